@@ -1,0 +1,15 @@
+# Messages and services, and what dependent packages get.
+file(GLOB MESSAGES RELATIVE ${PROJECT_SOURCE_DIR}/msg CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/msg/*.msg)
+file(GLOB SERVICES RELATIVE ${PROJECT_SOURCE_DIR}/srv CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/srv/*.srv)
+if(MESSAGES)
+  add_message_files(FILES ${MESSAGES})
+endif()
+if(SERVICES)
+  add_service_files(FILES ${SERVICES})
+endif()
+generate_messages(DEPENDENCIES std_msgs geometry_msgs)
+catkin_package(
+  INCLUDE_DIRS include
+  LIBRARIES slender_sim slender_sim_node
+  CATKIN_DEPENDS diagnostic_msgs geometry_msgs message_runtime roscpp sensor_msgs std_msgs std_srvs tf2_ros visualization_msgs
+  DEPENDS EIGEN3)

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+
+namespace slender {
+
+/// Why a step was refused. The state is then what it was before the step.
+enum class StepFailure
+{
+  none,
+  newton_diverged,      ///< Newton did not reach its tolerance even after cutting the step
+  folded_back,          ///< two consecutive tangents came (nearly) opposite: parallel transport is undefined there
+  singular_matrix,      ///< the Hessian could not be made positive definite
+  input_not_finite,     ///< an input (pose, velocity, wind) was NaN or infinite
+  state_not_finite,     ///< explicit step blew up
+};
+
+/// What one call of step() did. Sums and maxima run over all its substeps.
+struct StepReport
+{
+  bool ok = true;
+  StepFailure failure = StepFailure::none;
+  std::string message;            ///< empty when ok; otherwise the reason and what to change
+  int substeps = 0;               ///< steps actually taken (1 unless the step was cut or adapted)
+  int cut_steps = 0;              ///< how often a step was halved because Newton failed
+  int iterations = 0;             ///< Newton iterations
+  int factorizations = 0;         ///< banded factorisations (more than iterations when a Hessian was shifted)
+  double residual = 0.0;          ///< largest unbalanced nodal force over the largest force in the rod [-]
+  double max_strain = 0.0;        ///< largest |stretch strain| over all edges [-]
+  double error_estimate = 0.0;    ///< adaptive steps only: estimated local error [m]
+
+  /// Takes the other report into this one (sums, maxima, first failure wins).
+  void merge(const StepReport& other);
+};
+
+const char* toString(StepFailure failure);
+
+}  // namespace slender

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <string>
+
+#include <Eigen/Core>
+
+#include "slender_sim/rod/rod_state.h"
+
+namespace slender {
+
+/// Fixed properties of one discrete rod (thesis 3.2.2, 4.2). Open: n nodes, n-1 edges; closed: n edges.
+/// Edge j runs from node j to node j+1 (mod n); joint i sits at node i between edges i-1 and i.
+struct RodModel
+{
+  std::string name;
+  bool closed = false;
+
+  Eigen::VectorXd mass;             ///< per node [kg], lumped Voronoi cells
+  Eigen::VectorXd rest_length;      ///< per edge [m]
+  Eigen::VectorXd stretch_modulus;  ///< per edge k_s [N]
+  Eigen::VectorXd radius_a, radius_b;   ///< per edge semi-axes [m]
+  Eigen::Matrix3Xd bend_modulus;    ///< per node (B11, B12, B22) [N m^2]
+  Eigen::VectorXd twist_modulus;    ///< per node beta [N m^2]
+  Eigen::Matrix2Xd rest_curvature;  ///< per node, integrated (kappa1, kappa2) [-]
+  Eigen::VectorXd rest_twist;       ///< per node, integrated [rad]
+
+  double mass_damping = 0.0;        ///< Rayleigh [1/s]
+  double stiffness_damping = 0.0;   ///< Rayleigh [s]
+  Eigen::VectorXd drag;             ///< per node [N s/m]: linear drag times Voronoi length
+
+  int nodes() const { return static_cast<int>(mass.size()); }
+  int edges() const { return static_cast<int>(rest_length.size()); }
+  double totalMass() const { return mass.sum(); }
+};
+
+/// Elliptic cross-section and material of one edge, for buildRod.
+struct RodSection
+{
+  double a, b;              ///< semi-axes along d1, d2 [m]
+  double linear_density;    ///< [kg/m]
+  double stretch_modulus;   ///< [N]
+  Eigen::Matrix2d bend_modulus;   ///< [N m^2]
+  double twist_modulus;     ///< [N m^2]
+};
+
+/// Builds the model from the rest shape. `nodes` 3 x n [m]; `director` d1 at the first edge (zero: any normal), the others
+/// by parallel transport along the curve, so the rest twist is zero (in a closed rod the holonomy is left at node 0 as rest twist).
+/// Throws std::invalid_argument naming the bad value: fewer than 3 nodes, repeated nodes, folded edges, sections of wrong number
+/// or not positive.
+RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed, const std::vector<RodSection>& sections,
+                  const Eigen::Vector3d& director, bool naturally_straight);
+
+/// A state at rest at the given nodes, twist-free frames plus `total_twist` [rad] spread evenly over the inner nodes.
+RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director, double total_twist = 0.0);
+
+/// Takes hold of nodes first..last as they are now (thesis 4.3 clamps, second order in the edge length: see ClampJoint).
+GraspState makeGrasp(const RodModel& model, const RodState& state, int first_node, int last_node, bool holds_frame);
+
+}  // namespace slender

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "slender_sim/geometry/pose.h"
+
+namespace slender {
+
+/// What a grasp of one rod holds at this instant. Part of the state because grasps come and go while running.
+struct GraspState
+{
+  bool active = true;
+  int first_node = 0, last_node = 0;          ///< held nodes, first <= last; equal: a single section
+  bool holds_frame = true;                    ///< false: a point pin (first == last)
+  Pose X_WG;                                  ///< the grasp frame: origin at the (middle of the) held part, x along its tangent, y along d1
+  Twist velocity;                             ///< of X_WG
+  std::vector<Eigen::Vector3d> nodes_G;       ///< held nodes in the grasp frame
+  std::vector<Eigen::Vector3d> directors_G;   ///< d1 of the held edges between them, in the grasp frame
+  /// The two end sections of the held part, seen from the grasp frame, and the twist [rad] (unwrapped) between each
+  /// and the free edge beyond it. Side 0 faces the edge before first_node, side 1 the edge after last_node.
+  Eigen::Matrix3d section_G[2] = {Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};   ///< columns t, d1, d2
+  double section_twist[2] = {0.0, 0.0};
+};
+
+/// Everything that changes while a rod moves; saving and restoring it restarts bit-equal.
+struct RodState
+{
+  Eigen::Matrix3Xd x;         ///< node positions [m], 3 x n
+  Eigen::Matrix3Xd v;         ///< node velocities [m/s], 3 x n
+  Eigen::Matrix3Xd d1;        ///< first material director of each edge, 3 x edges
+  Eigen::VectorXd twist;      ///< integrated material twist m_i at each node [rad], unwrapped; zero at the ends of an open rod
+  std::vector<GraspState> grasps;
+
+  /// Integrator memory (empty when the integrator has none, or has not stepped yet).
+  double last_step = 0.0;                       ///< [s]
+  Eigen::Matrix3Xd a;                           ///< accelerations
+  Eigen::Matrix3Xd x_previous, v_previous;      ///< multistep methods
+  Eigen::Matrix4Xd strain_rate;                 ///< per node: of stretch (edge after the node), kappa1, kappa2, twist [1/s]
+  Eigen::Matrix4Xd strain_rate_previous;
+};
+
+}  // namespace slender

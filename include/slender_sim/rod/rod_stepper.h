@@ -1,0 +1,69 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "slender_sim/dynamics/step_report.h"
+#include "slender_sim/rod/rod_model.h"
+#include "slender_sim/rod/rod_state.h"
+#include "slender_sim/dynamics/time_config.h"
+
+namespace slender {
+
+/// Where a grasp shall be at the end of the step. Without a velocity the motion inside the step is uniform.
+struct GraspTarget
+{
+  Pose X_WG;
+  std::optional<Twist> velocity;
+};
+
+/// Inputs of one rod, latched once per step. `grasps` is as long as RodState::grasps (entries of inactive grasps are ignored).
+struct RodInputs
+{
+  std::vector<GraspTarget> grasps;
+  Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
+  Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
+  Eigen::Matrix3Xd forces;                ///< extra nodal forces, 3 x n [N], or empty
+};
+
+/// Force and torque that the rod exerts on the gripper, about the grasp origin, in world axes.
+struct Wrench
+{
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< [N]
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
+};
+
+struct RodEnergies
+{
+  double stretch = 0, bend = 0, twist = 0, kinetic = 0, gravity = 0;   ///< [J]
+  double total() const { return stretch + bend + twist + kinetic + gravity; }
+};
+
+/// Advances one rod: implicit steps by Newton on the banded system, or explicit symplectic Euler (thesis 4.6).
+class RodStepper
+{
+public:
+  RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& time);
+  ~RodStepper();
+  RodStepper(RodStepper&&) noexcept;
+
+  /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
+  StepReport step(RodState& state, const RodInputs& inputs, double duration);
+
+  /// Static equilibrium under the inputs, reached by continuation; velocities become zero.
+  StepReport solveEquilibrium(RodState& state, const RodInputs& inputs);
+
+  /// Of the last successful step() or solveEquilibrium(); one per grasp, zero for inactive ones.
+  const std::vector<Wrench>& wrenches() const;
+
+  RodEnergies energies(const RodState& state, const Eigen::Vector3d& gravity) const;
+
+  const RodModel& model() const;
+
+private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slender

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "slender_sim/dynamics/time_config.h"
+#include "slender_sim/geometry/pose.h"
+#include "slender_sim/geometry/pose_trajectory.h"
+
+/// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
+namespace slender {
+
+/// A curve as the scene file states it. Exactly one alternative.
+struct StraightCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; int edges = 50; };
+struct PolylineCurve { std::vector<Eigen::Vector3d> points; std::optional<int> edges; };       ///< resampled when edges is given
+struct ArcCurve      { Eigen::Vector3d center{0, 0, 0}, start{1, 0, 0}, axis{0, 0, 1}; double angle = 1.0; int edges = 50; };
+struct HelixCurve    { Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1}; double radius = 0.1, pitch = 0.05, turns = 3; int edges = 150; };
+struct CatenaryCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; double length = 1.2; int edges = 50; };  ///< hangs along gravity (or -z)
+struct FileCurve     { std::string path; std::optional<int> edges; };                          ///< CSV: x,y,z per line, '#' comments
+using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, FileCurve>;
+
+/// Radii [m]; a vector has one entry per edge, or two (linear taper from the first to the last edge), or one.
+struct CrossSection
+{
+  std::vector<double> a;   ///< semi-axis along d1
+  std::vector<double> b;   ///< semi-axis along d2
+};
+
+enum class Torsion { polar, saint_venant };
+
+/// Either by (youngs_modulus, poissons_ratio) or directly by moduli; density always.
+struct Material
+{
+  double density = 1000.0;                         ///< [kg/m^3] > 0
+  double youngs_modulus = 1e6;                     ///< E [Pa] > 0
+  double poissons_ratio = 0.5;                     ///< (-1, 0.5]
+  Torsion torsion = Torsion::polar;                ///< G A (a^2+b^2)/4, or the exact ellipse G pi a^3 b^3/(a^2+b^2)
+  std::optional<double> linear_density;            ///< [kg/m] instead of density times area
+  std::optional<double> stretch_modulus;           ///< k_s [N]
+  std::optional<Eigen::Matrix2d> bend_modulus;     ///< B [N m^2]; scalar alpha or [B1, B2] or 2x2 in the file
+  std::optional<double> twist_modulus;             ///< beta [N m^2]
+};
+
+struct Damping
+{
+  double mass = 0.0;        ///< Rayleigh, force -mass * m * v [1/s] >= 0
+  double stiffness = 0.0;   ///< Rayleigh, stiffness * d(strain)/dt in place of strain [s] >= 0
+  double drag = 0.0;        ///< linear drag, force -drag * (v - wind) per length [N s/m^2] >= 0
+};
+
+struct FixedMotion {};
+struct TopicMotion {};                                    ///< driven by `grasps/NAME/pose` or `guides`; fixed without a node
+struct BodyMotion  { std::string body; };                 ///< rigidly follows a body of the `bodies` topic
+struct TableMotion { PoseTrajectory poses; };             ///< timed poses, from the scene or a CSV file
+using Motion = std::variant<FixedMotion, TopicMotion, BodyMotion, TableMotion>;
+
+enum class Hold { frame, position };                      ///< clamp (position and material frame) or point pin
+
+/// Where the gripper sits relative to its motion's poses.
+enum class Attach
+{
+  section,   ///< poses are those of the held section itself: x along the tangent, y along d1
+  initial,   ///< keep the offset between the first pose and the section as the scene starts (or as it is at attaching)
+};
+
+struct GraspConfig
+{
+  std::string name;
+  /// Held nodes, first..last (resolved by the reader: negative indices counted from the end).
+  /// `edges: [0]` (or [-1]) of an open rod is the end section: first == last == the end node. More edges hold all their nodes.
+  int first_node = 0, last_node = 0;
+  Hold hold = Hold::frame;
+  Motion motion = FixedMotion{};
+  Attach attach = Attach::section;
+};
+
+struct RodConfig
+{
+  std::string name;
+  Curve centerline = StraightCurve{};          ///< rest (natural) shape, also the initial one unless `initial` is given
+  std::optional<Curve> initial;                ///< initial shape; its edges are resampled to those of the centerline
+  bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
+  bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
+  double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
+  Eigen::Vector3d director{0, 0, 0};           ///< d1 at the first edge (projected); zero: chosen automatically
+  CrossSection cross_section;
+  Material material;
+  Damping damping;
+  std::vector<GraspConfig> grasps;
+};
+
+enum class Start { as_given, equilibrium };    ///< equilibrium: the static solver runs first
+
+struct RecordConfig { int every = 1; };        ///< record every n-th step (`simulate`)
+
+struct SceneConfig
+{
+  std::string name = "scene";
+  std::string source;                          ///< the YAML text after --set overrides (what `scene` publishes)
+  Eigen::Vector3d gravity{0, 0, -9.81};        ///< [m/s^2]
+  Eigen::Vector3d wind{0, 0, 0};               ///< [m/s]
+  Start start = Start::as_given;
+  TimeConfig time;
+  RecordConfig record;
+  std::vector<RodConfig> rods;
+};
+
+}  // namespace slender
