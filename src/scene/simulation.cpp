@@ -88,7 +88,7 @@ void Simulation::findEquilibrium()
     const StepReport report = steppers_[r].solveEquilibrium(state_.rods[r], inputs[r]);
     if (!report.ok)
     {
-      throw SimulationError("rod " + config_.rods[r].name + ": no equilibrium to start from: " + report.message +
+      throw SimulationError("no equilibrium to start from: " + report.message +
                             " (start: as_given starts from the shape in the scene)");
     }
   }
@@ -214,10 +214,6 @@ StepReport Simulation::step(const SceneInputs& inputs)
   StepReport total;
   for (int r = 0; r < count; ++r)
   {
-    if (!reports[r].ok)
-    {
-      reports[r].message = "rod " + config_.rods[r].name + ": " + reports[r].message;
-    }
     total.merge(reports[r]);
   }
   if (total.ok)

@@ -125,7 +125,7 @@ TEST_F(Simulate, aFailingSimulationIsStatus3)
                                  " --set time.min_step=0.05 --duration 100 --csv " + folder_ + "/csv");
   EXPECT_EQ(result.status, 3) << result.output;
   EXPECT_NE(result.output.find("step "), std::string::npos) << result.output;
-  EXPECT_NE(result.output.find("rod beam: "), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("rod 'beam'"), std::string::npos) << result.output;
   EXPECT_TRUE(fs::exists(folder_ + "/csv/nodes.csv"));
 }
 

@@ -121,7 +121,7 @@ TEST(Simulation, aFailedStepTouchesNothing)
   inputs.grasps[1].X_WG.position.x() = std::nan("");
   const StepReport report = simulation.step(inputs);
   EXPECT_FALSE(report.ok);
-  EXPECT_NE(report.message.find("rod a"), std::string::npos) << report.message;
+  EXPECT_NE(report.message.find("rod 'a'"), std::string::npos) << report.message;
   expectSameBits(simulation.state(), before);
   run(simulation, 1);   // and it goes on
 }
