@@ -51,7 +51,7 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
   newton.max_iterations = std::max(60, time.newton.max_iterations);
   double done = move > 0 ? 0.0 : 1.0, advance = move > 1 ? 1.0 / move : 1.0;
   double relative = 1.0;   // proximal weight over base_weight
-  int failures = 0;
+  int failures = 0, nudges = 0;
   system.load(work);
   system.setResponse(0.0, nullptr);
   constexpr int kMaxRounds = 3000;
@@ -85,6 +85,16 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
     {
       done = fraction;
       advance = std::min(1.5 * advance, move > 1 ? 1.0 / move : 1.0);
+      continue;
+    }
+    if (weight == 0.0 && !result.definite && nudges < 3)
+    {
+      // a saddle, for example a straight column beyond its buckling load: push it off, the minimisation does the rest
+      const double size = 1e-4 * length * (++nudges);
+      for (int i = 0; i < n; ++i)
+        if (system.isFree(i))
+          work.x.col(i) += size / n * Eigen::Vector3d(std::sin(1.0 + 3.1 * i / n), std::sin(2.0 + 4.7 * i / n), std::sin(3.0 + 2.3 * i / n));
+      relative = 1e-2;
       continue;
     }
     if (weight == 0.0)
