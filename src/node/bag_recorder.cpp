@@ -1,0 +1,84 @@
+#include "slender_sim/node/bag_recorder.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+
+#include <std_msgs/String.h>
+
+namespace slender {
+
+BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names)
+  : path_(path)
+{
+  const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
+  state_topic_ = prefix + "state";
+  poses_topic_ = prefix + "poses";
+  scene_topic_ = prefix + "scene";
+  for (const std::string& name : grasp_names)
+    wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
+  try
+  {
+    bag_.open(path + ".active", rosbag::bagmode::Write);
+  }
+  catch (const rosbag::BagException& e)
+  {
+    throw std::runtime_error("bag " + path + ": cannot be written: " + e.what());
+  }
+  open_ = true;
+}
+
+BagRecorder::~BagRecorder()
+{
+  try
+  {
+    close();
+  }
+  catch (const std::exception&)
+  {
+    // close() is there for those who want to know
+  }
+}
+
+void BagRecorder::recordScene(const std::string& yaml, const ros::Time& stamp)
+{
+  std_msgs::String message;
+  message.data = yaml;
+  bag_.write(scene_topic_, stamp, message);
+}
+
+void BagRecorder::record(const SceneMessages& messages)
+{
+  try
+  {
+    for (const slender_sim::RodState& state : messages.states)
+      bag_.write(state_topic_, state.header.stamp, state);
+    bag_.write(poses_topic_, messages.poses.header.stamp, messages.poses);
+    for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
+      bag_.write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
+  }
+  catch (const rosbag::BagException& e)
+  {
+    throw std::runtime_error("bag " + path_ + ": " + e.what());
+  }
+}
+
+void BagRecorder::close()
+{
+  if (!open_)
+    return;
+  open_ = false;
+  try
+  {
+    bag_.close();
+  }
+  catch (const rosbag::BagException& e)
+  {
+    throw std::runtime_error("bag " + path_ + ": " + e.what());
+  }
+  if (std::rename((path_ + ".active").c_str(), path_.c_str()) != 0)
+    throw std::runtime_error("bag " + path_ + ": cannot be renamed from " + path_ + ".active: " + std::strerror(errno));
+}
+
+}  // namespace slender
