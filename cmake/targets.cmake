@@ -1,0 +1,3 @@
+if(WITH_ROS)
+  include(cmake/nodes.cmake)
+endif()

@@ -5,6 +5,7 @@
 #include <geometry_msgs/Pose.h>
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/Transform.h>
+#include <geometry_msgs/Twist.h>
 #include <geometry_msgs/Wrench.h>
 #include <std_msgs/Header.h>
 
