@@ -11,7 +11,7 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kInstant = 1e-7;       // [s] for one-sided limits; shorter than any step
+constexpr double kInstant = 1e-7;       // [s] for limits from the right; shorter than any step
 constexpr double kSame = 1e-10;         // [m], [rad], [m/s], [rad/s] round-off of evaluating the same motion twice
 
 Matrix3d cross(const Vector3d& v)
@@ -91,10 +91,6 @@ GraspTarget GuideBuffer::target(double time)
   if (changed_)   // does the trajectory still pass where the grasp was led to?
     blendFrom(previous, last_, followed(previous + kInstant));
   changed_ = false;
-  const double end = trajectory_.lastTime();
-  if (previous < end && end <= query)   // from here on the end pose is held
-    blendFrom(end, blended(end - kInstant, followed(end - kInstant)), followed(end + kInstant));
-
   last_ = blended(query, followed(query));
   last_query_ = query;
   trajectory_.forgetBefore(query);

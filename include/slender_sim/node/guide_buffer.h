@@ -12,8 +12,8 @@ namespace slender {
 ///
 /// Method. Samples are joined by PoseTrajectory (C1 cubic Hermite in position and rotation vector) and evaluated at simulated
 /// time minus a constant delay, so that sparse, jittery messages are interpolated rather than extrapolated. Where the
-/// trajectory changes under the grasp (input stopped and its end pose is held; a sample came too late; the first sample, or a
-/// new attachment, is elsewhere), the difference in pose and velocity between what was last given to the solver and what the
+/// trajectory changes under the grasp (input stopped, its end pose was held, and it comes back; a sample came too late; the first
+/// sample, or a new attachment, is elsewhere), the difference in pose and velocity between what was last given to the solver and what the
 /// trajectory now says becomes an offset, which a cubic Hermite takes to zero within a blending time: the grasp catches up with
 /// continuous velocity, at no more than about `catch_up_speed` on average. With timely input the offset is exactly zero.
 class GuideBuffer
