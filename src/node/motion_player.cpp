@@ -8,7 +8,6 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include "slender_sim/geometry/pose_trajectory.h"
 #include "slender_sim/node/converters.h"
 
 namespace slender {
@@ -31,7 +30,7 @@ MotionPlayer::MotionPlayer(const ros::NodeHandle& nh, const ros::NodeHandle& nh_
     throw std::runtime_error("~offset: must be three numbers [x, y, z]");
   offset_ = {offset[0], offset[1], offset[2]};
 
-  table_ = readMotionTable(file);
+  table_ = readPoseFile(file);
   XmlRpc::XmlRpcValue bodies;
   if (nh_priv.getParam("bodies", bodies))
   {
@@ -39,7 +38,8 @@ MotionPlayer::MotionPlayer(const ros::NodeHandle& nh, const ros::NodeHandle& nh_
       throw std::runtime_error("~bodies: must be a map from bodies of the table to grasps, e.g. {left_wrist: left}");
     for (auto& entry : bodies)
     {
-      if (!table_.count(entry.first) || entry.second.getType() != XmlRpc::XmlRpcValue::TypeString)
+      const auto named = [&entry](const BodyTrajectory& body) { return body.body == entry.first; };
+      if (std::none_of(table_.begin(), table_.end(), named) || entry.second.getType() != XmlRpc::XmlRpcValue::TypeString)
         throw std::runtime_error("~bodies: " + entry.first + " is not in " + file + ", or its grasp is not a name");
       pose_pubs_[entry.first] =
           nh_.advertise<geometry_msgs::PoseStamped>("grasps/" + static_cast<std::string>(entry.second) + "/pose", 1000);
@@ -53,23 +53,16 @@ MotionPlayer::MotionPlayer(const ros::NodeHandle& nh, const ros::NodeHandle& nh_
 std::vector<MotionPlayer::Instant> MotionPlayer::instants(double rate) const
 {
   std::map<double, Instant> by_time;
-  if (rate > 0.0)
+  for (const BodyTrajectory& body : table_)
   {
-    for (const auto& [name, body] : table_)
-    {
-      const PoseTrajectory trajectory(body.times, body.poses);
-      const int count = static_cast<int>(std::floor((body.times.back() - body.times.front()) * rate + 1e-9));
-      for (int k = 0; k <= count; ++k)
-      {
-        const double t = body.times.front() + k / rate;
-        by_time[t].bodies[name] = trajectory.evaluate(t);
-      }
-    }
+    const PoseTrajectory& poses = body.poses;
+    if (rate == 0.0)
+      for (std::size_t k = 0; k < poses.times().size(); ++k)
+        by_time[poses.times()[k]].bodies[body.body] = poses.poses()[k];
+    else
+      for (int k = 0; poses.firstTime() + k / rate <= poses.lastTime() + 1e-9; ++k)
+        by_time[poses.firstTime() + k / rate].bodies[body.body] = poses.evaluate(poses.firstTime() + k / rate);
   }
-  else
-    for (const auto& [name, body] : table_)
-      for (std::size_t k = 0; k < body.times.size(); ++k)
-        by_time[body.times[k]].bodies[name] = body.poses[k];
   std::vector<Instant> out;
   for (auto& [time, instant] : by_time)
   {

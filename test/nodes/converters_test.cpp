@@ -2,11 +2,9 @@
 
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/node/motion_table.h"
 #include "slender_sim/node/sim_clock.h"
 
 namespace slender {
@@ -104,40 +102,6 @@ TEST(SimClock, StampsDoNotDrift)
   EXPECT_LT(clock.stamp(), clock.nextStamp());
   EXPECT_NEAR(clock.secondsAt(ros::Time(9, 5)), -1.0, 1e-12);
   EXPECT_EQ(clock.ticks(), 3000003u);
-}
-
-TEST(MotionTable, ReadsBodies)
-{
-  std::istringstream in("# comment\nt,body,x,y,z,qx,qy,qz,qw\n0,a,1,2,3,0,0,0,1\n0,b,0,0,0,0,0,1,0\n\n0.5,a,4,5,6,0,0,0,1 # end\n");
-  const auto table = readMotionTable(in, "table");
-  ASSERT_EQ(table.size(), 2u);
-  EXPECT_EQ(table.at("a").times, (std::vector<double>{0.0, 0.5}));
-  EXPECT_EQ(table.at("a").poses[1].position, Eigen::Vector3d(4, 5, 6));
-  EXPECT_EQ(table.at("b").poses[0].orientation.z(), 1.0);
-}
-
-TEST(MotionTable, NamesLineAndFault)
-{
-  const auto message = [](const std::string& text) {
-    std::istringstream in(text);
-    try
-    {
-      readMotionTable(in, "table");
-    }
-    catch (const std::runtime_error& e)
-    {
-      return std::string(e.what());
-    }
-    return std::string("no error");
-  };
-  const std::string good = "0,a,1,2,3,0,0,0,1\n";
-  EXPECT_NE(message(good + "1,a,1,2,3,0,0,0\n").find("table:2: 8 columns"), std::string::npos);
-  EXPECT_NE(message(good + "1,a,1,x,3,0,0,0,1\n").find("column 4"), std::string::npos);
-  EXPECT_NE(message(good + "1,a,1,nan,3,0,0,0,1\n").find("column 4"), std::string::npos);
-  EXPECT_NE(message(good + "1,a,1,2,3,0,0,0,2\n").find("quaternion"), std::string::npos);
-  EXPECT_NE(message(good + "0,a,1,2,3,0,0,0,1\n").find("time"), std::string::npos);
-  EXPECT_NE(message(good + "1,,1,2,3,0,0,0,1\n").find("no name"), std::string::npos);
-  EXPECT_NE(message("# nothing\n").find("no poses"), std::string::npos);
 }
 
 }  // namespace

@@ -6,11 +6,11 @@
 
 #include <ros/node_handle.h>
 
-#include "slender_sim/node/motion_table.h"
+#include "slender_sim/scene/pose_file.h"
 
 namespace slender {
 
-/// Plays a table of timed poses (motion_table.h) as a tracker or motion capture system would send them.
+/// Plays a table of timed poses (scene/pose_file.h) as a tracker or motion capture system would send them.
 ///
 /// Publishes each body of the table as a tf frame BODY in ~frame_id, and for each entry `BODY: GRASP` of ~bodies a PoseStamped on
 /// `grasps/GRASP/pose`, in the frame BODY itself (its pose there is the identity), so that the receiver has to ask tf.
@@ -42,7 +42,7 @@ private:
   double speed_ = 1.0, wait_ = 30.0;
   bool tf_ = true, loop_ = false;
   Eigen::Vector3d offset_{0, 0, 0};
-  std::map<std::string, TimedPoses> table_;
+  std::vector<BodyTrajectory> table_;
   std::vector<Instant> instants_;
   ros::Publisher tf_pub_;
   std::map<std::string, ros::Publisher> pose_pubs_;   // by body
