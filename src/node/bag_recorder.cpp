@@ -14,7 +14,6 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
 {
   const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
   state_topic_ = prefix + "state";
-  poses_topic_ = prefix + "poses";
   scene_topic_ = prefix + "scene";
   for (const std::string& name : grasp_names)
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
@@ -54,7 +53,6 @@ void BagRecorder::record(const SceneMessages& messages)
   {
     for (const slender_sim::RodState& state : messages.states)
       bag_.write(state_topic_, state.header.stamp, state);
-    bag_.write(poses_topic_, messages.poses.header.stamp, messages.poses);
     for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
       bag_.write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
   }
