@@ -7,6 +7,8 @@
 
 #include <std_msgs/String.h>
 
+#include "slender_sim/node/sim_clock.h"
+
 namespace slender {
 
 BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names)
@@ -78,5 +80,41 @@ void BagRecorder::close()
   if (std::rename((path_ + ".active").c_str(), path_.c_str()) != 0)
     throw std::runtime_error("bag " + path_ + ": cannot be renamed from " + path_ + ".active: " + std::strerror(errno));
 }
+
+namespace {
+
+class SimulationBag final : public Recorder
+{
+public:
+  explicit SimulationBag(const std::string& path) : path_(path) {}
+
+  void record(const Simulation& simulation, const StepReport&) override
+  {
+    SimClock clock(ros::Time(1.0), simulation.config().time.step);
+    clock.skip(simulation.state().steps);
+    if (!bag_)
+    {
+      bag_ = std::make_unique<BagRecorder>(path_, "/", graspTopicNames(simulation));
+      bag_->recordScene(simulation.config().source, clock.stamp());
+    }
+    messages_.fill(simulation, clock.stamp(), "world", 0);
+    bag_->record(messages_);
+  }
+
+  void finish() override
+  {
+    if (bag_)
+      bag_->close();
+  }
+
+private:
+  std::string path_;
+  std::unique_ptr<BagRecorder> bag_;
+  SceneMessages messages_;
+};
+
+}  // namespace
+
+std::unique_ptr<Recorder> makeBagRecorder(const std::string& path) { return std::make_unique<SimulationBag>(path); }
 
 }  // namespace slender

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <rosbag/bag.h>
 
 #include "slender_sim/node/scene_messages.h"
+#include "slender_sim/scene/recorder.h"
 
 namespace slender {
 
@@ -34,5 +36,8 @@ private:
   rosbag::Bag bag_;
   bool open_ = false;
 };
+
+/// The same bag as rod_node writes with `~start_time: 1`, frame world and no namespace, for `simulate --bag`.
+std::unique_ptr<Recorder> makeBagRecorder(const std::string& path);
 
 }  // namespace slender
