@@ -14,6 +14,11 @@ foreach(kind unit analytic scenes)
 endforeach()
 if(TARGET scenes_tests)
   add_dependencies(scenes_tests slender_sim_simulate)
-  target_compile_definitions(scenes_tests PRIVATE SLENDER_SIMULATE="$<TARGET_FILE:slender_sim_simulate>"
-    SLENDER_HAS_BAG=$<IN_LIST:SLENDER_WITH_BAG,$<TARGET_PROPERTY:slender_sim_simulate,COMPILE_DEFINITIONS>>)
+  get_target_property(simulate_definitions slender_sim_simulate COMPILE_DEFINITIONS)
+  set(has_bag 0)
+  if("SLENDER_WITH_BAG" IN_LIST simulate_definitions)
+    set(has_bag 1)
+  endif()
+  target_compile_definitions(scenes_tests PRIVATE SLENDER_HAS_BAG=${has_bag}
+    SLENDER_SIMULATE="$<TARGET_FILE:slender_sim_simulate>")
 endif()
