@@ -91,38 +91,61 @@ std::vector<Section> sections(const RodModel& model, const RodState& s)
   return out;
 }
 
-/// Two triangles per side and section; flat colours per side make the stripe's edge sharp.
+/// rviz does not light triangles that have colours of their own, so light from above and the side is painted in.
+std_msgs::ColorRGBA lit(const std_msgs::ColorRGBA& paint, const Vector3d& normal)
+{
+  static const Vector3d light = Vector3d(0.45, -0.35, 0.85).normalized();
+  const double diffuse = 0.5 + 0.5 * normal.dot(light);   // wraps round: no side is black
+  const double gloss = 0.35 * std::pow(std::max(0.0, normal.dot(light)), 24.0);
+  const auto shade = [&](float c) { return std::min(1.0, c * (0.45 + 0.65 * diffuse) + gloss); };
+  return color(shade(paint.r), shade(paint.g), shade(paint.b), paint.a);
+}
+
+/// Two triangles per side and section; the stripes' edges are sharp because each side has one colour.
 void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& base, bool closed, Marker& marker)
 {
-  marker.points.clear();
-  std_msgs::ColorRGBA stripe = color(0.97, 0.96, 0.92);
-  const auto point = [](const Section& s, int side) {
+  struct Corner
+  {
+    geometry_msgs::Point x;
+    Vector3d normal;
+  };
+  const std_msgs::ColorRGBA stripe = color(0.20, 0.24, 0.30);
+  const auto corner = [](const Section& s, int side) {
     const double angle = 2.0 * M_PI * (side - 0.5) / kSides;   // the first side faces d1
-    return toPoint(s.x + std::cos(angle) * s.u + std::sin(angle) * s.w);
+    const Vector3d out = std::cos(angle) * s.u / s.u.squaredNorm() + std::sin(angle) * s.w / s.w.squaredNorm();
+    return Corner{toPoint(s.x + std::cos(angle) * s.u + std::sin(angle) * s.w), out.normalized()};
   };
-  const auto triangle = [&](const geometry_msgs::Point& a, const geometry_msgs::Point& b, const geometry_msgs::Point& c,
-                            const std_msgs::ColorRGBA& paint) {
-    marker.points.insert(marker.points.end(), {a, b, c});
-    marker.colors.insert(marker.colors.end(), 3, paint);
+  const auto triangle = [&](const Corner& a, const Corner& b, const Corner& c, const std_msgs::ColorRGBA& paint) {
+    for (const Corner* p : {&a, &b, &c})
+    {
+      marker.points.push_back(p->x);
+      marker.colors.push_back(lit(paint, p->normal));
+    }
   };
+  marker.points.reserve(sections.size() * kSides * 6);
+  marker.colors.reserve(sections.size() * kSides * 6);
   for (std::size_t i = 0; i + 1 < sections.size(); ++i)
     for (int side = 0; side < kSides; ++side)
     {
       const std_msgs::ColorRGBA& paint = side % (kSides / 2) <= 1 ? stripe : base;   // two stripes: seen from everywhere
-      const auto a = point(sections[i], side), b = point(sections[i + 1], side);
-      const auto c = point(sections[i + 1], side + 1), d = point(sections[i], side + 1);
+      const Corner a = corner(sections[i], side), b = corner(sections[i + 1], side);
+      const Corner c = corner(sections[i + 1], side + 1), d = corner(sections[i], side + 1);
       triangle(a, c, b, paint);
       triangle(a, d, c, paint);
     }
   if (closed)
     return;
   for (const bool front : {false, true})   // caps
+  {
+    const Section& s = front ? sections.back() : sections.front();
+    const Vector3d normal = (front ? 1.0 : -1.0) * s.u.cross(s.w).normalized();
     for (int side = 0; side < kSides; ++side)
     {
-      const Section& s = front ? sections.back() : sections.front();
-      const auto a = point(s, side), b = point(s, side + 1);
-      triangle(toPoint(s.x), front ? a : b, front ? b : a, base);
+      const Corner middle{toPoint(s.x), normal};
+      const Corner a{corner(s, side).x, normal}, b{corner(s, side + 1).x, normal};
+      triangle(middle, front ? a : b, front ? b : a, base);
     }
+  }
 }
 
 void addFrames(const RodModel& model, const RodState& s, Marker& marker)
