@@ -1,6 +1,5 @@
 #include "slender_sim/node/scene_messages.h"
 
-#include <map>
 #include <stdexcept>
 
 #include <ros/names.h>
@@ -22,19 +21,13 @@ void checkName(const std::string& name, const std::string& kind)
 
 std::vector<std::string> graspTopicNames(const Simulation& simulation)
 {
-  std::map<std::string, int> uses;
   for (const RodConfig& rod : simulation.config().rods)
     checkName(rod.name, "rod");
-  for (const GraspRef& grasp : simulation.grasps())
-  {
-    checkName(grasp.config->name, "grasp");
-    ++uses[grasp.config->name];
-  }
   std::vector<std::string> names;
   for (const GraspRef& grasp : simulation.grasps())
   {
-    const std::string& name = grasp.config->name;
-    names.push_back(uses[name] == 1 ? name : simulation.config().rods[grasp.rod].name + "/" + name);
+    checkName(grasp.config->name, "grasp");
+    names.push_back(grasp.config->name);
   }
   return names;
 }

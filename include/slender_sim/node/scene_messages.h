@@ -11,8 +11,8 @@
 
 namespace slender {
 
-/// Names of the grasps in topics, in scene order: the grasp's own name, or ROD/NAME where several rods use the same name.
-/// Throws std::invalid_argument for a name that cannot stand in a topic.
+/// Names of the grasps in scene order, as they stand in topics (the reader has made sure that they differ). Throws
+/// std::invalid_argument for a rod or a grasp whose name cannot be part of a topic.
 std::vector<std::string> graspTopicNames(const Simulation& simulation);
 
 /// What is published and recorded of one instant, in scene order.
