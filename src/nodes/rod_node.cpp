@@ -1,3 +1,4 @@
+#include <csignal>
 #include <exception>
 #include <iostream>
 
@@ -9,6 +10,7 @@ int main(int argc, char** argv)
 try
 {
   ros::init(argc, argv, "rod_node");
+  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });   // like SIGINT, or the bag stays unfinished
   return slender::RodNode(ros::NodeHandle(), ros::NodeHandle("~")).spin();
 }
 catch (const std::exception& e)

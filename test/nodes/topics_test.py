@@ -167,6 +167,15 @@ class Topics(NodeCase):
         self.assertEqual(counts, {"/t/scene": 1, "/t/state": 201, "/t/grasps/left/wrench": 201, "/t/grasps/right/wrench": 201})
         self.assertIn("real-time factor", self.output("rod.out"))
 
+    def test_bag_is_complete_when_terminated(self):
+        process = self.start(pace="fast", record_bag=self.path("cut.bag"))
+        rospy.sleep(0.5)
+        process.terminate()
+        process.wait(20)
+        steps = [m.step for topic, m, stamp in rosbag.Bag(self.path("cut.bag")).read_messages(["/t/state"])]
+        self.assertGreater(len(steps), 10)
+        self.assertEqual(steps, list(range(len(steps))))
+
 
 if __name__ == "__main__":
     run("topics_test", Topics)
