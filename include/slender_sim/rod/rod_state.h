@@ -38,8 +38,19 @@ struct RodState
   double last_step = 0.0;                       ///< [s]
   Eigen::Matrix3Xd a;                           ///< accelerations
   Eigen::Matrix3Xd x_previous, v_previous;      ///< multistep methods
-  Eigen::Matrix4Xd strain_rate;                 ///< per node: of stretch (edge after the node), kappa1, kappa2, twist [1/s]
-  Eigen::Matrix4Xd strain_rate_previous;
+  /// With Rayleigh stiffness damping only: per node, then two per grasp, (stretch of the edge after the node, kappa1, kappa2, twist).
+  Eigen::Matrix4Xd strain_rate, strain_rate_previous;   ///< [1/s]
+  Eigen::Matrix4Xd strain_previous;                     ///< one step ago
+
+  /// Forgets the integrator's memory: after a grasp was taken or released, or the state was edited.
+  void forgetHistory()
+  {
+    last_step = 0.0;
+    for (auto* m : {&a, &x_previous, &v_previous})
+      m->resize(3, 0);
+    for (auto* m : {&strain_rate, &strain_rate_previous, &strain_previous})
+      m->resize(4, 0);
+  }
 };
 
 }  // namespace slender

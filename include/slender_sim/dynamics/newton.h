@@ -1,0 +1,125 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/dynamics/step_report.h"
+#include "slender_sim/dynamics/time_config.h"
+#include "slender_sim/linalg/banded_ldlt.h"
+
+namespace slender {
+
+struct NewtonResult
+{
+  StepFailure failure = StepFailure::none;
+  int iterations = 0, factorizations = 0;
+  double residual = 0.0;     ///< unbalanced force over the force scale [-]
+  double max_strain = 0.0;
+  bool definite = true;      ///< the last Hessian was positive definite without a shift
+  bool ok() const { return failure == StepFailure::none; }
+};
+
+/// 1 + t.t' below which a trial is refused: consecutive tangents within about 3 degrees of opposite. There the discrete
+/// curvature 2 tan(phi/2) has grown to 40 and parallel transport is about to become undefined.
+constexpr double kFoldedChi = 1.5e-3;
+
+/// Minimises a system's energy by Newton's method from its trial configuration.
+///
+/// System offers evaluate(with_hessian), factor(shift), solve(), moveAlong(alpha), accept(), saveBase(), restoreBase() and
+/// the measures used below (see RodSystem). A Hessian with negative eigenvalues (known from the inertia of its LDL^T) is
+/// shifted by a positive diagonal until it is definite, so that the direction descends.
+/// Steps are accepted by a watchdog [Nocedal & Wright, Numerical Optimization, 15.6]: nearly inextensible bodies gain a little
+/// stretching energy in every full step that turns them, and a strict line search would creep. Full steps may raise
+/// the energy a few times; if it does not then fall below its best, the search returns there and becomes strict.
+template <class System>
+NewtonResult minimize(System& system, const NewtonConfig& config)
+{
+  constexpr int kPatience = 5;
+  constexpr double kArmijo = 1e-4, kMaxShift = 1e12;
+  NewtonResult result;
+  const auto fail = [&](StepFailure why) {
+    result.failure = why;
+    return result;
+  };
+
+  auto trial = system.evaluate(true);
+  if (!std::isfinite(trial.energy()))
+    return fail(StepFailure::state_not_finite);
+  if (!(trial.min_chi > kFoldedChi))
+    return fail(StepFailure::folded_back);
+  system.accept();
+  double energy = trial.energy(), best = energy, shift = 0.0;
+  int misses = 0;
+  bool strict = false;
+
+  for (;;)
+  {
+    // round-off of the energy's sum; differences below it mean nothing
+    const double noise = 1e-13 * (std::abs(trial.stretch) + std::abs(trial.bend_twist) + std::abs(trial.potential));
+    shift = shift > 1e-2 ? 0.1 * shift : 0.0;
+    Inertia inertia = system.factor(shift);
+    ++result.factorizations;
+    while (!inertia.positiveDefinite())
+    {
+      shift = shift > 0 ? 10.0 * shift : 1e-1;
+      if (shift > kMaxShift)
+        return fail(StepFailure::singular_matrix);
+      system.moveAlong(0.0);
+      system.evaluate(true);
+      inertia = system.factor(shift);
+      ++result.factorizations;
+    }
+    result.definite = shift == 0.0;
+    system.solve();
+    ++result.iterations;
+
+    const double increment = system.incrementSize(), slope = system.slope();
+    if (!std::isfinite(increment))
+      return fail(StepFailure::state_not_finite);
+    double alpha = system.stepLimit();
+    if (alpha == 1.0 && shift == 0.0 && (increment <= config.tolerance || system.residual() <= system.noiseLevel()))
+    {
+      system.moveAlong(1.0);
+      trial = system.evaluate(false);
+      result.residual = system.residual() / system.forceScale();
+      result.max_strain = trial.max_strain;
+      if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
+        return result;
+    }
+    if (result.iterations >= config.max_iterations)
+      return fail(StepFailure::newton_diverged);
+
+    for (;;)
+    {
+      system.moveAlong(alpha);
+      trial = system.evaluate(true);
+      const bool sound = std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi;
+      if (sound && (!strict || trial.energy() <= energy + kArmijo * alpha * slope + noise))
+        break;
+      alpha *= 0.5;
+      if (alpha < 1e-8)
+        return fail(trial.min_chi > kFoldedChi ? StepFailure::newton_diverged : StepFailure::folded_back);
+    }
+    if (trial.energy() <= best + noise)
+    {
+      best = std::min(best, trial.energy());
+      misses = 0;
+    }
+    else if (!strict)
+    {
+      if (misses == 0)
+        system.saveBase();
+      if (++misses > kPatience)
+      {
+        system.restoreBase();
+        system.moveAlong(0.0);
+        trial = system.evaluate(true);
+        strict = true;
+      }
+    }
+    system.accept();
+    energy = trial.energy();
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,62 @@
+#pragma once
+
+#include "slender_sim/linalg/banded_ldlt.h"
+
+namespace slender {
+
+/// Structure-of-arrays view of one rod for the hot loops. Every array is indexed by node or by edge (edge j follows node j,
+/// joint i sits at node i between edges i-1 and i) and is readable from index -kHalo to nodes + kHalo.
+/// In a closed rod the halo repeats the rod; in an open one it continues the end edges and carries no stiffness.
+struct RodArrays
+{
+  static constexpr int kHalo = 16;
+
+  int nodes = 0, edges = 0;
+  bool closed = false;
+
+  // configuration to evaluate
+  double* x[3];               ///< node positions [m]
+  double* turn;               ///< rotation of each edge's frame about its tangent since the base frames [rad]
+  // frames to transport from (thesis 3.17), and those they become
+  double *base_t[3], *base_d1[3], *base_twist;
+  double *t[3], *d1[3], *d2[3], *twist;
+  double *length, *inverse_length, *strain, *kappa1, *kappa2;
+
+  // elastic (or viscous) response, already divided by rest lengths where the strain is integrated
+  double *stretch;            ///< k_s [N]
+  double *inverse_rest_length, *rest_strain;
+  double *b11, *b12, *b22, *beta;   ///< B / l, beta / l [N m]
+  double *rest_kappa1, *rest_kappa2, *rest_twist;
+
+  // inertia and loads: 1/2 weight |x - target|^2 - force . x
+  double *weight, *target[3], *force[3];
+
+  // results
+  double* gradient;           ///< 4 per node: dE/dx (3), dE/dtheta
+  double *theta_diagonal, *theta_off;   ///< angle block of the Hessian, only without panels
+};
+
+struct RodEvaluation
+{
+  double stretch = 0, bend_twist = 0, potential = 0;   ///< [J]; potential: inertia and loads
+  double min_chi = 2;         ///< smallest 1 + t.t' over joints and over transports in time; 0 = folded back
+  double max_strain = 0;      ///< largest |axial strain|
+  double energy() const { return stretch + bend_twist + potential; }
+};
+
+struct RodKernels
+{
+  /// Tangents, frames, twists and strains at x. Returns the smallest 1 + t_base . t.
+  double (*frames)(const RodArrays& rod);
+  /// Energy and gradient; second derivatives into `panels` unless it is null. After frames().
+  RodEvaluation (*forces)(const RodArrays& rod, BandPanel<10, 4>* panels);
+};
+
+namespace baseline { extern const RodKernels rod_kernels; }
+namespace avx2 { extern const RodKernels rod_kernels; }
+namespace avx512 { extern const RodKernels rod_kernels; }
+
+/// The table for this machine.
+const RodKernels& rodKernels();
+
+}  // namespace slender

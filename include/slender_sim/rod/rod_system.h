@@ -1,0 +1,129 @@
+#pragma once
+
+#include <vector>
+
+#include "slender_sim/energy/rod_kernel.h"
+#include "slender_sim/linalg/cyclic_banded_ldlt.h"
+#include "slender_sim/rod/rod_model.h"
+
+namespace slender {
+
+/// The bending and twisting between a clamped section and the free edge beyond it: half a joint, with half the edge's rest
+/// length. The section itself has a prescribed frame; the edge is free to turn. That makes a clamp second order accurate.
+struct ClampJoint
+{
+  int grasp = 0, side = 0;        ///< side 1: the free edge follows the section, side 0: it precedes it
+  int node = 0, edge = 0;
+  double b11 = 0, b12 = 0, b22 = 0, beta = 0;   ///< divided by the half joint's length [N m]
+  double rest_kappa1 = 0, rest_kappa2 = 0, rest_twist = 0;
+  // present response (with viscous part), see RodSystem::setResponse
+  double scale = 1.0, rest1 = 0, rest2 = 0, rest3 = 0;
+
+  Eigen::Vector3d t = Eigen::Vector3d::UnitX(), d1 = Eigen::Vector3d::UnitY(), base_t = t, base_d1 = d1;   ///< section frame
+  double turn = 0, base_twist = 0;
+  double kappa1 = 0, kappa2 = 0, twist = 0;
+  double energy = 0;
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< on the gripper [N m]
+};
+
+/// Equations of one rod in the layout of the hot loops: configuration, energy, gradient, banded Hessian, constraints.
+///
+/// A trial configuration is reached from the base one by moveAlong(); evaluate() computes everything there; accept() makes it
+/// the new base. Frames are transported from the base (thesis 4.6.2, Newton update).
+class RodSystem
+{
+public:
+  explicit RodSystem(const RodModel& model);
+
+  const RodModel& model() const { return model_; }
+  const RodArrays& arrays() const { return a_; }
+
+  /// Base and trial := state. Rebuilds the clamps when the state's grasps changed.
+  void load(const RodState& state);
+  /// Positions, frames, twists, grasp sections.
+  void store(RodState& state) const;
+
+  /// Trial position of a node; held nodes are overwritten by placeGrasps().
+  void setPosition(int node, const Eigen::Vector3d& x) { for (int k = 0; k < 3; ++k) a_.x[k][node] = x[k]; }
+  Eigen::Vector3d position(int node) const { return {a_.x[0][node], a_.x[1][node], a_.x[2][node]}; }
+  /// Trial positions and frames of everything held, for the given grasp frames (one per grasp of the state).
+  void placeGrasps(const std::vector<Pose>& X_WG);
+
+  /// Inertia and loads of node i: 1/2 weight |x - target|^2 - force . x.
+  void setInertia(int node, double weight, const Eigen::Vector3d& target, const Eigen::Vector3d& force);
+
+  /// Elastic response; with viscous_ratio > 0 every stiffness acts as k (1 + ratio) about the mean of its rest strain and
+  /// `viscous_strain` with weights 1 : ratio, which is the elastic force plus k ratio (strain - viscous_strain).
+  void setResponse(double viscous_ratio, const Eigen::Matrix4Xd* viscous_strain);
+
+  /// Everything at the trial configuration; with_hessian also assembles the matrix.
+  RodEvaluation evaluate(bool with_hessian);
+  /// Factors the assembled matrix plus shift times a positive diagonal. The matrix is consumed.
+  Inertia factor(double shift);
+  /// direction() := -K^-1 gradient.
+  void solve();
+  /// Trial := base + alpha direction.
+  void moveAlong(double alpha);
+  /// Base := trial.
+  void accept();
+  /// Copies of the base for a later return to it.
+  void saveBase();
+  void restoreBase();
+
+  /// Largest step along the direction that turns no edge by more than about 0.7 rad, at most 1.
+  double stepLimit() const;
+  /// Largest nodal displacement of the direction over the shortest rest length [-].
+  double incrementSize() const;
+  double slope() const;                 ///< gradient . direction [J]
+  double residual() const;              ///< largest unbalanced nodal force or moment / edge [N]
+  double forceScale() const;            ///< largest internal or external force [N]
+  double noiseLevel() const;            ///< unbalanced force that round-off alone can cause [N]
+  bool isFree(int node) const { return !held_[node]; }
+
+  /// Strains at the trial configuration, columns as in RodState::strain_rate.
+  void strains(Eigen::Matrix4Xd& out) const;
+
+  /// One Newton step of the material frames towards equilibrium at fixed positions (thesis 4.3): sets the trial's turns from
+  /// the last evaluate(false). Returns the largest turn [rad].
+  double turnFrames();
+  /// Repeats it until the frames are in equilibrium. Leaves the trial evaluated and accepted.
+  void relaxFrames();
+
+  /// dE/dx of an evaluated trial at a node, held or not: minus the force of the rod on it [N].
+  Eigen::Vector3d nodeGradient(int node) const;
+  /// Torque [N m] of the clamps of a grasp and of its held edges on the gripper (without the forces' levers).
+  Eigen::Vector3d clampTorque(int grasp) const;
+  const std::vector<ClampJoint>& clamps() const { return clamps_; }
+
+private:
+  void compose(const RodState& state);
+  void composeClamp(int grasp, int side);
+  void respond(ClampJoint& clamp) const;
+  void evaluateClamp(ClampJoint& clamp, bool with_hessian, RodEvaluation& sum);
+  void fixHeld(bool with_hessian);
+  void fixUnknown(int node, int component);
+  void wrapHalo(double* p, int count) const;
+  int before(int node) const { return node > 0 ? node - 1 : model_.edges() - 1; }
+
+  const RodModel& model_;
+  RodArrays a_;
+  std::vector<AlignedVector<double>> storage_;
+  CyclicBandedLdlt matrix_;
+  AlignedVector<double> gradient_, direction_, x_base_[3], saved_[10];
+  std::vector<ClampJoint> saved_clamps_;
+  AlignedVector<double> stretch_, b11_, b12_, b22_, beta_, rest_k1_, rest_k2_, rest_m_;   ///< elastic response as composed
+
+  std::vector<GraspState> grasps_;
+  std::vector<ClampJoint> clamps_;
+  std::vector<int> held_;                          ///< per node: slot in held_nodes_ plus one, 0 = free
+  std::vector<int> held_nodes_, held_angles_;      ///< nodes, edges whose unknowns are prescribed
+  std::vector<Eigen::Vector4d> reactions_;         ///< gradient at held_nodes_ (x, y, z) before it is cleared
+  std::vector<double> angle_reactions_;            ///< likewise at held_angles_
+  double max_stretch_modulus_ = 0, min_rest_length_ = 0, shift_x_ = 0, shift_theta_ = 0;
+};
+
+/// Frame (t, d1, d2) of the section at a node: the mean of the two edges' frames, or at the end of an open rod the end edge's frame
+/// bent back by the rest curvature of half an edge.
+Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int node);
+
+}  // namespace slender

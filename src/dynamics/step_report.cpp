@@ -1,0 +1,38 @@
+#include "slender_sim/dynamics/step_report.h"
+
+#include <algorithm>
+
+namespace slender {
+
+void StepReport::merge(const StepReport& other)
+{
+  if (ok && !other.ok)
+  {
+    ok = false;
+    failure = other.failure;
+    message = other.message;
+  }
+  substeps += other.substeps;
+  cut_steps += other.cut_steps;
+  iterations += other.iterations;
+  factorizations += other.factorizations;
+  residual = std::max(residual, other.residual);
+  max_strain = std::max(max_strain, other.max_strain);
+  error_estimate = std::max(error_estimate, other.error_estimate);
+}
+
+const char* toString(StepFailure failure)
+{
+  switch (failure)
+  {
+    case StepFailure::none: return "none";
+    case StepFailure::newton_diverged: return "newton_diverged";
+    case StepFailure::folded_back: return "folded_back";
+    case StepFailure::singular_matrix: return "singular_matrix";
+    case StepFailure::input_not_finite: return "input_not_finite";
+    case StepFailure::state_not_finite: return "state_not_finite";
+  }
+  return "unknown";
+}
+
+}  // namespace slender

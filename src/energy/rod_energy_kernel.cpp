@@ -1,0 +1,388 @@
+// Compiled once per instruction set (SLENDER_ISA). Plain arrays only; nothing here may be emitted under a shared name.
+#include "slender_sim/energy/joint_stencil.h"
+#include "slender_sim/energy/rod_kernel.h"
+
+namespace slender {
+namespace SLENDER_ISA {
+namespace {
+
+using Pack = double __attribute__((vector_size(64)));
+using PackU = double __attribute__((vector_size(64), aligned(8), may_alias));
+using Lanes = long long __attribute__((vector_size(64)));
+constexpr int W = 8;
+constexpr double kTwoPi = 6.283185307179586476925286766559;
+
+SLENDER_INLINE Pack load(const double* p) { return *reinterpret_cast<const PackU*>(p); }
+SLENDER_INLINE void store(double* p, Pack v) { *reinterpret_cast<PackU*>(p) = v; }
+SLENDER_INLINE Vec3<Pack> load3(double* const* p, int i) { return {load(p[0] + i), load(p[1] + i), load(p[2] + i)}; }
+SLENDER_INLINE void store3(double* const* p, int i, const Vec3<Pack>& v)
+{
+  store(p[0] + i, v.x);
+  store(p[1] + i, v.y);
+  store(p[2] + i, v.z);
+}
+SLENDER_INLINE Pack squareRoot(Pack v)
+{
+  Pack r;
+  for (int k = 0; k < W; ++k)
+    r[k] = __builtin_sqrt(v[k]);
+  return r;
+}
+SLENDER_INLINE Pack minimum(Pack a, Pack b) { return a < b ? a : b; }
+SLENDER_INLINE Pack maximum(Pack a, Pack b) { return a > b ? a : b; }
+SLENDER_INLINE Pack absolute(Pack a) { return a < 0.0 ? -a : a; }
+SLENDER_INLINE double sum(Pack v) { return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7])); }
+/// Nearest integer for |v| < 2^51.
+SLENDER_INLINE Pack nearest(Pack v)
+{
+  const double magic = 6755399441055744.0;
+  return (v + magic) - magic;
+}
+
+/// sin and cos to round-off for |a| <= pi: Taylor on a/8, then three doublings.
+SLENDER_INLINE void sineCosine(Pack a, Pack& s, Pack& c)
+{
+  const Pack y = a * 0.125, z = y * y;
+  s = y * (1.0 + z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800 + z * (1.0 / 6227020800.0)))))));
+  Pack v = z * (0.5 + z * (-1.0 / 24 + z * (1.0 / 720 + z * (-1.0 / 40320 + z * (1.0 / 3628800 + z * (-1.0 / 479001600))))));   // 1 - cos
+  for (int k = 0; k < 3; ++k)
+  {
+    s = 2.0 * s * (1.0 - v);
+    v = 2.0 * v * (2.0 - v);   // 1 - cos 2y = 2 sin^2 y = 2 v (2 - v)
+  }
+  c = 1.0 - v;
+}
+
+/// atan2 in (-pi, pi] for arguments on the unit circle: three half-angle steps, then the Taylor series.
+SLENDER_INLINE Pack angleOf(Pack s, Pack c)
+{
+  const Pack ca = absolute(c);
+  Pack u = s / (ca + squareRoot(s * s + c * c));
+  u = u / (1.0 + squareRoot(1.0 + u * u));
+  u = u / (1.0 + squareRoot(1.0 + u * u));
+  const Pack z = u * u;   // |u| <= tan(pi/16)
+  Pack series = Pack{} + 1.0 / 23;
+  for (int k = 21; k >= 1; k -= 2)
+    series = 1.0 / k - z * series;
+  const Pack a = 8.0 * u * series;
+  const Pack pi = Pack{} + kTwoPi / 2;
+  return c < 0.0 ? (s < 0.0 ? -pi - a : pi - a) : a;
+}
+
+void copyEdge(const RodArrays& r, int to, int from)
+{
+  for (int k = 0; k < 3; ++k)
+  {
+    r.t[k][to] = r.t[k][from];
+    r.d1[k][to] = r.d1[k][from];
+    r.d2[k][to] = r.d2[k][from];
+  }
+  r.length[to] = r.length[from];
+  r.inverse_length[to] = r.inverse_length[from];
+  r.strain[to] = r.strain[from];
+}
+
+double evaluateFrames(const RodArrays& r)
+{
+  const int n = r.nodes, edges = r.edges;
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < W + 1; ++i)
+      r.x[k][n + i] = r.closed ? r.x[k][i % n] : r.x[k][n - 1] + (i + 1) * (r.x[k][n - 1] - r.x[k][n - 2]);
+
+  Pack min_chi = Pack{} + 2.0;
+  for (int j = 0; j < edges; j += W)
+  {
+    const Vec3<Pack> e = load3(r.x, j + 1) - load3(r.x, j);
+    const Pack length = squareRoot(dot(e, e));
+    const Pack inverse = 1.0 / length;
+    const Vec3<Pack> t = e * inverse;
+    // transport in time (3.17) written out for a vector normal to the old tangent, cleaned of round-off, then the turn
+    const Vec3<Pack> t0 = load3(r.base_t, j), d0 = load3(r.base_d1, j);
+    const Pack chi = 1.0 + dot(t0, t);
+    min_chi = minimum(chi, min_chi);
+    Vec3<Pack> d = d0 - (t0 + t) * (dot(d0, t) / chi);
+    d = d - t * dot(d, t);
+    d = d * (1.0 / squareRoot(dot(d, d)));
+    Pack s, c;
+    sineCosine(load(r.turn + j), s, c);
+    d = d * c + cross(t, d) * s;
+    store3(r.t, j, t);
+    store3(r.d1, j, d);
+    store3(r.d2, j, cross(t, d));
+    store(r.length + j, length);
+    store(r.inverse_length + j, inverse);
+    store(r.strain + j, length * load(r.inverse_rest_length + j) - 1.0);
+  }
+  for (int i = 1; i <= 2; ++i)
+    copyEdge(r, -i, r.closed ? edges - i : 0);
+  for (int i = 0; i < W + 2; ++i)
+    copyEdge(r, edges + i, r.closed ? i % edges : edges - 1);
+
+  // Twist: the angle from the transported frame to the next one, unwrapped next to where the turns would take it. Measured
+  // from the frames each time, so it never drifts however many turns it counts.
+  for (int i = -1; i <= n; i += W)
+  {
+    const Vec3<Pack> te = load3(r.t, i - 1), tf = load3(r.t, i), d = load3(r.d1, i - 1), df = load3(r.d1, i);
+    const Pack chi = 1.0 + dot(te, tf);
+    const Vec3<Pack> p = d - (te + tf) * (dot(d, tf) / chi);
+    const Pack angle = angleOf(dot(cross(tf, p), df), dot(p, df));
+    const Pack expected = load(r.base_twist + i) + load(r.turn + i) - load(r.turn + i - 1);
+    store(r.twist + i, angle + kTwoPi * nearest((expected - angle) * (1.0 / kTwoPi)));
+  }
+  if (r.closed)
+  {
+    r.twist[-1] = r.twist[n - 1];
+    r.twist[n] = r.twist[0];
+  }
+  else
+    r.twist[-1] = r.twist[0] = r.twist[n - 1] = r.twist[n] = 0.0;
+  double result = min_chi[0];
+  for (int k = 1; k < W; ++k)
+    result = min_chi[k] < result || min_chi[k] != min_chi[k] ? min_chi[k] : result;
+  return result;
+}
+
+/// Results of the last joints, ten wide: two carried over, eight new. Slot s holds joint (first - 2 + s).
+struct JointBuffer
+{
+  double ee[6][16], ff[6][16], ef[3][3][16], e_te[3][16], e_tf[3][16], f_te[3][16], f_tf[3][16];
+  double te_te[16], te_tf[16], tf_tf[16];
+  double ge[3][16], gf[3][16], gte[16], gtf[16];
+  double stretch[16], bend_twist[16];
+};
+
+SLENDER_INLINE void storeSym(double (*b)[16], const Sym3<Pack>& s)
+{
+  store(b[0] + 2, s.xx);
+  store(b[1] + 2, s.xy);
+  store(b[2] + 2, s.xz);
+  store(b[3] + 2, s.yy);
+  store(b[4] + 2, s.yz);
+  store(b[5] + 2, s.zz);
+}
+SLENDER_INLINE void storeVec(double (*b)[16], const Vec3<Pack>& v)
+{
+  store(b[0] + 2, v.x);
+  store(b[1] + 2, v.y);
+  store(b[2] + 2, v.z);
+}
+
+template <bool WithHessian>
+SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffer, Pack& min_chi)
+{
+  // last two joints of the previous round
+  double* all = &buffer.ee[0][0];
+  for (unsigned k = 0; k < sizeof(JointBuffer) / sizeof(double) / 16; ++k)
+  {
+    all[16 * k] = all[16 * k + 8];
+    all[16 * k + 1] = all[16 * k + 9];
+  }
+
+  const JointFrames<Pack> s = {load3(r.t, i - 1), load3(r.d1, i - 1), load3(r.d2, i - 1), load3(r.t, i), load3(r.d1, i), load3(r.d2, i),
+                               load(r.inverse_length + i - 1), load(r.inverse_length + i)};
+  const JointMaterial<Pack> p = {load(r.b11 + i), load(r.b12 + i), load(r.b22 + i), load(r.beta + i),
+                                 load(r.rest_kappa1 + i), load(r.rest_kappa2 + i), load(r.rest_twist + i)};
+  const JointStrains<Pack> k = jointStrains(s);
+  min_chi = minimum(1.0 / k.inverse_chi, min_chi);
+  store(r.kappa1 + i, k.kappa1);
+  store(r.kappa2 + i, k.kappa2);
+  JointGradient<Pack> g;
+  JointHessian<Pack> h;
+  store(buffer.bend_twist + 2, jointEnergy<WithHessian>(s, k, load(r.twist + i), p, g, h));
+
+  // stretching of the edge after the joint: 1/2 k_s strain^2 |eBar| (thesis 4.2.1, 4.4.1)
+  const Pack ks = load(r.stretch + i), strain = load(r.strain + i) - load(r.rest_strain + i), inverse_rest = load(r.inverse_rest_length + i);
+  const Pack tension = ks * strain;
+  store(buffer.stretch + 2, 0.5 * tension * strain / inverse_rest);
+  storeVec(buffer.ge, g.e);
+  storeVec(buffer.gf, g.f + s.tf * tension);
+  store(buffer.gte + 2, g.theta_e);
+  store(buffer.gtf + 2, g.theta_f);
+  store(buffer.te_te + 2, h.te_te);
+  store(buffer.te_tf + 2, h.te_tf);
+  store(buffer.tf_tf + 2, h.tf_tf);
+  if (WithHessian)
+  {
+    storeSym(buffer.ee, h.ee);
+    storeSym(buffer.ff, h.ff + symmetricOuter(s.tf * (0.5 * ks * inverse_rest), s.tf) + normalProjector(tension * s.inverse_f, s.tf));
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        store(buffer.ef[a][b] + 2, h.ef.m[a][b]);
+    storeVec(buffer.e_te, h.e_te);
+    storeVec(buffer.e_tf, h.e_tf);
+    storeVec(buffer.f_te, h.f_te);
+    storeVec(buffer.f_tf, h.f_tf);
+  }
+}
+
+/// In-register transposition of an 8 x 8 block.
+SLENDER_INLINE void transpose(Pack (&m)[8])
+{
+  Pack u[8];
+  for (int k = 0; k < 8; k += 2)
+  {
+    u[k] = __builtin_shuffle(m[k], m[k + 1], Lanes{0, 8, 2, 10, 4, 12, 6, 14});
+    u[k + 1] = __builtin_shuffle(m[k], m[k + 1], Lanes{1, 9, 3, 11, 5, 13, 7, 15});
+  }
+  Pack v[8];
+  for (int k = 0; k < 8; k += 4)
+    for (int a = 0; a < 2; ++a)
+    {
+      v[k + a] = __builtin_shuffle(u[k + a], u[k + a + 2], Lanes{0, 1, 8, 9, 4, 5, 12, 13});
+      v[k + a + 2] = __builtin_shuffle(u[k + a], u[k + a + 2], Lanes{2, 3, 10, 11, 6, 7, 14, 15});
+    }
+  for (int a = 0; a < 4; ++a)
+  {
+    m[a] = __builtin_shuffle(v[a], v[a + 4], Lanes{0, 1, 2, 3, 8, 9, 10, 11});
+    m[a + 4] = __builtin_shuffle(v[a], v[a + 4], Lanes{4, 5, 6, 7, 12, 13, 14, 15});
+  }
+}
+
+/// Writes quantities 8*part .. 8*part+7 of the panels of nodes first..last (lane 0 is node i).
+SLENDER_INLINE void storePart(RodPanel* panels, int i, int first, int last, int part, Pack (&m)[8])
+{
+  transpose(m);
+  for (int k = first; k <= last; ++k)
+    store(reinterpret_cast<double*>(panels + i + k) + 8 * part, m[k]);
+}
+
+/// Panels of nodes i .. i+7 from the joints around them. With E the energy as a function of edges, dE/dx_i = dE/de_{i-1} - dE/de_i;
+/// the second derivatives follow by the same rule from the blocks of joints i-1 (slot k), i (k+1) and i+1 (k+2).
+SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPanel* panels, int i, int first, int last)
+{
+  const auto at = [](const double* p, int slot) { return load(p + slot); };
+  const Pack weight = load(r.weight + i), zero = {};
+  // edge i with itself, edge i-1 with itself
+  Pack own[6], before[6];
+  for (int k = 0; k < 6; ++k)
+  {
+    own[k] = at(b.ff[k], 1) + at(b.ee[k], 2);
+    before[k] = at(b.ff[k], 0) + at(b.ee[k], 1);
+  }
+  constexpr int sym[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  Pack mixed[3];   // edge i with its angle
+  for (int a = 0; a < 3; ++a)
+    mixed[a] = at(b.f_tf[a], 1) + at(b.e_te[a], 2);
+
+  for (int c = 0; c < 3; ++c)
+  {
+    Pack m[8];
+    for (int a = 0; a < 3; ++a)
+    {
+      m[a] = at(b.ef[c][a], 1) + at(b.ef[c][a], 2) - own[sym[a][c]];
+      m[4 + a] = -at(b.ef[c][a], 2);
+    }
+    m[3] = -at(b.e_tf[c], 2);
+    m[7] = zero;
+    storePart(panels, i, first, last, c, m);
+  }
+  {
+    Pack m[8];
+    for (int a = 0; a < 3; ++a)
+    {
+      m[a] = mixed[a] - at(b.f_te[a], 2);
+      m[4 + a] = at(b.f_te[a], 2);
+    }
+    m[3] = at(b.te_tf, 2);
+    m[7] = zero;
+    storePart(panels, i, first, last, 3, m);
+  }
+  Pack d[4][4] = {};   // d[column][row], row >= column
+  for (int c = 0; c < 3; ++c)
+  {
+    for (int a = c; a < 3; ++a)
+      d[c][a] = before[sym[a][c]] + own[sym[a][c]] - at(b.ef[a][c], 1) - at(b.ef[c][a], 1);
+    d[c][c] += weight;
+    d[c][3] = at(b.e_tf[c], 1) - mixed[c];
+  }
+  d[3][3] = at(b.tf_tf, 1) + at(b.te_te, 2);
+  for (int half = 0; half < 2; ++half)
+  {
+    Pack m[8];
+    for (int k = 0; k < 8; ++k)
+      m[k] = d[2 * half + k / 4][k % 4];
+    storePart(panels, i, first, last, 4 + half, m);
+  }
+}
+
+template <bool WithHessian>
+RodEvaluation evaluateForces(const RodArrays& r, RodPanel* panels)
+{
+  const int n = r.nodes;
+  JointBuffer b;
+  double* all = &b.ee[0][0];
+  for (unsigned k = 0; k < sizeof(JointBuffer) / sizeof(double); ++k)
+    all[k] = 0.0;
+
+  Pack stretch = {}, bend_twist = {}, potential = {}, min_chi = Pack{} + 2.0, max_strain = {};
+  for (int joint = -1; joint - 1 < n; joint += W)
+  {
+    evaluateJoints<WithHessian>(r, joint, b, min_chi);
+    const int i = joint - 1;   // first node whose joints are all known
+    const int first = i < 0 ? -i : 0, last = i + W > n ? n - 1 - i : W - 1;
+
+    const Pack weight = load(r.weight + i);
+    Pack gradient[4], local_potential = {};
+    const auto at = [](const double* p, int slot) { return load(p + slot); };
+    for (int a = 0; a < 3; ++a)
+    {
+      const Pack away = load(r.x[a] + i) - load(r.target[a] + i), force = load(r.force[a] + i);
+      local_potential += 0.5 * weight * away * away - force * load(r.x[a] + i);
+      gradient[a] = (at(b.gf[a], 0) + at(b.ge[a], 1)) - (at(b.gf[a], 1) + at(b.ge[a], 2)) + weight * away - force;
+    }
+    gradient[3] = at(b.gtf, 1) + at(b.gte, 2);
+    const Pack local_stretch = load(b.stretch + 1), local_bend = load(b.bend_twist + 1), local_strain = absolute(load(r.strain + i));
+    for (int k = first; k <= last; ++k)
+      for (int a = 0; a < 4; ++a)
+        r.gradient[4 * (i + k) + a] = gradient[a][k];
+    if (first == 0 && last == W - 1)
+    {
+      stretch += local_stretch;
+      bend_twist += local_bend;
+      potential += local_potential;
+      max_strain = maximum(local_strain, max_strain);
+    }
+    else
+      for (int k = first; k <= last; ++k)
+      {
+        stretch[0] += local_stretch[k];
+        bend_twist[0] += local_bend[k];
+        potential[0] += local_potential[k];
+        max_strain[0] = local_strain[k] > max_strain[0] ? local_strain[k] : max_strain[0];
+      }
+    if (WithHessian)
+      writePanels(r, b, panels, i, first, last);
+    else
+    {
+      const Pack diagonal = at(b.tf_tf, 1) + at(b.te_te, 2), off = at(b.te_tf, 2);
+      for (int k = first; k <= last; ++k)
+      {
+        r.theta_diagonal[i + k] = diagonal[k];
+        r.theta_off[i + k] = off[k];
+      }
+    }
+  }
+  RodEvaluation result;
+  result.stretch = sum(stretch);
+  result.bend_twist = sum(bend_twist);
+  result.potential = sum(potential);
+  for (int k = 0; k < W; ++k)
+  {
+    result.min_chi = min_chi[k] < result.min_chi || min_chi[k] != min_chi[k] ? min_chi[k] : result.min_chi;
+    result.max_strain = max_strain[k] > result.max_strain ? max_strain[k] : result.max_strain;
+  }
+  return result;
+}
+
+RodEvaluation evaluate(const RodArrays& r, RodPanel* panels)
+{
+  return panels ? evaluateForces<true>(r, panels) : evaluateForces<false>(r, panels);
+}
+
+}  // namespace
+
+extern const RodKernels rod_kernels;
+const RodKernels rod_kernels = {evaluateFrames, evaluate};
+
+}  // namespace SLENDER_ISA
+}  // namespace slender

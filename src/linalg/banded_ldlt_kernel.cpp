@@ -1,0 +1,160 @@
+// Compiled once per instruction set (SLENDER_ISA). Plain arrays only; nothing here may be emitted under a shared name.
+#include "slender_sim/linalg/banded_ldlt.h"
+#include "slender_sim/linalg/banded_ldlt_kernel.h"
+
+namespace slender {
+namespace SLENDER_ISA {
+namespace {
+
+using V4 = double __attribute__((vector_size(32), aligned(32), may_alias));
+using V8 = double __attribute__((vector_size(64), aligned(64), may_alias));
+using V8u = double __attribute__((vector_size(64), aligned(8), may_alias));   // rows of right-hand sides, any alignment
+
+inline __attribute__((always_inline)) V4 low(V8 v) { return V4{v[0], v[1], v[2], v[3]}; }
+inline __attribute__((always_inline)) V4 high(V8 v) { return V4{v[4], v[5], v[6], v[7]}; }
+inline __attribute__((always_inline)) V8 join(V4 a, V4 b) { return V8{a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]}; }
+
+/// Right-looking: each block column is factored, then subtracts L D L^T from the two blocks that it reaches.
+/// The trailing 8 x 8 window travels in registers (w: rows of the next two blocks for the next block's columns,
+/// c: the diagonal block after that), so that memory is touched once per panel.
+int factorBand(RodPanel* panels, int blocks)
+{
+  int negative = 0;
+  V8 window[4] = {};       // to subtract from the coming panel: column c, its eight rows (own block, next block)
+  V4 corner[4] = {};       // to subtract from the panel after it: diagonal block
+  for (int b = 0; b < blocks; ++b)
+  {
+    RodPanel& p = panels[b];
+    V4 d[4];
+    V8 l[4], u[4];
+    for (int c = 0; c < 4; ++c)
+    {
+      d[c] = *reinterpret_cast<V4*>(p.diag[c]) - low(window[c]);
+      l[c] = *reinterpret_cast<V8*>(p.below[c]);
+      l[c] -= join(high(window[c]), V4{});
+    }
+    for (int c = 0; c < 4; ++c)
+    {
+      const double pivot = d[c][c];
+      // also false for NaN
+      if (!(pivot > 0 || pivot < 0) || pivot - pivot != 0)
+        return -1 - (4 * b + c);
+      negative += pivot < 0;
+      const double inverse = 1.0 / pivot;
+      const V4 dl = d[c] * inverse;
+      u[c] = l[c];
+      l[c] = u[c] * inverse;
+      for (int k = c + 1; k < 4; ++k)
+      {
+        const double f = d[c][k];
+        d[k] -= dl * f;
+        l[k] -= l[c] * f;
+      }
+      d[c] = dl;
+      d[c][c] = inverse;
+    }
+    for (int c = 0; c < 4; ++c)
+    {
+      *reinterpret_cast<V4*>(p.diag[c]) = d[c];
+      *reinterpret_cast<V8*>(p.below[c]) = l[c];
+    }
+    for (int k = 0; k < 4; ++k)
+    {
+      V8 w = join(corner[k], V4{});
+      for (int c = 0; c < 4; ++c)
+        w += l[c] * u[c][k];
+      window[k] = w;
+    }
+    // The last row of the reach (an edge angle) is structurally zero: three columns are enough.
+    for (int k = 0; k < 3; ++k)
+    {
+      V4 w = {};
+      for (int c = 0; c < 4; ++c)
+        w += high(l[c]) * u[c][4 + k];
+      corner[k] = w;
+    }
+  }
+  return negative;
+}
+
+void solveBand(const RodPanel* panels, int blocks, double* x)
+{
+  V8 carry = {};   // to subtract from the next two blocks
+  for (int b = 0; b < blocks; ++b)
+  {
+    const RodPanel& p = panels[b];
+    double* xb = x + 4 * b;
+    double y[4];
+    for (int r = 0; r < 4; ++r)
+      y[r] = xb[r] - carry[r];
+    carry = join(high(carry), V4{});
+    for (int c = 0; c < 4; ++c)
+    {
+      for (int r = c + 1; r < 4; ++r)
+        y[r] -= p.diag[c][r] * y[c];
+      carry += *reinterpret_cast<const V8*>(p.below[c]) * y[c];
+    }
+    for (int r = 0; r < 4; ++r)
+      xb[r] = y[r];
+  }
+  V8 ahead = {};   // solution of the two blocks below
+  for (int b = blocks - 1; b >= 0; --b)
+  {
+    const RodPanel& p = panels[b];
+    double* xb = x + 4 * b;
+    double y[4];
+    for (int c = 0; c < 4; ++c)
+    {
+      const V8 product = *reinterpret_cast<const V8*>(p.below[c]) * ahead;
+      const V4 half = low(product) + high(product);
+      y[c] = xb[c] * p.diag[c][c] - ((half[0] + half[1]) + (half[2] + half[3]));
+    }
+    for (int c = 3; c >= 0; --c)
+      for (int r = c + 1; r < 4; ++r)
+        y[c] -= p.diag[c][r] * y[r];
+    for (int c = 0; c < 4; ++c)
+      xb[c] = y[c];
+    ahead = join(V4{y[0], y[1], y[2], y[3]}, low(ahead));
+  }
+}
+
+void solveBand8(const RodPanel* panels, int blocks, double* x)
+{
+  V8u* rows = reinterpret_cast<V8u*>(x);
+  for (int b = 0; b < blocks; ++b)
+  {
+    const RodPanel& p = panels[b];
+    V8u* y = rows + 4 * b;
+    const int reach = blocks - b > 2 ? 7 : 4 * (blocks - b - 1);
+    for (int c = 0; c < 4; ++c)
+    {
+      for (int r = c + 1; r < 4; ++r)
+        y[r] -= p.diag[c][r] * y[c];
+      for (int r = 0; r < reach; ++r)
+        y[4 + r] -= p.below[c][r] * y[c];
+    }
+  }
+  for (int b = blocks - 1; b >= 0; --b)
+  {
+    const RodPanel& p = panels[b];
+    V8u* y = rows + 4 * b;
+    const int reach = blocks - b > 2 ? 7 : 4 * (blocks - b - 1);
+    for (int c = 3; c >= 0; --c)
+    {
+      V8 sum = y[c] * p.diag[c][c];
+      for (int r = c + 1; r < 4; ++r)
+        sum -= p.diag[c][r] * y[r];
+      for (int r = 0; r < reach; ++r)
+        sum -= p.below[c][r] * y[4 + r];
+      y[c] = sum;
+    }
+  }
+}
+
+}  // namespace
+
+extern const BandKernels band_kernels;
+const BandKernels band_kernels = {factorBand, solveBand, solveBand8};
+
+}  // namespace SLENDER_ISA
+}  // namespace slender

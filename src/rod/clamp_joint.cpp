@@ -1,0 +1,79 @@
+// The half joint between a clamped section and the free edge beyond it: the same stencil as every other joint, with the
+// section in the place of the missing edge.
+#include <cmath>
+
+#include "slender_sim/energy/joint_stencil.h"
+#include "slender_sim/geometry/rotation.h"
+#include "slender_sim/rod/rod_system.h"
+
+namespace slender {
+
+namespace {
+Vec3<double> vec(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Vec3<double> at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
+}  // namespace
+
+void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& sum)
+{
+  const int j = c.edge, next = j + 1 < a_.nodes ? j + 1 : 0;
+  const Vec3<double> section_t = vec(c.t), section_d1 = vec(c.d1), section_d2 = vec(c.t.cross(c.d1));
+  const Vec3<double> edge_t = at(a_.t, j), edge_d1 = at(a_.d1, j), edge_d2 = at(a_.d2, j);
+  const double inverse = a_.inverse_length[j];
+  const bool section_first = c.side == 1;
+  const JointFrames<double> frames = section_first
+      ? JointFrames<double>{section_t, section_d1, section_d2, edge_t, edge_d1, edge_d2, inverse, inverse}
+      : JointFrames<double>{edge_t, edge_d1, edge_d2, section_t, section_d1, section_d2, inverse, inverse};
+
+  const Eigen::Vector3d te(edge_t.x, edge_t.y, edge_t.z), de(edge_d1.x, edge_d1.y, edge_d1.z);
+  const double angle = section_first ? signedAngle(parallelTransport(c.d1, c.t, te), de, te) : signedAngle(parallelTransport(de, te, c.t), c.d1, c.t);
+  const double turned = section_first ? a_.turn[j] - c.turn : c.turn - a_.turn[j];
+  c.twist = unwrapNear(angle, c.base_twist + turned);
+
+  const JointStrains<double> strains = jointStrains(frames);
+  c.kappa1 = strains.kappa1;
+  c.kappa2 = strains.kappa2;
+  const JointMaterial<double> material = {c.scale * c.b11, c.scale * c.b12, c.scale * c.b22, c.scale * c.beta, c.rest1, c.rest2, c.rest3};
+  JointGradient<double> g;
+  JointHessian<double> h;
+  c.energy = with_hessian ? jointEnergy<true>(frames, strains, c.twist, material, g, h)
+                          : jointEnergy<false>(frames, strains, c.twist, material, g, h);
+  sum.bend_twist += c.energy;
+  sum.min_chi = std::min(sum.min_chi, 1.0 / strains.inverse_chi);
+
+  const Vec3<double> ge = section_first ? g.f : g.e;
+  const double gt = section_first ? g.theta_f : g.theta_e;
+  const double force[3] = {ge.x, ge.y, ge.z};
+  for (int k = 0; k < 3; ++k)
+  {
+    gradient_[4 * j + k] -= force[k];
+    gradient_[4 * next + k] += force[k];
+  }
+  gradient_[4 * j + 3] += gt;
+  c.torque = a_.length[j] * te.cross(Eigen::Vector3d(ge.x, ge.y, ge.z)) + gt * te;
+  if (!with_hessian)
+    return;
+
+  const Sym3<double>& s = section_first ? h.ff : h.ee;
+  const Vec3<double>& m = section_first ? h.f_tf : h.e_te;
+  const double ee[3][3] = {{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}};
+  const double et[3] = {m.x, m.y, m.z};
+  RodPanel& p = matrix_.panels()[j];
+  RodPanel& q = matrix_.panels()[next];
+  for (int col = 0; col < 3; ++col)
+  {
+    for (int row = 0; row < 3; ++row)
+    {
+      if (row >= col)
+      {
+        p.diag[col][row] += ee[row][col];
+        q.diag[col][row] += ee[row][col];
+      }
+      p.below[col][row] -= ee[row][col];
+    }
+    p.diag[col][3] -= et[col];
+    p.below[3][col] += et[col];
+  }
+  p.diag[3][3] += section_first ? h.tf_tf : h.te_te;
+}
+
+}  // namespace slender

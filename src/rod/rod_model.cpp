@@ -1,0 +1,206 @@
+#include "slender_sim/rod/rod_model.h"
+
+#include <stdexcept>
+
+#include "slender_sim/geometry/framed_curve.h"
+#include "slender_sim/geometry/rotation.h"
+#include "slender_sim/rod/rod_system.h"
+
+namespace slender {
+
+namespace {
+
+void requirePositive(double value, const std::string& what)
+{
+  if (!(value > 0) || !std::isfinite(value))
+    throw std::invalid_argument(what + " must be positive and finite, got " + std::to_string(value));
+}
+
+void checkSections(const std::vector<RodSection>& sections, int edges)
+{
+  if (static_cast<int>(sections.size()) != edges)
+    throw std::invalid_argument("expected " + std::to_string(edges) + " cross-sections, one per edge, got " + std::to_string(sections.size()));
+  for (int j = 0; j < edges; ++j)
+  {
+    const RodSection& s = sections[j];
+    const std::string at = " of edge " + std::to_string(j);
+    requirePositive(s.a, "semi-axis a" + at);
+    requirePositive(s.b, "semi-axis b" + at);
+    requirePositive(s.linear_density, "linear density" + at);
+    requirePositive(s.stretch_modulus, "stretch modulus" + at);
+    requirePositive(s.twist_modulus, "twist modulus" + at);
+    requirePositive(s.bend_modulus(0, 0), "bend modulus B11" + at);
+    requirePositive(s.bend_modulus.determinant(), "determinant of the bend modulus" + at);
+  }
+}
+
+}  // namespace
+
+RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed, const std::vector<RodSection>& sections,
+                  const Eigen::Vector3d& director, bool naturally_straight)
+{
+  const int n = static_cast<int>(nodes.cols());
+  if (n < (closed ? 5 : 3))
+    throw std::invalid_argument("rod '" + name + "' needs at least " + (closed ? "5" : "3") + " nodes, got " + std::to_string(n));
+  if (!nodes.allFinite())
+    throw std::invalid_argument("rod '" + name + "' has a node that is not finite");
+  const FramedCurve curve(nodes, closed, director);
+  const int edges = curve.edges();
+  checkSections(sections, edges);
+
+  RodModel model;
+  model.name = name;
+  model.closed = closed;
+  model.mass = Eigen::VectorXd::Zero(n);
+  model.rest_length.resize(edges);
+  model.stretch_modulus.resize(edges);
+  model.radius_a.resize(edges);
+  model.radius_b.resize(edges);
+  model.bend_modulus = Eigen::Matrix3Xd::Zero(3, n);
+  model.twist_modulus = Eigen::VectorXd::Zero(n);
+  model.rest_curvature = Eigen::Matrix2Xd::Zero(2, n);
+  model.rest_twist = Eigen::VectorXd::Zero(n);
+  model.drag = Eigen::VectorXd::Zero(n);
+
+  for (int j = 0; j < edges; ++j)
+  {
+    const RodSection& s = sections[j];
+    const double length = (nodes.col((j + 1) % n) - nodes.col(j)).norm();
+    model.rest_length[j] = length;
+    model.stretch_modulus[j] = s.stretch_modulus;
+    model.radius_a[j] = s.a;
+    model.radius_b[j] = s.b;
+    model.mass[j] += 0.5 * s.linear_density * length;
+    model.mass[(j + 1) % n] += 0.5 * s.linear_density * length;
+  }
+  for (int i = 0; i < n; ++i)
+  {
+    // The stiffness of a joint is the length-weighted mean of its two edges'; an end has only one.
+    const int e = closed ? (i + edges - 1) % edges : std::max(i - 1, 0), f = closed ? i : std::min(i, edges - 1);
+    const double share = model.rest_length[e] / (model.rest_length[e] + model.rest_length[f]);
+    const Eigen::Matrix2d b = share * sections[e].bend_modulus + (1 - share) * sections[f].bend_modulus;
+    model.bend_modulus.col(i) << b(0, 0), 0.5 * (b(0, 1) + b(1, 0)), b(1, 1);
+    model.twist_modulus[i] = share * sections[e].twist_modulus + (1 - share) * sections[f].twist_modulus;
+    if (curve.hasJoint(i))
+    {
+      if (!naturally_straight)
+        model.rest_curvature.col(i) = curve.materialCurvature(i);
+      model.rest_twist[i] = curve.twist(i);
+    }
+  }
+  if (!closed)
+  {
+    // The ends carry the rest curvature of their half edge, continued from the next joint; clamps use it.
+    const auto continued = [&](int end, int joint, int edge) {
+      const double l = 0.5 * (model.rest_length[joint - 1] + model.rest_length[joint]);
+      model.rest_curvature.col(end) = model.rest_curvature.col(joint) * (0.5 * model.rest_length[edge] / l);
+    };
+    continued(0, 1, 0);
+    continued(n - 1, n - 2, edges - 1);
+  }
+  return model;
+}
+
+RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director, double total_twist)
+{
+  if (nodes.cols() != model.nodes())
+    throw std::invalid_argument("rod '" + model.name + "' has " + std::to_string(model.nodes()) + " nodes, got " + std::to_string(nodes.cols()));
+  FramedCurve curve(nodes, model.closed, director);
+  const int n = model.nodes(), edges = model.edges();
+  const int joints = model.closed ? n : n - 2;
+  for (int j = 0; j < edges; ++j)
+    curve.theta[j] = total_twist * j / joints;
+  RodState state;
+  state.x = nodes;
+  state.v = Eigen::Matrix3Xd::Zero(3, n);
+  state.d1.resize(3, edges);
+  state.twist = Eigen::VectorXd::Zero(n);
+  for (int j = 0; j < edges; ++j)
+    state.d1.col(j) = curve.d1(j);
+  for (int i = 0; i < n; ++i)
+    state.twist[i] = curve.twist(i);
+  if (model.closed)
+    state.twist[0] += total_twist;   // the turns closed into the loop: frames alone do not show them
+  return state;
+}
+
+Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int node)
+{
+  const int n = model.nodes(), edges = model.edges();
+  const auto tangent = [&](int j) { return Eigen::Vector3d((state.x.col((j + 1) % n) - state.x.col(j)).normalized()); };
+  Eigen::Vector3d t, d1;
+  if (!model.closed && (node == 0 || node == n - 1))
+  {
+    // Half the rest turn back from the end edge: curvature (kappa1, kappa2) turns t about kappa b = kappa1 d2 - kappa2 d1.
+    const int edge = node == 0 ? 0 : edges - 1;
+    const Eigen::Vector3d te = tangent(edge), d1e = state.d1.col(edge), d2e = te.cross(d1e);
+    const Eigen::Vector2d k = model.rest_curvature.col(node);
+    const Eigen::Vector3d kb = k[0] * d2e - k[1] * d1e;
+    const double angle = 2.0 * std::atan(0.5 * kb.norm()) * (node == 0 ? -1.0 : 1.0);
+    const Eigen::Vector3d axis = kb.norm() > 0 ? Eigen::Vector3d(kb.normalized()) : d1e;
+    t = rotateAbout(te, axis, angle);
+    d1 = rotateAbout(d1e, axis, angle);
+  }
+  else
+  {
+    const int e = (node + edges - 1) % edges, f = node;
+    const Eigen::Vector3d te = tangent(e), tf = tangent(f);
+    t = (te + tf).normalized();
+    d1 = rotateAbout(parallelTransport(state.d1.col(e), te, t), t, 0.5 * state.twist[node]);
+  }
+  d1 = (d1 - d1.dot(t) * t).normalized();
+  Eigen::Matrix3d frame;
+  frame << t, d1, t.cross(d1);
+  return frame;
+}
+
+GraspState makeGrasp(const RodModel& model, const RodState& state, int first_node, int last_node, bool holds_frame)
+{
+  const int n = model.nodes();
+  if (first_node < 0 || last_node < first_node || last_node >= n)
+    throw std::invalid_argument("rod '" + model.name + "': held nodes " + std::to_string(first_node) + ".." + std::to_string(last_node) +
+                                " must lie in 0.." + std::to_string(n - 1));
+  if (!holds_frame && first_node != last_node)
+    throw std::invalid_argument("rod '" + model.name + "': a point pin holds one node, not " + std::to_string(last_node - first_node + 1));
+  GraspState g;
+  g.first_node = first_node;
+  g.last_node = last_node;
+  g.holds_frame = holds_frame;
+  // origin half way along the held part; axes of the section there
+  const int held = last_node - first_node;
+  if (held % 2 == 0)
+  {
+    g.X_WG.position = state.x.col(first_node + held / 2);
+    g.X_WG.orientation = Eigen::Quaterniond(sectionFrame(model, state, first_node + held / 2)).normalized();
+  }
+  else
+  {
+    const int edge = first_node + held / 2;
+    g.X_WG.position = 0.5 * (state.x.col(edge) + state.x.col(edge + 1));
+    Eigen::Matrix3d frame;
+    const Eigen::Vector3d t = (state.x.col(edge + 1) - state.x.col(edge)).normalized();
+    frame << t, state.d1.col(edge), t.cross(Eigen::Vector3d(state.d1.col(edge)));
+    g.X_WG.orientation = Eigen::Quaterniond(frame).normalized();
+  }
+  const Pose X_GW = g.X_WG.inverse();
+  for (int i = first_node; i <= last_node; ++i)
+    g.nodes_G.push_back(X_GW * Eigen::Vector3d(state.x.col(i)));
+  for (int j = first_node; j < last_node; ++j)
+    g.directors_G.push_back(X_GW.orientation * Eigen::Vector3d(state.d1.col(j)));
+  for (int side = 0; side < 2; ++side)
+  {
+    const int node = side ? last_node : first_node;
+    const Eigen::Matrix3d section = sectionFrame(model, state, node);
+    g.section_G[side] = X_GW.orientation.toRotationMatrix() * section;
+    const bool free_side = model.closed || (side ? node < n - 1 : node > 0);
+    if (!free_side)
+      continue;
+    const int edge = side ? node : (node + model.edges() - 1) % model.edges();
+    const Eigen::Vector3d te = (state.x.col((edge + 1) % n) - state.x.col(edge)).normalized();
+    const double angle = signedAngle(parallelTransport(section.col(1), section.col(0), te), state.d1.col(edge), te);
+    g.section_twist[side] = unwrapNear(side ? angle : -angle, 0.5 * state.twist[node]);
+  }
+  return g;
+}
+
+}  // namespace slender

@@ -1,0 +1,45 @@
+// Rayleigh stiffness damping: every strain s gets the extra force stiffness_damping * k * ds/dt (thesis 5.3.1). A stage's rate is
+// (s - s~) / tau_v with s~ the stage's own combination of past strains, so the damping has the integrator's order.
+#include "rod_stepper_impl.h"
+
+namespace slender {
+
+void RodStepper::Impl::startStrainHistory(const RodInputs& inputs, double duration, double t)
+{
+  placeAt(inputs, duration, t / duration);
+  system.evaluate(false);
+  system.strains(strain_start);
+  if (work.strain_rate.cols() != strain_start.cols())
+    work.strain_rate.setZero(4, strain_start.cols());
+  if (work.strain_rate_previous.cols() != strain_start.cols())
+    work.strain_rate_previous = work.strain_rate;
+}
+
+void RodStepper::Impl::setViscousResponse(const Stage& stage, std::size_t)
+{
+  const Combination& c = stage.q_tilde;
+  strain_reference = c[kQ] * strain_start + c[kV] * work.strain_rate;
+  if (c[kA] != 0 && work.last_step > 0)
+    strain_reference += (c[kA] / work.last_step) * (work.strain_rate - work.strain_rate_previous);
+  if (c[kQPrevious] != 0)
+    strain_reference += c[kQPrevious] * (work.strain_previous.cols() == strain_start.cols() ? work.strain_previous : strain_start);
+  if (c[kQStage] != 0)
+    strain_reference += c[kQStage] * strain_stage;
+  system.setResponse(model->stiffness_damping / stage.tau_v, &strain_reference);
+}
+
+void RodStepper::Impl::finishStrainHistory(const Stage& stage)
+{
+  system.strains(strain_end);
+  // strain_end is that of the stage unless the stage lies inside the step
+  if (plan.fraction == 1.0)
+    next.strain_rate = (strain_end - strain_reference) / stage.tau_v;
+  else
+    next.strain_rate = work.strain_rate + ((strain_start + plan.fraction * (strain_end - strain_start) - strain_reference) / stage.tau_v - work.strain_rate) / plan.fraction;
+  next.strain_rate_previous = work.strain_rate;
+  if (time.integrator == Integrator::bdf2)
+    next.strain_previous = strain_start;
+  system.setResponse(0.0, nullptr);
+}
+
+}  // namespace slender
