@@ -82,16 +82,17 @@ void require(const StepReport& report, const std::string& what)
     throw std::runtime_error(what + ": " + toString(report.failure) + ": " + report.message);
 }
 
-void settle(RodStepper& stepper, RodSetup& rod, double step, double speed, int max_steps)
+std::string settle(RodStepper& stepper, RodSetup& rod, double step, double speed, int max_steps)
 {
   for (int i = 0; i < max_steps; ++i)
   {
-    require(stepper.step(rod.state, rod.inputs, step), "settling");
+    const StepReport report = stepper.step(rod.state, rod.inputs, step);
+    if (!report.ok)
+      return report.message;
     if (fastestNode(rod.state) < speed)
-      return;
+      return "";
   }
-  throw std::runtime_error("rod has not settled after " + std::to_string(max_steps) + " steps: still moves at " +
-                           std::to_string(fastestNode(rod.state)) + " m/s");
+  return "has not settled after " + std::to_string(max_steps) + " steps";
 }
 
 TimeConfig timeConfig(Integrator integrator, double step, double tolerance)

@@ -54,8 +54,8 @@ bool sameBits(const RodState& a, const RodState& b);
 /// Throws std::runtime_error with `what` and the report's message unless report.ok.
 void require(const StepReport& report, const std::string& what);
 
-/// Steps until no node moves faster than `speed` [m/s]; throws after `max_steps`.
-void settle(RodStepper& stepper, RodSetup& rod, double step, double speed, int max_steps);
+/// Steps until no node moves faster than `speed` [m/s]. Returns an empty string, or why it has not come to rest.
+std::string settle(RodStepper& stepper, RodSetup& rod, double step, double speed, int max_steps);
 
 /// TimeConfig with this integrator and step, and a Newton tolerance (fraction of the shortest edge).
 TimeConfig timeConfig(Integrator integrator, double step, double tolerance = 1e-6);
