@@ -18,6 +18,7 @@ void StepReport::merge(const StepReport& other)
   factorizations += other.factorizations;
   residual = std::max(residual, other.residual);
   max_strain = std::max(max_strain, other.max_strain);
+  stable = stable && other.stable;
   error_estimate = std::max(error_estimate, other.error_estimate);
 }
 

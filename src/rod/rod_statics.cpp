@@ -51,7 +51,8 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
   newton.max_iterations = std::max(60, time.newton.max_iterations);
   double done = move > 0 ? 0.0 : 1.0, advance = move > 1 ? 1.0 / move : 1.0;
   double relative = 1.0;   // proximal weight over base_weight
-  int failures = 0;
+  int failures = 0, nudges = 0;
+  RodState saddle;
   system.load(work);
   system.setResponse(0.0, nullptr);
   constexpr int kMaxRounds = 3000;
@@ -67,6 +68,18 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
     const NewtonResult result = minimize(system, newton);
     report.iterations += result.iterations;
     report.factorizations += result.factorizations;
+    if (!result.ok() && nudges > 0 && ++failures > 3)
+    {
+      // no minimum within reach of the saddle: give the saddle, and say so
+      system.load(saddle);
+      for (int i = 0; i < n; ++i)
+        system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), load(inputs, i));
+      work = saddle;
+      placeAt(targets, 1.0, 1.0);
+      system.evaluate(false);
+      report.stable = false;
+      return finishEquilibrium(state, inputs, report);
+    }
     if (!result.ok())
     {
       relative = std::max(100.0 * relative, 1e-6);
@@ -87,20 +100,39 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
       advance = std::min(1.5 * advance, move > 1 ? 1.0 / move : 1.0);
       continue;
     }
+    if (weight == 0.0 && !result.definite && nudges < 3)
+    {
+      // a saddle, for example a straight column beyond its buckling load: push it off, the minimisation does the rest
+      if (nudges == 0)
+        saddle = work;
+      failures = 0;
+      const double size = 1e-4 * length * (++nudges);
+      for (int i = 0; i < n; ++i)
+        if (system.isFree(i))
+          work.x.col(i) += size / n * Eigen::Vector3d(std::sin(1.0 + 3.1 * i / n), std::sin(2.0 + 4.7 * i / n), std::sin(3.0 + 2.3 * i / n));
+      relative = 1e-2;
+      continue;
+    }
     if (weight == 0.0)
     {
-      report.residual = result.residual;
-      report.max_strain = result.max_strain;
-      computeWrenches(inputs, 0.0);
-      for (std::size_t k = 0; k < work.grasps.size(); ++k)
-        if (work.grasps[k].active)
-          work.grasps[k].X_WG = {inputs.grasps[k].X_WG.position, inputs.grasps[k].X_WG.orientation.normalized()};
-      state = work;
-      return report;
+      report.stable = result.definite;
+      return finishEquilibrium(state, inputs, report);
     }
     relative *= shift < 1e-3 ? 0.01 : shift < 0.05 ? 0.2 : 0.7;
   }
   return refuse(report, StepFailure::newton_diverged, "the equilibrium did not settle: the rod may be free to drift; hold it, or let it settle by time stepping with damping");
+}
+
+/// Takes over the evaluated equilibrium.
+StepReport RodStepper::Impl::finishEquilibrium(RodState& state, const RodInputs& inputs, StepReport& report)
+{
+  report.residual = system.residual() / system.forceScale();
+  computeWrenches(inputs, 0.0);
+  for (std::size_t k = 0; k < work.grasps.size(); ++k)
+    if (work.grasps[k].active)
+      work.grasps[k].X_WG = {inputs.grasps[k].X_WG.position, inputs.grasps[k].X_WG.orientation.normalized()};
+  state = work;
+  return report;
 }
 
 }  // namespace slender

@@ -41,6 +41,9 @@ private:
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message);
   std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
 
+  // rod_statics.cpp
+  StepReport finishEquilibrium(RodState& state, const RodInputs& inputs, StepReport& report);
+
   // rod_explicit.cpp
   StepFailure explicitStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
 

@@ -77,7 +77,9 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     if (!std::isfinite(increment))
       return fail(StepFailure::state_not_finite);
     double alpha = system.stepLimit();
-    if (alpha == 1.0 && shift == 0.0 && (increment <= config.tolerance || system.residual() <= system.noiseLevel()))
+    // A shifted Hessian shortens the increment, so a saddle (a step's equation may well have one) must show by its residual.
+    const double unbalanced = shift == 0.0 ? 0.0 : system.residual() / system.forceScale();
+    if (alpha == 1.0 && unbalanced < 1e-9 && (increment <= config.tolerance || system.residual() <= system.noiseLevel()))
     {
       system.moveAlong(1.0);
       trial = system.evaluate(false);
