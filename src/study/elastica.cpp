@@ -25,31 +25,39 @@ Bound bucklingBound(int edges)
 
 void buckle(StudyContext& context, bool clamped, int edges, const std::vector<double>& compressions, Plot& plot)
 {
-  RodCase c;   // EI = L = 1; EA = 1e7: P/EA <= 6e-6 at the largest load here
+  RodCase c;   // EI = L = 1; the largest load strains it by 5e-5
   c.edges = edges;
+  c.stretch = 1e6;
   RodSetup rod = straightRod(c);
   rod.hold(0, 0, clamped);
   const int far = rod.hold(edges, edges, clamped);
-  const Pose start = rod.inputs.grasps[far].X_WG;
-  RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
 
-  // A small push at the middle decides where it buckles; once it has, the push goes.
-  rod.inputs.forces = Eigen::Matrix3Xd::Zero(3, edges + 1);
-  rod.inputs.forces(2, edges / 2) = 1.0;
-  rod.inputs.grasps[far].X_WG.position.x() = start.position.x() - 0.01;
-  std::string refused = stepper.solveEquilibrium(rod.state, rod.inputs).message;
-  rod.inputs.forces.setZero();
+  // Start buckled, with the first mode's angles (amplitude 0.2 rad: 1 % shorter) and edges of rest length.
+  const double h = 1.0 / edges;
+  Eigen::Matrix3Xd nodes = rod.state.x;
+  for (int i = 0; i < edges; ++i)
+  {
+    const double s = (i + 0.5) * h, angle = 0.2 * (clamped ? std::sin(2 * M_PI * s) : std::cos(M_PI * s));
+    nodes.col(i + 1) = nodes.col(i) + h * Eigen::Vector3d(std::cos(angle), 0, std::sin(angle));
+  }
+  const RodState bent = makeRodState(*rod.model, nodes, Eigen::Vector3d::UnitY());
+  rod.state.x = bent.x;
+  rod.state.d1 = bent.d1;
+  rod.state.twist = bent.twist;
+  rod.state.grasps[far].X_WG.position = rod.inputs.grasps[far].X_WG.position = nodes.col(edges);
+  RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
+  std::string refused;
 
   const std::string ends = clamped ? "clamped" : "pinned";
-  double from = 0.01;
+  double from = 1 - nodes(0, edges);
   for (const double compression : compressions)
   {
     const double begin = threadSeconds();
-    const int steps = std::max(1, static_cast<int>(std::ceil((compression - from) / 0.02)));
+    const int steps = std::max(1, static_cast<int>(std::ceil((compression - from) / (0.5 * h))));
     for (int k = 1; k <= steps && refused.empty(); ++k)
     {
       const double at = from + (compression - from) * k / steps;
-      rod.inputs.grasps[far].X_WG.position.x() = start.position.x() - at;
+      rod.inputs.grasps[far].X_WG.position = {1 - at, 0, 0};
       refused = stepper.solveEquilibrium(rod.state, rod.inputs).message;
     }
     from = compression;
@@ -87,7 +95,7 @@ void loadTheEnd(StudyContext& context, int edges, const std::vector<double>& loa
     rod.inputs.forces(2, edges) = -load;
     RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
     const double begin = threadSeconds();
-    require(stepper.solveEquilibrium(rod.state, rod.inputs), "end-loaded cantilever");
+    const std::string refused = stepper.solveEquilibrium(rod.state, rod.inputs).message;
     const double seconds = threadSeconds() - begin;
     const CantileverTip exact = endLoadedCantilever(load);
     const double finer = 40.0 / edges;
@@ -96,9 +104,12 @@ void loadTheEnd(StudyContext& context, int edges, const std::vector<double>& loa
       row.set("case", std::string("end load, ") + quantity).set("edges", edges).set("parameter", load);
       row.check(measured, expected, 0.005 * finer * finer * expected, "Bisshopp and Drucker 1945");
       row.set("relative_error", measured / expected - 1).set("cpu_seconds", seconds);
+      if (!refused.empty())
+        row.set("refused", refused);
     };
-    add("tip deflection", -rod.tip().z(), exact.drop);
-    add("tip x", rod.tip().x(), exact.extent);
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    add("tip deflection", refused.empty() ? -rod.tip().z() : nan, exact.drop);
+    add("tip x", refused.empty() ? rod.tip().x() : nan, exact.extent);
     Series& s = plot.at("end load " + std::to_string(load).substr(0, 4));
     s.x.push_back(edges);
     s.y.push_back(std::abs(-rod.tip().z() / exact.drop - 1));

@@ -1,5 +1,6 @@
 #include "slender_sim/study/reference.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -40,7 +41,8 @@ CantileverTip heavyCantilever(double gamma, double stretch)
 {
   // theta_{i-1} - 2 theta_i + theta_{i+1} = h^2/12 (f_{i-1} + 10 f_i + f_{i+1}) inside. At the free end theta' = f = 0, so that
   // theta_{n-1} = theta_n - h^3/6 f'_n + h^4/24 f''_n + O(h^5), f' = gamma cos(theta), f'' = -2 gamma stretch sin cos.
-  const int n = 8000;
+  // 50 points in the boundary layer; round-off grows as n^2, so no more than that
+  const int n = 2 * std::clamp(static_cast<int>(25 * std::sqrt(gamma)), 1000, 8000);
   const double h = 1.0 / n;
   const auto f = [&](double s, double t) {
     return -gamma * (1 - s) * std::cos(t) * (1 + stretch * (1 - s) * std::sin(t));
