@@ -34,6 +34,7 @@ RodSystem::RodSystem(const RodModel& model) : model_(model)
     allocate(*p, 1.0);
   gradient_.assign(4 * n, 0.0);
   direction_.assign(4 * n, 0.0);
+  reduced_.assign(4 * n, 0.0);
   a_.gradient = gradient_.data();
   for (auto& x : x_base_)
     x.assign(n, 0.0);
@@ -279,81 +280,143 @@ void RodSystem::strains(Eigen::Matrix4Xd& out) const
     out.col(n + 2 * c.grasp + c.side) << 0.0, c.kappa1, c.kappa2, c.twist;
 }
 
-RodEvaluation RodSystem::evaluate(bool with_hessian)
+RodEvaluation RodSystem::evaluate(bool with_hessian, double shift)
 {
-  const double transport_chi = rodKernels().frames(a_);
-  RodEvaluation result = rodKernels().forces(a_, with_hessian ? matrix_.panels() : nullptr);
-  result.min_chi = std::min(result.min_chi, transport_chi);
-  for (ClampJoint& c : clamps_)
-    evaluateClamp(c, with_hessian, result);
-  for (std::size_t k = 0; k < held_nodes_.size(); ++k)
-    for (int c = 0; c < 3; ++c)
-      reactions_[k][c] = gradient_[4 * held_nodes_[k] + c];
-  for (std::size_t k = 0; k < held_angles_.size(); ++k)
-    angle_reactions_[k] = gradient_[4 * held_angles_[k] + 3];
-  fixHeld(with_hessian);
+  // Pieces of this many nodes stay in the second-level cache from assembly to elimination.
+  constexpr int kPiece = 256;
+  const RodKernels& kernels = rodKernels();
+  const int n = a_.nodes;
+  RodPanel* panels = with_hessian ? matrix_.panels() : nullptr;
+  RodSweep sweep;
+  kernels.begin(a_, sweep);
+  RodEvaluation clamped;   // of the clamps alone
+  BandCarry carry;
+  const bool by_pieces = with_hessian && !model_.closed;
+  int done = 0, eliminated = 0;
+  while (done < n)
+  {
+    const int before = done;
+    done = kernels.advance(a_, sweep, panels, by_pieces ? done + kPiece : n);
+    for (ClampJoint& c : clamps_)
+    {
+      const int last = std::max(c.edge, (c.edge + 1) % n);   // node that must be there
+      if (last < done && last >= before)
+        evaluateClamp(c, with_hessian, clamped);
+    }
+    // the newest node may still receive from a clamp on the edge after it
+    const int complete = done < n ? done - 1 : n;
+    takeReactions(eliminated, complete);
+    if (with_hessian)
+    {
+      fixPanels(eliminated, complete);
+      addShift(eliminated, complete, shift);
+    }
+    if (by_pieces)
+    {
+      for (int i = 4 * eliminated; i < 4 * complete; ++i)
+        reduced_[i] = -gradient_[i];
+      if (carry.zero == 0)
+        matrix_.band().eliminate(eliminated, complete, reduced_.data(), carry);
+    }
+    eliminated = complete;
+  }
+  RodEvaluation result = kernels.end(sweep);
+  result.bend_twist += clamped.bend_twist;
+  result.min_chi = std::min(result.min_chi, clamped.min_chi);
+  if (by_pieces)
+    result.inertia = {4 * n - carry.negative - carry.zero, carry.negative, carry.zero};
+  else if (with_hessian)
+    result.inertia = matrix_.factor();
   return result;
 }
 
-void RodSystem::fixUnknown(int node, int c)
+void RodSystem::solve()
+{
+  if (model_.closed)
+  {
+    for (std::size_t i = 0; i < gradient_.size(); ++i)
+      direction_[i] = -gradient_[i];
+    matrix_.solve(direction_.data());
+    return;
+  }
+  std::swap(direction_, reduced_);
+  matrix_.band().substitute(direction_.data());
+}
+
+void RodSystem::takeReactions(int from, int to)
+{
+  for (std::size_t k = 0; k < held_nodes_.size(); ++k)
+  {
+    const int node = held_nodes_[k];
+    if (node >= from && node < to)
+      for (int c = 0; c < 3; ++c)
+      {
+        reactions_[k][c] = gradient_[4 * node + c];
+        gradient_[4 * node + c] = 0.0;
+      }
+  }
+  for (std::size_t k = 0; k < held_angles_.size(); ++k)
+  {
+    const int edge = held_angles_[k];
+    if (edge >= from && edge < to)
+    {
+      angle_reactions_[k] = gradient_[4 * edge + 3];
+      gradient_[4 * edge + 3] = 0.0;
+    }
+  }
+  if (!model_.closed && to == a_.nodes)   // the last node has no edge
+    gradient_[4 * a_.nodes - 1] = 0.0;
+}
+
+void RodSystem::fixUnknown(int node, int c, int from, int to)
 {
   const int n = a_.nodes;
   RodPanel* panels = matrix_.panels();
-  RodPanel& p = panels[node];
-  for (int r = c + 1; r < 4; ++r)
-    p.diag[c][r] = 0.0;
-  for (int k = 0; k < c; ++k)
-    p.diag[k][c] = 0.0;
-  p.diag[c][c] = 1.0;
-  for (double& entry : p.below[c])
-    entry = 0.0;
+  if (node >= from && node < to)
+  {
+    RodPanel& p = panels[node];
+    for (int r = c + 1; r < 4; ++r)
+      p.diag[c][r] = 0.0;
+    for (int k = 0; k < c; ++k)
+      p.diag[k][c] = 0.0;
+    p.diag[c][c] = 1.0;
+    for (double& entry : p.below[c])
+      entry = 0.0;
+  }
   for (int back = 1; back <= 2; ++back)
-    if (model_.closed || node >= back)
-      for (auto& column : panels[(node + n - back) % n].below)
+  {
+    const int above = model_.closed ? (node + n - back) % n : node - back;
+    if (above >= from && above < to)
+      for (auto& column : panels[above].below)
         column[4 * (back - 1) + c] = 0.0;
+  }
 }
 
-void RodSystem::fixHeld(bool with_hessian)
+/// Replaces the equations of prescribed unknowns by identities, in panels from .. to-1.
+void RodSystem::fixPanels(int from, int to)
 {
+  const auto near = [&](int node) { return model_.closed || (node >= from && node < to + 2); };
   for (int node : held_nodes_)
-    for (int c = 0; c < 3; ++c)
-    {
-      gradient_[4 * node + c] = 0.0;
-      if (with_hessian)
-        fixUnknown(node, c);
-    }
+    if (near(node))
+      for (int c = 0; c < 3; ++c)
+        fixUnknown(node, c, from, to);
   for (int edge : held_angles_)
-  {
-    gradient_[4 * edge + 3] = 0.0;
-    if (with_hessian)
-      fixUnknown(edge, 3);
-  }
-  if (!model_.closed)   // the last node has no edge
-  {
-    gradient_[4 * a_.nodes - 1] = 0.0;
-    if (with_hessian)
-      fixUnknown(a_.nodes - 1, 3);
-  }
+    if (near(edge))
+      fixUnknown(edge, 3, from, to);
+  if (!model_.closed)
+    fixUnknown(a_.nodes - 1, 3, from, to);
 }
 
-Inertia RodSystem::factor(double shift)
+void RodSystem::addShift(int from, int to, double shift)
 {
   if (shift > 0)
-    for (int i = 0; i < a_.nodes; ++i)
+    for (int i = from; i < to; ++i)
     {
       RodPanel& p = matrix_.panels()[i];
       for (int c = 0; c < 3; ++c)
         p.diag[c][c] += shift * (a_.weight[i] + shift_x_);
       p.diag[3][3] += shift * shift_theta_;
     }
-  return matrix_.factor();
-}
-
-void RodSystem::solve()
-{
-  for (std::size_t i = 0; i < gradient_.size(); ++i)
-    direction_[i] = -gradient_[i];
-  matrix_.solve(direction_.data());
 }
 
 void RodSystem::moveAlong(double alpha)
