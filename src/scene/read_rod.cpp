@@ -203,6 +203,7 @@ Material readMaterial(const YamlCursor& at)
   assign(material.torsion, map.get("torsion").choice<Torsion>({{"polar", Torsion::polar}, {"saint_venant", Torsion::saint_venant}}));
   material.linear_density = map.get("linear_density").number(Range::above(0, 1e6, "kg/m"));
   material.stretch_modulus = map.get("stretch_modulus").number(modulus);
+  assign(material.inextensible, map.get("inextensible").boolean());
   material.bend_modulus = readBendModulus(map.get("bend_modulus"));
   material.twist_modulus = map.get("twist_modulus").number(stiffness);
   map.finish();

@@ -67,6 +67,7 @@ void visitRod(Archive& archive, State& rod)
     visitGrasp(archive, grasp);
   }
   archive(rod.last_step);
+  archive(rod.next_step);
   archive(rod.a);
   archive(rod.x_previous);
   archive(rod.v_previous);

@@ -120,7 +120,7 @@ private:
   std::vector<int> held_nodes_, held_angles_;      ///< nodes, edges whose unknowns are prescribed
   std::vector<Eigen::Vector4d> reactions_;         ///< gradient at held_nodes_ (x, y, z) before it is cleared
   std::vector<double> angle_reactions_;            ///< likewise at held_angles_
-  double max_stretch_modulus_ = 0, min_rest_length_ = 0, shift_x_ = 0, shift_theta_ = 0;
+  double max_stretch_modulus_ = 0, min_rest_length_ = 0, shift_x_ = 0, shift_theta_ = 0, spin_ = 0;
 };
 
 /// Frame (t, d1, d2) of the section at a node: the mean of the two edges' frames, or at the end of an open rod the end edge's frame

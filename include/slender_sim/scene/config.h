@@ -42,6 +42,7 @@ struct Material
   Torsion torsion = Torsion::polar;                ///< G A (a^2+b^2)/4, or the exact ellipse G pi a^3 b^3/(a^2+b^2)
   std::optional<double> linear_density;            ///< [kg/m] instead of density times area
   std::optional<double> stretch_modulus;           ///< k_s [N]
+  bool inextensible = false;                       ///< k_s raised until the rod's own weight stretches it by at most 1e-5
   std::optional<Eigen::Matrix2d> bend_modulus;     ///< B [N m^2]; scalar alpha or [B1, B2] or 2x2 in the file
   std::optional<double> twist_modulus;             ///< beta [N m^2]
 };
