@@ -25,9 +25,9 @@ Bound bucklingBound(int edges)
 
 void buckle(StudyContext& context, bool clamped, int edges, const std::vector<double>& compressions, Plot& plot)
 {
-  RodCase c;   // EI = L = 1; the largest load strains it by 5e-5
+  RodCase c;   // EI = L = 1; the largest load strains it by 5e-6
   c.edges = edges;
-  c.stretch = 1e6;
+  c.stretch = 1e7;
   RodSetup rod = straightRod(c);
   rod.hold(0, 0, clamped);
   const int far = rod.hold(edges, edges, clamped);
@@ -99,17 +99,17 @@ void loadTheEnd(StudyContext& context, int edges, const std::vector<double>& loa
     const double seconds = threadSeconds() - begin;
     const CantileverTip exact = endLoadedCantilever(load);
     const double finer = 40.0 / edges;
-    const auto add = [&](const char* quantity, double measured, double expected) {
+    const auto add = [&](const char* quantity, double measured, double expected, double scale) {
       Row& row = context.row();
       row.set("case", std::string("end load, ") + quantity).set("edges", edges).set("parameter", load);
-      row.check(measured, expected, 0.005 * finer * finer * expected, "Bisshopp and Drucker 1945");
+      row.check(measured, expected, 0.005 * finer * finer * scale, "Bisshopp and Drucker 1945");
       row.set("relative_error", measured / expected - 1).set("cpu_seconds", seconds);
       if (!refused.empty())
         row.set("refused", refused);
     };
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    add("tip deflection", refused.empty() ? -rod.tip().z() : nan, exact.drop);
-    add("tip x", refused.empty() ? rod.tip().x() : nan, exact.extent);
+    add("tip deflection", refused.empty() ? -rod.tip().z() : nan, exact.drop, exact.drop);
+    add("tip x", refused.empty() ? rod.tip().x() : nan, exact.extent, 1.0);   // a position: in parts of the length
     Series& s = plot.at("end load " + std::to_string(load).substr(0, 4));
     s.x.push_back(edges);
     s.y.push_back(std::abs(-rod.tip().z() / exact.drop - 1));
@@ -137,6 +137,7 @@ void runElastica(StudyContext& context)
     context.progress(done++, total, "end load");
     loadTheEnd(context, edges, loads, plot);
   }
+  context.note("end load: the deflection within 0.5 % of itself, the tip's x within 0.5 % of the length.");
   context.note("parameter: end shortening over length, or end load P L^2/(E I). Bounds between the issue's follow second order.");
 }
 
