@@ -68,7 +68,7 @@ void runCantilever(StudyContext& context)
     gammas.push_back(std::pow(10.0, -2 + (context.quick() ? 1.0 : 0.25) * k));
   const int total = static_cast<int>(gammas.size() * edges.size());
 
-  Plot& errors = context.plot("cantilever_error", "Heavy cantilever: error of H/W (dashed laws in the table)", "free edges n", "relative error of H/W");
+  Plot& errors = context.plot("cantilever_error", "Heavy cantilever, static: error of H/W against resolution", "free edges n", "relative error of H/W");
   Plot& cost = context.plot("cantilever_cost", "Heavy cantilever, static: error against run time", "CPU time [s]", "relative error of H/W");
   double order = std::numeric_limits<double>::infinity();
   int done = 0;

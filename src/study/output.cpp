@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <ostream>
 
 #include <spawn.h>
@@ -106,6 +107,15 @@ void writeScript(std::ostream& out, const Plot& plot, const std::string& picture
     out << "set logscale x\nset format x \"%g\"\n";
   if (plot.log_y)
     out << "set logscale y\nset format y \"%g\"\n";
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  for (const Series& s : plot.series)
+    for (const double x : s.x)
+    {
+      least = std::min(least, x);
+      most = std::max(most, x);
+    }
+  if (least == most && least > 0)   // a single abscissa: gnuplot would complain
+    out << "set xrange [" << format(0.5 * least, "%g") << ":" << format(2 * most, "%g") << "]\n";
   std::size_t index = 0;
   for (const Series& s : plot.series)
   {
