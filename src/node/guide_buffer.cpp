@@ -4,49 +4,15 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "slender_sim/geometry/rotation.h"
+
 namespace slender {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kInstant = 1e-7;       // [s] for limits from the right; shorter than any step
 constexpr double kSame = 1e-10;         // [m], [rad], [m/s], [rad/s] round-off of evaluating the same motion twice
-
-Matrix3d cross(const Vector3d& v)
-{
-  Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-Quaterniond expMap(const Vector3d& r)
-{
-  const double angle = r.norm();
-  if (angle < 1e-12)
-    return Quaterniond(1.0, 0.5 * r.x(), 0.5 * r.y(), 0.5 * r.z()).normalized();
-  return Quaterniond(Eigen::AngleAxisd(angle, r / angle));
-}
-
-Vector3d logMap(const Quaterniond& q)
-{
-  const double sign = q.w() < 0.0 ? -1.0 : 1.0;   // the shorter way round
-  const double s = q.vec().norm();
-  if (s < 1e-12)
-    return 2.0 * sign * q.vec();
-  return 2.0 * std::atan2(s, sign * q.w()) * sign * q.vec() / s;
-}
-
-/// J with omega = J(r) dr/dt for the rotation exp(r), axes fixed in space.
-Matrix3d rotationRate(const Vector3d& r)
-{
-  const double a2 = r.squaredNorm(), a = std::sqrt(a2);
-  const Matrix3d c = cross(r);
-  const double f = a < 1e-4 ? 0.5 - a2 / 24.0 : (1.0 - std::cos(a)) / a2;
-  const double g = a < 1e-4 ? 1.0 / 6.0 - a2 / 120.0 : (a - std::sin(a)) / (a2 * a);
-  return Matrix3d::Identity() + f * c + g * c * c;
-}
 
 }  // namespace
 
@@ -145,7 +111,7 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
   const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = d * s * (1 - s) * (1 - s);
   const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - s) * (1 - 3 * s);
   const Vector3d r = h0 * o.r + h1 * o.r_rate, r_rate = dh0 * o.r + dh1 * o.r_rate;
-  const Quaterniond turn = expMap(r);
+  const Quaterniond turn = fromRotationVector(r);
   Motion m;
   m.X.position = followed.X.position + h0 * o.p + h1 * o.p_rate;
   m.V.linear = followed.V.linear + dh0 * o.p + dh1 * o.p_rate;
@@ -157,7 +123,7 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
 void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
 {
   const auto differ = [](const Vector3d& a, const Vector3d& b, double scale) { return (a - b).norm() > kSame * (1.0 + scale); };
-  const auto rotated = [](const Motion& a, const Motion& b) { return logMap(a.X.orientation * b.X.orientation.conjugate()); };
+  const auto rotated = [](const Motion& a, const Motion& b) { return rotationVector(a.X.orientation * b.X.orientation.conjugate()); };
   const Motion expected = blended(time, to);   // `to` was evaluated an instant away: allow for that
   const double speed = (to.V.linear.norm() + to.V.angular.norm()) * kInstant / kSame;
   if (!differ(from.X.position, expected.X.position, speed) && !differ(rotated(from, expected), Vector3d::Zero(), speed) &&
@@ -169,7 +135,7 @@ void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
   o.p = from.X.position - to.X.position;
   o.p_rate = from.V.linear - to.V.linear;
   o.r = rotated(from, to);
-  o.r_rate = rotationRate(o.r).inverse() * (from.V.angular - expMap(o.r) * to.V.angular);
+  o.r_rate = rotationRate(o.r).inverse() * (from.V.angular - fromRotationVector(o.r) * to.V.angular);
   o.duration = std::max({options_.catch_up_time, o.p.norm() / options_.catch_up_speed, o.r.norm() / options_.catch_up_turning});
   offset_ = o;
 }
