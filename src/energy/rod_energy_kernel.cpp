@@ -1,6 +1,7 @@
 // Compiled once per instruction set (SLENDER_ISA). Plain arrays only; nothing here may be emitted under a shared name.
 #include "slender_sim/energy/joint_stencil.h"
 #include "slender_sim/energy/rod_kernel.h"
+#include "slender_sim/linalg/flush_denormals.h"
 
 namespace slender {
 namespace SLENDER_ISA {
@@ -82,15 +83,10 @@ void copyEdge(const RodArrays& r, int to, int from)
   r.strain[to] = r.strain[from];
 }
 
-double evaluateFrames(const RodArrays& r)
+/// Tangents, lengths and frames of edges from .. to-1 (rounded up to whole packs).
+void evaluateEdges(const RodArrays& r, int from, int to, Pack& min_chi)
 {
-  const int n = r.nodes, edges = r.edges;
-  for (int k = 0; k < 3; ++k)
-    for (int i = 0; i < W + 1; ++i)
-      r.x[k][n + i] = r.closed ? r.x[k][i % n] : r.x[k][n - 1] + (i + 1) * (r.x[k][n - 1] - r.x[k][n - 2]);
-
-  Pack min_chi = Pack{} + 2.0;
-  for (int j = 0; j < edges; j += W)
+  for (int j = from; j < to; j += W)
   {
     const Vec3<Pack> e = load3(r.x, j + 1) - load3(r.x, j);
     const Pack length = squareRoot(dot(e, e));
@@ -113,36 +109,20 @@ double evaluateFrames(const RodArrays& r)
     store(r.inverse_length + j, inverse);
     store(r.strain + j, length * load(r.inverse_rest_length + j) - 1.0);
   }
-  for (int i = 1; i <= 2; ++i)
-    copyEdge(r, -i, r.closed ? edges - i : 0);
-  for (int i = 0; i < W + 2; ++i)
-    copyEdge(r, edges + i, r.closed ? i % edges : edges - 1);
-
-  // Twist: the angle from the transported frame to the next one, unwrapped next to where the turns would take it. Measured
-  // from the frames each time, so it never drifts however many turns it counts.
-  for (int i = -1; i <= n; i += W)
-  {
-    const Vec3<Pack> te = load3(r.t, i - 1), tf = load3(r.t, i), d = load3(r.d1, i - 1), df = load3(r.d1, i);
-    const Pack chi = 1.0 + dot(te, tf);
-    const Vec3<Pack> p = d - (te + tf) * (dot(d, tf) / chi);
-    const Pack angle = angleOf(dot(cross(tf, p), df), dot(p, df));
-    const Pack expected = load(r.base_twist + i) + load(r.turn + i) - load(r.turn + i - 1);
-    store(r.twist + i, angle + kTwoPi * nearest((expected - angle) * (1.0 / kTwoPi)));
-  }
-  if (r.closed)
-  {
-    r.twist[-1] = r.twist[n - 1];
-    r.twist[n] = r.twist[0];
-  }
-  else
-    r.twist[-1] = r.twist[0] = r.twist[n - 1] = r.twist[n] = 0.0;
-  double result = min_chi[0];
-  for (int k = 1; k < W; ++k)
-    result = min_chi[k] < result || min_chi[k] != min_chi[k] ? min_chi[k] : result;
-  return result;
 }
 
-/// Results of the last joints, ten wide: two carried over, eight new. Slot s holds joint (first - 2 + s).
+/// Twist of a pack of joints: the angle from the transported frame to the next one, unwrapped next to where the turns would take
+/// it. Measured from the frames each time, so it never drifts however many turns it counts.
+SLENDER_INLINE Pack jointTwist(const RodArrays& r, int i, const JointFrames<Pack>& s)
+{
+  const Pack chi = 1.0 + dot(s.te, s.tf);
+  const Vec3<Pack> p = s.d1e - (s.te + s.tf) * (dot(s.d1e, s.tf) / chi);
+  const Pack angle = angleOf(dot(cross(s.tf, p), s.d1f), dot(p, s.d1f));
+  const Pack expected = load(r.base_twist + i) + load(r.turn + i) - load(r.turn + i - 1);
+  return angle + kTwoPi * nearest((expected - angle) * (1.0 / kTwoPi));
+}
+
+/// The joints of a RodSweep by name, ten used of each sixteen: two carried over, eight new. Slot k is joint (next_joint - 2 + k).
 struct JointBuffer
 {
   double ee[6][16], ff[6][16], ef[3][3][16], e_te[3][16], e_tf[3][16], f_te[3][16], f_tf[3][16];
@@ -150,6 +130,7 @@ struct JointBuffer
   double ge[3][16], gf[3][16], gte[16], gtf[16];
   double stretch[16], bend_twist[16];
 };
+static_assert(sizeof(JointBuffer) == sizeof(RodSweep::joints), "RodSweep::kQuantities");
 
 SLENDER_INLINE void storeSym(double (*b)[16], const Sym3<Pack>& s)
 {
@@ -188,7 +169,9 @@ SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffe
   store(r.kappa2 + i, k.kappa2);
   JointGradient<Pack> g;
   JointHessian<Pack> h;
-  store(buffer.bend_twist + 2, jointEnergy<WithHessian>(s, k, load(r.twist + i), p, g, h));
+  const Pack twist = jointTwist(r, i, s);
+  store(r.twist + i, twist);
+  store(buffer.bend_twist + 2, jointEnergy<WithHessian>(s, k, twist, p, g, h));
 
   // stretching of the edge after the joint: 1/2 k_s strain^2 |eBar| (thesis 4.2.1, 4.4.1)
   const Pack ks = load(r.stretch + i), strain = load(r.strain + i) - load(r.rest_strain + i), inverse_rest = load(r.inverse_rest_length + i);
@@ -305,17 +288,16 @@ SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPan
   }
 }
 
+/// Joints from next_joint on, and the nodes between them.
 template <bool WithHessian>
-RodEvaluation evaluateForces(const RodArrays& r, RodPanel* panels)
+void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int to)
 {
   const int n = r.nodes;
-  JointBuffer b;
-  double* all = &b.ee[0][0];
-  for (unsigned k = 0; k < sizeof(JointBuffer) / sizeof(double); ++k)
-    all[k] = 0.0;
-
-  Pack stretch = {}, bend_twist = {}, potential = {}, min_chi = Pack{} + 2.0, max_strain = {};
-  for (int joint = -1; joint - 1 < n; joint += W)
+  JointBuffer& b = *reinterpret_cast<JointBuffer*>(&sweep.joints);
+  Pack stretch = load(sweep.sums[0]), bend_twist = load(sweep.sums[1]), potential = load(sweep.sums[2]);
+  Pack min_chi = load(sweep.sums[3]), max_strain = load(sweep.sums[4]);
+  int joint = sweep.next_joint;
+  for (; joint - 1 < to; joint += W)
   {
     evaluateJoints<WithHessian>(r, joint, b, min_chi);
     const int i = joint - 1;   // first node whose joints are all known
@@ -362,27 +344,90 @@ RodEvaluation evaluateForces(const RodArrays& r, RodPanel* panels)
       }
     }
   }
-  RodEvaluation result;
-  result.stretch = sum(stretch);
-  result.bend_twist = sum(bend_twist);
-  result.potential = sum(potential);
-  for (int k = 0; k < W; ++k)
-  {
-    result.min_chi = min_chi[k] < result.min_chi || min_chi[k] != min_chi[k] ? min_chi[k] : result.min_chi;
-    result.max_strain = max_strain[k] > result.max_strain ? max_strain[k] : result.max_strain;
-  }
-  return result;
+  sweep.next_joint = joint;
+  sweep.next_node = joint - 1 < n ? joint - 1 : n;
+  store(sweep.sums[0], stretch);
+  store(sweep.sums[1], bend_twist);
+  store(sweep.sums[2], potential);
+  store(sweep.sums[3], min_chi);
+  store(sweep.sums[4], max_strain);
 }
 
-RodEvaluation evaluate(const RodArrays& r, RodPanel* panels)
+void beginSweep(const RodArrays& r, RodSweep& sweep)
 {
-  return panels ? evaluateForces<true>(r, panels) : evaluateForces<false>(r, panels);
+  for (auto& quantity : sweep.joints)
+    for (double& value : quantity)
+      value = 0.0;
+  for (auto& lanes : sweep.sums)
+    for (double& value : lanes)
+      value = 0.0;
+  for (double& value : sweep.sums[3])
+    value = 2.0;
+  sweep.next_edge = 0;
+  sweep.next_joint = -1;
+  sweep.next_node = 0;
+  const int n = r.nodes;
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < W + 1; ++i)
+      r.x[k][n + i] = r.closed ? r.x[k][i % n] : r.x[k][n - 1] + (i + 1) * (r.x[k][n - 1] - r.x[k][n - 2]);
+}
+
+int advanceSweep(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int to)
+{
+  const FlushDenormals scope;
+  const int n = r.nodes, edges = r.edges;
+  if (r.closed || to > n)
+    to = n;
+  // nodes below `to` come in packs and need the edges one further on
+  const int ahead = to + 3 * W < edges ? to + 3 * W : edges;
+  if (sweep.next_edge < ahead)
+  {
+    Pack min_chi = load(sweep.sums[3]);
+    evaluateEdges(r, sweep.next_edge, ahead, min_chi);
+    store(sweep.sums[3], min_chi);
+    if (sweep.next_edge == 0)
+      for (int i = 1; i <= 2; ++i)
+        copyEdge(r, -i, r.closed ? edges - i : 0);
+    sweep.next_edge += (ahead - sweep.next_edge + W - 1) / W * W;
+    if (sweep.next_edge >= edges)
+      for (int i = 0; i < W + 2; ++i)
+        copyEdge(r, edges + i, r.closed ? i % edges : edges - 1);
+  }
+  if (panels)
+    evaluateJointsUpTo<true>(r, sweep, panels, to);
+  else
+    evaluateJointsUpTo<false>(r, sweep, panels, to);
+  if (sweep.next_node == n)
+  {
+    if (r.closed)
+    {
+      r.twist[-1] = r.twist[n - 1];
+      r.twist[n] = r.twist[0];
+    }
+    else
+      r.twist[-1] = r.twist[0] = r.twist[n - 1] = r.twist[n] = 0.0;
+  }
+  return sweep.next_node;
+}
+
+RodEvaluation endSweep(const RodSweep& sweep)
+{
+  RodEvaluation result;
+  result.stretch = sum(load(sweep.sums[0]));
+  result.bend_twist = sum(load(sweep.sums[1]));
+  result.potential = sum(load(sweep.sums[2]));
+  for (int k = 0; k < W; ++k)
+  {
+    result.min_chi = sweep.sums[3][k] < result.min_chi ? sweep.sums[3][k] : result.min_chi;
+    result.max_strain = sweep.sums[4][k] > result.max_strain ? sweep.sums[4][k] : result.max_strain;
+  }
+  return result;
 }
 
 }  // namespace
 
 extern const RodKernels rod_kernels;
-const RodKernels rod_kernels = {evaluateFrames, evaluate};
+const RodKernels rod_kernels = {beginSweep, advanceSweep, endSweep};
 
 }  // namespace SLENDER_ISA
 }  // namespace slender

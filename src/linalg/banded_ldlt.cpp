@@ -30,10 +30,21 @@ template <int HalfBandwidth, int Block>
 Inertia BandedLdlt<HalfBandwidth, Block>::factor(int count)
 {
   const int n = count < 0 ? blocks_ : count;
-  const int negative = kernels().factor(panels_.data(), n);
-  if (negative < 0)
-    return {0, 0, 1};
-  return {n * Block - negative, negative, 0};
+  BandCarry carry;
+  eliminate(0, n, nullptr, carry);
+  return {n * Block - carry.negative - carry.zero, carry.negative, carry.zero};
+}
+
+template <int HalfBandwidth, int Block>
+void BandedLdlt<HalfBandwidth, Block>::eliminate(int from, int to, double* x, BandCarry& carry)
+{
+  kernels().eliminate(panels_.data(), from, to, x, carry);
+}
+
+template <int HalfBandwidth, int Block>
+void BandedLdlt<HalfBandwidth, Block>::substitute(double* x) const
+{
+  kernels().substitute(panels_.data(), blocks_, x);
 }
 
 template <int HalfBandwidth, int Block>

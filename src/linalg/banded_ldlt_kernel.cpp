@@ -1,6 +1,7 @@
 // Compiled once per instruction set (SLENDER_ISA). Plain arrays only; nothing here may be emitted under a shared name.
 #include "slender_sim/linalg/banded_ldlt.h"
 #include "slender_sim/linalg/banded_ldlt_kernel.h"
+#include "slender_sim/linalg/flush_denormals.h"
 
 namespace slender {
 namespace SLENDER_ISA {
@@ -8,21 +9,47 @@ namespace {
 
 using V4 = double __attribute__((vector_size(32), aligned(32), may_alias));
 using V8 = double __attribute__((vector_size(64), aligned(64), may_alias));
+using V4u = double __attribute__((vector_size(32), aligned(8), may_alias));
 using V8u = double __attribute__((vector_size(64), aligned(8), may_alias));   // rows of right-hand sides, any alignment
 
 inline __attribute__((always_inline)) V4 low(V8 v) { return V4{v[0], v[1], v[2], v[3]}; }
 inline __attribute__((always_inline)) V4 high(V8 v) { return V4{v[4], v[5], v[6], v[7]}; }
 inline __attribute__((always_inline)) V8 join(V4 a, V4 b) { return V8{a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]}; }
 
-/// Right-looking: each block column is factored, then subtracts L D L^T from the two blocks that it reaches.
-/// The trailing 8 x 8 window travels in registers (w: rows of the next two blocks for the next block's columns,
-/// c: the diagonal block after that), so that memory is touched once per panel.
-int factorBand(RodPanel* panels, int blocks)
+/// x := L^-1 x for one block; `ahead` is what is to be subtracted from the next two blocks.
+inline __attribute__((always_inline)) void forwardBlock(const V4 (&d)[4], const V8 (&l)[4], double* x, V8& ahead)
 {
+  V4 y = *reinterpret_cast<V4u*>(x) - low(ahead);
+  ahead = join(high(ahead), V4{});
+  for (int c = 0; c < 4; ++c)
+  {
+    const double v = y[c];
+    V4 column = d[c];
+    for (int r = 0; r <= c; ++r)
+      column[r] = 0.0;
+    y -= column * v;
+    ahead += l[c] * v;
+  }
+  *reinterpret_cast<V4u*>(x) = y;
+}
+
+/// Right-looking: each block column is factored, then subtracts L D L^T from the two blocks that it reaches.
+/// What is still to be subtracted (window: rows of the next two blocks in the next block's columns, corner: the diagonal
+/// block after that) travels in registers, so memory is touched once per panel. The forward substitution of one
+/// right-hand side rides along: its chain of dependences hides behind the factorisation's.
+void eliminateBand(RodPanel* panels, int from, int to, double* x, BandCarry& carry)
+{
+  const FlushDenormals scope;
+  V8 window[4];
+  V4 corner[4];
+  for (int c = 0; c < 4; ++c)
+  {
+    window[c] = *reinterpret_cast<V8*>(carry.window[c]);
+    corner[c] = *reinterpret_cast<V4*>(carry.corner[c]);
+  }
+  V8 ahead = *reinterpret_cast<V8*>(carry.ahead);
   int negative = 0;
-  V8 window[4] = {};       // to subtract from the coming panel: column c, its eight rows (own block, next block)
-  V4 corner[4] = {};       // to subtract from the panel after it: diagonal block
-  for (int b = 0; b < blocks; ++b)
+  for (int b = from; b < to; ++b)
   {
     RodPanel& p = panels[b];
     V4 d[4];
@@ -38,7 +65,10 @@ int factorBand(RodPanel* panels, int blocks)
       const double pivot = d[c][c];
       // also false for NaN
       if (!(pivot > 0 || pivot < 0) || pivot - pivot != 0)
-        return -1 - (4 * b + c);
+      {
+        ++carry.zero;
+        return;
+      }
       negative += pivot < 0;
       const double inverse = 1.0 / pivot;
       const V4 dl = d[c] * inverse;
@@ -73,30 +103,22 @@ int factorBand(RodPanel* panels, int blocks)
         w += high(l[c]) * u[c][4 + k];
       corner[k] = w;
     }
+    if (x)
+      forwardBlock(d, l, x + 4 * b, ahead);
   }
-  return negative;
+  for (int c = 0; c < 4; ++c)
+  {
+    *reinterpret_cast<V8*>(carry.window[c]) = window[c];
+    *reinterpret_cast<V4*>(carry.corner[c]) = corner[c];
+  }
+  *reinterpret_cast<V8*>(carry.ahead) = ahead;
+  carry.negative += negative;
 }
 
-void solveBand(const RodPanel* panels, int blocks, double* x)
+/// x := L^-T D^-1 x
+void substituteBand(const RodPanel* panels, int blocks, double* x)
 {
-  V8 carry = {};   // to subtract from the next two blocks
-  for (int b = 0; b < blocks; ++b)
-  {
-    const RodPanel& p = panels[b];
-    double* xb = x + 4 * b;
-    double y[4];
-    for (int r = 0; r < 4; ++r)
-      y[r] = xb[r] - carry[r];
-    carry = join(high(carry), V4{});
-    for (int c = 0; c < 4; ++c)
-    {
-      for (int r = c + 1; r < 4; ++r)
-        y[r] -= p.diag[c][r] * y[c];
-      carry += *reinterpret_cast<const V8*>(p.below[c]) * y[c];
-    }
-    for (int r = 0; r < 4; ++r)
-      xb[r] = y[r];
-  }
+  const FlushDenormals scope;
   V8 ahead = {};   // solution of the two blocks below
   for (int b = blocks - 1; b >= 0; --b)
   {
@@ -118,8 +140,28 @@ void solveBand(const RodPanel* panels, int blocks, double* x)
   }
 }
 
+void solveBand(const RodPanel* panels, int blocks, double* x)
+{
+  const FlushDenormals scope;
+  V8 ahead = {};
+  for (int b = 0; b < blocks; ++b)
+  {
+    const RodPanel& p = panels[b];
+    V4 d[4];
+    V8 l[4];
+    for (int c = 0; c < 4; ++c)
+    {
+      d[c] = *reinterpret_cast<const V4*>(p.diag[c]);
+      l[c] = *reinterpret_cast<const V8*>(p.below[c]);
+    }
+    forwardBlock(d, l, x + 4 * b, ahead);
+  }
+  substituteBand(panels, blocks, x);
+}
+
 void solveBand8(const RodPanel* panels, int blocks, double* x)
 {
+  const FlushDenormals scope;
   V8u* rows = reinterpret_cast<V8u*>(x);
   for (int b = 0; b < blocks; ++b)
   {
@@ -154,7 +196,7 @@ void solveBand8(const RodPanel* panels, int blocks, double* x)
 }  // namespace
 
 extern const BandKernels band_kernels;
-const BandKernels band_kernels = {factorBand, solveBand, solveBand8};
+const BandKernels band_kernels = {eliminateBand, substituteBand, solveBand, solveBand8};
 
 }  // namespace SLENDER_ISA
 }  // namespace slender

@@ -127,6 +127,8 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
 StepReport RodStepper::Impl::finishEquilibrium(RodState& state, const RodInputs& inputs, StepReport& report)
 {
   report.residual = system.residual() / system.forceScale();
+  for (int j = 0; j < model->edges(); ++j)
+    report.max_strain = std::max(report.max_strain, std::abs(system.arrays().strain[j]));
   computeWrenches(inputs, 0.0);
   for (std::size_t k = 0; k < work.grasps.size(); ++k)
     if (work.grasps[k].active)

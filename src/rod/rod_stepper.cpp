@@ -37,7 +37,6 @@ RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t) :
 void RodStepper::Impl::resizeFor(const RodState& state)
 {
   const std::size_t grasps = state.grasps.size();
-  start_poses.resize(grasps);
   stage_poses.resize(grasps);
   wrenches.resize(grasps);
 }
@@ -104,56 +103,45 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
 
   const bool explicit_step = time.integrator == Integrator::symplectic_euler;
   const bool adaptive = time.error_tolerance > 0 && !explicit_step;
-  double t = 0.0, h = adaptive && adaptive_step > 0 ? std::min(adaptive_step, duration) : duration;
-  int cuts = 0;
+  double t = 0.0, h = adaptive && work.next_step > 0 ? work.next_step : duration;
   while (t < duration)
   {
-    // the last substep ends exactly on the step; a sliver would be worse than a slightly longer one
+    // the last substep ends exactly with the step; a sliver would be worse than a slightly longer one
     const bool last = t + h > duration * (1 - 1e-9);
     const double length = last ? duration - t : h;
+    const bool can_shorten = !explicit_step && 0.5 * length >= time.min_step;
     StepReport sub;
     const StepFailure failure = explicit_step ? explicitStep(inputs, duration, t, length, sub) : implicitStep(inputs, duration, t, length, sub);
-    if (failure != StepFailure::none)
+    const double ratio = sub.error_estimate / time.error_tolerance;
+    const bool inaccurate = adaptive && failure == StepFailure::none && ratio > 1 && can_shorten;
+    if (failure != StepFailure::none || inaccurate)
     {
       report.iterations += sub.iterations;
       report.factorizations += sub.factorizations;
-      if (explicit_step || cuts >= time.newton.max_cuts || 0.5 * length < time.min_step)
+      if (!inaccurate && (!can_shorten || length < duration * std::ldexp(1.0, -time.newton.max_cuts)))
         return refuse(report, failure, explainFailure(failure, length, explicit_step));
-      ++cuts;
-      ++report.cut_steps;
-      h = 0.5 * length;
+      report.cut_steps += !inaccurate;
+      h = length * (inaccurate ? std::clamp(stepFactor(ratio), 0.2, 0.8) : 0.5);
       continue;
     }
-    double growth = cuts > 0 ? 2.0 : 1.0;
-    if (adaptive)
-    {
-      const int p = order(time.integrator);
-      const double wanted = 0.9 * std::pow(time.error_tolerance / std::max(sub.error_estimate, 1e-300), 1.0 / (p + 1));
-      if (sub.error_estimate > time.error_tolerance && 0.5 * length >= time.min_step)
-      {
-        report.iterations += sub.iterations;
-        report.factorizations += sub.factorizations;
-        h = length * std::clamp(wanted, 0.2, 0.8);
-        continue;
-      }
-      growth = std::clamp(wanted, 0.5, 2.0);
-    }
     std::swap(work, next);
+    ++sub.substeps;
     report.merge(sub);
-    ++report.substeps;
     t = last ? duration : t + length;
-    if (adaptive && !(last && growth > 1 && length < h))
-      adaptive_step = length * growth;
-    h = std::min(h * (adaptive ? 1.0 : growth), duration);
-    if (adaptive)
-      h = std::max(adaptive_step, time.min_step);
-    cuts = std::max(cuts - 1, 0);
+    h = std::max(last && adaptive ? h : 0.0, length * (adaptive ? std::clamp(stepFactor(ratio), 0.5, 2.0) : 2.0));
   }
+  work.next_step = adaptive ? std::min(h, duration) : 0.0;
   for (std::size_t k = 0; k < work.grasps.size(); ++k)
     if (work.grasps[k].active)
       work.grasps[k].X_WG = graspPose(state.grasps[k], inputs.grasps[k], duration, 1.0, &work.grasps[k].velocity);
   state = work;
   return report;
+}
+
+/// Next step length over this one for a local error that is `ratio` times the tolerance, with a margin.
+double RodStepper::Impl::stepFactor(double ratio) const
+{
+  return 0.9 * std::pow(std::max(ratio, 1e-12), -1.0 / (order(time.integrator) + 1));
 }
 
 StepReport RodStepper::Impl::refuse(StepReport& report, StepFailure failure, const std::string& message)

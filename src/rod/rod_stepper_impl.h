@@ -28,6 +28,7 @@ public:
 private:
   // rod_stepper.cpp
   void resizeFor(const RodState& state);
+  double stepFactor(double ratio) const;
   static bool inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what);
   static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
   void placeAt(const RodInputs& inputs, double duration, double fraction);
@@ -57,8 +58,7 @@ private:
   StepPlan plan;
   Eigen::Matrix3Xd stage_q, stage_v;
   Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end;
-  std::vector<Pose> start_poses, stage_poses;
-  double adaptive_step = 0.0;
+  std::vector<Pose> stage_poses;
 };
 
 }  // namespace slender

@@ -25,7 +25,7 @@ constexpr double kFoldedChi = 1.5e-3;
 
 /// Minimises a system's energy by Newton's method from its trial configuration.
 ///
-/// System offers evaluate(with_hessian), factor(shift), solve(), moveAlong(alpha), accept(), saveBase(), restoreBase() and
+/// System offers evaluate(with_hessian, shift), solve(), moveAlong(alpha), accept(), saveBase(), restoreBase() and
 /// the measures used below (see RodSystem). A Hessian with negative eigenvalues (known from the inertia of its LDL^T) is
 /// shifted by a positive diagonal until it is definite, so that the direction descends.
 /// Steps are accepted by a watchdog [Nocedal & Wright, Numerical Optimization, 15.6]: nearly inextensible bodies gain a little
@@ -42,7 +42,8 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     return result;
   };
 
-  auto trial = system.evaluate(true);
+  auto trial = system.evaluate(true, 0.0);
+  ++result.factorizations;
   if (!std::isfinite(trial.energy()))
     return fail(StepFailure::state_not_finite);
   if (!(trial.min_chi > kFoldedChi))
@@ -56,17 +57,13 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
   {
     // round-off of the energy's sum; differences below it mean nothing
     const double noise = 1e-13 * (std::abs(trial.stretch) + std::abs(trial.bend_twist) + std::abs(trial.potential));
-    shift = shift > 1e-2 ? 0.1 * shift : 0.0;
-    Inertia inertia = system.factor(shift);
-    ++result.factorizations;
-    while (!inertia.positiveDefinite())
+    while (!trial.inertia.positiveDefinite())
     {
       shift = shift > 0 ? 10.0 * shift : 1e-1;
       if (shift > kMaxShift)
         return fail(StepFailure::singular_matrix);
       system.moveAlong(0.0);
-      system.evaluate(true);
-      inertia = system.factor(shift);
+      trial = system.evaluate(true, shift);
       ++result.factorizations;
     }
     result.definite = shift == 0.0;
@@ -91,10 +88,12 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     if (result.iterations >= config.max_iterations)
       return fail(StepFailure::newton_diverged);
 
+    shift = shift > 1e-2 ? 0.1 * shift : 0.0;
     for (;;)
     {
       system.moveAlong(alpha);
-      trial = system.evaluate(true);
+      trial = system.evaluate(true, shift);
+      ++result.factorizations;
       const bool sound = std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi;
       if (sound && (!strict || trial.energy() <= energy + kArmijo * alpha * slope + noise))
         break;
@@ -115,7 +114,8 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       {
         system.restoreBase();
         system.moveAlong(0.0);
-        trial = system.evaluate(true);
+        trial = system.evaluate(true, shift);
+        ++result.factorizations;
         strict = true;
       }
     }

@@ -41,15 +41,27 @@ struct RodEvaluation
   double stretch = 0, bend_twist = 0, potential = 0;   ///< [J]; potential: inertia and loads
   double min_chi = 2;         ///< smallest 1 + t.t' over joints and over transports in time; 0 = folded back
   double max_strain = 0;      ///< largest |axial strain|
+  Inertia inertia;            ///< of the Hessian, when it was factored
   double energy() const { return stretch + bend_twist + potential; }
+};
+
+/// An evaluation under way along the rod: results of the last joints and running sums. A long rod is treated in pieces that
+/// stay in the cache between assembling and eliminating them.
+struct RodSweep
+{
+  static constexpr int kQuantities = 46;
+  alignas(64) double joints[kQuantities][16];   ///< see JointBuffer in the kernel
+  alignas(64) double sums[5][8];                ///< stretch, bend_twist, potential, min_chi, max_strain by lane
+  int next_edge, next_joint, next_node;
 };
 
 struct RodKernels
 {
-  /// Tangents, frames, twists and strains at x. Returns the smallest 1 + t_base . t.
-  double (*frames)(const RodArrays& rod);
-  /// Energy and gradient; second derivatives into `panels` unless it is null. After frames().
-  RodEvaluation (*forces)(const RodArrays& rod, BandPanel<10, 4>* panels);
+  void (*begin)(const RodArrays& rod, RodSweep& sweep);
+  /// Frames, twists, strains, energy and gradient of all nodes below `to` (at least); second derivatives into `panels` unless
+  /// it is null. Returns the first node not done. A closed rod is done in one go.
+  int (*advance)(const RodArrays& rod, RodSweep& sweep, BandPanel<10, 4>* panels, int to);
+  RodEvaluation (*end)(const RodSweep& sweep);
 };
 
 namespace baseline { extern const RodKernels rod_kernels; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "slender_sim/geometry/pose.h"
@@ -11,12 +12,18 @@ namespace slender {
 /// Positions: cubic Hermite segments whose slopes are the three-point (non-uniform) finite differences of the samples.
 /// Orientations: the same on rotation vectors, each segment R(t) = R_k exp(phi(t)), with phi cubic Hermite from 0 to
 /// log(R_k^T R_{k+1}) and angular velocities at the samples by the three-point difference. Outside the samples the end pose
-/// is held with zero velocity. Sparse (10..60 Hz) and jittery input so reaches the rod without jumps of velocity.
+/// is held with zero velocity, so the slopes of the first and last sample are zero. Sparse (10..60 Hz) and jittery input so
+/// reaches the rod without jumps of velocity. Two exceptions to the three-point slope: beside a sample with the same value it
+/// is zero (a pause stays a pause), and where one interval is under a quarter of the other (a burst of late messages) it is
+/// the chord over both, whose noise does not grow with the shortness of the interval.
+/// q and -q are the same orientation; between samples the turn is the shorter one, so turns must be sampled more often than
+/// every half turn.
 class PoseTrajectory
 {
 public:
   PoseTrajectory() = default;
   /// times [s] strictly increasing, as many as poses, at least one; throws std::invalid_argument otherwise.
+  /// Orientations are normalised; a zero quaternion or a number that is not finite throws as well.
   PoseTrajectory(std::vector<double> times, std::vector<Pose> poses);
 
   /// Appends a later sample; throws std::invalid_argument when time is not after the last one.
@@ -27,11 +34,15 @@ public:
   bool empty() const { return times_.empty(); }
   double firstTime() const { return times_.front(); }
   double lastTime() const { return times_.back(); }
+  std::size_t size() const { return times_.size(); }
 
   /// Pose and velocity at `time`; not empty.
   Pose evaluate(double time, Twist* velocity = nullptr) const;
 
 private:
+  /// Velocity of sample k by differences: linear in world axes, angular in the axes of the sample itself.
+  Twist slope(std::size_t k) const;
+
   std::vector<double> times_;
   std::vector<Pose> poses_;
 };

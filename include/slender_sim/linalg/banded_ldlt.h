@@ -44,6 +44,15 @@ struct BandPanel
   double diag[Block][Block];      ///< diag[c][r], r >= c
 };
 
+/// Where an elimination stands: what the blocks so far subtract from the next ones. Zero at the start.
+struct BandCarry
+{
+  alignas(64) double window[4][8] = {};
+  alignas(64) double ahead[8] = {};
+  alignas(64) double corner[4][4] = {};
+  int negative = 0, zero = 0;
+};
+
 /// Symmetric band matrix with LDL^T factorisation in place, no pivoting [Golub & Van Loan, Matrix Computations, 4.1, 4.3].
 ///
 /// Column j of block b = j / Block reaches down to row b*Block + HalfBandwidth, so no entry is further than HalfBandwidth
@@ -63,9 +72,15 @@ public:
   Panel* panels() { return panels_.data(); }
   const Panel* panels() const { return panels_.data(); }
 
-  /// Factors the first `count` blocks (all when negative) in place. Entries coupling them to later blocks are ignored
-  /// only if they are zero. A pivot that is zero or not finite counts as `zero` and stops the factorisation.
+  /// Factors the first `count` blocks (all when negative) in place; their coupling to later blocks must be zero.
+  /// A pivot that is zero or not finite counts as `zero` and stops the factorisation.
   Inertia factor(int count = -1);
+
+  /// The same by pieces, for callers that assemble block after block: factors blocks from..to-1, and when x is given takes
+  /// its rows to L^-1 x on the way. All entries of these blocks must be there; later ones need not.
+  void eliminate(int from, int to, double* x, BandCarry& carry);
+  /// x := L^-T D^-1 x, which completes a solution begun by eliminate().
+  void substitute(double* x) const;
 
   /// x := A^-1 x after factor(); x has Block doubles per factored block.
   void solve(double* x, int count = -1) const;

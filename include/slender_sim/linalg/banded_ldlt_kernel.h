@@ -4,12 +4,13 @@ namespace slender {
 
 template <int HalfBandwidth, int Block>
 struct BandPanel;
+struct BandCarry;
 
 /// Entry points of one instruction set's factorisation (src/linalg/banded_ldlt_kernel.cpp is compiled once for each).
 struct BandKernels
 {
-  /// Returns the number of negative pivots, or -1 - i when pivot i is zero or not finite.
-  int (*factor)(BandPanel<10, 4>* panels, int blocks);
+  void (*eliminate)(BandPanel<10, 4>* panels, int from, int to, double* x, BandCarry& carry);
+  void (*substitute)(const BandPanel<10, 4>* panels, int blocks, double* x);
   void (*solve)(const BandPanel<10, 4>* panels, int blocks, double* x);
   void (*solve8)(const BandPanel<10, 4>* panels, int blocks, double* x);
 };

@@ -18,6 +18,9 @@ public:
   void resize(int blocks, bool closed);
   int blocks() const { return band_.blocks(); }
   RodPanel* panels() { return band_.panels(); }
+  bool closed() const { return closed_; }
+  /// The band itself; of an open rod that is the whole matrix.
+  BandedLdlt<10, 4>& band() { return band_; }
 
   /// Factors in place; see BandedLdlt.
   Inertia factor();

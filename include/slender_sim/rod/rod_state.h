@@ -36,6 +36,7 @@ struct RodState
 
   /// Integrator memory (empty when the integrator has none, or has not stepped yet).
   double last_step = 0.0;                       ///< [s]
+  double next_step = 0.0;                       ///< [s] where the error control left off, 0 = nowhere
   Eigen::Matrix3Xd a;                           ///< accelerations
   Eigen::Matrix3Xd x_previous, v_previous;      ///< multistep methods
   /// With Rayleigh stiffness damping only: per node, then two per grasp, (stretch of the edge after the node, kappa1, kappa2, twist).
@@ -45,7 +46,7 @@ struct RodState
   /// Forgets the integrator's memory: after a grasp was taken or released, or the state was edited.
   void forgetHistory()
   {
-    last_step = 0.0;
+    last_step = next_step = 0.0;
     for (auto* m : {&a, &x_previous, &v_previous})
       m->resize(3, 0);
     for (auto* m : {&strain_rate, &strain_rate_previous, &strain_previous})

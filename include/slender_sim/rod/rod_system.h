@@ -56,11 +56,10 @@ public:
   /// `viscous_strain` with weights 1 : ratio, which is the elastic force plus k ratio (strain - viscous_strain).
   void setResponse(double viscous_ratio, const Eigen::Matrix4Xd* viscous_strain);
 
-  /// Everything at the trial configuration; with_hessian also assembles the matrix.
-  RodEvaluation evaluate(bool with_hessian);
-  /// Factors the assembled matrix plus shift times a positive diagonal. The matrix is consumed.
-  Inertia factor(double shift);
-  /// direction() := -K^-1 gradient.
+  /// Everything at the trial configuration; with_hessian also assembles and factors the matrix plus shift times a positive
+  /// diagonal (result.inertia), and begins the solution of solve().
+  RodEvaluation evaluate(bool with_hessian, double shift = 0.0);
+  /// direction() := -K^-1 gradient of the last evaluate(true).
   void solve();
   /// Trial := base + alpha direction.
   void moveAlong(double alpha);
@@ -100,8 +99,10 @@ private:
   void composeClamp(int grasp, int side);
   void respond(ClampJoint& clamp) const;
   void evaluateClamp(ClampJoint& clamp, bool with_hessian, RodEvaluation& sum);
-  void fixHeld(bool with_hessian);
-  void fixUnknown(int node, int component);
+  void takeReactions(int from, int to);
+  void fixPanels(int from, int to);
+  void fixUnknown(int node, int component, int from, int to);
+  void addShift(int from, int to, double shift);
   void wrapHalo(double* p, int count) const;
   int before(int node) const { return node > 0 ? node - 1 : model_.edges() - 1; }
 
@@ -109,7 +110,7 @@ private:
   RodArrays a_;
   std::vector<AlignedVector<double>> storage_;
   CyclicBandedLdlt matrix_;
-  AlignedVector<double> gradient_, direction_, x_base_[3], saved_[10];
+  AlignedVector<double> gradient_, direction_, reduced_, x_base_[3], saved_[10];
   std::vector<ClampJoint> saved_clamps_;
   AlignedVector<double> stretch_, b11_, b12_, b22_, beta_, rest_k1_, rest_k2_, rest_m_;   ///< elastic response as composed
 
@@ -119,7 +120,7 @@ private:
   std::vector<int> held_nodes_, held_angles_;      ///< nodes, edges whose unknowns are prescribed
   std::vector<Eigen::Vector4d> reactions_;         ///< gradient at held_nodes_ (x, y, z) before it is cleared
   std::vector<double> angle_reactions_;            ///< likewise at held_angles_
-  double max_stretch_modulus_ = 0, min_rest_length_ = 0, shift_x_ = 0, shift_theta_ = 0;
+  double max_stretch_modulus_ = 0, min_rest_length_ = 0, shift_x_ = 0, shift_theta_ = 0, spin_ = 0;
 };
 
 /// Frame (t, d1, d2) of the section at a node: the mean of the two edges' frames, or at the end of an open rod the end edge's frame

@@ -21,7 +21,7 @@ struct PolylineCurve { std::vector<Eigen::Vector3d> points; std::optional<int> e
 struct ArcCurve      { Eigen::Vector3d center{0, 0, 0}, start{1, 0, 0}, axis{0, 0, 1}; double angle = 1.0; int edges = 50; };
 struct HelixCurve    { Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1}; double radius = 0.1, pitch = 0.05, turns = 3; int edges = 150; };
 struct CatenaryCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; double length = 1.2; int edges = 50; };  ///< hangs along gravity (or -z)
-struct FileCurve     { std::string path; std::optional<int> edges; };                          ///< CSV: x,y,z per line, '#' comments
+struct FileCurve     { std::string path; std::vector<Eigen::Vector3d> points; std::optional<int> edges; };   ///< CSV: x,y,z per line
 using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, FileCurve>;
 
 /// Radii [m]; a vector has one entry per edge, or two (linear taper from the first to the last edge), or one.
@@ -42,6 +42,7 @@ struct Material
   Torsion torsion = Torsion::polar;                ///< G A (a^2+b^2)/4, or the exact ellipse G pi a^3 b^3/(a^2+b^2)
   std::optional<double> linear_density;            ///< [kg/m] instead of density times area
   std::optional<double> stretch_modulus;           ///< k_s [N]
+  bool inextensible = false;                       ///< k_s raised until the rod's own weight stretches it by at most 1e-5
   std::optional<Eigen::Matrix2d> bend_modulus;     ///< B [N m^2]; scalar alpha or [B1, B2] or 2x2 in the file
   std::optional<double> twist_modulus;             ///< beta [N m^2]
 };
@@ -88,7 +89,7 @@ struct RodConfig
   bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
   double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
   Eigen::Vector3d director{0, 0, 0};           ///< d1 at the first edge (projected); zero: chosen automatically
-  CrossSection cross_section;
+  CrossSection cross_section{{0.005}, {0.005}};
   Material material;
   Damping damping;
   std::vector<GraspConfig> grasps;

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -15,6 +18,16 @@ struct SceneState
   double time = 0.0;          ///< simulated [s] = steps * step length
   std::uint64_t steps = 0;
   std::vector<RodState> rods;
+  /// Per grasp of the scene: the held section seen from the pose that drives it; identity with `attach: section`.
+  std::vector<Pose> grasp_offsets;
+  std::vector<Wrench> wrenches;   ///< per grasp of the scene, of the last step
+};
+
+/// The scene was read, but its equilibrium (`start: equilibrium`) could not be found.
+class SimulationError : public std::runtime_error
+{
+public:
+  using std::runtime_error::runtime_error;
 };
 
 /// Inputs of one step, latched before it. Indices follow the scene's order of grasps (over all rods).
@@ -31,7 +44,8 @@ struct GraspRef { int rod; int index; const GraspConfig* config; };
 class Simulation
 {
 public:
-  /// Throws SceneError (scene/reader.h) when the configuration cannot be built. With `start: equilibrium` it solves for it.
+  /// Throws SceneError (scene/reader.h) when the configuration cannot be built. With `start: equilibrium` it solves for it, and
+  /// throws SimulationError when there is none to be found.
   explicit Simulation(SceneConfig config);
 
   const SceneConfig& config() const { return config_; }
@@ -42,28 +56,53 @@ public:
   /// Inputs as the scene itself defines them at the end of the coming step: tables evaluated, everything else held where it is.
   SceneInputs defaultInputs() const;
 
-  /// One step of config().time.step. On failure the state is untouched.
+  /// The pose of the held section when the driving frame M of a grasp (a gripper, a body) is at X_WM: with `attach: section` the
+  /// same, else X_WM and the offset taken when the grasp began (or the one last set).
+  GraspTarget targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity = std::nullopt) const;
+  /// `attach: initial`: takes the offset between the driving frame now at X_WM and the held section. No effect otherwise.
+  void setOffset(int grasp, const Pose& X_WM);
+
+  /// One step of config().time.step. On failure the state is untouched. Throws std::invalid_argument unless there is one grasp
+  /// target per grasp of the scene.
   StepReport step(const SceneInputs& inputs);
+
+  /// Threads for scenes of several rods (at least 1; default: what OpenMP offers). Results do not depend on it.
+  void setThreads(int threads);
 
   /// Back to the initial state.
   void reset();
 
-  /// Takes hold of nodes first..last of a rod as they are now, under the name of an existing grasp of that rod.
+  /// Takes hold of nodes first..last of a rod as they are now, under the name of an existing grasp of that rod. With
+  /// `attach: initial` a table's offset is taken anew; other motions set theirs when their next pose comes (setOffset).
+  /// Throws std::invalid_argument: no such grasp or nodes, overlap with another active grasp, several nodes held by position.
   void attach(int grasp, int first_node, int last_node, Hold hold);
   void release(int grasp);
 
   const Wrench& wrench(int grasp) const;
   RodEnergies energies(int rod) const;
 
-  /// Exact restart. save writes a temporary file and renames it; load throws std::runtime_error naming what does not fit.
+  /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could
+  /// not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a shortened one is refused
+  /// and the state stays as it is.
   void save(const std::string& path) const;
   void load(const std::string& path);
 
 private:
+  void buildRods();
+  void findEquilibrium();
+  SceneInputs inputsAt(double time) const;
+  std::vector<RodInputs> rodInputs(const SceneInputs& inputs) const;
+  GraspState& graspState(int grasp) { return state_.rods[grasps_[grasp].rod].grasps[grasps_[grasp].index]; }
+  const GraspState& graspState(int grasp) const { return state_.rods[grasps_[grasp].rod].grasps[grasps_[grasp].index]; }
+  void checkGrasp(int grasp) const;
+  void takeWrenches();
+  std::uint64_t fingerprint() const;
+
   SceneConfig config_;
   SceneState state_, initial_;
   std::vector<RodStepper> steppers_;
   std::vector<GraspRef> grasps_;
+  int threads_ = 0;   // 0: as OpenMP says
 };
 
 }  // namespace slender

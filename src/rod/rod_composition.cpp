@@ -1,0 +1,166 @@
+// What a rod's equations consist of at the moment: held parts, clamps, joints and their stiffness.
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/geometry/rotation.h"
+#include "slender_sim/rod/rod_system.h"
+
+namespace slender {
+
+void RodSystem::compose(const RodState& state)
+{
+  const auto same = [](const GraspState& a, const GraspState& b) {
+    return a.active == b.active && a.first_node == b.first_node && a.last_node == b.last_node && a.holds_frame == b.holds_frame;
+  };
+  const bool unchanged = !held_.empty() && grasps_.size() == state.grasps.size() &&
+                         std::equal(grasps_.begin(), grasps_.end(), state.grasps.begin(), same);
+  grasps_ = state.grasps;
+  if (unchanged)
+    return;
+
+  const int n = a_.nodes, edges = a_.edges;
+  held_.assign(n, 0);
+  held_nodes_.clear();
+  held_angles_.clear();
+  std::vector<char> jointless(n, 0);
+  if (!model_.closed)
+    jointless[0] = jointless[n - 1] = 1;
+  for (const GraspState& g : grasps_)
+    if (g.active)
+      for (int i = g.first_node; i <= g.last_node; ++i)
+      {
+        held_nodes_.push_back(i);
+        held_[i] = static_cast<int>(held_nodes_.size());
+        if (g.holds_frame)
+          jointless[i] = 1;
+        if (i < g.last_node)
+          held_angles_.push_back(i);
+      }
+  reactions_.assign(held_nodes_.size(), Eigen::Vector4d::Zero());
+  angle_reactions_.assign(held_angles_.size(), 0.0);
+
+  // Voronoi lengths of the joints that remain, with the half cells of the clamps next to them
+  std::vector<double> length(n, 0.0);
+  for (int i = 0; i < n; ++i)
+    if (!jointless[i])
+      length[i] = 0.5 * (model_.rest_length[before(i)] + model_.rest_length[i]);
+  clamps_.clear();
+  for (int g = 0; g < static_cast<int>(grasps_.size()); ++g)
+    if (grasps_[g].active && grasps_[g].holds_frame)
+      for (int side = 0; side < 2; ++side)
+      {
+        const int node = side ? grasps_[g].last_node : grasps_[g].first_node;
+        if (!model_.closed && node == (side ? n - 1 : 0))
+          continue;
+        ClampJoint c;
+        c.grasp = g;
+        c.side = side;
+        c.node = node;
+        c.edge = side ? node : before(node);
+        const double h = model_.rest_length[c.edge];
+        double l = 0.5 * h;
+        // Joints sample the curvature at the nodes: a trapezoidal rule from a clamp on. Gregory's end correction moves h/12 of
+        // the clamp's weight to the next joint and removes the leading error, the slope of the curvature at the clamp.
+        const int next = side ? (node + 1) % n : before(node), after = side ? (next + 1) % n : (model_.closed ? before(next) : next - 1);
+        const bool has_after = model_.closed || (after >= 0 && after < n);
+        if (!jointless[next] && has_after && !jointless[after])
+        {
+          l -= h / 12.0;
+          length[next] += h / 12.0;
+        }
+        const double half_share = 0.5 * h / (model_.closed || (node > 0 && node < n - 1) ? 0.5 * (model_.rest_length[before(node)] + model_.rest_length[node]) : 0.5 * h);
+        c.b11 = model_.bend_modulus(0, node) / l;
+        c.b12 = model_.bend_modulus(1, node) / l;
+        c.b22 = model_.bend_modulus(2, node) / l;
+        c.beta = model_.twist_modulus[node] / l;
+        c.rest_kappa1 = model_.rest_curvature(0, node) * half_share;
+        c.rest_kappa2 = model_.rest_curvature(1, node) * half_share;
+        c.rest_twist = model_.rest_twist[node] * half_share;
+        clamps_.push_back(c);
+      }
+
+  const auto resize = [n](AlignedVector<double>& v) { v.assign(n, 0.0); };
+  for (auto* v : {&stretch_, &b11_, &b12_, &b22_, &beta_, &rest_k1_, &rest_k2_, &rest_m_})
+    resize(*v);
+  double bend = 0, twist = 0;
+  for (int i = 0; i < n; ++i)
+  {
+    if (i < edges)
+      stretch_[i] = model_.stretch_modulus[i];
+    if (length[i] > 0)
+    {
+      b11_[i] = model_.bend_modulus(0, i) / length[i];
+      b12_[i] = model_.bend_modulus(1, i) / length[i];
+      b22_[i] = model_.bend_modulus(2, i) / length[i];
+      beta_[i] = model_.twist_modulus[i] / length[i];
+      rest_k1_[i] = model_.rest_curvature(0, i);
+      rest_k2_[i] = model_.rest_curvature(1, i);
+      rest_m_[i] = model_.rest_twist[i];
+      bend = std::max(bend, (b11_[i] + b22_[i]) / (length[i] * length[i]));
+      twist = std::max(twist, beta_[i] + b11_[i] + b22_[i]);
+    }
+  }
+  shift_x_ = 1e-2 * bend;
+  shift_theta_ = twist;
+  // A rod whose frames nobody holds can spin about itself without energy (if isotropic): keep its matrix definite.
+  spin_ = clamps_.empty() && held_angles_.empty() ? 1e-8 * twist : 0.0;
+  setResponse(0.0, nullptr);
+}
+
+void RodSystem::placeGrasps(const std::vector<Pose>& X_WG)
+{
+  for (std::size_t k = 0; k < grasps_.size(); ++k)
+  {
+    const GraspState& g = grasps_[k];
+    if (!g.active)
+      continue;
+    for (int i = g.first_node; i <= g.last_node; ++i)
+      setPosition(i, X_WG[k] * g.nodes_G[i - g.first_node]);
+    for (int j = g.first_node; j < g.last_node; ++j)
+    {
+      const Eigen::Vector3d t0(a_.base_t[0][j], a_.base_t[1][j], a_.base_t[2][j]), d0(a_.base_d1[0][j], a_.base_d1[1][j], a_.base_d1[2][j]);
+      const Eigen::Vector3d t = (position(j + 1) - position(j)).normalized();
+      const Eigen::Vector3d d = X_WG[k].orientation * g.directors_G[j - g.first_node];
+      a_.turn[j] = signedAngle(parallelTransport(d0, t0, t), d, t);
+    }
+  }
+  wrapHalo(a_.turn, a_.edges);
+  for (ClampJoint& c : clamps_)
+  {
+    const Eigen::Matrix3d section = X_WG[c.grasp].orientation.toRotationMatrix() * grasps_[c.grasp].section_G[c.side];
+    c.t = section.col(0);
+    c.d1 = section.col(1);
+    c.turn = signedAngle(parallelTransport(c.base_d1, c.base_t, c.t), c.d1, c.t);
+  }
+}
+
+void RodSystem::setResponse(double r, const Eigen::Matrix4Xd* strain)
+{
+  const double scale = 1.0 + r, share = r / scale;
+  const int n = a_.nodes;
+  const auto rest = [&](double elastic, int row, int column) { return r > 0 ? elastic + share * ((*strain)(row, column) - elastic) : elastic; };
+  for (int i = 0; i < n; ++i)
+  {
+    a_.stretch[i] = scale * stretch_[i];
+    a_.rest_strain[i] = rest(0.0, 0, i);
+    a_.b11[i] = scale * b11_[i];
+    a_.b12[i] = scale * b12_[i];
+    a_.b22[i] = scale * b22_[i];
+    a_.beta[i] = scale * beta_[i];
+    a_.rest_kappa1[i] = rest(rest_k1_[i], 1, i);
+    a_.rest_kappa2[i] = rest(rest_k2_[i], 2, i);
+    a_.rest_twist[i] = rest(rest_m_[i], 3, i);
+  }
+  for (double* p : {a_.stretch, a_.rest_strain, a_.b11, a_.b12, a_.b22, a_.beta, a_.rest_kappa1, a_.rest_kappa2, a_.rest_twist})
+    wrapHalo(p, n);
+  for (ClampJoint& c : clamps_)
+  {
+    const int column = n + 2 * c.grasp + c.side;
+    c.scale = scale;
+    c.rest1 = rest(c.rest_kappa1, 1, column);
+    c.rest2 = rest(c.rest_kappa2, 2, column);
+    c.rest3 = rest(c.rest_twist, 3, column);
+  }
+}
+
+}  // namespace slender

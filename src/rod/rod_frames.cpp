@@ -1,0 +1,97 @@
+// Material frames at fixed positions: the quasistatic condition dE/dtheta = 0 (thesis 4.3) is a tridiagonal system.
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/rod/rod_system.h"
+
+namespace slender {
+
+double RodSystem::turnFrames()
+{
+  // Thomas' algorithm on the edge angles; held ones are decoupled. A closed rod's corner is treated by Sherman and Morrison.
+  const int edges = a_.edges;
+  double* d = a_.theta_diagonal;
+  double* off = a_.theta_off;   // off[j] couples edges j and j+1
+  for (int j = 0; j < edges; ++j)
+    d[j] += spin_;
+  for (ClampJoint& c : clamps_)
+    d[c.edge] += c.beta * c.scale;
+  for (int edge : held_angles_)
+  {
+    d[edge] = 1.0;
+    off[edge] = 0.0;
+    if (edge > 0)
+      off[edge - 1] = 0.0;
+    else if (model_.closed)
+      off[edges - 1] = 0.0;
+  }
+  const double corner = model_.closed ? off[edges - 1] : 0.0;
+  const double gamma = -d[0];
+  if (corner != 0.0)
+  {
+    d[edges - 1] -= corner * corner / gamma;
+    d[0] -= gamma;
+  }
+  double* r = a_.turn;
+  double* u = direction_.data();
+  for (int j = 0; j < edges; ++j)
+  {
+    r[j] = -gradient_[4 * j + 3];
+    u[j] = 0.0;
+  }
+  u[0] = gamma;
+  u[edges - 1] = corner;
+  for (int j = 0; j < edges; ++j)
+  {
+    // twisting alone makes the angles' matrix positive; a curved rod's may not be, then the pivot is lifted
+    const double floor = 1e-3 * shift_theta_;
+    if (d[j] < floor)
+      d[j] = floor;
+    if (j + 1 < edges)
+    {
+      const double f = off[j] / d[j];
+      d[j + 1] -= f * off[j];
+      r[j + 1] -= f * r[j];
+      u[j + 1] -= f * u[j];
+    }
+  }
+  for (int j = edges - 1; j >= 0; --j)
+  {
+    if (j + 1 < edges)
+    {
+      r[j] -= off[j] * r[j + 1];
+      u[j] -= off[j] * u[j + 1];
+    }
+    r[j] /= d[j];
+    u[j] /= d[j];
+  }
+  if (corner != 0.0)
+  {
+    const double factor = (r[0] + corner * r[edges - 1] / gamma) / (1.0 + u[0] + corner * u[edges - 1] / gamma);
+    for (int j = 0; j < edges; ++j)
+      r[j] -= factor * u[j];
+  }
+  double largest = 0.0;
+  for (int j = 0; j < edges; ++j)
+  {
+    r[j] = std::clamp(r[j], -1.5, 1.5);
+    largest = std::max(largest, std::abs(r[j]));
+  }
+  wrapHalo(a_.turn, edges);
+  return largest;
+}
+
+void RodSystem::relaxFrames()
+{
+  evaluate(false);
+  for (int k = 0; k < 50; ++k)
+  {
+    accept();
+    const double turned = turnFrames();
+    evaluate(false);
+    if (turned < 1e-10)
+      break;
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,151 @@
+#include "read_parts.h"
+
+#include "slender_sim/scene/pose_file.h"
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+
+namespace {
+
+const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
+
+std::optional<int> readEdges(YamlMap& map) { return map.get("edges").integer(1, max_edges); }
+
+std::vector<Eigen::Vector3d> readPoints(const YamlCursor& at)
+{
+  std::vector<Eigen::Vector3d> points;
+  for (const YamlCursor& item : at.items(2, max_edges + 1))
+  {
+    if (const auto point = item.vector3(coordinate))
+    {
+      points.push_back(*point);
+    }
+  }
+  return points;
+}
+
+StraightCurve readStraight(YamlMap& map)
+{
+  StraightCurve curve;
+  assign(curve.from, map.get("from").vector3(coordinate));
+  assign(curve.to, map.get("to").vector3(coordinate));
+  assign(curve.edges, readEdges(map));
+  if (!((curve.to - curve.from).norm() > 0))
+  {
+    map.at().problem("from and to are the same point; must differ");
+  }
+  return curve;
+}
+
+PolylineCurve readPolyline(YamlMap& map)
+{
+  PolylineCurve curve;
+  curve.points = readPoints(map.require("points"));
+  curve.edges = readEdges(map);
+  return curve;
+}
+
+ArcCurve readArc(YamlMap& map)
+{
+  ArcCurve curve;
+  assign(curve.center, map.get("center").vector3(coordinate));
+  assign(curve.start, map.get("start").vector3(coordinate));
+  assign(curve.axis, map.get("axis").vector3(coordinate));
+  const YamlCursor angle = map.get("angle");
+  assign(curve.angle, angle.number(Range::closed(-2 * M_PI - 1e-6, 2 * M_PI + 1e-6, "rad")));
+  if (curve.angle == 0)
+  {
+    angle.problem("must not be zero; must be in [-2 pi, 2 pi] rad");
+  }
+  assign(curve.edges, readEdges(map));
+  return curve;
+}
+
+HelixCurve readHelix(YamlMap& map)
+{
+  HelixCurve curve;
+  assign(curve.center, map.get("center").vector3(coordinate));
+  assign(curve.axis, map.get("axis").vector3(coordinate));
+  assign(curve.radius, map.get("radius").number(Range::above(0, max_coordinate, "m")));
+  assign(curve.pitch, map.get("pitch").number(coordinate));
+  const YamlCursor turns = map.get("turns");
+  assign(curve.turns, turns.number(Range::closed(-1e5, 1e5)));
+  if (curve.turns == 0)
+  {
+    turns.problem("must not be zero; negative turns give a left-handed helix");
+  }
+  assign(curve.edges, readEdges(map));
+  return curve;
+}
+
+CatenaryCurve readCatenary(YamlMap& map)
+{
+  CatenaryCurve curve;
+  assign(curve.from, map.get("from").vector3(coordinate));
+  assign(curve.to, map.get("to").vector3(coordinate));
+  assign(curve.length, map.get("length").number(Range::above(0, max_coordinate, "m")));
+  assign(curve.edges, readEdges(map));
+  return curve;
+}
+
+FileCurve readFile(YamlMap& map, const ReadContext& context)
+{
+  FileCurve curve;
+  const YamlCursor path = map.require("path");
+  curve.edges = readEdges(map);
+  if (const auto text = path.text())
+  {
+    curve.path = context.resolve(*text);
+    try
+    {
+      curve.points = readPointFile(curve.path);
+      if (curve.points.size() < 2 || curve.points.size() > max_edges + 1u)
+      {
+        path.problem("holds " + std::to_string(curve.points.size()) + " points; must hold 2 to " + std::to_string(max_edges + 1));
+      }
+    }
+    catch (const SceneError& error)
+    {
+      path.problem(error.what());
+    }
+  }
+  return curve;
+}
+
+}  // namespace
+
+std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
+{
+  if (!at.present())
+  {
+    return std::nullopt;
+  }
+  const std::size_t before = at.problems().size();
+  YamlMap kinds(at);
+  std::optional<Curve> curve;
+  int given = 0;
+  const auto read = [&](const char* kind, auto reader) {
+    const YamlCursor value = kinds.get(kind);
+    if (value.present())
+    {
+      ++given;
+      YamlMap map(value);
+      curve = reader(map);
+      map.finish();
+    }
+  };
+  read("straight", readStraight);
+  read("polyline", readPolyline);
+  read("arc", readArc);
+  read("helix", readHelix);
+  read("catenary", readCatenary);
+  read("file", [&](YamlMap& map) { return readFile(map, context); });
+  kinds.finish();
+  if (given != 1 && at.problems().size() == before)
+  {
+    at.problem("names " + std::to_string(given) + " curves; must name one of: straight, polyline, arc, helix, catenary, file");
+  }
+  return at.problems().size() == before ? curve : std::nullopt;
+}
+
+}  // namespace slender

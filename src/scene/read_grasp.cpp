@@ -1,0 +1,239 @@
+#include <algorithm>
+
+#include "read_parts.h"
+#include "slender_sim/scene/pose_file.h"
+#include "slender_sim/scene/reader.h"
+#include "yaml_number.h"
+
+namespace slender {
+
+namespace {
+
+/// Indices first..last of edges or nodes: a list of consecutive whole numbers; an entry "3..7" stands for all between. Negative
+/// ones count from the end. Reported and empty otherwise.
+std::optional<std::pair<int, int>> readIndices(const YamlCursor& at, int count)
+{
+  std::vector<int> indices;
+  const int limit = count > 0 ? count : max_edges + 1;
+  const auto resolve = [&](int index) { return index < 0 && count > 0 ? index + count : index; };
+  for (const YamlCursor& item : at.items(1, static_cast<std::size_t>(limit)))
+  {
+    const std::string text = item.isScalar() ? item.tree()->scalar : "";
+    const auto dots = text.find("..");
+    if (dots == std::string::npos)
+    {
+      const auto index = item.integer(-limit, limit - 1);
+      if (!index)
+      {
+        return std::nullopt;
+      }
+      indices.push_back(resolve(*index));
+      continue;
+    }
+    const auto first = parseNumber(text.substr(0, dots)), last = parseNumber(text.substr(dots + 2));
+    const auto fits = [&](const std::optional<double>& x) { return x && *x == std::floor(*x) && *x >= -limit && *x < limit; };
+    if (!fits(first) || !fits(last) || resolve(static_cast<int>(*first)) > resolve(static_cast<int>(*last)))
+    {
+      item.problem("must be FIRST..LAST with whole numbers in [" + std::to_string(-limit) + ", " + std::to_string(limit - 1) + "]");
+      return std::nullopt;
+    }
+    for (int index = resolve(static_cast<int>(*first)); index <= resolve(static_cast<int>(*last)); ++index)
+    {
+      indices.push_back(index);
+    }
+  }
+  if (indices.empty())
+  {
+    return std::nullopt;
+  }
+  std::sort(indices.begin(), indices.end());
+  for (std::size_t k = 1; k < indices.size(); ++k)
+  {
+    if (indices[k] != indices[k - 1] + 1)
+    {
+      at.problem("must be consecutive and each given once; make one grasp for each group");
+      return std::nullopt;
+    }
+  }
+  return std::make_pair(indices.front(), indices.back());
+}
+
+void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
+{
+  const YamlCursor edge_list = map.get("edges"), node_list = map.get("nodes");
+  if (edge_list.present() == node_list.present())
+  {
+    if (map.at().isMap())
+    {
+      map.at().problem("must have either edges or nodes, for example edges: [0] for the start of the rod or edges: [-1] for its end");
+    }
+    return;
+  }
+  if (node_list.present())
+  {
+    const int nodes = edges == 0 ? 0 : edges + (closed ? 0 : 1);
+    if (const auto held = readIndices(node_list, nodes))
+    {
+      grasp.first_node = held->first;
+      grasp.last_node = held->second;
+    }
+    return;
+  }
+  const auto held = readIndices(edge_list, edges);
+  if (!held || edges == 0)
+  {
+    return;
+  }
+  grasp.first_node = held->first;
+  grasp.last_node = held->second + 1;
+  if (!closed && held->first == held->second && (held->first == 0 || held->first == edges - 1))
+  {
+    // The end section itself, not half an edge further in.
+    grasp.first_node = grasp.last_node = held->first == 0 ? 0 : edges;
+  }
+  if (closed && grasp.last_node == edges)
+  {
+    edge_list.problem("holds the edge that joins the last node to the first; hold an edge in [0, " + std::to_string(edges - 2) + "]");
+  }
+}
+
+std::optional<TableMotion> readTable(const YamlCursor& at, bool needs_orientation)
+{
+  TableMotion motion;
+  bool good = true;
+  for (const YamlCursor& item : at.items(1))
+  {
+    const auto row = item.numbers(Range::closed(-1e9, 1e9));
+    if (!row)
+    {
+      good = false;
+      continue;
+    }
+    if (row->size() != 8 && (needs_orientation || row->size() != 4))
+    {
+      item.problem("has " + std::to_string(row->size()) + " numbers; must be [t, x, y, z, qx, qy, qz, qw]" +
+                   (needs_orientation ? "" : " or [t, x, y, z]"));
+      good = false;
+      continue;
+    }
+    std::vector<double> numbers = *row;
+    if (numbers.size() == 4)
+    {
+      numbers.insert(numbers.end(), {0, 0, 0, 1});
+    }
+    try
+    {
+      appendRecorded(motion.poses, numbers[0], checkedPose(numbers.data() + 1));
+    }
+    catch (const std::invalid_argument& error)
+    {
+      item.problem(error.what());
+      good = false;
+    }
+  }
+  return good && !motion.poses.empty() ? std::optional<TableMotion>(std::move(motion)) : std::nullopt;
+}
+
+std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCursor& body, const ReadContext& context)
+{
+  const auto file = path.text();
+  const auto name = body.text();
+  if (!file || !name)
+  {
+    return std::nullopt;
+  }
+  try
+  {
+    auto bodies = readPoseFile(context.resolve(*file));
+    std::vector<std::string> names;
+    for (BodyTrajectory& entry : bodies)
+    {
+      if (entry.body == *name)
+      {
+        return TableMotion{std::move(entry.poses)};
+      }
+      names.push_back(entry.body);
+    }
+    body.problem("is not in " + *file + "; it has: " + joinWords(names));
+  }
+  catch (const SceneError& error)
+  {
+    path.problem(error.what());
+  }
+  return std::nullopt;
+}
+
+Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation)
+{
+  Motion motion = FixedMotion{};
+  if (!at.present())
+  {
+    return motion;
+  }
+  if (at.isScalar())
+  {
+    assign(motion, at.choice<Motion>({{"fixed", FixedMotion{}}, {"topic", TopicMotion{}}}));
+    return motion;
+  }
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  const YamlCursor topic = map.get("topic"), body = map.get("body"), table = map.get("table"), file = map.get("file");
+  map.finish();
+  const int given = topic.present() + table.present() + (body.present() || file.present());
+  if (given != 1)
+  {
+    if (at.problems().size() == before)
+    {
+      at.problem("must be fixed or one of {topic: true}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}");
+    }
+  }
+  else if (topic.present())
+  {
+    const auto on = topic.boolean();
+    if (on && !*on)
+    {
+      topic.problem("must be true; a grasp without a topic is written motion: fixed");
+    }
+    motion = TopicMotion{};
+  }
+  else if (table.present())
+  {
+    assign(motion, readTable(table, needs_orientation));
+  }
+  else if (file.present())
+  {
+    if (!body.present())
+    {
+      body.problem("is missing; the file holds several bodies");
+    }
+    assign(motion, readFileMotion(file, body, context));
+  }
+  else if (const auto name = body.text())
+  {
+    motion = BodyMotion{*name};
+  }
+  return motion;
+}
+
+}  // namespace
+
+GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges)
+{
+  GraspConfig grasp;
+  grasp.name = name;
+  YamlMap map(at);
+  readHeldNodes(map, grasp, closed, edges);
+  const YamlCursor hold = map.get("hold");
+  assign(grasp.hold, hold.choice<Hold>({{"frame", Hold::frame}, {"position", Hold::position}}));
+  assign(grasp.attach, map.get("attach").choice<Attach>({{"section", Attach::section}, {"initial", Attach::initial}}));
+  grasp.motion = readMotion(map.get("motion"), context, grasp.hold == Hold::frame && grasp.attach == Attach::section);
+  if (grasp.hold == Hold::position && grasp.first_node != grasp.last_node)
+  {
+    hold.problem("holds " + std::to_string(grasp.last_node - grasp.first_node + 1) +
+                 " nodes; a point pin holds one: give nodes: [INDEX], or edges: [0] or [-1]");
+  }
+  map.finish();
+  return grasp;
+}
+
+}  // namespace slender

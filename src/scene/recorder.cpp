@@ -1,0 +1,213 @@
+#include "slender_sim/scene/recorder.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+namespace slender {
+
+namespace {
+
+void makeFolder(const std::string& folder)
+{
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!std::filesystem::is_directory(folder))
+  {
+    throw std::runtime_error(folder + ": cannot be made a folder" + (error ? ": " + error.message() : ""));
+  }
+}
+
+/// A text file written through a buffer; every failure is an exception.
+class TextFile
+{
+public:
+  explicit TextFile(std::string path) : path_(std::move(path)), file_(path_, std::ios::binary | std::ios::trunc)
+  {
+    if (!file_)
+    {
+      throw std::runtime_error(path_ + ": cannot be opened for writing: " + std::strerror(errno));
+    }
+  }
+
+  TextFile& operator<<(const std::string& text)
+  {
+    line_ += text;
+    return *this;
+  }
+  TextFile& operator<<(const char* text)
+  {
+    line_ += text;
+    return *this;
+  }
+  TextFile& operator<<(char c)
+  {
+    line_ += c;
+    return *this;
+  }
+  template <class Number>
+  TextFile& number(Number value)
+  {
+    char buffer[40];
+    const auto end = std::to_chars(buffer, buffer + sizeof buffer, value);
+    line_.append(buffer, end.ptr);
+    return *this;
+  }
+  TextFile& vector(const Eigen::Vector3d& v, char separator)
+  {
+    number(v.x()) << separator;
+    number(v.y()) << separator;
+    return number(v.z());
+  }
+  void endLine()
+  {
+    line_ += '\n';
+    file_.write(line_.data(), static_cast<std::streamsize>(line_.size()));
+    line_.clear();
+    check();
+  }
+  void close()
+  {
+    file_.close();
+    check();
+  }
+
+private:
+  void check()
+  {
+    if (!file_)
+    {
+      throw std::runtime_error(path_ + ": writing failed: " + std::strerror(errno));
+    }
+  }
+
+  std::string path_;
+  std::ofstream file_;
+  std::string line_;
+};
+
+class CsvRecorder final : public Recorder
+{
+public:
+  explicit CsvRecorder(const std::string& folder) : nodes_((makeFolder(folder), folder + "/nodes.csv")), grasps_(folder + "/grasps.csv")
+  {
+    nodes_ << "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],d1x,d1y,d1z,twist [rad]";
+    nodes_.endLine();
+    grasps_ << "t [s],object,grasp,active,x [m],y [m],z [m],qx,qy,qz,qw,fx [N],fy [N],fz [N],tx [N m],ty [N m],tz [N m]";
+    grasps_.endLine();
+  }
+
+  void record(const Simulation& simulation, const StepReport&) override
+  {
+    const SceneState& state = simulation.state();
+    for (std::size_t r = 0; r < state.rods.size(); ++r)
+    {
+      recordRod(state.time, simulation.rodModel(static_cast<int>(r)), state.rods[r]);
+    }
+    for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
+    {
+      const GraspRef& ref = simulation.grasps()[g];
+      const GraspState& held = state.rods[ref.rod].grasps[ref.index];
+      const Wrench& wrench = simulation.wrench(static_cast<int>(g));
+      grasps_.number(state.time) << ',' << simulation.config().rods[ref.rod].name << ',' << ref.config->name << ',';
+      grasps_ << (held.active ? "1," : "0,");
+      const Eigen::Vector4d q = held.X_WG.orientation.coeffs();
+      grasps_.vector(held.X_WG.position, ',') << ',';
+      grasps_.vector(q.head<3>(), ',') << ',';
+      grasps_.number(q[3]) << ',';
+      grasps_.vector(wrench.force, ',') << ',';
+      grasps_.vector(wrench.torque, ',');
+      grasps_.endLine();
+    }
+  }
+
+  void finish() override
+  {
+    nodes_.close();
+    grasps_.close();
+  }
+
+private:
+  void recordRod(double time, const RodModel& model, const RodState& rod)
+  {
+    for (int i = 0; i < model.nodes(); ++i)
+    {
+      nodes_.number(time) << ',' << model.name << ',';
+      nodes_.number(i) << ',';
+      nodes_.vector(rod.x.col(i), ',') << ',';
+      nodes_.vector(rod.v.col(i), ',') << ',';
+      nodes_.vector(rod.d1.col(std::min(i, model.edges() - 1)), ',') << ',';
+      nodes_.number(rod.twist[i]);
+      nodes_.endLine();
+    }
+  }
+
+  TextFile nodes_, grasps_;
+};
+
+class ObjRecorder final : public Recorder
+{
+public:
+  explicit ObjRecorder(std::string folder) : folder_(std::move(folder)) { makeFolder(folder_); }
+
+  void record(const Simulation& simulation, const StepReport&) override
+  {
+    char name[32];
+    std::snprintf(name, sizeof name, "/frame_%06ld.obj", frame_++);
+    TextFile file(folder_ + name);
+    file << "# scene " << oneLine(simulation.config().name) << ", t = ";
+    file.number(simulation.state().time) << " s; lengths in m";
+    file.endLine();
+    int first = 1;   // OBJ counts from 1, over the whole file
+    for (std::size_t r = 0; r < simulation.state().rods.size(); ++r)
+    {
+      const RodModel& model = simulation.rodModel(static_cast<int>(r));
+      const Eigen::Matrix3Xd& x = simulation.state().rods[r].x;
+      file << "o " << model.name;
+      file.endLine();
+      for (int i = 0; i < model.nodes(); ++i)
+      {
+        file << "v ";
+        file.vector(x.col(i), ' ');
+        file.endLine();
+      }
+      file << 'l';
+      for (int i = 0; i <= model.edges(); ++i)
+      {
+        file << ' ';
+        file.number(first + i % model.nodes());
+      }
+      file.endLine();
+      first += model.nodes();
+    }
+    file.close();
+  }
+
+  void finish() override {}
+
+private:
+  static std::string oneLine(std::string text)
+  {
+    for (char& c : text)
+    {
+      c = c == '\n' || c == '\r' ? ' ' : c;
+    }
+    return text;
+  }
+
+  std::string folder_;
+  long frame_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Recorder> makeCsvRecorder(const std::string& folder) { return std::make_unique<CsvRecorder>(folder); }
+
+std::unique_ptr<Recorder> makeObjRecorder(const std::string& folder) { return std::make_unique<ObjRecorder>(folder); }
+
+}  // namespace slender

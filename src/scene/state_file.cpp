@@ -1,0 +1,311 @@
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "byte_archive.h"
+#include "slender_sim/scene/simulation.h"
+
+/// Saving and loading of a simulation's state. The file: magic, version, fingerprint of the scene, size and checksum of the
+/// payload, payload; numbers as this machine keeps them (the magic number tells the byte order).
+namespace slender {
+
+namespace {
+
+constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
+constexpr std::uint64_t version = 1;
+constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
+
+template <class Archive, class PoseType>
+void visitPose(Archive& archive, PoseType& pose)
+{
+  archive(pose.position);
+  archive(pose.orientation.coeffs());
+}
+
+template <class Archive, class State>
+void visitGrasp(Archive& archive, State& grasp)
+{
+  archive(grasp.active);
+  archive(grasp.first_node);
+  archive(grasp.last_node);
+  archive(grasp.holds_frame);
+  visitPose(archive, grasp.X_WG);
+  archive(grasp.velocity.linear);
+  archive(grasp.velocity.angular);
+  archive.list(grasp.nodes_G);
+  for (auto& node : grasp.nodes_G)
+  {
+    archive(node);
+  }
+  archive.list(grasp.directors_G);
+  for (auto& director : grasp.directors_G)
+  {
+    archive(director);
+  }
+  for (int side = 0; side < 2; ++side)
+  {
+    archive(grasp.section_G[side]);
+    archive(grasp.section_twist[side]);
+  }
+}
+
+template <class Archive, class State>
+void visitRod(Archive& archive, State& rod)
+{
+  archive(rod.x);
+  archive(rod.v);
+  archive(rod.d1);
+  archive(rod.twist);
+  archive.list(rod.grasps);
+  for (auto& grasp : rod.grasps)
+  {
+    visitGrasp(archive, grasp);
+  }
+  archive(rod.last_step);
+  archive(rod.next_step);
+  archive(rod.a);
+  archive(rod.x_previous);
+  archive(rod.v_previous);
+  archive(rod.strain_rate);
+  archive(rod.strain_rate_previous);
+  archive(rod.strain_previous);
+}
+
+template <class Archive, class State>
+void visitScene(Archive& archive, State& scene)
+{
+  archive(scene.time);
+  archive(scene.steps);
+  archive.list(scene.rods);
+  for (auto& rod : scene.rods)
+  {
+    visitRod(archive, rod);
+  }
+  archive.list(scene.grasp_offsets);
+  for (auto& offset : scene.grasp_offsets)
+  {
+    visitPose(archive, offset);
+  }
+  archive.list(scene.wrenches);
+  for (auto& wrench : scene.wrenches)
+  {
+    archive(wrench.force);
+    archive(wrench.torque);
+  }
+}
+
+std::string errorText(const std::string& path, const std::string& what) { return path + ": " + what + ": " + std::strerror(errno); }
+
+/// Writes all bytes to a temporary file beside `path` and then takes its place, so that there is never half a file.
+void writeDurably(const std::string& path, const std::string& bytes)
+{
+  const std::string temporary = path + ".tmp" + std::to_string(::getpid());
+  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file < 0)
+  {
+    throw std::runtime_error(errorText(temporary, "cannot be opened for writing"));
+  }
+  std::size_t written = 0;
+  bool good = true;
+  while (good && written < bytes.size())
+  {
+    const ssize_t count = ::write(file, bytes.data() + written, bytes.size() - written);
+    good = count > 0 || (count < 0 && errno == EINTR);
+    written += count > 0 ? static_cast<std::size_t>(count) : 0;
+  }
+  good = good && ::fsync(file) == 0;
+  const int error = errno;
+  const bool closed = ::close(file) == 0;
+  if (!good || !closed || std::rename(temporary.c_str(), path.c_str()) != 0)
+  {
+    errno = good ? errno : error;
+    const std::string text = errorText(path, "cannot be written");
+    ::unlink(temporary.c_str());
+    throw std::runtime_error(text);
+  }
+  const auto slash = path.find_last_of('/');
+  const int folder = ::open(slash == std::string::npos ? "." : path.substr(0, slash + 1).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder >= 0)
+  {
+    ::fsync(folder);   // makes the new name durable too, where the file system can
+    ::close(folder);
+  }
+}
+
+/// Empty, or what does not fit between a loaded rod and its model.
+std::string misfit(const RodState& rod, const RodModel& model, std::size_t grasps)
+{
+  const Eigen::Index n = model.nodes();
+  if (rod.x.cols() != n || rod.v.cols() != n || rod.twist.size() != n || rod.d1.cols() != model.edges())
+  {
+    return "rod " + model.name + " has another number of nodes";
+  }
+  for (const auto* memory : {&rod.a, &rod.x_previous, &rod.v_previous})
+  {
+    if (memory->cols() != 0 && memory->cols() != n)
+    {
+      return "rod " + model.name + " has integrator memory of another size";
+    }
+  }
+  if (rod.grasps.size() != grasps)
+  {
+    return "rod " + model.name + " has another number of grasps";
+  }
+  for (const GraspState& grasp : rod.grasps)
+  {
+    const bool fits = grasp.first_node >= 0 && grasp.first_node <= grasp.last_node && grasp.last_node < n;
+    if (!fits)
+    {
+      return "a grasp of rod " + model.name + " holds nodes that do not exist";
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+std::uint64_t Simulation::fingerprint() const
+{
+  ByteWriter out;
+  const auto text = [&out](const std::string& word) {
+    out(static_cast<std::uint64_t>(word.size()));
+    for (char c : word)
+    {
+      out(c);
+    }
+  };
+  out(config_.gravity);
+  const TimeConfig& time = config_.time;
+  out(time.step);
+  out(static_cast<int>(time.integrator));
+  out(time.spectral_radius);
+  out(time.error_tolerance);
+  out(time.min_step);
+  out(time.newton.tolerance);
+  out(time.newton.max_iterations);
+  out(time.newton.max_cuts);
+  for (std::size_t r = 0; r < steppers_.size(); ++r)
+  {
+    const RodModel& model = steppers_[r].model();
+    text(model.name);
+    out(model.closed);
+    for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a, &model.radius_b,
+                                          &model.twist_modulus, &model.rest_twist, &model.drag})
+    {
+      out(*values);
+    }
+    out(model.bend_modulus);
+    out(model.rest_curvature);
+    out(model.mass_damping);
+    out(model.stiffness_damping);
+    for (const GraspConfig& grasp : config_.rods[r].grasps)
+    {
+      text(grasp.name);
+      out(static_cast<int>(grasp.attach));
+    }
+  }
+  Checksum checksum;
+  checksum.add(out.bytes().data(), out.bytes().size());
+  return checksum.value();
+}
+
+void Simulation::save(const std::string& path) const
+{
+  ByteWriter payload;
+  visitScene(payload, state_);
+  Checksum checksum;
+  checksum.add(payload.bytes().data(), payload.bytes().size());
+  ByteWriter file;
+  for (std::uint64_t word : {magic, version, fingerprint(), static_cast<std::uint64_t>(payload.bytes().size()), checksum.value()})
+  {
+    file(word);
+  }
+  writeDurably(path, file.bytes() + payload.bytes());
+}
+
+void Simulation::load(const std::string& path)
+{
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+  {
+    throw std::runtime_error(errorText(path, "cannot be opened for reading"));
+  }
+  std::ostringstream text;
+  text << file.rdbuf();
+  const std::string bytes = text.str();
+  if (file.bad() || bytes.empty())
+  {
+    throw std::runtime_error(path + ": is empty or cannot be read");
+  }
+
+  std::uint64_t header[5] = {};
+  ByteReader reader(bytes.data(), bytes.size());
+  if (bytes.size() >= sizeof(std::uint64_t))
+  {
+    reader(header[0]);
+  }
+  if (header[0] != magic)
+  {
+    throw std::runtime_error(path + ": is not a saved state (of a machine with this byte order)");
+  }
+  if (bytes.size() < header_size)
+  {
+    throw std::runtime_error(path + ": ends too early");
+  }
+  for (int k = 1; k < 5; ++k)
+  {
+    reader(header[k]);
+  }
+  if (header[1] != version)
+  {
+    throw std::runtime_error(path + ": has format version " + std::to_string(header[1]) + "; this program reads version " +
+                             std::to_string(version));
+  }
+  if (header[3] != reader.left())
+  {
+    throw std::runtime_error(path + ": has " + std::to_string(reader.left()) + " bytes of state; its header says " +
+                             std::to_string(header[3]));
+  }
+  Checksum checksum;
+  checksum.add(bytes.data() + header_size, bytes.size() - header_size);
+  if (header[4] != checksum.value())
+  {
+    throw std::runtime_error(path + ": is damaged (its checksum does not fit)");
+  }
+  if (header[2] != fingerprint())
+  {
+    throw std::runtime_error(path + ": belongs to another scene (rods, moduli, grasps, gravity, step and integrator must be the same)");
+  }
+
+  SceneState loaded;
+  try
+  {
+    visitScene(reader, loaded);
+  }
+  catch (const std::runtime_error& error)
+  {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+  std::string problem = reader.left() != 0 ? "has bytes after its end" : "";
+  if (loaded.rods.size() != steppers_.size() || loaded.grasp_offsets.size() != grasps_.size() ||
+      loaded.wrenches.size() != grasps_.size())
+  {
+    problem = "has another number of rods or grasps";
+  }
+  for (std::size_t r = 0; problem.empty() && r < steppers_.size(); ++r)
+  {
+    problem = misfit(loaded.rods[r], steppers_[r].model(), config_.rods[r].grasps.size());
+  }
+  if (!problem.empty())
+  {
+    throw std::runtime_error(path + ": " + problem);
+  }
+  state_ = std::move(loaded);
+}
+
+}  // namespace slender

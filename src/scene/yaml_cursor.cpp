@@ -1,0 +1,399 @@
+#include "yaml_cursor.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+#include "yaml_number.h"
+
+namespace slender {
+
+namespace {
+
+constexpr std::size_t max_reported = 50;
+constexpr std::size_t max_name = 64;
+
+std::size_t editDistance(const std::string& a, const std::string& b)
+{
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i)
+  {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j)
+    {
+      const std::size_t change = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, change});
+    }
+  }
+  return row[b.size()];
+}
+
+/// The value as the user wrote it, cut to a line's length.
+std::string quote(const YamlTree& tree)
+{
+  std::string text;
+  switch (tree.kind)
+  {
+    case YamlTree::Kind::null: return "";
+    case YamlTree::Kind::scalar: text = tree.scalar; break;
+    case YamlTree::Kind::map: return "";
+    case YamlTree::Kind::list:
+      text = "[";
+      for (const YamlTree& item : tree.items)
+      {
+        text += (text.size() > 1 ? ", " : "") + (item.kind == YamlTree::Kind::map ? std::string("{...}") : quote(item));
+        if (text.size() > 60)
+        {
+          break;
+        }
+      }
+      text += "]";
+  }
+  for (char& c : text)
+  {
+    c = std::iscntrl(static_cast<unsigned char>(c)) ? ' ' : c;
+  }
+  return text.size() > 60 ? text.substr(0, 57) + "..." : text;
+}
+
+}  // namespace
+
+std::string shortNumber(double value)
+{
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.10g", value);
+  return buffer;
+}
+
+std::string joinWords(const std::vector<std::string>& words)
+{
+  std::string text;
+  for (const std::string& word : words)
+  {
+    text += (text.empty() ? "" : ", ") + word;
+  }
+  return text;
+}
+
+std::string nearestWord(const std::string& word, const std::vector<std::string>& words)
+{
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
+  for (const std::string& candidate : words)
+  {
+    const std::size_t distance = editDistance(word, candidate);
+    const bool contains = word.size() >= 4 && candidate.find(word) != std::string::npos;
+    if (distance < best_distance || (contains && best.empty()))
+    {
+      best = candidate;
+      best_distance = std::min(best_distance, distance);
+    }
+  }
+  return best;
+}
+
+std::string Range::text() const
+{
+  const std::string unit_text = *unit ? std::string(" ") + unit : "";
+  if (std::isinf(low) && std::isinf(high))
+  {
+    return "a finite number" + (*unit ? " [" + std::string(unit) + "]" : "");
+  }
+  return std::string("in ") + (open_low ? "(" : "[") + shortNumber(low) + ", " + shortNumber(high) + (open_high ? ")" : "]") +
+         unit_text;
+}
+
+void Problems::add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason)
+{
+  const YamlTree* place = tree ? tree : parent;
+  std::string line = file_;
+  if (place && !place->origin.empty())
+  {
+    line = place->origin;
+  }
+  else if (place && place->line > 0)
+  {
+    line += ":" + std::to_string(place->line);
+  }
+  line += ": " + (path.empty() ? "scene" : path);
+  const std::string value = tree ? quote(*tree) : "";
+  if (!value.empty())
+  {
+    line += " = " + value;
+  }
+  lines_.push_back(line + ": " + reason);
+}
+
+std::string Problems::text() const
+{
+  std::string text;
+  for (std::size_t k = 0; k < std::min(lines_.size(), max_reported); ++k)
+  {
+    text += (k ? "\n" : "") + lines_[k];
+  }
+  if (lines_.size() > max_reported)
+  {
+    text += "\n" + file_ + ": and " + std::to_string(lines_.size() - max_reported) + " more problems";
+  }
+  return text;
+}
+
+bool YamlCursor::check(YamlTree::Kind kind, const char* expected) const
+{
+  if (!tree_)
+  {
+    return false;
+  }
+  if (tree_->kind != kind)
+  {
+    problem(std::string("is ") + toString(tree_->kind) + "; must be " + expected);
+    return false;
+  }
+  return true;
+}
+
+std::optional<double> YamlCursor::number(const Range& range) const
+{
+  const std::string expected = "a number " + range.text();
+  if (!check(YamlTree::Kind::scalar, expected.c_str()))
+  {
+    return std::nullopt;
+  }
+  const auto value = parseNumber(tree_->scalar);
+  if (!value)
+  {
+    problem("is not a number; must be " + expected);
+    return std::nullopt;
+  }
+  if (!std::isfinite(*value))
+  {
+    problem("is not finite; must be " + expected);
+    return std::nullopt;
+  }
+  if (!range.holds(*value))
+  {
+    problem("is out of range; must be " + expected);
+    return std::nullopt;
+  }
+  return value;
+}
+
+std::optional<int> YamlCursor::integer(long low, long high, const char* unit) const
+{
+  const Range range = Range::closed(static_cast<double>(low), static_cast<double>(high), unit);
+  const auto value = number(range);
+  if (value && *value != std::floor(*value))
+  {
+    problem("must be a whole number " + range.text());
+    return std::nullopt;
+  }
+  return value ? std::optional<int>(static_cast<int>(*value)) : std::nullopt;
+}
+
+std::optional<bool> YamlCursor::boolean() const
+{
+  if (!check(YamlTree::Kind::scalar, "true or false"))
+  {
+    return std::nullopt;
+  }
+  std::string word = tree_->scalar;
+  std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (word == "true" || word == "yes" || word == "on")
+  {
+    return true;
+  }
+  if (word == "false" || word == "no" || word == "off")
+  {
+    return false;
+  }
+  problem("must be true or false");
+  return std::nullopt;
+}
+
+std::optional<std::string> YamlCursor::text() const
+{
+  if (!check(YamlTree::Kind::scalar, "a text"))
+  {
+    return std::nullopt;
+  }
+  if (tree_->scalar.empty())
+  {
+    problem("is empty; must be a text");
+    return std::nullopt;
+  }
+  return tree_->scalar;
+}
+
+std::optional<std::string> YamlCursor::name() const
+{
+  const auto word = text();
+  if (word)
+  {
+    const bool fits = word->size() <= max_name && std::isalpha(static_cast<unsigned char>(word->front())) &&
+                      std::all_of(word->begin(), word->end(),
+                                  [](unsigned char c) { return c < 128 && (std::isalnum(c) || c == '_'); });
+    if (!fits)
+    {
+      problem("is not a name; must be a letter and then letters, digits or '_', at most " + std::to_string(max_name));
+      return std::nullopt;
+    }
+  }
+  return word;
+}
+
+std::optional<Eigen::Vector3d> YamlCursor::vector3(const Range& range) const
+{
+  const std::string expected = "a list [x, y, z] of numbers " + range.text();
+  if (!check(YamlTree::Kind::list, expected.c_str()))
+  {
+    return std::nullopt;
+  }
+  if (tree_->items.size() != 3)
+  {
+    problem("has " + std::to_string(tree_->items.size()) + " entries; must be " + expected);
+    return std::nullopt;
+  }
+  Eigen::Vector3d vector;
+  bool good = true;
+  const auto entries = items();
+  for (int k = 0; k < 3; ++k)
+  {
+    const auto value = entries[k].number(range);
+    good = good && value;
+    vector[k] = value.value_or(0.0);
+  }
+  return good ? std::optional<Eigen::Vector3d>(vector) : std::nullopt;
+}
+
+std::optional<std::vector<double>> YamlCursor::numbers(const Range& range) const
+{
+  if (!tree_)
+  {
+    return std::nullopt;
+  }
+  if (!isList())
+  {
+    const auto value = number(range);
+    return value ? std::make_optional(std::vector<double>{*value}) : std::nullopt;
+  }
+  std::vector<double> values;
+  bool good = true;
+  for (const YamlCursor& item : items())
+  {
+    const auto value = item.number(range);
+    good = good && value;
+    values.push_back(value.value_or(0.0));
+  }
+  return good ? std::optional<std::vector<double>>(std::move(values)) : std::nullopt;
+}
+
+int YamlCursor::chosen(const std::vector<std::string>& words) const
+{
+  const std::string expected = "one of: " + joinWords(words);
+  if (!check(YamlTree::Kind::scalar, expected.c_str()))
+  {
+    return -1;
+  }
+  const auto found = std::find(words.begin(), words.end(), tree_->scalar);
+  if (found == words.end())
+  {
+    const std::string nearest = nearestWord(tree_->scalar, words);
+    problem("is not known; must be " + expected + (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
+    return -1;
+  }
+  return static_cast<int>(found - words.begin());
+}
+
+std::vector<YamlCursor> YamlCursor::items(std::size_t min_size, std::size_t max_size) const
+{
+  std::vector<YamlCursor> entries;
+  if (!check(YamlTree::Kind::list, "a list"))
+  {
+    return entries;
+  }
+  const std::size_t size = tree_->items.size();
+  if (size < min_size || size > max_size)
+  {
+    std::string allowed = min_size == max_size ? std::to_string(min_size) : "at least " + std::to_string(min_size);
+    if (min_size != max_size && max_size != std::numeric_limits<std::size_t>::max())
+    {
+      allowed = std::to_string(min_size) + " to " + std::to_string(max_size);
+    }
+    problem("has " + std::to_string(size) + " entries; must have " + allowed);
+    return entries;
+  }
+  entries.reserve(size);
+  for (std::size_t k = 0; k < size; ++k)
+  {
+    entries.emplace_back(&tree_->items[k], tree_, path_ + "." + std::to_string(k), *problems_);
+  }
+  return entries;
+}
+
+std::vector<std::pair<std::string, YamlCursor>> YamlCursor::members() const
+{
+  std::vector<std::pair<std::string, YamlCursor>> entries;
+  if (!check(YamlTree::Kind::map, "a map of names"))
+  {
+    return entries;
+  }
+  for (const auto& [key, value] : tree_->members)
+  {
+    entries.emplace_back(key, YamlCursor(&value, tree_, path_ + (path_.empty() ? "" : ".") + key, *problems_));
+  }
+  return entries;
+}
+
+YamlMap::YamlMap(const YamlCursor& at) : at_(at)
+{
+  if (at.isMap())
+  {
+    map_ = at.tree();
+  }
+  else if (at.present())
+  {
+    at.problem(std::string("is ") + toString(at.tree()->kind) + "; must be a map of keys and values");
+  }
+}
+
+YamlCursor YamlMap::get(const std::string& key)
+{
+  known_.push_back(key);
+  const YamlTree* value = map_ ? map_->find(key) : nullptr;
+  return YamlCursor(value, at_.tree(), at_.path() + (at_.path().empty() ? "" : ".") + key, at_.problems());
+}
+
+YamlCursor YamlMap::require(const std::string& key)
+{
+  YamlCursor value = get(key);
+  if (!value.present() && map_)
+  {
+    value.problem("is missing");
+  }
+  return value;
+}
+
+void YamlMap::finish()
+{
+  if (!map_)
+  {
+    return;
+  }
+  for (const auto& [key, value] : map_->members)
+  {
+    if (std::find(known_.begin(), known_.end(), key) == known_.end())
+    {
+      const std::string nearest = nearestWord(key, known_);
+      at_.problems().add(&value, map_, at_.path() + (at_.path().empty() ? "" : ".") + key,
+                         "unknown key" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") + "; known here: " +
+                           joinWords(known_));
+    }
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,144 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "yaml_tree.h"
+
+namespace slender {
+
+/// Allowed values of a number, written as mathematicians do: (0, 10] m.
+struct Range
+{
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool open_low = false;    ///< low itself is not allowed
+  bool open_high = false;
+  const char* unit = "";
+
+  bool holds(double x) const { return (open_low ? x > low : x >= low) && (open_high ? x < high : x <= high); }
+  std::string text() const;
+
+  static Range closed(double low, double high, const char* unit = "") { return {low, high, false, false, unit}; }
+  static Range above(double low, double high, const char* unit = "") { return {low, high, true, false, unit}; }   ///< (low, high]
+  static Range between(double low, double high, const char* unit = "") { return {low, high, true, true, unit}; }  ///< (low, high)
+};
+
+/// Everything wrong with one scene, in the order found.
+class Problems
+{
+public:
+  explicit Problems(std::string file) : file_(std::move(file)) {}
+
+  /// Adds "FILE:LINE: PATH = VALUE: reason" (or the override in place of file and line). `tree` may be null: then `parent` tells
+  /// the line.
+  void add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason);
+  void addText(const std::string& line) { lines_.push_back(line); }
+
+  bool empty() const { return lines_.empty(); }
+  std::size_t size() const { return lines_.size(); }
+  std::string text() const;
+
+private:
+  std::string file_;
+  std::vector<std::string> lines_;
+};
+
+/// One value of a scene with its path: typed, checked access. Every getter returns nothing when the value is absent or wrong, and
+/// reports it in the second case, so that reading goes on and finds the other problems too.
+class YamlCursor
+{
+public:
+  YamlCursor(const YamlTree* tree, const YamlTree* parent, std::string path, Problems& problems)
+    : tree_(tree), parent_(parent), path_(std::move(path)), problems_(&problems) {}
+
+  bool present() const { return tree_ != nullptr; }
+  bool isScalar() const { return tree_ && tree_->kind == YamlTree::Kind::scalar; }
+  bool isList() const { return tree_ && tree_->kind == YamlTree::Kind::list; }
+  bool isMap() const { return tree_ && tree_->kind == YamlTree::Kind::map; }
+  const YamlTree* tree() const { return tree_; }
+  const std::string& path() const { return path_; }
+  Problems& problems() const { return *problems_; }
+
+  /// Reports what is wrong with this value.
+  void problem(const std::string& reason) const { problems_->add(tree_, parent_, path_, reason); }
+
+  std::optional<double> number(const Range& range) const;
+  std::optional<int> integer(long low, long high, const char* unit = "") const;
+  std::optional<bool> boolean() const;
+  std::optional<std::string> text() const;
+  /// A word of letters, digits and '_' that starts with a letter (names become topic names).
+  std::optional<std::string> name() const;
+  /// `range` holds for each component.
+  std::optional<Eigen::Vector3d> vector3(const Range& range) const;
+  /// A list of numbers, or a single number as a list of one.
+  std::optional<std::vector<double>> numbers(const Range& range) const;
+
+  template <class Value>
+  std::optional<Value> choice(const std::vector<std::pair<std::string, Value>>& choices) const
+  {
+    std::vector<std::string> words;
+    for (const auto& entry : choices)
+    {
+      words.push_back(entry.first);
+    }
+    const int found = chosen(words);
+    return found < 0 ? std::nullopt : std::optional<Value>(choices[found].second);
+  }
+
+  /// Entries of a list; reports and returns none for anything else. `size`: allowed sizes.
+  std::vector<YamlCursor> items(std::size_t min_size = 0, std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
+  /// Members of a map, in file order; reports and returns none for anything else.
+  std::vector<std::pair<std::string, YamlCursor>> members() const;
+
+private:
+  bool check(YamlTree::Kind kind, const char* expected) const;
+  int chosen(const std::vector<std::string>& words) const;
+
+  const YamlTree* tree_;
+  const YamlTree* parent_;
+  std::string path_;
+  Problems* problems_;
+};
+
+/// A map whose keys are asked for by name. Keys nobody asked for are reported by finish(), with the nearest known one.
+class YamlMap
+{
+public:
+  explicit YamlMap(const YamlCursor& at);
+
+  YamlCursor get(const std::string& key);
+  YamlCursor require(const std::string& key);
+  bool has(const std::string& key) const { return map_ && map_->find(key); }
+  const YamlCursor& at() const { return at_; }
+  void finish();
+
+private:
+  YamlCursor at_;
+  const YamlTree* map_ = nullptr;
+  std::vector<std::string> known_;
+};
+
+/// Overwrites `target` when there is a value.
+template <class Target, class Value>
+void assign(Target& target, const std::optional<Value>& value)
+{
+  if (value)
+  {
+    target = *value;
+  }
+}
+
+/// "1.5e-3" rather than "0.001500".
+std::string shortNumber(double value);
+
+/// The word most like `word` (few edits), or empty.
+std::string nearestWord(const std::string& word, const std::vector<std::string>& words);
+std::string joinWords(const std::vector<std::string>& words);
+
+}  // namespace slender

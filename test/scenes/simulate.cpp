@@ -1,0 +1,207 @@
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+/// The program itself: exit codes, messages, files, and every scene of the package for a few steps.
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Result
+{
+  int status = -1;
+  std::string output;   // stdout and stderr
+};
+
+Result simulate(const std::string& arguments)
+{
+  Result result;
+  FILE* pipe = popen((std::string(SLENDER_SIMULATE) + " " + arguments + " 2>&1").c_str(), "r");
+  if (!pipe)
+  {
+    return result;
+  }
+  std::array<char, 4096> buffer;
+  for (std::size_t count = 0; (count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
+  {
+    result.output.append(buffer.data(), count);
+  }
+  const int status = pclose(pipe);
+  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
+  return result;
+}
+
+const std::string scenes = std::string(SLENDER_SOURCE_DIR) + "/config/scenes/";
+const std::string cantilever = scenes + "cantilever.yaml";
+
+class Simulate : public testing::Test
+{
+protected:
+  void SetUp() override
+  {
+    folder_ = testing::TempDir() + "/slender_sim_simulate_" + std::to_string(getpid());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string folder_;
+};
+
+std::vector<std::string> allScenes()
+{
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(scenes))
+  {
+    if (entry.path().extension() == ".yaml")
+    {
+      names.push_back(entry.path().filename().string());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+class Scene : public testing::TestWithParam<std::string> {};
+
+TEST_P(Scene, runs)
+{
+  const Result result = simulate(scenes + GetParam() + " --duration 0.05");
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_EQ(result.output.find("nan"), std::string::npos) << result.output;
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Scene, testing::ValuesIn(allScenes()));
+
+TEST_F(Simulate, printsASummary)
+{
+  const Result result = simulate(cantilever + " --duration 0.1");
+  EXPECT_EQ(result.status, 0);
+  for (const char* word : {"steps             20\n", "simulated         0.1 s", "wall", "real-time factor", "worst residual", "iterations",
+                           "cut steps"})
+  {
+    EXPECT_NE(result.output.find(word), std::string::npos) << word << " not in\n" << result.output;
+  }
+  EXPECT_EQ(simulate(cantilever + " --duration 0.1 --quiet").output, "");
+}
+
+TEST_F(Simulate, badInputIsStatus2)
+{
+  for (const char* arguments : {"", "--nonsense", "/nonexistent.yaml", "a.yaml b.yaml", "--duration"})
+  {
+    const Result result = simulate(arguments);
+    EXPECT_EQ(result.status, 2) << arguments;
+    EXPECT_NE(result.output, "") << arguments;
+  }
+  for (const char* options : {"--duration 0", "--duration x", "--duration nan", "--duration 1e8", "--threads 0", "--threads 1.5", "--set",
+                              "--set time.step", "--set time.step=-1", "--set colour=red", "--csv /proc/nowhere", "--obj /proc/nowhere",
+                              "--duration 0.1 --bag /nonexistent/file.bag"})
+  {
+    const Result result = simulate(cantilever + " " + options);
+    EXPECT_EQ(result.status, 2) << options << "\n" << result.output;
+  }
+}
+
+TEST_F(Simulate, namesFileLineKeyValueAndRange)
+{
+  const std::string scene = folder_ + "/bad.yaml";
+  std::ofstream(scene) << "rods:\n  - name: rope\n    cross_section: {radius: -1}\n";
+  const Result result = simulate(scene);
+  EXPECT_EQ(result.status, 2);
+  EXPECT_EQ(result.output, "simulate: " + scene + ":3: rods.0.cross_section.radius = -1: is out of range; must be a number in (0, 10] m\n");
+}
+
+TEST_F(Simulate, aFailingSimulationIsStatus3)
+{
+  // Explicit steps far above the stability limit, and no step cutting to save them.
+  const Result result = simulate(cantilever + " --set time.integrator=symplectic_euler --set time.step=0.05 --set time.newton.max_cuts=0" +
+                                 " --set time.min_step=0.05 --duration 100 --csv " + folder_ + "/csv");
+  EXPECT_EQ(result.status, 3) << result.output;
+  EXPECT_NE(result.output.find("step "), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("rod 'beam'"), std::string::npos) << result.output;
+  EXPECT_TRUE(fs::exists(folder_ + "/csv/nodes.csv"));
+}
+
+TEST_F(Simulate, aTenLineSceneRuns)
+{
+  const std::string scene = folder_ + "/tiny.yaml";
+  std::ofstream(scene) << "rods:\n  - grasps: {left: {edges: [0]}}\n";
+  EXPECT_EQ(simulate(scene + " --duration 0.1").status, 0);
+}
+
+TEST_F(Simulate, writesTables)
+{
+  const Result result = simulate(cantilever + " --duration 0.1 --set record.every=5 --set rods.0.centerline.straight.edges=10 --csv " + folder_);
+  ASSERT_EQ(result.status, 0) << result.output;
+  std::ifstream nodes(folder_ + "/nodes.csv");
+  std::string line;
+  ASSERT_TRUE(std::getline(nodes, line));
+  EXPECT_EQ(line.find("t [s],object,index,x [m],y [m],z [m],vx [m/s]"), 0u) << line;
+  const auto columns = std::count(line.begin(), line.end(), ',');
+  int rows = 0;
+  while (std::getline(nodes, line))
+  {
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), columns);
+    ++rows;
+  }
+  EXPECT_EQ(rows, 5 * 11);   // t = 0, and every fifth of 20 steps; 11 nodes
+  EXPECT_EQ(line.find("0.1,beam,10,") == 0 || line.empty(), true) << line;
+  std::ifstream grasps(folder_ + "/grasps.csv");
+  rows = 0;
+  while (std::getline(grasps, line))
+  {
+    ++rows;
+  }
+  EXPECT_EQ(rows, 1 + 5);
+}
+
+TEST_F(Simulate, writesObjFiles)
+{
+  const Result result = simulate(scenes + "grass.yaml --duration 0.02 --obj " + folder_);
+  ASSERT_EQ(result.status, 0) << result.output;
+  std::ifstream file(folder_ + "/frame_000002.obj");
+  ASSERT_TRUE(file);
+  std::ostringstream text;
+  text << file.rdbuf();
+  EXPECT_NE(text.str().find("o blade2\nv "), std::string::npos);
+  EXPECT_NE(text.str().find("l 63 64 65"), std::string::npos);   // 31 nodes per blade
+  EXPECT_FALSE(fs::exists(folder_ + "/frame_000003.obj"));
+}
+
+TEST_F(Simulate, threadsDoNotChangeTheTables)
+{
+  const auto table = [&](const std::string& threads) {
+    EXPECT_EQ(simulate(scenes + "grass.yaml --duration 0.2 --csv " + folder_ + "/" + threads + " --threads " + threads).status, 0);
+    std::ifstream file(folder_ + "/" + threads + "/nodes.csv");
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+  };
+  const std::string one = table("1");
+  EXPECT_GT(one.size(), 10000u);
+  EXPECT_TRUE(one == table("3"));
+}
+
+TEST_F(Simulate, bagsNeedRos)
+{
+  const Result result = simulate(cantilever + " --duration 0.02 --bag " + folder_ + "/out.bag");
+  if (SLENDER_HAS_BAG)
+  {
+    EXPECT_EQ(result.status, 0) << result.output;
+    EXPECT_TRUE(fs::exists(folder_ + "/out.bag"));
+  }
+  else
+  {
+    EXPECT_EQ(result.status, 2);
+    EXPECT_NE(result.output.find("has no ROS"), std::string::npos) << result.output;
+  }
+}
+
+}  // namespace

@@ -1,0 +1,146 @@
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+/// The rooms depend on each other one way only (DESIGN 1): node -> scene -> {rod, thread, cloth, tracking, fairing} ->
+/// {energy, dynamics, contact} -> {geometry, linalg}; study sits beside node.
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::map<std::string, int> level{
+  {"linalg", 0}, {"geometry", 0}, {"energy", 1},  {"dynamics", 1}, {"contact", 1}, {"rod", 2},   {"thread", 2}, {"cloth", 2},
+  {"tracking", 2}, {"fairing", 2}, {"scene", 3},  {"node", 4},     {"study", 4},   {"nodes", 5}, {"tools", 5}};
+
+struct Include
+{
+  std::string file, room, header;
+  int line;
+};
+
+std::vector<Include> allIncludes()
+{
+  static const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
+  std::vector<Include> includes;
+  for (const char* top : {"include/slender_sim", "src"})
+  {
+    const fs::path root = fs::path(SLENDER_SOURCE_DIR) / top;
+    for (const auto& entry : fs::recursive_directory_iterator(root))
+    {
+      const std::string suffix = entry.path().extension().string();
+      if (!entry.is_regular_file() || (suffix != ".h" && suffix != ".cpp" && suffix != ".hpp" && suffix != ".inc"))
+      {
+        continue;
+      }
+      const fs::path relative = fs::relative(entry.path(), root);
+      std::ifstream file(entry.path());
+      std::string text;
+      std::smatch match;
+      for (int line = 1; std::getline(file, text); ++line)
+      {
+        if (std::regex_search(text, match, pattern))
+        {
+          includes.push_back({(fs::path(top) / relative).string(), relative.begin()->string(), match[1], line});
+        }
+      }
+    }
+  }
+  return includes;
+}
+
+std::string roomOf(const std::string& header)
+{
+  const std::string prefix = "slender_sim/";
+  if (header.compare(0, prefix.size(), prefix) != 0)
+  {
+    return "";
+  }
+  const auto slash = header.find('/', prefix.size());
+  return slash == std::string::npos ? "" : header.substr(prefix.size(), slash - prefix.size());
+}
+
+TEST(Layers, everyFolderIsARoom)
+{
+  for (const Include& include : allIncludes())
+  {
+    EXPECT_TRUE(level.count(include.room)) << include.file << ": " << include.room << " is no room of DESIGN 1";
+  }
+}
+
+TEST(Layers, dependenciesPointDown)
+{
+  int checked = 0;
+  for (const Include& include : allIncludes())
+  {
+    const auto from = level.find(include.room), to = level.find(roomOf(include.header));
+    if (from == level.end() || to == level.end() || from->first == to->first)
+    {
+      continue;
+    }
+    ++checked;
+    // Rooms of one level may use each other (energy and dynamics; geometry and linalg) except the solvers and node/study.
+    const bool siblings_allowed = from->second <= 1;
+    EXPECT_TRUE(to->second < from->second || (siblings_allowed && to->second == from->second))
+      << include.file << ":" << include.line << ": " << from->first << " must not include " << include.header;
+  }
+  EXPECT_GT(checked, 10);   // the walk found the sources
+}
+
+TEST(Layers, onlyNodesKnowRos)
+{
+  static const std::regex ros(R"(^(ros|rosbag|rosgraph_msgs|tf2?(_ros|_geometry_msgs)?|\w+_msgs|std_srvs|nodelet|pluginlib|diagnostic_updater|rosconsole|xmlrpcpp)/)");
+  for (const Include& include : allIncludes())
+  {
+    if (include.room == "node" || include.room == "nodes")
+    {
+      continue;
+    }
+    EXPECT_FALSE(std::regex_search(include.header, ros)) << include.file << ":" << include.line << ": " << include.header;
+  }
+}
+
+TEST(Layers, onlyContactKnowsFclAndOnlySceneKnowsYaml)
+{
+  for (const Include& include : allIncludes())
+  {
+    EXPECT_FALSE(include.room != "contact" && include.header.compare(0, 4, "fcl/") == 0) << include.file;
+    const bool yaml = include.header.compare(0, 9, "yaml-cpp/") == 0;
+    EXPECT_FALSE(yaml && include.file.compare(0, 10, "src/scene/") != 0) << include.file << " must not include " << include.header;
+  }
+}
+
+TEST(Layers, noFileIsTooLong)
+{
+  std::set<std::string> folders{"include", "src", "test", "bench"};
+  for (const std::string& folder : folders)
+  {
+    const fs::path root = fs::path(SLENDER_SOURCE_DIR) / folder;
+    if (!fs::exists(root))
+    {
+      continue;
+    }
+    for (const auto& entry : fs::recursive_directory_iterator(root))
+    {
+      if (!entry.is_regular_file())
+      {
+        continue;
+      }
+      std::ifstream file(entry.path());
+      std::string line;
+      int count = 0;
+      while (std::getline(file, line))
+      {
+        ++count;
+      }
+      EXPECT_LE(count, 500) << entry.path();
+    }
+  }
+}
+
+}  // namespace

@@ -1,0 +1,317 @@
+#include "slender_sim/scene/simulation.h"
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+namespace {
+
+const char* const two_rods = R"(
+time: {step: 0.01}
+rods:
+  - name: a
+    centerline: {straight: {edges: 20}}
+    grasps:
+      left: {edges: [0]}
+      right: {edges: [-1], attach: initial, motion: {table: [[0, 5, 0, 0], [1, 5, 0, 1], [2, 5, 0.5, 1]]}}
+  - name: b
+    centerline: {straight: {from: [0, 1, 0], to: [1, 1, 0], edges: 30}}
+    grasps: {b_left: {nodes: [3], hold: position}}
+)";
+
+Simulation make(const std::vector<std::string>& overrides = {}) { return Simulation(parseScene(two_rods, "t", overrides)); }
+
+void run(Simulation& simulation, int steps)
+{
+  for (int k = 0; k < steps; ++k)
+  {
+    const StepReport report = simulation.step(simulation.defaultInputs());
+    ASSERT_TRUE(report.ok) << report.message;
+  }
+}
+
+void expectSameBits(const SceneState& a, const SceneState& b)
+{
+  EXPECT_EQ(a.steps, b.steps);
+  EXPECT_EQ(a.time, b.time);
+  ASSERT_EQ(a.rods.size(), b.rods.size());
+  for (std::size_t r = 0; r < a.rods.size(); ++r)
+  {
+    EXPECT_EQ(a.rods[r].x, b.rods[r].x);
+    EXPECT_EQ(a.rods[r].v, b.rods[r].v);
+    EXPECT_EQ(a.rods[r].d1, b.rods[r].d1);
+    EXPECT_EQ(a.rods[r].twist, b.rods[r].twist);
+  }
+  for (std::size_t g = 0; g < a.wrenches.size(); ++g)
+  {
+    EXPECT_EQ(a.wrenches[g].force, b.wrenches[g].force);
+    EXPECT_EQ(a.wrenches[g].torque, b.wrenches[g].torque);
+  }
+}
+
+TEST(Simulation, buildsWhatTheSceneSays)
+{
+  const Simulation simulation = make();
+  ASSERT_EQ(simulation.grasps().size(), 3u);
+  EXPECT_EQ(simulation.grasps()[2].rod, 1);
+  EXPECT_EQ(simulation.grasps()[2].index, 0);
+  EXPECT_EQ(simulation.grasps()[2].config->name, "b_left");
+  EXPECT_NEAR(simulation.rodModel(0).totalMass(), 1000 * M_PI * 0.005 * 0.005, 1e-12);
+  EXPECT_EQ(simulation.rodModel(1).nodes(), 31);
+  EXPECT_EQ(simulation.state().time, 0.0);
+}
+
+TEST(Simulation, dragIsSpreadOverTheNodes)
+{
+  const Simulation simulation = make({"rods.0.damping.drag=0.3"});
+  EXPECT_NEAR(simulation.rodModel(0).drag.sum(), 0.3, 1e-12);   // 0.3 N s/m^2 times 1 m
+  EXPECT_NEAR(simulation.rodModel(0).drag[0], 0.5 * simulation.rodModel(0).drag[1], 1e-15);
+}
+
+TEST(Simulation, timeIsStepsTimesStep)
+{
+  Simulation simulation = make({"gravity=[0, 0, 0]", "rods.0.grasps.right.motion=fixed"});
+  run(simulation, 30);
+  EXPECT_EQ(simulation.state().time, 30 * 0.01);
+}
+
+TEST(Simulation, anInitialAttachmentKeepsItsOffset)
+{
+  Simulation simulation = make();
+  run(simulation, 100);   // the gripper rose by 1 m
+  const RodState& rod = simulation.state().rods[0];
+  EXPECT_LT((rod.x.col(20) - Eigen::Vector3d(1, 0, 1)).norm(), 1e-12);
+  EXPECT_LT((rod.x.col(0) - Eigen::Vector3d(0, 0, 0)).norm(), 1e-12);
+}
+
+TEST(Simulation, offsetsCarryTheVelocityOfTheirLever)
+{
+  Simulation simulation = make();
+  const double c = std::cos(0.3), s = std::sin(0.3);
+  const Pose X_WM{{1, 1, 0}, Eigen::Quaterniond(c, 0, 0, s)};
+  simulation.setOffset(1, {{1, 1, 0}, Eigen::Quaterniond::Identity()});   // the section is at (1, 0, 0): 1 m along -y
+  const GraspTarget target = simulation.targetOf(1, X_WM, Twist{{0.1, 0, 0}, {0, 0, 2}});
+  EXPECT_LT((target.X_WG.position - (X_WM.position + X_WM.orientation * Eigen::Vector3d(0, -1, 0))).norm(), 1e-14);
+  const Eigen::Vector3d arm = target.X_WG.position - X_WM.position;
+  EXPECT_LT((target.velocity->linear - (Eigen::Vector3d(0.1, 0, 0) + Eigen::Vector3d(0, 0, 2).cross(arm))).norm(), 1e-14);
+  EXPECT_EQ(simulation.targetOf(0, X_WM).X_WG.position, X_WM.position);   // attach: section
+}
+
+TEST(Simulation, refusesInputsOfTheWrongSize)
+{
+  Simulation simulation = make();
+  SceneInputs inputs = simulation.defaultInputs();
+  inputs.grasps.pop_back();
+  EXPECT_THROW(simulation.step(inputs), std::invalid_argument);
+}
+
+TEST(Simulation, aFailedStepTouchesNothing)
+{
+  Simulation simulation = make();
+  run(simulation, 3);
+  const SceneState before = simulation.state();
+  SceneInputs inputs = simulation.defaultInputs();
+  inputs.grasps[1].X_WG.position.x() = std::nan("");
+  const StepReport report = simulation.step(inputs);
+  EXPECT_FALSE(report.ok);
+  EXPECT_NE(report.message.find("rod 'a'"), std::string::npos) << report.message;
+  expectSameBits(simulation.state(), before);
+  run(simulation, 1);   // and it goes on
+}
+
+TEST(Simulation, threadsDoNotChangeResults)
+{
+  Simulation one = make(), many = make();
+  one.setThreads(1);
+  many.setThreads(2);
+  run(one, 40);
+  run(many, 40);
+  expectSameBits(one.state(), many.state());
+  EXPECT_THROW(one.setThreads(0), std::invalid_argument);
+}
+
+TEST(Simulation, resetStartsAgain)
+{
+  Simulation simulation = make();
+  const SceneState start = simulation.state();
+  run(simulation, 20);
+  const SceneState first = simulation.state();
+  simulation.reset();
+  expectSameBits(simulation.state(), start);
+  run(simulation, 20);
+  expectSameBits(simulation.state(), first);
+}
+
+TEST(Simulation, attachAndRelease)
+{
+  Simulation simulation = make({"rods.0.grasps.right.motion=fixed"});
+  run(simulation, 5);
+  simulation.release(1);
+  EXPECT_EQ(simulation.wrench(1).force, Eigen::Vector3d(0, 0, 0));
+  run(simulation, 20);
+  EXPECT_LT(simulation.state().rods[0].x(2, 20), -0.05);   // the released end falls
+  const Eigen::Vector3d caught = simulation.state().rods[0].x.col(10);
+  simulation.attach(1, 10, 12, Hold::frame);
+  run(simulation, 20);
+  EXPECT_LT((simulation.state().rods[0].x.col(10) - caught).norm(), 1e-12);
+}
+
+TEST(Simulation, refusesToAttachWhatCannotBeHeld)
+{
+  Simulation simulation = make();
+  EXPECT_THROW(simulation.attach(3, 0, 0, Hold::frame), std::invalid_argument);
+  EXPECT_THROW(simulation.attach(-1, 0, 0, Hold::frame), std::invalid_argument);
+  EXPECT_THROW(simulation.attach(1, -1, 0, Hold::frame), std::invalid_argument);
+  EXPECT_THROW(simulation.attach(1, 20, 21, Hold::frame), std::invalid_argument);
+  EXPECT_THROW(simulation.attach(1, 6, 5, Hold::frame), std::invalid_argument);
+  EXPECT_THROW(simulation.attach(1, 5, 6, Hold::position), std::invalid_argument);
+  EXPECT_THROW(simulation.attach(1, 0, 3, Hold::frame), std::invalid_argument);   // node 0 belongs to `left`
+  EXPECT_THROW(simulation.release(7), std::invalid_argument);
+  simulation.release(0);
+  EXPECT_NO_THROW(simulation.attach(1, 0, 3, Hold::frame));
+}
+
+TEST(Simulation, equilibriumHangsStill)
+{
+  Simulation simulation = make({"start=equilibrium", "rods.1.grasps.b_left={edges: [0]}", "rods.0.grasps.right.motion=fixed"});
+  const Eigen::Matrix3Xd start = simulation.state().rods[1].x;
+  EXPECT_LT(start(2, 30), -0.1);
+  EXPECT_NEAR(simulation.wrench(2).force.z(), -simulation.rodModel(1).totalMass() * 9.81, 1e-6);
+  run(simulation, 10);
+  EXPECT_LT((simulation.state().rods[1].x - start).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(Simulation, explainsARodThatCannotBeBuilt)
+{
+  SceneConfig config = parseScene(two_rods);
+  config.rods[1].cross_section.a = {-1.0};
+  try
+  {
+    Simulation simulation(config);
+    FAIL() << "a negative radius was accepted";
+  }
+  catch (const SceneError& error)
+  {
+    EXPECT_NE(std::string(error.what()).find("rods.1 (b)"), std::string::npos) << error.what();
+  }
+}
+
+class SavedState : public testing::TestWithParam<const char*>
+{
+protected:
+  void SetUp() override
+  {
+    path_ = testing::TempDir() + "/slender_sim_state_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
+            GetParam();
+  }
+  void TearDown() override { std::remove(path_.c_str()); }
+
+  std::string read() const
+  {
+    std::ifstream file(path_, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+  void write(const std::string& bytes) const { std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes; }
+
+  std::string path_;
+};
+
+TEST_P(SavedState, loadAndStepIsBitEqual)
+{
+  const std::vector<std::string> settings{std::string("time.integrator=") + GetParam(), "rods.0.damping.stiffness=0.001",
+                                          std::string("time.step=") + (std::string(GetParam()) == "symplectic_euler" ? "1e-5" : "0.01")};
+  Simulation through = make(settings);
+  run(through, 25);
+  through.save(path_);
+  run(through, 25);
+
+  Simulation again = make(settings);
+  again.load(path_);
+  run(again, 25);
+  expectSameBits(again.state(), through.state());
+
+  run(through, 3);
+  through.load(path_);   // back in the same object as well
+  run(through, 25);
+  expectSameBits(again.state(), through.state());
+}
+
+TEST_P(SavedState, refusesWhatDoesNotFit)
+{
+  Simulation simulation = make({std::string("time.integrator=") + GetParam()});
+  const auto refusal = [&](Simulation& target) {
+    const SceneState before = target.state();
+    std::string reason;
+    try
+    {
+      target.load(path_);
+    }
+    catch (const std::runtime_error& error)
+    {
+      reason = error.what();
+    }
+    expectSameBits(target.state(), before);
+    return reason;
+  };
+  EXPECT_NE(refusal(simulation).find("cannot be opened"), std::string::npos);
+  simulation.save(path_);
+  const std::string good = read();
+  EXPECT_EQ(refusal(simulation), "");
+
+  for (std::size_t size : {std::size_t{0}, std::size_t{5}, std::size_t{20}, std::size_t{40}, good.size() / 2, good.size() - 1})
+  {
+    write(good.substr(0, size));
+    EXPECT_NE(refusal(simulation), "") << "cut to " << size << " bytes";
+  }
+  for (std::size_t at = 0; at < good.size(); at += 97)   // prime, so that all parts of numbers are hit
+  {
+    std::string bad = good;
+    bad[at] = static_cast<char>(bad[at] ^ 0x10);
+    write(bad);
+    EXPECT_NE(refusal(simulation), "") << "byte " << at << " changed";
+  }
+  write(good + "x");
+  EXPECT_NE(refusal(simulation), "");
+  write("not a state at all, but long enough to hold a header of forty bytes");
+  EXPECT_NE(refusal(simulation).find("is not a saved state"), std::string::npos);
+
+  write(good);
+  for (const char* change : {"rods.0.material.youngs_modulus=2e6", "rods.1.centerline.straight.edges=31", "time.step=0.02",
+                             "gravity=[0, 0, -1]", "rods.1.name=c"})
+  {
+    Simulation other = make({std::string("time.integrator=") + GetParam(), change});
+    EXPECT_NE(refusal(other).find("belongs to another scene"), std::string::npos) << change;
+  }
+  Simulation same = make({std::string("time.integrator=") + GetParam(), "record.every=7", "name=other"});
+  EXPECT_EQ(refusal(same), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, SavedState,
+                         testing::Values("implicit_euler", "bdf2", "tr_bdf2", "implicit_midpoint", "generalized_alpha",
+                                         "symplectic_euler"));
+
+TEST(SavedStateFile, sayWhyItCannotBeWritten)
+{
+  const Simulation simulation = make();
+  try
+  {
+    simulation.save("/nonexistent/folder/state");
+    FAIL();
+  }
+  catch (const std::runtime_error& error)
+  {
+    EXPECT_NE(std::string(error.what()).find("/nonexistent/folder/state"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace slender
