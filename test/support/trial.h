@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Eigen/LU>
-
 #include "slender_sim/rod/rod_system.h"
 #include "test/support/rods.h"
 
@@ -53,13 +51,11 @@ inline Eigen::VectorXd freeDirection(const RodSystem& system, const RodState& st
   return d;
 }
 
-/// -K^-1 r for the matrix of the last factor(). The system must be at its base.
-inline Eigen::VectorXd solveFor(RodSystem& system, const Eigen::VectorXd& r)
+/// Newton's direction -K^-1 gradient of an evaluation with Hessian at the base. The system stays there.
+inline Eigen::VectorXd newtonDirection(RodSystem& system)
 {
   const int n = system.model().nodes();
-  Eigen::Map<Eigen::VectorXd>(system.arrays().gradient, 4 * n) = r;
   Eigen::VectorXd base(3 * n), d(4 * n);
-  system.moveAlong(0.0);
   for (int i = 0; i < n; ++i)
     base.segment<3>(3 * i) = system.position(i);
   system.solve();

@@ -73,6 +73,34 @@ TEST(BandedLdlt, SolvesEightRightHandSides)
   }
 }
 
+TEST(BandedLdlt, EliminatesByPieces)
+{
+  Random random(9);
+  const int blocks = 23;
+  const Eigen::MatrixXd a = bandWithPivots(signedPivots(4 * blocks, 0.3, random), random);
+  const Eigen::VectorXd b = random.numbers(4 * blocks);
+  BandedLdlt<10, 4> whole, pieces;
+  for (auto* solver : {&whole, &pieces})
+  {
+    solver->resize(blocks);
+    load(*solver, panelsOf(a));
+  }
+  const Inertia inertia = whole.factor();
+  Eigen::VectorXd x = b;
+  whole.solve(x.data());
+  BandCarry carry;
+  Eigen::VectorXd y = b;
+  for (int from = 0, to; from < blocks; from = to)
+  {
+    to = std::min(from + 1 + from % 4, blocks);
+    pieces.eliminate(from, to, y.data(), carry);
+  }
+  pieces.substitute(y.data());
+  EXPECT_EQ(carry.negative, inertia.negative);
+  EXPECT_EQ(carry.zero, 0);
+  EXPECT_EQ(y, x);   // the same operations in the same order
+}
+
 TEST(BandedLdlt, FactorsALeadingPart)
 {
   Random random(3);

@@ -220,9 +220,10 @@ TEST(MakeRodState, SpreadsTwistAndRefusesBadInput)
   EXPECT_EQ(s.v.norm(), 0.0);
   const int n = 8;
   const RodModel ring = buildRod("ring", ringNodes(n, 1.0), true, uniformSections(modulusSection(1, 1, 1, 1), n), Vector3d::Zero(), false);
-  const RodState r = makeRodState(ring, ringNodes(n, 1.0), Vector3d::Zero(), 3.0);
+  const RodState r = makeRodState(ring, ringNodes(n, 1.0), Vector3d::Zero(), 2 * M_PI);
   for (int i = 0; i < n; ++i)
-    EXPECT_NEAR(r.twist[i], 3.0 / n, 1e-13);
+    EXPECT_NEAR(r.twist[i], 2 * M_PI / n, 1e-13);
+  expectRefused("multiple of 2 pi", [&] { makeRodState(ring, ringNodes(n, 1.0), Vector3d::Zero(), 3.0); });
 
   expectRefused("5 nodes", [&] { makeRodState(m, straightNodes(4, 1.0), Vector3d::Zero()); });
   expectRefused("twist", [&] { makeRodState(m, unevenNodes(), Vector3d::Zero(), kNan); });

@@ -47,11 +47,37 @@ struct LoadedRod
     Matrix3Xd nodes = rest;
     for (int i = 0; i < n; ++i)
       nodes.col(i) += random.vector(0.15);
-    Rod rod(model, nodes, 0.5 * n);
+    Rod rod(model, nodes, 2 * M_PI);
     c.grasp(rod);
     return rod;
   }
 };
+
+/// The solver gives d = -K^-1 g for the gradient g, so d^T K d must be -g.d; second differences of the energy along d must say the
+/// same. (Differences of the gradient would not: its frames move on, by holonomy.) Random loads turn d into every direction.
+void checkHessian(LoadedRod& s, Random& random, int samples, double tolerance)
+{
+  const int n = s.rod.model->nodes();
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(4 * n);
+  for (int sample = 0; sample < samples; ++sample)
+  {
+    for (int i = 0; i < n; ++i)
+      s.system.setInertia(i, s.system.isFree(i) ? 5.0 : 0.0, s.rod.state.x.col(i), random.vector(3.0));
+    const RodEvaluation base = evaluateAt(s.system, s.rod.state, zero, true);
+    ASSERT_EQ(base.inertia.zero, 0);
+    const Eigen::VectorXd g = gradientOf(s.system), d = newtonDirection(s.system);
+    const double expected = -g.dot(d);
+    double best = 1e9;
+    for (double size : {1e-1, 3e-2, 1e-2, 3e-3})
+    {
+      const double h = size / d.lpNorm<Eigen::Infinity>();
+      const auto even = [&](double f) { return evaluateAt(s.system, s.rod.state, f * h * d).energy() + evaluateAt(s.system, s.rod.state, -f * h * d).energy() - 2 * base.energy(); };
+      // fourth order: truncation h^4, round-off 1e-16 E / h^2 (E up to 1e3)
+      best = std::min(best, std::abs((16 * even(1) - even(2)) / (12 * h * h) - expected) / std::abs(expected));
+    }
+    EXPECT_LT(best, tolerance) << "n " << n;
+  }
+}
 
 class RodDerivatives : public ::testing::TestWithParam<Case>
 {
@@ -89,31 +115,25 @@ TEST_P(RodDerivatives, Hessian)
   for (int n : {9, 17})
   {
     LoadedRod s(GetParam(), n, random);
-    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(4 * n);
-    evaluateAt(s.system, s.rod.state, zero, true);
-    ASSERT_EQ(s.system.factor(0.0).zero, 0);
-    // The banded solve gives d = -K^-1 r, so d^T K d must be -r.d; second differences of the energy along d must say the same.
-    // (Differences of the gradient would not: its frames move on, by holonomy.) Directions that the matrix is stiff or soft against
-    // take part alike, because r is as random as K's scale is uniform here.
-    for (int sample = 0; sample < 12; ++sample)
-    {
-      evaluateAt(s.system, s.rod.state, zero, true);
-      s.system.factor(0.0);
-      const Eigen::VectorXd r = freeDirection(s.system, s.rod.state, random);
-      const Eigen::VectorXd d = solveFor(s.system, r);
-      const double expected = -r.dot(d);
-      double best = 1e9;
-      const double e0 = evaluateAt(s.system, s.rod.state, zero).energy();
-      for (double size : {3e-2, 1e-2, 3e-3})
-      {
-        const double h = size / d.lpNorm<Eigen::Infinity>();
-        const auto even = [&](double f) { return evaluateAt(s.system, s.rod.state, f * h * d).energy() + evaluateAt(s.system, s.rod.state, -f * h * d).energy() - 2 * e0; };
-        // fourth order: truncation h^4, round-off 1e-14/h^2
-        best = std::min(best, std::abs((16 * even(1) - even(2)) / (12 * h * h) - expected) / std::abs(expected));
-      }
-      EXPECT_LT(best, 1e-6) << "n " << n;
-    }
+    // truncation and round-off meet near 1e-6; where no frame is held the solver adds 1e-8 of the twist stiffness, seen in soft spins
+    checkHessian(s, random, 12, 1e-4);
   }
+}
+
+TEST_P(RodDerivatives, HessianOfALongRodAssembledByPieces)
+{
+  Random random(44);
+  const int n = 600;   // more than two pieces of 256 nodes
+  Case c = GetParam();
+  const auto grasp = c.grasp;
+  c.grasp = [&](Rod& r) {
+    grasp(r);
+    if (!r.state.grasps.empty())   // a clamp on every edge near the seams, wherever exactly they are
+      for (int node = 244; node < 540; node += node == 272 ? 232 : 2)
+        r.hold(node, node);
+  };
+  LoadedRod s(c, n, random);
+  checkHessian(s, random, 3, 3e-4);   // one entry missing at a seam is 1e-3 and more; round-off of sixty times the energy 1e-4
 }
 
 TEST_P(RodDerivatives, ViscousResponseIsElasticPlusRatioTimesRate)

@@ -31,7 +31,7 @@ TEST_P(RodEnergy, EqualsTheFormulaOnTheFramedCurve)
   {
     const Matrix3Xd rest = wigglyNodes(n, closed(), random), x = displaced(rest, 0.2, random);
     const RodModel m = model(rest, false, random);
-    const double turns = 9.0;
+    const double turns = 6 * M_PI;   // whole turns, as a loop must have
     const RodState state = makeRodState(m, x, Vector3d::Zero(), turns);
     RodSystem system(m);
     system.load(state);
@@ -99,7 +99,7 @@ TEST_P(RodEnergy, UnchangedByRigidMotion)
   const int n = 11;
   const Matrix3Xd rest = wigglyNodes(n, closed(), random), x = displaced(rest, 0.2, random);
   const RodModel m = model(rest, false, random);
-  const RodState state = makeRodState(m, x, Vector3d::Zero(), 2.0);
+  const RodState state = makeRodState(m, x, Vector3d::Zero(), 2 * M_PI);
   RodSystem system(m);
   system.load(state);
   const RodEvaluation before = system.evaluate(true);
@@ -154,7 +154,7 @@ TEST_P(RodEnergy, ForcesAndMomentsOfAFreeRodVanish)
     const Matrix3Xd rest = wigglyNodes(n, closed(), random), x = displaced(rest, 0.2, random);
     const RodModel m = model(rest, false, random);
     RodSystem system(m);
-    system.load(makeRodState(m, x, Vector3d::Zero(), 3.0));
+    system.load(makeRodState(m, x, Vector3d::Zero(), 2 * M_PI));
     system.evaluate(false);
     const Eigen::VectorXd g = gradientOf(system);
     Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();
