@@ -22,3 +22,8 @@ if(TARGET scenes_tests)
   target_compile_definitions(scenes_tests PRIVATE SLENDER_HAS_BAG=${has_bag}
     SLENDER_SIMULATE="$<TARGET_FILE:slender_sim_simulate>")
 endif()
+foreach(program study_tests node_unit_tests)
+  if(TARGET ${program})
+    set_target_properties(${program} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
+  endif()
+endforeach()

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "slender_sim/geometry/rotation.h"
+
 namespace slender {
 
 namespace {
@@ -13,53 +15,6 @@ namespace {
 constexpr double same_position = 0.0;        // [m] only a sample that truly repeats counts as a pause
 constexpr double same_orientation = 1e-12;   // [rad] round-off of q^-1 q
 constexpr double burst_ratio = 4.0;          // intervals more uneven than this are a burst, see the header
-
-Eigen::Matrix3d skew(const Eigen::Vector3d& w)
-{
-  Eigen::Matrix3d s;
-  s << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
-  return s;
-}
-
-Eigen::Quaterniond expMap(const Eigen::Vector3d& phi)
-{
-  const double half = 0.5 * phi.norm();
-  const double scale = half < 1e-4 ? 0.5 * (1 - half * half / 6) : 0.5 * std::sin(half) / half;
-  Eigen::Quaterniond q;
-  q.w() = std::cos(half);
-  q.vec() = scale * phi;
-  return q;
-}
-
-/// Rotation vector of length at most pi; the sign of q does not matter.
-Eigen::Vector3d logMap(const Eigen::Quaterniond& q)
-{
-  const double sine = q.vec().norm();
-  const double sign = q.w() < 0 ? -1.0 : 1.0;
-  if (sine < 1e-9)
-  {
-    return sign * 2.0 * q.vec();   // the next term is sine^3 / 3, below round-off
-  }
-  return (sign * 2.0 * std::atan2(sine, std::abs(q.w())) / sine) * q.vec();
-}
-
-/// Body angular velocity of exp(phi(t)) is rightJacobian(phi) * phi'.
-Eigen::Matrix3d rightJacobian(const Eigen::Vector3d& phi)
-{
-  const double x = phi.norm();
-  const Eigen::Matrix3d s = skew(phi);
-  const double a = x < 1e-3 ? 0.5 - x * x / 24 : (1 - std::cos(x)) / (x * x);
-  const double b = x < 1e-3 ? 1.0 / 6 - x * x / 120 : (x - std::sin(x)) / (x * x * x);
-  return Eigen::Matrix3d::Identity() - a * s + b * s * s;
-}
-
-Eigen::Matrix3d inverseRightJacobian(const Eigen::Vector3d& phi)
-{
-  const double x = phi.norm();
-  const Eigen::Matrix3d s = skew(phi);
-  const double b = x < 1e-3 ? 1.0 / 12 + x * x / 720 : (1 - 0.5 * x / std::tan(0.5 * x)) / (x * x);
-  return Eigen::Matrix3d::Identity() + 0.5 * s + b * s * s;
-}
 
 /// Slope at the middle of three samples; `before`, `after`: the neighbours' values minus its own.
 Eigen::Vector3d threePointSlope(double h_before, const Eigen::Vector3d& before, double h_after, const Eigen::Vector3d& after,
@@ -139,7 +94,7 @@ Twist PoseTrajectory::slope(std::size_t k) const
   Twist slope;
   slope.linear = threePointSlope(h0, poses_[k - 1].position - poses_[k].position, h1, poses_[k + 1].position - poses_[k].position,
                                  same_position);
-  slope.angular = threePointSlope(h0, logMap(back * poses_[k - 1].orientation), h1, logMap(back * poses_[k + 1].orientation),
+  slope.angular = threePointSlope(h0, rotationVector(back * poses_[k - 1].orientation), h1, rotationVector(back * poses_[k + 1].orientation),
                                   same_orientation);
   return slope;
 }
@@ -165,18 +120,18 @@ Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
 
   const Pose& a = poses_[k];
   const Pose& b = poses_[k + 1];
-  const Eigen::Vector3d whole = logMap(a.orientation.conjugate() * b.orientation);
+  const Eigen::Vector3d whole = rotationVector(a.orientation.conjugate() * b.orientation);
   const Eigen::Vector3d rate0 = from.angular;                                   // phi' = body rate where phi = 0
-  const Eigen::Vector3d rate1 = inverseRightJacobian(whole) * to.angular;
+  const Eigen::Vector3d rate1 = rotationRate(-whole).inverse() * to.angular;
   const Eigen::Vector3d phi = h01 * whole + h * (h10 * rate0 + h11 * rate1);
 
   Pose pose;
   pose.position = a.position + h01 * (b.position - a.position) + h * (h10 * from.linear + h11 * to.linear);
-  pose.orientation = (a.orientation * expMap(phi)).normalized();
+  pose.orientation = (a.orientation * fromRotationVector(phi)).normalized();
   if (velocity)
   {
     velocity->linear = d01 * (b.position - a.position) + h * (d10 * from.linear + d11 * to.linear);
-    velocity->angular = pose.orientation * (rightJacobian(phi) * (d01 * whole + h * (d10 * rate0 + d11 * rate1)));
+    velocity->angular = pose.orientation * (rotationRate(-phi) * (d01 * whole + h * (d10 * rate0 + d11 * rate1)));
   }
   return pose;
 }

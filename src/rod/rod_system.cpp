@@ -366,7 +366,7 @@ double RodSystem::residual() const
 
 double RodSystem::forceScale() const
 {
-  double largest = std::numeric_limits<double>::min();
+  double largest = 1e-9 * max_stretch_modulus_;   // a rod at rest has no forces to compare with, only their round-off
   for (int i = 0; i < a_.nodes; ++i)
   {
     largest = std::max(largest, std::abs(a_.stretch[i] * (a_.strain[i] - a_.rest_strain[i])));

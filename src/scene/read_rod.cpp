@@ -230,6 +230,7 @@ RodConfig readRod(const YamlCursor& at, const ReadContext& context, const std::s
   assign(rod.closed, map.get("closed").boolean());
   assign(rod.naturally_straight, map.get("naturally_straight").boolean());
   assign(rod.initial_twist, map.get("initial_twist").number(Range::closed(-1e5, 1e5, "rad")));
+  assign(rod.formulation, map.get("formulation").choice<Formulation>({{"auto", Formulation::automatic}, {"general", Formulation::general}}));
   const int edges = readShape(map, context, rod);
   if (edges > 0 && rod.initial)
   {

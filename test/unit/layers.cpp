@@ -1,7 +1,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <regex>
 #include <set>
 #include <string>
 #include <vector>
@@ -24,9 +23,36 @@ struct Include
   int line;
 };
 
+/// What an #include line includes; empty for any other line.
+std::string includedHeader(const std::string& line)
+{
+  const auto hash = line.find_first_not_of(" \t");
+  if (hash == std::string::npos || line[hash] != '#')
+  {
+    return "";
+  }
+  const auto word = line.find_first_not_of(" \t", hash + 1);
+  if (word == std::string::npos || line.compare(word, 7, "include") != 0)
+  {
+    return "";
+  }
+  const auto open = line.find_first_of("<\"", word + 7);
+  const auto close = open == std::string::npos ? open : line.find_first_of(">\"", open + 1);
+  return close == std::string::npos ? "" : line.substr(open + 1, close - open - 1);
+}
+
+bool isRos(const std::string& header)
+{
+  static const std::set<std::string> packages{"ros", "rosbag", "tf", "tf2", "tf2_ros", "std_srvs", "nodelet", "pluginlib",
+                                              "diagnostic_updater", "rosconsole", "xmlrpcpp"};
+  const auto slash = header.find('/');
+  const std::string package = header.substr(0, slash);
+  const bool messages = package.size() > 5 && package.compare(package.size() - 5, 5, "_msgs") == 0;
+  return slash != std::string::npos && (messages || packages.count(package));
+}
+
 std::vector<Include> allIncludes()
 {
-  static const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
   std::vector<Include> includes;
   for (const char* top : {"include/slender_sim", "src"})
   {
@@ -41,12 +67,12 @@ std::vector<Include> allIncludes()
       const fs::path relative = fs::relative(entry.path(), root);
       std::ifstream file(entry.path());
       std::string text;
-      std::smatch match;
       for (int line = 1; std::getline(file, text); ++line)
       {
-        if (std::regex_search(text, match, pattern))
+        const std::string header = includedHeader(text);
+        if (!header.empty())
         {
-          includes.push_back({(fs::path(top) / relative).string(), relative.begin()->string(), match[1], line});
+          includes.push_back({(fs::path(top) / relative).string(), relative.begin()->string(), header, line});
         }
       }
     }
@@ -94,14 +120,13 @@ TEST(Layers, dependenciesPointDown)
 
 TEST(Layers, onlyNodesKnowRos)
 {
-  static const std::regex ros(R"(^(ros|rosbag|rosgraph_msgs|tf2?(_ros|_geometry_msgs)?|\w+_msgs|std_srvs|nodelet|pluginlib|diagnostic_updater|rosconsole|xmlrpcpp)/)");
   for (const Include& include : allIncludes())
   {
     if (include.room == "node" || include.room == "nodes")
     {
       continue;
     }
-    EXPECT_FALSE(std::regex_search(include.header, ros)) << include.file << ":" << include.line << ": " << include.header;
+    EXPECT_FALSE(isRos(include.header)) << include.file << ":" << include.line << ": " << include.header;
   }
 }
 

@@ -34,6 +34,9 @@ public:
   bool empty() const { return times_.empty(); }
   double firstTime() const { return times_.front(); }
   double lastTime() const { return times_.back(); }
+  /// The samples that were given and not forgotten.
+  const std::vector<double>& times() const { return times_; }
+  const std::vector<Pose>& poses() const { return poses_; }
   std::size_t size() const { return times_.size(); }
 
   /// Pose and velocity at `time`; not empty.

@@ -57,4 +57,15 @@ inline Eigen::Quaterniond fromRotationVector(const Eigen::Vector3d& w)
   return Eigen::Quaterniond(std::cos(0.5 * angle), scale * w.x(), scale * w.y(), scale * w.z()).normalized();
 }
 
+/// Angular velocity of the rotation exp(r(t)), axes fixed in space: rotationRate(r) r'. In body axes it is rotationRate(-r) r'.
+inline Eigen::Matrix3d rotationRate(const Eigen::Vector3d& r)
+{
+  const double a2 = r.squaredNorm(), a = std::sqrt(a2);
+  Eigen::Matrix3d c;
+  c << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
+  const double f = a < 1e-3 ? 0.5 - a2 / 24.0 : (1.0 - std::cos(a)) / a2;
+  const double g = a < 1e-3 ? 1.0 / 6.0 - a2 / 120.0 : (a - std::sin(a)) / (a2 * a);
+  return Eigen::Matrix3d::Identity() + f * c + g * c * c;
+}
+
 }  // namespace slender

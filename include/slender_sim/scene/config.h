@@ -80,6 +80,9 @@ struct GraspConfig
   Attach attach = Attach::section;
 };
 
+/// Which equations a rod uses. `automatic` chooses the cheapest that applies; so far that is always the general one.
+enum class Formulation { automatic, general };
+
 struct RodConfig
 {
   std::string name;
@@ -87,6 +90,7 @@ struct RodConfig
   std::optional<Curve> initial;                ///< initial shape; its edges are resampled to those of the centerline
   bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
   bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
+  Formulation formulation = Formulation::automatic;
   double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
   Eigen::Vector3d director{0, 0, 0};           ///< d1 at the first edge (projected); zero: chosen automatically
   CrossSection cross_section{{0.005}, {0.005}};

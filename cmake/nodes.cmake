@@ -1,0 +1,26 @@
+# Everything that needs ROS: the node library, the nodes, their tests.
+file(GLOB NODE_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/node/*.cpp)
+add_library(slender_sim_node SHARED ${NODE_SOURCES})
+add_dependencies(slender_sim_node ${PROJECT_NAME}_generate_messages_cpp)
+target_include_directories(slender_sim_node PUBLIC
+  $<BUILD_INTERFACE:${CATKIN_DEVEL_PREFIX}/include> ${catkin_INCLUDE_DIRS})
+target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES})
+
+foreach(node rod_node motion_player)
+  add_executable(${node} ${PROJECT_SOURCE_DIR}/src/nodes/${node}.cpp)
+  target_link_libraries(${node} PRIVATE slender_sim_node)
+endforeach()
+
+if(BUILD_TESTING)
+  find_package(rostest REQUIRED)
+  # Pure functions and buffers: no master needed.
+  add_executable(node_unit_tests ${PROJECT_SOURCE_DIR}/test/nodes/guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/converters_test.cpp)
+  find_package(GTest REQUIRED)
+  target_link_libraries(node_unit_tests PRIVATE slender_sim_node GTest::gtest GTest::gtest_main)
+  add_test(NAME node_unit COMMAND node_unit_tests)
+
+  file(GLOB ROSTESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/nodes/*.test)
+  foreach(test ${ROSTESTS})
+    add_rostest(${test} DEPENDENCIES rod_node motion_player ${PROJECT_NAME}_generate_messages_py)
+  endforeach()
+endif()

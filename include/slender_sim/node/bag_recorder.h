@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <rosbag/bag.h>
+
+#include "slender_sim/node/scene_messages.h"
+#include "slender_sim/scene/recorder.h"
+
+namespace slender {
+
+/// Writes a bag in-process: topics drop messages, this does not. Messages go in a fixed order with their own stamps and nothing
+/// of the machine or the hour, so that two equal runs leave files of equal bytes.
+class BagRecorder
+{
+public:
+  /// Opens PATH.active, which close() renames to PATH. `topic_namespace` precedes the topics, e.g. "/". Throws
+  /// std::runtime_error when the file cannot be written.
+  BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names);
+  ~BagRecorder();
+
+  /// The scene as parsed, on `scene`; once, before the first record().
+  void recordScene(const std::string& yaml, const ros::Time& stamp);
+  /// `state` per rod, then `grasps/NAME/wrench` per grasp; `poses` can be derived from the state.
+  void record(const SceneMessages& messages);
+  /// Throws std::runtime_error when the file cannot be completed.
+  void close();
+
+  const std::string& path() const { return path_; }
+
+private:
+  std::string path_, state_topic_, scene_topic_;
+  std::vector<std::string> wrench_topics_;
+  rosbag::Bag bag_;
+  bool open_ = false;
+};
+
+/// The same bag as rod_node writes with `~start_time: 1`, frame world and no namespace, for `simulate --bag`.
+std::unique_ptr<Recorder> makeBagRecorder(const std::string& path);
+
+}  // namespace slender

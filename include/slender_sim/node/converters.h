@@ -1,0 +1,47 @@
+#pragma once
+
+#include <string>
+
+#include <geometry_msgs/Pose.h>
+#include <geometry_msgs/PoseArray.h>
+#include <geometry_msgs/Transform.h>
+#include <geometry_msgs/Twist.h>
+#include <geometry_msgs/Wrench.h>
+#include <std_msgs/Header.h>
+
+#include "slender_sim/RodState.h"
+#include "slender_sim/rod/rod_model.h"
+#include "slender_sim/rod/rod_stepper.h"
+
+/// Between the solver's types and messages. Pure functions: no clock, no node handle.
+namespace slender {
+
+geometry_msgs::Point toPoint(const Eigen::Vector3d& p);
+geometry_msgs::Vector3 toVector3(const Eigen::Vector3d& v);
+geometry_msgs::Quaternion toQuaternion(const Eigen::Quaterniond& q);
+geometry_msgs::Pose toMessage(const Pose& X);
+geometry_msgs::Wrench toMessage(const Wrench& wrench);
+
+Eigen::Vector3d fromMessage(const geometry_msgs::Point& p);
+
+/// Why a pose from a message cannot be used.
+enum class PoseFault { none, not_finite, bad_quaternion };
+
+/// Takes over a pose; its quaternion may be off unit length by 1 % (it is normalised), more is a fault and leaves `X` alone.
+PoseFault fromMessage(const geometry_msgs::Pose& message, Pose& X);
+PoseFault fromMessage(const geometry_msgs::Transform& message, Pose& X);
+bool isFinite(const geometry_msgs::Twist& twist);
+
+/// Material frame of edge j: x along the tangent, y along d1.
+Eigen::Quaterniond edgeFrame(const RodModel& model, const RodState& state, int edge);
+
+/// Fills everything but header, epoch and step. `out` may hold an earlier message: its memory is reused.
+void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out);
+
+/// Appends the middle of each edge with the edge's frame.
+void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out);
+
+/// False when any position, velocity, director or twist is NaN or infinite.
+bool isFinite(const RodState& state);
+
+}  // namespace slender

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+namespace slender {
+
+/// Why an incoming message (or an entry of one) was dropped.
+enum class Drop
+{
+  not_finite,       ///< NaN or infinite numbers
+  bad_quaternion,   ///< length off 1 by more than 1 %
+  wrong_length,     ///< arrays that do not fit the scene or each other
+  unknown_name,     ///< a body that no grasp follows
+  bad_frame,        ///< no frame_id
+  no_transform,     ///< tf2 did not know the transform at the message's stamp in time
+  out_of_order,     ///< not later than the last one
+  stale,            ///< older than ~guide_timeout
+  from_future,      ///< more than an hour ahead: another clock
+  queue_full,       ///< too many messages wait for transforms
+};
+constexpr int kDropReasons = 10;
+
+const char* toString(Drop reason);
+
+/// Counts dropped messages by reason, and complains at most once a second.
+class DropCounter
+{
+public:
+  /// `what`: e.g. the topic; `detail` ends the sentence, e.g. the value.
+  void drop(Drop reason, const std::string& what, const std::string& detail = "");
+
+  std::uint64_t count(Drop reason) const { return counts_[static_cast<int>(reason)]; }
+  std::uint64_t total() const;
+
+private:
+  std::array<std::uint64_t, kDropReasons> counts_{};
+  std::chrono::steady_clock::time_point last_warning_{};   // wall time: simulated time may stand still
+  std::uint64_t silent_ = 0;
+};
+
+}  // namespace slender

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <geometry_msgs/PoseArray.h>
+#include <geometry_msgs/PoseStamped.h>
+#include <ros/node_handle.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include "slender_sim/BodyStates.h"
+#include "slender_sim/node/drop_counter.h"
+#include "slender_sim/node/guide_buffer.h"
+#include "slender_sim/node/node_options.h"
+#include "slender_sim/node/sim_clock.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+/// Everything that moves grasps from outside: `grasps/NAME/pose`, `guides`, `bodies`, through tf2 into the node's frame. Subscribes
+/// only to what the scene's grasps ask for. Bad messages are dropped and counted; the grasp keeps its previous input.
+/// A stamp of zero means now, as everywhere in tf.
+class GuideInputs
+{
+public:
+  /// `nh` carries the callback queue of the simulating thread: callbacks never run beside a step.
+  GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
+              const std::vector<std::string>& grasp_names);
+
+  /// Takes in messages whose transforms have arrived meanwhile; drops those that waited too long.
+  void processPending();
+
+  /// Replaces the targets of grasps driven from outside by where they shall be at `time` [s since the clock's start].
+  void apply(double time, SceneInputs& inputs);
+
+  /// The grasp took hold of the rod where it is now (attached while running, state loaded).
+  void attachAt(int grasp, const Pose& X_WG);
+  /// The scene was reset: forgets all input.
+  void restart(const Simulation& simulation);
+
+  const DropCounter& drops() const { return drops_; }
+  bool waiting() const { return !pending_.empty(); }
+
+  /// Per grasp driven from outside.
+  struct Age { std::string name; std::optional<double> seconds; };
+  /// Age of the last pose at the clock's present; nothing while none came.
+  std::vector<Age> ages() const;
+
+private:
+  struct Guided { std::string name, body; std::unique_ptr<GuideBuffer> buffer; };   // buffer: null when not driven from outside
+  struct Entry { int grasp; Pose X_FH; };                 // a gripper in the frame of the message
+  struct Message
+  {
+    int source;                                           // messages of one source keep their order
+    std::string what, frame;
+    ros::Time stamp;
+    std::vector<Entry> entries;
+    std::chrono::steady_clock::time_point deadline;
+  };
+
+  void onPose(int grasp, const geometry_msgs::PoseStamped& message);
+  void onGuides(const geometry_msgs::PoseArray& message);
+  void onBodies(const slender_sim::BodyStates& message);
+  bool checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X);
+  void take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries);
+  /// False when the transform is not known yet.
+  bool deliver(const Message& message, std::string* why);
+
+  const NodeOptions options_;
+  const SimClock& clock_;
+  std::vector<Guided> guided_;
+  std::deque<Message> pending_;
+  DropCounter drops_;
+  tf2_ros::Buffer tf_buffer_;
+  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::vector<ros::Subscriber> subscribers_;
+};
+
+}  // namespace slender

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <ros/node_handle.h>
+
+namespace slender {
+
+/// A private parameter that cannot be used; what() names it, its value and what is allowed.
+class OptionError : public std::runtime_error
+{
+public:
+  using std::runtime_error::runtime_error;
+};
+
+enum class Pace
+{
+  wall,     ///< keeps real time as well as it can; never skips physics
+  fast,     ///< as fast as it can
+  follow,   ///< steps up to the incoming /clock
+  step,     ///< only when the step service is called
+};
+
+enum class MarkerStyle { tube, line };
+
+/// Private parameters of rod_node, with their defaults.
+struct NodeOptions
+{
+  std::string scene;                            ///< ~scene: path of the scene file, or its YAML text
+  std::vector<std::string> overrides;           ///< ~set: list of "path=value", or one such string
+  std::string frame_id = "world";               ///< ~frame_id of everything published
+  Pace pace = Pace::wall;                       ///< ~pace
+  std::optional<double> start_time;             ///< ~start_time [s] > 0; default: ROS time now (wall), first /clock (follow), else 1
+  double stop_after = 0.0;                      ///< ~stop_after [s] simulated, then the node ends; 0: never
+  bool publish_clock = false;                   ///< ~publish_clock: /clock comes from here; needs /use_sim_time
+  bool paused = false;                          ///< ~paused: start paused
+  int state_every = 1;                          ///< ~state_every: steps between state, poses and wrench messages
+  std::string record_bag;                       ///< ~record_bag: path; empty: no bag
+  double guide_delay = 0.05;                    ///< ~guide_delay [s] behind which grasps follow their guides
+  double guide_timeout = 1.0;                   ///< ~guide_timeout [s]: older guides are stale; no guide for so long: WARN
+  double catch_up_time = 0.1;                   ///< ~catch_up_time [s] shortest time for closing a gap
+  double catch_up_speed = 1.0;                  ///< ~catch_up_speed [m/s] when closing a gap
+  double tf_timeout = 0.2;                      ///< ~tf_timeout [s] wall time that a message waits for its transform
+  double diagnostics_rate = 1.0;                ///< ~diagnostics_rate [Hz]
+  double marker_rate = 30.0;                    ///< ~marker_rate [Hz] at most, up to 30
+  MarkerStyle marker_style = MarkerStyle::tube; ///< ~marker_style: tube | line
+  bool marker_frames = false;                   ///< ~marker_frames: show material frames
+
+  /// Reads and checks them all; throws OptionError on the first that does not fit, unknown names included.
+  static NodeOptions read(const ros::NodeHandle& nh_priv);
+};
+
+const char* toString(Pace pace);
+
+}  // namespace slender

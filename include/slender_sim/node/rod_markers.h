@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include <visualization_msgs/MarkerArray.h>
+
+#include "slender_sim/node/node_options.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+/// Pictures of a scene for rviz, derived from the state. One marker per thing with a stable ns and id:
+/// `rods/NAME` 0 the rod, `frames/NAME` 0 its material frames, `grasps` i the gripper of grasp i.
+///
+/// tube: true to scale, drawn through a smooth curve, with a stripe along d1 that shows the twist; line: one line strip.
+/// Very fine rods are thinned out to a few hundred sections: a picture has no more pixels.
+visualization_msgs::MarkerArray rodMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,
+                                           bool material_frames);
+
+}  // namespace slender

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <std_srvs/SetBool.h>
+#include <std_srvs/Trigger.h>
+
+#include "slender_sim/FilePath.h"
+#include "slender_sim/SetGrasp.h"
+#include "slender_sim/Step.h"
+#include "slender_sim/node/bag_recorder.h"
+#include "slender_sim/node/guide_inputs.h"
+#include "slender_sim/node/node_options.h"
+#include "slender_sim/node/run_statistics.h"
+#include "slender_sim/node/scene_messages.h"
+#include "slender_sim/node/sim_clock.h"
+
+namespace slender {
+
+/// Simulates the rods of a scene: poses of grippers come in as messages, the rods' motion goes out. README lists topics,
+/// services and parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
+class RodNode
+{
+public:
+  /// Reads options and scene and composes it before anything is advertised. Throws SceneError, OptionError or
+  /// std::exception with a text for the user.
+  RodNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv);
+  ~RodNode();
+
+  /// Until shut down, or ~stop_after. Returns the exit status: 0, or 3 when it ends after a failed step.
+  int spin();
+
+private:
+  enum class Mode { running, paused, failed };
+
+  // rod_node.cpp
+  void checkClock() const;
+  void startClock();
+  void advertise();
+  bool advance();                        // one step with everything it publishes; false when it failed
+  void fail(const std::string& reason);
+  void publishState();
+  void publishMarkers();
+  void jumped();                         // the state was replaced: a new epoch begins, one tick later
+  void realign();                        // time went on while the rod stood still
+  ros::WallDuration untilDue() const;
+  void work();
+  void recordingFailed(const std::string& reason);
+  void summary() const;
+
+  // rod_node_services.cpp
+  void advertiseServices();
+  bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
+  bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  bool onStep(slender_sim::Step::Request& request, slender_sim::Step::Response& response);
+  bool onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response);
+  bool onSave(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
+  bool onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
+  std::string attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response);
+
+  // rod_node_diagnostics.cpp
+  void publishDiagnostics();
+  diagnostic_msgs::DiagnosticStatus simulationStatus() const;
+  diagnostic_msgs::DiagnosticStatus inputStatus();
+
+  ros::CallbackQueue queue_;
+  ros::NodeHandle nh_, nh_priv_;
+  NodeOptions options_;
+  std::unique_ptr<Simulation> simulation_;
+  std::vector<std::string> grasp_names_;
+  SimClock clock_;
+  bool clock_started_ = false;
+  std::unique_ptr<GuideInputs> inputs_;
+  std::unique_ptr<BagRecorder> bag_;
+  SceneMessages messages_;
+
+  Mode mode_ = Mode::running;
+  bool finished_ = false;
+  std::uint32_t epoch_ = 0;
+  std::string failure_, bag_failure_;
+  StepReport last_report_;
+  RunStatistics total_, recent_;         // since the start, since the last diagnostics
+  std::uint64_t reported_drops_ = 0;
+
+  ros::WallTime wall_start_;             // when the tick wall_start_ticks_ was due
+  std::uint64_t wall_start_ticks_ = 0;
+  ros::WallTime next_diagnostics_, next_markers_;
+  std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture
+
+  ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
+  std::vector<ros::Publisher> rod_poses_pubs_, wrench_pubs_;
+  std::vector<ros::ServiceServer> services_;
+};
+
+}  // namespace slender

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <vector>
+
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+/// Sums over a stretch of steps, for diagnostics (since the last report) and for the closing summary (since the start).
+struct RunStatistics
+{
+  std::uint64_t steps = 0, iterations = 0, substeps = 0, cut_steps = 0;
+  double simulated = 0.0;          ///< [s]
+  double busy = 0.0;               ///< wall time spent stepping and publishing [s]
+  double worst_step = 0.0;         ///< wall time of the longest step [s]
+  double residual = 0.0;           ///< worst [-]
+  double max_strain = 0.0;         ///< worst [-]
+  std::vector<double> max_force, max_torque;   ///< per grasp [N], [N m]
+  std::chrono::steady_clock::time_point since = std::chrono::steady_clock::now();
+
+  void add(const StepReport& report, const Simulation& simulation, double simulated_seconds, double busy_seconds);
+  /// Simulated over computing time: how much faster than real time this machine could go; 0 before the first step.
+  double realTimeFactor() const { return busy > 0.0 ? simulated / busy : 0.0; }
+  double wallSeconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count(); }
+};
+
+}  // namespace slender

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <geometry_msgs/PoseArray.h>
+#include <geometry_msgs/WrenchStamped.h>
+
+#include "slender_sim/RodState.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+/// Names of the grasps in scene order, as they stand in topics (the reader has made sure that they differ). Throws
+/// std::invalid_argument for a rod or a grasp whose name cannot be part of a topic.
+std::vector<std::string> graspTopicNames(const Simulation& simulation);
+
+/// What is published and recorded of one instant, in scene order.
+struct SceneMessages
+{
+  std::vector<slender_sim::RodState> states;            ///< per rod
+  geometry_msgs::PoseArray poses;                       ///< the edges' frames at their middles, all rods one after the other
+  std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
+
+  void fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch);
+};
+
+}  // namespace slender

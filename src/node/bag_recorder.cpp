@@ -1,0 +1,120 @@
+#include "slender_sim/node/bag_recorder.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+
+#include <std_msgs/String.h>
+
+#include "slender_sim/node/sim_clock.h"
+
+namespace slender {
+
+BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names)
+  : path_(path)
+{
+  const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
+  state_topic_ = prefix + "state";
+  scene_topic_ = prefix + "scene";
+  for (const std::string& name : grasp_names)
+    wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
+  try
+  {
+    bag_.open(path + ".active", rosbag::bagmode::Write);
+  }
+  catch (const rosbag::BagException& e)
+  {
+    throw std::runtime_error("bag " + path + ": cannot be written: " + e.what());
+  }
+  open_ = true;
+}
+
+BagRecorder::~BagRecorder()
+{
+  try
+  {
+    close();
+  }
+  catch (const std::exception&)
+  {
+    // close() is there for those who want to know
+  }
+}
+
+void BagRecorder::recordScene(const std::string& yaml, const ros::Time& stamp)
+{
+  std_msgs::String message;
+  message.data = yaml;
+  bag_.write(scene_topic_, stamp, message);
+}
+
+void BagRecorder::record(const SceneMessages& messages)
+{
+  try
+  {
+    for (const slender_sim::RodState& state : messages.states)
+      bag_.write(state_topic_, state.header.stamp, state);
+    for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
+      bag_.write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
+  }
+  catch (const rosbag::BagException& e)
+  {
+    throw std::runtime_error("bag " + path_ + ": " + e.what());
+  }
+}
+
+void BagRecorder::close()
+{
+  if (!open_)
+    return;
+  open_ = false;
+  try
+  {
+    bag_.close();
+  }
+  catch (const rosbag::BagException& e)
+  {
+    throw std::runtime_error("bag " + path_ + ": " + e.what());
+  }
+  if (std::rename((path_ + ".active").c_str(), path_.c_str()) != 0)
+    throw std::runtime_error("bag " + path_ + ": cannot be renamed from " + path_ + ".active: " + std::strerror(errno));
+}
+
+namespace {
+
+class SimulationBag final : public Recorder
+{
+public:
+  explicit SimulationBag(const std::string& path) : path_(path) {}
+
+  void record(const Simulation& simulation, const StepReport&) override
+  {
+    SimClock clock(ros::Time(1.0), simulation.config().time.step);
+    clock.skip(simulation.state().steps);
+    if (!bag_)
+    {
+      bag_ = std::make_unique<BagRecorder>(path_, "/", graspTopicNames(simulation));
+      bag_->recordScene(simulation.config().source, clock.stamp());
+    }
+    messages_.fill(simulation, clock.stamp(), "world", 0);
+    bag_->record(messages_);
+  }
+
+  void finish() override
+  {
+    if (bag_)
+      bag_->close();
+  }
+
+private:
+  std::string path_;
+  std::unique_ptr<BagRecorder> bag_;
+  SceneMessages messages_;
+};
+
+}  // namespace
+
+std::unique_ptr<Recorder> makeBagRecorder(const std::string& path) { return std::make_unique<SimulationBag>(path); }
+
+}  // namespace slender

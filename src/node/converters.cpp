@@ -1,0 +1,136 @@
+#include "slender_sim/node/converters.h"
+
+#include <cmath>
+
+namespace slender {
+
+geometry_msgs::Point toPoint(const Eigen::Vector3d& p)
+{
+  geometry_msgs::Point out;
+  out.x = p.x();
+  out.y = p.y();
+  out.z = p.z();
+  return out;
+}
+
+geometry_msgs::Vector3 toVector3(const Eigen::Vector3d& v)
+{
+  geometry_msgs::Vector3 out;
+  out.x = v.x();
+  out.y = v.y();
+  out.z = v.z();
+  return out;
+}
+
+geometry_msgs::Quaternion toQuaternion(const Eigen::Quaterniond& q)
+{
+  geometry_msgs::Quaternion out;
+  out.x = q.x();
+  out.y = q.y();
+  out.z = q.z();
+  out.w = q.w();
+  return out;
+}
+
+geometry_msgs::Pose toMessage(const Pose& X)
+{
+  geometry_msgs::Pose out;
+  out.position = toPoint(X.position);
+  out.orientation = toQuaternion(X.orientation);
+  return out;
+}
+
+geometry_msgs::Wrench toMessage(const Wrench& wrench)
+{
+  geometry_msgs::Wrench out;
+  out.force = toVector3(wrench.force);
+  out.torque = toVector3(wrench.torque);
+  return out;
+}
+
+Eigen::Vector3d fromMessage(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
+
+namespace {
+
+PoseFault checked(const Eigen::Vector3d& p, const geometry_msgs::Quaternion& q, Pose& X)
+{
+  const Eigen::Vector4d c(q.x, q.y, q.z, q.w);
+  if (!p.allFinite() || !c.allFinite())
+    return PoseFault::not_finite;
+  if (std::abs(c.norm() - 1.0) > 0.01)
+    return PoseFault::bad_quaternion;
+  X.position = p;
+  X.orientation = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
+  return PoseFault::none;
+}
+
+}  // namespace
+
+PoseFault fromMessage(const geometry_msgs::Pose& message, Pose& X)
+{
+  return checked(fromMessage(message.position), message.orientation, X);
+}
+
+PoseFault fromMessage(const geometry_msgs::Transform& message, Pose& X)
+{
+  const geometry_msgs::Vector3& t = message.translation;
+  return checked({t.x, t.y, t.z}, message.rotation, X);
+}
+
+bool isFinite(const geometry_msgs::Twist& t)
+{
+  return std::isfinite(t.linear.x) && std::isfinite(t.linear.y) && std::isfinite(t.linear.z) && std::isfinite(t.angular.x) &&
+         std::isfinite(t.angular.y) && std::isfinite(t.angular.z);
+}
+
+Eigen::Quaterniond edgeFrame(const RodModel& model, const RodState& state, int edge)
+{
+  Eigen::Matrix3d axes;
+  axes.col(0) = (state.x.col((edge + 1) % model.nodes()) - state.x.col(edge)).normalized();
+  // the solver keeps d1 normal to the edge up to round-off; the quaternion needs an exact frame
+  axes.col(1) = (state.d1.col(edge) - axes.col(0) * axes.col(0).dot(state.d1.col(edge))).normalized();
+  axes.col(2) = axes.col(0).cross(axes.col(1));
+  return Eigen::Quaterniond(axes).normalized();
+}
+
+void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out)
+{
+  const int nodes = model.nodes(), edges = model.edges();
+  out.name = model.name;
+  out.closed = model.closed;
+  out.nodes.resize(nodes);
+  out.velocities.resize(nodes);
+  out.twists.resize(nodes);
+  for (int i = 0; i < nodes; ++i)
+  {
+    out.nodes[i] = toPoint(state.x.col(i));
+    out.velocities[i] = toVector3(state.v.col(i));
+    out.twists[i] = state.twist[i];
+  }
+  out.frames.resize(edges);
+  for (int j = 0; j < edges; ++j)
+    out.frames[j] = toQuaternion(edgeFrame(model, state, j));
+  out.radii.assign(model.radius_a.data(), model.radius_a.data() + model.radius_a.size());
+  if (model.radius_b == model.radius_a)
+    out.radii_b.clear();
+  else
+    out.radii_b.assign(model.radius_b.data(), model.radius_b.data() + model.radius_b.size());
+}
+
+void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out)
+{
+  for (int j = 0; j < model.edges(); ++j)
+  {
+    geometry_msgs::Pose pose;
+    pose.position = toPoint(0.5 * (state.x.col(j) + state.x.col((j + 1) % model.nodes())));
+    pose.orientation = toQuaternion(edgeFrame(model, state, j));
+    out.push_back(pose);
+  }
+}
+
+bool isFinite(const RodState& state)
+{
+  return state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite();
+}
+
+}  // namespace slender

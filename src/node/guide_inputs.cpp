@@ -1,0 +1,277 @@
+#include "slender_sim/node/guide_inputs.h"
+
+#include <set>
+
+#include "slender_sim/node/converters.h"
+
+namespace slender {
+namespace {
+
+constexpr int kQueueSize = 1000;               // a burst of fast trackers; in wall pace it is emptied every step
+constexpr std::size_t kMaxPending = 1000;
+constexpr double kMaxAhead = 3600.0;           // [s] whole trajectories may be sent in advance, another clock's stamps may not
+constexpr int kGuidesSource = -1, kBodiesSource = -2;
+
+const Pose& graspPose(const Simulation& simulation, const GraspRef& ref)
+{
+  return simulation.state().rods[ref.rod].grasps[ref.index].X_WG;
+}
+
+}  // namespace
+
+GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
+                         const std::vector<std::string>& grasp_names)
+  : options_(options), clock_(clock)
+{
+  GuideBuffer::Options buffer_options;
+  buffer_options.delay = options.guide_delay;
+  buffer_options.catch_up_time = options.catch_up_time;
+  buffer_options.catch_up_speed = options.catch_up_speed;
+  buffer_options.catch_up_turning = 3.0 * options.catch_up_speed;   // [rad/s]: as if a hand's radius of 1/3 m turned
+
+  bool topics = false, bodies = false;
+  for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
+  {
+    const GraspRef& ref = simulation.grasps()[g];
+    Guided guided;
+    guided.name = grasp_names[g];
+    if (const auto* body = std::get_if<BodyMotion>(&ref.config->motion))
+    {
+      guided.body = body->body;
+      bodies = true;
+    }
+    const bool topic = std::holds_alternative<TopicMotion>(ref.config->motion);
+    if (topic || !guided.body.empty())
+      guided.buffer = std::make_unique<GuideBuffer>(buffer_options, ref.config->attach, graspPose(simulation, ref));
+    guided_.push_back(std::move(guided));
+    if (topic)
+    {
+      topics = true;
+      const int grasp = static_cast<int>(g);
+      const boost::function<void(const geometry_msgs::PoseStamped&)> callback =
+          [this, grasp](const geometry_msgs::PoseStamped& message) { onPose(grasp, message); };
+      subscribers_.push_back(nh.subscribe<const geometry_msgs::PoseStamped&>("grasps/" + grasp_names[g] + "/pose", kQueueSize, callback,
+                                                                            ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+    }
+  }
+  if (topics)
+    subscribers_.push_back(nh.subscribe("guides", kQueueSize, &GuideInputs::onGuides, this, ros::TransportHints().tcpNoDelay()));
+  if (bodies)
+    subscribers_.push_back(nh.subscribe("bodies", kQueueSize, &GuideInputs::onBodies, this, ros::TransportHints().tcpNoDelay()));
+  if (topics || bodies)
+    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
+}
+
+bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X)
+{
+  switch (fromMessage(message, X))
+  {
+    case PoseFault::none: return true;
+    case PoseFault::not_finite: drops_.drop(Drop::not_finite, what, "position and orientation must be finite"); return false;
+    case PoseFault::bad_quaternion: drops_.drop(Drop::bad_quaternion, what, "its length must be 1 within 1 %"); return false;
+  }
+  return false;
+}
+
+void GuideInputs::onPose(int grasp, const geometry_msgs::PoseStamped& message)
+{
+  const std::string what = "grasps/" + guided_[grasp].name + "/pose";
+  Entry entry{grasp, Pose()};
+  if (checkPose(message.pose, what, entry.X_FH))
+    take(grasp, what, message.header, {entry});
+}
+
+void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
+{
+  if (message.poses.size() != guided_.size())
+  {
+    drops_.drop(Drop::wrong_length, "guides",
+                std::to_string(message.poses.size()) + " poses, but the scene has " + std::to_string(guided_.size()) + " grasps");
+    return;
+  }
+  std::vector<Entry> entries;
+  for (std::size_t g = 0; g < guided_.size(); ++g)
+  {
+    Entry entry{static_cast<int>(g), Pose()};
+    if (!checkPose(message.poses[g], "guides", entry.X_FH))
+      return;   // all grasps at one instant, or none
+    if (guided_[g].buffer && guided_[g].body.empty())
+      entries.push_back(entry);
+  }
+  take(kGuidesSource, "guides", message.header, entries);
+}
+
+void GuideInputs::onBodies(const slender_sim::BodyStates& message)
+{
+  if (message.pose.size() != message.name.size() || (!message.twist.empty() && message.twist.size() != message.name.size()))
+  {
+    drops_.drop(Drop::wrong_length, "bodies", "name, pose and twist must be equally long (twist may be empty)");
+    return;
+  }
+  std::vector<Entry> entries;
+  for (std::size_t b = 0; b < message.name.size(); ++b)
+  {
+    Entry entry{0, Pose()};
+    if (!checkPose(message.pose[b], "bodies", entry.X_FH))
+      return;
+    if (!message.twist.empty() && !isFinite(message.twist[b]))
+    {
+      drops_.drop(Drop::not_finite, "bodies", "twist of " + message.name[b]);
+      return;
+    }
+    bool known = false;
+    for (std::size_t g = 0; g < guided_.size(); ++g)
+    {
+      if (guided_[g].body != message.name[b])
+        continue;
+      known = true;
+      entry.grasp = static_cast<int>(g);
+      entries.push_back(entry);
+    }
+    if (!known)
+      drops_.drop(Drop::unknown_name, "bodies", "no grasp follows \"" + message.name[b] + "\"");
+  }
+  if (!entries.empty())
+    take(kBodiesSource, "bodies", message.header, entries);
+}
+
+void GuideInputs::take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries)
+{
+  if (header.frame_id.empty())
+  {
+    drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");
+    return;
+  }
+  Message message;
+  message.source = source;
+  message.what = what;
+  message.frame = header.frame_id.front() == '/' ? header.frame_id.substr(1) : header.frame_id;   // tf2 wants no slash
+  message.stamp = header.stamp.isZero() ? clock_.stamp() : header.stamp;
+  message.entries = std::move(entries);
+  const double age = -clock_.secondsAt(message.stamp) + clock_.seconds();
+  if (age > options_.guide_timeout || -age > kMaxAhead)
+  {
+    drops_.drop(age > 0.0 ? Drop::stale : Drop::from_future, what,
+                "its stamp is " + std::to_string(std::abs(age)) + " s " + (age > 0.0 ? "before" : "after") + " the simulated time");
+    return;
+  }
+  for (const Message& waiting : pending_)
+  {
+    if (waiting.source != source)
+      continue;
+    if (pending_.size() >= kMaxPending)
+      drops_.drop(Drop::queue_full, what);
+    else
+    {
+      message.deadline = std::chrono::steady_clock::now() +
+                         std::chrono::microseconds(static_cast<std::int64_t>(options_.tf_timeout * 1e6));
+      pending_.push_back(message);
+    }
+    return;
+  }
+  if (deliver(message, nullptr))
+    return;
+  message.deadline = std::chrono::steady_clock::now() +
+                     std::chrono::microseconds(static_cast<std::int64_t>(options_.tf_timeout * 1e6));
+  pending_.push_back(message);
+}
+
+bool GuideInputs::deliver(const Message& message, std::string* why)
+{
+  Pose X_WF;
+  if (message.frame != options_.frame_id)
+  {
+    if (!tf_buffer_.canTransform(options_.frame_id, message.frame, message.stamp, why))
+      return false;
+    try
+    {
+      const PoseFault fault =
+          fromMessage(tf_buffer_.lookupTransform(options_.frame_id, message.frame, message.stamp).transform, X_WF);
+      if (fault != PoseFault::none)
+      {
+        drops_.drop(fault == PoseFault::not_finite ? Drop::not_finite : Drop::bad_quaternion, message.what,
+                    "in the transform from " + message.frame);
+        return true;
+      }
+    }
+    catch (const tf2::TransformException& e)
+    {
+      if (why)
+        *why = e.what();
+      return false;
+    }
+  }
+  const double time = clock_.secondsAt(message.stamp);
+  bool late = false;
+  for (const Entry& entry : message.entries)
+    late |= !guided_[entry.grasp].buffer->push(time, X_WF * entry.X_FH);
+  if (late)
+    drops_.drop(Drop::out_of_order, message.what, "its stamp is not after that of an earlier message");
+  return true;
+}
+
+void GuideInputs::processPending()
+{
+  if (pending_.empty())
+    return;
+  const auto now = std::chrono::steady_clock::now();
+  std::set<int> blocked;   // sources whose earlier message still waits
+  for (std::size_t i = 0; i < pending_.size();)
+  {
+    const Message& message = pending_[i];
+    std::string why;
+    if (blocked.count(message.source))
+    {
+      ++i;
+      continue;
+    }
+    const bool done = deliver(message, &why);
+    if (!done && now < message.deadline)
+    {
+      blocked.insert(message.source);
+      ++i;
+      continue;
+    }
+    if (!done)
+      drops_.drop(Drop::no_transform, message.what, "from " + message.frame + " to " + options_.frame_id + ": " + why);
+    pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
+void GuideInputs::apply(double time, SceneInputs& inputs)
+{
+  for (std::size_t g = 0; g < guided_.size(); ++g)
+    if (guided_[g].buffer)
+      inputs.grasps[g] = guided_[g].buffer->target(time);
+}
+
+void GuideInputs::attachAt(int grasp, const Pose& X_WG)
+{
+  if (guided_[grasp].buffer)
+    guided_[grasp].buffer->attachAt(X_WG);
+}
+
+void GuideInputs::restart(const Simulation& simulation)
+{
+  pending_.clear();
+  for (std::size_t g = 0; g < guided_.size(); ++g)
+    if (guided_[g].buffer)
+      guided_[g].buffer->restart(graspPose(simulation, simulation.grasps()[g]));
+}
+
+std::vector<GuideInputs::Age> GuideInputs::ages() const
+{
+  std::vector<Age> ages;
+  for (const Guided& guided : guided_)
+  {
+    if (!guided.buffer)
+      continue;
+    std::optional<double> age = guided.buffer->lastTime();
+    if (age)
+      age = clock_.seconds() - *age;
+    ages.push_back({guided.name, age});
+  }
+  return ages;
+}
+
+}  // namespace slender

@@ -1,0 +1,146 @@
+#include "slender_sim/node/motion_player.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <XmlRpcValue.h>
+#include <geometry_msgs/PoseStamped.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "slender_sim/node/converters.h"
+
+namespace slender {
+
+MotionPlayer::MotionPlayer(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv) : nh_(nh)
+{
+  const std::string file = nh_priv.param<std::string>("file", "");
+  if (file.empty())
+    throw std::runtime_error("~file: missing; give a CSV table t,body,x,y,z,qx,qy,qz,qw");
+  frame_id_ = nh_priv.param<std::string>("frame_id", frame_id_);
+  speed_ = nh_priv.param<double>("speed", speed_);
+  wait_ = nh_priv.param<double>("wait", wait_);
+  tf_ = nh_priv.param<bool>("tf", tf_);
+  loop_ = nh_priv.param<bool>("loop", loop_);
+  const double rate = nh_priv.param<double>("rate", 0.0);
+  if (!(speed_ > 0.0) || !std::isfinite(speed_) || !(rate >= 0.0) || !std::isfinite(rate) || !std::isfinite(wait_))
+    throw std::runtime_error("~speed must be > 0, ~rate >= 0, ~wait finite");
+  const std::vector<double> offset = nh_priv.param("offset", std::vector<double>(3, 0.0));
+  if (offset.size() != 3)
+    throw std::runtime_error("~offset: must be three numbers [x, y, z]");
+  offset_ = {offset[0], offset[1], offset[2]};
+
+  table_ = readPoseFile(file);
+  XmlRpc::XmlRpcValue bodies;
+  if (nh_priv.getParam("bodies", bodies))
+  {
+    if (bodies.getType() != XmlRpc::XmlRpcValue::TypeStruct)
+      throw std::runtime_error("~bodies: must be a map from bodies of the table to grasps, e.g. {left_wrist: left}");
+    for (auto& entry : bodies)
+    {
+      const auto named = [&entry](const BodyTrajectory& body) { return body.body == entry.first; };
+      if (std::none_of(table_.begin(), table_.end(), named) || entry.second.getType() != XmlRpc::XmlRpcValue::TypeString)
+        throw std::runtime_error("~bodies: " + entry.first + " is not in " + file + ", or its grasp is not a name");
+      pose_pubs_[entry.first] =
+          nh_.advertise<geometry_msgs::PoseStamped>("grasps/" + static_cast<std::string>(entry.second) + "/pose", 1000);
+    }
+  }
+  if (tf_)
+    tf_pub_ = nh_.advertise<tf2_msgs::TFMessage>("/tf", 1000);
+  instants_ = instants(rate);
+}
+
+std::vector<MotionPlayer::Instant> MotionPlayer::instants(double rate) const
+{
+  std::map<double, Instant> by_time;
+  for (const BodyTrajectory& body : table_)
+  {
+    const PoseTrajectory& poses = body.poses;
+    if (rate == 0.0)
+      for (std::size_t k = 0; k < poses.times().size(); ++k)
+        by_time[poses.times()[k]].bodies[body.body] = poses.poses()[k];
+    else
+      for (int k = 0; poses.firstTime() + k / rate <= poses.lastTime() + 1e-9; ++k)
+        by_time[poses.firstTime() + k / rate].bodies[body.body] = poses.evaluate(poses.firstTime() + k / rate);
+  }
+  std::vector<Instant> out;
+  for (auto& [time, instant] : by_time)
+  {
+    instant.time = time;
+    out.push_back(std::move(instant));
+  }
+  return out;
+}
+
+void MotionPlayer::waitForSubscribers()
+{
+  const ros::WallTime give_up = ros::WallTime::now() + ros::WallDuration(wait_);
+  const auto missing = [this]() {
+    return (tf_ && tf_pub_.getNumSubscribers() == 0) ||
+           std::any_of(pose_pubs_.begin(), pose_pubs_.end(), [](const auto& p) { return p.second.getNumSubscribers() == 0; });
+  };
+  while (nh_.ok() && missing() && ros::WallTime::now() < give_up)
+    ros::WallDuration(0.02).sleep();
+  while (nh_.ok() && ros::Time::now().isZero())   // simulated time has not begun
+    ros::WallDuration(0.02).sleep();
+}
+
+void MotionPlayer::publish(const Instant& instant, const ros::Time& stamp)
+{
+  if (tf_)
+  {
+    tf2_msgs::TFMessage message;
+    for (const auto& [name, X] : instant.bodies)
+    {
+      geometry_msgs::TransformStamped transform;
+      transform.header.stamp = stamp;
+      transform.header.frame_id = frame_id_;
+      transform.child_frame_id = name;
+      transform.transform.translation = toVector3(X.position + offset_);
+      transform.transform.rotation = toQuaternion(X.orientation);
+      message.transforms.push_back(transform);
+    }
+    tf_pub_.publish(message);
+  }
+  for (const auto& [name, publisher] : pose_pubs_)
+  {
+    const auto body = instant.bodies.find(name);
+    if (body == instant.bodies.end())
+      continue;
+    geometry_msgs::PoseStamped message;
+    message.header.stamp = stamp;
+    message.header.frame_id = tf_ ? name : frame_id_;
+    message.pose = tf_ ? toMessage(Pose()) : toMessage(Pose{body->second.position + offset_, body->second.orientation});
+    publisher.publish(message);
+  }
+}
+
+void MotionPlayer::spin()
+{
+  waitForSubscribers();
+  ros::Time start = ros::Time::now() + ros::Duration(0.1);
+  bool forward = true;
+  const double begin = instants_.front().time, end = instants_.back().time;
+  std::size_t next = 0;
+  while (nh_.ok())
+  {
+    const std::size_t index = forward ? next : instants_.size() - 1 - next;
+    const double since = forward ? instants_[index].time - begin : end - instants_[index].time;
+    const ros::Time due = start + ros::Duration(since / speed_);
+    while (nh_.ok() && ros::Time::now() < due)
+      ros::WallDuration(0.001).sleep();
+    if (!nh_.ok())
+      return;
+    publish(instants_[index], due);
+    if (++next < instants_.size())
+      continue;
+    if (!loop_ || instants_.size() < 2)
+      break;
+    start = due;        // turn round; the turning point was just published
+    forward = !forward;
+    next = 1;
+  }
+  ros::WallDuration(0.5).sleep();   // the last messages leave
+}
+
+}  // namespace slender

@@ -1,0 +1,228 @@
+#include "slender_sim/node/rod_markers.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "slender_sim/node/converters.h"
+
+namespace slender {
+namespace {
+
+using Eigen::Vector3d;
+using visualization_msgs::Marker;
+
+constexpr int kSides = 16;           // of the tube
+constexpr int kMaxSections = 800;    // per rod
+
+std_msgs::ColorRGBA color(double r, double g, double b, double a = 1.0)
+{
+  std_msgs::ColorRGBA c;
+  c.r = static_cast<float>(r);
+  c.g = static_cast<float>(g);
+  c.b = static_cast<float>(b);
+  c.a = static_cast<float>(a);
+  return c;
+}
+
+const std::array<std_msgs::ColorRGBA, 4>& rodColors()
+{
+  static const std::array<std_msgs::ColorRGBA, 4> colors = {color(0.93, 0.55, 0.16), color(0.16, 0.50, 0.72),
+                                                            color(0.35, 0.62, 0.30), color(0.62, 0.36, 0.66)};
+  return colors;
+}
+
+Marker makeMarker(const std_msgs::Header& header, const std::string& ns, int id, int type)
+{
+  Marker marker;
+  marker.header = header;
+  marker.ns = ns;
+  marker.id = id;
+  marker.type = type;
+  marker.action = Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
+  marker.color = color(1, 1, 1);
+  return marker;
+}
+
+struct Section
+{
+  Vector3d x, u, w;   ///< centre, and the cross-section's semi-axes as vectors (u along d1)
+};
+
+Vector3d directorAt(const RodState& s, int node, int edges, bool closed)
+{
+  const int after = closed ? node % edges : std::min(node, edges - 1);
+  const int before = closed ? (node + edges - 1) % edges : std::max(node - 1, 0);
+  const Vector3d sum = s.d1.col(before) + s.d1.col(after);   // opposite only beyond half a turn per edge
+  return sum.norm() > 1e-6 ? Vector3d(sum.normalized()) : Vector3d(s.d1.col(after));
+}
+
+/// Sections through the nodes and, on cubic Hermite curves with three-point tangents, between them.
+std::vector<Section> sections(const RodModel& model, const RodState& s)
+{
+  const int nodes = model.nodes(), edges = model.edges();
+  const int stride = std::max(1, (edges + kMaxSections - 1) / kMaxSections);
+  const int pieces = std::clamp(kMaxSections / (2 * edges), 1, 4);   // per edge
+  const auto x = [&](int i) -> Vector3d { return s.x.col(model.closed ? (i + nodes) % nodes : std::clamp(i, 0, nodes - 1)); };
+  const auto tangent = [&](int i) -> Vector3d {
+    const bool end = !model.closed && (i == 0 || i == nodes - 1);
+    return (end ? 1.0 : 0.5) * (x(i + stride) - x(i - stride));
+  };
+  std::vector<Section> out;
+  for (int j = 0; j < edges; j += stride)
+  {
+    const int next = std::min(j + stride, edges);
+    const Vector3d x0 = x(j), x1 = x(next), m0 = tangent(j), m1 = tangent(next % (model.closed ? nodes : nodes + 1));
+    const Vector3d d0 = directorAt(s, j, edges, model.closed), d1 = directorAt(s, next, edges, model.closed);
+    const int last = next == edges ? pieces : pieces - 1;
+    for (int k = 0; k <= last; ++k)
+    {
+      const double f = static_cast<double>(k) / pieces, g = 1.0 - f;
+      const Vector3d t = (6 * f * g * (x1 - x0) + g * (1 - 3 * f) * m0 + f * (3 * f - 2) * m1).normalized();
+      Vector3d d = g * d0 + f * d1;
+      d = (d - d.dot(t) * t).normalized();
+      const int e = std::min(j, edges - 1);
+      out.push_back({(1 + 2 * f) * g * g * x0 + f * g * g * m0 + f * f * (3 - 2 * f) * x1 - f * f * g * m1, model.radius_a[e] * d,
+                     model.radius_b[e] * t.cross(d)});
+    }
+  }
+  return out;
+}
+
+/// rviz does not light triangles that have colours of their own, so light from above and the side is painted in.
+std_msgs::ColorRGBA lit(const std_msgs::ColorRGBA& paint, const Vector3d& normal)
+{
+  static const Vector3d light = Vector3d(0.45, -0.35, 0.85).normalized();
+  const double diffuse = 0.5 + 0.5 * normal.dot(light);   // wraps round: no side is black
+  const double gloss = 0.35 * std::pow(std::max(0.0, normal.dot(light)), 24.0);
+  const auto shade = [&](float c) { return std::min(1.0, c * (0.45 + 0.65 * diffuse) + gloss); };
+  return color(shade(paint.r), shade(paint.g), shade(paint.b), paint.a);
+}
+
+/// Two triangles per side and section; the stripes' edges are sharp because each side has one colour.
+void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& base, bool closed, Marker& marker)
+{
+  struct Corner
+  {
+    geometry_msgs::Point x;
+    Vector3d normal;
+  };
+  const std_msgs::ColorRGBA stripe = color(0.20, 0.24, 0.30);
+  const auto corner = [](const Section& s, int side) {
+    const double angle = 2.0 * M_PI * (side - 0.5) / kSides;   // the first side faces d1
+    const Vector3d out = std::cos(angle) * s.u / s.u.squaredNorm() + std::sin(angle) * s.w / s.w.squaredNorm();
+    return Corner{toPoint(s.x + std::cos(angle) * s.u + std::sin(angle) * s.w), out.normalized()};
+  };
+  const auto triangle = [&](const Corner& a, const Corner& b, const Corner& c, const std_msgs::ColorRGBA& paint) {
+    for (const Corner* p : {&a, &b, &c})
+    {
+      marker.points.push_back(p->x);
+      marker.colors.push_back(lit(paint, p->normal));
+    }
+  };
+  marker.points.reserve(sections.size() * kSides * 6);
+  marker.colors.reserve(sections.size() * kSides * 6);
+  for (std::size_t i = 0; i + 1 < sections.size(); ++i)
+    for (int side = 0; side < kSides; ++side)
+    {
+      const std_msgs::ColorRGBA& paint = side % (kSides / 2) <= 1 ? stripe : base;   // two stripes: seen from everywhere
+      const Corner a = corner(sections[i], side), b = corner(sections[i + 1], side);
+      const Corner c = corner(sections[i + 1], side + 1), d = corner(sections[i], side + 1);
+      triangle(a, c, b, paint);
+      triangle(a, d, c, paint);
+    }
+  if (closed)
+    return;
+  for (const bool front : {false, true})   // caps
+  {
+    const Section& s = front ? sections.back() : sections.front();
+    const Vector3d normal = (front ? 1.0 : -1.0) * s.u.cross(s.w).normalized();
+    for (int side = 0; side < kSides; ++side)
+    {
+      const Corner middle{toPoint(s.x), normal};
+      const Corner a{corner(s, side).x, normal}, b{corner(s, side + 1).x, normal};
+      triangle(middle, front ? a : b, front ? b : a, base);
+    }
+  }
+}
+
+void addFrames(const RodModel& model, const RodState& s, Marker& marker)
+{
+  const int edges = model.edges(), stride = std::max(1, edges / 60);
+  const double length = std::max(4.0 * model.radius_a.maxCoeff(), 0.4 * model.rest_length.mean() * stride);
+  marker.scale.x = 0.08 * length;
+  for (int j = 0; j < edges; j += stride)
+  {
+    const Eigen::Matrix3d axes = edgeFrame(model, s, j).toRotationMatrix();
+    const Vector3d middle = 0.5 * (s.x.col(j) + s.x.col((j + 1) % model.nodes()));
+    for (int k = 0; k < 3; ++k)
+    {
+      marker.points.push_back(toPoint(middle));
+      marker.points.push_back(toPoint(middle + length * axes.col(k)));
+      marker.colors.insert(marker.colors.end(), 2, color(k == 0 ? 0.85 : 0.1, k == 1 ? 0.7 : 0.1, k == 2 ? 0.85 : 0.1));
+    }
+  }
+}
+
+Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& config, const GraspState& grasp, const RodModel& model)
+{
+  Marker marker = makeMarker(header, "grasps", id, grasp.holds_frame ? Marker::CUBE : Marker::SPHERE);
+  if (!grasp.active)
+  {
+    marker.action = Marker::DELETE;
+    return marker;
+  }
+  const int edge = std::min(grasp.first_node, model.edges() - 1);
+  double length = 0.0;
+  for (int j = grasp.first_node; j < grasp.last_node; ++j)
+    length += model.rest_length[j % model.edges()];
+  const double width = 3.6 * std::max(model.radius_a[edge], model.radius_b[edge]);
+  marker.pose = toMessage(grasp.X_WG);
+  marker.scale.x = (grasp.holds_frame ? 1.0 : 0.0) * length + width;
+  marker.scale.y = marker.scale.z = width;
+  marker.color = std::holds_alternative<FixedMotion>(config.motion) ? color(0.35, 0.37, 0.40) : color(0.22, 0.27, 0.33);
+  return marker;
+}
+
+}  // namespace
+
+visualization_msgs::MarkerArray rodMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,
+                                           bool material_frames)
+{
+  visualization_msgs::MarkerArray out;
+  for (std::size_t r = 0; r < simulation.state().rods.size(); ++r)
+  {
+    const RodModel& model = simulation.rodModel(static_cast<int>(r));
+    const RodState& state = simulation.state().rods[r];
+    const std_msgs::ColorRGBA& base = rodColors()[r % rodColors().size()];
+    const std::vector<Section> curve = sections(model, state);
+    Marker rod = makeMarker(header, "rods/" + model.name, 0, style == MarkerStyle::tube ? Marker::TRIANGLE_LIST : Marker::LINE_STRIP);
+    if (style == MarkerStyle::tube)
+      addTube(curve, base, model.closed, rod);
+    else
+    {
+      rod.scale.x = 2.0 * model.radius_a.mean();
+      rod.color = base;
+      for (const Section& s : curve)
+        rod.points.push_back(toPoint(s.x));
+    }
+    out.markers.push_back(std::move(rod));
+    if (material_frames)
+    {
+      Marker frames = makeMarker(header, "frames/" + model.name, 0, Marker::LINE_LIST);
+      addFrames(model, state, frames);
+      out.markers.push_back(std::move(frames));
+    }
+  }
+  for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
+  {
+    const GraspRef& ref = simulation.grasps()[g];
+    out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config, simulation.state().rods[ref.rod].grasps[ref.index],
+                                      simulation.rodModel(ref.rod)));
+  }
+  return out;
+}
+
+}  // namespace slender

@@ -1,0 +1,314 @@
+#include "slender_sim/node/rod_node.h"
+
+#include <algorithm>
+#include <iomanip>
+#include <iostream>
+
+#include <geometry_msgs/PoseArray.h>
+#include <geometry_msgs/WrenchStamped.h>
+#include <rosgraph_msgs/Clock.h>
+#include <std_msgs/String.h>
+
+#include "slender_sim/RodState.h"
+#include "slender_sim/node/converters.h"
+#include "slender_sim/node/rod_markers.h"
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+namespace {
+
+constexpr double kIdle = 0.02;         // [s] longest sleep: how late diagnostics and markers may be
+constexpr double kBurst = 0.02;        // [s] longest run of steps between two looks at the callbacks
+
+SceneConfig loadScene(const NodeOptions& options)
+{
+  if (options.scene.find('\n') != std::string::npos)
+    return parseScene(options.scene, "~scene", options.overrides);
+  return readScene(options.scene, options.overrides);
+}
+
+}  // namespace
+
+RodNode::RodNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv)
+  : nh_(nh), nh_priv_(nh_priv), options_(NodeOptions::read(nh_priv))
+{
+  nh_.setCallbackQueue(&queue_);
+  nh_priv_.setCallbackQueue(&queue_);
+  checkClock();
+  simulation_ = std::make_unique<Simulation>(loadScene(options_));
+  grasp_names_ = graspTopicNames(*simulation_);
+  if (!options_.record_bag.empty())
+    bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), grasp_names_);
+  if (options_.paused)
+    mode_ = Mode::paused;
+  startClock();
+}
+
+RodNode::~RodNode()
+{
+  for (ros::ServiceServer& service : services_)
+    service.shutdown();
+}
+
+void RodNode::checkClock() const
+{
+  bool use_sim_time = false;
+  nh_.getParam("/use_sim_time", use_sim_time);
+  if (options_.pace == Pace::follow && options_.publish_clock)
+    throw OptionError("~pace: follow waits for /clock, which ~publish_clock: true would publish; choose one");
+  if (options_.pace == Pace::follow && !use_sim_time)
+    throw OptionError("~pace: follow needs the parameter /use_sim_time set to true (and somebody who publishes /clock)");
+  if (options_.publish_clock && !use_sim_time)
+    throw OptionError("~publish_clock: true needs the parameter /use_sim_time set to true, or no other node will listen to /clock");
+  if (use_sim_time && !options_.publish_clock && options_.pace != Pace::follow)
+    throw OptionError(std::string("/use_sim_time is true, but ~pace: ") + toString(options_.pace) +
+                      " without ~publish_clock keeps its own time; use ~pace: follow, or ~publish_clock: true, or unset it");
+}
+
+/// Everything that needs the time of the first stamp. With `follow` that may be the first /clock.
+void RodNode::startClock()
+{
+  ros::Time start(1.0);
+  if (options_.start_time)
+    start = ros::Time(*options_.start_time);
+  else if (options_.pace == Pace::follow)
+  {
+    start = ros::Time::now();
+    if (start.isZero())
+      return;   // no /clock yet; asked again in work()
+  }
+  else if (options_.pace == Pace::wall && !options_.publish_clock)
+    start = ros::Time::now();
+  clock_ = SimClock(start, simulation_->config().time.step);
+  clock_started_ = true;
+  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, grasp_names_);
+  advertise();
+  advertiseServices();
+  std_msgs::String scene;
+  scene.data = simulation_->config().source;
+  scene_pub_.publish(scene);
+  if (bag_)
+    bag_->recordScene(scene.data, clock_.stamp());
+  wall_start_ = ros::WallTime::now();
+  total_ = recent_ = RunStatistics();
+  publishState();
+}
+
+void RodNode::advertise()
+{
+  state_pub_ = nh_.advertise<slender_sim::RodState>("state", 1000);
+  poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>("poses", 100);
+  if (simulation_->config().rods.size() > 1)
+    for (const RodConfig& rod : simulation_->config().rods)
+      rod_poses_pubs_.push_back(nh_.advertise<geometry_msgs::PoseArray>("rods/" + rod.name + "/poses", 100));
+  for (const std::string& name : grasp_names_)
+    wrench_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>("grasps/" + name + "/wrench", 100));
+  markers_pub_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
+  scene_pub_ = nh_.advertise<std_msgs::String>("scene", 1, true);
+  diagnostics_pub_ = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
+  if (options_.publish_clock)
+    clock_pub_ = nh_.advertise<rosgraph_msgs::Clock>("/clock", 100, true);
+}
+
+bool RodNode::advance()
+{
+  const ros::WallTime begin = ros::WallTime::now();
+  SceneInputs inputs = simulation_->defaultInputs();
+  inputs_->apply(clock_.seconds() + clock_.step(), inputs);
+  const StepReport report = simulation_->step(inputs);
+  last_report_ = report;
+  if (!report.ok)
+  {
+    fail(std::string(toString(report.failure)) + ": " + report.message);
+    return false;
+  }
+  for (const RodState& rod : simulation_->state().rods)
+    if (!isFinite(rod))
+    {
+      fail("the state is not finite any more");
+      return false;
+    }
+  clock_.tick();
+  if (simulation_->state().steps % static_cast<std::uint64_t>(options_.state_every) == 0)
+    publishState();
+  else if (options_.publish_clock)
+  {
+    rosgraph_msgs::Clock message;
+    message.clock = clock_.stamp();
+    clock_pub_.publish(message);
+  }
+  const double busy = (ros::WallTime::now() - begin).toSec();
+  total_.add(report, *simulation_, clock_.step(), busy);
+  recent_.add(report, *simulation_, clock_.step(), busy);
+  if (options_.stop_after > 0.0 && clock_.seconds() >= options_.stop_after - 0.5 * clock_.step())
+    finished_ = true;
+  return true;
+}
+
+void RodNode::fail(const std::string& reason)
+{
+  mode_ = Mode::failed;
+  failure_ = "step " + std::to_string(simulation_->state().steps + 1) + ": " + reason;
+  ROS_ERROR("stopped at %s; call ~reset to start again", failure_.c_str());
+  publishDiagnostics();
+}
+
+void RodNode::publishState()
+{
+  if (options_.publish_clock)   // before the messages with this stamp
+  {
+    rosgraph_msgs::Clock message;
+    message.clock = clock_.stamp();
+    clock_pub_.publish(message);
+  }
+  const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
+  if (!bag_ && !heard(state_pub_) && !heard(poses_pub_) && std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) &&
+      std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard))
+    return;
+  messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
+  for (const slender_sim::RodState& state : messages_.states)
+    state_pub_.publish(state);
+  poses_pub_.publish(messages_.poses);
+  for (std::size_t r = 0; r < rod_poses_pubs_.size(); ++r)
+  {
+    geometry_msgs::PoseArray poses;
+    poses.header = messages_.poses.header;
+    appendPoses(simulation_->rodModel(static_cast<int>(r)), simulation_->state().rods[r], poses.poses);
+    rod_poses_pubs_[r].publish(poses);
+  }
+  for (std::size_t g = 0; g < wrench_pubs_.size(); ++g)
+    wrench_pubs_[g].publish(messages_.wrenches[g]);
+  if (!bag_)
+    return;
+  try
+  {
+    bag_->record(messages_);
+  }
+  catch (const std::runtime_error& e)
+  {
+    recordingFailed(e.what());
+  }
+}
+
+void RodNode::recordingFailed(const std::string& reason)
+{
+  bag_failure_ = reason;
+  bag_.reset();
+  ROS_ERROR("recording stopped: %s", reason.c_str());
+}
+
+void RodNode::publishMarkers()
+{
+  const std::uint32_t listeners = markers_pub_.getNumSubscribers();
+  const auto now = std::make_pair(clock_.ticks(), listeners);
+  if (listeners == 0 || ros::WallTime::now() < next_markers_ || drawn_ == now)
+    return;
+  next_markers_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.marker_rate);
+  drawn_ = now;
+  std_msgs::Header header;
+  header.stamp = clock_.stamp();
+  header.frame_id = options_.frame_id;
+  markers_pub_.publish(rodMarkers(*simulation_, header, options_.marker_style, options_.marker_frames));
+}
+
+void RodNode::jumped()
+{
+  ++epoch_;
+  clock_.tick();   // stamps grow even so
+  realign();
+  publishState();
+}
+
+void RodNode::realign()
+{
+  // Where others keep the time, skip to their present: guides then act when they come, not late by the length of the pause.
+  const bool others = options_.pace == Pace::follow || (options_.pace == Pace::wall && !options_.publish_clock && !options_.start_time);
+  if (others)
+  {
+    const double behind = clock_.secondsAt(ros::Time::now()) - clock_.seconds();
+    if (behind > clock_.step())
+      clock_.skip(static_cast<std::uint64_t>(behind / clock_.step()));
+  }
+  wall_start_ = ros::WallTime::now();
+  wall_start_ticks_ = clock_.ticks();
+}
+
+ros::WallDuration RodNode::untilDue() const
+{
+  if (!clock_started_ || mode_ != Mode::running || options_.pace == Pace::step)
+    return ros::WallDuration(kIdle);
+  if (options_.pace == Pace::fast)
+    return ros::WallDuration(0.0);
+  if (options_.pace == Pace::follow)
+    return ros::WallDuration(clock_.nextStamp() <= ros::Time::now() ? 0.0 : 0.001);
+  const double due = static_cast<double>(clock_.ticks() + 1 - wall_start_ticks_) * clock_.step();
+  const double remaining = due - (ros::WallTime::now() - wall_start_).toSec();
+  return ros::WallDuration(std::clamp(remaining, 0.0, kIdle));
+}
+
+void RodNode::work()
+{
+  if (!clock_started_)
+  {
+    startClock();
+    return;
+  }
+  inputs_->processPending();
+  const ros::WallTime begin = ros::WallTime::now();
+  while (mode_ == Mode::running && !finished_ && options_.pace != Pace::step && untilDue().toSec() == 0.0 &&
+         (ros::WallTime::now() - begin).toSec() < kBurst)
+  {
+    if (!advance())
+      break;
+    if (!queue_.isEmpty())
+      break;
+  }
+  publishMarkers();
+  if (ros::WallTime::now() >= next_diagnostics_)
+    publishDiagnostics();
+}
+
+int RodNode::spin()
+{
+  while (nh_.ok() && !finished_)
+  {
+    queue_.callAvailable(untilDue());
+    work();
+  }
+  if (clock_started_)
+    publishDiagnostics();
+  if (bag_)
+  {
+    try
+    {
+      bag_->close();
+    }
+    catch (const std::runtime_error& e)
+    {
+      recordingFailed(e.what());
+    }
+  }
+  summary();
+  if (finished_)
+    ros::WallDuration(0.3).sleep();   // the last messages and answers leave
+  return mode_ == Mode::failed || !bag_failure_.empty() ? 3 : 0;
+}
+
+void RodNode::summary() const
+{
+  const RunStatistics& s = total_;
+  std::cout << std::setprecision(4) << "rod_node: " << s.steps << " steps, " << s.simulated << " s simulated, " << s.busy
+            << " s computing, real-time factor " << s.realTimeFactor() << ", worst residual " << s.residual << ", largest strain "
+            << s.max_strain << ", Newton iterations per step " << (s.steps ? static_cast<double>(s.iterations) / s.steps : 0.0)
+            << ", cut steps " << s.cut_steps << "\n";
+  for (std::size_t g = 0; g < s.max_force.size(); ++g)
+    std::cout << "rod_node: grasp " << grasp_names_[g] << ": largest force " << s.max_force[g] << " N, torque " << s.max_torque[g]
+              << " N m\n";
+  if (inputs_ && inputs_->drops().total() > 0)
+    std::cout << "rod_node: " << inputs_->drops().total() << " messages dropped\n";
+  if (bag_)
+    std::cout << "rod_node: recorded " << bag_->path() << "\n";
+  std::cout << std::flush;
+}
+
+}  // namespace slender

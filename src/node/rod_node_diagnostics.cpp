@@ -1,0 +1,118 @@
+#include <algorithm>
+#include <cstdio>
+
+#include <diagnostic_msgs/DiagnosticStatus.h>
+#include <ros/this_node.h>
+
+#include "slender_sim/node/rod_node.h"
+
+namespace slender {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+void add(DiagnosticStatus& status, const std::string& key, const std::string& value)
+{
+  diagnostic_msgs::KeyValue entry;
+  entry.key = key;
+  entry.value = value;
+  status.values.push_back(entry);
+}
+
+void add(DiagnosticStatus& status, const std::string& key, double value)
+{
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.6g", value);
+  add(status, key, std::string(text));
+}
+
+void add(DiagnosticStatus& status, const std::string& key, std::uint64_t value) { add(status, key, std::to_string(value)); }
+
+void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& message)
+{
+  if (level < status.level)
+    return;
+  status.message = level > status.level || status.message.empty() ? message : status.message + "; " + message;
+  status.level = level;
+}
+
+}  // namespace
+
+void RodNode::publishDiagnostics()
+{
+  diagnostic_msgs::DiagnosticArray message;
+  message.header.stamp = clock_.stamp();
+  message.status = {simulationStatus(), inputStatus()};
+  diagnostics_pub_.publish(message);
+  recent_ = RunStatistics();
+  next_diagnostics_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.diagnostics_rate);
+}
+
+DiagnosticStatus RodNode::simulationStatus() const
+{
+  DiagnosticStatus status;
+  status.name = ros::this_node::getName() + ": simulation";
+  status.hardware_id = simulation_->config().name;
+  status.level = DiagnosticStatus::OK;
+
+  const double wall = recent_.wallSeconds();
+  const double achieved = wall > 0.0 ? recent_.simulated / wall : 0.0;
+  const bool running = mode_ == Mode::running && options_.pace != Pace::step;
+  if (running && options_.pace == Pace::wall && recent_.steps > 10 && recent_.realTimeFactor() < 1.0)
+    raise(status, DiagnosticStatus::WARN, "slower than real time");
+  if (recent_.cut_steps > 0)
+    raise(status, DiagnosticStatus::WARN, "steps had to be cut");
+  if (!bag_failure_.empty())
+    raise(status, DiagnosticStatus::ERROR, "recording stopped: " + bag_failure_);
+  if (mode_ == Mode::failed)
+    raise(status, DiagnosticStatus::ERROR, "stopped at " + failure_ + "; waiting for ~reset");
+  if (status.message.empty())
+    status.message = mode_ == Mode::paused ? "paused" : running ? "running" : "waiting for ~step";
+
+  double energy = 0.0;
+  for (std::size_t r = 0; r < simulation_->state().rods.size(); ++r)
+    energy += simulation_->energies(static_cast<int>(r)).total();
+  add(status, "epoch", std::uint64_t{epoch_});
+  add(status, "step", simulation_->state().steps);
+  add(status, "simulated time [s]", simulation_->state().time);
+  add(status, "mean step time [ms]", recent_.steps ? 1e3 * recent_.busy / static_cast<double>(recent_.steps) : 0.0);
+  add(status, "longest step time [ms]", 1e3 * recent_.worst_step);
+  add(status, "real-time factor", recent_.realTimeFactor());
+  add(status, "simulated per wall second", achieved);
+  add(status, "iterations per step", recent_.steps ? static_cast<double>(recent_.iterations) / static_cast<double>(recent_.steps) : 0.0);
+  add(status, "cut steps", recent_.cut_steps);
+  add(status, "residual", recent_.residual);
+  add(status, "largest strain", recent_.max_strain);
+  add(status, "energy [J]", energy);
+  add(status, "recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);
+  return status;
+}
+
+DiagnosticStatus RodNode::inputStatus()
+{
+  DiagnosticStatus status;
+  status.name = ros::this_node::getName() + ": inputs";
+  status.hardware_id = simulation_->config().name;
+  status.level = DiagnosticStatus::OK;
+  for (const GuideInputs::Age& age : inputs_->ages())
+  {
+    if (age.seconds)
+      add(status, "input age " + age.name + " [s]", *age.seconds);
+    else
+      add(status, "input age " + age.name + " [s]", std::string("none yet"));
+    if (age.seconds && *age.seconds > options_.guide_timeout && mode_ == Mode::running)
+      raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
+  }
+  const DropCounter& drops = inputs_->drops();
+  if (drops.total() > reported_drops_)
+    raise(status, DiagnosticStatus::WARN, "messages were dropped");
+  reported_drops_ = drops.total();
+  add(status, "dropped", drops.total());
+  for (int r = 0; r < kDropReasons; ++r)
+    add(status, std::string("dropped ") + toString(static_cast<Drop>(r)), drops.count(static_cast<Drop>(r)));
+  if (status.message.empty())
+    status.message = inputs_->ages().empty() ? "no grasp is driven from outside" : "ok";
+  return status;
+}
+
+}  // namespace slender

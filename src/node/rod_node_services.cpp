@@ -1,0 +1,195 @@
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/node/converters.h"
+#include "slender_sim/node/rod_node.h"
+
+namespace slender {
+
+void RodNode::advertiseServices()
+{
+  services_ = {nh_priv_.advertiseService("pause", &RodNode::onPause, this),
+               nh_priv_.advertiseService("reset", &RodNode::onReset, this),
+               nh_priv_.advertiseService("step", &RodNode::onStep, this),
+               nh_priv_.advertiseService("set_grasp", &RodNode::onSetGrasp, this),
+               nh_priv_.advertiseService("save_state", &RodNode::onSave, this),
+               nh_priv_.advertiseService("load_state", &RodNode::onLoad, this)};
+}
+
+bool RodNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)
+{
+  if (mode_ == Mode::failed)
+  {
+    response.success = false;
+    response.message = "stopped at " + failure_ + "; call ~reset first";
+    return true;
+  }
+  if (!request.data && mode_ == Mode::paused)
+    realign();
+  mode_ = request.data ? Mode::paused : Mode::running;
+  response.success = true;
+  response.message = request.data ? "paused" : "running";
+  return true;
+}
+
+bool RodNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response)
+{
+  simulation_->reset();
+  inputs_->restart(*simulation_);
+  if (mode_ == Mode::failed)
+    mode_ = Mode::running;
+  failure_.clear();
+  last_report_ = StepReport();
+  jumped();
+  publishDiagnostics();
+  response.success = true;
+  response.message = "epoch " + std::to_string(epoch_);
+  return true;
+}
+
+bool RodNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::Response& response)
+{
+  response.success = false;
+  if (mode_ == Mode::failed)
+    response.message = "stopped at " + failure_ + "; call ~reset first";
+  else if (options_.pace != Pace::step && mode_ != Mode::paused)
+    response.message = std::string("the node runs by itself (~pace: ") + toString(options_.pace) + "); call ~pause first";
+  else if (request.n == 0)
+    response.message = "n must be at least 1";
+  else
+  {
+    inputs_->processPending();
+    std::uint32_t done = 0;
+    while (done < request.n && nh_.ok() && advance())
+      ++done;
+    response.success = done == request.n;
+    if (!response.success)
+      response.message = "took " + std::to_string(done) + " of " + std::to_string(request.n) + " steps; " + failure_;
+  }
+  response.step = simulation_->state().steps;
+  response.stamp = clock_.stamp();
+  return true;
+}
+
+bool RodNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response)
+{
+  const auto found = std::find(grasp_names_.begin(), grasp_names_.end(), request.name);
+  response.success = false;
+  response.first_node = response.last_node = -1;
+  if (found == grasp_names_.end())
+  {
+    response.message = "no grasp \"" + request.name + "\"; the scene has:";
+    for (const std::string& name : grasp_names_)
+      response.message += " " + name;
+    return true;
+  }
+  const int g = static_cast<int>(found - grasp_names_.begin());
+  const GraspRef& ref = simulation_->grasps()[g];
+  const bool active = simulation_->state().rods[ref.rod].grasps[ref.index].active;
+  if (request.action == slender_sim::SetGrasp::Request::RELEASE)
+  {
+    if (!active)
+      response.message = request.name + " holds nothing";
+    else
+      simulation_->release(g);
+    response.success = active;
+    return true;
+  }
+  if (active)
+    response.message = request.name + " holds the rod already; release it first";
+  else
+    response.message = attach(request, g, response);
+  response.success = response.message.empty();
+  return true;
+}
+
+/// Returns why not; empty when done.
+std::string RodNode::attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response)
+{
+  const GraspRef& ref = simulation_->grasps()[grasp];
+  const RodState& rod = simulation_->state().rods[ref.rod];
+  const int nodes = static_cast<int>(rod.x.cols());
+  int first = request.first_node, last = request.last_node;
+  if (request.action == slender_sim::SetGrasp::Request::ATTACH_NODES)
+  {
+    first += first < 0 ? nodes : 0;
+    last += last < 0 ? nodes : 0;
+    if (first < 0 || last >= nodes || first > last)
+      return "nodes " + std::to_string(request.first_node) + " .. " + std::to_string(request.last_node) +
+             ": must be in order and within " + std::to_string(-nodes) + " .. " + std::to_string(nodes - 1);
+  }
+  else if (request.action == slender_sim::SetGrasp::Request::ATTACH_NEAREST)
+  {
+    const Eigen::Vector3d point = fromMessage(request.point);
+    if (!point.allFinite() || !std::isfinite(request.max_distance) || request.max_distance < 0.0)
+      return "point must be finite, max_distance finite and not negative";
+    const double distance = (rod.x.colwise() - point).colwise().norm().minCoeff(&first);
+    last = first;
+    if (request.max_distance > 0.0 && distance > request.max_distance)
+      return "the nearest node " + std::to_string(first) + " is " + std::to_string(distance) + " m away";
+  }
+  else
+    return "action " + std::to_string(request.action) + ": must be RELEASE, ATTACH_NODES or ATTACH_NEAREST";
+  if (request.position_only && first != last)
+    return "position_only holds a single node: first_node must be last_node";
+  for (const GraspState& other : rod.grasps)
+    if (other.active && first <= other.last_node && other.first_node <= last)
+      return "nodes " + std::to_string(other.first_node) + " .. " + std::to_string(other.last_node) + " are held by another grasp";
+  try
+  {
+    simulation_->attach(grasp, first, last, request.position_only ? Hold::position : Hold::frame);
+  }
+  catch (const std::exception& e)
+  {
+    return e.what();
+  }
+  inputs_->attachAt(grasp, simulation_->state().rods[ref.rod].grasps[ref.index].X_WG);
+  response.first_node = first;
+  response.last_node = last;
+  return "";
+}
+
+bool RodNode::onSave(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response)
+{
+  response.success = false;
+  if (request.path.empty())
+    response.message = "path is empty";
+  else
+    try
+    {
+      simulation_->save(request.path);
+      response.success = true;
+    }
+    catch (const std::exception& e)
+    {
+      response.message = e.what();
+    }
+  return true;
+}
+
+bool RodNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response)
+{
+  response.success = false;
+  try
+  {
+    simulation_->load(request.path);
+  }
+  catch (const std::exception& e)
+  {
+    response.message = request.path.empty() ? "path is empty" : e.what();
+    return true;
+  }
+  for (std::size_t g = 0; g < grasp_names_.size(); ++g)
+  {
+    const GraspRef& ref = simulation_->grasps()[g];
+    inputs_->attachAt(static_cast<int>(g), simulation_->state().rods[ref.rod].grasps[ref.index].X_WG);
+  }
+  if (mode_ == Mode::failed)
+    mode_ = Mode::paused;   // what was loaded may be just before the failure
+  failure_.clear();
+  jumped();
+  response.success = true;
+  return true;
+}
+
+}  // namespace slender

@@ -1,0 +1,31 @@
+#include "slender_sim/node/run_statistics.h"
+
+#include <algorithm>
+
+namespace slender {
+
+void RunStatistics::add(const StepReport& report, const Simulation& simulation, double simulated_seconds, double busy_seconds)
+{
+  ++steps;
+  iterations += static_cast<std::uint64_t>(report.iterations);
+  substeps += static_cast<std::uint64_t>(report.substeps);
+  cut_steps += static_cast<std::uint64_t>(report.cut_steps);
+  simulated += simulated_seconds;
+  busy += busy_seconds;
+  worst_step = std::max(worst_step, busy_seconds);
+  residual = std::max(residual, report.residual);
+  max_strain = std::max(max_strain, report.max_strain);
+  max_force.resize(simulation.grasps().size());
+  max_torque.resize(simulation.grasps().size());
+  for (std::size_t g = 0; g < max_force.size(); ++g)
+  {
+    const GraspRef& ref = simulation.grasps()[g];
+    if (!simulation.state().rods[ref.rod].grasps[ref.index].active)
+      continue;
+    const Wrench& wrench = simulation.wrench(static_cast<int>(g));
+    max_force[g] = std::max(max_force[g], wrench.force.norm());
+    max_torque[g] = std::max(max_torque[g], wrench.torque.norm());
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,61 @@
+#include "slender_sim/node/scene_messages.h"
+
+#include <stdexcept>
+
+#include <ros/names.h>
+
+#include "slender_sim/node/converters.h"
+
+namespace slender {
+namespace {
+
+void checkName(const std::string& name, const std::string& kind)
+{
+  std::string why;
+  if (name.empty() || name.find_first_of("/~") != std::string::npos || !ros::names::validate(name, why))
+    throw std::invalid_argument(kind + " \"" + name +
+                                "\": the name cannot be part of a topic; use letters, digits and _, with a letter first");
+}
+
+}  // namespace
+
+std::vector<std::string> graspTopicNames(const Simulation& simulation)
+{
+  for (const RodConfig& rod : simulation.config().rods)
+    checkName(rod.name, "rod");
+  std::vector<std::string> names;
+  for (const GraspRef& grasp : simulation.grasps())
+  {
+    checkName(grasp.config->name, "grasp");
+    names.push_back(grasp.config->name);
+  }
+  return names;
+}
+
+void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch)
+{
+  const SceneState& scene = simulation.state();
+  states.resize(scene.rods.size());
+  poses.header.stamp = stamp;
+  poses.header.frame_id = frame_id;
+  poses.poses.clear();
+  for (std::size_t r = 0; r < scene.rods.size(); ++r)
+  {
+    const RodModel& model = simulation.rodModel(static_cast<int>(r));
+    toMessage(model, scene.rods[r], states[r]);
+    states[r].header = poses.header;
+    states[r].epoch = epoch;
+    states[r].step = scene.steps;
+    appendPoses(model, scene.rods[r], poses.poses);
+  }
+  wrenches.resize(simulation.grasps().size());
+  for (std::size_t g = 0; g < wrenches.size(); ++g)
+  {
+    const GraspRef& ref = simulation.grasps()[g];
+    wrenches[g].header = poses.header;
+    wrenches[g].wrench = scene.rods[ref.rod].grasps[ref.index].active ? toMessage(simulation.wrench(static_cast<int>(g)))
+                                                                      : geometry_msgs::Wrench();
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,19 @@
+#include <exception>
+#include <iostream>
+
+#include <ros/init.h>
+
+#include "slender_sim/node/motion_player.h"
+
+int main(int argc, char** argv)
+try
+{
+  ros::init(argc, argv, "motion_player");
+  slender::MotionPlayer(ros::NodeHandle(), ros::NodeHandle("~")).spin();
+  return 0;
+}
+catch (const std::exception& e)
+{
+  std::cerr << "motion_player: " << e.what() << std::endl;
+  return 2;
+}

@@ -1,0 +1,20 @@
+#include <csignal>
+#include <exception>
+#include <iostream>
+
+#include <ros/init.h>
+
+#include "slender_sim/node/rod_node.h"
+
+int main(int argc, char** argv)
+try
+{
+  ros::init(argc, argv, "rod_node");
+  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });   // like SIGINT, or the bag stays unfinished
+  return slender::RodNode(ros::NodeHandle(), ros::NodeHandle("~")).spin();
+}
+catch (const std::exception& e)
+{
+  std::cerr << "rod_node: " << e.what() << std::endl;
+  return 2;
+}

@@ -1,0 +1,200 @@
+"""Starts rod_node by itself with any parameters, and listens to it: what the node tests share."""
+import os
+import shutil
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from slender_sim.srv import Step
+
+SCENE = """
+name: test_rope
+gravity: [0, 0, -9.81]
+time: {step: 0.005, duration: 1, integrator: implicit_euler}
+rods:
+  - name: rope
+    centerline: {straight: {from: [0, 0, 1], to: [1, 0, 1], edges: 20}}
+    cross_section: {radius: 0.004}
+    material: {density: 1100, youngs_modulus: 1.0e6, poissons_ratio: 0.45}
+    damping: {mass: 2.0}
+    grasps:
+      left: {edges: [0], motion: fixed}
+      right: {edges: [-1], motion: {topic: true}, attach: initial}
+"""
+
+
+def find_program(name):
+    """Path of a node of this package, in the devel or install space."""
+    for folder in os.environ.get("CMAKE_PREFIX_PATH", "").split(":"):
+        path = os.path.join(folder, "lib", "slender_sim", name)
+        if os.access(path, os.X_OK):
+            return path
+    found = subprocess.run(["catkin_find", "--libexec", "slender_sim", name], stdout=subprocess.PIPE, universal_newlines=True)
+    if found.stdout.strip():
+        return found.stdout.split("\n")[0]
+    raise RuntimeError("%s is not built" % name)
+
+
+class Listener:
+    """Collects every message of a topic."""
+
+    def __init__(self, topic, kind):
+        self.messages = []
+        self.lock = threading.Lock()
+        self.subscriber = rospy.Subscriber(topic, kind, self._take, queue_size=10000)
+
+    def _take(self, message):
+        with self.lock:
+            self.messages.append(message)
+
+    def count(self):
+        with self.lock:
+            return len(self.messages)
+
+    def all(self):
+        with self.lock:
+            return list(self.messages)
+
+    def last(self):
+        with self.lock:
+            return self.messages[-1]
+
+    def connected(self):
+        return self.subscriber.get_num_connections() > 0
+
+
+def wait_until(condition, timeout=15.0, what="condition"):
+    end = time.time() + timeout
+    while time.time() < end:
+        if condition():
+            return
+        time.sleep(0.01)
+    raise AssertionError("timed out waiting for " + what)
+
+
+class NodeCase(unittest.TestCase):
+    """Each test starts its own rod_node in the namespace /t and stops it at the end."""
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix="slender_sim_test_")
+        self.processes = []
+
+    def tearDown(self):
+        for process in self.processes:
+            if process.poll() is None:
+                process.terminate()
+        for process in self.processes:
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        if rospy.has_param("/t"):
+            rospy.delete_param("/t")
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def launch(self, program, name, parameters, remappings=()):
+        """Starts a program as /t/NAME with private parameters."""
+        for key, value in parameters.items():
+            rospy.set_param("/t/%s/%s" % (name, key), value)
+        process = subprocess.Popen([find_program(program), "__name:=" + name, "__ns:=/t"] + list(remappings),
+                                   stdout=open(self.path(name + ".out"), "w"), stderr=open(self.path(name + ".err"), "w"))
+        self.processes.append(process)
+        return process
+
+    def start(self, scene=SCENE, wait=True, **parameters):
+        """Starts rod_node; by default it steps only on request, with exact stamps from 1 s on."""
+        values = {"scene": scene, "pace": "step", "diagnostics_rate": 20.0, "guide_delay": 0.0}
+        values.update(parameters)
+        process = self.launch("rod_node", "rod", values)
+        if wait:
+            rospy.wait_for_service("/t/rod/load_state", 20)
+        return process
+
+    def output(self, name):
+        with open(self.path(name)) as file:
+            return file.read()
+
+    def listen(self, topic, kind):
+        """Subscribes and waits for the connection."""
+        listener = Listener(topic, kind)
+        wait_until(listener.connected, what="a publisher of " + topic)
+        return listener
+
+    def publisher(self, topic, kind):
+        publisher = rospy.Publisher(topic, kind, queue_size=1000)
+        wait_until(lambda: publisher.get_num_connections() > 0, what="a subscriber of " + topic)
+        return publisher
+
+    def call(self, name, kind, *arguments):
+        proxy = rospy.ServiceProxy("/t/rod/" + name, kind)
+        return proxy(*arguments)
+
+    def step(self, n):
+        answer = self.call("step", Step, n)
+        self.assertTrue(answer.success, answer.message)
+        return answer
+
+    def states_after(self, listener, n):
+        """Steps n times and returns the last state."""
+        stamp = self.step(n).stamp
+        wait_until(lambda: listener.count() > 0 and listener.last().header.stamp >= stamp, what="the state at %s" % stamp)
+        return listener.last()
+
+    def diagnostics(self, kind):
+        """Values of the node's latest status `simulation` or `inputs`, with `level` and `message`."""
+        message = rospy.wait_for_message("/diagnostics", DiagnosticArray, 10)
+        for status in message.status:
+            if status.name == "/t/rod: " + kind:
+                values = {value.key: value.value for value in status.values}
+                values.update(level=status.level, message=status.message)
+                return values
+        raise AssertionError("no status " + kind)
+
+    def dropped(self, reason):
+        return int(self.diagnostics("inputs")["dropped " + reason])
+
+    def expect_drop(self, reason, count=1):
+        wait_until(lambda: self.dropped(reason) == count, what="%d dropped as %s" % (count, reason))
+
+
+def pose(x, y, z, stamp=0.0, frame="world", q=(0, 0, 0, 1)):
+    message = PoseStamped()
+    message.header.stamp = rospy.Time.from_sec(stamp)
+    message.header.frame_id = frame
+    fill(message.pose, (x, y, z), q)
+    return message
+
+
+def fill(out, p, q=(0, 0, 0, 1)):
+    out.position.x, out.position.y, out.position.z = p
+    out.orientation.x, out.orientation.y, out.orientation.z, out.orientation.w = q
+    return out
+
+
+def numbers(state):
+    """All numbers of a state message, for exact comparison."""
+    out = []
+    for p in state.nodes:
+        out += [p.x, p.y, p.z]
+    for v in state.velocities:
+        out += [v.x, v.y, v.z]
+    for q in state.frames:
+        out += [q.x, q.y, q.z, q.w]
+    return out + list(state.twists)
+
+
+
+def run(name, case):
+    """Entry of a rostest: runs one TestCase."""
+    import rostest
+    rospy.init_node(name)
+    rostest.rosrun("slender_sim", name, case)

@@ -1,0 +1,226 @@
+#!/usr/bin/python3
+"""Services of rod_node (success and refusal), paces, and how it fails."""
+import math
+
+import rosgraph
+import rospy
+from geometry_msgs.msg import Point, PoseStamped, WrenchStamped
+from node_harness import SCENE, NodeCase, numbers, pose, run, wait_until
+from rosgraph_msgs.msg import Clock
+from slender_sim.msg import RodState
+from slender_sim.srv import FilePath, SetGrasp, SetGraspRequest, Step
+from std_srvs.srv import SetBool, Trigger
+
+
+class Services(NodeCase):
+
+    def test_step_returns_after_publishing(self):
+        self.start()
+        state = self.listen("/t/state", RodState)
+        answer = self.step(7)
+        self.assertEqual(answer.step, 7)
+        self.assertEqual(answer.stamp.to_nsec(), 1000000000 + 7 * 5000000)
+        wait_until(lambda: state.count() == 7, 2, "7 states")
+        self.assertFalse(self.call("step", Step, 0).success)
+
+    def test_step_is_refused_while_running(self):
+        self.start(pace="wall")
+        answer = self.call("step", Step, 1)
+        self.assertFalse(answer.success)
+        self.assertIn("pause", answer.message)
+
+    def test_pause_holds_the_step(self):
+        self.start(pace="wall")
+        state = self.listen("/t/state", RodState)
+        wait_until(lambda: state.count() > 10, what="states")
+        self.assertTrue(self.call("pause", SetBool, True).success)
+        rospy.sleep(0.2)
+        held = state.last()
+        count = state.count()
+        rospy.sleep(0.5)
+        self.assertEqual(state.count(), count)
+        answer = self.call("step", Step, 2)   # a paused node can be stepped
+        self.assertTrue(answer.success)
+        self.assertEqual(answer.step, held.step + 2)
+        self.assertTrue(self.call("pause", SetBool, False).success)
+        wait_until(lambda: state.count() > count + 10, what="states after the pause")
+        after = state.all()[count:]
+        self.assertEqual([m.step for m in after], list(range(held.step + 1, held.step + 1 + len(after))))
+        stamps = [m.header.stamp for m in state.all()]
+        self.assertTrue(all(a < b for a, b in zip(stamps, stamps[1:])))
+
+    def test_wall_pace_keeps_real_time(self):
+        self.start(pace="wall")
+        state = self.listen("/t/state", RodState)
+        wait_until(lambda: state.count() > 0, what="a state")
+        begin, now = state.last().header.stamp, rospy.get_time()
+        rospy.sleep(2.0)
+        simulated, real = (state.last().header.stamp - begin).to_sec(), rospy.get_time() - now
+        self.assertAlmostEqual(simulated, real, delta=0.2)
+        self.assertAlmostEqual(state.last().header.stamp.to_sec(), rospy.get_time(), delta=0.2)
+
+    def test_reset(self):
+        self.start()
+        state = self.listen("/t/state", RodState)
+        self.step(40)
+        wait_until(lambda: state.count() == 40, what="40 states")
+        self.assertTrue(self.call("reset", Trigger).success)
+        wait_until(lambda: state.count() == 41, what="the state after the reset")
+        first, fresh = state.all()[39:]
+        self.assertEqual((fresh.epoch, fresh.step), (1, 0))
+        self.assertGreater(fresh.header.stamp, first.header.stamp)
+        self.assertTrue(all(abs(p.z - 1) < 1e-12 for p in fresh.nodes))
+        again = self.states_after(state, 40)
+        self.assertEqual(numbers(again), numbers(first))
+
+    def test_save_and_load_are_exact(self):
+        self.start()
+        state = self.listen("/t/state", RodState)
+        self.step(30)
+        file = self.path("saved")
+        self.assertTrue(self.call("save_state", FilePath, file).success)
+        onwards = self.states_after(state, 30)
+        answer = self.call("load_state", FilePath, file)
+        self.assertTrue(answer.success, answer.message)
+        again = self.states_after(state, 30)
+        self.assertEqual(numbers(again), numbers(onwards))
+        self.assertEqual((again.step, again.epoch), (60, 1))
+        self.assertGreater(again.header.stamp, onwards.header.stamp)
+
+    def test_save_and_load_refuse(self):
+        self.start()
+        self.step(3)
+        self.assertFalse(self.call("save_state", FilePath, "/nowhere/at/all").success)
+        self.assertFalse(self.call("save_state", FilePath, "").success)
+        for path in ("", self.path("missing"), __file__):
+            answer = self.call("load_state", FilePath, path)
+            self.assertFalse(answer.success)
+            self.assertTrue(answer.message)
+        self.assertEqual(self.step(1).step, 4)   # the state was left alone
+
+    def set_grasp(self, name, action, first=0, last=0, point=None, max_distance=0.0, position_only=False):
+        return self.call("set_grasp", SetGrasp, SetGraspRequest(name, action, first, last, point or Point(), max_distance, position_only))
+
+    def test_set_grasp(self):
+        self.start()
+        state = self.listen("/t/state", RodState)
+        wrench = self.listen("/t/grasps/right/wrench", WrenchStamped)
+        self.step(10)
+        release, nodes, nearest = SetGraspRequest.RELEASE, SetGraspRequest.ATTACH_NODES, SetGraspRequest.ATTACH_NEAREST
+        self.assertFalse(self.set_grasp("middle", release).success)
+        self.assertFalse(self.set_grasp("right", nodes, 4, 4).success)      # holds already
+        self.assertTrue(self.set_grasp("right", release).success)
+        self.assertFalse(self.set_grasp("right", release).success)
+        fallen = self.states_after(state, 60)
+        self.assertLess(fallen.nodes[-1].z, 0.8)
+        force = wrench.last().wrench.force
+        self.assertEqual((force.x, force.y, force.z), (0, 0, 0))
+        for bad in ((nodes, -1, 3), (nodes, 5, 21), (nodes, -22, 0), (nodes, 0, 2), (9, 0, 0)):
+            answer = self.set_grasp("right", *bad)
+            self.assertFalse(answer.success)
+            self.assertTrue(answer.message)
+        self.assertFalse(self.set_grasp("right", nodes, 4, 6, position_only=True).success)
+        self.assertFalse(self.set_grasp("right", nearest, point=Point(9, 9, 9), max_distance=0.5).success)
+        self.assertFalse(self.set_grasp("right", nearest, point=Point(float("nan"), 9, 9)).success)
+
+        answer = self.set_grasp("right", nodes, -3, -1)
+        self.assertTrue(answer.success, answer.message)
+        self.assertEqual((answer.first_node, answer.last_node), (18, 20))
+        held = self.states_after(state, 100)
+        for a, b in zip(held.nodes[18:], fallen.nodes[18:]):
+            self.assertLess(math.dist((a.x, a.y, a.z), (b.x, b.y, b.z)), 1e-9)
+
+        self.assertTrue(self.set_grasp("right", release).success)
+        here = held.nodes[12]
+        answer = self.set_grasp("right", nearest, point=Point(here.x, here.y, here.z + 0.001), max_distance=0.01, position_only=True)
+        self.assertTrue(answer.success, answer.message)
+        self.assertEqual((answer.first_node, answer.last_node), (12, 12))
+        after = self.states_after(state, 50).nodes[12]
+        self.assertLess(math.dist((after.x, after.y, after.z), (here.x, here.y, here.z)), 1e-9)
+
+    def test_failed_step(self):
+        """A guide that leaves for the stars: no step can follow, the node says so and waits for ~reset."""
+        self.start()
+        state = self.listen("/t/state", RodState)
+        guide = self.publisher("/t/grasps/right/pose", PoseStamped)
+        guide.publish(pose(1, 0, 1, 1.0))
+        guide.publish(pose(1e200, 0, 1, 1.01))
+        wait_until(lambda: self.diagnostics("inputs")["input age right [s]"] != "none yet", what="guides")
+        rospy.sleep(0.2)
+        answer = self.call("step", Step, 20)
+        self.assertFalse(answer.success)
+        self.assertTrue(answer.message)
+        wait_until(lambda: self.diagnostics("simulation")["level"] == 2, what="an error")
+        self.assertIn("reset", self.diagnostics("simulation")["message"])
+        for refused in (self.call("step", Step, 1), self.call("pause", SetBool, False)):
+            self.assertFalse(refused.success)
+            self.assertIn("reset", refused.message)
+        self.assertTrue(all(math.isfinite(x) for m in state.all() for x in numbers(m)))
+        self.assertTrue(self.call("reset", Trigger).success)
+        self.assertEqual(self.step(5).step, 5)
+        wait_until(lambda: self.diagnostics("simulation")["level"] == 0, what="the error to go")
+
+    def refused(self, *needles, **parameters):
+        """The node exits with 2, explains, and has advertised nothing."""
+        if rospy.has_param("/t"):
+            rospy.delete_param("/t")
+        process = self.start(wait=False, **parameters)
+        self.assertEqual(process.wait(20), 2)
+        error = self.output("rod.err")
+        for needle in needles:
+            self.assertIn(needle, error)
+        published = rosgraph.Master("/test").getSystemState()[0]
+        self.assertFalse([topic for topic, nodes in published if "/t/rod" in nodes and topic != "/rosout"])
+
+    def test_bad_scene_exits_2(self):
+        self.refused("radius", scene=SCENE.replace("radius: 0.004", "radius: -1"))
+        self.refused("radios", scene=SCENE.replace("radius:", "radios:"))
+        self.refused("missing.yaml", scene="/nowhere/missing.yaml")
+        self.refused("~scene", scene="")
+        self.refused("grasp", "a-b", scene=SCENE.replace("left:", "a-b:"))
+
+    def test_bad_parameters_exit_2(self):
+        self.refused("~pace", "wall | fast | follow | step", pace="slow")
+        self.refused("~state_every", state_every=0)
+        self.refused("~guide_dealy", "no such parameter", guide_dealy=0.1)
+        self.refused("~guide_delay", guide_delay="soon")
+        self.refused("cannot be written", record_bag="/nowhere/at/all.bag")
+        self.refused("use_sim_time", pace="follow")
+        self.refused("use_sim_time", pace="fast", publish_clock=True)
+
+    def test_numbers_as_strings(self):
+        self.start(guide_delay="1e-2")   # what rosparam makes of a number without a point
+
+    def test_follows_the_clock(self):
+        rospy.set_param("/use_sim_time", True)
+        try:
+            self.refused("use_sim_time", pace="wall")
+            self.start(wait=False, pace="follow")
+            clock = rospy.Publisher("/clock", Clock, queue_size=100)
+            wait_until(lambda: clock.get_num_connections() > 0, what="the node to listen to /clock")
+            rospy.sleep(0.2)
+            clock.publish(Clock(rospy.Time.from_sec(5.0)))
+            state = self.listen("/t/state", RodState)
+            clock.publish(Clock(rospy.Time.from_sec(5.0)))
+            rospy.sleep(0.3)
+            clock.publish(Clock(rospy.Time(5, 100000000)))
+            wait_until(lambda: state.count() and state.last().step == 20, what="20 steps")
+            rospy.sleep(0.3)
+            self.assertEqual(state.last().step, 20)
+            self.assertEqual(state.last().header.stamp, rospy.Time(5, 100000000))
+        finally:
+            rospy.delete_param("/use_sim_time")
+
+    def test_publishes_the_clock(self):
+        rospy.set_param("/use_sim_time", True)
+        try:
+            self.start(publish_clock=True)
+            clock = self.listen("/clock", Clock)
+            self.step(3)
+            wait_until(lambda: clock.count() and clock.last().clock.to_nsec() == 1015000000, what="the clock")
+        finally:
+            rospy.delete_param("/use_sim_time")
+
+
+if __name__ == "__main__":
+    run("services_test", Services)
