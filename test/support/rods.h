@@ -162,7 +162,7 @@ inline bool bitEqual(const RodState& a, const RodState& b)
         g.section_twist[1] != h.section_twist[1])
       return false;
   }
-  return same(a.x, b.x) && same(a.v, b.v) && same(a.d1, b.d1) && same(a.twist, b.twist) && a.last_step == b.last_step && same(a.a, b.a) &&
+  return same(a.x, b.x) && same(a.v, b.v) && same(a.d1, b.d1) && same(a.twist, b.twist) && a.last_step == b.last_step && a.next_step == b.next_step && same(a.a, b.a) &&
          same(a.x_previous, b.x_previous) && same(a.v_previous, b.v_previous) && same(a.strain_rate, b.strain_rate) &&
          same(a.strain_rate_previous, b.strain_rate_previous) && same(a.strain_previous, b.strain_previous);
 }
