@@ -1,5 +1,6 @@
 #include "slender_sim/geometry/framed_curve.h"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -19,9 +20,12 @@ FramedCurve::FramedCurve(const Eigen::Matrix3Xd& x, bool closed, const Eigen::Ve
     throw std::invalid_argument("a curve needs at least " + std::string(closed ? "3" : "2") + " nodes, got " + std::to_string(n));
   t_.resize(3, closed ? n : n - 1);
   u_.resize(3, t_.cols());
+  if (!director.allFinite())
+    throw std::invalid_argument("director is not finite");
   theta = Eigen::VectorXd::Zero(t_.cols());
   reference_twist_ = Eigen::VectorXd::Zero(n);
-  setTangents(x);
+  t_ = tangentsOf(x);
+  x_ = x;
   const Eigen::Vector3d t0 = t_.col(0);
   Eigen::Vector3d u = director - director.dot(t0) * t0;
   if (director.norm() > 0 && u.norm() < 1e-6 * director.norm())
@@ -33,30 +37,33 @@ FramedCurve::FramedCurve(const Eigen::Matrix3Xd& x, bool closed, const Eigen::Ve
   makeSpaceParallel();
 }
 
-void FramedCurve::setTangents(const Eigen::Matrix3Xd& x)
+Eigen::Matrix3Xd FramedCurve::tangentsOf(const Eigen::Matrix3Xd& x) const
 {
+  Eigen::Matrix3Xd t(3, edges());
   const int n = static_cast<int>(x.cols());
-  for (int j = 0; j < t_.cols(); ++j)
+  for (int j = 0; j < edges(); ++j)
   {
     const Eigen::Vector3d e = x.col((j + 1) % n) - x.col(j);
     const double length = e.norm();
-    if (!(length > 0))
+    if (!(length > 0) || !std::isfinite(length))
       throw std::invalid_argument("nodes " + std::to_string(j) + " and " + std::to_string((j + 1) % n) + " coincide or are not finite");
-    t_.col(j) = e / length;
+    t.col(j) = e / length;
   }
-  x_ = x;
+  return t;
 }
 
 void FramedCurve::moveTo(const Eigen::Matrix3Xd& x)
 {
   if (x.cols() != x_.cols())
     throw std::invalid_argument("moveTo: expected " + std::to_string(x_.cols()) + " nodes, got " + std::to_string(x.cols()));
-  const Eigen::Matrix3Xd old = t_;
-  setTangents(x);
+  const Eigen::Matrix3Xd old = t_, moved = tangentsOf(x);
+  for (int j = 0; j < edges(); ++j)
+    if (1.0 + old.col(j).dot(moved.col(j)) < kFolded)
+      throw std::invalid_argument("edge " + std::to_string(j) + " turned over in one move; move in smaller steps");
+  t_ = moved;
+  x_ = x;
   for (int j = 0; j < edges(); ++j)
   {
-    if (1.0 + old.col(j).dot(t_.col(j)) < kFolded)
-      throw std::invalid_argument("edge " + std::to_string(j) + " turned over in one move; move in smaller steps");
     const Eigen::Vector3d u = parallelTransport(u_.col(j), old.col(j), t_.col(j));
     u_.col(j) = (u - u.dot(t_.col(j)) * t_.col(j)).normalized();
   }

@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include <Eigen/Eigenvalues>
-
 namespace slender {
 
 void CyclicBandedLdlt::resize(int blocks, bool closed)
@@ -67,15 +65,22 @@ Inertia CyclicBandedLdlt::factor()
   Border schur = c;
   for (int i = 0; i < split; ++i)
     schur.noalias() -= b_map.row(i).transpose() * z_map.row(i);
-  const Eigen::SelfAdjointEigenSolver<Border> eigen(schur);
-  for (int k = 0; k < kBorder; ++k)
+  // L D L^T without pivoting, as in the band: rows of very different size (positions, angles) keep their relative accuracy
+  for (int j = 0; j < kBorder; ++j)
   {
-    const double value = eigen.eigenvalues()[k];
-    ++(value > 0 ? inertia.positive : value < 0 ? inertia.negative : inertia.zero);
+    const double pivot = schur(j, j);
+    if (!(pivot > 0 || pivot < 0) || !std::isfinite(pivot))
+      return {inertia.positive, inertia.negative, 1};
+    ++(pivot > 0 ? inertia.positive : inertia.negative);
+    for (int k = j + 1; k < kBorder; ++k)
+    {
+      const double factor = schur(k, j) / pivot;
+      for (int i = k; i < kBorder; ++i)
+        schur(i, k) -= schur(i, j) * factor;
+    }
+    schur.col(j).tail(kBorder - 1 - j) /= pivot;
   }
-  if (inertia.zero || !schur.allFinite())
-    return {inertia.positive, inertia.negative, std::max(inertia.zero, 1)};
-  schur_inverse_ = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+  schur_ = schur;
   return inertia;
 }
 
@@ -91,7 +96,10 @@ void CyclicBandedLdlt::solve(double* x) const
   for (int i = 0; i < split; ++i)
     for (int k = 0; k < kBorder; ++k)
       right[k] -= coupling_[i * kBorder + k] * x[i];
-  x2 = schur_inverse_ * right;
+  schur_.triangularView<Eigen::UnitLower>().solveInPlace(right);
+  right.array() /= schur_.diagonal().array();
+  schur_.transpose().triangularView<Eigen::UnitUpper>().solveInPlace(right);
+  x2 = right;
   for (int i = 0; i < split; ++i)
     for (int k = 0; k < kBorder; ++k)
       x[i] -= reduced_[i * kBorder + k] * x2[k];

@@ -68,14 +68,20 @@ void RodSystem::compose(const RodState& state)
           l -= h / 12.0;
           length[next] += h / 12.0;
         }
-        const double half_share = 0.5 * h / (model_.closed || (node > 0 && node < n - 1) ? 0.5 * (model_.rest_length[before(node)] + model_.rest_length[node]) : 0.5 * h);
         c.b11 = model_.bend_modulus(0, node) / l;
         c.b12 = model_.bend_modulus(1, node) / l;
         c.b22 = model_.bend_modulus(2, node) / l;
         c.beta = model_.twist_modulus[node] / l;
-        c.rest_kappa1 = model_.rest_curvature(0, node) * half_share;
-        c.rest_kappa2 = model_.rest_curvature(1, node) * half_share;
-        c.rest_twist = model_.rest_twist[node] * half_share;
+        // The half joint of the rest shape turns and twists by its share of the joint; its directors' mean lies elsewhere
+        // between the edges than the joint's own, and strains are tangents of half angles (3.13, 3.14).
+        const double share = shareOfEdge(model_, node, side), m = model_.rest_twist[node];
+        const Eigen::Vector2d kappa = model_.rest_curvature.col(node);
+        const double mean = std::abs(std::cos(0.5 * m)) > 1e-3 ? std::cos(0.5 * m) : 1.0, half_tangent = 0.5 * kappa.norm() / std::abs(mean);
+        const double ratio = half_tangent > 0 ? std::tan(share * std::atan(half_tangent)) / half_tangent * std::cos(0.5 * share * m) / mean : 0.0;
+        const Eigen::Vector2d half = ratio * (Eigen::Rotation2Dd((side ? -0.5 : 0.5) * (1 - share) * m) * kappa);
+        c.rest_kappa1 = half[0];
+        c.rest_kappa2 = half[1];
+        c.rest_twist = share * m;
         clamps_.push_back(c);
       }
 

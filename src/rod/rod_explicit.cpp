@@ -23,10 +23,10 @@ StepFailure RodStepper::Impl::explicitStep(const RodInputs& inputs, double durat
   if (work.last_step == 0.0)
     system.relaxFrames();
   RodEvaluation now = system.evaluate(false);
+  if (now.min_chi <= kFoldedChi)
+    return StepFailure::folded_back;
   if (!std::isfinite(now.energy()))
     return StepFailure::state_not_finite;
-  if (!(now.min_chi > kFoldedChi))
-    return StepFailure::folded_back;
   report.max_strain = now.max_strain;
 
   next = work;
@@ -50,10 +50,10 @@ StepFailure RodStepper::Impl::explicitStep(const RodInputs& inputs, double durat
       next.v.col(i) = heldVelocity(inputs, duration, t + h, i, Eigen::Vector3d::Zero());
     }
   now = system.evaluate(false);
+  if (now.min_chi <= kFoldedChi)
+    return StepFailure::folded_back;
   if (!std::isfinite(now.energy()) || !next.x.allFinite())
     return StepFailure::state_not_finite;
-  if (!(now.min_chi > kFoldedChi))
-    return StepFailure::folded_back;
   computeWrenches(inputs, h);
   system.store(next);
   if (viscous)

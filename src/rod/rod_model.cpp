@@ -1,5 +1,6 @@
 #include "slender_sim/rod/rod_model.h"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "slender_sim/geometry/framed_curve.h"
@@ -31,6 +32,8 @@ void checkSections(const std::vector<RodSection>& sections, int edges)
     requirePositive(s.twist_modulus, "twist modulus" + at);
     requirePositive(s.bend_modulus(0, 0), "bend modulus B11" + at);
     requirePositive(s.bend_modulus.determinant(), "determinant of the bend modulus" + at);
+    if (std::abs(s.bend_modulus(0, 1) - s.bend_modulus(1, 0)) > 1e-9 * s.bend_modulus.norm())
+      throw std::invalid_argument("bend modulus" + at + " must be symmetric, got " + std::to_string(s.bend_modulus(0, 1)) + " and " + std::to_string(s.bend_modulus(1, 0)));
   }
 }
 
@@ -105,6 +108,11 @@ RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, cons
 {
   if (nodes.cols() != model.nodes())
     throw std::invalid_argument("rod '" + model.name + "' has " + std::to_string(model.nodes()) + " nodes, got " + std::to_string(nodes.cols()));
+  if (!nodes.allFinite() || !std::isfinite(total_twist))
+    throw std::invalid_argument("rod '" + model.name + "': a node or the total twist is not finite");
+  if (model.closed && std::abs(std::remainder(total_twist, 2 * M_PI)) > 1e-6)
+    throw std::invalid_argument("rod '" + model.name + "': the frames of a closed rod meet again only after whole turns; its total twist must be a multiple of 2 pi, got " +
+                                std::to_string(total_twist) + " (a loop glued at another angle has that angle as rest twist of a node)");
   FramedCurve curve(nodes, model.closed, director);
   const int n = model.nodes(), edges = model.edges();
   const int joints = model.closed ? n : n - 2;
@@ -122,6 +130,15 @@ RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, cons
   if (model.closed)
     state.twist[0] += total_twist;   // the turns closed into the loop: frames alone do not show them
   return state;
+}
+
+double shareOfEdge(const RodModel& model, int node, int side)
+{
+  const int n = model.nodes(), edges = model.edges();
+  if (!model.closed && (node == 0 || node == n - 1))
+    return 1.0;
+  const double before = model.rest_length[(node + edges - 1) % edges], after = model.rest_length[node];
+  return (side ? after : before) / (before + after);
 }
 
 Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int node)
@@ -143,10 +160,13 @@ Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int n
   }
   else
   {
+    // between the middles of the two edges, where the node is: the turn and the twist are shared in proportion to their lengths
     const int e = (node + edges - 1) % edges, f = node;
     const Eigen::Vector3d te = tangent(e), tf = tangent(f);
-    t = (te + tf).normalized();
-    d1 = rotateAbout(parallelTransport(state.d1.col(e), te, t), t, 0.5 * state.twist[node]);
+    const double share = shareOfEdge(model, node, 0);
+    const Eigen::Vector3d kb = te.cross(tf);
+    t = kb.norm() > 0 ? rotateAbout(te, kb.normalized(), share * std::atan2(kb.norm(), te.dot(tf))).normalized() : te;
+    d1 = rotateAbout(parallelTransport(state.d1.col(e), te, t), t, share * state.twist[node]);
   }
   d1 = (d1 - d1.dot(t) * t).normalized();
   Eigen::Matrix3d frame;
@@ -198,7 +218,7 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
     const int edge = side ? node : (node + model.edges() - 1) % model.edges();
     const Eigen::Vector3d te = (state.x.col((edge + 1) % n) - state.x.col(edge)).normalized();
     const double angle = signedAngle(parallelTransport(section.col(1), section.col(0), te), state.d1.col(edge), te);
-    g.section_twist[side] = unwrapNear(side ? angle : -angle, 0.5 * state.twist[node]);
+    g.section_twist[side] = unwrapNear(side ? angle : -angle, shareOfEdge(model, node, side) * state.twist[node]);
   }
   return g;
 }

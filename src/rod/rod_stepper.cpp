@@ -41,28 +41,42 @@ void RodStepper::Impl::resizeFor(const RodState& state)
   wrenches.resize(grasps);
 }
 
-bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what)
+bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const
 {
-  const auto check = [&](bool good, const std::string& name) {
+  const int nodes = model->nodes(), edges = model->edges();
+  // names are built only when they are needed: a good step takes no memory
+  const auto check = [&](bool good, const char* name, std::size_t number = std::string::npos) {
     if (!good && what.empty())
-      what = name;
+      what = number == std::string::npos ? std::string(name) : name + std::to_string(number);
     return good;
   };
+  const auto refuse_count = [&](const char* name, std::size_t count, std::size_t expected) {
+    what = std::string("number of ") + name + " (" + std::to_string(count) + " for " + std::to_string(expected) + ")";
+    return false;
+  };
   bool good = check(inputs.gravity.allFinite(), "gravity") && check(inputs.wind.allFinite(), "wind") && check(inputs.forces.allFinite(), "a nodal force");
+  if (state.x.cols() != nodes || state.v.cols() != nodes || state.twist.size() != nodes || state.d1.cols() != edges)
+    return refuse_count("nodes of the state", state.x.cols(), nodes);
   if (inputs.grasps.size() != state.grasps.size())
-    return check(false, "number of grasp targets (" + std::to_string(inputs.grasps.size()) + " for " + std::to_string(state.grasps.size()) + " grasps)");
+    return refuse_count("grasp targets", inputs.grasps.size(), state.grasps.size());
   if (inputs.forces.cols() != 0 && inputs.forces.cols() != state.x.cols())
-    return check(false, "number of nodal forces");
+    return refuse_count("nodal forces", inputs.forces.cols(), state.x.cols());
   for (std::size_t k = 0; k < inputs.grasps.size(); ++k)
   {
     const GraspTarget& g = inputs.grasps[k];
     if (!state.grasps[k].active)
       continue;
     const double norm = g.X_WG.orientation.norm();
-    good = good && check(g.X_WG.position.allFinite() && std::isfinite(norm) && std::abs(norm - 1.0) < 1e-3, "pose of grasp " + std::to_string(k)) &&
-           check(!g.velocity || (g.velocity->linear.allFinite() && g.velocity->angular.allFinite()), "velocity of grasp " + std::to_string(k));
+    good = good && check(g.X_WG.position.allFinite() && std::isfinite(norm) && std::abs(norm - 1.0) < 1e-3, "pose of grasp ", k) &&
+           check(!g.velocity || (g.velocity->linear.allFinite() && g.velocity->angular.allFinite()), "velocity of grasp ", k);
   }
-  return good && check(state.x.allFinite() && state.v.allFinite(), "the state");
+  bool sound = state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() && state.a.allFinite() &&
+               state.x_previous.allFinite() && state.v_previous.allFinite() && state.strain_rate.allFinite() &&
+               state.strain_rate_previous.allFinite() && state.strain_previous.allFinite();
+  for (const GraspState& g : state.grasps)
+    sound = sound && (!g.active || (g.X_WG.position.allFinite() && g.X_WG.orientation.coeffs().allFinite() && g.velocity.linear.allFinite() &&
+                                    g.velocity.angular.allFinite() && std::isfinite(g.section_twist[0]) && std::isfinite(g.section_twist[1])));
+  return good && check(sound, "the state");
 }
 
 /// Pose (and velocity) of a grasp at a fraction of the whole step: uniform motion, or a cubic through both ends' velocities.
@@ -194,7 +208,8 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length,
   switch (failure)
   {
     case StepFailure::folded_back:
-      return "two consecutive edges point (nearly) opposite ways" + at + ": use more edges, a stiffer rod or a slower motion";
+      return "two consecutive edges point (nearly) opposite ways" + at + ": use more edges, a stiffer rod or a slower motion" +
+             (explicit_step ? "; if the motion is slow, the explicit step blew up: use a shorter step or an implicit integrator" : "");
     case StepFailure::singular_matrix:
       return "the stiffness matrix could not be made definite" + at + ": moduli or masses differ by too many orders of magnitude";
     case StepFailure::state_not_finite:
@@ -224,13 +239,15 @@ Eigen::Vector3d RodStepper::Impl::load(const RodInputs& inputs, int i) const
   return f;
 }
 
-void RodStepper::Impl::computeAcceleration(const RodInputs& inputs, double duration, double t)
+StepFailure RodStepper::Impl::computeAcceleration(const RodInputs& inputs, double duration, double t)
 {
   // at the start of a run: frames to equilibrium, then a = M^-1 F
   system.setResponse(0.0, nullptr);
   for (int i = 0; i < model->nodes(); ++i)
     system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), load(inputs, i));
   placeAt(inputs, duration, t / duration);
+  if (system.evaluate(false).min_chi <= kFoldedChi)
+    return StepFailure::folded_back;
   system.relaxFrames();
   work.a.resize(3, model->nodes());
   for (int i = 0; i < model->nodes(); ++i)
@@ -240,6 +257,7 @@ void RodStepper::Impl::computeAcceleration(const RodInputs& inputs, double durat
                                      : Eigen::Vector3d(Eigen::Vector3d::Zero());
   }
   system.store(work);
+  return StepFailure::none;
 }
 
 StepFailure RodStepper::Impl::implicitStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report)
@@ -250,7 +268,9 @@ StepFailure RodStepper::Impl::implicitStep(const RodInputs& inputs, double durat
   const bool measure_error = time.error_tolerance > 0;
   if ((plan.needs_acceleration || measure_error) && work.a.cols() == 0)
   {
-    computeAcceleration(inputs, duration, t);
+    const StepFailure failure = computeAcceleration(inputs, duration, t);
+    if (failure != StepFailure::none)
+      return failure;
     system.load(work);
   }
   const bool viscous = model->stiffness_damping > 0;

@@ -29,11 +29,11 @@ private:
   // rod_stepper.cpp
   void resizeFor(const RodState& state);
   double stepFactor(double ratio) const;
-  static bool inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what);
+  bool inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const;
   static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
   void placeAt(const RodInputs& inputs, double duration, double fraction);
   Eigen::Vector3d load(const RodInputs& inputs, int node) const;
-  void computeAcceleration(const RodInputs& inputs, double duration, double t);
+  StepFailure computeAcceleration(const RodInputs& inputs, double duration, double t);
   StepFailure implicitStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
   void finishStep(const RodInputs& inputs, double duration, double t, double h, const Stage& stage, StepReport& report);
   Eigen::Vector3d heldVelocity(const RodInputs& inputs, double duration, double at, int node, const Eigen::Vector3d& otherwise);

@@ -44,10 +44,10 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
 
   auto trial = system.evaluate(true, 0.0);
   ++result.factorizations;
-  if (!std::isfinite(trial.energy()))
-    return fail(StepFailure::state_not_finite);
-  if (!(trial.min_chi > kFoldedChi))
+  if (trial.min_chi <= kFoldedChi)   // first: a perfect fold has an infinite energy
     return fail(StepFailure::folded_back);
+  if (!std::isfinite(trial.energy()) || !std::isfinite(trial.min_chi))
+    return fail(StepFailure::state_not_finite);
   system.accept();
   double energy = trial.energy(), best = energy, shift = 0.0;
   int misses = 0;

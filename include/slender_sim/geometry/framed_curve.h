@@ -24,7 +24,7 @@ public:
   const Eigen::Matrix3Xd& referenceDirectors() const { return u_; }   ///< first directors; the second is t x u
 
   /// Moves the nodes; reference frames follow by parallel transport in time (3.17) and the reference twist accumulates,
-  /// unwrapped, so that any number of full turns survives. Throws std::invalid_argument when a tangent turns over.
+  /// unwrapped, so that any number of full turns survives. Throws std::invalid_argument when a tangent turns over; the curve then stays.
   void moveTo(const Eigen::Matrix3Xd& x);
 
   /// Replaces the reference frames by the space-parallel (Bishop) ones (3.18), starting from the present one at edge 0.
@@ -49,7 +49,7 @@ public:
 
 private:
   int before(int joint) const { return joint > 0 ? joint - 1 : edges() - 1; }
-  void setTangents(const Eigen::Matrix3Xd& x);
+  Eigen::Matrix3Xd tangentsOf(const Eigen::Matrix3Xd& x) const;
 
   bool closed_;
   Eigen::Matrix3Xd x_, t_, u_;

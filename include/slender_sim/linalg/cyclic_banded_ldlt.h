@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include "slender_sim/linalg/banded_ldlt.h"
 
@@ -37,7 +36,7 @@ private:
   BandedLdlt<10, 4> band_;
   AlignedVector<double> coupling_;   ///< B, row-major, eight columns
   AlignedVector<double> reduced_;    ///< A^-1 B
-  Border schur_inverse_;
+  Border schur_;                     ///< its L D L^T
 };
 
 }  // namespace slender

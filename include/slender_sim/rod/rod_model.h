@@ -50,7 +50,8 @@ struct RodSection
 RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed, const std::vector<RodSection>& sections,
                   const Eigen::Vector3d& director, bool naturally_straight);
 
-/// A state at rest at the given nodes, twist-free frames plus `total_twist` [rad] spread evenly over the inner nodes.
+/// A state at rest at the given nodes, twist-free frames plus `total_twist` [rad] spread evenly over the inner nodes
+/// (of a closed rod: over all nodes, and whole turns only). Throws std::invalid_argument naming the bad value.
 RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director, double total_twist = 0.0);
 
 /// Takes hold of nodes first..last as they are now (thesis 4.3 clamps, second order in the edge length: see ClampJoint).

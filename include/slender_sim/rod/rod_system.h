@@ -128,7 +128,10 @@ private:
   double max_stretch_modulus_ = 0, min_rest_length_ = 0, shift_x_ = 0, shift_theta_ = 0, spin_ = 0;
 };
 
-/// Frame (t, d1, d2) of the section at a node: the mean of the two edges' frames, or at the end of an open rod the end edge's frame
+/// Share of a joint's turn and twist that falls on the half joint between its node and the edge before (side 0) or after it (side 1).
+double shareOfEdge(const RodModel& model, int node, int side);
+
+/// Frame (t, d1, d2) of the section at a node: between the two edges' frames, or at the end of an open rod the end edge's frame
 /// bent back by the rest curvature of half an edge.
 Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int node);
 

@@ -1,0 +1,263 @@
+// Rotations, parallel transport and framed curves (thesis chapter 3).
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/geometry/framed_curve.h"
+#include "slender_sim/geometry/rotation.h"
+#include "test/support/rods.h"
+
+namespace slender::test {
+namespace {
+
+TEST(ParallelTransport, IsTheSmallestRotation)
+{
+  Random random(21);
+  for (int k = 0; k < 200; ++k)
+  {
+    const Vector3d a = random.direction(), b = random.direction(), v = random.vector();
+    if (1.0 + a.dot(b) < 1e-2)
+      continue;
+    const double tolerance = 1e-13 / (1.0 + a.dot(b));   // (3.9) divides by 1 + a.b
+    EXPECT_LT((parallelTransport(a, a, b) - b).norm(), tolerance);
+    EXPECT_LT((parallelTransport(a.cross(b), a, b) - a.cross(b)).norm(), tolerance);
+    EXPECT_NEAR(parallelTransport(v, a, b).norm(), v.norm(), tolerance);
+    EXPECT_LT((parallelTransport(parallelTransport(v, a, b), b, a) - v).norm(), tolerance);
+    EXPECT_LT((parallelTransport(v, a, b) - Eigen::Quaterniond::FromTwoVectors(a, b) * v).norm(), 10 * tolerance);
+    EXPECT_EQ(parallelTransport(v, a, a), Vector3d(a.dot(a) * v));
+  }
+}
+
+TEST(ParallelTransport, StaysARotationNearOpposite)
+{
+  Random random(22);
+  for (double off : {1e-1, 1e-2, 1e-3})
+  {
+    const Vector3d a = random.direction(), b = rotateAbout(-a, anyNormal(a), off);
+    for (const Vector3d& v : {random.direction(), a, anyNormal(a)})
+      // 1 + a.b = off^2 / 2 carries an error of one rounding, and so the result 1e-16 / off^2
+      EXPECT_NEAR(parallelTransport(v, a, b).norm(), 1.0, 1e-15 / (off * off));
+    EXPECT_LT((parallelTransport(a, a, b) - b).norm(), 1e-15 / (off * off));
+  }
+}
+
+TEST(RotationVector, RoundTrips)
+{
+  Random random(23);
+  for (double angle : {0.0, 1e-14, 1e-9, 1e-8, 1e-5, 0.3, 2.0, 3.0, M_PI - 1e-6, M_PI - 1e-9})
+    for (int k = 0; k < 20; ++k)
+    {
+      const Vector3d w = angle * random.direction();
+      EXPECT_LT((rotationVector(fromRotationVector(w)) - w).norm(), 1e-15 + 1e-15 * angle) << angle;
+      Eigen::Quaterniond q = fromRotationVector(w);
+      q.coeffs() *= -1.0;   // the same rotation
+      EXPECT_LT((rotationVector(q) - w).norm(), 1e-15 + 1e-15 * angle) << angle;
+      const Vector3d v = random.vector();
+      const Vector3d axis = angle > 0 ? Vector3d(w.normalized()) : Vector3d::UnitX();
+      EXPECT_LT((fromRotationVector(w) * v - rotateAbout(v, axis, angle)).norm(), 4e-15);
+    }
+}
+
+TEST(Rotation, SignedAngleAndUnwrap)
+{
+  Random random(24);
+  for (int k = 0; k < 50; ++k)
+  {
+    const Vector3d t = random.direction(), u = anyNormal(t);
+    EXPECT_NEAR(u.norm(), 1.0, 1e-15);
+    EXPECT_NEAR(u.dot(t), 0.0, 1e-15);
+    const double angle = random.uniform(-3.1, 3.1);
+    EXPECT_NEAR(signedAngle(u, rotateAbout(u, t, angle), t), angle, 1e-14);
+    const double far = angle + 2 * M_PI * 1000 * random.uniform();
+    EXPECT_LE(std::abs(unwrapNear(angle, far) - far), M_PI * (1 + 1e-12));
+    EXPECT_NEAR(std::remainder(unwrapNear(angle, far) - angle, 2 * M_PI), 0.0, 1e-11);
+  }
+}
+
+TEST(FramedCurve, FramesAreAdaptedAndTwistFree)
+{
+  Random random(25);
+  for (bool closed : {false, true})
+  {
+    const FramedCurve curve(wigglyNodes(15, closed, random), closed, random.direction());
+    for (int j = 0; j < curve.edges(); ++j)
+    {
+      EXPECT_NEAR(curve.d1(j).norm(), 1.0, 1e-14);
+      EXPECT_NEAR(curve.d1(j).dot(curve.tangents().col(j)), 0.0, 1e-14);
+      EXPECT_LT((curve.d2(j) - curve.tangents().col(j).cross(curve.d1(j))).norm(), 1e-15);
+    }
+    for (int i = closed ? 1 : 0; i < curve.nodes(); ++i)   // the loop's holonomy stays at node 0
+      EXPECT_EQ(curve.twist(i), 0.0);
+  }
+}
+
+TEST(FramedCurve, TwistIsTheAngleFromTheTransportedFrame)
+{
+  Random random(26);
+  FramedCurve curve(wigglyNodes(9, false, random), false);
+  for (int j = 0; j < curve.edges(); ++j)
+    curve.theta[j] = random.uniform(-1.0, 1.0);
+  for (int i = 1; i + 1 < curve.nodes(); ++i)
+  {
+    // sin m by (3.11)
+    const Vector3d p = parallelTransport(curve.d2(i - 1), curve.tangents().col(i - 1), curve.tangents().col(i));
+    EXPECT_NEAR(std::sin(curve.twist(i)), curve.d1(i).dot(p), 1e-13);
+  }
+}
+
+TEST(FramedCurve, CurvatureOfAKnownTurn)
+{
+  // a right angle in the plane of d1: |kappa b| = 2 tan(pi/4) = 2, along d1 alone (3.13, 3.14)
+  Matrix3Xd x(3, 3);
+  x.col(0) = Vector3d(0, 0, 0);
+  x.col(1) = Vector3d(1, 0, 0);
+  x.col(2) = Vector3d(1, 1, 0);
+  const FramedCurve curve(x, false, Vector3d::UnitY());
+  EXPECT_NEAR(curve.materialCurvature(1)[0], 2.0, 1e-15);
+  EXPECT_NEAR(curve.materialCurvature(1)[1], 0.0, 1e-15);
+  EXPECT_LT((curve.curvatureBinormal(1) - Vector3d(0, 0, 2)).norm(), 1e-15);
+  EXPECT_EQ(curve.materialCurvature(0).norm(), 0.0);
+  EXPECT_EQ(curve.twist(2), 0.0);
+}
+
+TEST(FramedCurve, SpaceAndTimeParallelFramesShowOneMaterialFrame)
+{
+  Random random(27);
+  for (bool closed : {false, true})
+  {
+    const Matrix3Xd start = wigglyNodes(12, closed, random);
+    FramedCurve curve(start, closed);
+    for (int j = 0; j < curve.edges(); ++j)
+      curve.theta[j] = random.uniform(-2.0, 2.0) * j;
+    for (int step = 0; step < 30; ++step)
+    {
+      Matrix3Xd x = start;
+      for (int i = 0; i < x.cols(); ++i)
+        x.col(i) += 0.3 * Vector3d(std::sin(0.2 * step + i), std::cos(0.23 * step + 2 * i) - 1, std::sin(0.17 * step - i));
+      curve.moveTo(x);
+    }
+    FramedCurve space = curve;
+    space.makeSpaceParallel();
+    for (int j = 0; j < curve.edges(); ++j)
+      EXPECT_LT((space.d1(j) - curve.d1(j)).norm(), 1e-12);   // 30 moves of round-off
+    for (int i = 0; i < curve.nodes(); ++i)
+    {
+      EXPECT_NEAR(space.twist(i), curve.twist(i), 1e-11);     // unwrapped twists, tens of radians
+      EXPECT_TRUE((closed && i == 0) || space.referenceTwist()[i] == 0.0);
+    }
+    EXPECT_GT(curve.referenceTwist().norm(), 0.1);   // the motion did twist the time-parallel frame
+  }
+}
+
+/// Three nodes whose first tangent stays along z and whose second goes round a cone of half-angle phi.
+Matrix3Xd coneNodes(double phi, double around)
+{
+  Matrix3Xd x(3, 3);
+  x.col(0) = Vector3d(0, 0, -1);
+  x.col(1).setZero();
+  x.col(2) = Vector3d(std::sin(phi) * std::cos(around), std::sin(phi) * std::sin(around), std::cos(phi));
+  return x;
+}
+
+TEST(FramedCurve, ReferenceTwistCountsHolonomyOverManyTurns)
+{
+  // A frame carried in time once round a closed path of tangents comes back turned by the enclosed area of the unit sphere, while
+  // the frame transported in space from the cone's axis follows the tangent without turning. So a turn round the cone changes the
+  // twist by the area of its cap, 2 pi (1 - cos phi) (thesis 3.5).
+  const double phi = 0.8;
+  const int steps = 2000, turns = 50;
+  FramedCurve curve(coneNodes(phi, 0.0), false);
+  for (int k = 1; k <= turns * steps; ++k)
+    curve.moveTo(coneNodes(phi, 2 * M_PI * k / steps));
+  const double area = 2 * M_PI * (1 - std::cos(phi));
+  // great-circle moves between steps enclose less than the circle by order (2 pi / steps)^2: sin^2 phi cos phi pi (2 pi/steps)^2 / 6 a turn
+  const double polygon = M_PI * std::sin(phi) * std::sin(phi) * std::cos(phi) * std::pow(2 * M_PI / steps, 2) / 6;
+  EXPECT_NEAR(std::abs(curve.twist(1)), turns * area, 2 * turns * polygon + 1e-9);
+  EXPECT_LT(polygon * turns, 1e-3);
+}
+
+TEST(FramedCurve, GradientOfTwist)
+{
+  Random random(28);
+  for (bool closed : {false, true})
+  {
+    const Matrix3Xd x = wigglyNodes(8, closed, random);
+    FramedCurve base(x, closed);
+    for (int j = 0; j < base.edges(); ++j)
+      base.theta[j] = random.uniform();
+    const int i = closed ? 0 : 3, before = (i + 7) % 8, after = (i + 1) % 8;
+    const Vector3d kb = base.curvatureBinormal(i);
+    ASSERT_GT(kb.norm(), 0.05);
+    // (3.22)
+    const Vector3d first = -kb / (2 * (x.col(i) - x.col(before)).norm()), last = kb / (2 * (x.col(after) - x.col(i)).norm());
+    const Vector3d expected[3] = {first, -first - last, last};
+    const int nodes[3] = {before, i, after};
+    for (int k = 0; k < 3; ++k)
+      for (int c = 0; c < 3; ++c)
+      {
+        double best = 1.0;
+        for (double h : {1e-2, 1e-3, 1e-4, 1e-5})
+        {
+          double m[2];
+          for (int side = 0; side < 2; ++side)
+          {
+            Matrix3Xd moved = x;
+            moved(c, nodes[k]) += side ? h : -h;
+            FramedCurve curve = base;
+            curve.moveTo(moved);
+            m[side] = curve.twist(i);
+          }
+          best = std::min(best, std::abs((m[1] - m[0]) / (2 * h) - expected[k][c]));
+        }
+        EXPECT_LT(best, 1e-10);   // truncation h^2 and round-off 1e-16/h meet near 1e-11
+      }
+  }
+}
+
+TEST(FramedCurve, TurnsOfAnglesAreNotForgottenByMoves)
+{
+  Random random(29);
+  const Matrix3Xd x = wigglyNodes(6, false, random);
+  FramedCurve curve(x, false);
+  for (int j = 0; j < curve.edges(); ++j)
+    curve.theta[j] = 100 * 2 * M_PI * j;
+  Matrix3Xd moved = x;
+  moved.col(2) += Vector3d(0.1, -0.2, 0.1);
+  curve.moveTo(moved);
+  curve.moveTo(x);   // there and back along the same path: nothing is left
+  for (int i = 1; i + 1 < curve.nodes(); ++i)
+    EXPECT_NEAR(curve.twist(i), 200 * M_PI, 1e-12 * 200 * M_PI);
+}
+
+TEST(FramedCurve, RefusesBadInput)
+{
+  const Matrix3Xd good = straightNodes(5, 1.0);
+  EXPECT_NO_THROW(FramedCurve(good, false));
+  EXPECT_THROW(FramedCurve(straightNodes(2, 1.0).leftCols(1), false), std::invalid_argument);
+  EXPECT_THROW(FramedCurve(straightNodes(2, 1.0), true), std::invalid_argument);
+  EXPECT_THROW(FramedCurve(good, true), std::invalid_argument);   // the closing edge runs straight back
+  Matrix3Xd repeated = good;
+  repeated.col(2) = repeated.col(1);
+  EXPECT_THROW(FramedCurve(repeated, false), std::invalid_argument);
+  Matrix3Xd folded = good;
+  folded.col(3) = folded.col(1);
+  EXPECT_THROW(FramedCurve(folded, false), std::invalid_argument);
+  Matrix3Xd nan = good;
+  nan(1, 2) = std::nan("");
+  EXPECT_THROW(FramedCurve(nan, false), std::invalid_argument);
+  nan(1, 2) = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(FramedCurve(nan, false), std::invalid_argument);
+  EXPECT_THROW(FramedCurve(good, false, Vector3d::UnitX()), std::invalid_argument);   // parallel to the first edge
+  EXPECT_THROW(FramedCurve(good, false, Vector3d(0, std::nan(""), 1)), std::invalid_argument);
+
+  FramedCurve curve(good, false);
+  EXPECT_THROW(curve.moveTo(straightNodes(4, 1.0)), std::invalid_argument);
+  EXPECT_THROW(curve.moveTo(-good), std::invalid_argument);   // every edge turned over at once
+  EXPECT_THROW(curve.moveTo(repeated), std::invalid_argument);
+  // a refused move leaves the curve as it was
+  EXPECT_EQ(curve.positions(), good);
+  EXPECT_NO_THROW(curve.moveTo(good));
+}
+
+}  // namespace
+}  // namespace slender::test

@@ -1,0 +1,91 @@
+// A warm step takes no memory from the heap: malloc and its kin are counted, so Eigen's and operator new's requests both show.
+#include <atomic>
+#include <cstddef>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/linalg/banded_ldlt.h"
+#include "test/support/rods.h"
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#define SLENDER_COUNTS_ALLOCATIONS
+namespace {
+std::atomic<long> allocations{0};
+}
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+void* malloc(std::size_t n) { ++allocations; return __libc_malloc(n); }
+void* calloc(std::size_t n, std::size_t size) { ++allocations; return __libc_calloc(n, size); }
+void* realloc(void* p, std::size_t n) { ++allocations; return __libc_realloc(p, n); }
+void* memalign(std::size_t alignment, std::size_t n) { ++allocations; return __libc_memalign(alignment, n); }
+void* aligned_alloc(std::size_t alignment, std::size_t n) { ++allocations; return __libc_memalign(alignment, n); }
+int posix_memalign(void** p, std::size_t alignment, std::size_t n)
+{
+  ++allocations;
+  *p = __libc_memalign(alignment, n);
+  return *p ? 0 : 12;
+}
+}
+#endif
+
+namespace slender::test {
+namespace {
+
+#ifdef SLENDER_COUNTS_ALLOCATIONS
+
+TEST(Allocations, AreCounted)
+{
+  const long before = allocations;
+  ::operator delete(::operator new(8));
+  Eigen::VectorXd v(100);
+  v.setZero();
+  AlignedVector<double> aligned(8, v[0]);
+  EXPECT_EQ(allocations - before, 3);
+}
+
+class Allocations : public ::testing::TestWithParam<Integrator>
+{
+};
+
+TEST_P(Allocations, AWarmStepMakesNone)
+{
+  for (bool closed : {false, true})
+    for (bool viscous : {false, true})
+      for (double tolerance : {0.0, 1e-5})
+      {
+        const int n = 30;
+        const Matrix3Xd nodes = closed ? ringNodes(n, 0.2) : straightNodes(n, 1.0);
+        RodModel model = buildRod("r", nodes, closed, uniformSections(roundSection(0.005, 1e6, 1000), closed ? n : n - 1), Vector3d::Zero(), false);
+        model.stiffness_damping = viscous ? 1e-4 : 0.0;
+        model.mass_damping = 0.1;
+        Rod rod(model, nodes);
+        rod.hold(0, 1);
+        rod.hold(15, 15, false);
+        TimeConfig time = withIntegrator(GetParam());
+        time.error_tolerance = tolerance;
+        RodStepper stepper(rod.model, time);
+        const double h = GetParam() == Integrator::symplectic_euler ? 1e-5 : 2e-3;
+        const auto advance = [&] {
+          rod.inputs.grasps[0].X_WG.position.z() += 0.1 * h;
+          return stepper.step(rod.state, rod.inputs, h).ok;
+        };
+        for (int k = 0; k < 20; ++k)
+          ASSERT_TRUE(advance());
+        const long before = allocations;
+        bool ok = true;
+        for (int k = 0; k < 20; ++k)
+          ok = advance() && ok;
+        EXPECT_EQ(allocations - before, 0) << (closed ? "closed" : "open") << (viscous ? " viscous" : "") << " tolerance " << tolerance;
+        EXPECT_TRUE(ok);
+      }
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, Allocations, ::testing::ValuesIn(allIntegrators()), [](const auto& info) { return toString(info.param); });
+
+#endif
+
+}  // namespace
+}  // namespace slender::test
