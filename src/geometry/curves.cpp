@@ -60,13 +60,18 @@ double solveSinhQuotient(double ratio)
 
 }  // namespace
 
-Eigen::Matrix3Xd straightCurve(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges)
+Eigen::Matrix3Xd straightCurve(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges, double grading)
 {
   checkEdges(edges);
+  if (!(grading > 0) || !std::isfinite(grading))
+  {
+    throw std::invalid_argument("grading must be positive, got " + std::to_string(grading));
+  }
   Eigen::Matrix3Xd nodes(3, edges + 1);
   for (int i = 0; i <= edges; ++i)
   {
-    const double s = static_cast<double>(i) / edges;
+    const double u = static_cast<double>(i) / edges;
+    const double s = grading == 1.0 ? u : u * (2 + (grading - 1) * u) / (1 + grading);
     nodes.col(i) = (1 - s) * from + s * to;
   }
   return nodes;

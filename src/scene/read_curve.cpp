@@ -30,6 +30,7 @@ StraightCurve readStraight(YamlMap& map)
   assign(curve.from, map.get("from").vector3(coordinate));
   assign(curve.to, map.get("to").vector3(coordinate));
   assign(curve.edges, readEdges(map));
+  assign(curve.grading, map.get("grading").number(Range::closed(0.01, 100)));
   if (!((curve.to - curve.from).norm() > 0))
   {
     map.at().problem("from and to are the same point; must differ");

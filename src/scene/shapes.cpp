@@ -39,7 +39,7 @@ Eigen::Matrix3Xd curvePoints(const Curve& curve, const Eigen::Vector3d& gravity,
       using T = std::decay_t<decltype(c)>;
       if constexpr (std::is_same_v<T, StraightCurve>)
       {
-        return straightCurve(c.from, c.to, edges.value_or(c.edges));
+        return straightCurve(c.from, c.to, edges.value_or(c.edges), c.grading);
       }
       else if constexpr (std::is_same_v<T, ArcCurve>)
       {

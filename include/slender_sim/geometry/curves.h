@@ -6,7 +6,8 @@
 /// range; `edges` is at least 1 everywhere.
 namespace slender {
 
-Eigen::Matrix3Xd straightCurve(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges);
+/// `grading`: length of the last edge over that of the first; lengths grow linearly along the line.
+Eigen::Matrix3Xd straightCurve(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges, double grading = 1.0);
 
 /// Turns `start` about the axis through `center` by `angle` [rad], at equal angles. `start` must not lie on the axis.
 Eigen::Matrix3Xd arcCurve(const Eigen::Vector3d& center, const Eigen::Vector3d& start, const Eigen::Vector3d& axis, double angle,

@@ -16,7 +16,7 @@
 namespace slender {
 
 /// A curve as the scene file states it. Exactly one alternative.
-struct StraightCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; int edges = 50; };
+struct StraightCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; int edges = 50; double grading = 1; };   ///< last edge length over the first
 struct PolylineCurve { std::vector<Eigen::Vector3d> points; std::optional<int> edges; };       ///< resampled when edges is given
 struct ArcCurve      { Eigen::Vector3d center{0, 0, 0}, start{1, 0, 0}, axis{0, 0, 1}; double angle = 1.0; int edges = 50; };
 struct HelixCurve    { Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1}; double radius = 0.1, pitch = 0.05, turns = 3; int edges = 150; };
