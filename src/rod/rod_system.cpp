@@ -130,7 +130,7 @@ void RodSystem::strains(Eigen::Matrix4Xd& out) const
     out.col(n + 2 * c.grasp + c.side) << 0.0, c.kappa1, c.kappa2, c.twist;
 }
 
-RodEvaluation RodSystem::evaluate(bool with_hessian, double shift)
+RodEvaluation RodSystem::evaluate(bool with_hessian, const HessianShift& shift)
 {
   const RodKernels& kernels = rodKernels();
   const int n = a_.nodes;
@@ -260,15 +260,15 @@ void RodSystem::fixPanels(int from, int to)
     fixUnknown(a_.nodes - 1, 3, from, to);
 }
 
-void RodSystem::addShift(int from, int to, double shift)
+void RodSystem::addShift(int from, int to, const HessianShift& shift)
 {
-  if (shift > 0)
+  if (shift.position > 0)
     for (int i = from; i < to; ++i)
       for (int c = 0; c < 3; ++c)
-        panel(i).diag[c][c] += shift * (a_.weight[i] + shift_x_);
-  if (shift > 0 || spin_ > 0)
+        panel(i).diag[c][c] += shift.position * (a_.weight[i] + shift_x_);
+  if (shift.angle > 0 || spin_ > 0)
     for (int i = from; i < to; ++i)
-      panel(i).diag[3][3] += shift * shift_theta_ + spin_;
+      panel(i).diag[3][3] += shift.angle * shift_theta_ + spin_;
 }
 
 void RodSystem::moveAlong(double alpha)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slender_sim/dynamics/hessian_shift.h"
 #include "slender_sim/dynamics/step_report.h"
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/linalg/banded_ldlt.h"
@@ -42,14 +43,15 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     return result;
   };
 
-  auto trial = system.evaluate(true, 0.0);
+  HessianShift shift;
+  auto trial = system.evaluate(true, shift);
   ++result.factorizations;
   if (trial.min_chi <= kFoldedChi)   // first: a perfect fold has an infinite energy
     return fail(StepFailure::folded_back);
   if (!std::isfinite(trial.energy()) || !std::isfinite(trial.min_chi))
     return fail(StepFailure::state_not_finite);
   system.accept();
-  double energy = trial.energy(), best = energy, shift = 0.0;
+  double energy = trial.energy(), best = energy;
   int misses = 0;
   bool strict = false;
 
@@ -59,14 +61,14 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     const double noise = 1e-13 * (std::abs(trial.stretch) + std::abs(trial.bend_twist) + std::abs(trial.potential));
     while (!trial.inertia.positiveDefinite())
     {
-      shift = shift > 0 ? 10.0 * shift : 1e-1;
-      if (shift > kMaxShift)
+      shift.raise();
+      if (shift.position > kMaxShift)
         return fail(StepFailure::singular_matrix);
       system.moveAlong(0.0);
       trial = system.evaluate(true, shift);
       ++result.factorizations;
     }
-    result.definite = shift == 0.0;
+    result.definite = shift.none();
     system.solve();
     ++result.iterations;
 
@@ -75,7 +77,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       return fail(StepFailure::state_not_finite);
     double alpha = system.stepLimit();
     // A shifted Hessian shortens the increment, so a saddle (a step's equation may well have one) must show by its residual.
-    const double unbalanced = shift == 0.0 ? 0.0 : system.residual() / system.forceScale();
+    const double unbalanced = shift.none() ? 0.0 : system.residual() / system.forceScale();
     if (alpha == 1.0 && unbalanced < 1e-9 && (increment <= config.tolerance || system.residual() <= system.noiseLevel()))
     {
       system.moveAlong(1.0);
@@ -88,7 +90,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     if (result.iterations >= config.max_iterations)
       return fail(StepFailure::newton_diverged);
 
-    shift = shift > 1e-2 ? 0.1 * shift : 0.0;
+    shift.relax();
     for (;;)
     {
       system.moveAlong(alpha);

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "slender_sim/dynamics/hessian_shift.h"
 #include "slender_sim/energy/rod_kernel.h"
 #include "slender_sim/linalg/cyclic_banded_ldlt.h"
 #include "slender_sim/rod/rod_model.h"
@@ -56,9 +57,9 @@ public:
   /// `viscous_strain` with weights 1 : ratio, which is the elastic force plus k ratio (strain - viscous_strain).
   void setResponse(double viscous_ratio, const Eigen::Matrix4Xd* viscous_strain);
 
-  /// Everything at the trial configuration; with_hessian also assembles and factors the matrix plus shift times a positive
+  /// Everything at the trial configuration; with_hessian also assembles and factors the matrix plus the shift of a positive
   /// diagonal (result.inertia), and begins the solution of solve().
-  RodEvaluation evaluate(bool with_hessian, double shift = 0.0);
+  RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
   /// direction() := -K^-1 gradient of the last evaluate(true).
   void solve();
   /// Trial := base + alpha direction.
@@ -103,7 +104,7 @@ private:
   RodPanel& panel(int node) { return panels_[node - first_panel_]; }
   void fixPanels(int from, int to);
   void fixUnknown(int node, int component, int from, int to);
-  void addShift(int from, int to, double shift);
+  void addShift(int from, int to, const HessianShift& shift);
   void wrapHalo(double* p, int count) const;
   int before(int node) const { return node > 0 ? node - 1 : model_.edges() - 1; }
 
