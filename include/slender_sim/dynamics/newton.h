@@ -77,8 +77,9 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       return fail(StepFailure::state_not_finite);
     double alpha = system.stepLimit();
     // A shifted Hessian shortens the increment, so a saddle (a step's equation may well have one) must show by its residual.
-    const double unbalanced = shift.none() ? 0.0 : system.residual() / system.forceScale();
-    if (alpha == 1.0 && unbalanced < 1e-9 && (increment <= config.tolerance || system.residual() <= system.noiseLevel()))
+    const bool balanced = system.residual() <= system.noiseLevel();
+    const bool stationary = shift.none() || balanced || system.residual() < 1e-9 * system.forceScale();
+    if (alpha == 1.0 && stationary && (increment <= config.tolerance || balanced))
     {
       system.moveAlong(1.0);
       trial = system.evaluate(false);
