@@ -21,6 +21,6 @@ if(BUILD_TESTING)
 
   file(GLOB ROSTESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/nodes/*.test)
   foreach(test ${ROSTESTS})
-    add_rostest(${test} DEPENDENCIES rod_node motion_player ${PROJECT_NAME}_generate_messages_py)
+    add_rostest(${test} DEPENDENCIES rod_node motion_player slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
   endforeach()
 endif()

@@ -76,9 +76,7 @@ void copyEdge(const RodArrays& r, int to, int from)
   {
     r.t[k][to] = r.t[k][from];
     r.d1[k][to] = r.d1[k][from];
-    r.d2[k][to] = r.d2[k][from];
   }
-  r.length[to] = r.length[from];
   r.inverse_length[to] = r.inverse_length[from];
   r.strain[to] = r.strain[from];
 }
@@ -104,8 +102,6 @@ void evaluateEdges(const RodArrays& r, int from, int to, Pack& min_chi)
     d = d * c + cross(t, d) * s;
     store3(r.t, j, t);
     store3(r.d1, j, d);
-    store3(r.d2, j, cross(t, d));
-    store(r.length + j, length);
     store(r.inverse_length + j, inverse);
     store(r.strain + j, length * load(r.inverse_rest_length + j) - 1.0);
   }
@@ -159,8 +155,8 @@ SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffe
     all[16 * k + 1] = all[16 * k + 9];
   }
 
-  const JointFrames<Pack> s = {load3(r.t, i - 1), load3(r.d1, i - 1), load3(r.d2, i - 1), load3(r.t, i), load3(r.d1, i), load3(r.d2, i),
-                               load(r.inverse_length + i - 1), load(r.inverse_length + i)};
+  const Vec3<Pack> te = load3(r.t, i - 1), d1e = load3(r.d1, i - 1), tf = load3(r.t, i), d1f = load3(r.d1, i);
+  const JointFrames<Pack> s = {te, d1e, cross(te, d1e), tf, d1f, cross(tf, d1f), load(r.inverse_length + i - 1), load(r.inverse_length + i)};
   const JointMaterial<Pack> p = {load(r.b11 + i), load(r.b12 + i), load(r.b22 + i), load(r.beta + i),
                                  load(r.rest_kappa1 + i), load(r.rest_kappa2 + i), load(r.rest_twist + i)};
   const JointStrains<Pack> k = jointStrains(s);
@@ -221,15 +217,15 @@ SLENDER_INLINE void transpose(Pack (&m)[8])
   }
 }
 
-/// Writes quantities 8*part .. 8*part+7 of the panels of nodes first..last (lane 0 is node i).
-SLENDER_INLINE void storePart(RodPanel* panels, int i, int first, int last, int part, Pack (&m)[8])
+/// Writes quantities 8*part .. 8*part+7 of the panels of lanes first..last, the first of them to `panels`.
+SLENDER_INLINE void storePart(RodPanel* panels, int first, int last, int part, Pack (&m)[8])
 {
   transpose(m);
   for (int k = first; k <= last; ++k)
-    store(reinterpret_cast<double*>(panels + i + k) + 8 * part, m[k]);
+    store(reinterpret_cast<double*>(panels + k - first) + 8 * part, m[k]);
 }
 
-/// Panels of nodes i .. i+7 from the joints around them. With E the energy as a function of edges, dE/dx_i = dE/de_{i-1} - dE/de_i;
+/// Panels of nodes i + first .. i + last from the joints around them. With E the energy as a function of edges, dE/dx_i = dE/de_{i-1} - dE/de_i;
 /// the second derivatives follow by the same rule from the blocks of joints i-1 (slot k), i (k+1) and i+1 (k+2).
 SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPanel* panels, int i, int first, int last)
 {
@@ -257,7 +253,7 @@ SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPan
     }
     m[3] = -at(b.e_tf[c], 2);
     m[7] = zero;
-    storePart(panels, i, first, last, c, m);
+    storePart(panels, first, last, c, m);
   }
   {
     Pack m[8];
@@ -268,7 +264,7 @@ SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPan
     }
     m[3] = at(b.te_tf, 2);
     m[7] = zero;
-    storePart(panels, i, first, last, 3, m);
+    storePart(panels, first, last, 3, m);
   }
   Pack d[4][4] = {};   // d[column][row], row >= column
   for (int c = 0; c < 3; ++c)
@@ -284,13 +280,13 @@ SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPan
     Pack m[8];
     for (int k = 0; k < 8; ++k)
       m[k] = d[2 * half + k / 4][k % 4];
-    storePart(panels, i, first, last, 4 + half, m);
+    storePart(panels, first, last, 4 + half, m);
   }
 }
 
 /// Joints from next_joint on, and the nodes between them.
 template <bool WithHessian>
-void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int to)
+void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int first_panel, int to)
 {
   const int n = r.nodes;
   JointBuffer& b = *reinterpret_cast<JointBuffer*>(&sweep.joints);
@@ -333,7 +329,7 @@ void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, i
         max_strain[0] = local_strain[k] > max_strain[0] ? local_strain[k] : max_strain[0];
       }
     if (WithHessian)
-      writePanels(r, b, panels, i, first, last);
+      writePanels(r, b, panels + (i + first - first_panel), i, first, last);
     else
     {
       const Pack diagonal = at(b.tf_tf, 1) + at(b.te_te, 2), off = at(b.te_tf, 2);
@@ -372,7 +368,7 @@ void beginSweep(const RodArrays& r, RodSweep& sweep)
       r.x[k][n + i] = r.closed ? r.x[k][i % n] : r.x[k][n - 1] + (i + 1) * (r.x[k][n - 1] - r.x[k][n - 2]);
 }
 
-int advanceSweep(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int to)
+int advanceSweep(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int first_panel, int to)
 {
   const FlushDenormals scope;
   const int n = r.nodes, edges = r.edges;
@@ -394,9 +390,9 @@ int advanceSweep(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int to)
         copyEdge(r, edges + i, r.closed ? i % edges : edges - 1);
   }
   if (panels)
-    evaluateJointsUpTo<true>(r, sweep, panels, to);
+    evaluateJointsUpTo<true>(r, sweep, panels, first_panel, to);
   else
-    evaluateJointsUpTo<false>(r, sweep, panels, to);
+    evaluateJointsUpTo<false>(r, sweep, panels, first_panel, to);
   if (sweep.next_node == n)
   {
     if (r.closed)

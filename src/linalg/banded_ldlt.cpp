@@ -31,14 +31,14 @@ Inertia BandedLdlt<HalfBandwidth, Block>::factor(int count)
 {
   const int n = count < 0 ? blocks_ : count;
   BandCarry carry;
-  eliminate(0, n, nullptr, carry);
+  eliminate(panels_.data(), 0, n, nullptr, carry);
   return {n * Block - carry.negative - carry.zero, carry.negative, carry.zero};
 }
 
 template <int HalfBandwidth, int Block>
-void BandedLdlt<HalfBandwidth, Block>::eliminate(int from, int to, double* x, BandCarry& carry)
+void BandedLdlt<HalfBandwidth, Block>::eliminate(Panel* assembled, int from, int to, double* x, BandCarry& carry)
 {
-  kernels().eliminate(panels_.data(), from, to, x, carry);
+  kernels().eliminate(assembled, panels_.data() + from, from, to, x, carry);
 }
 
 template <int HalfBandwidth, int Block>

@@ -16,6 +16,28 @@ inline __attribute__((always_inline)) V4 low(V8 v) { return V4{v[0], v[1], v[2],
 inline __attribute__((always_inline)) V4 high(V8 v) { return V4{v[4], v[5], v[6], v[7]}; }
 inline __attribute__((always_inline)) V8 join(V4 a, V4 b) { return V8{a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]}; }
 
+/// Past the cache when the factors are too many to stay in it: they are next read when all the others have been written.
+inline __attribute__((always_inline)) void storeFactor(double* p, V8 v, bool stream)
+{
+#if defined(__AVX512F__)
+  if (stream)
+  {
+    __builtin_ia32_movntpd512(p, v);
+    return;
+  }
+#elif defined(__AVX__)
+  if (stream)
+  {
+    __builtin_ia32_movntpd256(p, low(v));
+    __builtin_ia32_movntpd256(p + 4, high(v));
+    return;
+  }
+#else
+  (void)stream;
+#endif
+  *reinterpret_cast<V8*>(p) = v;
+}
+
 /// x := L^-1 x for one block; `ahead` is what is to be subtracted from the next two blocks.
 inline __attribute__((always_inline)) void forwardBlock(const V4 (&d)[4], const V8 (&l)[4], double* x, V8& ahead)
 {
@@ -37,7 +59,7 @@ inline __attribute__((always_inline)) void forwardBlock(const V4 (&d)[4], const 
 /// What is still to be subtracted (window: rows of the next two blocks in the next block's columns, corner: the diagonal
 /// block after that) travels in registers, so memory is touched once per panel. The forward substitution of one
 /// right-hand side rides along: its chain of dependences hides behind the factorisation's.
-void eliminateBand(RodPanel* panels, int from, int to, double* x, BandCarry& carry)
+void eliminateBand(RodPanel* panels, RodPanel* factors, int from, int to, double* x, BandCarry& carry)
 {
   const FlushDenormals scope;
   V8 window[4];
@@ -49,9 +71,11 @@ void eliminateBand(RodPanel* panels, int from, int to, double* x, BandCarry& car
   }
   V8 ahead = *reinterpret_cast<V8*>(carry.ahead);
   int negative = 0;
+  const bool stream = factors != panels;
   for (int b = from; b < to; ++b)
   {
-    RodPanel& p = panels[b];
+    RodPanel& p = panels[b - from];
+    RodPanel& f = factors[b - from];
     V4 d[4];
     V8 l[4], u[4];
     for (int c = 0; c < 4; ++c)
@@ -76,18 +100,17 @@ void eliminateBand(RodPanel* panels, int from, int to, double* x, BandCarry& car
       l[c] = u[c] * inverse;
       for (int k = c + 1; k < 4; ++k)
       {
-        const double f = d[c][k];
-        d[k] -= dl * f;
-        l[k] -= l[c] * f;
+        const double entry = d[c][k];
+        d[k] -= dl * entry;
+        l[k] -= l[c] * entry;
       }
       d[c] = dl;
       d[c][c] = inverse;
     }
     for (int c = 0; c < 4; ++c)
-    {
-      *reinterpret_cast<V4*>(p.diag[c]) = d[c];
-      *reinterpret_cast<V8*>(p.below[c]) = l[c];
-    }
+      storeFactor(f.below[c], l[c], stream);
+    for (int c = 0; c < 4; c += 2)
+      storeFactor(f.diag[c], join(d[c], d[c + 1]), stream);
     for (int k = 0; k < 4; ++k)
     {
       V8 w = join(corner[k], V4{});

@@ -111,7 +111,7 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
   const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = d * s * (1 - s) * (1 - s);
   const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - s) * (1 - 3 * s);
   const Vector3d r = h0 * o.r + h1 * o.r_rate, r_rate = dh0 * o.r + dh1 * o.r_rate;
-  const Quaterniond turn = fromRotationVector(r);
+  const Eigen::Quaterniond turn = fromRotationVector(r);
   Motion m;
   m.X.position = followed.X.position + h0 * o.p + h1 * o.p_rate;
   m.V.linear = followed.V.linear + dh0 * o.p + dh1 * o.p_rate;

@@ -59,7 +59,7 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   if (bodies)
     subscribers_.push_back(nh.subscribe("bodies", kQueueSize, &GuideInputs::onBodies, this, ros::TransportHints().tcpNoDelay()));
   if (topics || bodies)
-    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
+    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
 }
 
 bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X)

@@ -17,7 +17,7 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
 {
   const int j = c.edge, next = j + 1 < a_.nodes ? j + 1 : 0;
   const Vec3<double> section_t = vec(c.t), section_d1 = vec(c.d1), section_d2 = vec(c.t.cross(c.d1));
-  const Vec3<double> edge_t = at(a_.t, j), edge_d1 = at(a_.d1, j), edge_d2 = at(a_.d2, j);
+  const Vec3<double> edge_t = at(a_.t, j), edge_d1 = at(a_.d1, j), edge_d2 = cross(edge_t, edge_d1);
   const double inverse = a_.inverse_length[j];
   const bool section_first = c.side == 1;
   const JointFrames<double> frames = section_first
@@ -49,7 +49,7 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
     gradient_[4 * next + k] += force[k];
   }
   gradient_[4 * j + 3] += gt;
-  c.torque = a_.length[j] * te.cross(Eigen::Vector3d(ge.x, ge.y, ge.z)) + gt * te;
+  c.torque = (1.0 / inverse) * te.cross(Eigen::Vector3d(ge.x, ge.y, ge.z)) + gt * te;
   if (!with_hessian)
     return;
 
@@ -57,8 +57,8 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   const Vec3<double>& m = section_first ? h.f_tf : h.e_te;
   const double ee[3][3] = {{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}};
   const double et[3] = {m.x, m.y, m.z};
-  RodPanel& p = matrix_.panels()[j];
-  RodPanel& q = matrix_.panels()[next];
+  RodPanel& p = panel(j);
+  RodPanel& q = panel(next);
   for (int col = 0; col < 3; ++col)
   {
     for (int row = 0; row < 3; ++row)

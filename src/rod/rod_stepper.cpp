@@ -117,6 +117,18 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
 
   const bool explicit_step = time.integrator == Integrator::symplectic_euler;
   const bool adaptive = time.error_tolerance > 0 && !explicit_step;
+  // Methods without damping at infinite frequency can feed on a stiff rod's stretching when it turns far in a step.
+  bool conserving = time.integrator == Integrator::implicit_midpoint || time.integrator == Integrator::generalized_alpha;
+  for (std::size_t k = 0; k < state.grasps.size(); ++k)
+    if (state.grasps[k].active)
+    {
+      const Pose& a = state.grasps[k].X_WG;
+      const Pose& b = inputs.grasps[k].X_WG;
+      conserving = conserving && a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
+    }
+  double energy = 0.0, allowance = 0.0;
+  if (conserving)
+    energy = mechanicalEnergy(work, inputs, allowance);
   double t = 0.0, h = adaptive && work.next_step > 0 ? work.next_step : duration;
   while (t < duration)
   {
@@ -125,7 +137,14 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
     const double length = last ? duration - t : h;
     const bool can_shorten = !explicit_step && 0.5 * length >= time.min_step;
     StepReport sub;
-    const StepFailure failure = explicit_step ? explicitStep(inputs, duration, t, length, sub) : implicitStep(inputs, duration, t, length, sub);
+    StepFailure failure = explicit_step ? explicitStep(inputs, duration, t, length, sub) : implicitStep(inputs, duration, t, length, sub);
+    double next_energy = 0.0, next_allowance = 0.0;
+    if (conserving && failure == StepFailure::none)
+    {
+      next_energy = mechanicalEnergy(next, inputs, next_allowance);
+      if (next_energy - energy > allowance)
+        failure = StepFailure::energy_grew;
+    }
     const double ratio = sub.error_estimate / time.error_tolerance;
     const bool inaccurate = adaptive && failure == StepFailure::none && ratio > 1 && can_shorten;
     if (failure != StepFailure::none || inaccurate)
@@ -150,6 +169,23 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
       work.grasps[k].X_WG = graspPose(state.grasps[k], inputs.grasps[k], duration, 1.0, &work.grasps[k].velocity);
   state = work;
   return report;
+}
+
+double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& inputs, double& allowance)
+{
+  system.load(s);
+  system.setResponse(0.0, nullptr);
+  double kinetic = 0.0, weight = 0.0;
+  for (int i = 0; i < model->nodes(); ++i)
+  {
+    const Eigen::Vector3d f = load(inputs, i);
+    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), f);
+    kinetic += 0.5 * model->mass[i] * s.v.col(i).squaredNorm();
+    weight += f.norm();
+  }
+  const RodEvaluation e = system.evaluate(false);
+  allowance = 0.05 * (kinetic + e.stretch + e.bend_twist + weight * model->rest_length.sum());
+  return e.energy() + kinetic;
 }
 
 /// Next step length over this one for a local error that is `ratio` times the tolerance, with a margin.
@@ -179,6 +215,8 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length,
     case StepFailure::state_not_finite:
       return explicit_step ? "the explicit step blew up" + at + ": use a shorter step or an implicit integrator"
                            : "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
+    case StepFailure::energy_grew:
+      return "the energy grew out of nothing" + at + ": use a shorter step, or tr_bdf2, bdf2 or implicit_euler, which damp what the step cannot resolve";
     default:
       return "Newton's method did not converge" + at + ": use a shorter step, more time.newton.max_iterations or max_cuts, or slow the grasps down";
   }

@@ -40,6 +40,7 @@ private:
   Eigen::Vector3d combine(const Combination& c, int node) const;
   void computeWrenches(const RodInputs& inputs, double h);
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message);
+  double mechanicalEnergy(const RodState& s, const RodInputs& inputs, double& allowance);
   std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
 
   // rod_statics.cpp

@@ -10,7 +10,9 @@ namespace slender {
 
 namespace {
 constexpr int kHalo = RodArrays::kHalo;
-}
+constexpr int kPiece = 256;          ///< nodes whose panels stay in the second-level cache from assembly to elimination
+constexpr int kLongRod = 1 << 13;    ///< nodes beyond which all panels do not
+}  // namespace
 
 RodSystem::RodSystem(const RodModel& model) : model_(model)
 {
@@ -25,12 +27,12 @@ RodSystem::RodSystem(const RodModel& model) : model_(model)
   };
   storage_.reserve(64);
   for (int k = 0; k < 3; ++k)
-    for (double** p : {&a_.x[k], &a_.base_t[k], &a_.base_d1[k], &a_.t[k], &a_.d1[k], &a_.d2[k], &a_.target[k], &a_.force[k]})
+    for (double** p : {&a_.x[k], &a_.base_t[k], &a_.base_d1[k], &a_.t[k], &a_.d1[k], &a_.target[k], &a_.force[k]})
       allocate(*p, 0.0);
   for (double** p : {&a_.turn, &a_.base_twist, &a_.twist, &a_.strain, &a_.kappa1, &a_.kappa2, &a_.stretch, &a_.rest_strain, &a_.b11, &a_.b12,
                      &a_.b22, &a_.beta, &a_.rest_kappa1, &a_.rest_kappa2, &a_.rest_twist, &a_.weight, &a_.theta_diagonal, &a_.theta_off})
     allocate(*p, 0.0);
-  for (double** p : {&a_.length, &a_.inverse_length, &a_.inverse_rest_length})
+  for (double** p : {&a_.inverse_length, &a_.inverse_rest_length})
     allocate(*p, 1.0);
   gradient_.assign(4 * n, 0.0);
   direction_.assign(4 * n, 0.0);
@@ -41,6 +43,8 @@ RodSystem::RodSystem(const RodModel& model) : model_(model)
   for (auto& s : saved_)
     s.assign(padded, 0.0);
   matrix_.resize(n, model.closed);
+  if (n > kLongRod && !model.closed)
+    piece_.resize(kPiece + RodSweep::kOvershoot + 2);
   for (int j = 0; j < model.edges(); ++j)
     a_.inverse_rest_length[j] = 1.0 / model.rest_length[j];
   wrapHalo(a_.inverse_rest_length, model.edges());
@@ -128,21 +132,20 @@ void RodSystem::strains(Eigen::Matrix4Xd& out) const
 
 RodEvaluation RodSystem::evaluate(bool with_hessian, double shift)
 {
-  // Pieces of this many nodes stay in the second-level cache from assembly to elimination.
-  constexpr int kPiece = 256;
   const RodKernels& kernels = rodKernels();
   const int n = a_.nodes;
-  RodPanel* panels = with_hessian ? matrix_.panels() : nullptr;
   RodSweep sweep;
   kernels.begin(a_, sweep);
   RodEvaluation clamped;   // of the clamps alone
   BandCarry carry;
   const bool by_pieces = with_hessian && !model_.closed;
+  panels_ = piece_.empty() ? matrix_.panels() : piece_.data();
+  first_panel_ = 0;
   int done = 0, eliminated = 0;
   while (done < n)
   {
     const int before = done;
-    done = kernels.advance(a_, sweep, panels, by_pieces ? done + kPiece : n);
+    done = kernels.advance(a_, sweep, with_hessian ? panels_ : nullptr, first_panel_, by_pieces ? done + kPiece : n);
     for (ClampJoint& c : clamps_)
     {
       const int last = std::max(c.edge, (c.edge + 1) % n);   // node that must be there
@@ -162,7 +165,12 @@ RodEvaluation RodSystem::evaluate(bool with_hessian, double shift)
       for (int i = 4 * eliminated; i < 4 * complete; ++i)
         reduced_[i] = -gradient_[i];
       if (carry.zero == 0)
-        matrix_.band().eliminate(eliminated, complete, reduced_.data(), carry);
+        matrix_.band().eliminate(&panel(eliminated), eliminated, complete, reduced_.data(), carry);
+      if (!piece_.empty() && complete < n)
+      {
+        piece_[0] = panel(complete);
+        first_panel_ = complete;
+      }
     }
     eliminated = complete;
   }
@@ -217,10 +225,9 @@ void RodSystem::takeReactions(int from, int to)
 void RodSystem::fixUnknown(int node, int c, int from, int to)
 {
   const int n = a_.nodes;
-  RodPanel* panels = matrix_.panels();
   if (node >= from && node < to)
   {
-    RodPanel& p = panels[node];
+    RodPanel& p = panel(node);
     for (int r = c + 1; r < 4; ++r)
       p.diag[c][r] = 0.0;
     for (int k = 0; k < c; ++k)
@@ -233,7 +240,7 @@ void RodSystem::fixUnknown(int node, int c, int from, int to)
   {
     const int above = model_.closed ? (node + n - back) % n : node - back;
     if (above >= from && above < to)
-      for (auto& column : panels[above].below)
+      for (auto& column : panel(above).below)
         column[4 * (back - 1) + c] = 0.0;
   }
 }
@@ -258,10 +265,10 @@ void RodSystem::addShift(int from, int to, double shift)
   if (shift > 0)
     for (int i = from; i < to; ++i)
       for (int c = 0; c < 3; ++c)
-        matrix_.panels()[i].diag[c][c] += shift * (a_.weight[i] + shift_x_);
+        panel(i).diag[c][c] += shift * (a_.weight[i] + shift_x_);
   if (shift > 0 || spin_ > 0)
     for (int i = from; i < to; ++i)
-      matrix_.panels()[i].diag[3][3] += shift * shift_theta_ + spin_;
+      panel(i).diag[3][3] += shift * shift_theta_ + spin_;
 }
 
 void RodSystem::moveAlong(double alpha)

@@ -2,13 +2,14 @@
 """Every topic of rod_node: type, frame, stamps, sizes; bags; the scene; two equal runs."""
 import hashlib
 import math
+import subprocess
 
 import rosbag
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, WrenchStamped
-from node_harness import SCENE, NodeCase, numbers, run, wait_until
+from node_harness import SCENE, NodeCase, find_program, numbers, run, wait_until
 from slender_sim.msg import RodState
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
@@ -166,6 +167,17 @@ class Topics(NodeCase):
                 last = message.step
         self.assertEqual(counts, {"/t/scene": 1, "/t/state": 201, "/t/grasps/left/wrench": 201, "/t/grasps/right/wrench": 201})
         self.assertIn("real-time factor", self.output("rod.out"))
+
+    def test_simulate_writes_the_same_states(self):
+        self.record("node.bag")
+        with open(self.path("scene.yaml"), "w") as file:
+            file.write(SCENE)
+        subprocess.run([find_program("simulate"), self.path("scene.yaml"), "--duration", "1", "--quiet", "--bag", self.path("tool.bag")],
+                       check=True)
+        bags = [[(raw[1], stamp) for topic, raw, stamp in rosbag.Bag(self.path(name)).read_messages([topic], raw=True)]
+                for name, topic in (("node.bag", "/t/state"), ("tool.bag", "/state"))]
+        self.assertEqual(len(bags[0]), 201)
+        self.assertTrue(bags[0] == bags[1])
 
     def test_bag_is_complete_when_terminated(self):
         process = self.start(pace="fast", record_bag=self.path("cut.bag"))

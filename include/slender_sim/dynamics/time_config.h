@@ -17,7 +17,7 @@ struct TimeConfig
 {
   double step = 0.005;                                ///< [s] (0, 10]
   double duration = 10.0;                             ///< [s] (0, 1e7]; used by `simulate`
-  Integrator integrator = Integrator::implicit_euler;
+  Integrator integrator = Integrator::tr_bdf2;
   double spectral_radius = 0.8;                       ///< generalised-alpha only: at infinite frequency [0, 1]
   double error_tolerance = 0.0;                       ///< [m] local error per step; 0 = fixed step
   double min_step = 1e-7;                             ///< [s] adaptive or cut steps never get shorter

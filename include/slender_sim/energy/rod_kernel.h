@@ -19,8 +19,8 @@ struct RodArrays
   double* turn;               ///< rotation of each edge's frame about its tangent since the base frames [rad]
   // frames to transport from (thesis 3.17), and those they become
   double *base_t[3], *base_d1[3], *base_twist;
-  double *t[3], *d1[3], *d2[3], *twist;
-  double *length, *inverse_length, *strain, *kappa1, *kappa2;
+  double *t[3], *d1[3], *twist;
+  double *inverse_length, *strain, *kappa1, *kappa2;
 
   // elastic (or viscous) response, already divided by rest lengths where the strain is integrated
   double *stretch;            ///< k_s [N]
@@ -49,7 +49,7 @@ struct RodEvaluation
 /// stay in the cache between assembling and eliminating them.
 struct RodSweep
 {
-  static constexpr int kQuantities = 46;
+  static constexpr int kQuantities = 46, kOvershoot = 8;
   alignas(64) double joints[kQuantities][16];   ///< see JointBuffer in the kernel
   alignas(64) double sums[5][8];                ///< stretch, bend_twist, potential, min_chi, max_strain by lane
   int next_edge, next_joint, next_node;
@@ -58,9 +58,10 @@ struct RodSweep
 struct RodKernels
 {
   void (*begin)(const RodArrays& rod, RodSweep& sweep);
-  /// Frames, twists, strains, energy and gradient of all nodes below `to` (at least); second derivatives into `panels` unless
-  /// it is null. Returns the first node not done. A closed rod is done in one go.
-  int (*advance)(const RodArrays& rod, RodSweep& sweep, BandPanel<10, 4>* panels, int to);
+  /// Frames, twists, strains, energy and gradient of all nodes below `to` (at least); second derivatives of node i into
+  /// panels[i - first_panel] unless it is null. Returns the first node not done: at most kOvershoot beyond `to`. A closed rod is
+  /// done in one go.
+  int (*advance)(const RodArrays& rod, RodSweep& sweep, BandPanel<10, 4>* panels, int first_panel, int to);
   RodEvaluation (*end)(const RodSweep& sweep);
 };
 

@@ -77,8 +77,9 @@ public:
   Inertia factor(int count = -1);
 
   /// The same by pieces, for callers that assemble block after block: factors blocks from..to-1, and when x is given takes
-  /// its rows to L^-1 x on the way. All entries of these blocks must be there; later ones need not.
-  void eliminate(int from, int to, double* x, BandCarry& carry);
+  /// its rows to L^-1 x on the way. All entries of these blocks must be there; later ones need not. `assembled` is the panel
+  /// of block `from`, in panels() or in memory of the caller's that is smaller and stays in the cache.
+  void eliminate(Panel* assembled, int from, int to, double* x, BandCarry& carry);
   /// x := L^-T D^-1 x, which completes a solution begun by eliminate().
   void substitute(double* x) const;
 

@@ -9,7 +9,8 @@ struct BandCarry;
 /// Entry points of one instruction set's factorisation (src/linalg/banded_ldlt_kernel.cpp is compiled once for each).
 struct BandKernels
 {
-  void (*eliminate)(BandPanel<10, 4>* panels, int from, int to, double* x, BandCarry& carry);
+  /// Both panel pointers are those of block `from`.
+  void (*eliminate)(BandPanel<10, 4>* panels, BandPanel<10, 4>* factors, int from, int to, double* x, BandCarry& carry);
   void (*substitute)(const BandPanel<10, 4>* panels, int blocks, double* x);
   void (*solve)(const BandPanel<10, 4>* panels, int blocks, double* x);
   void (*solve8)(const BandPanel<10, 4>* panels, int blocks, double* x);

@@ -43,7 +43,7 @@ struct NodeOptions
   double guide_timeout = 1.0;                   ///< ~guide_timeout [s]: older guides are stale; no guide for so long: WARN
   double catch_up_time = 0.1;                   ///< ~catch_up_time [s] shortest time for closing a gap
   double catch_up_speed = 1.0;                  ///< ~catch_up_speed [m/s] when closing a gap
-  double tf_timeout = 0.2;                      ///< ~tf_timeout [s] wall time that a message waits for its transform
+  double tf_timeout = 0.5;                      ///< ~tf_timeout [s] wall time that a message waits for its transform
   double diagnostics_rate = 1.0;                ///< ~diagnostics_rate [Hz]
   double marker_rate = 30.0;                    ///< ~marker_rate [Hz] at most, up to 30
   MarkerStyle marker_style = MarkerStyle::tube; ///< ~marker_style: tube | line

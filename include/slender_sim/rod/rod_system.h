@@ -100,6 +100,7 @@ private:
   void respond(ClampJoint& clamp) const;
   void evaluateClamp(ClampJoint& clamp, bool with_hessian, RodEvaluation& sum);
   void takeReactions(int from, int to);
+  RodPanel& panel(int node) { return panels_[node - first_panel_]; }
   void fixPanels(int from, int to);
   void fixUnknown(int node, int component, int from, int to);
   void addShift(int from, int to, double shift);
@@ -110,6 +111,10 @@ private:
   RodArrays a_;
   std::vector<AlignedVector<double>> storage_;
   CyclicBandedLdlt matrix_;
+  /// Where panels are assembled: the matrix itself, or for long open rods a piece that stays in the cache.
+  RodPanel* panels_ = nullptr;
+  int first_panel_ = 0;
+  AlignedVector<RodPanel> piece_;
   AlignedVector<double> gradient_, direction_, reduced_, x_base_[3], saved_[10];
   std::vector<ClampJoint> saved_clamps_;
   AlignedVector<double> stretch_, b11_, b12_, b22_, beta_, rest_k1_, rest_k2_, rest_m_;   ///< elastic response as composed

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "slender_sim/study/study.h"
+
+namespace slender::study {
+
+/// A finished (or failed) run of one study.
+struct StudyResult
+{
+  const StudyContext* context;
+  double wall_seconds;
+  std::string error;   ///< empty unless the study threw
+};
+
+/// Aligned table of all rows, then metrics and notes.
+void printTable(std::ostream& out, const StudyContext& context);
+
+/// {"studies": [{"name", "metrics": {}, "rows": [], "wall_seconds"}]}; numbers that are not finite become null.
+void writeJson(std::ostream& out, const std::vector<StudyResult>& results);
+
+/// One line per row; the header is the union of all keys.
+void writeCsv(std::ostream& out, const StudyContext& context);
+
+/// Writes DIR/NAME.gp for every plot and lets gnuplot turn it into DIR/NAME.png.
+/// Returns an empty string, or why there are no pictures (the scripts are kept).
+std::string writePlots(const std::string& directory, const StudyContext& context);
+
+}  // namespace slender::study

@@ -1,0 +1,40 @@
+#include "slender_sim/study/study.h"
+
+namespace slender::study {
+
+// One per file; a new study is its file, one line here and one below.
+void runCantilever(StudyContext&);
+void runElastica(StudyContext&);
+void runRodsAtRest(StudyContext&);
+void runSwing(StudyContext&);
+void runBeamFrequencies(StudyContext&);
+void runTorsion(StudyContext&);
+void runRodScaling(StudyContext&);
+void runImplicitVsExplicit(StudyContext&);
+void runRodStability(StudyContext&);
+
+const std::vector<Study>& studies()
+{
+  static const std::vector<Study> all = {
+      {"cantilever", "heavy rod clamped horizontally: aspect ratio H/W against Gamma, static and settled", runCantilever},
+      {"elastica", "buckled and end-loaded planar rods against elliptic integrals", runElastica},
+      {"rods_at_rest", "settled tips of four 1 m rods against the exact elastica", runRodsAtRest},
+      {"swing", "a rod released from rest: tip error at 1 s against CPU time, all integrators and steps", runSwing},
+      {"beam_frequencies", "natural frequencies of the clamped-free rod, and each integrator's numerical damping", runBeamFrequencies},
+      {"torsion", "torque of a twisted rod and period of a torsional pendulum", runTorsion},
+      {"rod_scaling", "time per Newton iteration and node from 50 to 100,000 nodes", runRodScaling},
+      {"rod_implicit_vs_explicit", "hair strand: stable steps and cost of implicit against explicit integration", runImplicitVsExplicit},
+      {"rod_stability", "extreme stiffness, thickness, steps, twist and grasps: done, cut or refused with reason", runRodStability},
+  };
+  return all;
+}
+
+const Study* findStudy(const std::string& name)
+{
+  for (const Study& s : studies())
+    if (s.name == name)
+      return &s;
+  return nullptr;
+}
+
+}  // namespace slender::study

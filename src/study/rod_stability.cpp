@@ -1,0 +1,289 @@
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "rod_cases.h"
+#include "slender_sim/study/cpu_clock.h"
+#include "slender_sim/study/study.h"
+
+namespace slender::study {
+namespace {
+
+/// What became of one case, and whether that was honest.
+struct Verdict
+{
+  int steps = 0, cuts = 0, substeps = 0, iterations = 0;
+  double worst_strain = 0, energy_growth = 0, cpu_seconds = 0;
+  bool refused = false;
+  std::string reason;
+  int not_finite = 0;
+  std::string unexplained;   ///< empty: nothing to complain about
+};
+
+struct Tally
+{
+  int done = 0, cut = 0, refused = 0, not_finite = 0, unexplained = 0;
+};
+
+using Motion = std::function<void(int step, RodSetup& rod)>;
+
+/// Runs up to `steps` steps; `motion` sets the inputs of each. Energy may not grow once the inputs stand still
+/// (from step `quiet` on): beyond a thousandth for implicit Euler, tenfold for methods that keep it only on average.
+/// `turned` [rad], if not zero: how far a straight rod must be twisted at the end, told by its energy beta turned^2/(2 L).
+Verdict run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motion, int quiet, double turned = 0.0)
+{
+  Verdict v;
+  RodStepper stepper(rod.model, time);
+  double before = 0, scale = 0;
+  const double begin = threadSeconds();
+  for (int i = 0; i < steps; ++i)
+  {
+    motion(i, rod);
+    const RodState saved = rod.state;
+    if (i == quiet)
+    {
+      const RodEnergies e = stepper.energies(rod.state, rod.inputs.gravity);
+      before = e.total();
+      // What there is to give: all elastic and kinetic energy, and the fall of the whole rod over its length.
+      scale = e.stretch + e.bend + e.twist + e.kinetic + rod.model->totalMass() * rod.inputs.gravity.norm() * rod.model->rest_length.sum();
+    }
+    const StepReport report = stepper.step(rod.state, rod.inputs, time.step);
+    v.cuts += report.cut_steps;
+    v.substeps += report.substeps;
+    v.iterations += report.iterations;
+    if (!isFinite(rod.state))
+    {
+      ++v.not_finite;
+      v.unexplained = "state is not finite";
+      break;
+    }
+    if (!report.ok)
+    {
+      v.refused = true;
+      v.reason = std::string(toString(report.failure)) + ": " + report.message;
+      if (report.message.empty() || report.failure == StepFailure::none)
+        v.unexplained = "refused without a reason";
+      else if (!sameBits(saved, rod.state))
+        v.unexplained = "refused, but the state has changed";
+      break;
+    }
+    ++v.steps;
+    v.worst_strain = std::max(v.worst_strain, report.max_strain);
+    if (i < quiet)
+      continue;
+    const double growth = (stepper.energies(rod.state, rod.inputs.gravity).total() - before) / scale;
+    v.energy_growth = std::max(v.energy_growth, growth);
+    const double allowed = time.integrator == Integrator::implicit_euler ? 1e-3 : 10.0;
+    if (!(growth <= allowed))
+    {
+      v.unexplained = "energy grew by " + std::to_string(growth) + " of what there was";
+      break;
+    }
+  }
+  v.cpu_seconds = threadSeconds() - begin;
+  if (turned > 0 && !v.refused && v.unexplained.empty())
+  {
+    const double found = std::sqrt(2 * stepper.energies(rod.state, rod.inputs.gravity).twist * rod.model->rest_length.sum() / rod.model->twist_modulus[1]);
+    if (!(std::abs(found - turned) < 0.01 * turned))
+      v.unexplained = "twisted by " + std::to_string(found / (2 * M_PI)) + " turns instead of " + std::to_string(turned / (2 * M_PI));
+  }
+  return v;
+}
+
+void record(StudyContext& context, Tally& tally, Row& row, const Verdict& v)
+{
+  const char* outcome = !v.unexplained.empty() ? "UNEXPLAINED" : v.refused ? "refused" : v.cuts > 0 ? "cut" : "done";
+  tally.not_finite += v.not_finite;
+  tally.unexplained += v.unexplained.empty() ? 0 : 1;
+  tally.refused += v.unexplained.empty() && v.refused ? 1 : 0;
+  tally.cut += v.unexplained.empty() && !v.refused && v.cuts > 0 ? 1 : 0;
+  tally.done += v.unexplained.empty() && !v.refused && v.cuts == 0 ? 1 : 0;
+  row.set("outcome", outcome).set("steps", v.steps).set("substeps", v.substeps).set("cuts", v.cuts).set("iterations", v.iterations)
+      .set("max_strain", v.worst_strain).set("energy_growth", v.energy_growth).set("cpu_seconds", v.cpu_seconds);
+  row.set("reason", v.unexplained.empty() ? v.reason : v.unexplained + (v.reason.empty() ? "" : " (" + v.reason + ")"));
+  context.metric("nan_count", tally.not_finite);
+  context.metric("unexplained_failures", tally.unexplained);
+}
+
+RodSetup heldRod(double radius, double youngs_modulus, int nodes)
+{
+  RodSetup rod = straightRod(circularRod(1.0, radius, youngs_modulus, 0.3, 1000, nodes - 1));
+  rod.inputs.gravity = {0, 0, -9.81};
+  rod.hold(0, 0, true);
+  return rod;
+}
+
+void still(int, RodSetup&) {}
+
+/// Both ends held; the far one turns by `turns` in `steps` steps.
+Motion twisting(double turns, int steps)
+{
+  return [=](int i, RodSetup& rod) {
+    if (i >= steps)
+      return;
+    Pose& pose = rod.inputs.grasps[1].X_WG;
+    pose.orientation = (Eigen::Quaterniond(Eigen::AngleAxisd(2 * M_PI * turns / steps, Eigen::Vector3d::UnitX())) * pose.orientation).normalized();
+  };
+}
+
+RodSetup heldAtBothEnds(double radius, double youngs_modulus, int nodes)
+{
+  RodSetup rod = heldRod(radius, youngs_modulus, nodes);
+  rod.hold(nodes - 1, nodes - 1, true);
+  return rod;
+}
+
+/// Naturally straight, folded back on itself over `joints` joints in its middle; bent by `fold` [rad] in all.
+RodSetup foldedRod(double fold, int joints)
+{
+  const int edges = 199;
+  const double h = 1.0 / edges;
+  Eigen::Matrix3Xd nodes(3, edges + 1);
+  nodes.col(0).setZero();
+  double angle = 0;
+  for (int i = 0; i < edges; ++i)
+  {
+    if (i >= (edges - joints) / 2 && i < (edges - joints) / 2 + joints)
+      angle += fold / joints;
+    nodes.col(i + 1) = nodes.col(i) + h * Eigen::Vector3d(std::cos(angle), 0, std::sin(angle));
+  }
+  RodSetup rod = straightRod(circularRod(1.0, 0.001, 1e7, 0.3, 1000, edges));
+  const RodState bent = makeRodState(*rod.model, nodes, Eigen::Vector3d::UnitY());
+  rod.hold(0, 0, true);
+  rod.state.x = bent.x;
+  rod.state.d1 = bent.d1;
+  rod.state.twist = bent.twist;
+  rod.inputs.gravity = {0, 0, -9.81};
+  return rod;
+}
+
+/// The free end starts at 100 m/s across the rod, the velocity falling off to nothing towards the clamp.
+RodSetup whippedRod(double radius, double youngs_modulus)
+{
+  RodSetup rod = heldRod(radius, youngs_modulus, 200);
+  for (int i = 0; i < 200; ++i)
+    rod.state.v.col(i) = Eigen::Vector3d(0, 0, 100 * std::pow(i / 199.0, 4));
+  return rod;
+}
+
+}  // namespace
+
+void runRodStability(StudyContext& context)
+{
+  Tally tally;
+  context.metric("nan_count", 0);
+  context.metric("unexplained_failures", 0);
+
+  // The map: held horizontally and released.
+  const std::vector<double> decades = context.quick() ? std::vector<double>{3, 6, 9, 13} : std::vector<double>{3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13};
+  const std::vector<double> radii = context.quick() ? std::vector<double>{1e-5, 1e-3, 0.1} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1};
+  const std::vector<double> steps = context.quick() ? std::vector<double>{1e-5, 1e-3, 1.0 / 30} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 1.0 / 30};
+  const std::vector<Integrator> integrators = context.quick() ? std::vector<Integrator>{Integrator::implicit_euler, Integrator::tr_bdf2}
+                                                              : implicitIntegrators();
+  const int total = static_cast<int>(integrators.size() * decades.size() * radii.size() * steps.size());
+  int done = 0;
+  Plot& plot = context.plot("rod_stability", "Stability map, implicit Euler and others: outcome of each cell", "Young's modulus [Pa]", "step [s] (shifted by radius)");
+  plot.lines = false;
+  for (const Integrator integrator : integrators)
+    for (const double decade : decades)
+      for (const double radius : radii)
+        for (const double step : steps)
+        {
+          const double modulus = std::pow(10.0, decade);
+          context.progress(done++, total, toString(integrator));
+          Row& row = context.row();
+          row.set("case", "released").set("integrator", toString(integrator)).set("E_Pa", modulus).set("radius_over_length", radius).set("step_s", step);
+          const Verdict v = run(heldRod(radius, modulus, 50), timeConfig(integrator, step), 30, still, 0);
+          record(context, tally, row, v);
+          Series& s = plot.at(!v.unexplained.empty() ? "unexplained" : v.refused ? "refused" : v.cuts ? "cut" : "done");
+          s.x.push_back(modulus);
+          s.y.push_back(step * (1 + 0.12 * (std::log10(radius) + 5)));
+        }
+
+  // Special cases.
+  using Setup = std::function<RodSetup()>;
+  const auto special = [&](const std::string& name, Integrator integrator, double step, const Setup& setup, int count, const Motion& motion, int quiet, double turned = 0.0) {
+    context.progress(done++, total, name);
+    Row& row = context.row();
+    row.set("case", name).set("integrator", toString(integrator)).set("step_s", step);
+    try
+    {
+      record(context, tally, row, run(setup(), timeConfig(integrator, step), count, motion, quiet, turned));
+    }
+    catch (const std::invalid_argument& e)   // what cannot even be set up is refused there
+    {
+      Verdict v;
+      v.refused = true;
+      v.reason = e.what();
+      record(context, tally, row, v);
+    }
+    catch (const std::exception& e)
+    {
+      Verdict v;
+      v.unexplained = std::string("threw: ") + e.what();
+      record(context, tally, row, v);
+    }
+  };
+  const int never = std::numeric_limits<int>::max();
+  const auto teleport = [](const Eigen::Vector3d& by, double angle) {
+    return [=](int i, RodSetup& rod) {
+      if (i != 5)
+        return;
+      Pose& pose = rod.inputs.grasps.back().X_WG;
+      pose.position += by;
+      pose.orientation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 3).normalized())) * pose.orientation).normalized();
+    };
+  };
+  const Setup rope = [] { return heldAtBothEnds(0.002, 1e7, 100); };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Integrator integrator : integrators)
+  {
+    for (const double step : {0.01, 1.0 / 30})
+    {
+      special("r 1 mm E 1e6", integrator, step, [] { return heldRod(0.001, 1e6, 200); }, 100, still, 0);
+      special("r 0.2 mm E 2e11", integrator, step, [] { return heldRod(0.0002, 2e11, 200); }, 100, still, 0);
+    }
+    const int turn_steps = context.quick() ? 4000 : 10000;   // less than half a turn each, or the direction would be lost
+    special("1000 turns, stiff and short of buckling", integrator, 1e-3,
+            [] {
+              RodSetup rod = straightRod([] {
+                RodCase c = circularRod(1.0, 0.01, 1e7, 0.3, 1000, 49);
+                c.twist = c.bend / 2000;   // so soft in twist that 1000 turns do not buckle it
+                return c;
+              }());
+              rod.hold(0, 0, true);
+              rod.hold(49, 49, true);
+              return rod;
+            },
+            turn_steps + 20, twisting(1000, turn_steps), turn_steps, 2 * M_PI * 1000);
+    const int rope_turns = context.quick() ? 100 : 1000;
+    special(std::to_string(rope_turns) + " turns, rope", integrator, 5e-3, [] { return heldAtBothEnds(0.002, 1e7, 100); }, 10 * rope_turns,
+            twisting(rope_turns, 10 * rope_turns), never);
+    for (const double step : {1e-3, 0.01, 1.0 / 30})
+    {
+      special("folded back on itself", integrator, step, [] { return foldedRod(M_PI, 8); }, 50, still, 0);
+      special("folded by 179.9 degrees in one joint", integrator, step, [] { return foldedRod(M_PI * 179.9 / 180, 1); }, 50, still, 0);
+      special("folded by 180 degrees in one joint", integrator, step, [] { return foldedRod(M_PI, 1); }, 50, still, 0);
+      special("free end at 100 m/s, rope", integrator, step, [] { return whippedRod(0.002, 1e7); }, 50, still, 0);
+      special("free end at 100 m/s, steel wire", integrator, step, [] { return whippedRod(0.0005, 2e11); }, 50, still, 0);
+      special("grasp teleports by 0.3 m", integrator, step, rope, 30, teleport({-0.3, 0.1, 0.1}, 0), never);
+      special("grasp teleports by 10 m", integrator, step, rope, 30, teleport({10, 0, 0}, 0), never);
+      special("grasp turns by 180 degrees at once", integrator, step, rope, 30, teleport({0, 0, 0}, M_PI), never);
+      special("grasp teleports onto the other", integrator, step, rope, 30, teleport({-1, 0, 0}, 0), never);
+      special("grasp pose is not a number", integrator, step, rope, 30, teleport({nan, 0, 0}, 0), never);
+    }
+  }
+  special("beyond the explicit limit", Integrator::symplectic_euler, 1e-3, [] { return heldRod(0.002, 1e9, 50); }, 2000, still, never);
+  special("within the explicit limit", Integrator::symplectic_euler, 1e-5, [] { return heldRod(0.002, 1e9, 50); }, 2000, still, 0);
+
+  context.metric("done", tally.done);
+  context.metric("cut", tally.cut);
+  context.metric("refused", tally.refused);
+  context.note("done: every step at once; cut: Newton needed shorter steps; refused: the step said why and left the state alone.");
+  context.note("unexplained: a refusal without reason, a changed state after one, a number that is not finite, or energy out of nothing.");
+}
+
+}  // namespace slender::study

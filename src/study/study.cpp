@@ -1,0 +1,138 @@
+#include "slender_sim/study/study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <stdexcept>
+
+#include <unistd.h>
+
+namespace slender::study {
+
+Row& Row::set(const std::string& key, double value)
+{
+  for (auto& entry : entries_)
+    if (entry.first == key)
+    {
+      entry.second = value;
+      return *this;
+    }
+  entries_.emplace_back(key, value);
+  return *this;
+}
+
+Row& Row::set(const std::string& key, const std::string& value)
+{
+  for (auto& entry : entries_)
+    if (entry.first == key)
+    {
+      entry.second = value;
+      return *this;
+    }
+  entries_.emplace_back(key, value);
+  return *this;
+}
+
+Row& Row::check(double measured, double expected, double bound, const std::string& source)
+{
+  if (!(bound > 0.0))
+    throw std::invalid_argument("study: bound must be positive, got " + std::to_string(bound) + " for " + source);
+  return set("measured", measured)
+      .set("expected", expected)
+      .set("bound", bound)
+      .set("error_over_bound", std::abs(measured - expected) / bound)
+      .set("source", source);
+}
+
+const Row::Value* Row::find(const std::string& key) const
+{
+  for (const auto& entry : entries_)
+    if (entry.first == key)
+      return &entry.second;
+  return nullptr;
+}
+
+Series& Plot::at(const std::string& label)
+{
+  for (Series& s : series)
+    if (s.label == label)
+      return s;
+  series.push_back({label, {}, {}});
+  return series.back();
+}
+
+StudyContext::StudyContext(std::string study, bool quick, bool show_progress)
+  : name_(std::move(study)), quick_(quick), show_progress_(show_progress), on_terminal_(isatty(STDERR_FILENO) == 1),
+    last_progress_(std::chrono::steady_clock::now())
+{
+}
+
+StudyContext::~StudyContext() { clearProgress(); }
+
+void StudyContext::progress(int done, int total, const std::string& what)
+{
+  if (!show_progress_)
+    return;
+  const auto now = std::chrono::steady_clock::now();
+  const double elapsed = std::chrono::duration<double>(now - last_progress_).count();
+  if (elapsed < (on_terminal_ ? 0.05 : 10.0))
+    return;
+  last_progress_ = now;
+  std::fprintf(stderr, on_terminal_ ? "\r%s  %d/%d  %s\033[K" : "%s  %d/%d  %s\n", name_.c_str(), done, total, what.c_str());
+  std::fflush(stderr);
+  line_shown_ = on_terminal_;
+}
+
+void StudyContext::clearProgress()
+{
+  if (line_shown_)
+    std::fputs("\r\033[K", stderr);
+  line_shown_ = false;
+}
+
+Row& StudyContext::row()
+{
+  rows_.emplace_back();
+  return rows_.back();
+}
+
+void StudyContext::metric(const std::string& key, double value)
+{
+  for (auto& m : metrics_)
+    if (m.first == key)
+    {
+      m.second = value;
+      return;
+    }
+  metrics_.emplace_back(key, value);
+}
+
+Plot& StudyContext::plot(const std::string& name, const std::string& title, const std::string& x_label, const std::string& y_label)
+{
+  plots_.push_back({name, title, x_label, y_label, true, true, true, {}});
+  return plots_.back();
+}
+
+void StudyContext::finish()
+{
+  clearProgress();
+  double worst = 0.0;
+  bool any = false;
+  for (const Row& r : rows_)
+  {
+    const Row::Value* ratio = r.find("error_over_bound");
+    if (!ratio || !std::holds_alternative<double>(*ratio))
+      continue;
+    any = true;
+    const double value = std::get<double>(*ratio);
+    if (std::isnan(value) || std::isnan(worst))
+      worst = std::numeric_limits<double>::quiet_NaN();   // a check without a number is no success
+    else
+      worst = std::max(worst, value);
+  }
+  if (any)
+    metric("worst_error_over_bound", worst);
+}
+
+}  // namespace slender::study
