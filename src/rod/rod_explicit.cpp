@@ -39,7 +39,8 @@ StepFailure RodStepper::Impl::explicitStep(const RodInputs& inputs, double durat
       next.x.col(i) += h * next.v.col(i);
     }
   system.accept();
-  system.turnFrames();   // one Newton step of the frames per time step: they trail by less than the step's own error
+  if (!viscous)
+    system.turnFrames();   // one Newton step of the frames per time step: they trail by less than the step's own error
   for (int i = 0; i < n; ++i)
     system.setPosition(i, next.x.col(i));
   placeAt(inputs, duration, (t + h) / duration);
@@ -49,6 +50,14 @@ StepFailure RodStepper::Impl::explicitStep(const RodInputs& inputs, double durat
       next.x.col(i) = system.position(i);
       next.v.col(i) = heldVelocity(inputs, duration, t + h, i, Eigen::Vector3d::Zero());
     }
+  if (viscous)
+  {
+    // massless frames relax in stiffness_damping seconds, which may be less than a step: that takes an implicit rate
+    system.setResponse(model->stiffness_damping / h, &strain_start);
+    system.evaluate(false);
+    system.accept();
+    system.turnFrames();
+  }
   now = system.evaluate(false);
   if (now.min_chi <= kFoldedChi)
     return StepFailure::folded_back;
