@@ -81,17 +81,15 @@ double RodSystem::turnFrames()
   return largest;
 }
 
-void RodSystem::relaxFrames()
+RodEvaluation RodSystem::relaxFrames()
 {
-  evaluate(false);
-  for (int k = 0; k < 50; ++k)
+  RodEvaluation result = evaluate(false);
+  for (int k = 0; k < 50 && turnFrames() > 1e-10; ++k)
   {
-    accept();
-    const double turned = turnFrames();
-    evaluate(false);
-    if (turned < 1e-10)
-      break;
+    accept(false);
+    result = evaluate(false);
   }
+  return result;
 }
 
 }  // namespace slender

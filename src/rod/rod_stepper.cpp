@@ -128,7 +128,11 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
     }
   double energy = 0.0, allowance = 0.0;
   if (conserving)
-    energy = mechanicalEnergy(work, inputs, allowance);
+  {
+    system.load(work);
+    system.setResponse(0.0, nullptr);
+    energy = mechanicalEnergy(work, inputs, system.evaluate(false), &allowance);
+  }
   double t = 0.0, h = adaptive && work.next_step > 0 ? work.next_step : duration;
   while (t < duration)
   {
@@ -138,13 +142,8 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
     const bool can_shorten = !explicit_step && 0.5 * length >= time.min_step;
     StepReport sub;
     StepFailure failure = explicit_step ? explicitStep(inputs, duration, t, length, sub) : implicitStep(inputs, duration, t, length, sub);
-    double next_energy = 0.0, next_allowance = 0.0;
-    if (conserving && failure == StepFailure::none)
-    {
-      next_energy = mechanicalEnergy(next, inputs, next_allowance);
-      if (next_energy - energy > allowance)
-        failure = StepFailure::energy_grew;
-    }
+    if (conserving && failure == StepFailure::none && mechanicalEnergy(next, inputs, end_evaluation, nullptr) > energy + allowance)
+      failure = StepFailure::energy_grew;
     const double ratio = sub.error_estimate / time.error_tolerance;
     const bool inaccurate = adaptive && failure == StepFailure::none && ratio > 1 && can_shorten;
     if (failure != StepFailure::none || inaccurate)
@@ -171,21 +170,20 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
   return report;
 }
 
-double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& inputs, double& allowance)
+/// Elastic (as evaluated) plus kinetic energy and the loads' potential. `allowance`: growth that errors of a sound step may show.
+double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const
 {
-  system.load(s);
-  system.setResponse(0.0, nullptr);
-  double kinetic = 0.0, weight = 0.0;
+  double kinetic = 0.0, potential = 0.0, weight = 0.0;
   for (int i = 0; i < model->nodes(); ++i)
   {
     const Eigen::Vector3d f = load(inputs, i);
-    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), f);
     kinetic += 0.5 * model->mass[i] * s.v.col(i).squaredNorm();
+    potential -= f.dot(s.x.col(i));
     weight += f.norm();
   }
-  const RodEvaluation e = system.evaluate(false);
-  allowance = 0.05 * (kinetic + e.stretch + e.bend_twist + weight * model->rest_length.sum());
-  return e.energy() + kinetic;
+  if (allowance)
+    *allowance = 0.05 * (kinetic + e.stretch + e.bend_twist + weight * model->rest_length.sum());
+  return e.stretch + e.bend_twist + potential + kinetic;
 }
 
 /// Next step length over this one for a local error that is `ratio` times the tolerance, with a margin.
@@ -366,7 +364,7 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
       next.x.col(i) = system.position(i);
     if (model->stiffness_damping > 0)
       system.setResponse(0.0, nullptr);
-    system.relaxFrames();
+    end_evaluation = system.relaxFrames();
   }
   system.store(next);
   if (model->stiffness_damping > 0)

@@ -40,7 +40,7 @@ private:
   Eigen::Vector3d combine(const Combination& c, int node) const;
   void computeWrenches(const RodInputs& inputs, double h);
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message);
-  double mechanicalEnergy(const RodState& s, const RodInputs& inputs, double& allowance);
+  double mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const;
   std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
 
   // rod_statics.cpp
@@ -57,6 +57,7 @@ private:
   const std::vector<GraspState>* origin = nullptr;
   RodState work, next;              ///< start and end of a substep
   StepPlan plan;
+  RodEvaluation end_evaluation;     ///< at the end of a substep whose stage lies inside it
   Eigen::Matrix3Xd stage_q, stage_v;
   Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end;
   std::vector<Pose> stage_poses;

@@ -282,7 +282,7 @@ void RodSystem::moveAlong(double alpha)
   wrapHalo(a_.turn, a_.edges);
 }
 
-void RodSystem::accept()
+void RodSystem::accept(bool clear_turns)
 {
   for (int k = 0; k < 3; ++k)
   {
@@ -291,7 +291,8 @@ void RodSystem::accept()
     std::copy_n(a_.x[k], a_.nodes, x_base_[k].data());
   }
   std::swap(a_.base_twist, a_.twist);
-  std::fill(a_.turn - kHalo, a_.turn + a_.nodes + kHalo, 0.0);
+  if (clear_turns)
+    std::fill(a_.turn - kHalo, a_.turn + a_.nodes + kHalo, 0.0);
   for (ClampJoint& c : clamps_)
   {
     c.base_t = c.t;

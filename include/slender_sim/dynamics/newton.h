@@ -77,9 +77,13 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       return fail(StepFailure::state_not_finite);
     double alpha = system.stepLimit();
     // A shifted Hessian shortens the increment, so a saddle (a step's equation may well have one) must show by its residual.
-    const bool balanced = system.residual() <= system.noiseLevel();
-    const bool stationary = shift.none() || balanced || system.residual() < 1e-9 * system.forceScale();
-    if (alpha == 1.0 && stationary && (increment <= config.tolerance || balanced))
+    bool converged = alpha == 1.0 && increment <= config.tolerance && shift.none();
+    if (!converged && alpha == 1.0 && increment < 1e-2)
+    {
+      const double residual = system.residual();
+      converged = residual <= system.noiseLevel() || (increment <= config.tolerance && residual < 1e-9 * system.forceScale());
+    }
+    if (converged)
     {
       system.moveAlong(1.0);
       trial = system.evaluate(false);

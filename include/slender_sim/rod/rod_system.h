@@ -64,8 +64,8 @@ public:
   void solve();
   /// Trial := base + alpha direction.
   void moveAlong(double alpha);
-  /// Base := trial.
-  void accept();
+  /// Base := trial. Its turns are done with, unless they are already those of the next trial.
+  void accept(bool clear_turns = true);
   /// Copies of the base for a later return to it.
   void saveBase();
   void restoreBase();
@@ -86,8 +86,8 @@ public:
   /// One Newton step of the material frames towards equilibrium at fixed positions (thesis 4.3): sets the trial's turns from
   /// the last evaluate(false). Returns the largest turn [rad].
   double turnFrames();
-  /// Repeats it until the frames are in equilibrium. Leaves the trial evaluated and accepted.
-  void relaxFrames();
+  /// Evaluates the trial and repeats this until its frames are in equilibrium. Returns the last evaluation.
+  RodEvaluation relaxFrames();
 
   /// dE/dx of an evaluated trial at a node, held or not: minus the force of the rod on it [N].
   Eigen::Vector3d nodeGradient(int node) const;
