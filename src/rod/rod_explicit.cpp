@@ -38,6 +38,7 @@ StepFailure RodStepper::Impl::explicitStep(const RodInputs& inputs, double durat
       next.v.col(i) = (model->mass[i] * work.v.col(i) - h * system.nodeGradient(i)) / (model->mass[i] + h * damping);
       next.x.col(i) += h * next.v.col(i);
     }
+  system.solveFrames();
   system.accept();
   if (!viscous)
     system.turnFrames();   // one Newton step of the frames per time step: they trail by less than the step's own error
@@ -55,6 +56,7 @@ StepFailure RodStepper::Impl::explicitStep(const RodInputs& inputs, double durat
     // massless frames relax in stiffness_damping seconds, which may be less than a step: that takes an implicit rate
     system.setResponse(model->stiffness_damping / h, &strain_start);
     system.evaluate(false);
+    system.solveFrames();
     system.accept();
     system.turnFrames();
   }

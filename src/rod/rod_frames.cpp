@@ -6,7 +6,7 @@
 
 namespace slender {
 
-double RodSystem::turnFrames()
+double RodSystem::solveFrames()
 {
   // Thomas' algorithm on the edge angles; held ones are decoupled. A closed rod's corner is treated by Sherman and Morrison.
   const int edges = a_.edges;
@@ -32,7 +32,7 @@ double RodSystem::turnFrames()
     d[edges - 1] -= corner * corner / gamma;
     d[0] -= gamma;
   }
-  double* r = a_.turn;
+  double* r = reduced_.data();
   double* u = direction_.data();
   for (int j = 0; j < edges; ++j)
   {
@@ -77,16 +77,22 @@ double RodSystem::turnFrames()
     r[j] = std::clamp(r[j], -1.5, 1.5);
     largest = std::max(largest, std::abs(r[j]));
   }
-  wrapHalo(a_.turn, edges);
   return largest;
+}
+
+void RodSystem::turnFrames()
+{
+  std::copy_n(reduced_.data(), a_.edges, a_.turn);
+  wrapHalo(a_.turn, a_.edges);
 }
 
 RodEvaluation RodSystem::relaxFrames()
 {
   RodEvaluation result = evaluate(false);
-  for (int k = 0; k < 50 && turnFrames() > 1e-10; ++k)
+  for (int k = 0; k < 50 && solveFrames() > 1e-10; ++k)
   {
-    accept(false);
+    accept();
+    turnFrames();
     result = evaluate(false);
   }
   return result;

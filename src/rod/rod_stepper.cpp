@@ -182,7 +182,8 @@ double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& in
     weight += f.norm();
   }
   if (allowance)
-    *allowance = 0.05 * (kinetic + e.stretch + e.bend_twist + weight * model->rest_length.sum());
+    *allowance = 0.05 * (kinetic + e.stretch + e.bend_twist + weight * model->rest_length.sum()) +
+                 1e-12 * model->stretch_modulus.dot(model->rest_length);   // a rod at rest: strains of a millionth
   return e.stretch + e.bend_twist + potential + kinetic;
 }
 

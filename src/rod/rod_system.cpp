@@ -282,7 +282,7 @@ void RodSystem::moveAlong(double alpha)
   wrapHalo(a_.turn, a_.edges);
 }
 
-void RodSystem::accept(bool clear_turns)
+void RodSystem::accept()
 {
   for (int k = 0; k < 3; ++k)
   {
@@ -291,8 +291,7 @@ void RodSystem::accept(bool clear_turns)
     std::copy_n(a_.x[k], a_.nodes, x_base_[k].data());
   }
   std::swap(a_.base_twist, a_.twist);
-  if (clear_turns)
-    std::fill(a_.turn - kHalo, a_.turn + a_.nodes + kHalo, 0.0);
+  std::fill(a_.turn - kHalo, a_.turn + a_.nodes + kHalo, 0.0);
   for (ClampJoint& c : clamps_)
   {
     c.base_t = c.t;

@@ -64,8 +64,8 @@ public:
   void solve();
   /// Trial := base + alpha direction.
   void moveAlong(double alpha);
-  /// Base := trial. Its turns are done with, unless they are already those of the next trial.
-  void accept(bool clear_turns = true);
+  /// Base := trial.
+  void accept();
   /// Copies of the base for a later return to it.
   void saveBase();
   void restoreBase();
@@ -83,9 +83,10 @@ public:
   /// Strains at the trial configuration, columns as in RodState::strain_rate.
   void strains(Eigen::Matrix4Xd& out) const;
 
-  /// One Newton step of the material frames towards equilibrium at fixed positions (thesis 4.3): sets the trial's turns from
-  /// the last evaluate(false). Returns the largest turn [rad].
-  double turnFrames();
+  /// One Newton step of the material frames towards equilibrium at fixed positions (thesis 4.3), from the last evaluate(false).
+  /// Returns the largest turn [rad]; turnFrames(), after accept(), makes these turns the next trial's.
+  double solveFrames();
+  void turnFrames();
   /// Evaluates the trial and repeats this until its frames are in equilibrium. Returns the last evaluation.
   RodEvaluation relaxFrames();
 
