@@ -357,6 +357,8 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
   if (c != 1.0)
   {
     // The stage lies inside the step: carry the frames on to its end and let them relax there (thesis 4.3).
+    if (model->stiffness_damping > 0)
+      system.strains(strain_stage);
     system.accept();
     for (int i = 0; i < n; ++i)
       system.setPosition(i, next.x.col(i));
@@ -364,7 +366,7 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
     for (int i = 0; i < n; ++i)
       next.x.col(i) = system.position(i);
     if (model->stiffness_damping > 0)
-      system.setResponse(0.0, nullptr);
+      setViscousResponseAtEnd(stage, h);
     end_evaluation = system.relaxFrames();
   }
   system.store(next);

@@ -52,6 +52,7 @@ private:
   // rod_viscous.cpp: strain history of Rayleigh stiffness damping
   void startStrainHistory(const RodInputs& inputs, double duration, double t);
   void setViscousResponse(const Stage& stage, std::size_t index);
+  void setViscousResponseAtEnd(const Stage& stage, double h);
   void finishStrainHistory(const Stage& stage);
 
   const std::vector<GraspState>* origin = nullptr;

@@ -28,6 +28,17 @@ void RodStepper::Impl::setViscousResponse(const Stage& stage, std::size_t)
   system.setResponse(model->stiffness_damping / stage.tau_v, &strain_reference);
 }
 
+/// For frames that are carried from a stage inside the step to its end, by TR-BDF2: the strain at the stage's time by the
+/// trapezoidal rule (the stage's own strain is a point on a chord, one order worse), then the two-step backward difference. Second
+/// order, and damped however fast the frames relax.
+void RodStepper::Impl::setViscousResponseAtEnd(const Stage& stage, double h)
+{
+  const double c = plan.fraction, r = (1 - c) / c, weight = (1 + r) * (1 + r) / (1 + 2 * r);
+  strain_end = strain_start + (0.5 * c * h) * (work.strain_rate + (strain_stage - strain_reference) / stage.tau_v);
+  strain_end = weight * strain_end - (weight - 1) * strain_start;
+  system.setResponse(model->stiffness_damping * (1 + 2 * r) / ((1 + r) * (1 - c) * h), &strain_end);
+}
+
 void RodStepper::Impl::finishStrainHistory(const Stage& stage)
 {
   system.strains(strain_end);
@@ -40,6 +51,8 @@ void RodStepper::Impl::finishStrainHistory(const Stage& stage)
   if (time.integrator == Integrator::bdf2)
     next.strain_previous = strain_start;
   system.setResponse(0.0, nullptr);
+  if (plan.fraction != 1.0)
+    end_evaluation = system.evaluate(false);   // elastic alone
 }
 
 }  // namespace slender
