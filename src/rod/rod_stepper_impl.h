@@ -51,14 +51,15 @@ private:
 
   // rod_viscous.cpp: strain history of Rayleigh stiffness damping
   void startStrainHistory(const RodInputs& inputs, double duration, double t);
-  void setViscousResponse(const Stage& stage, std::size_t index);
+  void setViscousResponse(const Stage& stage, double h);
+  void setViscousResponseAtEnd(const Stage& stage, double h);
   void finishStrainHistory(const Stage& stage);
 
   const std::vector<GraspState>* origin = nullptr;
   RodState work, next;              ///< start and end of a substep
   StepPlan plan;
   Eigen::Matrix3Xd stage_q, stage_v;
-  Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end;
+  Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end, strain_sag;
   std::vector<Pose> stage_poses;
 };
 
