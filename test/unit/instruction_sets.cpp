@@ -74,7 +74,7 @@ TEST(InstructionSets, BandKernelsAgree)
     AlignedVector<RodPanel> reference = original;
     BandCarry carry;
     Eigen::VectorXd x = b, x8 = b8, by_pieces = b;
-    baseline::band_kernels.eliminate(reference.data(), 0, blocks, by_pieces.data(), carry);
+    baseline::band_kernels.eliminate(reference.data(), reference.data(), 0, blocks, by_pieces.data(), carry);
     baseline::band_kernels.substitute(reference.data(), blocks, by_pieces.data());
     EXPECT_EQ(carry.negative, (d.array() < 0).count());
     EXPECT_EQ(carry.zero, 0);
@@ -85,7 +85,7 @@ TEST(InstructionSets, BandKernelsAgree)
       AlignedVector<RodPanel> panels = original;
       BandCarry other;
       Eigen::VectorXd y = b, y8 = b8, y_pieces = b;
-      table->eliminate(panels.data(), 0, blocks, y_pieces.data(), other);
+      table->eliminate(panels.data(), panels.data(), 0, blocks, y_pieces.data(), other);
       table->substitute(panels.data(), blocks, y_pieces.data());
       EXPECT_EQ(other.negative, carry.negative) << name;
       table->solve(panels.data(), blocks, y.data());
@@ -98,7 +98,7 @@ TEST(InstructionSets, BandKernelsAgree)
       broken(n - 2, n - 2) = 0.0;
       AlignedVector<RodPanel> singular = panelsOf(broken);
       BandCarry stopped;
-      table->eliminate(singular.data(), 0, blocks, nullptr, stopped);
+      table->eliminate(singular.data(), singular.data(), 0, blocks, nullptr, stopped);
       EXPECT_EQ(stopped.zero, 1) << name;
     }
   }
@@ -117,7 +117,7 @@ RodEvaluation sweep(const RodKernels& table, const RodArrays& a, RodPanel* panel
   for (int done = 0; done < a.nodes;)
   {
     const int before = done;
-    done = table.advance(a, sweep, panels, a.closed ? a.nodes : std::min(done + piece, a.nodes));
+    done = table.advance(a, sweep, panels, 0, a.closed ? a.nodes : std::min(done + piece, a.nodes));
     if (done <= before)
     {
       ADD_FAILURE() << "the sweep stands still at node " << done;
@@ -139,10 +139,9 @@ Output evaluate(const RodKernels& table, const RodSystem& system, int piece)
   out.angles << Eigen::Map<Eigen::VectorXd>(a.theta_diagonal, edges), Eigen::Map<Eigen::VectorXd>(a.theta_off, edges);
   out.with = sweep(table, a, panels.data(), piece);
   out.gradient = Eigen::Map<Eigen::VectorXd>(a.gradient, 4 * n);
-  out.frames.resize(9 * edges);
+  out.frames.resize(6 * edges);
   for (int k = 0; k < 3; ++k)
-    out.frames.segment(3 * k * edges, 3 * edges) << Eigen::Map<Eigen::VectorXd>(a.t[k], edges), Eigen::Map<Eigen::VectorXd>(a.d1[k], edges),
-        Eigen::Map<Eigen::VectorXd>(a.d2[k], edges);
+    out.frames.segment(2 * k * edges, 2 * edges) << Eigen::Map<Eigen::VectorXd>(a.t[k], edges), Eigen::Map<Eigen::VectorXd>(a.d1[k], edges);
   out.strains.resize(3 * n + edges);
   out.strains << Eigen::Map<Eigen::VectorXd>(a.kappa1, n), Eigen::Map<Eigen::VectorXd>(a.kappa2, n), Eigen::Map<Eigen::VectorXd>(a.twist, n),
       Eigen::Map<Eigen::VectorXd>(a.strain, edges);
