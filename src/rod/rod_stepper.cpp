@@ -298,7 +298,7 @@ StepFailure RodStepper::Impl::implicitStep(const RodInputs& inputs, double durat
     }
     placeAt(inputs, duration, (t + stage.time * h) / duration);
     if (viscous)
-      setViscousResponse(stage, s);
+      setViscousResponse(stage, h);
     const NewtonResult newton = minimize(system, time.newton);
     report.iterations += newton.iterations;
     report.factorizations += newton.factorizations;

@@ -51,7 +51,7 @@ private:
 
   // rod_viscous.cpp: strain history of Rayleigh stiffness damping
   void startStrainHistory(const RodInputs& inputs, double duration, double t);
-  void setViscousResponse(const Stage& stage, std::size_t index);
+  void setViscousResponse(const Stage& stage, double h);
   void setViscousResponseAtEnd(const Stage& stage, double h);
   void finishStrainHistory(const Stage& stage);
 
@@ -60,7 +60,7 @@ private:
   StepPlan plan;
   RodEvaluation end_evaluation;     ///< at the end of a substep whose stage lies inside it
   Eigen::Matrix3Xd stage_q, stage_v;
-  Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end;
+  Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end, strain_sag;
   std::vector<Pose> stage_poses;
 };
 

@@ -15,9 +15,17 @@ void RodStepper::Impl::startStrainHistory(const RodInputs& inputs, double durati
     work.strain_rate_previous = work.strain_rate;
 }
 
-void RodStepper::Impl::setViscousResponse(const Stage& stage, std::size_t)
+/// A stage inside the step lies on the chord between the step's ends, but its strain does not lie on the chord of their strains, which
+/// is what its backward difference means. That sag, second order in the step, is taken from the step before.
+void RodStepper::Impl::setViscousResponse(const Stage& stage, double h)
 {
   const Combination& c = stage.q_tilde;
+  if (plan.fraction == 1.0)
+    strain_sag.setZero(4, 0);
+  else if (work.last_step > 0 && work.strain_previous.cols() == strain_start.cols())
+    strain_sag = (h / work.last_step) * (h / work.last_step) * work.strain_previous;
+  else
+    strain_sag.setZero(4, strain_start.cols());
   strain_reference = c[kQ] * strain_start + c[kV] * work.strain_rate;
   if (c[kA] != 0 && work.last_step > 0)
     strain_reference += (c[kA] / work.last_step) * (work.strain_rate - work.strain_rate_previous);
@@ -25,6 +33,8 @@ void RodStepper::Impl::setViscousResponse(const Stage& stage, std::size_t)
     strain_reference += c[kQPrevious] * (work.strain_previous.cols() == strain_start.cols() ? work.strain_previous : strain_start);
   if (c[kQStage] != 0)
     strain_reference += c[kQStage] * strain_stage;
+  if (strain_sag.cols() > 0)
+    strain_reference += strain_sag;
   system.setResponse(model->stiffness_damping / stage.tau_v, &strain_reference);
 }
 
@@ -42,11 +52,15 @@ void RodStepper::Impl::setViscousResponseAtEnd(const Stage& stage, double h)
 void RodStepper::Impl::finishStrainHistory(const Stage& stage)
 {
   system.strains(strain_end);
-  // strain_end is that of the stage unless the stage lies inside the step
-  if (plan.fraction == 1.0)
+  const double c = plan.fraction;
+  if (c == 1.0)
     next.strain_rate = (strain_end - strain_reference) / stage.tau_v;
   else
-    next.strain_rate = work.strain_rate + ((strain_start + plan.fraction * (strain_end - strain_start) - strain_reference) / stage.tau_v - work.strain_rate) / plan.fraction;
+  {
+    next.strain_previous = (1 - c) * strain_start + c * strain_end;   // the chord at the stage's time
+    next.strain_rate = work.strain_rate + ((next.strain_previous + strain_sag - strain_reference) / stage.tau_v - work.strain_rate) / c;
+    next.strain_previous = strain_stage - next.strain_previous;
+  }
   next.strain_rate_previous = work.strain_rate;
   if (time.integrator == Integrator::bdf2)
     next.strain_previous = strain_start;

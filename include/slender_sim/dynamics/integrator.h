@@ -37,8 +37,6 @@ struct StepPlan
 ///  - tr_bdf2: trapezoid to gamma h, then BDF2, gamma = 2 - sqrt 2; second order, L-stable [Bank et al. 1985; Hosea & Shampine 1996].
 ///  - implicit_midpoint: second order, symplectic, no damping at infinite frequency.
 ///  - generalized_alpha: second order, damping at infinite frequency by spectral_radius (1: midpoint-like, 0: most) [Chung & Hulbert 1993].
-/// Stages of the last two lie inside the step, where a strain's backward difference is that of a chord: Rayleigh stiffness damping
-/// is only first order accurate with them.
 void planStep(Integrator integrator, double spectral_radius, double h, double previous_step, StepPlan& plan);
 
 /// Constant C in the local position error C h^2 |a1 - a0| (second order) or C h^2 |a1| (implicit Euler).

@@ -41,7 +41,7 @@ struct RodState
   Eigen::Matrix3Xd x_previous, v_previous;      ///< multistep methods
   /// With Rayleigh stiffness damping only: per node, then two per grasp, (stretch of the edge after the node, kappa1, kappa2, twist).
   Eigen::Matrix4Xd strain_rate, strain_rate_previous;   ///< [1/s]
-  Eigen::Matrix4Xd strain_previous;                     ///< one step ago
+  Eigen::Matrix4Xd strain_previous;   ///< multistep methods: one step ago; a stage inside the step: its strain less the step's chord
 
   /// Forgets the integrator's memory: after a grasp was taken or released, or the state was edited.
   void forgetHistory()
