@@ -41,10 +41,11 @@ double RodSystem::solveFrames()
   }
   u[0] = gamma;
   u[edges - 1] = corner;
+  // in the measure of the twisting, not of the bending: that may be stiffer by any factor
+  const double floor = std::max(1e-3 * *std::max_element(a_.beta, a_.beta + a_.nodes), 1e-12 * shift_theta_);
   for (int j = 0; j < edges; ++j)
   {
     // twisting alone makes the angles' matrix positive; a curved rod's may not be, then the pivot is lifted
-    const double floor = 1e-3 * shift_theta_;
     if (d[j] < floor)
       d[j] = floor;
     if (j + 1 < edges)
