@@ -54,7 +54,8 @@ public:
   /// Static equilibrium under the inputs, reached by continuation; velocities become zero.
   StepReport solveEquilibrium(RodState& state, const RodInputs& inputs);
 
-  /// Of the last successful step() or solveEquilibrium(); one per grasp, zero for inactive ones.
+  /// Of the last successful step() or solveEquilibrium(); one per grasp, zero for inactive ones. They belong to the instant at which
+  /// the step balances forces: its end, but its middle for implicit_midpoint and 1 / (1 + spectral_radius) of it for generalized_alpha.
   const std::vector<Wrench>& wrenches() const;
 
   RodEnergies energies(const RodState& state, const Eigen::Vector3d& gravity) const;
