@@ -44,6 +44,7 @@ private:
   std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
 
   // rod_statics.cpp
+  void carryFreeNodes(const RodInputs& inputs, double weight);
   StepReport finishEquilibrium(RodState& state, const RodInputs& inputs, StepReport& report);
 
   // rod_explicit.cpp
