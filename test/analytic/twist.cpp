@@ -77,6 +77,23 @@ TEST(Twist, StaticTorqueOfAnUnevenRod)
   EXPECT_LT(stepper.wrenches()[0].force.norm(), 1e-9);
 }
 
+TEST(Twist, StaticTurnsAddUp)
+{
+  // ten static solutions, each almost half a turn on: no turn is lost or gained
+  const double twist = 1e-3, turn = 3.1;
+  Rod rod = straightRod(21, 1.0, modulusSection(1.0, twist, 1e4, 1.0));
+  rod.hold(0, 0);
+  rod.hold(20, 20);
+  RodStepper stepper(rod.model, TimeConfig{});
+  for (int k = 1; k <= 10; ++k)
+  {
+    rod.inputs.grasps[1].X_WG.orientation = Eigen::AngleAxisd(turn * k, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
+    const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
+    ASSERT_TRUE(report.ok) << report.message;
+    EXPECT_NEAR(stepper.wrenches()[0].torque.x(), twist * turn * k, 1e-9) << k;
+  }
+}
+
 TEST(Twist, ATwistedRingPressesOnNothingButItself)
 {
   // A planar ring with whole turns of twist: uniform twist 2 pi k / n, torque beta 2 pi k / L, elastic energy (2 pi k)^2 beta / (2 L).
