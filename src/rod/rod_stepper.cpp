@@ -134,6 +134,7 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
     energy = mechanicalEnergy(work, inputs, system.evaluate(false), &allowance);
   }
   double t = 0.0, h = adaptive && work.next_step > 0 ? work.next_step : duration;
+  int cuts = 0;   // since the last good substep
   while (t < duration)
   {
     // the last substep ends exactly with the step; a sliver would be worse than a slightly longer one
@@ -150,13 +151,15 @@ StepReport RodStepper::Impl::step(RodState& state, const RodInputs& inputs, doub
     {
       report.iterations += sub.iterations;
       report.factorizations += sub.factorizations;
-      if (!inaccurate && (!can_shorten || length < duration * std::ldexp(1.0, -time.newton.max_cuts)))
+      const bool shortest = !adaptive && 0.5 * length < duration * std::ldexp(1.0 - 1e-9, -time.newton.max_cuts);
+      if (!inaccurate && (!can_shorten || shortest || ++cuts > time.newton.max_cuts))
         return refuse(report, failure, explainFailure(failure, length, explicit_step));
       report.cut_steps += !inaccurate;
       h = length * (inaccurate ? std::clamp(stepFactor(ratio), 0.2, 0.8) : 0.5);
       continue;
     }
     std::swap(work, next);
+    cuts = 0;
     ++sub.substeps;
     report.merge(sub);
     t = last ? duration : t + length;
