@@ -201,6 +201,30 @@ TEST(RigidBodies, DrivenBodyCarriesItsRod)
   EXPECT_LT((stepper.wrenches()[0].force - group.wrenches(0)[0].force).norm(), 1e-9 * stepper.wrenches()[0].force.norm());
 }
 
+TEST(RigidBodies, HangingBodyAtRest)
+{
+  // a rope between a wall and a body that hangs from another: forces balance, the wall carries the weights
+  const RodSection section = modulusSection(1e-3, 1e-3, 200.0, 0.05);
+  Rod rope = straightRod(21, 0.6, section);
+  rope.inputs.gravity << 0, 0, -9.81;
+  rope.hold(0, 0);
+  Group g;
+  g.addRod(rope);
+  const double mass = 0.08;
+  g.weld(0, 20, 20, g.addBody(bodyOf(mass, {1e-5, 1e-5, 1e-5}), {Vector3d(0.61, 0, 0), Eigen::Quaterniond::Identity()}));
+  RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  const StepReport report = group.solveEquilibrium(g.state, g.inputs);
+  ASSERT_TRUE(report.ok) << report.message;
+  const double weight = 9.81 * (mass + rope.model->totalMass());
+  EXPECT_NEAR(group.wrenches(0)[0].force.z(), -weight, 1e-6 * weight);
+  EXPECT_LT(group.wrenches(0)[0].force.head<2>().norm(), 1e-6 * weight);
+  EXPECT_LT(g.state.bodies[0].X_WB.position.z(), -0.5);
+  // and a step from there moves nothing
+  const Vector3d at = g.state.bodies[0].X_WB.position;
+  ASSERT_TRUE(group.step(g.state, g.inputs, 0.01).ok);
+  EXPECT_LT((g.state.bodies[0].X_WB.position - at).norm(), 1e-9);
+}
+
 TEST(RigidBodies, ImpossibleInertiaIsRefused)
 {
   EXPECT_THROW(checkBody(bodyOf(1.0, {1, 1, 3})), std::invalid_argument);

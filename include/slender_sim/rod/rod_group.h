@@ -63,6 +63,9 @@ public:
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(RodGroupState& state, const RodGroupInputs& inputs, double duration);
 
+  /// Equilibrium under the inputs, without friction: implicit Euler steps that grow, from rest each time. Velocities become zero.
+  StepReport solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs);
+
   /// Throws std::invalid_argument when something touches or crosses in this state, naming what.
   void checkClearance(const RodGroupState& state);
   /// Smallest distance between surfaces [m], up to the gap at which they repel.
