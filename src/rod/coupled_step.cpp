@@ -41,9 +41,15 @@ ContactSurface contactSurface(const RodGroupModel& model)
     surface.points += m.nodes();
   }
   for (const GroupContact::Obstacle& o : model.contact.obstacles)
-    surface.solids.push_back({o.shape, o.friction, -1});
+    surface.solids.push_back({o.shape, o.friction, {}});
   for (const GroupContact::Body& b : model.contact.bodies)
-    surface.solids.push_back({b.shape, b.friction, -1});
+  {
+    surface.solids.push_back({b.shape, b.friction, {}});
+    for (std::size_t k = 0; k < model.contact.rods.size(); ++k)   // what is welded to a body starts inside it
+      for (const Weld& weld : model.welds)
+        if (weld.body == b.body && weld.rod == model.contact.rods[k].rod)
+          surface.solids.back().ignores.push_back(static_cast<int>(k));
+  }
   return surface;
 }
 
@@ -229,10 +235,9 @@ NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, doub
   if (!contact_)
     return minimize(*this, newton);
   contact_->begin(points_base_, solids_base_, (now - before) * h);
-  contact_->evaluate(points_base_, solids_base_, false);
-  contact_->lagFriction();
   if (s == 0)
   {
+    contact_->evaluate(points_base_, solids_base_, false);
     // the pattern follows from the state alone, so that a run that was stopped goes on bit by bit
     std::vector<std::array<int, 5>> before_keys;
     before_keys.swap(keys_);
