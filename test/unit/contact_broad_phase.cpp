@@ -78,7 +78,14 @@ TEST(BroadPhase, CandidatesKeptFromEarlierCallsChangeNothing)
   surface.solids.push_back({Sphere{0.03}, -1.0, {}});
   surface.solids.push_back({Box{{0.2, 0.1, 0.1}}, -1.0, {}});
   surface.solids.push_back({Capsule{5e-4, 0.3}, -1.0, {}});
-  std::vector<Pose> poses(3);
+  const auto mesh = std::make_shared<TriangleMesh>();   // a roof
+  mesh->vertices.resize(3, 4);
+  mesh->vertices << -0.05, 0.05, 0.05, -0.05, 0, 0.01, 0.08, 0.08, 0, 0, 0, 0.02;
+  mesh->triangles.resize(3, 2);
+  mesh->triangles << 0, 0, 1, 2, 2, 3;
+  surface.solids.push_back({mesh, -1.0, {}});
+  std::vector<Pose> poses(4);
+  poses[3].position = {0, -0.02, -0.02};
   poses[0].position = {-0.05, 0.02, 0.1};
   poses[1].position = {0.0, 0.0, 0.3};
   poses[2].position = {0.015, 0.06, 0.1};
@@ -101,7 +108,7 @@ TEST(BroadPhase, CandidatesKeptFromEarlierCallsChangeNothing)
     ASSERT_GT(share, 0.0) << k;
     limited += share < 1.0;
     x += share * (end - x);
-    for (int s = 0; s < 3; ++s)
+    for (std::size_t s = 0; s < poses.size(); ++s)
       poses[s] = RigidMotion(poses[s], poses_end[s]).at(share);
     ASSERT_GT(kept.clearance(x, poses), 0.0) << k;
     ContactPotential fresh(surface, options);
