@@ -16,8 +16,8 @@
 /// contact moves continuously, and G is continuously differentiable with the gradient n / phi (that at fixed s, t). G vanishes exactly where
 /// the pieces meet, and g_min <= G <= g_min / (1 - c)^2. With one parameter (a segment against a convex solid) phi = 1 - c (2t-1)^2.
 ///
-/// Where a contact slides across a node, the two segments there share it. Close to the ends, 1/phi = 1.47 makes each of them carry about
-/// half of the force that one carries in its middle: sliding over nodes changes the gap by less than 3 % of the barrier's reach.
+/// Where a contact slides across a node, both segments there carry it, each with the softened gap 1.47 g, so that the height of a rod that
+/// slides over another's nodes under a constant load changes by less than 8 % of the barrier's reach (13 % as c goes to 0).
 namespace slender {
 
 constexpr double kSoftness = 0.32;   ///< c
