@@ -12,6 +12,7 @@ void runTorsion(StudyContext&);
 void runRodScaling(StudyContext&);
 void runImplicitVsExplicit(StudyContext&);
 void runRodStability(StudyContext&);
+void runRodContactSafety(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -25,6 +26,7 @@ const std::vector<Study>& studies()
       {"rod_scaling", "time per Newton iteration and node from 50 to 100,000 nodes", runRodScaling},
       {"rod_implicit_vs_explicit", "hair strand: stable steps and cost of implicit against explicit integration", runImplicitVsExplicit},
       {"rod_stability", "extreme stiffness, thickness, steps, twist and grasps: done, cut or refused with reason", runRodStability},
+      {"rod_contact_safety", "1,000 random knots, heaps and whips: an independent check finds no penetration after any step", runRodContactSafety},
   };
   return all;
 }
