@@ -39,7 +39,6 @@ void check(const RodGroupModel& model)
     if (!good)
       throw std::invalid_argument(what);
   };
-  need(!model.rods.empty(), "a group needs at least one rod");
   for (const RigidBodyModel& body : model.bodies)
     checkBody(body);
   const int rods = static_cast<int>(model.rods.size()), bodies = static_cast<int>(model.bodies.size());

@@ -99,7 +99,14 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
       report.factorizations += sub.factorizations;
       const bool shortest = !adaptive && 0.5 * length < duration * std::ldexp(1.0 - 1e-9, -time_.newton.max_cuts);
       if (!inaccurate && (!can_shorten || shortest || ++cuts > time_.newton.max_cuts))
-        return rods_[failed_]->refuse(report, failure, rods_[failed_]->explainFailure(failure, length, explicit_step));
+      {
+        if (!rods_.empty())
+          return rods_[failed_]->refuse(report, failure, rods_[failed_]->explainFailure(failure, length, explicit_step));
+        report.ok = false;
+        report.failure = failure;
+        report.message = "the bodies' motion was not found: use a shorter step";
+        return report;
+      }
       report.cut_steps += !inaccurate;
       h = length * (inaccurate ? std::clamp(stepFactor(ratio), 0.2, 0.8) : 0.5);
       continue;

@@ -100,7 +100,8 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   assign(scene.wind, wind_map.get("velocity").vector3(speed));
   wind_map.finish();
   assign(scene.start, map.get("start").choice<Start>({{"as_given", Start::as_given}, {"equilibrium", Start::equilibrium}}));
-  scene.time = readTime(map.get("time"));
+  const YamlCursor time = map.get("time");
+  scene.time = readTime(time);
   YamlMap record(map.get("record"));
   assign(scene.record.every, record.get("every").integer(1, 1'000'000'000, "steps"));
   record.finish();
@@ -112,9 +113,15 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   scene.contact = readContact(map.get("contact"), parts);
   scene.obstacles = readObstacles(obstacles, context);
   scene.bodies = readBodies(bodies, context, parts);
+  bool touches = false;
   for (RodPart& part : parts)
   {
+    touches = touches || part.config.contact;
     scene.rods.push_back(std::move(part.config));
+  }
+  if (touches && !YamlMap(time).has("integrator"))
+  {
+    scene.time.integrator = Integrator::implicit_euler;   // methods of second order carry an impact's velocity on and bounce
   }
   const auto entries = [](const YamlCursor& list) { return list.isList() ? list.items() : std::vector<YamlCursor>{}; };
   checkSolids(scene, entries(obstacles), entries(bodies), entries(rods));

@@ -22,6 +22,8 @@ Pose sectionOffset(const Pose& X_WM, const Pose& X_WG) { return X_WM.inverse() *
 Simulation::Simulation(SceneConfig config) : config_(std::move(config))
 {
   buildRods();
+  buildBodies();
+  buildGroup();
   state_.grasp_offsets.resize(grasps_.size());
   state_.wrenches.resize(grasps_.size());
   for (std::size_t g = 0; g < grasps_.size(); ++g)
@@ -29,6 +31,22 @@ Simulation::Simulation(SceneConfig config) : config_(std::move(config))
     if (const auto* table = std::get_if<TableMotion>(&grasps_[g].config->motion))
     {
       setOffset(static_cast<int>(g), table->poses.evaluate(table->poses.firstTime()));
+    }
+    else if (const auto* body = std::get_if<BodyMotion>(&grasps_[g].config->motion))
+    {
+      SceneInputs there;
+      for (const RigidBodyState& b : state_.bodies)
+      {
+        there.bodies.push_back({b.X_WB, {}});
+      }
+      for (const Pose& pose : state_.obstacles)
+      {
+        there.obstacles.push_back({pose, {}});
+      }
+      if (const GraspTarget* frame = followed(*body, there))
+      {
+        setOffset(static_cast<int>(g), frame->X_WG);
+      }
     }
   }
   if (config_.start == Start::equilibrium)
@@ -74,7 +92,7 @@ void Simulation::buildRods()
         state.grasps.push_back(makeGrasp(model, state, grasp.first_node, grasp.last_node, grasp.hold == Hold::frame));
         grasps_.push_back({static_cast<int>(r), static_cast<int>(g), &grasp});
       }
-      steppers_.emplace_back(std::make_shared<const RodModel>(std::move(model)), config_.time);
+      models_.push_back(std::make_shared<const RodModel>(std::move(model)));
       state_.rods.push_back(std::move(state));
     }
     catch (const std::invalid_argument& error)
@@ -86,15 +104,23 @@ void Simulation::buildRods()
 
 void Simulation::findEquilibrium()
 {
-  const std::vector<RodInputs> inputs = rodInputs(inputsAt(0.0));
-  for (std::size_t r = 0; r < steppers_.size(); ++r)
+  const SceneInputs inputs = inputsAt(0.0);
+  fillRodInputs(inputs);
+  StepReport report;
+  for (std::size_t r = 0; r < steppers_.size() && report.ok; ++r)
   {
-    const StepReport report = steppers_[r].solveEquilibrium(state_.rods[r], inputs[r]);
-    if (!report.ok)
+    if (steppers_[r])
     {
-      throw SimulationError("no equilibrium to start from: " + report.message +
-                            " (start: as_given starts from the shape in the scene)");
+      report = steppers_[r]->solveEquilibrium(state_.rods[r], rod_inputs_[r]);
     }
+  }
+  if (report.ok && group_)
+  {
+    report = stepGroup(inputs, true);
+  }
+  if (!report.ok)
+  {
+    throw SimulationError("no equilibrium to start from: " + report.message + " (start: as_given starts from the shape in the scene)");
   }
   takeWrenches();
 }
@@ -103,6 +129,22 @@ SceneInputs Simulation::inputsAt(double time) const
 {
   SceneInputs inputs;
   inputs.wind = config_.wind;
+  const auto given = [time](const GivenMotion& motion, const Pose& now) {
+    GraspTarget target{now, Twist{}};
+    if (const auto* table = std::get_if<TableMotion>(&motion))
+    {
+      target.X_WG = table->poses.evaluate(time, &*target.velocity);
+    }
+    return target;
+  };
+  for (std::size_t b = 0; b < config_.bodies.size(); ++b)
+  {
+    inputs.bodies.push_back(given(config_.bodies[b].motion.value_or(FixedMotion{}), state_.bodies[b].X_WB));
+  }
+  for (std::size_t k = 0; k < config_.obstacles.size(); ++k)
+  {
+    inputs.obstacles.push_back(given(config_.obstacles[k].motion, state_.obstacles[k]));
+  }
   inputs.grasps.reserve(grasps_.size());
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
@@ -149,82 +191,122 @@ void Simulation::setOffset(int grasp, const Pose& X_WM)
   }
 }
 
-std::vector<RodInputs> Simulation::rodInputs(const SceneInputs& inputs) const
+void Simulation::checkInputs(const SceneInputs& inputs) const
 {
-  if (inputs.grasps.size() != grasps_.size())
+  const auto check = [](const char* name, std::size_t given, std::size_t expected, const char* of) {
+    if (given != expected)
+    {
+      throw std::invalid_argument(std::string("inputs.") + name + " has " + std::to_string(given) + " targets; must have " +
+                                  std::to_string(expected) + ", one per " + of + " of the scene");
+    }
+  };
+  check("grasps", inputs.grasps.size(), grasps_.size(), "grasp");
+  check("bodies", inputs.bodies.size(), config_.bodies.size(), "body");
+  check("obstacles", inputs.obstacles.size(), config_.obstacles.size(), "obstacle");
+}
+
+void Simulation::fillRodInputs(const SceneInputs& inputs)
+{
+  checkInputs(inputs);
+  rod_inputs_.resize(models_.size());
+  for (std::size_t r = 0; r < models_.size(); ++r)
   {
-    throw std::invalid_argument("inputs.grasps has " + std::to_string(inputs.grasps.size()) + " targets; must have " +
-                                std::to_string(grasps_.size()) + ", one per grasp of the scene");
-  }
-  std::vector<RodInputs> rods(steppers_.size());
-  for (RodInputs& rod : rods)
-  {
-    rod.gravity = config_.gravity;
-    rod.wind = inputs.wind;
+    rod_inputs_[r].gravity = config_.gravity;
+    rod_inputs_[r].wind = inputs.wind;
+    rod_inputs_[r].grasps.resize(state_.rods[r].grasps.size());   // welds last: the group fills them
   }
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
-    rods[grasps_[g].rod].grasps.push_back(inputs.grasps[g]);   // grasps_ is in the order of the rods' own grasps
+    GraspTarget& target = rod_inputs_[grasps_[g].rod].grasps[grasps_[g].index];
+    const auto* body = std::get_if<BodyMotion>(&grasps_[g].config->motion);
+    const GraspTarget* frame = body && graspState(static_cast<int>(g)).active ? followed(*body, inputs) : nullptr;
+    target = frame ? targetOf(static_cast<int>(g), frame->X_WG, frame->velocity) : inputs.grasps[g];
   }
-  return rods;
 }
 
 StepReport Simulation::step(const SceneInputs& inputs)
 {
-  const std::vector<RodInputs> rod_inputs = rodInputs(inputs);
-  const int count = static_cast<int>(steppers_.size());
-  std::vector<StepReport> reports(steppers_.size());
-  if (count == 1)
+  fillRodInputs(inputs);
+  // One part's failure must leave the others where they were, too.
+  const bool several = models_.size() > 1 && !(group_ && group_rods_.size() == models_.size());
+  const std::vector<RodState> before = several ? state_.rods : std::vector<RodState>();
+  StepReport total;
+  try
   {
-    reports[0] = steppers_[0].step(state_.rods[0], rod_inputs[0], config_.time.step);   // leaves the state alone if it fails
+    total = stepAll();
+    if (total.ok && group_)
+    {
+      total.merge(stepGroup(inputs, false));
+    }
   }
-  else
+  catch (...)
   {
-    // One rod's failure must leave the others where they were, too.
-    const std::vector<RodState> before = state_.rods;
-    std::vector<std::exception_ptr> errors(steppers_.size());
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) if (threads_ != 1) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
-#endif
-    for (int r = 0; r < count; ++r)
-    {
-      try
-      {
-        reports[r] = steppers_[r].step(state_.rods[r], rod_inputs[r], config_.time.step);
-      }
-      catch (...)
-      {
-        errors[r] = std::current_exception();   // must not leave the parallel region
-      }
-    }
-    bool good = true;
-    for (int r = 0; r < count; ++r)
-    {
-      good = good && reports[r].ok && !errors[r];
-    }
-    if (!good)
+    if (several)
     {
       state_.rods = before;
     }
-    for (const std::exception_ptr& error : errors)
-    {
-      if (error)
-      {
-        std::rethrow_exception(error);
-      }
-    }
+    throw;
   }
+  if (!total.ok)
+  {
+    if (several)
+    {
+      state_.rods = before;
+    }
+    return total;
+  }
+  moveGiven(inputs);
+  ++state_.steps;
+  state_.time = static_cast<double>(state_.steps) * config_.time.step;   // no sum of round-off
+  takeWrenches();
+  return total;
+}
 
+/// Rods on their own, in parallel.
+StepReport Simulation::stepAll()
+{
   StepReport total;
+  const int count = static_cast<int>(steppers_.size());
+  if (count == 1)
+  {
+    if (steppers_[0])
+    {
+      total.merge(steppers_[0]->step(state_.rods[0], rod_inputs_[0], config_.time.step));
+    }
+    return total;
+  }
+  std::vector<StepReport> reports(steppers_.size());
+  std::vector<std::exception_ptr> errors(steppers_.size());
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic) if (threads_ != 1) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
+#endif
   for (int r = 0; r < count; ++r)
   {
-    total.merge(reports[r]);
+    try
+    {
+      if (steppers_[r])
+      {
+        reports[r] = steppers_[r]->step(state_.rods[r], rod_inputs_[r], config_.time.step);
+      }
+    }
+    catch (...)
+    {
+      errors[r] = std::current_exception();   // must not leave the parallel region
+    }
   }
-  if (total.ok)
+  for (const std::exception_ptr& error : errors)
   {
-    ++state_.steps;
-    state_.time = static_cast<double>(state_.steps) * config_.time.step;   // no sum of round-off
-    takeWrenches();
+    if (error)
+    {
+      std::rethrow_exception(error);
+    }
+  }
+  for (int r = 0; r < count; ++r)
+  {
+    if (steppers_[r])
+    {
+      total.merge(reports[r]);
+    }
   }
   return total;
 }
@@ -236,13 +318,18 @@ void Simulation::setThreads(int threads)
     throw std::invalid_argument("threads = " + std::to_string(threads) + "; must be at least 1");
   }
   threads_ = threads;
+  if (group_)
+  {
+    group_->setThreads(threads);
+  }
 }
 
 void Simulation::takeWrenches()
 {
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
-    state_.wrenches[g] = steppers_[grasps_[g].rod].wrenches()[grasps_[g].index];
+    const int rod = grasps_[g].rod;
+    state_.wrenches[g] = (steppers_[rod] ? steppers_[rod]->wrenches() : group_->wrenches(group_index_[rod]))[grasps_[g].index];
   }
 }
 
@@ -277,8 +364,9 @@ void Simulation::attach(int grasp, int first_node, int last_node, Hold hold)
     const GraspState& held = rod.grasps[other];
     if (static_cast<int>(other) != ref.index && held.active && first_node <= held.last_node && held.first_node <= last_node)
     {
-      throw std::invalid_argument("grasp " + ref.config->name + ": " + nodes + " overlap grasp " +
-                                  config_.rods[ref.rod].grasps[other].name + ", which holds " + std::to_string(held.first_node) +
+      const auto& grasps = config_.rods[ref.rod].grasps;
+      throw std::invalid_argument("grasp " + ref.config->name + ": " + nodes + " overlap " +
+                                  (other < grasps.size() ? "grasp " + grasps[other].name : std::string("a weld")) + ", which holds " + std::to_string(held.first_node) +
                                   " to " + std::to_string(held.last_node));
     }
   }
@@ -304,6 +392,10 @@ const Wrench& Simulation::wrench(int grasp) const
   return state_.wrenches[grasp];
 }
 
-RodEnergies Simulation::energies(int rod) const { return steppers_.at(rod).energies(state_.rods.at(rod), config_.gravity); }
+RodEnergies Simulation::energies(int rod) const
+{
+  return steppers_.at(rod) ? steppers_[rod]->energies(state_.rods[rod], config_.gravity)
+                           : group_->energies(group_index_[rod], state_.rods[rod], config_.gravity);
+}
 
 }  // namespace slender

@@ -17,7 +17,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 1;
+constexpr std::uint64_t version = 2;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -34,6 +34,7 @@ void visitGrasp(Archive& archive, State& grasp)
   archive(grasp.first_node);
   archive(grasp.last_node);
   archive(grasp.holds_frame);
+  archive(grasp.body);
   visitPose(archive, grasp.X_WG);
   archive(grasp.velocity.linear);
   archive(grasp.velocity.angular);
@@ -77,6 +78,25 @@ void visitRod(Archive& archive, State& rod)
 }
 
 template <class Archive, class State>
+void visitTwist(Archive& archive, State& twist)
+{
+  archive(twist.linear);
+  archive(twist.angular);
+}
+
+template <class Archive, class State>
+void visitBody(Archive& archive, State& body)
+{
+  visitPose(archive, body.X_WB);
+  visitTwist(archive, body.velocity);
+  archive(body.has_history);
+  archive(body.linear_acceleration);
+  archive(body.angular_acceleration);
+  visitPose(archive, body.X_previous);
+  visitTwist(archive, body.velocity_previous);
+}
+
+template <class Archive, class State>
 void visitScene(Archive& archive, State& scene)
 {
   archive(scene.time);
@@ -86,6 +106,22 @@ void visitScene(Archive& archive, State& scene)
   {
     visitRod(archive, rod);
   }
+  archive.list(scene.bodies);
+  for (auto& body : scene.bodies)
+  {
+    visitBody(archive, body);
+  }
+  archive.list(scene.obstacles);
+  for (auto& pose : scene.obstacles)
+  {
+    visitPose(archive, pose);
+  }
+  archive.list(scene.obstacle_velocities);
+  for (auto& velocity : scene.obstacle_velocities)
+  {
+    visitTwist(archive, velocity);
+  }
+  archive(scene.contact_stiffness);
   archive.list(scene.grasp_offsets);
   for (auto& offset : scene.grasp_offsets)
   {
@@ -189,9 +225,9 @@ std::uint64_t Simulation::fingerprint() const
   out(time.newton.tolerance);
   out(time.newton.max_iterations);
   out(time.newton.max_cuts);
-  for (std::size_t r = 0; r < steppers_.size(); ++r)
+  for (std::size_t r = 0; r < models_.size(); ++r)
   {
-    const RodModel& model = steppers_[r].model();
+    const RodModel& model = *models_[r];
     text(model.name);
     out(model.closed);
     for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a, &model.radius_b,
@@ -208,7 +244,26 @@ std::uint64_t Simulation::fingerprint() const
       text(grasp.name);
       out(static_cast<int>(grasp.attach));
     }
+    const RodContact touch = config_.rods[r].contact.value_or(RodContact{});
+    out(config_.rods[r].contact.has_value());
+    out(touch.self);
+    out(touch.rods);
+    out(touch.obstacles);
+    out(touch.friction);
   }
+  for (const BodyConfig& body : config_.bodies)
+  {
+    text(body.name);
+    out(body.motion.has_value());
+    out(body.mass);
+    out(body.inertia);
+    out(static_cast<std::uint64_t>(body.welds.size()));
+  }
+  for (const ObstacleConfig& obstacle : config_.obstacles)
+  {
+    text(obstacle.name);
+  }
+  out(config_.contact.gap);
   Checksum checksum;
   checksum.add(out.bytes().data(), out.bytes().size());
   return checksum.value();
@@ -292,14 +347,15 @@ void Simulation::load(const std::string& path)
     throw std::runtime_error(path + ": " + error.what());
   }
   std::string problem = reader.left() != 0 ? "has bytes after its end" : "";
-  if (loaded.rods.size() != steppers_.size() || loaded.grasp_offsets.size() != grasps_.size() ||
+  if (loaded.rods.size() != models_.size() || loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
+      loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||
       loaded.wrenches.size() != grasps_.size())
   {
-    problem = "has another number of rods or grasps";
+    problem = "has another number of rods, bodies, obstacles or grasps";
   }
-  for (std::size_t r = 0; problem.empty() && r < steppers_.size(); ++r)
+  for (std::size_t r = 0; problem.empty() && r < models_.size(); ++r)
   {
-    problem = misfit(loaded.rods[r], steppers_[r].model(), config_.rods[r].grasps.size());
+    problem = misfit(loaded.rods[r], *models_[r], state_.rods[r].grasps.size());
   }
   if (!problem.empty())
   {

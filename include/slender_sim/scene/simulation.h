@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "slender_sim/rod/rod_group.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
 
@@ -17,7 +18,11 @@ struct SceneState
 {
   double time = 0.0;          ///< simulated [s] = steps * step length
   std::uint64_t steps = 0;
-  std::vector<RodState> rods;
+  std::vector<RodState> rods;          ///< grasps of the scene first, then welds
+  std::vector<RigidBodyState> bodies;  ///< per body of the scene, driven ones included
+  std::vector<Pose> obstacles;
+  std::vector<Twist> obstacle_velocities;
+  double contact_stiffness = 0.0;      ///< of the barrier [N]
   /// Per grasp of the scene: the held section seen from the pose that drives it; identity with `attach: section`.
   std::vector<Pose> grasp_offsets;
   std::vector<Wrench> wrenches;   ///< per grasp of the scene, of the last step
@@ -34,6 +39,7 @@ public:
 struct SceneInputs
 {
   std::vector<GraspTarget> grasps;
+  std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
   Eigen::Vector3d wind{0, 0, 0};
 };
 
@@ -50,7 +56,11 @@ public:
 
   const SceneConfig& config() const { return config_; }
   const SceneState& state() const { return state_; }
-  const RodModel& rodModel(int rod) const { return steppers_[rod].model(); }
+  const RodModel& rodModel(int rod) const { return *models_[rod]; }
+  /// True for bodies that move by the forces on them; others are driven.
+  bool isSimulated(int body) const { return !config_.bodies[body].motion.has_value(); }
+  /// Contacts of the last step.
+  const std::vector<ContactTerm>& contacts() const;
   const std::vector<GraspRef>& grasps() const { return grasps_; }
 
   /// Inputs as the scene itself defines them at the end of the coming step: tables evaluated, everything else held where it is.
@@ -91,7 +101,18 @@ private:
   void buildRods();
   void findEquilibrium();
   SceneInputs inputsAt(double time) const;
-  std::vector<RodInputs> rodInputs(const SceneInputs& inputs) const;
+  void fillRodInputs(const SceneInputs& inputs);
+  void checkInputs(const SceneInputs& inputs) const;
+  StepReport stepAll();
+
+  // simulation_group.cpp: rods that bodies join or that touch something
+  void buildBodies();
+  void buildGroup();
+  void exchangeGroup();
+  StepReport stepGroup(const SceneInputs& inputs, bool to_equilibrium);
+  void moveGiven(const SceneInputs& inputs);
+  /// Of the frame that a grasp with a body's motion follows; null when the scene has no such body or obstacle.
+  const GraspTarget* followed(const BodyMotion& motion, const SceneInputs& inputs) const;
   GraspState& graspState(int grasp) { return state_.rods[grasps_[grasp].rod].grasps[grasps_[grasp].index]; }
   const GraspState& graspState(int grasp) const { return state_.rods[grasps_[grasp].rod].grasps[grasps_[grasp].index]; }
   void checkGrasp(int grasp) const;
@@ -100,7 +121,14 @@ private:
 
   SceneConfig config_;
   SceneState state_, initial_;
-  std::vector<RodStepper> steppers_;
+  std::vector<std::shared_ptr<const RodModel>> models_;
+  std::vector<std::optional<RodStepper>> steppers_;   ///< per rod; none for those of the group
+  std::optional<RodGroup> group_;
+  std::vector<int> group_rods_, group_bodies_;        ///< what of the scene is in the group
+  std::vector<int> group_index_;                      ///< per rod: in the group, -1: on its own
+  RodGroupState group_state_;
+  RodGroupInputs group_inputs_;
+  std::vector<RodInputs> rod_inputs_;
   std::vector<GraspRef> grasps_;
   int threads_ = 0;   // 0: as OpenMP says
 };
