@@ -33,12 +33,14 @@ std::string metres(double x)
 }
 
 /// Unit vectors: first along `main`, second as `other` lets it be.
-std::pair<Vector3d, Vector3d> plane(const Vector3d& main, const char* main_name, const Vector3d& other, const char* other_name)
+std::pair<Vector3d, Vector3d> plane(const Vector3d& main, const char* main_name, const Vector3d& other,
+                                    const char* other_name)
 {
   check(main.norm() > 0 && main.allFinite(), main_name, main.norm(), "a vector of non-zero, finite length");
   const Vector3d e1 = main.normalized();
   const Vector3d across = other - e1.dot(other) * e1;
-  check(across.norm() > 1e-9 * other.norm() && other.allFinite(), other_name, across.norm(), std::string("a vector not along ") + main_name);
+  check(across.norm() > 1e-9 * other.norm() && other.allFinite(), other_name, across.norm(),
+        std::string("a vector not along ") + main_name);
   return {e1, across.normalized()};
 }
 
@@ -47,12 +49,13 @@ double smoothStep(double u) { return u * u * u * (10 + u * (6 * u - 15)); }
 
 }  // namespace
 
-Eigen::Matrix3Xd trefoilCurve(const Vector3d& center, const Vector3d& axis, const Vector3d& up, double radius, double separation, double length,
-                              bool left_handed, int edges)
+Eigen::Matrix3Xd trefoilCurve(const Vector3d& center, const Vector3d& axis, const Vector3d& up, double radius, double separation,
+                              double length, bool left_handed, int edges)
 {
   check(edges >= 1, "edges", edges, "at least 1");
   check(radius > 0, "radius", radius, "> 0 m");
-  check(separation > 0 && separation <= 0.25 * radius, "separation", separation, "in (0, " + metres(0.25 * radius) + "], a quarter of the radius");
+  check(separation > 0 && separation <= 0.25 * radius, "separation", separation,
+        "in (0, " + metres(0.25 * radius) + "], a quarter of the radius");
   const auto [e1, e2] = plane(axis, "axis", up, "up");
   const Vector3d e3 = (left_handed ? -1.0 : 1.0) * e1.cross(e2);
 

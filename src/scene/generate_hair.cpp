@@ -9,8 +9,8 @@
 
 namespace slender {
 
-/// Strands on the upper part of a ball, which is an obstacle; their roots follow it. They start straight out, where nothing touches, whatever
-/// their natural curl.
+/// Strands on the upper part of a ball, which is an obstacle; their roots follow it. They start straight out, where nothing touches,
+/// whatever their natural curl.
 void generateHair(const YamlCursor& at, const ReadContext& context, Generated& out)
 {
   const std::size_t before = at.problems().size();

@@ -75,7 +75,8 @@ void shareNodes(std::vector<Branch>& branches, int vertices)
 
 }  // namespace
 
-/// A trunk with side branches, theirs, and so on. Each branch is a tapered rod; where it leaves its parent, a small rigid ball carries both.
+/// A trunk with side branches, theirs, and so on. Each branch is a tapered rod; where it leaves its parent, a small rigid ball carries
+/// both.
 void generateTree(const YamlCursor& at, const ReadContext& context, int first_rod, Generated& out)
 {
   const std::size_t before = at.problems().size();
@@ -131,8 +132,8 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
       const int edge = std::max({static_cast<int>(branch.at * (parent.nodes - 1)), last_joint[branch.parent] + 2, 1});
       if (edge > parent.nodes - 3)
       {
-        return place.problem("gives " + name + "_" + std::to_string(branch.parent) + " too few (" + std::to_string(parent.nodes) + ") for its " +
-                             std::to_string(shape.children) + " children; raise it, or lower levels or children");
+        return place.problem("gives " + name + "_" + std::to_string(branch.parent) + " too few (" + std::to_string(parent.nodes) +
+                             ") for its " + std::to_string(shape.children) + " children; raise it, or lower levels or children");
       }
       last_joint[branch.parent] = edge;
       const Eigen::Vector3d tangent = (line[edge + 1] - line[edge]).normalized();

@@ -223,7 +223,8 @@ Damping readDamping(const YamlCursor& at)
 
 void readTraits(YamlMap& map, RodConfig& rod)
 {
-  assign(rod.formulation, map.get("formulation").choice<Formulation>({{"auto", Formulation::automatic}, {"general", Formulation::general}}));
+  assign(rod.formulation,
+         map.get("formulation").choice<Formulation>({{"auto", Formulation::automatic}, {"general", Formulation::general}}));
   rod.material = readMaterial(map.get("material"));
   rod.damping = readDamping(map.get("damping"));
   rod.contact = readRodContact(map.get("contact"));

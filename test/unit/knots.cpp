@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// |Alexander polynomial at -1| of a closed polyline, by its crossings seen along a direction: 1 for the unknot, 3 for the trefoil. Each stretch
-/// from one crossing under to the next is an arc; at a crossing twice the arc over it equals the sum of the two arcs below it.
+/// |Alexander polynomial at -1| of a closed polyline, by its crossings seen along a direction: 1 for the unknot, 3 for the trefoil. Each
+/// stretch from one crossing under to the next is an arc; at a crossing twice the arc over it equals the sum of the two arcs below it.
 long knotDeterminant(const Eigen::Matrix3Xd& nodes, const Vector3d& view)
 {
   const Vector3d e3 = view.normalized(), e1 = e3.unitOrthogonal(), e2 = e3.cross(e1);

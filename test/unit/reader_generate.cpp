@@ -113,7 +113,8 @@ TEST(Generate, treeHasItsVerticesAndJoints)
     EXPECT_EQ(child.first_node, 0);
     EXPECT_EQ(child.last_node, 0);
     EXPECT_LT((nodes[child.rod].col(0) - body.pose.position).norm(), 1e-12);
-    EXPECT_LT((0.5 * (nodes[parent.rod].col(parent.first_node) + nodes[parent.rod].col(parent.last_node)) - body.pose.position).norm(), 1e-12);
+    const Eigen::Vector3d ends = nodes[parent.rod].col(parent.first_node) + nodes[parent.rod].col(parent.last_node);
+    EXPECT_LT((0.5 * ends - body.pose.position).norm(), 1e-12);
     for (const WeldConfig& weld : body.welds)
     {
       for (int node = weld.first_node; node <= weld.last_node; ++node)
@@ -126,8 +127,9 @@ TEST(Generate, treeHasItsVerticesAndJoints)
 
 TEST(Generate, weldsOfTreesCountTheRodsBefore)
 {
-  const SceneConfig scene = parseScene("rods: [{}, {}]\ngenerate: [{tree: {levels: 2, children: 2, vertices: 60}}, {tree: {name: b, levels: 2, "
-                                       "children: 1, vertices: 40}}]\nbodies: [{mass: 1, inertia: [1, 1, 1], welds: [{rod: tree_0, edge: -1}]}]");
+  const SceneConfig scene = parseScene("rods: [{}, {}]\ngenerate:\n  - tree: {levels: 2, children: 2, vertices: 60}\n"
+                                       "  - tree: {name: b, levels: 2, children: 1, vertices: 40}\n"
+                                       "bodies: [{mass: 1, inertia: [1, 1, 1], welds: [{rod: tree_0, edge: -1}]}]");
   ASSERT_EQ(scene.rods.size(), 7u);
   EXPECT_EQ(scene.bodies[0].welds[0].rod, 2);
   EXPECT_EQ(scene.bodies[1].name, "tree_1_joint");
@@ -148,8 +150,8 @@ TEST(Generate, seedsDecide)
 
 TEST(Generate, hairGrowsOutOfItsHead)
 {
-  const SceneConfig scene = parseScene("generate: [{hair: {strands: 60, edges: 20, length: 0.2, length_variation: 0.5, head: {center: [1, 2, 3], "
-                                       "radius: 0.09, motion: {topic: true}}, contact: {self: false}}}]");
+  const SceneConfig scene = parseScene("generate: [{hair: {strands: 60, edges: 20, length: 0.2, length_variation: 0.5, contact: {}, "
+                                       "head: {center: [1, 2, 3], radius: 0.09, motion: {topic: true}}}}]");
   ASSERT_EQ(scene.rods.size(), 60u);
   ASSERT_EQ(scene.obstacles.size(), 1u);
   EXPECT_EQ(scene.obstacles[0].name, "head");
@@ -243,8 +245,10 @@ INSTANTIATE_TEST_SUITE_P(All, BadGenerator, testing::Values(
   Case{"generate: [{hair: {head: {motion: free}}}]", "must be one of: fixed, topic"},
   Case{"generate: [{hair: {head: {size: 3}}}]", "unknown key"},
   Case{"generate: [{hair: {curl: {radius: 0}}}]", "in (0, 1000000] m"},
-  Case{"{generate: [{hair: {}}], obstacles: [{name: head, shape: {sphere: {}}}]}", "generate.0.hair: makes head, which is also the name of obstacles.0"},
-  Case{"{generate: [{hair: {}}], bodies: [{mass: 1, shape: {sphere: {}}, welds: [{rod: hair_0, edge: 0}]}]}", "grasp hair_0_root holds nodes 0 to 0"},
+  Case{"{generate: [{hair: {}}], obstacles: [{name: head, shape: {sphere: {}}}]}",
+       "generate.0.hair: makes head, which is also the name of obstacles.0"},
+  Case{"{generate: [{hair: {}}], bodies: [{mass: 1, shape: {sphere: {}}, welds: [{rod: hair_0, edge: 0}]}]}",
+       "grasp hair_0_root holds nodes 0 to 0"},
   Case{"{}", "rods: is missing"}));
 
 }  // namespace

@@ -35,8 +35,8 @@ Eigen::Matrix3Xd torusKnotCurve(const Eigen::Vector3d& center, const Eigen::Vect
 
 /// Two straight arms of equal length from `tip`, in the plane with the given normal, at angle/2 [rad] to either side of `direction`; starts
 /// on the side of -(normal x direction). `edges` is even, so that the tip is a node.
-Eigen::Matrix3Xd veeCurve(const Eigen::Vector3d& tip, const Eigen::Vector3d& direction, const Eigen::Vector3d& normal, double arm, double angle,
-                          int edges);
+Eigen::Matrix3Xd veeCurve(const Eigen::Vector3d& tip, const Eigen::Vector3d& direction, const Eigen::Vector3d& normal, double arm,
+                          double angle, int edges);
 
 /// Points at equal arc lengths along the polyline through `points`. Closed: the polyline is joined back to its first point, and
 /// the result has `edges` points (the joining edge is the last one).

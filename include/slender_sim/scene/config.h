@@ -33,9 +33,20 @@ struct TrefoilCurve
   bool left_handed = false;
   int edges = 150;
 };
-struct TorusKnotCurve { Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1}; double radius = 0.1, tube_radius = 0.04; int around = 2, through = 3, edges = 120; };
-struct VeeCurve { Eigen::Vector3d tip{0, 0, 0}, direction{1, 0, 0}, normal{0, 0, 1}; double arm = 0.5, angle = M_PI / 2; int edges = 50; };
-using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, TrefoilCurve, TorusKnotCurve, VeeCurve, FileCurve>;
+struct TorusKnotCurve
+{
+  Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1};
+  double radius = 0.1, tube_radius = 0.04;
+  int around = 2, through = 3, edges = 120;
+};
+struct VeeCurve
+{
+  Eigen::Vector3d tip{0, 0, 0}, direction{1, 0, 0}, normal{0, 0, 1};
+  double arm = 0.5, angle = M_PI / 2;
+  int edges = 50;
+};
+using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, TrefoilCurve, TorusKnotCurve, VeeCurve,
+                           FileCurve>;
 
 /// Radii [m]; a vector has one entry per edge, or two (linear taper from the first to the last edge), or one.
 struct CrossSection
@@ -158,7 +169,7 @@ struct BodyConfig
   Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};           ///< constant, world axes, at the centre of mass [N], [N m]
   double linear_damping = 0.0, angular_damping = 0.0;        ///< [1/s]
   std::optional<GivenMotion> motion;                         ///< nothing: simulated
-  bool contact = true;                                       ///< its shape touches rods
+  bool contact = true;                                       ///< its shape touches rods (bodies and obstacles pass through each other)
   std::optional<double> friction;                            ///< [-]; nothing: that of the rod
   bool broadcast_tf = false;
   std::vector<WeldConfig> welds;
