@@ -14,7 +14,10 @@ endforeach()
 if(BUILD_TESTING)
   find_package(rostest REQUIRED)
   # Pure functions and buffers: no master needed.
-  add_executable(node_unit_tests ${PROJECT_SOURCE_DIR}/test/nodes/guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/converters_test.cpp)
+  add_executable(node_unit_tests
+    ${PROJECT_SOURCE_DIR}/test/nodes/guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/converters_test.cpp
+    ${PROJECT_SOURCE_DIR}/test/nodes/markers_test.cpp)
+  target_compile_definitions(node_unit_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   find_package(GTest REQUIRED)
   target_link_libraries(node_unit_tests PRIVATE slender_sim_node GTest::gtest GTest::gtest_main)
   add_test(NAME node_unit COMMAND node_unit_tests)

@@ -17,6 +17,7 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
   const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
   state_topic_ = prefix + "state";
   scene_topic_ = prefix + "scene";
+  bodies_topic_ = prefix + "body_states";
   for (const std::string& name : grasp_names)
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
   try
@@ -57,6 +58,8 @@ void BagRecorder::record(const SceneMessages& messages)
       bag_.write(state_topic_, state.header.stamp, state);
     for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
       bag_.write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
+    if (!messages.bodies.name.empty())
+      bag_.write(bodies_topic_, messages.bodies.header.stamp, messages.bodies);
   }
   catch (const rosbag::BagException& e)
   {

@@ -48,6 +48,14 @@ geometry_msgs::Wrench toMessage(const Wrench& wrench)
   return out;
 }
 
+geometry_msgs::Twist toMessage(const Twist& twist)
+{
+  geometry_msgs::Twist out;
+  out.linear = toVector3(twist.linear);
+  out.angular = toVector3(twist.angular);
+  return out;
+}
+
 Eigen::Vector3d fromMessage(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
 
 namespace {
@@ -131,6 +139,12 @@ void appendPoses(const RodModel& model, const RodState& state, std::vector<geome
 bool isFinite(const RodState& state)
 {
   return state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite();
+}
+
+bool isFinite(const RigidBodyState& state)
+{
+  return state.X_WB.position.allFinite() && state.X_WB.orientation.coeffs().allFinite() && state.velocity.linear.allFinite() &&
+         state.velocity.angular.allFinite();
 }
 
 }  // namespace slender

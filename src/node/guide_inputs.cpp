@@ -1,5 +1,6 @@
 #include "slender_sim/node/guide_inputs.h"
 
+#include <algorithm>
 #include <set>
 
 #include "slender_sim/node/converters.h"
@@ -17,6 +18,17 @@ const Pose& graspPose(const Simulation& simulation, const GraspRef& ref)
   return simulation.state().rods[ref.rod].grasps[ref.index].X_WG;
 }
 
+/// Names of the scene's own bodies and obstacles: grasps follow those without messages.
+std::set<std::string> solidNames(const SceneConfig& scene)
+{
+  std::set<std::string> names;
+  for (const BodyConfig& body : scene.bodies)
+    names.insert(body.name);
+  for (const ObstacleConfig& obstacle : scene.obstacles)
+    names.insert(obstacle.name);
+  return names;
+}
+
 }  // namespace
 
 GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
@@ -29,17 +41,16 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   buffer_options.catch_up_speed = options.catch_up_speed;
   buffer_options.catch_up_turning = 3.0 * options.catch_up_speed;   // [rad/s]: as if a hand's radius of 1/3 m turned
 
-  bool topics = false, bodies = false;
+  bool topics = false;
+  const std::set<std::string> solids = solidNames(simulation.config());
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {
     const GraspRef& ref = simulation.grasps()[g];
     Guided guided;
     guided.name = grasp_names[g];
-    if (const auto* body = std::get_if<BodyMotion>(&ref.config->motion))
-    {
+    const auto* body = std::get_if<BodyMotion>(&ref.config->motion);
+    if (body && !solids.count(body->body))
       guided.body = body->body;
-      bodies = true;
-    }
     const bool topic = std::holds_alternative<TopicMotion>(ref.config->motion);
     if (topic || !guided.body.empty())
       guided.buffer = std::make_unique<GuideBuffer>(buffer_options, ref.config->attach, graspPose(simulation, ref));
@@ -54,12 +65,35 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
                                                                             ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
     }
   }
+  grasps_ = guided_.size();
+  addSolids(simulation, buffer_options);
+  const bool bodies = std::any_of(guided_.begin(), guided_.end(), [](const Guided& guided) { return !guided.body.empty(); });
   if (topics)
     subscribers_.push_back(nh.subscribe("guides", kQueueSize, &GuideInputs::onGuides, this, ros::TransportHints().tcpNoDelay()));
   if (bodies)
     subscribers_.push_back(nh.subscribe("bodies", kQueueSize, &GuideInputs::onBodies, this, ros::TransportHints().tcpNoDelay()));
   if (topics || bodies)
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
+}
+
+void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Options& options)
+{
+  const auto add = [&](const std::string& name, const GivenMotion& motion, const Pose& pose) {
+    Guided guided;
+    guided.name = name;
+    if (std::holds_alternative<TopicMotion>(motion))
+    {
+      guided.body = name;
+      guided.buffer = std::make_unique<GuideBuffer>(options, Attach::section, pose);
+    }
+    guided_.push_back(std::move(guided));
+  };
+  const SceneConfig& scene = simulation.config();
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    add(scene.bodies[b].name, scene.bodies[b].motion.value_or(FixedMotion{}), simulation.state().bodies[b].X_WB);
+  bodies_ = scene.bodies.size();
+  for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
+    add(scene.obstacles[k].name, scene.obstacles[k].motion, simulation.state().obstacles[k]);
 }
 
 bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X)
@@ -83,14 +117,14 @@ void GuideInputs::onPose(int grasp, const geometry_msgs::PoseStamped& message)
 
 void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
 {
-  if (message.poses.size() != guided_.size())
+  if (message.poses.size() != grasps_)
   {
     drops_.drop(Drop::wrong_length, "guides",
-                std::to_string(message.poses.size()) + " poses, but the scene has " + std::to_string(guided_.size()) + " grasps");
+                std::to_string(message.poses.size()) + " poses, but the scene has " + std::to_string(grasps_) + " grasps");
     return;
   }
   std::vector<Entry> entries;
-  for (std::size_t g = 0; g < guided_.size(); ++g)
+  for (std::size_t g = 0; g < grasps_; ++g)
   {
     Entry entry{static_cast<int>(g), Pose()};
     if (!checkPose(message.poses[g], "guides", entry.X_FH))
@@ -125,11 +159,11 @@ void GuideInputs::onBodies(const slender_sim::BodyStates& message)
       if (guided_[g].body != message.name[b])
         continue;
       known = true;
-      entry.grasp = static_cast<int>(g);
+      entry.guided = static_cast<int>(g);
       entries.push_back(entry);
     }
     if (!known)
-      drops_.drop(Drop::unknown_name, "bodies", "no grasp follows \"" + message.name[b] + "\"");
+      drops_.drop(Drop::unknown_name, "bodies", "nothing follows \"" + message.name[b] + "\"");
   }
   if (!entries.empty())
     take(kBodiesSource, "bodies", message.header, entries);
@@ -204,7 +238,7 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
   const double time = clock_.secondsAt(message.stamp);
   bool late = false;
   for (const Entry& entry : message.entries)
-    late |= !guided_[entry.grasp].buffer->push(time, X_WF * entry.X_FH);
+    late |= !guided_[entry.guided].buffer->push(time, X_WF * entry.X_FH);
   if (late)
     drops_.drop(Drop::out_of_order, message.what, "its stamp is not after that of an earlier message");
   return true;
@@ -242,7 +276,19 @@ void GuideInputs::apply(double time, SceneInputs& inputs)
 {
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
-      inputs.grasps[g] = guided_[g].buffer->target(time);
+    {
+      const std::size_t solid = g - grasps_;
+      GraspTarget& target = g < grasps_ ? inputs.grasps[g] : solid < bodies_ ? inputs.bodies[solid] : inputs.obstacles[solid - bodies_];
+      target = guided_[g].buffer->target(time);
+    }
+}
+
+Pose GuideInputs::poseOf(const Simulation& simulation, std::size_t guided) const
+{
+  const std::size_t solid = guided - grasps_;
+  if (guided < grasps_)
+    return graspPose(simulation, simulation.grasps()[guided]);
+  return solid < bodies_ ? simulation.state().bodies[solid].X_WB : simulation.state().obstacles[solid - bodies_];
 }
 
 void GuideInputs::attachAt(int grasp, const Pose& X_WG)
@@ -251,12 +297,19 @@ void GuideInputs::attachAt(int grasp, const Pose& X_WG)
     guided_[grasp].buffer->attachAt(X_WG);
 }
 
+void GuideInputs::attachAll(const Simulation& simulation)
+{
+  for (std::size_t g = 0; g < guided_.size(); ++g)
+    if (guided_[g].buffer)
+      guided_[g].buffer->attachAt(poseOf(simulation, g));
+}
+
 void GuideInputs::restart(const Simulation& simulation)
 {
   pending_.clear();
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
-      guided_[g].buffer->restart(graspPose(simulation, simulation.grasps()[g]));
+      guided_[g].buffer->restart(poseOf(simulation, g));
 }
 
 std::vector<GuideInputs::Age> GuideInputs::ages() const

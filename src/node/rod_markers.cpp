@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "marker_tools.h"
 #include "slender_sim/node/converters.h"
 
 namespace slender {
@@ -15,35 +16,11 @@ using visualization_msgs::Marker;
 constexpr int kSides = 16;           // of the tube
 constexpr int kMaxSections = 800;    // per rod
 
-std_msgs::ColorRGBA color(double r, double g, double b, double a = 1.0)
-{
-  std_msgs::ColorRGBA c;
-  c.r = static_cast<float>(r);
-  c.g = static_cast<float>(g);
-  c.b = static_cast<float>(b);
-  c.a = static_cast<float>(a);
-  return c;
-}
-
 const std::array<std_msgs::ColorRGBA, 4>& rodColors()
 {
   static const std::array<std_msgs::ColorRGBA, 4> colors = {color(0.93, 0.55, 0.16), color(0.16, 0.50, 0.72),
                                                             color(0.35, 0.62, 0.30), color(0.62, 0.36, 0.66)};
   return colors;
-}
-
-Marker makeMarker(const std_msgs::Header& header, const std::string& ns, int id, int type)
-{
-  Marker marker;
-  marker.header = header;
-  marker.ns = ns;
-  marker.id = id;
-  marker.type = type;
-  marker.action = Marker::ADD;
-  marker.pose.orientation.w = 1.0;
-  marker.scale.x = marker.scale.y = marker.scale.z = 1.0;
-  marker.color = color(1, 1, 1);
-  return marker;
 }
 
 struct Section
@@ -89,16 +66,6 @@ std::vector<Section> sections(const RodModel& model, const RodState& s)
     }
   }
   return out;
-}
-
-/// rviz does not light triangles that have colours of their own, so light from above and the side is painted in.
-std_msgs::ColorRGBA lit(const std_msgs::ColorRGBA& paint, const Vector3d& normal)
-{
-  static const Vector3d light = Vector3d(0.45, -0.35, 0.85).normalized();
-  const double diffuse = 0.5 + 0.5 * normal.dot(light);   // wraps round: no side is black
-  const double gloss = 0.35 * std::pow(std::max(0.0, normal.dot(light)), 24.0);
-  const auto shade = [&](float c) { return std::min(1.0, c * (0.45 + 0.65 * diffuse) + gloss); };
-  return color(shade(paint.r), shade(paint.g), shade(paint.b), paint.a);
 }
 
 /// Two triangles per side and section; the stripes' edges are sharp because each side has one colour.
@@ -222,6 +189,7 @@ visualization_msgs::MarkerArray rodMarkers(const Simulation& simulation, const s
     out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config, simulation.state().rods[ref.rod].grasps[ref.index],
                                       simulation.rodModel(ref.rod)));
   }
+  addSolidMarkers(simulation, header, out);
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include <geometry_msgs/PoseArray.h>
+#include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/WrenchStamped.h>
 #include <rosgraph_msgs/Clock.h>
 #include <std_msgs/String.h>
@@ -103,6 +104,11 @@ void RodNode::advertise()
       rod_poses_pubs_.push_back(nh_.advertise<geometry_msgs::PoseArray>("rods/" + rod.name + "/poses", 100));
   for (const std::string& name : grasp_names_)
     wrench_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>("grasps/" + name + "/wrench", 100));
+  const std::vector<BodyConfig>& bodies = simulation_->config().bodies;
+  if (!bodies.empty())
+    bodies_pub_ = nh_.advertise<slender_sim::BodyStates>("body_states", 1000);
+  if (std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.broadcast_tf; }))
+    tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   markers_pub_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
   scene_pub_ = nh_.advertise<std_msgs::String>("scene", 1, true);
   diagnostics_pub_ = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
@@ -124,6 +130,12 @@ bool RodNode::advance()
   }
   for (const RodState& rod : simulation_->state().rods)
     if (!isFinite(rod))
+    {
+      fail("the state is not finite any more");
+      return false;
+    }
+  for (const RigidBodyState& body : simulation_->state().bodies)
+    if (!isFinite(body))
     {
       fail("the state is not finite any more");
       return false;
@@ -161,9 +173,10 @@ void RodNode::publishState()
     message.clock = clock_.stamp();
     clock_pub_.publish(message);
   }
+  broadcastBodies();
   const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
-  if (!bag_ && !heard(state_pub_) && !heard(poses_pub_) && std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) &&
-      std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard))
+  if (!bag_ && !heard(state_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) &&
+      std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) && std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard))
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
   for (const slender_sim::RodState& state : messages_.states)
@@ -178,6 +191,8 @@ void RodNode::publishState()
   }
   for (std::size_t g = 0; g < wrench_pubs_.size(); ++g)
     wrench_pubs_[g].publish(messages_.wrenches[g]);
+  if (!messages_.bodies.name.empty())
+    bodies_pub_.publish(messages_.bodies);
   if (!bag_)
     return;
   try
@@ -188,6 +203,28 @@ void RodNode::publishState()
   {
     recordingFailed(e.what());
   }
+}
+
+void RodNode::broadcastBodies()
+{
+  if (!tf_broadcaster_)
+    return;
+  std::vector<geometry_msgs::TransformStamped> transforms;
+  const std::vector<BodyConfig>& bodies = simulation_->config().bodies;
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+  {
+    if (!bodies[b].broadcast_tf)
+      continue;
+    const Pose& X_WB = simulation_->state().bodies[b].X_WB;
+    geometry_msgs::TransformStamped transform;
+    transform.header.stamp = clock_.stamp();
+    transform.header.frame_id = options_.frame_id;
+    transform.child_frame_id = bodies[b].name;
+    transform.transform.translation = toVector3(X_WB.position);
+    transform.transform.rotation = toQuaternion(X_WB.orientation);
+    transforms.push_back(transform);
+  }
+  tf_broadcaster_->sendTransform(transforms);
 }
 
 void RodNode::recordingFailed(const std::string& reason)

@@ -111,7 +111,7 @@ DiagnosticStatus RodNode::inputStatus()
   for (int r = 0; r < kDropReasons; ++r)
     add(status, std::string("dropped ") + toString(static_cast<Drop>(r)), drops.count(static_cast<Drop>(r)));
   if (status.message.empty())
-    status.message = inputs_->ages().empty() ? "no grasp is driven from outside" : "ok";
+    status.message = inputs_->ages().empty() ? "nothing is driven from outside" : "ok";
   return status;
 }
 

@@ -179,11 +179,7 @@ bool RodNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::FileP
     response.message = request.path.empty() ? "path is empty" : e.what();
     return true;
   }
-  for (std::size_t g = 0; g < grasp_names_.size(); ++g)
-  {
-    const GraspRef& ref = simulation_->grasps()[g];
-    inputs_->attachAt(static_cast<int>(g), simulation_->state().rods[ref.rod].grasps[ref.index].X_WG);
-  }
+  inputs_->attachAll(*simulation_);
   if (mode_ == Mode::failed)
     mode_ = Mode::paused;   // what was loaded may be just before the failure
   failure_.clear();

@@ -56,6 +56,17 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     wrenches[g].wrench = scene.rods[ref.rod].grasps[ref.index].active ? toMessage(simulation.wrench(static_cast<int>(g)))
                                                                       : geometry_msgs::Wrench();
   }
+  const std::vector<BodyConfig>& configs = simulation.config().bodies;
+  bodies.header = poses.header;
+  bodies.name.resize(configs.size());
+  bodies.pose.resize(configs.size());
+  bodies.twist.resize(configs.size());
+  for (std::size_t b = 0; b < configs.size(); ++b)
+  {
+    bodies.name[b] = configs[b].name;
+    bodies.pose[b] = toMessage(scene.bodies[b].X_WB);
+    bodies.twist[b] = toMessage(scene.bodies[b].velocity);
+  }
 }
 
 }  // namespace slender

@@ -8,6 +8,7 @@ namespace slender {
 namespace {
 
 const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
+const Range positive = Range::above(0, max_coordinate, "m");
 
 std::optional<int> readEdges(YamlMap& map) { return map.get("edges").integer(1, max_edges); }
 
@@ -67,7 +68,7 @@ HelixCurve readHelix(YamlMap& map)
   HelixCurve curve;
   assign(curve.center, map.get("center").vector3(coordinate));
   assign(curve.axis, map.get("axis").vector3(coordinate));
-  assign(curve.radius, map.get("radius").number(Range::above(0, max_coordinate, "m")));
+  assign(curve.radius, map.get("radius").number(positive));
   assign(curve.pitch, map.get("pitch").number(coordinate));
   const YamlCursor turns = map.get("turns");
   assign(curve.turns, turns.number(Range::closed(-1e5, 1e5)));
@@ -84,7 +85,46 @@ CatenaryCurve readCatenary(YamlMap& map)
   CatenaryCurve curve;
   assign(curve.from, map.get("from").vector3(coordinate));
   assign(curve.to, map.get("to").vector3(coordinate));
-  assign(curve.length, map.get("length").number(Range::above(0, max_coordinate, "m")));
+  assign(curve.length, map.get("length").number(positive));
+  assign(curve.edges, readEdges(map));
+  return curve;
+}
+
+TrefoilCurve readTrefoil(YamlMap& map)
+{
+  TrefoilCurve curve;
+  assign(curve.center, map.get("center").vector3(coordinate));
+  assign(curve.axis, map.get("axis").vector3(coordinate));
+  assign(curve.up, map.get("up").vector3(coordinate));
+  assign(curve.radius, map.get("radius").number(positive));
+  assign(curve.separation, map.get("separation").number(positive));
+  assign(curve.length, map.get("length").number(positive));
+  assign(curve.left_handed, map.get("left_handed").boolean());
+  assign(curve.edges, readEdges(map));
+  return curve;
+}
+
+TorusKnotCurve readTorusKnot(YamlMap& map)
+{
+  TorusKnotCurve curve;
+  assign(curve.center, map.get("center").vector3(coordinate));
+  assign(curve.axis, map.get("axis").vector3(coordinate));
+  assign(curve.radius, map.get("radius").number(positive));
+  assign(curve.tube_radius, map.get("tube_radius").number(positive));
+  assign(curve.around, map.get("around").integer(1, 1000));
+  assign(curve.through, map.get("through").integer(1, 1000));
+  assign(curve.edges, readEdges(map));
+  return curve;
+}
+
+VeeCurve readVee(YamlMap& map)
+{
+  VeeCurve curve;
+  assign(curve.tip, map.get("tip").vector3(coordinate));
+  assign(curve.direction, map.get("direction").vector3(coordinate));
+  assign(curve.normal, map.get("normal").vector3(coordinate));
+  assign(curve.arm, map.get("arm").number(positive));
+  assign(curve.angle, map.get("angle").number(Range::between(0, M_PI, "rad")));
   assign(curve.edges, readEdges(map));
   return curve;
 }
@@ -140,11 +180,15 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
   read("arc", readArc);
   read("helix", readHelix);
   read("catenary", readCatenary);
+  read("trefoil", readTrefoil);
+  read("torus_knot", readTorusKnot);
+  read("vee", readVee);
   read("file", [&](YamlMap& map) { return readFile(map, context); });
   kinds.finish();
   if (given != 1 && at.problems().size() == before)
   {
-    at.problem("names " + std::to_string(given) + " curves; must name one of: straight, polyline, arc, helix, catenary, file");
+    at.problem("names " + std::to_string(given) +
+               " curves; must name one of: straight, polyline, arc, helix, catenary, trefoil, torus_knot, vee, file");
   }
   return at.problems().size() == before ? curve : std::nullopt;
 }

@@ -30,7 +30,20 @@ Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
 /// A rod, and how many edges it has: 0 when its centreline could not be read.
 struct RodPart { RodConfig config; int edges = 0; };
+/// What rods of a scene and those of a generator have in common: formulation, material, damping, contact.
+void readTraits(YamlMap& map, RodConfig& rod);
 RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
+
+/// What the generators of a scene make, each with the place that asked for it. Welds count rods from `first_rod`.
+struct Generated
+{
+  std::vector<std::pair<RodPart, YamlCursor>> rods;
+  std::vector<std::pair<ObstacleConfig, YamlCursor>> obstacles;
+  std::vector<std::pair<BodyConfig, YamlCursor>> bodies;
+};
+/// The list `generate`; `first_rod`: number of rods before them.
+Generated readGenerators(const YamlCursor& at, const ReadContext& context, int first_rod);
+
 Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation);
 /// Nothing: free, which is also the default where it may be.
 std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadContext& context, bool may_be_free);

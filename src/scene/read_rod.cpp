@@ -221,6 +221,15 @@ Damping readDamping(const YamlCursor& at)
   return damping;
 }
 
+void readTraits(YamlMap& map, RodConfig& rod)
+{
+  assign(rod.formulation,
+         map.get("formulation").choice<Formulation>({{"auto", Formulation::automatic}, {"general", Formulation::general}}));
+  rod.material = readMaterial(map.get("material"));
+  rod.damping = readDamping(map.get("damping"));
+  rod.contact = readRodContact(map.get("contact"));
+}
+
 RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
   RodConfig rod;
@@ -230,17 +239,14 @@ RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::str
   assign(rod.closed, map.get("closed").boolean());
   assign(rod.naturally_straight, map.get("naturally_straight").boolean());
   assign(rod.initial_twist, map.get("initial_twist").number(Range::closed(-1e5, 1e5, "rad")));
-  assign(rod.formulation, map.get("formulation").choice<Formulation>({{"auto", Formulation::automatic}, {"general", Formulation::general}}));
   const int edges = readCenterline(map, context, rod);
   if (edges > 0 && rod.initial)
   {
     checkInitial(map, context, rod);
   }
   rod.cross_section = readCrossSection(map.get("cross_section"), edges);
-  rod.material = readMaterial(map.get("material"));
-  rod.damping = readDamping(map.get("damping"));
+  readTraits(map, rod);
   readGrasps(map.get("grasps"), context, rod, edges);
-  rod.contact = readRodContact(map.get("contact"));
   map.finish();
   return {std::move(rod), edges};
 }

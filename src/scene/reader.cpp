@@ -42,32 +42,68 @@ std::vector<RodPart> readRods(const YamlCursor& at, const ReadContext& context)
   return rods;
 }
 
-/// Obstacles and bodies are entries of one topic: their names must differ. A grasp cannot follow what it may hold back.
-void checkSolids(const SceneConfig& scene, const std::vector<YamlCursor>& obstacles, const std::vector<YamlCursor>& bodies,
-                 const std::vector<YamlCursor>& rods)
+/// Adds what the generators made; names must differ from those of the file.
+void takeGeneratedRods(Generated& generated, std::vector<RodPart>& rods)
 {
-  std::map<std::string, std::string> paths;   // of names
-  std::set<std::string> simulated;
-  const auto take = [&](const YamlCursor& entry, const std::string& name) {
-    const auto [other, is_new] = paths.emplace(name, entry.path());
+  std::set<std::string> names, grasps;
+  const auto take = [&](std::set<std::string>& used, const std::string& what, const std::string& name, const YamlCursor* maker) {
+    if (!used.insert(name).second && maker)
+    {
+      maker->problem("makes a " + what + " " + name + ", whose name is taken; give the generator another name");
+      return false;
+    }
+    return true;
+  };
+  for (const RodPart& part : rods)
+  {
+    take(names, "rod", part.config.name, nullptr);
+    for (const GraspConfig& grasp : part.config.grasps)
+    {
+      take(grasps, "grasp", grasp.name, nullptr);
+    }
+  }
+  bool good = true;   // one generator repeats itself thousands of times
+  for (auto& [part, maker] : generated.rods)
+  {
+    good = good && take(names, "rod", part.config.name, &maker);
+    for (const GraspConfig& grasp : part.config.grasps)
+    {
+      good = good && take(grasps, "grasp", grasp.name, &maker);
+    }
+    rods.push_back(std::move(part));
+  }
+}
+
+/// Obstacles and bodies are entries of one topic: their names must differ.
+class SolidNames
+{
+public:
+  void take(const YamlCursor& at, const std::string& name, bool generated)
+  {
+    const auto [other, is_new] = paths_.emplace(name, at.path());
     if (!is_new)
     {
-      YamlMap(entry).get("name").problem("is also the name of " + other->second + "; names of bodies and obstacles must differ");
+      const std::string reason = "is also the name of " + other->second + "; names of bodies and obstacles must differ";
+      generated ? at.problem("makes " + name + ", which " + reason) : YamlMap(at).get("name").problem(reason);
     }
-  };
-  for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
-  {
-    take(obstacles[k], scene.obstacles[k].name);
   }
-  for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+
+private:
+  std::map<std::string, std::string> paths_;
+};
+
+/// A grasp cannot follow what it may hold back.
+void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods)
+{
+  std::set<std::string> simulated;
+  for (const BodyConfig& body : scene.bodies)
   {
-    take(bodies[k], scene.bodies[k].name);
-    if (!scene.bodies[k].motion)
+    if (!body.motion)
     {
-      simulated.insert(scene.bodies[k].name);
+      simulated.insert(body.name);
     }
   }
-  for (std::size_t r = 0; r < scene.rods.size(); ++r)
+  for (std::size_t r = 0; r < rods.size(); ++r)
   {
     for (const GraspConfig& grasp : scene.rods[r].grasps)
     {
@@ -79,6 +115,47 @@ void checkSolids(const SceneConfig& scene, const std::vector<YamlCursor>& obstac
       }
     }
   }
+}
+
+std::vector<YamlCursor> entriesOf(const YamlCursor& list) { return list.isList() ? list.items() : std::vector<YamlCursor>{}; }
+
+/// All that has a place in space.
+void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
+{
+  const YamlCursor at_generate = map.get("generate"), at_rods = at_generate.present() ? map.get("rods") : map.require("rods");
+  const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
+  std::vector<RodPart> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<RodPart>{};
+  Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
+  takeGeneratedRods(generated, rods);
+  scene.contact = readContact(map.get("contact"), rods);
+  scene.obstacles = readObstacles(at_obstacles, context);
+  scene.bodies = readBodies(at_bodies, context, rods);
+
+  SolidNames names;
+  const std::vector<YamlCursor> obstacles = entriesOf(at_obstacles), bodies = entriesOf(at_bodies);
+  for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
+  {
+    names.take(obstacles[k], scene.obstacles[k].name, false);
+  }
+  for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+  {
+    names.take(bodies[k], scene.bodies[k].name, false);
+  }
+  for (auto& [obstacle, maker] : generated.obstacles)
+  {
+    names.take(maker, obstacle.name, true);
+    scene.obstacles.push_back(std::move(obstacle));
+  }
+  for (auto& [body, maker] : generated.bodies)
+  {
+    names.take(maker, body.name, true);
+    scene.bodies.push_back(std::move(body));
+  }
+  for (RodPart& part : rods)
+  {
+    scene.rods.push_back(std::move(part.config));
+  }
+  checkFollowed(scene, entriesOf(at_rods));
 }
 
 SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::string& directory)
@@ -108,23 +185,12 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   ReadContext context;
   context.directory = directory;
   context.gravity = scene.gravity;
-  const YamlCursor rods = map.require("rods"), obstacles = map.get("obstacles"), bodies = map.get("bodies");
-  std::vector<RodPart> parts = readRods(rods, context);
-  scene.contact = readContact(map.get("contact"), parts);
-  scene.obstacles = readObstacles(obstacles, context);
-  scene.bodies = readBodies(bodies, context, parts);
-  bool touches = false;
-  for (RodPart& part : parts)
-  {
-    touches = touches || part.config.contact;
-    scene.rods.push_back(std::move(part.config));
-  }
+  readObjects(map, context, scene);
+  const bool touches = std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
   if (touches && !YamlMap(time).has("integrator"))
   {
     scene.time.integrator = Integrator::implicit_euler;   // methods of second order carry an impact's velocity on and bounce
   }
-  const auto entries = [](const YamlCursor& list) { return list.isList() ? list.items() : std::vector<YamlCursor>{}; };
-  checkSolids(scene, entries(obstacles), entries(bodies), entries(rods));
   map.finish();
   if (!problems.empty())
   {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <stdexcept>
 
 namespace slender {
@@ -94,7 +95,8 @@ private:
 class CsvRecorder final : public Recorder
 {
 public:
-  explicit CsvRecorder(const std::string& folder) : nodes_((makeFolder(folder), folder + "/nodes.csv")), grasps_(folder + "/grasps.csv")
+  explicit CsvRecorder(const std::string& folder)
+    : folder_(folder), nodes_((makeFolder(folder), folder + "/nodes.csv")), grasps_(folder + "/grasps.csv")
   {
     nodes_ << "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],d1x,d1y,d1z,twist [rad]";
     nodes_.endLine();
@@ -124,12 +126,25 @@ public:
       grasps_.vector(wrench.torque, ',');
       grasps_.endLine();
     }
+    const SceneConfig& scene = simulation.config();
+    for (std::size_t b = 0; b < state.bodies.size(); ++b)
+    {
+      recordSolid(state.time, scene.bodies[b].name, state.bodies[b].X_WB, state.bodies[b].velocity);
+    }
+    for (std::size_t k = 0; k < state.obstacles.size(); ++k)
+    {
+      recordSolid(state.time, scene.obstacles[k].name, state.obstacles[k], state.obstacle_velocities[k]);
+    }
   }
 
   void finish() override
   {
     nodes_.close();
     grasps_.close();
+    if (bodies_)
+    {
+      bodies_->close();
+    }
   }
 
 private:
@@ -147,7 +162,27 @@ private:
     }
   }
 
+  void recordSolid(double time, const std::string& name, const Pose& pose, const Twist& velocity)
+  {
+    if (!bodies_)
+    {
+      bodies_.emplace(folder_ + "/bodies.csv");
+      *bodies_ << "t [s],object,x [m],y [m],z [m],qx,qy,qz,qw,vx [m/s],vy [m/s],vz [m/s],wx [rad/s],wy [rad/s],wz [rad/s]";
+      bodies_->endLine();
+    }
+    const Eigen::Vector4d q = pose.orientation.coeffs();
+    bodies_->number(time) << ',' << name << ',';
+    bodies_->vector(pose.position, ',') << ',';
+    bodies_->vector(q.head<3>(), ',') << ',';
+    bodies_->number(q[3]) << ',';
+    bodies_->vector(velocity.linear, ',') << ',';
+    bodies_->vector(velocity.angular, ',');
+    bodies_->endLine();
+  }
+
+  std::string folder_;
   TextFile nodes_, grasps_;
+  std::optional<TextFile> bodies_;   // only scenes that have any
 };
 
 class ObjRecorder final : public Recorder

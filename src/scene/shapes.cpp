@@ -54,6 +54,19 @@ Eigen::Matrix3Xd curvePoints(const Curve& curve, const Eigen::Vector3d& gravity,
         const Eigen::Vector3d down = gravity.norm() > 0 ? gravity : Eigen::Vector3d(0, 0, -1);
         return catenaryCurve(c.from, c.to, c.length, down, edges.value_or(c.edges));
       }
+      else if constexpr (std::is_same_v<T, TrefoilCurve>)
+      {
+        const double separation = c.separation > 0 ? c.separation : c.radius / 8;
+        return trefoilCurve(c.center, c.axis, c.up, c.radius, separation, c.length, c.left_handed, edges.value_or(c.edges));
+      }
+      else if constexpr (std::is_same_v<T, TorusKnotCurve>)
+      {
+        return torusKnotCurve(c.center, c.axis, c.radius, c.tube_radius, c.around, c.through, edges.value_or(c.edges));
+      }
+      else if constexpr (std::is_same_v<T, VeeCurve>)
+      {
+        return veeCurve(c.tip, c.direction, c.normal, c.arm, c.angle, edges.value_or(c.edges));
+      }
       else
       {
         return toMatrix(c.points);

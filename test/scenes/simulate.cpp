@@ -71,9 +71,12 @@ std::vector<std::string> allScenes()
 
 class Scene : public testing::TestWithParam<std::string> {};
 
+/// A smaller scene of the same kind, where the whole one takes long.
+std::string reduced(const std::string& name) { return name == "hair.yaml" ? " --set generate.0.hair.strands=60" : ""; }
+
 TEST_P(Scene, runs)
 {
-  const Result result = simulate(scenes + GetParam() + " --duration 0.05");
+  const Result result = simulate(scenes + GetParam() + " --duration 0.05" + reduced(GetParam()));
   EXPECT_EQ(result.status, 0) << result.output;
   EXPECT_EQ(result.output.find("nan"), std::string::npos) << result.output;
 }
@@ -160,6 +163,29 @@ TEST_F(Simulate, writesTables)
     ++rows;
   }
   EXPECT_EQ(rows, 1 + 5);
+}
+
+TEST_F(Simulate, writesATableOfBodies)
+{
+  const Result result = simulate(scenes + "torsional_pendulum.yaml --duration 0.1 --set record.every=10 --csv " + folder_ +
+                                 " --set \"obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, -2]}}]\"");
+  ASSERT_EQ(result.status, 0) << result.output;
+  std::ifstream file(folder_ + "/bodies.csv");
+  std::string header, line;
+  ASSERT_TRUE(std::getline(file, header));
+  EXPECT_EQ(header.find("t [s],object,x [m],y [m],z [m],qx,qy,qz,qw,vx [m/s]"), 0u) << header;
+  std::vector<std::string> lines;
+  while (std::getline(file, line))
+  {
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), std::count(header.begin(), header.end(), ','));
+    lines.push_back(line);
+  }
+  ASSERT_EQ(lines.size(), 12u);   // t = 0, and every tenth of 50 steps
+  EXPECT_EQ(lines[0], "0,disc,0,0,0,0,0,0,1,0,0,0,0,0,1");
+  EXPECT_EQ(lines[1], "0,floor,0,0,-2,0,0,0,1,0,0,0,0,0,0");
+  EXPECT_EQ(lines[10].find("0.1,disc,"), 0u) << lines[10];
+  simulate(cantilever + " --duration 0.02 --csv " + folder_ + "/none");
+  EXPECT_FALSE(fs::exists(folder_ + "/none/bodies.csv"));
 }
 
 TEST_F(Simulate, writesObjFiles)

@@ -23,7 +23,7 @@ public:
 
   /// The scene as parsed, on `scene`; once, before the first record().
   void recordScene(const std::string& yaml, const ros::Time& stamp);
-  /// `state` per rod, then `grasps/NAME/wrench` per grasp; `poses` can be derived from the state.
+  /// `state` per rod, then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies; the rest can be derived from these.
   void record(const SceneMessages& messages);
   /// Throws std::runtime_error when the file cannot be completed.
   void close();
@@ -31,7 +31,7 @@ public:
   const std::string& path() const { return path_; }
 
 private:
-  std::string path_, state_topic_, scene_topic_;
+  std::string path_, state_topic_, scene_topic_, bodies_topic_;
   std::vector<std::string> wrench_topics_;
   rosbag::Bag bag_;
   bool open_ = false;

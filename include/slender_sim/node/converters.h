@@ -10,6 +10,7 @@
 #include <std_msgs/Header.h>
 
 #include "slender_sim/RodState.h"
+#include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/rod/rod_stepper.h"
 
@@ -21,6 +22,7 @@ geometry_msgs::Vector3 toVector3(const Eigen::Vector3d& v);
 geometry_msgs::Quaternion toQuaternion(const Eigen::Quaterniond& q);
 geometry_msgs::Pose toMessage(const Pose& X);
 geometry_msgs::Wrench toMessage(const Wrench& wrench);
+geometry_msgs::Twist toMessage(const Twist& twist);
 
 Eigen::Vector3d fromMessage(const geometry_msgs::Point& p);
 
@@ -43,5 +45,6 @@ void appendPoses(const RodModel& model, const RodState& state, std::vector<geome
 
 /// False when any position, velocity, director or twist is NaN or infinite.
 bool isFinite(const RodState& state);
+bool isFinite(const RigidBodyState& state);
 
 }  // namespace slender

@@ -22,8 +22,9 @@
 
 namespace slender {
 
-/// Everything that moves grasps from outside: `grasps/NAME/pose`, `guides`, `bodies`, through tf2 into the node's frame. Subscribes
-/// only to what the scene's grasps ask for. Bad messages are dropped and counted; the grasp keeps its previous input.
+/// Everything that moves grasps, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`, `bodies`, through tf2 into the
+/// node's frame. Subscribes only to what the scene asks for. Bad messages are dropped and counted; what they would have moved keeps its
+/// previous input.
 /// A stamp of zero means now, as everywhere in tf.
 class GuideInputs
 {
@@ -35,25 +36,27 @@ public:
   /// Takes in messages whose transforms have arrived meanwhile; drops those that waited too long.
   void processPending();
 
-  /// Replaces the targets of grasps driven from outside by where they shall be at `time` [s since the clock's start].
+  /// Replaces the targets of everything driven from outside by where it shall be at `time` [s since the clock's start].
   void apply(double time, SceneInputs& inputs);
 
-  /// The grasp took hold of the rod where it is now (attached while running, state loaded).
+  /// The grasp took hold of the rod where it is now.
   void attachAt(int grasp, const Pose& X_WG);
+  /// Everything was moved: a state was loaded.
+  void attachAll(const Simulation& simulation);
   /// The scene was reset: forgets all input.
   void restart(const Simulation& simulation);
 
   const DropCounter& drops() const { return drops_; }
   bool waiting() const { return !pending_.empty(); }
 
-  /// Per grasp driven from outside.
+  /// Per grasp, body and obstacle driven from outside.
   struct Age { std::string name; std::optional<double> seconds; };
   /// Age of the last pose at the clock's present; nothing while none came.
   std::vector<Age> ages() const;
 
 private:
   struct Guided { std::string name, body; std::unique_ptr<GuideBuffer> buffer; };   // buffer: null when not driven from outside
-  struct Entry { int grasp; Pose X_FH; };                 // a gripper in the frame of the message
+  struct Entry { int guided; Pose X_FH; };                // a gripper, body or obstacle in the frame of the message
   struct Message
   {
     int source;                                           // messages of one source keep their order
@@ -66,6 +69,8 @@ private:
   void onPose(int grasp, const geometry_msgs::PoseStamped& message);
   void onGuides(const geometry_msgs::PoseArray& message);
   void onBodies(const slender_sim::BodyStates& message);
+  Pose poseOf(const Simulation& simulation, std::size_t guided) const;
+  void addSolids(const Simulation& simulation, const GuideBuffer::Options& options);
   bool checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X);
   void take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries);
   /// False when the transform is not known yet.
@@ -73,7 +78,8 @@ private:
 
   const NodeOptions options_;
   const SimClock& clock_;
-  std::vector<Guided> guided_;
+  std::vector<Guided> guided_;                            // grasps in scene order, then bodies, then obstacles
+  std::size_t grasps_ = 0, bodies_ = 0;                   // how many of the first two
   std::deque<Message> pending_;
   DropCounter drops_;
   tf2_ros::Buffer tf_buffer_;

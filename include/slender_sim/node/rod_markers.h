@@ -10,7 +10,8 @@
 namespace slender {
 
 /// Pictures of a scene for rviz, derived from the state. One marker per thing with a stable ns and id:
-/// `rods/NAME` 0 the rod, `frames/NAME` 0 its material frames, `grasps` i the gripper of grasp i.
+/// `rods/NAME` 0 the rod, `frames/NAME` 0 its material frames, `grasps` i the gripper of grasp i, `bodies` i and `obstacles` i their shapes
+/// (of a plane a piece).
 ///
 /// tube: true to scale, drawn through a smooth curve, with a stripe along d1 that shows the twist; line: one line strip.
 /// Very fine rods are thinned out to a few hundred sections: a picture has no more pixels.

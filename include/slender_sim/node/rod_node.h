@@ -10,6 +10,7 @@
 #include <ros/node_handle.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
+#include <tf2_ros/transform_broadcaster.h>
 
 #include "slender_sim/FilePath.h"
 #include "slender_sim/SetGrasp.h"
@@ -23,7 +24,7 @@
 
 namespace slender {
 
-/// Simulates the rods of a scene: poses of grippers come in as messages, the rods' motion goes out. README lists topics,
+/// Simulates the rods and bodies of a scene: poses of what moves them come in as messages, their motion goes out. README lists topics,
 /// services and parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
 class RodNode
 {
@@ -46,6 +47,7 @@ private:
   bool advance();                        // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
   void publishState();
+  void broadcastBodies();
   void publishMarkers();
   void jumped();                         // the state was replaced: a new epoch begins, one tick later
   void realign();                        // time went on while the rod stood still
@@ -93,6 +95,8 @@ private:
   ros::WallTime next_diagnostics_, next_markers_;
   std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture
 
+  ros::Publisher bodies_pub_;            // only when the scene has bodies, like the next
+  std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
   ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
   std::vector<ros::Publisher> rod_poses_pubs_, wrench_pubs_;
   std::vector<ros::ServiceServer> services_;

@@ -6,6 +6,7 @@
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/WrenchStamped.h>
 
+#include "slender_sim/BodyStates.h"
 #include "slender_sim/RodState.h"
 #include "slender_sim/scene/simulation.h"
 
@@ -21,6 +22,7 @@ struct SceneMessages
   std::vector<slender_sim::RodState> states;            ///< per rod
   geometry_msgs::PoseArray poses;                       ///< the edges' frames at their middles, all rods one after the other
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
+  slender_sim::BodyStates bodies;                       ///< the scene's bodies, simulated and driven; none: not published
 
   void fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch);
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -23,7 +24,29 @@ struct ArcCurve      { Eigen::Vector3d center{0, 0, 0}, start{1, 0, 0}, axis{0, 
 struct HelixCurve    { Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1}; double radius = 0.1, pitch = 0.05, turns = 3; int edges = 150; };
 struct CatenaryCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; double length = 1.2; int edges = 50; };  ///< hangs along gravity (or -z)
 struct FileCurve     { std::string path; std::vector<Eigen::Vector3d> points; std::optional<int> edges; };   ///< CSV: x,y,z per line
-using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, FileCurve>;
+/// See geometry/curves.h for the next three.
+struct TrefoilCurve
+{
+  Eigen::Vector3d center{0, 0, 0}, axis{1, 0, 0}, up{0, 0, 1};
+  double radius = 0.1, length = 1.5;
+  double separation = 0.0;   ///< 0: an eighth of the radius
+  bool left_handed = false;
+  int edges = 150;
+};
+struct TorusKnotCurve
+{
+  Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1};
+  double radius = 0.1, tube_radius = 0.04;
+  int around = 2, through = 3, edges = 120;
+};
+struct VeeCurve
+{
+  Eigen::Vector3d tip{0, 0, 0}, direction{1, 0, 0}, normal{0, 0, 1};
+  double arm = 0.5, angle = M_PI / 2;
+  int edges = 50;
+};
+using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, TrefoilCurve, TorusKnotCurve, VeeCurve,
+                           FileCurve>;
 
 /// Radii [m]; a vector has one entry per edge, or two (linear taper from the first to the last edge), or one.
 struct CrossSection
@@ -146,7 +169,7 @@ struct BodyConfig
   Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};           ///< constant, world axes, at the centre of mass [N], [N m]
   double linear_damping = 0.0, angular_damping = 0.0;        ///< [1/s]
   std::optional<GivenMotion> motion;                         ///< nothing: simulated
-  bool contact = true;                                       ///< its shape touches rods
+  bool contact = true;                                       ///< its shape touches rods (bodies and obstacles pass through each other)
   std::optional<double> friction;                            ///< [-]; nothing: that of the rod
   bool broadcast_tf = false;
   std::vector<WeldConfig> welds;

@@ -26,6 +26,8 @@ public:
 ///                at the end of an open rod), twist
 ///   grasps.csv   one row per instant and grasp: t, object, grasp, active, pose of the held section, force and torque of the rod
 ///                on the gripper about the section's origin, in world axes
+///   bodies.csv   one row per instant and body, then per obstacle, if there are any: t, object, pose of its frame (simulated bodies:
+///                origin at the centre of mass), velocity of the origin and angular velocity, in world axes
 /// Numbers are the shortest that read back to the same double.
 std::unique_ptr<Recorder> makeCsvRecorder(const std::string& folder);
 

@@ -1,0 +1,91 @@
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "generators.h"
+#include "slender_sim/geometry/curves.h"
+
+namespace slender {
+
+/// Round links in a row, each turned by a quarter against the last and hooked into it. The outermost points of the first and the last
+/// are held.
+void generateChain(const YamlCursor& at, const ReadContext& context, Generated& out)
+{
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  const std::string name = map.get("name").name().value_or("chain");
+  const int links = map.get("links").integer(1, 10'000).value_or(7);
+  const double radius = map.get("radius").number(generator_length).value_or(0.05);
+  const YamlCursor at_opening = map.get("opening"), at_spacing = map.get("spacing"), at_up = map.get("up");
+  const double opening = at_opening.number(Range::closed(0, 0.5 * M_PI, "rad")).value_or(0.0);
+  const int edges = map.get("edges").integer(3, 10'000).value_or(30);
+  const Eigen::Vector3d from = map.get("from").vector3(generator_position).value_or(Eigen::Vector3d::Zero());
+  const Eigen::Vector3d along = readDirection(map.get("direction"), Eigen::Vector3d::UnitX());
+  const Eigen::Vector3d up = readDirection(at_up, Eigen::Vector3d::UnitZ());
+  RodConfig rod;
+  rod.cross_section = readCrossSection(map.get("cross_section"), edges);
+  readTraits(map, rod);
+  const Motion motions[2] = {readMotion(map.get("start_motion"), context, false), readMotion(map.get("end_motion"), context, false)};
+  double thickness = 0.0;
+  for (const auto* radii : {&rod.cross_section.a, &rod.cross_section.b})
+  {
+    for (double r : *radii)
+    {
+      thickness = std::max(thickness, r);
+    }
+  }
+  // Closer, links two apart meet; farther, neighbours do.
+  const Range allowed = Range::between(radius + thickness, 2 * (radius - thickness), "m");
+  const double spacing = at_spacing.number(allowed).value_or(2 * radius - 4 * thickness);
+  map.finish();
+  if (up.cross(along).norm() < 1e-6)
+  {
+    at_up.problem("is along direction; must point away from it");
+  }
+  if (at.problems().size() == before && !allowed.holds(spacing))
+  {
+    at.problem("the wire is too thick: its radius " + shortNumber(thickness) + " m must be less than a fifth of the links' radius " +
+               shortNumber(radius) + " m");
+  }
+  if (at.problems().size() != before)
+  {
+    return;
+  }
+  const Eigen::Vector3d side = up.cross(along).normalized();
+  for (int k = 0; k < links; ++k)
+  {
+    rod.name = name + "_" + std::to_string(k);
+    const Eigen::Vector3d center = from + k * spacing * along;
+    // An opening is at the side, where it does not let the neighbours go as long as the link keeps its shape.
+    const Eigen::Vector3d across = k % 2 == 0 ? side : along.cross(side), axis = along.cross(across);
+    ArcCurve arc;
+    arc.center = center;
+    arc.axis = axis;
+    arc.start = center + Eigen::AngleAxisd(0.5 * opening, axis) * (radius * across);
+    arc.angle = 2 * M_PI - opening;
+    arc.edges = edges;
+    rod.centerline = arc;
+    rod.closed = opening == 0;
+    rod.grasps.clear();
+    for (int end = 0; end < 2; ++end)
+    {
+      if (k != (end == 0 ? 0 : links - 1))
+      {
+        continue;
+      }
+      Eigen::Index outermost = 0;
+      const Eigen::Matrix3Xd nodes = arcCurve(arc.center, arc.start, arc.axis, arc.angle, edges).leftCols(edges);
+      (nodes.transpose() * (end == 0 ? -along : along)).maxCoeff(&outermost);
+      GraspConfig grasp;
+      grasp.name = name + (end == 0 ? "_start" : "_end");
+      grasp.first_node = grasp.last_node = static_cast<int>(outermost);
+      grasp.motion = motions[end];
+      grasp.attach = Attach::initial;
+      rod.grasps.push_back(std::move(grasp));
+    }
+    out.rods.emplace_back(RodPart{rod, edges}, at);
+  }
+}
+
+}  // namespace slender

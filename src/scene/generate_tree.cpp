@@ -1,0 +1,177 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <Eigen/Geometry>
+
+#include "generators.h"
+#include "slender_sim/geometry/rotation.h"
+
+namespace slender {
+
+namespace {
+
+constexpr int least_nodes = 5;   // of a branch
+
+struct Branch
+{
+  int parent = -1, level = 0;
+  double at = 0.0;          ///< on the parent, fraction of its length
+  double azimuth = 0.0, incline = 0.0, length = 0.0, radius = 0.0;
+  int nodes = 0;
+  Eigen::Vector3d root{0, 0, 0}, direction{0, 0, 1};
+};
+
+struct TreeShape
+{
+  int vertices = 0, levels = 0, children = 0;
+  double length = 0.0, radius = 0.0, length_ratio = 0.0, radius_ratio = 0.0, incline = 0.0;
+};
+
+std::vector<Branch> grow(const TreeShape& shape, Dice& dice)
+{
+  std::vector<Branch> branches(1);
+  branches[0].length = shape.length;
+  branches[0].radius = shape.radius;
+  for (std::size_t b = 0; b < branches.size(); ++b)
+  {
+    const Branch parent = branches[b];
+    for (int c = 0; parent.level + 1 < shape.levels && c < shape.children; ++c)
+    {
+      Branch child;
+      child.parent = static_cast<int>(b);
+      child.level = parent.level + 1;
+      child.at = 0.3 + 0.65 * (c + dice.between(0.25, 0.75)) / shape.children;
+      child.azimuth = golden_angle * c + dice.between(-0.4, 0.4);
+      child.incline = shape.incline * dice.between(0.8, 1.2);
+      child.length = parent.length * shape.length_ratio * (1.2 - 0.5 * child.at) * dice.between(0.9, 1.1);
+      child.radius = parent.radius * shape.radius_ratio;
+      branches.push_back(child);
+    }
+  }
+  return branches;
+}
+
+/// As many nodes as asked for in all, shared out by length.
+void shareNodes(std::vector<Branch>& branches, int vertices)
+{
+  const double total = std::accumulate(branches.begin(), branches.end(), 0.0, [](double sum, const Branch& b) { return sum + b.length; });
+  const int spare = vertices - least_nodes * static_cast<int>(branches.size());
+  std::vector<std::pair<double, std::size_t>> rests;
+  int given = 0;
+  for (std::size_t b = 0; b < branches.size(); ++b)
+  {
+    const double share = spare * branches[b].length / total;
+    branches[b].nodes = least_nodes + static_cast<int>(share);
+    given += static_cast<int>(share);
+    rests.emplace_back(static_cast<int>(share) - share, b);
+  }
+  std::sort(rests.begin(), rests.end());
+  for (int k = 0; k < spare - given; ++k)
+  {
+    ++branches[rests[static_cast<std::size_t>(k)].second].nodes;
+  }
+}
+
+}  // namespace
+
+/// A trunk with side branches, theirs, and so on. Each branch is a tapered rod; where it leaves its parent, a small rigid ball carries
+/// both.
+void generateTree(const YamlCursor& at, const ReadContext& context, int first_rod, Generated& out)
+{
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  const std::string name = map.get("name").name().value_or("tree");
+  Dice dice(map.get("seed").integer(0, 1'000'000'000).value_or(1));
+  TreeShape shape;
+  const YamlCursor at_vertices = map.get("vertices");
+  shape.vertices = at_vertices.integer(least_nodes, max_edges).value_or(2158);
+  shape.levels = map.get("levels").integer(1, 6).value_or(3);
+  shape.children = map.get("children").integer(1, 30).value_or(7);
+  shape.length = map.get("length").number(generator_length).value_or(3.0);
+  shape.radius = map.get("radius").number(Range::above(0, 10, "m")).value_or(0.05);
+  const Range ratio = Range::above(0, 1);
+  shape.length_ratio = map.get("length_ratio").number(ratio).value_or(0.5);
+  shape.radius_ratio = map.get("radius_ratio").number(ratio).value_or(0.45);
+  shape.incline = map.get("angle").number(Range::between(0, 0.5 * M_PI, "rad")).value_or(0.9);
+  const double taper = map.get("taper").number(ratio).value_or(0.4);
+  const Eigen::Vector3d root = map.get("root").vector3(generator_position).value_or(Eigen::Vector3d::Zero());
+  const Eigen::Vector3d up = readDirection(map.get("direction"), Eigen::Vector3d::UnitZ());
+  RodConfig rod;
+  rod.material.density = 700;
+  readTraits(map, rod);
+  const double joint_density = map.get("joint_density").number(Range::above(0, 1e6, "kg/m^3")).value_or(rod.material.density);
+  const Motion motion = readMotion(map.get("motion"), context, false);
+  map.finish();
+  if (at.problems().size() != before)
+  {
+    return;
+  }
+
+  std::vector<Branch> branches = grow(shape, dice);
+  const int least = least_nodes * static_cast<int>(branches.size());
+  const YamlCursor& place = at_vertices.present() ? at_vertices : at;
+  if (shape.vertices < least)
+  {
+    return place.problem("is too few for " + std::to_string(branches.size()) + " branches; must be at least " + std::to_string(least));
+  }
+  shareNodes(branches, shape.vertices);
+
+  branches[0].root = root;
+  branches[0].direction = up;
+  std::vector<std::vector<Eigen::Vector3d>> points(branches.size());
+  std::vector<int> last_joint(branches.size(), -1);   // edge of the branch that carries its last ball so far
+  for (std::size_t b = 0; b < branches.size(); ++b)
+  {
+    Branch& branch = branches[b];
+    const std::string rod_name = name + "_" + std::to_string(b);
+    if (branch.parent >= 0)
+    {
+      const Branch& parent = branches[branch.parent];
+      const auto& line = points[branch.parent];
+      const int edge = std::max({static_cast<int>(branch.at * (parent.nodes - 1)), last_joint[branch.parent] + 2, 1});
+      if (edge > parent.nodes - 3)
+      {
+        return place.problem("gives " + name + "_" + std::to_string(branch.parent) + " too few (" + std::to_string(parent.nodes) +
+                             ") for its " + std::to_string(shape.children) + " children; raise it, or lower levels or children");
+      }
+      last_joint[branch.parent] = edge;
+      const Eigen::Vector3d tangent = (line[edge + 1] - line[edge]).normalized();
+      const Eigen::Vector3d normal = rotateAbout(anyNormal(tangent), tangent, branch.azimuth);
+      branch.root = 0.5 * (line[edge] + line[edge + 1]);
+      branch.direction = std::cos(branch.incline) * tangent + std::sin(branch.incline) * normal;
+
+      BodyConfig ball;
+      const double radius = 1.5 * parent.radius;
+      ball.name = rod_name + "_joint";
+      ball.shape = Sphere{radius};
+      ball.mass = joint_density * 4.0 / 3.0 * M_PI * std::pow(radius, 3);
+      ball.inertia = 0.4 * ball.mass * radius * radius * Eigen::Matrix3d::Identity();
+      ball.pose.position = branch.root;
+      ball.contact = false;
+      ball.welds = {{first_rod + branch.parent, edge, edge + 1}, {first_rod + static_cast<int>(b), 0, 0}};
+      out.bodies.emplace_back(std::move(ball), at);
+    }
+    // Branches turn up towards their tips.
+    for (int i = 0; i < branch.nodes; ++i)
+    {
+      const double u = static_cast<double>(i) / (branch.nodes - 1);
+      points[b].push_back(branch.root + branch.length * (u * branch.direction + 0.15 * u * u * up));
+    }
+    rod.name = rod_name;
+    rod.centerline = PolylineCurve{points[b], std::nullopt};
+    rod.cross_section.a = rod.cross_section.b = {branch.radius, taper * branch.radius};
+    rod.grasps.clear();
+    if (b == 0)
+    {
+      GraspConfig grasp;
+      grasp.name = name + "_root";
+      grasp.motion = motion;
+      grasp.attach = Attach::initial;
+      rod.grasps.push_back(std::move(grasp));
+    }
+    out.rods.emplace_back(RodPart{rod, branch.nodes - 1}, at);
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,53 @@
+#include "generators.h"
+
+namespace slender {
+
+Eigen::Vector3d readDirection(const YamlCursor& at, const Eigen::Vector3d& otherwise)
+{
+  const auto vector = at.vector3(Range::closed(-1e6, 1e6));
+  if (vector && !(vector->norm() > 0))
+  {
+    at.problem("must not be zero");
+    return otherwise;
+  }
+  return vector.value_or(otherwise).normalized();
+}
+
+Generated readGenerators(const YamlCursor& at, const ReadContext& context, int first_rod)
+{
+  Generated all;
+  if (!at.present())
+  {
+    return all;
+  }
+  for (const YamlCursor& item : at.items())
+  {
+    const std::size_t before = item.problems().size();
+    YamlMap map(item);
+    const YamlCursor chain = map.get("chain"), tree = map.get("tree"), hair = map.get("hair");
+    map.finish();
+    if (item.problems().size() != before)
+    {
+      continue;
+    }
+    if (chain.present() + tree.present() + hair.present() != 1)
+    {
+      item.problem("must be one of {chain: {...}}, {tree: {...}}, {hair: {...}}");
+    }
+    else if (chain.present())
+    {
+      generateChain(chain, context, all);
+    }
+    else if (tree.present())
+    {
+      generateTree(tree, context, first_rod + static_cast<int>(all.rods.size()), all);
+    }
+    else if (hair.present())
+    {
+      generateHair(hair, context, all);
+    }
+  }
+  return all;
+}
+
+}  // namespace slender

@@ -1,0 +1,65 @@
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/node/converters.h"
+#include "slender_sim/node/rod_markers.h"
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+namespace {
+
+using visualization_msgs::Marker;
+
+/// Volume enclosed by a triangle list; positive when the triangles face outwards.
+double volumeOf(const Marker& marker)
+{
+  double volume = 0;
+  for (std::size_t k = 0; k + 2 < marker.points.size(); k += 3)
+  {
+    const Eigen::Vector3d a = fromMessage(marker.points[k]), b = fromMessage(marker.points[k + 1]), c = fromMessage(marker.points[k + 2]);
+    volume += a.dot(b.cross(c)) / 6;
+  }
+  return volume;
+}
+
+TEST(Markers, solidsHaveTheirShapeAndPlace)
+{
+  const Simulation simulation(parseScene(R"(
+rods: [{}]
+obstacles:
+  - {name: floor, shape: {plane: {}}, pose: {position: [0, 0, -3]}}
+  - {name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [1, 2, 3]}}
+  - {name: crate, shape: {box: {size: [1, 2, 3]}}}
+  - {name: drum, shape: {cylinder: {radius: 0.2, length: 0.5}}}
+  - {name: log, shape: {capsule: {radius: 0.2, length: 0.5}}, pose: {position: [0, 0, 1], rpy: [1, 0, 0]}}
+bodies:
+  - {name: point, mass: 1, inertia: [1, 1, 1]}
+  - {name: cube, density: 1, shape: {mesh: {file: cube.obj}}, pose: {position: [5, 0, 0]}}
+)", "scene", {}, std::string(SLENDER_SOURCE_DIR) + "/test/unit/data"));
+  std::map<std::pair<std::string, int>, Marker> markers;
+  for (const Marker& marker : rodMarkers(simulation, std_msgs::Header(), MarkerStyle::line, false).markers)
+    markers[{marker.ns, marker.id}] = marker;
+  ASSERT_EQ(markers.size(), 1u + 5u + 1u);   // no picture of the body without a shape
+  const Marker& floor = markers[{"obstacles", 0}];
+  EXPECT_EQ(floor.type, Marker::CUBE);
+  EXPECT_NEAR(floor.pose.position.z + 0.5 * floor.scale.z, -3, 1e-12);   // its upper face
+  EXPECT_EQ((markers[{"obstacles", 1}].type), Marker::SPHERE);
+  EXPECT_EQ((markers[{"obstacles", 1}].scale.x), 0.2);
+  EXPECT_EQ((markers[{"obstacles", 1}].pose.position.y), 2);
+  EXPECT_EQ((markers[{"obstacles", 2}].scale.y), 2);
+  EXPECT_EQ((markers[{"obstacles", 3}].type), Marker::CYLINDER);
+  EXPECT_EQ((markers[{"obstacles", 3}].scale.z), 0.5);
+  const Marker& log = markers[{"obstacles", 4}];
+  EXPECT_EQ(log.pose.position.z, 1);
+  const double exact = M_PI * 0.04 * 0.5 + 4.0 / 3.0 * M_PI * 0.008;
+  EXPECT_NEAR(volumeOf(log), exact, 0.03 * exact);
+  EXPECT_LT(volumeOf(log), exact);   // its corners lie on the capsule
+  EXPECT_EQ(log.colors.size(), log.points.size());
+  const Marker& cube = markers[{"bodies", 1}];
+  EXPECT_NEAR(volumeOf(cube), 1, 1e-12);
+  EXPECT_NEAR(cube.pose.position.x, 5, 1e-12);   // the mesh stays where the scene puts it
+}
+
+}  // namespace
+}  // namespace slender
