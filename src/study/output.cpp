@@ -129,7 +129,7 @@ void writeScript(std::ostream& out, const Plot& plot, const std::string& picture
   index = 0;
   for (const Series& s : plot.series)
   {
-    out << (index ? ", \\\n     " : "") << "$series" << index << " using 1:2 with " << (plot.lines ? "linespoints" : "points")
+    out << (index ? ", \\\n     " : "") << "$series" << index << " using 1:2 with " << (plot.lines && !s.points ? "linespoints" : "points")
         << " pointtype " << index % 13 + 4 << " title " << gnuplotString(s.label);
     ++index;
   }

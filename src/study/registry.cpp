@@ -12,6 +12,7 @@ void runTorsion(StudyContext&);
 void runRodScaling(StudyContext&);
 void runImplicitVsExplicit(StudyContext&);
 void runRodStability(StudyContext&);
+void runBendTwist(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -25,6 +26,7 @@ const std::vector<Study>& studies()
       {"rod_scaling", "time per Newton iteration and node from 50 to 100,000 nodes", runRodScaling},
       {"rod_implicit_vs_explicit", "hair strand: stable steps and cost of implicit against explicit integration", runImplicitVsExplicit},
       {"rod_stability", "extreme stiffness, thickness, steps, twist and grasps: done, cut or refused with reason", runRodStability},
+      {"bend_twist", "heavy naturally curved rod: planar or three-dimensional on both sides of the boundary", runBendTwist},
   };
   return all;
 }
