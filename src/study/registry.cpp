@@ -13,6 +13,7 @@ void runRodScaling(StudyContext&);
 void runImplicitVsExplicit(StudyContext&);
 void runRodStability(StudyContext&);
 void runBendTwist(StudyContext&);
+void runLateralBuckling(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -27,6 +28,7 @@ const std::vector<Study>& studies()
       {"rod_implicit_vs_explicit", "hair strand: stable steps and cost of implicit against explicit integration", runImplicitVsExplicit},
       {"rod_stability", "extreme stiffness, thickness, steps, twist and grasps: done, cut or refused with reason", runRodStability},
       {"bend_twist", "heavy naturally curved rod: planar or three-dimensional on both sides of the boundary", runBendTwist},
+      {"lateral_buckling", "heavy cantilevers of elliptical section that topple sideways: critical load", runLateralBuckling},
   };
   return all;
 }
