@@ -32,6 +32,7 @@ const char* toString(StepFailure failure)
     case StepFailure::singular_matrix: return "singular_matrix";
     case StepFailure::input_not_finite: return "input_not_finite";
     case StepFailure::state_not_finite: return "state_not_finite";
+    case StepFailure::squeezed: return "squeezed";
     case StepFailure::energy_grew: return "energy_grew";
   }
   return "unknown";

@@ -49,7 +49,9 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
     gradient_[4 * next + k] += force[k];
   }
   gradient_[4 * j + 3] += gt;
-  c.torque = (1.0 / inverse) * te.cross(Eigen::Vector3d(ge.x, ge.y, ge.z)) + gt * te;
+  c.gradient_e << ge.x, ge.y, ge.z;
+  c.gradient_t = gt;
+  c.torque = (1.0 / inverse) * te.cross(c.gradient_e) + gt * te;
   if (!with_hessian)
     return;
 
@@ -57,6 +59,9 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   const Vec3<double>& m = section_first ? h.f_tf : h.e_te;
   const double ee[3][3] = {{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}};
   const double et[3] = {m.x, m.y, m.z};
+  c.hessian_ee << s.xx, s.xy, s.xz, s.xy, s.yy, s.yz, s.xz, s.yz, s.zz;
+  c.hessian_et << m.x, m.y, m.z;
+  c.hessian_tt = section_first ? h.tf_tf : h.te_te;
   RodPanel& p = panel(j);
   RodPanel& q = panel(next);
   for (int col = 0; col < 3; ++col)
@@ -73,7 +78,7 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
     p.diag[col][3] -= et[col];
     p.below[3][col] += et[col];
   }
-  p.diag[3][3] += section_first ? h.tf_tf : h.te_te;
+  p.diag[3][3] += c.hessian_tt;
 }
 
 }  // namespace slender

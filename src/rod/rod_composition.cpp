@@ -10,7 +10,7 @@ namespace slender {
 void RodSystem::compose(const RodState& state)
 {
   const auto same = [](const GraspState& a, const GraspState& b) {
-    return a.active == b.active && a.first_node == b.first_node && a.last_node == b.last_node && a.holds_frame == b.holds_frame;
+    return a.active == b.active && a.first_node == b.first_node && a.last_node == b.last_node && a.holds_frame == b.holds_frame && a.body == b.body;
   };
   const bool unchanged = !held_.empty() && grasps_.size() == state.grasps.size() &&
                          std::equal(grasps_.begin(), grasps_.end(), state.grasps.begin(), same);
@@ -20,6 +20,7 @@ void RodSystem::compose(const RodState& state)
 
   const int n = a_.nodes, edges = a_.edges;
   held_.assign(n, 0);
+  carried_.assign(n, 0);
   held_nodes_.clear();
   held_angles_.clear();
   std::vector<char> jointless(n, 0);
@@ -31,6 +32,7 @@ void RodSystem::compose(const RodState& state)
       {
         held_nodes_.push_back(i);
         held_[i] = static_cast<int>(held_nodes_.size());
+        carried_[i] = g.body >= 0;
         if (g.holds_frame)
           jointless[i] = 1;
         if (i < g.last_node)

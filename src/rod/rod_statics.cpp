@@ -15,7 +15,7 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
   std::string what;
   if (!inputsFinite(state, inputs, what))
     return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
-  resizeFor(state);
+  begin(state);
   const int n = model->nodes();
   work = state;
   work.forgetHistory();

@@ -11,44 +11,60 @@
 
 namespace slender {
 
-/// Work space and parts of RodStepper. Memory is reused from step to step.
+/// Pose (and velocity) at a fraction s of a motion from `start` to a target: uniform, or a cubic through both ends' velocities.
+Pose poseBetween(const Pose& start, const Twist& start_velocity, const GraspTarget& target, double duration, double s, Twist* velocity);
+
+/// One rod's part in a step and its work space, which is reused from step to step. StepLoop runs one or several of them.
 class RodStepper::Impl
 {
 public:
   Impl(std::shared_ptr<const RodModel> model, const TimeConfig& time);
 
-  StepReport step(RodState& state, const RodInputs& inputs, double duration);
   StepReport solveEquilibrium(RodState& state, const RodInputs& inputs);
 
   std::shared_ptr<const RodModel> model;
   TimeConfig time;
   RodSystem system;
   std::vector<Wrench> wrenches;
+  RodState work, next;              ///< start and end of a substep
+  /// Of all grasps at the instant being solved for. Those of grasps carried by bodies are set from outside.
+  std::vector<Pose> stage_poses;
+  std::vector<Twist> carried_velocity;   ///< of the frames of grasps carried by bodies
+
+  // rod_stepper.cpp: a whole step from t = 0 to duration, in substeps of h
+  void begin(const RodState& state);
+  bool inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const;
+  /// The grasps of `next` move on, so that clamps measure turns from where they are.
+  void moveGrasps(const RodInputs& inputs, double duration, double t);
+  /// Held nodes and frames at a fraction of the step; poses of carried grasps stay as they are.
+  void placeAt(const RodInputs& inputs, double duration, double fraction);
+  RodEnergies energies(const RodState& state, const Eigen::Vector3d& gravity);
+  double mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const;
+  double startEnergy(const RodInputs& inputs, double* allowance);
+  double endEnergy(const RodInputs& inputs) const { return mechanicalEnergy(next, inputs, end_evaluation, nullptr); }
+  StepReport refuse(StepReport& report, StepFailure failure, const std::string& message);
+  std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
+  Eigen::Vector3d load(const RodInputs& inputs, int node) const;
+
+  // rod_stages.cpp: an implicit substep; the stages' equations are solved between beginStage and endStage or finishStep
+  StepFailure beginStep(const StepPlan& plan, const RodInputs& inputs, double duration, double t, double h);
+  void beginStage(std::size_t stage, const RodInputs& inputs, double duration, double t, double h);
+  void endStage(std::size_t stage, const RodInputs& inputs, double duration, double t, double h);
+  void finishStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
+
+  // rod_explicit.cpp
+  StepFailure explicitStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
 
 private:
-  // rod_stepper.cpp
-  void resizeFor(const RodState& state);
-  double stepFactor(double ratio) const;
-  bool inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const;
   static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
-  void placeAt(const RodInputs& inputs, double duration, double fraction);
-  Eigen::Vector3d load(const RodInputs& inputs, int node) const;
   StepFailure computeAcceleration(const RodInputs& inputs, double duration, double t);
-  StepFailure implicitStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
-  void finishStep(const RodInputs& inputs, double duration, double t, double h, const Stage& stage, StepReport& report);
   Eigen::Vector3d heldVelocity(const RodInputs& inputs, double duration, double at, int node, const Eigen::Vector3d& otherwise);
   Eigen::Vector3d combine(const Combination& c, int node) const;
   void computeWrenches(const RodInputs& inputs, double h);
-  StepReport refuse(StepReport& report, StepFailure failure, const std::string& message);
-  double mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const;
-  std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
 
   // rod_statics.cpp
   void carryFreeNodes(const RodInputs& inputs, double weight);
   StepReport finishEquilibrium(RodState& state, const RodInputs& inputs, StepReport& report);
-
-  // rod_explicit.cpp
-  StepFailure explicitStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
 
   // rod_viscous.cpp: strain history of Rayleigh stiffness damping
   void startStrainHistory(const RodInputs& inputs, double duration, double t);
@@ -57,12 +73,10 @@ private:
   void finishStrainHistory(const Stage& stage);
 
   const std::vector<GraspState>* origin = nullptr;
-  RodState work, next;              ///< start and end of a substep
-  StepPlan plan;
+  const StepPlan* plan = nullptr;   ///< of the substep
   RodEvaluation end_evaluation;     ///< at the end of a substep whose stage lies inside it
   Eigen::Matrix3Xd stage_q, stage_v;
   Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end, strain_sag;
-  std::vector<Pose> stage_poses;
 };
 
 }  // namespace slender

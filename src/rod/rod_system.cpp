@@ -184,6 +184,23 @@ RodEvaluation RodSystem::evaluate(bool with_hessian, const HessianShift& shift)
   return result;
 }
 
+RodEvaluation RodSystem::evaluateWhole(bool with_hessian)
+{
+  const RodKernels& kernels = rodKernels();
+  RodSweep sweep;
+  kernels.begin(a_, sweep);
+  panels_ = matrix_.panels();
+  first_panel_ = 0;
+  kernels.advance(a_, sweep, with_hessian ? panels_ : nullptr, 0, a_.nodes);
+  RodEvaluation clamped;
+  for (ClampJoint& c : clamps_)
+    evaluateClamp(c, with_hessian, clamped);
+  RodEvaluation result = kernels.end(sweep);
+  result.bend_twist += clamped.bend_twist;
+  result.min_chi = std::min(result.min_chi, clamped.min_chi);
+  return result;
+}
+
 void RodSystem::solve()
 {
   if (model_.closed)

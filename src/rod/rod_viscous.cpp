@@ -20,7 +20,7 @@ void RodStepper::Impl::startStrainHistory(const RodInputs& inputs, double durati
 void RodStepper::Impl::setViscousResponse(const Stage& stage, double h)
 {
   const Combination& c = stage.q_tilde;
-  if (plan.fraction == 1.0)
+  if (plan->fraction == 1.0)
     strain_sag.setZero(4, 0);
   else if (work.last_step > 0 && work.strain_previous.cols() == strain_start.cols())
     strain_sag = (h / work.last_step) * (h / work.last_step) * work.strain_previous;
@@ -43,7 +43,7 @@ void RodStepper::Impl::setViscousResponse(const Stage& stage, double h)
 /// order, and damped however fast the frames relax.
 void RodStepper::Impl::setViscousResponseAtEnd(const Stage& stage, double h)
 {
-  const double c = plan.fraction, r = (1 - c) / c, weight = (1 + r) * (1 + r) / (1 + 2 * r);
+  const double c = plan->fraction, r = (1 - c) / c, weight = (1 + r) * (1 + r) / (1 + 2 * r);
   strain_end = strain_start + (0.5 * c * h) * (work.strain_rate + (strain_stage - strain_reference) / stage.tau_v);
   strain_end = weight * strain_end - (weight - 1) * strain_start;
   system.setResponse(model->stiffness_damping * (1 + 2 * r) / ((1 + r) * (1 - c) * h), &strain_end);
@@ -52,7 +52,7 @@ void RodStepper::Impl::setViscousResponseAtEnd(const Stage& stage, double h)
 void RodStepper::Impl::finishStrainHistory(const Stage& stage)
 {
   system.strains(strain_end);
-  const double c = plan.fraction;
+  const double c = plan->fraction;
   if (c == 1.0)
     next.strain_rate = (strain_end - strain_reference) / stage.tau_v;
   else
@@ -65,7 +65,7 @@ void RodStepper::Impl::finishStrainHistory(const Stage& stage)
   if (time.integrator == Integrator::bdf2)
     next.strain_previous = strain_start;
   system.setResponse(0.0, nullptr);
-  if (plan.fraction != 1.0)
+  if (plan->fraction != 1.0)
     end_evaluation = system.evaluate(false);   // elastic alone
 }
 

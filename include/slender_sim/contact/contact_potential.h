@@ -35,7 +35,7 @@ struct ContactSolid
 {
   Shape shape;
   double friction = -1.0;      ///< negative: that of whatever touches it; otherwise the geometric mean of both counts
-  int ignores = -1;            ///< an object it never touches
+  std::vector<int> ignores;    ///< objects it never touches
 };
 
 struct ContactSurface
@@ -49,11 +49,18 @@ struct ContactSurface
 struct ContactOptions
 {
   double gap = 0.0;            ///< distance between surfaces below which they repel [m] > 0
-  double slip_speed = 1e-4;    ///< friction sticks below it [m/s]
+  double slip_speed = 1e-4;    ///< friction sticks below it [m/s] > 0
+  double least_stiffness = 1e-6;   ///< [N] > 0: stiffness() never falls below it; a good choice is the weight of a piece
 };
 
-/// One touching pair. With the relative displacement u = sum_i weight[i] x[point[i]] minus that of the solid's material point at
-/// `position`, the potential has the gradient dE/du = -force and, projected to be semidefinite, the second derivative `stiffness`.
+/// Whether two segments of one curve are neighbours, which never count as a pair: their rest distance along the curve, the shorter way
+/// around a closed one, is less than half a turn of the tightest bend that does not touch itself, (pi/2) (r1 + r2), plus the gap.
+bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap);
+
+/// Part of a touching pair's potential. With the relative displacement u = sum_i weight[i] x[point[i]] minus, if there is a solid, that of its
+/// material point at `position`, the potential has the gradient dE/du = -force and, projected to be semidefinite, the second derivative
+/// `stiffness`. A pair gives one term with its normal force; with stiffness, pairs that are nearly parallel give up to two more without
+/// force (the place of contact runs along them); with friction, one more.
 struct ContactTerm
 {
   int point[4] = {-1, -1, -1, -1};   ///< -1: unused
@@ -74,24 +81,33 @@ public:
   ~ContactPotential();
   ContactPotential(ContactPotential&&) noexcept;
 
-  /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; negative or zero: they meet.
+  /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less: they meet. Shares no
+  /// search structure and no minimisation with the rest of this class. The surface of a mesh is touched from both sides.
   double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
 
-  /// A time step of h seconds begins here: tangential displacements of friction count from this configuration.
+  /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its normal forces and
+  /// tangent planes are those of friction until lagFriction(). Nothing else is carried over from earlier steps but stiffness().
   void begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h);
-  /// The normal forces and tangent planes of the last evaluate() become those of friction; returns their largest relative change.
+  /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change of a contact's
+  /// force over the largest force.
   double lagFriction();
 
-  /// The largest share alpha <= 1 of the motion from (x, solids) to (x_end, solids_end), along straight lines and uniform screw motions,
-  /// that leaves at least a fifth of each present distance. Conservative [Li et al. 2021, additive CCD]: misses nothing.
+  /// The largest share alpha <= 1 of the motion from (x, solids) to (x_end, solids_end) that leaves of each distance between surfaces at least
+  /// a fifth, or a fifth of the gap. Points go along straight lines; solids' origins too, while they turn uniformly by the smaller angle.
+  /// Conservative [Li et al. 2021, additive CCD]: misses nothing. 0 if surfaces meet at x.
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
 
-  /// Potential [J] at a configuration; infinite where surfaces meet. Fills terms(); their stiffness only on request.
+  /// Potential [J] at a configuration; infinite where surfaces meet or x is not finite. Fills terms(), in an order that depends on x and
+  /// solids only; their stiffness only on request.
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   const std::vector<ContactTerm>& terms() const;
 
-  /// Force [N] of the barrier at half the gap. adaptStiffness(), after a step, follows the largest contact forces and keeps gaps from
-  /// getting too small to resolve. Part of a simulation's state.
+  /// Largest normal force [N] and smallest softened gap [m] of the last evaluate(); 0 and infinity without contact.
+  double largestForce() const;
+  double smallestGap() const;
+
+  /// Force [N] of the barrier at half the gap. adaptStiffness(), after a step, follows the largest normal force of the last evaluate(): it
+  /// aims at a smallest gap of a fifth and acts outside a twelfth to a half. Part of a simulation's state.
   double stiffness() const;
   void setStiffness(double force);
   void adaptStiffness();

@@ -13,6 +13,7 @@ enum class StepFailure
   singular_matrix,      ///< the Hessian could not be made positive definite
   input_not_finite,     ///< an input (pose, velocity, wind) was NaN or infinite
   state_not_finite,     ///< explicit step blew up
+  squeezed,             ///< contact: prescribed motions leave no room for what lies between them
   energy_grew,          ///< implicit_midpoint, generalized_alpha: energy out of nothing
 };
 

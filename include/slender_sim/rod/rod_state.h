@@ -15,6 +15,7 @@ struct GraspState
   bool active = true;
   int first_node = 0, last_node = 0;          ///< held nodes, first <= last; equal: a single section
   bool holds_frame = true;                    ///< false: a point pin (first == last)
+  int body = -1;                              ///< simulated body that carries it (see Weld), -1: its pose is an input
   Pose X_WG;                                  ///< the grasp frame: origin at the (middle of the) held part, x along its tangent, y along d1
   Twist velocity;                             ///< of X_WG
   std::vector<Eigen::Vector3d> nodes_G;       ///< held nodes in the grasp frame

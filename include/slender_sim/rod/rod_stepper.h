@@ -62,9 +62,11 @@ public:
 
   const RodModel& model() const;
 
-private:
   class Impl;
+
+private:
   std::unique_ptr<Impl> impl_;
+  std::unique_ptr<class StepLoop> loop_;
 };
 
 }  // namespace slender

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "slender_sim/dynamics/hessian_shift.h"
@@ -25,6 +26,10 @@ struct ClampJoint
   double kappa1 = 0, kappa2 = 0, twist = 0;
   double energy = 0;
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< on the gripper [N m]
+  // by the edge vector and its angle (with_hessian only the second derivatives)
+  Eigen::Vector3d gradient_e = Eigen::Vector3d::Zero(), hessian_et = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d hessian_ee = Eigen::Matrix3d::Zero();
+  double gradient_t = 0, hessian_tt = 0;
 };
 
 /// Equations of one rod in the layout of the hot loops: configuration, energy, gradient, banded Hessian, constraints.
@@ -47,6 +52,7 @@ public:
   /// Trial position of a node; held nodes are overwritten by placeGrasps().
   void setPosition(int node, const Eigen::Vector3d& x) { for (int k = 0; k < 3; ++k) a_.x[k][node] = x[k]; }
   Eigen::Vector3d position(int node) const { return {a_.x[0][node], a_.x[1][node], a_.x[2][node]}; }
+  Eigen::Vector3d basePosition(int node) const { return {x_base_[0][node], x_base_[1][node], x_base_[2][node]}; }
   /// Trial positions and frames of everything held, for the given grasp frames (one per grasp of the state).
   void placeGrasps(const std::vector<Pose>& X_WG);
 
@@ -62,6 +68,19 @@ public:
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
   /// direction() := -K^-1 gradient of the last evaluate(true).
   void solve();
+
+  /// For systems of several rods, bodies and contact: energy, gradient() and panels() of all unknowns, prescribed ones included, without
+  /// factoring. closeGradient() then keeps the prescribed ones' entries as reactions and clears them.
+  RodEvaluation evaluateWhole(bool with_hessian);
+  void closeGradient() { takeReactions(0, a_.nodes); }
+  RodPanel* panels() { return matrix_.panels(); }
+  double* gradient() { return gradient_.data(); }       ///< 4 per node
+  double* direction() { return direction_.data(); }     ///< 4 per node
+  /// What a shift adds to the diagonal of panels() of node i: {position, angle}.
+  std::array<double, 2> diagonalShift(int node, const HessianShift& shift) const
+  {
+    return {shift.position * (a_.weight[node] + shift_x_), shift.angle * shift_theta_ + spin_};
+  }
   /// Trial := base + alpha direction.
   void moveAlong(double alpha);
   /// Base := trial.
@@ -79,6 +98,8 @@ public:
   double forceScale() const;            ///< largest internal or external force [N]
   double noiseLevel() const;            ///< unbalanced force that round-off alone can cause [N]
   bool isFree(int node) const { return !held_[node]; }
+  /// Has inertia here: free, or carried by a simulated body.
+  bool isMoving(int node) const { return !held_[node] || carried_[node]; }
 
   /// Strains at the trial configuration, columns as in RodState::strain_rate.
   void strains(Eigen::Matrix4Xd& out) const;
@@ -123,6 +144,7 @@ private:
 
   std::vector<GraspState> grasps_;
   std::vector<ClampJoint> clamps_;
+  std::vector<char> carried_;                      ///< per node: held by a simulated body
   std::vector<int> held_;                          ///< per node: slot in held_nodes_ plus one, 0 = free
   std::vector<int> held_nodes_, held_angles_;      ///< nodes, edges whose unknowns are prescribed
   std::vector<Eigen::Vector4d> reactions_;         ///< gradient at held_nodes_ (x, y, z) before it is cleared

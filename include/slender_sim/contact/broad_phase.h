@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace slender {
+
+/// Axis-parallel box [m].
+struct BoundingBox
+{
+  Eigen::Vector3d low, high;
+  bool overlaps(const BoundingBox& b) const { return (low.array() <= b.high.array()).all() && (b.low.array() <= high.array()).all(); }
+};
+
+/// Pairs of overlapping boxes through a hashed uniform grid. Time and memory are linear in boxes and pairs when boxes are of similar
+/// size; memory is reused from call to call.
+class GridPairs
+{
+public:
+  struct Pair
+  {
+    int first, second;   ///< first < second
+  };
+  /// All overlapping pairs, sorted. Boxes must be finite.
+  const std::vector<Pair>& find(const std::vector<BoundingBox>& boxes);
+
+private:
+  struct Entry
+  {
+    std::int32_t cell[3];
+    int box;
+  };
+  double cellSize(const std::vector<BoundingBox>& boxes) const;
+  void sortPairs(int boxes);
+
+  std::vector<Entry> entries_, sorted_;
+  std::vector<int> bucket_start_;
+  std::vector<Pair> found_, pairs_;
+  std::vector<int> first_start_;
+};
+
+}  // namespace slender

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "slender_sim/contact/shape.h"
+
+namespace slender {
+
+using Triangle = std::array<Eigen::Vector3d, 3>;
+
+/// A convex shape in its own frame. Meshes are taken triangle by triangle.
+using ConvexPiece = std::variant<Plane, Sphere, Box, Cylinder, Capsule, Triangle>;
+
+/// Distance from a convex piece along a line through a point. Outside it is once continuously differentiable and convex in the point.
+struct PieceDistance
+{
+  double distance = 0.0;        ///< [m] negative inside (a triangle has no inside)
+  Eigen::Vector3d normal;       ///< its gradient, unit
+  double curvature = 0.0;       ///< second derivative along `direction` (not normalised)
+};
+
+/// p, direction: in the piece's frame [m].
+PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& direction);
+
+/// Throws std::invalid_argument naming what is wrong with a shape: sizes that are not positive, indices out of range, no triangles.
+void checkShape(const Shape& shape);
+
+/// Radius [m] of a ball about the frame's origin that holds the shape; infinite for a plane.
+double boundingRadius(const Shape& shape);
+
+}  // namespace slender

@@ -1,0 +1,122 @@
+#include "slender_sim/contact/broad_phase.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace slender {
+
+namespace {
+
+unsigned bucketOf(const std::int32_t* cell, unsigned mask)
+{
+  unsigned h = static_cast<unsigned>(cell[0]) * 73856093u ^ static_cast<unsigned>(cell[1]) * 19349663u ^ static_cast<unsigned>(cell[2]) * 83492791u;
+  h ^= h >> 15;
+  return h & mask;
+}
+
+std::int32_t cellOf(double coordinate, double inverse_size)
+{
+  return static_cast<std::int32_t>(std::floor(coordinate * inverse_size));
+}
+
+}  // namespace
+
+double GridPairs::cellSize(const std::vector<BoundingBox>& boxes) const
+{
+  double mean = 0.0, farthest = 0.0;
+  for (const BoundingBox& b : boxes)
+  {
+    mean += (b.high - b.low).maxCoeff();
+    farthest = std::max({farthest, b.high.cwiseAbs().maxCoeff(), b.low.cwiseAbs().maxCoeff()});
+  }
+  // No smaller than 32-bit cell numbers allow; larger while a few huge boxes would fill too many cells.
+  double size = std::max({mean / boxes.size(), farthest * 1e-9, 1e-300});
+  for (;;)
+  {
+    double count = 0.0;
+    for (const BoundingBox& b : boxes)
+    {
+      const Eigen::Array3d cells = (b.high.array() / size).floor() - (b.low.array() / size).floor() + 1.0;
+      count += cells.prod();
+    }
+    if (count <= 12.0 * boxes.size())
+      return size;
+    size *= 1.5;
+  }
+}
+
+const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBox>& boxes)
+{
+  pairs_.clear();
+  found_.clear();
+  entries_.clear();
+  if (boxes.size() < 2)
+    return pairs_;
+  const double inverse = 1.0 / cellSize(boxes);
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+  {
+    std::int32_t low[3], high[3];
+    for (int k = 0; k < 3; ++k)
+    {
+      low[k] = cellOf(boxes[i].low[k], inverse);
+      high[k] = cellOf(boxes[i].high[k], inverse);
+    }
+    for (std::int32_t x = low[0]; x <= high[0]; ++x)
+      for (std::int32_t y = low[1]; y <= high[1]; ++y)
+        for (std::int32_t z = low[2]; z <= high[2]; ++z)
+          entries_.push_back({{x, y, z}, static_cast<int>(i)});
+  }
+  unsigned buckets = 64;
+  while (buckets < entries_.size())
+    buckets *= 2;
+  bucket_start_.assign(buckets + 1, 0);
+  for (const Entry& e : entries_)
+    ++bucket_start_[bucketOf(e.cell, buckets - 1) + 1];
+  for (unsigned k = 0; k < buckets; ++k)
+    bucket_start_[k + 1] += bucket_start_[k];
+  sorted_.resize(entries_.size());
+  for (auto e = entries_.rbegin(); e != entries_.rend(); ++e)   // ends at the buckets' starts shifted by one
+    sorted_[--bucket_start_[bucketOf(e->cell, buckets - 1) + 1]] = *e;
+  for (unsigned k = 0; k < buckets; ++k)
+  {
+    const int from = bucket_start_[k + 1], to = k + 2 <= buckets ? bucket_start_[k + 2] : static_cast<int>(sorted_.size());
+    for (int p = from; p < to; ++p)
+      for (int q = p + 1; q < to; ++q)
+      {
+        const Entry &a = sorted_[p], &b = sorted_[q];
+        if (a.cell[0] != b.cell[0] || a.cell[1] != b.cell[1] || a.cell[2] != b.cell[2])
+          continue;
+        const BoundingBox &u = boxes[a.box], &v = boxes[b.box];
+        if (!u.overlaps(v))
+          continue;
+        // of the cells that both fill, the one with the lowest corner of what they share reports the pair
+        bool reports = true;
+        for (int c = 0; c < 3; ++c)
+          reports = reports && a.cell[c] == cellOf(std::max(u.low[c], v.low[c]), inverse);
+        if (reports)
+          found_.push_back({std::min(a.box, b.box), std::max(a.box, b.box)});
+      }
+  }
+  sortPairs(static_cast<int>(boxes.size()));
+  return pairs_;
+}
+
+void GridPairs::sortPairs(int boxes)
+{
+  first_start_.assign(boxes + 1, 0);
+  for (const Pair& p : found_)
+    ++first_start_[p.first + 1];
+  for (int i = 0; i < boxes; ++i)
+    first_start_[i + 1] += first_start_[i];
+  pairs_.resize(found_.size());
+  for (const Pair& p : found_)
+    pairs_[first_start_[p.first]++] = p;
+  int from = 0;
+  for (int i = 0; i < boxes; ++i)
+  {
+    std::sort(pairs_.begin() + from, pairs_.begin() + first_start_[i], [](const Pair& p, const Pair& q) { return p.second < q.second; });
+    from = first_start_[i];
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,115 @@
+#include "candidates.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/geometry/rotation.h"
+
+namespace slender {
+
+namespace {
+
+double angleBetween(const Pose& a, const Pose& b)
+{
+  return rotationVector(a.orientation * b.orientation.conjugate()).norm();
+}
+
+bool mayTouch(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b, double gap)
+{
+  if (a.object == b.object)
+    return surface.objects[a.object].self && !contactNeighbours(a, b, surface.objects[a.object], gap);
+  return surface.objects[a.object].others && surface.objects[b.object].others;
+}
+
+bool mayTouch(const ContactSurface& surface, const ContactSegment& segment, const ContactSolid& solid)
+{
+  return surface.objects[segment.object].solids &&
+         std::find(solid.ignores.begin(), solid.ignores.end(), segment.object) == solid.ignores.end();
+}
+
+}  // namespace
+
+bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap)
+{
+  const ContactSegment &first = a.start <= b.start ? a : b, &second = a.start <= b.start ? b : a;
+  double apart = second.start - (first.start + first.length);
+  if (curve.closed)
+    apart = std::min(apart, curve.curve_length + first.start - (second.start + second.length));
+  return apart < 0.5 * M_PI * (a.radius + b.radius) + gap;
+}
+
+void Candidates::build(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion, double gap, double margin,
+                       double turn)
+{
+  low_ = motion.x.cwiseMin(motion.x_end).array() - margin;
+  high_ = motion.x.cwiseMax(motion.x_end).array() + margin;
+  boxes_.resize(surface.segments.size());
+  for (std::size_t i = 0; i < boxes_.size(); ++i)
+  {
+    const ContactSegment& s = surface.segments[i];
+    const double around = s.radius + 0.5 * gap;
+    boxes_[i].low = low_.col(s.a).cwiseMin(low_.col(s.b)).array() - around;
+    boxes_[i].high = high_.col(s.a).cwiseMax(high_.col(s.b)).array() + around;
+  }
+  pairs_.clear();
+  if (std::any_of(surface.objects.begin(), surface.objects.end(), [](const ContactObject& o) { return o.self || o.others; }))
+    for (const GridPairs::Pair& p : grid_.find(boxes_))
+      if (mayTouch(surface, surface.segments[p.first], surface.segments[p.second], gap))
+        pairs_.push_back(p);
+  on_solids_.clear();
+  solids_ = motion.solids;
+  shift_.resize(solids_.size());
+  turn_.resize(solids_.size());
+  for (std::size_t k = 0; k < solids_.size(); ++k)
+  {
+    shift_[k] = (motion.solids_end[k].position - solids_[k].position).norm() + margin;
+    turn_[k] = angleBetween(motion.solids_end[k], solids_[k]) + turn;
+    findOnSolid(surface, static_cast<int>(k), solids[k], motion, gap, margin);
+  }
+  built_ = true;
+}
+
+void Candidates::findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion, double gap, double margin)
+{
+  const Pose& pose = solids_[solid];
+  const ContactSolid& properties = surface.solids[solid];
+  const double reach = boundingRadius(properties.shape), corner = std::sqrt(3.0) * margin;
+  for (std::size_t i = 0; i < surface.segments.size(); ++i)
+  {
+    const ContactSegment& s = surface.segments[i];
+    const Eigen::Vector3d a = motion.x.col(s.a) - pose.position, b = motion.x.col(s.b) - pose.position;
+    const double moved = std::sqrt(std::max((motion.x_end.col(s.a) - motion.x.col(s.a)).squaredNorm(),
+                                            (motion.x_end.col(s.b) - motion.x.col(s.b)).squaredNorm())) + corner;
+    const double farthest = std::sqrt(std::max(a.squaredNorm(), b.squaredNorm())), half = 0.5 * (b - a).norm();
+    // how far a point of the segment may come nearer, seen from the solid
+    const double slack = moved + shift_[solid] + turn_[solid] * (farthest + moved + shift_[solid]);
+    const double range = gap + s.radius + slack;
+    const Eigen::Vector3d middle = 0.5 * (a + b);
+    if (middle.norm() > reach + half + range || !mayTouch(surface, s, properties))
+      continue;
+    const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
+    if (pieces.tree.empty())
+    {
+      if (pieceDistance(pieces.pieces[0], to_solid * middle, Eigen::Vector3d::Zero()).distance <= half + range)
+        on_solids_.push_back({solid, static_cast<int>(i), 0});
+      continue;
+    }
+    const Eigen::Vector3d za = to_solid * a, zb = to_solid * b;
+    triangles_.clear();
+    pieces.tree[0].query({za.cwiseMin(zb).array() - range, za.cwiseMax(zb).array() + range}, triangles_);
+    for (int triangle : triangles_)
+      on_solids_.push_back({solid, static_cast<int>(i), triangle});
+  }
+}
+
+bool Candidates::holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const
+{
+  if (!built_ || (x.array() < low_.array()).any() || (x.array() > high_.array()).any())
+    return false;
+  for (std::size_t k = 0; k < solids.size(); ++k)
+    if ((solids[k].position - solids_[k].position).norm() > shift_[k] || angleBetween(solids[k], solids_[k]) > turn_[k])
+      return false;
+  return true;
+}
+
+}  // namespace slender

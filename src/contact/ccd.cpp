@@ -1,0 +1,177 @@
+#include "slender_sim/contact/ccd.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Geometry>
+
+#include "slender_sim/contact/distance.h"
+#include "slender_sim/geometry/rotation.h"
+#include "soft_gap.h"
+
+namespace slender {
+
+namespace {
+
+constexpr int kMaxAdvances = 500;   // stopping early is safe: the share so far is free
+constexpr double kTolerance = 0.1;  // share of the kept gap at which the advance ends
+
+/// Times until linearly moving corners can reach the plane that separates the pieces now.
+class PlaneBound
+{
+public:
+  explicit PlaneBound(double room) : room_(room) {}
+  /// A pair of corners: its distance beyond the nearest pair's, along the normal, and its rate.
+  void corner(double beyond, double rate)
+  {
+    if (rate < 0.0)
+      time_ = std::min(time_, (room_ + std::max(0.0, beyond)) / -rate);
+  }
+  double time() const { return time_; }
+
+private:
+  double room_, time_ = std::numeric_limits<double>::infinity();
+};
+
+/// Pieces of N and M corners that move along straight lines; closest(a, b) gives the difference of the nearest points, a - b.
+template <int N, int M, class Closest>
+double advance(const MovingPoint* const (&a)[N], const MovingPoint* const (&b)[M], const ApproachLimit& limit, Closest closest)
+{
+  Eigen::Vector3d va[N], vb[M], pa[N], pb[M];
+  double speed = 0.0;
+  for (int i = 0; i < N; ++i)
+    va[i] = a[i]->to - a[i]->from;
+  for (int j = 0; j < M; ++j)
+    vb[j] = b[j]->to - b[j]->from;
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j < M; ++j)
+      speed = std::max(speed, (va[i] - vb[j]).norm());
+  double t = 0.0, goal = 0.0;
+  for (int k = 0; k < kMaxAdvances; ++k)
+  {
+    for (int i = 0; i < N; ++i)
+      pa[i] = a[i]->from + t * va[i];
+    for (int j = 0; j < M; ++j)
+      pb[j] = b[j]->from + t * vb[j];
+    const Eigen::Vector3d difference = closest(pa, pb);
+    const double d = difference.norm(), gap = d - limit.thickness;
+    if (k == 0)
+    {
+      if (!(gap > 0.0))
+        return 0.0;
+      goal = limit.kept * std::min(gap, limit.reach);
+    }
+    const double room = gap - goal;
+    if (room >= speed * (1.0 - t))
+      return 1.0;
+    if (room <= kTolerance * goal)
+      return t;
+    const Eigen::Vector3d n = difference / d;
+    PlaneBound plane(room);
+    for (int i = 0; i < N; ++i)
+      for (int j = 0; j < M; ++j)
+        plane.corner(n.dot(pa[i] - pb[j]) - d, n.dot(va[i] - vb[j]));
+    t += std::max(room / speed, plane.time());
+    if (t >= 1.0)
+      return 1.0;
+  }
+  return t;
+}
+
+}  // namespace
+
+double segmentsLimit(const MovingPoint& a0, const MovingPoint& a1, const MovingPoint& b0, const MovingPoint& b1, const ApproachLimit& limit)
+{
+  const MovingPoint* const a[2] = {&a0, &a1};
+  const MovingPoint* const b[2] = {&b0, &b1};
+  return advance(a, b, limit, [](const Eigen::Vector3d* p, const Eigen::Vector3d* q) -> Eigen::Vector3d {
+    const SegmentPair c = closestOfSegments(p[0], p[1], q[0], q[1]);
+    return p[0] + c.s * (p[1] - p[0]) - q[0] - c.t * (q[1] - q[0]);
+  });
+}
+
+double pointSegmentLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const ApproachLimit& limit)
+{
+  const MovingPoint* const point[1] = {&p};
+  const MovingPoint* const segment[2] = {&a, &b};
+  return advance(point, segment, limit, [](const Eigen::Vector3d* p, const Eigen::Vector3d* q) -> Eigen::Vector3d {
+    return p[0] - q[0] - closestOnSegment(p[0], q[0], q[1]) * (q[1] - q[0]);
+  });
+}
+
+double pointTriangleLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const MovingPoint& c, const ApproachLimit& limit)
+{
+  const MovingPoint* const point[1] = {&p};
+  const MovingPoint* const triangle[3] = {&a, &b, &c};
+  return advance(point, triangle, limit, [](const Eigen::Vector3d* p, const Eigen::Vector3d* q) -> Eigen::Vector3d {
+    const Eigen::Vector3d w = closestOnTriangle(p[0], q[0], q[1], q[2]);
+    return p[0] - w[0] * q[0] - w[1] * q[1] - w[2] * q[2];
+  });
+}
+
+RigidMotion::RigidMotion(const Pose& from, const Pose& to)
+  : from(from), shift(to.position - from.position), turn(rotationVector(to.orientation * from.orientation.conjugate()))
+{
+}
+
+Pose RigidMotion::at(double share) const
+{
+  return {from.position + share * shift, fromRotationVector(share * turn) * from.orientation};
+}
+
+double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const ConvexPiece& piece, const RigidMotion& motion,
+                         const ApproachLimit& limit)
+{
+  // Seen from the solid, whose axes turn with w, a corner at r from the origin has the velocity v - w x r and an acceleration of
+  // at most 2 |w| |v| + w^2 |r|; v is constant and r runs along a line, so that both are largest at an end of the remaining time.
+  const double spin = motion.turn.norm();
+  const MovingPoint* corner[2] = {&a, &b};
+  const Eigen::Vector3d v[2] = {a.to - a.from - motion.shift, b.to - b.from - motion.shift};
+  double t = 0.0, goal = 0.0;
+  for (int k = 0; k < kMaxAdvances; ++k)
+  {
+    const Pose pose = motion.at(t);
+    const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
+    Eigen::Vector3d r[2], rate[2], z[2];
+    double speed = 0.0, acceleration = 0.0;
+    for (int i = 0; i < 2; ++i)
+    {
+      r[i] = corner[i]->from + t * (corner[i]->to - corner[i]->from) - pose.position;
+      const Eigen::Vector3d r_end = r[i] + (1.0 - t) * v[i];
+      rate[i] = to_solid * Eigen::Vector3d(v[i] - motion.turn.cross(r[i]));
+      z[i] = to_solid * r[i];
+      speed = std::max({speed, rate[i].norm(), (v[i] - motion.turn.cross(r_end)).norm()});
+      acceleration = std::max(acceleration, spin * (2.0 * v[i].norm() + spin * std::max(r[i].norm(), r_end.norm())));
+    }
+    const SegmentPieceDistance nearest = segmentPieceDistance(piece, z[0], z[1]);
+    const double gap = nearest.distance - limit.thickness;
+    if (k == 0)
+    {
+      if (!(gap > 0.0))
+        return 0.0;
+      goal = limit.kept * std::min(gap, limit.reach);
+    }
+    const double room = gap - goal;
+    if (room >= speed * (1.0 - t))
+      return 1.0;
+    if (room <= kTolerance * goal)
+      return t;
+    double plane = std::numeric_limits<double>::infinity();
+    const Eigen::Vector3d foot = z[0] + nearest.t * (z[1] - z[0]);
+    for (int i = 0; i < 2; ++i)
+    {
+      // the first time at which room + beyond + rate t - acceleration t^2 / 2 = 0
+      const double c = room + std::max(0.0, nearest.normal.dot(z[i] - foot)), s = nearest.normal.dot(rate[i]);
+      const double root = std::sqrt(s * s + 2.0 * acceleration * c);
+      const double time = s <= 0.0 ? (root > s ? 2.0 * c / (root - s) : plane) : acceleration > 0.0 ? (s + root) / acceleration : plane;
+      plane = std::min(plane, time);
+    }
+    t += std::max(room / speed, plane);
+    if (t >= 1.0)
+      return 1.0;
+  }
+  return t;
+}
+
+}  // namespace slender

@@ -1,0 +1,131 @@
+// The parts of ContactPotential that look at distances only: limits of motions and the check of clearance.
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "contact_potential_impl.h"
+#include "slender_sim/contact/distance.h"
+
+namespace slender {
+
+namespace {
+
+/// Smallest value of a convex function on [0, 1] by golden section.
+template <class Function>
+double convexMinimum(Function f)
+{
+  constexpr double kGolden = 0.6180339887498949;
+  double a = 0.0, b = 1.0, p = 1.0 - kGolden, q = kGolden, fp = f(p), fq = f(q);
+  double best = std::min({f(0.0), f(1.0), fp, fq});
+  for (int k = 0; k < 60; ++k)
+  {
+    if (fp < fq)
+    {
+      b = q;
+      q = p;
+      fq = fp;
+      p = b - kGolden * (b - a);
+      fp = f(p);
+    }
+    else
+    {
+      a = p;
+      p = q;
+      fp = fq;
+      q = a + kGolden * (b - a);
+      fq = f(q);
+    }
+    best = std::min({best, fp, fq});
+  }
+  return best;
+}
+
+}  // namespace
+
+double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& poses,
+                                         const std::vector<Pose>& poses_end)
+{
+  check(x, poses);
+  check(x_end, poses_end);
+  if (!x.allFinite() || !x_end.allFinite())
+    return 0.0;
+  const Candidates* candidates = &near_;
+  if (!near_.holdsFor(x, poses) || !near_.holdsFor(x_end, poses_end))
+  {
+    swept_.build(surface, solids, {x, x_end, poses, poses_end}, options.gap, 0.0, 0.0);
+    candidates = &swept_;
+    const double moved = (x_end - x).colwise().norm().maxCoeff();
+    margin_ = std::min(std::max(options.gap, 2.0 * moved), 20.0 * options.gap);
+  }
+  double share = 1.0;
+  ApproachLimit limit;
+  limit.reach = options.gap;
+  const auto motion = [&](int i) { return MovingPoint{x.col(i), x_end.col(i)}; };
+  for (const GridPairs::Pair& pair : candidates->pairs())
+  {
+    const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
+    limit.thickness = a.radius + b.radius;
+    share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
+  }
+  int solid = -1;
+  RigidMotion rigid{Pose{}, Pose{}};
+  for (const Candidates::OnSolid& on : candidates->onSolids())
+  {
+    if (on.solid != solid)
+      rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
+    solid = on.solid;
+    const ContactSegment& s = surface.segments[on.segment];
+    limit.thickness = s.radius;
+    share = std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids[on.solid].pieces[on.piece], rigid, limit));
+  }
+  return share;
+}
+
+double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+{
+  check(x, poses);
+  double least = options.gap;
+  const int n = static_cast<int>(surface.segments.size());
+  boxes_.resize(n);
+  order_.resize(n);
+  for (int i = 0; i < n; ++i)
+  {
+    const ContactSegment& s = surface.segments[i];
+    const double around = s.radius + 0.5 * options.gap;
+    boxes_[i] = {x.col(s.a).cwiseMin(x.col(s.b)).array() - around, x.col(s.a).cwiseMax(x.col(s.b)).array() + around};
+  }
+  std::iota(order_.begin(), order_.end(), 0);
+  std::sort(order_.begin(), order_.end(), [&](int i, int j) { return boxes_[i].low.x() < boxes_[j].low.x(); });
+  for (int p = 0; p < n; ++p)
+    for (int q = p + 1; q < n && boxes_[order_[q]].low.x() <= boxes_[order_[p]].high.x(); ++q)
+    {
+      const ContactSegment &a = surface.segments[order_[p]], &b = surface.segments[order_[q]];
+      const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
+      const bool counts = a.object == b.object ? c.self && !contactNeighbours(a, b, c, options.gap) : c.others && d.others;
+      if (counts && boxes_[order_[p]].overlaps(boxes_[order_[q]]))
+        least = std::min(least, segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - a.radius - b.radius);
+    }
+  for (std::size_t k = 0; k < solids.size(); ++k)
+  {
+    const Pose to_solid = poses[k].inverse();
+    const ContactSolid& solid = surface.solids[k];
+    const double reach = boundingRadius(solid.shape) + options.gap;
+    for (const ContactSegment& s : surface.segments)
+    {
+      if (!surface.objects[s.object].solids || std::count(solid.ignores.begin(), solid.ignores.end(), s.object))
+        continue;
+      const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a)), e = to_solid * Eigen::Vector3d(x.col(s.b)) - a;
+      if ((a + 0.5 * e).norm() > 0.5 * e.norm() + s.radius + reach)
+        continue;
+      for (const ConvexPiece& piece : solids[k].pieces)
+      {
+        const auto distance = [&](double t) { return pieceDistance(piece, a + t * e, e).distance - s.radius; };
+        if (distance(0.5) < 0.5 * e.norm() + least)
+          least = std::min(least, convexMinimum(distance));
+      }
+    }
+  }
+  return least;
+}
+
+}  // namespace slender

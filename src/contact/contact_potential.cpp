@@ -1,0 +1,347 @@
+#include "slender_sim/contact/contact_potential.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "contact_potential_impl.h"
+#include "slender_sim/contact/distance.h"
+#include "slender_sim/contact/friction.h"
+
+namespace slender {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kTurnMargin = 0.02;   // [rad] a solid may turn before candidates are sought again
+
+void checkSurface(const ContactSurface& surface, const ContactOptions& options)
+{
+  const auto require = [](bool ok, const std::string& what) {
+    if (!ok)
+      throw std::invalid_argument("contact: " + what);
+  };
+  require(options.gap > 0.0 && std::isfinite(options.gap), "gap is " + std::to_string(options.gap) + " m; must be positive");
+  require(options.slip_speed > 0.0, "slip_speed is " + std::to_string(options.slip_speed) + " m/s; must be positive");
+  require(options.least_stiffness > 0.0, "least_stiffness is " + std::to_string(options.least_stiffness) + " N; must be positive");
+  for (std::size_t i = 0; i < surface.segments.size(); ++i)
+  {
+    const ContactSegment& s = surface.segments[i];
+    const std::string name = "segment " + std::to_string(i);
+    require(s.a >= 0 && s.a < surface.points && s.b >= 0 && s.b < surface.points && s.a != s.b,
+            name + " names points outside 0 ... " + std::to_string(surface.points - 1) + " or one point twice");
+    require(s.object >= 0 && s.object < static_cast<int>(surface.objects.size()), name + " names an object that does not exist");
+    require(s.radius > 0.0 && std::isfinite(s.radius), name + ": radius is " + std::to_string(s.radius) + " m; must be positive");
+    require(s.length >= 0.0, name + ": length is " + std::to_string(s.length) + " m; must not be negative");
+  }
+  for (std::size_t i = 0; i < surface.objects.size(); ++i)
+    require(surface.objects[i].friction >= 0.0, "object " + std::to_string(i) + ": friction is negative");
+  for (const ContactSolid& solid : surface.solids)
+    checkShape(solid.shape);
+}
+
+template <class To, class From>
+void copyFour(To& to, const From& from)
+{
+  std::copy(std::begin(from), std::end(from), std::begin(to));
+}
+
+}  // namespace
+
+ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
+  : surface((checkSurface(s, o), std::move(s))), options(o), barrier(o.gap), stiffness(o.least_stiffness), margin_(o.gap)
+{
+  solids.resize(surface.solids.size());
+  for (std::size_t k = 0; k < solids.size(); ++k)
+    std::visit(
+      [&](const auto& shape) {
+        using T = std::decay_t<decltype(shape)>;
+        if constexpr (std::is_same_v<T, std::shared_ptr<const TriangleMesh>>)
+        {
+          for (Eigen::Index i = 0; i < shape->triangles.cols(); ++i)
+            solids[k].pieces.push_back(Triangle{shape->vertices.col(shape->triangles(0, i)), shape->vertices.col(shape->triangles(1, i)),
+                                                shape->vertices.col(shape->triangles(2, i))});
+          solids[k].tree.emplace_back(*shape);
+        }
+        else
+          solids[k].pieces.push_back(shape);
+      },
+      surface.solids[k].shape);
+}
+
+void ContactPotential::Impl::check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses) const
+{
+  if (x.cols() != surface.points || poses.size() != surface.solids.size())
+    throw std::invalid_argument("contact: " + std::to_string(x.cols()) + " points and " + std::to_string(poses.size()) + " poses; needs " +
+                                std::to_string(surface.points) + " and " + std::to_string(surface.solids.size()));
+}
+
+double ContactPotential::Impl::restart()
+{
+  terms.clear();
+  contacts.clear();
+  largest_force = 0.0;
+  smallest_gap = kInfinity;
+  return kInfinity;
+}
+
+double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness)
+{
+  check(x, poses);
+  restart();
+  if (!x.allFinite())
+    return kInfinity;
+  if (!near_.holdsFor(x, poses))
+    near_.build(surface, solids, {x, x, poses, poses}, options.gap, margin_, kTurnMargin);
+  double energy = 0.0;
+  for (const GridPairs::Pair& pair : near_.pairs())
+  {
+    energy += addPair(x, pair, with_stiffness);
+    if (!std::isfinite(energy))
+      return restart();
+  }
+  for (const Candidates::OnSolid& on : near_.onSolids())
+  {
+    energy += addOnSolid(x, on, poses[on.solid], with_stiffness);
+    if (!std::isfinite(energy))
+      return restart();
+  }
+  for (const Contact& contact : lagged)
+    energy += addFriction(x, poses, contact, with_stiffness);
+  return energy;
+}
+
+double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness)
+{
+  const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
+  const Eigen::Vector3d a0 = x.col(a.a), a1 = x.col(a.b), b0 = x.col(b.a), b1 = x.col(b.b);
+  const double thickness = a.radius + b.radius, range = thickness + options.gap;
+  const Eigen::Vector3d e = a1 - a0, f = b1 - b0;
+  const double middles2 = 0.25 * (a0 + a1 - b0 - b1).squaredNorm();
+  // half the lengths and the range, squared: (p + q + r)^2 <= 3 (p^2 + q^2 + r^2)
+  if (middles2 > 0.75 * (e.squaredNorm() + f.squaredNorm()) + 3.0 * range * range || segmentDistance(a0, a1, b0, b1) >= range)
+    return 0.0;
+  const SoftGap gap = softGap(a0, a1, b0, b1, thickness);
+  Contact contact{pair.first,
+                  pair.second,
+                  {a.a, a.b, b.a, b.b},
+                  {1.0 - gap.s, gap.s, gap.t - 1.0, -gap.t},
+                  -1,
+                  Eigen::Vector3d::Zero(),
+                  b0 + gap.t * f + (b.radius + 0.5 * gap.gap / gap.weight) * gap.normal,
+                  Eigen::Vector3d::Zero(),
+                  std::sqrt(surface.objects[a.object].friction * surface.objects[b.object].friction)};
+  return addContact(gap, contact, with_stiffness);
+}
+
+double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose, bool with_stiffness)
+{
+  const ContactSegment& s = surface.segments[on.segment];
+  const ContactSolid& solid = surface.solids[on.solid];
+  const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
+  const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
+  const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a) - pose.position), b = to_solid * Eigen::Vector3d(x.col(s.b) - pose.position);
+  const double middle = pieceDistance(piece, 0.5 * (a + b), Eigen::Vector3d::Zero()).distance;
+  if (middle > 0.5 * (b - a).norm() + s.radius + options.gap)
+    return 0.0;
+  SoftGap gap = softGap(a, b, s.radius, piece);
+  const Eigen::Vector3d foot = a + gap.t * (b - a) - (gap.gap / gap.weight + s.radius) * gap.normal;
+  gap.normal = pose.orientation * gap.normal;
+  const double own = surface.objects[s.object].friction;
+  // behind the pairs of segments
+  Contact contact{static_cast<std::int64_t>(surface.segments.size()) + on.solid,
+                  (static_cast<std::int64_t>(on.segment) << 32) + on.piece,
+                  {s.a, s.b, -1, -1},
+                  {1.0 - gap.t, gap.t, 0.0, 0.0},
+                  on.solid,
+                  foot,
+                  pose * foot,
+                  Eigen::Vector3d::Zero(),
+                  solid.friction < 0.0 ? own : std::sqrt(own * solid.friction)};
+  return addContact(gap, contact, with_stiffness);
+}
+
+double ContactPotential::Impl::addContact(const SoftGap& gap, Contact& contact, bool with_stiffness)
+{
+  if (!(gap.gap > 0.0))
+    return kInfinity;
+  if (gap.gap >= options.gap)
+    return 0.0;
+  const double force = stiffness * barrier.force(gap.gap);
+  contact.force = force * gap.weight * gap.normal;
+  terms.emplace_back();
+  ContactTerm& term = terms.back();
+  copyFour(term.point, contact.point);
+  copyFour(term.weight, contact.weight);
+  term.solid = contact.solid;
+  term.position = contact.position;
+  term.force = contact.force;
+  if (with_stiffness)
+  {
+    term.stiffness = stiffness * barrier.stiffness(gap.gap) * gap.weight * gap.weight * gap.normal * gap.normal.transpose();
+    addRunning(gap, contact, force);
+  }
+  contacts.push_back(contact);
+  largest_force = std::max(largest_force, force * gap.weight);
+  smallest_gap = std::min(smallest_gap, gap.gap);
+  return stiffness * barrier.energy(gap.gap);
+}
+
+/// The place of contact runs along the segments as they turn: force r^T H^-1 r of the softened gap, column by column of H = L D L^T.
+void ContactPotential::Impl::addRunning(const SoftGap& gap, const Contact& contact, double force)
+{
+  constexpr double kNegligible = 1e-3;   // of the pair's own stiffness
+  const double own = stiffness * barrier.stiffness(gap.gap) * gap.weight * gap.weight;
+  const auto add = [&](const Eigen::Vector4d& r, double d) {
+    const double k = force / d;
+    if (!(d > 0.0) || !(k * r.squaredNorm() > kNegligible * own))
+      return;
+    terms.emplace_back();
+    ContactTerm& term = terms.back();
+    copyFour(term.point, contact.point);
+    Eigen::Map<Eigen::Vector4d>(term.weight) = r;
+    term.position = contact.position;
+    term.stiffness = k * gap.normal * gap.normal.transpose();
+  };
+  if (contact.solid >= 0)
+  {
+    // The solid's own turning is left out: the term's force is zero, so that only the rate of convergence could tell.
+    if (gap.free_t)
+      add(gap.weight * Eigen::Vector4d(-1, 1, 0, 0), gap.htt);
+    return;
+  }
+  const Eigen::Map<const Eigen::Vector4d> u(contact.weight);
+  const Eigen::Vector4d rs = gap.weight * Eigen::Vector4d(-1, 1, 0, 0) + gap.weight_s * u;
+  const Eigen::Vector4d rt = gap.weight * Eigen::Vector4d(0, 0, 1, -1) + gap.weight_t * u;
+  if (gap.free_s)
+    add(rs, gap.hss);
+  if (gap.free_t)
+  {
+    const double l = gap.free_s ? gap.hst / gap.hss : 0.0;
+    add(rt - l * rs, gap.htt - l * (gap.free_s ? gap.hst : 0.0));
+  }
+}
+
+double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Contact& contact, bool with_stiffness)
+{
+  if (contact.friction == 0.0)
+    return 0.0;
+  terms.emplace_back();
+  ContactTerm& term = terms.back();
+  copyFour(term.point, contact.point);
+  copyFour(term.weight, contact.weight);
+  term.solid = contact.solid;
+  term.position = contact.position;
+  Eigen::Vector3d u = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 4; ++i)
+    if (contact.point[i] >= 0)
+      u += contact.weight[i] * (x.col(contact.point[i]) - x_begin.col(contact.point[i]));
+  if (contact.solid >= 0)
+  {
+    term.position = poses[contact.solid] * contact.material;
+    u -= term.position - solids_begin[contact.solid] * contact.material;
+  }
+  const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
+  const Eigen::Vector3d n = contact.force / normal_force, slip = u - n.dot(u) * n;
+  const double y = slip.norm();
+  const SmoothedCoulomb law{options.slip_speed * h};
+  const double over_slip = law.forceOverSlip(y);
+  term.force = -most * over_slip * slip;
+  if (with_stiffness)
+  {
+    term.stiffness = most * over_slip * (Eigen::Matrix3d::Identity() - n * n.transpose());
+    if (y > 0.0)
+      term.stiffness += most * (law.slope(y) - over_slip) / (y * y) * slip * slip.transpose();
+  }
+  return most * law.energy(y);
+}
+
+double ContactPotential::Impl::lagFriction()
+{
+  const auto before = [](const Contact& a, const Contact& b) { return a.first != b.first ? a.first < b.first : a.second < b.second; };
+  double change = 0.0, largest = 0.0;
+  auto old = lagged.begin();
+  for (const Contact& contact : contacts)
+  {
+    for (; old != lagged.end() && before(*old, contact); ++old)
+      change = std::max(change, old->force.norm());
+    const bool same = old != lagged.end() && !before(contact, *old);
+    change = std::max(change, (same ? Eigen::Vector3d(contact.force - old->force) : contact.force).norm());
+    largest = std::max(largest, contact.force.norm());
+    if (same)
+      ++old;
+  }
+  for (; old != lagged.end(); ++old)
+    change = std::max(change, old->force.norm());
+  for (const Contact& contact : lagged)
+    largest = std::max(largest, contact.force.norm());
+  lagged = contacts;
+  return largest > 0.0 ? change / largest : 0.0;
+}
+
+ContactPotential::ContactPotential(ContactSurface surface, const ContactOptions& options)
+  : impl_(std::make_unique<Impl>(std::move(surface), options))
+{
+}
+
+ContactPotential::~ContactPotential() = default;
+ContactPotential::ContactPotential(ContactPotential&&) noexcept = default;
+
+double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
+{
+  return impl_->clearance(x, solids);
+}
+
+void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h)
+{
+  impl_->lagged.clear();
+  impl_->x_begin = x;
+  impl_->solids_begin = solids;
+  impl_->h = h;
+  impl_->evaluate(x, solids, false);
+  impl_->lagFriction();
+}
+
+double ContactPotential::lagFriction()
+{
+  return impl_->lagFriction();
+}
+
+double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
+                                   const std::vector<Pose>& solids_end)
+{
+  return impl_->stepLimit(x, x_end, solids, solids_end);
+}
+
+double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness)
+{
+  return impl_->evaluate(x, solids, with_stiffness);
+}
+
+const std::vector<ContactTerm>& ContactPotential::terms() const { return impl_->terms; }
+double ContactPotential::largestForce() const { return impl_->largest_force; }
+double ContactPotential::smallestGap() const { return impl_->smallest_gap; }
+double ContactPotential::stiffness() const { return impl_->stiffness; }
+
+void ContactPotential::setStiffness(double force)
+{
+  if (!(force > 0.0) || !std::isfinite(force))
+    throw std::invalid_argument("contact: stiffness is " + std::to_string(force) + " N; must be positive and finite");
+  impl_->stiffness = std::max(force, impl_->options.least_stiffness);
+}
+
+void ContactPotential::adaptStiffness()
+{
+  // force over stiffness() at a fifth, a twelfth and half of the gap
+  const double gap = impl_->options.gap, c = impl_->barrier.force(gap / 5), high = impl_->barrier.force(gap / 12), low = 1.0;
+  double& stiffness = impl_->stiffness;
+  const double share = impl_->largest_force / stiffness;
+  if (share > high)
+    stiffness = impl_->largest_force / c;
+  else if (share > 0.0 && share < low)   // slowly: a load that comes and goes should not find a soft barrier
+    stiffness = std::max({impl_->options.least_stiffness, 0.8 * stiffness, impl_->largest_force / c});
+}
+
+}  // namespace slender

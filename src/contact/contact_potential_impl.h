@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "candidates.h"
+#include "slender_sim/contact/barrier.h"
+#include "slender_sim/contact/contact_potential.h"
+#include "soft_gap.h"
+
+namespace slender {
+
+class ContactPotential::Impl
+{
+public:
+  /// A touching pair as friction needs it.
+  struct Contact
+  {
+    std::int64_t first, second;     ///< what touches: orders contacts
+    int point[4];
+    double weight[4];
+    int solid;
+    Eigen::Vector3d material;       ///< in the solid's frame
+    Eigen::Vector3d position, force;   ///< normal force on u
+    double friction;
+  };
+
+  Impl(ContactSurface surface, const ContactOptions& options);
+
+  double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
+  double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
+  double lagFriction();
+  void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
+
+  ContactSurface surface;
+  ContactOptions options;
+  Barrier barrier;
+  double stiffness;
+  std::vector<SolidPieces> solids;
+
+  double h = 0.0;
+  Eigen::Matrix3Xd x_begin;
+  std::vector<Pose> solids_begin;
+  std::vector<Contact> contacts, lagged;
+  std::vector<ContactTerm> terms;
+  double largest_force = 0.0, smallest_gap = 0.0;
+
+private:
+  double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
+  double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose, bool with_stiffness);
+  double addContact(const SoftGap& gap, Contact& contact, bool with_stiffness);
+  void addRunning(const SoftGap& gap, const Contact& contact, double force);
+  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Contact& contact, bool with_stiffness);
+  double restart();
+
+  Candidates near_, swept_;
+  double margin_;
+  std::vector<int> order_;   ///< for clearance()
+  std::vector<BoundingBox> boxes_;
+};
+
+}  // namespace slender

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "slender_sim/contact/solids.h"
+
+/// Smooth gaps of straight pieces, for barriers.
+///
+/// The distance between two segments has a kink where they are parallel: the place of contact jumps from one end of the overlap to
+/// the other, and so does the force. Mollifiers that fade the pair out there [Li et al. 2020, section 5] leave the contact to other pairs and
+/// add torques of their own. Here the minimum itself is made unique instead:
+///
+///   G = min over (s, t) of g(s, t) Q(s, t),   Q = 1 + (c/2) ((2s-1)^2 + (2t-1)^2),   g = |A(s) - B(t)| - thickness.
+///
+/// g is convex. With z = (2s-1, 2t-1), a stationary point of g Q inside has grad g / g = -grad Q / Q = -c z / Q, and there the second
+/// derivative of log(g Q) in z is at least c I / Q - 2 c^2 z z^T / Q^2, positive definite if 3 c |z|^2 < 2, so everywhere for c < 1/3. Every
+/// stationary point is then a strict minimum, hence there is one only; it moves continuously, and G is continuously differentiable with
+/// the gradient Q n (that at fixed s, t). G vanishes exactly where the pieces meet, and g_min <= G <= (1 + c) g_min. With one
+/// parameter (a segment against a convex solid) Q = 1 + c (2t-1)^2 and the same holds.
+namespace slender {
+
+constexpr double kSoftness = 0.25;   ///< c
+
+/// Where a segment's point a + t (b - a) is nearest to a convex piece.
+struct SegmentPieceDistance
+{
+  double t = 0.0, distance = 0.0;   ///< [m] along `normal`; negative inside
+  Eigen::Vector3d normal;
+};
+SegmentPieceDistance segmentPieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
+/// G, its parameters and what its derivatives need. With the rows r_s = n . (Q d(a1 - a0) + Q_s du) and
+/// r_t = n . (-Q d(b1 - b0) + Q_t du), u = A(s) - B(t), the second derivative of G contains -r^T H^-1 r over the free parameters.
+struct SoftGap
+{
+  double s = 0.0, t = 0.0;
+  double gap = 0.0;               ///< G [m]; not positive: they meet
+  double weight = 1.0;            ///< Q
+  double weight_s = 0.0, weight_t = 0.0;
+  double hss = 0.0, hst = 0.0, htt = 0.0;
+  bool free_s = false, free_t = false;   ///< not held at an end of the segment
+  Eigen::Vector3d normal{0, 0, 1};       ///< from B to A (from the solid to the segment)
+};
+SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0, const Eigen::Vector3d& b1, double thickness);
+
+/// Of a segment with a radius against a convex piece, in the piece's frame; only t is used.
+SoftGap softGap(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius, const ConvexPiece& piece);
+
+}  // namespace slender

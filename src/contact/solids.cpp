@@ -1,0 +1,153 @@
+#include "slender_sim/contact/solids.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include <Eigen/Geometry>
+
+#include "slender_sim/contact/distance.h"
+
+namespace slender {
+
+namespace {
+
+/// Distance from the nearest point of a feature, e.g. the centre of a sphere.
+PieceDistance fromPoint(const Eigen::Vector3d& offset, double radius, const Eigen::Vector3d& e, double along_feature2)
+{
+  const double d = offset.norm();
+  PieceDistance out;
+  out.distance = d - radius;
+  out.normal = d > 0.0 ? Eigen::Vector3d(offset / d) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+  const double across = out.normal.dot(e);
+  out.curvature = d > 0.0 ? std::max(0.0, e.squaredNorm() - along_feature2 - across * across) / d : 0.0;
+  return out;
+}
+
+PieceDistance of(const Plane&, const Eigen::Vector3d& p, const Eigen::Vector3d&)
+{
+  return {p.z(), Eigen::Vector3d::UnitZ(), 0.0};
+}
+
+PieceDistance of(const Sphere& s, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+{
+  return fromPoint(p, s.radius, e, 0.0);
+}
+
+PieceDistance of(const Capsule& c, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+{
+  const double z = std::min(std::max(p.z(), -0.5 * c.length), 0.5 * c.length);
+  return fromPoint({p.x(), p.y(), p.z() - z}, c.radius, e, z == p.z() ? e.z() * e.z() : 0.0);
+}
+
+PieceDistance of(const Box& b, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+{
+  const Eigen::Vector3d beyond = p.cwiseAbs() - 0.5 * b.size;
+  if ((beyond.array() > 0.0).any())
+  {
+    Eigen::Vector3d offset;
+    double along2 = 0.0;
+    for (int k = 0; k < 3; ++k)
+    {
+      offset[k] = beyond[k] > 0.0 ? std::copysign(beyond[k], p[k]) : 0.0;
+      along2 += beyond[k] > 0.0 ? 0.0 : e[k] * e[k];
+    }
+    return fromPoint(offset, 0.0, e, along2);
+  }
+  int k;
+  const double d = beyond.maxCoeff(&k);
+  return {d, std::copysign(1.0, p[k]) * Eigen::Vector3d::Unit(k), 0.0};
+}
+
+PieceDistance of(const Cylinder& c, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+{
+  const double rho = std::hypot(p.x(), p.y()), side = rho - c.radius, end = std::abs(p.z()) - 0.5 * c.length;
+  const Eigen::Vector3d radial = rho > 0.0 ? Eigen::Vector3d(p.x() / rho, p.y() / rho, 0.0) : Eigen::Vector3d(Eigen::Vector3d::UnitX());
+  const Eigen::Vector3d axial = std::copysign(1.0, p.z()) * Eigen::Vector3d::UnitZ();
+  const double around = radial.x() * e.y() - radial.y() * e.x();
+  if (side > 0.0 && end > 0.0)   // the rim: a circle, whose meridian sections are points
+  {
+    const double d = std::hypot(side, end), meridian = (radial.dot(e) * end - axial.dot(e) * side) / d;
+    return {d, (side * radial + end * axial) / d, meridian * meridian / d + around * around * side / (rho * d)};
+  }
+  if (side > end)
+    return {side, radial, rho > 0.0 ? around * around / rho : 0.0};
+  return {end, axial, 0.0};
+}
+
+PieceDistance of(const Triangle& t, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+{
+  const Eigen::Vector3d w = closestOnTriangle(p, t[0], t[1], t[2]);
+  const int corners = (w.array() > 0.0).count();
+  double along2 = 0.0;
+  if (corners == 3)
+  {
+    const Eigen::Vector3d n = (t[1] - t[0]).cross(t[2] - t[0]);
+    along2 = e.squaredNorm() - std::pow(n.dot(e), 2) / n.squaredNorm();
+  }
+  else if (corners == 2)
+  {
+    const int absent = w[0] > 0.0 ? (w[1] > 0.0 ? 2 : 1) : 0;
+    const Eigen::Vector3d edge = t[(absent + 2) % 3] - t[(absent + 1) % 3];
+    along2 = std::pow(edge.dot(e), 2) / edge.squaredNorm();
+  }
+  return fromPoint(p - w[0] * t[0] - w[1] * t[1] - w[2] * t[2], 0.0, e, along2);
+}
+
+void requirePositive(const char* what, double value)
+{
+  if (!(value > 0.0) || !std::isfinite(value))
+    throw std::invalid_argument(std::string(what) + " is " + std::to_string(value) + " m; must be positive and finite");
+}
+
+}  // namespace
+
+PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& direction)
+{
+  return std::visit([&](const auto& shape) { return of(shape, p, direction); }, piece);
+}
+
+void checkShape(const Shape& shape)
+{
+  if (const auto* s = std::get_if<Sphere>(&shape))
+    requirePositive("sphere: radius", s->radius);
+  else if (const auto* b = std::get_if<Box>(&shape))
+    requirePositive("box: smallest edge length", b->size.allFinite() ? b->size.minCoeff() : b->size.sum());
+  else if (const auto* c = std::get_if<Cylinder>(&shape))
+  {
+    requirePositive("cylinder: radius", c->radius);
+    requirePositive("cylinder: length", c->length);
+  }
+  else if (const auto* k = std::get_if<Capsule>(&shape))
+  {
+    requirePositive("capsule: radius", k->radius);
+    requirePositive("capsule: length", k->length);
+  }
+  else if (const auto* m = std::get_if<std::shared_ptr<const TriangleMesh>>(&shape))
+  {
+    if (!*m || (*m)->triangles.cols() == 0)
+      throw std::invalid_argument("mesh: has no triangles");
+    if (!(*m)->vertices.allFinite())
+      throw std::invalid_argument("mesh: a vertex is not finite");
+    if ((*m)->triangles.minCoeff() < 0 || (*m)->triangles.maxCoeff() >= (*m)->vertices.cols())
+      throw std::invalid_argument("mesh: a triangle names a vertex outside 0 ... " + std::to_string((*m)->vertices.cols() - 1));
+  }
+}
+
+double boundingRadius(const Shape& shape)
+{
+  if (const auto* s = std::get_if<Sphere>(&shape))
+    return s->radius;
+  if (const auto* b = std::get_if<Box>(&shape))
+    return 0.5 * b->size.norm();
+  if (const auto* c = std::get_if<Cylinder>(&shape))
+    return std::hypot(c->radius, 0.5 * c->length);
+  if (const auto* k = std::get_if<Capsule>(&shape))
+    return k->radius + 0.5 * k->length;
+  if (const auto* m = std::get_if<std::shared_ptr<const TriangleMesh>>(&shape))
+    return (*m)->vertices.colwise().norm().maxCoeff();
+  return std::numeric_limits<double>::infinity();
+}
+
+}  // namespace slender

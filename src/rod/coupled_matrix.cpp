@@ -1,0 +1,384 @@
+// The sparse matrix of coupled rods, bodies and contacts: its pattern and its entries.
+#include <algorithm>
+
+#include "coupled_system.h"
+
+namespace slender {
+
+namespace {
+
+constexpr int kPrescribed = -1;
+constexpr int kRows = 11;   // of a panel: its own block, the next, and the positions after that
+
+Eigen::Matrix3d cross(const Eigen::Vector3d& v)
+{
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+double entry(const RodPanel& p, int column, int row) { return row < 4 ? p.diag[column][row] : p.below[column][row - 4]; }
+
+/// The unknown that row `row` of node i's panel belongs to, -1 beyond the end of an open rod.
+int panelDof(const RodModel& model, int node, int row)
+{
+  const int n = model.nodes(), at = node + row / 4;
+  return at < n ? 4 * at + row % 4 : model.closed ? 4 * (at - n) + row % 4 : -1;
+}
+
+}  // namespace
+
+/// Numbers the unknowns of a rod whose grasps have changed.
+void CoupledSystem::mapUnknowns(RodPart& part)
+{
+  const RodState& state = part.rod->work;
+  const RodModel& model = *part.rod->model;
+  bool same = part.holds.size() == state.grasps.size() && !part.dof.empty();
+  for (std::size_t k = 0; same && k < state.grasps.size(); ++k)
+  {
+    const GraspState& g = state.grasps[k];
+    same = part.holds[k] == std::array<int, 4>{g.active, g.first_node, g.last_node, g.body};
+  }
+  if (same)
+    return;
+  pattern_valid_ = false;
+  part.holds.clear();
+  part.dof.assign(4 * model.nodes(), 0);
+  part.welded = false;
+  if (!model.closed)
+    part.dof.back() = kPrescribed;   // the last node has no edge
+  for (std::size_t k = 0; k < state.grasps.size(); ++k)
+  {
+    const GraspState& g = state.grasps[k];
+    part.holds.push_back({g.active, g.first_node, g.last_node, g.body});
+    if (!g.active)
+      continue;
+    const int code = g.body < 0 ? kPrescribed : -2 - static_cast<int>(k);
+    part.welded = part.welded || g.body >= 0;
+    for (int i = g.first_node; i <= g.last_node; ++i)
+      for (int c = 0; c < (i < g.last_node ? 4 : 3); ++c)
+        part.dof[4 * i + c] = code;
+  }
+  part.unknowns = 0;
+  for (int& d : part.dof)
+    if (d == 0)
+      d = part.unknowns++;
+}
+
+/// Weighted unknowns that an unknown of a rod stands for: itself, or those of the body that carries it.
+void CoupledSystem::mapDof(const RodPart& part, int dof, double weight, Columns& out) const
+{
+  const int code = part.dof[dof];
+  if (code >= 0)
+    out.push(part.offset + code, weight);
+  if (code >= kPrescribed)
+    return;
+  const int body = part.rod->work.grasps[-2 - code].body, base = bodyUnknown(body), node = dof / 4, c = dof % 4;
+  const RodArrays& a = part.rod->system.arrays();
+  if (c == 3)
+  {
+    for (int k = 0; k < 3; ++k)
+      out.push(base + 3 + k, weight * a.t[k][node]);
+    return;
+  }
+  out.push(base + c, weight);
+  const Eigen::Vector3d r = part.rod->system.position(node) - bodies_[simulated_[body]].pose.position;
+  const int next = (c + 1) % 3, after = (c + 2) % 3;   // (turn x r)_c = turn_next r_after - turn_after r_next
+  out.push(base + 3 + next, weight * r[after]);
+  out.push(base + 3 + after, -weight * r[next]);
+}
+
+/// Displacement of a contact's points against each other, one row per component.
+void CoupledSystem::contactColumns(const ContactTerm& term, std::array<Columns, 3>& rows) const
+{
+  for (int c = 0; c < 3; ++c)
+  {
+    rows[c].count = 0;
+    for (int p = 0; p < 4; ++p)
+      if (term.point[p] >= 0)
+      {
+        const RodPart& part = partOf(term.point[p]);
+        mapDof(part, 4 * (term.point[p] - part.point) + c, term.weight[p], rows[c]);
+      }
+    const int obstacles = static_cast<int>(obstacles_.size());
+    if (term.solid < obstacles)
+      continue;
+    const int body = model_.contact.bodies[term.solid - obstacles].body;
+    if (simulated_[body] < 0)
+      continue;
+    const int base = bodyUnknown(body), next = (c + 1) % 3, after = (c + 2) % 3;
+    const Eigen::Vector3d r = term.position - bodies_[simulated_[body]].pose.position;
+    rows[c].push(base + c, -1.0);
+    rows[c].push(base + 3 + next, -r[after]);
+    rows[c].push(base + 3 + after, r[next]);
+  }
+}
+
+/// Makes room for the present contacts; true when there was none for some of them.
+bool CoupledSystem::takeKeys()
+{
+  bool grown = false;
+  for (const ContactTerm& term : contact_->terms())
+  {
+    const std::array<int, 5> key{term.point[0], term.point[1], term.point[2], term.point[3], term.solid};
+    const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
+    if (at == keys_.end() || *at != key)
+    {
+      keys_.insert(at, key);
+      grown = true;
+    }
+  }
+  return grown;
+}
+
+void CoupledSystem::buildPattern()
+{
+  // unknowns: the coupled rods, then the bodies
+  for (RodPart& part : parts_)
+    part.touched = false;
+  for (const auto& key : keys_)
+    for (int p = 0; p < 4; ++p)
+      if (key[p] >= 0)
+        parts_[point_part_[key[p]]].touched = true;
+  unknowns_ = 0;
+  for (RodPart& part : parts_)
+  {
+    part.coupled = part.welded || part.touched;
+    part.offset = unknowns_;
+    if (part.coupled)
+      unknowns_ += part.unknowns;
+  }
+  body_offset_ = unknowns_;
+  unknowns_ += 6 * static_cast<int>(bodies_.size());
+  rhs_.assign(unknowns_, 0.0);
+  pattern_valid_ = true;
+  if (unknowns_ == 0)
+    return;
+
+  std::vector<std::vector<int>> columns(unknowns_);
+  const auto note = [&](int a, int b) { columns[std::min(a, b)].push_back(std::max(a, b)); };
+  const auto notePairs = [&](const Columns& a, const Columns& b) {
+    for (int i = 0; i < a.count; ++i)
+      for (int j = 0; j < b.count; ++j)
+        note(a.index[i], b.index[j]);
+  };
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j <= i; ++j)
+        note(body_offset_ + 6 * b + i, body_offset_ + 6 * b + j);
+  for (RodPart& part : parts_)
+  {
+    if (!part.coupled)
+      continue;
+    const RodModel& model = *part.rod->model;
+    part.carried_entries.clear();
+    for (int i = 0; i < model.nodes(); ++i)
+      for (int c = 0; c < 4; ++c)
+        for (int r = c; r < kRows; ++r)
+        {
+          const int a = 4 * i + c, b = panelDof(model, i, r);
+          if (b < 0 || part.dof[a] == kPrescribed || part.dof[b] == kPrescribed)
+            continue;
+          if (part.dof[a] >= 0 && part.dof[b] >= 0)
+          {
+            note(part.offset + part.dof[a], part.offset + part.dof[b]);
+            continue;
+          }
+          part.carried_entries.push_back({i, c, r});
+          Columns ca, cb;
+          mapDof(part, a, 1.0, ca);
+          mapDof(part, b, 1.0, cb);
+          notePairs(ca, cb);
+        }
+    for (const ClampJoint& clamp : part.rod->system.clamps())
+      if (const int body = part.rod->work.grasps[clamp.grasp].body; body >= 0)
+      {
+        Columns edge, turn;
+        const int next = (clamp.edge + 1) % model.nodes();
+        for (int c = 0; c < 3; ++c)
+        {
+          mapDof(part, 4 * clamp.edge + c, 1.0, edge);
+          mapDof(part, 4 * next + c, 1.0, edge);
+          turn.push(bodyUnknown(body) + 3 + c, 1.0);
+        }
+        mapDof(part, 4 * clamp.edge + 3, 1.0, edge);
+        notePairs(edge, turn);
+      }
+  }
+  for (const auto& key : keys_)
+  {
+    ContactTerm term;
+    std::copy_n(key.begin(), 4, term.point);
+    term.solid = key[4];
+    std::array<Columns, 3> rows;
+    contactColumns(term, rows);
+    for (const Columns& a : rows)
+      for (const Columns& b : rows)
+        notePairs(a, b);
+  }
+  std::vector<int> starts{0}, rows;
+  for (auto& column : columns)
+  {
+    std::sort(column.begin(), column.end());
+    rows.insert(rows.end(), column.begin(), std::unique(column.begin(), column.end()));
+    starts.push_back(static_cast<int>(rows.size()));
+  }
+  matrix_.setPattern(unknowns_, std::move(starts), std::move(rows));
+
+  for (RodPart& part : parts_)
+  {
+    part.slots.clear();
+    if (!part.coupled)
+      continue;
+    const RodModel& model = *part.rod->model;
+    for (int i = 0; i < model.nodes(); ++i)
+      for (int c = 0; c < 4; ++c)
+        for (int r = c; r < kRows; ++r)
+        {
+          const int a = part.dof[4 * i + c], at = panelDof(model, i, r), b = at < 0 ? kPrescribed : part.dof[at];
+          part.slots.push_back(a >= 0 && b >= 0 ? matrix_.index(part.offset + std::max(a, b), part.offset + std::min(a, b)) : -1);
+        }
+  }
+}
+
+void CoupledSystem::add(int a, int b, double value) { matrix_.values()[matrix_.index(std::max(a, b), std::min(a, b))] += value; }
+
+/// The symmetric pair of entries (a, b) and (b, a) of rows of unknowns.
+void CoupledSystem::addPair(const Columns& a, const Columns& b, double value)
+{
+  for (int i = 0; i < a.count; ++i)
+    for (int j = 0; j < b.count; ++j)
+      add(a.index[i], b.index[j], (a.index[i] == b.index[j] ? 2.0 : 1.0) * a.value[i] * b.value[j] * value);
+}
+
+/// The diagonal entry (a, a).
+void CoupledSystem::addSquare(const Columns& a, double value)
+{
+  for (int i = 0; i < a.count; ++i)
+    for (int j = 0; j <= i; ++j)
+      add(a.index[i], a.index[j], (i != j && a.index[i] == a.index[j] ? 2.0 : 1.0) * a.value[i] * a.value[j] * value);
+}
+
+/// Entries of carried unknowns, and what the curvature of a rotation adds: for a point at r with gradient g, (g r^T + r g^T)/2 - (g.r) I.
+void CoupledSystem::addCarried(const RodPart& part)
+{
+  RodSystem& system = part.rod->system;
+  const RodPanel* panels = system.panels();
+  Columns a, b;
+  for (const auto& [node, column, row] : part.carried_entries)
+  {
+    const double value = entry(panels[node], column, row);
+    const int dof = panelDof(*part.rod->model, node, row);
+    a.count = b.count = 0;
+    mapDof(part, 4 * node + column, 1.0, a);
+    if (dof == 4 * node + column)
+    {
+      addSquare(a, value);
+      continue;
+    }
+    mapDof(part, dof, 1.0, b);
+    addPair(a, b, value);
+  }
+  for (const GraspState& g : part.rod->work.grasps)
+  {
+    if (!g.active || g.body < 0)
+      continue;
+    const int base = bodyUnknown(g.body) + 3;
+    for (int i = g.first_node; i <= g.last_node; ++i)
+    {
+      const Eigen::Vector3d r = system.position(i) - bodies_[simulated_[g.body]].pose.position;
+      const Eigen::Vector3d grad = Eigen::Map<const Eigen::Vector3d>(system.gradient() + 4 * i);
+      for (int p = 0; p < 3; ++p)
+        for (int q = 0; q <= p; ++q)
+          add(base + p, base + q, 0.5 * (grad[p] * r[q] + r[p] * grad[q]) - (p == q ? grad.dot(r) : 0.0));
+    }
+  }
+}
+
+/// The turn of a clamped section that a body carries. Turning the section is turning the edge backwards, so its derivatives follow
+/// from those of the edge: gradient -(e x g + g_theta t), and so on.
+void CoupledSystem::addClamps(const RodPart& part)
+{
+  const RodArrays& arrays = part.rod->system.arrays();
+  for (const ClampJoint& c : part.rod->system.clamps())
+  {
+    const int body = part.rod->work.grasps[c.grasp].body;
+    if (body < 0)
+      continue;
+    const int j = c.edge, next = (j + 1) % arrays.nodes;
+    const Eigen::Vector3d t(arrays.t[0][j], arrays.t[1][j], arrays.t[2][j]), e = t / arrays.inverse_length[j];
+    const Eigen::Matrix3d by_edge = -cross(c.gradient_e) + cross(e) * c.hessian_ee + t * c.hessian_et.transpose() +
+                                    c.gradient_t * arrays.inverse_length[j] * (Eigen::Matrix3d::Identity() - t * t.transpose());
+    const Eigen::Vector3d by_angle = e.cross(c.hessian_et) + c.hessian_tt * t;
+    Eigen::Matrix3d turn = cross(c.torque) - by_edge * cross(e) + by_angle * t.transpose();
+    turn = (0.5 * (turn + turn.transpose())).eval();
+    const int base = bodyUnknown(body) + 3;
+    Columns row, column;
+    for (int p = 0; p < 3; ++p)
+    {
+      row.count = 0;
+      row.push(base + p, 1.0);
+      for (int k = 0; k < 3; ++k)
+      {
+        column.count = 0;
+        mapDof(part, 4 * next + k, 1.0, column);
+        mapDof(part, 4 * j + k, -1.0, column);
+        addPair(row, column, -by_edge(p, k));
+      }
+      column.count = 0;
+      mapDof(part, 4 * j + 3, 1.0, column);
+      addPair(row, column, -by_angle[p]);
+      for (int q = 0; q <= p; ++q)
+        add(base + p, base + q, turn(p, q));
+    }
+  }
+}
+
+void CoupledSystem::assemble(const HessianShift& shift)
+{
+  std::fill_n(matrix_.values(), matrix_.rows().size(), 0.0);
+  for (const RodPart& part : parts_)
+  {
+    if (!part.coupled)
+      continue;
+    RodSystem& system = part.rod->system;
+    const RodPanel* panels = system.panels();
+    const int* slot = part.slots.data();
+    double* values = matrix_.values();
+    for (int i = 0; i < part.rod->model->nodes(); ++i)
+    {
+      const auto shifts = system.diagonalShift(i, shift);
+      for (int c = 0; c < 4; ++c)
+        for (int r = c; r < kRows; ++r, ++slot)
+          if (*slot >= 0)
+            values[*slot] += entry(panels[i], c, r) + (r == c ? shifts[c == 3] : 0.0);
+    }
+    if (part.welded)
+    {
+      addCarried(part);
+      addClamps(part);
+    }
+  }
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+  {
+    bodies_[b].addShift(shift);
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j <= i; ++j)
+        add(body_offset_ + 6 * b + i, body_offset_ + 6 * b + j, bodies_[b].hessian(i, j));
+  }
+  if (!contact_)
+    return;
+  std::array<Columns, 3> rows;
+  for (const ContactTerm& term : contact_->terms())
+  {
+    contactColumns(term, rows);
+    for (int c = 0; c < 3; ++c)
+    {
+      addSquare(rows[c], term.stiffness(c, c));
+      for (int d = 0; d < c; ++d)
+        addPair(rows[c], rows[d], term.stiffness(c, d));
+    }
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "coupled_system.h"
+#include "rod_stepper_impl.h"
+
+namespace slender {
+
+/// Advances one rod, or rods with bodies and contact together, by a step: cuts it where a substep fails, shortens it where it is
+/// inaccurate, and changes the states only when all of it is done.
+class StepLoop
+{
+public:
+  StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, std::unique_ptr<CoupledSystem> coupled = nullptr);
+  ~StepLoop();
+
+  /// One state and one input per rod. `group`, its bodies and obstacles, for coupled rods only.
+  StepReport step(RodState* states, const RodInputs* inputs, double duration, RodGroupState* group = nullptr, const RodGroupInputs* group_inputs = nullptr);
+  CoupledSystem* coupled() { return coupled_.get(); }
+
+private:
+  bool begin(const RodState* states, StepReport& report);
+  bool conserves(const RodState* states) const;
+  double energy(bool at_start, double* allowance);
+  StepFailure implicitStep(double t, double h, StepReport& report);
+  StepFailure explicitStep(double t, double h, StepReport& report);
+  double stepFactor(double ratio) const;
+
+  const TimeConfig time_;
+  std::vector<RodStepper::Impl*> rods_;
+  std::unique_ptr<CoupledSystem> coupled_;   ///< null: a single rod on its own
+  const RodInputs* inputs_ = nullptr;
+  double duration_ = 0;
+  std::size_t failed_ = 0;   ///< rod that the last failure is about
+  StepPlan plan_;
+};
+
+}  // namespace slender

@@ -1,0 +1,236 @@
+// Rigid bodies welded to rods, and bodies alone (thesis 4.5).
+#include <gtest/gtest.h>
+
+#include "test/support/groups.h"
+
+namespace slender::test {
+namespace {
+
+const Vector3d kNone = Vector3d::Zero();
+
+/// End to end error of the angular velocity of a free body with three moments, after 1 s, in steps of 1/count s.
+Twist tumble(Integrator integrator, int count, Pose& end)
+{
+  Group g;
+  // a group needs a rod: far away, weightless company
+  g.addRod(straightRod(4, 1.0, modulusSection(1.0, 1.0, 100.0, 1.0)));
+  Twist spin;
+  spin.angular << 1.0, 5.0, 0.3;
+  g.addBody(bodyOf(1.0, {0.02, 0.035, 0.05}), {}, spin);
+  g.setGravity(kNone);
+  RodGroup group(g.model, withIntegrator(integrator));
+  for (int k = 0; k < count; ++k)
+  {
+    const StepReport report = group.step(g.state, g.inputs, 1.0 / count);
+    EXPECT_TRUE(report.ok) << report.message;
+  }
+  end = g.state.bodies[0].X_WB;
+  return g.state.bodies[0].velocity;
+}
+
+TEST(RigidBodies, TumblingHasTheIntegratorsOrder)
+{
+  for (Integrator integrator : {Integrator::implicit_euler, Integrator::bdf2, Integrator::tr_bdf2, Integrator::implicit_midpoint, Integrator::generalized_alpha})
+  {
+    Pose exact_pose, coarse_pose, fine_pose;
+    const Twist exact = tumble(Integrator::tr_bdf2, 6400, exact_pose);
+    const Twist coarse = tumble(integrator, 200, coarse_pose), fine = tumble(integrator, 400, fine_pose);
+    const Vector3d spin(1.0, 5.0, 0.3), inertia(0.02, 0.035, 0.05);
+    const auto momentum = [&](const Pose& x, const Twist& v) {
+      return Vector3d(x.orientation * Vector3d(inertia.cwiseProduct(x.orientation.conjugate() * v.angular)));
+    };
+    EXPECT_LT((momentum(exact_pose, exact) - inertia.cwiseProduct(spin)).norm(), 1e-6);   // constant: 6400 steps leave 2e-7
+    const double ratio = (coarse.angular - exact.angular).norm() / (fine.angular - exact.angular).norm();
+    const double pose_ratio = coarse_pose.orientation.angularDistance(exact_pose.orientation) / fine_pose.orientation.angularDistance(exact_pose.orientation);
+    const double order = integrator == Integrator::implicit_euler ? 1.0 : 2.0;
+    EXPECT_NEAR(std::log2(ratio), order, 0.2) << toString(integrator);
+    EXPECT_NEAR(std::log2(pose_ratio), order, 0.2) << toString(integrator);
+  }
+}
+
+TEST(RigidBodies, TorsionalPendulum)
+{
+  // T = 2 pi sqrt(J L / beta); the rod's own polar inertia is not modelled, its nodes have no extent
+  const double length = 1.0, beta = 2e-3, inertia = 1e-3;
+  Rod rod = straightRod(11, length, modulusSection(0.05, beta, 1e4, 1e-3));
+  rod.hold(0, 0);
+  Group g;
+  g.addRod(rod);
+  Twist spin;
+  spin.angular << 0.5, 0, 0;
+  const int body = g.addBody(bodyOf(1.0, {inertia, 0.6 * inertia, 0.6 * inertia}), {Vector3d(length, 0, 0), Eigen::Quaterniond::Identity()}, spin);
+  g.weld(0, 10, 10, body);
+  g.setGravity(kNone);
+  RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  const double period = 2 * M_PI * std::sqrt(inertia * length / beta), h = period / 400;
+  double time = 0, last = 0, crossing = 0;
+  int found = 0;
+  for (int k = 0; k < 1300 && found < 4; ++k)
+  {
+    const double before = g.state.bodies[0].velocity.angular.x();
+    ASSERT_TRUE(group.step(g.state, g.inputs, h).ok);
+    time += h;
+    const double after = g.state.bodies[0].velocity.angular.x();
+    if (before > 0 && after <= 0)
+    {
+      crossing = time - h + h * before / (before - after);
+      if (found++ > 0)
+      {
+        EXPECT_NEAR(crossing - last, period, 2e-4 * period);   // TR-BDF2's phase error at 400 steps a period is 1e-4
+      }
+      last = crossing;
+    }
+  }
+  EXPECT_GE(found, 3);
+}
+
+/// A T of three rods on one body, spinning and bending freely.
+Group tee()
+{
+  Group g;
+  const RodSection section = modulusSection(0.02, 0.015, 50.0, 0.05);
+  const Vector3d ends[] = {{0.3, 0, 0}, {-0.3, 0.02, 0}, {0.01, 0.1, 0.25}};
+  Twist spin;
+  spin.linear << 0.1, -0.2, 0.3;
+  spin.angular << 1.0, 2.0, 3.0;
+  const int body = g.addBody(bodyOf(0.02, {2e-5, 3e-5, 4e-5}), {Vector3d(0.002, 0.001, 0), Eigen::Quaterniond(0.9, 0.1, 0.2, 0.3).normalized()}, spin);
+  int inner = 0;
+  for (const Vector3d& end : ends)
+  {
+    const int n = 9;
+    Matrix3Xd nodes(3, n);
+    for (int i = 0; i < n; ++i)
+      nodes.col(i) = end * (i + 0.1) / n;
+    Rod rod(openRod(nodes, section), nodes);
+    const int r = g.addRod(rod);
+    inner == 2 ? g.weld(r, 3, 4, body) : g.weld(r, 0, 0, body);   // the third by an edge inside it
+    ++inner;
+    for (int i = 0; i < n; ++i)
+      g.state.rods[r].v.col(i) = spin.linear + spin.angular.cross(nodes.col(i) - g.state.bodies[0].X_WB.position);
+  }
+  g.setGravity(kNone);
+  return g;
+}
+
+TEST(RigidBodies, MomentaAreConserved)
+{
+  // Linear momentum exactly (Newton's tolerance); angular momentum to the order of the method, as of rods.
+  double error[2];
+  for (int fine = 0; fine < 2; ++fine)
+  {
+    Group g = tee();
+    TimeConfig time = withIntegrator(Integrator::tr_bdf2);
+    time.newton.tolerance = 1e-11;
+    RodGroup group(g.model, time);
+    const Vector3d p = g.momentum(), l = g.angularMomentum();
+    for (int k = 0; k < 100 * (fine + 1); ++k)
+    {
+      const StepReport report = group.step(g.state, g.inputs, 2e-3 / (fine + 1));
+      ASSERT_TRUE(report.ok) << report.message;
+      ASSERT_LE(report.iterations, 12);   // two stages, quadratic convergence
+    }
+    EXPECT_LT((g.momentum() - p).norm(), 1e-6 * p.norm());   // what Newton leaves in 400 stages
+    error[fine] = (g.angularMomentum() - l).norm() / l.norm();
+  }
+  EXPECT_LT(error[0], 2e-3);
+  EXPECT_LT(error[1], 0.35 * error[0]);
+}
+
+TEST(RigidBodies, WeldsHold)
+{
+  Group g = tee();
+  RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  for (int k = 0; k < 50; ++k)
+    ASSERT_TRUE(group.step(g.state, g.inputs, 4e-3).ok);
+  for (const Weld& w : group.model().welds.empty() ? g.model.welds : group.model().welds)
+  {
+    const GraspState& grasp = g.state.rods[w.rod].grasps[w.grasp];
+    const Pose expected = g.state.bodies[w.body].X_WB * w.X_BG;
+    for (int i = grasp.first_node; i <= grasp.last_node; ++i)
+      EXPECT_LT((g.state.rods[w.rod].x.col(i) - expected * grasp.nodes_G[i - grasp.first_node]).norm(), 1e-12);
+    EXPECT_LT((grasp.X_WG.position - expected.position).norm(), 1e-12);
+  }
+}
+
+TEST(RigidBodies, HeavyBodyIsAClamp)
+{
+  // A body a million times heavier than the rod holds it as a fixed grasp does.
+  Rod held = straightRod(21, 1.0, modulusSection(0.05, 0.04, 1e3, 0.02));
+  held.inputs.gravity << 0, 0, -9.81;
+  Rod free = held;
+  held.hold(0, 0);
+  RodStepper stepper(held.model, withIntegrator(Integrator::tr_bdf2));
+  Group g;
+  g.addRod(free);
+  RigidBodyModel heavy = bodyOf(1e6, {1e6, 1e6, 1e6});
+  heavy.gravity = false;
+  g.weld(0, 0, 0, g.addBody(heavy, {}));
+  RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  for (int k = 0; k < 200; ++k)
+  {
+    ASSERT_TRUE(stepper.step(held.state, held.inputs, 2e-3).ok);
+    ASSERT_TRUE(group.step(g.state, g.inputs, 2e-3).ok);
+  }
+  EXPECT_LT((held.state.x - g.state.rods[0].x).cwiseAbs().maxCoeff(), 1e-6);   // the body moves by mass ratio times g t^2
+}
+
+TEST(RigidBodies, DrivenBodyCarriesItsRod)
+{
+  // A driven body with a weld is a grasp with that motion.
+  Rod held = straightRod(15, 0.7, modulusSection(0.05, 0.04, 1e3, 0.02));
+  Rod free = held;
+  held.hold(0, 0);
+  Group g;
+  g.addRod(free);
+  RigidBodyModel driven = bodyOf(1.0, {1, 1, 1});
+  driven.simulated = false;
+  const Pose start = held.state.grasps[0].X_WG;
+  g.weld(0, 0, 0, g.addBody(driven, start));
+  RodStepper stepper(held.model, withIntegrator(Integrator::tr_bdf2));
+  RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  for (int k = 1; k <= 100; ++k)
+  {
+    Pose pose = start;
+    pose.position += Vector3d(0, 0.2 * std::sin(0.05 * k), 0.001 * k);
+    pose.orientation = Eigen::AngleAxisd(0.02 * k, Vector3d(1, 2, 3).normalized()) * pose.orientation;
+    held.inputs.grasps[0].X_WG = g.inputs.bodies[0].X_WG = pose;
+    ASSERT_TRUE(stepper.step(held.state, held.inputs, 5e-3).ok);
+    ASSERT_TRUE(group.step(g.state, g.inputs, 5e-3).ok);
+  }
+  EXPECT_LT((held.state.x - g.state.rods[0].x).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((stepper.wrenches()[0].force - group.wrenches(0)[0].force).norm(), 1e-9 * stepper.wrenches()[0].force.norm());
+}
+
+TEST(RigidBodies, HangingBodyAtRest)
+{
+  // a rope between a wall and a body that hangs from another: forces balance, the wall carries the weights
+  const RodSection section = modulusSection(1e-3, 1e-3, 200.0, 0.05);
+  Rod rope = straightRod(21, 0.6, section);
+  rope.inputs.gravity << 0, 0, -9.81;
+  rope.hold(0, 0);
+  Group g;
+  g.addRod(rope);
+  const double mass = 0.08;
+  g.weld(0, 20, 20, g.addBody(bodyOf(mass, {1e-5, 1e-5, 1e-5}), {Vector3d(0.61, 0, 0), Eigen::Quaterniond::Identity()}));
+  RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  const StepReport report = group.solveEquilibrium(g.state, g.inputs);
+  ASSERT_TRUE(report.ok) << report.message;
+  const double weight = 9.81 * (mass + rope.model->totalMass());
+  EXPECT_NEAR(group.wrenches(0)[0].force.z(), -weight, 1e-6 * weight);
+  EXPECT_LT(group.wrenches(0)[0].force.head<2>().norm(), 1e-6 * weight);
+  EXPECT_LT(g.state.bodies[0].X_WB.position.z(), -0.5);
+  // and a step from there moves nothing
+  const Vector3d at = g.state.bodies[0].X_WB.position;
+  ASSERT_TRUE(group.step(g.state, g.inputs, 0.01).ok);
+  EXPECT_LT((g.state.bodies[0].X_WB.position - at).norm(), 1e-9);
+}
+
+TEST(RigidBodies, ImpossibleInertiaIsRefused)
+{
+  EXPECT_THROW(checkBody(bodyOf(1.0, {1, 1, 3})), std::invalid_argument);
+  EXPECT_THROW(checkBody(bodyOf(-1.0, {1, 1, 1})), std::invalid_argument);
+  EXPECT_THROW(checkBody(bodyOf(1.0, {1, 0, 1})), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace slender::test

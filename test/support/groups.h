@@ -1,0 +1,86 @@
+#pragma once
+
+#include "slender_sim/rod/rod_group.h"
+#include "test/support/rods.h"
+
+namespace slender::test {
+
+/// Rods, bodies and obstacles under construction, with inputs that hold everything held where it is.
+struct Group
+{
+  RodGroupModel model;
+  RodGroupState state;
+  RodGroupInputs inputs;
+
+  int addRod(const Rod& rod)
+  {
+    model.rods.push_back(rod.model);
+    state.rods.push_back(rod.state);
+    inputs.rods.push_back(rod.inputs);
+    inputs.gravity = rod.inputs.gravity;
+    return static_cast<int>(model.rods.size()) - 1;
+  }
+  int addBody(const RigidBodyModel& body, const Pose& pose, const Twist& velocity = {})
+  {
+    model.bodies.push_back(body);
+    RigidBodyState s;
+    s.X_WB = pose;
+    s.velocity = velocity;
+    state.bodies.push_back(s);
+    inputs.bodies.push_back({pose, std::nullopt});
+    return static_cast<int>(model.bodies.size()) - 1;
+  }
+  int addObstacle(const Shape& shape, const Pose& pose, double friction = -1.0)
+  {
+    model.contact.obstacles.push_back({shape, friction});
+    state.obstacles.push_back(pose);
+    state.obstacle_velocities.push_back({});
+    inputs.obstacles.push_back({pose, std::nullopt});
+    return static_cast<int>(model.contact.obstacles.size()) - 1;
+  }
+  void weld(int rod, int first, int last, int body)
+  {
+    makeWeld(model, state, rod, first, last, body);
+    inputs.rods[rod].grasps.push_back({state.rods[rod].grasps.back().X_WG, std::nullopt});
+  }
+  void setGravity(const Vector3d& g)
+  {
+    inputs.gravity = g;
+    for (RodInputs& rod : inputs.rods)
+      rod.gravity = g;
+  }
+  Vector3d momentum() const
+  {
+    Vector3d sum = Vector3d::Zero();
+    for (std::size_t r = 0; r < model.rods.size(); ++r)
+      sum += state.rods[r].v * model.rods[r]->mass;
+    for (std::size_t b = 0; b < model.bodies.size(); ++b)
+      sum += model.bodies[b].mass * state.bodies[b].velocity.linear;
+    return sum;
+  }
+  Vector3d angularMomentum() const
+  {
+    Vector3d sum = Vector3d::Zero();
+    for (std::size_t r = 0; r < model.rods.size(); ++r)
+      for (int i = 0; i < model.rods[r]->nodes(); ++i)
+        sum += model.rods[r]->mass[i] * state.rods[r].x.col(i).cross(state.rods[r].v.col(i));
+    for (std::size_t b = 0; b < model.bodies.size(); ++b)
+    {
+      const RigidBodyState& s = state.bodies[b];
+      const Eigen::Matrix3d r = s.X_WB.orientation.toRotationMatrix();
+      sum += model.bodies[b].mass * s.X_WB.position.cross(s.velocity.linear) + r * model.bodies[b].inertia * r.transpose() * s.velocity.angular;
+    }
+    return sum;
+  }
+};
+
+inline RigidBodyModel bodyOf(double mass, const Vector3d& principal)
+{
+  RigidBodyModel body;
+  body.name = "body";
+  body.mass = mass;
+  body.inertia = principal.asDiagonal();
+  return body;
+}
+
+}  // namespace slender::test

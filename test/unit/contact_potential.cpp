@@ -1,0 +1,139 @@
+#include <Eigen/Eigenvalues>
+#include <gtest/gtest.h>
+
+#include "test/support/contact.h"
+
+namespace slender::test {
+namespace {
+
+constexpr double kGap = 0.02, kRadius = 0.05;
+
+Eigen::Matrix3Xd line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges)
+{
+  Eigen::Matrix3Xd nodes(3, edges + 1);
+  for (int i = 0; i <= edges; ++i)
+    nodes.col(i) = from + (to - from) * (static_cast<double>(i) / edges);
+  return nodes;
+}
+
+struct Case
+{
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;
+  std::vector<Pose> solids;
+
+  ContactPotential potential(double stiffness = 3.0) const
+  {
+    ContactOptions options;
+    options.gap = kGap;
+    ContactPotential p(surface, options);
+    p.setStiffness(stiffness);
+    return p;
+  }
+};
+
+/// Largest error of the gradient by central differences over the largest force, over points and, if any, the solids' poses.
+double gradientError(const Case& c, ContactPotential& potential)
+{
+  constexpr double kStep = 1e-7;
+  potential.evaluate(c.x, c.solids, false);
+  const std::vector<ContactTerm> terms = potential.terms();
+  const Eigen::Matrix3Xd g = gradient(potential, c.x.cols());
+  double error = 0.0;
+  for (Eigen::Index i = 0; i < c.x.size(); ++i)
+  {
+    Eigen::Matrix3Xd plus = c.x, minus = c.x;
+    plus(i) += kStep;
+    minus(i) -= kStep;
+    const double slope = (potential.evaluate(plus, c.solids, false) - potential.evaluate(minus, c.solids, false)) / (2 * kStep);
+    error = std::max(error, std::abs(slope - g(i)));
+  }
+  for (std::size_t k = 0; k < c.solids.size(); ++k)
+  {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();   // on the solid
+    for (const ContactTerm& term : terms)
+      if (term.solid == static_cast<int>(k))
+      {
+        force -= term.force;
+        torque -= (term.position - c.solids[k].position).cross(term.force);
+      }
+    for (int d = 0; d < 6; ++d)
+    {
+      const Eigen::Vector3d unit = kStep * Eigen::Vector3d::Unit(d % 3), none = Eigen::Vector3d::Zero();
+      std::vector<Pose> plus = c.solids, minus = c.solids;
+      plus[k] = moved(c.solids[k], d < 3 ? unit : none, d < 3 ? none : unit);
+      minus[k] = moved(c.solids[k], d < 3 ? -unit : none, d < 3 ? none : -unit);
+      const double slope = (potential.evaluate(c.x, plus, false) - potential.evaluate(c.x, minus, false)) / (2 * kStep);
+      error = std::max(error, std::abs(slope + (d < 3 ? force : torque)[d % 3]));
+    }
+  }
+  const double largest = g.colwise().norm().maxCoeff();
+  EXPECT_GT(largest, 0.0);
+  return error / largest;
+}
+
+// Central differences over 1e-7 m where the barrier's third derivative is at most 1e8 N/m^2 at forces of some newtons: 1e-6.
+constexpr double kDifferences = 2e-6;
+
+Case twoRods(const Eigen::Vector3d& offset, double angle, double tilt, double height)
+{
+  Case c;
+  addCurve(c.surface, c.x, line({-0.5, 0, 0}, {0.5, 0, 0}, 3), kRadius);
+  const Eigen::Vector3d along(std::cos(angle), std::sin(angle), tilt), middle = offset + Eigen::Vector3d(0, 0, 2 * kRadius + height);
+  addCurve(c.surface, c.x, line(middle - 0.5 * along, middle + 0.5 * along, 3), kRadius);
+  return c;
+}
+
+TEST(ContactPotential, ForceOfRodsIsTheGradient)
+{
+  for (double height : {0.002, 0.006, 0.015})
+    for (double angle : {0.0, 1e-4, 0.01, 0.3, 1.3})
+      for (double tilt : {0.0, 1e-3})
+        for (double along : {0.0, 0.11, 1.0 / 6})
+        {
+          Case c = twoRods({along, 0.003, 0}, angle, tilt, height);
+          ContactPotential p = c.potential();
+          EXPECT_LT(gradientError(c, p), kDifferences) << height << " " << angle << " " << tilt << " " << along;
+        }
+}
+
+TEST(ContactPotential, ForceOfSolidsIsTheGradient)
+{
+  const auto mesh = std::make_shared<TriangleMesh>();
+  mesh->vertices.resize(3, 4);
+  mesh->vertices << -0.3, 0.3, 0.0, 0.0, -0.2, -0.2, 0.4, 0.0, 0.0, 0.0, 0.0, 0.3;
+  mesh->triangles.resize(3, 4);
+  mesh->triangles << 0, 0, 1, 2, 2, 1, 2, 0, 1, 3, 3, 3;
+  const std::vector<Shape> shapes{Plane{}, Sphere{0.2}, Box{{0.4, 0.3, 0.2}}, Cylinder{0.1, 0.5}, Capsule{0.1, 0.3}, mesh};
+  Random random(3);
+  for (const Shape& shape : shapes)
+  {
+    int checked = 0;
+    for (int k = 0; k < 40; ++k)
+    {
+      Case c;
+      const Eigen::Vector3d e = 0.4 * random.direction(), n = random.direction();
+      addCurve(c.surface, c.x, line(-0.5 * e, 0.5 * e, 2), kRadius);
+      c.surface.solids.push_back({shape, -1.0, {}});
+      c.solids.push_back({Eigen::Vector3d::Zero(), random.rotation()});
+      ContactPotential p = c.potential();
+      // along n to a clearance of a third of the gap
+      double low = -1.0, high = 2.0;
+      for (int i = 0; i < 60; ++i)
+      {
+        const double s = 0.5 * (low + high);
+        c.solids[0].position = s * n;
+        const double clear = p.clearance(c.x, c.solids);
+        (s > 0.0 && clear > kGap / 3 ? high : low) = s;
+      }
+      if (std::abs(p.clearance(c.x, c.solids) - kGap / 3) > 1e-6)
+        continue;   // a plane that n does not leave
+      EXPECT_LT(gradientError(c, p), kDifferences) << shape.index() << " case " << k;
+      ++checked;
+    }
+    EXPECT_GT(checked, 10);
+  }
+}
+
+}  // namespace
+}  // namespace slender::test
