@@ -14,6 +14,7 @@ void runImplicitVsExplicit(StudyContext&);
 void runRodStability(StudyContext&);
 void runBendTwist(StudyContext&);
 void runLateralBuckling(StudyContext&);
+void runPerversion(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -29,6 +30,7 @@ const std::vector<Study>& studies()
       {"rod_stability", "extreme stiffness, thickness, steps, twist and grasps: done, cut or refused with reason", runRodStability},
       {"bend_twist", "heavy naturally curved rod: planar or three-dimensional on both sides of the boundary", runBendTwist},
       {"lateral_buckling", "heavy cantilevers of elliptical section that topple sideways: critical load", runLateralBuckling},
+      {"perversion", "a curled ribbon drawn flat and released: two helices of opposite handedness", runPerversion},
   };
   return all;
 }

@@ -45,7 +45,9 @@ struct Plot
   std::string x_label, y_label;
   bool log_x = true, log_y = true;
   bool lines = true;     ///< false: points only
-  std::deque<Series> series;
+  bool markers = true;   ///< false: lines only
+  bool equal_axes = false;   ///< pictures of shapes
+  std::deque<Series> series = {};
 
   /// The series with this label, added at its first use.
   Series& at(const std::string& label);
