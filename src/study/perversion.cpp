@@ -162,20 +162,19 @@ void release(StudyContext& context, int edges)
   Ribbon ribbon(edges, kPitch);
   ribbon.drawFlat(1.2 * criticalTension(ribbon.curvature));
   RodStepper stepper(ribbon.rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
-  Plot& picture = context.plot("perversion_shapes_" + std::to_string(edges), "Natural, drawn flat (shifted up) and released shapes", "x [L]", "z [L]");
+  Plot& picture = context.plot("perversion_shapes_" + std::to_string(edges), "Natural (top), drawn flat (middle) and released (bottom); height drawn larger", "x [L]", "z [L]");
   Plot& profile = context.plot("perversion_torsion_" + std::to_string(edges), "Torsion of the centreline, mean over a turn", "s [L]", "torsion [1/L]");
   picture.log_x = picture.log_y = picture.markers = profile.log_x = profile.log_y = profile.markers = false;
-  picture.equal_axes = true;
   const auto draw = [&](const std::string& label, const Eigen::Matrix3Xd& x, double across, double up) {
     Series& s = picture.at(label);
     for (int i = 0; i < x.cols(); ++i)
     {
-      s.x.push_back(across + x(0, i) + 0.2 * x(1, i));   // seen a little from the side
+      s.x.push_back(across + x(0, i) + 0.5 * x(1, i));   // seen from the side and from above
       s.y.push_back(up + x(2, i) + 0.2 * x(1, i));
     }
   };
-  draw("natural", ribbon.natural, 0.1, 0.15);
-  draw("drawn flat", ribbon.rod.state.x, 0.0, 0.08);
+  draw("natural", ribbon.natural, 0.2, 0.11);
+  draw("drawn flat", ribbon.rod.state.x, 0.0, 0.065);
 
   for (const double target : {0.9, 0.8, 0.7, 0.6, 0.5, 0.45})
   {
@@ -221,7 +220,8 @@ void release(StudyContext& context, int edges)
       wound.check(half.torsion, exact.torsion, 0.05 * std::abs(exact.torsion), source).set("relative_error", half.torsion / exact.torsion - 1);
     }
     Series& s = profile.at("ends " + std::to_string(target).substr(0, 4) + " L apart");
-    for (std::size_t j = 0; j < line.torsion.size(); ++j)
+    const std::size_t margin = static_cast<std::size_t>(edges / kTurns / 2);   // means over less than a turn are left out
+    for (std::size_t j = margin; j + margin < line.torsion.size(); ++j)
     {
       s.x.push_back((j + 0.5) / edges);
       s.y.push_back(line.torsion[j]);
