@@ -15,6 +15,8 @@ if(BUILD_BENCHMARKS)
   find_package(LAPACK REQUIRED)   # BLA_VENDOR picks one
   add_executable(banded_ldlt_benchmark ${PROJECT_SOURCE_DIR}/bench/banded_ldlt_benchmark.cpp)
   target_link_libraries(banded_ldlt_benchmark PRIVATE slender_sim benchmark::benchmark LAPACK::LAPACK)
+  add_executable(contact_benchmark ${PROJECT_SOURCE_DIR}/bench/contact_benchmark.cpp)
+  target_link_libraries(contact_benchmark PRIVATE slender_sim benchmark::benchmark fcl)
 endif()
 
 if(BUILD_TESTING)

@@ -30,16 +30,14 @@ double GridPairs::cellSize(const std::vector<BoundingBox>& boxes) const
     farthest = std::max({farthest, b.high.cwiseAbs().maxCoeff(), b.low.cwiseAbs().maxCoeff()});
   }
   // No smaller than 32-bit cell numbers allow; larger while a few huge boxes would fill too many cells.
-  double size = std::max({mean / boxes.size(), farthest * 1e-9, 1e-300});
+  // Twice the mean: a box then fills about three and a half cells.
+  double size = std::max({2.0 * mean / boxes.size(), farthest * 1e-9, 1e-300});
   for (;;)
   {
     double count = 0.0;
     for (const BoundingBox& b : boxes)
-    {
-      const Eigen::Array3d cells = (b.high.array() / size).floor() - (b.low.array() / size).floor() + 1.0;
-      count += cells.prod();
-    }
-    if (count <= 12.0 * boxes.size())
+      count += ((b.high - b.low).array() / size + 1.0).prod();   // on average over its place in the grid
+    if (count <= 8.0 * boxes.size())
       return size;
     size *= 1.5;
   }

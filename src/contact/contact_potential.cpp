@@ -226,7 +226,8 @@ void ContactPotential::Impl::addRunning(const SoftGap& gap, const Contact& conta
 
 double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Contact& contact, bool with_stiffness)
 {
-  if (contact.friction == 0.0)
+  const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
+  if (!(most > 0.0))
     return 0.0;
   terms.emplace_back();
   ContactTerm& term = terms.back();
@@ -243,7 +244,6 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
     term.position = poses[contact.solid] * contact.material;
     u -= term.position - solids_begin[contact.solid] * contact.material;
   }
-  const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
   const Eigen::Vector3d n = contact.force / normal_force, slip = u - n.dot(u) * n;
   const double y = slip.norm();
   const SmoothedCoulomb law{options.slip_speed * h};

@@ -123,6 +123,7 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
     p.hst = -p.weight * (e.dot(f) - ne * nf) / d - p.ws * nf + p.wt * ne;
     return p;
   };
+  const double reaching = e.norm() + f.norm();
   const SegmentPair start = closestOfSegments(a0, a1, b0, b1);
   OnSegments p = at(start.s, start.t);
   bool free_s = false, free_t = false;
@@ -137,7 +138,7 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
     const double safe_s = p.hss - 2.0 * p.ws * p.normal.dot(e), safe_t = p.htt + 2.0 * p.wt * p.normal.dot(f);
     const double det = p.hss * p.htt - p.hst * p.hst;
     bool both = free_s && free_t;
-    if (both && p.hss > 0.0 && det > 1e-12 * p.hss * p.htt)
+    if (both && p.hss > 0.0 && det > 1e-14 * p.hss * p.htt)
     {
       ds = (p.hst * p.ht - p.htt * p.hs) / det;
       dt = (p.hst * p.hs - p.hss * p.ht) / det;
@@ -168,12 +169,18 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
       return v < 1e-15 ? 0.0 : v > 1.0 - 1e-15 ? 1.0 : v;
     };
     OnSegments trial = at(moved(p.s, ds, reach), moved(p.t, dt, reach));
-    while (!(trial.h <= p.h + 1e-4 * reach * slope) && reach > 1e-6)
+    // Where the gap's rounding hides a descent, the slopes still show it.
+    const double noise = 4e-16 * (p.gap + thickness + reaching);
+    const auto steepness = [&](const OnSegments& q) { return std::max(ds != 0.0 ? std::abs(q.hs) : 0.0, dt != 0.0 ? std::abs(q.ht) : 0.0); };
+    const auto better = [&] {
+      return trial.h <= p.h + 1e-4 * reach * slope || (trial.h <= p.h + noise && steepness(trial) < 0.5 * steepness(p));
+    };
+    while (!better() && reach > 1e-6)
     {
       reach *= 0.5;
       trial = at(moved(p.s, ds, reach), moved(p.t, dt, reach));
     }
-    if (!(trial.h <= p.h))   // round-off
+    if (!better())
       break;
     p = trial;
   }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/linalg/banded_ldlt.h"
+#include "test/support/contact.h"
 #include "test/support/rods.h"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
@@ -81,6 +82,41 @@ TEST_P(Allocations, AWarmStepMakesNone)
         EXPECT_EQ(allocations - before, 0) << (closed ? "closed" : "open") << (viscous ? " viscous" : "") << " tolerance " << tolerance;
         EXPECT_TRUE(ok);
       }
+}
+
+TEST(ContactAllocations, WarmContactMakesNone)
+{
+  ContactSurface surface;
+  Matrix3Xd x;
+  addCurve(surface, x, straightNodes(20, 0.3), 0.01, 0.3);
+  addCurve(surface, x, straightNodes(20, 0.3).colwise() + Vector3d(0.01, 0, 0.022), 0.01, 0.3);
+  surface.solids.push_back({Plane{}, -1.0, {}});
+  surface.solids.push_back({Capsule{0.01, 0.3}, -1.0, {}});
+  std::vector<Pose> solids(2);
+  solids[0].position.z() = -0.012;
+  solids[1].position.y() = 0.022;
+  ContactOptions options;
+  options.gap = 4e-3;
+  ContactPotential potential(surface, options);
+  std::size_t terms = 0;
+  const Matrix3Xd there = x.colwise() + Vector3d(5e-2, 1e-4, 0), back = x;
+  const auto step = [&] {   // far enough for new candidates
+    potential.begin(x, solids, 1e-3);
+    potential.stepLimit(x, there, solids, solids);
+    potential.evaluate(there, solids, true);
+    potential.lagFriction();
+    potential.evaluate(there, solids, true);
+    terms = potential.terms().size();
+    potential.adaptStiffness();
+    potential.clearance(back, solids);
+  };
+  for (int k = 0; k < 3; ++k)
+    step();
+  const long before = allocations;
+  for (int k = 0; k < 3; ++k)
+    step();
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_GT(terms, 50u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Integrators, Allocations, ::testing::ValuesIn(allIntegrators()), [](const auto& info) { return toString(info.param); });

@@ -11,7 +11,11 @@ namespace slender {
 struct BoundingBox
 {
   Eigen::Vector3d low, high;
-  bool overlaps(const BoundingBox& b) const { return (low.array() <= b.high.array()).all() && (b.low.array() <= high.array()).all(); }
+  bool overlaps(const BoundingBox& b) const   // without branches: most boxes of a grid cell do not, and nobody can predict which
+  {
+    return (low.x() <= b.high.x()) & (b.low.x() <= high.x()) & (low.y() <= b.high.y()) & (b.low.y() <= high.y()) & (low.z() <= b.high.z()) &
+           (b.low.z() <= high.z());
+  }
 };
 
 /// Pairs of overlapping boxes through a hashed uniform grid. Time and memory are linear in boxes and pairs when boxes are of similar

@@ -1,0 +1,237 @@
+#include <functional>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <gtest/gtest.h>
+
+#include "test/support/contact.h"
+
+namespace slender::test {
+namespace {
+
+constexpr double kGap = 0.02, kRadius = 0.05;
+
+Eigen::Matrix3Xd line(const Eigen::Vector3d& middle, const Eigen::Vector3d& along, int edges)
+{
+  Eigen::Matrix3Xd nodes(3, edges + 1);
+  for (int i = 0; i <= edges; ++i)
+    nodes.col(i) = middle + along * (static_cast<double>(i) / edges - 0.5);
+  return nodes;
+}
+
+struct Rods
+{
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;
+};
+
+/// A rod of five edges along x and one of four above it.
+Rods stacked(const Eigen::Vector3d& middle, const Eigen::Vector3d& along, double friction = 0.0)
+{
+  Rods rods;
+  addCurve(rods.surface, rods.x, line({0, 0, 0}, {1, 0, 0}, 5), kRadius, friction);
+  addCurve(rods.surface, rods.x, line(middle, along, 4), kRadius, friction);
+  return rods;
+}
+
+ContactOptions options()
+{
+  ContactOptions o;
+  o.gap = kGap;
+  return o;
+}
+
+/// Largest change of all nodes' forces between neighbouring samples of a motion, over the largest force.
+double largestJump(int samples, const std::function<Rods(double)>& motion)
+{
+  ContactPotential potential(motion(0.0).surface, options());
+  potential.setStiffness(1.0);
+  double jump = 0.0, largest = 0.0;
+  Eigen::Matrix3Xd before;
+  for (int k = 0; k <= samples; ++k)
+  {
+    const Rods rods = motion(static_cast<double>(k) / samples);
+    EXPECT_TRUE(std::isfinite(potential.evaluate(rods.x, {}, false)));
+    const Eigen::Matrix3Xd g = gradient(potential, rods.x.cols());
+    if (k > 0)
+      jump = std::max(jump, (g - before).cwiseAbs().maxCoeff());
+    largest = std::max(largest, g.cwiseAbs().maxCoeff());
+    before = g;
+  }
+  return jump / largest;
+}
+
+/// A continuous force's jumps shrink with the samples' distance.
+void expectContinuous(const std::function<Rods(double)>& motion)
+{
+  const double coarse = largestJump(2000, motion), fine = largestJump(20000, motion);
+  EXPECT_LT(fine, 0.15 * coarse);
+  EXPECT_LT(fine, 0.01);
+}
+
+TEST(ContactForces, DoNotJumpAsRodsBecomeParallel)
+{
+  static constexpr double kHeight = 2 * kRadius + 0.006;
+  // turning in the plane of contact, through parallel; tilting, so that the contact runs from one end to the other; both, off centre
+  expectContinuous([](double s) {
+    const double angle = 0.4 * (s - 0.5);
+    return stacked({0.05, 0, kHeight}, {std::cos(angle), std::sin(angle), 0});
+  });
+  expectContinuous([](double s) { return stacked({0.05, 0, kHeight}, {1, 0, 0.01 * (s - 0.5)}); });
+  expectContinuous([](double s) { return stacked({0.05, 0.01, kHeight}, {1, 0.1 * (s - 0.47), 0.01 * (s - 0.5)}); });
+}
+
+TEST(ContactForces, DoNotJumpAsRodsSlide)
+{
+  for (double angle : {0.0, 0.05, 0.7, 1.5707})
+    expectContinuous([angle](double s) {
+      return stacked({s - 0.5, 0.003, 2 * kRadius + 0.006}, {0.8 * std::cos(angle), 0.8 * std::sin(angle), 0});
+    });
+}
+
+/// Second derivatives along the normal: with the terms of the running place of contact they are those of the energy.
+TEST(ContactForces, StiffnessFollowsTheForceAlongTheNormal)
+{
+  Random random(5);
+  for (double angle : {0.0, 0.02, 0.3, 1.2})
+  {
+    const Rods rods = stacked({0.05, 0, 2 * kRadius + 0.006}, {std::cos(angle), std::sin(angle), 1e-3});
+    ContactPotential potential(rods.surface, options());
+    potential.setStiffness(1.0);
+    potential.evaluate(rods.x, {}, true);
+    const Eigen::MatrixXd h = hessian(potential, rods.x.cols());
+    EXPECT_GE(h.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-12 * h.norm());
+    Eigen::Matrix3Xd step = Eigen::Matrix3Xd::Zero(3, rods.x.cols());
+    step.row(2) = random.numbers(static_cast<int>(rods.x.cols()), 1e-7);
+    potential.evaluate(rods.x + step, {}, false);
+    Eigen::Matrix3Xd change = gradient(potential, rods.x.cols());
+    potential.evaluate(rods.x - step, {}, false);
+    change = 0.5 * (change - gradient(potential, rods.x.cols()));
+    const Eigen::VectorXd predicted = h * Eigen::Map<const Eigen::VectorXd>(step.data(), step.size());
+    const Eigen::Map<const Eigen::MatrixXd> shaped(predicted.data(), 3, rods.x.cols());
+    // what is left out: the normal's turning, of the order of gap over distance
+    EXPECT_LT((shaped.row(2) - change.row(2)).norm(), 0.05 * change.row(2).norm()) << angle;
+  }
+}
+
+/// Newton's method with these terms and a strict line search: a rod pressed on another by weights. Both are held as in an implicit step, by
+/// springs that alone would let the upper one sink 3 cm, and resist changes of their edges' vectors.
+TEST(ContactForces, NewtonConverges)
+{
+  for (double angle : {0.0, 0.01, 0.2, 1.4})
+    for (double weight : {1e-3, 0.1, 10.0})
+    {
+      Rods rods = stacked({0.05, 0.01, 2 * kRadius + 0.015}, {std::cos(angle), std::sin(angle), 2e-3});
+      ContactPotential potential(rods.surface, options());
+      potential.setStiffness(1.0);
+      const Eigen::Index n = rods.x.cols();
+      const Eigen::Matrix3Xd rest = rods.x;
+      Eigen::MatrixXd elastic = Eigen::MatrixXd::Identity(n, n);   // per coordinate
+      for (const ContactSegment& s : rods.surface.segments)
+      {
+        Eigen::VectorXd edge = Eigen::VectorXd::Zero(n);
+        edge[s.a] = -1.0;
+        edge[s.b] = 1.0;
+        elastic += 10.0 * edge * edge.transpose();
+      }
+      elastic *= weight / 0.03;
+      Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, n);
+      load.row(2).tail(5).setConstant(weight);
+      const auto total = [&](const Eigen::Matrix3Xd& x, bool with_stiffness) {
+        const Eigen::Matrix3Xd u = x - rest;
+        return potential.evaluate(x, {}, with_stiffness) + (0.5 * u * elastic + load).cwiseProduct(u).sum();
+      };
+      int iterations = 0;
+      for (; iterations < 60; ++iterations)
+      {
+        const double energy = total(rods.x, true);
+        const Eigen::Matrix3Xd g = gradient(potential, n) + (rods.x - rest) * elastic + load;
+        const Eigen::Map<const Eigen::VectorXd> residual(g.data(), g.size());
+        if (residual.norm() < 1e-9 * weight)
+          break;
+        Eigen::MatrixXd h = hessian(potential, n);
+        for (Eigen::Index i = 0; i < n; ++i)
+          for (Eigen::Index j = 0; j < n; ++j)
+            h.block<3, 3>(3 * i, 3 * j).diagonal().array() += elastic(i, j);
+        const Eigen::VectorXd direction = -h.ldlt().solve(residual);
+        const Eigen::Map<const Eigen::MatrixXd> move(direction.data(), 3, n);
+        double share = potential.stepLimit(rods.x, rods.x + move, {}, {});
+        ASSERT_GT(share, 0.0);
+        while (total(rods.x + share * move, false) > energy + 1e-4 * share * residual.dot(direction) + 1e-13 * std::abs(energy))
+        {
+          share *= 0.5;
+          ASSERT_GT(share, 1e-6) << "angle " << angle << " weight " << weight << " residual " << residual.norm();
+        }
+        rods.x += share * move;
+        ASSERT_GT(potential.clearance(rods.x, {}), 0.0);
+      }
+      EXPECT_LT(potential.smallestGap(), kGap);
+      EXPECT_LT(iterations, 40) << "angle " << angle << " weight " << weight;
+    }
+}
+
+TEST(ContactFriction, SticksAndSlipsAsCoulombSays)
+{
+  constexpr double kStep = 0.01, kFriction = 0.4;
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;
+  addCurve(surface, x, line({0, 0, kRadius + 0.008}, {0.3, 0, 0}, 1), kRadius, 0.1);
+  surface.solids.push_back({Plane{}, 1.6, {}});   // geometric mean 0.4
+  const std::vector<Pose> solids(1);
+  ContactPotential potential(surface, options());
+  potential.setStiffness(2.0);
+  potential.begin(x, solids, kStep);
+  potential.evaluate(x, solids, false);
+  ASSERT_EQ(potential.terms().size(), 2u);
+  EXPECT_EQ(potential.terms()[1].force.norm(), 0.0);
+  const double normal = potential.terms()[0].force.norm();
+  const Eigen::Vector3d side(0.6, 0.8, 0);
+  const double full = options().slip_speed * kStep;
+  for (double slip : {0.1 * full, full, 20 * full})
+  {
+    const Eigen::Matrix3Xd there = x.colwise() + slip * side;
+    potential.evaluate(there, solids, true);
+    const Eigen::Vector3d force = potential.terms().back().force;
+    EXPECT_LE(force.norm(), kFriction * normal * (1 + 1e-12));
+    EXPECT_NEAR(force.dot(side), slip < full ? -kFriction * normal * 0.19 : -kFriction * normal, 1e-9 * normal);   // slips are 1e-7 m of coordinates of 0.1 m
+    EXPECT_GE(potential.terms().back().stiffness.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-9);
+    const double h = 1e-3 * full;
+    const double slope = (potential.evaluate(there.colwise() + h * side, solids, false) - potential.evaluate(there.colwise() - h * side, solids, false)) / (2 * h);
+    if (slip != full)
+    {
+      EXPECT_NEAR(slope, -force.dot(side), 1e-6 * normal);
+    }
+  }
+  // a solid that moves along drags: no slip, no force
+  std::vector<Pose> along = solids;
+  along[0].position = full * side;
+  potential.evaluate(x.colwise() + full * side, along, false);
+  EXPECT_NEAR(potential.terms().back().force.norm(), 0.0, 1e-9 * normal);
+  EXPECT_EQ(potential.lagFriction(), 0.0);   // the same normal forces
+  potential.evaluate(x.colwise() - Eigen::Vector3d(0, 0, 0.002), solids, false);
+  EXPECT_GT(potential.lagFriction(), 0.1);
+}
+
+TEST(ContactForces, FrictionBetweenRodsIsTheGradient)
+{
+  Rods rods = stacked({0.05, 0.01, 2 * kRadius + 0.006}, {0.8, 0.3, 0.001}, 0.5);
+  ContactPotential potential(rods.surface, options());
+  potential.setStiffness(1.0);
+  potential.begin(rods.x, {}, 0.01);
+  Random random(2);
+  for (Eigen::Index i = 0; i < rods.x.size(); ++i)
+    rods.x(i) += random.uniform(-1e-6, 1e-6);
+  potential.evaluate(rods.x, {}, false);
+  const Eigen::Matrix3Xd g = gradient(potential, rods.x.cols());
+  for (Eigen::Index i = 0; i < rods.x.size(); ++i)
+  {
+    constexpr double kStep = 1e-9;
+    Eigen::Matrix3Xd plus = rods.x, minus = rods.x;
+    plus(i) += kStep;
+    minus(i) -= kStep;
+    EXPECT_NEAR((potential.evaluate(plus, {}, false) - potential.evaluate(minus, {}, false)) / (2 * kStep), g(i), 2e-5 * g.norm());
+  }
+}
+
+}  // namespace
+}  // namespace slender::test
