@@ -15,6 +15,8 @@ void runRodStability(StudyContext&);
 void runBendTwist(StudyContext&);
 void runLateralBuckling(StudyContext&);
 void runPerversion(StudyContext&);
+void runTorsionalPendulum(StudyContext&);
+void runWilberforce(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -31,6 +33,8 @@ const std::vector<Study>& studies()
       {"bend_twist", "heavy naturally curved rod: planar or three-dimensional on both sides of the boundary", runBendTwist},
       {"lateral_buckling", "heavy cantilevers of elliptical section that topple sideways: critical load", runLateralBuckling},
       {"perversion", "a curled ribbon drawn flat and released: two helices of opposite handedness", runPerversion},
+      {"torsional_pendulum", "a disc that turns on a wire: period, all integrators and steps", runTorsionalPendulum},
+      {"wilberforce", "a body on a helical spring: frequencies, beat, exchange of energy", runWilberforce},
   };
   return all;
 }
