@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include <Eigen/Dense>
@@ -9,32 +10,53 @@
 namespace slender::study {
 namespace {
 
-/// q_{k+2} + q_{k-2} = b (q_{k+1} + q_{k-1}) + c q_k holds for any two tones, with b = 2 (cos p + cos r), c = -2 - 4 cos p cos r for
-/// their phases p, r per lag. A lag of about an eighth of a period keeps it well conditioned.
-Eigen::Vector2d prony(const std::vector<Eigen::VectorXd>& signals, double interval)
+/// Columns 1, cos, sin, cos, sin at every `stride`-th sample; time zero in the middle.
+Eigen::MatrixXd tones(const Eigen::Vector2d& omega, Eigen::Index samples, double interval, Eigen::Index stride)
 {
+  Eigen::MatrixXd basis((samples + stride - 1) / stride, 5);
+  for (Eigen::Index k = 0; k < basis.rows(); ++k)
+  {
+    const double t = interval * static_cast<double>(k * stride - samples / 2);
+    basis.row(k) << 1, std::cos(omega[0] * t), std::sin(omega[0] * t), std::cos(omega[1] * t), std::sin(omega[1] * t);
+  }
+  return basis;
+}
+
+/// The best of a grid of frequencies about the mean one, which the zero crossings give; spaced finely enough for Gauss-Newton.
+Eigen::Vector2d scan(const std::vector<Eigen::VectorXd>& signals, double interval)
+{
+  const Eigen::Index samples = signals.front().size();
+  const double duration = interval * static_cast<double>(samples);
   int crossings = 0;
-  const Eigen::VectorXd& first = signals.front();
-  for (int k = 1; k < first.size(); ++k)
-    crossings += (first[k - 1] < 0) != (first[k] < 0);
-  if (crossings < 4)
-    throw std::runtime_error("two tones: the signal does not oscillate");
-  const int lag = std::max<int>(1, static_cast<int>(2.0 * first.size() / crossings / 8.0));
-  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d right = Eigen::Vector2d::Zero();
   for (const Eigen::VectorXd& q : signals)
-    for (int k = 2 * lag; k + 2 * lag < q.size(); ++k)
+    for (Eigen::Index k = 1; k < samples; ++k)
+      crossings += (q[k - 1] < 0) != (q[k] < 0);
+  const double mean = M_PI * crossings / static_cast<double>(signals.size()) / duration;
+  if (mean * duration < 8 * M_PI)
+    throw std::runtime_error("two tones: fewer than four periods");
+  const Eigen::Index stride = std::max<Eigen::Index>(1, static_cast<Eigen::Index>(2 * M_PI / mean / 8 / interval));
+  const double step = 0.25 * 2 * M_PI / duration;
+  Eigen::Vector2d best(mean, mean);
+  double least = std::numeric_limits<double>::infinity();
+  for (int shift = -12; shift <= 12; ++shift)
+    for (int split = 1; split <= 40; ++split)
     {
-      const Eigen::Vector2d row(q[k + lag] + q[k - lag], q[k]);
-      normal += row * row.transpose();
-      right += row * (q[k + 2 * lag] + q[k - 2 * lag]);
+      const Eigen::Vector2d omega(mean + step * (shift - 0.5 * split), mean + step * (shift + 0.5 * split));
+      const Eigen::MatrixXd basis = tones(omega, samples, interval, stride);
+      const Eigen::LDLT<Eigen::MatrixXd> normal(basis.transpose() * basis);
+      double misfit = 0;
+      for (const Eigen::VectorXd& q : signals)
+      {
+        const Eigen::VectorXd thin = Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<>>(q.data(), basis.rows(), Eigen::InnerStride<>(stride));
+        misfit += (thin - basis * normal.solve(basis.transpose() * thin)).squaredNorm();
+      }
+      if (misfit < least)
+      {
+        least = misfit;
+        best = omega;
+      }
     }
-  const Eigen::Vector2d bc = normal.ldlt().solve(right);
-  const double sum = 0.5 * bc[0], product = -0.25 * (bc[1] + 2), root = std::sqrt(std::max(0.0, 0.25 * sum * sum - product));
-  const double c1 = 0.5 * sum + root, c2 = 0.5 * sum - root;
-  if (!(std::abs(c1) < 1 && std::abs(c2) < 1))
-    throw std::runtime_error("two tones: none found");
-  return Eigen::Vector2d(std::acos(c1), std::acos(c2)) / (lag * interval);
+  return best;
 }
 
 }  // namespace
@@ -51,7 +73,7 @@ TwoTones fitTwoTones(const std::vector<std::vector<double>>& signals, double int
       throw std::runtime_error("two tones: a signal is constant or too short");
     q.push_back(v / spread);
   }
-  Eigen::Vector2d omega = prony(q, interval);
+  Eigen::Vector2d omega = scan(q, interval);
 
   // Gauss-Newton on the two frequencies, amplitudes and constants together
   const Eigen::Index samples = q.front().size();
@@ -59,12 +81,7 @@ TwoTones fitTwoTones(const std::vector<std::vector<double>>& signals, double int
   double misfit = 0;
   for (int round = 0; round < 30; ++round)
   {
-    Eigen::MatrixXd basis(samples, 5);
-    for (Eigen::Index k = 0; k < samples; ++k)
-    {
-      const double t = interval * static_cast<double>(k - samples / 2);
-      basis.row(k) << 1, std::cos(omega[0] * t), std::sin(omega[0] * t), std::cos(omega[1] * t), std::sin(omega[1] * t);
-    }
+    const Eigen::MatrixXd basis = tones(omega, samples, interval, 1);
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit(basis);
     Eigen::MatrixXd slopes(samples * count, 2);   // by the frequencies, less what amplitudes can follow
     Eigen::VectorXd rest(samples * count);

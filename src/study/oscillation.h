@@ -12,7 +12,8 @@ struct TwoTones
 };
 
 /// Fits every signal by a constant and two undamped sinusoids whose frequencies all share (least squares, each signal scaled by its
-/// spread). Samples `interval` [s] apart. Starts from Prony's recurrence. Throws std::runtime_error when there are no two tones.
+/// spread). Samples `interval` [s] apart, over four periods or more, at most ten beats.
+/// Throws std::runtime_error for fewer periods, or a signal that is constant.
 TwoTones fitTwoTones(const std::vector<std::vector<double>>& signals, double interval);
 
 }  // namespace slender::study

@@ -46,6 +46,24 @@ std::shared_ptr<const RodModel> keptPlanar(const RodModel& model, int keep, doub
   return stiff;
 }
 
+std::shared_ptr<const RodModel> matchedToCurve(const RodModel& model)
+{
+  auto matched = std::make_shared<RodModel>(model);
+  for (int i = 0; i < model.nodes(); ++i)
+  {
+    const Eigen::Vector2d curvature = model.rest_curvature.col(i);
+    const double k2 = curvature.squaredNorm();
+    if (k2 == 0)
+      continue;
+    const Eigen::Matrix2d scale = Eigen::Matrix2d::Identity() - (1 - 1 / (1 + k2 / 4)) / k2 * curvature * curvature.transpose();
+    Eigen::Matrix2d bend;
+    bend << model.bend_modulus(0, i), model.bend_modulus(1, i), model.bend_modulus(1, i), model.bend_modulus(2, i);
+    bend = scale * bend * scale;
+    matched->bend_modulus.col(i) << bend(0, 0), bend(0, 1), bend(1, 1);
+  }
+  return matched;
+}
+
 int unstableModes(const RodModel& model, const RodState& state, const Eigen::Vector3d& gravity)
 {
   RodSystem system(model);

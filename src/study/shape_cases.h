@@ -19,6 +19,10 @@ void lay(RodSetup& rod, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& di
 /// itself would not, and has the same planar equilibria.
 std::shared_ptr<const RodModel> keptPlanar(const RodModel& model, int keep, double factor = 1e3);
 
+/// The rod with joints that are as stiff about their natural turn as the smooth rod. The discrete curvature 2 tan(a/2) of a joint that
+/// turns by a grows by 1/cos^2(a/2) = 1 + curvature^2/4 times the turn, so coils of few edges come out too stiff.
+std::shared_ptr<const RodModel> matchedToCurve(const RodModel& model);
+
 /// Number of negative eigenvalues of the energy's Hessian (zero ones count), grasps held, at an equilibrium.
 int unstableModes(const RodModel& model, const RodState& state, const Eigen::Vector3d& gravity);
 
