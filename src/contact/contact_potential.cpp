@@ -108,7 +108,7 @@ double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::ve
     if (!std::isfinite(energy))
       return restart();
   }
-  for (const Contact& contact : lagged)
+  for (Contact& contact : lagged)
     energy += addFriction(x, poses, contact, with_stiffness);
   return energy;
 }
@@ -224,7 +224,7 @@ void ContactPotential::Impl::addRunning(const SoftGap& gap, const Contact& conta
   }
 }
 
-double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Contact& contact, bool with_stiffness)
+double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact, bool with_stiffness)
 {
   const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
   if (!(most > 0.0))
@@ -252,7 +252,14 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   if (with_stiffness)
   {
     term.stiffness = most * over_slip * (Eigen::Matrix3d::Identity() - n * n.transpose());
-    if (y > 0.0)
+    // Newton's method leaps over the narrow range in which a contact sticks, from slip to slip the other way, for ever. The secant's
+    // stiffness bounds the energy from above and leads there.
+    if (y > law.e)
+    {
+      contact.reversed = contact.reversed || contact.last_slip.dot(slip) < 0.0;
+      contact.last_slip = slip;
+    }
+    if (y > 0.0 && !contact.reversed)
       term.stiffness += most * (law.slope(y) - over_slip) / (y * y) * slip * slip.transpose();
   }
   return most * law.energy(y);

@@ -23,6 +23,8 @@ public:
     Eigen::Vector3d material;       ///< in the solid's frame
     Eigen::Vector3d position, force;   ///< normal force on u
     double friction;
+    Eigen::Vector3d last_slip = Eigen::Vector3d::Zero();
+    bool reversed = false;          ///< its slip has changed direction from one iterate to the next
   };
 
   Impl(ContactSurface surface, const ContactOptions& options);
@@ -51,7 +53,7 @@ private:
   double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose, bool with_stiffness);
   double addContact(const SoftGap& gap, Contact& contact, bool with_stiffness);
   void addRunning(const SoftGap& gap, const Contact& contact, double force);
-  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Contact& contact, bool with_stiffness);
+  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact, bool with_stiffness);
   double restart();
 
   Candidates near_, swept_;

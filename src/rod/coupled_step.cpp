@@ -11,6 +11,8 @@ namespace slender {
 
 namespace {
 
+constexpr double kLeastGap = 1.0 / 12;   // of the contact's gap: as ContactPotential::adaptStiffness()
+
 Eigen::Matrix3d cross(const Eigen::Vector3d& v)
 {
   Eigen::Matrix3d m;
@@ -53,6 +55,15 @@ ContactSurface contactSurface(const RodGroupModel& model)
   return surface;
 }
 
+/// A contact force [N] that every scene meets: the weight of an edge, or what stops it within the gap in a step.
+double leastStiffness(const RodGroupModel& model, double step)
+{
+  double mass = 0.0;
+  for (const GroupContact::Rod& rod : model.contact.rods)
+    mass = std::max(mass, model.rods[rod.rod]->mass.maxCoeff());
+  return mass * std::max(10.0, model.contact.options.gap / (step * step));
+}
+
 }  // namespace
 
 CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodStepper::Impl*>& rods) : model_(model)
@@ -62,6 +73,7 @@ CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodSt
   {
     parts_[r].rod = rods[r];
     parts_[r].index = static_cast<int>(r);
+    least_edge_ = std::min(least_edge_, rods[r]->model->rest_length.minCoeff());
   }
   bodies_.reserve(model.bodies.size());
   for (const RigidBodyModel& body : model.bodies)
@@ -80,7 +92,9 @@ CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodSt
     parts_[rod.rod].point = static_cast<int>(point_part_.size());
     point_part_.insert(point_part_.end(), model.rods[rod.rod]->nodes(), rod.rod);
   }
-  contact_ = std::make_unique<ContactPotential>(contactSurface(model), model.contact.options);
+  ContactOptions options = model.contact.options;
+  options.least_stiffness = std::max(options.least_stiffness, leastStiffness(model, rods[0]->time.step));
+  contact_ = std::make_unique<ContactPotential>(contactSurface(model), options);
   points_.resize(3, point_part_.size());
   points_base_ = points_end_ = points_;
   solids_.resize(obstacles_.size() + model.contact.bodies.size());
@@ -93,8 +107,8 @@ void CoupledSystem::begin(const RodGroupState& state, const RodGroupInputs& inpu
   inputs_ = &inputs;
   duration_ = duration;
   bodies_now_ = bodies_next_ = state.bodies;
-  if (contact_ && state.contact_stiffness > 0)
-    contact_->setStiffness(state.contact_stiffness);
+  if (contact_)
+    stiffness_now_ = state.contact_stiffness > 0 ? state.contact_stiffness : contact_->stiffness();
 }
 
 void CoupledSystem::placeDriven(double fraction)
@@ -145,7 +159,10 @@ void CoupledSystem::beginStep(const StepPlan& plan, double t)
     startAccelerations();
   placeDriven(t / duration_);
   if (contact_)
+  {
+    contact_->setStiffness(stiffness_now_);   // not what an attempt that failed left
     gather(points_base_, solids_base_);
+  }
 }
 
 /// Accelerations of the bodies, and of what they carry, from the forces in the rods as they are. Contacts count from the first step on.
@@ -234,7 +251,8 @@ NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, doub
   placeWelds();
   if (!contact_)
     return minimize(*this, newton);
-  contact_->begin(points_base_, solids_base_, (now - before) * h);
+  // friction sticks below a speed over the whole step: in cut steps that range would become too narrow to find
+  contact_->begin(points_base_, solids_base_, duration_);
   if (s == 0)
   {
     contact_->evaluate(points_base_, solids_base_, false);
@@ -290,20 +308,43 @@ bool CoupledSystem::approach(double from, double to, double& reached)
   return false;
 }
 
+/// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. True if it was made stiffer.
+bool CoupledSystem::stiffen(bool converged)
+{
+  if (contact_->smallestGap() > kLeastGap * model_.contact.options.gap)
+    return false;
+  const double before = contact_->stiffness();
+  if (converged)
+    contact_->adaptStiffness();
+  else   // forces mean nothing yet
+    contact_->setStiffness(4.0 * before);
+  return contact_->stiffness() > before;
+}
+
 NewtonResult CoupledSystem::solveConfined(double from, double to, const NewtonConfig& newton)
 {
-  constexpr int kMaxApproaches = 200, kMaxLags = 12;
+  constexpr int kMaxApproaches = 200, kMaxSolutions = 24, kMaxFailures = 8;
   constexpr double kLagTolerance = 1e-2;
-  NewtonResult result, total;
-  const auto take = [&](const NewtonResult& r) {
+  NewtonResult total;
+  const auto solve = [&](const NewtonConfig& config, double gap_tolerance) {
+    gap_tolerance_ = gap_tolerance;
+    tolerance_ = config.tolerance;
+    const NewtonResult r = minimize(*this, config);
     const int iterations = total.iterations + r.iterations, factorizations = total.factorizations + r.factorizations;
     total = r;
     total.iterations = iterations;
     total.factorizations = factorizations;
+    if (!r.ok())   // back to the last good configuration
+    {
+      moveAlong(0.0);
+      evaluate(false);
+    }
+    accept();
+    return r.ok();
   };
   NewtonConfig loose = newton;
-  loose.tolerance = 1e-2;
-  loose.max_iterations = 8;
+  loose.tolerance = std::max(newton.tolerance, 0.02 * model_.contact.options.gap / least_edge_);
+  loose.max_iterations = 12;
   for (int k = 0;; ++k)
   {
     double reached = to;
@@ -315,27 +356,21 @@ NewtonResult CoupledSystem::solveConfined(double from, double to, const NewtonCo
     if (reached >= to)
       break;
     // what is in the way gives way, then on from there
-    const NewtonResult partial = minimize(*this, loose);
-    total.iterations += partial.iterations;
-    total.factorizations += partial.factorizations;
-    if (!partial.ok())
-    {
-      moveAlong(0.0);
-      evaluate(false);
-    }
-    accept();
+    stiffen(solve(loose, 0.1));
     from = reached;
     placeDriven(to);
     for (RodPart& part : parts_)
       part.rod->placeAt(inputs_->rods[part.index], duration_, to);
     placeWelds();
   }
-  for (int lag = 0;; ++lag)
+  for (int k = 0, failures = 0;; ++k)
   {
-    take(minimize(*this, newton));
-    if (!total.ok() || lag == kMaxLags || contact_->lagFriction() < kLagTolerance)
+    const bool good = solve(newton, 0.01);
+    const bool softer = stiffen(good);
+    if (!good && !(softer && ++failures <= kMaxFailures))
       return total;
-    accept();
+    if (good && !softer && (contact_->lagFriction() < kLagTolerance || k >= kMaxSolutions))
+      return total;
   }
 }
 
@@ -343,8 +378,8 @@ void CoupledSystem::endStage(const StepPlan& plan, std::size_t s, bool last)
 {
   if (contact_)
   {
-    std::swap(points_base_, points_);
-    std::swap(solids_base_, solids_);
+    points_base_ = points_;
+    solids_base_ = solids_;
   }
   for (BodySystem& body : bodies_)
   {
@@ -366,6 +401,15 @@ void CoupledSystem::endStage(const StepPlan& plan, std::size_t s, bool last)
     }
 }
 
+void CoupledSystem::commitStep()
+{
+  std::swap(bodies_now_, bodies_next_);
+  if (!contact_)
+    return;
+  contact_->adaptStiffness();
+  stiffness_now_ = contact_->stiffness();
+}
+
 void CoupledSystem::end(RodGroupState& state)
 {
   for (std::size_t b = 0; b < model_.bodies.size(); ++b)
@@ -380,11 +424,7 @@ void CoupledSystem::end(RodGroupState& state)
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
     state.obstacles[k] = poseBetween(state.obstacles[k], Twist(state.obstacle_velocities[k]), inputs_->obstacles[k], duration_, 1.0, &state.obstacle_velocities[k]);
-  if (contact_)
-  {
-    contact_->adaptStiffness();
-    state.contact_stiffness = contact_->stiffness();
-  }
+  state.contact_stiffness = stiffness_now_;
 }
 
 double CoupledSystem::bodyEnergy(bool next) const

@@ -207,15 +207,27 @@ double CoupledSystem::stepLimit()
 
 double CoupledSystem::incrementSize() const
 {
-  double largest = 0.0, edge = 0.01;
+  double largest = 0.0;
   for (const RodPart& part : parts_)
-  {
     largest = std::max(largest, part.rod->system.incrementSize());
-    edge = std::min(edge, part.rod->model->rest_length.minCoeff());
-  }
   for (const BodySystem::Vector6& d : body_direction_)
-    largest = std::max({largest, d.head<3>().lpNorm<Eigen::Infinity>() / edge, d.tail<3>().lpNorm<Eigen::Infinity>()});
-  return largest;
+    largest = std::max({largest, d.head<3>().lpNorm<Eigen::Infinity>() / least_edge_, d.tail<3>().lpNorm<Eigen::Infinity>()});
+  if (!contact_)
+    return largest;
+  // a barrier is resolved when its gaps are
+  double at_contact = 0.0;
+  for (const ContactTerm& term : contact_->terms())
+  {
+    Eigen::Vector3d u = Eigen::Vector3d::Zero();
+    for (int p = 0; p < 4; ++p)
+      if (term.point[p] >= 0)
+      {
+        const RodPart& part = partOf(term.point[p]);
+        u += term.weight[p] * Eigen::Map<const Eigen::Vector3d>(part.rod->system.direction() + 4 * (term.point[p] - part.point));
+      }
+    at_contact = std::max(at_contact, u.norm());
+  }
+  return std::max(largest, tolerance_ * at_contact / (gap_tolerance_ * contact_->smallestGap()));
 }
 
 double CoupledSystem::slope() const

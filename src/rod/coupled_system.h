@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -26,7 +27,7 @@ public:
   NewtonResult solveStage(const StepPlan& plan, std::size_t stage, double t, double h, const NewtonConfig& newton);
   /// Velocities of the bodies at the end of a stage, or (last) of the step. The rods' endStage() or finishStep() come after.
   void endStage(const StepPlan& plan, std::size_t stage, bool last);
-  void commitStep() { std::swap(bodies_now_, bodies_next_); }
+  void commitStep();
   void end(RodGroupState& state);
   double bodyEnergy(bool next) const;   ///< kinetic and of loads [J]
   double clearance(const RodGroupState& state);
@@ -95,6 +96,7 @@ private:
   void placeDriven(double fraction);
   void gather(Eigen::Matrix3Xd& x, std::vector<Pose>& solids) const;
   NewtonResult solveConfined(double from, double to, const NewtonConfig& newton);
+  bool stiffen(bool converged);
   bool approach(double from, double to, double& reached);
   void startAccelerations();
   void setCarriedInertia(const Stage& stage);
@@ -112,9 +114,11 @@ private:
   std::vector<int> point_part_;                 ///< per contact point: its rod
   const RodGroupState* origin_ = nullptr;
   const RodGroupInputs* inputs_ = nullptr;
-  double duration_ = 0;
+  double duration_ = 0, least_edge_ = std::numeric_limits<double>::infinity();
 
   std::unique_ptr<ContactPotential> contact_;
+  double stiffness_now_ = 0;                    ///< of the barrier as the substep begins
+  double tolerance_ = 0, gap_tolerance_ = 0;    ///< of increments: over the shortest edge, and at contacts over the smallest gap
   Eigen::Matrix3Xd points_, points_base_, points_end_;
   std::vector<Pose> solids_, solids_base_, solids_end_;
 

@@ -52,14 +52,16 @@ std::shared_ptr<const RodModel> matchedToCurve(const RodModel& model)
   for (int i = 0; i < model.nodes(); ++i)
   {
     const Eigen::Vector2d curvature = model.rest_curvature.col(i);
-    const double k2 = curvature.squaredNorm();
-    if (k2 == 0)
+    const double k = curvature.norm(), half = std::atan(k / 2);   // half the joint's turn
+    if (k == 0)
       continue;
-    const Eigen::Matrix2d scale = Eigen::Matrix2d::Identity() - (1 - 1 / (1 + k2 / 4)) / k2 * curvature * curvature.transpose();
+    const double along = std::pow(std::cos(half), 2), across = half / std::tan(half), length = std::sin(half) / half;
+    const Eigen::Matrix2d scale = across * Eigen::Matrix2d::Identity() + (along - across) / (k * k) * curvature * curvature.transpose();
     Eigen::Matrix2d bend;
     bend << model.bend_modulus(0, i), model.bend_modulus(1, i), model.bend_modulus(1, i), model.bend_modulus(2, i);
-    bend = scale * bend * scale;
+    bend = length * scale * bend * scale;
     matched->bend_modulus.col(i) << bend(0, 0), bend(0, 1), bend(1, 1);
+    matched->twist_modulus[i] *= length * across * across;
   }
   return matched;
 }

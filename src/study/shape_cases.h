@@ -19,8 +19,10 @@ void lay(RodSetup& rod, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& di
 /// itself would not, and has the same planar equilibria.
 std::shared_ptr<const RodModel> keptPlanar(const RodModel& model, int keep, double factor = 1e3);
 
-/// The rod with joints that are as stiff about their natural turn as the smooth rod. The discrete curvature 2 tan(a/2) of a joint that
-/// turns by a grows by 1/cos^2(a/2) = 1 + curvature^2/4 times the turn, so coils of few edges come out too stiff.
+/// The rod with joints as stiff about their natural turn as the arcs they stand for. About a turn a the discrete curvature 2 tan(a/2)
+/// changes by 1/cos^2(a/2) times the change of the turn, and the curvature across and the twist by tan(a/2) / (a/2) times the components
+/// of the rotation's logarithm; and a joint has the length of two half chords, not that of the arc. All of that makes coils of few edges
+/// stiffer by terms of second order.
 std::shared_ptr<const RodModel> matchedToCurve(const RodModel& model);
 
 /// Number of negative eigenvalues of the energy's Hessian (zero ones count), grasps held, at an equilibrium.

@@ -42,14 +42,11 @@ struct Record
   std::vector<double> sway;                    ///< horizontal distance from the axis [m]
 };
 
-/// `matched`: the polygon encloses the same area as the coil instead of having its nodes on it, and its joints are as stiff about
-/// their natural turn as the smooth wire. Errors are of second order either way, but smaller.
+/// Nodes on the coil; `matched`: joints as stiff as the arcs they stand for. Errors are of second order either way, but smaller.
 GroupSetup hang(const Spring& s, int edges_per_turn, bool matched)
 {
   const int edges = s.turns * edges_per_turn;
-  const double turn = 2 * M_PI / edges_per_turn;
-  const double radius = s.radius * (matched ? std::sqrt(turn / std::sin(turn)) : 1.0);
-  Eigen::Matrix3Xd nodes = helixCurve({0, 0, 0}, Eigen::Vector3d::UnitZ(), radius, s.pitch, s.turns, edges);
+  Eigen::Matrix3Xd nodes = helixCurve({0, 0, 0}, Eigen::Vector3d::UnitZ(), s.radius, s.pitch, s.turns, edges);
   nodes.row(2) *= -1;
   const RodCase wire = circularRod(1.0, s.wire_radius, s.youngs_modulus, s.poissons_ratio, 1.0, 1);
   RodSection section = sectionOf(wire.stretch, wire.bend, wire.bend, wire.twist);
@@ -149,7 +146,7 @@ void runWilberforce(StudyContext& context)
         const TwoTones tones = fitTwoTones({r.height, r.angle}, r.interval);
         const double seconds = threadSeconds() - begin, exact_beat = 1 / (s.f2 - s.f1);
         const auto newRow = [&](const char* quantity) -> Row& {
-          return context.row().set("case", s.name).set("quantity", quantity).set("polygon", matched ? "matched" : "plain").set("edges_per_turn", per_turn);
+          return context.row().set("case", s.name).set("quantity", quantity).set("joints", matched ? "matched" : "plain").set("edges_per_turn", per_turn);
         };
         const auto add = [&](const char* quantity, double measured, double expected, double relative) {
           Row& row = newRow(quantity);
@@ -178,8 +175,8 @@ void runWilberforce(StudyContext& context)
         if (per_turn == 24 && matched)
           draw(context, s, r);
       }
-  context.note("matched: polygon of the coil's area, joints as stiff about their natural turn as the smooth wire; plain: nodes on the coil. Start: 3 mm");
-  context.note("upwards, everything else at rest. Frequencies: two tones fitted to height and angle of 2.2 beats; tr_bdf2, 60 steps a period.");
+  context.note("Nodes on the coil; matched: moduli corrected so that joints are as stiff as the arcs they stand for. Start: 3 mm upwards,");
+  context.note("everything else at rest. Frequencies: two tones fitted to height and angle of 2.2 beats; tr_bdf2, 60 steps a period.");
 }
 
 }  // namespace slender::study

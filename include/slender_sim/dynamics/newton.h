@@ -108,12 +108,12 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       if (alpha < 1e-8)
         return fail(trial.min_chi > kFoldedChi ? StepFailure::newton_diverged : StepFailure::folded_back);
     }
-    if (trial.energy() <= best + noise)
+    if (trial.energy() <= best + noise && (trial.energy() < best + kArmijo * slope || std::abs(slope) < noise))
     {
       best = std::min(best, trial.energy());
       misses = 0;
     }
-    else if (!strict)
+    else if (!strict)   // higher, or no lower than before: full steps may go round in circles
     {
       if (misses == 0)
         system.saveBase();

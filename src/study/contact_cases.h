@@ -1,0 +1,35 @@
+#pragma once
+
+#include <random>
+
+#include "slender_sim/rod/rod_group.h"
+#include "rod_cases.h"
+
+namespace slender::study {
+
+/// A group under construction: model, state, and inputs that hold everything where it is.
+struct GroupSetup
+{
+  RodGroupModel model;
+  RodGroupState state;
+  RodGroupInputs inputs;
+
+  /// Appends a rod that touches everything. Returns its index.
+  int addRod(const RodSetup& rod, double friction);
+  int addObstacle(const Shape& shape, const Pose& pose, double friction = -1.0);
+  int addBody(const RigidBodyModel& body, const Pose& pose, const Twist& velocity = {});
+  void weld(int rod, int first_node, int last_node, int body);
+  void setGravity(const Eigen::Vector3d& gravity);
+};
+
+/// A rod (naturally straight, free) through the given points, resampled to equal edges.
+RodSetup rodThrough(const Eigen::Matrix3Xd& points, bool closed, double radius, double youngs_modulus, double density, int edges);
+
+/// Points of an open overhand (trefoil) knot about the origin whose tails leave along -x and +x; `size` is about the radius of its loops.
+Eigen::Matrix3Xd overhandKnot(double size, double tail);
+
+/// Smallest distance between surfaces of rods, and of rods and obstacles (plane, sphere, capsule); negative when they
+/// penetrate. All pairs, by formulas of its own.
+double bruteForceClearance(const GroupSetup& group);
+
+}  // namespace slender::study

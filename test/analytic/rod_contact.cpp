@@ -1,0 +1,214 @@
+// Rods against obstacles, bodies, each other and themselves.
+#include <gtest/gtest.h>
+
+#include "test/support/groups.h"
+
+namespace slender::test {
+namespace {
+
+const Vector3d kNone = Vector3d::Zero();
+
+/// Rope of the given number of nodes lying along x at height z.
+Rod rope(int n, double length, double radius, double z, double youngs = 1e6)
+{
+  Rod rod(openRod(straightNodes(n, length, Vector3d(0, 0, z)), roundSection(radius, youngs, 1000.0)), straightNodes(n, length, Vector3d(0, 0, z)));
+  rod.inputs.gravity << 0, 0, -9.81;
+  return rod;
+}
+
+void touch(Group& g, double gap, double friction = 0.3)
+{
+  for (std::size_t r = 0; r < g.model.rods.size(); ++r)
+    g.model.contact.rods.push_back({static_cast<int>(r), true, true, true, friction});
+  g.model.contact.options.gap = gap;
+}
+
+double contactForce(const RodGroup& group, int axis)
+{
+  double sum = 0;
+  for (const ContactTerm& term : group.contacts())
+    sum += term.force[axis];
+  return sum;
+}
+
+TEST(RodContact, RopeComesToRestOnTheFloor)
+{
+  const double radius = 0.004;
+  // multistep methods carry the velocity before an impact beyond it and bounce; implicit Euler does not
+  for (Integrator integrator : {Integrator::implicit_euler, Integrator::bdf2, Integrator::tr_bdf2})
+  {
+    Group g;
+    g.addRod(rope(21, 0.4, radius, 0.05));
+    g.addObstacle(Plane{}, {});
+    touch(g, 0.1 * radius);
+    RodGroup group(g.model, withIntegrator(integrator));
+    for (int k = 0; k < 400; ++k)
+    {
+      const StepReport report = group.step(g.state, g.inputs, 2e-3);
+      ASSERT_TRUE(report.ok) << toString(integrator) << " step " << k << ": " << report.message;
+      ASSERT_GT(g.state.rods[0].x.row(2).minCoeff(), radius) << k;
+    }
+    if (integrator != Integrator::implicit_euler)
+    {
+      EXPECT_LT(g.state.rods[0].x.row(2).maxCoeff(), 0.03) << toString(integrator);   // fallen from 0.05
+      continue;
+    }
+    EXPECT_LT(g.state.rods[0].x.row(2).maxCoeff(), 1.11 * radius) << toString(integrator);
+    const double weight = 9.81 * g.model.rods[0]->totalMass();
+    EXPECT_NEAR(contactForce(group, 2), weight, 0.02 * weight) << toString(integrator);
+    EXPECT_LT(g.state.rods[0].v.cwiseAbs().maxCoeff(), 2e-3) << toString(integrator);
+  }
+}
+
+/// Speed 0.2 s after the ground under a rope at rest became a slope.
+double slide(double slope, double friction)
+{
+  Group g;
+  g.addRod(rope(11, 0.2, 0.004, 0.00425));
+  g.addObstacle(Plane{}, {});
+  touch(g, 0.0008, friction);
+  RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
+  for (int k = -50; k < 100; ++k)
+  {
+    if (k >= 0)
+      g.setGravity(9.81 * Vector3d(std::sin(slope), 0, -std::cos(slope)));
+    const StepReport report = group.step(g.state, g.inputs, 2e-3);
+    EXPECT_TRUE(report.ok) << report.message;
+  }
+  return (g.state.rods[0].v * g.model.rods[0]->mass).x() / g.model.rods[0]->totalMass();
+}
+
+TEST(RodContact, CoulombsLawOnASlope)
+{
+  const double mu = 0.4;
+  // just below the angle of friction: it creeps within slip_speed; just above: the excess accelerates it
+  EXPECT_LT(slide(std::atan(0.9 * mu), mu), 1.1e-4);
+  const double slope = std::atan(1.5 * mu);
+  const double expected = 0.2 * 9.81 * (std::sin(slope) - mu * std::cos(slope));
+  EXPECT_NEAR(slide(slope, mu), expected, 0.02 * expected);   // it lifts off a little as it starts
+  EXPECT_NEAR(slide(slope, 0.0), 0.2 * 9.81 * std::sin(slope), 1e-3);
+}
+
+TEST(RodContact, MovedObstaclePushesARope)
+{
+  // a cylinder across a rope held at both ends pushes it down by 8 cm at 1 m/s: the rope is in contact, taut, and nowhere inside
+  const double radius = 0.003;
+  Rod rod = rope(41, 0.4, radius, 0.0, 1e5);
+  rod.hold(0, 0);
+  rod.hold(40, 40);
+  Group g;
+  g.addRod(rod);
+  Pose pose{Vector3d(0.2, 0, 0.03), Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitX()))};
+  g.addObstacle(Cylinder{0.02, 0.2}, pose, 0.3);
+  touch(g, 0.1 * radius);
+  RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  for (int k = 1; k <= 80; ++k)
+  {
+    g.inputs.obstacles[0].X_WG.position.z() = 0.03 - 0.001 * k;
+    const StepReport report = group.step(g.state, g.inputs, 1e-3);
+    ASSERT_TRUE(report.ok) << k << ": " << report.message;
+    ASSERT_GT(group.clearance(g.state), 0.0) << k;
+  }
+  EXPECT_LT(g.state.rods[0].x.row(2).minCoeff(), -0.05);
+  EXPECT_LT(contactForce(group, 2), 0.0);
+}
+
+TEST(RodContact, CrossingRopesCarryEachOther)
+{
+  const double radius = 0.003;
+  Rod below = rope(31, 0.3, radius, 0.0), above = rope(31, 0.3, radius, 0.02);
+  below.hold(0, 0);
+  below.hold(30, 30);
+  for (int i = 0; i < 31; ++i)
+    above.state.x.col(i) = Vector3d(0.15, above.state.x(0, i) - 0.15, 0.02);
+  above = Rod(openRod(above.state.x, roundSection(radius, 1e6, 1000.0)), above.state.x);
+  Group g;
+  g.addRod(below);
+  g.addRod(above);
+  touch(g, 0.1 * radius, 0.5);
+  g.setGravity(Vector3d(0, 0, -9.81));
+  RodGroup group(g.model, withIntegrator(Integrator::bdf2));
+  for (int k = 0; k < 300; ++k)
+  {
+    const StepReport report = group.step(g.state, g.inputs, 1e-3);
+    ASSERT_TRUE(report.ok) << k << ": " << report.message;
+    ASSERT_GT(group.clearance(g.state), 0.0) << k;
+  }
+  EXPECT_GT(g.state.rods[1].x.row(2).maxCoeff(), g.state.rods[0].x(2, 15));
+}
+
+TEST(RodContact, WhipDoesNotPassAThinObstacle)
+{
+  // 50 m/s against a capsule of 4 mm: ten edges' length per step
+  const double radius = 0.001;
+  Group g;
+  Rod rod = rope(101, 0.5, radius, 0.0, 1e8);
+  rod.state.v.row(2).setConstant(-50.0);
+  g.addRod(rod);
+  g.addObstacle(Capsule{0.002, 0.4}, {Vector3d(0.253, 0, -0.3), Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitX()))}, 0.2);
+  touch(g, 0.2 * radius);
+  RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
+  for (int k = 0; k < 12; ++k)
+  {
+    const StepReport report = group.step(g.state, g.inputs, 1e-3);
+    ASSERT_TRUE(report.ok) << k << ": " << report.message;
+    ASSERT_GT(group.clearance(g.state), 0.0) << k;
+  }
+  // wrapped around it: the middle is held above while the ends go on
+  EXPECT_GT(g.state.rods[0].x.row(2).maxCoeff(), -0.31);
+  EXPECT_LT(g.state.rods[0].x.row(2).minCoeff(), -0.45);
+}
+
+TEST(RodContact, BodyFallsOnRopesAndStaysOnThem)
+{
+  // a plate across two taut ropes
+  const double radius = 0.004;
+  Rod left = rope(41, 0.4, radius, 0.0, 1e7), right = left;
+  left.model->mass_damping = right.model->mass_damping = 20.0;
+  for (Rod* rod : {&left, &right})
+  {
+    rod->state.x.row(1).setConstant(rod == &left ? -0.03 : 0.03);
+    rod->hold(0, 0);
+    rod->hold(40, 40);
+  }
+  Group g;
+  g.addRod(left);
+  g.addRod(right);
+  const int plate = g.addBody(bodyOf(0.05, {6e-5, 3e-5, 8e-5}), {Vector3d(0.2, 0, 0.03), Eigen::Quaterniond::Identity()});
+  touch(g, 0.1 * radius);
+  g.model.contact.bodies.push_back({plate, Box{Vector3d(0.06, 0.12, 0.01)}, {}, -1.0});
+  RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
+  for (int k = 0; k < 1000; ++k)
+  {
+    const StepReport report = group.step(g.state, g.inputs, 1e-3);
+    ASSERT_TRUE(report.ok) << k << ": " << report.message;
+    ASSERT_GT(group.clearance(g.state), 0.0) << k;
+  }
+  EXPECT_GT(g.state.bodies[0].X_WB.position.z(), -0.1);
+  EXPECT_LT(g.state.bodies[0].velocity.linear.norm(), 0.02);
+  EXPECT_NEAR(contactForce(group, 2), -0.05 * 9.81, 0.1 * 0.05 * 9.81);   // on the ropes, which still swing
+}
+
+TEST(RodContact, RestartIsBitEqual)
+{
+  const double radius = 0.004;
+  Group g;
+  g.addRod(rope(21, 0.4, radius, 0.02));
+  g.addObstacle(Plane{}, {});
+  touch(g, 0.1 * radius);
+  g.state.rods[0].x.row(2) += 0.02 * g.state.rods[0].x.row(0);
+  RodGroup one(g.model, withIntegrator(Integrator::tr_bdf2));
+  for (int k = 0; k < 40; ++k)
+    ASSERT_TRUE(one.step(g.state, g.inputs, 2e-3).ok);
+  RodGroupState copy = g.state;
+  RodGroup other(g.model, withIntegrator(Integrator::tr_bdf2));
+  for (int k = 0; k < 40; ++k)
+  {
+    ASSERT_TRUE(one.step(g.state, g.inputs, 2e-3).ok);
+    ASSERT_TRUE(other.step(copy, g.inputs, 2e-3).ok);
+    ASSERT_EQ(g.state.rods[0].x, copy.rods[0].x) << k;
+  }
+}
+
+}  // namespace
+}  // namespace slender::test
