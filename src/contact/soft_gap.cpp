@@ -9,6 +9,19 @@ namespace slender {
 
 namespace {
 
+/// 1 / (1 - c (2t-1)^2) and its derivatives in t.
+struct EndWeight
+{
+  EndWeight(double softness, double t)
+  {
+    const double tau = 2.0 * t - 1.0, slope = 4.0 * softness * tau;
+    value = 1.0 / (1.0 - softness * tau * tau);
+    first = slope * value * value;
+    second = (8.0 * softness + 2.0 * slope * slope * value) * value * value;
+  }
+  double value, first, second;
+};
+
 /// g Q and its derivatives at a place of a segment.
 struct AlongSegment
 {
@@ -22,11 +35,12 @@ AlongSegment along(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eig
   at.t = t;
   at.piece = pieceDistance(piece, a + t * e, e);
   at.gap = at.piece.distance - radius;
-  const double tau = 2.0 * t - 1.0, rise = at.piece.normal.dot(e);
-  at.weight = 1.0 + softness * tau * tau;
-  at.weight_t = 4.0 * softness * tau;
-  at.slope = at.weight * rise + at.weight_t * at.gap;
-  at.curvature = at.weight * at.piece.curvature + 2.0 * at.weight_t * rise + 8.0 * softness * at.gap;
+  const EndWeight q(softness, t);
+  const double rise = at.piece.normal.dot(e);
+  at.weight = q.value;
+  at.weight_t = q.first;
+  at.slope = q.value * rise + q.first * at.gap;
+  at.curvature = q.value * at.piece.curvature + 2.0 * q.first * rise + q.second * at.gap;
   return at;
 }
 
@@ -73,7 +87,7 @@ AlongSegment minimiseAlong(const ConvexPiece& piece, const Eigen::Vector3d& a, c
 /// g Q of two segments and its first two derivatives in (s, t).
 struct OnSegments
 {
-  double s, t, gap, weight, ws, wt, h, hs, ht, hss, hst, htt;
+  double s, t, gap, weight, ws, wt, wss, wtt, h, hs, ht, hss, hst, htt;
   Eigen::Vector3d normal;
 };
 
@@ -103,29 +117,35 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
 {
   constexpr double kStep = 1e-12;   // of a segment
   const Eigen::Vector3d w0 = a0 - b0, e = a1 - a0, f = b1 - b0;
+  const double ee = e.squaredNorm(), ff = f.squaredNorm(), ef = e.dot(f);
   const auto at = [&](double s, double t) {
     OnSegments p;
     p.s = s;
     p.t = t;
     const Eigen::Vector3d w = w0 + s * e - t * f;
-    const double d = w.norm(), sigma = 2.0 * s - 1.0, tau = 2.0 * t - 1.0;
+    const double d = w.norm();
+    const EndWeight qs(kSoftness, s), qt(kSoftness, t);
     p.normal = w / d;
     p.gap = d - thickness;
-    p.weight = 1.0 + 0.5 * kSoftness * (sigma * sigma + tau * tau);
-    p.ws = 2.0 * kSoftness * sigma;
-    p.wt = 2.0 * kSoftness * tau;
-    const double ne = p.normal.dot(e), nf = p.normal.dot(f);
+    p.weight = qs.value * qt.value;
+    p.ws = qs.first * qt.value;
+    p.wt = qs.value * qt.first;
+    p.wss = qs.second * qt.value;
+    p.wtt = qs.value * qt.second;
+    const double ne = p.normal.dot(e), nf = p.normal.dot(f), turn = p.weight / d;
     p.h = p.gap * p.weight;
     p.hs = p.weight * ne + p.ws * p.gap;
     p.ht = -p.weight * nf + p.wt * p.gap;
-    p.hss = p.weight * (e.squaredNorm() - ne * ne) / d + 2.0 * p.ws * ne + 4.0 * kSoftness * p.gap;
-    p.htt = p.weight * (f.squaredNorm() - nf * nf) / d - 2.0 * p.wt * nf + 4.0 * kSoftness * p.gap;
-    p.hst = -p.weight * (e.dot(f) - ne * nf) / d - p.ws * nf + p.wt * ne;
+    p.hss = turn * (ee - ne * ne) + 2.0 * p.ws * ne + p.wss * p.gap;
+    p.htt = turn * (ff - nf * nf) - 2.0 * p.wt * nf + p.wtt * p.gap;
+    p.hst = -turn * (ef - ne * nf) - p.ws * nf + p.wt * ne + qs.first * qt.first * p.gap;
     return p;
   };
-  const double reaching = e.norm() + f.norm();
+  const double reaching = std::sqrt(ee) + std::sqrt(ff);
   const SegmentPair start = closestOfSegments(a0, a1, b0, b1);
-  OnSegments p = at(start.s, start.t);
+  // An end that is nearly reached is reached: steps too small to tell from rounding would end the search.
+  const auto inside = [](double v) { return v < kStep ? 0.0 : v > 1.0 - kStep ? 1.0 : v; };
+  OnSegments p = at(inside(start.s), inside(start.t));
   bool free_s = false, free_t = false;
   for (int k = 0; k < 60 && p.gap > 0.0; ++k)
   {
@@ -164,11 +184,7 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
     const double slope = p.hs * ds + p.ht * dt;
     if (std::max(std::abs(ds), std::abs(dt)) < kStep || !(slope < 0.0))
       break;
-    const auto moved = [](double value, double step, double share) {
-      const double v = value + share * step;
-      return v < 1e-15 ? 0.0 : v > 1.0 - 1e-15 ? 1.0 : v;
-    };
-    OnSegments trial = at(moved(p.s, ds, reach), moved(p.t, dt, reach));
+    OnSegments trial = at(inside(p.s + reach * ds), inside(p.t + reach * dt));
     // Where the gap's rounding hides a descent, the slopes still show it.
     const double noise = 4e-16 * (p.gap + thickness + reaching);
     const auto steepness = [&](const OnSegments& q) { return std::max(ds != 0.0 ? std::abs(q.hs) : 0.0, dt != 0.0 ? std::abs(q.ht) : 0.0); };
@@ -178,7 +194,7 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
     while (!better() && reach > 1e-6)
     {
       reach *= 0.5;
-      trial = at(moved(p.s, ds, reach), moved(p.t, dt, reach));
+      trial = at(inside(p.s + reach * ds), inside(p.t + reach * dt));
     }
     if (!better())
       break;

@@ -10,16 +10,17 @@
 /// the other, and so does the force. Mollifiers that fade the pair out there [Li et al. 2020, section 5] leave the contact to other pairs and
 /// add torques of their own. Here the minimum itself is made unique instead:
 ///
-///   G = min over (s, t) of g(s, t) Q(s, t),   Q = 1 + (c/2) ((2s-1)^2 + (2t-1)^2),   g = |A(s) - B(t)| - thickness.
+///   G = min over (s, t) of g(s, t) / phi(s, t),   g = |A(s) - B(t)| - thickness,   phi = (1 - c (2s-1)^2) (1 - c (2t-1)^2).
 ///
-/// g is convex. With z = (2s-1, 2t-1), a stationary point of g Q inside has grad g / g = -grad Q / Q = -c z / Q, and there the second
-/// derivative of log(g Q) in z is at least c I / Q - 2 c^2 z z^T / Q^2, positive definite if 3 c |z|^2 < 2, so everywhere for c < 1/3. Every
-/// stationary point is then a strict minimum, hence there is one only; it moves continuously, and G is continuously differentiable with
-/// the gradient Q n (that at fixed s, t). G vanishes exactly where the pieces meet, and g_min <= G <= (1 + c) g_min. With one
-/// parameter (a segment against a convex solid) Q = 1 + c (2t-1)^2 and the same holds.
+/// g is convex and phi strictly concave for c < 1/3, so that g - G phi is strictly convex: it vanishes at one point only. This place of
+/// contact moves continuously, and G is continuously differentiable with the gradient n / phi (that at fixed s, t). G vanishes exactly where
+/// the pieces meet, and g_min <= G <= g_min / (1 - c)^2. With one parameter (a segment against a convex solid) phi = 1 - c (2t-1)^2.
+///
+/// Where a contact slides across a node, both segments there carry it, each with the softened gap 1.47 g, so that the height of a rod that
+/// slides over another's nodes under a constant load changes by less than 8 % of the barrier's reach (13 % as c goes to 0).
 namespace slender {
 
-constexpr double kSoftness = 0.25;   ///< c
+constexpr double kSoftness = 0.32;   ///< c
 
 /// Where a segment's point a + t (b - a) is nearest to a convex piece.
 struct SegmentPieceDistance
@@ -35,7 +36,7 @@ struct SoftGap
 {
   double s = 0.0, t = 0.0;
   double gap = 0.0;               ///< G [m]; not positive: they meet
-  double weight = 1.0;            ///< Q
+  double weight = 1.0;            ///< Q = 1 / phi
   double weight_s = 0.0, weight_t = 0.0;
   double hss = 0.0, hst = 0.0, htt = 0.0;
   bool free_s = false, free_t = false;   ///< not held at an end of the segment

@@ -75,6 +75,10 @@ CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodSt
     parts_[r].index = static_cast<int>(r);
     least_edge_ = std::min(least_edge_, rods[r]->model->rest_length.minCoeff());
   }
+  int nodes = 0;
+  for (const auto& rod : model.rods)
+    nodes += rod->nodes();
+  parallel_ = rods.size() > 1 && nodes >= 4000;
   bodies_.reserve(model.bodies.size());
   for (const RigidBodyModel& body : model.bodies)
   {
@@ -342,7 +346,9 @@ NewtonResult CoupledSystem::solveConfined(double from, double to, const NewtonCo
     accept();
     return r.ok();
   };
-  NewtonConfig loose = newton;
+  // Friction that is about to slip and contacts that run along rods converge slowly at the end, far below what gaps resolve.
+  NewtonConfig fine = newton, loose = newton;
+  fine.tolerance = std::max(newton.tolerance, 1e-3 * model_.contact.options.gap / least_edge_);
   loose.tolerance = std::max(newton.tolerance, 0.02 * model_.contact.options.gap / least_edge_);
   loose.max_iterations = 12;
   for (int k = 0;; ++k)
@@ -365,7 +371,7 @@ NewtonResult CoupledSystem::solveConfined(double from, double to, const NewtonCo
   }
   for (int k = 0, failures = 0;; ++k)
   {
-    const bool good = solve(newton, 0.01);
+    const bool good = solve(fine, 0.01);
     const bool softer = stiffen(good);
     if (!good && !(softer && ++failures <= kMaxFailures))
       return total;

@@ -15,7 +15,7 @@ void CoupledSystem::forRods(F&& f)
 {
   const int count = static_cast<int>(parts_.size());
 #ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic, 4) if (count > 1 && threads != 1) num_threads(threads > 0 ? threads : omp_get_max_threads())
+#pragma omp parallel for schedule(dynamic, 4) if (parallel_ && threads != 1) num_threads(threads > 0 ? threads : omp_get_max_threads())
 #endif
   for (int r = 0; r < count; ++r)
     f(parts_[r]);

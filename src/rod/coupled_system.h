@@ -107,6 +107,7 @@ private:
 
   const RodGroupModel& model_;
   std::vector<RodPart> parts_;
+  bool parallel_ = false;                       ///< enough rods for the threads to be worth their synchronisation
   std::vector<BodySystem> bodies_;              ///< simulated ones
   std::vector<int> simulated_;                  ///< per body of the model: index into bodies_, -1: driven
   std::vector<RigidBodyState> bodies_now_, bodies_next_;   ///< all

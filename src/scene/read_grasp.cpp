@@ -1,8 +1,7 @@
 #include <algorithm>
+#include <tuple>
 
 #include "read_parts.h"
-#include "slender_sim/scene/pose_file.h"
-#include "slender_sim/scene/reader.h"
 #include "yaml_number.h"
 
 namespace slender {
@@ -84,138 +83,24 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
   {
     return;
   }
-  grasp.first_node = held->first;
-  grasp.last_node = held->second + 1;
-  if (!closed && held->first == held->second && (held->first == 0 || held->first == edges - 1))
-  {
-    // The end section itself, not half an edge further in.
-    grasp.first_node = grasp.last_node = held->first == 0 ? 0 : edges;
-  }
-  if (closed && grasp.last_node == edges)
-  {
-    edge_list.problem("holds the edge that joins the last node to the first; hold an edge in [0, " + std::to_string(edges - 2) + "]");
-  }
-}
-
-std::optional<TableMotion> readTable(const YamlCursor& at, bool needs_orientation)
-{
-  TableMotion motion;
-  bool good = true;
-  for (const YamlCursor& item : at.items(1))
-  {
-    const auto row = item.numbers(Range::closed(-1e9, 1e9));
-    if (!row)
-    {
-      good = false;
-      continue;
-    }
-    if (row->size() != 8 && (needs_orientation || row->size() != 4))
-    {
-      item.problem("has " + std::to_string(row->size()) + " numbers; must be [t, x, y, z, qx, qy, qz, qw]" +
-                   (needs_orientation ? "" : " or [t, x, y, z]"));
-      good = false;
-      continue;
-    }
-    std::vector<double> numbers = *row;
-    if (numbers.size() == 4)
-    {
-      numbers.insert(numbers.end(), {0, 0, 0, 1});
-    }
-    try
-    {
-      appendRecorded(motion.poses, numbers[0], checkedPose(numbers.data() + 1));
-    }
-    catch (const std::invalid_argument& error)
-    {
-      item.problem(error.what());
-      good = false;
-    }
-  }
-  return good && !motion.poses.empty() ? std::optional<TableMotion>(std::move(motion)) : std::nullopt;
-}
-
-std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCursor& body, const ReadContext& context)
-{
-  const auto file = path.text();
-  const auto name = body.text();
-  if (!file || !name)
-  {
-    return std::nullopt;
-  }
-  try
-  {
-    auto bodies = readPoseFile(context.resolve(*file));
-    std::vector<std::string> names;
-    for (BodyTrajectory& entry : bodies)
-    {
-      if (entry.body == *name)
-      {
-        return TableMotion{std::move(entry.poses)};
-      }
-      names.push_back(entry.body);
-    }
-    body.problem("is not in " + *file + "; it has: " + joinWords(names));
-  }
-  catch (const SceneError& error)
-  {
-    path.problem(error.what());
-  }
-  return std::nullopt;
-}
-
-Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation)
-{
-  Motion motion = FixedMotion{};
-  if (!at.present())
-  {
-    return motion;
-  }
-  if (at.isScalar())
-  {
-    assign(motion, at.choice<Motion>({{"fixed", FixedMotion{}}, {"topic", TopicMotion{}}}));
-    return motion;
-  }
-  const std::size_t before = at.problems().size();
-  YamlMap map(at);
-  const YamlCursor topic = map.get("topic"), body = map.get("body"), table = map.get("table"), file = map.get("file");
-  map.finish();
-  const int given = topic.present() + table.present() + (body.present() || file.present());
-  if (given != 1)
-  {
-    if (at.problems().size() == before)
-    {
-      at.problem("must be fixed or one of {topic: true}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}");
-    }
-  }
-  else if (topic.present())
-  {
-    const auto on = topic.boolean();
-    if (on && !*on)
-    {
-      topic.problem("must be true; a grasp without a topic is written motion: fixed");
-    }
-    motion = TopicMotion{};
-  }
-  else if (table.present())
-  {
-    assign(motion, readTable(table, needs_orientation));
-  }
-  else if (file.present())
-  {
-    if (!body.present())
-    {
-      body.problem("is missing; the file holds several bodies");
-    }
-    assign(motion, readFileMotion(file, body, context));
-  }
-  else if (const auto name = body.text())
-  {
-    motion = BodyMotion{*name};
-  }
-  return motion;
+  std::tie(grasp.first_node, grasp.last_node) = nodesOfEdges(edge_list, held->first, held->second, closed, edges);
 }
 
 }  // namespace
+
+std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges)
+{
+  if (!closed && first == last && (first == 0 || first == edges - 1))
+  {
+    // The end section itself, not half an edge further in.
+    return first == 0 ? std::make_pair(0, 0) : std::make_pair(edges, edges);
+  }
+  if (closed && last + 1 == edges)
+  {
+    at.problem("holds the edge that joins the last node to the first; hold an edge in [0, " + std::to_string(edges - 2) + "]");
+  }
+  return {first, last + 1};
+}
 
 GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges)
 {

@@ -22,11 +22,25 @@ constexpr double max_coordinate = 1e6;     // [m]
 
 std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context);
 /// `edges` of the rod, or 0 when its centreline could not be read: then indices are not checked.
+/// Nodes held when edges first..last of the rod are (see GraspConfig); reports the joining edge of a closed rod.
+std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges);
 GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges);
 CrossSection readCrossSection(const YamlCursor& at, int edges);
 Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
-RodConfig readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
+/// A rod, and how many edges it has: 0 when its centreline could not be read.
+struct RodPart { RodConfig config; int edges = 0; };
+RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
+Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation);
+/// Nothing: free, which is also the default where it may be.
+std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadContext& context, bool may_be_free);
+std::optional<Pose> readPose(const YamlCursor& at);
+/// `pose` may be replaced by the shape (a plane by point and normal).
+std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
+std::optional<RodContact> readRodContact(const YamlCursor& at);
+ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods);
+std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
+std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodPart>& rods);
 TimeConfig readTime(const YamlCursor& at);
 
 }  // namespace slender

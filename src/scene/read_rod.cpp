@@ -99,7 +99,7 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
 }
 
 /// Edges of the rod as its curves give them; 0 when they could not be read or do not make a rod.
-int readShape(YamlMap& map, const ReadContext& context, RodConfig& rod)
+int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
 {
   const YamlCursor centerline = map.get("centerline"), initial = map.get("initial");
   const std::size_t before = map.at().problems().size();
@@ -221,7 +221,7 @@ Damping readDamping(const YamlCursor& at)
   return damping;
 }
 
-RodConfig readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
+RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
   RodConfig rod;
   YamlMap map(at);
@@ -231,7 +231,7 @@ RodConfig readRod(const YamlCursor& at, const ReadContext& context, const std::s
   assign(rod.naturally_straight, map.get("naturally_straight").boolean());
   assign(rod.initial_twist, map.get("initial_twist").number(Range::closed(-1e5, 1e5, "rad")));
   assign(rod.formulation, map.get("formulation").choice<Formulation>({{"auto", Formulation::automatic}, {"general", Formulation::general}}));
-  const int edges = readShape(map, context, rod);
+  const int edges = readCenterline(map, context, rod);
   if (edges > 0 && rod.initial)
   {
     checkInitial(map, context, rod);
@@ -240,8 +240,9 @@ RodConfig readRod(const YamlCursor& at, const ReadContext& context, const std::s
   rod.material = readMaterial(map.get("material"));
   rod.damping = readDamping(map.get("damping"));
   readGrasps(map.get("grasps"), context, rod, edges);
+  rod.contact = readRodContact(map.get("contact"));
   map.finish();
-  return rod;
+  return {std::move(rod), edges};
 }
 
 }  // namespace slender

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <set>
 #include <sstream>
 
 #include "read_parts.h"
@@ -13,21 +14,21 @@ namespace {
 
 constexpr std::uintmax_t max_file_size = 256u << 20;   // [bytes]
 
-std::vector<RodConfig> readRods(const YamlCursor& at, const ReadContext& context)
+std::vector<RodPart> readRods(const YamlCursor& at, const ReadContext& context)
 {
-  std::vector<RodConfig> rods;
+  std::vector<RodPart> rods;
   std::map<std::string, std::string> rod_names, grasp_names;   // to the path that used it first
   const auto entries = at.items(1, 100'000);
   for (std::size_t k = 0; k < entries.size(); ++k)
   {
     const YamlCursor& entry = entries[k];
     rods.push_back(readRod(entry, context, entries.size() == 1 ? "rod" : "rod" + std::to_string(k)));
-    const auto [rod, new_rod] = rod_names.emplace(rods.back().name, entry.path());
+    const auto [rod, new_rod] = rod_names.emplace(rods.back().config.name, entry.path());
     if (!new_rod)
     {
       YamlMap(entry).get("name").problem("is also the name of " + rod->second + "; names must differ");
     }
-    for (const GraspConfig& grasp : rods.back().grasps)
+    for (const GraspConfig& grasp : rods.back().config.grasps)
     {
       const std::string path = entry.path() + ".grasps." + grasp.name;
       const auto [other, new_grasp] = grasp_names.emplace(grasp.name, path);
@@ -39,6 +40,45 @@ std::vector<RodConfig> readRods(const YamlCursor& at, const ReadContext& context
     }
   }
   return rods;
+}
+
+/// Obstacles and bodies are entries of one topic: their names must differ. A grasp cannot follow what it may hold back.
+void checkSolids(const SceneConfig& scene, const std::vector<YamlCursor>& obstacles, const std::vector<YamlCursor>& bodies,
+                 const std::vector<YamlCursor>& rods)
+{
+  std::map<std::string, std::string> paths;   // of names
+  std::set<std::string> simulated;
+  const auto take = [&](const YamlCursor& entry, const std::string& name) {
+    const auto [other, is_new] = paths.emplace(name, entry.path());
+    if (!is_new)
+    {
+      YamlMap(entry).get("name").problem("is also the name of " + other->second + "; names of bodies and obstacles must differ");
+    }
+  };
+  for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
+  {
+    take(obstacles[k], scene.obstacles[k].name);
+  }
+  for (std::size_t k = 0; k < scene.bodies.size(); ++k)
+  {
+    take(bodies[k], scene.bodies[k].name);
+    if (!scene.bodies[k].motion)
+    {
+      simulated.insert(scene.bodies[k].name);
+    }
+  }
+  for (std::size_t r = 0; r < scene.rods.size(); ++r)
+  {
+    for (const GraspConfig& grasp : scene.rods[r].grasps)
+    {
+      const auto* motion = std::get_if<BodyMotion>(&grasp.motion);
+      if (motion && simulated.count(motion->body))
+      {
+        YamlMap(YamlMap(YamlMap(rods[r]).get("grasps")).get(grasp.name))
+          .get("motion").problem("body " + motion->body + " is simulated; weld the rod to it instead (bodies: welds)");
+      }
+    }
+  }
 }
 
 SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::string& directory)
@@ -67,7 +107,17 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   ReadContext context;
   context.directory = directory;
   context.gravity = scene.gravity;
-  scene.rods = readRods(map.require("rods"), context);
+  const YamlCursor rods = map.require("rods"), obstacles = map.get("obstacles"), bodies = map.get("bodies");
+  std::vector<RodPart> parts = readRods(rods, context);
+  scene.contact = readContact(map.get("contact"), parts);
+  scene.obstacles = readObstacles(obstacles, context);
+  scene.bodies = readBodies(bodies, context, parts);
+  for (RodPart& part : parts)
+  {
+    scene.rods.push_back(std::move(part.config));
+  }
+  const auto entries = [](const YamlCursor& list) { return list.isList() ? list.items() : std::vector<YamlCursor>{}; };
+  checkSolids(scene, entries(obstacles), entries(bodies), entries(rods));
   map.finish();
   if (!problems.empty())
   {

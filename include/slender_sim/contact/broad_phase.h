@@ -19,7 +19,8 @@ struct BoundingBox
 };
 
 /// Pairs of overlapping boxes through a hashed uniform grid. Time and memory are linear in boxes and pairs when boxes are of similar
-/// size; memory is reused from call to call.
+/// size; memory is reused from call to call. For 2,000 (50,000) segments of hair 0.16 (12) ms, against 0.35 (17) ms of FCL's dynamic AABB tree
+/// and 0.21 (130) ms of sort and sweep (bench/contact_benchmark.cpp).
 class GridPairs
 {
 public:

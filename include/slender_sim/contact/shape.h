@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "slender_sim/geometry/triangle_mesh.h"
+
 namespace slender {
 
 /// Shapes of obstacles and rigid bodies, each in its own frame. Lengths in m.
@@ -14,11 +16,6 @@ struct Sphere { double radius = 0.1; };
 struct Box { Eigen::Vector3d size{0.1, 0.1, 0.1}; };         ///< full edge lengths, centred
 struct Cylinder { double radius = 0.1, length = 0.2; };      ///< about z, centred
 struct Capsule { double radius = 0.1, length = 0.2; };       ///< about z, centred; length between the centres of its caps
-struct TriangleMesh
-{
-  Eigen::Matrix3Xd vertices;     ///< 3 x n
-  Eigen::Matrix3Xi triangles;    ///< 3 x m, counter-clockwise seen from outside
-};
 using Shape = std::variant<Plane, Sphere, Box, Cylinder, Capsule, std::shared_ptr<const TriangleMesh>>;
 
 struct MassProperties

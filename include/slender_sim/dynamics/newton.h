@@ -36,7 +36,7 @@ template <class System>
 NewtonResult minimize(System& system, const NewtonConfig& config)
 {
   constexpr int kPatience = 5;
-  constexpr double kArmijo = 1e-4, kMaxShift = 1e12;
+  constexpr double kArmijo = 1e-4, kProgress = 0.1, kMaxShift = 1e12;
   NewtonResult result;
   const auto fail = [&](StepFailure why) {
     result.failure = why;
@@ -81,7 +81,8 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     if (!converged && alpha == 1.0 && increment < 1e-2)
     {
       const double residual = system.residual();
-      converged = residual <= system.noiseLevel() || (increment <= config.tolerance && residual < 1e-9 * system.forceScale());
+      converged = residual <= system.noiseLevel() || (increment <= config.tolerance && residual < 1e-9 * system.forceScale()) ||
+                  (shift.position == 0.0 && increment <= 1e-3 * config.tolerance);   // angles alone shorten it no more than tenfold
     }
     if (converged)
     {
@@ -108,7 +109,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       if (alpha < 1e-8)
         return fail(trial.min_chi > kFoldedChi ? StepFailure::newton_diverged : StepFailure::folded_back);
     }
-    if (trial.energy() <= best + noise && (trial.energy() < best + kArmijo * slope || std::abs(slope) < noise))
+    if (trial.energy() <= best + noise && (trial.energy() < best + kProgress * slope || std::abs(slope) < noise))
     {
       best = std::min(best, trial.energy());
       misses = 0;

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "slender_sim/contact/shape.h"
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
@@ -56,9 +57,13 @@ struct Damping
 
 struct FixedMotion {};
 struct TopicMotion {};                                    ///< driven by `grasps/NAME/pose` or `guides`; fixed without a node
-struct BodyMotion  { std::string body; };                 ///< rigidly follows a body of the `bodies` topic
+/// Rigidly follows a body: an obstacle or a driven body of the scene, or else one that only the `bodies` topic knows. The scene's
+/// bodies have a pose from the start, so that `attach: initial` takes its offset then.
+struct BodyMotion  { std::string body; };
 struct TableMotion { PoseTrajectory poses; };             ///< timed poses, from the scene or a CSV file
 using Motion = std::variant<FixedMotion, TopicMotion, BodyMotion, TableMotion>;
+/// Motion of obstacles and driven bodies. Topic: the entry of the same name in `bodies` messages.
+using GivenMotion = std::variant<FixedMotion, TopicMotion, TableMotion>;
 
 enum class Hold { frame, position };                      ///< clamp (position and material frame) or point pin
 
@@ -83,6 +88,15 @@ struct GraspConfig
 /// Which equations a rod uses. `automatic` chooses the cheapest that applies; so far that is always the general one.
 enum class Formulation { automatic, general };
 
+/// What a rod touches.
+struct RodContact
+{
+  bool self = true;
+  bool rods = true;          ///< other rods that have this set, too
+  bool obstacles = true;     ///< obstacles and bodies
+  double friction = 0.3;     ///< Coulomb [-] >= 0
+};
+
 struct RodConfig
 {
   std::string name;
@@ -97,6 +111,45 @@ struct RodConfig
   Material material;
   Damping damping;
   std::vector<GraspConfig> grasps;
+  std::optional<RodContact> contact;           ///< nothing: touches nothing
+};
+
+struct ContactConfig
+{
+  double gap = 0.0;            ///< distance at which surfaces begin to repel [m]; the reader's default: a tenth of the smallest
+                               ///< radius that takes part, 0 when no rod does
+  double slip_speed = 1e-4;    ///< friction sticks below it [m/s] > 0
+};
+
+struct ObstacleConfig
+{
+  std::string name;
+  Shape shape = Plane{};
+  Pose pose;                              ///< of the shape, where the scene starts
+  std::optional<double> friction;         ///< [-]; nothing: that of the rod
+  GivenMotion motion = FixedMotion{};
+};
+
+/// Nodes of a rod that a body carries, as GraspConfig's. They keep the place and orientation that they have in the body at the start.
+struct WeldConfig { int rod = 0, first_node = 0, last_node = 0; };
+
+struct BodyConfig
+{
+  std::string name;
+  double mass = 1.0;                                         ///< [kg]; no matter unless simulated, like inertia and loads
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();     ///< about the centre of mass, body axes [kg m^2]
+  std::optional<Shape> shape;
+  Pose X_BS;                                                 ///< the shape in the body's frame
+  Pose pose;                                                 ///< of the body's frame at the start; simulated: centre of mass
+  Twist velocity;                                            ///< at the start
+  bool gravity = true;
+  Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};           ///< constant, world axes, at the centre of mass [N], [N m]
+  double linear_damping = 0.0, angular_damping = 0.0;        ///< [1/s]
+  std::optional<GivenMotion> motion;                         ///< nothing: simulated
+  bool contact = true;                                       ///< its shape touches rods
+  std::optional<double> friction;                            ///< [-]; nothing: that of the rod
+  bool broadcast_tf = false;
+  std::vector<WeldConfig> welds;
 };
 
 enum class Start { as_given, equilibrium };    ///< equilibrium: the static solver runs first
@@ -112,7 +165,10 @@ struct SceneConfig
   Start start = Start::as_given;
   TimeConfig time;
   RecordConfig record;
+  ContactConfig contact;
   std::vector<RodConfig> rods;
+  std::vector<ObstacleConfig> obstacles;
+  std::vector<BodyConfig> bodies;              ///< names differ from each other and from the obstacles'
 };
 
 }  // namespace slender

@@ -1,0 +1,266 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "read_parts.h"
+#include "slender_sim/contact/solids.h"
+#include "slender_sim/geometry/mesh_file.h"
+#include "slender_sim/scene/pose_file.h"
+
+/// Poses, shapes, obstacles, and what touches.
+namespace slender {
+
+namespace {
+
+const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
+const Range size = Range::above(0, max_coordinate, "m");
+const Range friction = Range::closed(0, 100);
+
+Eigen::Quaterniond fromRpy(const Eigen::Vector3d& rpy)
+{
+  using Eigen::AngleAxisd;
+  using Eigen::Vector3d;
+  return AngleAxisd(rpy.z(), Vector3d::UnitZ()) * AngleAxisd(rpy.y(), Vector3d::UnitY()) * AngleAxisd(rpy.x(), Vector3d::UnitX());
+}
+
+Plane readPlane(YamlMap& map, std::optional<Pose>& pose)
+{
+  const YamlCursor point = map.get("point"), normal = map.get("normal");
+  if (!point.present() && !normal.present())
+  {
+    return {};
+  }
+  if (pose)
+  {
+    map.at().problem("has a point or normal, and there is a pose as well; give one or the other");
+    return {};
+  }
+  const auto through = point.vector3(coordinate);
+  const auto up = normal.vector3(Range::closed(-1e6, 1e6));
+  if (up && !(up->norm() > 0))
+  {
+    normal.problem("must not be zero; it points out of the solid");
+    return {};
+  }
+  pose = Pose{through.value_or(Eigen::Vector3d::Zero()),
+              Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up.value_or(Eigen::Vector3d::UnitZ()))};
+  return {};
+}
+
+/// Radius and length of a cylinder or a capsule.
+template <class Round>
+Round readRound(YamlMap& map)
+{
+  Round shape;
+  assign(shape.radius, map.get("radius").number(size));
+  assign(shape.length, map.get("length").number(size));
+  return shape;
+}
+
+Box readBox(YamlMap& map)
+{
+  Box box;
+  assign(box.size, map.get("size").vector3(size));
+  return box;
+}
+
+std::optional<Shape> readMesh(YamlMap& map, const ReadContext& context)
+{
+  const YamlCursor file = map.require("file");
+  const double scale = map.get("scale").number(Range::above(0, 1e6)).value_or(1.0);
+  const auto path = file.text();
+  if (!path)
+  {
+    return std::nullopt;
+  }
+  try
+  {
+    auto mesh = std::make_shared<TriangleMesh>(readObj(context.resolve(*path)));
+    mesh->vertices *= scale;
+    return Shape(std::shared_ptr<const TriangleMesh>(std::move(mesh)));
+  }
+  catch (const std::runtime_error& error)
+  {
+    file.problem(error.what());
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+std::optional<Pose> readPose(const YamlCursor& at)
+{
+  if (!at.present())
+  {
+    return std::nullopt;
+  }
+  Pose pose;
+  YamlMap map(at);
+  assign(pose.position, map.get("position").vector3(coordinate));
+  const YamlCursor orientation = map.get("orientation"), rpy = map.get("rpy");
+  map.finish();
+  if (orientation.present() && rpy.present())
+  {
+    at.problem("must have either orientation: [x, y, z, w] or rpy: [roll, pitch, yaw]");
+  }
+  else if (orientation.present())
+  {
+    const auto entries = orientation.numbers(Range::closed(-2, 2));
+    if (entries && entries->size() != 4)
+    {
+      orientation.problem("has " + std::to_string(entries->size()) + " entries; must be a unit quaternion [x, y, z, w]");
+    }
+    else if (entries)
+    {
+      const double numbers[7] = {0, 0, 0, (*entries)[0], (*entries)[1], (*entries)[2], (*entries)[3]};
+      try
+      {
+        pose.orientation = checkedPose(numbers).orientation;
+      }
+      catch (const std::invalid_argument& error)
+      {
+        orientation.problem(error.what());
+      }
+    }
+  }
+  else if (const auto angles = rpy.vector3(Range::closed(-100, 100, "rad")))
+  {
+    pose.orientation = fromRpy(*angles);
+  }
+  return pose;
+}
+
+std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose)
+{
+  if (!at.present())
+  {
+    return std::nullopt;
+  }
+  const std::size_t before = at.problems().size();
+  YamlMap kinds(at);
+  std::optional<Shape> shape;
+  int given = 0;
+  const auto read = [&](const char* kind, auto reader) {
+    const YamlCursor value = kinds.get(kind);
+    if (value.present())
+    {
+      ++given;
+      YamlMap map(value);
+      shape = reader(map);
+      map.finish();
+    }
+  };
+  read("plane", [&](YamlMap& map) { return readPlane(map, pose); });
+  read("sphere", [](YamlMap& map) {
+    Sphere sphere;
+    assign(sphere.radius, map.get("radius").number(size));
+    return sphere;
+  });
+  read("box", readBox);
+  read("cylinder", readRound<Cylinder>);
+  read("capsule", readRound<Capsule>);
+  read("mesh", [&](YamlMap& map) { return readMesh(map, context); });
+  kinds.finish();
+  if (given != 1 && at.problems().size() == before)
+  {
+    at.problem("names " + std::to_string(given) + " shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh");
+  }
+  if (at.problems().size() != before)
+  {
+    return std::nullopt;
+  }
+  try
+  {
+    checkShape(*shape);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    at.problem(error.what());
+    return std::nullopt;
+  }
+  return shape;
+}
+
+std::optional<RodContact> readRodContact(const YamlCursor& at)
+{
+  if (!at.present())
+  {
+    return std::nullopt;
+  }
+  RodContact contact;
+  YamlMap map(at);
+  assign(contact.self, map.get("self").boolean());
+  assign(contact.rods, map.get("rods").boolean());
+  assign(contact.obstacles, map.get("obstacles").boolean());
+  assign(contact.friction, map.get("friction").number(friction));
+  map.finish();
+  return contact;
+}
+
+ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods)
+{
+  ContactConfig contact;
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const RodPart& rod : rods)
+  {
+    if (rod.config.contact)
+    {
+      for (const auto* radii : {&rod.config.cross_section.a, &rod.config.cross_section.b})
+      {
+        for (double radius : *radii)
+        {
+          smallest = std::min(smallest, radius);
+        }
+      }
+    }
+  }
+  const bool any = std::isfinite(smallest);
+  contact.gap = any ? 0.1 * smallest : 0.0;
+  assign(contact.gap, map.get("gap").number(Range::above(0, 1, "m")));
+  assign(contact.slip_speed, map.get("slip_speed").number(Range::above(0, 10, "m/s")));
+  map.finish();
+  if (at.present() && !any && at.problems().size() == before)
+  {
+    at.problem("no rod takes part; give those that do a contact of their own, for example contact: {friction: 0.3}");
+  }
+  return contact;
+}
+
+std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context)
+{
+  std::vector<ObstacleConfig> obstacles;
+  if (!at.present())
+  {
+    return obstacles;
+  }
+  const auto entries = at.items(0, 100'000);
+  for (std::size_t k = 0; k < entries.size(); ++k)
+  {
+    ObstacleConfig obstacle;
+    YamlMap map(entries[k]);
+    obstacle.name = entries.size() == 1 ? "obstacle" : "obstacle" + std::to_string(k);
+    assign(obstacle.name, map.get("name").name());
+    const YamlCursor at_pose = map.get("pose");
+    std::optional<Pose> pose = readPose(at_pose);
+    assign(obstacle.shape, readShape(map.require("shape"), context, pose));
+    obstacle.friction = map.get("friction").number(friction);
+    assign(obstacle.motion, readSolidMotion(map.get("motion"), context, false));
+    if (const auto* table = std::get_if<TableMotion>(&obstacle.motion))
+    {
+      if (pose)
+      {
+        (at_pose.present() ? at_pose : map.at()).problem("there is a table of poses as well; the obstacle starts at its first");
+      }
+      pose = table->poses.evaluate(table->poses.firstTime());
+    }
+    assign(obstacle.pose, pose);
+    map.finish();
+    obstacles.push_back(std::move(obstacle));
+  }
+  return obstacles;
+}
+
+}  // namespace slender
