@@ -1,4 +1,4 @@
-#include "oscillation.h"
+#include "slender_sim/study/oscillation.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "group_cases.h"
-#include "oscillation.h"
 #include "shape_cases.h"
 #include "slender_sim/geometry/curves.h"
 #include "slender_sim/geometry/rotation.h"
 #include "slender_sim/study/cpu_clock.h"
+#include "slender_sim/study/oscillation.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {
