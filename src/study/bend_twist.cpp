@@ -203,7 +203,7 @@ void runBendTwist(StudyContext& context)
     std::snprintf(name, sizeof name, "bend_twist_nu_0%02.0f", 100 * nu);
     std::snprintf(title, sizeof title, "Hanging curl, nu = %g", nu);
     Plot& plot = context.plot(name, title, "phi / pi", "y = Gamma^(1/3) / phi");
-    plot.log_x = plot.log_y = false;
+    plot.log_x = plot.log_y = plot.markers = false;
     int index = 0;
     for (const BendTwistPoint& p : kBendTwistBoundary)
     {
@@ -243,6 +243,12 @@ void runBendTwist(StudyContext& context)
         errors.at(title).y.push_back(std::abs(phi / p.phi - 1));
       }
     }
+    for (auto p = std::rbegin(kBendTwistLongRods); p != std::rend(kBendTwistLongRods); ++p)   // listed from long to short
+      if (p->nu == nu)
+      {
+        plot.at("boundary, exact").x.push_back(p->phi / M_PI);
+        plot.at("boundary, exact").y.push_back(p->y);
+      }
     for (const BendTwistPoint& p : kBendTwistLongRods)   // the boundary runs along phi here, so y is what is moved
       for (const int edges : meshes)
       {

@@ -47,7 +47,7 @@ struct Plot
   bool lines = true;     ///< false: points only
   bool markers = true;   ///< false: lines only
   bool equal_axes = false;   ///< pictures of shapes
-  std::deque<Series> series = {};
+  std::deque<Series> series;
 
   /// The series with this label, added at its first use.
   Series& at(const std::string& label);
