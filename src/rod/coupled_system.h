@@ -44,6 +44,8 @@ public:
   void restoreBase();
   double stepLimit();
   double incrementSize() const;
+  /// A stage may end at a saddle of kinked joints' angles, when positions have arrived.
+  static constexpr bool anglesMayKeepShift() { return true; }
   double slope() const;
   double residual() const;
   double forceScale() const;

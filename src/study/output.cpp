@@ -103,6 +103,8 @@ void writeScript(std::ostream& out, const Plot& plot, const std::string& picture
       << "set title " << gnuplotString(plot.title) << "\n"
       << "set xlabel " << gnuplotString(plot.x_label) << "\nset ylabel " << gnuplotString(plot.y_label) << "\n"
       << "set key outside right\nset grid\n";
+  if (plot.equal_axes)
+    out << "set size ratio -1\n";
   if (plot.log_x)
     out << "set logscale x\nset format x \"%g\"\n";
   if (plot.log_y)
@@ -129,8 +131,10 @@ void writeScript(std::ostream& out, const Plot& plot, const std::string& picture
   index = 0;
   for (const Series& s : plot.series)
   {
-    out << (index ? ", \\\n     " : "") << "$series" << index << " using 1:2 with " << (plot.lines ? "linespoints" : "points")
-        << " pointtype " << index % 13 + 4 << " title " << gnuplotString(s.label);
+    out << (index ? ", \\\n     " : "") << "$series" << index << " using 1:2 with " << (!plot.lines || s.points ? "points" : plot.markers ? "linespoints" : "lines");
+    if (!plot.lines || s.points || plot.markers)
+      out << " pointtype " << index % 13 + 4;
+    out << " title " << gnuplotString(s.label);
     ++index;
   }
   out << "\n";

@@ -12,6 +12,12 @@ void runTorsion(StudyContext&);
 void runRodScaling(StudyContext&);
 void runImplicitVsExplicit(StudyContext&);
 void runRodStability(StudyContext&);
+void runBendTwist(StudyContext&);
+void runLateralBuckling(StudyContext&);
+void runPerversion(StudyContext&);
+void runTwistAsymmetry(StudyContext&);
+void runTorsionalPendulum(StudyContext&);
+void runWilberforce(StudyContext&);
 void runRodContactSafety(StudyContext&);
 
 const std::vector<Study>& studies()
@@ -26,6 +32,12 @@ const std::vector<Study>& studies()
       {"rod_scaling", "time per Newton iteration and node from 50 to 100,000 nodes", runRodScaling},
       {"rod_implicit_vs_explicit", "hair strand: stable steps and cost of implicit against explicit integration", runImplicitVsExplicit},
       {"rod_stability", "extreme stiffness, thickness, steps, twist and grasps: done, cut or refused with reason", runRodStability},
+      {"bend_twist", "heavy naturally curved rod: planar or three-dimensional on both sides of the boundary", runBendTwist},
+      {"lateral_buckling", "heavy cantilevers of elliptical section that topple sideways: critical load", runLateralBuckling},
+      {"perversion", "a curled ribbon drawn flat and released: two helices of opposite handedness", runPerversion},
+      {"twist_asymmetry", "a V and a semicircle turned at one end: where the twist goes", runTwistAsymmetry},
+      {"torsional_pendulum", "a disc that turns on a wire: period, all integrators and steps", runTorsionalPendulum},
+      {"wilberforce", "a body on a helical spring: frequencies, beat, exchange of energy", runWilberforce},
       {"rod_contact_safety", "1,000 random knots, heaps and whips: an independent check finds no penetration after any step", runRodContactSafety},
   };
   return all;

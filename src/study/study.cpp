@@ -110,8 +110,12 @@ void StudyContext::metric(const std::string& key, double value)
 
 Plot& StudyContext::plot(const std::string& name, const std::string& title, const std::string& x_label, const std::string& y_label)
 {
-  plots_.push_back({name, title, x_label, y_label, true, true, true, {}});
-  return plots_.back();
+  Plot& plot = plots_.emplace_back();
+  plot.name = name;
+  plot.title = title;
+  plot.x_label = x_label;
+  plot.y_label = y_label;
+  return plot;
 }
 
 void StudyContext::finish()

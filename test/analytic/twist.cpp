@@ -94,6 +94,49 @@ TEST(Twist, StaticTurnsAddUp)
   }
 }
 
+TEST(Twist, FramesOfAHeldCentrelineJumpOverABend)
+{
+  // A flat rod pinned along a V and turned at one end: nothing but frames can move. The bend keeps the twist on the turned side, until
+  // at 18.1 rad (19.35 for the smooth rod) a whole turn slips over it at once. Every solution must be one.
+  const int edges = 48;
+  Matrix3Xd nodes = Matrix3Xd::Zero(3, edges + 1);
+  for (int j = 0; j < edges; ++j)
+  {
+    const double a = 0.5 * M_PI * std::min(1.0, std::max(0.0, (j + 0.5 - 22) / 4));
+    nodes.col(j + 1) = nodes.col(j) + Vector3d(std::cos(a), 0, std::sin(a)) / edges;
+  }
+  RodSection flat = modulusSection(1.0, 1.6 / 1.3, 1e6, 1.0);
+  flat.bend_modulus(1, 1) = 4.0;
+  const RodModel model = buildRod("V", nodes, false, uniformSections(flat, edges), Vector3d::UnitZ(), false);
+  Rod rod(model, nodes);
+  const RodState laid = makeRodState(model, nodes, Vector3d::UnitZ());
+  rod.state.d1 = laid.d1;
+  rod.state.twist = laid.twist;
+  rod.inputs.gravity.setZero();
+  rod.hold(0, 0);
+  rod.hold(edges, edges);
+  for (int i = 1; i < edges; ++i)
+    rod.hold(i, i, false);
+  const Eigen::Quaterniond start = rod.inputs.grasps[1].X_WG.orientation;
+  TimeConfig time;
+  time.newton.max_iterations = 1000;
+  RodStepper stepper(rod.model, time);
+  double before = 0, jump_at = 0;
+  for (int k = 1; k <= 380; ++k)
+  {
+    rod.inputs.grasps[1].X_WG.orientation = start * Eigen::AngleAxisd(0.05 * k, Vector3d::UnitX());
+    const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
+    ASSERT_TRUE(report.ok) << report.message;
+    ASSERT_LT(report.residual, 1e-6) << 0.05 * k;
+    const double clamped = rod.state.grasps[0].section_twist[1] + rod.state.twist.head(edges / 2 + 1).sum();
+    if (clamped - before > M_PI)
+      jump_at = 0.05 * k;
+    before = clamped;
+  }
+  EXPECT_NEAR(jump_at, 18.1, 0.051);
+  EXPECT_NEAR(before, 2 * M_PI, 0.3);
+}
+
 TEST(Twist, ATwistedRingPressesOnNothingButItself)
 {
   // A planar ring with whole turns of twist: uniform twist 2 pi k / n, torque beta 2 pi k / L, elastic energy (2 pi k)^2 beta / (2 L).

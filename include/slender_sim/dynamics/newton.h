@@ -27,7 +27,7 @@ constexpr double kFoldedChi = 1.5e-3;
 /// Minimises a system's energy by Newton's method from its trial configuration.
 ///
 /// System offers evaluate(with_hessian, shift), solve(), moveAlong(alpha), accept(), saveBase(), restoreBase() and
-/// the measures used below (see RodSystem). A Hessian with negative eigenvalues (known from the inertia of its LDL^T) is
+/// the measures used below (see RodSystem and CoupledSystem). A Hessian with negative eigenvalues (known from the inertia of its LDL^T) is
 /// shifted by a positive diagonal until it is definite, so that the direction descends.
 /// Steps are accepted by a watchdog [Nocedal & Wright, Numerical Optimization, 15.6]: nearly inextensible bodies gain a little
 /// stretching energy in every full step that turns them, and a strict line search would creep. Full steps may raise
@@ -82,7 +82,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     {
       const double residual = system.residual();
       converged = residual <= system.noiseLevel() || (increment <= config.tolerance && residual < 1e-9 * system.forceScale()) ||
-                  (shift.position == 0.0 && increment <= 1e-3 * config.tolerance);   // angles alone shorten it no more than tenfold
+                  (shift.position == 0.0 && increment <= 1e-3 * config.tolerance && system.anglesMayKeepShift());   // they shorten it no more than tenfold
     }
     if (converged)
     {

@@ -93,6 +93,8 @@ public:
   double stepLimit() const;
   /// Largest nodal displacement of the direction over the shortest rest length [-].
   double incrementSize() const;
+  /// No: where nodes are held only frames move, and then no increment of positions tells whether they have arrived.
+  static constexpr bool anglesMayKeepShift() { return false; }
   double slope() const;                 ///< gradient . direction [J]
   double residual() const;              ///< largest unbalanced nodal force or moment / edge [N]
   double forceScale() const;            ///< largest internal or external force [N]

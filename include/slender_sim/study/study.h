@@ -34,6 +34,7 @@ struct Series
 {
   std::string label;
   std::vector<double> x, y;
+  bool points = false;   ///< no line, whatever the plot says
 };
 
 /// A plot with units in its axis labels; series in order of the legend. Logarithmic axes unless told otherwise.
@@ -44,6 +45,8 @@ struct Plot
   std::string x_label, y_label;
   bool log_x = true, log_y = true;
   bool lines = true;     ///< false: points only
+  bool markers = true;   ///< false: lines only
+  bool equal_axes = false;   ///< pictures of shapes
   std::deque<Series> series;
 
   /// The series with this label, added at its first use.
