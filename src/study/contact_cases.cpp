@@ -8,47 +8,20 @@
 
 namespace slender::study {
 
-int GroupSetup::addRod(const RodSetup& rod, double friction)
+int addTouching(GroupSetup& group, const RodSetup& rod, double friction)
 {
-  model.rods.push_back(rod.model);
-  state.rods.push_back(rod.state);
-  inputs.rods.push_back(rod.inputs);
-  const int index = static_cast<int>(model.rods.size()) - 1;
-  model.contact.rods.push_back({index, true, true, true, friction});
+  const int index = group.add(rod);
+  group.model.contact.rods.push_back({index, true, true, true, friction});
   return index;
 }
 
-int GroupSetup::addObstacle(const Shape& shape, const Pose& pose, double friction)
+int addObstacle(GroupSetup& group, const Shape& shape, const Pose& pose, double friction)
 {
-  model.contact.obstacles.push_back({shape, friction});
-  state.obstacles.push_back(pose);
-  state.obstacle_velocities.push_back({});
-  inputs.obstacles.push_back({pose, std::nullopt});
-  return static_cast<int>(state.obstacles.size()) - 1;
-}
-
-int GroupSetup::addBody(const RigidBodyModel& body, const Pose& pose, const Twist& velocity)
-{
-  model.bodies.push_back(body);
-  RigidBodyState s;
-  s.X_WB = pose;
-  s.velocity = velocity;
-  state.bodies.push_back(s);
-  inputs.bodies.push_back({pose, std::nullopt});
-  return static_cast<int>(model.bodies.size()) - 1;
-}
-
-void GroupSetup::weld(int rod, int first_node, int last_node, int body)
-{
-  makeWeld(model, state, rod, first_node, last_node, body);
-  inputs.rods[rod].grasps.push_back({state.rods[rod].grasps.back().X_WG, std::nullopt});
-}
-
-void GroupSetup::setGravity(const Eigen::Vector3d& gravity)
-{
-  inputs.gravity = gravity;
-  for (RodInputs& rod : inputs.rods)
-    rod.gravity = gravity;
+  group.model.contact.obstacles.push_back({shape, friction});
+  group.state.obstacles.push_back(pose);
+  group.state.obstacle_velocities.push_back({});
+  group.inputs.obstacles.push_back({pose, std::nullopt});
+  return static_cast<int>(group.state.obstacles.size()) - 1;
 }
 
 RodSetup rodThrough(const Eigen::Matrix3Xd& points, bool closed, double radius, double youngs_modulus, double density, int edges)

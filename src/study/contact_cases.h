@@ -1,26 +1,12 @@
 #pragma once
 
-#include <random>
-
-#include "slender_sim/rod/rod_group.h"
-#include "rod_cases.h"
+#include "group_cases.h"
 
 namespace slender::study {
 
-/// A group under construction: model, state, and inputs that hold everything where it is.
-struct GroupSetup
-{
-  RodGroupModel model;
-  RodGroupState state;
-  RodGroupInputs inputs;
-
-  /// Appends a rod that touches everything. Returns its index.
-  int addRod(const RodSetup& rod, double friction);
-  int addObstacle(const Shape& shape, const Pose& pose, double friction = -1.0);
-  int addBody(const RigidBodyModel& body, const Pose& pose, const Twist& velocity = {});
-  void weld(int rod, int first_node, int last_node, int body);
-  void setGravity(const Eigen::Vector3d& gravity);
-};
+/// Appends a rod that touches everything. Returns its index.
+int addTouching(GroupSetup& group, const RodSetup& rod, double friction);
+int addObstacle(GroupSetup& group, const Shape& shape, const Pose& pose, double friction = -1.0);
 
 /// A rod (naturally straight, free) through the given points, resampled to equal edges.
 RodSetup rodThrough(const Eigen::Matrix3Xd& points, bool closed, double radius, double youngs_modulus, double density, int edges);

@@ -19,6 +19,10 @@ void runTwistAsymmetry(StudyContext&);
 void runTorsionalPendulum(StudyContext&);
 void runWilberforce(StudyContext&);
 void runRodContactSafety(StudyContext&);
+void runHelicalBuckling(StudyContext&);
+void runMichell(StudyContext&);
+void runGreenhill(StudyContext&);
+void runPeerCases(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -39,6 +43,10 @@ const std::vector<Study>& studies()
       {"torsional_pendulum", "a disc that turns on a wire: period, all integrators and steps", runTorsionalPendulum},
       {"wilberforce", "a body on a helical spring: frequencies, beat, exchange of energy", runWilberforce},
       {"rod_contact_safety", "1,000 random knots, heaps and whips: an independent check finds no penetration after any step", runRodContactSafety},
+      {"helical_buckling", "localised helix of a twisted rod: peak, moment and envelope against discrete and smooth solutions", runHelicalBuckling},
+      {"michell", "twist at which a ring leaves its plane, by the energy's Hessian and by the growth of a push", runMichell},
+      {"greenhill", "torque that buckles a clamped straight rod under tension or compression", runGreenhill},
+      {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
   };
   return all;
 }

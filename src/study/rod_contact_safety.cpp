@@ -1,8 +1,10 @@
 // Random scenes in which rods are pulled, dropped and whipped against each other and against obstacles. After every step an independent
 // check of all pairs looks for penetrations.
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
+#include <random>
 
 #include "contact_cases.h"
 #include "slender_sim/study/study.h"
@@ -46,8 +48,9 @@ Scene knot(Random& random)
   const int last = rod.model->nodes() - 1;
   rod.hold(0, 0, true);
   rod.hold(last, last, true);
-  s.group.addRod(rod, uniform(random, 0, 0.6));
-  const double speed = uniform(random, 0.1, 1.0), turn = uniform(random, -6, 6);
+  addTouching(s.group, rod, uniform(random, 0, 0.6));
+  s.steps = 300;
+  const double speed = uniform(random, 0.3, 1.0), turn = uniform(random, -6, 6);
   const double room = 0.8 * (rod.model->rest_length.sum() - (rod.state.x.col(last) - rod.state.x.col(0)).norm());
   s.drive = [=](GroupSetup& g, double time) {
     const double way = std::min(speed * time, 0.5 * room);
@@ -67,9 +70,9 @@ Scene heap(Random& random)
 {
   Scene s;
   const int count = 2 + random() % 4;
-  s.group.addObstacle(Plane{}, {}, 0.4);
+  addObstacle(s.group, Plane{}, {}, 0.4);
   if (random() % 2)
-    s.group.addObstacle(Sphere{0.03}, {Vector3d(0.02, 0, 0.03), Eigen::Quaterniond::Identity()}, 0.2);
+    addObstacle(s.group, Sphere{0.03}, {Vector3d(0.02, 0, 0.03), Eigen::Quaterniond::Identity()}, 0.2);
   for (int r = 0; r < count; ++r)
   {
     const double radius = uniform(random, 0.002, 0.005), height = 0.08 + 0.025 * r, angle = uniform(random, 0, M_PI);
@@ -81,7 +84,7 @@ Scene heap(Random& random)
         points.col(i) = middle + 0.06 * Vector3d(std::cos(2 * M_PI * i / 60), std::sin(2 * M_PI * i / 60), 0);
     else
       points << middle - 0.15 * along, middle + 0.15 * along;
-    s.group.addRod(rodThrough(points, closed, radius, logUniform(random, 1e5, 1e8), 1100, 24 + random() % 30), uniform(random, 0, 0.8));
+    addTouching(s.group, rodThrough(points, closed, radius, logUniform(random, 1e5, 1e8), 1100, 24 + random() % 30), uniform(random, 0, 0.8));
   }
   s.group.setGravity(Vector3d(0, 0, -9.81));
   s.step = 2e-3;
@@ -103,10 +106,10 @@ Scene whip(Random& random)
     rod.state.v.col(i) = Vector3d(0, 0, -speed * (held ? rod.state.x(0, i) / length : 1.0));
   if (held)
     rod.hold(0, 0, false);
-  s.group.addRod(rod, uniform(random, 0, 0.5));
+  addTouching(s.group, rod, uniform(random, 0, 0.5));
   const Vector3d across = (Vector3d::UnitY() + 0.5 * direction(random)).normalized();
   const Pose bar{Vector3d(uniform(random, 0.15, 0.4), 0, -uniform(random, 0.02, 0.1)), Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), across)};
-  s.group.addObstacle(Capsule{logUniform(random, 0.0005, 0.005), 0.4}, bar, 0.2);
+  addObstacle(s.group, Capsule{logUniform(random, 0.0005, 0.005), 0.4}, bar, 0.2);
   s.steps = 40;
   return s;
 }

@@ -1,0 +1,122 @@
+// Michell's (Zajac's) instability: the twist at which a ring of a naturally straight isotropic rod leaves its plane (thesis 4.7.1, Fig. 4.4).
+#include <cmath>
+#include <string>
+
+#include "rod_cases.h"
+#include "slender_sim/rod/rod_system.h"
+#include "slender_sim/study/study.h"
+
+namespace slender::study {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// Ring of radius 1 with bending modulus 1. The imposed twist is a rest twist of the opposite sign: a closed rod turned by any angle
+/// before its ends were joined.
+class Ring
+{
+public:
+  Ring(int edges, double beta) : edges_(edges)
+  {
+    Eigen::Matrix3Xd nodes(3, edges);
+    const double radius = 1.0;
+    for (int i = 0; i < edges; ++i)
+      nodes.col(i) = radius * Eigen::Vector3d(std::cos(2 * kPi * i / edges), std::sin(2 * kPi * i / edges), 0);
+    const RodSection section{0.01, 0.01, 1.0, 1e6, Eigen::Matrix2d::Identity(), beta};
+    model_ = buildRod("ring", nodes, true, std::vector<RodSection>(edges, section), Eigen::Vector3d::UnitZ(), true);
+    state_ = makeRodState(model_, nodes, Eigen::Vector3d::UnitZ());
+  }
+
+  void twist(double angle) { model_.rest_twist.setConstant(-angle / edges_); }
+
+  /// Whether the energy has a minimum in the plane. A millionth of the bending stiffness on all nodes decides the rigid motions, which
+  /// cost nothing.
+  bool planarIsStable() const
+  {
+    RodSystem system(model_);
+    system.load(state_);
+    system.setResponse(0.0, nullptr);
+    for (int i = 0; i < edges_; ++i)
+      system.setInertia(i, 1e-6 * 2 * kPi / edges_, state_.x.col(i), Eigen::Vector3d::Zero());
+    return system.evaluate(true).inertia.positiveDefinite();
+  }
+
+  /// Growth of a small lateral push of the second mode over a damped motion of two seconds: above 1, unstable.
+  double growth() const
+  {
+    auto model = std::make_shared<RodModel>(model_);
+    model->mass_damping = 2.0;
+    RodState state = state_;
+    const double size = 1e-4;
+    for (int i = 0; i < edges_; ++i)
+      state.x(2, i) = size * std::cos(4 * kPi * i / edges_);
+    const Eigen::Matrix3Xd nodes = state.x;
+    state = makeRodState(*model, nodes, Eigen::Vector3d::UnitZ());
+    RodInputs inputs;
+    inputs.gravity.setZero();
+    RodStepper stepper(model, timeConfig(Integrator::implicit_euler, 0.05, 1e-9));
+    double early = 0, late = 0;
+    for (int k = 0; k < 400; ++k)
+    {
+      require(stepper.step(state, inputs, 0.05), "ring");
+      if (k == 100 || k == 399)
+        (k == 100 ? early : late) = (state.x.row(2).array() - state.x.row(2).mean()).abs().maxCoeff();
+    }
+    return late / early;
+  }
+
+private:
+  int edges_;
+  RodModel model_;
+  RodState state_;
+};
+
+}  // namespace
+
+void runMichell(StudyContext& context)
+{
+  Plot& plot = context.plot("michell", "Michell's instability of a twisted ring, n = 50", "beta / alpha", "twist [rad]");
+  plot.log_x = plot.log_y = false;
+  const double step = context.quick() ? 0.5 : 0.1;
+  const std::vector<int> meshes = {50, 100};
+  const int points = static_cast<int>(std::lround(2.0 / step)) + 1;
+  int done = 0;
+  for (const int edges : meshes)
+    for (int k = 0; k < points; ++k)
+    {
+      const double beta = 0.5 + step * k;
+      context.progress(done++, points * 2, "n = " + std::to_string(edges));
+      const double smooth = 2 * kPi * std::sqrt(3.0) / beta, expected = smooth * (1 + 31.3 / (edges * edges));
+      Ring ring(edges, beta);
+      double stable = 0.5 * expected, unstable = 2.0 * expected;
+      for (int i = 0; i < 40; ++i)
+      {
+        const double middle = 0.5 * (stable + unstable);
+        ring.twist(middle);
+        (ring.planarIsStable() ? stable : unstable) = middle;
+      }
+      context.row().set("n", edges).set("beta_over_alpha", beta).check(stable, expected, 0.01 * expected, "reference 2b: closed n-gon, 2 pi sqrt 3 (1 + 31.3/n^2)");
+      if (edges != 50)
+        continue;
+      plot.at("theory (continuous)").x.push_back(beta);
+      plot.at("theory (continuous)").y.push_back(smooth);
+      plot.at("measured, n = 50").x.push_back(beta);
+      plot.at("measured, n = 50").y.push_back(stable);
+      if (k % 5 != 0 && !context.quick())
+        continue;
+      // as in the thesis: does a small push decay or grow?
+      for (const double share : {0.9, 0.97, 1.03, 1.1})
+      {
+        ring.twist(share * expected);
+        const double growth = ring.growth();
+        Row& row = context.row();
+        row.set("n", edges).set("beta_over_alpha", beta).set("share_of_threshold", share).set("growth", growth);
+        row.check(growth > 1 ? 1 : 0, share > 1 ? 1 : 0, 0.5, "1: a small push grows, 0: it decays");
+        Series& dots = plot.at(growth > 1 ? "push grows" : "push decays");
+        dots.x.push_back(beta);
+        dots.y.push_back(share * expected);
+      }
+    }
+}
+
+}  // namespace slender::study
