@@ -81,7 +81,7 @@ Result solve(const Case& c, int edges, double refinement)
   const Eigen::VectorXd fractions = lengthFractions(lengths);
   Eigen::Matrix3Xd straight = Eigen::Matrix3Xd::Zero(3, edges + 1);
   straight.row(0) = c.length * fractions.transpose();
-  RodSetup rod = naturalRod(sectionOf(1e6 * c.alpha, c.alpha, c.alpha, c.beta), straight, Eigen::Vector3d::UnitY());
+  RodSetup rod = naturalRod(sectionOf(2e7 * c.alpha, c.alpha, c.alpha, c.beta), straight, Eigen::Vector3d::UnitY());
   rod.inputs.gravity.setZero();
   // The frames of an isotropic rod may be chosen freely: with the turns as rest twist of the opposite sign they hardly twist, and joints do
   // not feel that the mean of both edges' curvatures (3.14) is cos(m/2) of either.
@@ -190,10 +190,13 @@ void runHelicalBuckling(StudyContext& context)
     errors.at("one half twice as fine").x.push_back(edges);
     errors.at("one half twice as fine").y.push_back(std::abs(r.peak / exact.peak - 1));
   }
-  if (n.size() > 1)
-    context.metric("order", -logSlope(n, error));
   if (context.quick())
     return;
+  const double finest = std::abs(solve(kThesis, 1200, 1).peak / exact.peak - 1);
+  context.row().set("case", "uniform").set("n", 1200).set("quantity", "peak").set("relative_error", finest);
+  context.metric("order", observedOrder(error.back(), finest));
+  context.metric("order_200_to_600", -logSlope(n, error));
+  context.note("order: from n = 600 to 1200. From 200 to 600 the table's own equilibria give 1.88: their error n^2 still grows there.");
   const Helix peer = exactHelix(kPeer);
   const Result r = solve(kPeer, 1000, 1);
   context.row().set("case", "L = 100, slack 3").set("n", 1000).set("quantity", "peak").check(r.peak, peer.peak, 0.005 * peer.peak, "closed form");

@@ -113,6 +113,7 @@ void runMichell(StudyContext& context)
         row.set("n", edges).set("beta_over_alpha", beta).set("share_of_threshold", share).set("growth", growth);
         row.check(growth > 1 ? 1 : 0, share > 1 ? 1 : 0, 0.5, "1: a small push grows, 0: it decays");
         Series& dots = plot.at(growth > 1 ? "push grows" : "push decays");
+        dots.points = true;
         dots.x.push_back(beta);
         dots.y.push_back(share * expected);
       }
