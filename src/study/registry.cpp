@@ -21,6 +21,7 @@ void runWilberforce(StudyContext&);
 void runRodContactSafety(StudyContext&);
 void runHelicalBuckling(StudyContext&);
 void runMichell(StudyContext&);
+void runStickSlip(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
 
@@ -46,6 +47,7 @@ const std::vector<Study>& studies()
       {"helical_buckling", "localised helix of a twisted rod: peak, moment and envelope against discrete and smooth solutions", runHelicalBuckling},
       {"michell", "twist at which a ring leaves its plane, by the energy's Hessian and by the growth of a push", runMichell},
       {"greenhill", "torque that buckles a clamped straight rod under tension or compression", runGreenhill},
+      {"stick_slip", "compression at which the foot of a strip pressed on a floor slips, against the coefficient of friction", runStickSlip},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
   };
   return all;
