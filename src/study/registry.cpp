@@ -21,6 +21,7 @@ void runWilberforce(StudyContext&);
 void runRodContactSafety(StudyContext&);
 void runHelicalBuckling(StudyContext&);
 void runMichell(StudyContext&);
+void runKnot(StudyContext&);
 void runStickSlip(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
@@ -48,6 +49,7 @@ const std::vector<Study>& studies()
       {"michell", "twist at which a ring leaves its plane, by the energy's Hessian and by the growth of a push", runMichell},
       {"greenhill", "torque that buckles a clamped straight rod under tension or compression", runGreenhill},
       {"stick_slip", "compression at which the foot of a strip pressed on a floor slips, against the coefficient of friction", runStickSlip},
+      {"knot", "open overhand knots: end force against the size of the loop", runKnot},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
   };
   return all;
