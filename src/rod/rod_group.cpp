@@ -33,12 +33,14 @@ public:
 
 namespace {
 
-void check(const RodGroupModel& model)
+void check(const RodGroupModel& model, Integrator integrator)
 {
   const auto need = [](bool good, const std::string& what) {
     if (!good)
       throw std::invalid_argument(what);
   };
+  need(integrator != Integrator::symplectic_euler,
+       "symplectic_euler steps rods alone: with bodies or contact take implicit_euler, bdf2 or tr_bdf2 (time.integrator)");
   for (const RigidBodyModel& body : model.bodies)
     checkBody(body);
   const int rods = static_cast<int>(model.rods.size()), bodies = static_cast<int>(model.bodies.size());
@@ -65,7 +67,7 @@ Weld makeWeld(RodGroupModel& model, RodGroupState& state, int rod, int first_nod
 
 RodGroup::RodGroup(RodGroupModel model, const TimeConfig& time)
 {
-  check(model);
+  check(model, time.integrator);
   impl_ = std::make_unique<Impl>(std::move(model), time);
 }
 RodGroup::~RodGroup() = default;

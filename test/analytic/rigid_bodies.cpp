@@ -230,6 +230,7 @@ TEST(RigidBodies, ImpossibleInertiaIsRefused)
   EXPECT_THROW(checkBody(bodyOf(1.0, {1, 1, 3})), std::invalid_argument);
   EXPECT_THROW(checkBody(bodyOf(-1.0, {1, 1, 1})), std::invalid_argument);
   EXPECT_THROW(checkBody(bodyOf(1.0, {1, 0, 1})), std::invalid_argument);
+  EXPECT_THROW(RodGroup(tee().model, withIntegrator(Integrator::symplectic_euler)), std::invalid_argument);   // would step the rods alone
 }
 
 }  // namespace
