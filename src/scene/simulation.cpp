@@ -28,26 +28,8 @@ Simulation::Simulation(SceneConfig config) : config_(std::move(config))
   state_.wrenches.resize(grasps_.size());
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
-    if (const auto* table = std::get_if<TableMotion>(&grasps_[g].config->motion))
-    {
-      setOffset(static_cast<int>(g), table->poses.evaluate(table->poses.firstTime()));
-    }
-    else if (const auto* body = std::get_if<BodyMotion>(&grasps_[g].config->motion))
-    {
-      SceneInputs there;
-      for (const RigidBodyState& b : state_.bodies)
-      {
-        there.bodies.push_back({b.X_WB, {}});
-      }
-      for (const Pose& pose : state_.obstacles)
-      {
-        there.obstacles.push_back({pose, {}});
-      }
-      if (const GraspTarget* frame = followed(*body, there))
-      {
-        setOffset(static_cast<int>(g), frame->X_WG);
-      }
-    }
+    const auto* table = std::get_if<TableMotion>(&grasps_[g].config->motion);
+    takeOffset(static_cast<int>(g), table ? table->poses.firstTime() : 0.0);
   }
   if (config_.start == Start::equilibrium)
   {
@@ -372,9 +354,32 @@ void Simulation::attach(int grasp, int first_node, int last_node, Hold hold)
   }
   rod.forgetHistory();   // the integrator's past was that of another set of constraints
   rod.grasps[ref.index] = makeGrasp(model, rod, first_node, last_node, hold == Hold::frame);
-  if (const auto* table = std::get_if<TableMotion>(&ref.config->motion))
+  takeOffset(grasp, state_.time);
+}
+
+/// The offset from the driving frame as a table has it at `time`, or as a body or obstacle of the scene stands now.
+void Simulation::takeOffset(int grasp, double time)
+{
+  const Motion& motion = grasps_[grasp].config->motion;
+  if (const auto* table = std::get_if<TableMotion>(&motion))
   {
-    setOffset(grasp, table->poses.evaluate(state_.time));
+    setOffset(grasp, table->poses.evaluate(time));
+  }
+  else if (const auto* body = std::get_if<BodyMotion>(&motion))
+  {
+    SceneInputs now;
+    for (const RigidBodyState& b : state_.bodies)
+    {
+      now.bodies.push_back({b.X_WB, {}});
+    }
+    for (const Pose& pose : state_.obstacles)
+    {
+      now.obstacles.push_back({pose, {}});
+    }
+    if (const GraspTarget* frame = followed(*body, now))
+    {
+      setOffset(grasp, frame->X_WG);
+    }
   }
 }
 

@@ -313,5 +313,30 @@ TEST(SavedStateFile, sayWhyItCannotBeWritten)
   }
 }
 
+TEST(Simulation, AGraspThatFollowsABodyTakesItsOffsetAnewWhenAttached)
+{
+  Simulation simulation(parseScene(R"(
+time: {step: 0.01}
+gravity: [0, 0, 0]
+bodies: [{name: hand, pose: {position: [0, 0, 1]}, motion: {topic: true}}]
+rods:
+  - centerline: {straight: {edges: 20}}
+    grasps: {g: {edges: [0], motion: {body: hand}, attach: initial}}
+)"));
+  const auto step = [&](double x) {
+    SceneInputs inputs = simulation.defaultInputs();
+    inputs.bodies[0].X_WG.position << x, 0, 1;
+    ASSERT_TRUE(simulation.step(inputs).ok);
+  };
+  step(0.01);
+  EXPECT_NEAR(simulation.state().rods[0].x(0, 0), 0.01, 1e-12);   // goes with the hand
+  simulation.release(0);
+  step(0.02);
+  const Eigen::Vector3d node = simulation.state().rods[0].x.col(3);
+  simulation.attach(0, 3, 3, Hold::frame);
+  step(0.02);
+  EXPECT_LT((simulation.state().rods[0].x.col(3) - node).norm(), 1e-12);   // the hand stands still: nothing jumps
+}
+
 }  // namespace
 }  // namespace slender

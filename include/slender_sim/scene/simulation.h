@@ -83,7 +83,7 @@ public:
   void reset();
 
   /// Takes hold of nodes first..last of a rod as they are now, under the name of an existing grasp of that rod. With
-  /// `attach: initial` a table's offset is taken anew; other motions set theirs when their next pose comes (setOffset).
+  /// `attach: initial` the offset from a table, or from a body or obstacle of the scene, is taken anew; other motions set theirs when their next pose comes (setOffset).
   /// Throws std::invalid_argument: no such grasp or nodes, overlap with another active grasp, several nodes held by position.
   void attach(int grasp, int first_node, int last_node, Hold hold);
   void release(int grasp);
@@ -99,6 +99,7 @@ public:
 
 private:
   void buildRods();
+  void takeOffset(int grasp, double time);
   void findEquilibrium();
   SceneInputs inputsAt(double time) const;
   void fillRodInputs(const SceneInputs& inputs);
