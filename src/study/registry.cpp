@@ -25,6 +25,9 @@ void runKnot(StudyContext&);
 void runStickSlip(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
+void runTrouton(StudyContext&);
+void runThreadTwist(StudyContext&);
+void runRetraction(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -51,6 +54,9 @@ const std::vector<Study>& studies()
       {"stick_slip", "compression at which the foot of a strip pressed on a floor slips, against the coefficient of friction", runStickSlip},
       {"knot", "open overhand knots: end force against the size of the loop", runKnot},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
+      {"trouton", "straight viscous threads stretched by plates and by their weight", runTrouton},
+      {"thread_twist", "torque of straight viscous threads twisted at a steady rate", runThreadTwist},
+      {"retraction", "a free viscous thread drawn together by surface tension", runRetraction},
   };
   return all;
 }

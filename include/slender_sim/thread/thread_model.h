@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string>
+
+#include <Eigen/Geometry>
+
+#include "slender_sim/thread/thread_state.h"
+
+namespace slender {
+
+/// A horizontal floor or belt. A node whose section touches it stays there (no slip) and moves with the belt.
+struct ThreadFloor
+{
+  bool present = false;
+  double height = 0.0;       ///< z of its surface [m]
+  bool touches_at_radius = true;   ///< a thread lies with its centreline one radius above the surface; false: on the surface
+};
+
+/// Where edges are divided, joined or taken away. The values given here switch all of it off.
+struct ThreadLimits
+{
+  double max_edge_length = std::numeric_limits<double>::infinity();   ///< [m] longer edges are divided
+  double min_edge_length = 0.0;                                       ///< [m] shorter edges are joined to a neighbour
+  std::size_t max_deposited = std::numeric_limits<std::size_t>::max();   ///< nodes on the floor; beyond, the oldest are dropped
+  Eigen::AlignedBox3d scene = Eigen::AlignedBox3d(Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity()),
+                                                  Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));   ///< the old end is dropped outside
+};
+
+/// Fixed properties of one viscous thread (thesis 5).
+struct ThreadModel
+{
+  std::string name;
+  double density = 1000.0;          ///< [kg/m^3]
+  double viscosity = 1.0;           ///< dynamic, mu [Pa s]
+  double surface_tension = 0.0;     ///< gamma [N/m]
+  double nozzle_diameter = 0.0;     ///< [m]; 0: no nozzle
+  double feed_length = 0.0;         ///< [m] of the edges that leave the nozzle
+  ThreadFloor floor;
+  ThreadLimits limits;
+
+  /// Dynamic viscosity [Pa s] that the fluid shows at a rate of stretching [1/s]. Newtonian: it does not depend on it.
+  double viscosityAt(double stretch_rate) const
+  {
+    (void)stretch_rate;
+    return viscosity;
+  }
+  double nozzleArea() const { return 0.25 * M_PI * nozzle_diameter * nozzle_diameter; }
+};
+
+/// Throws std::invalid_argument naming the bad value.
+void checkThreadModel(const ThreadModel& model);
+
+/// A thread at rest through `nodes` (3 x n, n >= 2, from the oldest to the newest [m]) with edge radii [m] (n-1), twist-free frames from
+/// `director` (zero: any normal). Ends are free. Throws std::invalid_argument naming the bad value.
+ThreadState makeThread(const Eigen::Matrix3Xd& nodes, const Eigen::VectorXd& radii, const Eigen::Vector3d& director = Eigen::Vector3d::Zero());
+
+/// The stub of a thread that begins to leave a nozzle: half an edge of fluid below it, moving at `speed` [m/s].
+ThreadState makeNozzleThread(const ThreadModel& model, const Pose& X_WN, double speed);
+
+}  // namespace slender

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "slender_sim/thread/thread_state.h"
+
+namespace slender {
+
+/// Divides edge j where `fraction` of its length lies on the older side (thesis 5.4.4): the new node by a cubic through the four nodes
+/// around it (the direction of a held end takes the place of a missing one), the ratio of the radii by a quadratic through those of
+/// three edges. Volume, mass and momentum are conserved.
+void splitEdge(ThreadState& state, int j, double fraction);
+
+/// Joins edges i-1 and i by taking node i away (0 < i < nodes - 1). Volume, mass and momentum are conserved.
+void removeNode(ThreadState& state, int i);
+
+/// Takes the `count` oldest nodes and the edges after them away; their volume goes to dropped_volume. At least two nodes stay.
+void dropOldest(ThreadState& state, int count);
+
+}  // namespace slender

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "slender_sim/dynamics/step_report.h"
+#include "slender_sim/dynamics/time_config.h"
+#include "slender_sim/thread/thread_model.h"
+#include "slender_sim/thread/thread_state.h"
+
+namespace slender {
+
+/// Inputs of one thread, latched once per step.
+struct ThreadInputs
+{
+  Eigen::Vector3d gravity{0, 0, -9.81};                     ///< [m/s^2]
+  std::array<Pose, 2> ends;                                 ///< where the held ends shall be at the end of the step
+  double flow_rate = 0.0;                                   ///< [m^3/s] out of the nozzle during the step, >= 0
+  Eigen::Vector3d belt_velocity = Eigen::Vector3d::Zero();  ///< [m/s] of the floor; what has landed moves with it
+};
+
+/// What the thread exerts on the holder of an end, about the end node, in world axes.
+struct EndLoad
+{
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< [N]
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
+};
+
+/// Advances one viscous thread by implicit Euler steps (thesis 5.3): the rod's energies with viscous stiffnesses, their rest strains
+/// those at the start of the step.
+class ThreadStepper
+{
+public:
+  /// Throws std::invalid_argument for a model that is not valid.
+  ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton);
+  ~ThreadStepper();
+  ThreadStepper(ThreadStepper&&) noexcept;
+
+  /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
+  StepReport step(ThreadState& state, const ThreadInputs& inputs, double duration);
+
+  /// At the end of the last successful step; zero for a free end.
+  const std::array<EndLoad, 2>& endLoads() const;
+
+  const ThreadModel& model() const;
+
+private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slender

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "slender_sim/study/study.h"
+#include "slender_sim/thread/thread_stepper.h"
+
+namespace slender::study {
+
+/// Model, state and inputs of one thread that belong together. Units are those of the case (CGS in most references).
+struct ThreadSetup
+{
+  ThreadModel model;
+  ThreadState state;
+  ThreadInputs inputs;
+  double time = 0.0;
+
+  /// Fixes an end (0: oldest, 1: newest) where it is, its section across the edge there.
+  void hold(int end);
+  double length() const;
+};
+
+/// A straight thread along x from the origin with the given edge radii, at rest, no gravity, ends free.
+ThreadSetup straightThread(double length, const Eigen::VectorXd& radii);
+
+/// A nozzle at `position` that points down, with the stub of a thread; its flow starts with the first step.
+ThreadSetup nozzleThread(const ThreadModel& model, const Eigen::Vector3d& position, double speed);
+
+ThreadStepper makeStepper(const ThreadSetup& thread);
+
+/// One step; throws std::runtime_error with `what` and the report's message unless it was done.
+void advance(ThreadStepper& stepper, ThreadSetup& thread, double h, const std::string& what);
+
+/// Adds a row that checks `measured` within `relative` of `expected`.
+Row& checkRelative(StudyContext& context, const std::string& test, const std::string& quantity, double measured, double expected, double relative,
+                   const std::string& source);
+
+}  // namespace slender::study

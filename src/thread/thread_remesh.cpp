@@ -1,0 +1,163 @@
+#include "slender_sim/thread/thread_remesh.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/geometry/rotation.h"
+
+namespace slender {
+
+namespace {
+
+/// Lagrange's polynomial through (s[k], y[k]), k = 0..count-1, at s = 0.
+template <class Value>
+Value interpolate(const double* s, const Value* y, int count)
+{
+  Value sum = 0.0 * y[0];
+  for (int k = 0; k < count; ++k)
+  {
+    double weight = 1.0;
+    for (int m = 0; m < count; ++m)
+      if (m != k)
+        weight *= s[m] / (s[m] - s[k]);
+    sum += weight * y[k];
+  }
+  return sum;
+}
+
+Eigen::Vector3d carried(const Eigen::Vector3d& d1, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double angle)
+{
+  const Eigen::Vector3d d = rotateAbout(parallelTransport(d1, from, to), to, angle);
+  return (d - to * to.dot(d)).normalized();
+}
+
+}  // namespace
+
+void splitEdge(ThreadState& state, int j, double fraction)
+{
+  const int last = state.nodes() - 1;
+  const Eigen::Vector3d a = state.x[j], b = state.x[j + 1], e = b - a;
+  const double length = e.norm();
+  const Eigen::Vector3d t = e / length;
+
+  // arc lengths from the new node; beyond a held end the straight inside of its holder
+  double s[4], radius_at[3];
+  Eigen::Vector3d y[4];
+  int count = 0;
+  const auto add = [&](double at, const Eigen::Vector3d& x) {
+    s[count] = at;
+    y[count++] = x;
+  };
+  const double to_a = fraction * length, to_b = length - to_a;
+  double before = 0.0, after = 0.0;   // lengths of the neighbouring edges
+  if (j > 0)
+    add(-to_a - (before = state.edge(j - 1).norm()), state.x[j - 1]);
+  else if (state.ends[0].held)
+    add(-to_a - length, a - state.ends[0].X_WE.orientation * Eigen::Vector3d(length, 0, 0));
+  add(-to_a, a);
+  add(to_b, b);
+  if (j + 1 < last)
+    add(to_b + (after = state.edge(j + 1).norm()), state.x[j + 2]);
+  else if (state.ends[1].held)
+    add(to_b + length, b - state.ends[1].X_WE.orientation * Eigen::Vector3d(length, 0, 0));
+  Eigen::Vector3d x = interpolate(s, y, count);
+  // next to a much longer edge the cubic may swing out; the chord is then the better guess
+  if ((x - (a + fraction * e)).norm() > 0.25 * std::min(to_a, to_b))
+    x = a + fraction * e;
+
+  // radii at the middles of three edges, seen from the middles of the two new ones
+  double volume_ratio = fraction;
+  if (j > 0 && j + 1 < last)
+  {
+    const double radii[3] = {state.radius(j - 1), state.radius(j), state.radius(j + 1)};
+    const double middles[3] = {-0.5 * before, 0.5 * length, length + 0.5 * after};   // from node j
+    const auto radius = [&](double where) {
+      for (int k = 0; k < 3; ++k)
+        radius_at[k] = middles[k] - where;
+      const double r = interpolate(radius_at, radii, 3);
+      return std::clamp(r, 0.5 * radii[1], 2.0 * radii[1]);
+    };
+    const double left = radius(0.5 * to_a), right = radius(to_a + 0.5 * to_b);
+    const double left_volume = left * left * to_a;
+    volume_ratio = left_volume / (left_volume + right * right * to_b);
+  }
+  const double volume = state.volume[j], left_volume = volume_ratio * volume, right_volume = volume - left_volume;
+  // each half of a removed share goes to the new node: momentum of the lumped masses stays
+  const Eigen::Vector3d v = (right_volume * state.v[j] + left_volume * state.v[j + 1]) / volume;
+
+  // The twist between the middles of neighbouring edges stays spread as it was. At a held end it lies on half an edge.
+  const double first_span = 0.5 * (length + before), second_span = 0.5 * (length + after);
+  const double twist_a = state.twist[j] / first_span, twist_b = state.twist[j + 1] / second_span;
+  const double left_turn = -twist_a * 0.5 * to_b, right_turn = twist_b * 0.5 * to_a;   // their middles moved by these lengths
+  const Eigen::Vector3d left = (x - a).normalized(), right = (b - x).normalized(), d1 = state.d1[j];
+  state.x.insert(state.x.begin() + j + 1, x);
+  state.v.insert(state.v.begin() + j + 1, v);
+  state.id.insert(state.id.begin() + j + 1, state.next_id++);
+  state.deposited.insert(state.deposited.begin() + j + 1, static_cast<char>(state.deposited[j] && state.deposited[j + 1]));
+  state.twist.insert(state.twist.begin() + j + 1, right_turn - left_turn);
+  state.twist[j] += left_turn;
+  state.twist[j + 2] -= right_turn;
+  state.d1[j] = carried(d1, t, left, left_turn);
+  state.d1.insert(state.d1.begin() + j + 1, carried(d1, t, right, right_turn));
+  state.spin.insert(state.spin.begin() + j + 1, state.spin[j]);
+  state.volume[j] = left_volume;
+  state.volume.insert(state.volume.begin() + j + 1, right_volume);
+}
+
+void removeNode(ThreadState& state, int i)
+{
+  const Eigen::Vector3d e = state.edge(i - 1), f = state.edge(i), joined = e + f;
+  const double le = e.norm(), lf = f.norm(), share = le / (le + lf);
+  const Eigen::Vector3d te = e / le, t = joined.normalized();
+  const double ve = state.volume[i - 1], vf = state.volume[i];
+
+  // the share of the lumped mass that a neighbour takes over brings its momentum along
+  const auto give = [&](int k, double taken) {
+    double own = (k > 0 ? state.volume[k - 1] : 0.0) + (k < state.edges() ? state.volume[k] : 0.0);
+    state.v[k] = (own * state.v[k] + taken * state.v[i]) / (own + taken);
+  };
+  give(i - 1, vf);
+  give(i + 1, ve);
+
+  // the frame in the middle of the joined edge lies between those of the two: turned by the nearer part of their twist
+  const double turn = (1.0 - share) * state.twist[i], rest = state.twist[i] - turn;
+  state.d1[i - 1] = carried(state.d1[i - 1], te, t, turn);
+  state.twist[i - 1] += turn;
+  state.twist[i + 1] += rest;
+  state.spin[i - 1] = (ve * state.spin[i - 1] + vf * state.spin[i]) / (ve + vf);
+  state.volume[i - 1] = ve + vf;
+  state.x.erase(state.x.begin() + i);
+  state.v.erase(state.v.begin() + i);
+  state.id.erase(state.id.begin() + i);
+  state.deposited.erase(state.deposited.begin() + i);
+  state.twist.erase(state.twist.begin() + i);
+  state.d1.erase(state.d1.begin() + i);
+  state.spin.erase(state.spin.begin() + i);
+  state.volume.erase(state.volume.begin() + i);
+  if (!state.ends[0].held)
+    state.twist.front() = 0.0;
+  if (!state.ends[1].held)
+    state.twist.back() = 0.0;
+}
+
+void dropOldest(ThreadState& state, int count)
+{
+  count = std::min(count, state.nodes() - 2);
+  if (count <= 0)
+    return;
+  for (int j = 0; j < count; ++j)
+    state.dropped_volume += state.volume[j];
+  const auto drop = [&](auto& v) { v.erase(v.begin(), v.begin() + count); };
+  drop(state.x);
+  drop(state.v);
+  drop(state.id);
+  drop(state.deposited);
+  drop(state.twist);
+  drop(state.d1);
+  drop(state.spin);
+  drop(state.volume);
+  state.twist[0] = 0.0;
+  state.ends[0].held = false;
+}
+
+}  // namespace slender

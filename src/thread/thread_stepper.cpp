@@ -1,0 +1,148 @@
+#include "slender_sim/thread/thread_stepper.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "thread_stepper_impl.h"
+
+namespace slender {
+
+ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton)
+{
+  checkThreadModel(*model);
+  impl_ = std::make_unique<Impl>(std::move(model), newton);
+}
+ThreadStepper::~ThreadStepper() = default;
+ThreadStepper::ThreadStepper(ThreadStepper&&) noexcept = default;
+
+StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, double duration)
+{
+  return impl_->step(state, inputs, duration);
+}
+const std::array<EndLoad, 2>& ThreadStepper::endLoads() const
+{
+  return impl_->loads;
+}
+const ThreadModel& ThreadStepper::model() const
+{
+  return *impl_->model;
+}
+
+bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs& inputs, double duration, std::string& what) const
+{
+  // names are built only when they are needed: a good step takes no memory
+  const auto check = [&](bool good, const char* name) {
+    if (!good && what.empty())
+      what = name;
+    return good;
+  };
+  check(duration > 0 && std::isfinite(duration), "step length (must be positive)");
+  check(inputs.gravity.allFinite(), "gravity");
+  check(inputs.belt_velocity.allFinite(), "belt velocity");
+  check(inputs.flow_rate >= 0 && std::isfinite(inputs.flow_rate), "flow rate (must be zero or more)");
+  check(inputs.flow_rate == 0 || (model->nozzle_diameter > 0 && s.ends[1].held), "flow rate (must be zero: the thread hangs on no nozzle)");
+  for (int end = 0; end < 2; ++end)
+    if (s.ends[end].held)
+      for (const Pose* pose : {&inputs.ends[end], &s.ends[end].X_WE})
+        check(pose->position.allFinite() && std::abs(pose->orientation.norm() - 1.0) < 1e-3, end ? "pose of the newest end" : "pose of the oldest end");
+  const std::size_t nodes = s.x.size(), edges = s.volume.size();
+  bool sound = nodes >= 2 && edges + 1 == nodes && s.v.size() == nodes && s.twist.size() == nodes && s.id.size() == nodes &&
+               s.deposited.size() == nodes && s.d1.size() == edges && s.spin.size() == edges;
+  if (!check(sound, "number of nodes or edges of the state"))
+    return false;
+  for (std::size_t i = 0; i < nodes; ++i)
+    sound = sound && s.x[i].allFinite() && s.v[i].allFinite() && std::isfinite(s.twist[i]);
+  for (std::size_t j = 0; j < edges; ++j)
+    sound = sound && s.d1[j].allFinite() && std::isfinite(s.spin[j]) && std::isfinite(s.volume[j]) && s.volume[j] > 0 && s.x[j] != s.x[j + 1];
+  check(sound, "the state");
+  return what.empty();
+}
+
+StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, const std::string& message) const
+{
+  report.ok = false;
+  report.failure = failure;
+  report.message = "thread '" + model->name + "': " + message;
+  return report;
+}
+
+std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double length) const
+{
+  const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
+  switch (failure)
+  {
+    case StepFailure::folded_back:
+      return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step";
+    case StepFailure::singular_matrix:
+      return "the matrix could not be made definite" + at + ": radii or edge lengths differ by too many orders of magnitude";
+    case StepFailure::state_not_finite:
+      return "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
+    default:
+      return "Newton's method did not converge" + at + ": use a shorter step, more time.newton.max_iterations or max_cuts, or move the nozzle slowly";
+  }
+}
+
+StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inputs, double duration)
+{
+  StepReport report;
+  std::string what;
+  if (!inputsFinite(state, inputs, duration, what))
+    return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
+  work = state;
+  start_ends = state.ends;
+  loads = {};
+  flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
+  // no more than an edge leaves the nozzle at a time
+  const double longest = flow_speed_ > 0 ? std::min(duration, model->feed_length / flow_speed_) : duration;
+  double t = 0.0, h = duration / std::ceil(duration / longest * (1 - 1e-9));
+  int cuts = 0;   // since the last good substep
+  while (t < duration)
+  {
+    const bool last = t + h > duration * (1 - 1e-9);
+    const double length = last ? duration - t : h;
+    StepReport sub;
+    const StepFailure failure = substep(inputs, t, last ? duration : t + length, duration, sub);
+    report.merge(sub);
+    if (failure != StepFailure::none)
+    {
+      if (++cuts > newton.max_cuts)
+        return refuse(report, failure, explainFailure(failure, length));
+      ++report.cut_steps;
+      h = 0.5 * length;
+      continue;
+    }
+    ++report.substeps;
+    t = last ? duration : t + length;
+    cuts = 0;
+    h = std::min(2.0 * length, longest);
+  }
+  std::swap(state, work);
+  return report;
+}
+
+Pose ThreadStepper::Impl::endPose(int end, const ThreadInputs& inputs, double fraction) const
+{
+  const Pose &a = start_ends[end].X_WE, &b = inputs.ends[end];
+  if (fraction >= 1.0)
+    return {b.position, b.orientation.normalized()};
+  return {a.position + fraction * (b.position - a.position), a.orientation.slerp(fraction, b.orientation).normalized()};
+}
+
+StepFailure ThreadStepper::Impl::substep(const ThreadInputs& inputs, double from, double to, double duration, StepReport& report)
+{
+  const double h = to - from;
+  for (int end = 0; end < 2; ++end)
+    if (work.ends[end].held)
+      end_poses[end] = endPose(end, inputs, to / duration);
+  if (!loadSystem(h))
+    return StepFailure::folded_back;
+  setResponse(inputs, h);
+  setTrial(inputs, h);
+  if (const StepFailure failure = solve(inputs, h, report); failure != StepFailure::none)
+    return failure;
+  finish(inputs, h);
+  remesh();
+  return StepFailure::none;
+}
+
+}  // namespace slender

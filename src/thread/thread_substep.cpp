@@ -1,0 +1,289 @@
+// One implicit Euler step of the thread (thesis 5.3, 5.4): set-up, solution, landing, take-over.
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/geometry/rotation.h"
+#include "slender_sim/thread/thread_remesh.h"
+#include "thread_stepper_impl.h"
+
+namespace slender {
+
+/// The configuration from which the step's strains are measured. It is the present one, except at the nozzle: there the fluid moves
+/// on like a solid plug while the nozzle stands, so the last edge is longer by what flows out, and less turned against the nozzle.
+/// No: the thread is folded.
+bool ThreadStepper::Impl::loadSystem(double h)
+{
+  const int n = work.nodes();
+  int free = 0;
+  while (free < n && work.deposited[free])
+    ++free;
+  first_ = std::max(0, std::min(free - 3, n - 2));
+  offset_ = first_ == 0 && work.ends[0].held ? 1 : 0;
+  const int last = lastInSystem();
+  system.resize(last + 1 + (work.ends[1].held ? 1 : 0));
+  for (int i = first_; i < n; ++i)
+  {
+    system.setNode(inSystem(i), work.x[i]);
+    system.setTwist(inSystem(i), work.twist[i]);
+  }
+  for (int j = first_; j + 1 < n; ++j)
+    system.setFrame(inSystem(j), work.edge(j).normalized(), work.d1[j]);
+
+  if (offset_)
+  {
+    const Eigen::Matrix3d section = work.ends[0].X_WE.orientation.toRotationMatrix();
+    system.setNode(0, work.x[0] - section.col(0) * work.edge(0).norm());
+    system.setFrame(0, section.col(0), section.col(1));
+  }
+  if (work.ends[1].held)
+  {
+    const Eigen::Matrix3d section = work.ends[1].X_WE.orientation.toRotationMatrix();
+    const double advance = h * flow_speed_, length = work.edge(n - 2).norm();
+    const Eigen::Vector3d end = work.x[n - 1] - advance * section.col(0);
+    if (advance > 0)
+    {
+      // What comes out is not twisted: the middle of the longer edge has less of the twist, and passes the rest on.
+      const double shed = work.twist[n - 1] * advance / (length + advance);
+      const Eigen::Vector3d t0 = work.edge(n - 2) / length, t = (end - work.x[n - 2]).normalized();
+      system.setFrame(last - 1, t, rotateAbout(parallelTransport(work.d1[n - 2], t0, t), t, shed));
+      system.setTwist(last, work.twist[n - 1] - shed);
+      system.setTwist(last - 1, work.twist[n - 2] + shed);
+    }
+    system.setNode(last, end);
+    system.setNode(last + 1, end - section.col(0) * (length + advance));
+    system.setFrame(last, -section.col(0), section.col(1));
+  }
+  return system.takeRestStrains().min_chi > kFoldedChi;
+}
+
+/// Viscous stiffnesses over the step (thesis 5.3.2), surface tension, inertia and loads; and what is held.
+void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
+{
+  const int n = work.nodes();
+  const double mu = model->viscosityAt(0.0);
+  system.setSurfaceTension(model->surface_tension);
+  // of the edge before the node: solid parts end a joint in a clamped section, whose half of the joint has no length
+  double length_before = 0.0, radius_before = 0.0, volume_before = 0.0;
+  for (int i = first_; i < n; ++i)
+  {
+    const int k = inSystem(i);
+    double length_after = 0.0, radius_after = 0.0, volume_after = 0.0;
+    if (i + 1 < n)
+    {
+      const double length = system.restLength(k);
+      volume_after = volume(i, h);
+      if (isSolid(i))
+        system.holdAngle(k);
+      else
+      {
+        const double area = volume_after / length;
+        length_after = length;
+        radius_after = std::sqrt(area / M_PI);
+        system.setEdge(k, 3.0 * mu * area / h, volume_after);
+        system.setSpin(k, 0.5 * model->density * volume_after * radius_after * radius_after / (h * h), h * work.spin[i]);
+      }
+    }
+    const bool has_joint = (i > first_ || offset_) && (i + 1 < n || work.ends[1].held);
+    if (has_joint && length_before + length_after > 0)
+    {
+      const double r = length_before > 0 && length_after > 0 ? 0.5 * (radius_before + radius_after) : std::max(radius_before, radius_after);
+      const double r4 = M_PI * r * r * r * r / (0.5 * (length_before + length_after));
+      system.setJoint(k, 0.75 * mu * r4 / h, 0.5 * mu * r4 / h);
+    }
+    const double mass = 0.5 * model->density * (volume_before + volume_after), weight = mass / (h * h);
+    system.setInertia(k, weight, work.x[i] + h * work.v[i], mass * inputs.gravity);
+    if (work.deposited[i] || endHeld(i))
+      system.holdNode(k);
+    length_before = length_after;
+    radius_before = radius_after;
+    volume_before = volume_after;
+  }
+  if (offset_)
+  {
+    system.holdNode(0);
+    system.holdAngle(0);
+  }
+  if (work.ends[1].held)
+  {
+    system.holdNode(lastInSystem() + 1);
+    system.holdAngle(lastInSystem());
+  }
+}
+
+/// First trial: motions go on as they were; what is held is where it will be.
+void ThreadStepper::Impl::setTrial(const ThreadInputs& inputs, double h)
+{
+  const int n = work.nodes(), last = lastInSystem();
+  for (int i = first_; i < n; ++i)
+    system.setNode(inSystem(i), work.x[i] + h * (work.deposited[i] ? inputs.belt_velocity : work.v[i]));
+  if (offset_)
+  {
+    const Eigen::Matrix3d section = end_poses[0].orientation.toRotationMatrix();
+    system.setNode(1, end_poses[0].position);
+    system.setNode(0, end_poses[0].position - section.col(0) * system.restLength(0));
+    system.setFrame(0, section.col(0), section.col(1));
+  }
+  if (work.ends[1].held)
+  {
+    const Eigen::Matrix3d section = end_poses[1].orientation.toRotationMatrix();
+    system.setNode(last, end_poses[1].position);
+    system.setNode(last + 1, end_poses[1].position - section.col(0) * system.restLength(last));
+    system.setFrame(last, -section.col(0), section.col(1));
+  }
+}
+
+StepFailure ThreadStepper::Impl::solve(const ThreadInputs& inputs, double h, StepReport& report)
+{
+  landed.assign(work.nodes(), 0);
+  do
+  {
+    const NewtonResult result = minimize(system, newton);
+    report.iterations += result.iterations;
+    report.factorizations += result.factorizations;
+    if (!result.ok())
+      return result.failure;
+    report.residual = result.residual;
+    report.max_strain = std::max(report.max_strain, result.max_strain);
+  } while (model->floor.present && land(inputs, h));
+  return StepFailure::none;
+}
+
+/// Height of a node whose section touches the floor.
+double ThreadStepper::Impl::restingHeight(int i) const
+{
+  if (!model->floor.touches_at_radius)
+    return model->floor.height;
+  const int last = work.edges() - 1;
+  return model->floor.height + 0.5 * (work.radius(std::max(i - 1, 0)) + work.radius(std::min(i, last)));
+}
+
+/// Stops the nodes that go through the floor where they meet it; from there they move with the belt. Those that get there first hold
+/// back the others, so these are looked at again after the next solution. No: there were none.
+bool ThreadStepper::Impl::land(const ThreadInputs& inputs, double h)
+{
+  constexpr double kTogether = 0.1;   // of the step
+  const int n = work.nodes();
+  const auto meets = [&](int i, double& when) {
+    if (work.deposited[i] || landed[i] || endHeld(i))
+      return false;
+    const double height = restingHeight(i), above = work.x[i].z() - height, after = system.node(inSystem(i)).z() - height;
+    if (after >= 0)
+      return false;
+    when = above > 0 ? above / (above - after) : 0.0;
+    return true;
+  };
+  double earliest = 2.0, when = 0.0;
+  for (int i = first_; i < n; ++i)
+    if (meets(i, when))
+      earliest = std::min(earliest, when);
+  if (earliest > 1.0)
+    return false;
+  system.accept();
+  for (int i = first_; i < n; ++i)
+    if (meets(i, when) && when <= earliest + kTogether)
+    {
+      const int k = inSystem(i);
+      Eigen::Vector3d x = work.x[i] + when * (system.node(k) - work.x[i]);
+      x.z() = std::max(x.z(), restingHeight(i));
+      system.setNode(k, x + (1.0 - when) * h * inputs.belt_velocity);
+      system.holdNode(k);
+      landed[i] = 1;
+    }
+  return true;
+}
+
+/// Takes the solution over.
+void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
+{
+  const int n = work.nodes(), last = lastInSystem();
+  const RodArrays& a = system.arrays();
+  for (int end = 0; end < 2; ++end)
+    if (work.ends[end].held && (end == 1 || offset_))
+      loads[end] = endLoad(end);
+  for (int i = 0; i < n; ++i)
+  {
+    if (work.deposited[i])
+    {
+      work.x[i] += h * inputs.belt_velocity;
+      work.v[i] = inputs.belt_velocity;
+      continue;
+    }
+    const Eigen::Vector3d x = system.node(inSystem(i));
+    work.v[i] = landed[i] ? inputs.belt_velocity : Eigen::Vector3d((x - work.x[i]) / h);
+    work.x[i] = x;
+    work.deposited[i] = landed[i];
+  }
+  for (int j = first_; j + 1 < n; ++j)
+  {
+    const int k = inSystem(j);
+    work.d1[j] = {a.d1[0][k], a.d1[1][k], a.d1[2][k]};
+    work.spin[j] = system.turn(k) / h;
+  }
+  for (int i = std::max(1, first_ + 1); i < n - 1; ++i)
+    work.twist[i] = a.twist[inSystem(i)];
+  if (offset_)
+    work.twist[0] = a.twist[1];
+  if (work.ends[1].held)
+  {
+    work.twist[n - 1] = a.twist[last];
+    work.v[n - 1] += flow_speed_ * (end_poses[1].orientation * Eigen::Vector3d::UnitX());
+    work.volume[n - 2] += fedVolume(h);
+    work.fed_volume += fedVolume(h);
+  }
+  for (int end = 0; end < 2; ++end)
+    if (work.ends[end].held)
+      work.ends[end].X_WE = end_poses[end];
+}
+
+EndLoad ThreadStepper::Impl::endLoad(int end) const
+{
+  const int node = end ? lastInSystem() : 1, inside = end ? node + 1 : 0, edge = end ? node : 0;
+  const Eigen::Vector4d at = system.reaction(node), beyond = system.reaction(inside);
+  const Eigen::Vector3d arm = system.node(inside) - system.node(node);
+  const Eigen::Vector3d tangent = (end ? -1.0 : 1.0) * (end_poses[end].orientation * Eigen::Vector3d::UnitX());
+  EndLoad load;
+  load.force = -(at + beyond).head<3>();
+  load.torque = -arm.cross(beyond.head<3>()) - system.reaction(edge)[3] * tangent;
+  return load;
+}
+
+/// Divides, joins and takes away edges; nothing of it when the step needs none.
+void ThreadStepper::Impl::remesh()
+{
+  const ThreadLimits& limits = model->limits;
+  const double feed = model->feed_length;
+  if (model->nozzle_diameter > 0 && work.ends[1].held)
+  {
+    // the edge at the nozzle grows from half a feed length to one and a half
+    for (double length = work.edge(work.edges() - 1).norm(); length >= 1.5 * feed; length = work.edge(work.edges() - 1).norm())
+      splitEdge(work, work.edges() - 1, feed / length);
+    if (work.edges() > 1 && !work.deposited[work.nodes() - 2] && work.edge(work.edges() - 1).norm() < 0.2 * feed)
+      removeNode(work, work.nodes() - 2);
+  }
+  for (int j = first_; j < work.edges(); ++j)
+  {
+    if (isSolid(j))
+      continue;
+    const double length = work.edge(j).norm();
+    if (length > limits.max_edge_length)
+      splitEdge(work, j--, 0.5);
+  }
+  for (int i = first_ + 1; i + 1 < work.nodes(); ++i)
+    if (!work.deposited[i] && std::min(work.edge(i - 1).norm(), work.edge(i).norm()) < limits.min_edge_length &&
+        (work.x[i + 1] - work.x[i - 1]).norm() < 0.9 * limits.max_edge_length)
+      removeNode(work, i--);
+
+  if (work.ends[0].held)
+    return;
+  int drop = 0;
+  while (drop + 2 < work.nodes() && !limits.scene.contains(work.x[drop]))
+    ++drop;
+  int deposited = 0;
+  while (deposited < work.nodes() && work.deposited[deposited])
+    ++deposited;
+  if (static_cast<std::size_t>(deposited) > limits.max_deposited)
+    drop = std::max(drop, deposited - static_cast<int>(limits.max_deposited));
+  dropOldest(work, drop);
+}
+
+}  // namespace slender

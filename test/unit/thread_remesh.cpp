@@ -1,0 +1,129 @@
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/geometry/rotation.h"
+#include "slender_sim/thread/thread_remesh.h"
+#include "test/support/threads.h"
+
+namespace slender::test {
+namespace {
+
+using Eigen::Vector3d;
+
+double twistSum(const ThreadState& s)
+{
+  double sum = 0.0;
+  for (const double m : s.twist)
+    sum += m;
+  return sum;
+}
+
+/// The twist that the frames show at a joint, modulo whole turns.
+double shownTwist(const ThreadState& s, int i)
+{
+  const Vector3d a = s.edge(i - 1).normalized(), b = s.edge(i).normalized();
+  return signedAngle(parallelTransport(s.d1[i - 1], a, b), s.d1[i], b);
+}
+
+TEST(ThreadRemesh, SplittingConservesVolumeAndMomentum)
+{
+  Random random(1);
+  for (int j = 0; j < 8; ++j)
+  {
+    ThreadState s = wigglyThread(9, random);
+    const double volume = s.totalVolume();
+    const Vector3d momentum = momentumOf(s);
+    splitEdge(s, j, 0.4);
+    EXPECT_EQ(s.nodes(), 10);
+    EXPECT_EQ(s.edges(), 9);
+    EXPECT_NEAR(s.totalVolume(), volume, 1e-15 * volume * 10);
+    EXPECT_LT((momentumOf(s) - momentum).norm(), 1e-14);
+    EXPECT_EQ(s.id[j + 1], 9u);
+    EXPECT_EQ(s.next_id, 10u);
+  }
+}
+
+TEST(ThreadRemesh, JoiningConservesVolumeAndMomentum)
+{
+  Random random(2);
+  for (int i = 1; i < 8; ++i)
+  {
+    ThreadState s = wigglyThread(9, random);
+    const double volume = s.totalVolume();
+    const Vector3d momentum = momentumOf(s);
+    removeNode(s, i);
+    EXPECT_EQ(s.nodes(), 8);
+    EXPECT_NEAR(s.totalVolume(), volume, 1e-15 * volume * 10);
+    EXPECT_LT((momentumOf(s) - momentum).norm(), 1e-14);
+    EXPECT_EQ(s.twist.front(), 0.0);
+    EXPECT_EQ(s.twist.back(), 0.0);
+  }
+}
+
+TEST(ThreadRemesh, SplitNodesLieOnTheCubicAndRadiiOnTheQuadratic)
+{
+  // a cubic curve whose chords are so short that arc length and parameter agree to the second order
+  const int n = 8;
+  double errors[2];
+  for (int k = 0; k < 2; ++k)
+  {
+    const double d = k ? 0.05 : 0.1;
+    Eigen::Matrix3Xd x(3, n);
+    Eigen::VectorXd radii(n - 1);
+    for (int i = 0; i < n; ++i)
+      x.col(i) = Vector3d(std::cos(i * d), std::sin(i * d), 0);
+    for (int j = 0; j + 1 < n; ++j)
+      radii[j] = 0.01 * (1 + (j + 0.5) * d * (j + 0.5) * d);
+    ThreadState s = makeThread(x, radii);
+    splitEdge(s, 3, 0.5);
+    errors[k] = std::abs(s.x[4].norm() - 1.0);
+    EXPECT_NEAR(s.radius(3) / s.radius(4), (1 + 3.25 * d * 3.25 * d) / (1 + 3.75 * d * 3.75 * d), 1e-3);
+    EXPECT_LT(s.radius(3), s.radius(4));
+  }
+  EXPECT_LT(errors[0], 1e-5);   // the chord's middle would be 1.2e-3 off
+  EXPECT_LT(errors[1], errors[0] / 12);
+}
+
+TEST(ThreadRemesh, FramesAndTwistsStayTogether)
+{
+  Random random(4);
+  ThreadState s = wigglyThread(12, random);
+  const double sum = twistSum(s);
+  // no turn is lost where the curve stays as it is
+  Eigen::Matrix3Xd line(3, 6);
+  for (int i = 0; i < 6; ++i)
+    line.col(i) = Vector3d(i * (1 + 0.1 * i), 0, 0);
+  ThreadState straight = makeThread(line, Eigen::VectorXd::Constant(5, 0.1));
+  for (int i = 1; i < 5; ++i)
+    straight.twist[i] = 2.5 * i;
+  const double turns = twistSum(straight);
+  for (int j = 0; j < 8; j += 2)
+    splitEdge(straight, j, 0.3);
+  removeNode(straight, 2);
+  removeNode(straight, 5);
+  EXPECT_NEAR(twistSum(straight), turns, 1e-12);
+
+  for (int j = 1; j < 12; j += 3)
+    splitEdge(s, j, 0.6);
+  removeNode(s, 4);
+  EXPECT_NEAR(twistSum(s), sum, 1e-12);
+  for (int i = 1; i + 1 < s.nodes(); ++i)
+    EXPECT_NEAR(std::remainder(shownTwist(s, i) - s.twist[i], 2 * M_PI), 0.0, 0.12) << i;   // up to the holonomy of the new corners
+}
+
+TEST(ThreadRemesh, DroppingCountsTheVolume)
+{
+  Random random(5);
+  ThreadState s = wigglyThread(9, random);
+  const double volume = s.totalVolume();
+  dropOldest(s, 3);
+  EXPECT_EQ(s.nodes(), 6);
+  EXPECT_EQ(s.firstId(), 3u);
+  EXPECT_NEAR(s.totalVolume() + s.dropped_volume, volume, 1e-15);
+  dropOldest(s, 100);
+  EXPECT_EQ(s.nodes(), 2);
+}
+
+}  // namespace
+}  // namespace slender::test
