@@ -28,6 +28,7 @@ void runPeerCases(StudyContext&);
 void runTrouton(StudyContext&);
 void runThreadTwist(StudyContext&);
 void runRetraction(StudyContext&);
+void runFiberExtrusion(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -57,6 +58,7 @@ const std::vector<Study>& studies()
       {"trouton", "straight viscous threads stretched by plates and by their weight", runTrouton},
       {"thread_twist", "torque of straight viscous threads twisted at a steady rate", runThreadTwist},
       {"retraction", "a free viscous thread drawn together by surface tension", runRetraction},
+      {"fiber_extrusion", "a viscous thread drawn steadily from a nozzle by a roll", runFiberExtrusion},
   };
   return all;
 }

@@ -94,8 +94,8 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
   flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
   // no more than an edge leaves the nozzle at a time
   const double longest = flow_speed_ > 0 ? std::min(duration, model->feed_length / flow_speed_) : duration;
-  double t = 0.0, h = duration / std::ceil(duration / longest * (1 - 1e-9));
-  int cuts = 0;   // since the last good substep
+  const double first = duration / std::ceil(duration / longest * (1 - 1e-9)), shortest = std::ldexp(first, -newton.max_cuts);
+  double t = 0.0, h = first;
   while (t < duration)
   {
     const bool last = t + h > duration * (1 - 1e-9);
@@ -105,7 +105,7 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
     report.merge(sub);
     if (failure != StepFailure::none)
     {
-      if (++cuts > newton.max_cuts)
+      if (0.5 * length < shortest * (1 - 1e-9))
         return refuse(report, failure, explainFailure(failure, length));
       ++report.cut_steps;
       h = 0.5 * length;
@@ -113,8 +113,7 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
     }
     ++report.substeps;
     t = last ? duration : t + length;
-    cuts = 0;
-    h = std::min(2.0 * length, longest);
+    h = std::min(2.0 * length, first);
   }
   std::swap(state, work);
   return report;

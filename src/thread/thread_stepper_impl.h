@@ -46,6 +46,7 @@ private:
   /// Where a held end goes on this substep.
   Pose endPose(int end, const ThreadInputs& inputs, double fraction) const;
   double restingHeight(int node) const;
+  double deformingShare(int j) const;
 
   int inSystem(int node) const { return node - first_ + offset_; }
   int lastInSystem() const { return inSystem(work.nodes() - 1); }

@@ -56,12 +56,24 @@ bool ThreadStepper::Impl::loadSystem(double h)
   return system.takeRestStrains().min_chi > kFoldedChi;
 }
 
+/// The part of an edge that is not yet below the floor: on a roll that draws the thread down, the edge between the last node taken up and
+/// the first one above stretches only there. So a node stiffens gradually as it comes down, and results do not jump when it arrives.
+double ThreadStepper::Impl::deformingShare(int j) const
+{
+  constexpr double kLeast = 1e-3;
+  if (work.deposited[j] == work.deposited[j + 1])
+    return 1.0;
+  const int low = work.deposited[j] ? j : j + 1, high = work.deposited[j] ? j + 1 : j;
+  const double below = restingHeight(low) - work.x[low].z(), above = work.x[high].z() - restingHeight(high);
+  return below > 0 && above > 0 ? std::max(above / (above + below), kLeast) : 1.0;
+}
+
 /// Viscous stiffnesses over the step (thesis 5.3.2), surface tension, inertia and loads; and what is held.
 void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
 {
   const int n = work.nodes();
   const double mu = model->viscosityAt(0.0);
-  system.setSurfaceTension(model->surface_tension);
+  system.setSurfaceTension(model->surface_tension, model->surface_shape);
   // of the edge before the node: solid parts end a joint in a clamped section, whose half of the joint has no length
   double length_before = 0.0, radius_before = 0.0, volume_before = 0.0;
   for (int i = first_; i < n; ++i)
@@ -76,10 +88,11 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
         system.holdAngle(k);
       else
       {
-        const double area = volume_after / length;
-        length_after = length;
+        const double area = volume_after / length, share = deformingShare(i);
+        system.setEdge(k, 3.0 * mu * area / (h * share), volume_after);
+        length_after = share * length;
+        volume_after *= share;
         radius_after = std::sqrt(area / M_PI);
-        system.setEdge(k, 3.0 * mu * area / h, volume_after);
         system.setSpin(k, 0.5 * model->density * volume_after * radius_after * radius_after / (h * h), h * work.spin[i]);
       }
     }
@@ -90,9 +103,10 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
       const double r4 = M_PI * r * r * r * r / (0.5 * (length_before + length_after));
       system.setJoint(k, 0.75 * mu * r4 / h, 0.5 * mu * r4 / h);
     }
-    const double mass = 0.5 * model->density * (volume_before + volume_after), weight = mass / (h * h);
-    system.setInertia(k, weight, work.x[i] + h * work.v[i], mass * inputs.gravity);
-    if (work.deposited[i] || endHeld(i))
+    const double mass = 0.5 * model->density * (volume_before + volume_after);
+    const bool held = work.deposited[i] || endHeld(i);
+    system.setInertia(k, held ? 0.0 : mass / (h * h), work.x[i] + h * work.v[i], mass * inputs.gravity);
+    if (held)
       system.holdNode(k);
     length_before = length_after;
     radius_before = radius_after;

@@ -18,7 +18,7 @@ double ThreadSystem::addSurface(bool with_hessian)
   {
     const bool before = i > 0 && volume_[i - 1] > 0, after = i < a_.edges && volume_[i] > 0;
     if (before && after)
-      add(i, coneArea(length(i - 1), volume_[i - 1], length(i), volume_[i]));
+      add(i, surfaceArea(shape_, length(i - 1), volume_[i - 1], length(i), volume_[i]));
     else if (before)
       add(i, endArea(length(i - 1), volume_[i - 1]));
     else if (after)

@@ -14,7 +14,8 @@ TEST(SurfaceTension, AConeHasItsArea)
 {
   // radii 1 and 2 over a height of 3 (half of each length)
   const double L1 = 2.5, L2 = 3.5;
-  EXPECT_NEAR(coneArea(L1, M_PI * L1, L2, 4 * M_PI * L2).value, M_PI * 3 * std::sqrt(9.0 + 1.0), 1e-12);
+  EXPECT_NEAR(surfaceArea(SurfaceShape::cone, L1, M_PI * L1, L2, 4 * M_PI * L2).value, M_PI * 3 * std::sqrt(9.0 + 1.0), 1e-12);
+  EXPECT_NEAR(surfaceArea(SurfaceShape::cylinder, L1, M_PI * L1, L2, 4 * M_PI * L2).value, M_PI * 3 * 3, 1e-12);
   EXPECT_NEAR(endArea(2.0, M_PI * 2.0).value, M_PI * 2.0, 1e-12);
 }
 
@@ -23,9 +24,11 @@ TEST(SurfaceTension, DerivativesMatchDifferences)
   Random random(3);
   for (int k = 0; k < 20; ++k)
   {
+    const SurfaceShape shape = k % 2 ? SurfaceShape::cone : SurfaceShape::cylinder;
+    const auto area = [&](double l1, double v1, double l2, double v2) { return surfaceArea(shape, l1, v1, l2, v2); };
     const double L1 = random.uniform(0.5, 2), L2 = random.uniform(0.5, 2), V1 = random.uniform(0.1, 3), V2 = random.uniform(0.1, 3), d = 1e-5;
-    const LengthFunction f = coneArea(L1, V1, L2, V2), p1 = coneArea(L1 + d, V1, L2, V2), m1 = coneArea(L1 - d, V1, L2, V2),
-                         p2 = coneArea(L1, V1, L2 + d, V2), m2 = coneArea(L1, V1, L2 - d, V2);
+    const LengthFunction f = area(L1, V1, L2, V2), p1 = area(L1 + d, V1, L2, V2), m1 = area(L1 - d, V1, L2, V2),
+                         p2 = area(L1, V1, L2 + d, V2), m2 = area(L1, V1, L2 - d, V2);
     EXPECT_NEAR(f.d1, (p1.value - m1.value) / (2 * d), 1e-8);
     EXPECT_NEAR(f.d2, (p2.value - m2.value) / (2 * d), 1e-8);
     EXPECT_NEAR(f.d11, (p1.d1 - m1.d1) / (2 * d), 1e-7);
@@ -42,7 +45,7 @@ TEST(SurfaceTension, AUniformThreadPullsWithPiGammaRadius)
 {
   // dE/dL of n equal edges that all lengthen alike
   const double r = 0.3, L = 0.7, V = M_PI * r * r * L;
-  const LengthFunction cone = coneArea(L, V, L, V);
+  const LengthFunction cone = surfaceArea(SurfaceShape::cone, L, V, L, V);
   EXPECT_NEAR(cone.d1 + cone.d2, M_PI * r, 1e-12);
   EXPECT_NEAR(2 * endArea(L, V).d1, M_PI * r, 1e-12);
 }
@@ -66,7 +69,7 @@ struct Equations
     for (int j = 0; j + 1 < n; ++j)
       system.setFrame(j, state.edge(j).normalized(), state.d1[j]);
     system.takeRestStrains();
-    system.setSurfaceTension(gamma);
+    system.setSurfaceTension(gamma, SurfaceShape::cone);
     for (int i = 0; i < n; ++i)
     {
       // the forces differ from one Equations to the next, and with them the Newton direction

@@ -14,23 +14,31 @@ struct LengthFunction
 
 inline double edgeRadius(double volume, double length) { return std::sqrt(volume / (M_PI * length)); }
 
-/// Area [m^2] of the truncated cone between the middles of two consecutive edges, pi (r1 + r2) sqrt(l^2 + (r2 - r1)^2) with
-/// l = (L1 + L2) / 2. Lengths L1, L2 [m] and volumes V1, V2 [m^3] positive.
-inline LengthFunction coneArea(double L1, double V1, double L2, double V2)
+/// What lies between the middles of two consecutive edges.
+enum class SurfaceShape
+{
+  cone,      ///< a truncated cone: pi (r1 + r2) sqrt(l^2 + (r2 - r1)^2) with l = (L1 + L2) / 2, as in the thesis
+  cylinder,  ///< pi (r1 + r2) l: leaves out the slope of the surface, so that the tension is pi gamma r as in slender theory
+};
+
+/// Area [m^2] around a node. Lengths L1, L2 [m] and volumes V1, V2 [m^3] of its edges positive.
+inline LengthFunction surfaceArea(SurfaceShape shape, double L1, double V1, double L2, double V2)
 {
   const double a = edgeRadius(V1, L1), b = edgeRadius(V2, L2);
   const double a1 = -0.5 * a / L1, a11 = 0.75 * a / (L1 * L1), b2 = -0.5 * b / L2, b22 = 0.75 * b / (L2 * L2);
-  const double sum = a + b, difference = b - a, l = 0.5 * (L1 + L2), slant = std::sqrt(l * l + difference * difference);
-  const double s1 = (0.5 * l - difference * a1) / slant, s2 = (0.5 * l + difference * b2) / slant;
-  const double s11 = (0.25 + a1 * a1 - difference * a11 - s1 * s1) / slant;
-  const double s22 = (0.25 + b2 * b2 + difference * b22 - s2 * s2) / slant;
-  const double s12 = (0.25 - a1 * b2 - s1 * s2) / slant;
-  return {M_PI * sum * slant,
-          M_PI * (a1 * slant + sum * s1),
-          M_PI * (b2 * slant + sum * s2),
-          M_PI * (a11 * slant + 2 * a1 * s1 + sum * s11),
+  const double slope = shape == SurfaceShape::cone ? 1.0 : 0.0;
+  const double sum = a + b, d = slope * (b - a), d1 = -slope * a1, d2 = slope * b2, d11 = -slope * a11, d22 = slope * b22;
+  const double l = 0.5 * (L1 + L2), s = std::sqrt(l * l + d * d);   // slant height
+  const double s1 = (0.5 * l + d * d1) / s, s2 = (0.5 * l + d * d2) / s;
+  const double s11 = (0.25 + d1 * d1 + d * d11 - s1 * s1) / s;
+  const double s22 = (0.25 + d2 * d2 + d * d22 - s2 * s2) / s;
+  const double s12 = (0.25 + d1 * d2 - s1 * s2) / s;
+  return {M_PI * sum * s,
+          M_PI * (a1 * s + sum * s1),
+          M_PI * (b2 * s + sum * s2),
+          M_PI * (a11 * s + 2 * a1 * s1 + sum * s11),
           M_PI * (a1 * s2 + b2 * s1 + sum * s12),
-          M_PI * (b22 * slant + 2 * b2 * s2 + sum * s22)};
+          M_PI * (b22 * s + 2 * b2 * s2 + sum * s22)};
 }
 
 /// Area [m^2] of the half of an end edge that no node's cone covers: a cylinder, pi r L. Without it the last edge would bear half the

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "slender_sim/energy/surface_tension.h"
 #include "slender_sim/thread/thread_state.h"
 
 namespace slender {
@@ -35,6 +36,7 @@ struct ThreadModel
   double density = 1000.0;          ///< [kg/m^3]
   double viscosity = 1.0;           ///< dynamic, mu [Pa s]
   double surface_tension = 0.0;     ///< gamma [N/m]
+  SurfaceShape surface_shape = SurfaceShape::cone;
   double nozzle_diameter = 0.0;     ///< [m]; 0: no nozzle
   double feed_length = 0.0;         ///< [m] of the edges that leave the nozzle
   ThreadFloor floor;

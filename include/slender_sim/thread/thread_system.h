@@ -41,7 +41,11 @@ public:
   void setEdge(int j, double modulus, double volume);
   /// Bending and twisting of a joint, divided by its length [N m].
   void setJoint(int i, double bend, double twist) { a_.b11[i] = a_.b22[i] = bend, a_.beta[i] = twist; }
-  void setSurfaceTension(double gamma) { gamma_ = gamma; }
+  void setSurfaceTension(double gamma, SurfaceShape shape)
+  {
+    gamma_ = gamma;
+    shape_ = shape;
+  }
   /// Inertia and loads of node i: 1/2 weight |x - target|^2 - force . x.
   void setInertia(int i, double weight, const Eigen::Vector3d& target, const Eigen::Vector3d& force);
   /// Inertia of edge j's turn since the start of the step: 1/2 weight (turn - target)^2.
@@ -93,6 +97,7 @@ private:
   std::vector<double> volume_, spin_weight_, spin_target_, turn_base_;
   std::vector<char> held_;
   double gamma_ = 0;
+  SurfaceShape shape_ = SurfaceShape::cone;
   double max_modulus_ = 0, min_rest_length_ = 0;
 };
 
