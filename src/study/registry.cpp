@@ -29,6 +29,8 @@ void runTrouton(StudyContext&);
 void runThreadTwist(StudyContext&);
 void runRetraction(StudyContext&);
 void runFiberExtrusion(StudyContext&);
+void runDraggedCatenary(StudyContext&);
+void runCoiling(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -59,6 +61,8 @@ const std::vector<Study>& studies()
       {"thread_twist", "torque of straight viscous threads twisted at a steady rate", runThreadTwist},
       {"retraction", "a free viscous thread drawn together by surface tension", runRetraction},
       {"fiber_extrusion", "a viscous thread drawn steadily from a nozzle by a roll", runFiberExtrusion},
+      {"dragged_catenary", "a viscous thread that falls onto a fast belt, with and without surface tension", runDraggedCatenary},
+      {"coiling", "a viscous thread that coils: frequency and radius against height, up and down", runCoiling},
   };
   return all;
 }

@@ -24,7 +24,7 @@ void checkThreadModel(const ThreadModel& model)
   check(limits.max_edge_length > 0, "limits.max_edge_length", limits.max_edge_length, "positive [m]");
   check(limits.min_edge_length >= 0 && limits.min_edge_length <= 0.4 * limits.max_edge_length, "limits.min_edge_length", limits.min_edge_length,
         "zero to 0.4 limits.max_edge_length [m]");
-  check(limits.max_deposited >= 4, "limits.max_deposited", static_cast<double>(limits.max_deposited), "4 or more nodes");
+  check(limits.max_deposited >= 4, "limits.max_deposited", limits.max_deposited, "4 or more nodes");
 }
 
 ThreadState makeThread(const Eigen::Matrix3Xd& nodes, const Eigen::VectorXd& radii, const Eigen::Vector3d& director)

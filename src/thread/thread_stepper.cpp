@@ -14,6 +14,7 @@ ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const New
 }
 ThreadStepper::~ThreadStepper() = default;
 ThreadStepper::ThreadStepper(ThreadStepper&&) noexcept = default;
+ThreadStepper& ThreadStepper::operator=(ThreadStepper&&) noexcept = default;
 
 StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, double duration)
 {

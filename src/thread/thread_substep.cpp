@@ -292,11 +292,11 @@ void ThreadStepper::Impl::remesh()
   int drop = 0;
   while (drop + 2 < work.nodes() && !limits.scene.contains(work.x[drop]))
     ++drop;
-  int deposited = 0;
-  while (deposited < work.nodes() && work.deposited[deposited])
-    ++deposited;
-  if (static_cast<std::size_t>(deposited) > limits.max_deposited)
-    drop = std::max(drop, deposited - static_cast<int>(limits.max_deposited));
+  int youngest = work.nodes() - 1;
+  while (youngest >= 0 && !work.deposited[youngest])
+    --youngest;
+  if (youngest > limits.max_deposited)
+    drop = std::max(drop, youngest - limits.max_deposited);
   dropOldest(work, drop);
 }
 

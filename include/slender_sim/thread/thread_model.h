@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <limits>
 #include <string>
 
@@ -24,7 +23,7 @@ struct ThreadLimits
 {
   double max_edge_length = std::numeric_limits<double>::infinity();   ///< [m] longer edges are divided
   double min_edge_length = 0.0;                                       ///< [m] shorter edges are joined to a neighbour
-  std::size_t max_deposited = std::numeric_limits<std::size_t>::max();   ///< nodes on the floor; beyond, the oldest are dropped
+  int max_deposited = std::numeric_limits<int>::max();   ///< nodes older than the youngest one on the floor; more are dropped
   Eigen::AlignedBox3d scene = Eigen::AlignedBox3d(Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity()),
                                                   Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));   ///< the old end is dropped outside
 };

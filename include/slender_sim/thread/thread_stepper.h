@@ -35,6 +35,7 @@ public:
   ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton);
   ~ThreadStepper();
   ThreadStepper(ThreadStepper&&) noexcept;
+  ThreadStepper& operator=(ThreadStepper&&) noexcept;
 
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(ThreadState& state, const ThreadInputs& inputs, double duration);

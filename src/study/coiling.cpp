@@ -1,0 +1,323 @@
+// A thread that coils on a still floor: frequency and radius against the height of the nozzle, going up and then down (thesis 5.5,
+// Fig. 5.2; coiling_grid.csv: steady coils in the rotating frame after Ribe 2004, with their linear stability).
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "rod_cases.h"
+#include "thread_cases.h"
+
+namespace slender::study {
+namespace {
+
+constexpr double kDensity = 5e-4, kMu = 0.2, kGravity = 9.81, kDiameter = 0.09, kSpeed = 0.615, kBound = 0.05;
+
+struct Coil
+{
+  double height;
+  int branch;
+  double frequency, radius;   ///< [rad/s], [length]
+  bool stable;
+};
+
+const std::vector<Coil> kSteadyCoils = {
+    {0.507201, 1, 4.4687, 0.122618, true}, {0.634002, 1, 3.70373, 0.154652, true}, {0.760802, 1, 3.15657, 0.185737, true},
+    {1.0144, 1, 2.46022, 0.243917, true}, {1.268, 1, 2.06063, 0.294633, true}, {1.5216, 1, 1.81762, 0.336554, true},
+    {2.02881, 1, 1.56845, 0.394542, true}, {2.53601, 1, 1.48099, 0.422962, true}, {3.04321, 1, 1.45244, 0.438006, true},
+    {3.80401, 1, 1.40789, 0.464735, true}, {5.07201, 1, 1.33828, 0.518066, true}, {6.34002, 1, 1.27864, 0.580908, true},
+    {7.60802, 1, 1.22327, 0.655217, true}, {8.87602, 1, 1.17056, 0.741917, true}, {8.87602, 2, 1.58332, 0.523988, false},
+    {8.87602, 3, 2.17242, 0.391109, false}, {10.144, 1, 1.12071, 0.841106, true}, {10.144, 2, 1.36547, 0.658683, false},
+    {10.144, 3, 2.21377, 0.419419, true}, {11.412, 1, 1.07457, 0.951969, true}, {11.412, 2, 1.22319, 0.802343, false},
+    {11.412, 3, 2.19268, 0.461707, true}, {12.68, 1, 1.03395, 1.07127, true}, {12.68, 2, 1.1125, 0.966766, false},
+    {12.68, 3, 2.14709, 0.513016, true}, {13.4408, 1, 1.01584, 1.13984, true}, {13.4408, 2, 1.05135, 1.08437, false},
+    {13.4408, 3, 2.11474, 0.547196, true}, {14.2016, 3, 2.08222, 0.583099, true}, {14.2016, 4, 2.62635, 0.452274, false},
+    {14.2016, 5, 2.80935, 0.425179, false}, {15.216, 3, 2.04708, 0.630478, true}, {15.216, 4, 2.28625, 0.553847, false},
+    {15.216, 5, 2.91952, 0.439561, false}, {15.7232, 3, 2.04718, 0.648086, true}, {15.7232, 4, 2.15389, 0.609701, false},
+    {15.7232, 5, 2.92266, 0.453934, false}, {16.484, 5, 2.91164, 0.478118, false}, {17.752, 5, 2.88916, 0.519696, false},
+    {19.02, 7, 3.58178, 0.450486, false}, {20.2881, 7, 3.62038, 0.479742, false}, {21.5561, 7, 4.19514, 0.443383, true},
+    {22.8241, 7, 4.32729, 0.460894, true}, {25.3601, 7, 5.18498, 0.438022, true}, {27.8961, 7, 6.16143, 0.417628, true},
+    {30.4321, 7, 7.20815, 0.401075, true}, {34.2361, 7, 9.05614, 0.375635, true}, {38.0401, 7, 11.2567, 0.35079, true},
+    {44.3801, 7, 15.7612, 0.312942, true}, {50.7201, 7, 21.3624, 0.280522, true}};
+
+double heightUnit() { return std::cbrt(kMu * kMu / (kDensity * kDensity * kGravity)); }
+double frequencyUnit() { return std::cbrt(kGravity * kGravity * kDensity / kMu); }
+
+/// The stable coil at this height whose frequency is nearest; nullptr: there is none.
+const Coil* nearestStable(double height, double frequency)
+{
+  const Coil* best = nullptr;
+  for (const Coil& c : kSteadyCoils)
+    if (c.stable && std::abs(c.height / height - 1) < 1e-4 &&
+        (!best || std::abs(c.frequency - frequency) < std::abs(best->frequency - frequency)))
+      best = &c;
+  return best;
+}
+
+/// Heights of the table on the given branches, ascending, each once.
+std::vector<double> heightsOf(const std::vector<int>& branches)
+{
+  std::vector<double> heights;
+  for (const Coil& c : kSteadyCoils)
+    if (c.stable && std::count(branches.begin(), branches.end(), c.branch) && (heights.empty() || c.height > heights.back() * 1.0001))
+      heights.push_back(c.height);
+  return heights;
+}
+
+/// Where the thread touches down, seen from above: one point for every node that lands.
+class Trace
+{
+public:
+  explicit Trace(const ThreadState& s) : last_(youngest(s) < 0 ? s.next_id : s.id[youngest(s)]) {}
+  void look(const ThreadState& s, double time)
+  {
+    const int i = youngest(s);
+    if (i < 0 || s.id[i] == last_)
+      return;
+    last_ = s.id[i];
+    double angle = std::atan2(s.x[i].y(), s.x[i].x());
+    if (!angles_.empty())
+      angle += 2 * M_PI * std::nearbyint((angles_.back() - angle) / (2 * M_PI));
+    times_.push_back(time);
+    angles_.push_back(angle);
+    radii_.push_back(std::hypot(s.x[i].x(), s.x[i].y()));
+  }
+  /// Slope of the angle by least squares [rad/s], 0 before there are three points.
+  double frequency() const
+  {
+    const std::size_t n = times_.size();
+    if (n < 3)
+      return 0.0;
+    const double t = mean(times_), a = mean(angles_);
+    double ta = 0, tt = 0;
+    for (std::size_t k = 0; k < n; ++k)
+    {
+      ta += (times_[k] - t) * (angles_[k] - a);
+      tt += (times_[k] - t) * (times_[k] - t);
+    }
+    return std::abs(ta / tt);
+  }
+  double radius() const { return mean(radii_); }
+  /// Standard deviation of the radius over its mean: zero for a circle about the nozzle's axis.
+  double unsteadiness() const
+  {
+    double sum = 0.0;
+    for (const double r : radii_)
+      sum += (r - radius()) * (r - radius());
+    return std::sqrt(sum / static_cast<double>(radii_.size())) / radius();
+  }
+  double perTurn() const { return 2 * M_PI * static_cast<double>(angles_.size() - 1) / std::abs(angles_.back() - angles_.front()); }
+  double turns() const { return angles_.empty() ? 0.0 : std::abs(angles_.back() - angles_.front()) / (2 * M_PI); }
+
+private:
+  static int youngest(const ThreadState& s)
+  {
+    int i = s.nodes() - 1;
+    while (i >= 0 && !s.deposited[i])
+      --i;
+    return i;
+  }
+  static double mean(const std::vector<double>& v)
+  {
+    double sum = 0.0;
+    for (const double x : v)
+      sum += x;
+    return sum / static_cast<double>(v.size());
+  }
+  std::uint64_t last_;
+  std::vector<double> times_, angles_, radii_;
+};
+
+class Pouring
+{
+public:
+  /// Radius and frequency: a first guess, for the resolution.
+  Pouring(double height, double radius, double frequency, double step_angle, double per_turn)
+    : step_angle_(step_angle), per_turn_(per_turn), frequency_(frequency)
+  {
+    resolve(height, radius, frequency);
+    thread_ = nozzleThread(model_, {0, 0, height}, kSpeed);
+    thread_.inputs.gravity = {0, 0, -kGravity};
+    // a perfectly straight thread would stand on the floor as a column
+    thread_.state.x[0].x() += 0.1 * model_.feed_length;
+    thread_.state.v[0].y() += 0.02 * kSpeed;
+  }
+
+  /// Moves the nozzle there, slowly.
+  void raise(double height)
+  {
+    ThreadStepper stepper = makeStepper(thread_);
+    const double from = thread_.inputs.ends[1].position.z(), rate = 0.03 * kSpeed * (1 + from);
+    const int steps = static_cast<int>(std::ceil(std::abs(height - from) / (rate * step())));
+    for (int k = 1; k <= steps; ++k)
+    {
+      thread_.inputs.ends[1].position.z() = from + (height - from) * k / steps;
+      advance(stepper, thread_, step(), "coiling");
+    }
+  }
+  /// Lets it coil for some turns, then measures some more.
+  Trace observe(double settling_turns, double turns)
+  {
+    ThreadStepper stepper = makeStepper(thread_);
+    const double height = thread_.inputs.ends[1].position.z();
+    for (double settled = 0; settled < settling_turns;)
+    {
+      Trace trace(thread_.state);
+      const double end = thread_.time + 4 * M_PI / frequency_;
+      while (thread_.time < end)
+      {
+        advance(stepper, thread_, step(), "coiling");
+        trace.look(thread_.state, thread_.time);
+      }
+      settled += 2;
+      if (trace.frequency() > 0)
+      {
+        frequency_ = trace.frequency();
+        resolve(height, trace.radius(), frequency_);
+        thread_.model = model_;
+        stepper = makeStepper(thread_);
+      }
+    }
+    Trace trace(thread_.state);
+    const double end = thread_.time + 2 * M_PI * turns / frequency_;
+    while (thread_.time < end)
+    {
+      advance(stepper, thread_, step(), "coiling");
+      trace.look(thread_.state, thread_.time);
+    }
+    return trace;
+  }
+  const ThreadSetup& thread() const { return thread_; }
+  double step() const { return step_angle_ / frequency_; }
+
+private:
+  /// Edges that make `per_turn` of a turn of the coil; long ones are divided on their way down.
+  void resolve(double height, double radius, double frequency)
+  {
+    const double edge = 2 * M_PI * radius / per_turn_;
+    model_.name = "coiling";
+    model_.density = kDensity;
+    model_.viscosity = kMu;
+    model_.nozzle_diameter = kDiameter;
+    model_.feed_length = std::min({edge, edge * kSpeed / (radius * frequency), 0.1 * height});
+    model_.limits.max_edge_length = 1.5 * edge;
+    model_.limits.max_deposited = static_cast<int>(3 * per_turn_);
+    model_.floor = {true, 0.0, false};
+  }
+  double step_angle_, per_turn_, frequency_;
+  ThreadModel model_;
+  ThreadSetup thread_;
+};
+
+double median(std::vector<double> v)
+{
+  std::sort(v.begin(), v.end());
+  const std::size_t n = v.size();
+  return n % 2 ? v[n / 2] : 0.5 * (v[n / 2 - 1] + v[n / 2]);
+}
+
+/// What all heights add to.
+struct Results
+{
+  Plot &frequency_plot, &radius_plot;
+  std::vector<double> frequency_errors, radius_errors;
+
+  void plot(const std::string& label, double height, double frequency, double radius, bool points)
+  {
+    for (Plot* p : {&frequency_plot, &radius_plot})
+    {
+      Series& s = p->at(label);
+      s.points = points;
+      s.x.push_back(height / heightUnit());
+      s.y.push_back(p == &frequency_plot ? frequency / frequencyUnit() : radius / heightUnit());
+    }
+  }
+};
+
+/// One height: measures, compares, plots. Returns the branch.
+int record(StudyContext& context, Pouring& pouring, double height, const std::string& way, double settling_turns, Results& results)
+{
+  const Trace trace = pouring.observe(settling_turns, 4);
+  const double frequency = trace.frequency(), radius = trace.radius();
+  Row& row = context.row();
+  row.set("way", way).set("H", height).set("H_nd", height / heightUnit()).set("Omega", frequency).set("R", radius);
+  row.set("Omega_nd", frequency / frequencyUnit()).set("R_nd", radius / heightUnit()).set("unsteadiness", trace.unsteadiness());
+  row.set("nodes", pouring.thread().state.nodes()).set("nodes_per_turn", trace.perTurn()).set("step", pouring.step());
+  const Coil* coil = nearestStable(height, frequency);
+  int branch = 0;
+  if (coil)
+  {
+    branch = coil->branch;
+    results.frequency_errors.push_back(std::abs(frequency / coil->frequency - 1));
+    results.radius_errors.push_back(std::abs(radius / coil->radius - 1));
+    row.set("branch", branch).set("Omega_steady", coil->frequency).set("Omega_error", frequency / coil->frequency - 1);
+    row.set("R_steady", coil->radius).set("R_error", radius / coil->radius - 1);
+  }
+  results.plot(way, height, frequency, radius, false);
+  return branch;
+}
+
+}  // namespace
+
+void runCoiling(StudyContext& context)
+{
+  Results results{context.plot("coiling_frequency", "Coiling frequency against height", "H / H*", "Omega / Omega*"),
+                  context.plot("coiling_radius", "Coil radius against height", "H / H*", "R / H*"), {}, {}};
+  std::vector<double> heights = heightsOf({1, 3}), inertial = heightsOf({7});
+  if (context.quick())   // every third, but all where branches meet
+  {
+    std::vector<double> some;
+    for (std::size_t k = 0; k < heights.size(); ++k)
+      if (k % 3 == 0 || heights[k] > 10)
+        some.push_back(heights[k]);
+    heights = some;
+    inertial = {inertial[1]};
+  }
+  const double step_angle = context.quick() ? 0.04 : 0.02, per_turn = context.quick() ? 20 : 30;
+  const int total = static_cast<int>(2 * heights.size() + inertial.size());
+  int done = 0;
+  const auto progress = [&](const std::string& way, double height) {
+    context.progress(done++, total, way + " to H = " + std::to_string(height));
+  };
+
+  double jump_up = 0, jump_down = 0;
+  Pouring pouring(heights.front(), 0.12, 4.5, step_angle, per_turn);
+  int before = 0;
+  for (const double height : heights)
+  {
+    progress("up", height);
+    pouring.raise(height);
+    const int branch = record(context, pouring, height, "up", height > 10 ? 30 : 12, results);
+    if (before == 1 && branch == 3)
+      jump_up = height;
+    before = branch;
+  }
+  for (auto height = heights.rbegin(); height != heights.rend(); ++height)
+  {
+    progress("down", *height);
+    pouring.raise(*height);
+    const int branch = record(context, pouring, *height, "down", *height > 8 ? 30 : 12, results);
+    if (before == 3 && branch == 1)
+      jump_down = *height;
+    before = branch;
+  }
+  for (const double height : inertial)
+  {
+    progress("inertial", height);
+    Pouring high(height, 0.4, 8e-3 * height * height, step_angle, per_turn);
+    record(context, high, height, "inertial", 30, results);
+  }
+
+  for (const Coil& c : kSteadyCoils)
+    results.plot(c.stable ? "steady, stable" : "steady, unstable", c.height, c.frequency, c.radius, true);
+  const double frequency = median(results.frequency_errors), radius = median(results.radius_errors);
+  context.row().set("way", "median relative error of Omega").check(frequency, 0.0, kBound, "steady coils on their stable branches");
+  context.row().set("way", "median relative error of R").check(radius, 0.0, kBound, "the same");
+  context.metric("median_relative_error_frequency", frequency);
+  context.metric("median_relative_error_radius", radius);
+  context.metric("worst_relative_error_frequency", *std::max_element(results.frequency_errors.begin(), results.frequency_errors.end()));
+  context.metric("jump_up_at_H", jump_up);
+  context.metric("jump_down_at_H", jump_down);
+}
+
+}  // namespace slender::study
