@@ -101,11 +101,11 @@ rods:
   - name: spring
     centerline: {helix: {axis: [0, 0, -1], radius: 0.02, pitch: 0.01, turns: 2, edges: 19}}
     cross_section: {radius: 0.0005}
-    material: {linear_density: 0.04, youngs_modulus: 5.0e8, poissons_ratio: 0.3}
+    material: {linear_density: 0.04, youngs_modulus: 3.0e9, poissons_ratio: 0.3}
     stretching: projected
     grasps: {top: {edges: [0]}}
 bodies:
-  - {name: bob, mass: 0.1, inertia: [2.0e-5, 2.0e-5, 2.0e-5], shape: {sphere: {radius: 0.015}}, pose: {position: [0.02, 0, -0.03]}, contact: false, welds: [{rod: spring, edge: -1}]}
+  - {name: bob, mass: 0.004, inertia: [1.0e-6, 1.0e-6, 1.0e-6], shape: {sphere: {radius: 0.015}}, pose: {position: [0.02, 0, -0.03]}, contact: false, welds: [{rod: spring, edge: -1}]}
 )"},
     {"4.10", "tree in the wind", 2158, 0.1, 0.87, kAbsent, 0.64, 21.0, 22.0, 100, R"(
 wind: {velocity: [12, 2, 0]}
