@@ -31,6 +31,8 @@ void runRetraction(StudyContext&);
 void runFiberExtrusion(StudyContext&);
 void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
+void runProjection(StudyContext&);
+void runRodTables(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -63,6 +65,8 @@ const std::vector<Study>& studies()
       {"fiber_extrusion", "a viscous thread drawn steadily from a nozzle by a roll", runFiberExtrusion},
       {"dragged_catenary", "a viscous thread that falls onto a fast belt, with and without surface tension", runDraggedCatenary},
       {"coiling", "a viscous thread that coils: frequency and radius against height, up and down", runCoiling},
+      {"projection", "inextensible rope: length error and iterations of fast projection; against stiff stretching, error against run time", runProjection},
+      {"rod_tables", "time per step of the thesis's rod examples, part by part, beside its table 4.1", runRodTables},
   };
   return all;
 }
