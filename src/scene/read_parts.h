@@ -51,6 +51,7 @@ std::optional<Pose> readPose(const YamlCursor& at);
 /// `pose` may be replaced by the shape (a plane by point and normal).
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
 std::optional<RodContact> readRodContact(const YamlCursor& at);
+std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context);
 ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodPart>& rods);

@@ -122,11 +122,13 @@ std::vector<YamlCursor> entriesOf(const YamlCursor& list) { return list.isList()
 /// All that has a place in space.
 void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
 {
-  const YamlCursor at_generate = map.get("generate"), at_rods = at_generate.present() ? map.get("rods") : map.require("rods");
+  const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads");
+  const YamlCursor at_rods = at_generate.present() || at_threads.present() ? map.get("rods") : map.require("rods");
   const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
   std::vector<RodPart> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<RodPart>{};
   Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
   takeGeneratedRods(generated, rods);
+  scene.threads = readThreads(at_threads, context);
   scene.contact = readContact(map.get("contact"), rods);
   scene.obstacles = readObstacles(at_obstacles, context);
   scene.bodies = readBodies(at_bodies, context, rods);
@@ -166,7 +168,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   if (tree.kind != YamlTree::Kind::map)
   {
     throw SceneError(name + ":" + std::to_string(std::max(1, tree.line)) + ": scene: is " + toString(tree.kind) +
-                     "; must be a map, at least with rods: [{...}]");
+                     "; must be a map, at least with rods: [{...}] or threads: [{...}]");
   }
   YamlMap map(root);
   const Range acceleration = Range::closed(-1e4, 1e4, "m/s^2"), speed = Range::closed(-1e3, 1e3, "m/s");

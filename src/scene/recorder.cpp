@@ -111,6 +111,10 @@ public:
     {
       recordRod(state.time, simulation.rodModel(static_cast<int>(r)), state.rods[r]);
     }
+    for (std::size_t k = 0; k < state.threads.size(); ++k)
+    {
+      recordThread(state.time, simulation.threadModel(static_cast<int>(k)).name, state.threads[k]);
+    }
     for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
     {
       const GraspRef& ref = simulation.grasps()[g];
@@ -141,9 +145,12 @@ public:
   {
     nodes_.close();
     grasps_.close();
-    if (bodies_)
+    for (auto* file : {&bodies_, &threads_})
     {
-      bodies_->close();
+      if (*file)
+      {
+        (*file)->close();
+      }
     }
   }
 
@@ -159,6 +166,26 @@ private:
       nodes_.vector(rod.d1.col(std::min(i, model.edges() - 1)), ',') << ',';
       nodes_.number(rod.twist[i]);
       nodes_.endLine();
+    }
+  }
+
+  void recordThread(double time, const std::string& name, const ThreadState& thread)
+  {
+    if (!threads_)
+    {
+      threads_.emplace(folder_ + "/threads.csv");
+      *threads_ << "t [s],object,thread,id,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],radius [m],deposited";
+      threads_->endLine();
+    }
+    for (int i = 0; i < thread.nodes(); ++i)
+    {
+      threads_->number(time) << ',' << name << ',';
+      threads_->number(thread.thread_id) << ',';
+      threads_->number(thread.id[i]) << ',';
+      threads_->vector(thread.x[i], ',') << ',';
+      threads_->vector(thread.v[i], ',') << ',';
+      threads_->number(thread.radius(std::min(i, thread.edges() - 1))) << (thread.deposited[i] ? ",1" : ",0");
+      threads_->endLine();
     }
   }
 
@@ -182,7 +209,7 @@ private:
 
   std::string folder_;
   TextFile nodes_, grasps_;
-  std::optional<TextFile> bodies_;   // only scenes that have any
+  std::optional<TextFile> bodies_, threads_;   // only scenes that have any
 };
 
 class ObjRecorder final : public Recorder
@@ -219,6 +246,26 @@ public:
       }
       file.endLine();
       first += model.nodes();
+    }
+    for (std::size_t k = 0; k < simulation.state().threads.size(); ++k)
+    {
+      const ThreadState& thread = simulation.state().threads[k];
+      file << "o " << simulation.threadModel(static_cast<int>(k)).name;
+      file.endLine();
+      for (const Eigen::Vector3d& x : thread.x)
+      {
+        file << "v ";
+        file.vector(x, ' ');
+        file.endLine();
+      }
+      file << 'l';
+      for (int i = 0; i < thread.nodes(); ++i)
+      {
+        file << ' ';
+        file.number(first + i);
+      }
+      file.endLine();
+      first += thread.nodes();
     }
     file.close();
   }

@@ -89,6 +89,8 @@ std::optional<int> sampledEdges(const Curve& curve)
 
 }  // namespace
 
+Eigen::Matrix3Xd curveNodes(const Curve& curve, const Eigen::Vector3d& gravity) { return curvePoints(curve, gravity, std::nullopt); }
+
 Eigen::Matrix3Xd restNodes(const RodConfig& rod, const Eigen::Vector3d& gravity)
 {
   Eigen::Matrix3Xd nodes = curvePoints(rod.centerline, gravity, std::nullopt);

@@ -40,6 +40,7 @@ Pose sectionOffset(const Pose& X_WM, const Pose& X_WG) { return X_WM.inverse() *
 Simulation::Simulation(SceneConfig config) : config_(std::move(config))
 {
   buildRods();
+  buildThreads();
   buildBodies();
   buildGroup();
   state_.grasp_offsets.resize(grasps_.size());
@@ -146,6 +147,7 @@ SceneInputs Simulation::inputsAt(double time) const
   {
     inputs.obstacles.push_back(given(config_.obstacles[k].motion, state_.obstacles[k]));
   }
+  addThreadInputs(inputs, time);
   inputs.grasps.reserve(grasps_.size());
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
@@ -203,6 +205,7 @@ void Simulation::checkInputs(const SceneInputs& inputs) const
   };
   check("grasps", inputs.grasps.size(), grasps_.size(), "grasp");
   check("bodies", inputs.bodies.size(), config_.bodies.size(), "body");
+  check("threads", inputs.threads.size(), config_.threads.size(), "thread");
   check("obstacles", inputs.obstacles.size(), config_.obstacles.size(), "obstacle");
 }
 
@@ -229,12 +232,25 @@ StepReport Simulation::step(const SceneInputs& inputs)
 {
   fillRodInputs(inputs);
   // One part's failure must leave the others where they were, too.
-  const bool several = models_.size() > 1 && !(group_ && group_rods_.size() == models_.size());
+  const std::size_t threads = config_.threads.size(), apart = models_.size() - group_rods_.size() + (group_ ? 1 : 0) + threads;
+  const bool several = apart > 1;
   const std::vector<RodState> before = several ? state_.rods : std::vector<RodState>();
+  const std::vector<ThreadState> threads_before = several ? state_.threads : std::vector<ThreadState>();
+  const auto restore = [&] {
+    if (several)
+    {
+      state_.rods = before;
+      state_.threads = threads_before;
+    }
+  };
   StepReport total;
   try
   {
-    total = stepAll();
+    total = stepThreads(inputs);
+    if (total.ok)
+    {
+      total.merge(stepAll());
+    }
     if (total.ok && group_)
     {
       total.merge(stepGroup(inputs, false));
@@ -242,18 +258,12 @@ StepReport Simulation::step(const SceneInputs& inputs)
   }
   catch (...)
   {
-    if (several)
-    {
-      state_.rods = before;
-    }
+    restore();
     throw;
   }
   if (!total.ok)
   {
-    if (several)
-    {
-      state_.rods = before;
-    }
+    restore();
     return total;
   }
   moveGiven(inputs);

@@ -17,7 +17,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 2;
+constexpr std::uint64_t version = 3;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -78,6 +78,35 @@ void visitRod(Archive& archive, State& rod)
 }
 
 template <class Archive, class State>
+void visitThread(Archive& archive, State& thread)
+{
+  const auto numbers = [&archive](auto& values) {
+    archive.list(values);
+    for (auto& value : values)
+    {
+      archive(value);
+    }
+  };
+  numbers(thread.x);
+  numbers(thread.v);
+  numbers(thread.d1);
+  numbers(thread.twist);
+  numbers(thread.spin);
+  numbers(thread.volume);
+  numbers(thread.id);
+  numbers(thread.deposited);
+  for (auto& end : thread.ends)
+  {
+    archive(end.held);
+    visitPose(archive, end.X_WE);
+  }
+  archive(thread.next_id);
+  archive(thread.thread_id);
+  archive(thread.fed_volume);
+  archive(thread.dropped_volume);
+}
+
+template <class Archive, class State>
 void visitTwist(Archive& archive, State& twist)
 {
   archive(twist.linear);
@@ -105,6 +134,11 @@ void visitScene(Archive& archive, State& scene)
   for (auto& rod : scene.rods)
   {
     visitRod(archive, rod);
+  }
+  archive.list(scene.threads);
+  for (auto& thread : scene.threads)
+  {
+    visitThread(archive, thread);
   }
   archive.list(scene.bodies);
   for (auto& body : scene.bodies)
@@ -203,6 +237,16 @@ std::string misfit(const RodState& rod, const RodModel& model, std::size_t grasp
   return "";
 }
 
+/// Likewise of a thread.
+std::string misfit(const ThreadState& thread, const ThreadModel& model, const ThreadState& initial)
+{
+  const std::size_t nodes = thread.x.size(), edges = thread.volume.size();
+  const bool fits = nodes >= 2 && edges + 1 == nodes && thread.v.size() == nodes && thread.twist.size() == nodes && thread.id.size() == nodes &&
+                    thread.deposited.size() == nodes && thread.d1.size() == edges && thread.spin.size() == edges &&
+                    thread.ends[0].held == initial.ends[0].held && thread.ends[1].held == initial.ends[1].held;
+  return fits ? "" : "thread " + model.name + " does not fit together";
+}
+
 }  // namespace
 
 std::uint64_t Simulation::fingerprint() const
@@ -239,6 +283,8 @@ std::uint64_t Simulation::fingerprint() const
     out(model.rest_curvature);
     out(model.mass_damping);
     out(model.stiffness_damping);
+    out(model.isotropic);
+    out(model.inextensible);
     for (const GraspConfig& grasp : config_.rods[r].grasps)
     {
       text(grasp.name);
@@ -250,6 +296,17 @@ std::uint64_t Simulation::fingerprint() const
     out(touch.rods);
     out(touch.obstacles);
     out(touch.friction);
+  }
+  for (const auto& model : thread_models_)
+  {
+    text(model->name);
+    for (const double value : {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
+                               model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length})
+    {
+      out(value);
+    }
+    out(model->floor.present);
+    out(model->limits.max_deposited);
   }
   for (const BodyConfig& body : config_.bodies)
   {
@@ -347,15 +404,19 @@ void Simulation::load(const std::string& path)
     throw std::runtime_error(path + ": " + error.what());
   }
   std::string problem = reader.left() != 0 ? "has bytes after its end" : "";
-  if (loaded.rods.size() != models_.size() || loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
+  if (loaded.rods.size() != models_.size() || loaded.threads.size() != thread_models_.size() || loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
       loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||
       loaded.wrenches.size() != grasps_.size())
   {
-    problem = "has another number of rods, bodies, obstacles or grasps";
+    problem = "has another number of rods, threads, bodies, obstacles or grasps";
   }
   for (std::size_t r = 0; problem.empty() && r < models_.size(); ++r)
   {
     problem = misfit(loaded.rods[r], *models_[r], state_.rods[r].grasps.size());
+  }
+  for (std::size_t k = 0; problem.empty() && k < thread_models_.size(); ++k)
+  {
+    problem = misfit(loaded.threads[k], *thread_models_[k], state_.threads[k]);
   }
   if (!problem.empty())
   {

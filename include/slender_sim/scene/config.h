@@ -177,6 +177,48 @@ struct BodyConfig
   std::vector<WeldConfig> welds;
 };
 
+/// A number that the scene gives: constant, or a table of (t [s], value) joined by straight lines; or set by messages from its first value on.
+struct TimedNumber
+{
+  std::vector<double> times{0.0}, values{0.0};
+  bool topic = false;
+  double at(double time) const;
+};
+
+struct NozzleConfig
+{
+  Pose pose;                               ///< where the scene starts: origin at the outlet, x along the flow
+  double diameter = 0.005;                 ///< [m]
+  TimedNumber flow;                        ///< [m^3/s]
+  GivenMotion motion = FixedMotion{};      ///< topic: `nozzle/pose`
+};
+
+/// A horizontal floor that the thread sticks to, or a belt.
+struct FloorConfig
+{
+  double height = 0.0;                     ///< [m]
+  TimedNumber belt_x, belt_y;              ///< velocity [m/s]; topic: `belt/velocity`
+  bool on_surface = false;                 ///< the centreline comes to lie on the surface instead of one radius above
+};
+
+/// A thread that leaves a nozzle, or one that is there from the start: one of `nozzle` and `centerline`.
+struct ThreadConfig
+{
+  std::string name;
+  double density = 1000.0;                 ///< [kg/m^3]
+  double viscosity = 1.0;                  ///< dynamic [Pa s]
+  double surface_tension = 0.0;            ///< [N/m]
+  std::optional<NozzleConfig> nozzle;
+  std::optional<Curve> centerline;         ///< from its oldest to its newest end
+  std::vector<double> radius;              ///< of its edges [m]: one, two (a taper) or one per edge
+  std::array<bool, 2> held{false, false};  ///< its ends are clamped where they are
+  std::optional<FloorConfig> floor;
+  double feed_length = 0.0;                ///< of the edges that leave the nozzle [m]
+  double longest_edge = 0.0, shortest_edge = 0.0;   ///< [m] 0: edges are neither divided nor joined
+  int most_deposited = 0;                  ///< nodes on the floor; 0: all are kept
+  std::optional<std::array<Eigen::Vector3d, 2>> region;   ///< corners; what lies outside is dropped, oldest first
+};
+
 enum class Start { as_given, equilibrium };    ///< equilibrium: the static solver runs first
 
 struct RecordConfig { int every = 1; };        ///< record every n-th step (`simulate`)
@@ -192,6 +234,7 @@ struct SceneConfig
   RecordConfig record;
   ContactConfig contact;
   std::vector<RodConfig> rods;
+  std::vector<ThreadConfig> threads;
   std::vector<ObstacleConfig> obstacles;
   std::vector<BodyConfig> bodies;              ///< names differ from each other and from the obstacles'
 };

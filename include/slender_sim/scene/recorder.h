@@ -28,10 +28,12 @@ public:
 ///                on the gripper about the section's origin, in world axes
 ///   bodies.csv   one row per instant and body, then per obstacle, if there are any: t, object, pose of its frame (simulated bodies:
 ///                origin at the centre of mass), velocity of the origin and angular velocity, in world axes
+///   threads.csv  one row per instant and node of a thread, from the oldest on, if there are any: t, object, thread, id (never used again),
+///                x y z, vx vy vz, radius of the edge after the node (the last edge at the newest end), deposited (1: lies on the floor)
 /// Numbers are the shortest that read back to the same double.
 std::unique_ptr<Recorder> makeCsvRecorder(const std::string& folder);
 
-/// One Wavefront OBJ file per instant, frame_000000.obj ...: a polyline per rod [m].
+/// One Wavefront OBJ file per instant, frame_000000.obj ...: a polyline per rod and thread [m].
 std::unique_ptr<Recorder> makeObjRecorder(const std::string& folder);
 
 }  // namespace slender

@@ -17,6 +17,9 @@ Eigen::Matrix3Xd restNodes(const RodConfig& rod, const Eigen::Vector3d& gravity)
 /// Nodes of the initial shape: `rest` itself unless the rod has `initial`, whose curve then gets as many nodes, spaced as in `rest`.
 Eigen::Matrix3Xd initialNodes(const RodConfig& rod, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& gravity);
 
+/// Nodes of an open curve as it stands [m].
+Eigen::Matrix3Xd curveNodes(const Curve& curve, const Eigen::Vector3d& gravity);
+
 /// One value per edge from one value, two (linear from the first to the last edge) or one per edge.
 std::vector<double> perEdge(const std::vector<double>& values, int edges, const char* name);
 

@@ -10,6 +10,7 @@
 #include "slender_sim/rod/rod_group.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
+#include "slender_sim/thread/thread_stepper.h"
 
 namespace slender {
 
@@ -19,6 +20,7 @@ struct SceneState
   double time = 0.0;          ///< simulated [s] = steps * step length
   std::uint64_t steps = 0;
   std::vector<RodState> rods;          ///< grasps of the scene first, then welds
+  std::vector<ThreadState> threads;
   std::vector<RigidBodyState> bodies;  ///< per body of the scene, driven ones included
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
@@ -35,11 +37,20 @@ public:
   using std::runtime_error::runtime_error;
 };
 
+/// What drives one thread during a step.
+struct ThreadDrive
+{
+  Pose nozzle;                              ///< at the end of the step
+  double flow_rate = 0.0;                   ///< during it [m^3/s]
+  Eigen::Vector3d belt_velocity{0, 0, 0};   ///< [m/s]
+};
+
 /// Inputs of one step, latched before it. Indices follow the scene's order of grasps (over all rods).
 struct SceneInputs
 {
   std::vector<GraspTarget> grasps;
   std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
+  std::vector<ThreadDrive> threads;             ///< per thread of the scene
   Eigen::Vector3d wind{0, 0, 0};
 };
 
@@ -90,6 +101,9 @@ public:
 
   const Wrench& wrench(int grasp) const;
   RodEnergies energies(int rod) const;
+  /// What a thread does to the holders of its ends (the newest: the nozzle), of the last step.
+  const std::array<EndLoad, 2>& endLoads(int thread) const { return thread_steppers_.at(thread).endLoads(); }
+  const ThreadModel& threadModel(int thread) const { return *thread_models_[thread]; }
 
   /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could
   /// not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a shortened one is refused
@@ -105,6 +119,11 @@ private:
   void fillRodInputs(const SceneInputs& inputs);
   void checkInputs(const SceneInputs& inputs) const;
   StepReport stepAll();
+
+  // simulation_threads.cpp
+  void buildThreads();
+  void addThreadInputs(SceneInputs& inputs, double time) const;
+  StepReport stepThreads(const SceneInputs& inputs);
 
   // simulation_group.cpp: rods that bodies join or that touch something
   void buildBodies();
@@ -124,6 +143,8 @@ private:
   SceneState state_, initial_;
   std::vector<std::shared_ptr<const RodModel>> models_;
   std::vector<std::optional<RodStepper>> steppers_;   ///< per rod; none for those of the group
+  std::vector<std::shared_ptr<const ThreadModel>> thread_models_;
+  std::vector<ThreadStepper> thread_steppers_;
   std::optional<RodGroup> group_;
   std::vector<int> group_rods_, group_bodies_;        ///< what of the scene is in the group
   std::vector<int> group_index_;                      ///< per rod: in the group, -1: on its own

@@ -1,0 +1,264 @@
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+
+#include "generators.h"
+#include "read_parts.h"
+#include "slender_sim/scene/shapes.h"
+
+/// Viscous threads, their nozzles and floors.
+namespace slender {
+
+namespace {
+
+const Range length = Range::above(0, max_coordinate, "m");
+
+/// A number, {table: [[t, value], ...]} or {topic: true, initial: value}.
+TimedNumber readTimed(const YamlCursor& at, const Range& range)
+{
+  TimedNumber timed;
+  if (!at.isMap())
+  {
+    assign(timed.values[0], at.number(range));
+    return timed;
+  }
+  YamlMap map(at);
+  const YamlCursor topic = map.get("topic"), initial = map.get("initial"), table = map.get("table");
+  map.finish();
+  if (topic.present() == table.present())
+  {
+    at.problem("must be a number, {table: [[t, value], ...]} or {topic: true, initial: value}");
+  }
+  else if (topic.present())
+  {
+    timed.topic = topic.boolean().value_or(true);
+    if (!timed.topic)
+    {
+      topic.problem("must be true; without a topic it is written as a number");
+    }
+    assign(timed.values[0], initial.number(range));
+  }
+  else
+  {
+    timed.times.clear();
+    timed.values.clear();
+    for (const YamlCursor& row : table.items(1))
+    {
+      const auto entries = row.items(2, 2);
+      const auto time = entries.empty() ? std::nullopt : entries[0].number(Range::closed(-1e9, 1e9, "s"));
+      const auto value = entries.empty() ? std::nullopt : entries[1].number(range);
+      if (!time || !value)
+      {
+        continue;
+      }
+      if (!timed.times.empty() && *time <= timed.times.back())
+      {
+        row.problem("is not later than the row before; times must increase");
+        continue;
+      }
+      timed.times.push_back(*time);
+      timed.values.push_back(*value);
+    }
+    if (timed.times.empty())
+    {
+      return {};
+    }
+  }
+  return timed;
+}
+
+NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context)
+{
+  NozzleConfig nozzle;
+  YamlMap map(at);
+  assign(nozzle.diameter, map.require("diameter").number(Range::above(0, 10, "m")));
+  const YamlCursor position = map.get("position"), direction = map.get("direction");
+  assign(nozzle.pose.position, position.vector3(Range::closed(-max_coordinate, max_coordinate, "m")));
+  const Eigen::Vector3d along = readDirection(direction, -Eigen::Vector3d::UnitZ());
+  nozzle.pose.orientation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), along);
+  nozzle.flow = readTimed(map.get("flow"), Range::closed(0, 1e3, "m^3/s"));
+  assign(nozzle.motion, readSolidMotion(map.get("motion"), context, false));
+  if (const auto* table = std::get_if<TableMotion>(&nozzle.motion))
+  {
+    if (position.present() || direction.present())
+    {
+      (position.present() ? position : direction).problem("there is a table of poses as well; the nozzle starts at its first");
+    }
+    nozzle.pose = table->poses.evaluate(0.0);
+  }
+  map.finish();
+  return nozzle;
+}
+
+FloorConfig readFloor(const YamlCursor& at)
+{
+  FloorConfig floor;
+  const Range speed = Range::closed(-1e3, 1e3, "m/s");
+  YamlMap map(at);
+  assign(floor.height, map.get("height").number(Range::closed(-max_coordinate, max_coordinate, "m")));
+  const YamlCursor belt = map.get("belt");
+  if (belt.isMap())
+  {
+    YamlMap velocity(belt);
+    const YamlCursor x = velocity.get("x"), y = velocity.get("y"), topic = velocity.get("topic");
+    velocity.finish();
+    if (topic.present())
+    {
+      floor.belt_x.topic = floor.belt_y.topic = topic.boolean().value_or(true);
+    }
+    if (x.present())
+    {
+      const bool on_topic = floor.belt_x.topic;
+      floor.belt_x = readTimed(x, speed);
+      floor.belt_x.topic = floor.belt_x.topic || on_topic;
+    }
+    if (y.present())
+    {
+      const bool on_topic = floor.belt_y.topic;
+      floor.belt_y = readTimed(y, speed);
+      floor.belt_y.topic = floor.belt_y.topic || on_topic;
+    }
+  }
+  else if (belt.present())
+  {
+    const auto velocity = belt.numbers(speed);
+    if (velocity && velocity->size() != 2)
+    {
+      belt.problem("has " + std::to_string(velocity->size()) + " numbers; must be [vx, vy] in m/s, or {x: ..., y: ..., topic: true}");
+    }
+    else if (velocity)
+    {
+      floor.belt_x.values[0] = (*velocity)[0];
+      floor.belt_y.values[0] = (*velocity)[1];
+    }
+  }
+  assign(floor.on_surface, map.get("centreline_on_surface").boolean());
+  map.finish();
+  return floor;
+}
+
+void readEdges(const YamlCursor& at, ThreadConfig& thread)
+{
+  YamlMap map(at);
+  const YamlCursor feed = map.get("feed"), longest = map.get("longest"), shortest = map.get("shortest");
+  assign(thread.feed_length, feed.number(length));
+  assign(thread.longest_edge, longest.number(length));
+  assign(thread.shortest_edge, shortest.number(length));
+  assign(thread.most_deposited, map.get("deposited").integer(4, 10'000'000, "nodes"));
+  if (feed.present() && !thread.nozzle)
+  {
+    feed.problem("is for threads with a nozzle");
+  }
+  if (shortest.present() && thread.longest_edge > 0 && thread.shortest_edge > 0.4 * thread.longest_edge)
+  {
+    shortest.problem("must be at most 0.4 of edges.longest (" + shortNumber(0.4 * thread.longest_edge) + " m), or edges would be joined and divided in turn");
+  }
+  map.finish();
+}
+
+ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
+{
+  ThreadConfig thread;
+  thread.name = default_name;
+  YamlMap map(at);
+  assign(thread.name, map.get("name").name());
+  YamlMap fluid(map.get("fluid"));
+  assign(thread.density, fluid.get("density").number(Range::above(0, 1e6, "kg/m^3")));
+  assign(thread.viscosity, fluid.get("viscosity").number(Range::above(0, 1e12, "Pa s")));
+  assign(thread.surface_tension, fluid.get("surface_tension").number(Range::closed(0, 1e3, "N/m")));
+  fluid.finish();
+
+  const YamlCursor nozzle = map.get("nozzle"), centerline = map.get("centerline"), radius = map.get("radius"), ends = map.get("ends");
+  if (nozzle.present() == centerline.present())
+  {
+    at.problem("must have either a nozzle that it flows out of, or a centerline (with radius)");
+  }
+  else if (nozzle.present())
+  {
+    thread.nozzle = readNozzle(nozzle, context);
+    for (const YamlCursor& other : {radius, ends})
+    {
+      if (other.present())
+      {
+        other.problem("is for threads with a centerline; the nozzle says it here");
+      }
+    }
+  }
+  else
+  {
+    thread.centerline = readCurve(centerline, context);
+    thread.radius = radius.numbers(Range::above(0, 10, "m")).value_or(std::vector<double>{});
+    if (!radius.present())
+    {
+      map.require("radius");
+    }
+    if (thread.centerline && !thread.radius.empty())
+    {
+      try
+      {
+        perEdge(thread.radius, static_cast<int>(curveNodes(*thread.centerline, context.gravity).cols()) - 1, "radius");
+      }
+      catch (const std::invalid_argument& error)
+      {
+        radius.problem(error.what());
+      }
+    }
+    YamlMap held(ends);
+    const char* names[2] = {"oldest", "newest"};
+    for (int end = 0; end < 2; ++end)
+    {
+      assign(thread.held[end], held.get(names[end]).choice<bool>({{"free", false}, {"held", true}}));
+    }
+    held.finish();
+  }
+  const YamlCursor floor = map.get("floor");
+  if (floor.present())
+  {
+    thread.floor = readFloor(floor);
+  }
+  readEdges(map.get("edges"), thread);
+  const YamlCursor region = map.get("region");
+  if (region.present())
+  {
+    YamlMap box(region);
+    const YamlCursor low = box.require("from"), high = box.require("to");
+    box.finish();
+    const Range anywhere = Range::closed(-1e9, 1e9, "m");
+    const auto a = low.vector3(anywhere), b = high.vector3(anywhere);
+    if (a && b && !(b->array() > a->array()).all())
+    {
+      high.problem("must be greater than region.from in every component");
+    }
+    else if (a && b)
+    {
+      thread.region = {*a, *b};
+    }
+  }
+  map.finish();
+  return thread;
+}
+
+}  // namespace
+
+std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context)
+{
+  std::vector<ThreadConfig> threads;
+  if (!at.present())
+  {
+    return threads;
+  }
+  std::map<std::string, std::string> names;   // to the path that used it first
+  const auto entries = at.items(1, 10'000);
+  for (std::size_t k = 0; k < entries.size(); ++k)
+  {
+    threads.push_back(readThread(entries[k], context, entries.size() == 1 ? "thread" : "thread" + std::to_string(k)));
+    const auto [other, is_new] = names.emplace(threads.back().name, entries[k].path());
+    if (!is_new)
+    {
+      YamlMap(entries[k]).get("name").problem("is also the name of " + other->second + "; names must differ");
+    }
+  }
+  return threads;
+}
+
+}  // namespace slender
