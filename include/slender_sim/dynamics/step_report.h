@@ -29,6 +29,7 @@ struct StepReport
   int factorizations = 0;         ///< banded factorisations (more than iterations when a Hessian was shifted)
   double residual = 0.0;          ///< largest unbalanced nodal force over the largest force in the rod [-]
   double max_strain = 0.0;        ///< largest |stretch strain| over all edges [-]
+  int mended_folds = 0;           ///< threads: sharp folds that were taken out because the step could not be done with them
   bool stable = true;             ///< statics: the equilibrium is a minimum of the energy (false: stationary only, a saddle)
   double error_estimate = 0.0;    ///< adaptive steps only: estimated local error [m]
 

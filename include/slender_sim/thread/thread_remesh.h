@@ -12,6 +12,10 @@ void splitEdge(ThreadState& state, int j, double fraction);
 /// Joins edges i-1 and i by taking node i away (0 < i < nodes - 1). Volume, mass and momentum are conserved.
 void removeNode(ThreadState& state, int i);
 
+/// Takes out the sharpest fold, where the thread turns by more than 110 degrees from edge to edge: a node that lies on the floor keeps its
+/// place and holds its free neighbour there, any other is removed (the fluid on both sides has flowed together). No: there is none.
+bool mendFold(ThreadState& state);
+
 /// Takes the `count` oldest nodes and the edges after them away; their volume goes to dropped_volume. At least two nodes stay.
 void dropOldest(ThreadState& state, int count);
 
