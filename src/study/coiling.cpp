@@ -135,7 +135,7 @@ public:
   Pouring(double height, double radius, double frequency, double step_angle, double per_turn)
     : step_angle_(step_angle), per_turn_(per_turn), frequency_(frequency)
   {
-    resolve(height, radius, frequency);
+    resolve(height, radius);
     thread_ = nozzleThread(model_, {0, 0, height}, kSpeed);
     thread_.inputs.gravity = {0, 0, -kGravity};
     // a perfectly straight thread would stand on the floor as a column
@@ -187,7 +187,7 @@ public:
       if (trace.frequency() > 0)
       {
         frequency_ = trace.frequency();
-        resolve(height, trace.radius(), frequency_);
+        resolve(height, trace.radius());
         thread_.model = model_;
         stepper = makeStepper(thread_);
       }
@@ -206,7 +206,7 @@ public:
 
 private:
   /// Edges that make `per_turn` of a turn of the coil; long ones are divided on their way down.
-  void resolve(double height, double radius, double frequency)
+  void resolve(double height, double radius)
   {
     const double edge = 2 * M_PI * radius / per_turn_;
     model_.name = "coiling";
