@@ -16,6 +16,7 @@ void StepReport::merge(const StepReport& other)
   cut_steps += other.cut_steps;
   iterations += other.iterations;
   factorizations += other.factorizations;
+  mended_folds += other.mended_folds;
   residual = std::max(residual, other.residual);
   max_strain = std::max(max_strain, other.max_strain);
   stable = stable && other.stable;

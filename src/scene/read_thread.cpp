@@ -217,6 +217,7 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
     thread.floor = readFloor(floor);
   }
   readEdges(map.get("edges"), thread);
+  assign(thread.breakup_radius, map.get("breakup_radius").number(length));
   const YamlCursor region = map.get("region");
   if (region.present())
   {

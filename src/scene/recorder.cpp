@@ -113,7 +113,10 @@ public:
     }
     for (std::size_t k = 0; k < state.threads.size(); ++k)
     {
-      recordThread(state.time, simulation.threadModel(static_cast<int>(k)).name, state.threads[k]);
+      for (const ThreadState& thread : state.threads[k].threads)
+      {
+        recordThread(state.time, simulation.threadModel(static_cast<int>(k)).name, thread);
+      }
     }
     for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
     {
@@ -249,23 +252,25 @@ public:
     }
     for (std::size_t k = 0; k < simulation.state().threads.size(); ++k)
     {
-      const ThreadState& thread = simulation.state().threads[k];
-      file << "o " << simulation.threadModel(static_cast<int>(k)).name;
-      file.endLine();
-      for (const Eigen::Vector3d& x : thread.x)
+      for (const ThreadState& thread : simulation.state().threads[k].threads)
       {
-        file << "v ";
-        file.vector(x, ' ');
+        file << "o " << simulation.threadModel(static_cast<int>(k)).name;
         file.endLine();
+        for (const Eigen::Vector3d& x : thread.x)
+        {
+          file << "v ";
+          file.vector(x, ' ');
+          file.endLine();
+        }
+        file << 'l';
+        for (int i = 0; i < thread.nodes(); ++i)
+        {
+          file << ' ';
+          file.number(first + i);
+        }
+        file.endLine();
+        first += thread.nodes();
       }
-      file << 'l';
-      for (int i = 0; i < thread.nodes(); ++i)
-      {
-        file << ' ';
-        file.number(first + i);
-      }
-      file.endLine();
-      first += thread.nodes();
     }
     file.close();
   }

@@ -235,7 +235,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
   const std::size_t threads = config_.threads.size(), apart = models_.size() - group_rods_.size() + (group_ ? 1 : 0) + threads;
   const bool several = apart > 1;
   const std::vector<RodState> before = several ? state_.rods : std::vector<RodState>();
-  const std::vector<ThreadState> threads_before = several ? state_.threads : std::vector<ThreadState>();
+  const std::vector<ThreadGroupState> threads_before = several ? state_.threads : std::vector<ThreadGroupState>();
   const auto restore = [&] {
     if (several)
     {

@@ -49,6 +49,7 @@ ThreadModel modelOf(const ThreadConfig& config)
     model.limits.max_edge_length = config.longest_edge;
   }
   model.limits.min_edge_length = config.shortest_edge;
+  model.limits.min_radius = config.breakup_radius;
   if (config.most_deposited > 0)
   {
     model.limits.max_deposited = config.most_deposited;
@@ -91,8 +92,8 @@ void Simulation::buildThreads()
     {
       thread_models_.push_back(std::make_shared<const ThreadModel>(modelOf(config_.threads[k])));
       thread_steppers_.emplace_back(thread_models_.back(), config_.time.newton);
-      state_.threads.push_back(stateOf(config_.threads[k], *thread_models_.back(), config_.gravity));
-      state_.threads.back().thread_id = k;
+      state_.threads.emplace_back();
+      state_.threads.back().threads.push_back(stateOf(config_.threads[k], *thread_models_.back(), config_.gravity));
     }
     catch (const std::invalid_argument& error)
     {
@@ -110,7 +111,7 @@ void Simulation::addThreadInputs(SceneInputs& inputs, double time) const
     if (thread.nozzle)
     {
       const auto* table = std::get_if<TableMotion>(&thread.nozzle->motion);
-      drive.nozzle = table ? table->poses.evaluate(time) : state_.threads[k].ends[1].X_WE;
+      drive.nozzle = table ? table->poses.evaluate(time) : state_.threads[k].threads.front().ends[1].X_WE;
       drive.flow_rate = thread.nozzle->flow.at(time - 0.5 * config_.time.step);   // the middle of the step
     }
     if (thread.floor)
@@ -131,7 +132,7 @@ StepReport Simulation::stepThreads(const SceneInputs& inputs)
     in.gravity = config_.gravity;
     for (int end = 0; end < 2; ++end)
     {
-      in.ends[end] = state_.threads[k].ends[end].X_WE;
+      in.ends[end] = initial_.threads.empty() ? state_.threads[k].threads.front().ends[end].X_WE : initial_.threads[k].threads.front().ends[end].X_WE;
     }
     if (config_.threads[k].nozzle)
     {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -136,9 +137,15 @@ void visitScene(Archive& archive, State& scene)
     visitRod(archive, rod);
   }
   archive.list(scene.threads);
-  for (auto& thread : scene.threads)
+  for (auto& group : scene.threads)
   {
-    visitThread(archive, thread);
+    archive.list(group.threads);
+    for (auto& thread : group.threads)
+    {
+      visitThread(archive, thread);
+    }
+    archive(group.next_thread_id);
+    archive(group.dropped_volume);
   }
   archive.list(scene.bodies);
   for (auto& body : scene.bodies)
@@ -238,13 +245,11 @@ std::string misfit(const RodState& rod, const RodModel& model, std::size_t grasp
 }
 
 /// Likewise of a thread.
-std::string misfit(const ThreadState& thread, const ThreadModel& model, const ThreadState& initial)
+bool fits(const ThreadState& thread)
 {
   const std::size_t nodes = thread.x.size(), edges = thread.volume.size();
-  const bool fits = nodes >= 2 && edges + 1 == nodes && thread.v.size() == nodes && thread.twist.size() == nodes && thread.id.size() == nodes &&
-                    thread.deposited.size() == nodes && thread.d1.size() == edges && thread.spin.size() == edges &&
-                    thread.ends[0].held == initial.ends[0].held && thread.ends[1].held == initial.ends[1].held;
-  return fits ? "" : "thread " + model.name + " does not fit together";
+  return nodes >= 2 && edges + 1 == nodes && thread.v.size() == nodes && thread.twist.size() == nodes && thread.id.size() == nodes &&
+                    thread.deposited.size() == nodes && thread.d1.size() == edges && thread.spin.size() == edges;
 }
 
 }  // namespace
@@ -301,7 +306,7 @@ std::uint64_t Simulation::fingerprint() const
   {
     text(model->name);
     for (const double value : {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
-                               model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length})
+                               model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length, model->limits.min_radius})
     {
       out(value);
     }
@@ -416,7 +421,11 @@ void Simulation::load(const std::string& path)
   }
   for (std::size_t k = 0; problem.empty() && k < thread_models_.size(); ++k)
   {
-    problem = misfit(loaded.threads[k], *thread_models_[k], state_.threads[k]);
+    const auto& threads = loaded.threads[k].threads;
+    if (threads.empty() || !std::all_of(threads.begin(), threads.end(), [](const ThreadState& thread) { return fits(thread); }))
+    {
+      problem = "thread " + thread_models_[k]->name + " does not fit together";
+    }
   }
   if (!problem.empty())
   {

@@ -135,7 +135,7 @@ public:
   Pouring(double height, double radius, double frequency, double step_angle, double per_turn)
     : step_angle_(step_angle), per_turn_(per_turn), frequency_(frequency)
   {
-    resolve(height, radius, frequency);
+    resolve(height, radius);
     thread_ = nozzleThread(model_, {0, 0, height}, kSpeed);
     thread_.inputs.gravity = {0, 0, -kGravity};
     // a perfectly straight thread would stand on the floor as a column
@@ -147,13 +147,27 @@ public:
   void raise(double height)
   {
     ThreadStepper stepper = makeStepper(thread_);
-    const double from = thread_.inputs.ends[1].position.z(), rate = 0.03 * kSpeed * (1 + from);
+    const double from = thread_.inputs.ends[1].position.z(), rate = (from > 8 && from < 20 ? 0.005 : 0.03) * kSpeed * (1 + from);   // slower where branches end
     const int steps = static_cast<int>(std::ceil(std::abs(height - from) / (rate * step())));
     for (int k = 1; k <= steps; ++k)
     {
       thread_.inputs.ends[1].position.z() = from + (height - from) * k / steps;
       advance(stepper, thread_, step(), "coiling");
     }
+  }
+  /// Swirls the nozzle about its axis at the frequency guessed, less and less: from high up the thread would otherwise fold to and fro.
+  void stir(double radius, double duration)
+  {
+    ThreadStepper stepper = makeStepper(thread_);
+    const Eigen::Vector3d centre = thread_.inputs.ends[1].position;
+    const double frequency = frequency_, start = thread_.time;
+    while (thread_.time < start + duration)
+    {
+      const double t = thread_.time + step() - start, r = radius * std::max(0.0, 1 - t / duration);
+      thread_.inputs.ends[1].position = centre + r * Eigen::Vector3d(std::cos(frequency * t), std::sin(frequency * t), 0);
+      advance(stepper, thread_, step(), "coiling");
+    }
+    thread_.inputs.ends[1].position = centre;
   }
   /// Lets it coil for some turns, then measures some more.
   Trace observe(double settling_turns, double turns)
@@ -173,7 +187,7 @@ public:
       if (trace.frequency() > 0)
       {
         frequency_ = trace.frequency();
-        resolve(height, trace.radius(), frequency_);
+        resolve(height, trace.radius());
         thread_.model = model_;
         stepper = makeStepper(thread_);
       }
@@ -192,14 +206,14 @@ public:
 
 private:
   /// Edges that make `per_turn` of a turn of the coil; long ones are divided on their way down.
-  void resolve(double height, double radius, double frequency)
+  void resolve(double height, double radius)
   {
     const double edge = 2 * M_PI * radius / per_turn_;
     model_.name = "coiling";
     model_.density = kDensity;
     model_.viscosity = kMu;
     model_.nozzle_diameter = kDiameter;
-    model_.feed_length = std::min({edge, edge * kSpeed / (radius * frequency), 0.1 * height});
+    model_.feed_length = std::min(edge, 0.1 * height);
     model_.limits.max_edge_length = 1.5 * edge;
     model_.limits.max_deposited = static_cast<int>(3 * per_turn_);
     model_.floor = {true, 0.0, false};
@@ -264,14 +278,14 @@ void runCoiling(StudyContext& context)
   Results results{context.plot("coiling_frequency", "Coiling frequency against height", "H / H*", "Omega / Omega*"),
                   context.plot("coiling_radius", "Coil radius against height", "H / H*", "R / H*"), {}, {}};
   std::vector<double> heights = heightsOf({1, 3}), inertial = heightsOf({7});
-  if (context.quick())   // every third, but all where branches meet
+  if (context.quick())   
   {
     std::vector<double> some;
     for (std::size_t k = 0; k < heights.size(); ++k)
-      if (k % 3 == 0 || heights[k] > 10)
+      if (k % 3 == 0)
         some.push_back(heights[k]);
     heights = some;
-    inertial = {inertial[1]};
+    inertial = {inertial[1], inertial[3]};
   }
   const double step_angle = context.quick() ? 0.04 : 0.02, per_turn = context.quick() ? 20 : 30;
   const int total = static_cast<int>(2 * heights.size() + inertial.size());
@@ -301,10 +315,12 @@ void runCoiling(StudyContext& context)
       jump_down = *height;
     before = branch;
   }
+  Pouring high(inertial.front(), 0.45, 8e-3 * inertial.front() * inertial.front(), step_angle, per_turn);
+  high.stir(2 * kDiameter, 40.0);
   for (const double height : inertial)
   {
     progress("inertial", height);
-    Pouring high(height, 0.4, 8e-3 * height * height, step_angle, per_turn);
+    high.raise(height);
     record(context, high, height, "inertial", 30, results);
   }
 

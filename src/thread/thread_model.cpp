@@ -24,6 +24,7 @@ void checkThreadModel(const ThreadModel& model)
   check(limits.max_edge_length > 0, "limits.max_edge_length", limits.max_edge_length, "positive [m]");
   check(limits.min_edge_length >= 0 && limits.min_edge_length <= 0.4 * limits.max_edge_length, "limits.min_edge_length", limits.min_edge_length,
         "zero to 0.4 limits.max_edge_length [m]");
+  check(limits.min_radius >= 0 && std::isfinite(limits.min_radius), "limits.min_radius", limits.min_radius, "zero or more [m]");
   check(limits.max_deposited >= 4, "limits.max_deposited", limits.max_deposited, "4 or more nodes");
 }
 

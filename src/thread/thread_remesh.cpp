@@ -140,6 +140,87 @@ void removeNode(ThreadState& state, int i)
     state.twist.back() = 0.0;
 }
 
+bool mendFold(ThreadState& state)
+{
+  double sharpest = std::cos(110.0 * M_PI / 180);
+  int fold = 0;
+  for (int i = 1; i + 1 < state.nodes(); ++i)
+  {
+    if (state.deposited[i - 1] && state.deposited[i] && state.deposited[i + 1])
+      continue;
+    const double cosine = state.edge(i - 1).normalized().dot(state.edge(i).normalized());
+    if (cosine < sharpest)
+    {
+      sharpest = cosine;
+      fold = i;
+    }
+  }
+  if (fold == 0)
+    return false;
+  if (!state.deposited[fold])
+  {
+    // the node itself, or a neighbour where the two edges lie so close on each other that nothing would be left of them
+    for (const int i : {fold, fold + 1, fold - 1})
+      if (i > 0 && i + 1 < state.nodes() && !state.deposited[i] &&
+          (state.x[i + 1] - state.x[i - 1]).norm() > 0.1 * std::min(state.edge(i - 1).norm(), state.edge(i).norm()))
+      {
+        removeNode(state, i);
+        return true;
+      }
+    return false;
+  }
+  const int other = state.deposited[fold + 1] ? fold - 1 : fold + 1;
+  if ((other == 0 && state.ends[0].held) || (other + 1 == state.nodes() && state.ends[1].held))
+    return false;
+  state.deposited[other] = 1;
+  state.v[other] = state.v[fold];
+  return true;
+}
+
+bool breakThread(ThreadState& state, double min_radius, ThreadState& older)
+{
+  int at = -1;
+  double thinnest = min_radius;
+  for (int j = 1; j + 1 < state.edges(); ++j)
+  {
+    if (state.deposited[j] && state.deposited[j + 1])
+      continue;
+    const double r = state.radius(j);
+    if (r < thinnest)
+    {
+      thinnest = r;
+      at = j;
+    }
+  }
+  if (at < 0)
+    return false;
+
+  // Each half of the edge's fluid thickens the edge beyond its node. A quarter of it, which that node had, comes to the next one.
+  const double half = 0.5 * state.volume[at];
+  const auto pass = [&](int from, int to) {
+    const double own = (to > 0 ? state.volume[to - 1] : 0.0) + (to < state.edges() ? state.volume[to] : 0.0);
+    state.v[to] = (own * state.v[to] + half * state.v[from]) / (own + half);
+  };
+  pass(at, at - 1);
+  pass(at + 1, at + 2);
+  state.volume[at - 1] += half;
+  state.volume[at + 1] += half;
+
+  older = state;
+  const auto keepFirst = [&](auto& v, int count) { v.resize(count); };
+  const auto keepRest = [&](auto& v) { v.erase(v.begin(), v.begin() + at + 1); };
+  const auto perNode = [](ThreadState& s, auto&& f) { f(s.x), f(s.v), f(s.twist), f(s.id), f(s.deposited); };
+  const auto perEdge = [](ThreadState& s, auto&& f) { f(s.d1), f(s.spin), f(s.volume); };
+  perNode(older, [&](auto& v) { keepFirst(v, at + 1); });
+  perEdge(older, [&](auto& v) { keepFirst(v, at); });
+  perNode(state, keepRest);
+  perEdge(state, keepRest);
+  older.ends[1].held = state.ends[0].held = false;
+  older.twist.back() = state.twist.front() = 0.0;
+  older.fed_volume = older.dropped_volume = 0.0;
+  return true;
+}
+
 void dropOldest(ThreadState& state, int count)
 {
   count = std::min(count, state.nodes() - 2);

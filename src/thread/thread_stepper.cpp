@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slender_sim/thread/thread_remesh.h"
 #include "thread_stepper_impl.h"
 
 namespace slender {
@@ -96,6 +97,7 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
   // no more than an edge leaves the nozzle at a time
   const double longest = flow_speed_ > 0 ? std::min(duration, model->feed_length / flow_speed_) : duration;
   const double first = duration / std::ceil(duration / longest * (1 - 1e-9)), shortest = std::ldexp(first, -newton.max_cuts);
+  constexpr int kMostFolds = 20;   // in one step
   double t = 0.0, h = first;
   while (t < duration)
   {
@@ -107,7 +109,13 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
     if (failure != StepFailure::none)
     {
       if (0.5 * length < shortest * (1 - 1e-9))
-        return refuse(report, failure, explainFailure(failure, length));
+      {
+        if (report.mended_folds >= kMostFolds || !mendFold(work))
+          return refuse(report, failure, explainFailure(failure, length));
+        ++report.mended_folds;
+        h = first;
+        continue;
+      }
       ++report.cut_steps;
       h = 0.5 * length;
       continue;

@@ -197,8 +197,7 @@ bool ThreadStepper::Impl::land(const ThreadInputs& inputs, double h)
     if (meets(i, when) && when <= earliest + kTogether)
     {
       const int k = inSystem(i);
-      Eigen::Vector3d x = work.x[i] + when * (system.node(k) - work.x[i]);
-      x.z() = std::max(x.z(), restingHeight(i));
+      const Eigen::Vector3d x = work.x[i] + when * (system.node(k) - work.x[i]);
       system.setNode(k, x + (1.0 - when) * h * inputs.belt_velocity);
       system.holdNode(k);
       landed[i] = 1;

@@ -7,6 +7,7 @@
 #include "slender_sim/linalg/banded_ldlt.h"
 #include "test/support/contact.h"
 #include "test/support/rods.h"
+#include "test/support/threads.h"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
 #define SLENDER_COUNTS_ALLOCATIONS
@@ -108,6 +109,32 @@ TEST(Allocations, WarmProjectedStepsMakeNone)
     EXPECT_EQ(allocations - before, 0) << isotropic;
     EXPECT_TRUE(ok);
   }
+}
+
+TEST(ThreadAllocations, AWarmStepMakesNone)
+{
+  ThreadModel model = honey();
+  model.viscosity = 100;
+  model.surface_tension = 0.05;
+  model.floor.present = true;
+  model.feed_length = 0.004;
+  model.limits.max_edge_length = 0.008;
+  model.limits.min_edge_length = 0.001;
+  model.limits.max_deposited = 30;
+  Thread t = Thread::fromNozzle(model, {0, 0, 0.1}, 0.1);
+  t.state.x[0].x() += 2e-4;
+  ThreadStepper stepper = t.stepper();
+  // edges are fed, divided and dropped all the time
+  for (int k = 0; k < 1000; ++k)
+    ASSERT_TRUE(stepper.step(t.state, t.inputs, 0.004).ok);
+  const std::uint64_t fed = t.state.next_id;
+  const long before = allocations;
+  bool ok = true;
+  for (int k = 0; k < 200; ++k)
+    ok = stepper.step(t.state, t.inputs, 0.004).ok && ok;
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_TRUE(ok);
+  EXPECT_GT(t.state.next_id, fed + 10);
 }
 
 TEST(ContactAllocations, WarmContactMakesNone)

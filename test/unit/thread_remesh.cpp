@@ -112,6 +112,32 @@ TEST(ThreadRemesh, FramesAndTwistsStayTogether)
     EXPECT_NEAR(std::remainder(shownTwist(s, i) - s.twist[i], 2 * M_PI), 0.0, 0.12) << i;   // up to the holonomy of the new corners
 }
 
+TEST(ThreadRemesh, FoldsAreTakenOut)
+{
+  Eigen::Matrix3Xd x(3, 6);
+  x << 0, 1, 2, 1.1, 3, 4, 0, 0, 0, 0.1, 0, 0, 0, 0, 0, 0, 0, 0;
+  ThreadState s = makeThread(x, Eigen::VectorXd::Constant(5, 0.1));
+  const double volume = s.totalVolume();
+  EXPECT_TRUE(mendFold(s));
+  while (mendFold(s))
+  {
+  }
+  EXPECT_LT(s.nodes(), 6);
+  EXPECT_NEAR(s.totalVolume(), volume, 1e-15);
+  for (int i = 1; i + 1 < s.nodes(); ++i)
+    EXPECT_GT(s.edge(i - 1).normalized().dot(s.edge(i).normalized()), -0.35);
+  // what lies on the floor stays where it is
+  x << 0, 1, 2, 1.4, 1.3, 2.5, 0, 0, 0, 0.1, 1.0, 1.2, 0, 0, 0, 0, 0, 0;
+  ThreadState on_floor = makeThread(x, Eigen::VectorXd::Constant(5, 0.1));
+  on_floor.deposited = {1, 1, 1, 0, 0, 0};
+  EXPECT_TRUE(mendFold(on_floor));
+  EXPECT_EQ(on_floor.nodes(), 6);
+  EXPECT_EQ(on_floor.deposited[3], 1);
+  // nothing to do
+  ThreadState straight = makeThread((Eigen::Matrix3Xd(3, 3) << 0, 1, 2, 0, 0, 0, 0, 0, 0).finished(), Eigen::VectorXd::Constant(2, 0.1));
+  EXPECT_FALSE(mendFold(straight));
+}
+
 TEST(ThreadRemesh, DroppingCountsTheVolume)
 {
   Random random(5);

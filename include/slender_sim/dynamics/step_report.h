@@ -31,6 +31,7 @@ struct StepReport
   int factorizations = 0;         ///< banded factorisations (more than iterations when a Hessian was shifted)
   double residual = 0.0;          ///< largest unbalanced nodal force over the largest force in the rod [-]
   double max_strain = 0.0;        ///< largest |stretch strain| over all edges [-]
+  int mended_folds = 0;           ///< threads: sharp folds that were taken out because the step could not be done with them
   bool stable = true;             ///< statics: the equilibrium is a minimum of the energy (false: stationary only, a saddle)
   int projection_iterations = 0;  ///< of fast projection (explicit steps of inextensible rods), the most in a step
   double constraint_error = 0.0;  ///< largest | |e|^2/L^2 - 1 | that it left [-]

@@ -10,7 +10,7 @@
 #include "slender_sim/rod/rod_group.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
-#include "slender_sim/thread/thread_stepper.h"
+#include "slender_sim/thread/thread_group.h"
 
 namespace slender {
 
@@ -20,7 +20,7 @@ struct SceneState
   double time = 0.0;          ///< simulated [s] = steps * step length
   std::uint64_t steps = 0;
   std::vector<RodState> rods;          ///< grasps of the scene first, then welds
-  std::vector<ThreadState> threads;
+  std::vector<ThreadGroupState> threads;   ///< per thread of the scene: it and what has broken off it
   std::vector<RigidBodyState> bodies;  ///< per body of the scene, driven ones included
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
@@ -144,7 +144,7 @@ private:
   std::vector<std::shared_ptr<const RodModel>> models_;
   std::vector<std::optional<RodStepper>> steppers_;   ///< per rod; none for those of the group
   std::vector<std::shared_ptr<const ThreadModel>> thread_models_;
-  std::vector<ThreadStepper> thread_steppers_;
+  std::vector<ThreadGroup> thread_steppers_;
   std::optional<RodGroup> group_;
   std::vector<int> group_rods_, group_bodies_;        ///< what of the scene is in the group
   std::vector<int> group_index_;                      ///< per rod: in the group, -1: on its own

@@ -12,6 +12,15 @@ void splitEdge(ThreadState& state, int j, double fraction);
 /// Joins edges i-1 and i by taking node i away (0 < i < nodes - 1). Volume, mass and momentum are conserved.
 void removeNode(ThreadState& state, int i);
 
+/// Takes out the sharpest fold, where the thread turns by more than 110 degrees from edge to edge: a node that lies on the floor keeps its
+/// place and holds its free neighbour there, any other is removed (the fluid on both sides has flowed together). No: there is none.
+bool mendFold(ThreadState& state);
+
+/// Breaks the thread at its thinnest free edge if that is thinner than `min_radius` [m] (thesis 5.4.4): `state` keeps the newer part, `older`
+/// becomes the other. The fluid of the edge goes to its neighbours, half to either side, with its momentum. The edges at the ends do not
+/// break. No: nothing is so thin.
+bool breakThread(ThreadState& state, double min_radius, ThreadState& older);
+
 /// Takes the `count` oldest nodes and the edges after them away; their volume goes to dropped_volume. At least two nodes stay.
 void dropOldest(ThreadState& state, int count);
 

@@ -1,0 +1,84 @@
+#include "slender_sim/thread/thread_group.h"
+
+#include <algorithm>
+
+#include "slender_sim/thread/thread_remesh.h"
+
+namespace slender {
+
+double ThreadGroupState::volumeBalance() const
+{
+  double sum = dropped_volume;
+  for (const ThreadState& t : threads)
+    sum += t.totalVolume() + t.dropped_volume - t.fed_volume;
+  return sum;
+}
+
+StepReport ThreadGroup::step(ThreadGroupState& state, const ThreadInputs& inputs, double duration)
+{
+  StepReport report;
+  work_ = state;
+  std::array<EndLoad, 2> loads;
+  ThreadInputs others = inputs;
+  others.flow_rate = 0.0;
+  std::uint64_t next_id = 0;
+  for (const ThreadState& thread : work_.threads)
+    next_id = std::max(next_id, thread.next_id);
+  for (ThreadState& thread : work_.threads)
+  {
+    thread.next_id = next_id;
+    report.merge(stepper_.step(thread, thread.ends[1].held ? inputs : others, duration));
+    if (!report.ok)
+      return report;
+    next_id = thread.next_id;
+    for (int end = 0; end < 2; ++end)
+      if (thread.ends[end].held)
+        loads[end] = stepper_.endLoads()[end];
+  }
+  breakUp();
+  drop();
+  loads_ = loads;
+  std::swap(state, work_);
+  return report;
+}
+
+void ThreadGroup::breakUp()
+{
+  const double min_radius = stepper_.model().limits.min_radius;
+  if (min_radius == 0.0)
+    return;
+  for (std::size_t k = 0; k < work_.threads.size(); ++k)
+  {
+    ThreadState older;
+    while (breakThread(work_.threads[k], min_radius, older))
+    {
+      older.thread_id = work_.next_thread_id++;
+      work_.threads.insert(work_.threads.begin() + k + 1, older);
+    }
+  }
+}
+
+/// Whole threads that have left the scene, and the oldest of those that only lie about.
+void ThreadGroup::drop()
+{
+  const ThreadLimits& limits = stepper_.model().limits;
+  const auto isHeld = [](const ThreadState& t) { return t.ends[0].held || t.ends[1].held; };
+  int lying = 0;
+  for (std::size_t k = 0; k < work_.threads.size();)
+  {
+    const ThreadState& t = work_.threads[k];
+    const bool outside = std::none_of(t.x.begin(), t.x.end(), [&](const Eigen::Vector3d& x) { return limits.scene.contains(x); });
+    const bool lies = std::all_of(t.deposited.begin(), t.deposited.end(), [](char d) { return d != 0; });
+    if (lies)
+      lying = std::min(lying, limits.max_deposited) + t.nodes();
+    if (!isHeld(t) && (outside || (lies && lying > limits.max_deposited)))
+    {
+      work_.dropped_volume += t.totalVolume() + t.dropped_volume - t.fed_volume;
+      work_.threads.erase(work_.threads.begin() + k);
+    }
+    else
+      ++k;
+  }
+}
+
+}  // namespace slender

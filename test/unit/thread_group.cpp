@@ -1,0 +1,118 @@
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/thread/thread_group.h"
+#include "slender_sim/thread/thread_remesh.h"
+#include "test/support/threads.h"
+
+namespace slender::test {
+namespace {
+
+using Eigen::Vector3d;
+
+TEST(ThreadBreak, BreakingConservesVolumeAndMomentum)
+{
+  Random random(1);
+  ThreadState s = wigglyThread(10, random), older;
+  s.volume[4] *= 1e-3;
+  const double volume = s.totalVolume(), thin = s.radius(4);
+  const Vector3d momentum = momentumOf(s);
+  EXPECT_FALSE(breakThread(s, 0.9 * thin, older));
+  ASSERT_TRUE(breakThread(s, 1.1 * thin, older));
+  EXPECT_EQ(older.nodes(), 5);
+  EXPECT_EQ(s.nodes(), 5);
+  EXPECT_EQ(older.id.back(), 4u);
+  EXPECT_EQ(s.id.front(), 5u);
+  EXPECT_NEAR(s.totalVolume() + older.totalVolume(), volume, 1e-14);
+  EXPECT_LT((momentumOf(s) + momentumOf(older) - momentum).norm(), 1e-14);
+}
+
+/// A dripping thread: surface tension and weight thin it until it breaks.
+struct Dripping
+{
+  ThreadModel model;
+  ThreadGroupState state;
+  ThreadInputs inputs;
+  Dripping()
+  {
+    model = honey();
+    model.viscosity = 5;
+    model.surface_tension = 0.05;
+    model.feed_length = 0.004;
+    model.floor.present = true;
+    model.limits.max_edge_length = 0.01;
+    model.limits.min_edge_length = 0.001;
+    model.limits.min_radius = 2e-4;
+    model.limits.max_deposited = 60;
+    const Thread t = Thread::fromNozzle(model, {0, 0, 0.3}, 0.01);
+    state.threads = {t.state};
+    state.threads[0].x[0].x() += 1e-4;
+    inputs = t.inputs;
+  }
+};
+
+TEST(ThreadGroup, AThreadThatDripsBreaksAndNoFluidIsLost)
+{
+  Dripping d;
+  ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
+  const double start = d.state.volumeBalance();
+  std::size_t most = 0;
+  for (int k = 0; k < 3000; ++k)
+  {
+    const StepReport report = group.step(d.state, d.inputs, 0.002);
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+    most = std::max(most, d.state.threads.size());
+    ASSERT_TRUE(d.state.threads[0].ends[1].held);
+  }
+  EXPECT_GT(most, 1u);
+  EXPECT_GT(d.state.next_thread_id, 1u);
+  EXPECT_NEAR(d.state.volumeBalance(), start, 1e-11 * d.state.threads[0].fed_volume);
+  std::set<std::uint64_t> nodes, threads;
+  std::size_t count = 0;
+  for (const ThreadState& t : d.state.threads)
+  {
+    count += t.id.size();
+    nodes.insert(t.id.begin(), t.id.end());
+    threads.insert(t.thread_id);
+  }
+  EXPECT_EQ(nodes.size(), count);
+  EXPECT_EQ(threads.size(), d.state.threads.size());
+}
+
+TEST(ThreadGroup, AFailureLeavesAllThreads)
+{
+  Dripping d;
+  ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
+  for (int k = 0; k < 10; ++k)
+    ASSERT_TRUE(group.step(d.state, d.inputs, 0.002).ok);
+  d.state.threads.push_back(d.state.threads[0]);
+  d.state.threads[1].ends[1].held = false;
+  d.state.threads[1].volume[0] = -1;
+  const ThreadState before = d.state.threads[0];
+  EXPECT_FALSE(group.step(d.state, d.inputs, 0.002).ok);
+  EXPECT_TRUE(sameThread(d.state.threads[0], before));
+}
+
+TEST(ThreadGroup, WhatLeavesTheSceneIsDropped)
+{
+  Dripping d;
+  d.model.floor.present = false;
+  d.model.limits.scene.min().z() = 0.0;
+  ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
+  const double start = d.state.volumeBalance();
+  std::size_t most = 0, nodes = 0;
+  for (int k = 0; k < 4000; ++k)
+  {
+    ASSERT_TRUE(group.step(d.state, d.inputs, 0.002).ok) << k;
+    most = std::max(most, d.state.threads.size());
+    nodes = std::max(nodes, d.state.threads[0].x.size());
+  }
+  EXPECT_LT(most, 30u);
+  EXPECT_LT(nodes, 300u);
+  EXPECT_NEAR(d.state.volumeBalance(), start, 1e-11 * d.state.threads[0].fed_volume);
+}
+
+}  // namespace
+}  // namespace slender::test
