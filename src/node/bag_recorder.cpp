@@ -11,7 +11,8 @@
 
 namespace slender {
 
-BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names)
+BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names,
+                         const std::vector<std::string>& thread_prefixes)
   : path_(path)
 {
   const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
@@ -20,6 +21,8 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
   bodies_topic_ = prefix + "body_states";
   for (const std::string& name : grasp_names)
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
+  for (const std::string& thread : thread_prefixes)
+    nozzle_topics_.push_back(prefix + thread + "nozzle/wrench");
   try
   {
     bag_.open(path + ".active", rosbag::bagmode::Write);
@@ -56,10 +59,14 @@ void BagRecorder::record(const SceneMessages& messages)
   {
     for (const slender_sim::RodState& state : messages.states)
       bag_.write(state_topic_, state.header.stamp, state);
+    for (const slender_sim::ThreadState& state : messages.threads)
+      bag_.write(state_topic_, state.header.stamp, state);
     for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
       bag_.write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
     if (!messages.bodies.name.empty())
       bag_.write(bodies_topic_, messages.bodies.header.stamp, messages.bodies);
+    for (std::size_t k = 0; k < messages.nozzles.size(); ++k)
+      bag_.write(nozzle_topics_[k], messages.nozzles[k].header.stamp, messages.nozzles[k]);
   }
   catch (const rosbag::BagException& e)
   {
@@ -97,7 +104,7 @@ public:
     clock.skip(simulation.state().steps);
     if (!bag_)
     {
-      bag_ = std::make_unique<BagRecorder>(path_, "/", graspTopicNames(simulation));
+      bag_ = std::make_unique<BagRecorder>(path_, "/", graspTopicNames(simulation), threadTopicPrefixes(simulation));
       bag_->recordScene(simulation.config().source, clock.stamp());
     }
     messages_.fill(simulation, clock.stamp(), "world", 0);

@@ -1,5 +1,7 @@
 #include "slender_sim/node/converters.h"
 
+#include <algorithm>
+
 #include <cmath>
 
 namespace slender {
@@ -145,6 +147,58 @@ bool isFinite(const RigidBodyState& state)
 {
   return state.X_WB.position.allFinite() && state.X_WB.orientation.coeffs().allFinite() && state.velocity.linear.allFinite() &&
          state.velocity.angular.allFinite();
+}
+
+Eigen::Quaterniond edgeFrame(const ThreadState& state, int edge)
+{
+  Eigen::Matrix3d axes;
+  axes.col(0) = state.edge(edge).normalized();
+  axes.col(1) = state.d1[edge];
+  axes.col(2) = axes.col(0).cross(axes.col(1));
+  return Eigen::Quaterniond(axes).normalized();
+}
+
+void toMessage(const ThreadState& state, slender_sim::ThreadState& out)
+{
+  const std::size_t nodes = state.x.size(), edges = state.volume.size();
+  out.thread_id = state.thread_id;
+  out.first_id = state.firstId();
+  out.ids = state.id;
+  out.twists = state.twist;
+  out.deposited.assign(state.deposited.begin(), state.deposited.end());
+  out.nodes.resize(nodes);
+  out.velocities.resize(nodes);
+  for (std::size_t i = 0; i < nodes; ++i)
+  {
+    out.nodes[i] = toPoint(state.x[i]);
+    out.velocities[i] = toVector3(state.v[i]);
+  }
+  out.frames.resize(edges);
+  out.radii.resize(edges);
+  for (std::size_t j = 0; j < edges; ++j)
+  {
+    out.frames[j] = toQuaternion(edgeFrame(state, static_cast<int>(j)));
+    out.radii[j] = state.radius(static_cast<int>(j));
+  }
+  out.fed_volume = state.fed_volume;
+  out.dropped_volume = state.dropped_volume;
+}
+
+void appendPoses(const ThreadState& state, std::vector<geometry_msgs::Pose>& out)
+{
+  for (int j = 0; j < state.edges(); ++j)
+    out.push_back(toMessage(Pose{0.5 * (state.x[j] + state.x[j + 1]), edgeFrame(state, j)}));
+}
+
+bool isFinite(const ThreadState& state)
+{
+  const auto finite = [](const std::vector<Eigen::Vector3d>& values) {
+    return std::all_of(values.begin(), values.end(), [](const Eigen::Vector3d& v) { return v.allFinite(); });
+  };
+  const auto numbers = [](const std::vector<double>& values) {
+    return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  };
+  return finite(state.x) && finite(state.v) && finite(state.d1) && numbers(state.twist) && numbers(state.spin) && numbers(state.volume);
 }
 
 }  // namespace slender

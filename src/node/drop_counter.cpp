@@ -19,6 +19,7 @@ const char* toString(Drop reason)
     case Drop::out_of_order: return "out_of_order";
     case Drop::stale: return "stale";
     case Drop::from_future: return "from_future";
+    case Drop::out_of_range: return "out_of_range";
     case Drop::queue_full: return "queue_full";
   }
   return "?";

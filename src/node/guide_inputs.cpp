@@ -1,6 +1,7 @@
 #include "slender_sim/node/guide_inputs.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "slender_sim/node/converters.h"
@@ -32,7 +33,7 @@ std::set<std::string> solidNames(const SceneConfig& scene)
 }  // namespace
 
 GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
-                         const std::vector<std::string>& grasp_names)
+                         const std::vector<std::string>& grasp_names, const std::vector<std::string>& thread_prefixes)
   : options_(options), clock_(clock)
 {
   GuideBuffer::Options buffer_options;
@@ -48,6 +49,7 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
     const GraspRef& ref = simulation.grasps()[g];
     Guided guided;
     guided.name = grasp_names[g];
+    guided.topic = "grasps/" + guided.name + "/pose";
     const auto* body = std::get_if<BodyMotion>(&ref.config->motion);
     if (body && !solids.count(body->body))
       guided.body = body->body;
@@ -58,22 +60,104 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
     if (topic)
     {
       topics = true;
-      const int grasp = static_cast<int>(g);
-      const boost::function<void(const geometry_msgs::PoseStamped&)> callback =
-          [this, grasp](const geometry_msgs::PoseStamped& message) { onPose(grasp, message); };
-      subscribers_.push_back(nh.subscribe<const geometry_msgs::PoseStamped&>("grasps/" + grasp_names[g] + "/pose", kQueueSize, callback,
-                                                                            ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+      subscribePose(nh);
     }
   }
   grasps_ = guided_.size();
   addSolids(simulation, buffer_options);
+  const bool threads = addThreads(nh, simulation, buffer_options, thread_prefixes);
   const bool bodies = std::any_of(guided_.begin(), guided_.end(), [](const Guided& guided) { return !guided.body.empty(); });
   if (topics)
     subscribers_.push_back(nh.subscribe("guides", kQueueSize, &GuideInputs::onGuides, this, ros::TransportHints().tcpNoDelay()));
   if (bodies)
     subscribers_.push_back(nh.subscribe("bodies", kQueueSize, &GuideInputs::onBodies, this, ros::TransportHints().tcpNoDelay()));
-  if (topics || bodies)
+  if (topics || bodies || threads)
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
+}
+
+/// Poses of the last of guided_, on its topic.
+void GuideInputs::subscribePose(ros::NodeHandle& nh)
+{
+  const int guided = static_cast<int>(guided_.size()) - 1;
+  const boost::function<void(const geometry_msgs::PoseStamped&)> callback =
+      [this, guided](const geometry_msgs::PoseStamped& message) { onPose(guided, message); };
+  subscribers_.push_back(nh.subscribe<const geometry_msgs::PoseStamped&>(guided_.back().topic, kQueueSize, callback, ros::VoidConstPtr(),
+                                                                        ros::TransportHints().tcpNoDelay()));
+}
+
+/// True when any of them listens to something that has a frame.
+bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
+                             const std::vector<std::string>& prefixes)
+{
+  bool framed = false;
+  const std::vector<ThreadConfig>& threads = simulation.config().threads;
+  threads_.resize(threads.size());
+  for (std::size_t k = 0; k < threads.size(); ++k)
+  {
+    Guided nozzle;
+    nozzle.topic = prefixes[k] + "nozzle/pose";
+    nozzle.name = prefixes[k] + "nozzle";
+    const bool moved = threads[k].nozzle && std::holds_alternative<TopicMotion>(threads[k].nozzle->motion);
+    if (moved)
+      nozzle.buffer = std::make_unique<GuideBuffer>(options, Attach::section, threads[k].nozzle->pose);
+    guided_.push_back(std::move(nozzle));
+    if (moved)
+      subscribePose(nh);
+    framed |= moved;
+    if (threads[k].nozzle && threads[k].nozzle->flow.topic)
+    {
+      const boost::function<void(const std_msgs::Float64&)> callback = [this, k](const std_msgs::Float64& message) { onFlow(k, message); };
+      subscribers_.push_back(nh.subscribe<const std_msgs::Float64&>(prefixes[k] + "nozzle/flow", kQueueSize, callback, ros::VoidConstPtr(),
+                                                                   ros::TransportHints().tcpNoDelay()));
+    }
+    if (threads[k].floor && (threads[k].floor->belt_x.topic || threads[k].floor->belt_y.topic))
+    {
+      framed = true;
+      const boost::function<void(const geometry_msgs::Vector3Stamped&)> callback =
+          [this, k](const geometry_msgs::Vector3Stamped& message) { onBelt(k, message); };
+      subscribers_.push_back(nh.subscribe<const geometry_msgs::Vector3Stamped&>(prefixes[k] + "belt/velocity", kQueueSize, callback,
+                                                                               ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+    }
+  }
+  return framed;
+}
+
+void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
+{
+  if (!std::isfinite(message.data))
+    drops_.drop(Drop::not_finite, "nozzle/flow", "it must be finite [m^3/s]");
+  else if (message.data < 0.0)
+    drops_.drop(Drop::out_of_range, "nozzle/flow", "it must not be negative [m^3/s]");
+  else
+    threads_[thread].flow = message.data;
+}
+
+/// In whatever frame the message names, as that stands now; only its horizontal part can be a belt's.
+void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped& message)
+{
+  const std::string what = "belt/velocity";
+  Eigen::Vector3d velocity(message.vector.x, message.vector.y, message.vector.z);
+  if (!velocity.allFinite())
+    return drops_.drop(Drop::not_finite, what, "it must be finite [m/s]");
+  const std::string& name = message.header.frame_id;
+  if (name.empty())
+    return drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");
+  const std::string frame = name.front() == '/' ? name.substr(1) : name;
+  if (frame != options_.frame_id)
+  {
+    Pose X_WF;
+    try
+    {
+      if (fromMessage(tf_buffer_.lookupTransform(options_.frame_id, frame, ros::Time(0)).transform, X_WF) != PoseFault::none)
+        return drops_.drop(Drop::not_finite, what, "in the transform from " + frame);
+    }
+    catch (const tf2::TransformException& e)
+    {
+      return drops_.drop(Drop::no_transform, what, e.what());
+    }
+    velocity = X_WF.orientation * velocity;
+  }
+  threads_[thread].belt = Eigen::Vector3d(velocity.x(), velocity.y(), 0.0);
 }
 
 void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Options& options)
@@ -94,6 +178,7 @@ void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Opt
   bodies_ = scene.bodies.size();
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
     add(scene.obstacles[k].name, scene.obstacles[k].motion, simulation.state().obstacles[k]);
+  obstacles_ = scene.obstacles.size();
 }
 
 bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X)
@@ -107,12 +192,11 @@ bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::strin
   return false;
 }
 
-void GuideInputs::onPose(int grasp, const geometry_msgs::PoseStamped& message)
+void GuideInputs::onPose(int guided, const geometry_msgs::PoseStamped& message)
 {
-  const std::string what = "grasps/" + guided_[grasp].name + "/pose";
-  Entry entry{grasp, Pose()};
-  if (checkPose(message.pose, what, entry.X_FH))
-    take(grasp, what, message.header, {entry});
+  Entry entry{guided, Pose()};
+  if (checkPose(message.pose, guided_[guided].topic, entry.X_FH))
+    take(guided, guided_[guided].topic, message.header, {entry});
 }
 
 void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
@@ -278,9 +362,21 @@ void GuideInputs::apply(double time, SceneInputs& inputs)
     if (guided_[g].buffer)
     {
       const std::size_t solid = g - grasps_;
+      if (g >= grasps_ + bodies_ + obstacles_)
+      {
+        inputs.threads[solid - bodies_ - obstacles_].nozzle = guided_[g].buffer->target(time).X_WG;
+        continue;
+      }
       GraspTarget& target = g < grasps_ ? inputs.grasps[g] : solid < bodies_ ? inputs.bodies[solid] : inputs.obstacles[solid - bodies_];
       target = guided_[g].buffer->target(time);
     }
+  for (std::size_t k = 0; k < threads_.size(); ++k)
+  {
+    if (threads_[k].flow)
+      inputs.threads[k].flow_rate = *threads_[k].flow;
+    if (threads_[k].belt)
+      inputs.threads[k].belt_velocity = *threads_[k].belt;
+  }
 }
 
 Pose GuideInputs::poseOf(const Simulation& simulation, std::size_t guided) const
@@ -288,7 +384,11 @@ Pose GuideInputs::poseOf(const Simulation& simulation, std::size_t guided) const
   const std::size_t solid = guided - grasps_;
   if (guided < grasps_)
     return graspPose(simulation, simulation.grasps()[guided]);
-  return solid < bodies_ ? simulation.state().bodies[solid].X_WB : simulation.state().obstacles[solid - bodies_];
+  if (solid < bodies_)
+    return simulation.state().bodies[solid].X_WB;
+  if (solid < bodies_ + obstacles_)
+    return simulation.state().obstacles[solid - bodies_];
+  return simulation.state().threads[solid - bodies_ - obstacles_].threads.front().ends[1].X_WE;
 }
 
 void GuideInputs::attachAt(int grasp, const Pose& X_WG)
@@ -307,6 +407,7 @@ void GuideInputs::attachAll(const Simulation& simulation)
 void GuideInputs::restart(const Simulation& simulation)
 {
   pending_.clear();
+  threads_.assign(threads_.size(), {});
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
       guided_[g].buffer->restart(poseOf(simulation, g));

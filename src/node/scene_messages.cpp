@@ -1,5 +1,6 @@
 #include "slender_sim/node/scene_messages.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include <ros/names.h>
@@ -32,6 +33,17 @@ std::vector<std::string> graspTopicNames(const Simulation& simulation)
   return names;
 }
 
+std::vector<std::string> threadTopicPrefixes(const Simulation& simulation)
+{
+  std::vector<std::string> prefixes;
+  for (const ThreadConfig& thread : simulation.config().threads)
+  {
+    checkName(thread.name, "thread");
+    prefixes.push_back(simulation.config().threads.size() == 1 ? std::string() : "threads/" + thread.name + "/");
+  }
+  return prefixes;
+}
+
 void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch)
 {
   const SceneState& scene = simulation.state();
@@ -48,6 +60,27 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     states[r].step = scene.steps;
     appendPoses(model, scene.rods[r], poses.poses);
   }
+  std::size_t piece = 0;
+  nozzles.resize(scene.threads.size());
+  for (std::size_t k = 0; k < scene.threads.size(); ++k)
+  {
+    for (const ThreadState& thread : scene.threads[k].threads)
+    {
+      threads.resize(std::max(threads.size(), piece + 1));
+      slender_sim::ThreadState& message = threads[piece++];
+      toMessage(thread, message);
+      message.header = poses.header;
+      message.epoch = epoch;
+      message.step = scene.steps;
+      message.name = simulation.threadModel(static_cast<int>(k)).name;
+      appendPoses(thread, poses.poses);
+    }
+    const EndLoad& load = simulation.endLoads(static_cast<int>(k))[1];
+    nozzles[k].header = poses.header;
+    nozzles[k].wrench.force = toVector3(load.force);
+    nozzles[k].wrench.torque = toVector3(load.torque);
+  }
+  threads.resize(piece);
   wrenches.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < wrenches.size(); ++g)
   {

@@ -4,14 +4,14 @@
 
 #include <ros/init.h>
 
-#include "slender_sim/node/rod_node.h"
+#include "slender_sim/node/scene_node.h"
 
 int main(int argc, char** argv)
 try
 {
   ros::init(argc, argv, "rod_node");
   std::signal(SIGTERM, [](int) { ros::requestShutdown(); });   // like SIGINT, or the bag stays unfinished
-  return slender::RodNode(ros::NodeHandle(), ros::NodeHandle("~")).spin();
+  return slender::SceneNode(ros::NodeHandle(), ros::NodeHandle("~"), slender::NodeKind::rods).spin();
 }
 catch (const std::exception& e)
 {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/node/converters.h"
-#include "slender_sim/node/rod_markers.h"
+#include "slender_sim/node/scene_markers.h"
 #include "slender_sim/scene/reader.h"
 
 namespace slender {
@@ -38,7 +38,7 @@ bodies:
   - {name: cube, density: 1, shape: {mesh: {file: cube.obj}}, pose: {position: [5, 0, 0]}}
 )", "scene", {}, std::string(SLENDER_SOURCE_DIR) + "/test/unit/data"));
   std::map<std::pair<std::string, int>, Marker> markers;
-  for (const Marker& marker : rodMarkers(simulation, std_msgs::Header(), MarkerStyle::line, false).markers)
+  for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header(), MarkerStyle::line, false).markers)
     markers[{marker.ns, marker.id}] = marker;
   ASSERT_EQ(markers.size(), 1u + 5u + 1u);   // no picture of the body without a shape
   const Marker& floor = markers[{"obstacles", 0}];

@@ -110,11 +110,11 @@ class NodeCase(unittest.TestCase):
         self.processes.append(process)
         return process
 
-    def start(self, scene=SCENE, wait=True, **parameters):
-        """Starts rod_node; by default it steps only on request, with exact stamps from 1 s on."""
+    def start(self, scene=SCENE, wait=True, program="rod_node", **parameters):
+        """Starts rod_node (or another simulating node); by default it steps only on request, with exact stamps from 1 s on."""
         values = {"scene": scene, "pace": "step", "diagnostics_rate": 20.0, "guide_delay": 0.0}
         values.update(parameters)
-        process = self.launch("rod_node", "rod", values)
+        process = self.launch(program, "rod", values)
         if wait:
             rospy.wait_for_service("/t/rod/load_state", 20)
         return process

@@ -18,12 +18,13 @@ class BagRecorder
 public:
   /// Opens PATH.active, which close() renames to PATH. `topic_namespace` precedes the topics, e.g. "/". Throws
   /// std::runtime_error when the file cannot be written.
-  BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names);
+  BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names,
+              const std::vector<std::string>& thread_prefixes);
   ~BagRecorder();
 
   /// The scene as parsed, on `scene`; once, before the first record().
   void recordScene(const std::string& yaml, const ros::Time& stamp);
-  /// `state` per rod, then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies; the rest can be derived from these.
+  /// `state` per rod, then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies, and `nozzle/wrench` per thread; the rest can be derived from these.
   void record(const SceneMessages& messages);
   /// Throws std::runtime_error when the file cannot be completed.
   void close();
@@ -32,7 +33,7 @@ public:
 
 private:
   std::string path_, state_topic_, scene_topic_, bodies_topic_;
-  std::vector<std::string> wrench_topics_;
+  std::vector<std::string> wrench_topics_, nozzle_topics_;
   rosbag::Bag bag_;
   bool open_ = false;
 };

@@ -10,9 +10,11 @@
 #include <std_msgs/Header.h>
 
 #include "slender_sim/RodState.h"
+#include "slender_sim/ThreadState.h"
 #include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/rod/rod_stepper.h"
+#include "slender_sim/thread/thread_state.h"
 
 /// Between the solver's types and messages. Pure functions: no clock, no node handle.
 namespace slender {
@@ -40,11 +42,16 @@ Eigen::Quaterniond edgeFrame(const RodModel& model, const RodState& state, int e
 /// Fills everything but header, epoch and step. `out` may hold an earlier message: its memory is reused.
 void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out);
 
+void toMessage(const ThreadState& state, slender_sim::ThreadState& out);
+
 /// Appends the middle of each edge with the edge's frame.
 void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out);
+
+void appendPoses(const ThreadState& state, std::vector<geometry_msgs::Pose>& out);
 
 /// False when any position, velocity, director or twist is NaN or infinite.
 bool isFinite(const RodState& state);
 bool isFinite(const RigidBodyState& state);
+bool isFinite(const ThreadState& state);
 
 }  // namespace slender

@@ -13,15 +13,16 @@ enum class Drop
   not_finite,       ///< NaN or infinite numbers
   bad_quaternion,   ///< length off 1 by more than 1 %
   wrong_length,     ///< arrays that do not fit the scene or each other
-  unknown_name,     ///< a body that no grasp follows
+  unknown_name,     ///< a body that nothing follows
   bad_frame,        ///< no frame_id
   no_transform,     ///< tf2 did not know the transform at the message's stamp in time
   out_of_order,     ///< not later than the last one
   stale,            ///< older than ~guide_timeout
   from_future,      ///< more than an hour ahead: another clock
+  out_of_range,     ///< a number that cannot be (a negative flow)
   queue_full,       ///< too many messages wait for transforms
 };
-constexpr int kDropReasons = 10;
+constexpr int kDropReasons = 11;
 
 const char* toString(Drop reason);
 

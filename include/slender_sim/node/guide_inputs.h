@@ -9,7 +9,9 @@
 
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/Vector3Stamped.h>
 #include <ros/node_handle.h>
+#include <std_msgs/Float64.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
 
@@ -22,8 +24,8 @@
 
 namespace slender {
 
-/// Everything that moves grasps, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`, `bodies`, through tf2 into the
-/// node's frame. Subscribes only to what the scene asks for. Bad messages are dropped and counted; what they would have moved keeps its
+/// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`, `bodies`, `nozzle/pose`,
+/// through tf2 into the node's frame; and `nozzle/flow` and `belt/velocity`, which hold from the next step on. Subscribes only to what the scene asks for. Bad messages are dropped and counted; what they would have moved keeps its
 /// previous input.
 /// A stamp of zero means now, as everywhere in tf.
 class GuideInputs
@@ -31,7 +33,7 @@ class GuideInputs
 public:
   /// `nh` carries the callback queue of the simulating thread: callbacks never run beside a step.
   GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
-              const std::vector<std::string>& grasp_names);
+              const std::vector<std::string>& grasp_names, const std::vector<std::string>& thread_prefixes);
 
   /// Takes in messages whose transforms have arrived meanwhile; drops those that waited too long.
   void processPending();
@@ -55,7 +57,7 @@ public:
   std::vector<Age> ages() const;
 
 private:
-  struct Guided { std::string name, body; std::unique_ptr<GuideBuffer> buffer; };   // buffer: null when not driven from outside
+  struct Guided { std::string name, body, topic; std::unique_ptr<GuideBuffer> buffer; };   // buffer: null when not driven from outside
   struct Entry { int guided; Pose X_FH; };                // a gripper, body or obstacle in the frame of the message
   struct Message
   {
@@ -66,10 +68,14 @@ private:
     std::chrono::steady_clock::time_point deadline;
   };
 
-  void onPose(int grasp, const geometry_msgs::PoseStamped& message);
+  void onPose(int guided, const geometry_msgs::PoseStamped& message);
+  void onFlow(std::size_t thread, const std_msgs::Float64& message);
+  void onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped& message);
   void onGuides(const geometry_msgs::PoseArray& message);
   void onBodies(const slender_sim::BodyStates& message);
   Pose poseOf(const Simulation& simulation, std::size_t guided) const;
+  bool addThreads(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options, const std::vector<std::string>& prefixes);
+  void subscribePose(ros::NodeHandle& nh);
   void addSolids(const Simulation& simulation, const GuideBuffer::Options& options);
   bool checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X);
   void take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries);
@@ -78,8 +84,10 @@ private:
 
   const NodeOptions options_;
   const SimClock& clock_;
-  std::vector<Guided> guided_;                            // grasps in scene order, then bodies, then obstacles
-  std::size_t grasps_ = 0, bodies_ = 0;                   // how many of the first two
+  std::vector<Guided> guided_;                            // grasps in scene order, then bodies, obstacles, nozzles
+  std::size_t grasps_ = 0, bodies_ = 0, obstacles_ = 0;   // how many of the first three
+  struct Driven { std::optional<double> flow; std::optional<Eigen::Vector3d> belt; };
+  std::vector<Driven> threads_;                           // last values by message
   std::deque<Message> pending_;
   DropCounter drops_;
   tf2_ros::Buffer tf_buffer_;

@@ -8,6 +8,7 @@
 
 #include "slender_sim/BodyStates.h"
 #include "slender_sim/RodState.h"
+#include "slender_sim/ThreadState.h"
 #include "slender_sim/scene/simulation.h"
 
 namespace slender {
@@ -16,12 +17,17 @@ namespace slender {
 /// std::invalid_argument for a rod or a grasp whose name cannot be part of a topic.
 std::vector<std::string> graspTopicNames(const Simulation& simulation);
 
+/// Before the topics of a thread: nothing in a scene of one thread, else "threads/NAME/". Throws like graspTopicNames().
+std::vector<std::string> threadTopicPrefixes(const Simulation& simulation);
+
 /// What is published and recorded of one instant, in scene order.
 struct SceneMessages
 {
   std::vector<slender_sim::RodState> states;            ///< per rod
-  geometry_msgs::PoseArray poses;                       ///< the edges' frames at their middles, all rods one after the other
+  std::vector<slender_sim::ThreadState> threads;        ///< per thread and piece of it
+  geometry_msgs::PoseArray poses;                       ///< the edges' frames at their middles, all rods and threads one after the other
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
+  std::vector<geometry_msgs::WrenchStamped> nozzles;    ///< per thread: what it does to its nozzle, about the outlet; zero without one
   slender_sim::BodyStates bodies;                       ///< the scene's bodies, simulated and driven; none: not published
 
   void fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch);

@@ -1,8 +1,9 @@
-#include "slender_sim/node/rod_markers.h"
+#include "slender_sim/node/scene_markers.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 
 #include "marker_tools.h"
 #include "slender_sim/node/converters.h"
@@ -15,6 +16,7 @@ using visualization_msgs::Marker;
 
 constexpr int kSides = 16;           // of the tube
 constexpr int kMaxSections = 800;    // per rod
+constexpr int kMaxThreadSections = 6000;   // a coil has many turns
 
 const std::array<std_msgs::ColorRGBA, 4>& rodColors()
 {
@@ -28,31 +30,54 @@ struct Section
   Vector3d x, u, w;   ///< centre, and the cross-section's semi-axes as vectors (u along d1)
 };
 
-Vector3d directorAt(const RodState& s, int node, int edges, bool closed)
+/// What a tube is drawn around.
+struct Line
 {
-  const int after = closed ? node % edges : std::min(node, edges - 1);
-  const int before = closed ? (node + edges - 1) % edges : std::max(node - 1, 0);
-  const Vector3d sum = s.d1.col(before) + s.d1.col(after);   // opposite only beyond half a turn per edge
-  return sum.norm() > 1e-6 ? Vector3d(sum.normalized()) : Vector3d(s.d1.col(after));
+  bool closed;
+  int nodes, edges;
+  std::function<Vector3d(int)> x, d1;        ///< of a node, of an edge
+  std::function<std::array<double, 2>(int)> semi_axes;   ///< of an edge [m]
+};
+
+Line lineOf(const RodModel& model, const RodState& s)
+{
+  return {model.closed, model.nodes(), model.edges(), [&s](int i) -> Vector3d { return s.x.col(i); }, [&s](int j) -> Vector3d { return s.d1.col(j); },
+          [&model](int j) { return std::array<double, 2>{model.radius_a[j], model.radius_b[j]}; }};
+}
+
+Line lineOf(const ThreadState& s)
+{
+  return {false, s.nodes(), s.edges(), [&s](int i) { return s.x[i]; }, [&s](int j) { return s.d1[j]; },
+          [&s](int j) { return std::array<double, 2>{s.radius(j), s.radius(j)}; }};
+}
+
+Vector3d directorAt(const Line& line, int node)
+{
+  const int edges = line.edges;
+  const int after = line.closed ? node % edges : std::min(node, edges - 1);
+  const int before = line.closed ? (node + edges - 1) % edges : std::max(node - 1, 0);
+  const Vector3d sum = line.d1(before) + line.d1(after);   // opposite only beyond half a turn per edge
+  return sum.norm() > 1e-6 ? Vector3d(sum.normalized()) : line.d1(after);
 }
 
 /// Sections through the nodes and, on cubic Hermite curves with three-point tangents, between them.
-std::vector<Section> sections(const RodModel& model, const RodState& s)
+std::vector<Section> sections(const Line& line, int most)
 {
-  const int nodes = model.nodes(), edges = model.edges();
-  const int stride = std::max(1, (edges + kMaxSections - 1) / kMaxSections);
-  const int pieces = std::clamp(kMaxSections / (2 * edges), 1, 4);   // per edge
-  const auto x = [&](int i) -> Vector3d { return s.x.col(model.closed ? (i + nodes) % nodes : std::clamp(i, 0, nodes - 1)); };
+  const int nodes = line.nodes, edges = line.edges;
+  const int stride = std::max(1, (edges + most - 1) / most);
+  const int pieces = std::clamp(most / (2 * edges), 1, 4);   // per edge
+  const auto x = [&](int i) -> Vector3d { return line.x(line.closed ? (i + nodes) % nodes : std::clamp(i, 0, nodes - 1)); };
   const auto tangent = [&](int i) -> Vector3d {
-    const bool end = !model.closed && (i == 0 || i == nodes - 1);
+    const bool end = !line.closed && (i == 0 || i == nodes - 1);
     return (end ? 1.0 : 0.5) * (x(i + stride) - x(i - stride));
   };
   std::vector<Section> out;
   for (int j = 0; j < edges; j += stride)
   {
     const int next = std::min(j + stride, edges);
-    const Vector3d x0 = x(j), x1 = x(next), m0 = tangent(j), m1 = tangent(next % (model.closed ? nodes : nodes + 1));
-    const Vector3d d0 = directorAt(s, j, edges, model.closed), d1 = directorAt(s, next, edges, model.closed);
+    const Vector3d x0 = x(j), x1 = x(next), m0 = tangent(j), m1 = tangent(next % (line.closed ? nodes : nodes + 1));
+    const Vector3d d0 = directorAt(line, j), d1 = directorAt(line, next);
+    const std::array<double, 2> axes = line.semi_axes(std::min(j, edges - 1));
     const int last = next == edges ? pieces : pieces - 1;
     for (int k = 0; k <= last; ++k)
     {
@@ -60,16 +85,14 @@ std::vector<Section> sections(const RodModel& model, const RodState& s)
       const Vector3d t = (6 * f * g * (x1 - x0) + g * (1 - 3 * f) * m0 + f * (3 * f - 2) * m1).normalized();
       Vector3d d = g * d0 + f * d1;
       d = (d - d.dot(t) * t).normalized();
-      const int e = std::min(j, edges - 1);
-      out.push_back({(1 + 2 * f) * g * g * x0 + f * g * g * m0 + f * f * (3 - 2 * f) * x1 - f * f * g * m1, model.radius_a[e] * d,
-                     model.radius_b[e] * t.cross(d)});
+      out.push_back({(1 + 2 * f) * g * g * x0 + f * g * g * m0 + f * f * (3 - 2 * f) * x1 - f * f * g * m1, axes[0] * d, axes[1] * t.cross(d)});
     }
   }
   return out;
 }
 
 /// Two triangles per side and section; the stripes' edges are sharp because each side has one colour.
-void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& base, bool closed, Marker& marker)
+void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& base, bool striped, bool closed, Marker& marker)
 {
   struct Corner
   {
@@ -94,7 +117,7 @@ void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& ba
   for (std::size_t i = 0; i + 1 < sections.size(); ++i)
     for (int side = 0; side < kSides; ++side)
     {
-      const std_msgs::ColorRGBA& paint = side % (kSides / 2) <= 1 ? stripe : base;   // two stripes: seen from everywhere
+      const std_msgs::ColorRGBA& paint = striped && side % (kSides / 2) <= 1 ? stripe : base;   // two stripes: seen from everywhere
       const Corner a = corner(sections[i], side), b = corner(sections[i + 1], side);
       const Corner c = corner(sections[i + 1], side + 1), d = corner(sections[i], side + 1);
       triangle(a, c, b, paint);
@@ -153,9 +176,51 @@ Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& co
   return marker;
 }
 
+/// Of a thread and its pieces: one marker each; pieces that are gone are taken away.
+void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& header, visualization_msgs::MarkerArray& out)
+{
+  const std_msgs::ColorRGBA honey = color(0.90, 0.60, 0.12), metal = color(0.55, 0.57, 0.60), ground = color(0.42, 0.45, 0.50);
+  for (std::size_t k = 0; k < simulation.state().threads.size(); ++k)
+  {
+    const ThreadConfig& config = simulation.config().threads[k];
+    Marker gone = makeMarker(header, "threads/" + config.name, 0, Marker::TRIANGLE_LIST);
+    gone.action = Marker::DELETEALL;
+    out.markers.push_back(gone);
+    for (const ThreadState& thread : simulation.state().threads[k].threads)
+    {
+      Marker tube = makeMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id), Marker::TRIANGLE_LIST);
+      addTube(sections(lineOf(thread), kMaxThreadSections), honey, false, false, tube);
+      out.markers.push_back(std::move(tube));
+    }
+    if (config.nozzle)
+    {
+      Marker nozzle = makeMarker(header, "nozzles", static_cast<int>(k), Marker::CYLINDER);
+      const Pose& X = simulation.state().threads[k].threads.front().ends[1].X_WE;
+      const double length = 4.0 * config.nozzle->diameter;
+      nozzle.pose = toMessage(Pose{X.position - X.orientation * Vector3d(0.5 * length, 0, 0),
+                                   X.orientation * Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d::UnitX())});
+      nozzle.scale.x = nozzle.scale.y = 1.4 * config.nozzle->diameter;
+      nozzle.scale.z = length;
+      nozzle.color = metal;
+      out.markers.push_back(nozzle);
+    }
+    if (config.floor)
+    {
+      Marker floor = makeMarker(header, "floors", static_cast<int>(k), Marker::CUBE);
+      const Pose X = config.nozzle ? config.nozzle->pose : Pose();
+      const double size = config.nozzle ? std::max(0.1, 1.5 * (X.position.z() - config.floor->height)) : 1.0;
+      floor.pose = toMessage(Pose{Vector3d(X.position.x(), X.position.y(), config.floor->height - 0.005 * size), Eigen::Quaterniond::Identity()});
+      floor.scale.x = floor.scale.y = size;
+      floor.scale.z = 0.01 * size;
+      floor.color = ground;
+      out.markers.push_back(floor);
+    }
+  }
+}
+
 }  // namespace
 
-visualization_msgs::MarkerArray rodMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,
+visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,
                                            bool material_frames)
 {
   visualization_msgs::MarkerArray out;
@@ -164,10 +229,10 @@ visualization_msgs::MarkerArray rodMarkers(const Simulation& simulation, const s
     const RodModel& model = simulation.rodModel(static_cast<int>(r));
     const RodState& state = simulation.state().rods[r];
     const std_msgs::ColorRGBA& base = rodColors()[r % rodColors().size()];
-    const std::vector<Section> curve = sections(model, state);
+    const std::vector<Section> curve = sections(lineOf(model, state), kMaxSections);
     Marker rod = makeMarker(header, "rods/" + model.name, 0, style == MarkerStyle::tube ? Marker::TRIANGLE_LIST : Marker::LINE_STRIP);
     if (style == MarkerStyle::tube)
-      addTube(curve, base, model.closed, rod);
+      addTube(curve, base, true, model.closed, rod);
     else
     {
       rod.scale.x = 2.0 * model.radius_a.mean();
@@ -189,6 +254,7 @@ visualization_msgs::MarkerArray rodMarkers(const Simulation& simulation, const s
     out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config, simulation.state().rods[ref.rod].grasps[ref.index],
                                       simulation.rodModel(ref.rod)));
   }
+  addThreadMarkers(simulation, header, out);
   addSolidMarkers(simulation, header, out);
   return out;
 }

@@ -1,4 +1,4 @@
-#include "slender_sim/node/rod_node.h"
+#include "slender_sim/node/scene_node.h"
 
 #include <algorithm>
 #include <iomanip>
@@ -11,8 +11,9 @@
 #include <std_msgs/String.h>
 
 #include "slender_sim/RodState.h"
+#include "slender_sim/ThreadState.h"
 #include "slender_sim/node/converters.h"
-#include "slender_sim/node/rod_markers.h"
+#include "slender_sim/node/scene_markers.h"
 #include "slender_sim/scene/reader.h"
 
 namespace slender {
@@ -21,37 +22,46 @@ namespace {
 constexpr double kIdle = 0.02;         // [s] longest sleep: how late diagnostics and markers may be
 constexpr double kBurst = 0.02;        // [s] longest run of steps between two looks at the callbacks
 
-SceneConfig loadScene(const NodeOptions& options)
+SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
 {
-  if (options.scene.find('\n') != std::string::npos)
-    return parseScene(options.scene, "~scene", options.overrides);
-  return readScene(options.scene, options.overrides);
+  SceneConfig scene = options.scene.find('\n') != std::string::npos ? parseScene(options.scene, "~scene", options.overrides)
+                                                                    : readScene(options.scene, options.overrides);
+  // one kind of state on the topic `state`
+  if (kind == NodeKind::rods && !scene.threads.empty())
+    throw SceneError("scene " + scene.name + ": it has threads, which thread_node simulates; rods and threads do not meet: put them in two scenes");
+  if (kind == NodeKind::threads && (scene.threads.empty() || !scene.rods.empty() || !scene.bodies.empty() || !scene.obstacles.empty()))
+    throw SceneError("scene " + scene.name + (scene.threads.empty() ? ": it has no threads; rod_node simulates rods"
+                                                                    : ": it has rods, bodies or obstacles beside its threads, which do not meet them; put them in two scenes"));
+  return scene;
 }
 
 }  // namespace
 
-RodNode::RodNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv)
-  : nh_(nh), nh_priv_(nh_priv), options_(NodeOptions::read(nh_priv))
+const char* toString(NodeKind kind) { return kind == NodeKind::rods ? "rod_node" : "thread_node"; }
+
+SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, NodeKind kind)
+  : nh_(nh), nh_priv_(nh_priv), kind_(kind), options_(NodeOptions::read(nh_priv))
 {
   nh_.setCallbackQueue(&queue_);
   nh_priv_.setCallbackQueue(&queue_);
   checkClock();
-  simulation_ = std::make_unique<Simulation>(loadScene(options_));
+  simulation_ = std::make_unique<Simulation>(loadScene(options_, kind_));
   grasp_names_ = graspTopicNames(*simulation_);
+  thread_prefixes_ = threadTopicPrefixes(*simulation_);
   if (!options_.record_bag.empty())
-    bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), grasp_names_);
+    bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), grasp_names_, thread_prefixes_);
   if (options_.paused)
     mode_ = Mode::paused;
   startClock();
 }
 
-RodNode::~RodNode()
+SceneNode::~SceneNode()
 {
   for (ros::ServiceServer& service : services_)
     service.shutdown();
 }
 
-void RodNode::checkClock() const
+void SceneNode::checkClock() const
 {
   bool use_sim_time = false;
   nh_.getParam("/use_sim_time", use_sim_time);
@@ -67,7 +77,7 @@ void RodNode::checkClock() const
 }
 
 /// Everything that needs the time of the first stamp. With `follow` that may be the first /clock.
-void RodNode::startClock()
+void SceneNode::startClock()
 {
   ros::Time start(1.0);
   if (options_.start_time)
@@ -82,7 +92,7 @@ void RodNode::startClock()
     start = ros::Time::now();
   clock_ = SimClock(start, simulation_->config().time.step);
   clock_started_ = true;
-  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, grasp_names_);
+  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, grasp_names_, thread_prefixes_);
   advertise();
   advertiseServices();
   std_msgs::String scene;
@@ -95,9 +105,11 @@ void RodNode::startClock()
   publishState();
 }
 
-void RodNode::advertise()
+void SceneNode::advertise()
 {
-  state_pub_ = nh_.advertise<slender_sim::RodState>("state", 1000);
+  state_pub_ = kind_ == NodeKind::rods ? nh_.advertise<slender_sim::RodState>("state", 1000) : nh_.advertise<slender_sim::ThreadState>("state", 1000);
+  for (const std::string& prefix : thread_prefixes_)
+    nozzle_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>(prefix + "nozzle/wrench", 100));
   poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>("poses", 100);
   if (simulation_->config().rods.size() > 1)
     for (const RodConfig& rod : simulation_->config().rods)
@@ -116,7 +128,7 @@ void RodNode::advertise()
     clock_pub_ = nh_.advertise<rosgraph_msgs::Clock>("/clock", 100, true);
 }
 
-bool RodNode::advance()
+bool SceneNode::advance()
 {
   const ros::WallTime begin = ros::WallTime::now();
   SceneInputs inputs = simulation_->defaultInputs();
@@ -134,6 +146,13 @@ bool RodNode::advance()
       fail("the state is not finite any more");
       return false;
     }
+  for (const ThreadGroupState& group : simulation_->state().threads)
+    for (const ThreadState& thread : group.threads)
+      if (!isFinite(thread))
+      {
+        fail("the state is not finite any more");
+        return false;
+      }
   for (const RigidBodyState& body : simulation_->state().bodies)
     if (!isFinite(body))
     {
@@ -157,7 +176,7 @@ bool RodNode::advance()
   return true;
 }
 
-void RodNode::fail(const std::string& reason)
+void SceneNode::fail(const std::string& reason)
 {
   mode_ = Mode::failed;
   failure_ = "step " + std::to_string(simulation_->state().steps + 1) + ": " + reason;
@@ -165,7 +184,7 @@ void RodNode::fail(const std::string& reason)
   publishDiagnostics();
 }
 
-void RodNode::publishState()
+void SceneNode::publishState()
 {
   if (options_.publish_clock)   // before the messages with this stamp
   {
@@ -176,11 +195,15 @@ void RodNode::publishState()
   broadcastBodies();
   const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
   if (!bag_ && !heard(state_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) &&
-      std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) && std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard))
+      std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) && std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard) && std::none_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard))
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
   for (const slender_sim::RodState& state : messages_.states)
     state_pub_.publish(state);
+  for (const slender_sim::ThreadState& state : messages_.threads)
+    state_pub_.publish(state);
+  for (std::size_t k = 0; k < nozzle_pubs_.size(); ++k)
+    nozzle_pubs_[k].publish(messages_.nozzles[k]);
   poses_pub_.publish(messages_.poses);
   for (std::size_t r = 0; r < rod_poses_pubs_.size(); ++r)
   {
@@ -205,7 +228,7 @@ void RodNode::publishState()
   }
 }
 
-void RodNode::broadcastBodies()
+void SceneNode::broadcastBodies()
 {
   if (!tf_broadcaster_)
     return;
@@ -227,14 +250,14 @@ void RodNode::broadcastBodies()
   tf_broadcaster_->sendTransform(transforms);
 }
 
-void RodNode::recordingFailed(const std::string& reason)
+void SceneNode::recordingFailed(const std::string& reason)
 {
   bag_failure_ = reason;
   bag_.reset();
   ROS_ERROR("recording stopped: %s", reason.c_str());
 }
 
-void RodNode::publishMarkers()
+void SceneNode::publishMarkers()
 {
   const std::uint32_t listeners = markers_pub_.getNumSubscribers();
   const auto now = std::make_pair(clock_.ticks(), listeners);
@@ -245,10 +268,10 @@ void RodNode::publishMarkers()
   std_msgs::Header header;
   header.stamp = clock_.stamp();
   header.frame_id = options_.frame_id;
-  markers_pub_.publish(rodMarkers(*simulation_, header, options_.marker_style, options_.marker_frames));
+  markers_pub_.publish(sceneMarkers(*simulation_, header, options_.marker_style, options_.marker_frames));
 }
 
-void RodNode::jumped()
+void SceneNode::jumped()
 {
   ++epoch_;
   clock_.tick();   // stamps grow even so
@@ -256,7 +279,7 @@ void RodNode::jumped()
   publishState();
 }
 
-void RodNode::realign()
+void SceneNode::realign()
 {
   // Where others keep the time, skip to their present: guides then act when they come, not late by the length of the pause.
   const bool others = options_.pace == Pace::follow || (options_.pace == Pace::wall && !options_.publish_clock && !options_.start_time);
@@ -270,7 +293,7 @@ void RodNode::realign()
   wall_start_ticks_ = clock_.ticks();
 }
 
-ros::WallDuration RodNode::untilDue() const
+ros::WallDuration SceneNode::untilDue() const
 {
   if (!clock_started_ || mode_ != Mode::running || options_.pace == Pace::step)
     return ros::WallDuration(kIdle);
@@ -283,7 +306,7 @@ ros::WallDuration RodNode::untilDue() const
   return ros::WallDuration(std::clamp(remaining, 0.0, kIdle));
 }
 
-void RodNode::work()
+void SceneNode::work()
 {
   if (!clock_started_)
   {
@@ -305,7 +328,7 @@ void RodNode::work()
     publishDiagnostics();
 }
 
-int RodNode::spin()
+int SceneNode::spin()
 {
   while (nh_.ok() && !finished_)
   {
@@ -331,20 +354,21 @@ int RodNode::spin()
   return mode_ == Mode::failed || !bag_failure_.empty() ? 3 : 0;
 }
 
-void RodNode::summary() const
+void SceneNode::summary() const
 {
   const RunStatistics& s = total_;
-  std::cout << std::setprecision(4) << "rod_node: " << s.steps << " steps, " << s.simulated << " s simulated, " << s.busy
+  const char* name = toString(kind_);
+  std::cout << std::setprecision(4) << name << ": " << s.steps << " steps, " << s.simulated << " s simulated, " << s.busy
             << " s computing, real-time factor " << s.realTimeFactor() << ", worst residual " << s.residual << ", largest strain "
             << s.max_strain << ", Newton iterations per step " << (s.steps ? static_cast<double>(s.iterations) / s.steps : 0.0)
             << ", cut steps " << s.cut_steps << "\n";
   for (std::size_t g = 0; g < s.max_force.size(); ++g)
-    std::cout << "rod_node: grasp " << grasp_names_[g] << ": largest force " << s.max_force[g] << " N, torque " << s.max_torque[g]
+    std::cout << name << ": grasp " << grasp_names_[g] << ": largest force " << s.max_force[g] << " N, torque " << s.max_torque[g]
               << " N m\n";
   if (inputs_ && inputs_->drops().total() > 0)
-    std::cout << "rod_node: " << inputs_->drops().total() << " messages dropped\n";
+    std::cout << name << ": " << inputs_->drops().total() << " messages dropped\n";
   if (bag_)
-    std::cout << "rod_node: recorded " << bag_->path() << "\n";
+    std::cout << name << ": recorded " << bag_->path() << "\n";
   std::cout << std::flush;
 }
 

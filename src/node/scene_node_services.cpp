@@ -2,21 +2,21 @@
 #include <cmath>
 
 #include "slender_sim/node/converters.h"
-#include "slender_sim/node/rod_node.h"
+#include "slender_sim/node/scene_node.h"
 
 namespace slender {
 
-void RodNode::advertiseServices()
+void SceneNode::advertiseServices()
 {
-  services_ = {nh_priv_.advertiseService("pause", &RodNode::onPause, this),
-               nh_priv_.advertiseService("reset", &RodNode::onReset, this),
-               nh_priv_.advertiseService("step", &RodNode::onStep, this),
-               nh_priv_.advertiseService("set_grasp", &RodNode::onSetGrasp, this),
-               nh_priv_.advertiseService("save_state", &RodNode::onSave, this),
-               nh_priv_.advertiseService("load_state", &RodNode::onLoad, this)};
+  services_ = {nh_priv_.advertiseService("pause", &SceneNode::onPause, this),
+               nh_priv_.advertiseService("reset", &SceneNode::onReset, this),
+               nh_priv_.advertiseService("step", &SceneNode::onStep, this),
+               nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this),
+               nh_priv_.advertiseService("save_state", &SceneNode::onSave, this),
+               nh_priv_.advertiseService("load_state", &SceneNode::onLoad, this)};
 }
 
-bool RodNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)
+bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)
 {
   if (mode_ == Mode::failed)
   {
@@ -32,7 +32,7 @@ bool RodNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Re
   return true;
 }
 
-bool RodNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response)
+bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response)
 {
   simulation_->reset();
   inputs_->restart(*simulation_);
@@ -47,7 +47,7 @@ bool RodNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& 
   return true;
 }
 
-bool RodNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::Response& response)
+bool SceneNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::Response& response)
 {
   response.success = false;
   if (mode_ == Mode::failed)
@@ -71,7 +71,7 @@ bool RodNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::Res
   return true;
 }
 
-bool RodNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response)
+bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response)
 {
   const auto found = std::find(grasp_names_.begin(), grasp_names_.end(), request.name);
   response.success = false;
@@ -104,7 +104,7 @@ bool RodNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim::S
 }
 
 /// Returns why not; empty when done.
-std::string RodNode::attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response)
+std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response)
 {
   const GraspRef& ref = simulation_->grasps()[grasp];
   const RodState& rod = simulation_->state().rods[ref.rod];
@@ -149,7 +149,7 @@ std::string RodNode::attach(const slender_sim::SetGrasp::Request& request, int g
   return "";
 }
 
-bool RodNode::onSave(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response)
+bool SceneNode::onSave(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response)
 {
   response.success = false;
   if (request.path.empty())
@@ -167,7 +167,7 @@ bool RodNode::onSave(slender_sim::FilePath::Request& request, slender_sim::FileP
   return true;
 }
 
-bool RodNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response)
+bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response)
 {
   response.success = false;
   try

@@ -4,7 +4,7 @@
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <ros/this_node.h>
 
-#include "slender_sim/node/rod_node.h"
+#include "slender_sim/node/scene_node.h"
 
 namespace slender {
 namespace {
@@ -38,7 +38,7 @@ void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& mess
 
 }  // namespace
 
-void RodNode::publishDiagnostics()
+void SceneNode::publishDiagnostics()
 {
   diagnostic_msgs::DiagnosticArray message;
   message.header.stamp = clock_.stamp();
@@ -48,7 +48,7 @@ void RodNode::publishDiagnostics()
   next_diagnostics_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.diagnostics_rate);
 }
 
-DiagnosticStatus RodNode::simulationStatus() const
+DiagnosticStatus SceneNode::simulationStatus() const
 {
   DiagnosticStatus status;
   status.name = ros::this_node::getName() + ": simulation";
@@ -93,7 +93,7 @@ DiagnosticStatus RodNode::simulationStatus() const
   return status;
 }
 
-DiagnosticStatus RodNode::inputStatus()
+DiagnosticStatus SceneNode::inputStatus()
 {
   DiagnosticStatus status;
   status.name = ros::this_node::getName() + ": inputs";

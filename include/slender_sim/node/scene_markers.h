@@ -11,11 +11,11 @@ namespace slender {
 
 /// Pictures of a scene for rviz, derived from the state. One marker per thing with a stable ns and id:
 /// `rods/NAME` 0 the rod, `frames/NAME` 0 its material frames, `grasps` i the gripper of grasp i, `bodies` i and `obstacles` i their shapes
-/// (of a plane a piece).
+/// (of a plane a piece); `threads/NAME` i piece i of a thread with its true radius, `nozzles` i, `floors` i.
 ///
 /// tube: true to scale, drawn through a smooth curve, with a stripe along d1 that shows the twist; line: one line strip.
 /// Very fine rods are thinned out to a few hundred sections: a picture has no more pixels.
-visualization_msgs::MarkerArray rodMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,
+visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,
                                            bool material_frames);
 
 }  // namespace slender

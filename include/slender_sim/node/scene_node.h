@@ -24,15 +24,19 @@
 
 namespace slender {
 
-/// Simulates the rods and bodies of a scene: poses of what moves them come in as messages, their motion goes out. README lists topics,
-/// services and parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
-class RodNode
+/// What a node simulates, and its name in what it prints.
+enum class NodeKind { rods, threads };
+const char* toString(NodeKind kind);
+
+/// Simulates a scene of rods and bodies, or of viscous threads: poses of what moves them come in as messages, their motion goes out.
+/// README lists topics, services and parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
+class SceneNode
 {
 public:
   /// Reads options and scene and composes it before anything is advertised. Throws SceneError, OptionError or
   /// std::exception with a text for the user.
-  RodNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv);
-  ~RodNode();
+  SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, NodeKind kind);
+  ~SceneNode();
 
   /// Until shut down, or ~stop_after. Returns the exit status: 0, or 3 when it ends after a failed step.
   int spin();
@@ -40,7 +44,7 @@ public:
 private:
   enum class Mode { running, paused, failed };
 
-  // rod_node.cpp
+  // scene_node.cpp
   void checkClock() const;
   void startClock();
   void advertise();
@@ -56,7 +60,7 @@ private:
   void recordingFailed(const std::string& reason);
   void summary() const;
 
-  // rod_node_services.cpp
+  // scene_node_services.cpp
   void advertiseServices();
   bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
   bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
@@ -66,16 +70,17 @@ private:
   bool onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
   std::string attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response);
 
-  // rod_node_diagnostics.cpp
+  // scene_node_diagnostics.cpp
   void publishDiagnostics();
   diagnostic_msgs::DiagnosticStatus simulationStatus() const;
   diagnostic_msgs::DiagnosticStatus inputStatus();
 
   ros::CallbackQueue queue_;
   ros::NodeHandle nh_, nh_priv_;
+  const NodeKind kind_;
   NodeOptions options_;
   std::unique_ptr<Simulation> simulation_;
-  std::vector<std::string> grasp_names_;
+  std::vector<std::string> grasp_names_, thread_prefixes_;
   SimClock clock_;
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;
@@ -98,7 +103,7 @@ private:
   ros::Publisher bodies_pub_;            // only when the scene has bodies, like the next
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
   ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
-  std::vector<ros::Publisher> rod_poses_pubs_, wrench_pubs_;
+  std::vector<ros::Publisher> rod_poses_pubs_, wrench_pubs_, nozzle_pubs_;
   std::vector<ros::ServiceServer> services_;
 };
 
