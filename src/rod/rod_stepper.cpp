@@ -221,21 +221,32 @@ RodEnergies RodStepper::energies(const RodState& state, const Eigen::Vector3d& g
 RodEnergies RodStepper::Impl::energies(const RodState& state, const Eigen::Vector3d& gravity)
 {
   const RodModel& m = *model;
+  RodEnergies result;
+  for (int i = 0; i < m.nodes(); ++i)
+  {
+    result.kinetic += 0.5 * m.mass[i] * state.v.col(i).squaredNorm();
+    result.gravity -= m.mass[i] * gravity.dot(state.x.col(i));
+  }
+  if (isotropic)
+  {
+    const RodEvaluation e = isotropic->evaluate(state);
+    result.stretch = e.stretch;
+    result.twist = isotropic->twistEnergy();
+    result.bend = e.bend_twist - result.twist;
+    return result;
+  }
   system.leaveOutStretching(false);
   system.load(state);
   system.setResponse(0.0, nullptr);
   for (int i = 0; i < m.nodes(); ++i)
     system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   const RodEvaluation e = system.evaluate(false);
-  RodEnergies result;
   result.stretch = e.stretch;
   const RodArrays& a = system.arrays();
   for (int i = 0; i < m.nodes(); ++i)
   {
     const double q = a.twist[i] - a.rest_twist[i];
     result.twist += 0.5 * a.beta[i] * q * q;
-    result.kinetic += 0.5 * m.mass[i] * state.v.col(i).squaredNorm();
-    result.gravity -= m.mass[i] * gravity.dot(state.x.col(i));
   }
   for (const ClampJoint& c : system.clamps())
     result.twist += 0.5 * c.beta * (c.twist - c.rest_twist) * (c.twist - c.rest_twist);
