@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
+
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
@@ -13,6 +15,13 @@ namespace {
 Eigen::Matrix3d pointInertia(double mass, const Eigen::Vector3d& r)
 {
   return mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+}
+
+Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
+{
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
 }
 
 /// Angular velocity of a body with this angular momentum.
@@ -112,11 +121,23 @@ void ExplicitSystem::predictBody(Body& body, double h)
       }
     }
   const Eigen::Quaterniond& q = body.start.orientation;
-  const double share = m.mass / body.mass;
   Twist& v = body.velocity;
-  v.linear = (v.linear + h / body.mass * force) / (1.0 + h * m.linear_damping * share);
-  const Eigen::Vector3d momentum =
-      (q * (body.inertia * (q.conjugate() * v.angular)) + h * torque) / (1.0 + h * m.angular_damping);
+  Eigen::Vector3d momentum = q * (body.inertia * (q.conjugate() * v.angular)) + h * torque;
+  v.linear += h / body.mass * force;
+  if (m.linear_damping > 0 || m.angular_damping > 0)
+  {
+    // damping of the body alone, about its own centre, by the velocity at the end; the nodes have their own
+    const double k = h * m.linear_damping * m.mass;
+    const Eigen::Matrix3d r = q.toRotationMatrix(), arm = crossMatrix(now.X_WB.position - body.start.position);
+    const Eigen::Matrix3d own = h * m.angular_damping * (r * m.inertia * r.transpose()) - k * arm * arm;
+    Eigen::Matrix<double, 6, 6> matrix;
+    matrix << (body.mass + k) * Eigen::Matrix3d::Identity(), -k * arm, k * arm, r * body.inertia * r.transpose() + own;
+    Eigen::Matrix<double, 6, 1> end;
+    end << body.mass * v.linear, momentum;
+    matrix.ldlt().solveInPlace(end);
+    v.linear = end.head<3>();
+    momentum -= k * arm * v.linear + own * Eigen::Vector3d(end.tail<3>());
+  }
   Eigen::Vector3d turn = h * spin(body.inertia, q, momentum);
   for (int k = 0; k < 20; ++k)
   {

@@ -1,6 +1,7 @@
 // Explicit steps: the isotropic formulation, inextensible rods, bodies, and torques handed to them (thesis 4.5, 4.6.1).
 #include <gtest/gtest.h>
 
+#include "slender_sim/geometry/rotation.h"
 #include "test/support/groups.h"
 
 namespace slender::test {
@@ -278,6 +279,37 @@ TEST(ExplicitSteps, ABodyUnderAStretchedRodStartsWhereItCanHang)
     EXPECT_LT(g.state.bodies[0].velocity.linear.norm(), 0.5 * 1e-8 / 1e-4);
     EXPECT_LT(g.state.rods[0].v.colwise().norm().maxCoeff(), 0.5 * 1e-8 / 1e-4);
   }
+}
+
+TEST(ExplicitSteps, LoadsAndDampingOfBodiesAreThoseOfImplicitSteps)
+{
+  // the same motion, to first order in the step: half the step, half the difference
+  Group start = tee();
+  RigidBodyModel& body = start.model.bodies[0];
+  body.force << 0.1, 0.2, -0.1;
+  body.torque << 1e-3, -2e-3, 1e-3;
+  body.linear_damping = 5;
+  body.angular_damping = 10;
+  start.setGravity({1, 2, -9.81});
+  for (std::size_t r = 0; r < start.model.rods.size(); ++r)
+  {
+    auto changed = std::make_shared<RodModel>(*start.model.rods[r]);
+    changed->drag.setConstant(changed->nodes(), 0.01);
+    changed->mass_damping = 1;
+    start.model.rods[r] = changed;
+    start.inputs.rods[r].wind << 3, 0, 0;
+  }
+  const auto run = [&](Integrator integrator, double h) {
+    Group g = start;
+    RodGroup group(g.model, withIntegrator(integrator));
+    for (int k = 0; k < std::lround(0.02 / h); ++k)
+      EXPECT_TRUE(group.step(g.state, g.inputs, h).ok);
+    return g.state.bodies[0].X_WB;
+  };
+  const Pose exact = run(Integrator::implicit_midpoint, 4e-5), a = run(Integrator::symplectic_euler, 2e-5), b = run(Integrator::symplectic_euler, 1e-5);
+  EXPECT_LT((b.position - exact.position).norm(), 4e-6);
+  EXPECT_LT(rotationVector(b.orientation * exact.orientation.conjugate()).norm(), 2e-5);
+  EXPECT_LT((2 * b.position - a.position - exact.position).norm(), 0.02 * (a.position - exact.position).norm());
 }
 
 TEST(ExplicitSteps, GroupsGoOnBitByBit)
