@@ -15,6 +15,24 @@ namespace slender {
 
 namespace {
 
+/// Which equations explicit steps use; implicit ones always use the general formulation with stretching.
+void chooseFormulation(const RodConfig& rod, Integrator integrator, RodModel& model)
+{
+  const bool explicit_steps = integrator == Integrator::symplectic_euler;
+  const std::string obstacle = explicit_steps ? whyNotIsotropic(model) : "it takes explicit steps (time.integrator: symplectic_euler)";
+  if (rod.formulation == Formulation::isotropic && !obstacle.empty())
+  {
+    throw std::invalid_argument("formulation: isotropic does not apply: " + obstacle + "; take formulation: auto");
+  }
+  if (rod.stretching == Stretching::projected && !explicit_steps)
+  {
+    throw std::invalid_argument("stretching: projected takes explicit steps (time.integrator: symplectic_euler); "
+                                "with implicit ones take stretching: stiff and material.inextensible: true");
+  }
+  model.isotropic = rod.formulation != Formulation::general && obstacle.empty();
+  model.inextensible = rod.stretching == Stretching::projected;
+}
+
 Pose sectionOffset(const Pose& X_WM, const Pose& X_WG) { return X_WM.inverse() * X_WG; }
 
 }  // namespace
@@ -62,6 +80,7 @@ void Simulation::buildRods()
         model.drag[j] += half;
         model.drag[(j + 1) % model.nodes()] += half;
       }
+      chooseFormulation(rod, config_.time.integrator, model);
       RodState state = makeRodState(model, initial, rod.director, rod.initial_twist);
       for (std::size_t g = 0; g < rod.grasps.size(); ++g)
       {

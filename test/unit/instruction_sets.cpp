@@ -192,12 +192,15 @@ TEST_P(RodKernelTables, Agree)
     EXPECT_GT(reference.gradient.norm(), 0.1);
     EXPECT_EQ(reference.gradient, reference.gradient_only);   // with or without the Hessian: one formula
     EXPECT_EQ(reference.with.energy(), reference.without.energy());
+    // Towards opposite directors the compensated strain is the quotient of two small numbers.
+    const auto twists = Eigen::Map<Eigen::VectorXd>(system.arrays().twist, n).array();
+    const double conditioning = curvature == Curvature::tangent ? 1.0 : (0.5 * twists).cos().square().inverse().maxCoeff();
     for (const auto& [name, table] : rodTables())
     {
       const Output out = evaluate(*table, system, 1 + n / 2);
-      const auto near = [&, name = name](const Eigen::VectorXd& a, const Eigen::VectorXd& b, const char* what) {
+      const auto near = [&, conditioning, name = name](const Eigen::VectorXd& a, const Eigen::VectorXd& b, const char* what) {
         // some tens of roundings each, relative to the largest entry
-        EXPECT_LT((a - b).lpNorm<Eigen::Infinity>(), 1e-13 * (1 + b.lpNorm<Eigen::Infinity>())) << what << " " << name << " n " << n;
+        EXPECT_LT((a - b).lpNorm<Eigen::Infinity>(), 1e-13 * conditioning * (1 + b.lpNorm<Eigen::Infinity>())) << what << " " << name << " n " << n;
       };
       near(out.frames, reference.frames, "frames");
       near(out.strains, reference.strains, "strains");

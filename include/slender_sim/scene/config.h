@@ -110,7 +110,8 @@ struct GraspConfig
 };
 
 /// Which equations a rod uses. `automatic` chooses the cheapest that applies; so far that is always the general one.
-enum class Formulation { automatic, general };
+enum class Formulation { automatic, isotropic, general };
+enum class Stretching { stiff, projected };
 
 /// What a rod touches.
 struct RodContact
@@ -130,6 +131,7 @@ struct RodConfig
   bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
   JointOptions joints;                         ///< `curvature`, `matched_to_arcs`
   Formulation formulation = Formulation::automatic;
+  Stretching stretching = Stretching::stiff;
   double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
   Eigen::Vector3d director{0, 0, 0};           ///< d1 at the first edge (projected); zero: chosen automatically
   CrossSection cross_section{{0.005}, {0.005}};
