@@ -99,6 +99,7 @@ void FastProjection::prepare()
 {
   touches_.clear();
   specials_ = 0;
+  int run = 0;
   std::size_t longest = 0;
   for (int c = 0; c < static_cast<int>(chains_.size()); ++c)
   {
@@ -110,8 +111,11 @@ void FastProjection::prepare()
       a.inverse_mass[i] = chain.owner[i] == kFree ? 1.0 / chain.mass[i] : 0.0;
     for (int i = 0; i < kHalo; ++i)
       a.inverse_mass[n + i] = a.closed ? a.inverse_mass[i % n] : 0.0;
+    const int first_run = ++run;
     for (int j = 0; j < a.edges; ++j)
     {
+      if (chain.owner[j] != kFree)
+        ++run;
       const int tail = j, head = (j + 1) % n, from = chain.owner[tail], to = chain.owner[head];
       const bool can_move = from == kFree || to == kFree || from != to;
       const bool special = can_move && from != kFree && to != kFree;
@@ -119,19 +123,72 @@ void FastProjection::prepare()
       a.lambda[j] = a.total[j] = 0.0;
       const int number = special ? specials_++ : -1;
       if (can_move && from >= 0)
-        touches_.push_back({c, j, from, -1.0, tail, number, Vector6::Zero(), Vector6::Zero()});
+        touches_.push_back({c, j, from, -1.0, tail, number, run, Vector6::Zero(), Vector6::Zero()});
       if (can_move && to >= 0)
-        touches_.push_back({c, j, to, 1.0, head, number, Vector6::Zero(), Vector6::Zero()});
+        touches_.push_back({c, j, to, 1.0, head, number, run, Vector6::Zero(), Vector6::Zero()});
     }
+    if (a.closed && chain.owner[0] == kFree)   // the last run goes on in the first
+      for (Touch& t : touches_)
+        if (t.chain == c && t.run == run)
+          t.run = first_run;
   }
-  const std::size_t unknowns = 6 * bodies_.size() + specials_;
-  dense_.resize(unknowns, unknowns);
-  dense_rhs_.resize(unknowns);
-  solution_.resize(unknowns);
+  solution_.resize(6 * bodies_.size() + specials_);
+  if (!touches_.empty())
+    buildPattern();
   impulse_.resize(bodies_.size());
   turn_.resize(bodies_.size());
   column_.assign(longest, 0.0);
   prepared_ = true;
+}
+
+/// Bodies whose touches lie in one run are coupled; touches are sorted by chain, so by run, too, but for closed chains.
+void FastProjection::buildPattern()
+{
+  const int bodies = static_cast<int>(bodies_.size()), size = 6 * bodies + specials_;
+  std::vector<std::vector<int>> blocks(bodies);   // per body, those that it is coupled to
+  std::vector<std::vector<int>> of_special(specials_);
+  for (int b = 0; b < bodies; ++b)
+    blocks[b].push_back(b);
+  for (std::size_t p = 0; p < touches_.size(); ++p)
+  {
+    if (touches_[p].special >= 0)
+    {
+      of_special[touches_[p].special].push_back(touches_[p].body);
+      continue;
+    }
+    for (std::size_t q = 0; q < touches_.size(); ++q)
+      if (touches_[q].special < 0 && touches_[q].chain == touches_[p].chain && touches_[q].run == touches_[p].run)
+        blocks[touches_[p].body].push_back(touches_[q].body);
+  }
+  std::vector<std::vector<int>> columns(size);
+  for (int b = 0; b < bodies; ++b)
+  {
+    std::sort(blocks[b].begin(), blocks[b].end());
+    blocks[b].erase(std::unique(blocks[b].begin(), blocks[b].end()), blocks[b].end());
+    for (int other : blocks[b])
+      for (int k = 0; k < 6; ++k)
+        for (int c = 0; c < 6; ++c)
+          columns[6 * b + c].push_back(6 * other + k);
+  }
+  for (int s = 0; s < specials_; ++s)
+  {
+    auto& own = of_special[s];
+    std::sort(own.begin(), own.end());
+    own.erase(std::unique(own.begin(), own.end()), own.end());
+    for (int b : own)
+      for (int k = 0; k < 6; ++k)
+      {
+        columns[6 * b + k].push_back(6 * bodies + s);
+        columns[6 * bodies + s].push_back(6 * b + k);
+      }
+  }
+  std::vector<int> starts{0}, rows;
+  for (const auto& column : columns)
+  {
+    rows.insert(rows.end(), column.begin(), column.end());
+    starts.push_back(static_cast<int>(rows.size()));
+  }
+  matrix_.setPattern(size, std::move(starts), std::move(rows));
 }
 
 /// A closed chain's corners are a rank-one change [Press et al., Numerical Recipes, 2.7.2].
@@ -210,13 +267,18 @@ void FastProjection::linearise()
 bool FastProjection::solveBodies()
 {
   const int bodies = static_cast<int>(bodies_.size()), first_special = 6 * bodies;
-  dense_.setZero();
-  dense_rhs_.setZero();
+  std::vector<double>& values = matrix_.values();
+  std::fill(values.begin(), values.end(), 0.0);
+  solution_.setZero();
   for (int b = 0; b < bodies; ++b)
   {
-    const Eigen::Matrix3d r = bodies_[b].start.orientation.toRotationMatrix();
-    dense_.block<3, 3>(6 * b, 6 * b).diagonal().setConstant(bodies_[b].mass);
-    dense_.block<3, 3>(6 * b + 3, 6 * b + 3) = r * bodies_[b].inertia * r.transpose();
+    const Eigen::Matrix3d r = bodies_[b].start.orientation.toRotationMatrix(), inertia = r * bodies_[b].inertia * r.transpose();
+    for (int k = 0; k < 3; ++k)
+    {
+      entry(6 * b + k, 6 * b + k) = bodies_[b].mass;
+      for (int l = 0; l < 3; ++l)
+        entry(6 * b + 3 + k, 6 * b + 3 + l) = inertia(k, l);
+    }
   }
   for (std::size_t begin = 0; begin < touches_.size();)
   {
@@ -228,29 +290,38 @@ bool FastProjection::solveBodies()
     solveChain(chain, column_.data());
     for (std::size_t q = begin; q < end; ++q)
       if (touches_[q].special < 0)
-        dense_rhs_.segment<6>(6 * touches_[q].body) += touches_[q].column * column_[touches_[q].edge];
+        solution_.segment<6>(6 * touches_[q].body) += touches_[q].column * column_[touches_[q].edge];
     for (std::size_t p = begin; p < end; ++p)
     {
       const Touch& t = touches_[p];
       if (t.special >= 0)
       {
         const int row = first_special + t.special;
-        dense_.block<1, 6>(row, 6 * t.body) -= t.row.transpose();
-        dense_.block<6, 1>(6 * t.body, row) -= t.column;
-        dense_rhs_[row] = 0.5 * (at(chain.a.s, t.edge).squaredNorm() - 1.0) * chain.a.rest_length[t.edge];
+        for (int k = 0; k < 6; ++k)
+        {
+          entry(row, 6 * t.body + k) -= t.row[k];
+          entry(6 * t.body + k, row) -= t.column[k];
+        }
+        solution_[row] = 0.5 * (at(chain.a.s, t.edge).squaredNorm() - 1.0) * chain.a.rest_length[t.edge];
         continue;
       }
       std::fill_n(column_.data(), chain.a.edges, 0.0);
       column_[t.edge] = 1.0;
       solveChain(chain, column_.data());
       for (std::size_t q = begin; q < end; ++q)
-        if (touches_[q].special < 0)
-          dense_.block<6, 6>(6 * touches_[q].body, 6 * t.body) -= (column_[touches_[q].edge] * touches_[q].column) * t.row.transpose();
+        if (touches_[q].special < 0 && touches_[q].run == t.run)
+          for (int l = 0; l < 6; ++l)
+          {
+            double* block = &entry(6 * touches_[q].body, 6 * t.body + l);   // six rows follow one another
+            for (int k = 0; k < 6; ++k)
+              block[k] -= column_[touches_[q].edge] * touches_[q].column[k] * t.row[l];
+          }
     }
     begin = end;
   }
-  lu_.compute(dense_);
-  solution_ = lu_.solve(dense_rhs_);
+  if (!matrix_.factor())
+    return false;
+  matrix_.solve(solution_.data());
   if (!solution_.allFinite())
     return false;
   for (const Touch& t : touches_)

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "rod_isotropic.h"
+#include "slender_sim/rod/isotropic_rod.h"
 #include "slender_sim/dynamics/fast_projection.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/dynamics/newton.h"

@@ -268,18 +268,29 @@ StepReport Simulation::stepAll()
 {
   StepReport total;
   const int count = static_cast<int>(steppers_.size());
+  constexpr int kWorthThreads = 500;   // nodes; less is done before threads are awake
+  int nodes = 0, alone = 0;
+  for (int r = 0; r < count; ++r)
+  {
+    if (steppers_[r])
+    {
+      nodes += models_[r]->nodes();
+      ++alone;
+    }
+  }
+  if (alone == 0)
+  {
+    return total;
+  }
   if (count == 1)
   {
-    if (steppers_[0])
-    {
-      total.merge(steppers_[0]->step(state_.rods[0], rod_inputs_[0], config_.time.step));
-    }
+    total.merge(steppers_[0]->step(state_.rods[0], rod_inputs_[0], config_.time.step));
     return total;
   }
   std::vector<StepReport> reports(steppers_.size());
   std::vector<std::exception_ptr> errors(steppers_.size());
 #ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) if (threads_ != 1) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
+#pragma omp parallel for schedule(dynamic) if (threads_ != 1 && alone > 1 && nodes >= kWorthThreads) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
 #endif
   for (int r = 0; r < count; ++r)
   {

@@ -25,6 +25,8 @@ void runKnot(StudyContext&);
 void runStickSlip(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
+void runProjection(StudyContext&);
+void runRodTables(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -51,6 +53,8 @@ const std::vector<Study>& studies()
       {"stick_slip", "compression at which the foot of a strip pressed on a floor slips, against the coefficient of friction", runStickSlip},
       {"knot", "open overhand knots: end force against the size of the loop", runKnot},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
+      {"projection", "inextensible rope: length error and iterations of fast projection; against stiff stretching, error against run time", runProjection},
+      {"rod_tables", "time per step of the thesis's rod examples, part by part, beside its table 4.1", runRodTables},
   };
   return all;
 }

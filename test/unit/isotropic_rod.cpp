@@ -1,5 +1,5 @@
 // The isotropic formulation: its gradient against differences of its energy, its twists against the frames it gives.
-#include "src/rod/rod_isotropic.h"
+#include "slender_sim/rod/isotropic_rod.h"
 
 #include <gtest/gtest.h>
 

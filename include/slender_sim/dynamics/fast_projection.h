@@ -3,11 +3,11 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include "slender_sim/dynamics/chain_kernel.h"
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/linalg/banded_ldlt.h"
+#include "slender_sim/linalg/sparse_lu.h"
 
 namespace slender {
 
@@ -35,7 +35,7 @@ struct ProjectedBody
 /// Constraint forces act along the edges as they lie at the start of the step (SHAKE [Ryckaert et al. 1977]) instead of at the last
 /// iterate: that conserves linear and angular momentum exactly, and with symplectic Euler it is a symplectic method. A body's turn is
 /// described by the rotation vector phi from its start, in the metric of its inertia there, so that its angular momentum changes by just
-/// the impulses' moments. Each iteration is a Newton step: tridiagonal solves along the chains, and a small dense system for the bodies.
+/// the impulses' moments. Each iteration is a Newton step: tridiagonal solves along the chains, and a sparse system for the bodies.
 class FastProjection
 {
 public:
@@ -92,11 +92,14 @@ private:
     double sign;           ///< +1: the edge ends at the welded node, -1: it begins there
     int node;
     int special;           ///< index among the edges that only bodies can move, -1: another
+    int run;               ///< of edges that free nodes connect: touches of one run feel each other
     Vector6 row, column;   ///< d(edge's length)/d(body), impulse on the body per multiplier
   };
 
   void setOwner(int chain, int node, int owner);
   void prepare();
+  void buildPattern();
+  double& entry(int row, int column) { return matrix_.values()[matrix_.index(row, column)]; }
   void factorChain(Chain& chain);
   void solveChain(const Chain& chain, double* b) const;
   double evaluate();
@@ -114,9 +117,8 @@ private:
   int specials_ = 0;
   std::vector<Vector6> impulse_;           ///< per body, sum so far
   std::vector<Eigen::Vector3d> turn_;      ///< per body, rotation vector from its start
-  Eigen::MatrixXd dense_;
-  Eigen::VectorXd dense_rhs_, solution_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  SparseLu matrix_;                        ///< of the bodies' displacements, six each, then of the special edges' multipliers
+  Eigen::VectorXd solution_;
   AlignedVector<double> column_;           ///< work space
 };
 

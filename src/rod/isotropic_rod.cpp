@@ -1,4 +1,4 @@
-#include "rod_isotropic.h"
+#include "slender_sim/rod/isotropic_rod.h"
 
 #include <algorithm>
 #include <cmath>
