@@ -376,6 +376,9 @@ rods: [{centerline: {straight: {edges: 20}}, material: {bend_modulus: 1e-4, twis
   run(a, 20);
   run(b, 20);
   expectSameBits(a.state(), b.state());
+  Simulation stiff = build({}), general = build({"rods.0.stretching=projected", "rods.0.formulation=general"});
+  EXPECT_THROW(stiff.load(file), std::runtime_error);   // other equations: not the same run going on
+  EXPECT_THROW(general.load(file), std::runtime_error);
 }
 
 }  // namespace
