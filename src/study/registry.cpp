@@ -23,6 +23,7 @@ void runHelicalBuckling(StudyContext&);
 void runMichell(StudyContext&);
 void runKnot(StudyContext&);
 void runStickSlip(StudyContext&);
+void runPlectoneme(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
 
@@ -50,6 +51,7 @@ const std::vector<Study>& studies()
       {"greenhill", "torque that buckles a clamped straight rod under tension or compression", runGreenhill},
       {"stick_slip", "compression at which the foot of a strip pressed on a floor slips, against the coefficient of friction", runStickSlip},
       {"knot", "open overhand knots: end force against the size of the loop", runKnot},
+      {"plectoneme", "a twisted rod with slack winds about itself: twist moment and tension against the ideal ply", runPlectoneme},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
   };
   return all;
