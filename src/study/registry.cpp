@@ -24,6 +24,7 @@ void runMichell(StudyContext&);
 void runKnot(StudyContext&);
 void runStickSlip(StudyContext&);
 void runPlectoneme(StudyContext&);
+void runChain(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
 
@@ -52,6 +53,7 @@ const std::vector<Study>& studies()
       {"stick_slip", "compression at which the foot of a strip pressed on a floor slips, against the coefficient of friction", runStickSlip},
       {"knot", "open overhand knots: end force against the size of the loop", runKnot},
       {"plectoneme", "a twisted rod with slack winds about itself: twist moment and tension against the ideal ply", runPlectoneme},
+      {"chain", "hooked links hold while the chain is drawn taut, and part when one is cut or bends open", runChain},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
   };
   return all;
