@@ -25,6 +25,8 @@ void runKnot(StudyContext&);
 void runStickSlip(StudyContext&);
 void runPlectoneme(StudyContext&);
 void runChain(StudyContext&);
+void runTree(StudyContext&);
+void runHair(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
 
@@ -54,6 +56,7 @@ const std::vector<Study>& studies()
       {"knot", "open overhand knots: end force against the size of the loop", runKnot},
       {"plectoneme", "a twisted rod with slack winds about itself: twist moment and tension against the ideal ply", runPlectoneme},
       {"chain", "hooked links hold while the chain is drawn taut, and part when one is cut or bends open", runChain},
+      {"tree", "a tree of 2,158 vertices in wind: what its root carries, time per step", runTree},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
   };
   return all;
