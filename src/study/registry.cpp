@@ -57,6 +57,7 @@ const std::vector<Study>& studies()
       {"plectoneme", "a twisted rod with slack winds about itself: twist moment and tension against the ideal ply", runPlectoneme},
       {"chain", "hooked links hold while the chain is drawn taut, and part when one is cut or bends open", runChain},
       {"tree", "a tree of 2,158 vertices in wind: what its root carries, time per step", runTree},
+      {"hair", "54,000 vertices of hair on a head that turns: time per step, worst gap", runHair},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
   };
   return all;
