@@ -17,6 +17,7 @@ void RodSystem::compose(const RodState& state)
   grasps_ = state.grasps;
   if (unchanged)
     return;
+  ++composition_;
 
   const int n = a_.nodes, edges = a_.edges;
   held_.assign(n, 0);
@@ -149,7 +150,7 @@ void RodSystem::setResponse(double r, const Eigen::Matrix4Xd* strain)
   const auto rest = [&](double elastic, int row, int column) { return r > 0 ? elastic + share * ((*strain)(row, column) - elastic) : elastic; };
   for (int i = 0; i < n; ++i)
   {
-    a_.stretch[i] = scale * stretch_[i];
+    a_.stretch[i] = no_stretching_ ? 0.0 : scale * stretch_[i];
     a_.rest_strain[i] = rest(0.0, 0, i);
     a_.b11[i] = scale * b11_[i];
     a_.b12[i] = scale * b12_[i];

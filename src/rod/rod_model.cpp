@@ -104,6 +104,22 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
   return model;
 }
 
+std::string whyNotIsotropic(const RodModel& model)
+{
+  for (int i = 0; i < model.nodes(); ++i)
+  {
+    const std::string at = " at node " + std::to_string(i);
+    const Eigen::Vector3d b = model.bend_modulus.col(i);
+    if (model.rest_curvature.col(i).norm() > 1e-9)   // round-off of a straight line's nodes
+      return "it is naturally curved" + at + " (naturally_straight: true makes it straight)";
+    if (std::abs(b[0] - b[2]) > 1e-9 * (b[0] + b[2]) || std::abs(b[1]) > 1e-9 * (b[0] + b[2]))
+      return "its bending modulus depends on the direction" + at;
+  }
+  if (model.stiffness_damping > 0)
+    return "it has damping.stiffness";
+  return "";
+}
+
 RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director, double total_twist)
 {
   if (nodes.cols() != model.nodes())

@@ -224,7 +224,9 @@ Damping readDamping(const YamlCursor& at)
 void readTraits(YamlMap& map, RodConfig& rod)
 {
   assign(rod.formulation,
-         map.get("formulation").choice<Formulation>({{"auto", Formulation::automatic}, {"general", Formulation::general}}));
+         map.get("formulation").choice<Formulation>(
+             {{"auto", Formulation::automatic}, {"isotropic", Formulation::isotropic}, {"general", Formulation::general}}));
+  assign(rod.stretching, map.get("stretching").choice<Stretching>({{"stiff", Stretching::stiff}, {"projected", Stretching::projected}}));
   rod.material = readMaterial(map.get("material"));
   rod.damping = readDamping(map.get("damping"));
   rod.contact = readRodContact(map.get("contact"));

@@ -29,6 +29,8 @@ void runTree(StudyContext&);
 void runHair(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
+void runProjection(StudyContext&);
+void runRodTables(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -59,6 +61,8 @@ const std::vector<Study>& studies()
       {"tree", "a tree of 2,158 vertices in wind: what its root carries, time per step", runTree},
       {"hair", "54,000 vertices of hair on a head that turns: time per step, worst gap", runHair},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
+      {"projection", "inextensible rope: length error and iterations of fast projection; against stiff stretching, error against run time", runProjection},
+      {"rod_tables", "time per step of the thesis's rod examples, part by part, beside its table 4.1", runRodTables},
   };
   return all;
 }

@@ -24,6 +24,9 @@ struct RodModel
   Eigen::Matrix2Xd rest_curvature;  ///< per node, integrated (kappa1, kappa2) [-]
   Eigen::VectorXd rest_twist;       ///< per node, integrated [rad]
 
+  bool isotropic = false;           ///< explicit steps use the isotropic formulation (see whyNotIsotropic)
+  bool inextensible = false;        ///< explicit steps keep the edges' lengths by projection instead of stretching energy
+
   double mass_damping = 0.0;        ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;   ///< Rayleigh [s]
   Eigen::VectorXd drag;             ///< per node [N s/m]: linear drag times Voronoi length
@@ -49,6 +52,10 @@ struct RodSection
 /// or not positive.
 RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed, const std::vector<RodSection>& sections,
                   const Eigen::Vector3d& director, bool naturally_straight);
+
+/// Why the isotropic formulation (thesis 4.2, special case) does not apply; empty when it does: naturally straight, the same
+/// bending modulus in all directions, no stiffness damping.
+std::string whyNotIsotropic(const RodModel& model);
 
 /// A state at rest at the given nodes, twist-free frames plus `total_twist` [rad] spread evenly over the inner nodes
 /// (of a closed rod: over all nodes, and whole turns only). Throws std::invalid_argument naming the bad value.

@@ -109,7 +109,8 @@ struct GraspConfig
 };
 
 /// Which equations a rod uses. `automatic` chooses the cheapest that applies; so far that is always the general one.
-enum class Formulation { automatic, general };
+enum class Formulation { automatic, isotropic, general };
+enum class Stretching { stiff, projected };
 
 /// What a rod touches.
 struct RodContact
@@ -128,6 +129,7 @@ struct RodConfig
   bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
   bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
   Formulation formulation = Formulation::automatic;
+  Stretching stretching = Stretching::stiff;
   double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
   Eigen::Vector3d director{0, 0, 0};           ///< d1 at the first edge (projected); zero: chosen automatically
   CrossSection cross_section{{0.005}, {0.005}};
