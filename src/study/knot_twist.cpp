@@ -1,6 +1,7 @@
 // A trefoil knot on a clamped wire, turned slowly at one end both ways: a smooth change, then a jump (thesis 4.7.2, Fig. 4.1).
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -94,7 +95,7 @@ private:
 
 struct Jump
 {
-  double turns = 0;           ///< where it happens; 0: nowhere
+  double turns = 0;              ///< where it happens; 0: nowhere
   double smooth = 0, size = 0;   ///< largest displacement of a node in a step before it; in the jump [m]
 };
 
@@ -134,13 +135,15 @@ Jump turnUntilJump(StudyContext& context, int edges, int direction, double step,
     else
       jump.smooth = std::max(jump.smooth, change);
   }
+  if (jump.turns == 0)
+    throw std::runtime_error("knot of " + std::to_string(edges) + " edges: no jump within " + std::to_string(static_cast<int>(last)) + " degrees");
   show(std::string(direction > 0 ? "+" : "-") + ", before the jump", before, 0);
   show(std::string(direction > 0 ? "+" : "-") + ", after the jump", knot.rod().x, 0.4);
   const auto row = [&](const char* quantity) -> Row& {
     return context.row().set("n", edges).set("direction", direction > 0 ? "+" : "-").set("quantity", quantity);
   };
   row("jump").set("turns", jump.turns).set("smooth_change_mm", 1e3 * jump.smooth).set("jump_mm", 1e3 * jump.size).set("released_uJ", 1e6 * released)
-      .set("tension_at_rest", tension).set("energy_at_rest", energy).set("clearance_um", 1e6 * clearance);
+      .set("tension_at_rest_N", tension).set("energy_at_rest_J", energy).set("clearance_um", 1e6 * clearance);
   row("end turn less twist and writhe [turns]").check(unlike, 0, 1e-5, "Calugareanu: constant unless the wire passes through itself");
   return jump;
 }
