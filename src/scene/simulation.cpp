@@ -71,7 +71,7 @@ void Simulation::buildRods()
       const Eigen::Matrix3Xd rest = restNodes(rod, config_.gravity);
       const Eigen::Matrix3Xd initial = initialNodes(rod, rest, config_.gravity);
       const int edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
-      RodModel model = buildRod(rod.name, rest, rod.closed, rodSections(rod, edges), rod.director, rod.naturally_straight);
+      RodModel model = buildRod(rod.name, rest, rod.closed, rodSections(rod, edges), rod.director, rod.naturally_straight, rod.joints);
       if (rod.material.inextensible)
       {
         model.stretch_modulus = model.stretch_modulus.cwiseMax(1e5 * model.totalMass() * config_.gravity.norm());

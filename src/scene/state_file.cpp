@@ -232,6 +232,7 @@ std::uint64_t Simulation::fingerprint() const
     out(model.closed);
     out(model.isotropic);
     out(model.inextensible);
+    out(static_cast<int>(model.curvature));
     for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a, &model.radius_b,
                                           &model.twist_modulus, &model.rest_twist, &model.drag})
     {

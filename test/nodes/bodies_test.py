@@ -61,6 +61,7 @@ class Bodies(NodeCase):
         wrench = self.listen("/t/grasps/left/wrench", WrenchStamped)
         told = self.listen("/t/body_states", BodyStates)
         self.states_after(state, 2)
+        wait_until(lambda: wrench.count() and wrench.last().header.stamp == state.last().header.stamp, what="the first wrench")
         before = wrench.last().wrench.force.x
         self.drive("cart", (1.1, 0, 1), (1.15, 0, 1), 0.5)
         last = self.states_after(state, 300).nodes[-1]

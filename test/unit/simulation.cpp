@@ -419,6 +419,8 @@ rods: [{centerline: {straight: {edges: 20}}, material: {bend_modulus: 1e-4, twis
   EXPECT_FALSE(build({"rods.0.damping.stiffness=0.1"}).rodModel(0).isotropic);
   EXPECT_FALSE(build({"rods.0.material.bend_modulus=[1e-4, 2e-4]"}).rodModel(0).isotropic);
   EXPECT_FALSE(build({"time.integrator=implicit_euler"}).rodModel(0).isotropic);
+  EXPECT_FALSE(build({"rods.0.curvature=compensated"}).rodModel(0).isotropic);
+  EXPECT_EQ(build({"rods.0.curvature=compensated"}).rodModel(0).curvature, Curvature::compensated);
   EXPECT_TRUE(build({"rods.0.stretching=projected"}).rodModel(0).inextensible);
   EXPECT_NE(refusal({"rods.0.formulation=isotropic", "rods.0.material.bend_modulus=[1e-4, 2e-4]"}).find("depends on the direction"), std::string::npos);
   EXPECT_NE(refusal({"rods.0.formulation=isotropic", "time.integrator=bdf2"}).find("symplectic_euler"), std::string::npos);

@@ -13,6 +13,7 @@
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
+#include "slender_sim/rod/rod_model.h"
 
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
 namespace slender {
@@ -129,6 +130,7 @@ struct RodConfig
   std::optional<Curve> initial;                ///< initial shape; its edges are resampled to those of the centerline
   bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
   bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
+  JointOptions joints;                         ///< `curvature`, `matched_to_arcs`
   Formulation formulation = Formulation::automatic;
   Stretching stretching = Stretching::stiff;
   double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
