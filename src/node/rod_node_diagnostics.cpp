@@ -85,6 +85,8 @@ DiagnosticStatus RodNode::simulationStatus() const
   add(status, "longest step time [ms]", 1e3 * recent_.worst_step);
   add(status, "real-time factor", recent_.realTimeFactor());
   add(status, "simulated per wall second", achieved);
+  if (options_.pace == Pace::wall && mode_ == Mode::running)
+    add(status, "behind real time [s]", std::max(0.0, (ros::WallTime::now() - wall_start_).toSec() - static_cast<double>(clock_.ticks() - wall_start_ticks_) * clock_.step()));
   add(status, "iterations per step", recent_.steps ? static_cast<double>(recent_.iterations) / static_cast<double>(recent_.steps) : 0.0);
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);

@@ -183,10 +183,10 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length,
     case StepFailure::overstretched:
       return overstretched[0] >= 0
                  ? "nodes " + std::to_string(overstretched[0]) + " and " + std::to_string(overstretched[1]) +
-                       " are held further apart than the rod between them is long" + at +
-                       ": bring the grasps closer together, or let the rod stretch (stretching: stiff)"
+                       " are held as far apart as the rod between them is long, or further" + at +
+                       ": bring the grasps closer together (projection needs some slack), or let the rod stretch (stretching: stiff)"
                  : "the projection found no configuration in which all edges keep their lengths" + at +
-                       ": use a shorter step, or let the rod stretch (stretching: stiff)";
+                       ": use a shorter step, give a taut rod some slack, or let it stretch (stretching: stiff)";
     case StepFailure::turned_too_far:
       return "the twist changed by about half a turn" + at + ": use a shorter step or slower grasps, or formulation: general, which counts turns by the edge";
     case StepFailure::energy_grew:

@@ -221,7 +221,12 @@ TimeConfig readTime(const YamlCursor& at)
                                                                     {"generalized_alpha", Integrator::generalized_alpha},
                                                                     {"symplectic_euler", Integrator::symplectic_euler}}));
   assign(time.spectral_radius, map.get("spectral_radius").number(Range::closed(0, 1)));
-  assign(time.error_tolerance, map.get("error_tolerance").number(Range::closed(0, 1, "m")));
+  const YamlCursor error_tolerance = map.get("error_tolerance");
+  assign(time.error_tolerance, error_tolerance.number(Range::closed(0, 1, "m")));
+  if (time.error_tolerance > 0 && time.integrator == Integrator::symplectic_euler)
+  {
+    error_tolerance.problem("is for implicit integrators; steps of symplectic_euler are of fixed length");
+  }
   const YamlCursor min_step = map.get("min_step");
   if (const auto value = min_step.number(Range::above(0, 10, "s")))
   {
