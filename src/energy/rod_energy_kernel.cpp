@@ -1,6 +1,6 @@
 // Compiled once per instruction set (SLENDER_ISA). Plain arrays only; nothing here may be emitted under a shared name.
 #include "pack.h"
-#include "slender_sim/energy/joint_stencil.h"
+#include "slender_sim/energy/compensated_response.h"
 #include "slender_sim/energy/rod_kernel.h"
 #include "slender_sim/linalg/flush_denormals.h"
 
@@ -98,7 +98,30 @@ SLENDER_INLINE void storeVec(double (*b)[16], const Vec3<Pack>& v)
   store(b[2] + 2, v.z);
 }
 
-template <bool WithHessian>
+/// Response of joints i .. i+W-1 and the strains it compares with the rest strains.
+template <Curvature kind>
+SLENDER_INLINE JointResponse<Pack> respond(const RodArrays& r, int i, const JointStrains<Pack>& k, Pack twist)
+{
+  const JointMaterial<Pack> p = {load(r.b11 + i), load(r.b12 + i), load(r.b22 + i), load(r.beta + i),
+                                 load(r.rest_kappa1 + i), load(r.rest_kappa2 + i), load(r.rest_twist + i)};
+  if constexpr (kind == Curvature::compensated)
+  {
+    JointCompensation<Pack> a;
+    a.coupling = load(r.coupling + i);
+    a.half_turn_cosine = squareRoot(0.5 * (1.0 / k.inverse_chi));
+    sineCosine(0.5 * twist - kTwoPi * nearest(twist * (0.5 / kTwoPi)), a.half_twist_sine, a.half_twist_cosine);
+    Pack kappa1, kappa2;
+    const JointResponse<Pack> response = compensatedResponse(k, twist, p, a, kappa1, kappa2);
+    store(r.kappa1 + i, kappa1);
+    store(r.kappa2 + i, kappa2);
+    return response;
+  }
+  store(r.kappa1 + i, k.kappa1);
+  store(r.kappa2 + i, k.kappa2);
+  return tangentResponse(k, twist, p);
+}
+
+template <bool WithHessian, Curvature kind>
 SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffer, Pack& min_chi)
 {
   // last two joints of the previous round
@@ -111,17 +134,15 @@ SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffe
 
   const Vec3<Pack> te = load3(r.t, i - 1), d1e = load3(r.d1, i - 1), tf = load3(r.t, i), d1f = load3(r.d1, i);
   const JointFrames<Pack> s = {te, d1e, cross(te, d1e), tf, d1f, cross(tf, d1f), load(r.inverse_length + i - 1), load(r.inverse_length + i)};
-  const JointMaterial<Pack> p = {load(r.b11 + i), load(r.b12 + i), load(r.b22 + i), load(r.beta + i),
-                                 load(r.rest_kappa1 + i), load(r.rest_kappa2 + i), load(r.rest_twist + i)};
   const JointStrains<Pack> k = jointStrains(s);
   min_chi = minimum(1.0 / k.inverse_chi, min_chi);
-  store(r.kappa1 + i, k.kappa1);
-  store(r.kappa2 + i, k.kappa2);
   JointGradient<Pack> g;
   JointHessian<Pack> h;
   const Pack twist = jointTwist(r, i, s);
   store(r.twist + i, twist);
-  store(buffer.bend_twist + 2, jointEnergy<WithHessian>(s, k, twist, p, g, h));
+  const JointResponse<Pack> response = respond<kind>(r, i, k, twist);
+  store(buffer.bend_twist + 2, response.energy);
+  jointDerivatives<WithHessian, kind == Curvature::compensated>(s, k, response, g, h);
 
   // stretching of the edge after the joint: 1/2 k_s strain^2 |eBar| (thesis 4.2.1, 4.4.1)
   const Pack ks = load(r.stretch + i), strain = load(r.strain + i) - load(r.rest_strain + i), inverse_rest = load(r.inverse_rest_length + i);
@@ -239,7 +260,7 @@ SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPan
 }
 
 /// Joints from next_joint on, and the nodes between them.
-template <bool WithHessian>
+template <bool WithHessian, Curvature kind>
 void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int first_panel, int to)
 {
   const int n = r.nodes;
@@ -249,7 +270,7 @@ void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, i
   int joint = sweep.next_joint;
   for (; joint - 1 < to; joint += W)
   {
-    evaluateJoints<WithHessian>(r, joint, b, min_chi);
+    evaluateJoints<WithHessian, kind>(r, joint, b, min_chi);
     const int i = joint - 1;   // first node whose joints are all known
     const int first = i < 0 ? -i : 0, last = i + W > n ? n - 1 - i : W - 1;
 
@@ -322,6 +343,7 @@ void beginSweep(const RodArrays& r, RodSweep& sweep)
       r.x[k][n + i] = r.closed ? r.x[k][i % n] : r.x[k][n - 1] + (i + 1) * (r.x[k][n - 1] - r.x[k][n - 2]);
 }
 
+template <Curvature kind>
 int advanceSweep(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int first_panel, int to)
 {
   const FlushDenormals scope;
@@ -344,9 +366,9 @@ int advanceSweep(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int firs
         copyEdge(r, edges + i, r.closed ? i % edges : edges - 1);
   }
   if (panels)
-    evaluateJointsUpTo<true>(r, sweep, panels, first_panel, to);
+    evaluateJointsUpTo<true, kind>(r, sweep, panels, first_panel, to);
   else
-    evaluateJointsUpTo<false>(r, sweep, panels, first_panel, to);
+    evaluateJointsUpTo<false, kind>(r, sweep, panels, first_panel, to);
   if (sweep.next_node == n)
   {
     if (r.closed)
@@ -377,7 +399,7 @@ RodEvaluation endSweep(const RodSweep& sweep)
 }  // namespace
 
 extern const RodKernels rod_kernels;
-const RodKernels rod_kernels = {beginSweep, advanceSweep, endSweep};
+const RodKernels rod_kernels = {beginSweep, {advanceSweep<Curvature::tangent>, advanceSweep<Curvature::compensated>}, endSweep};
 
 }  // namespace SLENDER_ISA
 }  // namespace slender

@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 #include <std_msgs/String.h>
@@ -23,6 +24,8 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
   for (const std::string& thread : thread_prefixes)
     nozzle_topics_.push_back(prefix + thread + "nozzle/wrench");
+  if (std::filesystem::is_directory(path))
+    throw std::runtime_error("bag " + path + ": cannot be written: is a directory");
   try
   {
     bag_.open(path + ".active", rosbag::bagmode::Write);

@@ -178,6 +178,7 @@ bool SceneNode::advance()
 
 void SceneNode::fail(const std::string& reason)
 {
+  mode_before_failure_ = mode_;
   mode_ = Mode::failed;
   failure_ = "step " + std::to_string(simulation_->state().steps + 1) + ": " + reason;
   ROS_ERROR("stopped at %s; call ~reset to start again", failure_.c_str());
@@ -323,6 +324,11 @@ void SceneNode::work()
     if (!queue_.isEmpty())
       break;
   }
+  tell();
+}
+
+void SceneNode::tell()
+{
   publishMarkers();
   if (ros::WallTime::now() >= next_diagnostics_)
     publishDiagnostics();

@@ -18,6 +18,7 @@ struct ClampJoint
   int node = 0, edge = 0;
   double b11 = 0, b12 = 0, b22 = 0, beta = 0;   ///< divided by the half joint's length [N m]
   double rest_kappa1 = 0, rest_kappa2 = 0, rest_twist = 0;
+  double coupling = 0;            ///< see JointCompensation
   // present response (with viscous part), see RodSystem::setResponse
   double scale = 1.0, rest1 = 0, rest2 = 0, rest3 = 0;
 
@@ -151,7 +152,7 @@ private:
   AlignedVector<RodPanel> piece_;
   AlignedVector<double> gradient_, direction_, reduced_, x_base_[3], saved_[10];
   std::vector<ClampJoint> saved_clamps_;
-  AlignedVector<double> stretch_, b11_, b12_, b22_, beta_, rest_k1_, rest_k2_, rest_m_;   ///< elastic response as composed
+  AlignedVector<double> stretch_, b11_, b12_, b22_, beta_, rest_k1_, rest_k2_, rest_m_, coupling_;   ///< elastic response as composed
 
   std::vector<GraspState> grasps_;
   std::vector<ClampJoint> clamps_;

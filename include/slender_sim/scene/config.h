@@ -13,6 +13,7 @@
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
+#include "slender_sim/rod/rod_model.h"
 
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
 namespace slender {
@@ -124,10 +125,12 @@ struct RodContact
 struct RodConfig
 {
   std::string name;
+  std::string place;                           ///< "FILE:LINE: PATH" for messages; empty when not read from a file
   Curve centerline = StraightCurve{};          ///< rest (natural) shape, also the initial one unless `initial` is given
   std::optional<Curve> initial;                ///< initial shape; its edges are resampled to those of the centerline
   bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
   bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
+  JointOptions joints;                         ///< `curvature`, `matched_to_arcs`
   Formulation formulation = Formulation::automatic;
   Stretching stretching = Stretching::stiff;
   double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
@@ -227,6 +230,7 @@ struct RecordConfig { int every = 1; };        ///< record every n-th step (`sim
 struct SceneConfig
 {
   std::string name = "scene";
+  std::string file;                            ///< that it was read from, for messages; may be empty
   std::string source;                          ///< the YAML text after --set overrides (what `scene` publishes)
   Eigen::Vector3d gravity{0, 0, -9.81};        ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};               ///< [m/s]
