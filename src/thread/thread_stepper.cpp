@@ -110,7 +110,8 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
     {
       if (0.5 * length < shortest * (1 - 1e-9))
       {
-        if (report.mended_folds >= kMostFolds || !mendFold(work))
+        const int fold = foldedNode();
+        if (report.mended_folds >= kMostFolds || fold < 0 || !mendFold(work, fold))
           return refuse(report, failure, explainFailure(failure, length));
         ++report.mended_folds;
         h = first;
@@ -126,6 +127,14 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
   }
   std::swap(state, work);
   return report;
+}
+
+/// The inner node at which the last trial turns most, if that is more than a right angle; -1: there is none.
+int ThreadStepper::Impl::foldedNode() const
+{
+  const int k = system.sharpestJoint();
+  const int node = k < 0 ? -1 : k - offset_ + first_;
+  return node > 0 && node + 1 < work.nodes() ? node : -1;
 }
 
 Pose ThreadStepper::Impl::endPose(int end, const ThreadInputs& inputs, double fraction) const

@@ -86,6 +86,22 @@ RodEvaluation ThreadSystem::takeRestStrains()
   return kernels.end(sweep);
 }
 
+int ThreadSystem::sharpestJoint() const
+{
+  double sharpest = 0.0;
+  int joint = -1;
+  for (int i = 1; i + 1 < a_.nodes; ++i)
+  {
+    const double cosine = get(a_.t, i - 1).dot(get(a_.t, i));
+    if (cosine < sharpest)
+    {
+      sharpest = cosine;
+      joint = i;
+    }
+  }
+  return joint;
+}
+
 void ThreadSystem::setEdge(int j, double modulus, double volume)
 {
   a_.stretch[j] = modulus;
