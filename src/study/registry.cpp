@@ -31,6 +31,7 @@ void runRetraction(StudyContext&);
 void runFiberExtrusion(StudyContext&);
 void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
+void runThreadStability(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -63,6 +64,7 @@ const std::vector<Study>& studies()
       {"fiber_extrusion", "a viscous thread drawn steadily from a nozzle by a roll", runFiberExtrusion},
       {"dragged_catenary", "a viscous thread that falls onto a fast belt, with and without surface tension", runDraggedCatenary},
       {"coiling", "a viscous thread that coils: frequency and radius against height, up and down", runCoiling},
+      {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
   };
   return all;
 }
