@@ -32,6 +32,7 @@ void runFiberExtrusion(StudyContext&);
 void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
 void runThreadStability(StudyContext&);
+void runSewingMachine(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -64,6 +65,7 @@ const std::vector<Study>& studies()
       {"fiber_extrusion", "a viscous thread drawn steadily from a nozzle by a roll", runFiberExtrusion},
       {"dragged_catenary", "a viscous thread that falls onto a fast belt, with and without surface tension", runDraggedCatenary},
       {"coiling", "a viscous thread that coils: frequency and radius against height, up and down", runCoiling},
+      {"sewing_machine", "patterns of a viscous thread on a moving belt, its speed rising and falling", runSewingMachine},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
   };
   return all;
