@@ -1,7 +1,15 @@
 # The study program: experiments behind the package's claims, without ROS.
 file(GLOB STUDY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/study/*.cpp)
-add_library(slender_sim_studies STATIC ${STUDY_SOURCES})
-target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include)
+# Scenes that studies run are built in: `study` finds them wherever it is installed, and they are those of the package.
+foreach(scene chain hair knot_twist plectoneme tree)
+  set(scene_file ${PROJECT_SOURCE_DIR}/config/scenes/${scene}.yaml)
+  file(READ ${scene_file} scene_text)
+  string(APPEND SCENE_TEXTS "    {\"${scene}\", R\"yaml(${scene_text})yaml\"},\n")
+  set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${scene_file})
+endforeach()
+configure_file(${CMAKE_CURRENT_LIST_DIR}/package_scenes.cpp.in ${PROJECT_BINARY_DIR}/package_scenes.cpp @ONLY)
+add_library(slender_sim_studies STATIC ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)
+target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include PRIVATE ${PROJECT_SOURCE_DIR})
 target_link_libraries(slender_sim_studies PUBLIC slender_sim)
 
 # `study` is too common a name for a target in a shared catkin workspace.

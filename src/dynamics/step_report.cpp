@@ -20,6 +20,8 @@ void StepReport::merge(const StepReport& other)
   residual = std::max(residual, other.residual);
   max_strain = std::max(max_strain, other.max_strain);
   stable = stable && other.stable;
+  projection_iterations = std::max(projection_iterations, other.projection_iterations);
+  constraint_error = std::max(constraint_error, other.constraint_error);
   error_estimate = std::max(error_estimate, other.error_estimate);
 }
 
@@ -35,6 +37,8 @@ const char* toString(StepFailure failure)
     case StepFailure::state_not_finite: return "state_not_finite";
     case StepFailure::squeezed: return "squeezed";
     case StepFailure::energy_grew: return "energy_grew";
+    case StepFailure::overstretched: return "overstretched";
+    case StepFailure::turned_too_far: return "turned_too_far";
   }
   return "unknown";
 }

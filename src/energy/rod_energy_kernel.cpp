@@ -1,58 +1,12 @@
 // Compiled once per instruction set (SLENDER_ISA). Plain arrays only; nothing here may be emitted under a shared name.
-#include "slender_sim/energy/joint_stencil.h"
+#include "pack.h"
+#include "slender_sim/energy/compensated_response.h"
 #include "slender_sim/energy/rod_kernel.h"
 #include "slender_sim/linalg/flush_denormals.h"
 
 namespace slender {
 namespace SLENDER_ISA {
 namespace {
-
-using Pack = double __attribute__((vector_size(64)));
-using PackU = double __attribute__((vector_size(64), aligned(8), may_alias));
-using Lanes = long long __attribute__((vector_size(64)));
-constexpr int W = 8;
-constexpr double kTwoPi = 6.283185307179586476925286766559;
-
-SLENDER_INLINE Pack load(const double* p) { return *reinterpret_cast<const PackU*>(p); }
-SLENDER_INLINE void store(double* p, Pack v) { *reinterpret_cast<PackU*>(p) = v; }
-SLENDER_INLINE Vec3<Pack> load3(double* const* p, int i) { return {load(p[0] + i), load(p[1] + i), load(p[2] + i)}; }
-SLENDER_INLINE void store3(double* const* p, int i, const Vec3<Pack>& v)
-{
-  store(p[0] + i, v.x);
-  store(p[1] + i, v.y);
-  store(p[2] + i, v.z);
-}
-SLENDER_INLINE Pack squareRoot(Pack v)
-{
-  Pack r;
-  for (int k = 0; k < W; ++k)
-    r[k] = __builtin_sqrt(v[k]);
-  return r;
-}
-SLENDER_INLINE Pack minimum(Pack a, Pack b) { return a < b ? a : b; }
-SLENDER_INLINE Pack maximum(Pack a, Pack b) { return a > b ? a : b; }
-SLENDER_INLINE Pack absolute(Pack a) { return a < 0.0 ? -a : a; }
-SLENDER_INLINE double sum(Pack v) { return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7])); }
-/// Nearest integer for |v| < 2^51.
-SLENDER_INLINE Pack nearest(Pack v)
-{
-  const double magic = 6755399441055744.0;
-  return (v + magic) - magic;
-}
-
-/// sin and cos to round-off for |a| <= pi: Taylor on a/8, then three doublings.
-SLENDER_INLINE void sineCosine(Pack a, Pack& s, Pack& c)
-{
-  const Pack y = a * 0.125, z = y * y;
-  s = y * (1.0 + z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800 + z * (1.0 / 6227020800.0)))))));
-  Pack v = z * (0.5 + z * (-1.0 / 24 + z * (1.0 / 720 + z * (-1.0 / 40320 + z * (1.0 / 3628800 + z * (-1.0 / 479001600))))));   // 1 - cos
-  for (int k = 0; k < 3; ++k)
-  {
-    s = 2.0 * s * (1.0 - v);
-    v = 2.0 * v * (2.0 - v);   // 1 - cos 2y = 2 sin^2 y = 2 v (2 - v)
-  }
-  c = 1.0 - v;
-}
 
 /// atan2 in (-pi, pi] for arguments on the unit circle: three half-angle steps, then the Taylor series.
 SLENDER_INLINE Pack angleOf(Pack s, Pack c)
@@ -144,7 +98,30 @@ SLENDER_INLINE void storeVec(double (*b)[16], const Vec3<Pack>& v)
   store(b[2] + 2, v.z);
 }
 
-template <bool WithHessian>
+/// Response of joints i .. i+W-1 and the strains it compares with the rest strains.
+template <Curvature kind>
+SLENDER_INLINE JointResponse<Pack> respond(const RodArrays& r, int i, const JointStrains<Pack>& k, Pack twist)
+{
+  const JointMaterial<Pack> p = {load(r.b11 + i), load(r.b12 + i), load(r.b22 + i), load(r.beta + i),
+                                 load(r.rest_kappa1 + i), load(r.rest_kappa2 + i), load(r.rest_twist + i)};
+  if constexpr (kind == Curvature::compensated)
+  {
+    JointCompensation<Pack> a;
+    a.coupling = load(r.coupling + i);
+    a.half_turn_cosine = squareRoot(0.5 * (1.0 / k.inverse_chi));
+    sineCosine(0.5 * twist - kTwoPi * nearest(twist * (0.5 / kTwoPi)), a.half_twist_sine, a.half_twist_cosine);
+    Pack kappa1, kappa2;
+    const JointResponse<Pack> response = compensatedResponse(k, twist, p, a, kappa1, kappa2);
+    store(r.kappa1 + i, kappa1);
+    store(r.kappa2 + i, kappa2);
+    return response;
+  }
+  store(r.kappa1 + i, k.kappa1);
+  store(r.kappa2 + i, k.kappa2);
+  return tangentResponse(k, twist, p);
+}
+
+template <bool WithHessian, Curvature kind>
 SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffer, Pack& min_chi)
 {
   // last two joints of the previous round
@@ -157,17 +134,15 @@ SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffe
 
   const Vec3<Pack> te = load3(r.t, i - 1), d1e = load3(r.d1, i - 1), tf = load3(r.t, i), d1f = load3(r.d1, i);
   const JointFrames<Pack> s = {te, d1e, cross(te, d1e), tf, d1f, cross(tf, d1f), load(r.inverse_length + i - 1), load(r.inverse_length + i)};
-  const JointMaterial<Pack> p = {load(r.b11 + i), load(r.b12 + i), load(r.b22 + i), load(r.beta + i),
-                                 load(r.rest_kappa1 + i), load(r.rest_kappa2 + i), load(r.rest_twist + i)};
   const JointStrains<Pack> k = jointStrains(s);
   min_chi = minimum(1.0 / k.inverse_chi, min_chi);
-  store(r.kappa1 + i, k.kappa1);
-  store(r.kappa2 + i, k.kappa2);
   JointGradient<Pack> g;
   JointHessian<Pack> h;
   const Pack twist = jointTwist(r, i, s);
   store(r.twist + i, twist);
-  store(buffer.bend_twist + 2, jointEnergy<WithHessian>(s, k, twist, p, g, h));
+  const JointResponse<Pack> response = respond<kind>(r, i, k, twist);
+  store(buffer.bend_twist + 2, response.energy);
+  jointDerivatives<WithHessian, kind == Curvature::compensated>(s, k, response, g, h);
 
   // stretching of the edge after the joint: 1/2 k_s strain^2 |eBar| (thesis 4.2.1, 4.4.1)
   const Pack ks = load(r.stretch + i), strain = load(r.strain + i) - load(r.rest_strain + i), inverse_rest = load(r.inverse_rest_length + i);
@@ -285,7 +260,7 @@ SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPan
 }
 
 /// Joints from next_joint on, and the nodes between them.
-template <bool WithHessian>
+template <bool WithHessian, Curvature kind>
 void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int first_panel, int to)
 {
   const int n = r.nodes;
@@ -295,7 +270,7 @@ void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, i
   int joint = sweep.next_joint;
   for (; joint - 1 < to; joint += W)
   {
-    evaluateJoints<WithHessian>(r, joint, b, min_chi);
+    evaluateJoints<WithHessian, kind>(r, joint, b, min_chi);
     const int i = joint - 1;   // first node whose joints are all known
     const int first = i < 0 ? -i : 0, last = i + W > n ? n - 1 - i : W - 1;
 
@@ -368,6 +343,7 @@ void beginSweep(const RodArrays& r, RodSweep& sweep)
       r.x[k][n + i] = r.closed ? r.x[k][i % n] : r.x[k][n - 1] + (i + 1) * (r.x[k][n - 1] - r.x[k][n - 2]);
 }
 
+template <Curvature kind>
 int advanceSweep(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int first_panel, int to)
 {
   const FlushDenormals scope;
@@ -390,9 +366,9 @@ int advanceSweep(const RodArrays& r, RodSweep& sweep, RodPanel* panels, int firs
         copyEdge(r, edges + i, r.closed ? i % edges : edges - 1);
   }
   if (panels)
-    evaluateJointsUpTo<true>(r, sweep, panels, first_panel, to);
+    evaluateJointsUpTo<true, kind>(r, sweep, panels, first_panel, to);
   else
-    evaluateJointsUpTo<false>(r, sweep, panels, first_panel, to);
+    evaluateJointsUpTo<false, kind>(r, sweep, panels, first_panel, to);
   if (sweep.next_node == n)
   {
     if (r.closed)
@@ -423,7 +399,7 @@ RodEvaluation endSweep(const RodSweep& sweep)
 }  // namespace
 
 extern const RodKernels rod_kernels;
-const RodKernels rod_kernels = {beginSweep, advanceSweep, endSweep};
+const RodKernels rod_kernels = {beginSweep, {advanceSweep<Curvature::tangent>, advanceSweep<Curvature::compensated>}, endSweep};
 
 }  // namespace SLENDER_ISA
 }  // namespace slender

@@ -83,6 +83,11 @@ DiagnosticStatus RodNode::simulationStatus() const
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);
   add(status, "largest strain", recent_.max_strain);
+  if (recent_.projection_iterations > 0)
+  {
+    add(status, "projection iterations", static_cast<std::uint64_t>(recent_.projection_iterations));
+    add(status, "constraint error", recent_.constraint_error);
+  }
   add(status, "energy [J]", energy);
   add(status, "recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);
   return status;

@@ -15,6 +15,8 @@ void RunStatistics::add(const StepReport& report, const Simulation& simulation, 
   worst_step = std::max(worst_step, busy_seconds);
   residual = std::max(residual, report.residual);
   max_strain = std::max(max_strain, report.max_strain);
+  projection_iterations = std::max(projection_iterations, report.projection_iterations);
+  constraint_error = std::max(constraint_error, report.constraint_error);
   max_force.resize(simulation.grasps().size());
   max_torque.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < max_force.size(); ++g)

@@ -2,7 +2,7 @@
 // section in the place of the missing edge.
 #include <cmath>
 
-#include "slender_sim/energy/joint_stencil.h"
+#include "slender_sim/energy/compensated_response.h"
 #include "slender_sim/geometry/rotation.h"
 #include "slender_sim/rod/rod_system.h"
 
@@ -35,8 +35,26 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   const JointMaterial<double> material = {c.scale * c.b11, c.scale * c.b12, c.scale * c.b22, c.scale * c.beta, c.rest1, c.rest2, c.rest3};
   JointGradient<double> g;
   JointHessian<double> h;
-  c.energy = with_hessian ? jointEnergy<true>(frames, strains, c.twist, material, g, h)
-                          : jointEnergy<false>(frames, strains, c.twist, material, g, h);
+  JointResponse<double> response;
+  if (model_.curvature == Curvature::compensated)
+  {
+    const JointCompensation<double> compensation = {c.scale * c.scale * c.coupling, std::sqrt(0.5 / strains.inverse_chi), std::sin(0.5 * c.twist),
+                                                    std::cos(0.5 * c.twist)};
+    response = compensatedResponse(strains, c.twist, material, compensation, c.kappa1, c.kappa2);
+    if (with_hessian)
+      jointDerivatives<true, true>(frames, strains, response, g, h);
+    else
+      jointDerivatives<false, true>(frames, strains, response, g, h);
+  }
+  else
+  {
+    response = tangentResponse(strains, c.twist, material);
+    if (with_hessian)
+      jointDerivatives<true, false>(frames, strains, response, g, h);
+    else
+      jointDerivatives<false, false>(frames, strains, response, g, h);
+  }
+  c.energy = response.energy;
   sum.bend_twist += c.energy;
   sum.min_chi = std::min(sum.min_chi, 1.0 / strains.inverse_chi);
 

@@ -7,6 +7,17 @@
 
 namespace slender {
 
+namespace {
+/// JointCompensation::coupling of the joint at a node.
+double couplingOf(const RodModel& model, int node)
+{
+  const Eigen::Vector3d B = model.bend_modulus.col(node);
+  const double alpha = 0.5 * (B[0] + B[2]);
+  const bool isotropic = std::abs(B[0] - B[2]) <= 2e-9 * alpha && std::abs(B[1]) <= 2e-9 * alpha;
+  return isotropic && model.rest_curvature.col(node).norm() < 1e-9 ? std::pow(model.twist_modulus[node] / (4 * alpha), 2) : 0.0;
+}
+}  // namespace
+
 void RodSystem::compose(const RodState& state)
 {
   const auto same = [](const GraspState& a, const GraspState& b) {
@@ -17,6 +28,7 @@ void RodSystem::compose(const RodState& state)
   grasps_ = state.grasps;
   if (unchanged)
     return;
+  ++composition_;
 
   const int n = a_.nodes, edges = a_.edges;
   held_.assign(n, 0);
@@ -78,17 +90,22 @@ void RodSystem::compose(const RodState& state)
         // between the edges than the joint's own, and strains are tangents of half angles (3.13, 3.14).
         const double share = shareOfEdge(model_, node, side), m = model_.rest_twist[node];
         const Eigen::Vector2d kappa = model_.rest_curvature.col(node);
-        const double mean = std::abs(std::cos(0.5 * m)) > 1e-3 ? std::cos(0.5 * m) : 1.0, half_tangent = 0.5 * kappa.norm() / std::abs(mean);
-        const double ratio = half_tangent > 0 ? std::tan(share * std::atan(half_tangent)) / half_tangent * std::cos(0.5 * share * m) / mean : 0.0;
+        double ratio = share;
+        if (model_.curvature == Curvature::tangent)
+        {
+          const double mean = std::abs(std::cos(0.5 * m)) > 1e-3 ? std::cos(0.5 * m) : 1.0, half_tangent = 0.5 * kappa.norm() / std::abs(mean);
+          ratio = half_tangent > 0 ? std::tan(share * std::atan(half_tangent)) / half_tangent * std::cos(0.5 * share * m) / mean : 0.0;
+        }
         const Eigen::Vector2d half = ratio * (Eigen::Rotation2Dd((side ? -0.5 : 0.5) * (1 - share) * m) * kappa);
         c.rest_kappa1 = half[0];
         c.rest_kappa2 = half[1];
         c.rest_twist = share * m;
+        c.coupling = couplingOf(model_, node);
         clamps_.push_back(c);
       }
 
   const auto resize = [n](AlignedVector<double>& v) { v.assign(n, 0.0); };
-  for (auto* v : {&stretch_, &b11_, &b12_, &b22_, &beta_, &rest_k1_, &rest_k2_, &rest_m_})
+  for (auto* v : {&stretch_, &b11_, &b12_, &b22_, &beta_, &rest_k1_, &rest_k2_, &rest_m_, &coupling_})
     resize(*v);
   double bend = 0, twist = 0;
   for (int i = 0; i < n; ++i)
@@ -104,6 +121,7 @@ void RodSystem::compose(const RodState& state)
       rest_k1_[i] = model_.rest_curvature(0, i);
       rest_k2_[i] = model_.rest_curvature(1, i);
       rest_m_[i] = model_.rest_twist[i];
+      coupling_[i] = couplingOf(model_, i);
       bend = std::max(bend, (b11_[i] + b22_[i]) / (length[i] * length[i]));
       twist = std::max(twist, beta_[i] + b11_[i] + b22_[i]);
     }
@@ -149,7 +167,7 @@ void RodSystem::setResponse(double r, const Eigen::Matrix4Xd* strain)
   const auto rest = [&](double elastic, int row, int column) { return r > 0 ? elastic + share * ((*strain)(row, column) - elastic) : elastic; };
   for (int i = 0; i < n; ++i)
   {
-    a_.stretch[i] = scale * stretch_[i];
+    a_.stretch[i] = no_stretching_ ? 0.0 : scale * stretch_[i];
     a_.rest_strain[i] = rest(0.0, 0, i);
     a_.b11[i] = scale * b11_[i];
     a_.b12[i] = scale * b12_[i];
@@ -161,6 +179,13 @@ void RodSystem::setResponse(double r, const Eigen::Matrix4Xd* strain)
   }
   for (double* p : {a_.stretch, a_.rest_strain, a_.b11, a_.b12, a_.b22, a_.beta, a_.rest_kappa1, a_.rest_kappa2, a_.rest_twist})
     wrapHalo(p, n);
+  if (model_.curvature == Curvature::compensated)
+  {
+    // at rest the twist from the mean rest strain is 1 / scale of that from the elastic one
+    for (int i = 0; i < n; ++i)
+      a_.coupling[i] = scale * scale * coupling_[i];
+    wrapHalo(a_.coupling, n);
+  }
   for (ClampJoint& c : clamps_)
   {
     const int column = n + 2 * c.grasp + c.side;

@@ -87,6 +87,21 @@ void RodSystem::turnFrames()
   wrapHalo(a_.turn, a_.edges);
 }
 
+void RodSystem::storeTurned(RodState& state) const
+{
+  store(state);
+  const double* turn = reduced_.data();
+  for (int j = 0; j < a_.edges; ++j)
+  {
+    const Eigen::Vector3d t(a_.t[0][j], a_.t[1][j], a_.t[2][j]), d = state.d1.col(j);
+    state.d1.col(j) = (std::cos(turn[j]) * d + std::sin(turn[j]) * t.cross(d)).normalized();
+  }
+  for (int i = model_.closed ? 0 : 1; i < (model_.closed ? a_.nodes : a_.nodes - 1); ++i)
+    state.twist[i] += turn[i] - turn[before(i)];
+  for (const ClampJoint& c : clamps_)
+    state.grasps[c.grasp].section_twist[c.side] += c.side == 1 ? turn[c.edge] : -turn[c.edge];
+}
+
 RodEvaluation RodSystem::relaxFrames()
 {
   RodEvaluation result = evaluate(false);

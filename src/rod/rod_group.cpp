@@ -1,6 +1,7 @@
 #include "slender_sim/rod/rod_group.h"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "step_loop.h"
@@ -18,7 +19,7 @@ public:
       rods.push_back(std::make_unique<RodStepper::Impl>(rod, time));
       parts.push_back(rods.back().get());
     }
-    loop = std::make_unique<StepLoop>(time, parts, std::make_unique<CoupledSystem>(model, parts));
+    loop = std::make_unique<StepLoop>(time, parts, &model);
   }
 
   StepReport step(RodGroupState& state, const RodGroupInputs& inputs, double duration);
@@ -28,6 +29,7 @@ public:
   TimeConfig time;
   std::vector<std::unique_ptr<RodStepper::Impl>> rods;
   std::unique_ptr<StepLoop> loop;
+  int threads = 0;
   RodGroupInputs inputs;   ///< with the targets of grasps that driven bodies carry
 };
 
@@ -39,8 +41,8 @@ void check(const RodGroupModel& model, Integrator integrator)
     if (!good)
       throw std::invalid_argument(what);
   };
-  need(integrator != Integrator::symplectic_euler,
-       "symplectic_euler steps rods alone: with bodies or contact take implicit_euler, bdf2 or tr_bdf2 (time.integrator)");
+  need(integrator != Integrator::symplectic_euler || model.contact.rods.empty(),
+       "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler, bdf2 or tr_bdf2 (time.integrator)");
   for (const RigidBodyModel& body : model.bodies)
     checkBody(body);
   const int rods = static_cast<int>(model.rods.size()), bodies = static_cast<int>(model.bodies.size());
@@ -83,7 +85,7 @@ StepReport RodGroup::solveEquilibrium(RodGroupState& state, const RodGroupInputs
   time.newton.max_iterations = std::max(60, time.newton.max_iterations);
   time.newton.tolerance = std::min(1e-7, time.newton.tolerance);
   Impl settling(impl_->model, time);
-  settling.loop->coupled()->threads = impl_->loop->coupled()->threads;
+  settling.loop->coupled()->threads = impl_->threads;
   const StepReport report = settling.solveEquilibrium(state, inputs);
   for (std::size_t r = 0; r < impl_->rods.size(); ++r)
     impl_->rods[r]->wrenches = settling.rods[r]->wrenches;
@@ -210,7 +212,11 @@ StepReport RodGroup::Impl::step(RodGroupState& state, const RodGroupInputs& step
   return m.loop->step(state.rods.data(), m.inputs.rods.data(), duration, &state, &m.inputs);
 }
 
-double RodGroup::clearance(const RodGroupState& state) { return impl_->loop->coupled()->clearance(state); }
+double RodGroup::clearance(const RodGroupState& state)
+{
+  CoupledSystem* coupled = impl_->loop->coupled();
+  return coupled ? coupled->clearance(state) : std::numeric_limits<double>::infinity();
+}
 
 void RodGroup::checkClearance(const RodGroupState& state)
 {
@@ -228,7 +234,17 @@ RodEnergies RodGroup::energies(int rod, const RodState& state, const Eigen::Vect
 }
 
 const RodGroupModel& RodGroup::model() const { return impl_->model; }
-const std::vector<ContactTerm>& RodGroup::contacts() const { return impl_->loop->coupled()->contacts(); }
-void RodGroup::setThreads(int threads) { impl_->loop->coupled()->threads = threads; }
+const std::vector<ContactTerm>& RodGroup::contacts() const
+{
+  static const std::vector<ContactTerm> none;
+  const CoupledSystem* coupled = impl_->loop->coupled();
+  return coupled ? coupled->contacts() : none;
+}
+void RodGroup::setThreads(int threads)
+{
+  impl_->threads = threads;
+  if (CoupledSystem* coupled = impl_->loop->coupled())
+    coupled->threads = threads;
+}
 
 }  // namespace slender

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "slender_sim/energy/compensated_response.h"
 #include "slender_sim/geometry/framed_curve.h"
 #include "slender_sim/geometry/rotation.h"
 #include "slender_sim/rod/rod_system.h"
@@ -37,16 +38,49 @@ void checkSections(const std::vector<RodSection>& sections, int edges)
   }
 }
 
+/// A curvature of the thesis (3.14) between edges twisted by m as the compensated strain; it does not depend on the rest of the joint.
+Eigen::Vector2d compensatedCurvature(const Eigen::Vector2d& kappa, double m)
+{
+  const double secant = regularInverse(std::cos(0.5 * m)), cosine = 1.0 / std::hypot(1.0, 0.5 * kappa.norm() * secant);
+  return kappa * (cosine * turnOverSine(1.0 - cosine).value * secant);
+}
+
+/// See JointOptions::matched_to_arcs.
+void matchToArcs(RodModel& model)
+{
+  const bool tangent = model.curvature == Curvature::tangent;
+  for (int i = 0; i < model.nodes(); ++i)
+  {
+    const Eigen::Vector2d curvature = model.rest_curvature.col(i);
+    const double k = curvature.norm(), half = tangent ? std::atan(0.5 * k) : 0.5 * k;   // half the joint's turn
+    if (k == 0)
+      continue;
+    const double across = half / std::tan(half), length = std::sin(half) / half;
+    Eigen::Matrix2d bend;
+    bend << model.bend_modulus(0, i), model.bend_modulus(1, i), model.bend_modulus(1, i), model.bend_modulus(2, i);
+    if (tangent)
+    {
+      const double along = std::pow(std::cos(half), 2);
+      const Eigen::Matrix2d scale = across * Eigen::Matrix2d::Identity() + (along - across) / (k * k) * curvature * curvature.transpose();
+      bend = scale * bend * scale;
+    }
+    model.bend_modulus.col(i) << length * bend(0, 0), length * bend(0, 1), length * bend(1, 1);
+    model.twist_modulus[i] *= length * across * across;
+  }
+}
+
 }  // namespace
 
 RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed, const std::vector<RodSection>& sections,
-                  const Eigen::Vector3d& director, bool naturally_straight)
+                  const Eigen::Vector3d& director, bool naturally_straight, const JointOptions& joints)
 {
   const int n = static_cast<int>(nodes.cols());
   if (n < (closed ? 5 : 3))
     throw std::invalid_argument("rod '" + name + "' needs at least " + (closed ? "5" : "3") + " nodes, got " + std::to_string(n));
   if (!nodes.allFinite())
     throw std::invalid_argument("rod '" + name + "' has a node that is not finite");
+  if (naturally_straight && joints.matched_to_arcs)
+    throw std::invalid_argument("rod '" + name + "' is naturally straight: it has no arcs that its joints could be matched to");
   const FramedCurve curve(nodes, closed, director);
   const int edges = curve.edges();
   checkSections(sections, edges);
@@ -54,6 +88,7 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
   RodModel model;
   model.name = name;
   model.closed = closed;
+  model.curvature = joints.curvature;
   model.mass = Eigen::VectorXd::Zero(n);
   model.rest_length.resize(edges);
   model.stretch_modulus.resize(edges);
@@ -87,7 +122,10 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
     if (curve.hasJoint(i))
     {
       if (!naturally_straight)
-        model.rest_curvature.col(i) = curve.materialCurvature(i);
+      {
+        const Eigen::Vector2d kappa = curve.materialCurvature(i);
+        model.rest_curvature.col(i) = joints.curvature == Curvature::tangent ? kappa : compensatedCurvature(kappa, curve.twist(i));
+      }
       model.rest_twist[i] = curve.twist(i);
     }
   }
@@ -101,7 +139,27 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
     continued(0, 1, 0);
     continued(n - 1, n - 2, edges - 1);
   }
+  if (joints.matched_to_arcs)
+    matchToArcs(model);
   return model;
+}
+
+std::string whyNotIsotropic(const RodModel& model)
+{
+  for (int i = 0; i < model.nodes(); ++i)
+  {
+    const std::string at = " at node " + std::to_string(i);
+    const Eigen::Vector3d b = model.bend_modulus.col(i);
+    if (model.rest_curvature.col(i).norm() > 1e-9)   // round-off of a straight line's nodes
+      return "it is naturally curved" + at + " (naturally_straight: true makes it straight)";
+    if (std::abs(b[0] - b[2]) > 1e-9 * (b[0] + b[2]) || std::abs(b[1]) > 1e-9 * (b[0] + b[2]))
+      return "its bending modulus depends on the direction" + at;
+  }
+  if (model.stiffness_damping > 0)
+    return "it has damping.stiffness";
+  if (model.curvature != Curvature::tangent)
+    return "it has curvature: compensated";
+  return "";
 }
 
 RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director, double total_twist)
@@ -153,7 +211,7 @@ Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int n
     const Eigen::Vector3d te = tangent(edge), d1e = state.d1.col(edge), d2e = te.cross(d1e);
     const Eigen::Vector2d k = model.rest_curvature.col(node);
     const Eigen::Vector3d kb = k[0] * d2e - k[1] * d1e;
-    const double angle = 2.0 * std::atan(0.5 * kb.norm()) * (node == 0 ? -1.0 : 1.0);
+    const double angle = (model.curvature == Curvature::tangent ? 2.0 * std::atan(0.5 * kb.norm()) : kb.norm()) * (node == 0 ? -1.0 : 1.0);
     const Eigen::Vector3d axis = kb.norm() > 0 ? Eigen::Vector3d(kb.normalized()) : d1e;
     t = rotateAbout(te, axis, angle);
     d1 = rotateAbout(d1e, axis, angle);

@@ -55,6 +55,7 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
   bool steady = false;     // definite with the last, very small weight: what is left is a motion that costs nothing
   int failures = 0, nudges = 0;
   RodState saddle;
+  system.leaveOutStretching(false);
   system.load(work);
   system.setResponse(0.0, nullptr);
   constexpr int kMaxRounds = 1000, kMaxEscapes = 25;

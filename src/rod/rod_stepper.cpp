@@ -35,6 +35,8 @@ const RodModel& RodStepper::model() const
 
 RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t) : model(std::move(m)), time(t), system(*model)
 {
+  if (model->isotropic && time.integrator == Integrator::symplectic_euler)
+    isotropic = std::make_unique<IsotropicRod>(*model, system);
 }
 
 void RodStepper::Impl::begin(const RodState& state)
@@ -178,6 +180,15 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length,
                            : "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
     case StepFailure::squeezed:
       return "contact: grasps, driven bodies or obstacles press on the rods and leave them no room" + at + ": slow these motions down, or use a shorter step";
+    case StepFailure::overstretched:
+      return overstretched[0] >= 0
+                 ? "nodes " + std::to_string(overstretched[0]) + " and " + std::to_string(overstretched[1]) +
+                       " are held further apart than the rod between them is long" + at +
+                       ": bring the grasps closer together, or let the rod stretch (stretching: stiff)"
+                 : "the projection found no configuration in which all edges keep their lengths" + at +
+                       ": use a shorter step, or let the rod stretch (stretching: stiff)";
+    case StepFailure::turned_too_far:
+      return "the twist changed by about half a turn" + at + ": use a shorter step or slower grasps, or formulation: general, which counts turns by the edge";
     case StepFailure::energy_grew:
       return "the energy grew out of nothing" + at + ": use a shorter step, or tr_bdf2, bdf2 or implicit_euler, which damp what the step cannot resolve";
     default:
@@ -210,6 +221,7 @@ RodEnergies RodStepper::energies(const RodState& state, const Eigen::Vector3d& g
 RodEnergies RodStepper::Impl::energies(const RodState& state, const Eigen::Vector3d& gravity)
 {
   const RodModel& m = *model;
+  system.leaveOutStretching(false);
   system.load(state);
   system.setResponse(0.0, nullptr);
   for (int i = 0; i < m.nodes(); ++i)

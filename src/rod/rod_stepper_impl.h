@@ -1,9 +1,12 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "slender_sim/rod/isotropic_rod.h"
+#include "slender_sim/dynamics/fast_projection.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/dynamics/newton.h"
 #include "slender_sim/rod/rod_stepper.h"
@@ -52,8 +55,11 @@ public:
   void endStage(std::size_t stage, const RodInputs& inputs, double duration, double t, double h);
   void finishStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
 
-  // rod_explicit.cpp
-  StepFailure explicitStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
+  // rod_explicit.cpp: an explicit substep; bodies move and constraints are projected between its two parts
+  StepFailure explicitPredict(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
+  StepFailure explicitFinish(const RodInputs& inputs, double duration, double t, double h);
+  void takeProjection(const FastProjection& projection, int chain);
+  std::array<int, 2> overstretched{-1, -1};   ///< held nodes that the last failed projection found too far apart
 
 private:
   static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
@@ -61,6 +67,11 @@ private:
   Eigen::Vector3d heldVelocity(const RodInputs& inputs, double duration, double at, int node, const Eigen::Vector3d& otherwise);
   Eigen::Vector3d combine(const Combination& c, int node) const;
   void computeWrenches(const RodInputs& inputs, double h);
+
+  // rod_explicit.cpp
+  RodEvaluation evaluateStart(const RodInputs& inputs, double duration, double t);
+  void elasticWrenches(const RodInputs& inputs);
+  void holdNodes(const RodInputs& inputs, double duration, double at);
 
   // rod_statics.cpp
   void carryFreeNodes(const RodInputs& inputs, double weight);
@@ -76,6 +87,7 @@ private:
   const StepPlan* plan = nullptr;   ///< of the substep
   RodEvaluation end_evaluation;     ///< at the end of a substep whose stage lies inside it
   Eigen::Matrix3Xd stage_q, stage_v;
+  std::unique_ptr<IsotropicRod> isotropic;   ///< explicit steps of isotropic rods
   Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end, strain_sag;
 };
 

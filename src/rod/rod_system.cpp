@@ -32,6 +32,9 @@ RodSystem::RodSystem(const RodModel& model) : model_(model)
   for (double** p : {&a_.turn, &a_.base_twist, &a_.twist, &a_.strain, &a_.kappa1, &a_.kappa2, &a_.stretch, &a_.rest_strain, &a_.b11, &a_.b12,
                      &a_.b22, &a_.beta, &a_.rest_kappa1, &a_.rest_kappa2, &a_.rest_twist, &a_.weight, &a_.theta_diagonal, &a_.theta_off})
     allocate(*p, 0.0);
+  a_.coupling = nullptr;
+  if (model.curvature == Curvature::compensated)
+    allocate(a_.coupling, 0.0);
   for (double** p : {&a_.inverse_length, &a_.inverse_rest_length})
     allocate(*p, 1.0);
   gradient_.assign(4 * n, 0.0);
@@ -133,6 +136,7 @@ void RodSystem::strains(Eigen::Matrix4Xd& out) const
 RodEvaluation RodSystem::evaluate(bool with_hessian, const HessianShift& shift)
 {
   const RodKernels& kernels = rodKernels();
+  RodKernels::Advance* const advance = kernels.advance[static_cast<int>(model_.curvature)];
   const int n = a_.nodes;
   RodSweep sweep;
   kernels.begin(a_, sweep);
@@ -145,7 +149,7 @@ RodEvaluation RodSystem::evaluate(bool with_hessian, const HessianShift& shift)
   while (done < n)
   {
     const int before = done;
-    done = kernels.advance(a_, sweep, with_hessian ? panels_ : nullptr, first_panel_, by_pieces ? done + kPiece : n);
+    done = advance(a_, sweep, with_hessian ? panels_ : nullptr, first_panel_, by_pieces ? done + kPiece : n);
     for (ClampJoint& c : clamps_)
     {
       const int last = std::max(c.edge, (c.edge + 1) % n);   // node that must be there
@@ -191,7 +195,7 @@ RodEvaluation RodSystem::evaluateWhole(bool with_hessian)
   kernels.begin(a_, sweep);
   panels_ = matrix_.panels();
   first_panel_ = 0;
-  kernels.advance(a_, sweep, with_hessian ? panels_ : nullptr, 0, a_.nodes);
+  kernels.advance[static_cast<int>(model_.curvature)](a_, sweep, with_hessian ? panels_ : nullptr, 0, a_.nodes);
   RodEvaluation clamped;
   for (ClampJoint& c : clamps_)
     evaluateClamp(c, with_hessian, clamped);

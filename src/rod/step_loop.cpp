@@ -5,10 +5,13 @@
 
 namespace slender {
 
-StepLoop::StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, std::unique_ptr<CoupledSystem> coupled)
-  : time_(time), rods_(std::move(rods)), coupled_(std::move(coupled))
+StepLoop::StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, const RodGroupModel* group) : time_(time), rods_(std::move(rods))
 {
   plan_.stages.reserve(2);
+  if (time_.integrator == Integrator::symplectic_euler)
+    explicit_ = std::make_unique<ExplicitSystem>(group, rods_);
+  else if (group)
+    coupled_ = std::make_unique<CoupledSystem>(*group, rods_);
 }
 
 StepLoop::~StepLoop() = default;
@@ -73,8 +76,10 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
     return report;
   if (coupled_)
     coupled_->begin(*group, *group_inputs, duration);
+  if (explicit_ && group)
+    explicit_->begin(*group, *group_inputs, duration);
 
-  const bool explicit_step = time_.integrator == Integrator::symplectic_euler;
+  const bool explicit_step = explicit_ != nullptr;
   const bool adaptive = time_.error_tolerance > 0 && !explicit_step;
   const bool conserving = conserves(states);
   double allowance = 0.0;
@@ -88,7 +93,7 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
     const double length = last ? duration - t : h;
     const bool can_shorten = !explicit_step && 0.5 * length >= time_.min_step;
     StepReport sub;
-    StepFailure failure = explicit_step ? explicitStep(t, length, sub) : implicitStep(t, length, sub);
+    StepFailure failure = explicit_step ? explicit_->step(inputs_, duration_, t, length, sub, failed_) : implicitStep(t, length, sub);
     if (conserving && failure == StepFailure::none && energy(false, nullptr) > start_energy + allowance)
       failure = StepFailure::energy_grew;
     const double ratio = sub.error_estimate / time_.error_tolerance;
@@ -119,6 +124,8 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
     }
     if (coupled_)
       coupled_->commitStep();
+    if (explicit_)
+      explicit_->commitStep();
     cuts = 0;
     ++sub.substeps;
     report.merge(sub);
@@ -131,6 +138,8 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
   }
   if (coupled_)
     coupled_->end(*group);
+  if (explicit_ && group)
+    explicit_->end(*group);
   return report;
 }
 
@@ -167,17 +176,6 @@ StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
     for (std::size_t r = 0; r < rods_.size(); ++r)
       last ? rods_[r]->finishStep(inputs_[r], duration_, t, h, report) : rods_[r]->endStage(s, inputs_[r], duration_, t, h);
   }
-  return StepFailure::none;
-}
-
-StepFailure StepLoop::explicitStep(double t, double h, StepReport& report)
-{
-  for (std::size_t r = 0; r < rods_.size(); ++r)
-    if (const StepFailure failure = rods_[r]->explicitStep(inputs_[r], duration_, t, h, report); failure != StepFailure::none)
-    {
-      failed_ = r;
-      return failure;
-    }
   return StepFailure::none;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "coupled_system.h"
+#include "explicit_system.h"
 #include "rod_stepper_impl.h"
 
 namespace slender {
@@ -13,24 +14,25 @@ namespace slender {
 class StepLoop
 {
 public:
-  StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, std::unique_ptr<CoupledSystem> coupled = nullptr);
+  /// `group` null: a single rod on its own.
+  StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, const RodGroupModel* group = nullptr);
   ~StepLoop();
 
   /// One state and one input per rod. `group`, its bodies and obstacles, for coupled rods only.
   StepReport step(RodState* states, const RodInputs* inputs, double duration, RodGroupState* group = nullptr, const RodGroupInputs* group_inputs = nullptr);
-  CoupledSystem* coupled() { return coupled_.get(); }
+  CoupledSystem* coupled() { return coupled_.get(); }   ///< of implicit steps of a group, else null
 
 private:
   bool begin(const RodState* states, StepReport& report);
   bool conserves(const RodState* states) const;
   double energy(bool at_start, double* allowance);
   StepFailure implicitStep(double t, double h, StepReport& report);
-  StepFailure explicitStep(double t, double h, StepReport& report);
   double stepFactor(double ratio) const;
 
   const TimeConfig time_;
   std::vector<RodStepper::Impl*> rods_;
-  std::unique_ptr<CoupledSystem> coupled_;   ///< null: a single rod on its own
+  std::unique_ptr<CoupledSystem> coupled_;     ///< null: a single rod on its own, or explicit steps
+  std::unique_ptr<ExplicitSystem> explicit_;   ///< null: implicit steps
   const RodInputs* inputs_ = nullptr;
   double duration_ = 0;
   std::size_t failed_ = 0;   ///< rod that the last failure is about

@@ -30,7 +30,7 @@ Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
 /// A rod, and how many edges it has: 0 when its centreline could not be read.
 struct RodPart { RodConfig config; int edges = 0; };
-/// What rods of a scene and those of a generator have in common: formulation, material, damping, contact.
+/// What rods of a scene and those of a generator have in common: curvature, formulation, material, damping, contact.
 void readTraits(YamlMap& map, RodConfig& rod);
 RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
 

@@ -223,8 +223,12 @@ Damping readDamping(const YamlCursor& at)
 
 void readTraits(YamlMap& map, RodConfig& rod)
 {
+  assign(rod.joints.curvature,
+         map.get("curvature").choice<Curvature>({{"tangent", Curvature::tangent}, {"compensated", Curvature::compensated}}));
   assign(rod.formulation,
-         map.get("formulation").choice<Formulation>({{"auto", Formulation::automatic}, {"general", Formulation::general}}));
+         map.get("formulation").choice<Formulation>(
+             {{"auto", Formulation::automatic}, {"isotropic", Formulation::isotropic}, {"general", Formulation::general}}));
+  assign(rod.stretching, map.get("stretching").choice<Stretching>({{"stiff", Stretching::stiff}, {"projected", Stretching::projected}}));
   rod.material = readMaterial(map.get("material"));
   rod.damping = readDamping(map.get("damping"));
   rod.contact = readRodContact(map.get("contact"));
@@ -238,6 +242,12 @@ RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::str
   assign(rod.name, map.get("name").name());
   assign(rod.closed, map.get("closed").boolean());
   assign(rod.naturally_straight, map.get("naturally_straight").boolean());
+  const YamlCursor matched = map.get("matched_to_arcs");
+  assign(rod.joints.matched_to_arcs, matched.boolean());
+  if (rod.joints.matched_to_arcs && rod.naturally_straight)
+  {
+    matched.problem("must not be true of a rod with naturally_straight: true, which has no arcs to match its joints to");
+  }
   assign(rod.initial_twist, map.get("initial_twist").number(Range::closed(-1e5, 1e5, "rad")));
   const int edges = readCenterline(map, context, rod);
   if (edges > 0 && rod.initial)

@@ -15,6 +15,24 @@ namespace slender {
 
 namespace {
 
+/// Which equations explicit steps use; implicit ones always use the general formulation with stretching.
+void chooseFormulation(const RodConfig& rod, Integrator integrator, RodModel& model)
+{
+  const bool explicit_steps = integrator == Integrator::symplectic_euler;
+  const std::string obstacle = explicit_steps ? whyNotIsotropic(model) : "it takes explicit steps (time.integrator: symplectic_euler)";
+  if (rod.formulation == Formulation::isotropic && !obstacle.empty())
+  {
+    throw std::invalid_argument("formulation: isotropic does not apply: " + obstacle + "; take formulation: auto");
+  }
+  if (rod.stretching == Stretching::projected && !explicit_steps)
+  {
+    throw std::invalid_argument("stretching: projected takes explicit steps (time.integrator: symplectic_euler); "
+                                "with implicit ones take stretching: stiff and material.inextensible: true");
+  }
+  model.isotropic = rod.formulation != Formulation::general && obstacle.empty();
+  model.inextensible = rod.stretching == Stretching::projected;
+}
+
 Pose sectionOffset(const Pose& X_WM, const Pose& X_WG) { return X_WM.inverse() * X_WG; }
 
 }  // namespace
@@ -48,7 +66,7 @@ void Simulation::buildRods()
       const Eigen::Matrix3Xd rest = restNodes(rod, config_.gravity);
       const Eigen::Matrix3Xd initial = initialNodes(rod, rest, config_.gravity);
       const int edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
-      RodModel model = buildRod(rod.name, rest, rod.closed, rodSections(rod, edges), rod.director, rod.naturally_straight);
+      RodModel model = buildRod(rod.name, rest, rod.closed, rodSections(rod, edges), rod.director, rod.naturally_straight, rod.joints);
       if (rod.material.inextensible)
       {
         model.stretch_modulus = model.stretch_modulus.cwiseMax(1e5 * model.totalMass() * config_.gravity.norm());
@@ -62,6 +80,7 @@ void Simulation::buildRods()
         model.drag[j] += half;
         model.drag[(j + 1) % model.nodes()] += half;
       }
+      chooseFormulation(rod, config_.time.integrator, model);
       RodState state = makeRodState(model, initial, rod.director, rod.initial_twist);
       for (std::size_t g = 0; g < rod.grasps.size(); ++g)
       {
@@ -249,18 +268,29 @@ StepReport Simulation::stepAll()
 {
   StepReport total;
   const int count = static_cast<int>(steppers_.size());
+  constexpr int kWorthThreads = 500;   // nodes; less is done before threads are awake
+  int nodes = 0, alone = 0;
+  for (int r = 0; r < count; ++r)
+  {
+    if (steppers_[r])
+    {
+      nodes += models_[r]->nodes();
+      ++alone;
+    }
+  }
+  if (alone == 0)
+  {
+    return total;
+  }
   if (count == 1)
   {
-    if (steppers_[0])
-    {
-      total.merge(steppers_[0]->step(state_.rods[0], rod_inputs_[0], config_.time.step));
-    }
+    total.merge(steppers_[0]->step(state_.rods[0], rod_inputs_[0], config_.time.step));
     return total;
   }
   std::vector<StepReport> reports(steppers_.size());
   std::vector<std::exception_ptr> errors(steppers_.size());
 #ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) if (threads_ != 1) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
+#pragma omp parallel for schedule(dynamic) if (threads_ != 1 && alone > 1 && nodes >= kWorthThreads) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
 #endif
   for (int r = 0; r < count; ++r)
   {

@@ -88,9 +88,7 @@ private:
     phi_ = phi;
     const double gamma = std::pow(y * phi, 3);
     rod_ = naturalRod(sectionOf(1e5 * std::max(1.0, gamma), 1.0, 1.0, 1.0 / (1.0 + nu_)), planarNodes([phi](double s) { return phi * s; }),
-                      Eigen::Vector3d::UnitY());
-    if (matched_)
-      rod_.model = matchedToCurve(*rod_.model);
+                      Eigen::Vector3d::UnitY(), {Curvature::tangent, matched_});
     rod_.inputs.gravity = {0, 0, -gamma};
     rod_.hold(0, 0, true);
     Eigen::Matrix3d down;   // columns t, d1, d2

@@ -99,33 +99,37 @@ double obstacleApart(const Shape& shape, const Pose& pose, const Vector3d& a, co
 
 double bruteForceClearance(const GroupSetup& g)
 {
-  struct Piece { Vector3d a, b; double radius, from, to, whole; int rod; bool closed; };
+  struct Piece { Vector3d a, b; double radius, from, to, whole; int rod; bool closed, self; double low, high; };
   std::vector<Piece> pieces;
-  for (std::size_t r = 0; r < g.model.rods.size(); ++r)
+  for (const GroupContact::Rod& touching : g.model.contact.rods)
   {
-    const RodModel& m = *g.model.rods[r];
+    const RodModel& m = *g.model.rods[touching.rod];
+    const Eigen::Matrix3Xd& x = g.state.rods[touching.rod].x;
     double s = 0.0;
     for (int j = 0; j < m.edges(); ++j)
     {
-      pieces.push_back({g.state.rods[r].x.col(j), g.state.rods[r].x.col((j + 1) % m.nodes()), m.radius_a[j], s, s + m.rest_length[j],
-                        m.rest_length.sum(), static_cast<int>(r), m.closed});
+      const Vector3d a = x.col(j), b = x.col((j + 1) % m.nodes());
+      pieces.push_back({a, b, m.radius_a[j], s, s + m.rest_length[j], m.rest_length.sum(), touching.rod, m.closed, touching.self,
+                        std::min(a.x(), b.x()) - m.radius_a[j], std::max(a.x(), b.x()) + m.radius_a[j]});
       s += m.rest_length[j];
     }
   }
+  // in order along x, so that most pairs need no more than a glance
+  std::sort(pieces.begin(), pieces.end(), [](const Piece& p, const Piece& q) { return p.low < q.low; });
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < pieces.size(); ++i)
   {
     const Piece& p = pieces[i];
-    for (std::size_t j = i + 1; j < pieces.size(); ++j)
+    for (std::size_t j = i + 1; j < pieces.size() && pieces[j].low - p.high < least; ++j)
     {
       const Piece& q = pieces[j];
       if (p.rod == q.rod)
       {
         // neighbours along the curve, within half a turn of the tightest bend, never count (see contactNeighbours)
-        double apart = q.from - p.to;
+        double apart = std::max(q.from - p.to, p.from - q.to);
         if (p.closed)
-          apart = std::min(apart, p.whole - q.to + p.from);
-        if (apart < 0.5 * M_PI * (p.radius + q.radius) + g.model.contact.options.gap)
+          apart = std::min(apart, p.whole - std::max(p.to, q.to) + std::min(p.from, q.from));
+        if (!p.self || apart < 0.5 * M_PI * (p.radius + q.radius) + g.model.contact.options.gap)
           continue;
       }
       least = std::min(least, segmentsApart(p.a, p.b, q.a, q.b) - p.radius - q.radius);

@@ -14,7 +14,7 @@ RodSetup rodThrough(const Eigen::Matrix3Xd& points, bool closed, double radius, 
 /// Points of an open overhand (trefoil) knot about the origin whose tails leave along -x and +x; `size` is about the radius of its loops.
 Eigen::Matrix3Xd overhandKnot(double size, double tail);
 
-/// Smallest distance between surfaces of rods, and of rods and obstacles (plane, sphere, capsule); negative when they
+/// Smallest distance between surfaces of rods that may touch, and of these and obstacles (plane, sphere, capsule); negative when they
 /// penetrate. All pairs, by formulas of its own.
 double bruteForceClearance(const GroupSetup& group);
 

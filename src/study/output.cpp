@@ -125,6 +125,8 @@ void writeScript(std::ostream& out, const Plot& plot, const std::string& picture
     for (std::size_t i = 0; i < s.x.size(); ++i)
       if (std::isfinite(s.x[i]) && std::isfinite(s.y[i]) && (!plot.log_x || s.x[i] > 0) && (!plot.log_y || s.y[i] > 0))
         out << format(s.x[i], "%.9g") << " " << format(s.y[i], "%.9g") << "\n";
+      else
+        out << "\n";   // the line breaks here
     out << "EOD\n";
   }
   out << "plot ";

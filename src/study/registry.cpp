@@ -23,8 +23,14 @@ void runHelicalBuckling(StudyContext&);
 void runMichell(StudyContext&);
 void runKnot(StudyContext&);
 void runStickSlip(StudyContext&);
+void runPlectoneme(StudyContext&);
+void runChain(StudyContext&);
+void runTree(StudyContext&);
+void runHair(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
+void runProjection(StudyContext&);
+void runRodTables(StudyContext&);
 void runTrouton(StudyContext&);
 void runThreadTwist(StudyContext&);
 void runRetraction(StudyContext&);
@@ -58,7 +64,13 @@ const std::vector<Study>& studies()
       {"greenhill", "torque that buckles a clamped straight rod under tension or compression", runGreenhill},
       {"stick_slip", "compression at which the foot of a strip pressed on a floor slips, against the coefficient of friction", runStickSlip},
       {"knot", "open overhand knots: end force against the size of the loop", runKnot},
+      {"plectoneme", "a twisted rod with slack winds about itself: twist moment and tension against the ideal ply", runPlectoneme},
+      {"chain", "hooked links hold while the chain is drawn taut, and part when one is cut or bends open", runChain},
+      {"tree", "a tree of 2,158 vertices in wind: what its root carries, time per step", runTree},
+      {"hair", "54,000 vertices of hair on a head that turns: time per step, worst gap", runHair},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
+      {"projection", "inextensible rope: length error and iterations of fast projection; against stiff stretching, error against run time", runProjection},
+      {"rod_tables", "time per step of the thesis's rod examples, part by part, beside its table 4.1", runRodTables},
       {"trouton", "straight viscous threads stretched by plates and by their weight", runTrouton},
       {"thread_twist", "torque of straight viscous threads twisted at a steady rate", runThreadTwist},
       {"retraction", "a free viscous thread drawn together by surface tension", runRetraction},

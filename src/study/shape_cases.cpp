@@ -17,10 +17,10 @@ RodSection sectionOf(double stretch, double bend1, double bend2, double twist)
   return s;
 }
 
-RodSetup naturalRod(const RodSection& section, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& director)
+RodSetup naturalRod(const RodSection& section, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& director, const JointOptions& joints)
 {
   const std::vector<RodSection> sections(static_cast<std::size_t>(rest.cols() - 1), section);
-  RodModel model = buildRod("study", rest, false, sections, director, false);
+  RodModel model = buildRod("study", rest, false, sections, director, false, joints);
   RodSetup rod;
   rod.state = makeRodState(model, rest, director);
   rod.model = std::make_shared<const RodModel>(std::move(model));
@@ -44,26 +44,6 @@ std::shared_ptr<const RodModel> keptPlanar(const RodModel& model, int keep, doub
   stiff->bend_modulus.row(keep == 1 ? 2 : 0) *= factor;
   stiff->twist_modulus *= factor;
   return stiff;
-}
-
-std::shared_ptr<const RodModel> matchedToCurve(const RodModel& model)
-{
-  auto matched = std::make_shared<RodModel>(model);
-  for (int i = 0; i < model.nodes(); ++i)
-  {
-    const Eigen::Vector2d curvature = model.rest_curvature.col(i);
-    const double k = curvature.norm(), half = std::atan(k / 2);   // half the joint's turn
-    if (k == 0)
-      continue;
-    const double along = std::pow(std::cos(half), 2), across = half / std::tan(half), length = std::sin(half) / half;
-    const Eigen::Matrix2d scale = across * Eigen::Matrix2d::Identity() + (along - across) / (k * k) * curvature * curvature.transpose();
-    Eigen::Matrix2d bend;
-    bend << model.bend_modulus(0, i), model.bend_modulus(1, i), model.bend_modulus(1, i), model.bend_modulus(2, i);
-    bend = length * scale * bend * scale;
-    matched->bend_modulus.col(i) << bend(0, 0), bend(0, 1), bend(1, 1);
-    matched->twist_modulus[i] *= length * across * across;
-  }
-  return matched;
 }
 
 int unstableModes(const RodModel& model, const RodState& state, const Eigen::Vector3d& gravity)

@@ -10,7 +10,7 @@ namespace slender::study {
 RodSection sectionOf(double stretch, double bend1, double bend2, double twist);
 
 /// A rod of one section at rest in its natural shape; d1 of the first edge as given, the others twist-free. No grasps, no gravity.
-RodSetup naturalRod(const RodSection& section, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& director);
+RodSetup naturalRod(const RodSection& section, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& director, const JointOptions& joints = {});
 
 /// Lays the rod along other nodes, twist-free from `director` on, at rest; grasps stay as they are.
 void lay(RodSetup& rod, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director);
@@ -18,12 +18,6 @@ void lay(RodSetup& rod, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& di
 /// The rod with bending along d1 (`keep` 2) or d2 (`keep` 1) and twisting `factor` times as stiff: it stays in its plane where the rod
 /// itself would not, and has the same planar equilibria.
 std::shared_ptr<const RodModel> keptPlanar(const RodModel& model, int keep, double factor = 1e3);
-
-/// The rod with joints as stiff about their natural turn as the arcs they stand for. About a turn a the discrete curvature 2 tan(a/2)
-/// changes by 1/cos^2(a/2) times the change of the turn, and the curvature across and the twist by tan(a/2) / (a/2) times the components
-/// of the rotation's logarithm; and a joint has the length of two half chords, not that of the arc. All of that makes coils of few edges
-/// stiffer by terms of second order.
-std::shared_ptr<const RodModel> matchedToCurve(const RodModel& model);
 
 /// Number of negative eigenvalues of the energy's Hessian (zero ones count), grasps held, at an equilibrium.
 int unstableModes(const RodModel& model, const RodState& state, const Eigen::Vector3d& gravity);

@@ -84,34 +84,6 @@ TEST(RigidBodies, TorsionalPendulum)
   EXPECT_GE(found, 3);
 }
 
-/// A T of three rods on one body, spinning and bending freely.
-Group tee()
-{
-  Group g;
-  const RodSection section = modulusSection(0.02, 0.015, 50.0, 0.05);
-  const Vector3d ends[] = {{0.3, 0, 0}, {-0.3, 0.02, 0}, {0.01, 0.1, 0.25}};
-  Twist spin;
-  spin.linear << 0.1, -0.2, 0.3;
-  spin.angular << 1.0, 2.0, 3.0;
-  const int body = g.addBody(bodyOf(0.02, {2e-5, 3e-5, 4e-5}), {Vector3d(0.002, 0.001, 0), Eigen::Quaterniond(0.9, 0.1, 0.2, 0.3).normalized()}, spin);
-  int inner = 0;
-  for (const Vector3d& end : ends)
-  {
-    const int n = 9;
-    Matrix3Xd nodes(3, n);
-    for (int i = 0; i < n; ++i)
-      nodes.col(i) = end * (i + 0.1) / n;
-    Rod rod(openRod(nodes, section), nodes);
-    const int r = g.addRod(rod);
-    inner == 2 ? g.weld(r, 3, 4, body) : g.weld(r, 0, 0, body);   // the third by an edge inside it
-    ++inner;
-    for (int i = 0; i < n; ++i)
-      g.state.rods[r].v.col(i) = spin.linear + spin.angular.cross(nodes.col(i) - g.state.bodies[0].X_WB.position);
-  }
-  g.setGravity(kNone);
-  return g;
-}
-
 TEST(RigidBodies, MomentaAreConserved)
 {
   // Linear momentum exactly (Newton's tolerance); angular momentum to the order of the method, as of rods.
@@ -230,7 +202,6 @@ TEST(RigidBodies, ImpossibleInertiaIsRefused)
   EXPECT_THROW(checkBody(bodyOf(1.0, {1, 1, 3})), std::invalid_argument);
   EXPECT_THROW(checkBody(bodyOf(-1.0, {1, 1, 1})), std::invalid_argument);
   EXPECT_THROW(checkBody(bodyOf(1.0, {1, 0, 1})), std::invalid_argument);
-  EXPECT_THROW(RodGroup(tee().model, withIntegrator(Integrator::symplectic_euler)), std::invalid_argument);   // would step the rods alone
 }
 
 }  // namespace

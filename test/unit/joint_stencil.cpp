@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/energy/joint_stencil.h"
+#include "slender_sim/energy/compensated_response.h"
 #include "test/support/random.h"
 
 namespace slender::test {
@@ -30,6 +30,8 @@ struct Joint
   V e, f, d1e, d1f;
   JointMaterial<Real> material;
   Real twist;   ///< at the base, unwrapped
+  bool compensated = false;
+  Real coupling = 0;
 
   JointFrames<Real> frames(const std::array<Real, 8>& q) const
   {
@@ -47,24 +49,46 @@ struct Joint
     return angle + 2 * pi * std::nearbyint((near - angle) / (2 * pi));
   }
 
+  JointResponse<Real> response(const JointFrames<Real>& s, const JointStrains<Real>& k, Real m, Real* kappa = nullptr) const
+  {
+    Real strain[2] = {k.kappa1, k.kappa2};
+    const JointResponse<Real> r = compensated
+        ? compensatedResponse(k, m, material, {coupling, std::sqrt((1 + dot(s.te, s.tf)) / 2), std::sin(m / 2), std::cos(m / 2)}, strain[0], strain[1])
+        : tangentResponse(k, m, material);
+    if (kappa)
+      std::copy_n(strain, 2, kappa);
+    return r;
+  }
+
   template <bool WithHessian = false>
   Real energy(const std::array<Real, 8>& q, JointGradient<Real>* gradient = nullptr, JointHessian<Real>* hessian = nullptr) const
   {
     const JointFrames<Real> s = frames(q);
     JointGradient<Real> g{};
     JointHessian<Real> h{};
-    const Real u = jointEnergy<WithHessian>(s, jointStrains(s), twistOf(s, twist + q[7] - q[6]), material, g, h);
+    const JointStrains<Real> k = jointStrains(s);
+    const JointResponse<Real> r = response(s, k, twistOf(s, twist + q[7] - q[6]));
+    if (compensated)
+      jointDerivatives<WithHessian, true>(s, k, r, g, h);
+    else
+      jointDerivatives<WithHessian, false>(s, k, r, g, h);
     if (gradient)
       *gradient = g;
     if (hessian)
       *hessian = h;
-    return u;
+    return r.energy;
   }
 };
 
-Joint randomJoint(Random& random, double turn)
+/// What the tests vary: the turn, and how the curvature is measured (coupling < 0: the thesis's way).
+struct Variant { double turn, coupling; };
+
+Joint randomJoint(Random& random, const Variant& variant)
 {
+  const double turn = variant.turn;
   Joint joint;
+  joint.compensated = variant.coupling >= 0;
+  joint.coupling = std::max(variant.coupling, 0.0);
   joint.e = vec(random.direction() * random.uniform(0.5, 1.5));
   const V te = normalized(joint.e), across = normalized(cross(te, vec(random.direction())));
   joint.f = (te * std::cos(Real(turn)) + across * std::sin(Real(turn))) * Real(random.uniform(0.5, 1.5));
@@ -106,7 +130,7 @@ Dense dense(const JointHessian<Real>& h)
   return k;
 }
 
-class JointTurn : public ::testing::TestWithParam<double>
+class JointTurn : public ::testing::TestWithParam<Variant>
 {
 };
 
@@ -195,9 +219,10 @@ TEST_P(JointTurn, ZeroAtRest)
   Random random(34);
   Joint joint = randomJoint(random, GetParam());
   const JointFrames<Real> s = joint.frames({});
-  const JointStrains<Real> strains = jointStrains(s);
-  joint.material.rest_kappa1 = strains.kappa1;
-  joint.material.rest_kappa2 = strains.kappa2;
+  Real kappa[2];
+  joint.response(s, jointStrains(s), joint.twist, kappa);
+  joint.material.rest_kappa1 = kappa[0];
+  joint.material.rest_kappa2 = kappa[1];
   joint.material.rest_twist = joint.twist;
   JointGradient<Real> g;
   JointHessian<Real> h;
@@ -216,7 +241,15 @@ TEST_P(JointTurn, ZeroAtRest)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Turns, JointTurn, ::testing::Values(1e-3, 0.3, 1.2, 2.2));
+std::vector<Variant> variants()
+{
+  std::vector<Variant> all;
+  for (const double turn : {1e-3, 0.3, 1.2, 2.2})
+    for (const double coupling : {-1.0, 0.0, 0.2})   // tangent; compensated without and with the coupling
+      all.push_back({turn, coupling});
+  return all;
+}
+INSTANTIATE_TEST_SUITE_P(Turns, JointTurn, ::testing::ValuesIn(variants()));
 
 }  // namespace
 }  // namespace slender::test

@@ -211,6 +211,9 @@ INSTANTIATE_TEST_SUITE_P(Material, BadValue, testing::Values(
   Case{"rods.0.material.bend_modulus=[[1, 0.1], [0, 1]]", "symmetric"},
   Case{"rods.0.damping.mass=-1", "in [0, 1000000] 1/s"},
   Case{"rods.0.damping.stiffness=-1", "in [0, 1000] s"},
+  Case{"rods.0.curvature=angle", "must be one of: tangent, compensated"},
+  Case{"rods.0.matched_to_arcs=1", "matched_to_arcs = 1"},
+  Case{"rods.0={naturally_straight: true, matched_to_arcs: true}", "has no arcs to match its joints to"},
   Case{"rods.0.damping.drag=-1", "N s/m^2"}));
 
 INSTANTIATE_TEST_SUITE_P(Grasp, BadValue, testing::Values(
@@ -358,6 +361,16 @@ TEST(Reader, resolvesGraspedNodes)
   EXPECT_EQ(held("{nodes: [3..5]}"), std::make_pair(3, 5));
   EXPECT_EQ(held("{edges: [0]}", "true"), std::make_pair(0, 1));
   EXPECT_THROW(held("{edges: [-1]}", "true"), SceneError);
+}
+
+TEST(Reader, readsHowJointsAreMade)
+{
+  const RodConfig plain = parseScene("rods:\n  - {}\n").rods[0];
+  EXPECT_EQ(plain.joints.curvature, Curvature::tangent);
+  EXPECT_FALSE(plain.joints.matched_to_arcs);
+  const RodConfig rod = parseScene("rods:\n  - {curvature: compensated, matched_to_arcs: true, centerline: {arc: {}}}\n").rods[0];
+  EXPECT_EQ(rod.joints.curvature, Curvature::compensated);
+  EXPECT_TRUE(rod.joints.matched_to_arcs);
 }
 
 TEST(Reader, readsModuliInEveryForm)

@@ -76,6 +76,9 @@ TEST(BuildRod, RestCurvatureOfAnArcAndAHelix)
     EXPECT_NEAR(m.rest_curvature(0, i), 2 * std::tan(phi / 2), 1e-13);
     EXPECT_NEAR(m.rest_curvature(1, i), 0.0, 1e-13);
   }
+  const RodModel turns = buildRod("arc", arc, false, uniformSections(modulusSection(1, 1, 1, 1), n - 1), -arc.col(0), false,
+                                  {Curvature::compensated, false});
+  EXPECT_NEAR(turns.rest_curvature(0, n / 2), phi, 1e-13);
   EXPECT_NEAR(m.rest_curvature(0, 0), std::tan(phi / 2), 1e-13);   // half an edge at the ends
   EXPECT_NEAR(m.rest_curvature(0, n - 1), std::tan(phi / 2), 1e-13);
 
@@ -103,26 +106,83 @@ double energyAtRest(const RodModel& m, const Matrix3Xd& nodes, const std::functi
 TEST(BuildRod, RestShapeHasNoEnergyHoweverItIsHeld)
 {
   Random random(61);
-  for (bool closed : {false, true})
-    for (bool uneven : {false, true})
+  const JointOptions options[] = {{}, {Curvature::compensated, false}, {Curvature::tangent, true}, {Curvature::compensated, true}};
+  for (int run = 0; run < 16; ++run)
+  {
+    const bool closed = run % 2 == 1, uneven = run / 2 % 2 == 1;
+    const int n = 16;
+    // in-plane and helical, equal and unequal edges, with turns up to 0.5 rad per joint
+    Matrix3Xd nodes = closed ? ringNodes(n, 1.0) : helixNodes(n, 1.0, 0.5, 0.8);
+    if (uneven)
+      nodes = wigglyNodes(n, closed, random);
+    const RodModel m = buildRod("r", nodes, closed, oddSections(closed ? n : n - 1, random), Vector3d::Zero(), false, options[run / 4]);
+    const std::vector<std::function<void(Rod&)>> holds = {
+        [](Rod&) {},
+        [](Rod& r) { r.hold(0, 0); },
+        [n](Rod& r) { r.hold(0, 0); r.hold(n - 1, n - 1); },
+        [](Rod& r) { r.hold(5, 5); },
+        [](Rod& r) { r.hold(0, 3); r.hold(7, 8); r.hold(12, 12, false); },
+    };
+    for (std::size_t k = 0; k < holds.size(); ++k)
+      // strains of round-off size, squared; anything wrong in the share of the curvature shows at 1e-6 and above
+      EXPECT_LT(energyAtRest(m, nodes, holds[k]), 1e-25) << (closed ? "closed " : "open ") << (uneven ? "uneven" : "even") << " options " << run / 4 << " hold " << k;
+  }
+}
+
+TEST(BuildRod, JointsMatchedToArcsAreAsStiffAsThese)
+{
+  // Two edges of one arc. Its ends turned against each other, the arc's energy is that of the change of its rotation's logarithm, which
+  // is spread evenly over its length: 1/2 d^T diag(beta, B) d / length.
+  Random random(62);
+  const double h = 0.5;
+  for (const Curvature curvature : {Curvature::tangent, Curvature::compensated})
+    for (const double turn : {0.1, 0.8})
     {
-      const int n = 16;
-      // in-plane and helical, equal and unequal edges, with turns up to 0.5 rad per joint
-      Matrix3Xd nodes = closed ? ringNodes(n, 1.0) : helixNodes(n, 1.0, 0.5, 0.8);
-      if (uneven)
-        nodes = wigglyNodes(n, closed, random);
-      const RodModel m = buildRod("r", nodes, closed, oddSections(closed ? n : n - 1, random), Vector3d::Zero(), false);
-      const std::vector<std::function<void(Rod&)>> holds = {
-          [](Rod&) {},
-          [](Rod& r) { r.hold(0, 0); },
-          [n](Rod& r) { r.hold(0, 0); r.hold(n - 1, n - 1); },
-          [](Rod& r) { r.hold(5, 5); },
-          [](Rod& r) { r.hold(0, 3); r.hold(7, 8); r.hold(12, 12, false); },
-      };
-      for (std::size_t k = 0; k < holds.size(); ++k)
-        // strains of round-off size, squared; anything wrong in the share of the curvature shows at 1e-6 and above
-        EXPECT_LT(energyAtRest(m, nodes, holds[k]), 1e-25) << (closed ? "closed " : "open ") << (uneven ? "uneven" : "even") << " hold " << k;
+      Matrix3Xd nodes = Matrix3Xd::Zero(3, 3);
+      nodes.col(0) << -h, 0, 0;
+      nodes.col(2) << h * std::cos(turn), h * std::sin(turn), 0;
+      const RodSection section = oddSection(random);
+      const Vector3d director = random.direction();
+      double worst[2] = {0, 0};
+      for (int matched = 0; matched < 2; ++matched)
+      {
+        const RodModel m = buildRod("arc", nodes, false, uniformSections(section, 2), director, false, {curvature, matched == 1});
+        for (int sample = 0; sample < 6; ++sample)
+        {
+          Rod rod(m, nodes);
+          rod.state = makeRodState(m, nodes, director);
+          const auto frame = [&](int j) {
+            Eigen::Matrix3d f;
+            f.col(0) = (rod.state.x.col(j + 1) - rod.state.x.col(j)).normalized();
+            f.col(1) = rod.state.d1.col(j);
+            f.col(2) = f.col(0).cross(f.col(1));
+            return f;
+          };
+          const auto logarithm = [&] {
+            const Eigen::AngleAxisd relative(Eigen::Matrix3d(frame(0).transpose() * frame(1)));
+            return Vector3d(relative.angle() * relative.axis());
+          };
+          const Vector3d before = logarithm();
+          const Eigen::Matrix3d turned = Eigen::AngleAxisd(1e-5, random.direction()) * frame(1);
+          rod.state.x.col(2) = rod.state.x.col(1) + h * turned.col(0);
+          rod.state.d1.col(1) = turned.col(1);
+          const Vector3d t = frame(0).col(0), transported = parallelTransport(Vector3d(rod.state.d1.col(0)), t, Vector3d(turned.col(0)));
+          rod.state.twist[1] = signedAngle(transported, Vector3d(turned.col(1)), Vector3d(turned.col(0)));
+          const Vector3d d = logarithm() - before;
+          const Eigen::Vector2d kappa(d[2], -d[1]);   // kappa1 turns about d2, kappa2 about -d1
+          const double arc = h * (turn / 2) / std::sin(turn / 2);
+          const double expected = 0.5 * (section.twist_modulus * d[0] * d[0] + kappa.dot(section.bend_modulus * kappa)) / arc;
+          RodSystem system(m);
+          system.load(rod.state);
+          const double energy = evaluateAt(system, rod.state, Eigen::VectorXd::Zero(12)).bend_twist;
+          worst[matched] = std::max(worst[matched], std::abs(energy / expected - 1));
+        }
+      }
+      EXPECT_LT(worst[1], 1e-4) << turn;                          // 1e-5: terms of third order in the small turn
+      EXPECT_GT(worst[0], 0.1 * turn * turn / 4) << turn;   // of second order in the joint's turn without
     }
+  EXPECT_THROW(buildRod("r", unevenNodes(), false, uniformSections(modulusSection(1, 1, 1, 1), 4), Vector3d::UnitY(), true, {Curvature::tangent, true}),
+               std::invalid_argument);
 }
 
 TEST(BuildRod, HoldingAUniformlyBentRodKeepsItsEnergy)

@@ -338,5 +338,45 @@ rods:
   EXPECT_LT((simulation.state().rods[0].x.col(3) - node).norm(), 1e-12);   // the hand stands still: nothing jumps
 }
 
+TEST(Simulation, FormulationIsChosenWhereItApplies)
+{
+  const auto build = [](const std::vector<std::string>& overrides) { return Simulation(parseScene(R"(
+time: {step: 1e-4, integrator: symplectic_euler}
+rods: [{centerline: {straight: {edges: 20}}, material: {bend_modulus: 1e-4, twist_modulus: 1e-4, stretch_modulus: 10}, grasps: {a: {edges: [0]}}}]
+)", "t", overrides)); };
+  const auto refusal = [&](const std::vector<std::string>& overrides) {
+    try
+    {
+      build(overrides);
+    }
+    catch (const SceneError& error)
+    {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_TRUE(build({}).rodModel(0).isotropic);
+  EXPECT_FALSE(build({"rods.0.formulation=general"}).rodModel(0).isotropic);
+  EXPECT_FALSE(build({"rods.0.damping.stiffness=0.1"}).rodModel(0).isotropic);
+  EXPECT_FALSE(build({"rods.0.material.bend_modulus=[1e-4, 2e-4]"}).rodModel(0).isotropic);
+  EXPECT_FALSE(build({"time.integrator=implicit_euler"}).rodModel(0).isotropic);
+  EXPECT_FALSE(build({"rods.0.curvature=compensated"}).rodModel(0).isotropic);
+  EXPECT_EQ(build({"rods.0.curvature=compensated"}).rodModel(0).curvature, Curvature::compensated);
+  EXPECT_TRUE(build({"rods.0.stretching=projected"}).rodModel(0).inextensible);
+  EXPECT_NE(refusal({"rods.0.formulation=isotropic", "rods.0.material.bend_modulus=[1e-4, 2e-4]"}).find("depends on the direction"), std::string::npos);
+  EXPECT_NE(refusal({"rods.0.formulation=isotropic", "time.integrator=bdf2"}).find("symplectic_euler"), std::string::npos);
+  EXPECT_NE(refusal({"rods.0.stretching=projected", "time.integrator=bdf2"}).find("material.inextensible"), std::string::npos);
+
+  // and a projected run holds its lengths, also after saving and loading
+  Simulation a = build({"rods.0.stretching=projected"}), b = build({"rods.0.stretching=projected"});
+  run(a, 50);
+  const std::string file = ::testing::TempDir() + "projected_state";
+  a.save(file);
+  b.load(file);
+  run(a, 20);
+  run(b, 20);
+  expectSameBits(a.state(), b.state());
+}
+
 }  // namespace
 }  // namespace slender

@@ -85,6 +85,32 @@ TEST_P(Allocations, AWarmStepMakesNone)
       }
 }
 
+TEST(Allocations, WarmProjectedStepsMakeNone)
+{
+  for (bool isotropic : {false, true})
+  {
+    const int n = 40;
+    Rod rod = straightRod(n, 1.0, roundSection(0.005, 1e6, 1000));
+    rod.model->isotropic = isotropic;
+    rod.model->inextensible = true;
+    rod.inputs.gravity << 0, 0, -9.81;
+    rod.hold(0, 1);
+    RodStepper stepper(rod.model, withIntegrator(Integrator::symplectic_euler));
+    const auto advance = [&] {
+      rod.inputs.grasps[0].X_WG.position.x() += 1e-5;
+      return stepper.step(rod.state, rod.inputs, 1e-4).ok;
+    };
+    for (int k = 0; k < 20; ++k)
+      ASSERT_TRUE(advance());
+    const long before = allocations;
+    bool ok = true;
+    for (int k = 0; k < 20; ++k)
+      ok = advance() && ok;
+    EXPECT_EQ(allocations - before, 0) << isotropic;
+    EXPECT_TRUE(ok);
+  }
+}
+
 TEST(ThreadAllocations, AWarmStepMakesNone)
 {
   ThreadModel model = honey();

@@ -15,6 +15,8 @@ enum class StepFailure
   state_not_finite,     ///< explicit step blew up
   squeezed,             ///< contact: prescribed motions leave no room for what lies between them
   energy_grew,          ///< implicit_midpoint, generalized_alpha: energy out of nothing
+  overstretched,        ///< projection: the edges cannot all keep their lengths
+  turned_too_far,       ///< isotropic formulation: the twist changed by about half a turn in one step, and could not be counted
 };
 
 /// What one call of step() did. Sums and maxima run over all its substeps.
@@ -31,6 +33,8 @@ struct StepReport
   double max_strain = 0.0;        ///< largest |stretch strain| over all edges [-]
   int mended_folds = 0;           ///< threads: sharp folds that were taken out because the step could not be done with them
   bool stable = true;             ///< statics: the equilibrium is a minimum of the energy (false: stationary only, a saddle)
+  int projection_iterations = 0;  ///< of fast projection (explicit steps of inextensible rods), the most in a step
+  double constraint_error = 0.0;  ///< largest | |e|^2/L^2 - 1 | that it left [-]
   double error_estimate = 0.0;    ///< adaptive steps only: estimated local error [m]
 
   /// Takes the other report into this one (sums, maxima, first failure wins).

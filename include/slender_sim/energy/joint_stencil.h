@@ -57,13 +57,32 @@ SLENDER_INLINE JointStrains<T> jointStrains(const JointFrames<T>& s)
   return {0.5 * dot(s.d2e + s.d2f, kb), -0.5 * dot(s.d1e + s.d1f, kb), kb, inverse_chi};
 }
 
-/// Energy; adds nothing, returns the gradient in `g` and, when WithHessian, the second derivatives in `h`. `m` is the twist [rad].
-template <bool WithHessian, class T>
-SLENDER_INLINE T jointEnergy(const JointFrames<T>& s, const JointStrains<T>& k, const T& m, const JointMaterial<T>& p,
-                             JointGradient<T>& g, JointHessian<T>& h)
+/// Energy of a joint as a function of (kappa1, kappa2, m) with its derivatives: moments m_i and second derivatives w_ij.
+template <class T>
+struct JointResponse
+{
+  T energy;             ///< [J]
+  T m1, m2, m3;         ///< [N m]
+  T w11, w12, w22, w33;
+  T w13, w23;           ///< only of a response that couples bending and twisting
+};
+
+/// The thesis's energy (4.2.2, 4.2.3).
+template <class T>
+SLENDER_INLINE JointResponse<T> tangentResponse(const JointStrains<T>& k, const T& m, const JointMaterial<T>& p)
 {
   const T q1 = k.kappa1 - p.rest_kappa1, q2 = k.kappa2 - p.rest_kappa2, q3 = m - p.rest_twist;
   const T m1 = p.b11 * q1 + p.b12 * q2, m2 = p.b12 * q1 + p.b22 * q2, m3 = p.twist * q3;
+  return {0.5 * (m1 * q1 + m2 * q2 + m3 * q3), m1, m2, m3, p.b11, p.b12, p.b22, p.twist, T{}, T{}};
+}
+
+/// Gradient in `g` (overwritten) and, when WithHessian, the second derivatives in `h` of a joint with response `r`; without them only
+/// the angles' block of `h`. Coupled: w13, w23 are not zero.
+template <bool WithHessian, bool Coupled, class T>
+SLENDER_INLINE void jointDerivatives(const JointFrames<T>& s, const JointStrains<T>& k, const JointResponse<T>& r, JointGradient<T>& g,
+                                     JointHessian<T>& h)
+{
+  const T m1 = r.m1, m2 = r.m2, m3 = r.m3;
   const T ie = s.inverse_e, jf = s.inverse_f;
   const Vec3<T> tt = (s.te + s.tf) * k.inverse_chi;
   const Vec3<T> td1 = (s.d1e + s.d1f) * k.inverse_chi, td2 = (s.d2e + s.d2f) * k.inverse_chi;
@@ -82,12 +101,21 @@ SLENDER_INLINE T jointEnergy(const JointFrames<T>& s, const JointStrains<T>& k, 
   g.theta_f = m1 * k1_tf + m2 * k2_tf + m3;
 
   // angle-angle part: cheap, and enough for a quasistatic update of the frames
-  const T b1_te = p.b11 * k1_te + p.b12 * k2_te, b2_te = p.b12 * k1_te + p.b22 * k2_te;
-  const T b1_tf = p.b11 * k1_tf + p.b12 * k2_tf, b2_tf = p.b12 * k1_tf + p.b22 * k2_tf;
+  T b1_te = r.w11 * k1_te + r.w12 * k2_te, b2_te = r.w12 * k1_te + r.w22 * k2_te, b3_te = -r.w33;
+  T b1_tf = r.w11 * k1_tf + r.w12 * k2_tf, b2_tf = r.w12 * k1_tf + r.w22 * k2_tf, b3_tf = r.w33;
+  if (Coupled)
+  {
+    b1_te -= r.w13;
+    b2_te -= r.w23;
+    b3_te += r.w13 * k1_te + r.w23 * k2_te;
+    b1_tf += r.w13;
+    b2_tf += r.w23;
+    b3_tf += r.w13 * k1_tf + r.w23 * k2_tf;
+  }
   // (4.5)
-  h.te_te = b1_te * k1_te + b2_te * k2_te + p.twist - 0.5 * dot(k.kb, s.d2e * m1 - s.d1e * m2);
-  h.tf_tf = b1_tf * k1_tf + b2_tf * k2_tf + p.twist - 0.5 * dot(k.kb, s.d2f * m1 - s.d1f * m2);
-  h.te_tf = b1_te * k1_tf + b2_te * k2_tf - p.twist;
+  h.te_te = b1_te * k1_te + b2_te * k2_te - b3_te - 0.5 * dot(k.kb, s.d2e * m1 - s.d1e * m2);
+  h.tf_tf = b1_tf * k1_tf + b2_tf * k2_tf + b3_tf - 0.5 * dot(k.kb, s.d2f * m1 - s.d1f * m2);
+  h.te_tf = b1_te * k1_tf + b2_te * k2_tf + b3_te;
 
   if (WithHessian)
   {
@@ -99,17 +127,26 @@ SLENDER_INLINE T jointEnergy(const JointFrames<T>& s, const JointStrains<T>& k, 
     const Vec3<T> a = cross(s.tf, D), b = cross(s.te, D);
     const T ie2 = ie * ie, jf2 = jf * jf, ij = ie * jf;
 
-    const Vec3<T> b1_e = k1_e * p.b11 + k2_e * p.b12, b2_e = k1_e * p.b12 + k2_e * p.b22;
-    const Vec3<T> b1_f = k1_f * p.b11 + k2_f * p.b12, b2_f = k1_f * p.b12 + k2_f * p.b22;
+    Vec3<T> b1_e = k1_e * r.w11 + k2_e * r.w12, b2_e = k1_e * r.w12 + k2_e * r.w22, b3_e = m_e * r.w33;
+    Vec3<T> b1_f = k1_f * r.w11 + k2_f * r.w12, b2_f = k1_f * r.w12 + k2_f * r.w22, b3_f = m_f * r.w33;
+    if (Coupled)
+    {
+      b1_e = b1_e + m_e * r.w13;
+      b2_e = b2_e + m_e * r.w23;
+      b3_e = b3_e + k1_e * r.w13 + k2_e * r.w23;
+      b1_f = b1_f + m_f * r.w13;
+      b2_f = b2_f + m_f * r.w23;
+      b3_f = b3_f + k1_f * r.w13 + k2_f * r.w23;
+    }
 
     const T half = T{} + 0.5;   // symmetricOuter counts u v^T and v u^T
     h.ee = symmetricOuter(b1_e * half, k1_e) + symmetricOuter(b2_e * half, k2_e)
-         + symmetricOuter(m_e * (0.5 * p.twist), m_e)
+         + symmetricOuter(b3_e * half, m_e)
          + symmetricOuter(tt * ie2, tt * K - a)
          + symmetricOuter(k.kb * (0.25 * ie2), De - (s.te + tt) * m3)
          + normalProjector(-K * k.inverse_chi * ie2, s.te);
     h.ff = symmetricOuter(b1_f * half, k1_f) + symmetricOuter(b2_f * half, k2_f)
-         + symmetricOuter(m_f * (0.5 * p.twist), m_f)
+         + symmetricOuter(b3_f * half, m_f)
          + symmetricOuter(tt * jf2, tt * K + b)
          + symmetricOuter(k.kb * (0.25 * jf2), Df - (s.tf + tt) * m3)
          + normalProjector(-K * k.inverse_chi * jf2, s.tf);
@@ -123,18 +160,17 @@ SLENDER_INLINE T jointEnergy(const JointFrames<T>& s, const JointStrains<T>& k, 
     addOuter(h.ef, tt * ij, tt * (2.0 * K) + b);
     addOuter(h.ef, a * (-ij), tt);
     addOuter(h.ef, k.kb * (-0.5 * ij * m3), tt);
-    addOuter(h.ef, m_e * p.twist, m_f);
+    addOuter(h.ef, b3_e, m_f);
     addCross(h.ef, s.te * (m3 * k.inverse_chi * ij) - D * ij);
 
     // derivative of (4.4): kappa . M split into the shares of the two edges, each with its own director
     const Vec3<T> Fe = (s.d1e * m1 + s.d2e * m2) * (-k.inverse_chi), Ff = (s.d1f * m1 + s.d2f * m2) * (-k.inverse_chi);
     const T se = m1 * k1_te + m2 * k2_te, sf = m1 * k1_tf + m2 * k2_tf;
-    h.e_te = k1_e * b1_te + k2_e * b2_te - m_e * p.twist + (cross(s.tf, Fe) - tt * se) * ie;
-    h.f_te = k1_f * b1_te + k2_f * b2_te - m_f * p.twist + (-cross(s.te, Fe) - tt * se) * jf;
-    h.e_tf = k1_e * b1_tf + k2_e * b2_tf + m_e * p.twist + (cross(s.tf, Ff) - tt * sf) * ie;
-    h.f_tf = k1_f * b1_tf + k2_f * b2_tf + m_f * p.twist + (-cross(s.te, Ff) - tt * sf) * jf;
+    h.e_te = k1_e * b1_te + k2_e * b2_te + m_e * b3_te + (cross(s.tf, Fe) - tt * se) * ie;
+    h.f_te = k1_f * b1_te + k2_f * b2_te + m_f * b3_te + (-cross(s.te, Fe) - tt * se) * jf;
+    h.e_tf = k1_e * b1_tf + k2_e * b2_tf + m_e * b3_tf + (cross(s.tf, Ff) - tt * sf) * ie;
+    h.f_tf = k1_f * b1_tf + k2_f * b2_tf + m_f * b3_tf + (-cross(s.te, Ff) - tt * sf) * jf;
   }
-  return 0.5 * (m1 * q1 + m2 * q2 + m3 * q3);
 }
 
 }  // namespace slender

@@ -4,6 +4,9 @@
 
 namespace slender {
 
+/// How joints measure their curvature: as in the thesis (joint_stencil.h), or compensated for its leading errors (compensated_response.h).
+enum class Curvature { tangent, compensated };
+
 /// Structure-of-arrays view of one rod for the hot loops. Every array is indexed by node or by edge (edge j follows node j,
 /// joint i sits at node i between edges i-1 and i) and is readable from index -kHalo to nodes + kHalo.
 /// In a closed rod the halo repeats the rod; in an open one it continues the end edges and carries no stiffness.
@@ -26,6 +29,7 @@ struct RodArrays
   double *stretch;            ///< k_s [N]
   double *inverse_rest_length, *rest_strain;
   double *b11, *b12, *b22, *beta;   ///< B / l, beta / l [N m]
+  double* coupling;           ///< JointCompensation::coupling [-]; only for Curvature::compensated
   double *rest_kappa1, *rest_kappa2, *rest_twist;
 
   // inertia and loads: 1/2 weight |x - target|^2 - force . x
@@ -61,7 +65,8 @@ struct RodKernels
   /// Frames, twists, strains, energy and gradient of all nodes below `to` (at least); second derivatives of node i into
   /// panels[i - first_panel] unless it is null. Returns the first node not done: at most kOvershoot beyond `to`. A closed rod is
   /// done in one go.
-  int (*advance)(const RodArrays& rod, RodSweep& sweep, BandPanel<10, 4>* panels, int first_panel, int to);
+  using Advance = int(const RodArrays& rod, RodSweep& sweep, BandPanel<10, 4>* panels, int first_panel, int to);
+  Advance* advance[2];   ///< by Curvature
   RodEvaluation (*end)(const RodSweep& sweep);
 };
 

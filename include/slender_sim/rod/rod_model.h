@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "slender_sim/energy/rod_kernel.h"
 #include "slender_sim/rod/rod_state.h"
 
 namespace slender {
@@ -14,6 +15,7 @@ struct RodModel
 {
   std::string name;
   bool closed = false;
+  Curvature curvature = Curvature::tangent;   ///< what rest_curvature, and the strain to compare with it, are
 
   Eigen::VectorXd mass;             ///< per node [kg], lumped Voronoi cells
   Eigen::VectorXd rest_length;      ///< per edge [m]
@@ -23,6 +25,9 @@ struct RodModel
   Eigen::VectorXd twist_modulus;    ///< per node beta [N m^2]
   Eigen::Matrix2Xd rest_curvature;  ///< per node, integrated (kappa1, kappa2) [-]
   Eigen::VectorXd rest_twist;       ///< per node, integrated [rad]
+
+  bool isotropic = false;           ///< explicit steps use the isotropic formulation (see whyNotIsotropic)
+  bool inextensible = false;        ///< explicit steps keep the edges' lengths by projection instead of stretching energy
 
   double mass_damping = 0.0;        ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;   ///< Rayleigh [s]
@@ -43,12 +48,27 @@ struct RodSection
   double twist_modulus;     ///< [N m^2]
 };
 
+/// How buildRod makes joints of a rest shape.
+struct JointOptions
+{
+  Curvature curvature = Curvature::tangent;
+  /// Joints as stiff about their natural turn as the arcs they stand for, whose ends are the middles of the edges. About a turn a the
+  /// curvature 2 tan(a/2) changes by 1/cos^2(a/2) times the change of the turn, and the curvature across and the twist by
+  /// tan(a/2) / (a/2) times the components of the rotation's logarithm (compensated: only the twist); and a joint has the length of two
+  /// half chords, not that of the arc. Left alone, all that makes coils of few edges stiffer by terms of second order.
+  bool matched_to_arcs = false;
+};
+
 /// Builds the model from the rest shape. `nodes` 3 x n [m]; `director` d1 at the first edge (zero: any normal), the others
 /// by parallel transport along the curve, so the rest twist is zero (in a closed rod the holonomy is left at node 0 as rest twist).
 /// Throws std::invalid_argument naming the bad value: fewer than 3 nodes, repeated nodes, folded edges, sections of wrong number
-/// or not positive.
+/// or not positive, a naturally straight rod to be matched to arcs.
 RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed, const std::vector<RodSection>& sections,
-                  const Eigen::Vector3d& director, bool naturally_straight);
+                  const Eigen::Vector3d& director, bool naturally_straight, const JointOptions& joints = {});
+
+/// Why the isotropic formulation (thesis 4.2, special case) does not apply; empty when it does: naturally straight, the same
+/// bending modulus in all directions, no stiffness damping, the thesis's curvature.
+std::string whyNotIsotropic(const RodModel& model);
 
 /// A state at rest at the given nodes, twist-free frames plus `total_twist` [rad] spread evenly over the inner nodes
 /// (of a closed rod: over all nodes, and whole turns only). Throws std::invalid_argument naming the bad value.

@@ -18,6 +18,7 @@ struct ClampJoint
   int node = 0, edge = 0;
   double b11 = 0, b12 = 0, b22 = 0, beta = 0;   ///< divided by the half joint's length [N m]
   double rest_kappa1 = 0, rest_kappa2 = 0, rest_twist = 0;
+  double coupling = 0;            ///< see JointCompensation
   // present response (with viscous part), see RodSystem::setResponse
   double scale = 1.0, rest1 = 0, rest2 = 0, rest3 = 0;
 
@@ -46,6 +47,12 @@ public:
 
   /// Base and trial := state. Rebuilds the clamps when the state's grasps changed.
   void load(const RodState& state);
+  /// Held parts, clamps and stiffnesses for the state's grasps, without its configuration; load() does it, too.
+  void compose(const RodState& state);
+  /// Counts the times that compose() found other grasps than before.
+  unsigned long composition() const { return composition_; }
+  /// Without stretching energy, for edges whose lengths are constraints; from the next setResponse() on.
+  void leaveOutStretching(bool leave_out) { no_stretching_ = leave_out; }
   /// Positions, frames, twists, grasp sections.
   void store(RodState& state) const;
 
@@ -110,6 +117,8 @@ public:
   /// Returns the largest turn [rad]; turnFrames(), after accept(), makes these turns the next trial's.
   double solveFrames();
   void turnFrames();
+  /// store() with those turns applied, which are exact for twists, without evaluating there.
+  void storeTurned(RodState& state) const;
   /// Evaluates the trial and repeats this until its frames are in equilibrium. Returns the last evaluation.
   RodEvaluation relaxFrames();
 
@@ -120,7 +129,6 @@ public:
   const std::vector<ClampJoint>& clamps() const { return clamps_; }
 
 private:
-  void compose(const RodState& state);
   void composeClamp(int grasp, int side);
   void respond(ClampJoint& clamp) const;
   void evaluateClamp(ClampJoint& clamp, bool with_hessian, RodEvaluation& sum);
@@ -134,6 +142,8 @@ private:
 
   const RodModel& model_;
   RodArrays a_;
+  unsigned long composition_ = 0;
+  bool no_stretching_ = false;
   std::vector<AlignedVector<double>> storage_;
   CyclicBandedLdlt matrix_;
   /// Where panels are assembled: the matrix itself, or for long open rods a piece that stays in the cache.
@@ -142,7 +152,7 @@ private:
   AlignedVector<RodPanel> piece_;
   AlignedVector<double> gradient_, direction_, reduced_, x_base_[3], saved_[10];
   std::vector<ClampJoint> saved_clamps_;
-  AlignedVector<double> stretch_, b11_, b12_, b22_, beta_, rest_k1_, rest_k2_, rest_m_;   ///< elastic response as composed
+  AlignedVector<double> stretch_, b11_, b12_, b22_, beta_, rest_k1_, rest_k2_, rest_m_, coupling_;   ///< elastic response as composed
 
   std::vector<GraspState> grasps_;
   std::vector<ClampJoint> clamps_;

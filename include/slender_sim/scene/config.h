@@ -13,6 +13,7 @@
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
+#include "slender_sim/rod/rod_model.h"
 
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
 namespace slender {
@@ -109,7 +110,8 @@ struct GraspConfig
 };
 
 /// Which equations a rod uses. `automatic` chooses the cheapest that applies; so far that is always the general one.
-enum class Formulation { automatic, general };
+enum class Formulation { automatic, isotropic, general };
+enum class Stretching { stiff, projected };
 
 /// What a rod touches.
 struct RodContact
@@ -127,7 +129,9 @@ struct RodConfig
   std::optional<Curve> initial;                ///< initial shape; its edges are resampled to those of the centerline
   bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
   bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
+  JointOptions joints;                         ///< `curvature`, `matched_to_arcs`
   Formulation formulation = Formulation::automatic;
+  Stretching stretching = Stretching::stiff;
   double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
   Eigen::Vector3d director{0, 0, 0};           ///< d1 at the first edge (projected); zero: chosen automatically
   CrossSection cross_section{{0.005}, {0.005}};

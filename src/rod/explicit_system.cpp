@@ -1,0 +1,266 @@
+#include "explicit_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/geometry/rotation.h"
+
+namespace slender {
+
+namespace {
+
+/// Inertia of a point mass.
+Eigen::Matrix3d pointInertia(double mass, const Eigen::Vector3d& r)
+{
+  return mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+}
+
+/// Angular velocity of a body with this angular momentum.
+Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q, const Eigen::Vector3d& momentum)
+{
+  return q * (inertia.inverse() * (q.conjugate() * momentum));
+}
+
+}  // namespace
+
+ExplicitSystem::ExplicitSystem(const RodGroupModel* group, const std::vector<RodStepper::Impl*>& rods) : model_(group), rods_(rods)
+{
+  for (const RodStepper::Impl* rod : rods_)
+  {
+    const RodModel& m = *rod->model;
+    chains_.push_back(m.inextensible ? projection_.addChain(m.rest_length, m.mass, m.closed) : -1);
+    inextensible_ = inextensible_ || m.inextensible;
+  }
+  if (!model_)
+    return;
+  for (int b = 0; b < static_cast<int>(model_->bodies.size()); ++b)
+    if (model_->bodies[b].simulated)
+    {
+      Body body;
+      body.index = b;
+      bodies_.push_back(body);
+      projection_.addBody();
+    }
+}
+
+void ExplicitSystem::begin(const RodGroupState& state, const RodGroupInputs& inputs, double duration)
+{
+  origin_ = &state;
+  inputs_ = &inputs;
+  duration_ = duration;
+  bodies_now_ = bodies_next_ = state.bodies;
+}
+
+bool ExplicitSystem::isWelded(const RodStepper::Impl& rod, const Weld& weld) const
+{
+  return weld.grasp < static_cast<int>(rod.work.grasps.size()) && rod.work.grasps[weld.grasp].active && rod.work.grasps[weld.grasp].body == weld.body;
+}
+
+/// Masses of the bodies with the nodes they carry, and where they are now.
+void ExplicitSystem::composeBodies()
+{
+  for (Body& body : bodies_)
+  {
+    const RigidBodyModel& m = model_->bodies[body.index];
+    body.mass = m.mass;
+    Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d inertia = m.inertia;   // about the body's own centre of mass so far
+    for (const Weld& weld : model_->welds)
+      if (weld.body == body.index && isWelded(*rods_[weld.rod], weld))
+      {
+        const GraspState& g = rods_[weld.rod]->work.grasps[weld.grasp];
+        for (int i = g.first_node; i <= g.last_node; ++i)
+        {
+          const double mass = rods_[weld.rod]->model->mass[i];
+          const Eigen::Vector3d r = weld.X_BG * g.nodes_G[i - g.first_node];
+          body.mass += mass;
+          moment += mass * r;
+          inertia += pointInertia(mass, r);
+        }
+      }
+    body.centre = moment / body.mass;
+    body.inertia = inertia - pointInertia(body.mass, body.centre);
+    const RigidBodyState& s = bodies_now_[body.index];
+    const Eigen::Vector3d arm = s.X_WB.orientation * body.centre;
+    body.start = {s.X_WB.position + arm, s.X_WB.orientation};
+    body.velocity = {s.velocity.linear + s.velocity.angular.cross(arm), s.velocity.angular};
+  }
+}
+
+/// Symplectic Euler for the centre; for the rotation the momentum is advanced likewise, and the turn that belongs to it found by the
+/// midpoint rule, which keeps the energy of a tumbling body.
+void ExplicitSystem::predictBody(Body& body, double h)
+{
+  const RigidBodyModel& m = model_->bodies[body.index];
+  const RigidBodyState& now = bodies_now_[body.index];
+  Eigen::Vector3d force = m.force, torque = m.torque;
+  if (m.gravity)
+    force += m.mass * inputs_->gravity;
+  torque += (now.X_WB.position - body.start.position).cross(force);
+  for (const Weld& weld : model_->welds)
+    if (weld.body == body.index && isWelded(*rods_[weld.rod], weld))
+    {
+      const RodStepper::Impl& rod = *rods_[weld.rod];
+      const GraspState& g = rod.work.grasps[weld.grasp];
+      force += rod.wrenches[weld.grasp].force;
+      torque += rod.wrenches[weld.grasp].torque + (g.X_WG.position - body.start.position).cross(rod.wrenches[weld.grasp].force);
+      for (int i = g.first_node; i <= g.last_node; ++i)
+      {
+        const Eigen::Vector3d drag = -(rod.model->mass_damping * rod.model->mass[i] + rod.model->drag[i]) * rod.work.v.col(i);
+        force += drag;
+        torque += (rod.work.x.col(i) - body.start.position).cross(drag);
+      }
+    }
+  const Eigen::Quaterniond& q = body.start.orientation;
+  const double share = m.mass / body.mass;
+  Twist& v = body.velocity;
+  v.linear = (v.linear + h / body.mass * force) / (1.0 + h * m.linear_damping * share);
+  const Eigen::Vector3d momentum =
+      (q * (body.inertia * (q.conjugate() * v.angular)) + h * torque) / (1.0 + h * m.angular_damping);
+  Eigen::Vector3d turn = h * spin(body.inertia, q, momentum);
+  for (int k = 0; k < 20; ++k)
+  {
+    const Eigen::Vector3d better = h * spin(body.inertia, fromRotationVector(0.5 * turn) * q, momentum);
+    const bool settled = (better - turn).norm() <= 1e-15;
+    turn = better;
+    if (settled)
+      break;
+  }
+  body.predicted = {body.start.position + h * v.linear, (fromRotationVector(turn) * q).normalized()};
+  v.angular = spin(body.inertia, body.predicted.orientation, momentum);
+}
+
+/// Takes over a body's motion at the end of the substep, and moves the grasps that it carries.
+void ExplicitSystem::placeBody(Body& body, const Pose& X, const Twist& velocity)
+{
+  RigidBodyState& next = bodies_next_[body.index];
+  const Eigen::Vector3d arm = X.orientation * body.centre;
+  next.X_WB = {X.position - arm, X.orientation};
+  next.velocity = {velocity.linear - velocity.angular.cross(arm), velocity.angular};
+  for (const Weld& weld : model_->welds)
+    if (weld.body == body.index && isWelded(*rods_[weld.rod], weld))
+    {
+      RodStepper::Impl& rod = *rods_[weld.rod];
+      rod.stage_poses[weld.grasp] = next.X_WB * weld.X_BG;
+      rod.carried_velocity[weld.grasp] = {next.velocity.linear + next.velocity.angular.cross(rod.stage_poses[weld.grasp].position - next.X_WB.position),
+                                          next.velocity.angular};
+    }
+}
+
+StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, double t, double h, StepReport& report, std::size_t& failed)
+{
+  // before a run's first step whatever stretching a rod comes with is taken out without becoming a velocity
+  const bool first = std::any_of(rods_.begin(), rods_.end(), [](const RodStepper::Impl* rod) { return rod->work.last_step == 0.0; });
+  if (inextensible_ && first)
+    if (const StepFailure failure = project(h, true, report, failed); failure != StepFailure::none)
+      return failure;
+  for (failed = 0; failed < rods_.size(); ++failed)
+    if (const StepFailure failure = rods_[failed]->explicitPredict(inputs[failed], duration, t, h, report); failure != StepFailure::none)
+      return failure;
+  composeBodies();
+  for (Body& body : bodies_)
+    predictBody(body, h);
+  if (inextensible_)
+  {
+    if (const StepFailure failure = project(h, false, report, failed); failure != StepFailure::none)
+      return failure;
+  }
+  else
+    for (Body& body : bodies_)
+      placeBody(body, body.predicted, body.velocity);
+  for (failed = 0; failed < rods_.size(); ++failed)
+    if (const StepFailure failure = rods_[failed]->explicitFinish(inputs[failed], duration, t, h); failure != StepFailure::none)
+      return failure;
+  for (const Body& body : bodies_)
+  {
+    const RigidBodyState& b = bodies_next_[body.index];
+    if (!b.X_WB.position.allFinite() || !b.X_WB.orientation.coeffs().allFinite() || !b.velocity.linear.allFinite() || !b.velocity.angular.allFinite())
+    {
+      failed = 0;
+      return StepFailure::state_not_finite;
+    }
+  }
+  return StepFailure::none;
+}
+
+/// Restores the lengths of inextensible rods' edges. `start_only`: of the state the substep begins with, bodies staying where they are.
+StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& report, std::size_t& failed)
+{
+  for (std::size_t r = 0; r < rods_.size(); ++r)
+  {
+    if (chains_[r] < 0)
+      continue;
+    RodStepper::Impl& rod = *rods_[r];
+    const int n = rod.model->nodes();
+    owner_.assign(n, -1);
+    arm_.resize(n);
+    for (std::size_t k = 0; k < rod.work.grasps.size(); ++k)
+    {
+      const GraspState& g = rod.work.grasps[k];
+      if (g.active)
+        std::fill(owner_.begin() + g.first_node, owner_.begin() + g.last_node + 1, -2);
+    }
+    for (std::size_t b = 0; b < bodies_.size() && !start_only; ++b)
+      for (const Weld& weld : model_->welds)
+        if (weld.rod == static_cast<int>(r) && weld.body == bodies_[b].index && isWelded(rod, weld))
+        {
+          const GraspState& g = rod.work.grasps[weld.grasp];
+          for (int i = g.first_node; i <= g.last_node; ++i)
+          {
+            owner_[i] = static_cast<int>(b);
+            arm_[i] = weld.X_BG * g.nodes_G[i - g.first_node] - bodies_[b].centre;
+          }
+        }
+    for (int i = 0; i < n; ++i)
+      if (owner_[i] >= 0)
+        projection_.weld(chains_[r], i, owner_[i], arm_[i]);
+      else
+        owner_[i] == -2 ? projection_.hold(chains_[r], i) : projection_.release(chains_[r], i);
+    projection_.setStart(chains_[r], rod.work.x);
+    projection_.setTrial(chains_[r], start_only ? rod.work.x : rod.next.x);
+  }
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+  {
+    ProjectedBody& body = projection_.body(static_cast<int>(b));
+    body.mass = bodies_[b].mass;
+    body.inertia = bodies_[b].inertia;
+    body.start = bodies_[b].start;
+    body.pose = start_only ? bodies_[b].start : bodies_[b].predicted;
+    body.velocity = bodies_[b].velocity;
+  }
+  const ProjectionReport result = projection_.project(h);
+  if (!result.ok)
+  {
+    failed = 0;
+    while (failed + 1 < rods_.size() && chains_[failed] != std::max(result.chain, 0))
+      ++failed;
+    rods_[failed]->overstretched = result.chain < 0 ? std::array<int, 2>{-1, -1} : std::array<int, 2>{result.first_node, result.last_node};
+    return StepFailure::overstretched;
+  }
+  report.projection_iterations = std::max(report.projection_iterations, result.iterations);
+  report.constraint_error = std::max(report.constraint_error, result.constraint_error);
+  for (std::size_t r = 0; r < rods_.size(); ++r)
+    if (chains_[r] >= 0 && start_only)
+    {
+      rods_[r]->next.v.setZero(3, rods_[r]->model->nodes());
+      projection_.correct(chains_[r], rods_[r]->work.x, rods_[r]->next.v);
+    }
+    else if (chains_[r] >= 0)
+      rods_[r]->takeProjection(projection_, chains_[r]);
+  for (std::size_t b = 0; b < bodies_.size() && !start_only; ++b)
+    placeBody(bodies_[b], projection_.body(static_cast<int>(b)).pose, projection_.body(static_cast<int>(b)).velocity);
+  return StepFailure::none;
+}
+
+/// Bodies, and obstacles and driven bodies at the end of their given motions.
+void ExplicitSystem::end(RodGroupState& state)
+{
+  for (std::size_t b = 0; b < bodies_now_.size(); ++b)
+    if (!model_->bodies[b].simulated)
+      bodies_now_[b].X_WB = poseBetween(origin_->bodies[b].X_WB, origin_->bodies[b].velocity, inputs_->bodies[b], duration_, 1.0, &bodies_now_[b].velocity);
+  state.bodies = bodies_now_;
+  for (std::size_t k = 0; k < state.obstacles.size(); ++k)
+    state.obstacles[k] = poseBetween(state.obstacles[k], Twist(state.obstacle_velocities[k]), inputs_->obstacles[k], duration_, 1.0, &state.obstacle_velocities[k]);
+}
+
+}  // namespace slender
