@@ -46,7 +46,8 @@ bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs&
   for (int end = 0; end < 2; ++end)
     if (s.ends[end].held)
       for (const Pose* pose : {&inputs.ends[end], &s.ends[end].X_WE})
-        check(pose->position.allFinite() && std::abs(pose->orientation.norm() - 1.0) < 1e-3, end ? "pose of the newest end" : "pose of the oldest end");
+        check(pose->position.allFinite() && std::abs(pose->orientation.norm() - 1.0) < 1e-3,
+              end ? "pose of the newest end" : "pose of the oldest end");
   const std::size_t nodes = s.x.size(), edges = s.volume.size();
   bool sound = nodes >= 2 && edges + 1 == nodes && s.v.size() == nodes && s.twist.size() == nodes && s.id.size() == nodes &&
                s.deposited.size() == nodes && s.d1.size() == edges && s.spin.size() == edges;
