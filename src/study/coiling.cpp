@@ -64,59 +64,45 @@ std::vector<double> heightsOf(const std::vector<int>& branches)
   return heights;
 }
 
-/// Where the thread touches down, seen from above: one point for every node that lands.
-class Trace
+/// A coil as its landing points show it, in polar coordinates about the nozzle's axis.
+struct CoilTrace
 {
-public:
-  explicit Trace(const ThreadState& s) : last_(youngest(s) < 0 ? s.next_id : s.id[youngest(s)]) {}
-  void look(const ThreadState& s, double time)
+  std::vector<double> times, angles, radii;
+
+  explicit CoilTrace(const Landings& landings)
   {
-    const int i = youngest(s);
-    if (i < 0 || s.id[i] == last_)
-      return;
-    last_ = s.id[i];
-    double angle = std::atan2(s.x[i].y(), s.x[i].x());
-    if (!angles_.empty())
-      angle += 2 * M_PI * std::nearbyint((angles_.back() - angle) / (2 * M_PI));
-    times_.push_back(time);
-    angles_.push_back(angle);
-    radii_.push_back(std::hypot(s.x[i].x(), s.x[i].y()));
+    for (const Landings::Point& p : landings.points())
+    {
+      const double angle = std::atan2(p.y, p.x);
+      angles.push_back(angles.empty() ? angle : angle + 2 * M_PI * std::nearbyint((angles.back() - angle) / (2 * M_PI)));
+      times.push_back(p.time);
+      radii.push_back(std::hypot(p.x, p.y));
+    }
   }
-  /// Slope of the angle by least squares [rad/s], 0 before there are three points.
+  /// Slope of the angle by least squares [rad/s], 0 for fewer than three points.
   double frequency() const
   {
-    const std::size_t n = times_.size();
-    if (n < 3)
-      return 0.0;
-    const double t = mean(times_), a = mean(angles_);
+    const double t = mean(times), a = mean(angles);
     double ta = 0, tt = 0;
-    for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t k = 0; k < times.size(); ++k)
     {
-      ta += (times_[k] - t) * (angles_[k] - a);
-      tt += (times_[k] - t) * (times_[k] - t);
+      ta += (times[k] - t) * (angles[k] - a);
+      tt += (times[k] - t) * (times[k] - t);
     }
-    return std::abs(ta / tt);
+    return times.size() < 3 ? 0.0 : std::abs(ta / tt);
   }
-  double radius() const { return mean(radii_); }
+  double radius() const { return mean(radii); }
   /// Standard deviation of the radius over its mean: zero for a circle about the nozzle's axis.
   double unsteadiness() const
   {
     double sum = 0.0;
-    for (const double r : radii_)
+    for (const double r : radii)
       sum += (r - radius()) * (r - radius());
-    return std::sqrt(sum / static_cast<double>(radii_.size())) / radius();
+    return std::sqrt(sum / static_cast<double>(radii.size())) / radius();
   }
-  double perTurn() const { return 2 * M_PI * static_cast<double>(angles_.size() - 1) / std::abs(angles_.back() - angles_.front()); }
-  double turns() const { return angles_.empty() ? 0.0 : std::abs(angles_.back() - angles_.front()) / (2 * M_PI); }
+  double perTurn() const { return 2 * M_PI * static_cast<double>(angles.size() - 1) / std::abs(angles.back() - angles.front()); }
 
 private:
-  static int youngest(const ThreadState& s)
-  {
-    int i = s.nodes() - 1;
-    while (i >= 0 && !s.deposited[i])
-      --i;
-    return i;
-  }
   static double mean(const std::vector<double>& v)
   {
     double sum = 0.0;
@@ -124,8 +110,6 @@ private:
       sum += x;
     return sum / static_cast<double>(v.size());
   }
-  std::uint64_t last_;
-  std::vector<double> times_, angles_, radii_;
 };
 
 class Pouring
@@ -170,41 +154,36 @@ public:
     thread_.inputs.ends[1].position = centre;
   }
   /// Lets it coil for some turns, then measures some more.
-  Trace observe(double settling_turns, double turns)
+  CoilTrace observe(double settling_turns, double turns)
   {
-    ThreadStepper stepper = makeStepper(thread_);
-    const double height = thread_.inputs.ends[1].position.z();
-    for (double settled = 0; settled < settling_turns;)
+    for (double settled = 0; settled < settling_turns; settled += 2)
     {
-      Trace trace(thread_.state);
-      const double end = thread_.time + 4 * M_PI / frequency_;
-      while (thread_.time < end)
-      {
-        advance(stepper, thread_, step(), "coiling");
-        trace.look(thread_.state, thread_.time);
-      }
-      settled += 2;
+      const CoilTrace trace = watch(2);
       if (trace.frequency() > 0)
       {
         frequency_ = trace.frequency();
-        resolve(height, trace.radius());
+        resolve(thread_.inputs.ends[1].position.z(), trace.radius());
         thread_.model = model_;
-        stepper = makeStepper(thread_);
       }
     }
-    Trace trace(thread_.state);
-    const double end = thread_.time + 2 * M_PI * turns / frequency_;
-    while (thread_.time < end)
-    {
-      advance(stepper, thread_, step(), "coiling");
-      trace.look(thread_.state, thread_.time);
-    }
-    return trace;
+    return watch(turns);
   }
   const ThreadSetup& thread() const { return thread_; }
   double step() const { return step_angle_ / frequency_; }
 
 private:
+  CoilTrace watch(double turns)
+  {
+    ThreadStepper stepper = makeStepper(thread_);
+    Landings landings(thread_.state);
+    const double end = thread_.time + 2 * M_PI * turns / frequency_;
+    while (thread_.time < end)
+    {
+      advance(stepper, thread_, step(), "coiling");
+      landings.look(thread_.state, thread_.time);
+    }
+    return CoilTrace(landings);
+  }
   /// Edges that make `per_turn` of a turn of the coil; long ones are divided on their way down.
   void resolve(double height, double radius)
   {
@@ -251,7 +230,7 @@ struct Results
 /// One height: measures, compares, plots. Returns the branch.
 int record(StudyContext& context, Pouring& pouring, double height, const std::string& way, double settling_turns, Results& results)
 {
-  const Trace trace = pouring.observe(settling_turns, 4);
+  const CoilTrace trace = pouring.observe(settling_turns, 4);
   const double frequency = trace.frequency(), radius = trace.radius();
   Row& row = context.row();
   row.set("way", way).set("H", height).set("H_nd", height / heightUnit()).set("Omega", frequency).set("R", radius);

@@ -29,14 +29,16 @@ void runTree(StudyContext&);
 void runHair(StudyContext&);
 void runGreenhill(StudyContext&);
 void runPeerCases(StudyContext&);
+void runProjection(StudyContext&);
+void runRodTables(StudyContext&);
 void runTrouton(StudyContext&);
 void runThreadTwist(StudyContext&);
 void runRetraction(StudyContext&);
 void runFiberExtrusion(StudyContext&);
 void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
-void runProjection(StudyContext&);
-void runRodTables(StudyContext&);
+void runThreadStability(StudyContext&);
+void runSewingMachine(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -67,14 +69,16 @@ const std::vector<Study>& studies()
       {"tree", "a tree of 2,158 vertices in wind: what its root carries, time per step", runTree},
       {"hair", "54,000 vertices of hair on a head that turns: time per step, worst gap", runHair},
       {"peer_cases", "published cases of other codes: a bent cantilever in space, cantilevers under distributed load", runPeerCases},
+      {"projection", "inextensible rope: length error and iterations of fast projection; against stiff stretching, error against run time", runProjection},
+      {"rod_tables", "time per step of the thesis's rod examples, part by part, beside its table 4.1", runRodTables},
       {"trouton", "straight viscous threads stretched by plates and by their weight", runTrouton},
       {"thread_twist", "torque of straight viscous threads twisted at a steady rate", runThreadTwist},
       {"retraction", "a free viscous thread drawn together by surface tension", runRetraction},
       {"fiber_extrusion", "a viscous thread drawn steadily from a nozzle by a roll", runFiberExtrusion},
       {"dragged_catenary", "a viscous thread that falls onto a fast belt, with and without surface tension", runDraggedCatenary},
       {"coiling", "a viscous thread that coils: frequency and radius against height, up and down", runCoiling},
-      {"projection", "inextensible rope: length error and iterations of fast projection; against stiff stretching, error against run time", runProjection},
-      {"rod_tables", "time per step of the thesis's rod examples, part by part, beside its table 4.1", runRodTables},
+      {"sewing_machine", "patterns of a viscous thread on a moving belt, its speed rising and falling", runSewingMachine},
+      {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
   };
   return all;
 }

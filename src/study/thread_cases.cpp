@@ -50,6 +50,29 @@ ThreadSetup nozzleThread(const ThreadModel& model, const Eigen::Vector3d& positi
   return t;
 }
 
+namespace {
+
+int youngestOnFloor(const ThreadState& s)
+{
+  int i = s.nodes() - 1;
+  while (i >= 0 && !s.deposited[i])
+    --i;
+  return i;
+}
+
+}  // namespace
+
+Landings::Landings(const ThreadState& s) : last_(youngestOnFloor(s) < 0 ? s.next_id : s.id[youngestOnFloor(s)]) {}
+
+void Landings::look(const ThreadState& s, double time)
+{
+  const int i = youngestOnFloor(s);
+  if (i < 0 || s.id[i] == last_)
+    return;
+  last_ = s.id[i];
+  points_.push_back({time, s.x[i].x(), s.x[i].y()});
+}
+
 ThreadStepper makeStepper(const ThreadSetup& thread)
 {
   NewtonConfig newton;

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "slender_sim/study/study.h"
 #include "slender_sim/thread/thread_stepper.h"
@@ -26,6 +27,25 @@ ThreadSetup straightThread(double length, const Eigen::VectorXd& radii);
 
 /// A nozzle at `position` that points down, with the stub of a thread; its flow starts with the first step.
 ThreadSetup nozzleThread(const ThreadModel& model, const Eigen::Vector3d& position, double speed);
+
+/// Where nodes land, one after the other, and when.
+class Landings
+{
+public:
+  struct Point
+  {
+    double time, x, y;
+  };
+  /// Nodes that lie on the floor already do not count.
+  explicit Landings(const ThreadState& s);
+  /// After every step.
+  void look(const ThreadState& s, double time);
+  const std::vector<Point>& points() const { return points_; }
+
+private:
+  std::uint64_t last_;
+  std::vector<Point> points_;
+};
 
 ThreadStepper makeStepper(const ThreadSetup& thread);
 

@@ -64,7 +64,8 @@ void runThreadTwist(StudyContext& context)
     const double seen = torque(stepped(edges), step, 0.1);
     errors[k++] = seen / exactStepped() - 1;
     if (edges < 160)
-      context.row().set("test", "half a = 0.1, half a = 0.2").set("quantity", "torque").set("measured", seen).set("relative_error", errors[k - 1]).set("edges", edges);
+      context.row().set("test", "half a = 0.1, half a = 0.2").set("quantity", "torque").set("measured", seen)
+          .set("relative_error", errors[k - 1]).set("edges", edges);
     else
       checkRelative(context, "half a = 0.1, half a = 0.2", "torque", seen, exactStepped(), 0.01, "rate / sum l_i/(pi mu a_i^4/2)").set("edges", edges);
   }

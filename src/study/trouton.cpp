@@ -112,9 +112,11 @@ void runTrouton(StudyContext& context)
       const Hanging seen = hang(gamma, context.quick() ? 40 : 80, h, part * t_star);
       const std::string test = "hanging, gamma " + std::to_string(static_cast<int>(gamma));
       const double length = gamma == 0 ? -std::log(1 - part) / part : hangingLength(gamma, part * t_star);
-      checkRelative(context, test, "length", seen.length, length, kBound, gamma == 0 ? "-L0 (t*/t) ln(1-t/t*)" : "3 mu dA/dt = -rho g A0 S + gamma sqrt(pi A)").set("t", part * t_star);
+      checkRelative(context, test, "length", seen.length, length, kBound,
+                    gamma == 0 ? "-L0 (t*/t) ln(1-t/t*)" : "3 mu dA/dt = -rho g A0 S + gamma sqrt(pi A)").set("t", part * t_star);
       if (gamma == 0)
-        checkRelative(context, test, "radius at the top", seen.top_radius, kRadius * std::sqrt(1 - part), kBound, "a0 sqrt(1-t/t*)").set("t", part * t_star);
+        checkRelative(context, test, "radius at the top", seen.top_radius, kRadius * std::sqrt(1 - part), kBound, "a0 sqrt(1-t/t*)")
+            .set("t", part * t_star);
     }
 
   const auto time_error = [&](double step) { return plateForce(true, 20.0, 10, step, 1.0) / exactForce(true, 20.0, 1.0) - 1; };

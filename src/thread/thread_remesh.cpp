@@ -140,40 +140,26 @@ void removeNode(ThreadState& state, int i)
     state.twist.back() = 0.0;
 }
 
-bool mendFold(ThreadState& state)
+bool mendFold(ThreadState& state, int fold)
 {
-  double sharpest = std::cos(110.0 * M_PI / 180);
-  int fold = 0;
-  for (int i = 1; i + 1 < state.nodes(); ++i)
-  {
-    if (state.deposited[i - 1] && state.deposited[i] && state.deposited[i + 1])
-      continue;
-    const double cosine = state.edge(i - 1).normalized().dot(state.edge(i).normalized());
-    if (cosine < sharpest)
-    {
-      sharpest = cosine;
-      fold = i;
-    }
-  }
-  if (fold == 0)
-    return false;
-  if (!state.deposited[fold])
+  if (!state.deposited[fold] || (state.deposited[fold - 1] && state.deposited[fold + 1]))
   {
     // the node itself, or a neighbour where the two edges lie so close on each other that nothing would be left of them
     for (const int i : {fold, fold + 1, fold - 1})
-      if (i > 0 && i + 1 < state.nodes() && !state.deposited[i] &&
+      if (i > 0 && i + 1 < state.nodes() && state.deposited[i] == state.deposited[fold] &&
           (state.x[i + 1] - state.x[i - 1]).norm() > 0.1 * std::min(state.edge(i - 1).norm(), state.edge(i).norm()))
       {
         removeNode(state, i);
         return true;
       }
-    return false;
+    if (state.deposited[fold] || !(state.deposited[fold - 1] || state.deposited[fold + 1]))
+      return false;
   }
-  const int other = state.deposited[fold + 1] ? fold - 1 : fold + 1;
+  const int other = !state.deposited[fold] ? fold : state.deposited[fold + 1] ? fold - 1 : fold + 1;
   if ((other == 0 && state.ends[0].held) || (other + 1 == state.nodes() && state.ends[1].held))
     return false;
+  state.v[other] = state.v[other != fold ? fold : state.deposited[fold + 1] ? fold + 1 : fold - 1];
   state.deposited[other] = 1;
-  state.v[other] = state.v[fold];
   return true;
 }
 

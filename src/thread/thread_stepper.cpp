@@ -46,7 +46,8 @@ bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs&
   for (int end = 0; end < 2; ++end)
     if (s.ends[end].held)
       for (const Pose* pose : {&inputs.ends[end], &s.ends[end].X_WE})
-        check(pose->position.allFinite() && std::abs(pose->orientation.norm() - 1.0) < 1e-3, end ? "pose of the newest end" : "pose of the oldest end");
+        check(pose->position.allFinite() && std::abs(pose->orientation.norm() - 1.0) < 1e-3,
+              end ? "pose of the newest end" : "pose of the oldest end");
   const std::size_t nodes = s.x.size(), edges = s.volume.size();
   bool sound = nodes >= 2 && edges + 1 == nodes && s.v.size() == nodes && s.twist.size() == nodes && s.id.size() == nodes &&
                s.deposited.size() == nodes && s.d1.size() == edges && s.spin.size() == edges;
@@ -110,7 +111,8 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
     {
       if (0.5 * length < shortest * (1 - 1e-9))
       {
-        if (report.mended_folds >= kMostFolds || !mendFold(work))
+        const int fold = foldedNode();
+        if (report.mended_folds >= kMostFolds || fold < 0 || !mendFold(work, fold))
           return refuse(report, failure, explainFailure(failure, length));
         ++report.mended_folds;
         h = first;
@@ -126,6 +128,14 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
   }
   std::swap(state, work);
   return report;
+}
+
+/// The inner node at which the last trial turns most, if that is more than a right angle; -1: there is none.
+int ThreadStepper::Impl::foldedNode() const
+{
+  const int k = system.sharpestJoint();
+  const int node = k < 0 ? -1 : k - offset_ + first_;
+  return node > 0 && node + 1 < work.nodes() ? node : -1;
 }
 
 Pose ThreadStepper::Impl::endPose(int end, const ThreadInputs& inputs, double fraction) const

@@ -36,6 +36,7 @@ private:
   bool land(const ThreadInputs& inputs, double h);
   void finish(const ThreadInputs& inputs, double h);
   void remesh();
+  int foldedNode() const;
   EndLoad endLoad(int end) const;
   double fedVolume(double h) const { return flow_speed_ * model->nozzleArea() * h; }
   /// Volume of an edge with what flows in during the substep.

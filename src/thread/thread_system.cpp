@@ -33,6 +33,7 @@ void ThreadSystem::allocate(int capacity)
     v->resize(capacity);
   held_.resize(4 * capacity);
   matrix_.resize(capacity);
+  a_.coupling = nullptr;   // of the thesis's curvature there is none
   a_.gradient = gradient_.data();
 }
 
@@ -70,7 +71,7 @@ RodEvaluation ThreadSystem::takeRestStrains()
   const RodKernels& kernels = rodKernels();
   RodSweep sweep;
   kernels.begin(a_, sweep);
-  kernels.advance(a_, sweep, nullptr, 0, a_.nodes);
+  kernels.advance[static_cast<int>(Curvature::tangent)](a_, sweep, nullptr, 0, a_.nodes);
   min_rest_length_ = std::numeric_limits<double>::infinity();
   for (int j = 0; j < edges; ++j)
   {
@@ -84,6 +85,22 @@ RodEvaluation ThreadSystem::takeRestStrains()
     a_.rest_twist[i] = a_.base_twist[i] = a_.twist[i];
   }
   return kernels.end(sweep);
+}
+
+int ThreadSystem::sharpestJoint() const
+{
+  double sharpest = 0.0;
+  int joint = -1;
+  for (int i = 1; i + 1 < a_.nodes; ++i)
+  {
+    const double cosine = get(a_.t, i - 1).dot(get(a_.t, i));
+    if (cosine < sharpest)
+    {
+      sharpest = cosine;
+      joint = i;
+    }
+  }
+  return joint;
 }
 
 void ThreadSystem::setEdge(int j, double modulus, double volume)
@@ -105,7 +122,7 @@ RodEvaluation ThreadSystem::evaluateWhole(bool with_hessian)
   const RodKernels& kernels = rodKernels();
   RodSweep sweep;
   kernels.begin(a_, sweep);
-  kernels.advance(a_, sweep, with_hessian ? matrix_.panels() : nullptr, 0, a_.nodes);
+  kernels.advance[static_cast<int>(Curvature::tangent)](a_, sweep, with_hessian ? matrix_.panels() : nullptr, 0, a_.nodes);
   RodEvaluation result = kernels.end(sweep);
   if (gamma_ != 0.0)
     result.stretch += addSurface(with_hessian);

@@ -59,7 +59,7 @@ TEST(ThreadGroup, AThreadThatDripsBreaksAndNoFluidIsLost)
   ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
   const double start = d.state.volumeBalance();
   std::size_t most = 0;
-  for (int k = 0; k < 3000; ++k)
+  for (int k = 0; k < 700; ++k)
   {
     const StepReport report = group.step(d.state, d.inputs, 0.002);
     ASSERT_TRUE(report.ok) << k << " " << report.message;

@@ -115,27 +115,29 @@ TEST(ThreadRemesh, FramesAndTwistsStayTogether)
 TEST(ThreadRemesh, FoldsAreTakenOut)
 {
   Eigen::Matrix3Xd x(3, 6);
-  x << 0, 1, 2, 1.1, 3, 4, 0, 0, 0, 0.1, 0, 0, 0, 0, 0, 0, 0, 0;
-  ThreadState s = makeThread(x, Eigen::VectorXd::Constant(5, 0.1));
-  const double volume = s.totalVolume();
-  EXPECT_TRUE(mendFold(s));
-  while (mendFold(s))
-  {
-  }
-  EXPECT_LT(s.nodes(), 6);
-  EXPECT_NEAR(s.totalVolume(), volume, 1e-15);
-  for (int i = 1; i + 1 < s.nodes(); ++i)
-    EXPECT_GT(s.edge(i - 1).normalized().dot(s.edge(i).normalized()), -0.35);
-  // what lies on the floor stays where it is
   x << 0, 1, 2, 1.4, 1.3, 2.5, 0, 0, 0, 0.1, 1.0, 1.2, 0, 0, 0, 0, 0, 0;
-  ThreadState on_floor = makeThread(x, Eigen::VectorXd::Constant(5, 0.1));
+  ThreadState s = makeThread(x, Eigen::VectorXd::Constant(5, 0.1)), on_floor = s, closed = s;
+  const double volume = s.totalVolume();
+  ASSERT_TRUE(mendFold(s, 2));
+  EXPECT_EQ(s.nodes(), 5);
+  EXPECT_NEAR(s.totalVolume(), volume, 1e-15);
+  EXPECT_GT(s.edge(0).normalized().dot(s.edge(1).normalized()), 0.5);
+  // what lies on the floor stays where it is
   on_floor.deposited = {1, 1, 1, 0, 0, 0};
-  EXPECT_TRUE(mendFold(on_floor));
+  ASSERT_TRUE(mendFold(on_floor, 2));
   EXPECT_EQ(on_floor.nodes(), 6);
   EXPECT_EQ(on_floor.deposited[3], 1);
-  // nothing to do
-  ThreadState straight = makeThread((Eigen::Matrix3Xd(3, 3) << 0, 1, 2, 0, 0, 0, 0, 0, 0).finished(), Eigen::VectorXd::Constant(2, 0.1));
-  EXPECT_FALSE(mendFold(straight));
+  // a free node between two on the floor that have come together is one of them
+  on_floor.deposited = {1, 1, 0, 1, 0, 0};
+  on_floor.x[3] = on_floor.x[1] + Vector3d(1e-3, 0, 0);
+  ASSERT_TRUE(mendFold(on_floor, 2));
+  EXPECT_EQ(on_floor.deposited[2], 1);
+  // two edges that cover each other do not become one of no length
+  closed.x[3] = closed.x[1] + Vector3d(1e-3, 0, 0);
+  ASSERT_TRUE(mendFold(closed, 2));
+  EXPECT_EQ(closed.nodes(), 5);
+  for (int j = 0; j < 4; ++j)
+    EXPECT_GT(closed.edge(j).norm(), 0.3);
 }
 
 TEST(ThreadRemesh, DroppingCountsTheVolume)

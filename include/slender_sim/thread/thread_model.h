@@ -25,8 +25,9 @@ struct ThreadLimits
   double min_edge_length = 0.0;                                       ///< [m] shorter edges are joined to a neighbour
   double min_radius = 0.0;                                            ///< [m] a thinner edge breaks: ThreadGroup then has one thread more
   int max_deposited = std::numeric_limits<int>::max();   ///< nodes older than the youngest one on the floor; more are dropped
-  Eigen::AlignedBox3d scene = Eigen::AlignedBox3d(Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity()),
-                                                  Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));   ///< the old end is dropped outside
+  /// The old end is dropped outside of it.
+  Eigen::AlignedBox3d scene{Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity()),
+                            Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity())};
 };
 
 /// Fixed properties of one viscous thread (thesis 5).

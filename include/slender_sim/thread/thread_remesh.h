@@ -12,9 +12,9 @@ void splitEdge(ThreadState& state, int j, double fraction);
 /// Joins edges i-1 and i by taking node i away (0 < i < nodes - 1). Volume, mass and momentum are conserved.
 void removeNode(ThreadState& state, int i);
 
-/// Takes out the sharpest fold, where the thread turns by more than 110 degrees from edge to edge: a node that lies on the floor keeps its
-/// place and holds its free neighbour there, any other is removed (the fluid on both sides has flowed together). No: there is none.
-bool mendFold(ThreadState& state);
+/// Takes out the fold at an inner node: removes it (the fluid on both sides has flowed together), or where a free edge folds back on one
+/// that lies on the floor, holds it there as it is. No: nothing can be done.
+bool mendFold(ThreadState& state, int node);
 
 /// Breaks the thread at its thinnest free edge if that is thinner than `min_radius` [m] (thesis 5.4.4): `state` keeps the newer part, `older`
 /// becomes the other. The fluid of the edge goes to its neighbours, half to either side, with its momentum. The edges at the ends do not

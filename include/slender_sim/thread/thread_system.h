@@ -59,6 +59,9 @@ public:
   /// dE/d(x, angle) of the last evaluation, what is held included.
   Eigen::Vector4d reaction(int i) const { return Eigen::Map<const Eigen::Vector4d>(reactions_.data() + 4 * i); }
 
+  /// Joint of the last trial with the sharpest turn beyond a right angle, -1: none.
+  int sharpestJoint() const;
+
   // for minimize()
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
   void solve();

@@ -1,0 +1,209 @@
+// Viscous threads under whatever may be asked of them: done or refused with a reason, never NaN, no fluid lost, bounded memory.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "slender_sim/study/cpu_clock.h"
+#include "slender_sim/thread/thread_group.h"
+#include "thread_cases.h"
+
+namespace slender::study {
+namespace {
+
+struct Verdict
+{
+  int steps = 0, cuts = 0, folds = 0, not_finite = 0;
+  std::size_t most_nodes = 0, most_threads = 0, last_nodes = 0;
+  double volume_drift = 0, cpu_seconds = 0;
+  std::string reason, unexplained;   ///< of a refusal; what is wrong with it
+};
+
+bool isFinite(const ThreadGroupState& s)
+{
+  bool finite = std::isfinite(s.volumeBalance());
+  for (const ThreadState& t : s.threads)
+  {
+    for (int i = 0; i < t.nodes(); ++i)
+      finite = finite && t.x[i].allFinite() && t.v[i].allFinite() && std::isfinite(t.twist[i]);
+    for (int j = 0; j < t.edges(); ++j)
+      finite = finite && t.d1[j].allFinite() && std::isfinite(t.spin[j]) && t.volume[j] > 0;
+  }
+  return finite;
+}
+
+std::size_t nodesOf(const ThreadGroupState& s)
+{
+  std::size_t sum = 0;
+  for (const ThreadState& t : s.threads)
+    sum += t.x.size();
+  return sum;
+}
+
+using Motion = std::function<void(double time, ThreadInputs& inputs)>;
+
+/// Runs `steps` steps of h; `motion` sets the inputs for the end of each.
+Verdict run(const ThreadSetup& setup, double h, int steps, const Motion& motion)
+{
+  Verdict v;
+  ThreadGroupState state;
+  state.threads = {setup.state};
+  ThreadInputs inputs = setup.inputs;
+  ThreadGroup group(std::make_shared<ThreadModel>(setup.model), NewtonConfig{});
+  const double start = state.volumeBalance(), begin = threadSeconds();
+  double fed = 0.0;
+  for (int k = 0; k < steps; ++k)
+  {
+    motion((k + 1) * h, inputs);
+    const std::size_t before = nodesOf(state);
+    const Eigen::Vector3d tip = state.threads[0].x.front();
+    const StepReport report = group.step(state, inputs, h);
+    v.cuts += report.cut_steps;
+    v.folds += report.mended_folds;
+    if (!isFinite(state))
+    {
+      ++v.not_finite;
+      v.unexplained = "state is not finite";
+      break;
+    }
+    if (!report.ok)
+    {
+      v.reason = std::string(toString(report.failure)) + ": " + report.message;
+      if (report.message.empty() || report.failure == StepFailure::none)
+        v.unexplained = "refused without a reason";
+      else if (before != nodesOf(state) || tip != state.threads[0].x.front())
+        v.unexplained = "refused, but the state has changed";
+      break;
+    }
+    ++v.steps;
+    fed += inputs.flow_rate * h;
+    v.most_nodes = std::max(v.most_nodes, nodesOf(state));
+    v.most_threads = std::max(v.most_threads, state.threads.size());
+    v.volume_drift = std::max(v.volume_drift, std::abs(state.volumeBalance() - start) / (start + fed));
+  }
+  v.last_nodes = nodesOf(state);
+  v.cpu_seconds = threadSeconds() - begin;
+  return v;
+}
+
+/// Poured from a nozzle of 5 mm, 10 cm above a floor.
+ThreadSetup pour(double viscosity, double surface_tension, double speed = 0.05)
+{
+  ThreadModel m;
+  m.name = "poured";
+  m.density = 1000;
+  m.viscosity = viscosity;
+  m.surface_tension = surface_tension;
+  m.nozzle_diameter = 5e-3;
+  m.feed_length = 3e-3;
+  m.floor.present = true;
+  m.limits.max_edge_length = 5e-3;
+  m.limits.min_edge_length = 5e-4;
+  m.limits.min_radius = 2e-5;
+  m.limits.max_deposited = 100;
+  m.limits.scene.min() = Eigen::Vector3d(-0.5, -0.5, -0.1);
+  m.limits.scene.max() = Eigen::Vector3d(0.5, 0.5, 1.0);
+  ThreadSetup t = nozzleThread(m, {0, 0, 0.1}, speed);
+  t.state.x[0].x() += 1e-4;
+  t.state.v[0].y() += 1e-4;
+  return t;
+}
+
+struct Tally
+{
+  int done = 0, refused = 0, not_finite = 0, unexplained = 0;
+  double volume_drift = 0;
+};
+
+void record(StudyContext& context, Tally& tally, const std::string& test, double h, const Verdict& v)
+{
+  Row& row = context.row();
+  row.set("test", test).set("step", h).set("steps", v.steps).set("outcome", v.not_finite ? "NaN" : v.reason.empty() ? "done" : "refused");
+  row.check(v.volume_drift, 0.0, 1e-10, "all fluid is accounted for");
+  row.set("cuts", v.cuts).set("folds", v.folds).set("most_nodes", static_cast<double>(v.most_nodes));
+  row.set("most_threads", static_cast<double>(v.most_threads));
+  row.set("cpu_seconds", v.cpu_seconds);
+  if (!v.reason.empty())
+    row.set("reason", v.reason);
+  if (!v.unexplained.empty())
+    row.set("complaint", v.unexplained);
+  ++(v.reason.empty() ? tally.done : tally.refused);
+  tally.not_finite += v.not_finite;
+  tally.unexplained += !v.unexplained.empty();
+  tally.volume_drift = std::max(tally.volume_drift, v.volume_drift);
+}
+
+/// Fixed between plates, pulled to `ratio` times its length.
+Verdict stretch(double ratio, double h, int steps)
+{
+  ThreadSetup t = straightThread(0.1, Eigen::VectorXd::Constant(20, 2e-3));
+  t.model.viscosity = 1e3;
+  t.hold(0);
+  t.hold(1);
+  return run(t, h, steps, [=](double time, ThreadInputs& inputs) { inputs.ends[1].position.x() = 0.1 * std::pow(ratio, time / (h * steps)); });
+}
+
+}  // namespace
+
+void runThreadStability(StudyContext& context)
+{
+  Tally tally;
+  const Motion steady = [](double, ThreadInputs&) {};
+  const auto name = [](const std::string& what, double value) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%s %g", what.c_str(), value);
+    return std::string(text);
+  };
+  const std::vector<double> viscosities = context.quick() ? std::vector<double>{1e-3, 1e3, 1e9} : std::vector<double>{1e-3, 1e-1, 1e1, 1e3, 1e6, 1e9};
+  const std::vector<double> tensions = {0.0, 0.07, 1.0};
+  int done = 0;
+  for (const double mu : viscosities)
+    for (const double gamma : tensions)
+      for (const double h : {1e-5, 1e-3, 1e-1})
+      {
+        const std::string test = name("viscosity", mu) + name(", surface tension", gamma);
+        context.progress(done++, static_cast<int>(9 * viscosities.size()), test);
+        record(context, tally, test, h, run(pour(mu, gamma), h, h < 1e-4 ? 300 : h < 1e-2 ? 600 : 40, steady));
+      }
+  for (const double ratio : {1e2, 1e5})
+    record(context, tally, name("stretched by", ratio), 0.1, stretch(ratio, 0.1, 200));
+
+  const double flow = pour(1, 0).inputs.flow_rate;
+  const struct
+  {
+    const char* name;
+    Motion motion;
+  } motions[] = {
+      {"nozzle that jumps by 5 cm twice a second", [](double t, ThreadInputs& in) { in.ends[1].position = {0.05 * (std::fmod(t, 1.0) < 0.5), 0, 0.1}; }},
+      {"nozzle that turns about its axis, 3 rad/s", [start = pour(1, 0).inputs.ends[1].orientation](double t, ThreadInputs& in) {
+         in.ends[1].orientation = Eigen::Quaterniond(Eigen::AngleAxisd(3 * t, Eigen::Vector3d::UnitZ())) * start;
+       }},
+      {"flow that stops and starts again", [flow](double t, ThreadInputs& in) { in.flow_rate = std::fmod(t, 1.0) < 0.5 ? flow : 0.0; }},
+      {"belt that reverses", [](double t, ThreadInputs& in) { in.belt_velocity.x() = std::fmod(t, 1.0) < 0.5 ? 0.2 : -0.2; }},
+  };
+  for (const auto& m : motions)
+    for (const double mu : {1.0, 1e2, 1e4})
+      for (const double h : {1e-3, 1e-2})
+      {
+        context.progress(done, done + 1, m.name);
+        ++done;
+        const int steps = static_cast<int>((context.quick() ? 1.5 : 4.0) / h);
+        record(context, tally, std::string(m.name) + name(", viscosity", mu), h, run(pour(mu, 0.03), h, steps, m.motion));
+      }
+
+  context.progress(done, done + 1, "an hour");
+  const double hour = context.quick() ? 300.0 : 3600.0, h = 0.02;
+  const Verdict early = run(pour(1e2, 0.03), h, static_cast<int>(60 / h), steady);
+  const Verdict late = run(pour(1e2, 0.03), h, static_cast<int>(hour / h), steady);
+  record(context, tally, name("poured, seconds:", hour), h, late);
+  const double growth = static_cast<double>(late.most_nodes) / static_cast<double>(early.most_nodes);
+  context.row().set("test", "most nodes at a time, over those of the first minute").check(growth, 1.0, 0.1, "bounded memory");
+  context.metric("nan_count", tally.not_finite);
+  context.metric("unexplained_failures", tally.unexplained);
+  context.metric("refused", tally.refused);
+  context.metric("volume_drift", tally.volume_drift);
+  context.metric("most_nodes_in_the_long_run", static_cast<double>(late.most_nodes));
+}
+
+}  // namespace slender::study
