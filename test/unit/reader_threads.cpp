@@ -1,0 +1,145 @@
+#include <cstdio>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+namespace {
+
+const char* const honey = R"(
+name: honey
+time: {step: 0.002, duration: 1}
+threads:
+  - name: honey
+    fluid: {density: 1400, viscosity: 20, surface_tension: 0.05}
+    nozzle: {position: [0, 0, 0.04], direction: [0.02, 0, -1], diameter: 0.005, flow: {table: [[0, 3.0e-7], [0.5, 9.0e-7]]}}
+    floor: {height: 0, belt: {x: 0.01, y: {table: [[0, 0], [1, 0.02]]}}}
+    edges: {feed: 0.001, longest: 0.002, shortest: 0.0005, deposited: 100}
+    breakup_radius: 1.0e-5
+    region: {from: [-1, -1, -1], to: [1, 1, 1]}
+)";
+
+std::string problemsOf(const std::string& override_text)
+{
+  try
+  {
+    parseScene(honey, "t", {override_text});
+  }
+  catch (const SceneError& error)
+  {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ThreadReader, ReadsEverything)
+{
+  const SceneConfig scene = parseScene(honey, "t");
+  ASSERT_EQ(scene.threads.size(), 1u);
+  const ThreadConfig& t = scene.threads[0];
+  EXPECT_EQ(t.viscosity, 20);
+  EXPECT_EQ(t.surface_tension, 0.05);
+  ASSERT_TRUE(t.nozzle && t.floor && t.region);
+  EXPECT_LT((t.nozzle->pose.orientation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0.02, 0, -1).normalized()).norm(), 1e-12);
+  EXPECT_DOUBLE_EQ(t.nozzle->flow.at(-1), 3e-7);
+  EXPECT_DOUBLE_EQ(t.nozzle->flow.at(0.25), 6e-7);
+  EXPECT_DOUBLE_EQ(t.nozzle->flow.at(9), 9e-7);
+  EXPECT_DOUBLE_EQ(t.floor->belt_x.at(3), 0.01);
+  EXPECT_DOUBLE_EQ(t.floor->belt_y.at(0.5), 0.01);
+  EXPECT_EQ(t.longest_edge, 0.002);
+  EXPECT_EQ(t.most_deposited, 100);
+  EXPECT_EQ(t.breakup_radius, 1e-5);
+}
+
+TEST(ThreadReader, NamesWhatIsWrong)
+{
+  const std::pair<const char*, const char*> cases[] = {
+      {"threads.0.fluid.viscosity=-1", "threads.0.fluid.viscosity = -1: is out of range; must be a number in (0, 1e+12] Pa s"},
+      {"threads.0.nozzle.diameter=0", "threads.0.nozzle.diameter = 0"},
+      {"threads.0.nozzle.flow=-1e-7", "threads.0.nozzle.flow = -1e-7"},
+      {"threads.0.nozzle.flow={topic: false}", "must be true"},
+      {"threads.0.nozzle.flow={table: [[1, 0], [1, 2]]}", "times must increase"},
+      {"threads.0.nozzle.spin=1", "unknown key"},
+      {"threads.0.centerline={straight: {edges: 3}}", "must have either a nozzle"},
+      {"threads.0.radius=0.1", "is for threads with a centerline"},
+      {"threads.0.floor.belt=[1, 2, 3]", "must be [vx, vy]"},
+      {"threads.0.edges.shortest=0.0019", "0.4 of edges.longest"},
+      {"threads.0.region={from: [0, 0, 0], to: [1, 0, 1]}", "must be greater than region.from"},
+  };
+  for (const auto& [assignment, expected] : cases)
+    EXPECT_NE(problemsOf(assignment).find(expected), std::string::npos) << assignment << "\ngave: " << problemsOf(assignment);
+}
+
+TEST(ThreadScene, FeedsWhatTheTableSays)
+{
+  Simulation simulation(parseScene(honey, "t"));
+  for (int k = 0; k < 400; ++k)
+  {
+    const StepReport report = simulation.step(simulation.defaultInputs());
+    ASSERT_TRUE(report.ok) << report.message;
+  }
+  const ThreadGroupState& state = simulation.state().threads[0];
+  // trapezoid to 0.5 s, then constant; the middle of each step makes the sum exact
+  EXPECT_NEAR(state.threads.front().fed_volume, 0.5 * 6e-7 + 0.3 * 9e-7, 1e-12 * 6e-7);
+  EXPECT_NEAR(simulation.endLoads(0)[1].force.z(), 0.0, 1.0);
+  EXPECT_LT(simulation.endLoads(0)[1].force.z(), 0.0);
+}
+
+TEST(ThreadScene, RestartsBitByBit)
+{
+  Simulation a(parseScene(honey, "t")), b(parseScene(honey, "t"));
+  const auto run = [](Simulation& s, int steps) {
+    for (int k = 0; k < steps; ++k)
+      ASSERT_TRUE(s.step(s.defaultInputs()).ok);
+  };
+  run(a, 300);
+  const std::string file = ::testing::TempDir() + "thread_state";
+  a.save(file);
+  b.load(file);
+  run(a, 200);
+  run(b, 200);
+  const ThreadState &s = a.state().threads[0].threads[0], &r = b.state().threads[0].threads[0];
+  EXPECT_TRUE(s.x == r.x && s.v == r.v && s.d1 == r.d1 && s.twist == r.twist && s.volume == r.volume && s.id == r.id && s.deposited == r.deposited);
+  EXPECT_EQ(a.endLoads(0)[1].force, b.endLoads(0)[1].force);
+  Simulation other(parseScene(honey, "t", {"threads.0.fluid.viscosity=21"}));
+  EXPECT_THROW(other.load(file), std::runtime_error);
+  std::remove(file.c_str());
+}
+
+TEST(ThreadScene, AFilamentBetweenTwoHoldersSags)
+{
+  Simulation simulation(parseScene(R"(
+time: {step: 0.01}
+threads:
+  - fluid: {density: 1000, viscosity: 100}
+    centerline: {straight: {from: [0, 0, 0], to: [0.1, 0, 0], edges: 20}}
+    radius: 0.002
+    ends: {oldest: held, newest: held}
+)"));
+  const double before = simulation.state().threads[0].volumeBalance();
+  const auto momentum = [&] {
+    const ThreadState& t = simulation.state().threads[0].threads[0];
+    double sum = 0.0;
+    for (int i = 1; i + 1 < t.nodes(); ++i)
+      sum += 500.0 * (t.volume[i - 1] + t.volume[i]) * t.v[i].z();
+    return sum;
+  };
+  double last = 0.0;
+  for (int k = 0; k < 50; ++k)
+  {
+    last = momentum();
+    ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
+  }
+  const ThreadState& thread = simulation.state().threads[0].threads[0];
+  EXPECT_LT(thread.x[10].z(), -1e-3);
+  EXPECT_EQ(thread.x[0], Eigen::Vector3d(0, 0, 0));
+  EXPECT_NEAR(simulation.state().threads[0].volumeBalance(), before, 1e-12 * before);
+  // Newton's law: what the holders carry is the weight less what the fluid gains in momentum
+  const double weight = 9.81 * 1000 * before, expected = -weight - (momentum() - last) / 0.01;
+  EXPECT_NEAR(simulation.endLoads(0)[0].force.z() + simulation.endLoads(0)[1].force.z(), expected, 1e-6 * weight);
+}
+
+}  // namespace
+}  // namespace slender
