@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "slender_sim/geometry/rotation.h"
 
@@ -14,13 +15,14 @@ namespace {
 constexpr int kHalo = ChainArrays::kHalo;
 
 Eigen::Vector3d at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
-void put(double* const* p, int i, const Eigen::Vector3d& v)
+
+}  // namespace
+
+void FastProjection::put(double* const* p, int i, const Eigen::Vector3d& v)
 {
   for (int k = 0; k < 3; ++k)
     p[k][i] = v[k];
 }
-
-}  // namespace
 
 int FastProjection::addChain(const Eigen::VectorXd& rest_length, const Eigen::VectorXd& mass, bool closed)
 {
@@ -98,7 +100,7 @@ void FastProjection::setTrial(int chain, const Eigen::Matrix3Xd& x)
 void FastProjection::prepare()
 {
   touches_.clear();
-  specials_ = 0;
+  specials_.clear();
   int run = 0;
   std::size_t longest = 0;
   for (int c = 0; c < static_cast<int>(chains_.size()); ++c)
@@ -112,83 +114,47 @@ void FastProjection::prepare()
     for (int i = 0; i < kHalo; ++i)
       a.inverse_mass[n + i] = a.closed ? a.inverse_mass[i % n] : 0.0;
     const int first_run = ++run;
+    int start = kFree;   // owner of the last node before that is not free; free: there is none
+    for (int i = 0; i < n && a.closed; ++i)
+      start = chain.owner[i] != kFree ? chain.owner[i] : start;
     for (int j = 0; j < a.edges; ++j)
     {
-      if (chain.owner[j] != kFree)
-        ++run;
       const int tail = j, head = (j + 1) % n, from = chain.owner[tail], to = chain.owner[head];
+      if (from != kFree)
+      {
+        ++run;
+        start = from;
+      }
       const bool can_move = from == kFree || to == kFree || from != to;
-      const bool special = can_move && from != kFree && to != kFree;
-      a.active[j] = can_move && !special;
+      const bool by_bodies = can_move && from != kFree && to != kFree;
+      const bool closes = from == kFree && to != kFree && start != kFree && std::max(start, to) >= 0;
+      a.active[j] = can_move && !by_bodies && !closes;
       a.lambda[j] = a.total[j] = 0.0;
-      const int number = special ? specials_++ : -1;
+      const int number = by_bodies || closes ? static_cast<int>(specials_.size()) : -1;
+      if (number >= 0)
+        specials_.push_back({c, j, run, closes ? (j > 0 ? j : a.edges) - 1 : -1});
       if (can_move && from >= 0)
         touches_.push_back({c, j, from, -1.0, tail, number, run, Vector6::Zero(), Vector6::Zero()});
       if (can_move && to >= 0)
         touches_.push_back({c, j, to, 1.0, head, number, run, Vector6::Zero(), Vector6::Zero()});
     }
     if (a.closed && chain.owner[0] == kFree)   // the last run goes on in the first
+    {
       for (Touch& t : touches_)
         if (t.chain == c && t.run == run)
           t.run = first_run;
+      for (Special& s : specials_)
+        if (s.chain == c && s.run == run)
+          s.run = first_run;
+    }
   }
-  solution_.resize(6 * bodies_.size() + specials_);
+  solution_.resize(6 * bodies_.size() + specials_.size());
   if (!touches_.empty())
     buildPattern();
   impulse_.resize(bodies_.size());
   turn_.resize(bodies_.size());
   column_.assign(longest, 0.0);
   prepared_ = true;
-}
-
-/// Bodies whose touches lie in one run are coupled; touches are sorted by chain, so by run, too, but for closed chains.
-void FastProjection::buildPattern()
-{
-  const int bodies = static_cast<int>(bodies_.size()), size = 6 * bodies + specials_;
-  std::vector<std::vector<int>> blocks(bodies);   // per body, those that it is coupled to
-  std::vector<std::vector<int>> of_special(specials_);
-  for (int b = 0; b < bodies; ++b)
-    blocks[b].push_back(b);
-  for (std::size_t p = 0; p < touches_.size(); ++p)
-  {
-    if (touches_[p].special >= 0)
-    {
-      of_special[touches_[p].special].push_back(touches_[p].body);
-      continue;
-    }
-    for (std::size_t q = 0; q < touches_.size(); ++q)
-      if (touches_[q].special < 0 && touches_[q].chain == touches_[p].chain && touches_[q].run == touches_[p].run)
-        blocks[touches_[p].body].push_back(touches_[q].body);
-  }
-  std::vector<std::vector<int>> columns(size);
-  for (int b = 0; b < bodies; ++b)
-  {
-    std::sort(blocks[b].begin(), blocks[b].end());
-    blocks[b].erase(std::unique(blocks[b].begin(), blocks[b].end()), blocks[b].end());
-    for (int other : blocks[b])
-      for (int k = 0; k < 6; ++k)
-        for (int c = 0; c < 6; ++c)
-          columns[6 * b + c].push_back(6 * other + k);
-  }
-  for (int s = 0; s < specials_; ++s)
-  {
-    auto& own = of_special[s];
-    std::sort(own.begin(), own.end());
-    own.erase(std::unique(own.begin(), own.end()), own.end());
-    for (int b : own)
-      for (int k = 0; k < 6; ++k)
-      {
-        columns[6 * b + k].push_back(6 * bodies + s);
-        columns[6 * bodies + s].push_back(6 * b + k);
-      }
-  }
-  std::vector<int> starts{0}, rows;
-  for (const auto& column : columns)
-  {
-    rows.insert(rows.end(), column.begin(), column.end());
-    starts.push_back(static_cast<int>(rows.size()));
-  }
-  matrix_.setPattern(size, std::move(starts), std::move(rows));
 }
 
 /// A closed chain's corners are a rank-one change [Press et al., Numerical Recipes, 2.7.2].
@@ -239,119 +205,23 @@ double FastProjection::evaluate()
     if (std::isnan(worst))
       return worst;
   }
-  for (const Touch& t : touches_)
-    if (t.special >= 0)
-    {
-      const double error = std::abs(at(chains_[t.chain].a.s, t.edge).squaredNorm() - 1.0);
-      if (!(error <= worst))
-        worst = error;
-    }
+  for (Special& special : specials_)
+  {
+    const ChainArrays& a = chains_[special.chain].a;
+    const int j = special.edge;
+    const Eigen::Vector3d s = at(a.s, j);
+    special.c = 0.5 * (s.squaredNorm() - 1.0) * a.rest_length[j];
+    const double error = std::abs(s.squaredNorm() - 1.0);
+    if (!(error <= worst))
+      worst = error;
+    if (special.before < 0)
+      continue;
+    special.to_before = std::exchange(a.upper[special.before], 0.0);
+    special.from_before = std::exchange(a.lower[j], 0.0);
+    special.own = a.inverse_mass[j] * s.dot(at(a.direction, j));
+    a.diagonal[j] = 1.0;
+  }
   return worst;
-}
-
-void FastProjection::linearise()
-{
-  for (Touch& t : touches_)
-  {
-    const Chain& chain = chains_[t.chain];
-    const ProjectedBody& body = bodies_[t.body];
-    const Eigen::Vector3d s = at(chain.a.s, t.edge), d = at(chain.a.direction, t.edge);
-    const Eigen::Vector3d arm = body.pose.orientation * chain.r_B[t.node], start_arm = body.start.orientation * chain.r_B[t.node];
-    t.row << t.sign * s, t.sign * (rotationRate(turn_[t.body]).transpose() * arm.cross(s));
-    t.column << -t.sign * d, -t.sign * start_arm.cross(d);
-  }
-}
-
-/// The bodies' displacements y: with T the chains' systems, A and B the touches' rows and columns, M the bodies' inertia,
-/// T lambda = c + A y and M y = B lambda. Adds A y to the right-hand sides. Edges that only bodies move keep their multipliers as unknowns.
-bool FastProjection::solveBodies()
-{
-  const int bodies = static_cast<int>(bodies_.size()), first_special = 6 * bodies;
-  std::vector<double>& values = matrix_.values();
-  std::fill(values.begin(), values.end(), 0.0);
-  solution_.setZero();
-  for (int b = 0; b < bodies; ++b)
-  {
-    const Eigen::Matrix3d r = bodies_[b].start.orientation.toRotationMatrix(), inertia = r * bodies_[b].inertia * r.transpose();
-    for (int k = 0; k < 3; ++k)
-    {
-      entry(6 * b + k, 6 * b + k) = bodies_[b].mass;
-      for (int l = 0; l < 3; ++l)
-        entry(6 * b + 3 + k, 6 * b + 3 + l) = inertia(k, l);
-    }
-  }
-  for (std::size_t begin = 0; begin < touches_.size();)
-  {
-    std::size_t end = begin;
-    while (end < touches_.size() && touches_[end].chain == touches_[begin].chain)
-      ++end;
-    const Chain& chain = chains_[touches_[begin].chain];
-    std::copy_n(chain.a.c, chain.a.edges, column_.data());
-    solveChain(chain, column_.data());
-    for (std::size_t q = begin; q < end; ++q)
-      if (touches_[q].special < 0)
-        solution_.segment<6>(6 * touches_[q].body) += touches_[q].column * column_[touches_[q].edge];
-    for (std::size_t p = begin; p < end; ++p)
-    {
-      const Touch& t = touches_[p];
-      if (t.special >= 0)
-      {
-        const int row = first_special + t.special;
-        for (int k = 0; k < 6; ++k)
-        {
-          entry(row, 6 * t.body + k) -= t.row[k];
-          entry(6 * t.body + k, row) -= t.column[k];
-        }
-        solution_[row] = 0.5 * (at(chain.a.s, t.edge).squaredNorm() - 1.0) * chain.a.rest_length[t.edge];
-        continue;
-      }
-      std::fill_n(column_.data(), chain.a.edges, 0.0);
-      column_[t.edge] = 1.0;
-      solveChain(chain, column_.data());
-      for (std::size_t q = begin; q < end; ++q)
-        if (touches_[q].special < 0 && touches_[q].run == t.run)
-          for (int l = 0; l < 6; ++l)
-          {
-            double* block = &entry(6 * touches_[q].body, 6 * t.body + l);   // six rows follow one another
-            for (int k = 0; k < 6; ++k)
-              block[k] -= column_[touches_[q].edge] * touches_[q].column[k] * t.row[l];
-          }
-    }
-    begin = end;
-  }
-  if (!matrix_.factor())
-    return false;
-  matrix_.solve(solution_.data());
-  if (!solution_.allFinite())
-    return false;
-  for (const Touch& t : touches_)
-  {
-    const ChainArrays& a = chains_[t.chain].a;
-    if (t.special < 0)
-      a.c[t.edge] += t.row.dot(solution_.segment<6>(6 * t.body));
-  }
-  return true;
-}
-
-/// Bodies, and the nodes welded to them, by their impulses so far.
-void FastProjection::moveBodies()
-{
-  for (const Touch& t : touches_)
-  {
-    const double lambda = chains_[t.chain].a.lambda[t.edge];
-    const Vector6 by = lambda * t.column;
-    ProjectedBody& body = bodies_[t.body];
-    impulse_[t.body] += by;
-    body.pose.position += by.head<3>() / body.mass;
-    const Eigen::Quaterniond& q = body.start.orientation;
-    turn_[t.body] += q * (body.inertia.inverse() * (q.conjugate() * Eigen::Vector3d(by.tail<3>())));
-  }
-  for (std::size_t b = 0; b < bodies_.size(); ++b)
-    bodies_[b].pose.orientation = (fromRotationVector(turn_[b]) * bodies_[b].start.orientation).normalized();
-  for (Chain& chain : chains_)
-    for (int i = 0; i < chain.a.nodes; ++i)
-      if (chain.owner[i] >= 0)
-        put(chain.a.x, i, bodies_[chain.owner[i]].pose * chain.r_B[i]);
 }
 
 ProjectionReport FastProjection::project(double h)
@@ -412,9 +282,8 @@ ProjectionReport FastProjection::project(double h)
       std::copy_n(chain.a.c, chain.a.edges, chain.a.lambda);
       solveChain(chain, chain.a.lambda);
     }
-    for (const Touch& t : touches_)
-      if (t.special >= 0)
-        chains_[t.chain].a.lambda[t.edge] = solution_[6 * bodies_.size() + t.special];
+    for (std::size_t k = 0; k < specials_.size(); ++k)
+      chains_[specials_[k].chain].a.lambda[specials_[k].edge] = solution_[6 * bodies_.size() + k];
     for (Chain& chain : chains_)
       kernels.apply(chain.a);
     if (!bodies_.empty())

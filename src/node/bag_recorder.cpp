@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 #include <std_msgs/String.h>
@@ -20,6 +21,8 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
   bodies_topic_ = prefix + "body_states";
   for (const std::string& name : grasp_names)
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
+  if (std::filesystem::is_directory(path))
+    throw std::runtime_error("bag " + path + ": cannot be written: is a directory");
   try
   {
     bag_.open(path + ".active", rosbag::bagmode::Write);

@@ -142,6 +142,12 @@ void GuideInputs::onBodies(const slender_sim::BodyStates& message)
     drops_.drop(Drop::wrong_length, "bodies", "name, pose and twist must be equally long (twist may be empty)");
     return;
   }
+  const std::set<std::string> names(message.name.begin(), message.name.end());
+  if (names.size() != message.name.size())
+  {
+    drops_.drop(Drop::wrong_length, "bodies", "a name comes twice; there must be one pose per body");
+    return;
+  }
   std::vector<Entry> entries;
   for (std::size_t b = 0; b < message.name.size(); ++b)
   {

@@ -187,6 +187,8 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
     throw OptionError("~scene: missing; give the path of a scene file (or its YAML text)");
   if (o.frame_id.empty())
     throw OptionError("~frame_id: is empty, must be the name of a frame, e.g. world");
+  if (o.frame_id.front() == '/')
+    throw OptionError("~frame_id: is " + o.frame_id + ", must not begin with a slash: tf2 knows no such frames");
   return o;
 }
 

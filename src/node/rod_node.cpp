@@ -159,6 +159,7 @@ bool RodNode::advance()
 
 void RodNode::fail(const std::string& reason)
 {
+  mode_before_failure_ = mode_;
   mode_ = Mode::failed;
   failure_ = "step " + std::to_string(simulation_->state().steps + 1) + ": " + reason;
   ROS_ERROR("stopped at %s; call ~reset to start again", failure_.c_str());
@@ -300,6 +301,11 @@ void RodNode::work()
     if (!queue_.isEmpty())
       break;
   }
+  tell();
+}
+
+void RodNode::tell()
+{
   publishMarkers();
   if (ros::WallTime::now() >= next_diagnostics_)
     publishDiagnostics();

@@ -11,6 +11,8 @@ namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
+constexpr double kBehind = 1.0;   // [s] /clock may lag behind the simulated time by a few resets' ticks
+
 void add(DiagnosticStatus& status, const std::string& key, const std::string& value)
 {
   diagnostic_msgs::KeyValue entry;
@@ -60,6 +62,10 @@ DiagnosticStatus RodNode::simulationStatus() const
   const bool running = mode_ == Mode::running && options_.pace != Pace::step;
   if (running && options_.pace == Pace::wall && recent_.steps > 10 && recent_.realTimeFactor() < 1.0)
     raise(status, DiagnosticStatus::WARN, "slower than real time");
+  const double behind = options_.pace == Pace::follow ? clock_.seconds() - clock_.secondsAt(ros::Time::now()) : 0.0;
+  if (running && behind > kBehind)
+    raise(status, DiagnosticStatus::WARN, "waits for /clock, which is " + std::to_string(behind) +
+                                          " s behind the simulated time; start the node anew if it went back");
   if (recent_.cut_steps > 0)
     raise(status, DiagnosticStatus::WARN, "steps had to be cut");
   if (!bag_failure_.empty())
@@ -79,6 +85,8 @@ DiagnosticStatus RodNode::simulationStatus() const
   add(status, "longest step time [ms]", 1e3 * recent_.worst_step);
   add(status, "real-time factor", recent_.realTimeFactor());
   add(status, "simulated per wall second", achieved);
+  if (options_.pace == Pace::wall && mode_ == Mode::running)
+    add(status, "behind real time [s]", std::max(0.0, (ros::WallTime::now() - wall_start_).toSec() - static_cast<double>(clock_.ticks() - wall_start_ticks_) * clock_.step()));
   add(status, "iterations per step", recent_.steps ? static_cast<double>(recent_.iterations) / static_cast<double>(recent_.steps) : 0.0);
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);

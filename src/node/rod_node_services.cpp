@@ -37,7 +37,7 @@ bool RodNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& 
   simulation_->reset();
   inputs_->restart(*simulation_);
   if (mode_ == Mode::failed)
-    mode_ = Mode::running;
+    mode_ = mode_before_failure_;
   failure_.clear();
   last_report_ = StepReport();
   jumped();
@@ -60,11 +60,15 @@ bool RodNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::Res
   {
     inputs_->processPending();
     std::uint32_t done = 0;
-    while (done < request.n && nh_.ok() && advance())
+    while (done < request.n && nh_.ok() && !finished_ && advance())
+    {
       ++done;
+      tell();
+    }
     response.success = done == request.n;
     if (!response.success)
-      response.message = "took " + std::to_string(done) + " of " + std::to_string(request.n) + " steps; " + failure_;
+      response.message = "took " + std::to_string(done) + " of " + std::to_string(request.n) + " steps; " +
+                         (failure_.empty() ? "the node ends" : failure_);
   }
   response.step = simulation_->state().steps;
   response.stamp = clock_.stamp();
@@ -132,9 +136,6 @@ std::string RodNode::attach(const slender_sim::SetGrasp::Request& request, int g
     return "action " + std::to_string(request.action) + ": must be RELEASE, ATTACH_NODES or ATTACH_NEAREST";
   if (request.position_only && first != last)
     return "position_only holds a single node: first_node must be last_node";
-  for (const GraspState& other : rod.grasps)
-    if (other.active && first <= other.last_node && other.first_node <= last)
-      return "nodes " + std::to_string(other.first_node) + " .. " + std::to_string(other.last_node) + " are held by another grasp";
   try
   {
     simulation_->attach(grasp, first, last, request.position_only ? Hold::position : Hold::frame);

@@ -72,7 +72,14 @@ struct Drawing
     }
   }
 
-  void operator()(const Plane&) { simple(Marker::CUBE, {kPlaneSize, kPlaneSize, 1e-3}, {0, 0, -5e-4}); }
+  void operator()(const Plane&)   // rviz would light a cube from the camera: seen at a glance it is black
+  {
+    marker.type = Marker::TRIANGLE_LIST;
+    const double h = 0.5 * kPlaneSize;
+    triangle({-h, -h, 0}, {h, -h, 0}, {h, h, 0});
+    triangle({-h, -h, 0}, {h, h, 0}, {-h, h, 0});
+  }
+
   void operator()(const Sphere& s) { simple(Marker::SPHERE, Vector3d::Constant(2 * s.radius)); }
   void operator()(const Box& b) { simple(Marker::CUBE, b.size); }
   void operator()(const Cylinder& c) { simple(Marker::CYLINDER, {2 * c.radius, 2 * c.radius, c.length}); }

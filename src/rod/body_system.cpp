@@ -51,7 +51,7 @@ void BodySystem::load(const RigidBodyState& s)
   base_ = pose = s.X_WB;
   start_ = s.X_WB.orientation;
   velocity_ = s.velocity;
-  acceleration_ = {s.linear_acceleration, s.angular_acceleration};
+  acceleration_ = s.has_history ? Twist{s.linear_acceleration, s.angular_acceleration} : Twist{};
   const Eigen::Vector3d previous = rotationVector(s.X_previous.orientation * start_.conjugate());
   history_[kQ] = {s.X_WB.position, Eigen::Vector3d::Zero()};
   history_[kV] = {s.velocity.linear, s.velocity.angular};

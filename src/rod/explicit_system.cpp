@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
+
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
@@ -13,6 +15,13 @@ namespace {
 Eigen::Matrix3d pointInertia(double mass, const Eigen::Vector3d& r)
 {
   return mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+}
+
+Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
+{
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
 }
 
 /// Angular velocity of a body with this angular momentum.
@@ -112,11 +121,23 @@ void ExplicitSystem::predictBody(Body& body, double h)
       }
     }
   const Eigen::Quaterniond& q = body.start.orientation;
-  const double share = m.mass / body.mass;
   Twist& v = body.velocity;
-  v.linear = (v.linear + h / body.mass * force) / (1.0 + h * m.linear_damping * share);
-  const Eigen::Vector3d momentum =
-      (q * (body.inertia * (q.conjugate() * v.angular)) + h * torque) / (1.0 + h * m.angular_damping);
+  Eigen::Vector3d momentum = q * (body.inertia * (q.conjugate() * v.angular)) + h * torque;
+  v.linear += h / body.mass * force;
+  if (m.linear_damping > 0 || m.angular_damping > 0)
+  {
+    // damping of the body alone, about its own centre, by the velocity at the end; the nodes have their own
+    const double k = h * m.linear_damping * m.mass;
+    const Eigen::Matrix3d r = q.toRotationMatrix(), arm = crossMatrix(now.X_WB.position - body.start.position);
+    const Eigen::Matrix3d own = h * m.angular_damping * (r * m.inertia * r.transpose()) - k * arm * arm;
+    Eigen::Matrix<double, 6, 6> matrix;
+    matrix << (body.mass + k) * Eigen::Matrix3d::Identity(), -k * arm, k * arm, r * body.inertia * r.transpose() + own;
+    Eigen::Matrix<double, 6, 1> end;
+    end << body.mass * v.linear, momentum;
+    matrix.ldlt().solveInPlace(end);
+    v.linear = end.head<3>();
+    momentum -= k * arm * v.linear + own * Eigen::Vector3d(end.tail<3>());
+  }
   Eigen::Vector3d turn = h * spin(body.inertia, q, momentum);
   for (int k = 0; k < 20; ++k)
   {
@@ -147,13 +168,32 @@ void ExplicitSystem::placeBody(Body& body, const Pose& X, const Twist& velocity)
     }
 }
 
+/// Moves a body, and what it carries, as the substep begins.
+void ExplicitSystem::placeStart(const Body& body, const Pose& X)
+{
+  Pose& X_WB = bodies_now_[body.index].X_WB;
+  X_WB = {X.position - X.orientation * body.centre, X.orientation};
+  for (const Weld& weld : model_->welds)
+    if (weld.body == body.index && isWelded(*rods_[weld.rod], weld))
+    {
+      RodStepper::Impl& rod = *rods_[weld.rod];
+      GraspState& g = rod.work.grasps[weld.grasp];
+      g.X_WG = rod.stage_poses[weld.grasp] = X_WB * weld.X_BG;
+      for (int i = g.first_node; i <= g.last_node; ++i)
+        rod.work.x.col(i) = g.X_WG * g.nodes_G[i - g.first_node];
+    }
+}
+
 StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, double t, double h, StepReport& report, std::size_t& failed)
 {
   // before a run's first step whatever stretching a rod comes with is taken out without becoming a velocity
   const bool first = std::any_of(rods_.begin(), rods_.end(), [](const RodStepper::Impl* rod) { return rod->work.last_step == 0.0; });
   if (inextensible_ && first)
+  {
+    composeBodies();
     if (const StepFailure failure = project(h, true, report, failed); failure != StepFailure::none)
       return failure;
+  }
   for (failed = 0; failed < rods_.size(); ++failed)
     if (const StepFailure failure = rods_[failed]->explicitPredict(inputs[failed], duration, t, h, report); failure != StepFailure::none)
       return failure;
@@ -183,7 +223,7 @@ StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, doubl
   return StepFailure::none;
 }
 
-/// Restores the lengths of inextensible rods' edges. `start_only`: of the state the substep begins with, bodies staying where they are.
+/// Restores the lengths of inextensible rods' edges. `start_only`: of the state the substep begins with, velocities staying what they are.
 StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& report, std::size_t& failed)
 {
   for (std::size_t r = 0; r < rods_.size(); ++r)
@@ -200,7 +240,7 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
       if (g.active)
         std::fill(owner_.begin() + g.first_node, owner_.begin() + g.last_node + 1, -2);
     }
-    for (std::size_t b = 0; b < bodies_.size() && !start_only; ++b)
+    for (std::size_t b = 0; b < bodies_.size(); ++b)
       for (const Weld& weld : model_->welds)
         if (weld.rod == static_cast<int>(r) && weld.body == bodies_[b].index && isWelded(rod, weld))
         {
@@ -239,6 +279,8 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
   }
   report.projection_iterations = std::max(report.projection_iterations, result.iterations);
   report.constraint_error = std::max(report.constraint_error, result.constraint_error);
+  if (start_only && result.iterations == 0)
+    return StepFailure::none;
   for (std::size_t r = 0; r < rods_.size(); ++r)
     if (chains_[r] >= 0 && start_only)
     {
@@ -247,8 +289,11 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
     }
     else if (chains_[r] >= 0)
       rods_[r]->takeProjection(projection_, chains_[r]);
-  for (std::size_t b = 0; b < bodies_.size() && !start_only; ++b)
-    placeBody(bodies_[b], projection_.body(static_cast<int>(b)).pose, projection_.body(static_cast<int>(b)).velocity);
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+  {
+    const ProjectedBody& body = projection_.body(static_cast<int>(b));
+    start_only ? placeStart(bodies_[b], body.pose) : placeBody(bodies_[b], body.pose, body.velocity);
+  }
   return StepFailure::none;
 }
 

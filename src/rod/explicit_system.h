@@ -37,6 +37,7 @@ private:
   void composeBodies();
   void predictBody(Body& body, double h);
   void placeBody(Body& body, const Pose& X, const Twist& velocity);
+  void placeStart(const Body& body, const Pose& X);
   StepFailure project(double h, bool start_only, StepReport& report, std::size_t& failed);
   bool isWelded(const RodStepper::Impl& rod, const Weld& weld) const;
 

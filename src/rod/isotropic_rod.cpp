@@ -154,7 +154,7 @@ RodEvaluation IsotropicRod::evaluate(const RodState& state)
   const IsotropicKernels& kernels = isotropicKernels();
   IsotropicEnergy sum;
   kernels.tangents(a_, sum);
-  RodEvaluation result;
+  twist_energy_ = 0.0;
   for (const Span& span : spans_)
   {
     const double moment = span.held() ? (totalTwist(span, state) - span.rest) / span.compliance : 0.0;
@@ -162,9 +162,11 @@ RodEvaluation IsotropicRod::evaluate(const RodState& state)
     for (int c : {span.before, span.after})
       if (c >= 0)
         clamp_moment_[c] = moment;
-    result.bend_twist += 0.5 * moment * moment * span.compliance;
+    twist_energy_ += 0.5 * moment * moment * span.compliance;
   }
   kernels.forces(a_, sum);
+  RodEvaluation result;
+  result.bend_twist = twist_energy_;
   for (int c = 0; c < static_cast<int>(clamp_moment_.size()); ++c)
     result.bend_twist += evaluateClamp(c, state, sum.min_chi);
   result.bend_twist += sum.bend;
@@ -234,10 +236,26 @@ StepFailure IsotropicRod::settle(const RodState& from, const std::vector<Pose>& 
       const Eigen::Vector3d t = tangent(j), d = poses[k].orientation * g.directors_G[j - g.first_node];
       to.d1.col(j) = (d - d.dot(t) * t).normalized();
     }
-    if (g.first_node == g.last_node && (model_.closed || (g.first_node > 0 && g.last_node < a_.nodes - 1)))   // what the joint there will have when it is released
-      to.twist[g.first_node] = g.section_twist[0] + g.section_twist[1];
+    releaseTwists(from.grasps[k], to, g);
   }
-  return StepFailure::none;
+  // a zero edge has no tangent, and the least of several numbers forgets what is not one
+  return to.d1.allFinite() && to.twist.allFinite() ? StepFailure::none : StepFailure::state_not_finite;
+}
+
+/// What the joints at the ends of a held part will have when it is released: whole turns live in the sections' twists until then.
+void IsotropicRod::releaseTwists(const GraspState& before, RodState& to, const GraspState& g) const
+{
+  for (int side = 0; side < 2; ++side)
+  {
+    const int node = side ? g.last_node : g.first_node, e = (node + a_.edges - 1) % a_.edges, f = node;
+    if (!model_.closed && (node == 0 || node == a_.nodes - 1))
+      continue;
+    if (g.first_node == g.last_node)
+      to.twist[node] = g.section_twist[0] + g.section_twist[1];
+    else   // the rest of the joint is rigid
+      to.twist[node] = unwrapNear(signedAngle(parallelTransport(to.d1.col(e), tangent(e), tangent(f)), to.d1.col(f), tangent(f)),
+                                  to.twist[node] + g.section_twist[side] - before.section_twist[side]);
+  }
 }
 
 /// The total twist is read off the frame carried along the span from one held section to the other, and counted on from the last one;
@@ -319,7 +337,10 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
     to.grasps[clamps[clamp].grasp].section_twist[clamps[clamp].side] = m;
     return m;
   };
-  forJoints(span, [&](int i) { to.twist[i] = s.rest_twist[i] + (s.beta[i] > 0 ? moment / s.beta[i] : 0.0); });
+  forJoints(span, [&](int i) {
+    if (s.beta[i] > 0)   // else the whole rod is held
+      to.twist[i] = s.rest_twist[i] + moment / s.beta[i];
+  });
   if (span.before >= 0)
     phi += setSection(span.before);
   if (span.after >= 0)

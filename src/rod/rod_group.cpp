@@ -4,6 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "slender_sim/geometry/rotation.h"
 #include "step_loop.h"
 
 namespace slender {
@@ -99,7 +100,9 @@ StepReport RodGroup::Impl::solveEquilibrium(RodGroupState& state, const RodGroup
   constexpr double kUnbalanced = 1e-8;   // of the largest force
   StepReport total;
   RodGroupState work = state, before;
-  double h = time.step, force_scale = 0.0;
+  double h = time.step, force_scale = 0.0, lever = std::numeric_limits<double>::max();   // for moments beside forces: the shortest edge
+  for (const auto& rod : model.rods)
+    lever = std::min(lever, rod->rest_length.minCoeff());
   for (int round = 0, failures = 0; round < kMaxRounds; ++round)
   {
     for (RodState& rod : work.rods)
@@ -139,7 +142,12 @@ StepReport RodGroup::Impl::solveEquilibrium(RodGroupState& state, const RodGroup
           unbalanced = std::max(unbalanced, model.rods[r]->mass[i] * (work.rods[r].x.col(i) - before.rods[r].x.col(i)).norm() / (h * h));
     for (std::size_t b = 0; b < work.bodies.size(); ++b)
       if (model.bodies[b].simulated)
-        unbalanced = std::max(unbalanced, model.bodies[b].mass * (work.bodies[b].X_WB.position - before.bodies[b].X_WB.position).norm() / (h * h));
+      {
+        const RigidBodyModel& m = model.bodies[b];
+        const Pose &from = before.bodies[b].X_WB, &to = work.bodies[b].X_WB;
+        const Eigen::Vector3d turn = rotationVector(from.orientation.conjugate() * to.orientation);
+        unbalanced = std::max({unbalanced, m.mass * (to.position - from.position).norm() / (h * h), (m.inertia * turn).norm() / (lever * h * h)});
+      }
     force_scale = std::max(force_scale, loop->coupled()->forceScale());
     total.residual = unbalanced / force_scale;
     total.max_strain = report.max_strain;

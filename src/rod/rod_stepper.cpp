@@ -183,10 +183,10 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length,
     case StepFailure::overstretched:
       return overstretched[0] >= 0
                  ? "nodes " + std::to_string(overstretched[0]) + " and " + std::to_string(overstretched[1]) +
-                       " are held further apart than the rod between them is long" + at +
-                       ": bring the grasps closer together, or let the rod stretch (stretching: stiff)"
+                       " are held as far apart as the rod between them is long, or further" + at +
+                       ": bring the grasps closer together (projection needs some slack), or let the rod stretch (stretching: stiff)"
                  : "the projection found no configuration in which all edges keep their lengths" + at +
-                       ": use a shorter step, or let the rod stretch (stretching: stiff)";
+                       ": use a shorter step, give a taut rod some slack, or let it stretch (stretching: stiff)";
     case StepFailure::turned_too_far:
       return "the twist changed by about half a turn" + at + ": use a shorter step or slower grasps, or formulation: general, which counts turns by the edge";
     case StepFailure::energy_grew:
@@ -221,21 +221,32 @@ RodEnergies RodStepper::energies(const RodState& state, const Eigen::Vector3d& g
 RodEnergies RodStepper::Impl::energies(const RodState& state, const Eigen::Vector3d& gravity)
 {
   const RodModel& m = *model;
+  RodEnergies result;
+  for (int i = 0; i < m.nodes(); ++i)
+  {
+    result.kinetic += 0.5 * m.mass[i] * state.v.col(i).squaredNorm();
+    result.gravity -= m.mass[i] * gravity.dot(state.x.col(i));
+  }
+  if (isotropic)
+  {
+    const RodEvaluation e = isotropic->evaluate(state);
+    result.stretch = e.stretch;
+    result.twist = isotropic->twistEnergy();
+    result.bend = e.bend_twist - result.twist;
+    return result;
+  }
   system.leaveOutStretching(false);
   system.load(state);
   system.setResponse(0.0, nullptr);
   for (int i = 0; i < m.nodes(); ++i)
     system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   const RodEvaluation e = system.evaluate(false);
-  RodEnergies result;
   result.stretch = e.stretch;
   const RodArrays& a = system.arrays();
   for (int i = 0; i < m.nodes(); ++i)
   {
     const double q = a.twist[i] - a.rest_twist[i];
     result.twist += 0.5 * a.beta[i] * q * q;
-    result.kinetic += 0.5 * m.mass[i] * state.v.col(i).squaredNorm();
-    result.gravity -= m.mass[i] * gravity.dot(state.x.col(i));
   }
   for (const ClampJoint& c : system.clamps())
     result.twist += 0.5 * c.beta * (c.twist - c.rest_twist) * (c.twist - c.rest_twist);

@@ -102,6 +102,7 @@ void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
   try
   {
     RigidBodyModel model;
+    model.name = body.name;
     model.mass = body.mass;
     model.inertia = body.inertia;
     checkBody(model);

@@ -23,6 +23,7 @@ std::vector<RodPart> readRods(const YamlCursor& at, const ReadContext& context)
   {
     const YamlCursor& entry = entries[k];
     rods.push_back(readRod(entry, context, entries.size() == 1 ? "rod" : "rod" + std::to_string(k)));
+    rods.back().config.place = entry.place();
     const auto [rod, new_rod] = rod_names.emplace(rods.back().config.name, entry.path());
     if (!new_rod)
     {
@@ -70,6 +71,7 @@ void takeGeneratedRods(Generated& generated, std::vector<RodPart>& rods)
     {
       good = good && take(grasps, "grasp", grasp.name, &maker);
     }
+    part.config.place = maker.place();
     rods.push_back(std::move(part));
   }
 }
@@ -191,6 +193,11 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   {
     scene.time.integrator = Integrator::implicit_euler;   // methods of second order carry an impact's velocity on and bounce
   }
+  if (touches && scene.time.integrator == Integrator::symplectic_euler)
+  {
+    YamlMap(time).get("integrator").problem("takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
+                                            "bdf2 or tr_bdf2, or no rod may have contact");
+  }
   map.finish();
   if (!problems.empty())
   {
@@ -214,7 +221,12 @@ TimeConfig readTime(const YamlCursor& at)
                                                                     {"generalized_alpha", Integrator::generalized_alpha},
                                                                     {"symplectic_euler", Integrator::symplectic_euler}}));
   assign(time.spectral_radius, map.get("spectral_radius").number(Range::closed(0, 1)));
-  assign(time.error_tolerance, map.get("error_tolerance").number(Range::closed(0, 1, "m")));
+  const YamlCursor error_tolerance = map.get("error_tolerance");
+  assign(time.error_tolerance, error_tolerance.number(Range::closed(0, 1, "m")));
+  if (time.error_tolerance > 0 && time.integrator == Integrator::symplectic_euler)
+  {
+    error_tolerance.problem("is for implicit integrators; steps of symplectic_euler are of fixed length");
+  }
   const YamlCursor min_step = map.get("min_step");
   if (const auto value = min_step.number(Range::above(0, 10, "s")))
   {
@@ -243,6 +255,7 @@ SceneConfig parseScene(const std::string& text, const std::string& name, const s
     applyOverride(tree, assignment);
   }
   SceneConfig scene = readTree(tree, name, directory);
+  scene.file = name;
   scene.source = overrides.empty() ? text : writeYaml(tree);
   return scene;
 }

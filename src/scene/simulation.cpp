@@ -35,6 +35,8 @@ void chooseFormulation(const RodConfig& rod, Integrator integrator, RodModel& mo
 
 Pose sectionOffset(const Pose& X_WM, const Pose& X_WG) { return X_WM.inverse() * X_WG; }
 
+bool isIdentity(const Pose& X) { return X.position == Eigen::Vector3d::Zero() && X.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs(); }
+
 }  // namespace
 
 Simulation::Simulation(SceneConfig config) : config_(std::move(config))
@@ -47,7 +49,10 @@ Simulation::Simulation(SceneConfig config) : config_(std::move(config))
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
     const auto* table = std::get_if<TableMotion>(&grasps_[g].config->motion);
-    takeOffset(static_cast<int>(g), table ? table->poses.firstTime() : 0.0);
+    if (grasps_[g].config->attach == Attach::initial)
+    {
+      takeOffset(static_cast<int>(g), table ? table->poses.firstTime() : 0.0);
+    }
   }
   if (config_.start == Start::equilibrium)
   {
@@ -98,7 +103,8 @@ void Simulation::buildRods()
     }
     catch (const std::invalid_argument& error)
     {
-      throw SceneError("scene " + config_.name + ": rods." + std::to_string(r) + " (" + rod.name + "): " + error.what());
+      const std::string place = rod.place.empty() ? "scene " + config_.name + ": rods." + std::to_string(r) : rod.place;
+      throw SceneError(place + " (" + rod.name + "): " + error.what());
     }
   }
 }
@@ -170,11 +176,11 @@ SceneInputs Simulation::defaultInputs() const { return inputsAt(static_cast<doub
 GraspTarget Simulation::targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity) const
 {
   checkGrasp(grasp);
-  if (grasps_[grasp].config->attach == Attach::section)
+  const Pose& offset = state_.grasp_offsets[grasp];
+  if (isIdentity(offset))
   {
     return {X_WM, velocity};   // not multiplied by an identity, which would round
   }
-  const Pose& offset = state_.grasp_offsets[grasp];
   GraspTarget target{X_WM * offset, velocity};
   if (velocity)
   {
@@ -186,10 +192,7 @@ GraspTarget Simulation::targetOf(int grasp, const Pose& X_WM, const std::optiona
 void Simulation::setOffset(int grasp, const Pose& X_WM)
 {
   checkGrasp(grasp);
-  if (grasps_[grasp].config->attach == Attach::initial)
-  {
-    state_.grasp_offsets[grasp] = sectionOffset(X_WM, graspState(grasp).X_WG);
-  }
+  state_.grasp_offsets[grasp] = sectionOffset(X_WM, graspState(grasp).X_WG);
 }
 
 void Simulation::checkInputs(const SceneInputs& inputs) const

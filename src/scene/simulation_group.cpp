@@ -120,7 +120,7 @@ void Simulation::buildGroup()
   }
   catch (const std::invalid_argument& error)
   {
-    throw SceneError("scene " + config_.name + ": " + error.what());
+    throw SceneError((config_.file.empty() ? "scene " + config_.name : config_.file) + ": " + error.what());
   }
 }
 

@@ -230,6 +230,8 @@ std::uint64_t Simulation::fingerprint() const
     const RodModel& model = *models_[r];
     text(model.name);
     out(model.closed);
+    out(model.isotropic);
+    out(model.inextensible);
     out(static_cast<int>(model.curvature));
     for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a, &model.radius_b,
                                           &model.twist_modulus, &model.rest_twist, &model.drag})

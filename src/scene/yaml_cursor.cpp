@@ -108,7 +108,7 @@ std::string Range::text() const
          unit_text;
 }
 
-void Problems::add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason)
+std::string Problems::placeOf(const YamlTree* tree, const YamlTree* parent, const std::string& path) const
 {
   const YamlTree* place = tree ? tree : parent;
   std::string line = file_;
@@ -120,7 +120,12 @@ void Problems::add(const YamlTree* tree, const YamlTree* parent, const std::stri
   {
     line += ":" + std::to_string(place->line);
   }
-  line += ": " + (path.empty() ? "scene" : path);
+  return line + ": " + (path.empty() ? "scene" : path);
+}
+
+void Problems::add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason)
+{
+  std::string line = placeOf(tree, parent, path);
   const std::string value = tree ? quote(*tree) : "";
   if (!value.empty())
   {

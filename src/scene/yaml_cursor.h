@@ -38,6 +38,8 @@ public:
   /// Adds "FILE:LINE: PATH = VALUE: reason" (or the override in place of file and line). `tree` may be null: then `parent` tells
   /// the line.
   void add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason);
+  /// "FILE:LINE: PATH".
+  std::string placeOf(const YamlTree* tree, const YamlTree* parent, const std::string& path) const;
   void addText(const std::string& line) { lines_.push_back(line); }
 
   bool empty() const { return lines_.empty(); }
@@ -65,6 +67,8 @@ public:
   const std::string& path() const { return path_; }
   Problems& problems() const { return *problems_; }
 
+  /// "FILE:LINE: PATH", for messages of those who take the value over.
+  std::string place() const { return problems_->placeOf(tree_, parent_, path_); }
   /// Reports what is wrong with this value.
   void problem(const std::string& reason) const { problems_->add(tree_, parent_, path_, reason); }
 

@@ -1,6 +1,7 @@
 // Rigid bodies welded to rods, and bodies alone (thesis 4.5).
 #include <gtest/gtest.h>
 
+#include "slender_sim/geometry/rotation.h"
 #include "test/support/groups.h"
 
 namespace slender::test {
@@ -195,6 +196,30 @@ TEST(RigidBodies, HangingBodyAtRest)
   const Vector3d at = g.state.bodies[0].X_WB.position;
   ASSERT_TRUE(group.step(g.state, g.inputs, 0.01).ok);
   EXPECT_LT((g.state.bodies[0].X_WB.position - at).norm(), 1e-9);
+}
+
+TEST(RigidBodies, TurnedBodyAtRest)
+{
+  // a constant moment on a body under a hanging rod: angle = moment L / beta, whatever the body's inertia
+  for (double inertia : {1e-5, 1e-3, 0.1, 10.0})
+  {
+    const double beta = 1e-4, length = 1.0;
+    const Matrix3Xd nodes = straightNodes(21, length, Vector3d::Zero(), -Vector3d::UnitZ());
+    Rod rod(openRod(nodes, modulusSection(1e-2, beta, 1e4, 0.01)), nodes);
+    rod.hold(0, 0);
+    Group g;
+    g.addRod(rod);
+    RigidBodyModel body = bodyOf(0.1, {inertia, inertia, inertia});
+    body.torque << 0, 0, 0.5 * beta / length;
+    g.weld(0, 20, 20, g.addBody(body, {Vector3d(0, 0, -length), Eigen::Quaterniond::Identity()}));
+    g.setGravity({0, 0, -9.81});
+    RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
+    const StepReport report = group.solveEquilibrium(g.state, g.inputs);
+    ASSERT_TRUE(report.ok) << report.message;
+    const Vector3d turn = rotationVector(g.state.bodies[0].X_WB.orientation);
+    EXPECT_NEAR(turn.z(), 0.5, 1e-4) << inertia;   // 1e-8 of the weight at an edge's length is 1e-5 of the moment
+    EXPECT_LT(turn.head<2>().norm(), 1e-6) << inertia;
+  }
 }
 
 TEST(RigidBodies, ImpossibleInertiaIsRefused)

@@ -7,6 +7,7 @@ import rospy
 from geometry_msgs.msg import Twist, WrenchStamped
 from node_harness import SCENE, NodeCase, fill, pose, run, wait_until
 from slender_sim.msg import BodyStates, RodState
+from slender_sim.srv import SetGrasp, SetGraspRequest
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
@@ -60,6 +61,7 @@ class Bodies(NodeCase):
         wrench = self.listen("/t/grasps/left/wrench", WrenchStamped)
         told = self.listen("/t/body_states", BodyStates)
         self.states_after(state, 2)
+        wait_until(lambda: wrench.count() and wrench.last().header.stamp == state.last().header.stamp, what="the first wrench")
         before = wrench.last().wrench.force.x
         self.drive("cart", (1.1, 0, 1), (1.15, 0, 1), 0.5)
         last = self.states_after(state, 300).nodes[-1]
@@ -115,6 +117,19 @@ class Bodies(NodeCase):
         last = self.states_after(state, 150).nodes[-1]
         self.assertLess(math.dist((last.x, last.y, last.z), (0.9, 0, 1.1)), 1e-9)
 
+    def test_a_grasp_attached_elsewhere_stays_there(self):
+        """Also where its body says `attach: section`."""
+        self.start(FOLLOWED.replace(", attach: initial", "").replace("[1, 0, 2]", "[1, 0, 1]"))
+        state = self.listen("/t/state", RodState)
+        self.step(5)
+        set_grasp = lambda action, node=0: self.call("set_grasp", SetGrasp, SetGraspRequest(
+            name="right", action=action, first_node=node, last_node=node))
+        self.assertTrue(set_grasp(SetGraspRequest.RELEASE).success)
+        fallen = self.states_after(state, 60).nodes[10]
+        self.assertTrue(set_grasp(SetGraspRequest.ATTACH_NODES, 10).success)
+        held = self.states_after(state, 5).nodes[10]
+        self.assertLess(math.dist((held.x, held.y, held.z), (fallen.x, fallen.y, fallen.z)), 1e-9)
+
     def test_bad_bodies_are_dropped_and_counted(self):
         self.start(CART_AND_BALL)
         state = self.listen("/t/state", RodState)
@@ -129,6 +144,10 @@ class Bodies(NodeCase):
         self.expect_drop("wrong_length")
         publisher.publish(bodies("cart", (0, 0, 0), 1.0, (0, 0, 0, 0)))
         self.expect_drop("bad_quaternion")
+        message = bodies("cart", (0, 0, 0), 1.0)
+        message.name, message.pose = 2 * message.name, 2 * message.pose   # which of them?
+        publisher.publish(message)
+        self.expect_drop("wrong_length", 2)
         last = self.states_after(state, 20).nodes[-1]
         self.assertLess(math.dist((last.x, last.y, last.z), (1, 0, 1)), 1e-9)
 

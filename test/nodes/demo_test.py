@@ -14,7 +14,7 @@ END = 12.5     # [s] the grippers rest from 11 s after the player's start
 
 
 def seen_from_camera(p, yaw=0.62, pitch=0.24):
-    """Orthographic picture from where config/rviz/rod.rviz looks."""
+    """Orthographic picture from where config/rviz/demo.rviz looks."""
     right = (-math.sin(yaw), math.cos(yaw), 0.0)
     up = (-math.cos(yaw) * math.sin(pitch), -math.sin(yaw) * math.sin(pitch), math.cos(pitch))
     return tuple(a[0] * p.x + a[1] * p.y + a[2] * p.z for a in (right, up))

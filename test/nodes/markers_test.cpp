@@ -42,8 +42,11 @@ bodies:
     markers[{marker.ns, marker.id}] = marker;
   ASSERT_EQ(markers.size(), 1u + 5u + 1u);   // no picture of the body without a shape
   const Marker& floor = markers[{"obstacles", 0}];
-  EXPECT_EQ(floor.type, Marker::CUBE);
-  EXPECT_NEAR(floor.pose.position.z + 0.5 * floor.scale.z, -3, 1e-12);   // its upper face
+  EXPECT_EQ(floor.type, Marker::TRIANGLE_LIST);
+  EXPECT_EQ(floor.pose.position.z, -3);
+  ASSERT_EQ(floor.points.size(), 6u);
+  EXPECT_EQ(floor.points[4].z, 0);
+  EXPECT_GT(floor.colors[0].r, 0.6f);   // shines upwards
   EXPECT_EQ((markers[{"obstacles", 1}].type), Marker::SPHERE);
   EXPECT_EQ((markers[{"obstacles", 1}].scale.x), 0.2);
   EXPECT_EQ((markers[{"obstacles", 1}].pose.position.y), 2);

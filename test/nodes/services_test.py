@@ -4,6 +4,7 @@ import math
 
 import rosgraph
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, PoseStamped, WrenchStamped
 from node_harness import SCENE, NodeCase, numbers, pose, run, wait_until
 from rosgraph_msgs.msg import Clock
@@ -111,6 +112,7 @@ class Services(NodeCase):
         self.assertFalse(self.set_grasp("right", nodes, 4, 4).success)      # holds already
         self.assertTrue(self.set_grasp("right", release).success)
         self.assertFalse(self.set_grasp("right", release).success)
+        self.assertIn("grasp left", self.set_grasp("right", nodes, 0, 2).message)
         fallen = self.states_after(state, 60)
         self.assertLess(fallen.nodes[-1].z, 0.8)
         force = wrench.last().wrench.force
@@ -160,6 +162,38 @@ class Services(NodeCase):
         self.assertEqual(self.step(5).step, 5)
         wait_until(lambda: self.diagnostics("simulation")["level"] == 0, what="the error to go")
 
+    def test_reset_after_a_failure_goes_on_as_before(self):
+        """A node that was paused, and stepped by hand into a failure, is paused again."""
+        self.start(pace="fast", paused=True)
+        guide = self.publisher("/t/grasps/right/pose", PoseStamped)
+        self.step(1)
+        guide.publish(pose(1, 0, 1, 1.0))
+        guide.publish(pose(1e200, 0, 1, 1.01))
+        wait_until(lambda: self.diagnostics("inputs")["input age right [s]"] != "none yet", what="guides")
+        rospy.sleep(0.2)
+        self.assertFalse(self.call("step", Step, 20).success)
+        self.assertTrue(self.call("reset", Trigger).success)
+        rospy.sleep(0.3)
+        self.assertEqual(self.diagnostics("simulation")["message"], "paused")
+        self.assertEqual(self.step(1).step, 1)
+
+    def test_stop_after_ends_a_long_step_too(self):
+        process = self.start(stop_after=0.05)
+        answer = self.call("step", Step, 100)
+        self.assertFalse(answer.success)
+        self.assertEqual(answer.step, 10)
+        self.assertEqual(process.wait(20), 0)
+
+    def test_tells_of_itself_during_a_long_step(self):
+        self.start()
+        told = self.listen("/diagnostics", DiagnosticArray)
+        before = told.count()
+        self.step(30000)   # about a second
+        wait_until(lambda: told.count() > before, 1, "diagnostics")
+        steps = [int(value.value) for message in told.all()[before:] for status in message.status for value in status.values
+                 if value.key == "step"]
+        self.assertTrue([s for s in steps if 0 < s < 30000], steps)
+
     def refused(self, *needles, **parameters):
         """The node exits with 2, explains, and has advertised nothing."""
         if rospy.has_param("/t"):
@@ -182,6 +216,8 @@ class Services(NodeCase):
     def test_bad_parameters_exit_2(self):
         self.refused("~pace", "wall | fast | follow | step", pace="slow")
         self.refused("~state_every", state_every=0)
+        self.refused("~frame_id", "slash", frame_id="/world")
+        self.refused("is a directory", record_bag=self.folder)
         self.refused("~guide_dealy", "no such parameter", guide_dealy=0.1)
         self.refused("~guide_delay", guide_delay="soon")
         self.refused("cannot be written", record_bag="/nowhere/at/all.bag")
@@ -208,6 +244,9 @@ class Services(NodeCase):
             rospy.sleep(0.3)
             self.assertEqual(state.last().step, 20)
             self.assertEqual(state.last().header.stamp, rospy.Time(5, 100000000))
+            self.assertEqual(self.diagnostics("simulation")["message"], "running")
+            clock.publish(Clock(rospy.Time(2)))   # a bag that begins anew
+            wait_until(lambda: "waits for /clock" in self.diagnostics("simulation")["message"], what="a warning")
         finally:
             rospy.delete_param("/use_sim_time")
 

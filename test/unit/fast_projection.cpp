@@ -235,6 +235,55 @@ TEST(FastProjection, ABodyAtAGripperSwingsAboutIt)
   EXPECT_NEAR(c.trial[0].col(1).norm(), 1.0, 1e-8);
 }
 
+TEST(FastProjection, StraightChainsThatOnlyBodiesCanRelieve)
+{
+  // exactly straight between two nodes that are not free: the chain's own system is singular, that with the bodies is not
+  for (int n : {3, 4, 5, 12})
+    for (int kind = 0; kind < 4; ++kind)
+    {
+      Random random(10 + n);
+      Case c;
+      const bool closed = kind == 3;
+      Matrix3Xd x = straightNodes(n, 0.1 * n);
+      if (closed)   // back again by way of a corner at the side
+      {
+        const Vector3d corner(0.05 * n, 0.05 * n, 0.0), from = x.col(n - 1), to = x.col(0);
+        Matrix3Xd loop(3, 2 * n + 3);
+        loop.leftCols(n) = x;
+        for (int i = 1; i <= n + 3; ++i)
+        {
+          const double s = 2.0 * i / (n + 4);
+          loop.col(n - 1 + i) = s < 1 ? from + s * (corner - from) : corner + (s - 1) * (to - corner);
+        }
+        x = loop;
+      }
+      c.add(x, closed, random);
+      if (kind == 0)
+        c.hold(0, 0, x.col(0));
+      else
+      {
+        c.addBody(x.col(0) - Vector3d(0.05, 0.02, 0), random);
+        c.weld(0, 0, 0);
+      }
+      if (kind == 1)
+        c.hold(0, n - 1, x.col(n - 1));
+      else
+      {
+        const int body = c.addBody(x.col(n - 1) + Vector3d(0.0, 0.0, 0.03), random);
+        c.weld(0, n - 1, body);
+      }
+      const auto before = c.momentum(kind < 2 ? 1 : 2);
+      const ProjectionReport report = c.run();
+      ASSERT_TRUE(report.ok) << n << " " << kind;
+      EXPECT_LE(report.iterations, 7) << n << " " << kind;
+      EXPECT_LE(c.worst(0, c.trial[0], closed), 1e-8) << n << " " << kind;
+      if (kind >= 2)
+      {
+        EXPECT_LT((c.momentum(2) - before).norm(), 1e-9 * before.norm()) << n << " " << kind;
+      }
+    }
+}
+
 TEST(FastProjection, ConvergesQuadratically)
 {
   Random random(7);

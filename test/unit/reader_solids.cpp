@@ -185,6 +185,7 @@ INSTANTIATE_TEST_SUITE_P(Contact, BadSolid, testing::Values(
   Case{"rods.0.contact.self=maybe", "must be true or false"},
   Case{"rods.0.contact.friction=-0.1", "rods.0.contact.friction = -0.1: is out of range; must be a number in [0, 100]"},
   Case{"rods.0.contact.bodies=true", "unknown key; known here: self, rods, obstacles, friction"},
+  Case{"time.integrator=symplectic_euler", "time.integrator = symplectic_euler: takes no contact"},
   Case{"rods.0.contact=true", "must be a map"}));
 
 INSTANTIATE_TEST_SUITE_P(Obstacle, BadSolid, testing::Values(
@@ -225,7 +226,7 @@ INSTANTIATE_TEST_SUITE_P(Body, BadSolid, testing::Values(
   Case{"bodies.2={name: point}", "must have a mass, or a density and a shape"},
   Case{"bodies.2={name: point, mass: 1}", "inertia: is missing; a body without a shape needs [Ixx, Iyy, Izz]"},
   Case{"bodies.2={name: point, density: 1, inertia: [1, 1, 1]}", "density = 1: needs a shape"},
-  Case{"bodies.2.inertia=[1, 2, 4]", "bodies.2.inertia = [1, 2, 4]"},
+  Case{"bodies.2.inertia=[1, 2, 4]", "bodies.2.inertia = [1, 2, 4]: body point: principal moments"},
   Case{"bodies.2.inertia=[1, 2, 0]", "inertia.2 = 0"},
   Case{"bodies.2.inertia=[1, 2]", "has 2 entries"},
   Case{"bodies.2.inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]", "must be symmetric"},

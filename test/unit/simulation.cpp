@@ -299,6 +299,21 @@ INSTANTIATE_TEST_SUITE_P(Integrators, SavedState,
                          testing::Values("implicit_euler", "bdf2", "tr_bdf2", "implicit_midpoint", "generalized_alpha",
                                          "symplectic_euler"));
 
+TEST(SavedStateFile, belongsToTheFormulationToo)
+{
+  const std::string path = testing::TempDir() + "/slender_sim_formulation";
+  const auto scene = [](const std::string& traits) {
+    return Simulation(parseScene("time: {step: 1e-4, integrator: symplectic_euler}\nrods: [{" + traits + "}]\n"));
+  };
+  scene("formulation: isotropic").save(path);
+  for (const char* other : {"formulation: general", "stretching: projected"})
+  {
+    EXPECT_THROW(scene(other).load(path), std::runtime_error) << other;
+  }
+  EXPECT_NO_THROW(scene("formulation: auto").load(path));
+  std::remove(path.c_str());
+}
+
 TEST(SavedStateFile, sayWhyItCannotBeWritten)
 {
   const Simulation simulation = make();
@@ -336,6 +351,50 @@ rods:
   simulation.attach(0, 3, 3, Hold::frame);
   step(0.02);
   EXPECT_LT((simulation.state().rods[0].x.col(3) - node).norm(), 1e-12);   // the hand stands still: nothing jumps
+}
+
+/// `attach: section` tells where the held section begins; one that is taken elsewhere, later, stays where it is.
+TEST(Simulation, NothingJumpsWhenAGraspIsAttachedElsewhere)
+{
+  for (const std::string motion : {"{body: hand}", "{table: [[0, 1, 0, 0, 0, 0, 0, 1], [1, 1, 0, 0, 0, 0, 0, 1]]}"})
+  {
+    Simulation simulation(parseScene(R"(
+time: {step: 0.01}
+bodies: [{name: hand, pose: {position: [1, 0, 0]}, motion: {topic: true}}]
+rods: [{centerline: {straight: {edges: 20}}, grasps: {left: {edges: [0]}, right: {edges: [-1], motion: )" + motion + "}}}]\n"));
+    run(simulation, 2);
+    EXPECT_EQ(simulation.state().rods[0].x(0, 20), 1.0);
+    simulation.release(1);
+    run(simulation, 20);
+    const Eigen::Matrix3Xd fallen = simulation.state().rods[0].x;
+    ASSERT_LT(fallen(2, 10), -0.05);
+    simulation.attach(1, 10, 10, Hold::frame);
+    run(simulation, 10);
+    EXPECT_LT((simulation.state().rods[0].x.col(10) - fallen.col(10)).norm(), 1e-12) << motion;
+    simulation.reset();
+    run(simulation, 2);
+    EXPECT_EQ(simulation.state().rods[0].x(0, 20), 1.0);   // the section itself again
+  }
+}
+
+TEST(Simulation, SaysWhereInTheFileARodCannotBeComposed)
+{
+  const auto refusal = [](const std::vector<std::string>& overrides) -> std::string {
+    try
+    {
+      Simulation simulation(parseScene(two_rods, "two.yaml", overrides));
+    }
+    catch (const SceneError& error)
+    {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(refusal({"rods.1.stretching=projected"}).find("two.yaml:9: rods.1 (b): stretching: projected takes explicit steps"), 0u)
+    << refusal({"rods.1.stretching=projected"});
+  EXPECT_EQ(refusal({"rods.0.formulation=isotropic"}).find("two.yaml:4: rods.0 (a): formulation: isotropic does not apply"), 0u);
+  const std::string touching = refusal({"rods.0.contact={}", "rods.1.contact={}", "rods.1.centerline.straight={from: [0.5, -1, 0], to: [0.5, 1, 0]}"});
+  EXPECT_EQ(touching.find("two.yaml: rods, bodies or obstacles with contact touch or cross"), 0u) << touching;
 }
 
 TEST(Simulation, FormulationIsChosenWhereItApplies)
@@ -376,6 +435,9 @@ rods: [{centerline: {straight: {edges: 20}}, material: {bend_modulus: 1e-4, twis
   run(a, 20);
   run(b, 20);
   expectSameBits(a.state(), b.state());
+  Simulation stiff = build({}), general = build({"rods.0.stretching=projected", "rods.0.formulation=general"});
+  EXPECT_THROW(stiff.load(file), std::runtime_error);   // other equations: not the same run going on
+  EXPECT_THROW(general.load(file), std::runtime_error);
 }
 
 }  // namespace

@@ -91,14 +91,25 @@ private:
     int chain, edge, body;
     double sign;           ///< +1: the edge ends at the welded node, -1: it begins there
     int node;
-    int special;           ///< index among the edges that only bodies can move, -1: another
+    int special;           ///< index of the edge among the special ones, -1: another
     int run;               ///< of edges that free nodes connect: touches of one run feel each other
     Vector6 row, column;   ///< d(edge's length)/d(body), impulse on the body per multiplier
+  };
+
+  /// An edge whose multiplier is an unknown beside the bodies' displacements: one that only bodies can move, or the last of a run between
+  /// two nodes that are not free. Without it such a run has a loose end; a straight one between two fixed nodes has a singular system.
+  struct Special
+  {
+    int chain, edge, run;
+    int before;            ///< the edge that a free node connects it to, -1: none
+    double c = 0;          ///< right-hand side, and entries of the chain's system: (before, edge), (edge, before), (edge, edge)
+    double to_before = 0, from_before = 0, own = 0;
   };
 
   void setOwner(int chain, int node, int owner);
   void prepare();
   void buildPattern();
+  static void put(double* const* p, int i, const Eigen::Vector3d& v);
   double& entry(int row, int column) { return matrix_.values()[matrix_.index(row, column)]; }
   void factorChain(Chain& chain);
   void solveChain(const Chain& chain, double* b) const;
@@ -114,7 +125,7 @@ private:
   double step_ = 1.0;
 
   std::vector<Touch> touches_;
-  int specials_ = 0;
+  std::vector<Special> specials_;
   std::vector<Vector6> impulse_;           ///< per body, sum so far
   std::vector<Eigen::Vector3d> turn_;      ///< per body, rotation vector from its start
   SparseLu matrix_;                        ///< of the bodies' displacements, six each, then of the special edges' multipliers

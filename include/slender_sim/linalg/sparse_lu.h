@@ -5,7 +5,9 @@
 
 namespace slender {
 
-/// LU factorisation of sparse matrices, symmetric or not, whose pattern stays while their values change (KLU of SuiteSparse).
+/// LU factorisation of sparse matrices, symmetric or not, whose pattern stays while their values change (KLU of SuiteSparse). Pivots lie
+/// on the diagonal in an order that follows from the pattern alone, so what was factored before leaves no trace in a result. That suits
+/// matrices like [M, B; C, 0] with a nearly symmetric and positive M, full-ranked C and B near -C^T.
 class SparseLu
 {
 public:
@@ -13,8 +15,9 @@ public:
   ~SparseLu();
   SparseLu(SparseLu&&) noexcept;
 
-  /// By columns: rows of column j are rows[starts[j]] .. rows[starts[j + 1] - 1], ascending. values() are zero afterwards.
-  void setPattern(int size, std::vector<int> starts, std::vector<int> rows);
+  /// By columns: rows of column j are rows[starts[j]] .. rows[starts[j + 1] - 1], ascending; the diagonal must be
+  /// among them. The first `leading` unknowns (M above) are eliminated first. values() are zero afterwards.
+  void setPattern(int size, std::vector<int> starts, std::vector<int> rows, int leading);
 
   int size() const;
   /// One per entry of the pattern.
@@ -22,7 +25,7 @@ public:
   /// Index of an entry in values(). It must be in the pattern.
   int index(int row, int column) const;
 
-  /// False when the matrix is singular or not finite. Pivots are chosen at the first call and kept while they serve.
+  /// False when a pivot is zero or not finite.
   bool factor();
   /// x := A^-1 x after a factor() that returned true.
   void solve(double* x) const;

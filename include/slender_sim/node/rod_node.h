@@ -53,6 +53,7 @@ private:
   void realign();                        // time went on while the rod stood still
   ros::WallDuration untilDue() const;
   void work();
+  void tell();                           // markers and diagnostics, when they are due
   void recordingFailed(const std::string& reason);
   void summary() const;
 
@@ -82,7 +83,7 @@ private:
   std::unique_ptr<BagRecorder> bag_;
   SceneMessages messages_;
 
-  Mode mode_ = Mode::running;
+  Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
   std::uint32_t epoch_ = 0;
   std::string failure_, bag_failure_;

@@ -19,6 +19,8 @@ public:
 
   /// Elastic energy and gradient() at a state.
   RodEvaluation evaluate(const RodState& state);
+  /// Of the state last evaluated [J].
+  double twistEnergy() const { return twist_energy_; }
   /// Twists and frames of `to`, whose nodes have moved and whose grasps are at `poses`, from those of the state last evaluated.
   StepFailure settle(const RodState& from, const std::vector<Pose>& poses, RodState& to);
 
@@ -42,6 +44,7 @@ private:
   double totalTwist(const Span& span, const RodState& state) const;
   double evaluateClamp(int clamp, const RodState& state, double& min_chi);
   StepFailure settleSpan(const Span& span, const RodState& from, const std::vector<Pose>& poses, RodState& to);
+  void releaseTwists(const GraspState& before, RodState& to, const GraspState& now) const;
   template <class F>
   void forJoints(const Span& span, F&& f) const;
   Eigen::Vector3d tangent(int edge) const { return {a_.t[0][edge], a_.t[1][edge], a_.t[2][edge]}; }
@@ -54,6 +57,7 @@ private:
   std::vector<AlignedVector<double>> storage_;
   AlignedVector<double> gradient_;
   unsigned long composition_ = 0;
+  double twist_energy_ = 0;
   std::vector<Span> spans_;
   std::vector<double> clamp_moment_;                 ///< twisting moment of each clamp's span [N m]
   std::vector<Eigen::Vector3d> clamp_torque_;        ///< on the gripper

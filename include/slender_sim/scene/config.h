@@ -125,6 +125,7 @@ struct RodContact
 struct RodConfig
 {
   std::string name;
+  std::string place;                           ///< "FILE:LINE: PATH" for messages; empty when not read from a file
   Curve centerline = StraightCurve{};          ///< rest (natural) shape, also the initial one unless `initial` is given
   std::optional<Curve> initial;                ///< initial shape; its edges are resampled to those of the centerline
   bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
@@ -186,6 +187,7 @@ struct RecordConfig { int every = 1; };        ///< record every n-th step (`sim
 struct SceneConfig
 {
   std::string name = "scene";
+  std::string file;                            ///< that it was read from, for messages; may be empty
   std::string source;                          ///< the YAML text after --set overrides (what `scene` publishes)
   Eigen::Vector3d gravity{0, 0, -9.81};        ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};               ///< [m/s]

@@ -23,7 +23,7 @@ struct SceneState
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
   double contact_stiffness = 0.0;      ///< of the barrier [N]
-  /// Per grasp of the scene: the held section seen from the pose that drives it; identity with `attach: section`.
+  /// Per grasp of the scene: the held section seen from the pose that drives it; with `attach: section` identity until attach().
   std::vector<Pose> grasp_offsets;
   std::vector<Wrench> wrenches;   ///< per grasp of the scene, of the last step
 };
@@ -66,10 +66,10 @@ public:
   /// Inputs as the scene itself defines them at the end of the coming step: tables evaluated, everything else held where it is.
   SceneInputs defaultInputs() const;
 
-  /// The pose of the held section when the driving frame M of a grasp (a gripper, a body) is at X_WM: with `attach: section` the
-  /// same, else X_WM and the offset taken when the grasp began (or the one last set).
+  /// The pose of the held section when the driving frame M of a grasp (a gripper, a body) is at X_WM: X_WM and the offset that was
+  /// taken as the scene began (none with `attach: section`), or last by attach() or setOffset().
   GraspTarget targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity = std::nullopt) const;
-  /// `attach: initial`: takes the offset between the driving frame now at X_WM and the held section. No effect otherwise.
+  /// Takes the offset between the driving frame now at X_WM and the held section.
   void setOffset(int grasp, const Pose& X_WM);
 
   /// One step of config().time.step. On failure the state is untouched. Throws std::invalid_argument unless there is one grasp
@@ -82,8 +82,8 @@ public:
   /// Back to the initial state.
   void reset();
 
-  /// Takes hold of nodes first..last of a rod as they are now, under the name of an existing grasp of that rod. With
-  /// `attach: initial` the offset from a table, or from a body or obstacle of the scene, is taken anew; other motions set theirs when their next pose comes (setOffset).
+  /// Takes hold of nodes first..last of a rod as they are now, under the name of an existing grasp of that rod. Nothing jumps: the
+  /// offset from a table, or from a body or obstacle of the scene, is taken anew, whatever `attach` says of the scene's start.
   /// Throws std::invalid_argument: no such grasp or nodes, overlap with another active grasp, several nodes held by position.
   void attach(int grasp, int first_node, int last_node, Hold hold);
   void release(int grasp);
