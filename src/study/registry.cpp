@@ -40,6 +40,7 @@ void runCoiling(StudyContext&);
 void runThreadStability(StudyContext&);
 void runSewingMachine(StudyContext&);
 void runSagging(StudyContext&);
+void runThreadImplicitVsExplicit(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -80,6 +81,7 @@ const std::vector<Study>& studies()
       {"coiling", "a viscous thread that coils: frequency and radius against height, up and down", runCoiling},
       {"sewing_machine", "patterns of a viscous thread on a moving belt, its speed rising and falling", runSewingMachine},
       {"sagging", "viscous threads that sag between plates: paths in time, catenary or U", runSagging},
+      {"thread_implicit_vs_explicit", "a coiling thread: largest steps and cost of implicit against explicit integration", runThreadImplicitVsExplicit},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
   };
   return all;
