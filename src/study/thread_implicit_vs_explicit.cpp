@@ -77,7 +77,7 @@ void runThreadImplicitVsExplicit(StudyContext& context)
     implicit_cpu = seconds;
   }
 
-  // explicit: stable over the passage of two edges through the nozzle
+  // explicit: over the passage of some edges through the nozzle
   double explicit_step = 0, explicit_cpu = 0;
   const double duration = (context.quick() ? 1.2 : 4.0) * settled.model.feed_length / 0.615;
   for (double h = 4e-6; h > 1e-8; h /= std::sqrt(2.0))
@@ -86,28 +86,37 @@ void runThreadImplicitVsExplicit(StudyContext& context)
     ThreadSetup t = settled;
     double seconds = 0;
     coilFrequency(t, Integrator::symplectic_euler, h, duration, &seconds);
-    const bool stable = seconds > 0;
     Row& row = context.row();
-    row.set("integrator", "symplectic_euler").set("step", h).set("outcome", stable ? "stable" : "blew up");
-    if (!stable)
+    row.set("integrator", "symplectic_euler").set("step", h);
+    if (seconds == 0)
+    {
+      row.set("outcome", "blew up");
       continue;
+    }
     // the same motion: every node where the implicit integration with a short step has it
     ThreadSetup other = settled;
     ThreadStepper stepper = makeStepper(other);
     while (other.time < t.time - 1e-9)
       advance(stepper, other, std::min(1e-3, t.time - other.time), "thread_implicit_vs_explicit");
     double away = 0.0;
-    for (int i = 0; i < std::min(t.state.nodes(), other.state.nodes()); ++i)
-      away = std::max(away, (t.state.x[i] - other.state.x[i]).norm());
-    row.set("cpu_per_second", seconds);
-    row.check(away / kRadius, 0.0, 0.05, "implicit integration with a step of 1e-3: largest distance over the coil's radius");
+    for (int i = 0; i < t.state.nodes(); ++i)
+    {
+      const auto same = std::find(other.state.id.begin(), other.state.id.end(), t.state.id[i]);
+      if (same != other.state.id.end())
+        away = std::max(away, (t.state.x[i] - other.state.x[same - other.state.id.begin()]).norm());
+    }
+    const bool stable = away < 0.01 * kRadius;
+    row.set("outcome", stable ? "stable" : "rattles").set("cpu_per_second", seconds).set("distance_from_implicit_over_R", away / kRadius);
+    if (!stable)
+      continue;
     explicit_step = h;
     explicit_cpu = seconds;
     break;
   }
   context.metric("step_ratio", implicit_step / explicit_step);
   context.metric("speedup", explicit_cpu / implicit_cpu);
-  context.note("implicit: the largest step that keeps the coil's frequency within 2 %; explicit: the largest that does not blow up, by factors of sqrt 2.");
+  context.note("implicit: the largest step that keeps the coil's frequency within 2 %; explicit: the largest that stays");
+  context.note("within 1 % of the coil's radius of an implicit integration with a step of 1e-3, by factors of sqrt 2.");
   context.note("The explicit step evaluates strains and forces once each.");
 }
 
