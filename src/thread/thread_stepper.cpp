@@ -2,16 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "slender_sim/thread/thread_remesh.h"
 #include "thread_stepper_impl.h"
 
 namespace slender {
 
-ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton)
+ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton, Integrator integrator)
 {
   checkThreadModel(*model);
-  impl_ = std::make_unique<Impl>(std::move(model), newton);
+  if (integrator != Integrator::implicit_euler && integrator != Integrator::symplectic_euler)
+    throw std::invalid_argument("thread '" + model->name + "': integrator is " + toString(integrator) + ", allowed: implicit_euler, symplectic_euler");
+  impl_ = std::make_unique<Impl>(std::move(model), newton, integrator == Integrator::symplectic_euler);
 }
 ThreadStepper::~ThreadStepper() = default;
 ThreadStepper::ThreadStepper(ThreadStepper&&) noexcept = default;
@@ -72,6 +75,8 @@ StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, 
 std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
+  if (explicit_step)
+    return "the explicit step blew up" + at + ": use a shorter step or implicit_euler";
   switch (failure)
   {
     case StepFailure::folded_back:
@@ -109,6 +114,8 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
     report.merge(sub);
     if (failure != StepFailure::none)
     {
+      if (explicit_step)   // a shorter step now would only hide that all of them are too long
+        return refuse(report, failure, explainFailure(failure, length));
       if (0.5 * length < shortest * (1 - 1e-9))
       {
         const int fold = foldedNode();
@@ -156,9 +163,11 @@ StepFailure ThreadStepper::Impl::substep(const ThreadInputs& inputs, double from
     return StepFailure::folded_back;
   setResponse(inputs, h);
   setTrial(inputs, h);
-  if (const StepFailure failure = solve(inputs, h, report); failure != StepFailure::none)
+  if (const StepFailure failure = explicit_step ? move(inputs, h) : solve(inputs, h, report); failure != StepFailure::none)
     return failure;
   finish(inputs, h);
+  if (explicit_step)
+    push(h);
   remesh();
   return StepFailure::none;
 }

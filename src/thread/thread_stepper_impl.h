@@ -15,12 +15,13 @@ namespace slender {
 class ThreadStepper::Impl
 {
 public:
-  Impl(std::shared_ptr<const ThreadModel> m, const NewtonConfig& n) : model(std::move(m)), newton(n) {}
+  Impl(std::shared_ptr<const ThreadModel> m, const NewtonConfig& n, bool is_explicit) : model(std::move(m)), newton(n), explicit_step(is_explicit) {}
 
   StepReport step(ThreadState& state, const ThreadInputs& inputs, double duration);
 
   std::shared_ptr<const ThreadModel> model;
   NewtonConfig newton;
+  bool explicit_step;
   std::array<EndLoad, 2> loads;
 
 private:
@@ -33,6 +34,8 @@ private:
   void setResponse(const ThreadInputs& inputs, double h);
   void setTrial(const ThreadInputs& inputs, double h);
   StepFailure solve(const ThreadInputs& inputs, double h, StepReport& report);
+  StepFailure move(const ThreadInputs& inputs, double h);
+  void push(double h);
   bool land(const ThreadInputs& inputs, double h);
   void finish(const ThreadInputs& inputs, double h);
   void remesh();

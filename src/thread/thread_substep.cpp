@@ -162,6 +162,35 @@ StepFailure ThreadStepper::Impl::solve(const ThreadInputs& inputs, double h, Ste
   return StepFailure::none;
 }
 
+/// Explicit step, first half: everything goes on as it moves. What resists this motion is then known.
+StepFailure ThreadStepper::Impl::move(const ThreadInputs& inputs, double h)
+{
+  landed.assign(work.nodes(), 0);
+  for (int j = first_; j + 1 < work.nodes(); ++j)
+    if (!isSolid(j))
+      system.setTurn(inSystem(j), h * work.spin[j]);
+  if (model->floor.present)
+    land(inputs, h);
+  const RodEvaluation there = system.evaluate(false);
+  if (there.min_chi <= kFoldedChi)
+    return StepFailure::folded_back;
+  return std::isfinite(there.energy()) ? StepFailure::none : StepFailure::state_not_finite;
+}
+
+/// Explicit step, second half: the forces change the velocities (symplectic Euler, thesis 4.6.1).
+void ThreadStepper::Impl::push(double h)
+{
+  const RodArrays& a = system.arrays();
+  for (int i = first_; i < work.nodes(); ++i)
+  {
+    const int k = inSystem(i);
+    if (!work.deposited[i] && !endHeld(i))
+      work.v[i] -= system.reaction(k).head<3>() / (h * a.weight[k]);
+    if (i + 1 < work.nodes() && system.spinWeight(k) > 0)
+      work.spin[i] -= system.reaction(k)[3] / (h * system.spinWeight(k));
+  }
+}
+
 /// Height of a node whose section touches the floor.
 double ThreadStepper::Impl::restingHeight(int i) const
 {
@@ -192,7 +221,8 @@ bool ThreadStepper::Impl::land(const ThreadInputs& inputs, double h)
       earliest = std::min(earliest, when);
   if (earliest > 1.0)
     return false;
-  system.accept();
+  if (!explicit_step)   // the next solution begins here
+    system.accept();
   for (int i = first_; i < n; ++i)
     if (meets(i, when) && when <= earliest + kTogether)
     {

@@ -112,6 +112,27 @@ TEST(Allocations, WarmProjectedStepsMakeNone)
   }
 }
 
+TEST(Allocations, WarmProjectedStepsWithBodiesMakeNone)
+{
+  Group g = tee();
+  for (auto& model : g.model.rods)
+  {
+    auto changed = std::make_shared<RodModel>(*model);
+    changed->isotropic = changed->inextensible = true;
+    model = changed;
+  }
+  RodGroup group(g.model, withIntegrator(Integrator::symplectic_euler));
+  const auto advance = [&] { return group.step(g.state, g.inputs, 2e-5).ok; };
+  for (int k = 0; k < 20; ++k)
+    ASSERT_TRUE(advance());
+  const long before = allocations;
+  bool ok = true;
+  for (int k = 0; k < 20; ++k)
+    ok = advance() && ok;
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_TRUE(ok);
+}
+
 TEST(ThreadAllocations, AWarmStepMakesNone)
 {
   ThreadModel model = honey();
@@ -136,27 +157,6 @@ TEST(ThreadAllocations, AWarmStepMakesNone)
   EXPECT_EQ(allocations - before, 0);
   EXPECT_TRUE(ok);
   EXPECT_GT(t.state.next_id, fed + 10);
-}
-
-TEST(Allocations, WarmProjectedStepsWithBodiesMakeNone)
-{
-  Group g = tee();
-  for (auto& model : g.model.rods)
-  {
-    auto changed = std::make_shared<RodModel>(*model);
-    changed->isotropic = changed->inextensible = true;
-    model = changed;
-  }
-  RodGroup group(g.model, withIntegrator(Integrator::symplectic_euler));
-  const auto advance = [&] { return group.step(g.state, g.inputs, 2e-5).ok; };
-  for (int k = 0; k < 20; ++k)
-    ASSERT_TRUE(advance());
-  const long before = allocations;
-  bool ok = true;
-  for (int k = 0; k < 20; ++k)
-    ok = advance() && ok;
-  EXPECT_EQ(allocations - before, 0);
-  EXPECT_TRUE(ok);
 }
 
 TEST(ContactAllocations, WarmContactMakesNone)

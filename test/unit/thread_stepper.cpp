@@ -84,6 +84,35 @@ TEST(ThreadStepper, AFailedStepLeavesTheState)
   EXPECT_TRUE(sameThread(t.state, before));
 }
 
+TEST(ThreadStepper, ExplicitAndImplicitStepsAgree)
+{
+  Thread t = pouring(0.05);
+  t.model.viscosity = 2;
+  t.model.surface_tension = 0.05;
+  Thread u = t;
+  ThreadStepper implicit = t.stepper(), explicitly(std::make_shared<ThreadModel>(t.model), NewtonConfig{}, Integrator::symplectic_euler);
+  for (int k = 0; k < 3000; ++k)   // the thread has reached the floor
+  {
+    ASSERT_TRUE(implicit.step(t.state, t.inputs, 5e-5).ok);
+    ASSERT_TRUE(explicitly.step(u.state, u.inputs, 5e-5).ok) << k;
+  }
+  ASSERT_EQ(t.state.nodes(), u.state.nodes());
+  EXPECT_GT(t.state.deposited[0], 0);
+  for (int i = 0; i < t.state.nodes(); ++i)
+    EXPECT_LT((t.state.x[i] - u.state.x[i]).norm(), 1e-4) << i;
+  // far too long a step is refused, and nothing has happened
+  StepReport report;
+  for (int k = 0; k < 2000 && report.ok; ++k)
+  {
+    const ThreadState last = u.state;
+    report = explicitly.step(u.state, u.inputs, 2e-3);
+    EXPECT_TRUE(report.ok || sameThread(u.state, last));
+  }
+  EXPECT_FALSE(report.ok);
+  EXPECT_NE(report.message.find("implicit_euler"), std::string::npos);
+  EXPECT_THROW(ThreadStepper(std::make_shared<ThreadModel>(t.model), NewtonConfig{}, Integrator::bdf2), std::invalid_argument);
+}
+
 TEST(ThreadStepper, AThreadFallsFreely)
 {
   Random random(1);

@@ -26,13 +26,13 @@ struct EndLoad
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
 };
 
-/// Advances one viscous thread by implicit Euler steps (thesis 5.3): the rod's energies with viscous stiffnesses, their rest strains
-/// those at the start of the step.
+/// Advances one viscous thread (thesis 5.3): the rod's energies with viscous stiffnesses, their rest strains those at the start of the step.
+/// implicit_euler for use; symplectic_euler, stable only for steps of about rho l^2 / (6 mu) at the shortest edge l, for comparison.
 class ThreadStepper
 {
 public:
-  /// Throws std::invalid_argument for a model that is not valid.
-  ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton);
+  /// Throws std::invalid_argument for a model that is not valid, or another integrator.
+  ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton, Integrator integrator = Integrator::implicit_euler);
   ~ThreadStepper();
   ThreadStepper(ThreadStepper&&) noexcept;
   ThreadStepper& operator=(ThreadStepper&&) noexcept;

@@ -50,6 +50,9 @@ public:
   void setInertia(int i, double weight, const Eigen::Vector3d& target, const Eigen::Vector3d& force);
   /// Inertia of edge j's turn since the start of the step: 1/2 weight (turn - target)^2.
   void setSpin(int j, double weight, double target) { spin_weight_[j] = weight, spin_target_[j] = target; }
+  double spinWeight(int j) const { return spin_weight_[j]; }
+  /// Turn of the trial from the base.
+  void setTurn(int j, double turn) { a_.turn[j] = turn; }
   void holdNode(int i) { held_[4 * i] = held_[4 * i + 1] = held_[4 * i + 2] = 1; }
   void holdAngle(int j) { held_[4 * j + 3] = 1; }
   bool nodeHeld(int i) const { return held_[4 * i]; }
