@@ -206,13 +206,19 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
     }
     if (config.floor)
     {
-      Marker floor = makeMarker(header, "floors", static_cast<int>(k), Marker::CUBE);
-      const Pose X = config.nozzle ? config.nozzle->pose : Pose();
-      const double size = config.nozzle ? std::max(0.1, 1.5 * (X.position.z() - config.floor->height)) : 1.0;
-      floor.pose = toMessage(Pose{Vector3d(X.position.x(), X.position.y(), config.floor->height - 0.005 * size), Eigen::Quaterniond::Identity()});
-      floor.scale.x = floor.scale.y = size;
-      floor.scale.z = 0.01 * size;
-      floor.color = ground;
+      // two triangles: rviz would light a flat box from the camera, and it looks black
+      Marker floor = makeMarker(header, "floors", static_cast<int>(k), Marker::TRIANGLE_LIST);
+      const Vector3d middle = config.nozzle ? config.nozzle->pose.position : Vector3d(0, 0, 0);
+      const double size = config.nozzle ? std::max(0.1, 1.5 * (middle.z() - config.floor->height)) : 1.0;
+      Vector3d low = middle - Vector3d(size, size, 0), high = middle + Vector3d(size, size, 0);
+      if (config.region && (*config.region)[1].head<2>().cwiseAbs().maxCoeff() < 1e3 && (*config.region)[0].head<2>().cwiseAbs().maxCoeff() < 1e3)
+        low = (*config.region)[0], high = (*config.region)[1];
+      const double z = config.floor->height;
+      for (const auto& [x, y] : {std::pair(low.x(), low.y()), {high.x(), low.y()}, {high.x(), high.y()}, {low.x(), low.y()}, {high.x(), high.y()}, {low.x(), high.y()}})
+      {
+        floor.points.push_back(toPoint(Vector3d(x, y, z)));
+        floor.colors.push_back(lit(ground, Vector3d::UnitZ()));
+      }
       out.markers.push_back(floor);
     }
   }

@@ -91,6 +91,8 @@ DiagnosticStatus SceneNode::simulationStatus() const
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);
   add(status, "largest strain", recent_.max_strain);
+  if (!simulation_->state().threads.empty())
+    add(status, "mended folds", recent_.mended_folds);
   if (recent_.projection_iterations > 0)
   {
     add(status, "projection iterations", static_cast<std::uint64_t>(recent_.projection_iterations));

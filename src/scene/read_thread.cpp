@@ -17,9 +17,10 @@ const Range length = Range::above(0, max_coordinate, "m");
 TimedNumber readTimed(const YamlCursor& at, const Range& range)
 {
   TimedNumber timed;
+  const auto constant = [](double value) { return NumberTable({{0.0, value}}); };
   if (!at.isMap())
   {
-    assign(timed.values[0], at.number(range));
+    timed.table = constant(at.number(range).value_or(0.0));
     return timed;
   }
   YamlMap map(at);
@@ -36,32 +37,28 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
     {
       topic.problem("must be true; without a topic it is written as a number");
     }
-    assign(timed.values[0], initial.number(range));
+    timed.table = constant(initial.number(range).value_or(0.0));
   }
   else
   {
-    timed.times.clear();
-    timed.values.clear();
+    std::vector<NumberTable::Entry> entries;
     for (const YamlCursor& row : table.items(1))
     {
-      const auto entries = row.items(2, 2);
-      const auto time = entries.empty() ? std::nullopt : entries[0].number(Range::closed(-1e9, 1e9, "s"));
-      const auto value = entries.empty() ? std::nullopt : entries[1].number(range);
-      if (!time || !value)
+      const auto pair = row.items(2, 2);
+      const auto time = pair.empty() ? std::nullopt : pair[0].number(Range::closed(-1e9, 1e9, "s"));
+      const auto value = pair.empty() ? std::nullopt : pair[1].number(range);
+      if (time && value)
       {
-        continue;
+        entries.push_back({*time, *value});
       }
-      if (!timed.times.empty() && *time <= timed.times.back())
-      {
-        row.problem("is not later than the row before; times must increase");
-        continue;
-      }
-      timed.times.push_back(*time);
-      timed.values.push_back(*value);
     }
-    if (timed.times.empty())
+    try
     {
-      return {};
+      timed.table = NumberTable(std::move(entries));
+    }
+    catch (const std::invalid_argument& error)
+    {
+      table.problem(error.what());
     }
   }
   return timed;
@@ -128,8 +125,8 @@ FloorConfig readFloor(const YamlCursor& at)
     }
     else if (velocity)
     {
-      floor.belt_x.values[0] = (*velocity)[0];
-      floor.belt_y.values[0] = (*velocity)[1];
+      floor.belt_x.table = NumberTable({{0.0, (*velocity)[0]}});
+      floor.belt_y.table = NumberTable({{0.0, (*velocity)[1]}});
     }
   }
   assign(floor.on_surface, map.get("centreline_on_surface").boolean());

@@ -1,5 +1,4 @@
 // Viscous threads of a scene.
-#include <algorithm>
 #include <stdexcept>
 
 #include "slender_sim/geometry/rotation.h"
@@ -8,21 +7,6 @@
 #include "slender_sim/scene/simulation.h"
 
 namespace slender {
-
-double TimedNumber::at(double time) const
-{
-  const auto after = std::upper_bound(times.begin(), times.end(), time);
-  if (after == times.begin())
-  {
-    return values.front();
-  }
-  if (after == times.end())
-  {
-    return values.back();
-  }
-  const std::size_t k = after - times.begin();
-  return values[k - 1] + (values[k] - values[k - 1]) * (time - times[k - 1]) / (times[k] - times[k - 1]);
-}
 
 namespace {
 
@@ -65,7 +49,7 @@ ThreadState stateOf(const ThreadConfig& config, const ThreadModel& model, const 
 {
   if (config.nozzle)
   {
-    return makeNozzleThread(model, config.nozzle->pose, config.nozzle->flow.at(0.0) / model.nozzleArea());
+    return makeNozzleThread(model, config.nozzle->pose, config.nozzle->flow.table.at(0.0) / model.nozzleArea());
   }
   const Eigen::Matrix3Xd nodes = curveNodes(*config.centerline, gravity);
   const int edges = static_cast<int>(nodes.cols()) - 1;
@@ -112,12 +96,12 @@ void Simulation::addThreadInputs(SceneInputs& inputs, double time) const
     {
       const auto* table = std::get_if<TableMotion>(&thread.nozzle->motion);
       drive.nozzle = table ? table->poses.evaluate(time) : state_.threads[k].threads.front().ends[1].X_WE;
-      drive.flow_rate = thread.nozzle->flow.at(time - 0.5 * config_.time.step);   // the middle of the step
+      drive.flow_rate = thread.nozzle->flow.table.mean(time - config_.time.step, time);
     }
     if (thread.floor)
     {
-      const double middle = time - 0.5 * config_.time.step;
-      drive.belt_velocity << thread.floor->belt_x.at(middle), thread.floor->belt_y.at(middle), 0.0;
+      const double start = time - config_.time.step;
+      drive.belt_velocity << thread.floor->belt_x.table.mean(start, time), thread.floor->belt_y.table.mean(start, time), 0.0;
     }
     inputs.threads.push_back(drive);
   }

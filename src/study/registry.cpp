@@ -39,6 +39,7 @@ void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
 void runThreadStability(StudyContext&);
 void runSewingMachine(StudyContext&);
+void runThreadTables(StudyContext&);
 void runSagging(StudyContext&);
 void runThreadImplicitVsExplicit(StudyContext&);
 
@@ -80,6 +81,7 @@ const std::vector<Study>& studies()
       {"dragged_catenary", "a viscous thread that falls onto a fast belt, with and without surface tension", runDraggedCatenary},
       {"coiling", "a viscous thread that coils: frequency and radius against height, up and down", runCoiling},
       {"sewing_machine", "patterns of a viscous thread on a moving belt, its speed rising and falling", runSewingMachine},
+      {"thread_tables", "time per frame of the thesis's thread examples and of hair, beside its table 5.1", runThreadTables},
       {"sagging", "viscous threads that sag between plates: paths in time, catenary or U", runSagging},
       {"thread_implicit_vs_explicit", "a coiling thread: largest steps and cost of implicit against explicit integration", runThreadImplicitVsExplicit},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},

@@ -210,6 +210,10 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   std::printf("iterations        %d (%.2f per step)\n", total.iterations,
               total.iterations / std::max(1.0, static_cast<double>(simulation.state().steps)));
   std::printf("cut steps         %d\n", total.cut_steps);
+  if (total.mended_folds > 0)
+  {
+    std::printf("mended folds      %d\n", total.mended_folds);
+  }
   if (total.projection_iterations > 0)
   {
     std::printf("projection        at most %d iterations a step, edge lengths squared to %.2g\n", total.projection_iterations, total.constraint_error);

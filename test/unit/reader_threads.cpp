@@ -43,11 +43,11 @@ TEST(ThreadReader, ReadsEverything)
   EXPECT_EQ(t.surface_tension, 0.05);
   ASSERT_TRUE(t.nozzle && t.floor && t.region);
   EXPECT_LT((t.nozzle->pose.orientation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0.02, 0, -1).normalized()).norm(), 1e-12);
-  EXPECT_DOUBLE_EQ(t.nozzle->flow.at(-1), 3e-7);
-  EXPECT_DOUBLE_EQ(t.nozzle->flow.at(0.25), 6e-7);
-  EXPECT_DOUBLE_EQ(t.nozzle->flow.at(9), 9e-7);
-  EXPECT_DOUBLE_EQ(t.floor->belt_x.at(3), 0.01);
-  EXPECT_DOUBLE_EQ(t.floor->belt_y.at(0.5), 0.01);
+  EXPECT_DOUBLE_EQ(t.nozzle->flow.table.at(-1), 3e-7);
+  EXPECT_DOUBLE_EQ(t.nozzle->flow.table.at(0.25), 6e-7);
+  EXPECT_DOUBLE_EQ(t.nozzle->flow.table.at(9), 9e-7);
+  EXPECT_DOUBLE_EQ(t.floor->belt_x.table.at(3), 0.01);
+  EXPECT_DOUBLE_EQ(t.floor->belt_y.table.at(0.5), 0.01);
   EXPECT_EQ(t.longest_edge, 0.002);
   EXPECT_EQ(t.most_deposited, 100);
   EXPECT_EQ(t.breakup_radius, 1e-5);
@@ -60,7 +60,7 @@ TEST(ThreadReader, NamesWhatIsWrong)
       {"threads.0.nozzle.diameter=0", "threads.0.nozzle.diameter = 0"},
       {"threads.0.nozzle.flow=-1e-7", "threads.0.nozzle.flow = -1e-7"},
       {"threads.0.nozzle.flow={topic: false}", "must be true"},
-      {"threads.0.nozzle.flow={table: [[1, 0], [1, 2]]}", "times must increase"},
+      {"threads.0.nozzle.flow={table: [[1, 0], [1, 2]]}", "times must rise"},
       {"threads.0.nozzle.spin=1", "unknown key"},
       {"threads.0.centerline={straight: {edges: 3}}", "must have either a nozzle"},
       {"threads.0.radius=0.1", "is for threads with a centerline"},
@@ -81,7 +81,7 @@ TEST(ThreadScene, FeedsWhatTheTableSays)
     ASSERT_TRUE(report.ok) << report.message;
   }
   const ThreadGroupState& state = simulation.state().threads[0];
-  // trapezoid to 0.5 s, then constant; the middle of each step makes the sum exact
+  // trapezoid to 0.5 s, then constant; means over steps add up exactly
   EXPECT_NEAR(state.threads.front().fed_volume, 0.5 * 6e-7 + 0.3 * 9e-7, 1e-12 * 6e-7);
   EXPECT_NEAR(simulation.endLoads(0)[1].force.z(), 0.0, 1.0);
   EXPECT_LT(simulation.endLoads(0)[1].force.z(), 0.0);

@@ -11,6 +11,7 @@
 
 #include "slender_sim/contact/shape.h"
 #include "slender_sim/dynamics/time_config.h"
+#include "slender_sim/geometry/number_table.h"
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
 #include "slender_sim/rod/rod_model.h"
@@ -180,12 +181,11 @@ struct BodyConfig
   std::vector<WeldConfig> welds;
 };
 
-/// A number that the scene gives: constant, or a table of (t [s], value) joined by straight lines; or set by messages from its first value on.
+/// A number that the scene gives: constant (one entry), or over time; or set by messages, until the first of which it holds.
 struct TimedNumber
 {
-  std::vector<double> times{0.0}, values{0.0};
+  NumberTable table{{{0.0, 0.0}}};
   bool topic = false;
-  double at(double time) const;
 };
 
 struct NozzleConfig

@@ -3,14 +3,14 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/thread/flow_table.h"
+#include "slender_sim/geometry/number_table.h"
 
 namespace slender::test {
 namespace {
 
-TEST(FlowTable, IsLinearBetweenEntriesAndConstantBeyond)
+TEST(NumberTable, IsLinearBetweenEntriesAndConstantBeyond)
 {
-  const FlowTable table({{1, 2}, {3, 4}, {4, 0}});
+  const NumberTable table({{1, 2}, {3, 4}, {4, 0}});
   EXPECT_EQ(table.at(0), 2);
   EXPECT_EQ(table.at(1), 2);
   EXPECT_EQ(table.at(2), 3);
@@ -18,9 +18,9 @@ TEST(FlowTable, IsLinearBetweenEntriesAndConstantBeyond)
   EXPECT_EQ(table.at(9), 0);
 }
 
-TEST(FlowTable, TheMeanCountsEveryEntryInTheStep)
+TEST(NumberTable, TheMeanCountsEveryEntryInTheStep)
 {
-  const FlowTable table({{1, 2}, {3, 4}, {4, 0}});
+  const NumberTable table({{1, 2}, {3, 4}, {4, 0}});
   EXPECT_NEAR(table.mean(0, 5), (2 + 6 + 2 + 0) / 5.0, 1e-15);
   EXPECT_NEAR(table.mean(1.5, 2), 2.75, 1e-15);
   // steps of any length add up
@@ -30,12 +30,11 @@ TEST(FlowTable, TheMeanCountsEveryEntryInTheStep)
   EXPECT_NEAR(sum, 4.9 * table.mean(0, 4.9), 1e-13);
 }
 
-TEST(FlowTable, BadTablesAreRefused)
+TEST(NumberTable, BadTablesAreRefused)
 {
-  EXPECT_THROW(FlowTable({}), std::invalid_argument);
-  EXPECT_THROW(FlowTable({{0, 1}, {0, 2}}), std::invalid_argument);
-  EXPECT_THROW(FlowTable({{0, -1}}), std::invalid_argument);
-  EXPECT_THROW(FlowTable({{std::nan(""), 1}}), std::invalid_argument);
+  EXPECT_THROW(NumberTable({}), std::invalid_argument);
+  EXPECT_THROW(NumberTable({{0, 1}, {0, 2}}), std::invalid_argument);
+  EXPECT_THROW(NumberTable({{std::nan(""), 1}}), std::invalid_argument);
 }
 
 }  // namespace
