@@ -100,6 +100,10 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
   start_ends = state.ends;
   loads = {};
   flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
+  constexpr double kMostFed = 1e4;   // edges in one step
+  if (!(flow_speed_ * duration <= kMostFed * model->feed_length))
+    return refuse(report, StepFailure::input_not_finite,
+                  "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or longer feed_length");
   // no more than an edge leaves the nozzle at a time
   const double longest = flow_speed_ > 0 ? std::min(duration, model->feed_length / flow_speed_) : duration;
   const double first = duration / std::ceil(duration / longest * (1 - 1e-9)), shortest = std::ldexp(first, -newton.max_cuts);

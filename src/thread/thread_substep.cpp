@@ -187,7 +187,7 @@ void ThreadStepper::Impl::push(double h)
     if (!work.deposited[i] && !endHeld(i))
       work.v[i] -= system.reaction(k).head<3>() / (h * a.weight[k]);
     if (i + 1 < work.nodes() && system.spinWeight(k) > 0)
-      work.spin[i] -= system.reaction(k)[3] / (h * system.spinWeight(k));
+      work.spin[i] -= system.reaction(k)[3] / (h * system.spinWeight(k)) * (work.edge(i).norm() / system.restLength(k));
   }
 }
 
@@ -260,7 +260,8 @@ void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
   {
     const int k = inSystem(j);
     work.d1[j] = {a.d1[0][k], a.d1[1][k], a.d1[2][k]};
-    work.spin[j] = system.turn(k) / h;
+    // the edge turns faster as it is drawn out: its moment of inertia is rho V^2 / (2 pi length)
+    work.spin[j] = system.turn(k) / h * (work.edge(j).norm() / system.restLength(k));
   }
   for (int i = std::max(1, first_ + 1); i < n - 1; ++i)
     work.twist[i] = a.twist[inSystem(i)];
