@@ -75,12 +75,16 @@ StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, 
 std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
+  if (failure == StepFailure::overstretched)
+    return "it is drawn out so far that more than 10000 edges would have to be divided" + at +
+           ": check the motion of nozzle and belt, or use a longer max_edge_length";
   if (explicit_step)
     return "the explicit step blew up" + at + ": use a shorter step or implicit_euler";
   switch (failure)
   {
     case StepFailure::folded_back:
-      return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step";
+      return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step" +
+             (model->floor.present && work.ends[1].held ? ", and keep the nozzle above the floor" : "");
     case StepFailure::singular_matrix:
       return "the matrix could not be made definite" + at + ": radii or edge lengths differ by too many orders of magnitude";
     case StepFailure::state_not_finite:
@@ -118,7 +122,8 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
     report.merge(sub);
     if (failure != StepFailure::none)
     {
-      if (explicit_step)   // a shorter step now would only hide that all of them are too long
+      // a shorter step now would only hide that all of them are too long, or draw the thread out bit by bit
+      if (explicit_step || failure == StepFailure::overstretched)
         return refuse(report, failure, explainFailure(failure, length));
       if (0.5 * length < shortest * (1 - 1e-9))
       {
@@ -172,8 +177,7 @@ StepFailure ThreadStepper::Impl::substep(const ThreadInputs& inputs, double from
   finish(inputs, h);
   if (explicit_step)
     push(h);
-  remesh();
-  return StepFailure::none;
+  return remesh() ? StepFailure::none : StepFailure::overstretched;
 }
 
 }  // namespace slender

@@ -189,6 +189,28 @@ TEST(ThreadStepper, AFlowOfMoreEdgesThanAStepCanFeedIsRefused)
   }
 }
 
+TEST(ThreadStepper, AMotionThatDrawsTheThreadOutBeyondAllMeasureIsRefused)
+{
+  Thread t = pouring(0.1);
+  t.model.limits.max_edge_length = 0.015;
+  ThreadStepper stepper = t.stepper();
+  for (int k = 0; k < 150; ++k)
+    ASSERT_TRUE(stepper.step(t.state, t.inputs, 0.01).ok);
+  ASSERT_TRUE(t.state.deposited[0]);
+  const ThreadState before = t.state;
+  const auto refused = [&](const ThreadInputs& inputs) {
+    const StepReport r = stepper.step(t.state, inputs, 0.01);
+    return !r.ok && r.message.find("max_edge_length") != std::string::npos && sameThread(t.state, before);
+  };
+  ThreadInputs far = t.inputs;
+  far.ends[1].position.x() = 1e4;   // m, where a slip of the pen may put it
+  EXPECT_TRUE(refused(far));
+  far = t.inputs;
+  far.belt_velocity.x() = 1e6;
+  EXPECT_TRUE(refused(far));
+  EXPECT_TRUE(stepper.step(t.state, t.inputs, 0.01).ok);
+}
+
 TEST(ThreadStepper, AThreadThatIsDrawnOutKeepsItsAngularMomentum)
 {
   // spinning about its axis while its ends fly apart: like a skater who draws in the arms
