@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "slender_sim/scene/config.h"
+
+namespace slender {
+
+/// One scene value that a sweep varies.
+struct SweepAxis
+{
+  std::string path;                  ///< as of --set: threads.0.floor.belt.x
+  std::vector<std::string> values;   ///< as written in the plan or in shortest form
+};
+
+/// Runs of one scene over every combination of the axes' values. The last axis varies fastest.
+struct SweepPlan
+{
+  std::string name;
+  std::string scene;                   ///< file
+  std::vector<SweepAxis> axes;
+  std::vector<std::string> measures;   ///< names, see study/measure.h
+  double after = 0.0;                  ///< measures look from this simulated time on [s]
+  std::string text;                    ///< of the plan and of its scene: what results depend on
+
+  long points() const;
+  /// One "path=value" per axis; 0 <= point < points().
+  std::vector<std::string> overrides(long point) const;
+  SceneConfig sceneOf(long point) const;
+};
+
+/// Reads and checks a plan; the scene file is relative to it. Every value of every axis is tried in the scene. Throws SceneError
+/// (scene/reader.h) listing every problem found.
+///
+///     name: sewing_map
+///     scene: ../scenes/sewing_map.yaml
+///     axes:
+///       threads.0.floor.belt.x: {from: 0.5, to: 6, count: 12}     # or a list of values; log: true for a geometric series
+///     measures: [belt_pattern]
+///     after: 20
+SweepPlan readSweepPlan(const std::string& path);
+
+}  // namespace slender
