@@ -69,6 +69,46 @@ SweepAxis readAxis(const std::string& path, const YamlCursor& at)
   return axis;
 }
 
+SweepPlot readPlot(const YamlCursor& at)
+{
+  SweepPlot plot;
+  YamlMap map(at);
+  assign(plot.x, map.require("x").text());
+  assign(plot.y, map.require("y").text());
+  assign(plot.by, map.get("by").text());
+  plot.x_label = plot.x;
+  plot.y_label = plot.y;
+  const YamlCursor labels = map.get("labels");
+  if (labels.present())
+  {
+    const auto words = labels.items(2, 2);
+    if (!words.empty())
+    {
+      assign(plot.x_label, words[0].text());
+      assign(plot.y_label, words[1].text());
+    }
+  }
+  map.finish();
+  return plot;
+}
+
+std::string dependencies(const SweepPlan& plan)
+{
+  std::ostringstream text;
+  for (const SweepAxis& axis : plan.axes)
+  {
+    text << axis.path << ":";
+    for (const std::string& value : axis.values)
+      text << " " << value;
+    text << "\n";
+  }
+  text << "measures:";
+  for (const std::string& measure : plan.measures)
+    text << " " << measure;
+  text << "\nafter: " << plan.after << "\nscene:\n" << readText(plan.scene);
+  return text.str();
+}
+
 /// Each value once, the other axes at their first.
 void tryValues(const SweepPlan& plan, Problems& problems)
 {
@@ -142,10 +182,13 @@ SweepPlan readSweepPlan(const std::string& path)
     if (const auto name = measure.name())
       plan.measures.push_back(*name);
   assign(plan.after, map.get("after").number(Range::closed(0, 1e9, "s")));
+  const YamlCursor plot = map.get("plot");
+  if (plot.present())
+    plan.plot = readPlot(plot);
   map.finish();
   if (problems.empty())
   {
-    plan.text = text + "\n---\n" + readText(plan.scene);
+    plan.text = dependencies(plan);
     tryValues(plan, problems);
   }
   if (!problems.empty())

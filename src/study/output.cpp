@@ -240,9 +240,9 @@ std::string csvCell(const std::string& text)
   return out + "\"";
 }
 
-std::string csvValue(const Row& row, const std::string& key)
+std::string valueText(const Row& row, const std::string& key)
 {
-  return csvCell(cell(row, key, "%.12g"));
+  return cell(row, key, "%.12g");
 }
 
 void writeCsv(std::ostream& out, const StudyContext& context)
@@ -254,7 +254,7 @@ void writeCsv(std::ostream& out, const StudyContext& context)
   for (const Row& row : context.rows())
   {
     for (std::size_t k = 0; k < keys.size(); ++k)
-      out << (k ? "," : "") << csvValue(row, keys[k]);
+      out << (k ? "," : "") << csvCell(valueText(row, keys[k]));
     out << "\n";
   }
 }

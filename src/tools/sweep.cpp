@@ -123,30 +123,65 @@ std::vector<const slender::study::MeasureKind*> kindsOf(const SweepPlan& plan)
   return kinds;
 }
 
-std::string header(const SweepPlan& plan)
+std::vector<std::string> columnsOf(const SweepPlan& plan)
 {
-  std::string line = "point";
+  std::vector<std::string> columns{"point"};
   for (const slender::SweepAxis& axis : plan.axes)
-    line += "," + csvCell(axis.path);
-  line += ",status,reason";
+    columns.push_back(axis.path);
+  columns.insert(columns.end(), {"status", "reason"});
   for (const auto* kind : kindsOf(plan))
-    for (const std::string& column : kind->columns)
-      line += "," + csvCell(column);
-  return line + "\n";
+    columns.insert(columns.end(), kind->columns.begin(), kind->columns.end());
+  return columns;
+}
+
+std::size_t columnOf(const SweepPlan& plan, const std::string& name)
+{
+  const std::vector<std::string> columns = columnsOf(plan);
+  const auto at = std::find(columns.begin(), columns.end(), name);
+  if (at != columns.end())
+    return at - columns.begin();
+  std::string known;
+  for (const std::string& column : columns)
+    known += (known.empty() ? "" : ", ") + column;
+  throw BadInput(plan.name + ": plot: no column " + name + "; there are " + known);
+}
+
+std::string csvLine(const std::vector<std::string>& cells)
+{
+  std::string line;
+  for (const std::string& cell : cells)
+    line += (line.empty() ? "" : ",") + csvCell(cell);
+  return line;
+}
+
+std::vector<std::string> cellsOf(const std::string& line)
+{
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i)
+    if (line[i] == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"')
+      cells.back() += line[i++];
+    else if (line[i] == '"')
+      quoted = !quoted;
+    else if (line[i] == ',' && !quoted)
+      cells.emplace_back();
+    else
+      cells.back() += line[i];
+  return cells;
 }
 
 /// One line of results.csv; `measured`: empty when the run failed.
 std::string resultLine(const SweepPlan& plan, long point, const std::string& reason, const std::vector<slender::study::Row>& measured)
 {
-  std::string line = std::to_string(point);
+  std::vector<std::string> cells{std::to_string(point)};
   for (const std::string& override : plan.overrides(point))
-    line += "," + csvCell(override.substr(override.find('=') + 1));
-  line += measured.empty() ? ",failed," + csvCell(reason) : ",done,";
+    cells.push_back(override.substr(override.find('=') + 1));
+  cells.insert(cells.end(), {measured.empty() ? "failed" : "done", reason});
   const auto kinds = kindsOf(plan);
   for (std::size_t k = 0; k < kinds.size(); ++k)
     for (const std::string& column : kinds[k]->columns)
-      line += "," + (measured.empty() ? "" : slender::study::csvValue(measured[k], column));
-  return line + "\n";
+      cells.push_back(measured.empty() ? "" : slender::study::valueText(measured[k], column));
+  return csvLine(cells);
 }
 
 std::string pointFile(const Options& options, long point)
@@ -215,18 +250,18 @@ int runPoint(const SweepPlan& plan, const Options& options)
     std::replace(reason.begin(), reason.end(), '\n', ' ');
     line = resultLine(plan, options.point, reason, {});
   }
-  writeWhole(pointFile(options, options.point), line);
+  writeWhole(pointFile(options, options.point), line + "\n");
   return kDone;
 }
 
-/// Results of another plan must not be mixed in. `bare`: a directory that may be new.
+/// Results of another plan must not be mixed in.
 void prepare(const SweepPlan& plan, const Options& options)
 {
   std::error_code error;
   fs::create_directories(options.out + "/points", error);
   if (error)
     throw BadInput("cannot make directory " + options.out + "/points: " + error.message());
-  const std::string copy = options.out + "/plan.yaml";
+  const std::string copy = options.out + "/plan.txt";
   std::ifstream old(copy);
   std::ostringstream text;
   text << old.rdbuf();
@@ -314,10 +349,31 @@ private:
   bool shown_line_ = false;
 };
 
+/// Points that failed are left out.
+std::string draw(const SweepPlan& plan, const std::string& folder, const std::vector<std::vector<std::string>>& lines)
+{
+  const slender::SweepPlot& wanted = *plan.plot;
+  const std::size_t x = columnOf(plan, wanted.x), y = columnOf(plan, wanted.y), status = columnOf(plan, "status");
+  slender::study::StudyContext context(plan.name, false, false);
+  slender::study::Plot& plot = context.plot(plan.name, plan.name, wanted.x_label, wanted.y_label);
+  plot.log_x = plot.log_y = plot.lines = false;
+  for (const auto& cells : lines)
+  {
+    if (cells[status] != "done")
+      continue;
+    slender::study::Series& series = plot.at(wanted.by.empty() ? "runs" : cells[columnOf(plan, wanted.by)]);
+    series.x.push_back(std::strtod(cells[x].c_str(), nullptr));
+    series.y.push_back(std::strtod(cells[y].c_str(), nullptr));
+  }
+  return slender::study::writePlots(folder, context);
+}
+
 int collect(const SweepPlan& plan, const Options& options, const std::map<long, std::string>& crashed)
 {
-  std::string all = header(plan);
+  std::string all = csvLine(columnsOf(plan)) + "\n";
+  std::vector<std::vector<std::string>> lines;
   long failed = 0;
+  const std::size_t status = columnOf(plan, "status"), reason = columnOf(plan, "reason");
   for (long point = 0; point < plan.points(); ++point)
   {
     const auto crash = crashed.find(point);
@@ -327,19 +383,23 @@ int collect(const SweepPlan& plan, const Options& options, const std::map<long, 
     else
     {
       std::ifstream file(pointFile(options, point));
-      std::getline(file, line);
-      if (!file)
+      if (!std::getline(file, line))
         throw std::runtime_error("cannot read " + pointFile(options, point));
-      line += "\n";
     }
-    if (line.find(",failed,") != std::string::npos)
-    {
-      ++failed;
-      std::fprintf(stderr, "sweep: failed: %s", line.c_str());
-    }
-    all += line;
+    all += line + "\n";
+    lines.push_back(cellsOf(line));
+    if (lines.back()[status] == "done")
+      continue;
+    ++failed;
+    std::fprintf(stderr, "sweep: run %ld failed: %s\n", point, lines.back()[reason].c_str());
   }
   writeWhole(options.out + "/results.csv", all);
+  if (plan.plot)
+  {
+    const std::string problem = draw(plan, options.out, lines);
+    if (!problem.empty())
+      std::fprintf(stderr, "sweep: %s\n", problem.c_str());
+  }
   std::printf("%ld runs, %ld failed: %s/results.csv\n", plan.points(), failed, options.out.c_str());
   return failed ? kSomeFailed : kDone;
 }
@@ -349,6 +409,10 @@ int run(const Options& options)
   const SweepPlan plan = slender::readSweepPlan(options.plan);
   for (const auto* kind : kindsOf(plan))
     kind->make(plan.sceneOf(0));
+  if (plan.plot)
+    for (const std::string& name : {plan.plot->x, plan.plot->y, plan.plot->by})
+      if (!name.empty())
+        columnOf(plan, name);
   if (options.count)
   {
     std::printf("%ld\n", plan.points());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,13 @@ struct SweepAxis
   std::vector<std::string> values;   ///< as written in the plan or in shortest form
 };
 
+/// A picture of the results: a point per run at two columns' values, drawn by a third column's word.
+struct SweepPlot
+{
+  std::string x, y, by;         ///< columns: paths of axes, or what the measures give; `by` may be empty
+  std::string x_label, y_label;
+};
+
 /// Runs of one scene over every combination of the axes' values. The last axis varies fastest.
 struct SweepPlan
 {
@@ -22,7 +30,8 @@ struct SweepPlan
   std::vector<SweepAxis> axes;
   std::vector<std::string> measures;   ///< names, see study/measure.h
   double after = 0.0;                  ///< measures look from this simulated time on [s]
-  std::string text;                    ///< of the plan and of its scene: what results depend on
+  std::optional<SweepPlot> plot;
+  std::string text;                    ///< what results depend on: axes, measures, the scene's text
 
   long points() const;
   /// One "path=value" per axis; 0 <= point < points().
@@ -39,6 +48,7 @@ struct SweepPlan
 ///       threads.0.floor.belt.x: {from: 0.5, to: 6, count: 12}     # or a list of values; log: true for a geometric series
 ///     measures: [belt_pattern]
 ///     after: 20
+///     plot: {x: threads.0.floor.belt.x, y: threads.0.nozzle.position.2, by: pattern, labels: ["belt speed [m/s]", "height [m]"]}
 SweepPlan readSweepPlan(const std::string& path);
 
 }  // namespace slender
