@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "belt_pattern.h"
 #include "rod_cases.h"
 #include "thread_cases.h"
 
@@ -31,69 +32,6 @@ ThreadSetup fallingThread(double radius)
   t.inputs.gravity = {0, 0, -981};
   t.state.x[0].x() += 0.1 * edge;
   t.state.v[0].y() += kSpeed;
-  return t;
-}
-
-/// What the trace of the landing points shows. Frequencies count crossings of the middle, across (y) and along (x) the belt.
-struct Trace
-{
-  double amplitude = 0, frequency_y = 0, frequency_x = 0;   ///< amplitude: half the extent across
-  double windings = 0, swing = 0;                           ///< of the tangent of what lies on the belt: net turns, and extent [turns]
-  std::string pattern;
-};
-
-Trace classify(const std::vector<Landings::Point>& p, double belt, double coil_radius, double coil_frequency)
-{
-  Trace t;
-  double y_low = 1e300, y_high = -1e300, x_low = 1e300, x_high = -1e300;
-  for (const Landings::Point& q : p)
-  {
-    y_low = std::min(y_low, q.y);
-    y_high = std::max(y_high, q.y);
-    x_low = std::min(x_low, q.x);
-    x_high = std::max(x_high, q.x);
-  }
-  const double x_middle = 0.5 * (x_low + x_high), y_middle = 0.5 * (y_low + y_high), duration = p.back().time - p.front().time;
-  t.amplitude = 0.5 * (y_high - y_low);
-  // a crossing counts when the trace has gone a tenth of its extent beyond the middle
-  const auto crossings = [&](auto&& value, double margin) {
-    int count = 0, side = 0;
-    for (const Landings::Point& q : p)
-    {
-      const double v = value(q);
-      const int now = v > margin ? 1 : v < -margin ? -1 : side;
-      count += side != 0 && now != side;
-      side = now;
-    }
-    return count;
-  };
-  t.frequency_y = M_PI / duration * crossings([&](const Landings::Point& q) { return q.y - y_middle; }, 0.1 * (y_high - y_low));
-  t.frequency_x = M_PI / duration * crossings([&](const Landings::Point& q) { return q.x - x_middle; }, 0.1 * (x_high - x_low));
-  double angle = 0, first = 0, low = 1e300, high = -1e300;
-  for (std::size_t k = 1; k < p.size(); ++k)
-  {
-    const double along = p[k].x - p[k - 1].x - belt * (p[k].time - p[k - 1].time), across = p[k].y - p[k - 1].y;
-    const double seen = std::atan2(across, -along);
-    angle = k == 1 ? seen : seen + 2 * M_PI * std::nearbyint((angle - seen) / (2 * M_PI));
-    first = k == 1 ? angle : first;
-    low = std::min(low, angle);
-    high = std::max(high, angle);
-  }
-  t.windings = (angle - first) / (2 * M_PI);
-  t.swing = (high - low) / (2 * M_PI);
-
-  const double turns = duration * coil_frequency / (2 * M_PI), ratio = t.frequency_y > 0 ? t.frequency_x / t.frequency_y : 0;
-  if (t.amplitude < 0.05 * coil_radius)
-    t.pattern = "straight";
-  else if (std::abs(t.windings) > 0.5 * turns)
-    t.pattern = "translated coiling";
-  else if (t.swing < 0.6 && (t.amplitude < 0.7 * coil_radius || std::abs(ratio - 2) < 0.5))
-    // never turns against the belt, and goes along it twice while across it once; small ones go along by less than an edge
-    t.pattern = "meanders";
-  else if (std::abs(t.windings) < 0.1 * turns && t.swing > 0.95 && t.swing < 1.4)   // a full turn to the left, then one to the right
-    t.pattern = "alternating loops";
-  else
-    t.pattern = "W or mixed";
   return t;
 }
 
@@ -176,9 +114,9 @@ void runSewingMachine(StudyContext& context)
     std::vector<std::string> patterns;
     const auto look = [&](double ratio) {
       const bool fresh = patterns.empty() && !rising;
-      return classify(observe(t, ratio * speed, radius, frequency, fresh ? 30 : 15, 15), ratio * speed, radius, frequency);
+      return classifyBeltTrace(observe(t, ratio * speed, radius, frequency, fresh ? 30 : 15, 15), ratio * speed, 0.05 * radius);
     };
-    const auto record = [&](double ratio, const Trace& trace) {
+    const auto record = [&](double ratio, const BeltTrace& trace) {
       seen_at.push_back(ratio);
       patterns.push_back(trace.pattern);
       context.row().set("way", way).set("V_over_Uc", ratio).set("pattern", trace.pattern).set("amplitude_over_Rc", trace.amplitude / radius)
@@ -193,7 +131,7 @@ void runSewingMachine(StudyContext& context)
     {
       context.progress(done++, static_cast<int>(2 * ratios.size()), way + " to V/Uc = " + std::to_string(ratio));
       const ThreadSetup before = t;
-      const Trace trace = look(ratio);
+      const BeltTrace trace = look(ratio);
       if (patterns.empty() || trace.pattern == patterns.back())
       {
         record(ratio, trace);
