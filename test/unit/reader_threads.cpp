@@ -61,7 +61,7 @@ TEST(ThreadReader, NamesWhatIsWrong)
       {"threads.0.nozzle.flow=-1e-7", "threads.0.nozzle.flow = -1e-7"},
       {"threads.0.nozzle.flow={topic: false}", "must be true"},
       {"threads.0.nozzle.flow={table: [[1, 0], [1, 2]]}", "times must rise"},
-      {"threads.0.nozzle.flow=1", "is too much: over a thousand edges would leave the nozzle in one step; must be at most 9.8"},
+      {"threads.0.nozzle.flow=1", "is too much: over a thousand edges would leave the nozzle in one step; must be at most 0.0098"},
       {"threads.0.nozzle.flow={table: [[0, 0], [1, 1]]}", "is too much"},
       {"threads.0.nozzle.flow={topic: true, initial: 1}", "is too much"},
       {"threads.0.nozzle.spin=1", "unknown key"},
