@@ -71,8 +71,8 @@ BeltTrace classifyBeltTrace(const std::vector<Landings::Point>& points, double b
     t.pattern = "straight";
   else if (wound > 0.5)   // once around for each time across
     t.pattern = "translated coiling";
-  else if (t.swing < 0.6 && (t.swing < 0.35 || std::abs(ratio - 2) < 0.5))
-    // never turns against the belt, and goes along it twice while across it once; small ones hardly go along
+  else if (t.swing < 0.6 && (t.swing < 0.45 || std::abs(ratio - 2) < 0.5))
+    // never turns against the belt, and goes along it twice while across it once; small ones go along by less than an edge
     t.pattern = "meanders";
   else if (wound < 0.1 && t.swing > 0.95 && t.swing < 1.4)   // a full turn to the left, then one to the right
     t.pattern = "alternating loops";
