@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "slender_sim/contact/broad_phase.h"
 #include "slender_sim/contact/shape.h"
 #include "slender_sim/geometry/pose.h"
 
@@ -18,6 +19,10 @@ struct ContactSegment
   int object = 0;
   double start = 0.0;      ///< arc length of a along the object's curve [m]; b is at start + length
   double length = 0.0;     ///< at rest [m]
+  double core = 1.0;       ///< share of the radius that other segments may not enter (fluid parts merge down to it)
+  bool driven = false;     ///< moves as prescribed: passes through what does so, too, solids included
+
+  double coreRadius() const { return core * radius; }
 };
 
 /// What a curve (later: a surface) touches. Pieces of one curve that are closer along it than about a quarter of a turn at its
@@ -28,6 +33,7 @@ struct ContactObject
   bool closed = false;
   bool self = true, others = true, solids = true;
   double friction = 0.0;       ///< Coulomb [-]
+  int owner = 0;               ///< see ContactSolid::only
 };
 
 /// An obstacle or a rigid body: a shape that moves rigidly.
@@ -36,6 +42,7 @@ struct ContactSolid
   Shape shape;
   double friction = -1.0;      ///< negative: that of whatever touches it; otherwise the geometric mean of both counts
   std::vector<int> ignores;    ///< objects it never touches
+  int only = -1;               ///< touches nothing but the objects of this owner; -1: those of all
 };
 
 struct ContactSurface
@@ -80,6 +87,15 @@ public:
   ContactPotential(ContactSurface surface, const ContactOptions& options);
   ~ContactPotential();
   ContactPotential(ContactPotential&&) noexcept;
+
+  /// Other points, segments and objects (sound ones) from now on; the solids stay. For curves that are fed and divided while they move.
+  void setCurves(int points, const std::vector<ContactSegment>& segments, const std::vector<ContactObject>& objects);
+  /// Thins segments where others, or solids, are nearer than a twentieth of the gap, or overlap: to a fifth of it. What was brought together by
+  /// something else than motion (a division, growing radii) can so begin a step. False: two centrelines, or one and a solid, meet.
+  bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  const std::vector<ContactSegment>& segments() const;
+  /// Segments that thinToFit() found near each other: all those within the gap, and more. First and second are in order.
+  const std::vector<GridPairs::Pair>& nearPairs() const;
 
   /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less: they meet. Shares no
   /// search structure and no minimisation with the rest of this class. The surface of a mesh is touched from both sides.
