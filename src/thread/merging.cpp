@@ -115,6 +115,14 @@ void MergingPotential::meet(const Eigen::Matrix3Xd& x, const std::vector<Contact
   places_.push_back(place);
 }
 
+double MergingPotential::largestAttraction() const
+{
+  double largest = 0.0;
+  for (const Place& place : places_)
+    largest = std::max(largest, place.attraction);
+  return largest;
+}
+
 double MergingPotential::evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness)
 {
   terms_.clear();

@@ -38,6 +38,7 @@ public:
   /// Potential [J] and terms(), as ContactPotential::evaluate().
   double evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness);
   const std::vector<ContactTerm>& terms() const { return terms_; }
+  double largestAttraction() const;   ///< of a place [N]
 
 private:
   struct Place

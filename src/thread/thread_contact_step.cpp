@@ -137,12 +137,24 @@ bool ThreadContact::load(double from, double h)
   placeSolids(from, solids_base_);
   solids_ = solids_base_;
   contact_.setCurves(count, segments_, objects_);
-  contact_.setStiffness(stiffness_now_);   // not what an attempt that failed left
   if (!contact_.thinToFit(points_base_, solids_base_))
     return false;
-  contact_.begin(points_base_, solids_base_, duration_);   // friction sticks below a speed over the whole step, cut or not
+  // not what an attempt that failed left; no less than weights, what stops a node within the gap, and merging ask for
+  double least = std::max(stiffness_now_, model_.options.least_stiffness);
+  for (std::size_t p = 0; p < part_count_; ++p)
+  {
+    const double gravity = parts_[p].thread->inputs().gravity.norm();
+    const RodArrays& a = systemOf(parts_[p]).arrays();
+    for (int i = 0; i < a.nodes; ++i)
+      least = std::max(least, a.weight[i] * h * h * std::max(gravity, model_.options.gap / (duration_ * duration_)));
+  }
   if (merges_)
+  {
     merging_.begin(points_base_, segments_, fluids_, contact_.nearPairs(), held_, model_.options.gap, h);
+    least = std::max(least, merging_.largestAttraction());
+  }
+  contact_.setStiffness(least);
+  contact_.begin(points_base_, solids_base_, duration_);   // friction sticks below a speed over the whole step, cut or not
 
   mapUnknowns();
   keys_before_.swap(keys_);

@@ -151,7 +151,7 @@ struct Pair : Touching
   Pair(double merging, double friction) : Touching(1e-5)
   {
     ThreadModel m = syrup();
-    m.density = 1e-3;
+    m.density = 1;
     m.surface_tension = 0.05;
     ThreadTouch touch;
     touch.merging = merging;
@@ -164,7 +164,7 @@ struct Pair : Touching
 
 TEST(TouchingThreads, ParallelThreadsMergeAtTheRateOfTheModel)
 {
-  Pair pair(0.4, 0.0);
+  Pair pair(0.4, 0.3);
   // surface tension along the threads is left out: it shortens them meanwhile
   for (auto& model : pair.model.threads)
     EXPECT_EQ(model->surface_tension, 0.05);
@@ -176,10 +176,87 @@ TEST(TouchingThreads, ParallelThreadsMergeAtTheRateOfTheModel)
     const StepReport report = threads.step(pair.state, pair.inputs, h);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
     t += h;
-    std::printf("%g %g it %d gap\n", t, pair.distance() / pair.r, report.iterations);
+    std::printf("%g %g it %d cuts %d clear %g K %g:", t, pair.distance() / pair.r, report.iterations, report.cut_steps, threads.clearance(pair.state) / pair.model.options.gap, pair.state.contact_stiffness);
+    if (t > 0.095)
+    for (int i = 0; i < pair.state.threads[0].threads[0].nodes(); ++i)
+      std::printf(" %.3f", (pair.state.threads[1].threads[0].x[i] - pair.state.threads[0].threads[0].x[i]).norm() / (pair.state.threads[0].threads[0].radius(std::min(i,19))));
+    std::printf("\n");
   }
   (void)mu;
   (void)gamma;
+}
+
+/// Smallest distance of centrelines over the sum of radii, of all parts that are no neighbours and do not both lie on the floor.
+double closest(const TouchingState& state)
+{
+  struct Piece { Vector3d a, b; double r, start, length; int thread; bool lies; };
+  std::vector<Piece> pieces;
+  int thread = 0;
+  for (const ThreadGroupState& group : state.threads)
+    for (const ThreadState& s : group.threads)
+    {
+      double start = 0.0;
+      for (int j = 0; j < s.edges(); ++j)
+      {
+        const double length = s.edge(j).norm();
+        pieces.push_back({s.x[j], s.x[j + 1], s.radius(j), start, length, thread, s.deposited[j] && s.deposited[j + 1]});
+        start += length;
+      }
+      ++thread;
+    }
+  double least = 1e9;
+  for (std::size_t i = 0; i < pieces.size(); ++i)
+    for (std::size_t j = i + 1; j < pieces.size(); ++j)
+    {
+      const Piece &p = pieces[i], &q = pieces[j];
+      if ((p.lies && q.lies) || (p.thread == q.thread && q.start - p.start - p.length < 1.0 * M_PI * (p.r + q.r)))
+        continue;
+      least = std::min(least, segmentDistance(p.a, p.b, q.a, q.b) / (p.r + q.r));
+    }
+  return least;
+}
+
+/// Honey that coils on a plate.
+struct Coil : Touching
+{
+  Coil(double gap, const ThreadTouch& touch) : Touching(gap)
+  {
+    ThreadModel m = honey();
+    m.viscosity = 100;
+    m.surface_tension = 0.05;
+    m.feed_length = 0.004;
+    m.floor.present = true;
+    m.limits.max_edge_length = 0.005;
+    m.limits.min_edge_length = 0.0015;
+    m.limits.max_deposited = 400;
+    const Thread t = Thread::fromNozzle(m, {0, 0, 0.06}, 0.05);
+    ThreadState s = t.state;
+    s.x[0].x() += 1e-4;
+    add(m, s, t.inputs, touch);
+  }
+};
+
+TEST(TouchingThreads, ACoilPilesUpAndNothingPassesThrough)
+{
+  Coil coil(3e-4, ThreadTouch{});
+  TouchingThreads threads(coil.model, NewtonConfig{});
+  const double start = coil.state.threads[0].volumeBalance();
+  double least = 1e9, highest = 0.0;
+  long iterations = 0;
+  for (int k = 0; k < 1500; ++k)
+  {
+    const StepReport report = threads.step(coil.state, coil.inputs, 0.002);
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+    iterations += report.iterations;
+    least = std::min(least, closest(coil.state));
+    const ThreadState& s = coil.state.threads[0].threads[0];
+    int held = 0;
+    for (int i = 0; i < s.nodes(); ++i) held += s.deposited[i];
+    if (k % 50 == 0) std::printf("%d nodes %d held %d it %d fact %d cuts %d least %g K %g contacts %zu rad %g\n", k, s.nodes(), held, report.iterations, report.factorizations, report.cut_steps, least, coil.state.contact_stiffness, threads.contacts().size(), s.radius(s.edges()/2));
+  }
+  (void)highest;
+  EXPECT_GT(least, 0.9);
+  EXPECT_NEAR(coil.state.threads[0].volumeBalance(), start, 1e-11 * coil.state.threads[0].threads[0].fed_volume);
 }
 
 }  // namespace
