@@ -83,6 +83,7 @@ private:
   void assemble(const HessianShift& shift);
   NewtonResult solveConfined(double from, double to);
   bool approach(double from, double to, double& reached);
+  void adaptStiffness();
   bool stiffen(bool converged);
 
   const TouchingModel& model_;
@@ -91,7 +92,7 @@ private:
   bool merges_ = false;
   std::vector<Part> parts_;
   std::size_t part_count_ = 0;                  ///< of parts_ in use
-  double duration_ = 0, least_edge_ = 0, stiffness_now_ = 0;
+  double duration_ = 0, least_edge_ = 0, stiffness_now_ = 0, most_stiffness_ = 0;
   bool still_driven_ = false;                   ///< after approach(): something held or driven has not arrived
   std::vector<Pose> solids_from_, solids_to_;   ///< over the step
   Eigen::Matrix3Xd points_, points_base_, points_end_, points_target_;

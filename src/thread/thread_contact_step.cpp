@@ -141,18 +141,22 @@ bool ThreadContact::load(double from, double h)
     return false;
   // not what an attempt that failed left; no less than weights, what stops a node within the gap, and merging ask for
   double least = std::max(stiffness_now_, model_.options.least_stiffness);
+  most_stiffness_ = model_.options.least_stiffness;
   for (std::size_t p = 0; p < part_count_; ++p)
   {
     const double gravity = parts_[p].thread->inputs().gravity.norm();
     const RodArrays& a = systemOf(parts_[p]).arrays();
     for (int i = 0; i < a.nodes; ++i)
       least = std::max(least, a.weight[i] * h * h * std::max(gravity, model_.options.gap / (duration_ * duration_)));
+    const ThreadStepper::Impl& thread = *parts_[p].thread;
+    most_stiffness_ = std::max(most_stiffness_, 3.0 * thread.model->viscosityAt(0.0) * thread.work.totalVolume() / (objects_[p].curve_length * duration_));
   }
   if (merges_)
   {
     merging_.begin(points_base_, segments_, fluids_, contact_.nearPairs(), held_, model_.options.gap, h);
     least = std::max(least, merging_.largestAttraction());
   }
+  most_stiffness_ = std::max(most_stiffness_, least);
   contact_.setStiffness(least);
   contact_.begin(points_base_, solids_base_, duration_);   // friction sticks below a speed over the whole step, cut or not
 
@@ -193,7 +197,7 @@ StepFailure ThreadContact::solve(double from, double to, double h, StepReport& r
     points_target_ = points_;
     from = to;
   }
-  contact_.adaptStiffness();
+  adaptStiffness();
   stiffness_now_ = contact_.stiffness();
   return StepFailure::none;
 }
@@ -242,6 +246,13 @@ bool ThreadContact::approach(double from, double to, double& reached)
   return false;
 }
 
+/// What would double the length of the thread in a step is force enough: where parts are jammed, gaps do not open however stiff the barrier is.
+void ThreadContact::adaptStiffness()
+{
+  contact_.adaptStiffness();
+  contact_.setStiffness(std::min(contact_.stiffness(), most_stiffness_));
+}
+
 /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. True if it was made stiffer.
 bool ThreadContact::stiffen(bool converged)
 {
@@ -249,9 +260,9 @@ bool ThreadContact::stiffen(bool converged)
     return false;
   const double before = contact_.stiffness();
   if (converged)
-    contact_.adaptStiffness();
+    adaptStiffness();
   else   // forces mean nothing yet
-    contact_.setStiffness(4.0 * before);
+    contact_.setStiffness(std::min(4.0 * before, most_stiffness_));
   return contact_.stiffness() > before;
 }
 
