@@ -105,7 +105,7 @@ private:
   double tolerance_ = 0, gap_tolerance_ = 0;    ///< of increments: over the shortest edge, and at contacts over the smallest gap
 
   // matrix
-  SparseCholesky matrix_;
+  SparseCholesky matrix_{true};
   bool pattern_valid_ = false;
   int unknowns_ = 0;
   std::vector<std::array<int, 4>> keys_, keys_before_;   ///< points of terms that the pattern has room for, sorted
