@@ -1,4 +1,5 @@
 // Threads that touch: merging against differences and its rate, what is conserved, and that nothing passes through anything.
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -162,28 +163,93 @@ struct Pair : Touching
   double distance() const { return (state.threads[1].threads[0].x[10] - state.threads[0].threads[0].x[10]).norm(); }
 };
 
+/// The model's distance: 2 pi gamma r = mu (4 pi/3) rho |d'|, while surface tension thickens the threads by r' = gamma/(6 mu). Runge-Kutta
+/// for the cube of a in d = 2 r cos(a), which begins smoothly.
+double modelDistance(double r0, double gamma, double mu, double time)
+{
+  const auto rate = [&](double t, double cube) {
+    const double a = std::cbrt(cube), r = r0 + gamma * t / (6 * mu), sine = a > 0 ? std::sin(a) / a : 1.0;
+    return 2.25 * gamma / (mu * r * sine * sine) + 3 * a * gamma / (6 * mu) * std::cos(a) / (r * sine);
+  };
+  const int steps = 1000;
+  const double h = time / steps;
+  double u = 0.0;
+  for (int k = 0; k < steps; ++k)
+  {
+    const double k1 = rate(k * h, u), k2 = rate((k + 0.5) * h, u + 0.5 * h * k1), k3 = rate((k + 0.5) * h, u + 0.5 * h * k2),
+                 k4 = rate((k + 1) * h, u + h * k3);
+    u += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+  }
+  return 2 * (r0 + gamma * time / (6 * mu)) * std::cos(std::cbrt(u));
+}
+
 TEST(TouchingThreads, ParallelThreadsMergeAtTheRateOfTheModel)
 {
-  Pair pair(0.4, 0.3);
-  // surface tension along the threads is left out: it shortens them meanwhile
-  for (auto& model : pair.model.threads)
-    EXPECT_EQ(model->surface_tension, 0.05);
-  TouchingThreads threads(pair.model, NewtonConfig{});
-  const double mu = 10, gamma = 0.05, h = 2e-3;
-  double t = 0.0;
-  for (int k = 0; k < 60; ++k)
+  const double mu = 10, gamma = 0.05, end = 0.05;
+  double error[2];
+  for (int fine = 0; fine < 2; ++fine)
   {
-    const StepReport report = threads.step(pair.state, pair.inputs, h);
-    ASSERT_TRUE(report.ok) << k << " " << report.message;
-    t += h;
-    std::printf("%g %g it %d cuts %d clear %g K %g:", t, pair.distance() / pair.r, report.iterations, report.cut_steps, threads.clearance(pair.state) / pair.model.options.gap, pair.state.contact_stiffness);
-    if (t > 0.095)
-    for (int i = 0; i < pair.state.threads[0].threads[0].nodes(); ++i)
-      std::printf(" %.3f", (pair.state.threads[1].threads[0].x[i] - pair.state.threads[0].threads[0].x[i]).norm() / (pair.state.threads[0].threads[0].radius(std::min(i,19))));
-    std::printf("\n");
+    Pair pair(0.4, 0.3);
+    const double h = fine ? 5e-4 : 1e-3;
+    TouchingThreads threads(pair.model, NewtonConfig{});
+    const double volume = pair.state.threads[0].volumeBalance();
+    for (int k = 0; k < std::lround(end / h); ++k)
+    {
+      const StepReport report = threads.step(pair.state, pair.inputs, h);
+      ASSERT_TRUE(report.ok) << k << " " << report.message;
+    }
+    EXPECT_NEAR(pair.state.threads[0].volumeBalance(), volume, 1e-13 * volume);
+    error[fine] = pair.distance() / modelDistance(pair.r, gamma, mu, end) - 1;
+    const Vector3d momentum = momentumOf(pair.state.threads[0].threads[0]) + momentumOf(pair.state.threads[1].threads[0]);
+    EXPECT_LT(momentum.norm(), 1e-6 * volume * pair.r / end);
   }
-  (void)mu;
-  (void)gamma;
+  EXPECT_LT(std::abs(error[1]), 0.01);
+  EXPECT_LT(std::abs(error[1]), 0.7 * std::abs(error[0]));
+}
+
+TEST(TouchingThreads, MergedThreadsStayAtTheDistanceAskedFor)
+{
+  Pair pair(0.6, 0.3);
+  TouchingThreads threads(pair.model, NewtonConfig{});
+  for (int k = 0; k < 80; ++k)
+  {
+    const StepReport report = threads.step(pair.state, pair.inputs, 2e-3);
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+  }
+  const double r = pair.state.threads[0].threads[0].radius(10);
+  EXPECT_GT(pair.distance(), 0.6 * 2 * r);
+  EXPECT_LT(pair.distance(), 0.6 * 2 * r + pair.model.options.gap);
+}
+
+TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
+{
+  for (const bool merging : {false, true})   // it has nothing to do with itself as long as it falls
+  {
+    ThreadModel m = honey();
+    m.viscosity = 100;
+    m.surface_tension = 0.05;
+    m.feed_length = 0.004;
+    m.limits.max_edge_length = 0.005;
+    const Thread t = Thread::fromNozzle(m, {0, 0, 0.06}, 0.05);
+    Touching touching(3e-4);
+    ThreadTouch touch;
+    touch.merging = merging ? 0.6 : 0.0;
+    touching.add(m, t.state, t.inputs, touch);
+    TouchingThreads threads(touching.model, NewtonConfig{});
+    ThreadGroup group(std::make_shared<ThreadModel>(m), NewtonConfig{});
+    ThreadGroupState alone;
+    alone.threads.push_back(t.state);
+    for (int k = 0; k < 100; ++k)
+    {
+      ASSERT_TRUE(threads.step(touching.state, touching.inputs, 0.002).ok);
+      ASSERT_TRUE(group.step(alone, t.inputs, 0.002).ok);
+      const ThreadState &s = touching.state.threads[0].threads[0], &a = alone.threads[0];
+      ASSERT_EQ(s.id, a.id);
+      for (int i = 0; i < s.nodes(); ++i)
+        ASSERT_LT((s.x[i] - a.x[i]).norm(), 1e-9) << k;
+    }
+    EXPECT_GT(alone.threads[0].nodes(), 4);
+  }
 }
 
 /// Smallest distance of centrelines over the sum of radii, of all parts that are no neighbours and do not both lie on the floor.
@@ -238,25 +304,156 @@ struct Coil : Touching
 
 TEST(TouchingThreads, ACoilPilesUpAndNothingPassesThrough)
 {
-  Coil coil(3e-4, ThreadTouch{});
-  TouchingThreads threads(coil.model, NewtonConfig{});
-  const double start = coil.state.threads[0].volumeBalance();
-  double least = 1e9, highest = 0.0;
-  long iterations = 0;
-  for (int k = 0; k < 1500; ++k)
+  for (const bool merging : {false, true})
   {
-    const StepReport report = threads.step(coil.state, coil.inputs, 0.002);
-    ASSERT_TRUE(report.ok) << k << " " << report.message;
-    iterations += report.iterations;
-    least = std::min(least, closest(coil.state));
+    ThreadTouch touch;
+    touch.merging = merging ? 0.6 : 0.0;
+    Coil coil(3e-4, touch);
+    TouchingThreads threads(coil.model, NewtonConfig{});
+    const double start = coil.state.threads[0].volumeBalance();
+    double least = 1e9;
+    std::size_t most = 0;
+    for (int k = 0; k < 1300; ++k)
+    {
+      const StepReport report = threads.step(coil.state, coil.inputs, 0.002);
+      ASSERT_TRUE(report.ok) << k << " " << report.message;
+      least = std::min(least, closest(coil.state));
+      most = std::max(most, threads.contacts().size());
+    }
     const ThreadState& s = coil.state.threads[0].threads[0];
-    int held = 0;
-    for (int i = 0; i < s.nodes(); ++i) held += s.deposited[i];
-    if (k % 50 == 0) std::printf("%d nodes %d held %d it %d fact %d cuts %d least %g K %g contacts %zu rad %g\n", k, s.nodes(), held, report.iterations, report.factorizations, report.cut_steps, least, coil.state.contact_stiffness, threads.contacts().size(), s.radius(s.edges()/2));
+    EXPECT_NEAR(coil.state.threads[0].volumeBalance(), start, 1e-11 * s.fed_volume);
+    // barriers keep it above 1; growing radii and divided edges may take a little of that
+    EXPECT_GT(least, merging ? 0.55 : 0.95);
+    EXPECT_LT(least, merging ? 0.9 : 1.1);
+    EXPECT_GT(most, merging ? 1u : 8u);
+    const bool piled = std::any_of(s.x.begin(), s.x.begin() + s.nodes() / 2, [](const Vector3d& x) { return x.z() > 0.012; });
+    EXPECT_TRUE(piled);
   }
-  (void)highest;
-  EXPECT_GT(least, 0.9);
-  EXPECT_NEAR(coil.state.threads[0].volumeBalance(), start, 1e-11 * coil.state.threads[0].threads[0].fed_volume);
+}
+
+TEST(TouchingThreads, ContactConservesMomentum)
+{
+  // two threads thrown at each other, crosswise
+  Touching cross(5e-5);
+  ThreadModel m = syrup();
+  for (int k = 0; k < 2; ++k)
+  {
+    ThreadState s = straight(0.03, 15, 1e-3, {0, 0, (2 * k - 1) * 1.5e-3});
+    if (k)
+      for (auto& x : s.x)
+        x = Vector3d(x.y() + 1e-3, x.x(), x.z());
+    s = k ? makeThread(Eigen::Map<Eigen::Matrix3Xd>(s.x[0].data(), 3, s.nodes()), Eigen::VectorXd::Constant(15, 1e-3)) : s;
+    for (auto& v : s.v)
+      v.z() = k ? -0.5 : 0.7;
+    cross.add(m, s, weightless(), ThreadTouch{});
+  }
+  TouchingThreads threads(cross.model, NewtonConfig{});
+  const auto momentum = [&] { return Vector3d(momentumOf(cross.state.threads[0].threads[0]) + momentumOf(cross.state.threads[1].threads[0])); };
+  const Vector3d before = momentum();
+  std::size_t most = 0;
+  for (int k = 0; k < 100; ++k)
+  {
+    const StepReport report = threads.step(cross.state, cross.inputs, 1e-3);
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+    most = std::max(most, threads.contacts().size());
+    ASSERT_GT(closest(cross.state), 0.95) << k;
+  }
+  EXPECT_GT(most, 0u);
+  EXPECT_LT((momentum() - before).norm(), 1e-6 * before.norm());
+}
+
+/// A thread that lies across an obstacle and sags on both sides.
+TEST(TouchingThreads, AThreadSagsOverAMovingObstacle)
+{
+  Touching over(1e-4);
+  ThreadModel m = syrup();
+  m.viscosity = 1000;
+  ThreadInputs in;
+  over.add(m, straight(0.1, 40, 1.5e-3, {0, 0, 0.0137}), in, ThreadTouch{});
+  over.addObstacle(Sphere{0.012}, Pose{}, 0.5);
+  TouchingThreads threads(over.model, NewtonConfig{});
+  double least = 1e9;
+  for (int k = 0; k < 200; ++k)
+  {
+    over.inputs.obstacles[0].position.z() = 1e-2 * std::sin(0.05 * (k + 1));
+    const StepReport report = threads.step(over.state, over.inputs, 2e-3);
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+    least = std::min(least, threads.clearance(over.state));
+  }
+  const ThreadState& s = over.state.threads[0].threads[0];
+  EXPECT_GT(least, 0.0);
+  EXPECT_LT(s.x[0].z(), s.x[20].z() - 0.01);
+  EXPECT_NEAR((s.x[20] - over.state.obstacles[0].position).norm(), 0.0135, 3e-4);
+}
+
+/// On a tilted plane it slides with g (sin a - friction cos a), or stays; on a belt that slips it is drawn along at g friction.
+TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
+{
+  const double tilt = 0.4, h = 1e-3;
+  for (const double friction : {0.0, 0.2, 0.6})
+  {
+    Touching slope(2e-5);
+    ThreadModel m = syrup();
+    m.surface_tension = 0;
+    m.viscosity = 1e3;
+    const Vector3d normal(0, -std::sin(tilt), std::cos(tilt)), down(0, -std::cos(tilt), -std::sin(tilt));
+    ThreadTouch touch;
+    touch.friction = 1.0;
+    slope.add(m, straight(0.02, 10, 1e-3, 1.01e-3 * normal), ThreadInputs{}, touch);
+    slope.addObstacle(Plane{}, {Vector3d::Zero(), Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal)}, friction * friction);
+    TouchingThreads threads(slope.model, NewtonConfig{});
+    for (int k = 0; k < 200; ++k)
+    {
+      const StepReport report = threads.step(slope.state, slope.inputs, h);
+      ASSERT_TRUE(report.ok) << k << " " << report.message;
+    }
+    const double expected = std::max(0.0, 9.81 * (std::sin(tilt) - friction * std::cos(tilt))) * 200 * h;
+    EXPECT_NEAR(slope.state.threads[0].threads[0].v[5].dot(down), expected, 0.02 * expected + 1e-3) << friction;
+  }
+  Touching belt(2e-5);
+  ThreadModel m = syrup();
+  m.surface_tension = 0;
+  m.viscosity = 1e3;
+  m.floor.present = true;
+  m.floor.friction = 0.25;
+  EXPECT_THROW(ThreadStepper(std::make_shared<ThreadModel>(m), NewtonConfig{}), std::invalid_argument);
+  ThreadInputs in;
+  in.belt_velocity << 0.0, 0.5, 0.0;
+  ThreadTouch touch;
+  touch.friction = 0.25;
+  belt.add(m, straight(0.02, 10, 1e-3, {0, 0, 1.01e-3}), in, touch);
+  TouchingThreads threads(belt.model, NewtonConfig{});
+  for (int k = 1; k <= 400; ++k)
+  {
+    const StepReport report = threads.step(belt.state, belt.inputs, h);
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+    if (k == 100)
+    {
+      EXPECT_NEAR(belt.state.threads[0].threads[0].v[5].y(), 0.25 * 9.81 * k * h, 0.01);
+    }
+  }
+  EXPECT_NEAR(belt.state.threads[0].threads[0].v[5].y(), 0.5, 1e-3);
+  EXPECT_EQ(std::count(belt.state.threads[0].threads[0].deposited.begin(), belt.state.threads[0].threads[0].deposited.end(), 1), 0);
+}
+
+TEST(TouchingThreads, RefusesWhatDoesNotFit)
+{
+  Touching bad(1e-4);
+  ThreadTouch touch;
+  touch.merging = 1.0;
+  bad.add(syrup(), straight(0.02, 4, 1e-3, Vector3d::Zero()), weightless(), touch);
+  EXPECT_THROW(TouchingThreads(bad.model, NewtonConfig{}), std::invalid_argument);
+  bad.model.touches[0].merging = 0.0;
+  bad.add(syrup(), straight(0.02, 4, 1e-3, {0, 0, 1.9e-3}), weightless(), ThreadTouch{});
+  TouchingThreads threads(bad.model, NewtonConfig{});
+  EXPECT_THROW(threads.checkClearance(bad.state), std::invalid_argument);   // they overlap
+  const ThreadState before = bad.state.threads[0].threads[0];
+  bad.inputs.threads[1].gravity.x() = std::nan("");
+  EXPECT_FALSE(threads.step(bad.state, bad.inputs, 1e-3).ok);
+  bad.inputs.threads[1].gravity.x() = 0.0;
+  bad.inputs.threads.pop_back();
+  EXPECT_FALSE(threads.step(bad.state, bad.inputs, 1e-3).ok);
+  EXPECT_TRUE(sameThread(bad.state.threads[0].threads[0], before));
 }
 
 }  // namespace
