@@ -6,6 +6,7 @@
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/thread/touching_threads.h"
+#include "rod_cases.h"
 #include "thread_cases.h"
 
 namespace slender::study {
