@@ -126,8 +126,8 @@ void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
 {
   if (!std::isfinite(message.data))
     drops_.drop(Drop::not_finite, "nozzle/flow", "it must be finite [m^3/s]");
-  else if (message.data < 0.0)
-    drops_.drop(Drop::out_of_range, "nozzle/flow", "it must not be negative [m^3/s]");
+  else if (message.data < 0.0 || message.data > 1e3)   // as in the scene file
+    drops_.drop(Drop::out_of_range, "nozzle/flow", "it must be 0 to 1e3 [m^3/s]");
   else
     threads_[thread].flow = message.data;
 }
@@ -139,6 +139,8 @@ void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped
   Eigen::Vector3d velocity(message.vector.x, message.vector.y, message.vector.z);
   if (!velocity.allFinite())
     return drops_.drop(Drop::not_finite, what, "it must be finite [m/s]");
+  if (velocity.norm() > 1e3)   // as in the scene file
+    return drops_.drop(Drop::out_of_range, what, "it must be at most 1e3 [m/s]");
   const std::string& name = message.header.frame_id;
   if (name.empty())
     return drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");

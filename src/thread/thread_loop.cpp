@@ -24,8 +24,9 @@ StepFailure substep(const ThreadPart* parts, const ThreadPart* end, double from,
     return failure;
   for (const ThreadPart* p = parts; p != end; ++p)
     p->thread->takeOver(h);
-  for (const ThreadPart* p = parts; p != end; ++p)
-    p->thread->remesh(contact);
+  for (failed = parts; failed != end; ++failed)
+    if (!failed->thread->remesh(contact))
+      return StepFailure::overstretched;
   return StepFailure::none;
 }
 
@@ -65,7 +66,8 @@ StepReport advanceThreads(const ThreadPart* parts, int count, double duration, T
     if (failure != StepFailure::none)
     {
       const ThreadStepper::Impl& thread = *failed->thread;
-      if (thread.explicit_step)   // a shorter step now would only hide that all of them are too long
+      // a shorter step now would only hide that all of them are too long, or draw the thread out bit by bit
+      if (thread.explicit_step || failure == StepFailure::overstretched)
         return thread.refuse(report, failure, thread.explainFailure(failure, length));
       if (0.5 * length < shortest * (1 - 1e-9))
       {

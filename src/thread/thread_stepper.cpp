@@ -78,12 +78,16 @@ StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, 
 std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
+  if (failure == StepFailure::overstretched)
+    return "it is drawn out so far that more than 10000 edges would have to be divided" + at +
+           ": check the motion of nozzle and belt, or use a longer max_edge_length";
   if (explicit_step)
     return "the explicit step blew up" + at + ": use a shorter step or implicit_euler";
   switch (failure)
   {
     case StepFailure::folded_back:
-      return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step";
+      return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step" +
+             (model->floor.present && work.ends[1].held ? ", and keep the nozzle above the floor" : "");
     case StepFailure::singular_matrix:
       return "the matrix could not be made definite" + at + ": radii or edge lengths differ by too many orders of magnitude";
     case StepFailure::state_not_finite:
@@ -108,6 +112,13 @@ bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& in
   start_ends = state.ends;
   loads = {};
   flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
+  constexpr double kMostFed = 1e4;   // edges in one step
+  if (!(flow_speed_ * duration <= kMostFed * model->feed_length))
+  {
+    refuse(report, StepFailure::input_not_finite,
+           "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or longer feed_length");
+    return false;
+  }
   return true;
 }
 

@@ -29,8 +29,9 @@ public:
   StepFailure solveAlone(double h, StepReport& report);
   /// Takes the solution over.
   void takeOver(double h);
-  /// Divides, joins and takes away edges, as far as the guard (may be null) allows; nothing of it when the step needs none.
-  void remesh(const RemeshGuard* guard);
+  /// Divides, joins and takes away edges, as far as the guard (may be null) allows; nothing of it when the step needs none. No: it
+  /// would take more edges than a motion can mean.
+  bool remesh(const RemeshGuard* guard);
   int foldedNode() const;
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
   std::string explainFailure(StepFailure failure, double length) const;
