@@ -23,7 +23,7 @@ struct Case
 constexpr double kUntil = 0.3;   // of the sum of the radii: below what is compared
 constexpr double kEdges = 24.0;  // radii long
 
-/// What a share phi of the time r mu / gamma is in seconds.
+/// [s]
 double timeScale(const Case& c) { return c.viscosity * c.radius / c.surface_tension; }
 
 /// The model: surface tension 2 pi gamma r draws two balls of radius r = (r1 + r2)/2 together, mu (4 pi/3) rho |d'| resists, so
@@ -125,10 +125,14 @@ double largestInfluence()
   return largest;
 }
 
-/// Honey that coils: side views of the pile, and how close to each other the turns lie, without merging and with it.
+/// Honey that coils: side views of the pile, and the height of its older half, without merging and with it.
 void pile(StudyContext& context)
 {
   const double duration = context.quick() ? 2.4 : 3.2;
+  Plot& plot = context.plot("merging_pile", "honey that coils onto itself: centrelines", "x [mm]", "z [mm]");
+  plot.log_x = plot.log_y = false;
+  plot.equal_axes = true;
+  plot.markers = false;
   for (const bool merging : {false, true})
   {
     Simulation s(parseScene(std::string("name: pile\ntime: {step: 0.002, duration: 4}\nthreads:\n"
@@ -145,7 +149,7 @@ void pile(StudyContext& context)
         throw std::runtime_error("merging, pile: " + report.message);
     }
     const ThreadState& t = s.state().threads[0].threads[0];
-    Series& series = context.plot("merging_pile", "honey that coils onto itself", "x [mm]", "z [mm]").at(merging ? "merging" : "contact only");
+    Series& series = plot.at(merging ? "merging" : "contact only");
     double highest = 0.0;
     for (int i = 0; i < t.nodes(); ++i)
     {
@@ -156,10 +160,6 @@ void pile(StudyContext& context)
     }
     context.metric(merging ? "pile_height_merging_mm" : "pile_height_contact_mm", 1e3 * highest);
   }
-  Plot& plot = context.plot("merging_pile", "", "", "");
-  plot.log_x = plot.log_y = false;
-  plot.equal_axes = true;
-  plot.markers = false;
 }
 
 }  // namespace
