@@ -165,11 +165,13 @@ void ThreadContact::assemble(const HessianShift& shift)
     }
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j)
-        if (base[i] >= 0 && base[j] >= 0)
-          for (int r = 0; r < 3; ++r)
-            for (int c = 0; c < 3; ++c)
-              if (base[i] + r >= base[j] + c)
-                values[matrix_.index(base[i] + r, base[j] + c)] += term.weight[i] * term.weight[j] * term.stiffness(r, c);
+        if (base[i] >= base[j] && base[j] >= 0)   // a node's three rows follow each other
+          for (int c = 0; c < 3; ++c)
+          {
+            const int first = i == j ? c : 0, at = matrix_.index(base[i] + first, base[j] + c);
+            for (int r = first; r < 3; ++r)
+              values[at + r - first] += term.weight[i] * term.weight[j] * term.stiffness(r, c);
+          }
   });
 }
 
