@@ -86,6 +86,7 @@ void Simulation::buildThreads()
         checkThreadModel(*thread_models_.back());
       }
       state_.threads.emplace_back();
+      state_.end_loads.emplace_back();
       state_.threads.back().threads.push_back(stateOf(config_.threads[k], *thread_models_.back(), config_.gravity));
     }
     catch (const std::invalid_argument& error)
@@ -145,12 +146,6 @@ void Simulation::exchangeTouching()
   }
   touching_state_.obstacles = state_.obstacles;
   std::swap(touching_state_.contact_stiffness, state_.thread_contact_stiffness);
-}
-
-const std::array<EndLoad, 2>& Simulation::endLoads(int thread) const
-{
-  const auto& alone = thread_steppers_.at(thread);
-  return alone ? alone->endLoads() : touching_->endLoads(touching_index_[thread]);
 }
 
 void Simulation::addThreadInputs(SceneInputs& inputs, double time) const
