@@ -259,7 +259,9 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
                                         " m^3/s, or with longer edges.feed or a shorter time.step more");
   }
   const YamlCursor breakup = map.get("breakup_radius");
-  assign(thread.breakup_radius, breakup.number(length));
+  // a thread whose flow stops drains without end
+  thread.breakup_radius = thread.nozzle ? 0.002 * thread.nozzle->diameter : 0.0;
+  assign(thread.breakup_radius, breakup.number(Range::closed(0, max_coordinate, "m")));
   if (thread.nozzle && thread.breakup_radius >= 0.5 * thread.nozzle->diameter)
   {
     breakup.problem("must be less than the nozzle's radius " + shortNumber(0.5 * thread.nozzle->diameter) + " m, or the thread would break wherever it is");

@@ -134,7 +134,8 @@ void ThreadContact::buildPattern()
   }
 }
 
-void ThreadContact::assemble(const HessianShift& shift)
+/// `whole`: with the part of the contacts' second derivatives that may be negative.
+void ThreadContact::assemble(const HessianShift& shift, bool whole)
 {
   std::fill_n(matrix_.values(), matrix_.rows().size(), 0.0);
   double* values = matrix_.values();
@@ -155,24 +156,53 @@ void ThreadContact::assemble(const HessianShift& shift)
             values[*slot] += entry(panels[i], c, r) + (r == c ? shifts[c == 3] : 0.0);
     }
   }
-  forTerms([&](const ContactTerm& term) {
+  // of four points, block(i, j) for i, j
+  const auto add = [&](const int (&points)[4], auto&& block) {
     int base[4];
     for (int k = 0; k < 4; ++k)
     {
-      base[k] = term.point[k] < 0 || term.weight[k] == 0.0 ? -1 : dofOf(term.point[k]);
+      base[k] = points[k] < 0 ? -1 : dofOf(points[k]);
       if (base[k] >= 0)
-        base[k] += parts_[point_part_[term.point[k]]].offset;
+        base[k] += parts_[point_part_[points[k]]].offset;
     }
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j)
         if (base[i] >= base[j] && base[j] >= 0)   // a node's three rows follow each other
+        {
+          const Eigen::Matrix3d b = block(i, j);
           for (int c = 0; c < 3; ++c)
           {
             const int first = i == j ? c : 0, at = matrix_.index(base[i] + first, base[j] + c);
             for (int r = first; r < 3; ++r)
-              values[at + r - first] += term.weight[i] * term.weight[j] * term.stiffness(r, c);
+              values[at + r - first] += b(r, c);
           }
+        }
+  };
+  forTerms([&](const ContactTerm& term) {
+    const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
+    add(term.point, [&](int i, int j) { return Eigen::Matrix3d(term.weight[i] * term.weight[j] * stiffness); });
   });
+  for (const ContactRow& row : contact_.rows())
+  {
+    Eigen::Vector3d r[4];
+    for (int k = 0; k < 4; ++k)
+      r[k] = row.along[k] * row.normal + (whole ? row.across[k] : 0.0) * row.turning;
+    add(row.point, [&](int i, int j) { return Eigen::Matrix3d(row.stiffness * r[i] * r[j].transpose()); });
+  }
+}
+
+bool ThreadContact::factor(const HessianShift& shift)
+{
+  if (!contact_.terms().empty() && whole_.due())
+  {
+    assemble(shift, true);
+    const bool definite = matrix_.factor();
+    whole_.tried(definite);
+    if (definite)
+      return true;
+  }
+  assemble(shift, false);
+  return matrix_.factor();
 }
 
 RodEvaluation ThreadContact::evaluate(bool with_hessian, const HessianShift& shift)
@@ -215,8 +245,7 @@ RodEvaluation ThreadContact::evaluate(bool with_hessian, const HessianShift& shi
   });
   if (with_hessian && unknowns_ > 0)
   {
-    assemble(shift);
-    sum.inertia.negative += !matrix_.factor();
+    sum.inertia.negative += !factor(shift);
   }
   for (std::size_t p = 0; p < part_count_; ++p)
     if (parts_[p].touched)

@@ -80,7 +80,8 @@ private:
   void mapUnknowns();
   bool takeKeys();
   void buildPattern();
-  void assemble(const HessianShift& shift);
+  void assemble(const HessianShift& shift, bool whole);
+  bool factor(const HessianShift& shift);
   NewtonResult solveConfined(double from, double to);
   bool approach(double from, double to, double& reached);
   void adaptStiffness();
@@ -107,6 +108,7 @@ private:
   // matrix
   SparseCholesky matrix_{true};
   bool pattern_valid_ = false;
+  WholeStiffness whole_;
   int unknowns_ = 0;
   std::vector<std::array<int, 4>> keys_, keys_before_;   ///< points of terms that the pattern has room for, sorted
   std::vector<std::vector<int>> columns_;

@@ -158,6 +158,7 @@ bool ThreadContact::load(double from, double h)
   }
   most_stiffness_ = std::max(most_stiffness_, least);
   contact_.setStiffness(least);
+  whole_ = {};
   contact_.begin(points_base_, solids_base_, duration_);   // friction sticks below a speed over the whole step, cut or not
 
   mapUnknowns();

@@ -51,6 +51,7 @@ TEST(ThreadReader, ReadsEverything)
   EXPECT_EQ(t.longest_edge, 0.002);
   EXPECT_EQ(t.most_deposited, 100);
   EXPECT_EQ(t.breakup_radius, 1e-5);
+  EXPECT_EQ(parseScene(honey, "t", {"threads.0.breakup_radius=0"}).threads[0].breakup_radius, 0.0);
 }
 
 TEST(ThreadReader, NamesWhatIsWrong)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -86,6 +87,22 @@ struct ContactRow
   double along[4] = {0, 0, 0, 0}, across[4] = {0, 0, 0, 0};
   Eigen::Vector3d normal{0, 0, 0}, turning{0, 0, 0};
   double stiffness = 0.0;
+};
+
+/// When to factor with contacts' whole second derivatives, which Newton's method wants where curves run along each other but which may leave
+/// the matrix indefinite: after a failure not for the next 1, 3, 7, 15 factorisations.
+class WholeStiffness
+{
+public:
+  bool due() { return --after_ < 0; }
+  void tried(bool definite)
+  {
+    pause_ = definite ? 0 : std::min(15, 2 * pause_ + 1);
+    after_ = pause_;
+  }
+
+private:
+  int after_ = 0, pause_ = 0;
 };
 
 /// Barrier potential of surfaces that may not touch, with Coulomb friction by lagged normal forces

@@ -231,7 +231,7 @@ struct ThreadConfig
   std::optional<FloorConfig> floor;
   double feed_length = 0.0;                ///< of the edges that leave the nozzle [m]
   double longest_edge = 0.0, shortest_edge = 0.0;   ///< [m] 0: edges are neither divided nor joined
-  double breakup_radius = 0.0;             ///< the thread parts where it is thinner [m]; 0: never
+  double breakup_radius = 0.0;             ///< the thread parts where it is thinner [m]; 0: never; the reader's default: 0.002 nozzle diameters
   int most_deposited = 0;                  ///< nodes on the floor; 0: all are kept
   std::optional<std::array<Eigen::Vector3d, 2>> region;   ///< corners; what lies outside is dropped, oldest first
   std::optional<ThreadContactConfig> contact;  ///< nothing: touches nothing but the floor
