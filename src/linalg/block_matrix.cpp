@@ -64,7 +64,7 @@ std::vector<int> BlockMatrix::mapOf(const PointMatrix& matrix) const
   for (int i = 0; i < matrix.size(); ++i)
     for (int k = matrix.starts()[i]; k < matrix.starts()[i + 1]; ++k)
     {
-      const int j = matrix.columns()[k];
+      const int j = matrix.column(k);
       map.push_back(j > i ? -1 : block(i, j));
       if (j <= i && map.back() < 0)
         throw std::invalid_argument("BlockMatrix: points " + std::to_string(i) + " and " + std::to_string(j) + " are not in the pattern");

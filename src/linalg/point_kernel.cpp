@@ -11,29 +11,36 @@ using QuadU = double __attribute__((vector_size(32), aligned(8), may_alias));
 inline __attribute__((always_inline)) Quad load(const double* p) { return *reinterpret_cast<const Quad*>(p); }
 inline __attribute__((always_inline)) Quad loadAnywhere(const double* p) { return *reinterpret_cast<const QuadU*>(p); }
 
-double multiply(int rows, const int* starts, const int* columns, const double* values, double factor, const double* x, double* y)
+template <bool Add>
+double multiplyRows(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y)
 {
   Quad form = {};
+  int k = starts[0];
   for (int i = 0; i < rows; ++i)
   {
     const int end = starts[i + 1];
-    int k = starts[i];
     Quad a = {}, b = {}, c = {}, d = {};   // four sums hide the latency of the additions
     for (; k + 4 <= end; k += 4)
     {
-      a += values[k] * load(x + 4 * columns[k]);
-      b += values[k + 1] * load(x + 4 * columns[k + 1]);
-      c += values[k + 2] * load(x + 4 * columns[k + 2]);
-      d += values[k + 3] * load(x + 4 * columns[k + 3]);
+      a += values[k] * load(x + offsets[k]);
+      b += values[k + 1] * load(x + offsets[k + 1]);
+      c += values[k + 2] * load(x + offsets[k + 2]);
+      d += values[k + 3] * load(x + offsets[k + 3]);
     }
     for (; k < end; ++k)
-      a += values[k] * load(x + 4 * columns[k]);
+      a += values[k] * load(x + offsets[k]);
     a = (a + b) + (c + d);
     form += a * load(x + 4 * i);
     Quad& out = *reinterpret_cast<Quad*>(y + 4 * i);
-    out = factor == 0.0 ? a : out + factor * a;
+    out = Add ? out + factor * a : a;
   }
   return form[0] + form[1] + form[2];
+}
+
+double multiply(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y)
+{
+  return factor == 0.0 ? multiplyRows<false>(rows, starts, offsets, values, factor, x, y)
+                       : multiplyRows<true>(rows, starts, offsets, values, factor, x, y);
 }
 
 void multiplyBlocks(int columns, const int* starts, const int* rows, const double* values, const double* x, double* y)

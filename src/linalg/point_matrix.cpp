@@ -33,26 +33,30 @@ PointMatrix::PointMatrix(int size, const std::vector<Eigen::Triplet<double>>& en
     throw std::invalid_argument("PointMatrix: the entries are not symmetric");
   matrix = 0.5 * (matrix + transposed);
   starts_.assign(matrix.outerIndexPtr(), matrix.outerIndexPtr() + size + 1);   // of columns, so of rows
-  columns_.assign(matrix.innerIndexPtr(), matrix.innerIndexPtr() + matrix.nonZeros());
+  for (Eigen::Index k = 0; k < matrix.nonZeros(); ++k)
+    offsets_.push_back(4u * static_cast<unsigned>(matrix.innerIndexPtr()[k]));
   values_.assign(matrix.valuePtr(), matrix.valuePtr() + matrix.nonZeros());
 }
 
 Eigen::SparseMatrix<double> PointMatrix::toEigen() const
 {
-  return Eigen::Map<const Eigen::SparseMatrix<double>>(size(), size(), static_cast<Eigen::Index>(values_.size()), starts_.data(), columns_.data(),
+  std::vector<int> columns(offsets_.size());
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    columns[k] = column(static_cast<int>(k));
+  return Eigen::Map<const Eigen::SparseMatrix<double>>(size(), size(), static_cast<Eigen::Index>(values_.size()), starts_.data(), columns.data(),
                                                        values_.data());
 }
 
 double PointMatrix::multiply(const double* x, double* y) const
 {
-  return pointKernels().multiply(size(), starts_.data(), columns_.data(), values_.data(), 0.0, x, y);
+  return pointKernels().multiply(size(), starts_.data(), offsets_.data(), values_.data(), 0.0, x, y);
 }
 
 double PointMatrix::addProduct(double factor, const double* x, double* y) const
 {
   if (factor == 0.0)
     return 0.0;
-  return pointKernels().multiply(size(), starts_.data(), columns_.data(), values_.data(), factor, x, y);
+  return pointKernels().multiply(size(), starts_.data(), offsets_.data(), values_.data(), factor, x, y);
 }
 
 double PointMatrix::bytes() const

@@ -5,8 +5,8 @@ namespace slender {
 
 struct PointKernels
 {
-  /// y = A x (factor 0) or y += factor A x, full rows. Returns x . A x.
-  double (*multiply)(int rows, const int* starts, const int* columns, const double* values, double factor, const double* x, double* y);
+  /// y = A x (factor 0) or y += factor A x, full rows; offsets are four times the columns. Returns x . A x.
+  double (*multiply)(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y);
   /// y += A x for a symmetric matrix of 3 x 3 blocks: lower triangle by columns, the diagonal block first, blocks by columns.
   void (*multiplyBlocks)(int columns, const int* starts, const int* rows, const double* values, const double* x, double* y);
   /// Sum of x . y over points; the unused parts do not count.

@@ -27,9 +27,9 @@ public:
   PointMatrix(int size, const std::vector<Eigen::Triplet<double>>& entries);
 
   int size() const { return static_cast<int>(starts_.size()) - 1; }
-  /// Row i has the columns columns()[starts()[i]] .. columns()[starts()[i + 1] - 1], ascending.
+  /// Row i has the entries starts()[i] .. starts()[i + 1] - 1, by ascending columns.
   const std::vector<int>& starts() const { return starts_; }
-  const AlignedVector<int>& columns() const { return columns_; }
+  int column(int entry) const { return static_cast<int>(offsets_[entry] / 4); }
   const AlignedVector<double>& values() const { return values_; }
   Eigen::SparseMatrix<double> toEigen() const;
 
@@ -42,7 +42,7 @@ public:
 
 private:
   std::vector<int> starts_{0};
-  AlignedVector<int> columns_;
+  AlignedVector<unsigned> offsets_;   ///< of the columns' points in a PointVector
   AlignedVector<double> values_;
 };
 
