@@ -172,8 +172,8 @@ void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
   m.values.assign(m.rows.size(), 0.0);
   m.common.method[0].ordering = CHOLMOD_NATURAL;
   m.common.postorder = 0;
-  const std::size_t widths[3] = {8, 32, 96};
-  const double zeros[3] = {0.9, 0.4, 0.15};
+  const std::size_t widths[3] = {16, 48, 128};
+  const double zeros[3] = {0.8, 0.3, 0.1};
   for (int k = 0; k < 3; ++k)
   {
     m.common.nrelax[k] = widths[k];
