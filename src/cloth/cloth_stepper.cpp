@@ -170,7 +170,8 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
 StepFailure ClothStepper::Impl::linearized(StepReport& report)
 {
   system.evaluateHessian(system.start(), HessianKind::semidefinite);
-  std::copy(pin_motion_.begin(), pin_motion_.end(), d_.begin());
+  for (int i = 0; i < model->vertices(); ++i)
+    point(d_, i) = system.held()[i] ? Eigen::Vector3d(point(pin_motion_, i)) : Eigen::Vector3d(point(system.target(), i) - point(system.start(), i));
   if (!system.solve(d_, report.linear_iterations, report.factorizations))
     return StepFailure::singular_matrix;
   ++report.iterations;

@@ -98,7 +98,7 @@ ClothSystem::ClothSystem(const ClothModel& model, ClothSolver solver, double lin
     factor_.setPattern(PointMatrix(n, entries));
     cg_.resize(n);
   }
-  for (PointVector* v : {&start_, &target_, &force_, &gradient_, &product_, &right_})
+  for (PointVector* v : {&start_, &target_, &force_, &gradient_, &product_, &right_, &correction_})
     v->assign(4 * n, 0.0);
   weight_.assign(n, 0.0);
   held_.assign(n, 0);
@@ -336,13 +336,14 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
 
 bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizations)
 {
-  // what is held moves as given; the rest sees that on the right-hand side
+  // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
   bool moved = false;
   for (int i = 0; i < points(); ++i)
-    if (!held_[i])
+  {
+    if (solver_ == ClothSolver::cholesky && !held_[i])
       point(d, i).setZero();
-    else
-      moved = moved || point(d, i) != Eigen::Vector3d::Zero();
+    moved = moved || point(d, i) != Eigen::Vector3d::Zero();
+  }
   for (std::size_t i = 0; i < right_.size(); ++i)
     right_[i] = -gradient_[i];
   if (moved)
@@ -363,18 +364,16 @@ bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizati
     return true;
   }
   clearHeld(right_);
-  std::swap(d, product_);   // keeps the motion of what is held
   const LinearResult result = cg_.solve(
-    right_, d, linear_tolerance_, 2000,
+    right_, correction_, linear_tolerance_, 2000,
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);
     },
     [&](const PointVector& r, PointVector& z) { factor_.solvePoints(r.data(), z.data()); });
   linear_iterations += result.iterations;
-  for (int i = 0; i < points(); ++i)
-    if (held_[i])
-      point(d, i) = point(product_, i);
+  for (std::size_t i = 0; i < d.size(); ++i)
+    d[i] += correction_[i];
   return result.definite;
 }
 

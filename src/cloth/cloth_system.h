@@ -46,7 +46,7 @@ public:
   /// Elastic and viscous parts only, added.
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient);
   PointVector& gradient() { return gradient_; }
-  /// Solves H d = -gradient with d of held points as given in `d`. False: not positive definite. `linear` grows by iterations.
+  /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. False: not positive definite. `linear` grows by iterations.
   bool solve(PointVector& d, int& linear_iterations, int& factorizations);
 
   const PointVector& start() const { return start_; }
@@ -81,7 +81,7 @@ private:
   ConjugateGradients cg_;
 
   double h_ = 0, ratio_ = 0;
-  PointVector start_, viscous_start_, target_, force_, wind_target_, gradient_, product_, right_, weight_;
+  PointVector start_, viscous_start_, target_, force_, wind_target_, gradient_, product_, right_, correction_, weight_;
   std::vector<Eigen::Matrix3d> drag_;         ///< empty without wind
   std::vector<char> held_;
   AlignedVector<double> strains_[3], angles_;
