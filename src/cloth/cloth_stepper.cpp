@@ -40,7 +40,7 @@ private:
 };
 
 ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
-  : model(std::move(m)), options(o), system(*model, o.solver, o.linear_tolerance)
+  : model(std::move(m)), options(o), system(*model, o)
 {
   const std::string who = "cloth '" + model->name + "': ";
   if (o.integrator != Integrator::implicit_euler && o.integrator != Integrator::symplectic_euler)

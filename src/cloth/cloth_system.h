@@ -26,7 +26,7 @@ struct ClothEvaluation
 class ClothSystem
 {
 public:
-  ClothSystem(const ClothModel& model, ClothSolver solver, double linear_tolerance);
+  ClothSystem(const ClothModel& model, const ClothOptions& options);
 
   int points() const { return model_.vertices(); }
   ClothSolver solver() const { return solver_; }
@@ -65,7 +65,7 @@ private:
 
   const ClothModel& model_;
   ClothSolver solver_;
-  double linear_tolerance_;
+  const double linear_tolerance_;
   MembraneEnergy membrane_;
   std::unique_ptr<HingeBending> hinges_;      ///< hinge bending only
   PointMatrix bending_, stand_in_;            ///< isometric model, or for hinges what preconditions; rest membrane
