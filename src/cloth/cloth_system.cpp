@@ -321,6 +321,13 @@ ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind k
   return result;
 }
 
+void ClothSystem::shiftMatrix(double factor)
+{
+  for (int i = 0; i < points(); ++i)
+    for (int k = 0; k < 3; ++k)
+      matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += factor * weight_[i];
+}
+
 void ClothSystem::clearHeld(PointVector& v) const
 {
   for (int i = 0; i < points(); ++i)

@@ -43,6 +43,8 @@ public:
   ClothEvaluation evaluate(const PointVector& x);
   /// The same with the matrix of solve().
   ClothEvaluation evaluateHessian(const PointVector& x, HessianKind kind);
+  /// Adds a multiple of the weights of inertia to the matrix.
+  void shiftMatrix(double factor);
   /// Elastic and viscous parts only, added.
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient);
   PointVector& gradient() { return gradient_; }
