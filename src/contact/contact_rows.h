@@ -1,0 +1,47 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace slender {
+
+/// A condition n . sum_i w_i y_i >= bound on vectors y of points (positions at the end of a step, or velocities), with friction against
+/// departures of the sum from `anchor` across n.
+struct ContactRow
+{
+  int point[4];
+  double weight[4];
+  Eigen::Vector3d normal, anchor;
+  double bound;
+  double push;        ///< share of the bound that only moves pieces apart and causes no friction
+  double friction;
+  double tolerance;   ///< of the bound
+  // set by ContactRows
+  double mobility = 0.0;   ///< sum of w_i^2 / m_i
+  double impulse = 0.0;
+  Eigen::Vector3d rubbing = Eigen::Vector3d::Zero();
+  int seen = -1;
+};
+
+/// Solves rows by projected Gauss-Seidel: impulses that never pull, friction in Coulomb's cone. Rows are visited in their order, and only
+/// while points that they act on still move.
+class ContactRows
+{
+public:
+  std::vector<ContactRow> rows;
+
+  /// Everything is forgotten but the memory.
+  void clear(int points);
+  /// Impulses begin at zero, e.g. with other bounds.
+  void restart();
+  /// Adds impulses to y until no row's bound is missed by more than its tolerance or a thousandth of the largest miss at first, or for `sweeps`
+  /// sweeps. Rows may have been added since the last call.
+  void relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y);
+
+private:
+  std::vector<int> moved_;
+  int clock_ = 0;
+};
+
+}  // namespace slender
