@@ -23,11 +23,15 @@ class PlaneBound
 {
 public:
   explicit PlaneBound(double room) : room_(room) {}
-  /// A pair of corners: its distance beyond the nearest pair's, along the normal, and its rate.
+  /// A pair of corners: its distance beyond the nearest pair's, along the normal, and its rate. Where pieces nearly touch, the normal is
+  /// rounded so much that it may not separate them: then this bound says nothing.
   void corner(double beyond, double rate)
   {
-    if (rate < 0.0)
-      time_ = std::min(time_, (room_ + std::max(0.0, beyond)) / -rate);
+    const double room = room_ + beyond;
+    if (!(room > 0.0))
+      time_ = 0.0;
+    else if (rate < 0.0)
+      time_ = std::min(time_, room / -rate);
   }
   double time() const { return time_; }
 
@@ -171,9 +175,9 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
     for (int i = 0; i < 2; ++i)
     {
       // the first time at which room + beyond + rate t - acceleration t^2 / 2 = 0
-      const double c = room + std::max(0.0, nearest.normal.dot(z[i] - foot)), s = nearest.normal.dot(rate[i]);
+      const double c = std::max(0.0, room + nearest.normal.dot(z[i] - foot)), s = nearest.normal.dot(rate[i]);
       const double root = std::sqrt(s * s + 2.0 * acceleration * c);
-      const double time = s <= 0.0 ? (root > s ? 2.0 * c / (root - s) : plane) : acceleration > 0.0 ? (s + root) / acceleration : plane;
+      const double time = !(c > 0.0) ? 0.0 : s <= 0.0 ? (root > s ? 2.0 * c / (root - s) : plane) : acceleration > 0.0 ? (s + root) / acceleration : plane;
       plane = std::min(plane, time);
     }
     t += std::max(room / speed, plane);

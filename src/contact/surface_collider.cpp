@@ -162,7 +162,8 @@ bool SurfaceCollider::Impl::examineStart()
     double apart = std::numeric_limits<double>::infinity();
     for (int i = 0; i < first; ++i)
       for (int j = first; j < 4; ++j)
-        apart = std::min(apart, place.normal.dot(to_.col(place.point[i]) - to_.col(place.point[j])));
+        for (const Eigen::Matrix3Xd* x : {&from_, &to_})   // both: the normal is rounded
+          apart = std::min(apart, place.normal.dot(x->col(place.point[i]) - x->col(place.point[j])));
     if (!(apart > core + 0.5 * gap))
       suspects_.push_back(pair);
   }
