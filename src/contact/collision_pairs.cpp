@@ -1,23 +1,48 @@
 #include "collision_pairs.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "slender_sim/contact/distance.h"
 
 namespace slender {
 
+namespace {
+
+constexpr double kMargin = 0.5;   // of shells
+
+double leastAlong(const CollisionPair& pair, const Eigen::Matrix3Xd& x)
+{
+  double least = std::numeric_limits<double>::infinity();
+  const int second = pair.edges ? 2 : 1;
+  double along[4];
+  for (int i = 0; i < 4; ++i)
+    along[i] = pair.normal.dot(x.col(pair.point[i]) - x.col(pair.point[3]));
+  for (int i = 0; i < second; ++i)
+    for (int j = second; j < 4; ++j)
+      least = std::min(least, along[i] - along[j]);
+  return least;
+}
+
+}  // namespace
+
 CollisionPairs::CollisionPairs(const CollisionElements& elements) : elements_(elements)
 {
   const std::size_t points = elements.point_object.size(), count = elements.elements.size();
   radius_.resize(points);
+  margin_.resize(points);
   for (std::size_t i = 0; i < points; ++i)
     if (const int object = elements.point_object[i]; object >= 0)
-      radius_[i] = elements.objects[object].shell + elements.objects[object].core;
+    {
+      margin_[i] = kMargin * elements.objects[object].shell;
+      radius_[i] = elements.objects[object].shell + elements.objects[object].core + margin_[i];
+    }
   points_.resize(points);
   edges_.resize(elements.edges.size());
   volumes_.resize(count);
   active_.resize(count);
-  all_.assign(points, 1);
+  strayed_.resize(points);
+  searched_.resize(3, points);
   Eigen::Matrix3Xd centers(3, count);
   std::vector<int> groups(count);
   for (std::size_t i = 0; i < count; ++i)
@@ -29,21 +54,45 @@ CollisionPairs::CollisionPairs(const CollisionElements& elements) : elements_(el
   tree_.build(centers, groups);
 }
 
-const std::vector<CollisionPair>& CollisionPairs::all(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
+const std::vector<CollisionPair>& CollisionPairs::find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 {
-  return ofChanged(from, to, all_);
+  pairs_.clear();
+  std::fill(strayed_.begin(), strayed_.end(), 1);
+  searched_ = to;
+  search(from);
+  return pairs_;
 }
 
-const std::vector<CollisionPair>& CollisionPairs::ofChanged(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
-                                                            const std::vector<char>& changed)
+const std::vector<CollisionPair>& CollisionPairs::update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
+{
+  bool any = false;
+  for (std::size_t i = 0; i < points_.size(); ++i)
+  {
+    strayed_[i] = (to.col(i) - searched_.col(i)).squaredNorm() > margin_[i] * margin_[i];
+    if (strayed_[i])
+      searched_.col(i) = to.col(i);
+    any = any || strayed_[i];
+  }
+  if (!any)
+    return pairs_;
+  const auto strayed = [&](const CollisionPair& p) {
+    return strayed_[p.point[0]] | strayed_[p.point[1]] | strayed_[p.point[2]] | strayed_[p.point[3]];
+  };
+  pairs_.erase(std::remove_if(pairs_.begin(), pairs_.end(), strayed), pairs_.end());
+  search(from);
+  return pairs_;
+}
+
+/// Adds all pairs of points that strayed.
+void CollisionPairs::search(const Eigen::Matrix3Xd& from)
 {
   for (std::size_t i = 0; i < points_.size(); ++i)
-    if (changed[i])
-      points_[i] = Kdop::swept(from.col(i).data(), to.col(i).data(), radius_[i]);
+    if (strayed_[i])
+      points_[i] = Kdop::swept(from.col(i).data(), searched_.col(i).data(), radius_[i]);
   for (std::size_t i = 0; i < edges_.size(); ++i)
   {
     const CollisionElements::Edge& e = elements_.edges[i];
-    if (!(changed[e.a] | changed[e.b]))
+    if (!(strayed_[e.a] | strayed_[e.b]))
       continue;
     edges_[i] = points_[e.a];
     edges_[i].include(points_[e.b]);
@@ -51,43 +100,48 @@ const std::vector<CollisionPair>& CollisionPairs::ofChanged(const Eigen::Matrix3
   for (std::size_t i = 0; i < volumes_.size(); ++i)
   {
     const auto& v = elements_.elements[i].v;
-    active_[i] = changed[v[0]] | changed[v[1]] | changed[v[2]];
+    active_[i] = strayed_[v[0]] | strayed_[v[1]] | strayed_[v[2]];
     if (!active_[i])
       continue;
     volumes_[i] = points_[v[0]];
     volumes_[i].include(points_[v[1]]);
     volumes_[i].include(points_[v[2]]);
   }
-  return find(changed);
-}
-
-const std::vector<CollisionPair>& CollisionPairs::find(const std::vector<char>& changed)
-{
-  pairs_.clear();
   found_.clear();
   tree_.refit(volumes_, active_);
   tree_.selfPairs(found_);
   for (const KdopTree::Pair& p : found_)
     if (elements_.mayTouch(elements_.elements[p.first].object, elements_.elements[p.second].object))
     {
-      testElements(p.first, p.second, changed);
-      testElements(p.second, p.first, changed);
+      testElements(p.first, p.second, from);
+      testElements(p.second, p.first, from);
     }
-  return pairs_;
+}
+
+void CollisionPairs::add(int first, int second, bool edges, const int (&point)[4], const Eigen::Matrix3Xd& from)
+{
+  if (!(strayed_[point[0]] | strayed_[point[1]] | strayed_[point[2]] | strayed_[point[3]]))
+    return;
+  CollisionPair pair{first, second, edges, {point[0], point[1], point[2], point[3]}, 0.0, 0.0, Eigen::Vector3d::Zero()};
+  const PairPlace at = place(pair, from);
+  const double thickness = core(pair);
+  pair.gap = at.distance - thickness;
+  pair.normal = at.normal;
+  const double room = thickness + 0.5 * pair.gap;
+  pair.room = leastAlong(pair, from) > room ? room : std::numeric_limits<double>::infinity();   // the normal is rounded
+  pairs_.push_back(pair);
 }
 
 /// What a owns against b: points against the face; edges against the edges that b owns, from one side only.
-void CollisionPairs::testElements(int a, int b, const std::vector<char>& changed)
+void CollisionPairs::testElements(int a, int b, const Eigen::Matrix3Xd& from)
 {
   const CollisionElements::Element &ea = elements_.elements[a], &eb = elements_.elements[b];
   if (ea.owns_point && eb.corners == 3)
     for (int k = 0; k < 3; ++k)
     {
       const int p = ea.v[k];
-      if (!(ea.owns_point & (1 << k)) || p == eb.v[0] || p == eb.v[1] || p == eb.v[2] ||
-          !(changed[p] | changed[eb.v[0]] | changed[eb.v[1]] | changed[eb.v[2]]) || !points_[p].overlaps(volumes_[b]))
-        continue;
-      pairs_.push_back({p, b, false});
+      if ((ea.owns_point & (1 << k)) && p != eb.v[0] && p != eb.v[1] && p != eb.v[2] && points_[p].overlaps(volumes_[b]))
+        add(p, b, false, {p, eb.v[0], eb.v[1], eb.v[2]}, from);
     }
   if (a > b || !ea.owns_edge || !eb.owns_edge)
     return;
@@ -101,13 +155,16 @@ void CollisionPairs::testElements(int a, int b, const std::vector<char>& changed
       if (!(eb.owns_edge & (1 << j)))
         continue;
       const CollisionElements::Edge& second = elements_.edges[eb.edge[j]];
-      if (first.a == second.a || first.a == second.b || first.b == second.a || first.b == second.b ||
-          !(changed[first.a] | changed[first.b] | changed[second.a] | changed[second.b]) ||
-          !edges_[ea.edge[i]].overlaps(edges_[eb.edge[j]]))
-        continue;
-      pairs_.push_back({ea.edge[i], eb.edge[j], true});
+      if (first.a != second.a && first.a != second.b && first.b != second.a && first.b != second.b &&
+          edges_[ea.edge[i]].overlaps(edges_[eb.edge[j]]))
+        add(ea.edge[i], eb.edge[j], true, {first.a, first.b, second.a, second.b}, from);
     }
   }
+}
+
+bool CollisionPairs::separated(const CollisionPair& pair, const Eigen::Matrix3Xd& to)
+{
+  return leastAlong(pair, to) > pair.room;
 }
 
 int CollisionPairs::object(const CollisionPair& pair, bool second) const
@@ -132,35 +189,27 @@ PairPlace CollisionPairs::placeAt(const CollisionPair& pair, Position x) const
 {
   PairPlace out;
   Eigen::Vector3d way;
+  const Eigen::Vector3d p[4] = {x(pair.point[0]), x(pair.point[1]), x(pair.point[2]), x(pair.point[3])};
+  std::copy(pair.point, pair.point + 4, out.point);
   if (pair.edges)
   {
-    const CollisionElements::Edge &a = elements_.edges[pair.first], &b = elements_.edges[pair.second];
-    const Eigen::Vector3d a0 = x(a.a), a1 = x(a.b), b0 = x(b.a), b1 = x(b.b);
-    const SegmentPair at = closestOfSegments(a0, a1, b0, b1);
-    out.point[0] = a.a;
-    out.point[1] = a.b;
-    out.point[2] = b.a;
-    out.point[3] = b.b;
+    const SegmentPair at = closestOfSegments(p[0], p[1], p[2], p[3]);
     out.weight[0] = 1.0 - at.s;
     out.weight[1] = at.s;
     out.weight[2] = at.t - 1.0;
     out.weight[3] = -at.t;
     out.inside = at.s > 0.0 && at.s < 1.0 && at.t > 0.0 && at.t < 1.0;
-    way = a0 - b0 + at.s * (a1 - a0) - at.t * (b1 - b0);
+    way = p[0] - p[2] + at.s * (p[1] - p[0]) - at.t * (p[3] - p[2]);
   }
   else
   {
-    const auto& v = elements_.elements[pair.second].v;
-    const Eigen::Vector3d p = x(pair.first), corner[3] = {x(v[0]), x(v[1]), x(v[2])};
-    const Eigen::Vector3d w = closestOnTriangle(p, corner[0], corner[1], corner[2]);
-    out.point[0] = pair.first;
+    const Eigen::Vector3d w = closestOnTriangle(p[0], p[1], p[2], p[3]);
     out.weight[0] = 1.0;
     way.setZero();
     for (int k = 0; k < 3; ++k)
     {
-      out.point[k + 1] = v[k];
       out.weight[k + 1] = -w[k];
-      way += w[k] * (p - corner[k]);
+      way += w[k] * (p[0] - p[k + 1]);
     }
     out.inside = true;
   }
@@ -181,14 +230,10 @@ PairPlace CollisionPairs::place(const CollisionPair& pair, const Eigen::Matrix3X
 
 double CollisionPairs::limit(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, const ApproachLimit& limit) const
 {
-  const auto moving = [&](int i) { return MovingPoint{from.col(i), to.col(i)}; };
-  if (pair.edges)
-  {
-    const CollisionElements::Edge &a = elements_.edges[pair.first], &b = elements_.edges[pair.second];
-    return segmentsLimit(moving(a.a), moving(a.b), moving(b.a), moving(b.b), limit);
-  }
-  const auto& v = elements_.elements[pair.second].v;
-  return pointTriangleLimit(moving(pair.first), moving(v[0]), moving(v[1]), moving(v[2]), limit);
+  MovingPoint p[4];
+  for (int i = 0; i < 4; ++i)
+    p[i] = {from.col(pair.point[i]), to.col(pair.point[i])};
+  return pair.edges ? segmentsLimit(p[0], p[1], p[2], p[3], limit) : pointTriangleLimit(p[0], p[1], p[2], p[3], limit);
 }
 
 }  // namespace slender

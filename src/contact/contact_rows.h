@@ -18,7 +18,8 @@ struct ContactRow
   double friction;
   double tolerance;   ///< of the bound
   // set by ContactRows
-  double mobility = 0.0;   ///< sum of w_i^2 / m_i
+  double response[4] = {0, 0, 0, 0};   ///< w_i / m_i
+  double mobility = 0.0;               ///< sum of w_i^2 / m_i
   double impulse = 0.0;
   Eigen::Vector3d rubbing = Eigen::Vector3d::Zero();
   int seen = -1;
@@ -33,10 +34,10 @@ public:
 
   /// Everything is forgotten but the memory.
   void clear(int points);
-  /// Impulses begin at zero, e.g. with other bounds.
-  void restart();
-  /// Adds impulses to y until no row's bound is missed by more than its tolerance or a thousandth of the largest miss at first, or for `sweeps`
-  /// sweeps. Rows may have been added since the last call.
+  /// Begins on other vectors y, for which bounds and anchors may have been changed since: a share of all impulses but pushes is the start.
+  void restart(const Eigen::VectorXd& inverse_mass, double share, Eigen::Matrix3Xd& y);
+  /// Adds impulses to y until no sweep changes a row by more than its tolerance or 1/200 of the largest miss at first, or for `sweeps` sweeps.
+  /// Rows may have been added since the last call.
   void relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y);
 
 private:

@@ -50,14 +50,14 @@ private:
   bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v);
   bool examineStart();
   bool examinePlanes();
-  void detect(bool first);
+  void detect();
+  ApproachLimit limitOf(const CollisionPair& pair) const;
   bool planeHit(int point, int plane) const;
   double planeGap(int plane, const std::vector<Pose>& poses, const Eigen::Vector3d& x) const;
   double reach(const CollisionPair& pair, double gap) const;
   void repel(const CollisionPair& pair, const PairPlace& place, double gap, double reach);
   void stop(const CollisionPair& pair);
   void addPlaneRow(int point, int plane, double gap, bool hit);
-  void markChanged();
   bool joinHits();
   bool moveZones();
   bool followPrescribed(const ImpactZones::Zone& zone);
@@ -73,11 +73,11 @@ private:
 
   const CollisionStep* step_ = nullptr;
   Eigen::Matrix3Xd from_, to_;      ///< all points, at both ends of the step
-  Eigen::Matrix3Xd tested_;         ///< ends for which all pairs but suspects_ and hits_ are known not to collide
+  Eigen::Matrix3Xd tested_;         ///< ends at the last detection
   Eigen::Matrix3Xd displacement_, velocity_;
   Eigen::VectorXd inverse_mass_;
   std::vector<char> changed_;
-  std::vector<CollisionPair> suspects_, hits_;
+  std::vector<CollisionPair> hits_;
   std::vector<PlaneHit> plane_hits_;
 };
 
@@ -143,31 +143,23 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
   ++report_.repulsions;
 }
 
-/// Looks at all pairs that may come near each other: those within their shells get repulsions; those that a plane does not keep apart for
-/// the whole step are suspects.
+/// Finds all pairs that may come near each other; those within their shells get repulsions.
 bool SurfaceCollider::Impl::examineStart()
 {
-  suspects_.clear();
-  for (const CollisionPair& pair : pairs_.all(from_, to_))
+  for (const CollisionPair& pair : pairs_.find(from_, to_))
   {
+    if (!(pair.gap > 0.0))
+      return fail("surfaces meet at the start of the step, at points " + std::to_string(pair.point[0]) + " and " + std::to_string(pair.point[3]));
+    if (pair.gap >= pairs_.shell(pair))
+      continue;
+    const double range = reach(pair, pair.gap);
+    if (pair.gap >= range)
+      continue;
     const PairPlace place = pairs_.place(pair, from_);
-    const double core = pairs_.core(pair), gap = place.distance - core;
-    if (!(gap > 0.0))
-      return fail("surfaces meet at the start of the step, at point " + std::to_string(place.point[0]) + " and point " + std::to_string(place.point[2]));
-    const double range = reach(pair, gap);
     const bool lone = pair.edges && (elements_.edges[pair.first].lone || elements_.edges[pair.second].lone);
-    if (gap < range && (place.inside || lone))   // other places of two edges are a vertex's, too
-      repel(pair, place, gap, range);
-    const int first = pair.edges ? 2 : 1;
-    double apart = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < first; ++i)
-      for (int j = first; j < 4; ++j)
-        for (const Eigen::Matrix3Xd* x : {&from_, &to_})   // both: the normal is rounded
-          apart = std::min(apart, place.normal.dot(x->col(place.point[i]) - x->col(place.point[j])));
-    if (!(apart > core + 0.5 * gap))
-      suspects_.push_back(pair);
+    if (place.inside || lone)   // other places of two edges are a vertex's, too
+      repel(pair, place, pair.gap, range);
   }
-  tested_ = to_;
   return true;
 }
 
@@ -227,43 +219,18 @@ bool SurfaceCollider::Impl::examinePlanes()
   return true;
 }
 
-void SurfaceCollider::Impl::markChanged()
+/// Fills hits_ and plane_hits_: all collisions along the present motions. After the first time only pairs whose motion has changed need a look.
+void SurfaceCollider::Impl::detect()
 {
+  const bool first = report_.rounds++ == 0;
   for (Eigen::Index i = 0; i < to_.cols(); ++i)
-    changed_[i] = to_(0, i) != tested_(0, i) || to_(1, i) != tested_(1, i) || to_(2, i) != tested_(2, i);
-}
-
-/// Fills hits_ and plane_hits_: all collisions along the present motions. Pairs whose motion has not changed were tested before, but for
-/// the suspects of the start and hits.
-void SurfaceCollider::Impl::detect(bool first)
-{
-  ++report_.rounds;
-  markChanged();
-  const auto hits = [&](const CollisionPair& pair) {
-    ApproachLimit limit;
-    limit.thickness = pairs_.core(pair);
-    limit.reach = pairs_.shell(pair);
-    limit.kept = kKept;
-    return pairs_.limit(pair, from_, to_, limit) < 1.0;
+    changed_[i] = first || to_(0, i) != tested_(0, i) || to_(1, i) != tested_(1, i) || to_(2, i) != tested_(2, i);
+  const auto changed = [&](const CollisionPair& p) {
+    return changed_[p.point[0]] | changed_[p.point[1]] | changed_[p.point[2]] | changed_[p.point[3]];
   };
-  const auto changed = [&](const CollisionPair& pair) {
-    if (pair.edges)
-    {
-      const CollisionElements::Edge &a = elements_.edges[pair.first], &b = elements_.edges[pair.second];
-      return changed_[a.a] | changed_[a.b] | changed_[b.a] | changed_[b.b];
-    }
-    const auto& v = elements_.elements[pair.second].v;
-    return changed_[pair.first] | changed_[v[0]] | changed_[v[1]] | changed_[v[2]];
-  };
-  // hits whose motion nothing changed are still hits
-  const auto settled = std::remove_if(hits_.begin(), hits_.end(), changed);
-  hits_.erase(settled, hits_.end());
-  if (first)
-    for (const CollisionPair& pair : suspects_)
-      if (!changed(pair) && hits(pair))
-        hits_.push_back(pair);
-  for (const CollisionPair& pair : pairs_.ofChanged(from_, to_, changed_))
-    if (hits(pair))
+  hits_.erase(std::remove_if(hits_.begin(), hits_.end(), changed), hits_.end());
+  for (const CollisionPair& pair : pairs_.update(from_, to_))
+    if (changed(pair) && !CollisionPairs::separated(pair, to_) && pairs_.limit(pair, from_, to_, limitOf(pair)) < 1.0)
       hits_.push_back(pair);
   std::sort(hits_.begin(), hits_.end(), [](const CollisionPair& a, const CollisionPair& b) {
     return std::tie(a.edges, a.first, a.second) < std::tie(b.edges, b.first, b.second);
@@ -277,15 +244,20 @@ void SurfaceCollider::Impl::detect(bool first)
   tested_ = to_;
 }
 
-/// The end of the step has to stay on this side, seen where the pieces come too near each other.
-void SurfaceCollider::Impl::stop(const CollisionPair& pair)
+ApproachLimit SurfaceCollider::Impl::limitOf(const CollisionPair& pair) const
 {
   ApproachLimit limit;
   limit.thickness = pairs_.core(pair);
   limit.reach = pairs_.shell(pair);
   limit.kept = kKept;
-  const double share = pairs_.limit(pair, from_, to_, limit);
-  const double gap = std::min(pairs_.place(pair, from_).distance - limit.thickness, limit.reach);
+  return limit;
+}
+
+/// The end of the step has to stay on this side, seen where the pieces come too near each other.
+void SurfaceCollider::Impl::stop(const CollisionPair& pair)
+{
+  const ApproachLimit limit = limitOf(pair);
+  const double share = pairs_.limit(pair, from_, to_, limit), gap = std::min(pair.gap, limit.reach);
   const PairPlace place = pairs_.place(pair, from_, to_, share);
   ContactRow row{};
   row.normal = place.normal;
@@ -320,9 +292,8 @@ bool SurfaceCollider::Impl::joinHits()
   };
   for (const CollisionPair& pair : hits_)
   {
-    const PairPlace place = pairs_.place(pair, from_);
     for (int i = 1; i < 4; ++i)
-      join(node(place.point[0]), node(place.point[i]));
+      join(node(pair.point[0]), node(pair.point[i]));
   }
   for (const PlaneHit& hit : plane_hits_)
     join(hit.point, static_cast<int>(from_.cols()) + elements_.planes[hit.plane] - elements_.sheet_count);
@@ -398,7 +369,6 @@ void SurfaceCollider::Impl::solveVelocities()
 {
   const double h = step_->h;
   auto& rows = rows_.rows;
-  rows_.restart();
   for (ContactRow& row : rows)
   {
     Eigen::Vector3d start = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::Zero();
@@ -409,9 +379,9 @@ void SurfaceCollider::Impl::solveVelocities()
     }
     row.anchor = (row.anchor - start) / h;   // zero, or the velocity of a plane
     row.bound = row.normal.dot(row.anchor);
-    row.push = 0.0;
     row.tolerance /= h;
   }
+  rows_.restart(inverse_mass_, 1.0 / h, velocity_);
   rows_.relax(inverse_mass_, kSweeps, velocity_);
   if (zones_.empty())
     return;
@@ -437,7 +407,7 @@ CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen:
     return report_;
   hits_.clear();
   rows_.relax(inverse_mass_, kSweeps, to_);
-  detect(true);
+  detect();
   while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds)
   {
     for (const CollisionPair& pair : hits_)
@@ -445,14 +415,14 @@ CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen:
     for (const PlaneHit& hit : plane_hits_)
       addPlaneRow(hit.point, hit.plane, planeGap(hit.plane, step.solids, from_.col(hit.point)), true);
     rows_.relax(inverse_mass_, kSweeps, to_);
-    detect(false);
+    detect();
   }
   displacement_ = to_ - from_;
   while (joinHits())
   {
     if (!moveZones())
       return report_;
-    detect(false);
+    detect();
   }
   solveVelocities();
   x = to_.leftCols(elements_.sheet_points);
