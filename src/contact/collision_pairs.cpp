@@ -68,7 +68,8 @@ const std::vector<CollisionPair>& CollisionPairs::update(const Eigen::Matrix3Xd&
   bool any = false;
   for (std::size_t i = 0; i < points_.size(); ++i)
   {
-    strayed_[i] = (to.col(i) - searched_.col(i)).squaredNorm() > margin_[i] * margin_[i];
+    // most ends lie between the start and the first end: impulses stop motions
+    strayed_[i] = to.col(i) != searched_.col(i) && pointSegmentDistance(to.col(i), from.col(i), searched_.col(i)) > margin_[i];
     if (strayed_[i])
       searched_.col(i) = to.col(i);
     any = any || strayed_[i];

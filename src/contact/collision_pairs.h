@@ -59,7 +59,7 @@ private:
 
   const CollisionElements& elements_;
   std::vector<double> radius_, margin_;   ///< of points [m]
-  Eigen::Matrix3Xd searched_;             ///< ends around which the volumes lie
+  Eigen::Matrix3Xd searched_;             ///< ends of the motions around which the volumes lie
   std::vector<char> strayed_;             ///< points whose pairs are looked for
   std::vector<Kdop> points_, edges_, volumes_;
   std::vector<char> active_;

@@ -53,7 +53,8 @@ struct CollisionReport
 /// friction [cf. Harmon et al., SIGGRAPH 2008]; pieces that still collide move rigidly (Provot's impact zones), which ends it.
 ///
 /// Impulses conserve momentum. Solids and points without inverse mass move as prescribed. Solids' corners go along straight lines; a cylinder
-/// is taken as a prism around it, by less than a twentieth of the thickness. Memory is reused; results do not depend on the order in which pairs are found.
+/// is taken as a prism around it, by less than a twentieth of the thickness. Memory is reused; nothing else is carried over from
+/// step to step.
 class SurfaceCollider
 {
 public:
