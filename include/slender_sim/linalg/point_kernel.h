@@ -1,0 +1,23 @@
+#pragma once
+
+/// Products of the sparse matrices of points. Points have 4 doubles, the last of them unused; vectors are aligned to 64 bytes.
+namespace slender {
+
+struct PointKernels
+{
+  /// y = A x (factor 0) or y += factor A x, full rows; offsets are four times the columns. Returns x . A x.
+  double (*multiply)(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y);
+  /// y += A x for a symmetric matrix of 3 x 3 blocks: lower triangle by columns, the diagonal block first, blocks by columns.
+  void (*multiplyBlocks)(int columns, const int* starts, const int* rows, const double* values, const double* x, double* y);
+  /// Sum of x . y over points; the unused parts do not count.
+  double (*dot)(int points, const double* x, const double* y);
+};
+
+namespace baseline { extern const PointKernels point_kernels; }
+namespace avx2 { extern const PointKernels point_kernels; }
+namespace avx512 { extern const PointKernels point_kernels; }
+
+/// The table for this machine.
+const PointKernels& pointKernels();
+
+}  // namespace slender
