@@ -70,6 +70,87 @@ void multiplyBlocks(int columns, const int* starts, const int* rows, const doubl
   }
 }
 
+/// Columns from .. from+Columns-1 of a supernode of `count` rows, whose first row is that of column 0: solve with the triangle, then take
+/// their part from the rows below.
+template <int Columns>
+inline __attribute__((always_inline)) void forward(const double* l, int count, const int* rows, int from, double* x)
+{
+  Quad c[Columns];
+  for (int a = 0; a < Columns; ++a)
+  {
+    Quad value = load(x + 4 * rows[from + a]);
+    for (int b = 0; b < a; ++b)
+      value -= l[static_cast<long>(from + b) * count + from + a] * c[b];
+    c[a] = value / l[static_cast<long>(from + a) * count + from + a];
+    *reinterpret_cast<Quad*>(x + 4 * rows[from + a]) = c[a];
+  }
+  const double* column[Columns];
+  for (int a = 0; a < Columns; ++a)
+    column[a] = l + static_cast<long>(from + a) * count;
+  for (int i = from + Columns; i < count; ++i)
+  {
+    Quad& out = *reinterpret_cast<Quad*>(x + 4 * rows[i]);
+    Quad value = out;
+    for (int a = 0; a < Columns; ++a)
+      value -= column[a][i] * c[a];
+    out = value;
+  }
+}
+
+/// The same backwards with the transpose.
+template <int Columns>
+inline __attribute__((always_inline)) void backward(const double* l, int count, const int* rows, int from, double* x)
+{
+  Quad sum[Columns] = {};
+  const double* column[Columns];
+  for (int a = 0; a < Columns; ++a)
+    column[a] = l + static_cast<long>(from + a) * count;
+  for (int i = from + Columns; i < count; ++i)
+  {
+    const Quad value = load(x + 4 * rows[i]);
+    for (int a = 0; a < Columns; ++a)
+      sum[a] += column[a][i] * value;
+  }
+  for (int a = Columns - 1; a >= 0; --a)
+  {
+    Quad& out = *reinterpret_cast<Quad*>(x + 4 * rows[from + a]);
+    Quad value = out - sum[a];
+    for (int b = a + 1; b < Columns; ++b)
+      value -= column[a][from + b] * load(x + 4 * rows[from + b]);
+    out = value / column[a][from + a];
+  }
+}
+
+void solveSupernodal(const SupernodalFactor& f, double* x)
+{
+  for (int s = 0; s < f.supernodes; ++s)
+  {
+    const int columns = f.first[s + 1] - f.first[s], count = f.row_starts[s + 1] - f.row_starts[s];
+    const int* rows = f.rows + f.row_starts[s];
+    const double* l = f.values + f.value_starts[s];
+    int c = 0;
+    for (; c + 8 <= columns; c += 8)
+      forward<8>(l, count, rows, c, x);
+    for (; c + 4 <= columns; c += 4)
+      forward<4>(l, count, rows, c, x);
+    for (; c < columns; ++c)
+      forward<1>(l, count, rows, c, x);
+  }
+  for (int s = f.supernodes - 1; s >= 0; --s)
+  {
+    const int columns = f.first[s + 1] - f.first[s], count = f.row_starts[s + 1] - f.row_starts[s];
+    const int* rows = f.rows + f.row_starts[s];
+    const double* l = f.values + f.value_starts[s];
+    int c = columns;
+    while (c % 4 != 0)
+      backward<1>(l, count, rows, --c, x);
+    if (c % 8 != 0)
+      backward<4>(l, count, rows, c -= 4, x);
+    while (c > 0)
+      backward<8>(l, count, rows, c -= 8, x);
+  }
+}
+
 double dot(int points, const double* x, const double* y)
 {
   Quad a = {}, b = {};
@@ -88,7 +169,7 @@ double dot(int points, const double* x, const double* y)
 }  // namespace
 
 extern const PointKernels point_kernels;
-const PointKernels point_kernels = {multiply, multiplyBlocks, dot};
+const PointKernels point_kernels = {multiply, multiplyBlocks, solveSupernodal, dot};
 
 }  // namespace SLENDER_ISA
 }  // namespace slender

@@ -20,8 +20,7 @@ public:
   void setPattern(int size, std::vector<int> starts, std::vector<int> rows);
 
   /// Likewise for the matrices of points: 3 x 3 blocks, or one number for all three coordinates. The order is found by nested dissection of
-  /// the graph of points (METIS), with the unknowns of a point next to each other and wider supernodes than usual: at 25,600 points
-  /// a factorisation takes about 0.7 of the time of setPattern(size, starts, rows). values(), starts(), rows() and index() are then not
+  /// the graph of points (METIS), with the unknowns of a point next to each other and supernodes wider than CHOLMOD's. values(), starts(), rows() and index() are then not
   /// to be used.
   void setPattern(const BlockMatrix& matrix);
   void setPattern(const PointMatrix& matrix);
