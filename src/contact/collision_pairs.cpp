@@ -212,7 +212,7 @@ PairPlace CollisionPairs::placeAt(const CollisionPair& pair, Position x) const
       out.weight[k + 1] = -w[k];
       way += w[k] * (p[0] - p[k + 1]);
     }
-    out.inside = true;
+    out.inside = w.minCoeff() > 0.0;
   }
   out.distance = way.norm();
   out.normal = out.distance > 0.0 ? Eigen::Vector3d(way / out.distance) : Eigen::Vector3d(Eigen::Vector3d::Zero());

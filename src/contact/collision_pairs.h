@@ -26,7 +26,7 @@ struct PairPlace
   double weight[4];
   double distance;          ///< [m]
   Eigen::Vector3d normal;   ///< from the second piece to the first; unit (zero where they meet)
-  bool inside;              ///< of both edges
+  bool inside;              ///< of the face, or of both edges
 };
 
 /// Pairs whose pieces may come nearer than their cores and shells while points move along lines. Memory is reused.

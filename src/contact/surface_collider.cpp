@@ -20,6 +20,7 @@ namespace {
 constexpr double kKept = 0.2;        // share of a gap that no collision may go below
 constexpr double kTarget = 0.5;      // share of the gap that impulses leave
 constexpr double kPush = 0.1;        // share of the overlap of shells that a step removes [Bridson et al. 2002]
+constexpr double kNear = 2.0;        // shells, up to where places of contact at the start tell those at the end
 constexpr int kSweeps = 50;
 constexpr int kImpulseRounds = 12;
 
@@ -54,8 +55,8 @@ private:
   ApproachLimit limitOf(const CollisionPair& pair) const;
   bool planeHit(int point, int plane) const;
   double planeGap(int plane, const std::vector<Pose>& poses, const Eigen::Vector3d& x) const;
-  double reach(const CollisionPair& pair, double gap) const;
-  void repel(const CollisionPair& pair, const PairPlace& place, double gap, double reach);
+  double reach(const CollisionPair& pair) const;
+  void repel(const CollisionPair& pair, const PairPlace& place, double range);
   void stop(const CollisionPair& pair);
   void addPlaneRow(int point, int plane, double gap, bool hit);
   bool joinHits();
@@ -116,15 +117,13 @@ bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3
 }
 
 /// Distance from which a pair repels: less than the shells where pieces of a sheet are close to each other at rest.
-double SurfaceCollider::Impl::reach(const CollisionPair& pair, double gap) const
+double SurfaceCollider::Impl::reach(const CollisionPair& pair) const
 {
   const double shell = pairs_.shell(pair);
-  if (gap >= shell || pairs_.object(pair, false) != pairs_.object(pair, true))
-    return shell;
-  return std::min(shell, 0.5 * pairs_.place(pair, elements_.reference).distance);
+  return pairs_.object(pair, false) != pairs_.object(pair, true) ? shell : std::min(shell, 0.5 * pairs_.place(pair, elements_.reference).distance);
 }
 
-void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& place, double gap, double reach)
+void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& place, double range)
 {
   ContactRow row{};
   row.normal = place.normal;
@@ -135,30 +134,36 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
     row.weight[i] = place.weight[i];
     row.anchor += place.weight[i] * from_.col(place.point[i]);
   }
-  row.push = kPush * (reach - gap);
-  row.bound = place.distance + row.push;
-  row.tolerance = 0.02 * gap;
+  row.push = kPush * std::max(0.0, range - pair.gap);
+  row.bound = pairs_.core(pair) + std::min(pair.gap, range) + row.push;
+  row.tolerance = 0.02 * std::min(pair.gap, range);
   row.friction = elements_.friction(pairs_.object(pair, false), pairs_.object(pair, true));
   rows_.rows.push_back(row);
   ++report_.repulsions;
 }
 
-/// Finds all pairs that may come near each other; those within their shells get repulsions.
+/// Finds all pairs that may come near each other; those within their shells, or near them and about to enter, get repulsions.
 bool SurfaceCollider::Impl::examineStart()
 {
   for (const CollisionPair& pair : pairs_.find(from_, to_))
   {
     if (!(pair.gap > 0.0))
       return fail("surfaces meet at the start of the step, at points " + std::to_string(pair.point[0]) + " and " + std::to_string(pair.point[3]));
-    if (pair.gap >= pairs_.shell(pair))
+    if (pair.gap >= kNear * pairs_.shell(pair))
       continue;
-    const double range = reach(pair, pair.gap);
-    if (pair.gap >= range)
+    const double range = reach(pair);
+    if (pair.gap >= kNear * range)
       continue;
     const PairPlace place = pairs_.place(pair, from_);
     const bool lone = pair.edges && (elements_.edges[pair.first].lone || elements_.edges[pair.second].lone);
-    if (place.inside || lone)   // other places of two edges are a vertex's, too
-      repel(pair, place, pair.gap, range);
+    // Other places of two edges are a vertex's, too. Beyond the shells a tilted normal would stop what only passes by.
+    if (!place.inside && (pair.gap >= range || (pair.edges && !lone)))
+      continue;
+    double end = 0.0;
+    for (int i = 0; i < 4; ++i)
+      end += place.weight[i] * place.normal.dot(to_.col(place.point[i]));
+    if (std::min(pair.gap, end - pairs_.core(pair)) < range)
+      repel(pair, place, range);
   }
   return true;
 }
@@ -194,8 +199,8 @@ void SurfaceCollider::Impl::addPlaneRow(int point, int plane, double gap, bool h
   row.weight[0] = 1.0;
   row.normal = end.orientation * Eigen::Vector3d::UnitZ();
   row.anchor = end * (step_->solids[solid].inverse() * Eigen::Vector3d(from_.col(point)));
-  row.push = hit ? 0.0 : kPush * (shell - gap);
-  row.bound = row.normal.dot(end.position) + (hit ? kTarget * std::min(gap, shell) : gap + row.push);
+  row.push = hit ? 0.0 : kPush * std::max(0.0, shell - gap);
+  row.bound = row.normal.dot(end.position) + (hit ? kTarget : 1.0) * std::min(gap, shell) + row.push;
   row.tolerance = 0.02 * std::min(gap, shell);
   row.friction = elements_.friction(sheet, object);
   rows_.rows.push_back(row);
@@ -213,7 +218,8 @@ bool SurfaceCollider::Impl::examinePlanes()
       const double gap = planeGap(static_cast<int>(plane), step_->solids, from_.col(i));
       if (!(gap > 0.0))
         return fail("point " + std::to_string(i) + " is behind a plane at the start of the step");
-      if (gap < elements_.objects[sheet].shell)
+      const double shell = elements_.objects[sheet].shell;
+      if (gap < kNear * shell && std::min(gap, planeGap(static_cast<int>(plane), step_->solids_end, to_.col(i))) < shell)
         addPlaneRow(i, static_cast<int>(plane), gap, false);
     }
   return true;

@@ -40,7 +40,7 @@ struct CollisionReport
 {
   bool ok = true;
   std::string reason;     ///< of a failure
-  int repulsions = 0;     ///< pairs nearer than the thickness at the start
+  int repulsions = 0;     ///< pairs nearer than the thickness, or about to be
   int impulses = 0;       ///< collisions found and stopped
   int rounds = 0;         ///< of detection, all stages
   int zones = 0;          ///< rigid impact zones that were left in the end
@@ -48,8 +48,8 @@ struct CollisionReport
 };
 
 /// Keeps sheets from passing through each other, themselves and solids: corrects the end of a step so that no pair of a vertex and a face, or of
-/// two edges, meets while points go along straight lines [Bridson, Fedkiw, Anderson, SIGGRAPH 2002]: pairs nearer than the thickness get
-/// inelastic repulsions with friction; collisions that are left (additive CCD, ccd.h) constrain the end of the step, all at once, with
+/// two edges, meets while points go along straight lines [Bridson, Fedkiw, Anderson, SIGGRAPH 2002]: pairs nearer than the thickness or
+/// about to be get inelastic repulsions with friction; collisions that are left (additive CCD, ccd.h) constrain the end of the step, all at once, with
 /// friction [cf. Harmon et al., SIGGRAPH 2008]; pieces that still collide move rigidly (Provot's impact zones), which ends it.
 ///
 /// Impulses conserve momentum. Solids and points without inverse mass move as prescribed. Solids' corners go along straight lines; a cylinder
