@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "collision_pairs.h"
-#include "contact_rows.h"
+#include "collision_rows.h"
 #include "impact_zones.h"
 #include "slender_sim/geometry/rotation.h"
 
@@ -68,7 +68,7 @@ private:
 
   CollisionElements elements_;
   CollisionPairs pairs_;
-  ContactRows rows_;
+  CollisionRows rows_;
   ImpactZones zones_;
   CollisionReport report_;
 
@@ -125,7 +125,7 @@ double SurfaceCollider::Impl::reach(const CollisionPair& pair) const
 
 void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& place, double range)
 {
-  ContactRow row{};
+  CollisionRow row{};
   row.normal = place.normal;
   row.anchor.setZero();
   for (int i = 0; i < 4; ++i)
@@ -194,7 +194,7 @@ void SurfaceCollider::Impl::addPlaneRow(int point, int plane, double gap, bool h
   const int object = elements_.planes[plane], solid = object - elements_.sheet_count, sheet = elements_.point_object[point];
   const Pose& end = step_->solids_end[solid];
   const double shell = elements_.objects[sheet].shell;
-  ContactRow row{};
+  CollisionRow row{};
   std::fill(row.point, row.point + 4, point);
   row.weight[0] = 1.0;
   row.normal = end.orientation * Eigen::Vector3d::UnitZ();
@@ -265,7 +265,7 @@ void SurfaceCollider::Impl::stop(const CollisionPair& pair)
   const ApproachLimit limit = limitOf(pair);
   const double share = pairs_.limit(pair, from_, to_, limit), gap = std::min(pair.gap, limit.reach);
   const PairPlace place = pairs_.place(pair, from_, to_, share);
-  ContactRow row{};
+  CollisionRow row{};
   row.normal = place.normal;
   row.anchor.setZero();
   for (int i = 0; i < 4; ++i)
@@ -375,7 +375,7 @@ void SurfaceCollider::Impl::solveVelocities()
 {
   const double h = step_->h;
   auto& rows = rows_.rows;
-  for (ContactRow& row : rows)
+  for (CollisionRow& row : rows)
   {
     Eigen::Vector3d start = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::Zero();
     for (int i = 0; i < 4; ++i)

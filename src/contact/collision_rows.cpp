@@ -1,4 +1,4 @@
-#include "contact_rows.h"
+#include "collision_rows.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,18 +12,18 @@ constexpr double kOverRelaxation = 1.3;  // three sheets in a heap: 10 instead o
 
 }  // namespace
 
-void ContactRows::clear(int points)
+void CollisionRows::clear(int points)
 {
   rows.clear();
   moved_.assign(points, 0);
   clock_ = 0;
 }
 
-void ContactRows::restart(const Eigen::VectorXd& inverse_mass, double share, Eigen::Matrix3Xd& y)
+void CollisionRows::restart(const Eigen::VectorXd& inverse_mass, double share, Eigen::Matrix3Xd& y)
 {
   std::fill(moved_.begin(), moved_.end(), 0);
   clock_ = 0;
-  for (ContactRow& r : rows)
+  for (CollisionRow& r : rows)
   {
     r.seen = -1;
     if (!(r.mobility > 0.0))
@@ -37,10 +37,10 @@ void ContactRows::restart(const Eigen::VectorXd& inverse_mass, double share, Eig
   }
 }
 
-void ContactRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y)
+void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y)
 {
   double* const values = y.data();
-  const auto relative = [values](const ContactRow& r) -> Eigen::Vector3d {
+  const auto relative = [values](const CollisionRow& r) -> Eigen::Vector3d {
     const double *a = values + 3 * r.point[0], *b = values + 3 * r.point[1], *c = values + 3 * r.point[2], *d = values + 3 * r.point[3];
     Eigen::Vector3d u;
     for (int k = 0; k < 3; ++k)
@@ -48,7 +48,7 @@ void ContactRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::
     return u;
   };
   double largest = 0.0;
-  for (ContactRow& r : rows)
+  for (CollisionRow& r : rows)
   {
     r.mobility = 0.0;
     for (int i = 0; i < 4; ++i)
@@ -63,7 +63,7 @@ void ContactRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::
   {
     const double relaxation = sweep == 0 ? 1.0 : kOverRelaxation;
     bool settled = true;
-    for (ContactRow& r : rows)
+    for (CollisionRow& r : rows)
     {
       const int moved = std::max(std::max(moved_[r.point[0]], moved_[r.point[1]]), std::max(moved_[r.point[2]], moved_[r.point[3]]));
       if (moved <= r.seen || r.mobility <= 0.0)

@@ -8,7 +8,7 @@ namespace slender {
 
 /// A condition n . sum_i w_i y_i >= bound on vectors y of points (positions at the end of a step, or velocities), with friction against
 /// departures of the sum from `anchor` across n.
-struct ContactRow
+struct CollisionRow
 {
   int point[4];
   double weight[4];
@@ -17,7 +17,7 @@ struct ContactRow
   double push;        ///< share of the bound that only moves pieces apart and causes no friction
   double friction;
   double tolerance;   ///< of the bound
-  // set by ContactRows
+  // set by CollisionRows
   double response[4] = {0, 0, 0, 0};   ///< w_i / m_i
   double mobility = 0.0;               ///< sum of w_i^2 / m_i
   double impulse = 0.0;
@@ -27,10 +27,10 @@ struct ContactRow
 
 /// Solves rows by projected Gauss-Seidel: impulses that never pull, friction in Coulomb's cone. Rows are visited in their order, and only
 /// while points that they act on still move.
-class ContactRows
+class CollisionRows
 {
 public:
-  std::vector<ContactRow> rows;
+  std::vector<CollisionRow> rows;
 
   /// Everything is forgotten but the memory.
   void clear(int points);
