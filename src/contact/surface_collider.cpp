@@ -21,7 +21,7 @@ constexpr double kKept = 0.2;        // share of a gap that no collision may go 
 constexpr double kTarget = 0.5;      // share of the gap that impulses leave
 constexpr double kPush = 0.1;        // share of the overlap of shells that a step removes [Bridson et al. 2002]
 constexpr double kNear = 2.0;        // shells, up to where places of contact at the start tell those at the end
-constexpr int kSweeps = 50;
+constexpr int kSweeps = 25;
 constexpr int kImpulseRounds = 12;
 
 }  // namespace
