@@ -16,17 +16,22 @@ namespace {
 
 constexpr int kMaxAdvances = 500;   // stopping early is safe: the share so far is free
 constexpr double kTolerance = 0.1;  // share of the kept gap at which the advance ends
+constexpr double kRounding = 1e-14; // of distances, over the pieces' extent
 
 /// Times until linearly moving corners can reach the plane that separates the pieces now.
 class PlaneBound
 {
 public:
   explicit PlaneBound(double room) : room_(room) {}
-  /// A pair of corners: its distance beyond the nearest pair's, along the normal, and its rate.
+  /// A pair of corners: its distance beyond the nearest pair's, along the normal, and its rate. Where pieces nearly touch, the normal is
+  /// rounded so much that it may not separate them: then this bound says nothing.
   void corner(double beyond, double rate)
   {
-    if (rate < 0.0)
-      time_ = std::min(time_, (room_ + std::max(0.0, beyond)) / -rate);
+    const double room = room_ + beyond;
+    if (!(room > 0.0))
+      time_ = 0.0;
+    else if (rate < 0.0)
+      time_ = std::min(time_, room / -rate);
   }
   double time() const { return time_; }
 
@@ -38,24 +43,32 @@ private:
 template <int N, int M, class Closest>
 double advance(const MovingPoint* const (&a)[N], const MovingPoint* const (&b)[M], const ApproachLimit& limit, Closest closest)
 {
-  Eigen::Vector3d va[N], vb[M], pa[N], pb[M];
-  double speed = 0.0;
+  // Seen from the first corner of b everything is rounded in proportion to the pieces' extent and relative motion, wherever they are.
+  Eigen::Vector3d ra[N], rb[M], va[N], vb[M], pa[N], pb[M];
+  double extent = 0.0, speed2 = 0.0;
+  const auto relative = [&](const MovingPoint& p, Eigen::Vector3d& r, Eigen::Vector3d& v) {
+    const Eigen::Vector3d end = p.to - b[0]->to;
+    r = p.from - b[0]->from;
+    v = end - r;
+    extent = std::max({extent, r.cwiseAbs().maxCoeff(), end.cwiseAbs().maxCoeff()});
+  };
   for (int i = 0; i < N; ++i)
-    va[i] = a[i]->to - a[i]->from;
+    relative(*a[i], ra[i], va[i]);
   for (int j = 0; j < M; ++j)
-    vb[j] = b[j]->to - b[j]->from;
+    relative(*b[j], rb[j], vb[j]);
   for (int i = 0; i < N; ++i)
     for (int j = 0; j < M; ++j)
-      speed = std::max(speed, (va[i] - vb[j]).norm());
+      speed2 = std::max(speed2, (va[i] - vb[j]).squaredNorm());
+  const double speed = std::sqrt(speed2), apart = limit.thickness + kRounding * extent;
   double t = 0.0, goal = 0.0;
   for (int k = 0; k < kMaxAdvances; ++k)
   {
     for (int i = 0; i < N; ++i)
-      pa[i] = a[i]->from + t * va[i];
+      pa[i] = ra[i] + t * va[i];
     for (int j = 0; j < M; ++j)
-      pb[j] = b[j]->from + t * vb[j];
+      pb[j] = rb[j] + t * vb[j];
     const Eigen::Vector3d difference = closest(pa, pb);
-    const double d = difference.norm(), gap = d - limit.thickness;
+    const double d = difference.norm(), gap = d - apart;
     if (k == 0)
     {
       if (!(gap > 0.0))
@@ -162,9 +175,9 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
     for (int i = 0; i < 2; ++i)
     {
       // the first time at which room + beyond + rate t - acceleration t^2 / 2 = 0
-      const double c = room + std::max(0.0, nearest.normal.dot(z[i] - foot)), s = nearest.normal.dot(rate[i]);
+      const double c = std::max(0.0, room + nearest.normal.dot(z[i] - foot)), s = nearest.normal.dot(rate[i]);
       const double root = std::sqrt(s * s + 2.0 * acceleration * c);
-      const double time = s <= 0.0 ? (root > s ? 2.0 * c / (root - s) : plane) : acceleration > 0.0 ? (s + root) / acceleration : plane;
+      const double time = !(c > 0.0) ? 0.0 : s <= 0.0 ? (root > s ? 2.0 * c / (root - s) : plane) : acceleration > 0.0 ? (s + root) / acceleration : plane;
       plane = std::min(plane, time);
     }
     t += std::max(room / speed, plane);

@@ -48,17 +48,26 @@ SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& 
 Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c)
 {
   const Eigen::Vector3d ab = b - a, ac = c - a, normal = ab.cross(ac);
-  const double n2 = normal.squaredNorm();
-  if (n2 > 1e-24 * ab.squaredNorm() * ac.squaredNorm())
+  const double n2 = normal.squaredNorm(), square = ab.squaredNorm() * ac.squaredNorm();
+  Eigen::Vector3d inner;
+  double inner2 = -1.0;
+  if (n2 > 1e-24 * square)
   {
     // signed areas of the triangles that the projection of p makes with the edges
     const double u = (c - b).cross(p - b).dot(normal), v = (a - c).cross(p - c).dot(normal), w = n2 - u - v;
     if (u > 0.0 && v > 0.0 && w > 0.0)
-      return {u / n2, v / n2, w / n2};
+    {
+      inner = {u / n2, v / n2, w / n2};
+      if (n2 > 1e-6 * square)
+        return inner;
+      inner2 = (inner[0] * a + inner[1] * b + inner[2] * c - p).squaredNorm();   // of a needle: rounded so much that an edge may be nearer
+    }
   }
   const double ts[3] = {closestOnSegment(p, a, b), closestOnSegment(p, b, c), closestOnSegment(p, c, a)};
   const double d2[3] = {(a + ts[0] * ab - p).squaredNorm(), (b + ts[1] * (c - b) - p).squaredNorm(), (c - ts[2] * ac - p).squaredNorm()};
   const int k = d2[0] <= d2[1] && d2[0] <= d2[2] ? 0 : d2[1] <= d2[2] ? 1 : 2;
+  if (inner2 >= 0.0 && inner2 < d2[k])
+    return inner;
   Eigen::Vector3d weights = Eigen::Vector3d::Zero();
   weights[k] = 1.0 - ts[k];
   weights[(k + 1) % 3] = ts[k];

@@ -10,6 +10,7 @@
 #include "test/support/contact.h"
 #include "test/support/groups.h"
 #include "test/support/rods.h"
+#include "test/support/sheets.h"
 #include "test/support/threads.h"
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
@@ -235,6 +236,34 @@ TEST(ContactAllocations, WarmContactMakesNone)
     step();
   EXPECT_EQ(allocations - before, 0);
   EXPECT_GT(terms, 50u);
+}
+
+TEST(CollisionAllocations, WarmStepsMakeNone)
+{
+  Sheets s;
+  s.gravity = {0, 0, -9.81};
+  for (int k = 0; k < 3; ++k)
+    s.add(6, 6, {0.01 * k, 0.02 * k, 0.003 + 0.005 * k}, {0.3, 0, 0}, {0, 0.3, 0});
+  s.addSolid(Plane{});
+  s.addSolid(Capsule{0.01, 0.5}, {{0.1, 0.1, -0.26}, Eigen::Quaterniond::Identity()});
+  SurfaceCollider collider(s.surface);
+  const CollisionStep step{s.x, s.inverse_mass, s.solids, s.solids, 0.01};
+  Matrix3Xd x, v;
+  CollisionReport report;
+  const auto collide = [&](const Matrix3Xd& candidate) {
+    x = candidate;
+    v = (x - s.x) / step.h;
+    report = collider.resolve(step, x, v);
+  };
+  Matrix3Xd fast = s.candidate(0.01);
+  fast.row(2).array() -= 0.05;
+  for (int k = 0; k < 3; ++k)
+    collide(fast);
+  const long before = allocations;
+  collide(fast);
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_TRUE(report.ok);
+  EXPECT_GT(report.impulses, 20);
 }
 
 INSTANTIATE_TEST_SUITE_P(Integrators, Allocations, ::testing::ValuesIn(allIntegrators()), [](const auto& info) { return toString(info.param); });

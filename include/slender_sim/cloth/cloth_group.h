@@ -1,0 +1,78 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/surface_collider.h"
+
+namespace slender {
+
+struct ClothContact
+{
+  double thickness = 1e-3;   ///< [m] > 0
+  double friction = 0.3;     ///< Coulomb
+  bool self = true, others = true, solids = true;
+};
+
+/// Cloths that touch themselves, each other and solids.
+struct ClothGroupModel
+{
+  std::vector<std::shared_ptr<const ClothModel>> cloths;
+  std::vector<ClothContact> contact;     ///< of each cloth
+  std::vector<ContactSolid> solids;      ///< `ignores` names cloths
+};
+
+struct ClothGroupState
+{
+  std::vector<ClothState> cloths;
+  std::vector<Pose> solids;
+};
+
+struct ClothGroupInputs
+{
+  std::vector<ClothInputs> cloths;
+  std::vector<Pose> solids;              ///< at the end of the step; origins go along lines, solids turn uniformly by the smaller angle
+};
+
+/// Steps cloths on their own, then corrects the end of the step so that nothing passes through anything (SurfaceCollider). Where that fails, or
+/// a cloth's step does, the step is halved.
+class ClothGroup
+{
+public:
+  /// Throws std::invalid_argument for models or options that are not valid.
+  ClothGroup(ClothGroupModel model, const ClothOptions& options);
+
+  /// Advances all by `duration` [s]. On failure the state is untouched and the report says why.
+  StepReport step(ClothGroupState& state, const ClothGroupInputs& inputs, double duration);
+
+  /// Intersections of a state, by a check of all pairs (see intersection.h).
+  std::size_t intersections(const ClothGroupState& state) const;
+  /// Throws std::invalid_argument where a state has any: collisions keep what is apart apart, no more.
+  void checkIntersections(const ClothGroupState& state) const;
+
+  /// Sums and maxima over the last step.
+  const CollisionReport& collisions() const { return collisions_; }
+  const ClothStepper& stepper(int cloth) const { return steppers_.at(cloth); }
+
+private:
+  StepReport substep(const ClothGroupInputs& inputs, double from, double to, double duration);
+  Eigen::Matrix3Xd positions(const ClothGroupState& state) const;
+
+  ClothGroupModel model_;
+  ClothOptions options_;
+  std::vector<ClothStepper> steppers_;
+  CollisionSurface surface_;
+  std::unique_ptr<SurfaceCollider> collider_;
+  std::vector<int> first_;                 ///< point of each cloth; one more at the end
+  CollisionReport collisions_;
+
+  ClothGroupState work_, next_;
+  ClothGroupInputs sub_;
+  std::vector<Eigen::Matrix3Xd> pins_start_;
+  Eigen::Matrix3Xd x_start_, x_, v_;
+  Eigen::VectorXd inverse_mass_;
+};
+
+}  // namespace slender

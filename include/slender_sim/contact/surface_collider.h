@@ -1,0 +1,75 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "slender_sim/contact/contact_potential.h"
+
+namespace slender {
+
+/// A sheet of cloth among the points of a CollisionSurface.
+struct CollisionSheet
+{
+  Eigen::Matrix3Xi triangles;   ///< corners: points
+  double thickness = 1e-3;      ///< distance of two sheets in contact [m] > 0; half of it from a solid
+  double friction = 0.3;        ///< Coulomb; of two sheets the geometric mean counts
+  bool self = true, others = true, solids = true;
+};
+
+/// What collides. Solids' `ignores` name sheets.
+struct CollisionSurface
+{
+  Eigen::Matrix3Xd rest;        ///< points of all sheets at rest [m]: pieces that are close there repel each other from half that distance only
+  std::vector<CollisionSheet> sheets;
+  std::vector<ContactSolid> solids;
+};
+
+/// What happens in a step, as far as it is not in the surface.
+struct CollisionStep
+{
+  const Eigen::Matrix3Xd& x_start;              ///< 3 x points [m], free of intersections
+  const Eigen::VectorXd& inverse_mass;          ///< [1/kg]; zero: the point's motion is prescribed
+  const std::vector<Pose>&solids, &solids_end;
+  double h;                                     ///< [s]
+};
+
+struct CollisionReport
+{
+  bool ok = true;
+  std::string reason;     ///< of a failure
+  int repulsions = 0;     ///< pairs nearer than the thickness, or about to be
+  int impulses = 0;       ///< collisions found and stopped
+  int rounds = 0;         ///< of detection, all stages
+  int zones = 0;          ///< rigid impact zones that were left in the end
+  int zone_points = 0;    ///< in the largest of them
+};
+
+/// Keeps sheets from passing through each other, themselves and solids: corrects the end of a step so that no pair of a vertex and a face, or of
+/// two edges, meets while points go along straight lines [Bridson, Fedkiw, Anderson, SIGGRAPH 2002]: pairs nearer than the thickness or
+/// about to be get inelastic repulsions with friction; collisions that are left (additive CCD, ccd.h) constrain the end of the step, all at once, with
+/// friction [cf. Harmon et al., SIGGRAPH 2008]; pieces that still collide move rigidly (Provot's impact zones), which ends it.
+///
+/// Impulses conserve momentum. Solids and points without inverse mass move as prescribed. Solids' corners go along straight lines; a cylinder
+/// is taken as a prism around it, by less than a twentieth of the thickness. Memory is reused; nothing else is carried over from
+/// step to step.
+class SurfaceCollider
+{
+public:
+  /// Throws std::invalid_argument naming what is wrong.
+  explicit SurfaceCollider(const CollisionSurface& surface);
+  ~SurfaceCollider();
+  SurfaceCollider(SurfaceCollider&&) noexcept;
+
+  /// Corrects the end of a step x [m] and the velocities v [m/s] there (3 x points). A failure changes nothing: surfaces meet at the start,
+  /// motions that are prescribed squeeze a piece, a piece would have to turn by more than a quarter; a shorter step may help.
+  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v);
+
+private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slender

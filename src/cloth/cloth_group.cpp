@@ -1,0 +1,162 @@
+#include "slender_sim/cloth/cloth_group.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "slender_sim/contact/ccd.h"
+#include "slender_sim/contact/intersection.h"
+
+namespace slender {
+
+ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : model_(std::move(model)), options_(options)
+{
+  if (model_.contact.size() != model_.cloths.size())
+    throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " contact settings expected, one per cloth");
+  first_.push_back(0);
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    const ClothModel& cloth = *model_.cloths[k];
+    const ClothContact& contact = model_.contact[k];
+    steppers_.emplace_back(model_.cloths[k], options);
+    surface_.rest.conservativeResize(3, first_.back() + cloth.vertices());
+    surface_.rest.rightCols(cloth.vertices()) = cloth.rest.vertices;
+    CollisionSheet sheet;
+    sheet.triangles = cloth.rest.triangles.array() + first_.back();
+    sheet.thickness = contact.thickness;
+    sheet.friction = contact.friction;
+    sheet.self = contact.self;
+    sheet.others = contact.others;
+    sheet.solids = contact.solids;
+    surface_.sheets.push_back(sheet);
+    first_.push_back(first_.back() + cloth.vertices());
+  }
+  surface_.solids = model_.solids;
+  collider_ = std::make_unique<SurfaceCollider>(surface_);
+  for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_})
+    m->resize(3, first_.back());
+  inverse_mass_.resize(first_.back());
+  sub_.cloths.resize(model_.cloths.size());
+  sub_.solids.resize(model_.solids.size());
+  pins_start_.resize(model_.cloths.size());
+}
+
+StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inputs, double duration)
+{
+  if (state.cloths.size() != model_.cloths.size() || inputs.cloths.size() != model_.cloths.size())
+    throw std::invalid_argument("cloths: states and inputs of " + std::to_string(model_.cloths.size()) + " cloths expected");
+  if (state.solids.size() != model_.solids.size() || inputs.solids.size() != model_.solids.size())
+    throw std::invalid_argument("cloths: poses of " + std::to_string(model_.solids.size()) + " solids expected");
+  StepReport report;
+  collisions_ = CollisionReport();
+  work_ = state;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    const std::vector<int>& pins = state.cloths[k].pins;
+    pins_start_[k].resize(3, static_cast<Eigen::Index>(pins.size()));
+    for (std::size_t p = 0; p < pins.size(); ++p)
+      pins_start_[k].col(static_cast<Eigen::Index>(p)) = state.cloths[k].x.col(pins[p]);
+  }
+  double done = 0.0, share = 1.0;
+  const double shortest = std::ldexp(1.0 - 1e-9, -options_.newton.max_cuts);
+  while (done < 1.0)
+  {
+    const double end = done + share > 1.0 - 1e-9 ? 1.0 : done + share;
+    const StepReport sub = substep(inputs, done, end, duration);
+    if (!sub.ok)
+    {
+      report.iterations += sub.iterations;
+      if (sub.failure == StepFailure::input_not_finite || 0.5 * share < shortest)
+      {
+        report.ok = false;
+        report.failure = sub.failure;
+        report.message = sub.message;
+        return report;
+      }
+      ++report.cut_steps;
+      share *= 0.5;
+      continue;
+    }
+    report.merge(sub);
+    std::swap(work_, next_);
+    done = end;
+    share *= 2.0;
+  }
+  std::swap(state, work_);
+  return report;
+}
+
+/// From work_ to next_; times as shares of the step.
+StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, double to, double duration)
+{
+  StepReport report;
+  const double h = (to - from) * duration;
+  next_ = work_;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    const int first = first_[k], count = first_[k + 1] - first;
+    sub_.cloths[k] = inputs.cloths[k];
+    if (to < 1.0 && inputs.cloths[k].pins.cols() == pins_start_[k].cols())
+      sub_.cloths[k].pins = pins_start_[k] + to * (inputs.cloths[k].pins - pins_start_[k]);
+    const StepReport own = steppers_[k].step(next_.cloths[k], sub_.cloths[k], h);
+    report.merge(own);
+    if (!report.ok)
+      return report;
+    x_start_.middleCols(first, count) = work_.cloths[k].x;
+    x_.middleCols(first, count) = next_.cloths[k].x;
+    v_.middleCols(first, count) = next_.cloths[k].v;
+    inverse_mass_.segment(first, count) = model_.cloths[k]->mass.cwiseInverse();
+    for (const int pin : work_.cloths[k].pins)
+      inverse_mass_[first + pin] = 0.0;
+  }
+  for (std::size_t s = 0; s < model_.solids.size(); ++s)   // uniformly from here to the end of the step
+    next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
+  const CollisionReport found = collider_->resolve({x_start_, inverse_mass_, work_.solids, next_.solids, h}, x_, v_);
+  if (!found.ok)
+  {
+    report.ok = false;
+    report.failure = StepFailure::squeezed;
+    report.message = "collisions: " + found.reason + "; use a shorter step, or leave the cloth more room";
+    return report;
+  }
+  collisions_.repulsions += found.repulsions;
+  collisions_.impulses += found.impulses;
+  collisions_.rounds += found.rounds;
+  collisions_.zones += found.zones;
+  collisions_.zone_points = std::max(collisions_.zone_points, found.zone_points);
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    next_.cloths[k].x = x_.middleCols(first_[k], first_[k + 1] - first_[k]);
+    next_.cloths[k].v = v_.middleCols(first_[k], first_[k + 1] - first_[k]);
+  }
+  return report;
+}
+
+Eigen::Matrix3Xd ClothGroup::positions(const ClothGroupState& state) const
+{
+  Eigen::Matrix3Xd x(3, first_.back());
+  for (std::size_t k = 0; k < state.cloths.size(); ++k)
+    x.middleCols(first_[k], first_[k + 1] - first_[k]) = state.cloths[k].x;
+  return x;
+}
+
+std::size_t ClothGroup::intersections(const ClothGroupState& state) const
+{
+  return slender::intersections(surface_, positions(state), state.solids).size();
+}
+
+void ClothGroup::checkIntersections(const ClothGroupState& state) const
+{
+  const auto found = slender::intersections(surface_, positions(state), state.solids);
+  if (found.empty())
+    return;
+  const int point = found[0].edge[0];
+  const auto cloth = std::upper_bound(first_.begin(), first_.end(), point) - first_.begin() - 1;
+  const std::string where = cloth < static_cast<std::ptrdiff_t>(model_.cloths.size())
+                              ? "cloth '" + model_.cloths[cloth]->name + "' at vertex " + std::to_string(point - first_[cloth])
+                              : "a solid";
+  throw std::invalid_argument(where + " intersects itself, another cloth or a solid as the scene starts (" + std::to_string(found.size()) +
+                              " places): move them apart");
+}
+
+}  // namespace slender

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace slender {
+
+/// Discrete orientation polytope of 16 sides (slabs across x, y, z, x+y, x-y, x+z, x-z, y+z), in floats rounded outwards: a cache line.
+struct Kdop
+{
+  using Slabs = float __attribute__((vector_size(16)));   // wider ones are taken apart where vectors are narrower
+  Slabs low[2], high[2];
+
+  /// Of a ball that moves along a line [m].
+  static Kdop swept(const double* from, const double* to, double radius);
+  static Kdop none();
+  void include(const Kdop& b)
+  {
+    for (int k = 0; k < 2; ++k)
+    {
+      low[k] = low[k] < b.low[k] ? low[k] : b.low[k];
+      high[k] = high[k] > b.high[k] ? high[k] : b.high[k];
+    }
+  }
+  bool overlaps(const Kdop& b) const
+  {
+    using Words = long long __attribute__((vector_size(16)));
+    const auto apart = (low[0] > b.high[0]) | (b.low[0] > high[0]) | (low[1] > b.high[1]) | (b.low[1] > high[1]);
+    const Words w = (Words)apart;   // the same bits
+    return !(w[0] | w[1]);
+  }
+};
+
+/// Bounding volume hierarchy over elements whose volumes change while its shape stays. The pairs found do not depend on the shape.
+/// Refit and 74,000 pairs of a folded sheet of 10,000 triangles: 4.1 ms, where FCL's 16-sided KDOP hierarchy takes 9.7 ms (refit alone 0.2
+/// against 1.8), its AABB hierarchy 8.3 ms and the grid 6.4 ms (bench/cloth_collision_benchmark.cpp).
+class KdopTree
+{
+public:
+  struct Pair
+  {
+    int first, second;   ///< elements
+  };
+
+  /// Groups of elements (rising from 0) get subtrees of their own, divided at medians of the centres [m].
+  void build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups);
+
+  /// Takes over the elements' volumes. Pairs are looked for among those of which one is `active`.
+  void refit(const std::vector<Kdop>& volumes, const std::vector<char>& active);
+  /// Appends pairs of different elements whose volumes overlap, one of them active, in an order that depends on the arguments of the last
+  /// build() and refit() only.
+  void selfPairs(std::vector<Pair>& pairs) const;
+
+private:
+  void divide(int from, int to, const Eigen::Matrix3Xd& centers, const std::vector<int>& groups);
+  void inside(int node, std::vector<Pair>& pairs) const;
+  void between(int a, int b, std::vector<Pair>& pairs) const;
+
+  std::vector<int> order_;         ///< elements, as the leaves follow each other
+  std::vector<Kdop> volumes_;      ///< nodes in depth-first order: the first child follows its parent
+  std::vector<int> second_;        ///< second child; of a leaf: -1 - element
+  std::vector<int> leaves_;        ///< below a node
+  std::vector<char> active_;
+};
+
+}  // namespace slender

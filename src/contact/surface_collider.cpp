@@ -1,0 +1,448 @@
+#include "slender_sim/contact/surface_collider.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <tuple>
+
+#include <Eigen/Geometry>
+
+#include "collision_pairs.h"
+#include "collision_rows.h"
+#include "impact_zones.h"
+#include "slender_sim/geometry/rotation.h"
+
+namespace slender {
+
+namespace {
+
+constexpr double kKept = 0.2;        // share of a gap that no collision may go below
+constexpr double kTarget = 0.5;      // share of the gap that impulses leave
+constexpr double kPush = 0.1;        // share of the overlap of shells that a step removes [Bridson et al. 2002]
+constexpr double kNear = 2.0;        // shells, up to where places of contact at the start tell those at the end
+constexpr int kSweeps = 25;
+constexpr int kImpulseRounds = 12;
+
+}  // namespace
+
+class SurfaceCollider::Impl
+{
+public:
+  explicit Impl(const CollisionSurface& surface) : elements_(surface), pairs_(elements_)
+  {
+    const Eigen::Index n = elements_.reference.cols();
+    from_.resize(3, n);
+    to_.resize(3, n);
+    tested_.resize(3, n);
+    velocity_.resize(3, n);
+    inverse_mass_.setZero(n);
+    changed_.resize(n);
+  }
+
+  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v);
+
+private:
+  struct PlaneHit
+  {
+    int point, plane;
+  };
+
+  bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v);
+  bool examineStart();
+  bool examinePlanes();
+  void detect();
+  ApproachLimit limitOf(const CollisionPair& pair) const;
+  bool planeHit(int point, int plane) const;
+  double planeGap(int plane, const std::vector<Pose>& poses, const Eigen::Vector3d& x) const;
+  double reach(const CollisionPair& pair) const;
+  void repel(const CollisionPair& pair, const PairPlace& place, double range);
+  void stop(const CollisionPair& pair);
+  void addPlaneRow(int point, int plane, double gap, bool hit);
+  bool joinHits();
+  bool moveZones();
+  bool followPrescribed(const ImpactZones::Zone& zone);
+  void solveVelocities();
+  bool fail(const std::string& reason);
+  int node(int point) const;
+
+  CollisionElements elements_;
+  CollisionPairs pairs_;
+  CollisionRows rows_;
+  ImpactZones zones_;
+  CollisionReport report_;
+
+  const CollisionStep* step_ = nullptr;
+  Eigen::Matrix3Xd from_, to_;      ///< all points, at both ends of the step
+  Eigen::Matrix3Xd tested_;         ///< ends at the last detection
+  Eigen::Matrix3Xd displacement_, velocity_;
+  Eigen::VectorXd inverse_mass_;
+  std::vector<char> changed_;
+  std::vector<CollisionPair> hits_;
+  std::vector<PlaneHit> plane_hits_;
+};
+
+bool SurfaceCollider::Impl::fail(const std::string& reason)
+{
+  report_.ok = false;
+  report_.reason = reason;
+  return false;
+}
+
+bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v)
+{
+  const int n = elements_.sheet_points;
+  const std::size_t solids = elements_.objects.size() - elements_.sheet_count;
+  if (step.x_start.cols() != n || x.cols() != n || v.cols() != n || step.inverse_mass.size() != n)
+    throw std::invalid_argument("collisions: " + std::to_string(n) + " points expected");
+  if (step.solids.size() != solids || step.solids_end.size() != solids)
+    throw std::invalid_argument("collisions: poses of " + std::to_string(solids) + " solids expected");
+  if (!(step.h > 0.0) || !(step.inverse_mass.minCoeff() >= 0.0))
+    throw std::invalid_argument("collisions: the step must be positive, inverse masses not negative");
+  step_ = &step;
+  report_ = CollisionReport();
+  from_.leftCols(n) = step.x_start;
+  to_.leftCols(n) = x;
+  velocity_.leftCols(n) = v;
+  elements_.place(step.solids, from_);
+  elements_.place(step.solids_end, to_);
+  const Eigen::Index rest = from_.cols() - n;
+  velocity_.rightCols(rest) = (to_.rightCols(rest) - from_.rightCols(rest)) / step.h;
+  inverse_mass_.head(n) = step.inverse_mass;
+  if (!from_.allFinite() || !to_.allFinite() || !velocity_.allFinite())
+    return fail("a position or velocity is not finite");
+  rows_.clear(static_cast<int>(from_.cols()));
+  zones_.clear(static_cast<int>(from_.cols()), static_cast<int>(solids));
+  return true;
+}
+
+/// Distance from which a pair repels: less than the shells where pieces of a sheet are close to each other at rest.
+double SurfaceCollider::Impl::reach(const CollisionPair& pair) const
+{
+  const double shell = pairs_.shell(pair);
+  return pairs_.object(pair, false) != pairs_.object(pair, true) ? shell : std::min(shell, 0.5 * pairs_.place(pair, elements_.reference).distance);
+}
+
+void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& place, double range)
+{
+  CollisionRow row{};
+  row.normal = place.normal;
+  row.anchor.setZero();
+  for (int i = 0; i < 4; ++i)
+  {
+    row.point[i] = place.point[i];
+    row.weight[i] = place.weight[i];
+    row.anchor += place.weight[i] * from_.col(place.point[i]);
+  }
+  row.push = kPush * std::max(0.0, range - pair.gap);
+  row.bound = pairs_.core(pair) + std::min(pair.gap, range) + row.push;
+  row.tolerance = 0.02 * std::min(pair.gap, range);
+  row.friction = elements_.friction(pairs_.object(pair, false), pairs_.object(pair, true));
+  rows_.rows.push_back(row);
+  ++report_.repulsions;
+}
+
+/// Finds all pairs that may come near each other; those within their shells, or near them and about to enter, get repulsions.
+bool SurfaceCollider::Impl::examineStart()
+{
+  for (const CollisionPair& pair : pairs_.find(from_, to_))
+  {
+    if (!(pair.gap > 0.0))
+      return fail("surfaces meet at the start of the step, at points " + std::to_string(pair.point[0]) + " and " + std::to_string(pair.point[3]));
+    if (pair.gap >= kNear * pairs_.shell(pair))
+      continue;
+    const double range = reach(pair);
+    if (pair.gap >= kNear * range)
+      continue;
+    const PairPlace place = pairs_.place(pair, from_);
+    const bool lone = pair.edges && (elements_.edges[pair.first].lone || elements_.edges[pair.second].lone);
+    // Other places of two edges are a vertex's, too. Beyond the shells a tilted normal would stop what only passes by.
+    if (!place.inside && (pair.gap >= range || (pair.edges && !lone)))
+      continue;
+    double end = 0.0;
+    for (int i = 0; i < 4; ++i)
+      end += place.weight[i] * place.normal.dot(to_.col(place.point[i]));
+    if (std::min(pair.gap, end - pairs_.core(pair)) < range)
+      repel(pair, place, range);
+  }
+  return true;
+}
+
+double SurfaceCollider::Impl::planeGap(int plane, const std::vector<Pose>& poses, const Eigen::Vector3d& x) const
+{
+  const Pose& pose = poses[elements_.planes[plane] - elements_.sheet_count];
+  return (pose.orientation * Eigen::Vector3d::UnitZ()).dot(x - pose.position);
+}
+
+/// Whether a point comes too near a plane whose origin and normal go along straight lines: the gap is quadratic in time.
+bool SurfaceCollider::Impl::planeHit(int point, int plane) const
+{
+  const int solid = elements_.planes[plane] - elements_.sheet_count;
+  const Pose &p0 = step_->solids[solid], &p1 = step_->solids_end[solid];
+  const Eigen::Vector3d n0 = p0.orientation * Eigen::Vector3d::UnitZ(), n1 = p1.orientation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d r0 = from_.col(point) - p0.position, r1 = to_.col(point) - p1.position;
+  const double start = n0.dot(r0), end = n1.dot(r1), goal = kKept * std::min(start, elements_.objects[elements_.point_object[point]].shell);
+  const double square = (n1 - n0).dot(r1 - r0), slope = end - start - square;
+  double least = std::min(start, end);
+  if (square > 0.0 && slope < 0.0 && -slope < 2.0 * square)
+    least = start - 0.25 * slope * slope / square;
+  return !(least > goal);
+}
+
+void SurfaceCollider::Impl::addPlaneRow(int point, int plane, double gap, bool hit)
+{
+  const int object = elements_.planes[plane], solid = object - elements_.sheet_count, sheet = elements_.point_object[point];
+  const Pose& end = step_->solids_end[solid];
+  const double shell = elements_.objects[sheet].shell;
+  CollisionRow row{};
+  std::fill(row.point, row.point + 4, point);
+  row.weight[0] = 1.0;
+  row.normal = end.orientation * Eigen::Vector3d::UnitZ();
+  row.anchor = end * (step_->solids[solid].inverse() * Eigen::Vector3d(from_.col(point)));
+  row.push = hit ? 0.0 : kPush * std::max(0.0, shell - gap);
+  row.bound = row.normal.dot(end.position) + (hit ? kTarget : 1.0) * std::min(gap, shell) + row.push;
+  row.tolerance = 0.02 * std::min(gap, shell);
+  row.friction = elements_.friction(sheet, object);
+  rows_.rows.push_back(row);
+  ++(hit ? report_.impulses : report_.repulsions);
+}
+
+bool SurfaceCollider::Impl::examinePlanes()
+{
+  for (std::size_t plane = 0; plane < elements_.planes.size(); ++plane)
+    for (int i = 0; i < elements_.sheet_points; ++i)
+    {
+      const int sheet = elements_.point_object[i];
+      if (sheet < 0 || !elements_.mayTouch(sheet, elements_.planes[plane]))
+        continue;
+      const double gap = planeGap(static_cast<int>(plane), step_->solids, from_.col(i));
+      if (!(gap > 0.0))
+        return fail("point " + std::to_string(i) + " is behind a plane at the start of the step");
+      const double shell = elements_.objects[sheet].shell;
+      if (gap < kNear * shell && std::min(gap, planeGap(static_cast<int>(plane), step_->solids_end, to_.col(i))) < shell)
+        addPlaneRow(i, static_cast<int>(plane), gap, false);
+    }
+  return true;
+}
+
+/// Fills hits_ and plane_hits_: all collisions along the present motions. After the first time only pairs whose motion has changed need a look.
+void SurfaceCollider::Impl::detect()
+{
+  const bool first = report_.rounds++ == 0;
+  for (Eigen::Index i = 0; i < to_.cols(); ++i)
+    changed_[i] = first || to_(0, i) != tested_(0, i) || to_(1, i) != tested_(1, i) || to_(2, i) != tested_(2, i);
+  const auto changed = [&](const CollisionPair& p) {
+    return changed_[p.point[0]] | changed_[p.point[1]] | changed_[p.point[2]] | changed_[p.point[3]];
+  };
+  hits_.erase(std::remove_if(hits_.begin(), hits_.end(), changed), hits_.end());
+  for (const CollisionPair& pair : pairs_.update(from_, to_))
+    if (changed(pair) && !CollisionPairs::separated(pair, to_) && pairs_.limit(pair, from_, to_, limitOf(pair)) < 1.0)
+      hits_.push_back(pair);
+  std::sort(hits_.begin(), hits_.end(), [](const CollisionPair& a, const CollisionPair& b) {
+    return std::tie(a.edges, a.first, a.second) < std::tie(b.edges, b.first, b.second);
+  });
+  plane_hits_.clear();
+  for (std::size_t plane = 0; plane < elements_.planes.size(); ++plane)
+    for (int i = 0; i < elements_.sheet_points; ++i)
+      if (const int sheet = elements_.point_object[i];
+          sheet >= 0 && elements_.mayTouch(sheet, elements_.planes[plane]) && planeHit(i, static_cast<int>(plane)))
+        plane_hits_.push_back({i, static_cast<int>(plane)});
+  tested_ = to_;
+}
+
+ApproachLimit SurfaceCollider::Impl::limitOf(const CollisionPair& pair) const
+{
+  ApproachLimit limit;
+  limit.thickness = pairs_.core(pair);
+  limit.reach = pairs_.shell(pair);
+  limit.kept = kKept;
+  return limit;
+}
+
+/// The end of the step has to stay on this side, seen where the pieces come too near each other.
+void SurfaceCollider::Impl::stop(const CollisionPair& pair)
+{
+  const ApproachLimit limit = limitOf(pair);
+  const double share = pairs_.limit(pair, from_, to_, limit), gap = std::min(pair.gap, limit.reach);
+  const PairPlace place = pairs_.place(pair, from_, to_, share);
+  CollisionRow row{};
+  row.normal = place.normal;
+  row.anchor.setZero();
+  for (int i = 0; i < 4; ++i)
+  {
+    row.point[i] = place.point[i];
+    row.weight[i] = place.weight[i];
+    row.anchor += place.weight[i] * from_.col(place.point[i]);
+  }
+  row.bound = limit.thickness + kTarget * gap;
+  row.tolerance = 0.02 * gap;
+  row.friction = elements_.friction(pairs_.object(pair, false), pairs_.object(pair, true));
+  rows_.rows.push_back(row);
+  ++report_.impulses;
+}
+
+/// Of a point in the zones: those of a solid are one.
+int SurfaceCollider::Impl::node(int point) const
+{
+  return point < elements_.sheet_points ? point
+                                        : static_cast<int>(from_.cols()) + elements_.point_object[point] - elements_.sheet_count;
+}
+
+/// Returns whether zones grew. Collisions within a zone are none: see ImpactZones.
+bool SurfaceCollider::Impl::joinHits()
+{
+  bool grown = false;
+  const auto join = [&](int a, int b) {
+    grown = grown || !zones_.together(a, b);
+    zones_.join(a, b);
+  };
+  for (const CollisionPair& pair : hits_)
+  {
+    for (int i = 1; i < 4; ++i)
+      join(node(pair.point[0]), node(pair.point[i]));
+  }
+  for (const PlaneHit& hit : plane_hits_)
+    join(hit.point, static_cast<int>(from_.cols()) + elements_.planes[hit.plane] - elements_.sheet_count);
+  return grown;
+}
+
+/// Moves a zone with what is prescribed in it, if that moves as one.
+bool SurfaceCollider::Impl::followPrescribed(const ImpactZones::Zone& zone)
+{
+  const int points = static_cast<int>(from_.cols());
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  const int last = zone.prescribed[zone.prescribed_count - 1];
+  if (last >= points)
+  {
+    const Pose moved = step_->solids_end[last - points] * step_->solids[last - points].inverse();
+    motion = Eigen::Translation3d(moved.position) * moved.orientation;
+  }
+  else
+    motion.translation() = to_.col(last) - from_.col(last);
+  const auto agrees = [&](const Eigen::Vector3d& start, const Eigen::Vector3d& end) {
+    return (motion * start - end).norm() <= 1e-9 * elements_.objects[0].shell;
+  };
+  const auto pointsAgree = [&] {
+    return std::all_of(zone.prescribed, zone.prescribed + zone.prescribed_count,
+                       [&](int i) { return i >= points || agrees(from_.col(i), to_.col(i)); });
+  };
+  if (last < points && !pointsAgree() && zone.prescribed_count > 2)   // a grasp that turns
+  {
+    Eigen::Matrix3Xd start(3, zone.prescribed_count), end(3, zone.prescribed_count);
+    for (int k = 0; k < zone.prescribed_count; ++k)
+    {
+      start.col(k) = from_.col(zone.prescribed[k]);
+      end.col(k) = to_.col(zone.prescribed[k]);
+    }
+    motion.matrix() = Eigen::umeyama(start, end, false);
+  }
+  bool one = pointsAgree();
+  for (int k = 0; k < zone.prescribed_count; ++k)
+    if (const int solid = zone.prescribed[k] - points; solid >= 0)
+      for (const Eigen::Vector3d& p : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)})
+        one = one && agrees(step_->solids[solid] * p, step_->solids_end[solid] * p);
+  if (!one)
+    return fail("prescribed motions squeeze or tear a piece at point " + std::to_string(zone.count > 0 ? zone.members[0] : zone.prescribed[0]));
+  if (motion.linear().trace() <= 1.0)   // 1 + 2 cos(angle)
+    return fail("a solid or grasp turns by more than a quarter in a step");
+  for (int k = 0; k < zone.count; ++k)
+    to_.col(zone.members[k]) = motion * from_.col(zone.members[k]);
+  return true;
+}
+
+bool SurfaceCollider::Impl::moveZones()
+{
+  for (const ImpactZones::Zone& zone : zones_.zones(inverse_mass_))
+  {
+    if (zone.prescribed_count > 0)
+    {
+      if (!followPrescribed(zone))
+        return false;
+      continue;
+    }
+    const RigidFit fit = rigidFit(zone.members, zone.count, inverse_mass_, from_, displacement_);
+    if (fit.angular.norm() > 0.5 * M_PI)
+      return fail("the piece at point " + std::to_string(zone.members[0]) + " would turn by more than a quarter in a step");
+    const Eigen::Matrix3d turn = fromRotationVector(fit.angular).toRotationMatrix();
+    for (int k = 0; k < zone.count; ++k)
+      to_.col(zone.members[k]) = fit.center + fit.linear + turn * (from_.col(zone.members[k]) - fit.center);
+  }
+  return true;
+}
+
+/// Velocities at the end do not approach where pieces touch then, with friction.
+void SurfaceCollider::Impl::solveVelocities()
+{
+  const double h = step_->h;
+  auto& rows = rows_.rows;
+  for (CollisionRow& row : rows)
+  {
+    Eigen::Vector3d start = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 4; ++i)
+    {
+      start += row.weight[i] * from_.col(row.point[i]);
+      end += row.weight[i] * to_.col(row.point[i]);
+    }
+    row.anchor = (row.anchor - start) / h;   // zero, or the velocity of a plane
+    row.bound = row.normal.dot(row.anchor);
+    row.tolerance /= h;
+  }
+  rows_.restart(inverse_mass_, 1.0 / h, velocity_);
+  rows_.relax(inverse_mass_, kSweeps, velocity_);
+  if (zones_.empty())
+    return;
+  for (const ImpactZones::Zone& zone : zones_.zones(inverse_mass_))
+  {
+    ++report_.zones;
+    report_.zone_points = std::max(report_.zone_points, zone.count);
+    if (zone.count == 0)
+      continue;
+    const bool free = zone.prescribed_count == 0;
+    const RigidFit fit = rigidFit(zone.members, zone.count, inverse_mass_, to_, velocity_);
+    for (int k = 0; k < zone.count; ++k)
+    {
+      const int i = zone.members[k];
+      velocity_.col(i) = free ? fit.rate(to_.col(i)) : Eigen::Vector3d((to_.col(i) - from_.col(i)) / h);
+    }
+  }
+}
+
+CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v)
+{
+  if (!load(step, x, v) || !examineStart() || !examinePlanes())
+    return report_;
+  hits_.clear();
+  rows_.relax(inverse_mass_, kSweeps, to_);
+  detect();
+  while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds)
+  {
+    for (const CollisionPair& pair : hits_)
+      stop(pair);
+    for (const PlaneHit& hit : plane_hits_)
+      addPlaneRow(hit.point, hit.plane, planeGap(hit.plane, step.solids, from_.col(hit.point)), true);
+    rows_.relax(inverse_mass_, kSweeps, to_);
+    detect();
+  }
+  displacement_ = to_ - from_;
+  while (joinHits())
+  {
+    if (!moveZones())
+      return report_;
+    detect();
+  }
+  solveVelocities();
+  x = to_.leftCols(elements_.sheet_points);
+  v = velocity_.leftCols(elements_.sheet_points);
+  return report_;
+}
+
+SurfaceCollider::SurfaceCollider(const CollisionSurface& surface) : impl_(std::make_unique<Impl>(surface)) {}
+SurfaceCollider::~SurfaceCollider() = default;
+SurfaceCollider::SurfaceCollider(SurfaceCollider&&) noexcept = default;
+
+CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v)
+{
+  return impl_->resolve(step, x, v);
+}
+
+}  // namespace slender

@@ -1,0 +1,146 @@
+#include <gtest/gtest.h>
+
+#include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/geometry/mesh_shapes.h"
+
+namespace slender::test {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+struct Cloths
+{
+  ClothGroupModel model;
+  ClothGroupState state;
+  ClothGroupInputs inputs;
+
+  void add(const std::string& name, int n, double size, const Vector3d& corner, double friction = 0.3)
+  {
+    ClothModel cloth = buildCloth(name, gridMesh(size, size, n, n, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 5e-4));
+    cloth.bending_modulus = 1e-6;
+    cloth.stiffness_damping = 1e-3;
+    model.cloths.push_back(std::make_shared<ClothModel>(cloth));
+    ClothContact contact;
+    contact.thickness = 4e-3;
+    contact.friction = friction;
+    model.contact.push_back(contact);
+    state.cloths.push_back(makeClothState(cloth, cloth.rest.vertices.colwise() + corner));
+    inputs.cloths.emplace_back();
+  }
+  void addSolid(const Shape& shape, const Pose& pose = {})
+  {
+    model.solids.push_back({shape, -1.0, {}});
+    state.solids.push_back(pose);
+    inputs.solids.push_back(pose);
+  }
+};
+
+TEST(ClothGroup, ComesToRestOnAFloor)
+{
+  Cloths c;
+  c.add("upper", 6, 0.3, {0, 0, 0.012});
+  c.add("lower", 6, 0.3, {0.02, 0.01, 0.006});
+  c.addSolid(Plane{});
+  ClothGroup group(c.model, {});
+  group.checkIntersections(c.state);
+  double speed = 0.0;
+  for (int k = 0; k < 200; ++k)
+  {
+    const StepReport report = group.step(c.state, c.inputs, 0.005);
+    ASSERT_TRUE(report.ok) << report.message;
+    ASSERT_EQ(group.intersections(c.state), 0u) << k;
+    speed = std::max(c.state.cloths[0].v.cwiseAbs().maxCoeff(), c.state.cloths[1].v.cwiseAbs().maxCoeff());
+  }
+  EXPECT_GT(group.collisions().repulsions, 0);
+  EXPECT_LT(speed, 5e-3);
+  // half a thickness above the floor, a thickness apart
+  EXPECT_NEAR(c.state.cloths[1].x.row(2).mean(), 2e-3, 4e-4);
+  EXPECT_NEAR(c.state.cloths[0].x.row(2).mean(), 6e-3, 1e-3);
+}
+
+TEST(ClothGroup, AFastSolidIsStoppedByNothingButCarriesCloth)
+{
+  Cloths c;
+  c.add("cloth", 8, 0.4, {-0.2, -0.2, 0});
+  c.addSolid(Sphere{0.05}, {{0, 0, -0.1}, Quaterniond::Identity()});
+  for (ClothInputs& in : c.inputs.cloths)
+    in.gravity.setZero();
+  ClothGroup group(c.model, {});
+  for (int k = 0; k < 10; ++k)   // at 20 m/s
+  {
+    c.inputs.solids[0].position.z() += 0.1;
+    const StepReport report = group.step(c.state, c.inputs, 0.005);
+    ASSERT_TRUE(report.ok) << report.message;
+    ASSERT_EQ(group.intersections(c.state), 0u);
+    ASSERT_EQ(c.state.solids[0].position, c.inputs.solids[0].position);
+  }
+  double top = -1e9;
+  for (int i = 0; i < c.state.cloths[0].x.cols(); ++i)
+    top = std::max(top, c.state.cloths[0].x(2, i));
+  EXPECT_GT(top, c.state.solids[0].position.z() + 0.05);
+}
+
+TEST(ClothGroup, SqueezedClothIsRefusedAndTheStateKept)
+{
+  Cloths c;
+  c.add("cloth", 4, 0.1, {-0.05, -0.05, 0});
+  c.addSolid(Box{{0.2, 0.2, 0.02}}, {{0, 0, 0.02}, Quaterniond::Identity()});
+  c.addSolid(Box{{0.2, 0.2, 0.02}}, {{0, 0, -0.02}, Quaterniond::Identity()});
+  ClothGroup group(c.model, {});
+  c.inputs.solids[0].position.z() = 0.009;
+  c.inputs.solids[1].position.z() = -0.009;
+  const ClothGroupState before = c.state;
+  const StepReport report = group.step(c.state, c.inputs, 0.01);
+  EXPECT_FALSE(report.ok);
+  EXPECT_EQ(report.failure, StepFailure::squeezed);
+  EXPECT_NE(report.message.find("prescribed"), std::string::npos) << report.message;
+  EXPECT_GT(report.cut_steps, 0);
+  EXPECT_EQ(c.state.cloths[0].x, before.cloths[0].x);
+  EXPECT_EQ(c.state.cloths[0].v, before.cloths[0].v);
+  EXPECT_EQ(c.state.solids[0].position, before.solids[0].position);
+}
+
+/// What one step cannot do, because a solid turns by more than a quarter, shorter ones can.
+TEST(ClothGroup, HalvesStepsWhereNeeded)
+{
+  Cloths c;
+  c.add("cloth", 6, 0.2, {-0.1, -0.1, 0.003});
+  c.addSolid(Box{{0.5, 0.5, 0.1}}, {{0, 0, -0.05}, Quaterniond::Identity()});
+  ClothGroup group(c.model, {});
+  for (int k = 0; k < 5; ++k)
+    ASSERT_TRUE(group.step(c.state, c.inputs, 0.01).ok);
+  c.inputs.solids[0].orientation = Quaterniond(Eigen::AngleAxisd(2.5, Vector3d::UnitZ()));
+  c.inputs.solids[0].position.z() += 0.02;
+  const StepReport report = group.step(c.state, c.inputs, 0.01);
+  ASSERT_TRUE(report.ok) << report.message;
+  EXPECT_EQ(group.intersections(c.state), 0u);
+  EXPECT_GT(c.state.cloths[0].x.row(2).minCoeff(), 0.02);
+}
+
+TEST(ClothGroup, RefusesIntersectionsAtTheStart)
+{
+  Cloths c;
+  c.add("first", 4, 0.2, {0, 0, 0});
+  c.add("second", 4, 0.2, {0.05, 0.05, 0.01});
+  c.addSolid(Sphere{0.05}, {{0, 0, 1}, Quaterniond::Identity()});
+  ClothGroup group(c.model, {});
+  EXPECT_NO_THROW(group.checkIntersections(c.state));
+  for (int i = 0; i < 25; ++i)
+    c.state.cloths[1].x(2, i) = c.state.cloths[1].x(0, i) - 0.1;
+  try
+  {
+    group.checkIntersections(c.state);
+    ADD_FAILURE();
+  }
+  catch (const std::invalid_argument& e)
+  {
+    EXPECT_NE(std::string(e.what()).find("' at vertex "), std::string::npos) << e.what();
+  }
+  c.model.contact.pop_back();
+  EXPECT_THROW(ClothGroup(c.model, {}), std::invalid_argument);
+  EXPECT_THROW(group.step(c.state, ClothGroupInputs(), 0.01), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace slender::test
