@@ -12,8 +12,9 @@ namespace {
 constexpr int kCuts = 30;
 /// Share of the promised decrease that a step must bring (Armijo).
 constexpr double kSufficient = 1e-4;
-/// Decreases below this part of the energy are round-off.
-constexpr double kResolved = 1e-12;
+/// Below these parts of the energy, and of the vertices' coordinates, a step is round-off; below the second ones it may be.
+constexpr double kEnergyResolved = 1e-12, kMoveResolved = 1e-14;
+constexpr double kEnergyDoubtful = 1e-9, kMoveDoubtful = 1e-10;
 
 }  // namespace
 
@@ -159,13 +160,17 @@ FairingReport WillmoreFlow::step(Eigen::Matrix3Xd& vertices)
     for (int k = 0; k < 4; ++k)
       gradient_[4 * i + k] *= held_[i] || k == 3 ? 0.0 : -1.0;
   cholesky_.solvePoints(gradient_.data(), direction_.data());
-  double decrement = 0.0;
+  double decrement = 0.0, reach = 0.0, size = 0.0;
   for (std::size_t k = 0; k < gradient_.size(); ++k)
+  {
     decrement += gradient_[k] * direction_[k];
+    reach = std::max(reach, std::abs(direction_[k]));
+    size = std::max(size, std::abs(x_[k]));
+  }
   report.decrement = decrement;
   if (!std::isfinite(decrement))
     return refuse("the gradient is too large for finite numbers; mend the mesh's thinnest faces first");
-  if (!(decrement > kResolved * report.energy))
+  if (!(decrement > kEnergyResolved * report.energy) || !(reach > kMoveResolved * size))
   {
     report.stationary = true;
     return report;
@@ -186,8 +191,7 @@ FairingReport WillmoreFlow::step(Eigen::Matrix3Xd& vertices)
   if (!taken)
   {
     report.cuts = kCuts;
-    // what is left to gain is lost in the round-off of the energy's sum
-    report.stationary = decrement <= 1e-9 * report.energy_before;
+    report.stationary = decrement <= kEnergyDoubtful * report.energy_before || reach <= kMoveDoubtful * size;
     return report.stationary ? report : refuse("no step in the flow's direction lowers the energy; remesh the thinnest faces, or take a shorter time step");
   }
   report.energy = after;
