@@ -23,7 +23,7 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 double bend(const Vector3d& n, const Vector3d& m)
 {
   const double scale = n.norm() * m.norm();
-  return scale > 0 ? 1.0 - n.dot(m) / scale : 2.0;   // a face without area is as bad as a fold
+  return scale > 0 ? 1.0 - n.dot(m) / scale : 3.0;   // a face without area is worse than a fold
 }
 
 }  // namespace

@@ -126,7 +126,7 @@ WillmoreFlow::WillmoreFlow(Part part)
   const PointMatrix matrix(n, entries);
   cholesky_.setPattern(matrix);
   if (!cholesky_.factor(matrix, held_.data()))
-    throw std::invalid_argument("Willmore flow: the matrix is singular; take a shorter time step");
+    throw std::invalid_argument("Willmore flow: the matrix is singular: faces are nearly without area, or nothing is held and the time step is too long");
 }
 
 void WillmoreFlow::load(const Eigen::Matrix3Xd& vertices)
