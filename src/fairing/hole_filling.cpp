@@ -112,7 +112,7 @@ HoleReport fillHole(TriangleMesh& mesh, const std::vector<int>& loop, const Hole
     std::optional<WillmoreFlow> flow;
     try
     {
-      flow.emplace(whole, meshTopology(whole), std::numeric_limits<double>::infinity(), selected);
+      flow.emplace(whole, meshTopology(whole), std::numeric_limits<double>::infinity(), 1, selected);
     }
     catch (const std::invalid_argument& error)
     {

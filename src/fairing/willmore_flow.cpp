@@ -15,6 +15,8 @@ constexpr double kSufficient = 1e-4;
 /// Below these parts of the energy, and of the vertices' coordinates, a step is round-off; below the second ones it may be.
 constexpr double kEnergyResolved = 1e-12, kMoveResolved = 1e-14;
 constexpr double kEnergyDoubtful = 1e-9, kMoveDoubtful = 1e-10;
+/// Iterations end where they promise this part of what the first one promised.
+constexpr double kConverged = 1e-3;
 
 }  // namespace
 
@@ -28,10 +30,13 @@ struct WillmoreFlow::Part
   TriangleMesh mesh;
   MeshTopology topology;   ///< only what isometricBending() reads
   double time_step;
+  int iterations;
 
-  Part(const TriangleMesh& whole, const MeshTopology& t, double step, const std::vector<char>& selected)
-    : mesh_vertices(whole.vertices.cols()), time_step(step)
+  Part(const TriangleMesh& whole, const MeshTopology& t, double step, int count, const std::vector<char>& selected)
+    : mesh_vertices(whole.vertices.cols()), time_step(step), iterations(count)
   {
+    if (iterations < 1)
+      throw std::invalid_argument("Willmore flow: a step needs at least one iteration");
     const std::size_t n = static_cast<std::size_t>(mesh_vertices);
     if (!(time_step > 0))
       throw std::invalid_argument("Willmore flow: the time step must be positive [m^4]");
@@ -97,20 +102,21 @@ struct WillmoreFlow::Part
   }
 };
 
-WillmoreFlow::WillmoreFlow(const TriangleMesh& mesh, const MeshTopology& topology, double time_step, const std::vector<char>& selected)
-  : WillmoreFlow(Part(mesh, topology, time_step, selected))
+WillmoreFlow::WillmoreFlow(const TriangleMesh& mesh, const MeshTopology& topology, double time_step, int iterations, const std::vector<char>& selected)
+  : WillmoreFlow(Part(mesh, topology, time_step, iterations, selected))
 {
 }
 
 WillmoreFlow::WillmoreFlow(Part part)
   : mesh_vertices_(part.mesh_vertices),
+    iterations_(part.iterations),
     moving_(std::move(part.moving)),
     vertices_(std::move(part.vertices)),
     held_(std::move(part.held)),
     willmore_(part.mesh.triangles, part.counted)
 {
   toPoints(part.mesh.vertices, x_);
-  gradient_ = direction_ = trial_ = x_;
+  start_ = gradient_ = direction_ = trial_ = x_;
   if (!std::isfinite(willmore_.energy(x_.data())))
     throw std::invalid_argument("Willmore flow: a face has no area, or a vertex is not finite; mend the mesh first");
   const int n = part.mesh.vertices.cols();
@@ -122,7 +128,10 @@ WillmoreFlow::WillmoreFlow(Part part)
       entries.emplace_back(i, bending.column(k), bending.values()[k]);
   const Eigen::VectorXd areas = vertexAreas(part.mesh);
   for (int i = 0; i < n; ++i)
-    entries.emplace_back(i, i, areas[i] / part.time_step);
+  {
+    mass_rate_.push_back(areas[i] / part.time_step);
+    entries.emplace_back(i, i, mass_rate_.back());
+  }
   const PointMatrix matrix(n, entries);
   cholesky_.setPattern(matrix);
   if (!cholesky_.factor(matrix, held_.data()))
@@ -148,58 +157,87 @@ FairingReport WillmoreFlow::step(Eigen::Matrix3Xd& vertices)
   FairingReport report;
   const auto refuse = [&](const char* reason) {
     report.ok = false;
+    report.energy = report.energy_before;
     report.message = reason;
     return report;
   };
   load(vertices);
-  std::fill(gradient_.begin(), gradient_.end(), 0.0);
-  report.energy_before = report.energy = willmore_.addGradient(x_.data(), gradient_.data());
-  if (!std::isfinite(report.energy))
-    return refuse("a face has no area, or a vertex is not finite; mend the mesh first");
-  for (std::size_t i = 0; i < held_.size(); ++i)
-    for (int k = 0; k < 4; ++k)
-      gradient_[4 * i + k] *= held_[i] || k == 3 ? 0.0 : -1.0;
-  cholesky_.solvePoints(gradient_.data(), direction_.data());
-  double decrement = 0.0, reach = 0.0, size = 0.0;
-  for (std::size_t k = 0; k < gradient_.size(); ++k)
+  start_ = x_;
+  report.energy_before = report.energy = willmore_.energy(x_.data());
+  double merit = report.energy;   // E + |x - start|^2_M / (2 h), whose minimum is the step's end
+  double first = 0.0;
+  for (int iteration = 0; iteration < iterations_; ++iteration)
   {
-    decrement += gradient_[k] * direction_[k];
-    reach = std::max(reach, std::abs(direction_[k]));
-    size = std::max(size, std::abs(x_[k]));
-  }
-  report.decrement = decrement;
-  if (!std::isfinite(decrement))
-    return refuse("the gradient is too large for finite numbers; mend the mesh's thinnest faces first");
-  if (!(decrement > kEnergyResolved * report.energy) || !(reach > kMoveResolved * size))
-  {
-    report.stationary = true;
-    return report;
-  }
-  double scale = 1.0, after = 0.0;
-  bool taken = false;
-  for (; report.cuts <= kCuts; ++report.cuts, scale *= 0.5)
-  {
-    for (std::size_t k = 0; k < x_.size(); ++k)
-      trial_[k] = x_[k] + scale * direction_[k];
-    if (willmore_.foldsOver(x_.data(), trial_.data()))
-      continue;
-    after = willmore_.energy(trial_.data());
-    taken = after <= report.energy_before - kSufficient * scale * decrement;
-    if (taken)
+    std::fill(gradient_.begin(), gradient_.end(), 0.0);
+    if (!std::isfinite(willmore_.addGradient(x_.data(), gradient_.data())))
+      return refuse("a face has no area, or a vertex is not finite; mend the mesh first");
+    for (std::size_t i = 0; i < held_.size(); ++i)
+      for (int k = 0; k < 4; ++k)
+      {
+        double& g = gradient_[4 * i + k];
+        g = held_[i] || k == 3 ? 0.0 : -g - mass_rate_[i] * (x_[4 * i + k] - start_[4 * i + k]);
+      }
+    cholesky_.solvePoints(gradient_.data(), direction_.data());
+    double decrement = 0.0, reach = 0.0, size = 0.0;
+    for (std::size_t k = 0; k < gradient_.size(); ++k)
+    {
+      decrement += gradient_[k] * direction_[k];
+      reach = std::max(reach, std::abs(direction_[k]));
+      size = std::max(size, std::abs(x_[k]));
+    }
+    if (!std::isfinite(decrement))
+      return refuse("the gradient is too large for finite numbers; mend the mesh's thinnest faces first");
+    if (iteration == 0)
+      report.decrement = first = decrement;
+    const bool resolved = decrement > kEnergyResolved * report.energy && reach > kMoveResolved * size;
+    if (!resolved || decrement <= kConverged * first * (iteration > 0))
+    {
+      report.stationary = iteration == 0;
       break;
+    }
+    double scale = 1.0;
+    int cuts = 0;
+    bool taken = false;
+    for (; !taken && cuts <= kCuts; scale *= 0.5)
+    {
+      double distance = 0.0;
+      for (std::size_t i = 0; i < held_.size(); ++i)
+        for (int k = 0; k < 4; ++k)
+        {
+          trial_[4 * i + k] = x_[4 * i + k] + scale * direction_[4 * i + k];
+          distance += mass_rate_[i] * std::pow(trial_[4 * i + k] - start_[4 * i + k], 2);
+        }
+      double energy = INFINITY;
+      if (!willmore_.foldsOver(x_.data(), trial_.data()))
+        energy = willmore_.energy(trial_.data());
+      taken = energy + 0.5 * distance <= merit - kSufficient * scale * decrement;
+      if (!taken)
+      {
+        ++cuts;
+        continue;
+      }
+      merit = energy + 0.5 * distance;
+      report.energy = energy;
+    }
+    if (!taken)
+    {
+      if (iteration > 0)
+        break;   // the iterations so far are a step
+      report.stationary = decrement <= kEnergyDoubtful * report.energy_before || reach <= kMoveDoubtful * size;
+      if (report.stationary)
+        return report;
+      return refuse("no step in the flow's direction lowers the energy; remesh the thinnest faces, or take a shorter time step");
+    }
+    report.cuts += cuts;
+    ++report.iterations;
+    x_.swap(trial_);
   }
-  if (!taken)
-  {
-    report.cuts = kCuts;
-    report.stationary = decrement <= kEnergyDoubtful * report.energy_before || reach <= kMoveDoubtful * size;
-    return report.stationary ? report : refuse("no step in the flow's direction lowers the energy; remesh the thinnest faces, or take a shorter time step");
-  }
-  report.energy = after;
   for (std::size_t i = 0; i < held_.size(); ++i)
     if (!held_[i])
     {
-      vertices.col(vertices_[i]) = point(trial_, static_cast<Eigen::Index>(i));
-      report.largest_move = std::max(report.largest_move, scale * point(direction_, static_cast<Eigen::Index>(i)).norm());
+      const auto at = point(x_, static_cast<Eigen::Index>(i));
+      report.largest_move = std::max(report.largest_move, (at - point(start_, static_cast<Eigen::Index>(i))).norm());
+      vertices.col(vertices_[i]) = at;
     }
   return report;
 }

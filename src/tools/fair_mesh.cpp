@@ -21,13 +21,15 @@ namespace {
 using slender::TriangleMesh;
 using Clock = std::chrono::steady_clock;
 
+/// Newton-like, of a step at most: enough for the implicit Euler method to the eye.
+constexpr int iterations = 10;
 constexpr int exit_done = 0, exit_bad_input = 2, exit_failed = 3;
 
 const char* const usage =
   "usage: fair_mesh IN OUT [options]\n"
   "  IN, OUT             meshes, .obj or .ply [m]\n"
   "  --steps N           steps of the Willmore flow (default: 10; with --fill-holes 0)\n"
-  "  --smoothing L       length [m]: a step halves bumps of wavelength 2 pi L, longer ones less (default: twice the mean edge length)\n"
+  "  --smoothing L       length [m]: a step halves bumps of wavelength 2 pi L, longer ones less (default: the mean edge length)\n"
   "  --region X,Y,Z,R    only vertices in this ball move [m]; may be repeated\n"
   "  --fill-holes        first close the holes by patches that continue the surface around them\n"
   "  --largest-hole N    leave boundaries of more than N edges open (default: 1000)\n"
@@ -220,8 +222,8 @@ void smooth(TriangleMesh& mesh, int steps, const Options& options, Progress& pro
   for (Eigen::Index v = 0; !options.region.empty() && v < mesh.vertices.cols(); ++v)
     selected.push_back(std::any_of(options.region.begin(), options.region.end(),
                                    [&](const Ball& ball) { return (mesh.vertices.col(v) - ball.middle).norm() <= ball.radius; }));
-  const double length = options.smoothing ? *options.smoothing : 2.0 * meanEdge(mesh, topology);
-  slender::WillmoreFlow flow(mesh, topology, std::pow(length, 4), selected);
+  const double length = options.smoothing ? *options.smoothing : meanEdge(mesh, topology);
+  slender::WillmoreFlow flow(mesh, topology, std::pow(length, 4), iterations, selected);
   outcome.energy_before = outcome.energy = flow.energy(mesh.vertices);
   for (int k = 0; k < steps && !outcome.stationary; ++k)
   {
