@@ -80,6 +80,8 @@ HoleReport fillHole(TriangleMesh& mesh, const std::vector<int>& loop, const Hole
     return refused("a hole of " + std::to_string(loop.size()) + " edges cannot be closed: there may be 3 to " + std::to_string(kLongestHole) +
                    "; divide it by a strip of faces");
   const Rim rim = rimOf(mesh, meshTopology(mesh), loop, options.edge_length);
+  if (loop.size() == 3 && rim.beyond[0] == rim.loop[2])
+    return refused("a face without neighbours cannot be closed: its back would have the same vertices; remove it");
   std::vector<Eigen::Vector3i> faces = triangulateLoop(mesh.vertices, rim.loop, rim.beyond, rim.taken);
   if (faces.empty())
     return refused("the hole cannot be closed: each way needs an edge that the mesh already has");

@@ -63,8 +63,8 @@ std::vector<Case> cases(bool quick)
                            return p[2] < 0 || (!(std::abs(p[1]) < 0.12 && p[0] > -0.12 && p[0] < 0.6) && !(std::abs(p[0]) < 0.12 && p[1] > -0.12 && p[1] < 0.6));
                          }),
                  0.0, fromSphere, 0.005, ""});
-  all.push_back({"Clifford torus, outer side", cutTorus({kClifford + 1, 0, 0}, 0.8), 0.0, fromTorus, 0.005, "max_torus_error_outer"});
-  all.push_back({"Clifford torus, inner side (saddle)", cutTorus({kClifford - 1, 0, 0}, 0.5), 0.0, fromTorus, 0.005, "max_torus_error_saddle"});
+  all.push_back({"Clifford torus, outer side", cutTorus((kClifford + 1) * Vector3d(0.6, -0.8, 0), 0.8), 0.0, fromTorus, 0.005, "max_torus_error_outer"});
+  all.push_back({"Clifford torus, inner side (saddle)", cutTorus((kClifford - 1) * Vector3d(-0.6, 0.8, 0), 0.5), 0.0, fromTorus, 0.005, "max_torus_error_saddle"});
   return all;
 }
 
