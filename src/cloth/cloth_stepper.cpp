@@ -35,12 +35,12 @@ private:
 
   ClothState work_;
   Eigen::Matrix3Xd pins_start_;
-  PointVector x_, trial_, d_, pin_motion_, v_, force_;
+  PointVector x_, best_, trial_, d_, pin_motion_, v_, force_;
   double shortest_edge_ = 0;
 };
 
 ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
-  : model(std::move(m)), options(o), system(*model, o.solver, o.linear_tolerance)
+  : model(std::move(m)), options(o), system(*model, o)
 {
   const std::string who = "cloth '" + model->name + "': ";
   if (o.integrator != Integrator::implicit_euler && o.integrator != Integrator::symplectic_euler)
@@ -56,7 +56,7 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
   for (Eigen::Index e = 0; e < model->topology.edges.cols(); ++e)
     shortest_edge_ = std::min(shortest_edge_, (model->rest.vertices.col(model->topology.edges(0, e)) -
                                                model->rest.vertices.col(model->topology.edges(1, e))).norm());
-  for (PointVector* v : {&x_, &trial_, &d_, &pin_motion_, &v_, &force_})
+  for (PointVector* v : {&x_, &best_, &trial_, &d_, &pin_motion_, &v_, &force_})
     v->assign(4 * model->vertices(), 0.0);
 }
 
@@ -180,25 +180,61 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
   return StepFailure::none;
 }
 
+/// Newton's method on the energy of the step, with a watchdog as in minimize() of rods: nearly inextensible cloth gains a little membrane
+/// energy in every full step that turns it, and a strict line search would creep. Where full steps do not get below the best energy
+/// for a while, it returns there and becomes strict.
 StepFailure ClothStepper::Impl::minimize(StepReport& report)
 {
   constexpr double kArmijo = 1e-4;
+  constexpr double kMostShift = 10.0;   // of the weight of inertia
+  constexpr int kPatience = 5;
   for (int i = 0; i < model->vertices(); ++i)
     point(x_, i) = system.held()[i] ? Eigen::Vector3d(point(system.start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(system.target(), i));
-  bool near = false, exact_failed = false;
+  bool near = false, strict = false;
+  double best = std::numeric_limits<double>::infinity(), shift = 0.0;
+  int misses = 0;
   for (int iteration = 0; iteration < options.newton.max_iterations; ++iteration)
   {
-    // far away, or where the exact matrix is indefinite, the one that is never so
-    bool solved = false;
-    ClothEvaluation here;
-    for (int attempt = near && !exact_failed ? 0 : 1; attempt < 2 && !solved; ++attempt)
+    // far away the matrix that is never indefinite; near by the exact one, shifted where wrinkles are about to grow
+    HessianKind kind = near ? HessianKind::exact : HessianKind::semidefinite;
+    ClothEvaluation here = system.evaluateHessian(x_, kind);
+    if (!std::isfinite(here.energy()))
+      return StepFailure::state_not_finite;
+    if (!strict && here.energy() > best + 1e-13 * here.magnitude())
     {
-      here = system.evaluateHessian(x_, attempt == 0 ? HessianKind::exact : HessianKind::semidefinite);
-      if (!std::isfinite(here.energy()))
-        return StepFailure::state_not_finite;
+      strict = ++misses > kPatience;
+      if (strict)
+      {
+        std::copy(best_.begin(), best_.end(), x_.begin());
+        kind = HessianKind::semidefinite;
+        here = system.evaluateHessian(x_, kind);
+      }
+    }
+    else if (!strict)
+    {
+      best = here.energy();
+      misses = 0;
+      std::copy(x_.begin(), x_.end(), best_.begin());
+    }
+    bool solved = false;
+    for (double added = 0.0; !solved;)
+    {
+      if (kind == HessianKind::exact && shift > added)
+      {
+        system.shiftMatrix(shift - added);
+        added = shift;
+      }
       std::fill(d_.begin(), d_.end(), 0.0);
       solved = system.solve(d_, report.linear_iterations, report.factorizations);
-      exact_failed = exact_failed || !solved;
+      if (solved || kind == HessianKind::semidefinite)
+        break;
+      shift = std::max(0.2, 4.0 * shift);
+      if (shift > kMostShift)
+      {
+        shift = 0.0;
+        kind = HessianKind::semidefinite;
+        system.evaluateHessian(x_, kind);
+      }
     }
     if (!solved)
       return StepFailure::singular_matrix;
@@ -213,7 +249,7 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
     {
       for (std::size_t i = 0; i < x_.size(); ++i)
         trial_[i] = x_[i] + alpha * d_[i];
-      if (increment <= options.newton.tolerance || system.energy(trial_).energy() <= here.energy() + kArmijo * alpha * slope + noise)
+      if (!strict || increment <= options.newton.tolerance || system.energy(trial_).energy() <= here.energy() + kArmijo * alpha * slope + noise)
         break;
       if (alpha < 1e-8)
         return StepFailure::newton_diverged;
@@ -222,6 +258,7 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
     if (alpha == 1.0 && increment <= options.newton.tolerance)
       return StepFailure::none;
     near = increment < 0.1;
+    shift = shift > 0.1 ? 0.25 * shift : 0.0;
   }
   return StepFailure::newton_diverged;
 }

@@ -9,8 +9,14 @@ namespace slender {
 
 namespace {
 
-/// Up to here factoring is faster (see the study implicit_step).
-constexpr int kLargestFactored = 10000;
+/// One Newton step needs few iterations of conjugate gradients; many exact ones are faster by factoring as long as that is cheap.
+ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
+{
+  constexpr int kLargestFactored = 5000;
+  if (options.solver != ClothSolver::automatic)
+    return options.solver;
+  return options.one_newton_step || model.vertices() > kLargestFactored ? ClothSolver::conjugate_gradients : ClothSolver::cholesky;
+}
 
 /// Cotangent stiffness of the rest mesh times a modulus: the membrane as if it acted on each coordinate alike.
 PointMatrix scalarMembrane(const ClothModel& model)
@@ -54,12 +60,8 @@ void addScaled(const PointMatrix& matrix, double factor, std::vector<Eigen::Trip
 
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
-ClothSystem::ClothSystem(const ClothModel& model, ClothSolver solver, double linear_tolerance)
-  : model_(model)
-  , solver_(solver != ClothSolver::automatic             ? solver
-            : model.vertices() <= kLargestFactored ? ClothSolver::cholesky
-                                                   : ClothSolver::conjugate_gradients)
-  , linear_tolerance_(linear_tolerance)
+ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
+  : model_(model), solver_(chosen(model, options)), linear_tolerance_(options.linear_tolerance)
   , membrane_(model.rest, model.membrane, model.warp)
 {
   const int n = points();
@@ -317,6 +319,13 @@ ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind k
   for (std::size_t i = 0; i < drag_.size(); ++i)
     Eigen::Map<Eigen::Matrix3d>(matrix_.values() + 9 * matrix_.starts()[i]) += drag_[i];
   return result;
+}
+
+void ClothSystem::shiftMatrix(double factor)
+{
+  for (int i = 0; i < points(); ++i)
+    for (int k = 0; k < 3; ++k)
+      matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += factor * weight_[i];
 }
 
 void ClothSystem::clearHeld(PointVector& v) const

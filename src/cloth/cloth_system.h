@@ -26,7 +26,7 @@ struct ClothEvaluation
 class ClothSystem
 {
 public:
-  ClothSystem(const ClothModel& model, ClothSolver solver, double linear_tolerance);
+  ClothSystem(const ClothModel& model, const ClothOptions& options);
 
   int points() const { return model_.vertices(); }
   ClothSolver solver() const { return solver_; }
@@ -43,6 +43,8 @@ public:
   ClothEvaluation evaluate(const PointVector& x);
   /// The same with the matrix of solve().
   ClothEvaluation evaluateHessian(const PointVector& x, HessianKind kind);
+  /// Adds a multiple of the weights of inertia to the matrix.
+  void shiftMatrix(double factor);
   /// Elastic and viscous parts only, added.
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient);
   PointVector& gradient() { return gradient_; }
@@ -65,7 +67,7 @@ private:
 
   const ClothModel& model_;
   ClothSolver solver_;
-  double linear_tolerance_;
+  const double linear_tolerance_;
   MembraneEnergy membrane_;
   std::unique_ptr<HingeBending> hinges_;      ///< hinge bending only
   PointMatrix bending_, stand_in_;            ///< isometric model, or for hinges what preconditions; rest membrane

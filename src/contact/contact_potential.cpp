@@ -81,6 +81,7 @@ void ContactPotential::Impl::check(const Eigen::Matrix3Xd& x, const std::vector<
 double ContactPotential::Impl::restart()
 {
   terms.clear();
+  rows.clear();
   contacts.clear();
   largest_force = 0.0;
   smallest_gap = kInfinity;
@@ -180,7 +181,10 @@ double ContactPotential::Impl::addContact(const SoftGap& gap, Contact& contact, 
   term.force = contact.force;
   if (with_stiffness)
   {
-    term.stiffness = stiffness * barrier.stiffness(gap.gap) * gap.weight * gap.weight * gap.normal * gap.normal.transpose();
+    const Eigen::Matrix3d normals = gap.normal * gap.normal.transpose();
+    term.stiffness = stiffness * barrier.stiffness(gap.gap) * gap.weight * gap.weight * normals;
+    if (contact.solid < 0)
+      term.geometric = -force * gap.weight / gap.distance * (Eigen::Matrix3d::Identity() - normals);
     addRunning(gap, contact, force);
   }
   contacts.push_back(contact);
@@ -194,33 +198,35 @@ void ContactPotential::Impl::addRunning(const SoftGap& gap, const Contact& conta
 {
   constexpr double kNegligible = 1e-3;   // of the pair's own stiffness
   const double own = stiffness * barrier.stiffness(gap.gap) * gap.weight * gap.weight;
-  const auto add = [&](const Eigen::Vector4d& r, double d) {
+  const Eigen::Map<const Eigen::Vector4d> u(contact.weight);
+  const auto add = [&](const Eigen::Vector4d& along, const Eigen::Vector3d& turning, double d) {
     const double k = force / d;
-    if (!(d > 0.0) || !(k * r.squaredNorm() > kNegligible * own))
+    if (!(d > 0.0) || !(k * (along.squaredNorm() + turning.squaredNorm()) > kNegligible * own))
       return;
-    terms.emplace_back();
-    ContactTerm& term = terms.back();
-    copyFour(term.point, contact.point);
-    Eigen::Map<Eigen::Vector4d>(term.weight) = r;
-    term.position = contact.position;
-    term.stiffness = k * gap.normal * gap.normal.transpose();
+    rows.emplace_back();
+    ContactRow& row = rows.back();
+    copyFour(row.point, contact.point);
+    Eigen::Map<Eigen::Vector4d>(row.along) = along;
+    Eigen::Map<Eigen::Vector4d>(row.across) = u;
+    row.normal = gap.normal;
+    row.turning = turning;
+    row.stiffness = k;
   };
   if (contact.solid >= 0)
   {
-    // The solid's own turning is left out: the term's force is zero, so that only the rate of convergence could tell.
+    // The solid's own turning is left out: only the rate of convergence could tell.
     if (gap.free_t)
-      add(gap.weight * Eigen::Vector4d(-1, 1, 0, 0), gap.htt);
+      add(gap.weight * Eigen::Vector4d(-1, 1, 0, 0), Eigen::Vector3d::Zero(), gap.htt);
     return;
   }
-  const Eigen::Map<const Eigen::Vector4d> u(contact.weight);
-  const Eigen::Vector4d rs = gap.weight * Eigen::Vector4d(-1, 1, 0, 0) + gap.weight_s * u;
-  const Eigen::Vector4d rt = gap.weight * Eigen::Vector4d(0, 0, 1, -1) + gap.weight_t * u;
+  const Eigen::Vector4d along_s = gap.weight * Eigen::Vector4d(-1, 1, 0, 0) + gap.weight_s * u;
+  const Eigen::Vector4d along_t = gap.weight * Eigen::Vector4d(0, 0, 1, -1) + gap.weight_t * u;
   if (gap.free_s)
-    add(rs, gap.hss);
+    add(along_s, gap.turn_s, gap.hss);
   if (gap.free_t)
   {
     const double l = gap.free_s ? gap.hst / gap.hss : 0.0;
-    add(rt - l * rs, gap.htt - l * (gap.free_s ? gap.hst : 0.0));
+    add(along_t - l * along_s, gap.turn_t - l * gap.turn_s, gap.htt - l * (gap.free_s ? gap.hst : 0.0));
   }
 }
 
@@ -328,6 +334,7 @@ double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<P
 }
 
 const std::vector<ContactTerm>& ContactPotential::terms() const { return impl_->terms; }
+const std::vector<ContactRow>& ContactPotential::rows() const { return impl_->rows; }
 double ContactPotential::largestForce() const { return impl_->largest_force; }
 double ContactPotential::smallestGap() const { return impl_->smallest_gap; }
 double ContactPotential::stiffness() const { return impl_->stiffness; }

@@ -46,6 +46,7 @@ public:
   std::vector<Pose> solids_begin;
   std::vector<Contact> contacts, lagged;
   std::vector<ContactTerm> terms;
+  std::vector<ContactRow> rows;
   double largest_force = 0.0, smallest_gap = 0.0;
 
 private:

@@ -213,6 +213,10 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
   out.free_s = free_s && p.hss > 0.0;
   out.free_t = free_t && p.htt > 0.0;
   out.normal = p.normal;
+  out.distance = p.gap + thickness;
+  const double turn = p.weight / out.distance;
+  out.turn_s = turn * (e - p.normal.dot(e) * p.normal);
+  out.turn_t = turn * (p.normal.dot(f) * p.normal - f);
   return out;
 }
 

@@ -30,17 +30,20 @@ struct SegmentPieceDistance
 };
 SegmentPieceDistance segmentPieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
-/// G, its parameters and what its derivatives need. With the rows r_s = n . (Q d(a1 - a0) + Q_s du) and
-/// r_t = n . (-Q d(b1 - b0) + Q_t du), u = A(s) - B(t), the second derivative of G contains -r^T H^-1 r over the free parameters.
+/// G, its parameters and what its derivatives need. With u = A(s) - B(t) and the rows r_s = n . (Q d(a1 - a0) + Q_s du) + turn_s . du and
+/// r_t = n . (-Q d(b1 - b0) + Q_t du) + turn_t . du, the second derivative of G is that at fixed parameters, Q/distance (1 - n n^T), less
+/// r^T H^-1 r over the free parameters.
 struct SoftGap
 {
   double s = 0.0, t = 0.0;
   double gap = 0.0;               ///< G [m]; not positive: they meet
+  double distance = 0.0;          ///< |u| [m] (segments only)
   double weight = 1.0;            ///< Q = 1 / phi
   double weight_s = 0.0, weight_t = 0.0;
   double hss = 0.0, hst = 0.0, htt = 0.0;
   bool free_s = false, free_t = false;   ///< not held at an end of the segment
   Eigen::Vector3d normal{0, 0, 1};       ///< from B to A (from the solid to the segment)
+  Eigen::Vector3d turn_s{0, 0, 0}, turn_t{0, 0, 0};   ///< Q dn/ds, Q dn/dt (segments only)
 };
 SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0, const Eigen::Vector3d& b1, double thickness);
 

@@ -32,6 +32,11 @@ double NumberTable::at(double time) const
   return before.value + (after->value - before.value) * (time - before.time) / (after->time - before.time);
 }
 
+double NumberTable::greatest() const
+{
+  return std::max_element(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.value < b.value; })->value;
+}
+
 double NumberTable::mean(double start, double end) const
 {
   double volume = 0.0, from = start;

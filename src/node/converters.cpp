@@ -162,7 +162,8 @@ void toMessage(const ThreadState& state, slender_sim::ThreadState& out)
 {
   const std::size_t nodes = state.x.size(), edges = state.volume.size();
   out.thread_id = state.thread_id;
-  out.first_id = state.firstId();
+  // the oldest node is not always the first by number: edges are divided; the one at the nozzle is there from the start
+  out.first_id = *std::min_element(state.id.begin(), state.id.end() - 1);
   out.ids = state.id;
   out.twists = state.twist;
   out.deposited.assign(state.deposited.begin(), state.deposited.end());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <set>
 
 #include "slender_sim/node/converters.h"
@@ -17,6 +18,13 @@ constexpr int kGuidesSource = -1, kBodiesSource = -2;
 const Pose& graspPose(const Simulation& simulation, const GraspRef& ref)
 {
   return simulation.state().rods[ref.rod].grasps[ref.index].X_WG;
+}
+
+std::string text(double value)
+{
+  char out[32];
+  std::snprintf(out, sizeof(out), "%.6g", value);
+  return out;
 }
 
 /// Names of the scene's own bodies and obstacles: grasps follow those without messages.
@@ -91,6 +99,7 @@ bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, 
 {
   bool framed = false;
   const std::vector<ThreadConfig>& threads = simulation.config().threads;
+  prefixes_ = prefixes;
   threads_.resize(threads.size());
   for (std::size_t k = 0; k < threads.size(); ++k)
   {
@@ -104,13 +113,16 @@ bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, 
     if (moved)
       subscribePose(nh);
     framed |= moved;
-    if (threads[k].nozzle && threads[k].nozzle->flow.topic)
+    threads_[k].greatest_flow = greatestFlow(threads[k], simulation.config().time.step);
+    threads_[k].flow_topic = threads[k].nozzle && threads[k].nozzle->flow.topic;
+    threads_[k].belt_topic = threads[k].floor && (threads[k].floor->belt_x.topic || threads[k].floor->belt_y.topic);
+    if (threads_[k].flow_topic)
     {
       const boost::function<void(const std_msgs::Float64&)> callback = [this, k](const std_msgs::Float64& message) { onFlow(k, message); };
       subscribers_.push_back(nh.subscribe<const std_msgs::Float64&>(prefixes[k] + "nozzle/flow", kQueueSize, callback, ros::VoidConstPtr(),
                                                                    ros::TransportHints().tcpNoDelay()));
     }
-    if (threads[k].floor && (threads[k].floor->belt_x.topic || threads[k].floor->belt_y.topic))
+    if (threads_[k].belt_topic)
     {
       framed = true;
       const boost::function<void(const geometry_msgs::Vector3Stamped&)> callback =
@@ -124,10 +136,12 @@ bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, 
 
 void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
 {
+  const std::string what = prefixes_[thread] + "nozzle/flow";
   if (!std::isfinite(message.data))
-    drops_.drop(Drop::not_finite, "nozzle/flow", "it must be finite [m^3/s]");
-  else if (message.data < 0.0)
-    drops_.drop(Drop::out_of_range, "nozzle/flow", "it must not be negative [m^3/s]");
+    drops_.drop(Drop::not_finite, what, "it must be finite [m^3/s]");
+  else if (message.data < 0.0 || message.data > threads_[thread].greatest_flow)
+    drops_.drop(Drop::out_of_range, what, text(message.data) + "; it must be from 0 to " + text(threads_[thread].greatest_flow) +
+                                              " m^3/s, with which a thousand edges leave the nozzle per step");
   else
     threads_[thread].flow = message.data;
 }
@@ -135,7 +149,7 @@ void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
 /// In whatever frame the message names, as that stands now; only its horizontal part can be a belt's.
 void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped& message)
 {
-  const std::string what = "belt/velocity";
+  const std::string what = prefixes_[thread] + "belt/velocity";
   Eigen::Vector3d velocity(message.vector.x, message.vector.y, message.vector.z);
   if (!velocity.allFinite())
     return drops_.drop(Drop::not_finite, what, "it must be finite [m/s]");
@@ -148,8 +162,9 @@ void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped
     Pose X_WF;
     try
     {
-      if (fromMessage(tf_buffer_.lookupTransform(options_.frame_id, frame, ros::Time(0)).transform, X_WF) != PoseFault::none)
-        return drops_.drop(Drop::not_finite, what, "in the transform from " + frame);
+      const PoseFault fault = fromMessage(tf_buffer_.lookupTransform(options_.frame_id, frame, ros::Time(0)).transform, X_WF);
+      if (fault != PoseFault::none)
+        return dropTransform(fault, what, frame);
     }
     catch (const tf2::TransformException& e)
     {
@@ -157,6 +172,8 @@ void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped
     }
     velocity = X_WF.orientation * velocity;
   }
+  if (!(velocity.head<2>().cwiseAbs().maxCoeff() <= max_belt_speed))
+    return drops_.drop(Drop::out_of_range, what, "components must be within " + text(max_belt_speed) + " m/s");
   threads_[thread].belt = Eigen::Vector3d(velocity.x(), velocity.y(), 0.0);
 }
 
@@ -300,6 +317,11 @@ void GuideInputs::take(int source, const std::string& what, const std_msgs::Head
   pending_.push_back(message);
 }
 
+void GuideInputs::dropTransform(PoseFault fault, const std::string& what, const std::string& frame)
+{
+  drops_.drop(fault == PoseFault::not_finite ? Drop::not_finite : Drop::bad_quaternion, what, "in the transform from " + frame);
+}
+
 bool GuideInputs::deliver(const Message& message, std::string* why)
 {
   Pose X_WF;
@@ -313,8 +335,7 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
           fromMessage(tf_buffer_.lookupTransform(options_.frame_id, message.frame, message.stamp).transform, X_WF);
       if (fault != PoseFault::none)
       {
-        drops_.drop(fault == PoseFault::not_finite ? Drop::not_finite : Drop::bad_quaternion, message.what,
-                    "in the transform from " + message.frame);
+        dropTransform(fault, message.what, message.frame);
         return true;
       }
     }
@@ -325,6 +346,12 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
       return false;
     }
   }
+  for (const Entry& entry : message.entries)
+    if (!((X_WF * entry.X_FH).position.cwiseAbs().maxCoeff() <= max_coordinate))
+    {
+      drops_.drop(Drop::out_of_range, message.what, "coordinates must be within " + text(max_coordinate) + " m");
+      return true;
+    }
   const double time = clock_.secondsAt(message.stamp);
   bool late = false;
   for (const Entry& entry : message.entries)
@@ -413,7 +440,8 @@ void GuideInputs::attachAll(const Simulation& simulation)
 void GuideInputs::restart(const Simulation& simulation)
 {
   pending_.clear();
-  threads_.assign(threads_.size(), {});
+  for (Driven& thread : threads_)
+    thread.flow.reset(), thread.belt.reset();
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
       guided_[g].buffer->restart(poseOf(simulation, g));
@@ -432,6 +460,20 @@ std::vector<GuideInputs::Age> GuideInputs::ages() const
     ages.push_back({guided.name, age});
   }
   return ages;
+}
+
+std::vector<GuideInputs::Setting> GuideInputs::settings() const
+{
+  std::vector<Setting> settings;
+  for (std::size_t k = 0; k < threads_.size(); ++k)
+  {
+    const Driven& thread = threads_[k];
+    if (thread.flow_topic)
+      settings.push_back({prefixes_[k] + "nozzle/flow [m^3/s]", thread.flow ? text(*thread.flow) : "none yet"});
+    if (thread.belt_topic)
+      settings.push_back({prefixes_[k] + "belt/velocity [m/s]", thread.belt ? text(thread.belt->x()) + " " + text(thread.belt->y()) : "none yet"});
+  }
+  return settings;
 }
 
 }  // namespace slender

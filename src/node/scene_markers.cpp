@@ -14,9 +14,10 @@ namespace {
 using Eigen::Vector3d;
 using visualization_msgs::Marker;
 
-constexpr int kSides = 16;           // of the tube
+constexpr int kSides = 16;           // of a tube
+constexpr int kCoarseSides = 8, kManySections = 1000;   // of one with more sections
 constexpr int kMaxSections = 800;    // per rod
-constexpr int kMaxThreadSections = 6000;   // a coil has many turns
+constexpr int kMaxThreadSections = 3000;   // of all threads together: a coil has many turns, but 30 pictures a second must go through
 
 const std::array<std_msgs::ColorRGBA, 4>& rodColors()
 {
@@ -99,9 +100,10 @@ void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& ba
     geometry_msgs::Point x;
     Vector3d normal;
   };
+  const int sides = sections.size() > kManySections ? kCoarseSides : kSides;
   const std_msgs::ColorRGBA stripe = color(0.20, 0.24, 0.30);
-  const auto corner = [](const Section& s, int side) {
-    const double angle = 2.0 * M_PI * (side - 0.5) / kSides;   // the first side faces d1
+  const auto corner = [sides](const Section& s, int side) {
+    const double angle = 2.0 * M_PI * (side - 0.5) / sides;   // the first side faces d1
     const Vector3d out = std::cos(angle) * s.u / s.u.squaredNorm() + std::sin(angle) * s.w / s.w.squaredNorm();
     return Corner{toPoint(s.x + std::cos(angle) * s.u + std::sin(angle) * s.w), out.normalized()};
   };
@@ -112,12 +114,12 @@ void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& ba
       marker.colors.push_back(lit(paint, p->normal));
     }
   };
-  marker.points.reserve(sections.size() * kSides * 6);
-  marker.colors.reserve(sections.size() * kSides * 6);
+  marker.points.reserve(sections.size() * sides * 6);
+  marker.colors.reserve(sections.size() * sides * 6);
   for (std::size_t i = 0; i + 1 < sections.size(); ++i)
-    for (int side = 0; side < kSides; ++side)
+    for (int side = 0; side < sides; ++side)
     {
-      const std_msgs::ColorRGBA& paint = striped && side % (kSides / 2) <= 1 ? stripe : base;   // two stripes: seen from everywhere
+      const std_msgs::ColorRGBA& paint = striped && side % (sides / 2) <= 1 ? stripe : base;   // two stripes: seen from everywhere
       const Corner a = corner(sections[i], side), b = corner(sections[i + 1], side);
       const Corner c = corner(sections[i + 1], side + 1), d = corner(sections[i], side + 1);
       triangle(a, c, b, paint);
@@ -129,7 +131,7 @@ void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& ba
   {
     const Section& s = front ? sections.back() : sections.front();
     const Vector3d normal = (front ? 1.0 : -1.0) * s.u.cross(s.w).normalized();
-    for (int side = 0; side < kSides; ++side)
+    for (int side = 0; side < sides; ++side)
     {
       const Corner middle{toPoint(s.x), normal};
       const Corner a{corner(s, side).x, normal}, b{corner(s, side + 1).x, normal};
@@ -176,21 +178,41 @@ Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& co
   return marker;
 }
 
-/// Of a thread and its pieces: one marker each; pieces that are gone are taken away.
-void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& header, visualization_msgs::MarkerArray& out)
+Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id, MarkerStyle style, const std::vector<Section>& curve,
+                   const std_msgs::ColorRGBA& paint, bool striped, bool closed, double width)
+{
+  Marker marker = makeMarker(header, ns, id, style == MarkerStyle::tube ? Marker::TRIANGLE_LIST : Marker::LINE_STRIP);
+  if (style == MarkerStyle::tube)
+    addTube(curve, paint, striped, closed, marker);
+  else
+  {
+    marker.scale.x = width;
+    marker.color = paint;
+    for (const Section& s : curve)
+      marker.points.push_back(toPoint(s.x));
+  }
+  return marker;
+}
+
+/// Of a thread and its pieces: one marker each.
+void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style, visualization_msgs::MarkerArray& out)
 {
   const std_msgs::ColorRGBA honey = color(0.90, 0.60, 0.12), metal = color(0.55, 0.57, 0.60), ground = color(0.42, 0.45, 0.50);
+  double edges = 0.0;
+  for (const ThreadGroupState& group : simulation.state().threads)
+    for (const ThreadState& thread : group.threads)
+      edges += thread.edges();
   for (std::size_t k = 0; k < simulation.state().threads.size(); ++k)
   {
     const ThreadConfig& config = simulation.config().threads[k];
-    Marker gone = makeMarker(header, "threads/" + config.name, 0, Marker::TRIANGLE_LIST);
-    gone.action = Marker::DELETEALL;
-    out.markers.push_back(gone);
     for (const ThreadState& thread : simulation.state().threads[k].threads)
     {
-      Marker tube = makeMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id), Marker::TRIANGLE_LIST);
-      addTube(sections(lineOf(thread), kMaxThreadSections), honey, false, false, tube);
-      out.markers.push_back(std::move(tube));
+      const int share = std::max(2, static_cast<int>(kMaxThreadSections * thread.edges() / edges));
+      double volume = 0.0, length = 0.0;
+      for (int j = 0; j < thread.edges(); ++j)
+        volume += thread.volume[j], length += thread.edge(j).norm();
+      out.markers.push_back(curveMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id), style, sections(lineOf(thread), share),
+                                        honey, false, false, 2.0 * std::sqrt(volume / (M_PI * length))));
     }
     if (config.nozzle)
     {
@@ -230,23 +252,20 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
                                            bool material_frames)
 {
   visualization_msgs::MarkerArray out;
+  if (!simulation.state().threads.empty())
+  {
+    // pieces come and go; rviz takes this for all namespaces, so it can stand here only
+    Marker gone = makeMarker(header, "threads", 0, Marker::TRIANGLE_LIST);
+    gone.action = Marker::DELETEALL;
+    out.markers.push_back(gone);
+  }
   for (std::size_t r = 0; r < simulation.state().rods.size(); ++r)
   {
     const RodModel& model = simulation.rodModel(static_cast<int>(r));
     const RodState& state = simulation.state().rods[r];
     const std_msgs::ColorRGBA& base = rodColors()[r % rodColors().size()];
-    const std::vector<Section> curve = sections(lineOf(model, state), kMaxSections);
-    Marker rod = makeMarker(header, "rods/" + model.name, 0, style == MarkerStyle::tube ? Marker::TRIANGLE_LIST : Marker::LINE_STRIP);
-    if (style == MarkerStyle::tube)
-      addTube(curve, base, true, model.closed, rod);
-    else
-    {
-      rod.scale.x = 2.0 * model.radius_a.mean();
-      rod.color = base;
-      for (const Section& s : curve)
-        rod.points.push_back(toPoint(s.x));
-    }
-    out.markers.push_back(std::move(rod));
+    out.markers.push_back(curveMarker(header, "rods/" + model.name, 0, style, sections(lineOf(model, state), kMaxSections), base, true, model.closed,
+                                      2.0 * model.radius_a.mean()));
     if (material_frames)
     {
       Marker frames = makeMarker(header, "frames/" + model.name, 0, Marker::LINE_LIST);
@@ -260,7 +279,7 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
     out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config, simulation.state().rods[ref.rod].grasps[ref.index],
                                       simulation.rodModel(ref.rod)));
   }
-  addThreadMarkers(simulation, header, out);
+  addThreadMarkers(simulation, header, style, out);
   addSolidMarkers(simulation, header, out);
   return out;
 }

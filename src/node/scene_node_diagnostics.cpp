@@ -38,6 +38,23 @@ void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& mess
   status.level = level;
 }
 
+void addThreads(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
+{
+  std::uint64_t nodes = 0, pieces = 0;
+  double fed = 0.0;
+  for (const ThreadGroupState& group : simulation.state().threads)
+    for (const ThreadState& thread : group.threads)
+    {
+      nodes += static_cast<std::uint64_t>(thread.nodes());
+      fed += thread.fed_volume;
+      ++pieces;
+    }
+  add(status, "nodes", nodes);
+  add(status, "threads and pieces", pieces);
+  add(status, "fed volume [m^3]", fed);
+  add(status, "mended folds", recent.mended_folds);
+}
+
 }  // namespace
 
 void SceneNode::publishDiagnostics()
@@ -75,9 +92,6 @@ DiagnosticStatus SceneNode::simulationStatus() const
   if (status.message.empty())
     status.message = mode_ == Mode::paused ? "paused" : running ? "running" : "waiting for ~step";
 
-  double energy = 0.0;
-  for (std::size_t r = 0; r < simulation_->state().rods.size(); ++r)
-    energy += simulation_->energies(static_cast<int>(r)).total();
   add(status, "epoch", std::uint64_t{epoch_});
   add(status, "step", simulation_->state().steps);
   add(status, "simulated time [s]", simulation_->state().time);
@@ -91,14 +105,20 @@ DiagnosticStatus SceneNode::simulationStatus() const
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);
   add(status, "largest strain", recent_.max_strain);
-  if (!simulation_->state().threads.empty())
-    add(status, "mended folds", recent_.mended_folds);
+  if (kind_ == NodeKind::threads)
+    addThreads(*simulation_, recent_, status);
   if (recent_.projection_iterations > 0)
   {
     add(status, "projection iterations", static_cast<std::uint64_t>(recent_.projection_iterations));
     add(status, "constraint error", recent_.constraint_error);
   }
-  add(status, "energy [J]", energy);
+  if (kind_ == NodeKind::rods)   // viscous threads keep none
+  {
+    double energy = 0.0;
+    for (std::size_t r = 0; r < simulation_->state().rods.size(); ++r)
+      energy += simulation_->energies(static_cast<int>(r)).total();
+    add(status, "energy [J]", energy);
+  }
   add(status, "recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);
   return status;
 }
@@ -118,6 +138,9 @@ DiagnosticStatus SceneNode::inputStatus()
     if (age.seconds && *age.seconds > options_.guide_timeout && mode_ == Mode::running)
       raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
   }
+  const std::vector<GuideInputs::Setting> settings = inputs_->settings();
+  for (const GuideInputs::Setting& setting : settings)
+    add(status, setting.name, setting.value);
   const DropCounter& drops = inputs_->drops();
   if (drops.total() > reported_drops_)
     raise(status, DiagnosticStatus::WARN, "messages were dropped");
@@ -126,7 +149,7 @@ DiagnosticStatus SceneNode::inputStatus()
   for (int r = 0; r < kDropReasons; ++r)
     add(status, std::string("dropped ") + toString(static_cast<Drop>(r)), drops.count(static_cast<Drop>(r)));
   if (status.message.empty())
-    status.message = inputs_->ages().empty() ? "nothing is driven from outside" : "ok";
+    status.message = inputs_->ages().empty() && settings.empty() ? "nothing is driven from outside" : "ok";
   return status;
 }
 

@@ -11,9 +11,10 @@ void SceneNode::advertiseServices()
   services_ = {nh_priv_.advertiseService("pause", &SceneNode::onPause, this),
                nh_priv_.advertiseService("reset", &SceneNode::onReset, this),
                nh_priv_.advertiseService("step", &SceneNode::onStep, this),
-               nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this),
                nh_priv_.advertiseService("save_state", &SceneNode::onSave, this),
                nh_priv_.advertiseService("load_state", &SceneNode::onLoad, this)};
+  if (kind_ == NodeKind::rods)
+    services_.push_back(nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this));
 }
 
 bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)

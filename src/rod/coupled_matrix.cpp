@@ -114,6 +114,21 @@ void CoupledSystem::contactColumns(const ContactTerm& term, std::array<Columns, 
   }
 }
 
+/// A pair's gap as the place of contact runs.
+void CoupledSystem::contactColumns(const ContactRow& contact, bool whole, Columns& row) const
+{
+  row.count = 0;
+  for (int p = 0; p < 4; ++p)
+  {
+    if (contact.point[p] < 0)
+      continue;
+    const RodPart& part = partOf(contact.point[p]);
+    const Eigen::Vector3d weights = contact.along[p] * contact.normal + (whole ? contact.across[p] : 0.0) * contact.turning;
+    for (int c = 0; c < 3; ++c)
+      mapDof(part, 4 * (contact.point[p] - part.point) + c, weights[c], row);
+  }
+}
+
 /// Makes room for the present contacts; true when there was none for some of them.
 bool CoupledSystem::takeKeys()
 {
@@ -334,7 +349,8 @@ void CoupledSystem::addClamps(const RodPart& part)
   }
 }
 
-void CoupledSystem::assemble(const HessianShift& shift)
+/// `whole`: with the part of the contacts' second derivatives that may be negative.
+void CoupledSystem::assemble(const HessianShift& shift, bool whole)
 {
   std::fill_n(matrix_.values(), matrix_.rows().size(), 0.0);
   for (const RodPart& part : parts_)
@@ -372,12 +388,18 @@ void CoupledSystem::assemble(const HessianShift& shift)
   for (const ContactTerm& term : contact_->terms())
   {
     contactColumns(term, rows);
+    const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
     for (int c = 0; c < 3; ++c)
     {
-      addSquare(rows[c], term.stiffness(c, c));
+      addSquare(rows[c], stiffness(c, c));
       for (int d = 0; d < c; ++d)
-        addPair(rows[c], rows[d], term.stiffness(c, d));
+        addPair(rows[c], rows[d], stiffness(c, d));
     }
+  }
+  for (const ContactRow& row : contact_->rows())
+  {
+    contactColumns(row, whole, rows[0]);
+    addSquare(rows[0], row.stiffness);
   }
 }
 

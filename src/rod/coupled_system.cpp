@@ -61,13 +61,33 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
   reduceGradient();
   if (with_hessian && unknowns_ > 0)
   {
-    assemble(shift);
-    sum.inertia.negative += !matrix_.factor();
+    sum.inertia.negative += !factor(shift);
   }
   for (RodPart& part : parts_)
     if (part.coupled)
       part.rod->system.closeGradient();
   return sum;
+}
+
+/// With all of the contacts' second derivatives where the matrix is definite so: where rods run along each other, Newton's method converges
+/// slowly without the negative part.
+bool CoupledSystem::factor(const HessianShift& shift)
+{
+  constexpr int kLongestPause = 16;
+  if (contact_ && !contact_->terms().empty() && --whole_after_ < 0)
+  {
+    assemble(shift, true);
+    if (matrix_.factor())
+    {
+      whole_pause_ = 0;
+      whole_after_ = 0;
+      return true;
+    }
+    whole_pause_ = std::min(kLongestPause, 2 * whole_pause_ + 1);
+    whole_after_ = whole_pause_;
+  }
+  assemble(shift, false);
+  return matrix_.factor();
 }
 
 /// Contact forces on the nodes, and all that acts on the bodies.

@@ -71,8 +71,9 @@ private:
   struct Columns
   {
     int count = 0;
-    std::array<int, 28> index;
-    std::array<double, 28> value;
+    static constexpr int kMost = 36;   // three for each component of four carried points
+    std::array<int, kMost> index;
+    std::array<double, kMost> value;
     void push(int i, double v)
     {
       index[count] = i;
@@ -82,7 +83,8 @@ private:
 
   // coupled_matrix.cpp
   void buildPattern();
-  void assemble(const HessianShift& shift);
+  void assemble(const HessianShift& shift, bool whole);
+  bool factor(const HessianShift& shift);
   void add(int a, int b, double value);
   void addPair(const Columns& a, const Columns& b, double value);
   void addSquare(const Columns& a, double value);
@@ -90,6 +92,7 @@ private:
   void addCarried(const RodPart& part);
   void addClamps(const RodPart& part);
   void contactColumns(const ContactTerm& term, std::array<Columns, 3>& rows) const;
+  void contactColumns(const ContactRow& contact, bool whole, Columns& row) const;
   bool takeKeys();
 
   void mapUnknowns(RodPart& part);
@@ -128,6 +131,7 @@ private:
   // matrix
   SparseCholesky matrix_;
   bool pattern_valid_ = false;
+  int whole_after_ = 0, whole_pause_ = 0;       ///< factorisations until contacts' whole derivatives are tried again, and after the next failure
   int unknowns_ = 0, body_offset_ = 0;
   std::vector<std::array<int, 5>> keys_;        ///< contacts (four points, a solid) the pattern has room for, sorted
   std::vector<double> rhs_;

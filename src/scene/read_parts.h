@@ -14,11 +14,11 @@ struct ReadContext
 {
   std::string directory;                   ///< files are relative to it
   Eigen::Vector3d gravity{0, 0, -9.81};
+  double step = 0.01;                      ///< time.step [s]
   std::string resolve(const std::string& path) const { return path[0] == '/' ? path : directory + "/" + path; }
 };
 
 constexpr int max_edges = 1'000'000;
-constexpr double max_coordinate = 1e6;     // [m]
 
 std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context);
 /// `edges` of the rod, or 0 when its centreline could not be read: then indices are not checked.

@@ -90,7 +90,7 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context)
 FloorConfig readFloor(const YamlCursor& at)
 {
   FloorConfig floor;
-  const Range speed = Range::closed(-1e3, 1e3, "m/s");
+  const Range speed = Range::closed(-max_belt_speed, max_belt_speed, "m/s");
   YamlMap map(at);
   assign(floor.height, map.get("height").number(Range::closed(-max_coordinate, max_coordinate, "m")));
   const YamlCursor belt = map.get("belt");
@@ -214,7 +214,20 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
     thread.floor = readFloor(floor);
   }
   readEdges(map.get("edges"), thread);
-  assign(thread.breakup_radius, map.get("breakup_radius").number(length));
+  const double most = greatestFlow(thread, context.step);
+  if (thread.nozzle && thread.nozzle->flow.table.greatest() > most)
+  {
+    YamlMap(nozzle).get("flow").problem("is too much: over a thousand edges would leave the nozzle in one step; must be at most " + shortNumber(most) +
+                                        " m^3/s, or with longer edges.feed or a shorter time.step more");
+  }
+  const YamlCursor breakup = map.get("breakup_radius");
+  // a thread whose flow stops drains without end
+  thread.breakup_radius = thread.nozzle ? 0.002 * thread.nozzle->diameter : 0.0;
+  assign(thread.breakup_radius, breakup.number(Range::closed(0, max_coordinate, "m")));
+  if (thread.nozzle && thread.breakup_radius >= 0.5 * thread.nozzle->diameter)
+  {
+    breakup.problem("must be less than the nozzle's radius " + shortNumber(0.5 * thread.nozzle->diameter) + " m, or the thread would break wherever it is");
+  }
   const YamlCursor region = map.get("region");
   if (region.present())
   {

@@ -125,7 +125,11 @@ std::vector<YamlCursor> entriesOf(const YamlCursor& list) { return list.isList()
 void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
 {
   const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads");
-  const YamlCursor at_rods = at_generate.present() || at_threads.present() ? map.get("rods") : map.require("rods");
+  const YamlCursor at_rods = map.get("rods");
+  if (!at_rods.present() && !at_generate.present() && !at_threads.present())
+  {
+    at_rods.problem("is missing; a scene has rods: [{...}], threads: [{...}] or generate: [{...}]");
+  }
   const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
   std::vector<RodPart> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<RodPart>{};
   Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
@@ -189,6 +193,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   ReadContext context;
   context.directory = directory;
   context.gravity = scene.gravity;
+  context.step = scene.time.step;
   readObjects(map, context, scene);
   const bool touches = std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
   if (touches && !YamlMap(time).has("integrator"))
@@ -199,6 +204,15 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   {
     YamlMap(time).get("integrator").problem("takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
                                             "bdf2 or tr_bdf2, or no rod may have contact");
+  }
+  const bool only_threads = !scene.threads.empty() && scene.rods.empty() && scene.bodies.empty();
+  if (only_threads && YamlMap(time).has("integrator") && scene.time.integrator != Integrator::implicit_euler)
+  {
+    YamlMap(time).get("integrator").problem("is not for threads; must be implicit_euler");
+  }
+  if (only_threads && scene.start == Start::equilibrium)
+  {
+    map.get("start").problem("is not for threads, which flow; must be as_given");
   }
   map.finish();
   if (!problems.empty())

@@ -356,6 +356,10 @@ void Simulation::takeWrenches()
     const int rod = grasps_[g].rod;
     state_.wrenches[g] = (steppers_[rod] ? steppers_[rod]->wrenches() : group_->wrenches(group_index_[rod]))[grasps_[g].index];
   }
+  for (std::size_t k = 0; k < thread_steppers_.size(); ++k)
+  {
+    state_.end_loads[k] = thread_steppers_[k].endLoads();
+  }
 }
 
 void Simulation::reset() { state_ = initial_; }

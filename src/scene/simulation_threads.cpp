@@ -77,6 +77,7 @@ void Simulation::buildThreads()
       thread_models_.push_back(std::make_shared<const ThreadModel>(modelOf(config_.threads[k])));
       thread_steppers_.emplace_back(thread_models_.back(), config_.time.newton);
       state_.threads.emplace_back();
+      state_.end_loads.emplace_back();
       state_.threads.back().threads.push_back(stateOf(config_.threads[k], *thread_models_.back(), config_.gravity));
     }
     catch (const std::invalid_argument& error)

@@ -18,7 +18,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 3;
+constexpr std::uint64_t version = 4;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -173,6 +173,15 @@ void visitScene(Archive& archive, State& scene)
   {
     archive(wrench.force);
     archive(wrench.torque);
+  }
+  archive.list(scene.end_loads);
+  for (auto& loads : scene.end_loads)
+  {
+    for (auto& load : loads)
+    {
+      archive(load.force);
+      archive(load.torque);
+    }
   }
 }
 
@@ -399,7 +408,7 @@ void Simulation::load(const std::string& path)
   }
   if (header[2] != fingerprint())
   {
-    throw std::runtime_error(path + ": belongs to another scene (rods, moduli, grasps, gravity, step and integrator must be the same)");
+    throw std::runtime_error(path + ": belongs to another scene (rods, moduli, grasps, threads, gravity, step and integrator must be the same)");
   }
 
   SceneState loaded;
@@ -414,7 +423,7 @@ void Simulation::load(const std::string& path)
   std::string problem = reader.left() != 0 ? "has bytes after its end" : "";
   if (loaded.rods.size() != models_.size() || loaded.threads.size() != thread_models_.size() || loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
       loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||
-      loaded.wrenches.size() != grasps_.size())
+      loaded.wrenches.size() != grasps_.size() || loaded.end_loads.size() != thread_models_.size())
   {
     problem = "has another number of rods, threads, bodies, obstacles or grasps";
   }
@@ -425,7 +434,9 @@ void Simulation::load(const std::string& path)
   for (std::size_t k = 0; problem.empty() && k < thread_models_.size(); ++k)
   {
     const auto& threads = loaded.threads[k].threads;
-    if (threads.empty() || !std::all_of(threads.begin(), threads.end(), [](const ThreadState& thread) { return fits(thread); }))
+    // a thread that nothing holds may have left its region
+    const bool gone = threads.empty() && config_.threads[k].nozzle;
+    if (gone || !std::all_of(threads.begin(), threads.end(), [](const ThreadState& thread) { return fits(thread); }))
     {
       problem = "thread " + thread_models_[k]->name + " does not fit together";
     }

@@ -273,7 +273,7 @@ void runCoiling(StudyContext& context)
     context.progress(done++, total, way + " to H = " + std::to_string(height));
   };
 
-  double jump_up = 0, jump_down = 0;
+  double jump_up = 0, jump_down = 0, last = 0;   // jumps: in the middle between two heights
   Pouring pouring(heights.front(), 0.12, 4.5, step_angle, per_turn);
   int before = 0;
   for (const double height : heights)
@@ -282,8 +282,9 @@ void runCoiling(StudyContext& context)
     pouring.raise(height);
     const int branch = record(context, pouring, height, "up", height > 10 ? 30 : 12, results);
     if (before == 1 && branch == 3)
-      jump_up = height;
+      jump_up = 0.5 * (last + height);
     before = branch;
+    last = height;
   }
   for (auto height = heights.rbegin(); height != heights.rend(); ++height)
   {
@@ -291,8 +292,9 @@ void runCoiling(StudyContext& context)
     pouring.raise(*height);
     const int branch = record(context, pouring, *height, "down", *height > 8 ? 30 : 12, results);
     if (before == 3 && branch == 1)
-      jump_down = *height;
+      jump_down = 0.5 * (last + *height);
     before = branch;
+    last = *height;
   }
   Pouring high(inertial.front(), 0.45, 8e-3 * inertial.front() * inertial.front(), step_angle, per_turn);
   high.stir(2 * kDiameter, 40.0);
@@ -308,6 +310,8 @@ void runCoiling(StudyContext& context)
   const double frequency = median(results.frequency_errors), radius = median(results.radius_errors);
   context.row().set("way", "median relative error of Omega").check(frequency, 0.0, kBound, "steady coils on their stable branches");
   context.row().set("way", "median relative error of R").check(radius, 0.0, kBound, "the same");
+  // without hysteresis this would be 1
+  context.row().set("way", "hysteresis: jump going up over jump going down").check(jump_up / jump_down, 13.64 / 10.0, 0.2, "where the stable branches end");
   context.metric("median_relative_error_frequency", frequency);
   context.metric("median_relative_error_radius", radius);
   context.metric("worst_relative_error_frequency", *std::max_element(results.frequency_errors.begin(), results.frequency_errors.end()));

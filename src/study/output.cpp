@@ -77,16 +77,6 @@ std::string jsonString(const std::string& text)
 
 std::string jsonNumber(double value) { return std::isfinite(value) ? format(value, "%.15g") : "null"; }
 
-std::string csvCell(const std::string& text)
-{
-  if (text.find_first_of(",\"\n") == std::string::npos)
-    return text;
-  std::string out = "\"";
-  for (const char c : text)
-    out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
-
 /// Double-quoted gnuplot string.
 std::string gnuplotString(const std::string& text)
 {
@@ -240,6 +230,21 @@ void writeJson(std::ostream& out, const std::vector<StudyResult>& results)
   out << "\n]}\n";
 }
 
+std::string csvCell(const std::string& text)
+{
+  if (text.find_first_of(",\"\n") == std::string::npos)
+    return text;
+  std::string out = "\"";
+  for (const char c : text)
+    out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
+}
+
+std::string valueText(const Row& row, const std::string& key)
+{
+  return cell(row, key, "%.12g");
+}
+
 void writeCsv(std::ostream& out, const StudyContext& context)
 {
   const std::vector<std::string> keys = columns(context);
@@ -249,7 +254,7 @@ void writeCsv(std::ostream& out, const StudyContext& context)
   for (const Row& row : context.rows())
   {
     for (std::size_t k = 0; k < keys.size(); ++k)
-      out << (k ? "," : "") << csvCell(cell(row, keys[k], "%.12g"));
+      out << (k ? "," : "") << csvCell(valueText(row, keys[k]));
     out << "\n";
   }
 }

@@ -146,7 +146,7 @@ void letGo(StudyContext& context, Plot& picture)
   // down, strongly down, and down with a little to the side
   std::vector<Case> cases = {{"as it hangs", "plies_hanging", "[0, 0, -9.81]", 0.1, 1.0, {1.0}}, {"five times the weight", "plies_heavy", "[0, 0, -50]", 0.1, 1.0, {1.0}}};
   if (!context.quick())
-    cases.push_back({"tilted, smooth", "plies_tilted", "[2, 0, -9.6]", 0.0, 2.6, {0.6, 1.4, 2.6}});
+    cases.push_back({"tilted, smooth", "plies_tilted", "[1, 0, -9.75]", 0.0, 2.6, {0.6, 1.4, 2.6}});
   int drawn = 0;
   for (const Case& c : cases)
   {

@@ -71,7 +71,8 @@ void ThreadGroup::drop()
     const bool lies = std::all_of(t.deposited.begin(), t.deposited.end(), [](char d) { return d != 0; });
     if (lies)
       lying = std::min(lying, limits.max_deposited) + t.nodes();
-    if (!isHeld(t) && (outside || (lies && lying > limits.max_deposited)))
+    // the stepper leaves max_deposited nodes behind the youngest one
+    if (!isHeld(t) && (outside || (lies && lying > limits.max_deposited + 1)))
     {
       work_.dropped_volume += t.totalVolume() + t.dropped_volume - t.fed_volume;
       work_.threads.erase(work_.threads.begin() + k);

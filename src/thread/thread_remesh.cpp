@@ -99,6 +99,9 @@ void splitEdge(ThreadState& state, int j, double fraction)
   state.twist[j + 2] -= right_turn;
   state.d1[j] = carried(d1, t, left, left_turn);
   state.d1.insert(state.d1.begin() + j + 1, carried(d1, t, right, right_turn));
+  // angular momentum stays; the moment of inertia of an edge goes with the square of its volume over its length
+  const double left_inertia = left_volume * left_volume / (x - a).norm(), right_inertia = right_volume * right_volume / (b - x).norm();
+  state.spin[j] *= volume * volume / length / (left_inertia + right_inertia);
   state.spin.insert(state.spin.begin() + j + 1, state.spin[j]);
   state.volume[j] = left_volume;
   state.volume.insert(state.volume.begin() + j + 1, right_volume);
@@ -124,7 +127,7 @@ void removeNode(ThreadState& state, int i)
   state.d1[i - 1] = carried(state.d1[i - 1], te, t, turn);
   state.twist[i - 1] += turn;
   state.twist[i + 1] += rest;
-  state.spin[i - 1] = (ve * state.spin[i - 1] + vf * state.spin[i]) / (ve + vf);
+  state.spin[i - 1] = (ve * ve / le * state.spin[i - 1] + vf * vf / lf * state.spin[i]) * joined.norm() / ((ve + vf) * (ve + vf));
   state.volume[i - 1] = ve + vf;
   state.x.erase(state.x.begin() + i);
   state.v.erase(state.v.begin() + i);

@@ -75,12 +75,16 @@ StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, 
 std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
+  if (failure == StepFailure::overstretched)
+    return "it is drawn out so far that more than 10000 edges would have to be divided" + at +
+           ": check the motion of nozzle and belt, or use a longer max_edge_length";
   if (explicit_step)
     return "the explicit step blew up" + at + ": use a shorter step or implicit_euler";
   switch (failure)
   {
     case StepFailure::folded_back:
-      return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step";
+      return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step" +
+             (model->floor.present && work.ends[1].held ? ", and keep the nozzle above the floor" : "");
     case StepFailure::singular_matrix:
       return "the matrix could not be made definite" + at + ": radii or edge lengths differ by too many orders of magnitude";
     case StepFailure::state_not_finite:
@@ -100,6 +104,10 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
   start_ends = state.ends;
   loads = {};
   flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
+  constexpr double kMostFed = 1e4;   // edges in one step
+  if (!(flow_speed_ * duration <= kMostFed * model->feed_length))
+    return refuse(report, StepFailure::input_not_finite,
+                  "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or longer feed_length");
   // no more than an edge leaves the nozzle at a time
   const double longest = flow_speed_ > 0 ? std::min(duration, model->feed_length / flow_speed_) : duration;
   const double first = duration / std::ceil(duration / longest * (1 - 1e-9)), shortest = std::ldexp(first, -newton.max_cuts);
@@ -114,7 +122,8 @@ StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inp
     report.merge(sub);
     if (failure != StepFailure::none)
     {
-      if (explicit_step)   // a shorter step now would only hide that all of them are too long
+      // a shorter step now would only hide that all of them are too long, or draw the thread out bit by bit
+      if (explicit_step || failure == StepFailure::overstretched)
         return refuse(report, failure, explainFailure(failure, length));
       if (0.5 * length < shortest * (1 - 1e-9))
       {
@@ -168,8 +177,7 @@ StepFailure ThreadStepper::Impl::substep(const ThreadInputs& inputs, double from
   finish(inputs, h);
   if (explicit_step)
     push(h);
-  remesh();
-  return StepFailure::none;
+  return remesh() ? StepFailure::none : StepFailure::overstretched;
 }
 
 }  // namespace slender

@@ -38,7 +38,7 @@ private:
   void push(double h);
   bool land(const ThreadInputs& inputs, double h);
   void finish(const ThreadInputs& inputs, double h);
-  void remesh();
+  bool remesh();
   int foldedNode() const;
   EndLoad endLoad(int end) const;
   double fedVolume(double h) const { return flow_speed_ * model->nozzleArea() * h; }

@@ -187,7 +187,7 @@ void ThreadStepper::Impl::push(double h)
     if (!work.deposited[i] && !endHeld(i))
       work.v[i] -= system.reaction(k).head<3>() / (h * a.weight[k]);
     if (i + 1 < work.nodes() && system.spinWeight(k) > 0)
-      work.spin[i] -= system.reaction(k)[3] / (h * system.spinWeight(k));
+      work.spin[i] -= system.reaction(k)[3] / (h * system.spinWeight(k)) * (work.edge(i).norm() / system.restLength(k));
   }
 }
 
@@ -260,7 +260,8 @@ void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
   {
     const int k = inSystem(j);
     work.d1[j] = {a.d1[0][k], a.d1[1][k], a.d1[2][k]};
-    work.spin[j] = system.turn(k) / h;
+    // the edge turns faster as it is drawn out: its moment of inertia is rho V^2 / (2 pi length)
+    work.spin[j] = system.turn(k) / h * (work.edge(j).norm() / system.restLength(k));
   }
   for (int i = std::max(1, first_ + 1); i < n - 1; ++i)
     work.twist[i] = a.twist[inSystem(i)];
@@ -290,12 +291,20 @@ EndLoad ThreadStepper::Impl::endLoad(int end) const
   return load;
 }
 
-/// Divides, joins and takes away edges; nothing of it when the step needs none.
-void ThreadStepper::Impl::remesh()
+/// Divides, joins and takes away edges; nothing of it when the step needs none. No: it would take more edges than a motion can mean.
+bool ThreadStepper::Impl::remesh()
 {
+  constexpr double kMostNew = 1e4;
   const ThreadLimits& limits = model->limits;
   const double feed = model->feed_length;
-  if (model->nozzle_diameter > 0 && work.ends[1].held)
+  const bool at_nozzle = model->nozzle_diameter > 0 && work.ends[1].held;
+  double more = at_nozzle ? work.edge(work.edges() - 1).norm() / feed : 0.0;
+  for (int j = first_; j < work.edges(); ++j)
+    if (!isSolid(j))
+      more += std::floor(work.edge(j).norm() / limits.max_edge_length);
+  if (!(more < kMostNew))
+    return false;
+  if (at_nozzle)
   {
     // the edge at the nozzle grows from half a feed length to one and a half
     for (double length = work.edge(work.edges() - 1).norm(); length >= 1.5 * feed; length = work.edge(work.edges() - 1).norm())
@@ -317,7 +326,7 @@ void ThreadStepper::Impl::remesh()
       removeNode(work, i--);
 
   if (work.ends[0].held)
-    return;
+    return true;
   int drop = 0;
   while (drop + 2 < work.nodes() && !limits.scene.contains(work.x[drop]))
     ++drop;
@@ -327,6 +336,7 @@ void ThreadStepper::Impl::remesh()
   if (youngest > limits.max_deposited)
     drop = std::max(drop, youngest - limits.max_deposited);
   dropOldest(work, drop);
+  return true;
 }
 
 }  // namespace slender

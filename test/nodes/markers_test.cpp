@@ -64,5 +64,34 @@ bodies:
   EXPECT_NEAR(cube.pose.position.x, 5, 1e-12);   // the mesh stays where the scene puts it
 }
 
+TEST(Markers, threadsAreTubesOrLinesOfBoundedSize)
+{
+  const std::string thread = "centerline: {straight: {to: [0.1, 0, 0], edges: 3000}}, radius: 0.002, ends: {oldest: held}}";
+  const Simulation simulation(parseScene("threads:\n  - {name: a, " + thread + "\n  - {name: b, " + thread, "scene"));
+  int erased = 0, tubes = 0;
+  std::size_t triangles = 0;
+  const auto markers = sceneMarkers(simulation, std_msgs::Header(), MarkerStyle::tube, false).markers;
+  for (const Marker& marker : markers)
+  {
+    erased += marker.action == Marker::DELETEALL;
+    if (marker.action != Marker::ADD)
+      continue;
+    ++tubes;
+    triangles += marker.points.size() / 3;
+    EXPECT_NEAR(volumeOf(marker), M_PI * 4e-6 * 0.1, 0.11 * M_PI * 4e-6 * 0.1);   // an octagon has 0.9 of a circle's area
+  }
+  EXPECT_EQ(markers.front().action, Marker::DELETEALL);   // rviz takes all away then, whatever the namespace
+  EXPECT_EQ(erased, 1);
+  EXPECT_EQ(tubes, 2);
+  EXPECT_LT(triangles, 60000u);
+  for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header(), MarkerStyle::line, false).markers)
+    if (marker.action == Marker::ADD)
+    {
+      EXPECT_EQ(marker.type, Marker::LINE_STRIP);
+      EXPECT_NEAR(marker.scale.x, 0.004, 1e-9);
+      EXPECT_NEAR(marker.points.back().x, 0.1, 1e-12);
+    }
+}
+
 }  // namespace
 }  // namespace slender

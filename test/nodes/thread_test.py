@@ -6,8 +6,10 @@ import rospy
 from geometry_msgs.msg import PoseStamped, Vector3Stamped, WrenchStamped
 from std_msgs.msg import Float64
 from slender_sim.msg import ThreadState
+from slender_sim.srv import FilePath
+from std_srvs.srv import Trigger
 
-from node_harness import NodeCase, pose, run, wait_until
+from node_harness import NodeCase, numbers, pose, run, wait_until
 
 STEP = 0.002
 FLOW = 6e-7
@@ -49,10 +51,11 @@ class Thread(NodeCase):
         rospy.sleep(0.3)
         more = self.after(50)
         self.assertAlmostEqual(more.fed_volume - before.fed_volume, 150 * STEP * FLOW, delta=1e-9 * FLOW)
-        for bad in (float("nan"), -1.0, float("inf")):
+        for bad in (float("nan"), -1.0, float("inf"), 1.0, 1e300):   # 1 m^3/s is a mistaken unit, and would take a step for ever
             flow.publish(bad)
         self.expect_drop("not_finite", 2)
-        self.expect_drop("out_of_range")
+        self.expect_drop("out_of_range", 3)
+        self.assertAlmostEqual(float(self.diagnostics("inputs")["nozzle/flow [m^3/s]"]), 3 * FLOW, delta=1e-5 * FLOW)
         kept = self.after(10)
         self.assertAlmostEqual(kept.fed_volume - more.fed_volume, 30 * STEP * FLOW, delta=1e-9 * FLOW)
         flow.publish(0.0)
@@ -77,6 +80,8 @@ class Thread(NodeCase):
         self.expect_drop("not_finite")
         nozzle.publish(pose(0.02, 0, HEIGHT, stamp=1.4, q=(0, 0, 0, 3)))
         self.expect_drop("bad_quaternion")
+        nozzle.publish(pose(0.02, 1e300, HEIGHT, stamp=1.4, q=down))
+        self.expect_drop("out_of_range")
         self.assertAlmostEqual(self.after(5).nodes[-1].x, 0.02, delta=1e-6)
 
     def test_belt_by_message(self):
@@ -96,6 +101,8 @@ class Thread(NodeCase):
         self.expect_drop("not_finite")
         self.expect_drop("bad_frame")
         self.expect_drop("no_transform")
+        velocity.publish(belt(1e4, 0))
+        self.expect_drop("out_of_range")
         oldest = {i: p for i, p in zip(state.ids, state.nodes)}
         later = self.after(50)
         common = [(oldest[i], p) for i, p, d in zip(later.ids, later.nodes, bytearray(later.deposited)) if d and i in oldest]
@@ -106,24 +113,64 @@ class Thread(NodeCase):
         self.begin()
         self.publisher("/t/belt/velocity", Vector3Stamped).publish(belt(0.04, 0))
         rospy.sleep(0.3)
-        self.after(2000)
-        wait_until(lambda: self.states.count() > 1900, what="the states")
-        newest, first, seen_first = -1, -1, 0
+        for _ in range(10):
+            self.after(200)                                            # topics drop what nobody takes in time
+        self.assertGreater(self.states.count(), 1900)
+        newest, first, seen_first, unsorted = -1, -1, 0, 0
         known = set()
         for state in self.states.all():
             ids = list(state.ids)
             self.assertEqual(len(ids), len(set(ids)))
             self.assertEqual(len(ids), len(state.nodes))
             self.assertEqual(len(ids), len(state.radii) + 1)
-            self.assertEqual(state.first_id, ids[0])
+            self.assertEqual(state.first_id, min(ids[:-1]))
+            self.assertGreaterEqual(state.first_id, first)             # so that all below are gone for good
+            unsorted += ids[0] != min(ids[:-1])
             fresh = [i for i in ids if i not in known]
             self.assertTrue(all(i > newest for i in fresh), "an id came again")
             if state.first_id != first:
                 first, seen_first = state.first_id, seen_first + 1
             newest = max([newest] + fresh)
             known.update(ids)
+        self.assertGreater(unsorted, 0)                                # edges were divided
         self.assertGreater(seen_first, 5)                              # old nodes were dropped
         self.assertGreater(newest, len(self.states.last().ids))        # and new ones fed
+
+    def test_wrench_belongs_to_the_state(self):
+        self.begin()
+        wrenches = self.listen("/t/nozzle/wrench", WrenchStamped)
+
+        def next_wrench(act):
+            before = wrenches.count()
+            act()
+            wait_until(lambda: wrenches.count() > before, what="a wrench")
+            return wrenches.last().wrench.force.z
+        saved = next_wrench(lambda: self.step(1))
+        self.assertTrue(self.call("save_state", FilePath, self.path("state")).success)
+        later = [numbers(self.after(1)) for _ in range(50)]
+        self.assertNotEqual(wrenches.last().wrench.force.z, saved)
+        self.assertEqual(next_wrench(lambda: self.call("load_state", FilePath, self.path("state"))), saved)
+        self.assertEqual([numbers(self.after(1)) for _ in range(50)], later)
+        self.assertEqual(next_wrench(lambda: self.call("reset", Trigger)), 0.0)
+
+    def test_several_threads(self):
+        glue = SCENE.split("threads:\n")[1].replace("name: honey", "name: glue").replace("[0, 0, 0.03]", "[0.1, 0, 0.03]")
+        self.start(SCENE + glue, program="thread_node")
+        states = self.listen("/t/state", ThreadState)
+        flow = self.publisher("/t/threads/glue/nozzle/flow", Float64)
+        flow.publish(-1.0)
+        self.expect_drop("out_of_range")
+        self.assertIn("threads/glue/nozzle/flow: dropped", self.output("rod.err") + self.output("rod.out"))
+        flow.publish(2 * FLOW)
+        rospy.sleep(0.3)
+        stamp = self.step(50).stamp
+        wait_until(lambda: sum(s.header.stamp == stamp for s in states.all()) == 2, what="both threads")
+        fed = {s.name: s.fed_volume for s in states.all() if s.header.stamp == stamp}
+        self.assertAlmostEqual(fed["honey"], 50 * STEP * FLOW, delta=1e-9 * FLOW)
+        self.assertAlmostEqual(fed["glue"], 100 * STEP * FLOW, delta=1e-9 * FLOW)
+        values = self.diagnostics("simulation")
+        self.assertEqual(values["threads and pieces"], "2")
+        self.assertEqual(int(values["nodes"]), sum(len(s.nodes) for s in states.all() if s.header.stamp == stamp))
 
 
 if __name__ == "__main__":

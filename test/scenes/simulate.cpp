@@ -83,6 +83,20 @@ TEST_P(Scene, runs)
 
 INSTANTIATE_TEST_SUITE_P(All, Scene, testing::ValuesIn(allScenes()));
 
+/// What hangs from a nozzle whose flow stops becomes thinner and thinner, and parts.
+TEST_F(Simulate, aThreadWhoseFlowStopsDrainsAndParts)
+{
+  const Result result = simulate(scenes + "honey_robot.yaml --duration 5.5 --set threads.0.nozzle.motion=fixed"
+                                          " --set 'threads.0.nozzle.flow={table: [[0, 6e-7], [4, 6e-7], [4.000001, 0]]}'"
+                                          " --set 'threads.0.floor.belt={x: {table: [[0, 0.03], [2, 0.03], [2.000001, -0.03]]}, y: 0}' --csv " + folder_);
+  EXPECT_EQ(result.status, 0) << result.output;
+  std::ifstream table(folder_ + "/threads.csv");
+  std::string line, last;
+  while (std::getline(table, line))
+    last = line;
+  EXPECT_NE(last.find(",honey,1,"), std::string::npos) << last;   // a second piece
+}
+
 TEST_F(Simulate, printsASummary)
 {
   const Result result = simulate(cantilever + " --duration 0.1");

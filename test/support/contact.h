@@ -42,15 +42,28 @@ inline Eigen::Matrix3Xd gradient(const ContactPotential& potential, Eigen::Index
   return g;
 }
 
-/// Second derivative from the terms with the solids at rest, 3 points x 3 points.
-inline Eigen::MatrixXd hessian(const ContactPotential& potential, Eigen::Index points)
+/// Second derivative from the terms and rows with the solids at rest, 3 points x 3 points; `whole`: with what may be negative.
+inline Eigen::MatrixXd hessian(const ContactPotential& potential, Eigen::Index points, bool whole)
 {
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(3 * points, 3 * points);
   for (const ContactTerm& term : potential.terms())
     for (int i = 0; i < 4; ++i)
       for (int j = 0; j < 4; ++j)
         if (term.point[i] >= 0 && term.point[j] >= 0)
-          h.block<3, 3>(3 * term.point[i], 3 * term.point[j]) += term.weight[i] * term.weight[j] * term.stiffness;
+        {
+          auto block = h.block<3, 3>(3 * term.point[i], 3 * term.point[j]);
+          block += term.weight[i] * term.weight[j] * term.stiffness;
+          if (whole)
+            block += term.weight[i] * term.weight[j] * term.geometric;
+        }
+  for (const ContactRow& row : potential.rows())
+  {
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(3 * points);
+    for (int i = 0; i < 4; ++i)
+      if (row.point[i] >= 0)
+        r.segment<3>(3 * row.point[i]) += row.along[i] * row.normal + (whole ? row.across[i] : 0.0) * row.turning;
+    h += row.stiffness * r * r.transpose();
+  }
   return h;
 }
 

@@ -237,6 +237,51 @@ TEST(ClothStepper, KeepsItsRestAngles)
   EXPECT_LT((cloth.state.x - mesh.vertices).norm(), 1e-12);
 }
 
+TEST(ClothStepper, RoughStartsGiveNoNaN)
+{
+  Random random(41);
+  int done = 0, refused = 0;
+  for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
+    for (const bool one_newton_step : {false, true})
+      for (const double modulus : {1e-1, 1e4, 1e9})
+        for (int kind = 0; kind < 4; ++kind)
+        {
+          ClothModel model = buildCloth("c", gridMesh(0.5, 0.5, 5, 5, GridPattern::alternating), 0.2, isotropicMembrane(modulus, 0.3, 1e-3));
+          model.bending = bending;
+          model.bending_modulus = 1e-4;
+          Cloth cloth(model);
+          for (Eigen::Index i = 0; i < cloth.state.x.cols(); ++i)
+          {
+            if (kind == 0)   // anywhere
+              cloth.state.x.col(i) = random.vector(0.5);
+            if (kind == 1)   // all in one point
+              cloth.state.x.col(i).setZero();
+            if (kind == 2)   // turned over and squeezed to needles
+              cloth.state.x.col(i) = cloth.state.x.col(i).cwiseProduct(Vector3d(-1, 1e-6, 1));
+          }
+          cloth.pin({0});
+          if (kind == 3)   // yanked
+            cloth.inputs.pins.col(0) += Vector3d(10, 0, 0);
+          ClothOptions o;
+          o.one_newton_step = one_newton_step;
+          ClothStepper stepper(cloth.model, o);
+          StepReport report;
+          for (int k = 0; k < 3 && report.ok; ++k)
+          {
+            const ClothState before = cloth.state;
+            report = stepper.step(cloth.state, cloth.inputs, 0.1);
+            EXPECT_TRUE(cloth.state.x.allFinite() && cloth.state.v.allFinite());
+            if (!report.ok)
+            {
+              EXPECT_EQ(cloth.state.x, before.x);
+              EXPECT_FALSE(report.message.empty());
+            }
+            ++(report.ok ? done : refused);
+          }
+        }
+  EXPECT_GT(done, 10 * refused) << done << " " << refused;   // all in one point, or needles a million times too stiff
+}
+
 TEST(ClothStepper, RefusesBadInputAndLeavesTheStateAlone)
 {
   Cloth cloth = busy(BendingModel::hinge);

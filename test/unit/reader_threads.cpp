@@ -51,6 +51,7 @@ TEST(ThreadReader, ReadsEverything)
   EXPECT_EQ(t.longest_edge, 0.002);
   EXPECT_EQ(t.most_deposited, 100);
   EXPECT_EQ(t.breakup_radius, 1e-5);
+  EXPECT_EQ(parseScene(honey, "t", {"threads.0.breakup_radius=0"}).threads[0].breakup_radius, 0.0);
 }
 
 TEST(ThreadReader, NamesWhatIsWrong)
@@ -61,12 +62,18 @@ TEST(ThreadReader, NamesWhatIsWrong)
       {"threads.0.nozzle.flow=-1e-7", "threads.0.nozzle.flow = -1e-7"},
       {"threads.0.nozzle.flow={topic: false}", "must be true"},
       {"threads.0.nozzle.flow={table: [[1, 0], [1, 2]]}", "times must rise"},
+      {"threads.0.nozzle.flow=1", "is too much: over a thousand edges would leave the nozzle in one step; must be at most 0.0098"},
+      {"threads.0.nozzle.flow={table: [[0, 0], [1, 1]]}", "is too much"},
+      {"threads.0.nozzle.flow={topic: true, initial: 1}", "is too much"},
       {"threads.0.nozzle.spin=1", "unknown key"},
       {"threads.0.centerline={straight: {edges: 3}}", "must have either a nozzle"},
       {"threads.0.radius=0.1", "is for threads with a centerline"},
       {"threads.0.floor.belt=[1, 2, 3]", "must be [vx, vy]"},
       {"threads.0.edges.shortest=0.0019", "0.4 of edges.longest"},
       {"threads.0.region={from: [0, 0, 0], to: [1, 0, 1]}", "must be greater than region.from"},
+      {"threads.0.breakup_radius=0.0025", "must be less than the nozzle's radius 0.0025 m"},
+      {"time.integrator=symplectic_euler", "time.integrator = symplectic_euler: is not for threads; must be implicit_euler"},
+      {"start=equilibrium", "is not for threads"},
   };
   for (const auto& [assignment, expected] : cases)
     EXPECT_NE(problemsOf(assignment).find(expected), std::string::npos) << assignment << "\ngave: " << problemsOf(assignment);
@@ -105,6 +112,36 @@ TEST(ThreadScene, RestartsBitByBit)
   EXPECT_EQ(a.endLoads(0)[1].force, b.endLoads(0)[1].force);
   Simulation other(parseScene(honey, "t", {"threads.0.fluid.viscosity=21"}));
   EXPECT_THROW(other.load(file), std::runtime_error);
+  EXPECT_NE(a.endLoads(0)[1].force.z(), 0.0);
+  a.load(file);   // what was told of the last step comes back, too
+  run(b, 1);
+  b.load(file);
+  EXPECT_EQ(a.endLoads(0)[1].force, b.endLoads(0)[1].force);
+  b.reset();
+  EXPECT_EQ(b.endLoads(0)[1].force.norm(), 0.0);
+  std::remove(file.c_str());
+}
+
+TEST(ThreadScene, ThreadsThatHaveLeftStayAway)
+{
+  Simulation simulation(parseScene(R"(
+time: {step: 0.01}
+threads:
+  - {centerline: {straight: {to: [0.1, 0, 0], edges: 5}}, radius: 0.002, region: {from: [-1, -1, -0.05], to: [1, 1, 1]}}
+)"));
+  const auto run = [&simulation](int steps) {
+    for (int k = 0; k < steps; ++k)
+      ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
+  };
+  run(30);
+  EXPECT_TRUE(simulation.state().threads[0].threads.empty());
+  const std::string file = ::testing::TempDir() + "no_thread";
+  simulation.save(file);
+  simulation.reset();
+  EXPECT_EQ(simulation.state().threads[0].threads.size(), 1u);
+  simulation.load(file);
+  EXPECT_TRUE(simulation.state().threads[0].threads.empty());
+  run(2);
   std::remove(file.c_str());
 }
 

@@ -114,5 +114,28 @@ TEST(ThreadGroup, WhatLeavesTheSceneIsDropped)
   EXPECT_NEAR(d.state.volumeBalance(), start, 1e-11 * d.state.threads[0].fed_volume);
 }
 
+TEST(ThreadGroup, APieceThatComesToRestKeepsTheNodesThatMayLie)
+{
+  // thicker and longer than what may lie: its oldest nodes are dropped one by one, the others stay
+  Dripping d;
+  d.model.limits.max_deposited = 8;
+  Eigen::Matrix3Xd x = Eigen::Matrix3Xd::Zero(3, 12);
+  x.row(0) = Eigen::RowVectorXd::LinSpaced(12, 0.5, 0.555);
+  x.row(2) = Eigen::RowVectorXd::LinSpaced(12, 0.005, 0.01);   // its oldest node on the floor, the others above it
+  ThreadState piece = makeThread(x, Eigen::VectorXd::Constant(11, 0.005));
+  piece.thread_id = d.state.next_thread_id++;
+  d.state.threads = {piece};
+  d.inputs.flow_rate = 0.0;
+  ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
+  const double start = d.state.volumeBalance();
+  for (int k = 0; k < 200; ++k)
+    ASSERT_TRUE(group.step(d.state, d.inputs, 0.005).ok);
+  ASSERT_EQ(d.state.threads.size(), 1u);
+  EXPECT_EQ(d.state.threads[0].nodes(), 9);
+  for (const char deposited : d.state.threads[0].deposited)
+    EXPECT_TRUE(deposited);
+  EXPECT_NEAR(d.state.volumeBalance(), start, 1e-14 * start);
+}
+
 }  // namespace
 }  // namespace slender::test

@@ -26,6 +26,21 @@ double shownTwist(const ThreadState& s, int i)
   return signedAngle(parallelTransport(s.d1[i - 1], a, b), s.d1[i], b);
 }
 
+/// Of the edges' spins, over half the density.
+double spinMomentum(const ThreadState& s)
+{
+  double sum = 0.0;
+  for (int j = 0; j < s.edges(); ++j)
+    sum += s.volume[j] * s.radius(j) * s.radius(j) * s.spin[j];
+  return sum;
+}
+
+void spinUp(ThreadState& s, Random& random)
+{
+  for (double& spin : s.spin)
+    spin = random.uniform(0.5, 1.5);
+}
+
 TEST(ThreadRemesh, SplittingConservesVolumeAndMomentum)
 {
   Random random(1);
@@ -33,8 +48,11 @@ TEST(ThreadRemesh, SplittingConservesVolumeAndMomentum)
   {
     ThreadState s = wigglyThread(9, random);
     const double volume = s.totalVolume();
+    spinUp(s, random);
     const Vector3d momentum = momentumOf(s);
+    const double spin = spinMomentum(s);
     splitEdge(s, j, 0.4);
+    EXPECT_NEAR(spinMomentum(s), spin, 1e-14 * spin);
     EXPECT_EQ(s.nodes(), 10);
     EXPECT_EQ(s.edges(), 9);
     EXPECT_NEAR(s.totalVolume(), volume, 1e-15 * volume * 10);
@@ -51,8 +69,11 @@ TEST(ThreadRemesh, JoiningConservesVolumeAndMomentum)
   {
     ThreadState s = wigglyThread(9, random);
     const double volume = s.totalVolume();
+    spinUp(s, random);
     const Vector3d momentum = momentumOf(s);
+    const double spin = spinMomentum(s);
     removeNode(s, i);
+    EXPECT_NEAR(spinMomentum(s), spin, 1e-14 * spin);
     EXPECT_EQ(s.nodes(), 8);
     EXPECT_NEAR(s.totalVolume(), volume, 1e-15 * volume * 10);
     EXPECT_LT((momentumOf(s) - momentum).norm(), 1e-14);

@@ -174,6 +174,76 @@ TEST(ThreadStepper, AStepMayFeedManyEdges)
   EXPECT_LT(std::abs(volumeDrift(t, start)), 1e-13);
 }
 
+TEST(ThreadStepper, AFlowOfMoreEdgesThanAStepCanFeedIsRefused)
+{
+  Thread t = pouring(0.1);
+  ThreadStepper stepper = t.stepper();
+  const ThreadState before = t.state;
+  for (const double speed : {1e7, 1e20, 1e300})
+  {
+    t.inputs.flow_rate = speed * t.model.nozzleArea();
+    const StepReport report = stepper.step(t.state, t.inputs, 0.01);
+    EXPECT_EQ(report.failure, StepFailure::input_not_finite);
+    EXPECT_NE(report.message.find("flow rate"), std::string::npos) << report.message;
+    EXPECT_TRUE(sameThread(t.state, before));
+  }
+}
+
+TEST(ThreadStepper, AMotionThatDrawsTheThreadOutBeyondAllMeasureIsRefused)
+{
+  Thread t = pouring(0.1);
+  t.model.limits.max_edge_length = 0.015;
+  ThreadStepper stepper = t.stepper();
+  for (int k = 0; k < 150; ++k)
+    ASSERT_TRUE(stepper.step(t.state, t.inputs, 0.01).ok);
+  ASSERT_TRUE(t.state.deposited[0]);
+  const ThreadState before = t.state;
+  const auto refused = [&](const ThreadInputs& inputs) {
+    const StepReport r = stepper.step(t.state, inputs, 0.01);
+    return !r.ok && r.message.find("max_edge_length") != std::string::npos && sameThread(t.state, before);
+  };
+  ThreadInputs far = t.inputs;
+  far.ends[1].position.x() = 1e4;   // m, where a slip of the pen may put it
+  EXPECT_TRUE(refused(far));
+  far = t.inputs;
+  far.belt_velocity.x() = 1e6;
+  EXPECT_TRUE(refused(far));
+  EXPECT_TRUE(stepper.step(t.state, t.inputs, 0.01).ok);
+}
+
+TEST(ThreadStepper, AThreadThatIsDrawnOutKeepsItsAngularMomentum)
+{
+  // spinning about its axis while its ends fly apart: like a skater who draws in the arms
+  Eigen::Matrix3Xd x = Eigen::Matrix3Xd::Zero(3, 11);
+  x.row(0) = Eigen::RowVectorXd::LinSpaced(11, -0.5, 0.5);
+  for (const Integrator integrator : {Integrator::implicit_euler, Integrator::symplectic_euler})
+  {
+    Thread t{honey(), makeThread(x, Eigen::VectorXd::Constant(10, 0.05)), {}};
+    t.model.viscosity = 1e-3;
+    t.model.nozzle_diameter = 0.0;
+    t.model.limits.max_edge_length = 0.12;
+    t.inputs.gravity.setZero();
+    const auto momentum = [&] {
+      double sum = 0.0;
+      for (int j = 0; j < t.state.edges(); ++j)
+        sum += 0.5 * t.state.volume[j] * t.state.radius(j) * t.state.radius(j) * t.state.spin[j];
+      return sum;
+    };
+    for (int i = 0; i < 11; ++i)
+      t.state.v[i].x() = t.state.x[i].x();
+    for (double& spin : t.state.spin)
+      spin = 2.0;
+    const double start = momentum();
+    ThreadStepper stepper(std::make_shared<ThreadModel>(t.model), NewtonConfig{}, integrator);
+    for (int k = 0; k < 100; ++k)
+      ASSERT_TRUE(stepper.step(t.state, t.inputs, 0.01).ok) << k;
+    ASSERT_GT(t.state.edges(), 10);                // divided on its way
+    EXPECT_NEAR(t.state.edge(5).norm() * (t.state.edges() / 10.0), 0.2, 0.05);
+    EXPECT_NEAR(momentum(), start, 1e-6 * start);
+    EXPECT_NEAR(t.state.spin[3], 4.0, 0.05);
+  }
+}
+
 TEST(ThreadStepper, TheFlowMayStopAndTheNozzleMove)
 {
   Thread t = pouring(0.2);

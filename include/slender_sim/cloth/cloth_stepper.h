@@ -25,7 +25,7 @@ struct ClothEnergies
 
 enum class ClothSolver
 {
-  automatic,             ///< by size
+  automatic,             ///< conjugate gradients for one Newton step or more than 5000 vertices, else cholesky
   cholesky,              ///< factorisation of the whole matrix
   conjugate_gradients    ///< preconditioned by a constant matrix of points (mass, bending, rest membrane)
 };
@@ -35,7 +35,8 @@ struct ClothOptions
   Integrator integrator = Integrator::implicit_euler;   ///< implicit_euler or symplectic_euler
   bool one_newton_step = false;          ///< implicit: linearised about the start of the step [Baraff & Witkin 1998]
   ClothSolver solver = ClothSolver::automatic;
-  double linear_tolerance = 1e-4;        ///< of conjugate gradients: residual over right-hand side, in the preconditioner's norm (0, 1)
+  /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged velocity.
+  double linear_tolerance = 0.02;
   NewtonConfig newton;
 };
 

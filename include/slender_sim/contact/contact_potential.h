@@ -58,9 +58,9 @@ struct ContactOptions
 bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap);
 
 /// Part of a touching pair's potential. With the relative displacement u = sum_i weight[i] x[point[i]] minus, if there is a solid, that of its
-/// material point at `position`, the potential has the gradient dE/du = -force and, projected to be semidefinite, the second derivative
-/// `stiffness`. A pair gives one term with its normal force; with stiffness, pairs that are nearly parallel give up to two more without
-/// force (the place of contact runs along them); with friction, one more.
+/// material point at `position`, the potential has the gradient dE/du = -force and the second derivative stiffness + `geometric`, of which the
+/// first is semidefinite and the second, from the turning of a normal under its force, is not. A pair gives one term with its normal
+/// force; with friction, one more.
 struct ContactTerm
 {
   int point[4] = {-1, -1, -1, -1};   ///< -1: unused
@@ -68,7 +68,17 @@ struct ContactTerm
   int solid = -1;                    ///< that is touched, -1: none
   Eigen::Vector3d position{0, 0, 0}; ///< of the contact, world
   Eigen::Vector3d force{0, 0, 0};    ///< on u [N], friction included
-  Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero(), geometric = Eigen::Matrix3d::Zero();
+};
+
+/// What a pair's second derivative contains besides, because the place of contact runs along the segments: stiffness r r^T over the points, with
+/// r_i = along[i] normal + across[i] turning. Without `turning` the parts that make up for `geometric` are left out.
+struct ContactRow
+{
+  int point[4] = {-1, -1, -1, -1};
+  double along[4] = {0, 0, 0, 0}, across[4] = {0, 0, 0, 0};
+  Eigen::Vector3d normal{0, 0, 0}, turning{0, 0, 0};
+  double stiffness = 0.0;
 };
 
 /// Barrier potential of surfaces that may not touch, with Coulomb friction by lagged normal forces
@@ -98,9 +108,11 @@ public:
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
 
   /// Potential [J] at a configuration; infinite where surfaces meet or x is not finite. Fills terms(), in an order that depends on x and
-  /// solids only; their stiffness only on request.
+  /// solids only; their stiffness and rows() only on request. The second derivative is exact for pairs of segments; of solids, what their
+  /// own curvature and turning add to it is left out, and friction's is that of the secant where it slips back and forth.
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   const std::vector<ContactTerm>& terms() const;
+  const std::vector<ContactRow>& rows() const;
 
   /// Largest normal force [N] and smallest softened gap [m] of the last evaluate(); 0 and infinity without contact.
   double largestForce() const;

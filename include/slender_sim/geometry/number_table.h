@@ -17,6 +17,7 @@ public:
   explicit NumberTable(std::vector<Entry> entries);
 
   double at(double time) const;
+  double greatest() const;
   /// Mean over a step from `start` to `end` [s], start < end: of a flow rate: with it as ThreadInputs::flow_rate exactly the tabled volume flows.
   double mean(double start, double end) const;
 

@@ -19,7 +19,7 @@ enum class Drop
   out_of_order,     ///< not later than the last one
   stale,            ///< older than ~guide_timeout
   from_future,      ///< more than an hour ahead: another clock
-  out_of_range,     ///< a number that cannot be (a negative flow)
+  out_of_range,     ///< a number that cannot be (a negative flow, a belt at 1e9 m/s)
   queue_full,       ///< too many messages wait for transforms
 };
 constexpr int kDropReasons = 11;

@@ -16,6 +16,7 @@
 #include <tf2_ros/transform_listener.h>
 
 #include "slender_sim/BodyStates.h"
+#include "slender_sim/node/converters.h"
 #include "slender_sim/node/drop_counter.h"
 #include "slender_sim/node/guide_buffer.h"
 #include "slender_sim/node/node_options.h"
@@ -25,8 +26,8 @@
 namespace slender {
 
 /// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`, `bodies`, `nozzle/pose`,
-/// through tf2 into the node's frame; and `nozzle/flow` and `belt/velocity`, which hold from the next step on. Subscribes only to what the scene asks for. Bad messages are dropped and counted; what they would have moved keeps its
-/// previous input.
+/// through tf2 into the node's frame; and `nozzle/flow` and `belt/velocity`, which hold from the next step on. Subscribes only to what the
+/// scene asks for. Bad messages are dropped and counted; what they would have moved keeps its previous input.
 /// A stamp of zero means now, as everywhere in tf.
 class GuideInputs
 {
@@ -56,6 +57,10 @@ public:
   /// Age of the last pose at the clock's present; nothing while none came.
   std::vector<Age> ages() const;
 
+  /// Per flow and belt driven from outside: the value by message.
+  struct Setting { std::string name, value; };
+  std::vector<Setting> settings() const;
+
 private:
   struct Guided { std::string name, body, topic; std::unique_ptr<GuideBuffer> buffer; };   // buffer: null when not driven from outside
   struct Entry { int guided; Pose X_FH; };                // a gripper, body or obstacle in the frame of the message
@@ -79,6 +84,7 @@ private:
   void addSolids(const Simulation& simulation, const GuideBuffer::Options& options);
   bool checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X);
   void take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries);
+  void dropTransform(PoseFault fault, const std::string& what, const std::string& frame);
   /// False when the transform is not known yet.
   bool deliver(const Message& message, std::string* why);
 
@@ -86,8 +92,15 @@ private:
   const SimClock& clock_;
   std::vector<Guided> guided_;                            // grasps in scene order, then bodies, obstacles, nozzles
   std::size_t grasps_ = 0, bodies_ = 0, obstacles_ = 0;   // how many of the first three
-  struct Driven { std::optional<double> flow; std::optional<Eigen::Vector3d> belt; };
-  std::vector<Driven> threads_;                           // last values by message
+  struct Driven
+  {
+    bool flow_topic = false, belt_topic = false;
+    double greatest_flow = 0.0;
+    std::optional<double> flow;                           // last values by message
+    std::optional<Eigen::Vector3d> belt;
+  };
+  std::vector<Driven> threads_;
+  std::vector<std::string> prefixes_;                     // of their topics
   std::deque<Message> pending_;
   DropCounter drops_;
   tf2_ros::Buffer tf_buffer_;

@@ -19,6 +19,9 @@
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
 namespace slender {
 
+constexpr double max_coordinate = 1e6;   ///< [m] of what a scene or a message places
+constexpr double max_belt_speed = 1e3;   ///< [m/s] of each component
+
 /// A curve as the scene file states it. Exactly one alternative.
 struct StraightCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; int edges = 50; double grading = 1; };   ///< last edge length over the first
 struct PolylineCurve { std::vector<Eigen::Vector3d> points; std::optional<int> edges; };       ///< resampled when edges is given
@@ -218,10 +221,18 @@ struct ThreadConfig
   std::optional<FloorConfig> floor;
   double feed_length = 0.0;                ///< of the edges that leave the nozzle [m]
   double longest_edge = 0.0, shortest_edge = 0.0;   ///< [m] 0: edges are neither divided nor joined
-  double breakup_radius = 0.0;             ///< the thread parts where it is thinner [m]; 0: never
+  double breakup_radius = 0.0;             ///< the thread parts where it is thinner [m]; 0: never; the reader's default: 0.002 nozzle diameters
   int most_deposited = 0;                  ///< nodes on the floor; 0: all are kept
   std::optional<std::array<Eigen::Vector3d, 2>> region;   ///< corners; what lies outside is dropped, oldest first
 };
+
+/// [m^3/s] At this flow a nozzle feeds a thousand edges per step of `step` [s]; more is a mistaken unit, and one step would take for ever.
+inline double greatestFlow(const ThreadConfig& thread, double step)
+{
+  const double diameter = thread.nozzle ? thread.nozzle->diameter : 0.0;
+  const double feed = thread.feed_length > 0 ? thread.feed_length : diameter;
+  return 1000 * feed * 0.25 * M_PI * diameter * diameter / step;
+}
 
 enum class Start { as_given, equilibrium };    ///< equilibrium: the static solver runs first
 

@@ -28,6 +28,7 @@ struct SceneState
   /// Per grasp of the scene: the held section seen from the pose that drives it; with `attach: section` identity until attach().
   std::vector<Pose> grasp_offsets;
   std::vector<Wrench> wrenches;   ///< per grasp of the scene, of the last step
+  std::vector<std::array<EndLoad, 2>> end_loads;   ///< per thread of the scene, of the last step
 };
 
 /// The scene was read, but its equilibrium (`start: equilibrium`) could not be found.
@@ -102,7 +103,7 @@ public:
   const Wrench& wrench(int grasp) const;
   RodEnergies energies(int rod) const;
   /// What a thread does to the holders of its ends (the newest: the nozzle), of the last step.
-  const std::array<EndLoad, 2>& endLoads(int thread) const { return thread_steppers_.at(thread).endLoads(); }
+  const std::array<EndLoad, 2>& endLoads(int thread) const { return state_.end_loads.at(thread); }
   const ThreadModel& threadModel(int thread) const { return *thread_models_[thread]; }
 
   /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could

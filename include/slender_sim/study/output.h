@@ -25,6 +25,10 @@ void writeJson(std::ostream& out, const std::vector<StudyResult>& results);
 /// One line per row; the header is the union of all keys.
 void writeCsv(std::ostream& out, const StudyContext& context);
 
+/// As in writeCsv: quoted where need be; a row's value as text, empty when it has none.
+std::string csvCell(const std::string& text);
+std::string valueText(const Row& row, const std::string& key);
+
 /// Writes DIR/NAME.gp for every plot and lets gnuplot turn it into DIR/NAME.png.
 /// Returns an empty string, or why there are no pictures (the scripts are kept).
 std::string writePlots(const std::string& directory, const StudyContext& context);

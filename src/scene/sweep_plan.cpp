@@ -1,0 +1,199 @@
+#include "slender_sim/scene/sweep_plan.h"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "slender_sim/scene/reader.h"
+#include "yaml_cursor.h"
+
+namespace slender {
+
+namespace {
+
+constexpr long max_points = 1'000'000;
+
+std::string readText(const std::string& path)
+{
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    throw SceneError(path + ": " + (std::filesystem::exists(path, error) ? "is not a regular file" : "no such file"));
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file)
+    throw SceneError(path + ": cannot be read");
+  return text.str();
+}
+
+std::vector<std::string> readSeries(const YamlCursor& at)
+{
+  YamlMap map(at);
+  const YamlCursor log_at = map.get("log"), from_at = map.require("from");
+  const auto from = from_at.number({}), to = map.require("to").number({});
+  const auto count = map.require("count").integer(2, max_points);
+  const bool log = log_at.boolean().value_or(false);
+  map.finish();
+  std::vector<std::string> values;
+  if (!from || !to || !count)
+    return values;
+  if (log && !(*from * *to > 0.0))
+  {
+    from_at.problem("a geometric series needs two numbers of one sign");
+    return values;
+  }
+  for (int k = 0; k < *count; ++k)
+  {
+    const double share = static_cast<double>(k) / (*count - 1);
+    values.push_back(shortNumber(log ? *from * std::pow(*to / *from, share) : *from + share * (*to - *from)));
+  }
+  return values;
+}
+
+SweepAxis readAxis(const std::string& path, const YamlCursor& at)
+{
+  SweepAxis axis{path, {}};
+  if (at.isMap())
+  {
+    axis.values = readSeries(at);
+    return axis;
+  }
+  for (const YamlCursor& item : at.items(1))
+  {
+    if (item.isScalar())
+      axis.values.push_back(item.tree()->scalar);
+    else
+      item.problem("must be a single value; lists in quotes, as in --set");
+  }
+  return axis;
+}
+
+SweepPlot readPlot(const YamlCursor& at)
+{
+  SweepPlot plot;
+  YamlMap map(at);
+  assign(plot.x, map.require("x").text());
+  assign(plot.y, map.require("y").text());
+  assign(plot.by, map.get("by").text());
+  plot.x_label = plot.x;
+  plot.y_label = plot.y;
+  const YamlCursor labels = map.get("labels");
+  if (labels.present())
+  {
+    const auto words = labels.items(2, 2);
+    if (!words.empty())
+    {
+      assign(plot.x_label, words[0].text());
+      assign(plot.y_label, words[1].text());
+    }
+  }
+  map.finish();
+  return plot;
+}
+
+std::string dependencies(const SweepPlan& plan)
+{
+  std::ostringstream text;
+  for (const SweepAxis& axis : plan.axes)
+  {
+    text << axis.path << ":";
+    for (const std::string& value : axis.values)
+      text << " " << value;
+    text << "\n";
+  }
+  text << "measures:";
+  for (const std::string& measure : plan.measures)
+    text << " " << measure;
+  text << "\nafter: " << plan.after << "\nscene:\n" << readText(plan.scene);
+  return text.str();
+}
+
+/// Each value once, the other axes at their first.
+void tryValues(const SweepPlan& plan, Problems& problems)
+{
+  long stride = plan.points();
+  for (const SweepAxis& axis : plan.axes)
+  {
+    stride /= static_cast<long>(axis.values.size());
+    for (std::size_t k = 0; k < axis.values.size(); ++k)
+      try
+      {
+        plan.sceneOf(static_cast<long>(k) * stride);
+      }
+      catch (const SceneError& error)
+      {
+        problems.addText(error.what());
+        return;   // the rest would mostly repeat it
+      }
+  }
+}
+
+}  // namespace
+
+long SweepPlan::points() const
+{
+  long n = 1;
+  for (const SweepAxis& axis : axes)
+    n *= static_cast<long>(axis.values.size());
+  return n;
+}
+
+std::vector<std::string> SweepPlan::overrides(long point) const
+{
+  std::vector<std::string> all(axes.size());
+  for (std::size_t k = axes.size(); k-- > 0;)
+  {
+    const long n = static_cast<long>(axes[k].values.size());
+    all[k] = axes[k].path + "=" + axes[k].values[point % n];
+    point /= n;
+  }
+  return all;
+}
+
+SceneConfig SweepPlan::sceneOf(long point) const
+{
+  return readScene(scene, overrides(point));
+}
+
+SweepPlan readSweepPlan(const std::string& path)
+{
+  const std::string text = readText(path);
+  const YamlTree tree = parseYaml(text, path);
+  Problems problems(path);
+  SweepPlan plan;
+  YamlMap map(YamlCursor(&tree, nullptr, "", problems));
+  assign(plan.name, map.require("name").name());
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  if (const auto scene = map.require("scene").text())
+    plan.scene = scene->front() == '/' || folder.empty() ? *scene : folder + "/" + *scene;
+  const YamlCursor axes = map.require("axes");
+  double points = 1;
+  for (const auto& [name, at] : axes.members())
+  {
+    plan.axes.push_back(readAxis(name, at));
+    points *= static_cast<double>(plan.axes.back().values.size());
+  }
+  if (axes.isMap() && plan.axes.empty())
+    axes.problem("names no value to vary");
+  if (points > max_points)
+    axes.problem("make " + shortNumber(points) + " runs; at most " + std::to_string(max_points));
+  for (const YamlCursor& measure : map.require("measures").items(1))
+    if (const auto name = measure.name())
+      plan.measures.push_back(*name);
+  assign(plan.after, map.get("after").number(Range::closed(0, 1e9, "s")));
+  const YamlCursor plot = map.get("plot");
+  if (plot.present())
+    plan.plot = readPlot(plot);
+  map.finish();
+  if (problems.empty())
+  {
+    plan.text = dependencies(plan);
+    tryValues(plan, problems);
+  }
+  if (!problems.empty())
+    throw SceneError(problems.text());
+  return plan;
+}
+
+}  // namespace slender

@@ -1,0 +1,130 @@
+#include "slender_sim/study/measure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "belt_pattern.h"
+
+namespace slender::study {
+
+namespace {
+
+/// Box around all nodes, and the fastest of them, at the end.
+class Extents : public Measure
+{
+public:
+  void look(const Simulation& simulation) override
+  {
+    box_.setEmpty();
+    speed_ = 0.0;
+    for (const RodState& rod : simulation.state().rods)
+      for (Eigen::Index i = 0; i < rod.x.cols(); ++i)
+        add(rod.x.col(i), rod.v.col(i));
+    for (const ThreadGroupState& group : simulation.state().threads)
+      for (const ThreadState& thread : group.threads)
+        for (int i = 0; i < thread.nodes(); ++i)
+          add(thread.x[i], thread.v[i]);
+  }
+  Row finish() const override
+  {
+    Row row;
+    const char* const axes[] = {"x", "y", "z"};
+    for (int k = 0; k < 3; ++k)
+      row.set(axes[k] + std::string("_min [m]"), box_.min()[k]).set(axes[k] + std::string("_max [m]"), box_.max()[k]);
+    return row.set("speed_max [m/s]", speed_);
+  }
+  static std::unique_ptr<Measure> make(const SceneConfig&) { return std::make_unique<Extents>(); }
+
+private:
+  void add(const Eigen::Vector3d& x, const Eigen::Vector3d& v)
+  {
+    box_.extend(x);
+    speed_ = std::max(speed_, v.norm());
+  }
+  Eigen::AlignedBox3d box_;
+  double speed_ = 0.0;
+};
+
+/// Largest force and torque on a grasp.
+class Loads : public Measure
+{
+public:
+  void look(const Simulation& simulation) override
+  {
+    for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
+    {
+      const Wrench& wrench = simulation.wrench(static_cast<int>(g));
+      force_ = std::max(force_, wrench.force.norm());
+      torque_ = std::max(torque_, wrench.torque.norm());
+    }
+  }
+  Row finish() const override { return Row().set("force_max [N]", force_).set("torque_max [N m]", torque_); }
+  static std::unique_ptr<Measure> make(const SceneConfig& scene)
+  {
+    if (std::all_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.grasps.empty(); }))
+      throw std::invalid_argument("loads: the scene has no grasp");
+    return std::make_unique<Loads>();
+  }
+
+private:
+  double force_ = 0.0, torque_ = 0.0;
+};
+
+/// Pattern that the first thread draws on its belt, whose speed is that at the end.
+class BeltPattern : public Measure
+{
+public:
+  void look(const Simulation& simulation) override
+  {
+    const ThreadState& thread = simulation.state().threads[0].threads[0];
+    belt_ = simulation.defaultInputs().threads[0].belt_velocity.x();
+    if (!landings_)
+      landings_ = std::make_unique<Landings>(thread);
+    landings_->look(thread, simulation.state().time);
+    for (int j = 0; j < thread.edges(); ++j)
+      if (thread.deposited[j] && thread.deposited[j + 1])
+        thinnest_ = std::min(thinnest_, thread.radius(j));
+  }
+  Row finish() const override
+  {
+    const BeltTrace t = classifyBeltTrace(landings_ ? landings_->points() : std::vector<Landings::Point>(), belt_, 0.5 * thinnest_);
+    return Row().set("pattern", t.pattern).set("amplitude [m]", t.amplitude).set("frequency_across [rad/s]", t.frequency_y)
+        .set("frequency_along [rad/s]", t.frequency_x).set("windings", t.windings).set("swing [turns]", t.swing);
+  }
+  static std::unique_ptr<Measure> make(const SceneConfig& scene)
+  {
+    if (scene.threads.empty() || !scene.threads[0].floor)
+      throw std::invalid_argument("belt_pattern: the scene has no thread with a floor");
+    return std::make_unique<BeltPattern>();
+  }
+
+private:
+  std::unique_ptr<Landings> landings_;
+  double belt_ = 0.0, thinnest_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
+const std::vector<MeasureKind>& measureKinds()
+{
+  static const std::vector<MeasureKind> kinds = {
+      {"extents", "box around all nodes and the fastest of them, at the end",
+       {"x_min [m]", "x_max [m]", "y_min [m]", "y_max [m]", "z_min [m]", "z_max [m]", "speed_max [m/s]"}, &Extents::make},
+      {"loads", "largest force and torque on a grasp", {"force_max [N]", "torque_max [N m]"}, &Loads::make},
+      {"belt_pattern", "what the first thread draws on its belt",
+       {"pattern", "amplitude [m]", "frequency_across [rad/s]", "frequency_along [rad/s]", "windings", "swing [turns]"}, &BeltPattern::make},
+  };
+  return kinds;
+}
+
+const MeasureKind* findMeasure(const std::string& name)
+{
+  for (const MeasureKind& kind : measureKinds())
+    if (kind.name == name)
+      return &kind;
+  return nullptr;
+}
+
+}  // namespace slender::study
