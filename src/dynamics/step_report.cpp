@@ -15,6 +15,7 @@ void StepReport::merge(const StepReport& other)
   substeps += other.substeps;
   cut_steps += other.cut_steps;
   iterations += other.iterations;
+  linear_iterations += other.linear_iterations;
   factorizations += other.factorizations;
   mended_folds += other.mended_folds;
   residual = std::max(residual, other.residual);

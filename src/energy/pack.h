@@ -55,6 +55,117 @@ SLENDER_INLINE void sineCosine(Pack a, Pack& s, Pack& c)
   c = 1.0 - v;
 }
 
+/// atan2 in (-pi, pi] for arguments on the unit circle: three half-angle steps, then the Taylor series.
+SLENDER_INLINE Pack angleOf(Pack s, Pack c)
+{
+  const Pack ca = absolute(c);
+  Pack u = s / (ca + squareRoot(s * s + c * c));
+  u = u / (1.0 + squareRoot(1.0 + u * u));
+  u = u / (1.0 + squareRoot(1.0 + u * u));
+  const Pack z = u * u;   // |u| <= tan(pi/16)
+  Pack series = Pack{} + 1.0 / 23;
+  for (int k = 21; k >= 1; k -= 2)
+    series = 1.0 / k - z * series;
+  const Pack a = 8.0 * u * series;
+  const Pack pi = Pack{} + kTwoPi / 2;
+  return c < 0.0 ? (s < 0.0 ? -pi - a : pi - a) : a;
+}
+
+/// atan2 in (-pi, pi] of unit vectors, to round-off: one half-angle step and one of division bring tan below tan(pi/16).
+SLENDER_INLINE Pack angleOfUnit(Pack s, Pack c)
+{
+  // tan(a/2) in [0, 1] of the acute angle a, less pi/8 where that leaves a smaller one
+  const Pack y = absolute(s), x = absolute(c);
+  const Pack norm = squareRoot(s * s + c * c);
+  const Pack t = y / (x + norm + 1e-300);
+  const double shift = 0.41421356237309504880;   // tan(pi/8)
+  const Pack low = Pack{} + 0.19891236737965800691, mid = Pack{} + 0.66817863791929891999;   // tan(pi/16), tan(3 pi/16)
+  const Pack zero = {}, one = zero + 1.0;
+  const Pack centre = t > mid ? one : t > low ? zero + shift : zero;
+  const Pack offset = t > mid ? zero + 0.78539816339744830962 : t > low ? zero + 0.39269908169872415481 : zero;
+  const Pack u = (t - centre) / (1.0 + t * centre);
+  const Pack z = u * u;
+  Pack series = zero + 1.0 / 23;
+  for (int k = 21; k >= 1; k -= 2)
+    series = 1.0 / k - z * series;
+  Pack a = 2.0 * (offset + u * series);
+  const Pack pi = zero + kTwoPi / 2;
+  a = c < 0.0 ? pi - a : a;
+  return s < 0.0 ? -a : a;
+}
+
+/// In-register transposition of an 8 x 8 block.
+SLENDER_INLINE void transpose(Pack (&m)[8])
+{
+  Pack u[8];
+  for (int k = 0; k < 8; k += 2)
+  {
+    u[k] = __builtin_shuffle(m[k], m[k + 1], Lanes{0, 8, 2, 10, 4, 12, 6, 14});
+    u[k + 1] = __builtin_shuffle(m[k], m[k + 1], Lanes{1, 9, 3, 11, 5, 13, 7, 15});
+  }
+  Pack v[8];
+  for (int k = 0; k < 8; k += 4)
+    for (int a = 0; a < 2; ++a)
+    {
+      v[k + a] = __builtin_shuffle(u[k + a], u[k + a + 2], Lanes{0, 1, 8, 9, 4, 5, 12, 13});
+      v[k + a + 2] = __builtin_shuffle(u[k + a], u[k + a + 2], Lanes{2, 3, 10, 11, 6, 7, 14, 15});
+    }
+  for (int a = 0; a < 4; ++a)
+  {
+    m[a] = __builtin_shuffle(v[a], v[a + 4], Lanes{0, 1, 2, 3, 8, 9, 10, 11});
+    m[a + 4] = __builtin_shuffle(v[a], v[a + 4], Lanes{4, 5, 6, 7, 12, 13, 14, 15});
+  }
+}
+
+using Quad = double __attribute__((vector_size(32)));
+
+/// Points ids[0..7] of an array with 4 doubles per point, aligned to 32 bytes.
+SLENDER_INLINE Vec3<Pack> gatherPoints(const double* x, const int* ids)
+{
+  Pack v[4];   // point k and point k + 4
+  for (int k = 0; k < 4; ++k)
+  {
+    const Quad low = *reinterpret_cast<const Quad*>(x + 4 * ids[k]), high = *reinterpret_cast<const Quad*>(x + 4 * ids[k + 4]);
+    v[k] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+  }
+  const Pack xz01 = __builtin_shuffle(v[0], v[1], Lanes{0, 8, 2, 10, 4, 12, 6, 14}), y01 = __builtin_shuffle(v[0], v[1], Lanes{1, 9, 3, 11, 5, 13, 7, 15});
+  const Pack xz23 = __builtin_shuffle(v[2], v[3], Lanes{0, 8, 2, 10, 4, 12, 6, 14}), y23 = __builtin_shuffle(v[2], v[3], Lanes{1, 9, 3, 11, 5, 13, 7, 15});
+  return {__builtin_shuffle(xz01, xz23, Lanes{0, 1, 8, 9, 4, 5, 12, 13}), __builtin_shuffle(y01, y23, Lanes{0, 1, 8, 9, 4, 5, 12, 13}),
+          __builtin_shuffle(xz01, xz23, Lanes{2, 3, 10, 11, 6, 7, 14, 15})};
+}
+
+/// Adds to them, one after another: ids may repeat.
+SLENDER_INLINE void scatterPoints(double* x, const int* ids, const Vec3<Pack>& v)
+{
+  const Pack zero = {};
+  const Pack even = __builtin_shuffle(v.x, v.y, Lanes{0, 8, 2, 10, 4, 12, 6, 14}), odd = __builtin_shuffle(v.x, v.y, Lanes{1, 9, 3, 11, 5, 13, 7, 15});
+  const Pack even_z = __builtin_shuffle(v.z, zero, Lanes{0, 8, 2, 10, 4, 12, 6, 14}), odd_z = __builtin_shuffle(v.z, zero, Lanes{1, 9, 3, 11, 5, 13, 7, 15});
+  const Pack quads[4] = {__builtin_shuffle(even, even_z, Lanes{0, 1, 8, 9, 4, 5, 12, 13}), __builtin_shuffle(odd, odd_z, Lanes{0, 1, 8, 9, 4, 5, 12, 13}),
+                         __builtin_shuffle(even, even_z, Lanes{2, 3, 10, 11, 6, 7, 14, 15}), __builtin_shuffle(odd, odd_z, Lanes{2, 3, 10, 11, 6, 7, 14, 15})};
+  for (int k = 0; k < 4; ++k)
+    *reinterpret_cast<Quad*>(x + 4 * ids[k]) += __builtin_shufflevector(quads[k], quads[k], 0, 1, 2, 3);
+  for (int k = 0; k < 4; ++k)
+    *reinterpret_cast<Quad*>(x + 4 * ids[k + 4]) += __builtin_shufflevector(quads[k], quads[k], 4, 5, 6, 7);
+}
+
+/// Adds 3 x 3 blocks (m[3 column + row] in packs, one block per lane) to the blocks of a matrix: slot 2 b adds lane k to block b, slot
+/// 2 b + 1 its transpose. `slots` are those of lane 0; the next lane's follow `stride` later.
+SLENDER_INLINE void scatterBlocks(double* values, const int* slots, int stride, const Pack (&m)[9])
+{
+  const Lanes order[2] = {{0, 1, 2, 3, 4, 5, 6, 7}, {0, 3, 6, 1, 4, 7, 2, 5}};
+  Pack t[8];
+  for (int k = 0; k < 8; ++k)
+    t[k] = m[k];
+  transpose(t);
+  for (int k = 0; k < W; ++k)
+  {
+    const int slot = slots[k * stride];
+    double* block = values + 9 * static_cast<long>(slot >> 1);
+    store(block, load(block) + __builtin_shuffle(t[k], order[slot & 1]));
+    block[8] += m[8][k];
+  }
+}
+
 }  // namespace
 }  // namespace SLENDER_ISA
 }  // namespace slender

@@ -8,22 +8,6 @@ namespace slender {
 namespace SLENDER_ISA {
 namespace {
 
-/// atan2 in (-pi, pi] for arguments on the unit circle: three half-angle steps, then the Taylor series.
-SLENDER_INLINE Pack angleOf(Pack s, Pack c)
-{
-  const Pack ca = absolute(c);
-  Pack u = s / (ca + squareRoot(s * s + c * c));
-  u = u / (1.0 + squareRoot(1.0 + u * u));
-  u = u / (1.0 + squareRoot(1.0 + u * u));
-  const Pack z = u * u;   // |u| <= tan(pi/16)
-  Pack series = Pack{} + 1.0 / 23;
-  for (int k = 21; k >= 1; k -= 2)
-    series = 1.0 / k - z * series;
-  const Pack a = 8.0 * u * series;
-  const Pack pi = Pack{} + kTwoPi / 2;
-  return c < 0.0 ? (s < 0.0 ? -pi - a : pi - a) : a;
-}
-
 void copyEdge(const RodArrays& r, int to, int from)
 {
   for (int k = 0; k < 3; ++k)
@@ -166,29 +150,6 @@ SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffe
     storeVec(buffer.e_tf, h.e_tf);
     storeVec(buffer.f_te, h.f_te);
     storeVec(buffer.f_tf, h.f_tf);
-  }
-}
-
-/// In-register transposition of an 8 x 8 block.
-SLENDER_INLINE void transpose(Pack (&m)[8])
-{
-  Pack u[8];
-  for (int k = 0; k < 8; k += 2)
-  {
-    u[k] = __builtin_shuffle(m[k], m[k + 1], Lanes{0, 8, 2, 10, 4, 12, 6, 14});
-    u[k + 1] = __builtin_shuffle(m[k], m[k + 1], Lanes{1, 9, 3, 11, 5, 13, 7, 15});
-  }
-  Pack v[8];
-  for (int k = 0; k < 8; k += 4)
-    for (int a = 0; a < 2; ++a)
-    {
-      v[k + a] = __builtin_shuffle(u[k + a], u[k + a + 2], Lanes{0, 1, 8, 9, 4, 5, 12, 13});
-      v[k + a + 2] = __builtin_shuffle(u[k + a], u[k + a + 2], Lanes{2, 3, 10, 11, 6, 7, 14, 15});
-    }
-  for (int a = 0; a < 4; ++a)
-  {
-    m[a] = __builtin_shuffle(v[a], v[a + 4], Lanes{0, 1, 2, 3, 8, 9, 10, 11});
-    m[a + 4] = __builtin_shuffle(v[a], v[a + 4], Lanes{4, 5, 6, 7, 12, 13, 14, 15});
   }
 }
 

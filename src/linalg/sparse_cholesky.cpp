@@ -5,6 +5,8 @@
 
 #include <suitesparse/cholmod.h>
 
+#include "slender_sim/linalg/point_kernel.h"
+
 namespace slender {
 
 struct SparseCholesky::Impl
@@ -21,6 +23,7 @@ struct SparseCholesky::Impl
   ~Impl()
   {
     cholmod_free_factor(&factor, &common);
+    cholmod_free_dense(&right, &common);
     cholmod_free_dense(&solution, &common);
     cholmod_free_dense(&work_y, &common);
     cholmod_free_dense(&work_e, &common);
@@ -43,6 +46,34 @@ struct SparseCholesky::Impl
     a.packed = 1;
     return a;
   }
+
+  /// Symmetric pattern without values, lower triangle by columns.
+  static cholmod_sparse patternView(std::vector<int>& starts, std::vector<int>& rows)
+  {
+    cholmod_sparse a{};
+    a.nrow = a.ncol = starts.size() - 1;
+    a.nzmax = rows.size();
+    a.p = starts.data();
+    a.i = rows.data();
+    a.stype = -1;
+    a.itype = CHOLMOD_INT;
+    a.xtype = CHOLMOD_PATTERN;
+    a.sorted = 1;
+    a.packed = 1;
+    return a;
+  }
+
+  /// Where the values of a block (or number) of a matrix of points go; its columns follow each other, each one shorter by one.
+  struct Target
+  {
+    int at, column_length;   ///< of its first column, and of that column
+    bool transposed, diagonal;
+  };
+  std::vector<int> place;         ///< of each point in the order of elimination
+  std::vector<Target> targets;
+  int unknowns = 1;               ///< per point
+  cholmod_dense* right = nullptr; ///< work space of solvePoints: for blocks
+  PointVector permuted;           ///< for numbers
 
   cholmod_common common;
   cholmod_factor* factor = nullptr;
@@ -69,6 +100,168 @@ void SparseCholesky::setPattern(int size, std::vector<int> starts, std::vector<i
     throw std::bad_alloc();
 }
 
+void SparseCholesky::setPattern(const BlockMatrix& matrix) { setPointPattern(matrix, 3); }
+
+void SparseCholesky::setPattern(const PointMatrix& matrix)
+{
+  std::vector<std::pair<int, int>> pairs;
+  for (int i = 0; i < matrix.size(); ++i)
+    for (int k = matrix.starts()[i]; k < matrix.starts()[i + 1]; ++k)
+      if (matrix.column(k) < i)
+        pairs.emplace_back(matrix.column(k), i);
+  Eigen::MatrixXi edges(2, static_cast<Eigen::Index>(pairs.size()));
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    edges.col(static_cast<Eigen::Index>(k)) << pairs[k].first, pairs[k].second;
+  setPointPattern(BlockMatrix(matrix.size(), {edges}), 1);
+  // entries of the lower triangle in the order of the rows, each to the target of its block
+  const BlockMatrix pattern(matrix.size(), {edges});
+  const std::vector<int> map = pattern.mapOf(matrix);
+  std::vector<Impl::Target> targets;
+  for (const int block : map)
+    if (block >= 0)
+      targets.push_back(impl_->targets[block]);
+  impl_->targets.swap(targets);
+}
+
+void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
+{
+  Impl& m = *impl_;
+  const int points = pattern.points(), d = unknowns;
+  // order of the points, postordered, by CHOLMOD's analysis of their graph
+  std::vector<int> starts = pattern.starts(), rows = pattern.rows();
+  cholmod_sparse graph = Impl::patternView(starts, rows);
+  m.common.nmethods = 1;
+  m.common.method[0].ordering = CHOLMOD_METIS;
+  m.common.postorder = 1;
+  cholmod_factor* order = cholmod_analyze(&graph, &m.common);
+  if (!order)
+    throw std::bad_alloc();
+  m.unknowns = d;
+  m.place.resize(points);
+  for (int k = 0; k < points; ++k)
+    m.place[static_cast<int*>(order->Perm)[k]] = k;
+  cholmod_free_factor(&order, &m.common);
+
+  // the permuted pattern; CHOLMOD takes it as it is, without making copies
+  std::vector<std::vector<std::pair<int, int>>> columns(points);   // row, block
+  for (int j = 0; j < points; ++j)
+    for (int k = pattern.starts()[j]; k < pattern.starts()[j + 1]; ++k)
+    {
+      const int a = m.place[j], b = m.place[pattern.rows()[k]];
+      columns[std::min(a, b)].emplace_back(std::max(a, b), k);
+    }
+  m.targets.resize(pattern.blocks());
+  m.starts.assign(1, 0);
+  m.rows.clear();
+  std::vector<int> column_of(pattern.blocks());
+  for (int j = 0; j < points; ++j)
+    for (int k = pattern.starts()[j]; k < pattern.starts()[j + 1]; ++k)
+      column_of[k] = j;
+  for (int j = 0; j < points; ++j)
+  {
+    std::sort(columns[j].begin(), columns[j].end());
+    const int begin = m.starts.back(), length = d * static_cast<int>(columns[j].size());
+    for (std::size_t r = 0; r < columns[j].size(); ++r)
+    {
+      const int k = columns[j][r].second;
+      m.targets[k] = {begin + d * static_cast<int>(r), length, m.place[column_of[k]] != j, r == 0};
+    }
+    for (int c = 0; c < d; ++c)
+    {
+      for (const auto& [row, block] : columns[j])
+        for (int e = row == j ? c : 0; e < d; ++e)
+          m.rows.push_back(d * row + e);
+      m.starts.push_back(static_cast<int>(m.rows.size()));
+    }
+  }
+  m.values.assign(m.rows.size(), 0.0);
+  m.common.method[0].ordering = CHOLMOD_NATURAL;
+  m.common.postorder = 0;
+  const std::size_t widths[3] = {16, 48, 128};
+  const double zeros[3] = {0.8, 0.3, 0.1};
+  for (int k = 0; k < 3; ++k)
+  {
+    m.common.nrelax[k] = widths[k];
+    m.common.zrelax[k] = zeros[k];
+  }
+  m.common.supernodal = CHOLMOD_SUPERNODAL;
+  cholmod_free_factor(&m.factor, &m.common);
+  cholmod_sparse a = m.view();
+  m.factor = cholmod_analyze(&a, &m.common);
+  cholmod_free_dense(&m.right, &m.common);
+  if (d == 1)
+    m.permuted.assign(4 * points, 0.0);
+  else
+    m.right = cholmod_allocate_dense(d * points, 1, d * points, CHOLMOD_REAL, &m.common);
+  if (!m.factor || (d != 1 && !m.right))
+    throw std::bad_alloc();
+}
+
+bool SparseCholesky::factor(const BlockMatrix& matrix, const char* fixed)
+{
+  Impl& m = *impl_;
+  for (int j = 0; j < matrix.points(); ++j)
+    for (int k = matrix.starts()[j]; k < matrix.starts()[j + 1]; ++k)
+    {
+      const Impl::Target& t = m.targets[k];
+      const double* block = matrix.values() + 9 * static_cast<std::size_t>(k);
+      const bool leave_out = fixed && (fixed[j] || fixed[matrix.rows()[k]]);
+      // column c of the target begins after c columns, each one shorter by one, and has lost its first c rows
+      for (int c = 0; c < 3; ++c)
+      {
+        double* out = m.values.data() + t.at + c * t.column_length - c * (c - 1) / 2 - c;
+        for (int r = t.diagonal ? c : 0; r < 3; ++r)
+          out[r] = leave_out ? (t.diagonal && r == c) : t.transposed ? block[3 * r + c] : block[3 * c + r];
+      }
+    }
+  return factorValues();
+}
+
+bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed)
+{
+  Impl& m = *impl_;
+  std::size_t next = 0;
+  for (int i = 0; i < matrix.size(); ++i)
+    for (int k = matrix.starts()[i]; k < matrix.starts()[i + 1]; ++k)
+    {
+      const int j = matrix.column(k);
+      if (j > i)
+        continue;
+      const bool leave_out = fixed && (fixed[i] || fixed[j]);
+      m.values[m.targets[next++].at] = leave_out ? i == j : matrix.values()[k];
+    }
+  return factorValues();
+}
+
+void SparseCholesky::solvePoints(const double* b, double* x) const
+{
+  Impl& m = *impl_;
+  const int points = static_cast<int>(m.place.size());
+  if (m.unknowns == 1)
+  {
+    // three right-hand sides are too few for BLAS: a kernel of our own takes a third of the time
+    for (int i = 0; i < points; ++i)
+      std::copy_n(b + 4 * i, 4, m.permuted.data() + 4 * m.place[i]);
+    const cholmod_factor& f = *m.factor;
+    pointKernels().solveSupernodal({static_cast<int>(f.nsuper), static_cast<const int*>(f.super), static_cast<const int*>(f.pi),
+                                    static_cast<const int*>(f.px), static_cast<const int*>(f.s), static_cast<const double*>(f.x)},
+                                   m.permuted.data());
+    for (int i = 0; i < points; ++i)
+      std::copy_n(m.permuted.data() + 4 * m.place[i], 4, x + 4 * i);
+    return;
+  }
+  double* right = static_cast<double*>(m.right->x);
+  for (int i = 0; i < points; ++i)
+    std::copy_n(b + 4 * i, 3, right + 3 * m.place[i]);
+  cholmod_solve2(CHOLMOD_A, m.factor, m.right, nullptr, &m.solution, nullptr, &m.work_y, &m.work_e, &m.common);
+  const double* solution = static_cast<const double*>(m.solution->x);
+  for (int i = 0; i < points; ++i)
+  {
+    std::copy_n(solution + 3 * m.place[i], 3, x + 4 * i);
+    x[4 * i + 3] = 0.0;
+  }
+}
+
 int SparseCholesky::size() const { return static_cast<int>(impl_->starts.size()) - 1; }
 double* SparseCholesky::values() { return impl_->values.data(); }
 const std::vector<int>& SparseCholesky::starts() const { return impl_->starts; }
@@ -80,7 +273,9 @@ int SparseCholesky::index(int row, int column) const
   return static_cast<int>(std::lower_bound(begin + impl_->starts[column], begin + impl_->starts[column + 1], row) - begin);
 }
 
-bool SparseCholesky::factor()
+bool SparseCholesky::factor() { return factorValues(); }
+
+bool SparseCholesky::factorValues()
 {
   Impl& m = *impl_;
   cholmod_sparse a = m.view();

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/linalg/banded_ldlt.h"
 #include "test/support/contact.h"
 #include "test/support/groups.h"
@@ -157,6 +159,47 @@ TEST(ThreadAllocations, AWarmStepMakesNone)
   EXPECT_EQ(allocations - before, 0);
   EXPECT_TRUE(ok);
   EXPECT_GT(t.state.next_id, fed + 10);
+}
+
+/// CHOLMOD takes its workspace anew for each factorisation, so ClothSolver::cholesky is not among them.
+TEST(ClothAllocations, AWarmStepMakesNone)
+{
+  for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
+    for (const Integrator integrator : {Integrator::implicit_euler, Integrator::symplectic_euler})
+      for (const bool one_newton_step : {false, true})
+      {
+        auto model = std::make_shared<ClothModel>(
+          buildCloth("c", gridMesh(0.5, 0.5, 8, 8, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 1e-3)));
+        model->bending = bending;
+        model->bending_modulus = 1e-4;
+        model->stiffness_damping = 1e-4;
+        model->wind_coefficient = 0.5;
+        ClothState state = makeClothState(*model, model->rest.vertices);
+        pinVertices(state, {0, 8});
+        ClothInputs inputs;
+        inputs.wind << 1, 2, 3;
+        inputs.pins.resize(3, 2);
+        inputs.pins.col(0) = state.x.col(0);
+        inputs.pins.col(1) = state.x.col(8);
+        ClothOptions options;
+        options.integrator = integrator;
+        options.one_newton_step = one_newton_step;
+        options.solver = ClothSolver::conjugate_gradients;
+        ClothStepper stepper(model, options);
+        const double h = integrator == Integrator::symplectic_euler ? 1e-5 : 5e-3;
+        const auto advance = [&] {
+          inputs.pins(2, 0) += 0.1 * h;
+          return stepper.step(state, inputs, h).ok;
+        };
+        for (int k = 0; k < 5; ++k)
+          ASSERT_TRUE(advance());
+        const long before = allocations;
+        bool ok = true;
+        for (int k = 0; k < 5; ++k)
+          ok = advance() && ok;
+        EXPECT_EQ(allocations - before, 0) << toString(bending) << toString(integrator) << one_newton_step;
+        EXPECT_TRUE(ok);
+      }
 }
 
 TEST(ContactAllocations, WarmContactMakesNone)

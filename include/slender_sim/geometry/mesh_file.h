@@ -12,4 +12,21 @@ namespace slender {
 /// one twice, or with one that the file does not have (later vertices may be named only by absolute indices), no faces at all.
 TriangleMesh readObj(const std::string& path);
 
+/// Reads x, y, z of the element "vertex" and the list vertex_indices (or vertex_index) of the element "face" of a Stanford PLY file [m]:
+/// ascii, binary_little_endian or binary_big_endian; order of vertices and polygons as in readObj, other elements and properties are
+/// passed over. Throws std::runtime_error "FILE: reason": not readable, a header that is not PLY's or lacks these, the
+/// file ends early, and what readObj says of numbers and faces.
+TriangleMesh readPly(const std::string& path);
+
+/// By the end of the name: .obj or .ply, in small or capital letters. Throws std::runtime_error for another.
+TriangleMesh readMesh(const std::string& path);
+
+/// Write all vertices in order, with enough digits to read the same doubles back (PLY: binary_little_endian, double). Throw
+/// std::runtime_error "FILE: cannot be written".
+void writeObj(const std::string& path, const TriangleMesh& mesh);
+void writePly(const std::string& path, const TriangleMesh& mesh);
+
+/// By the end of the name, as readMesh.
+void writeMesh(const std::string& path, const TriangleMesh& mesh);
+
 }  // namespace slender

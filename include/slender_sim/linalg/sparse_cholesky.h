@@ -3,6 +3,8 @@
 #include <memory>
 #include <vector>
 
+#include "slender_sim/linalg/block_matrix.h"
+
 namespace slender {
 
 /// Cholesky factorisation of sparse symmetric matrices whose pattern stays while their values change (CHOLMOD).
@@ -19,6 +21,17 @@ public:
   /// Analyses the pattern (fill-reducing order); values() are zero afterwards.
   void setPattern(int size, std::vector<int> starts, std::vector<int> rows);
 
+  /// Likewise for the matrices of points: 3 x 3 blocks, or one number for all three coordinates. The order is found by nested dissection of
+  /// the graph of points (METIS), with the unknowns of a point next to each other and supernodes wider than CHOLMOD's. values(), starts(), rows() and index() are then not
+  /// to be used.
+  void setPattern(const BlockMatrix& matrix);
+  void setPattern(const PointMatrix& matrix);
+  /// As factor(), of a matrix with that pattern. Points with fixed[i] != 0 keep their place: their rows and columns are those of the identity.
+  bool factor(const BlockMatrix& matrix, const char* fixed);
+  bool factor(const PointMatrix& matrix, const char* fixed);
+  /// x = A^-1 b for points (4 doubles each; x may be b). Fixed points: x = b.
+  void solvePoints(const double* b, double* x) const;
+
   int size() const;
   /// One per entry of the pattern.
   double* values();
@@ -33,6 +46,9 @@ public:
   void solve(double* x) const;
 
 private:
+  void setPointPattern(const BlockMatrix& pattern, int unknowns);
+  bool factorValues();
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace slender {
+
+/// Everything that changes while a cloth moves; saving and restoring it restarts bit-equal.
+struct ClothState
+{
+  Eigen::Matrix3Xd x;            ///< vertices [m], 3 x n
+  Eigen::Matrix3Xd v;            ///< velocities [m/s], 3 x n
+  Eigen::VectorXd rest_angles;   ///< per hinge [rad], hinge bending only: plastic flow moves them
+  std::vector<int> pins;         ///< held vertices, ascending
+};
+
+}  // namespace slender

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <memory>
+
+#include "slender_sim/cloth/cloth_model.h"
+#include "slender_sim/dynamics/step_report.h"
+#include "slender_sim/dynamics/time_config.h"
+
+namespace slender {
+
+/// Inputs of one cloth, latched once per step.
+struct ClothInputs
+{
+  Eigen::Matrix3Xd pins;                  ///< where each pin shall be at the end of the step, 3 x pins; the motion inside it is uniform
+  Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
+  Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
+  Eigen::Matrix3Xd forces;                ///< extra forces on the vertices, 3 x n [N], or empty
+};
+
+struct ClothEnergies
+{
+  double membrane = 0, bending = 0, kinetic = 0, gravity = 0;   ///< [J]
+  double total() const { return membrane + bending + kinetic + gravity; }
+};
+
+enum class ClothSolver
+{
+  automatic,             ///< conjugate gradients for one Newton step or more than 5000 vertices, else cholesky
+  cholesky,              ///< factorisation of the whole matrix
+  conjugate_gradients    ///< preconditioned by a constant matrix of points (mass, bending, rest membrane)
+};
+
+struct ClothOptions
+{
+  Integrator integrator = Integrator::implicit_euler;   ///< implicit_euler or symplectic_euler
+  bool one_newton_step = false;          ///< implicit: linearised about the start of the step [Baraff & Witkin 1998]
+  ClothSolver solver = ClothSolver::automatic;
+  /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged velocity.
+  double linear_tolerance = 0.02;
+  NewtonConfig newton;
+};
+
+/// Advances one cloth.
+class ClothStepper
+{
+public:
+  /// Throws std::invalid_argument for a model or options that are not valid.
+  ClothStepper(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
+  ~ClothStepper();
+  ClothStepper(ClothStepper&&) noexcept;
+
+  /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
+  StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
+
+  /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step.
+  const Eigen::Matrix3Xd& pinForces() const;
+
+  ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;
+  /// What `automatic` took.
+  ClothSolver solver() const;
+  const ClothModel& model() const;
+
+private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slender

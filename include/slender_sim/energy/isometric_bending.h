@@ -1,0 +1,35 @@
+#pragma once
+
+#include "slender_sim/geometry/mesh_topology.h"
+#include "slender_sim/linalg/point_matrix.h"
+
+namespace slender {
+
+/// Discretisations of the isometric bending model E = 1/2 int |Laplacian x|^2 (thesis 2.4).
+enum class IsometricElement
+{
+  nonconforming,   ///< per edge, the hinge's stencil (2.4.4)
+  conforming       ///< per inner vertex: cotangents, Voronoi cells lumped (2.4.1)
+};
+
+const char* toString(IsometricElement element);
+
+/// `coefficient` times K = L^T M^-1 L of the thesis on the rest mesh: E = 1/2 x^T K x for each coordinate of the points. Boundary edges
+/// (nonconforming) and boundary vertices (conforming) have no row in L, so a free boundary is free. It is positive semidefinite, and constants are in its
+/// kernel, and linear functions if the mesh is flat.
+PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& topology, IsometricElement element, double coefficient);
+
+/// The number by which a plate's bending modulus D must be multiplied to become the coefficient of isometricBending() or hingeStiffness().
+///
+/// With coefficient 1 the models give energies that depend on the mesh: three times 1/2 int H^2 for a cylinder on equilateral triangles
+/// (nonconforming). The calibration makes the energies of cylinders bent along `warp` and across it D area / (2 R^2) in the mean of
+/// the two, for cylinders that the vertices lie on. It is 1/3 for nonconforming elements and 1 for conforming ones on equilateral and right-angled
+/// lattices with edges along the warp. `warp` is a direction in space, projected onto the mesh; where it is normal to it nothing is counted.
+/// Throws std::invalid_argument if nothing is left.
+double bendingCalibration(const TriangleMesh& mesh, const MeshTopology& topology, IsometricElement element, const Eigen::Vector3d& warp);
+
+/// Stiffnesses k of hinges E = sum 1/2 k (theta - rest)^2 that have nonconforming isometric bending as their small-angle limit:
+/// coefficient 3 |e|^2 / (A0 + A1) [N m].
+Eigen::VectorXd hingeStiffness(const TriangleMesh& mesh, const MeshTopology& topology, double coefficient);
+
+}  // namespace slender

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cmath>
+
+#include "slender_sim/linalg/point_kernel.h"
+#include "slender_sim/linalg/point_matrix.h"
+
+namespace slender {
+
+struct LinearResult
+{
+  int iterations = 0;
+  double residual = 0.0;   ///< over the right-hand side's, in the preconditioner's norm sqrt(r . P r)
+  bool definite = true;    ///< no direction of negative curvature was met
+};
+
+/// Preconditioned conjugate gradients for points, with memory of its own.
+class ConjugateGradients
+{
+public:
+  void resize(int points)
+  {
+    points_ = points;
+    for (PointVector* v : {&r_, &z_, &p_, &ap_})
+      v->assign(4 * points, 0.0);
+  }
+
+  /// Solves A x = b from x = 0. apply(p, ap) writes A p, precondition(r, z) writes P r; both leave fixed points zero. Stops at the
+  /// tolerance, after max_iterations, or at negative curvature with the x so far.
+  template <class Apply, class Precondition>
+  LinearResult solve(const PointVector& b, PointVector& x, double tolerance, int max_iterations, Apply apply, Precondition precondition)
+  {
+    const PointKernels& k = pointKernels();
+    LinearResult result;
+    std::fill(x.begin(), x.end(), 0.0);
+    std::copy(b.begin(), b.end(), r_.begin());
+    precondition(r_, z_);
+    double rz = k.dot(points_, r_.data(), z_.data());
+    const double start = rz;
+    if (!(start > 0))
+    {
+      result.definite = start == 0.0;
+      return result;
+    }
+    std::copy(z_.begin(), z_.end(), p_.begin());
+    while (result.iterations < max_iterations)
+    {
+      apply(p_, ap_);
+      const double curvature = k.dot(points_, p_.data(), ap_.data());
+      if (!(curvature > 0))
+      {
+        result.definite = false;
+        break;
+      }
+      const double alpha = rz / curvature;
+      for (std::size_t i = 0; i < x.size(); ++i)
+      {
+        x[i] += alpha * p_[i];
+        r_[i] -= alpha * ap_[i];
+      }
+      ++result.iterations;
+      precondition(r_, z_);
+      const double next = k.dot(points_, r_.data(), z_.data());
+      result.residual = std::sqrt(std::abs(next) / start);
+      if (!(result.residual > tolerance))
+        break;
+      const double beta = next / rz;
+      rz = next;
+      for (std::size_t i = 0; i < p_.size(); ++i)
+        p_[i] = z_[i] + beta * p_[i];
+    }
+    return result;
+  }
+
+private:
+  int points_ = 0;
+  PointVector r_, z_, p_, ap_;
+};
+
+}  // namespace slender

@@ -1,0 +1,34 @@
+#pragma once
+
+/// Products of the sparse matrices of points. Points have 4 doubles, the last of them unused; vectors are aligned to 64 bytes.
+namespace slender {
+
+/// L of a supernodal Cholesky factorisation as CHOLMOD keeps it: supernode s has the columns first[s] .. first[s + 1] - 1 and the rows
+/// rows[row_starts[s]] .. rows[row_starts[s + 1] - 1], those of its own columns first; values by columns from value_starts[s] on.
+struct SupernodalFactor
+{
+  int supernodes = 0;
+  const int *first = nullptr, *row_starts = nullptr, *value_starts = nullptr, *rows = nullptr;
+  const double* values = nullptr;
+};
+
+struct PointKernels
+{
+  /// y = A x (factor 0) or y += factor A x, full rows; offsets are four times the columns. Returns x . A x.
+  double (*multiply)(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y);
+  /// y += A x for a symmetric matrix of 3 x 3 blocks: lower triangle by columns, the diagonal block first, blocks by columns.
+  void (*multiplyBlocks)(int columns, const int* starts, const int* rows, const double* values, const double* x, double* y);
+  /// x := (L L^T)^-1 x for each coordinate.
+  void (*solveSupernodal)(const SupernodalFactor& factor, double* x);
+  /// Sum of x . y over points; the unused parts do not count.
+  double (*dot)(int points, const double* x, const double* y);
+};
+
+namespace baseline { extern const PointKernels point_kernels; }
+namespace avx2 { extern const PointKernels point_kernels; }
+namespace avx512 { extern const PointKernels point_kernels; }
+
+/// The table for this machine.
+const PointKernels& pointKernels();
+
+}  // namespace slender

@@ -1,0 +1,389 @@
+#include "cloth_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+namespace slender {
+
+namespace {
+
+/// One Newton step needs few iterations of conjugate gradients; many exact ones are faster by factoring as long as that is cheap.
+ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
+{
+  constexpr int kLargestFactored = 5000;
+  if (options.solver != ClothSolver::automatic)
+    return options.solver;
+  return options.one_newton_step || model.vertices() > kLargestFactored ? ClothSolver::conjugate_gradients : ClothSolver::cholesky;
+}
+
+/// Cotangent stiffness of the rest mesh times a modulus: the membrane as if it acted on each coordinate alike.
+PointMatrix scalarMembrane(const ClothModel& model)
+{
+  std::vector<Eigen::Triplet<double>> entries;
+  const double modulus = 0.5 * (model.membrane.c11 + model.membrane.c22);
+  const Eigen::Matrix3Xd& x = model.rest.vertices;
+  for (Eigen::Index f = 0; f < model.rest.triangles.cols(); ++f)
+    for (int k = 0; k < 3; ++k)
+    {
+      const auto corner = [&](int c) { return model.rest.triangles((k + c) % 3, f); };
+      const int a = corner(1), b = corner(2);
+      const Eigen::Vector3d u = x.col(a) - x.col(corner(0)), v = x.col(b) - x.col(corner(0));
+      const double weight = 0.5 * modulus * u.dot(v) / u.cross(v).norm();
+      entries.emplace_back(a, a, weight);
+      entries.emplace_back(b, b, weight);
+      entries.emplace_back(a, b, -weight);
+      entries.emplace_back(b, a, -weight);
+    }
+  return PointMatrix(model.vertices(), entries);
+}
+
+Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
+{
+  std::vector<int> pairs;
+  for (int i = 0; i < matrix.size(); ++i)
+    for (int k = matrix.starts()[i]; k < matrix.starts()[i + 1]; ++k)
+      if (matrix.column(k) < i)
+        pairs.insert(pairs.end(), {i, matrix.column(k)});
+  return Eigen::Map<const Eigen::MatrixXi>(pairs.data(), 2, static_cast<Eigen::Index>(pairs.size() / 2));
+}
+
+void addScaled(const PointMatrix& matrix, double factor, std::vector<Eigen::Triplet<double>>& entries)
+{
+  for (int i = 0; i < matrix.size(); ++i)
+    for (int k = matrix.starts()[i]; k < matrix.starts()[i + 1]; ++k)
+      entries.emplace_back(i, matrix.column(k), factor * matrix.values()[k]);
+}
+
+}  // namespace
+
+double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
+
+ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
+  : model_(model), solver_(chosen(model, options)), linear_tolerance_(options.linear_tolerance)
+  , membrane_(model.rest, model.membrane, model.warp)
+{
+  const int n = points();
+  const bool direct = solver_ == ClothSolver::cholesky;
+  const MeshTopology& t = model.topology;
+  if (model.bending != BendingModel::none && model.bending_modulus > 0 && t.hingeCount() > 0)
+  {
+    const auto element = model.bending == BendingModel::isometric_conforming ? IsometricElement::conforming : IsometricElement::nonconforming;
+    const double coefficient = model.bending_modulus * bendingCalibration(model.rest, t, element, model.warp);
+    constant_bending_ = model.bending != BendingModel::hinge;
+    if (!constant_bending_)
+      hinges_ = std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()));
+    if (constant_bending_ || !direct)
+      bending_ = isometricBending(model.rest, t, element, coefficient);
+  }
+  std::vector<Eigen::MatrixXi> elements{model.rest.triangles};
+  if (hinges_)
+    elements.emplace_back(t.hinges);
+  bending_in_blocks_ = constant_bending_ && direct;
+  if (bending_in_blocks_)
+    elements.push_back(pairsOf(bending_));
+  matrix_ = BlockMatrix(n, elements);
+  membrane_slots_ = membrane_.slotsIn(matrix_);
+  if (hinges_)
+    hinge_slots_ = hinges_->slotsIn(matrix_);
+  if (bending_in_blocks_)
+    bending_map_ = matrix_.mapOf(bending_);
+  if (direct)
+    factor_.setPattern(matrix_);
+  else
+  {
+    stand_in_ = scalarMembrane(model);
+    std::vector<Eigen::Triplet<double>> entries;
+    for (const PointMatrix* part : {&bending_, &stand_in_})
+      addScaled(*part, 1.0, entries);
+    factor_.setPattern(PointMatrix(n, entries));
+    cg_.resize(n);
+  }
+  for (PointVector* v : {&start_, &target_, &force_, &gradient_, &product_, &right_, &correction_})
+    v->assign(4 * n, 0.0);
+  weight_.assign(n, 0.0);
+  held_.assign(n, 0);
+  if (model.wind_coefficient > 0)
+  {
+    drag_.assign(n, Eigen::Matrix3d::Zero());
+    wind_target_.assign(4 * n, 0.0);
+  }
+  if (model.stiffness_damping > 0)
+  {
+    for (auto& s : strains_)
+      s.assign(membrane_.paddedCount(), 0.0);
+    if (hinges_)
+      angles_.assign(hinges_->paddedCount(), 0.0);
+  }
+}
+
+void ClothSystem::setRestAngles(const Eigen::VectorXd& angles)
+{
+  if (hinges_)
+    for (int h = 0; h < hinges_->count(); ++h)
+      hinges_->setRestAngle(h, angles[h]);
+}
+
+void ClothSystem::setViscosity(double ratio, const PointVector& x)
+{
+  if (ratio == 0.0 && ratio_ == 0.0)
+    return;
+  ratio_ = ratio;
+  double* strains[3] = {strains_[0].data(), strains_[1].data(), strains_[2].data()};
+  if (ratio > 0)
+    membrane_.strains(x.data(), strains);
+  membrane_.setResponse(ratio, strains);
+  if (constant_bending_ && ratio > 0)
+    viscous_start_ = x;
+  if (hinges_)
+  {
+    if (ratio > 0)
+      hinges_->angles(x.data(), angles_.data());
+    hinges_->setResponse(ratio, angles_.data());
+  }
+}
+
+/// D of the wind: on each vertex a third of c A n n^T of its faces, times the factor.
+void ClothSystem::gatherDrag(const PointVector& x, double factor)
+{
+  std::fill(drag_.begin(), drag_.end(), Eigen::Matrix3d::Zero());
+  for (Eigen::Index f = 0; f < model_.rest.triangles.cols(); ++f)
+  {
+    const Eigen::Vector3i t = model_.rest.triangles.col(f);
+    const Eigen::Vector3d origin = point(x, t[0]);
+    const Eigen::Vector3d area = 0.5 * (point(x, t[1]) - origin).cross(point(x, t[2]) - origin);
+    const double size = area.norm();
+    if (!(size > 0))
+      continue;
+    const Eigen::Matrix3d drag = factor * model_.wind_coefficient / (3.0 * size) * area * area.transpose();
+    for (int k = 0; k < 3; ++k)
+      drag_[t[k]] += drag;
+  }
+}
+
+void ClothSystem::addWind(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind, PointVector& force) const
+{
+  for (Eigen::Index f = 0; f < model_.rest.triangles.cols() && !drag_.empty(); ++f)
+  {
+    const Eigen::Vector3i t = model_.rest.triangles.col(f);
+    const Eigen::Vector3d origin = point(x, t[0]);
+    const Eigen::Vector3d area = 0.5 * (point(x, t[1]) - origin).cross(point(x, t[2]) - origin);
+    const double size = area.norm();
+    for (int k = 0; k < 3 && size > 0; ++k)
+      point(force, t[k]) += model_.wind_coefficient / (3.0 * size) * area.dot(wind - point(v, t[k])) * area;
+  }
+}
+
+void ClothSystem::setWeights(double h, double ratio)
+{
+  if (h == base_h_ && ratio == base_ratio_ && held_ == base_held_)
+    return;
+  const int n = points();
+  const double rate = 1.0 / (h * h) + model_.mass_damping / h;
+  for (int i = 0; i < n; ++i)
+    weight_[i] = rate * model_.mass[i];
+  matrix_.setZero();
+  if (bending_in_blocks_)
+    matrix_.add(1.0 + ratio, bending_, bending_map_);
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k)
+      matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += weight_[i];
+  base_.assign(matrix_.values(), matrix_.values() + 9 * matrix_.blocks());
+  if (solver_ == ClothSolver::conjugate_gradients)
+  {
+    std::vector<Eigen::Triplet<double>> entries;
+    for (const PointMatrix* part : {&bending_, &stand_in_})
+      addScaled(*part, 1.0 + ratio, entries);
+    for (int i = 0; i < n; ++i)
+      entries.emplace_back(i, i, weight_[i]);
+    factor_.factor(PointMatrix(n, entries), held_.data());
+  }
+  base_h_ = h;
+  base_ratio_ = ratio;
+  base_held_ = held_;
+}
+
+void ClothSystem::beginStep(const ClothState& state, const ClothInputs& inputs, double h)
+{
+  const int n = points();
+  std::fill(held_.begin(), held_.end(), 0);
+  for (const int p : state.pins)
+    held_[p] = 1;
+  toPoints(state.x, start_);
+  h_ = h;
+  setRestAngles(state.rest_angles);
+  setViscosity(model_.stiffness_damping / h, start_);
+  setWeights(h, ratio_);
+  const bool extra = inputs.forces.cols() > 0;
+  for (int i = 0; i < n; ++i)
+  {
+    point(target_, i) = state.x.col(i) + h / (1.0 + model_.mass_damping * h) * state.v.col(i);
+    point(force_, i) = model_.mass[i] * inputs.gravity;
+    if (extra)
+      point(force_, i) += inputs.forces.col(i);
+  }
+  if (!drag_.empty())
+  {
+    gatherDrag(start_, 1.0 / h);
+    for (int i = 0; i < n; ++i)
+      point(wind_target_, i) = state.x.col(i) + h * inputs.wind;
+  }
+}
+
+ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)
+{
+  ClothEvaluation result;
+  for (int i = 0; i < points(); ++i)
+  {
+    const Eigen::Vector3d away = point(x, i) - point(target_, i);
+    Eigen::Vector3d slope = weight_[i] * away - point(force_, i);
+    result.potential += 0.5 * weight_[i] * away.squaredNorm() - point(force_, i).dot(point(x, i) - point(start_, i));
+    if (!drag_.empty())
+    {
+      const Eigen::Vector3d past = point(x, i) - point(wind_target_, i), drag = drag_[i] * past;
+      result.potential += 0.5 * past.dot(drag);
+      slope += drag;
+    }
+    if (with_gradient)
+      point(gradient_, i) += slope;
+  }
+  return result;
+}
+
+ClothEvaluation ClothSystem::addInternal(const PointVector& x, PointVector& gradient)
+{
+  ClothEvaluation result;
+  const MembraneSums sums = membrane_.addGradient(x.data(), gradient.data());
+  result.membrane = sums.energy;
+  result.max_strain = std::max(sums.max_strain, -sums.min_strain);
+  if (hinges_)
+    result.bending = hinges_->addGradient(x.data(), gradient.data());
+  else if (constant_bending_)
+    result.bending = addIsometric(x, gradient);
+  return result;
+}
+
+/// Viscous response: (1 + ratio) K about the mean of zero and the start of the step, weighted 1 : ratio.
+double ClothSystem::addIsometric(const PointVector& x, PointVector& gradient)
+{
+  double energy = 0.5 * (1.0 + ratio_) * bending_.addProduct(1.0 + ratio_, x.data(), gradient.data());
+  if (ratio_ > 0)
+  {
+    bending_.multiply(viscous_start_.data(), product_.data());
+    energy -= ratio_ * pointKernels().dot(points(), x.data(), product_.data());
+    for (std::size_t i = 0; i < gradient.size(); ++i)
+      gradient[i] -= ratio_ * product_[i];
+  }
+  return energy;
+}
+
+ClothEvaluation ClothSystem::energy(const PointVector& x)
+{
+  ClothEvaluation result = addLoads(x, false);
+  const MembraneSums sums = membrane_.energy(x.data());
+  result.membrane = sums.energy;
+  result.max_strain = std::max(sums.max_strain, -sums.min_strain);
+  if (hinges_)
+    result.bending = hinges_->energy(x.data());
+  else if (constant_bending_)
+  {
+    const double form = bending_.multiply(x.data(), product_.data());
+    result.bending = 0.5 * (1.0 + ratio_) * form;
+    if (ratio_ > 0)
+      result.bending -= ratio_ * pointKernels().dot(points(), viscous_start_.data(), product_.data());
+  }
+  return result;
+}
+
+ClothEvaluation ClothSystem::evaluate(const PointVector& x)
+{
+  std::fill(gradient_.begin(), gradient_.end(), 0.0);
+  ClothEvaluation result = addInternal(x, gradient_);
+  result.potential = addLoads(x, true).potential;
+  return result;
+}
+
+ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind kind)
+{
+  std::copy(base_.begin(), base_.end(), matrix_.values());
+  std::fill(gradient_.begin(), gradient_.end(), 0.0);
+  ClothEvaluation result = addLoads(x, true);
+  const MembraneSums sums = membrane_.addHessian(kind, x.data(), membrane_slots_, gradient_.data(), matrix_.values());
+  result.membrane = sums.energy;
+  result.max_strain = std::max(sums.max_strain, -sums.min_strain);
+  if (hinges_)
+    result.bending = hinges_->addHessian(kind, x.data(), hinge_slots_, gradient_.data(), matrix_.values());
+  else if (constant_bending_)
+    result.bending = addIsometric(x, gradient_);
+  for (std::size_t i = 0; i < drag_.size(); ++i)
+    Eigen::Map<Eigen::Matrix3d>(matrix_.values() + 9 * matrix_.starts()[i]) += drag_[i];
+  return result;
+}
+
+void ClothSystem::shiftMatrix(double factor)
+{
+  for (int i = 0; i < points(); ++i)
+    for (int k = 0; k < 3; ++k)
+      matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += factor * weight_[i];
+}
+
+void ClothSystem::clearHeld(PointVector& v) const
+{
+  for (int i = 0; i < points(); ++i)
+    if (held_[i])
+      point(v, i).setZero();
+}
+
+void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
+{
+  std::fill(ap.begin(), ap.end(), 0.0);
+  matrix_.addProduct(p.data(), ap.data());
+  if (constant_bending_ && !bending_in_blocks_)
+    bending_.addProduct(1.0 + ratio_, p.data(), ap.data());
+}
+
+bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizations)
+{
+  // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
+  bool moved = false;
+  for (int i = 0; i < points(); ++i)
+  {
+    if (solver_ == ClothSolver::cholesky && !held_[i])
+      point(d, i).setZero();
+    moved = moved || point(d, i) != Eigen::Vector3d::Zero();
+  }
+  for (std::size_t i = 0; i < right_.size(); ++i)
+    right_[i] = -gradient_[i];
+  if (moved)
+  {
+    applyMatrix(d, product_);
+    for (std::size_t i = 0; i < right_.size(); ++i)
+      right_[i] -= product_[i];
+  }
+  if (solver_ == ClothSolver::cholesky)
+  {
+    for (int i = 0; i < points(); ++i)
+      if (held_[i])
+        point(right_, i) = point(d, i);
+    ++factorizations;
+    if (!factor_.factor(matrix_, held_.data()))
+      return false;
+    factor_.solvePoints(right_.data(), d.data());
+    return true;
+  }
+  clearHeld(right_);
+  const LinearResult result = cg_.solve(
+    right_, correction_, linear_tolerance_, 2000,
+    [&](const PointVector& p, PointVector& ap) {
+      applyMatrix(p, ap);
+      clearHeld(ap);
+    },
+    [&](const PointVector& r, PointVector& z) { factor_.solvePoints(r.data(), z.data()); });
+  linear_iterations += result.iterations;
+  for (std::size_t i = 0; i < d.size(); ++i)
+    d[i] += correction_[i];
+  return result.definite;
+}
+
+}  // namespace slender

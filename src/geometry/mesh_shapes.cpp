@@ -1,0 +1,240 @@
+#include "slender_sim/geometry/mesh_shapes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+namespace slender {
+
+namespace {
+
+constexpr double kRowHeight = 0.86602540378443864676;   // of an equilateral triangle of side 1
+
+using Faces = std::vector<Eigen::Vector3i>;
+
+TriangleMesh meshOf(const std::vector<Eigen::Vector3d>& vertices, const Faces& faces)
+{
+  TriangleMesh mesh;
+  mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
+  mesh.triangles.resize(3, static_cast<Eigen::Index>(faces.size()));
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    mesh.vertices.col(i) = vertices[i];
+  for (std::size_t i = 0; i < faces.size(); ++i)
+    mesh.triangles.col(i) = faces[i];
+  return mesh;
+}
+
+TriangleMesh rightAngled(double width, double height, int columns, int rows, bool alternating)
+{
+  std::vector<Eigen::Vector3d> vertices;
+  Faces faces;
+  for (int j = 0; j <= rows; ++j)
+    for (int i = 0; i <= columns; ++i)
+      vertices.emplace_back(width * i / columns, height * j / rows, 0.0);
+  for (int j = 0; j < rows; ++j)
+    for (int i = 0; i < columns; ++i)
+    {
+      const int a = j * (columns + 1) + i, b = a + 1, c = b + columns + 1, d = c - 1;
+      if (alternating && (i + j) % 2 == 1)
+      {
+        faces.emplace_back(a, b, d);
+        faces.emplace_back(b, c, d);
+      }
+      else
+      {
+        faces.emplace_back(a, b, c);
+        faces.emplace_back(a, c, d);
+      }
+    }
+  return meshOf(vertices, faces);
+}
+
+TriangleMesh equilateral(double width, double height, int columns, int rows)
+{
+  std::vector<Eigen::Vector3d> vertices;
+  Faces faces;
+  std::vector<int> starts;   // of rows
+  for (int j = 0; j <= rows; ++j)
+  {
+    starts.push_back(static_cast<int>(vertices.size()));
+    const int count = columns + 1 + j % 2;
+    for (int i = 0; i < count; ++i)
+      vertices.emplace_back(width / columns * (j % 2 == 0 ? i : std::clamp(i - 0.5, 0.0, static_cast<double>(columns))), height * j / rows, 0.0);
+  }
+  for (int j = 0; j < rows; ++j)
+    for (int i = 0; i <= columns; ++i)
+    {
+      // the shifted row has one vertex more; upwards and downwards triangles follow each other along it
+      const int even = (j % 2 == 0 ? starts[j] : starts[j + 1]) + i, odd = (j % 2 == 0 ? starts[j + 1] : starts[j]) + i;
+      const auto add = [&](int a, int b, int c) { j % 2 == 0 ? faces.emplace_back(a, b, c) : faces.emplace_back(a, c, b); };
+      add(even, odd + 1, odd);
+      if (i < columns)
+        add(even, even + 1, odd + 1);
+    }
+  return meshOf(vertices, faces);
+}
+
+/// Lawson's flips of the inner edges of a plane mesh until it is Delaunay.
+void makeDelaunay(TriangleMesh& mesh)
+{
+  const auto faces = mesh.triangles.cols();
+  std::map<std::pair<int, int>, int> face_of;   // directed edge -> face
+  const auto enter = [&](int f) {
+    for (int k = 0; k < 3; ++k)
+      face_of[{mesh.triangles(k, f), mesh.triangles((k + 1) % 3, f)}] = f;
+  };
+  for (int f = 0; f < faces; ++f)
+    enter(f);
+  std::vector<std::pair<int, int>> open;
+  for (const auto& [edge, f] : face_of)
+    if (edge.first < edge.second && face_of.count({edge.second, edge.first}))
+      open.push_back(edge);
+  const auto third = [&](int f, int a, int b) { return mesh.triangles.col(f).sum() - a - b; };
+  const auto p = [&](int v) { return mesh.vertices.col(v).head<2>(); };
+  while (!open.empty())
+  {
+    const auto [a, b] = open.back();
+    open.pop_back();
+    const auto left = face_of.find({a, b}), right = face_of.find({b, a});
+    if (left == face_of.end() || right == face_of.end())
+      continue;
+    const int f = left->second, g = right->second, c = third(f, a, b), d = third(g, a, b);
+    // d inside the circle through a, b, c
+    Eigen::Matrix3d m;
+    const int corners[3] = {a, b, c};
+    for (int k = 0; k < 3; ++k)
+    {
+      const Eigen::Vector2d r = p(corners[k]) - p(d);
+      m.row(k) << r[0], r[1], r.squaredNorm();
+    }
+    if (m.determinant() <= 1e-9 * std::pow((p(a) - p(b)).norm(), 4))
+      continue;
+    face_of.erase(left);
+    face_of.erase({b, a});
+    mesh.triangles.col(f) << c, a, d;
+    mesh.triangles.col(g) << d, b, c;
+    enter(f);
+    enter(g);
+    for (const auto& [s, t] : {std::pair{a, d}, std::pair{d, b}, std::pair{b, c}, std::pair{c, a}})
+      open.emplace_back(s, t);
+  }
+}
+
+TriangleMesh irregular(double width, double height, int columns, int rows, unsigned seed)
+{
+  TriangleMesh mesh = equilateral(width, height, columns, rows);
+  std::mt19937 engine(seed);
+  const auto random = [&] { return 2.0 * (engine() * 0x1p-32) - 1.0; };   // no std:: distribution: these differ between libraries
+  const double reach_x = 0.3 * width / columns, reach_y = 0.3 * height / rows;
+  for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
+  {
+    const double dx = reach_x * random(), dy = reach_y * random();
+    double &x = mesh.vertices(0, i), &y = mesh.vertices(1, i);
+    const bool side = x <= 0 || x >= width, end = y <= 0 || y >= height;   // these stay on their side of the rectangle
+    x += side ? 0.0 : std::clamp(dx, -0.3 * x, 0.3 * (width - x));
+    y += end ? 0.0 : dy;
+  }
+  makeDelaunay(mesh);
+  return mesh;
+}
+
+}  // namespace
+
+const char* toString(GridPattern pattern)
+{
+  switch (pattern)
+  {
+    case GridPattern::one_diagonal: return "one_diagonal";
+    case GridPattern::alternating: return "alternating";
+    case GridPattern::equilateral: return "equilateral";
+    case GridPattern::irregular: return "irregular";
+  }
+  return "unknown";
+}
+
+TriangleMesh gridMesh(double width, double height, int columns, int rows, GridPattern pattern, unsigned seed)
+{
+  const bool right = pattern == GridPattern::one_diagonal || pattern == GridPattern::alternating;
+  if (!(width > 0) || !(height > 0) || !std::isfinite(width) || !std::isfinite(height))
+    throw std::invalid_argument("grid: width and height must be positive and finite [m]");
+  if (columns < 1 || rows < 0)
+    throw std::invalid_argument("grid: columns must be at least 1 and rows at least 0, got " + std::to_string(columns) + " and " + std::to_string(rows));
+  if (rows == 0)
+    rows = std::max(1, static_cast<int>(std::lround(height / (width / columns * (right ? 1.0 : kRowHeight)))));
+  if (pattern == GridPattern::irregular && (columns < 2 || rows < 2))
+    throw std::invalid_argument("grid: an irregular one needs at least 2 columns and 2 rows");
+  switch (pattern)
+  {
+    case GridPattern::equilateral: return equilateral(width, height, columns, rows);
+    case GridPattern::irregular: return irregular(width, height, columns, rows, seed);
+    default: return rightAngled(width, height, columns, rows, pattern == GridPattern::alternating);
+  }
+}
+
+TriangleMesh discMesh(double radius, int rings)
+{
+  if (!(radius > 0) || !std::isfinite(radius) || rings < 1)
+    throw std::invalid_argument("disc: radius must be positive [m] and rings at least 1");
+  std::vector<Eigen::Vector3d> vertices{Eigen::Vector3d::Zero()};
+  Faces faces;
+  const auto vertex = [](int ring, int k) { return ring == 0 ? 0 : 3 * ring * (ring - 1) + 1 + k % (6 * ring); };
+  for (int ring = 1; ring <= rings; ++ring)
+  {
+    for (int k = 0; k < 6 * ring; ++k)
+    {
+      const double angle = 2.0 * M_PI * k / (6 * ring), r = radius * ring / rings;
+      vertices.emplace_back(r * std::cos(angle), r * std::sin(angle), 0.0);
+    }
+    for (int sixth = 0; sixth < 6; ++sixth)
+      for (int k = 0; k < ring; ++k)
+      {
+        const int outer = sixth * ring + k, inner = sixth * (ring - 1) + k;
+        faces.emplace_back(vertex(ring - 1, inner), vertex(ring, outer), vertex(ring, outer + 1));
+        if (k + 1 < ring)
+          faces.emplace_back(vertex(ring - 1, inner), vertex(ring, outer + 1), vertex(ring - 1, inner + 1));
+      }
+  }
+  return meshOf(vertices, faces);
+}
+
+TriangleMesh icosphere(double radius, int levels)
+{
+  if (!(radius > 0) || !std::isfinite(radius) || levels < 0 || levels > 10)
+    throw std::invalid_argument("icosphere: radius must be positive [m] and levels from 0 to 10");
+  const double g = 0.5 * (1.0 + std::sqrt(5.0));
+  std::vector<Eigen::Vector3d> vertices{{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g},
+                                        {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
+  Faces faces{{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+              {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8}, {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  for (Eigen::Vector3d& v : vertices)
+    v *= radius / v.norm();
+  for (int level = 0; level < levels; ++level)
+  {
+    std::map<std::pair<int, int>, int> middles;
+    const auto middle = [&](int a, int b) {
+      const auto [at, fresh] = middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<int>(vertices.size()));
+      if (fresh)
+        vertices.push_back((vertices[a] + vertices[b]).normalized() * radius);
+      return at->second;
+    };
+    Faces finer;
+    for (const Eigen::Vector3i& f : faces)
+    {
+      const int a = middle(f[0], f[1]), b = middle(f[1], f[2]), c = middle(f[2], f[0]);
+      for (const Eigen::Vector3i& t : {Eigen::Vector3i(f[0], a, c), Eigen::Vector3i(f[1], b, a), Eigen::Vector3i(f[2], c, b), Eigen::Vector3i(a, b, c)})
+        finer.push_back(t);
+    }
+    faces.swap(finer);
+  }
+  return meshOf(vertices, faces);
+}
+
+}  // namespace slender

@@ -1,0 +1,175 @@
+// Compiled once per instruction set (SLENDER_ISA). Plain arrays only; nothing here may be emitted under a shared name.
+#include "slender_sim/linalg/point_kernel.h"
+
+namespace slender {
+namespace SLENDER_ISA {
+namespace {
+
+using Quad = double __attribute__((vector_size(32)));
+using QuadU = double __attribute__((vector_size(32), aligned(8), may_alias));
+
+inline __attribute__((always_inline)) Quad load(const double* p) { return *reinterpret_cast<const Quad*>(p); }
+inline __attribute__((always_inline)) Quad loadAnywhere(const double* p) { return *reinterpret_cast<const QuadU*>(p); }
+
+template <bool Add>
+double multiplyRows(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y)
+{
+  Quad form = {};
+  int k = starts[0];
+  for (int i = 0; i < rows; ++i)
+  {
+    const int end = starts[i + 1];
+    Quad a = {}, b = {}, c = {}, d = {};   // four sums hide the latency of the additions
+    for (; k + 4 <= end; k += 4)
+    {
+      a += values[k] * load(x + offsets[k]);
+      b += values[k + 1] * load(x + offsets[k + 1]);
+      c += values[k + 2] * load(x + offsets[k + 2]);
+      d += values[k + 3] * load(x + offsets[k + 3]);
+    }
+    for (; k < end; ++k)
+      a += values[k] * load(x + offsets[k]);
+    a = (a + b) + (c + d);
+    form += a * load(x + 4 * i);
+    Quad& out = *reinterpret_cast<Quad*>(y + 4 * i);
+    out = Add ? out + factor * a : a;
+  }
+  return form[0] + form[1] + form[2];
+}
+
+double multiply(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y)
+{
+  return factor == 0.0 ? multiplyRows<false>(rows, starts, offsets, values, factor, x, y)
+                       : multiplyRows<true>(rows, starts, offsets, values, factor, x, y);
+}
+
+void multiplyBlocks(int columns, const int* starts, const int* rows, const double* values, const double* x, double* y)
+{
+  for (int j = 0; j < columns; ++j)
+  {
+    const Quad xj = load(x + 4 * j);
+    Quad s0 = {}, s1 = {}, s2 = {};
+    const int end = starts[j + 1];
+    for (int k = starts[j] + 1; k < end; ++k)
+    {
+      const double* a = values + 9 * static_cast<long>(k);
+      const Quad c0 = loadAnywhere(a), c1 = loadAnywhere(a + 3), c2 = loadAnywhere(a + 6);   // fourth lanes are other entries
+      const int i = rows[k];
+      const Quad xi = load(x + 4 * i);
+      Quad& yi = *reinterpret_cast<Quad*>(y + 4 * i);
+      yi += c0 * xj[0] + c1 * xj[1] + c2 * xj[2];
+      s0 += c0 * xi;
+      s1 += c1 * xi;
+      s2 += c2 * xi;
+    }
+    const double* a = values + 9 * static_cast<long>(starts[j]);
+    Quad yj = load(y + 4 * j) + loadAnywhere(a) * xj[0] + loadAnywhere(a + 3) * xj[1] + loadAnywhere(a + 6) * xj[2];
+    yj += Quad{s0[0] + s0[1] + s0[2], s1[0] + s1[1] + s1[2], s2[0] + s2[1] + s2[2], 0.0};
+    yj[3] = 0.0;
+    *reinterpret_cast<Quad*>(y + 4 * j) = yj;
+  }
+}
+
+/// Columns from .. from+Columns-1 of a supernode of `count` rows, whose first row is that of column 0: solve with the triangle, then take
+/// their part from the rows below.
+template <int Columns>
+inline __attribute__((always_inline)) void forward(const double* l, int count, const int* rows, int from, double* x)
+{
+  Quad c[Columns];
+  for (int a = 0; a < Columns; ++a)
+  {
+    Quad value = load(x + 4 * rows[from + a]);
+    for (int b = 0; b < a; ++b)
+      value -= l[static_cast<long>(from + b) * count + from + a] * c[b];
+    c[a] = value / l[static_cast<long>(from + a) * count + from + a];
+    *reinterpret_cast<Quad*>(x + 4 * rows[from + a]) = c[a];
+  }
+  const double* column[Columns];
+  for (int a = 0; a < Columns; ++a)
+    column[a] = l + static_cast<long>(from + a) * count;
+  for (int i = from + Columns; i < count; ++i)
+  {
+    Quad& out = *reinterpret_cast<Quad*>(x + 4 * rows[i]);
+    Quad value = out;
+    for (int a = 0; a < Columns; ++a)
+      value -= column[a][i] * c[a];
+    out = value;
+  }
+}
+
+/// The same backwards with the transpose.
+template <int Columns>
+inline __attribute__((always_inline)) void backward(const double* l, int count, const int* rows, int from, double* x)
+{
+  Quad sum[Columns] = {};
+  const double* column[Columns];
+  for (int a = 0; a < Columns; ++a)
+    column[a] = l + static_cast<long>(from + a) * count;
+  for (int i = from + Columns; i < count; ++i)
+  {
+    const Quad value = load(x + 4 * rows[i]);
+    for (int a = 0; a < Columns; ++a)
+      sum[a] += column[a][i] * value;
+  }
+  for (int a = Columns - 1; a >= 0; --a)
+  {
+    Quad& out = *reinterpret_cast<Quad*>(x + 4 * rows[from + a]);
+    Quad value = out - sum[a];
+    for (int b = a + 1; b < Columns; ++b)
+      value -= column[a][from + b] * load(x + 4 * rows[from + b]);
+    out = value / column[a][from + a];
+  }
+}
+
+void solveSupernodal(const SupernodalFactor& f, double* x)
+{
+  for (int s = 0; s < f.supernodes; ++s)
+  {
+    const int columns = f.first[s + 1] - f.first[s], count = f.row_starts[s + 1] - f.row_starts[s];
+    const int* rows = f.rows + f.row_starts[s];
+    const double* l = f.values + f.value_starts[s];
+    int c = 0;
+    for (; c + 8 <= columns; c += 8)
+      forward<8>(l, count, rows, c, x);
+    for (; c + 4 <= columns; c += 4)
+      forward<4>(l, count, rows, c, x);
+    for (; c < columns; ++c)
+      forward<1>(l, count, rows, c, x);
+  }
+  for (int s = f.supernodes - 1; s >= 0; --s)
+  {
+    const int columns = f.first[s + 1] - f.first[s], count = f.row_starts[s + 1] - f.row_starts[s];
+    const int* rows = f.rows + f.row_starts[s];
+    const double* l = f.values + f.value_starts[s];
+    int c = columns;
+    while (c % 4 != 0)
+      backward<1>(l, count, rows, --c, x);
+    if (c % 8 != 0)
+      backward<4>(l, count, rows, c -= 4, x);
+    while (c > 0)
+      backward<8>(l, count, rows, c -= 8, x);
+  }
+}
+
+double dot(int points, const double* x, const double* y)
+{
+  Quad a = {}, b = {};
+  int i = 0;
+  for (; i + 2 <= points; i += 2)
+  {
+    a += load(x + 4 * i) * load(y + 4 * i);
+    b += load(x + 4 * i + 4) * load(y + 4 * i + 4);
+  }
+  if (i < points)
+    a += load(x + 4 * i) * load(y + 4 * i);
+  a += b;
+  return a[0] + a[1] + a[2];
+}
+
+}  // namespace
+
+extern const PointKernels point_kernels;
+const PointKernels point_kernels = {multiply, multiplyBlocks, solveSupernodal, dot};
+
+}  // namespace SLENDER_ISA
+}  // namespace slender

@@ -1,0 +1,259 @@
+// Derivatives of hinges and membrane against differences; invariances; reference 3f (one triangle of St. Venant-Kirchhoff).
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "test/support/cloths.h"
+
+namespace slender::test {
+namespace {
+
+struct Sheet
+{
+  TriangleMesh mesh;
+  MeshTopology topology;
+
+  explicit Sheet(GridPattern pattern, int cells = 3) : mesh(gridMesh(cells, cells, cells, cells, pattern)), topology(meshTopology(mesh)) {}
+  int points() const { return static_cast<int>(mesh.vertices.cols()); }
+  Matrix3Xd shaken(Random& random, double size) const
+  {
+    Matrix3Xd x = mesh.vertices;
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+      x.col(i) += random.vector(size);
+    return x;
+  }
+};
+
+double energyOf(const HingeBending& e, const Matrix3Xd& x) { return e.energy(pointsOf(x).data()); }
+double energyOf(const MembraneEnergy& e, const Matrix3Xd& x) { return e.energy(pointsOf(x).data()).energy; }
+
+/// Against differences of energy and gradient.
+template <class Energy>
+void check(Derivatives<Energy>& d, const Matrix3Xd& x, double h, double tolerance)
+{
+  const Matrix3Xd g = d.gradient(x);
+  const MatrixXd slope = differences(x, h, [&](const Matrix3Xd& y) { return VectorXd::Constant(1, energyOf(d.energy, y)); });
+  EXPECT_LT((flattened(g) - slope.col(0)).norm(), tolerance * g.norm());
+  const MatrixXd exact = d.hessian(x, HessianKind::exact);
+  const MatrixXd curvature = differences(x, h, [&](const Matrix3Xd& y) { return flattened(d.gradient(y)); });
+  EXPECT_LT((exact - curvature).norm(), tolerance * exact.norm());
+  const MatrixXd semidefinite = d.hessian(x, HessianKind::semidefinite);
+  const double size = exact.norm();
+  EXPECT_GT(smallestEigenvalue(semidefinite), -1e-12 * size);
+  EXPECT_GT(smallestEigenvalue(semidefinite - exact), -1e-12 * size);
+}
+
+HingeBending hingesOf(const Sheet& s, Random& random, double rest)
+{
+  return HingeBending(s.topology.hinges, hingeStiffness(s.mesh, s.topology, 0.7), random.numbers(s.topology.hingeCount(), rest));
+}
+
+TEST(HingeBending, DerivativesMatchDifferences)
+{
+  Random random(3);
+  for (const GridPattern pattern : {GridPattern::one_diagonal, GridPattern::alternating, GridPattern::irregular})
+    for (const double size : {0.05, 0.5})
+    {
+      const Sheet s(pattern);
+      const HingeBending hinges = hingesOf(s, random, 0.4);
+      Derivatives<HingeBending> d(hinges, s.points(), s.topology.hinges);
+      check(d, s.shaken(random, size), 1e-3 * size, size < 0.1 ? 1e-7 : 1e-5);
+    }
+}
+
+/// Two triangles folded about their common edge by `angle`, the third points `height` high.
+Matrix3Xd flap(double angle, double left, double right)
+{
+  Matrix3Xd x(3, 4);
+  x << 0, 1.3, 0.4, 0.7,   //
+    0, 0, left, -right * std::cos(angle),   //
+    0, 0, 0, -right * std::sin(angle);
+  return x;
+}
+
+TEST(HingeBending, LargeAnglesAndThinTriangles)
+{
+  Random random(5);
+  Eigen::Matrix4Xi hinge(4, 1);
+  hinge << 0, 1, 2, 3;
+  for (const double angle : {0.0, 1e-9, 0.5, 1.5, 3.0, 3.14, -0.5, -3.1})
+    for (const double height : {1.0, 0.03, 1e-3})
+    {
+      const HingeBending e(hinge, VectorXd::Constant(1, 2.0), VectorXd::Constant(1, 0.3));
+      const Matrix3Xd x = Eigen::AngleAxisd(1.1, random.direction()).toRotationMatrix() * flap(angle, height, 0.8);
+      double theta[8];
+      e.angles(pointsOf(x).data(), theta);
+      EXPECT_NEAR(theta[0], angle, 1e-13 / height) << height;
+      Derivatives<HingeBending> d(e, 4, hinge);
+      SCOPED_TRACE(testing::Message() << angle << " height " << height);
+      check(d, x, 3e-3 * height, 1e-6);
+    }
+}
+
+TEST(HingeBending, DeviationGoesTheShorterWayRound)
+{
+  Eigen::Matrix4Xi hinge(4, 1);
+  hinge << 0, 1, 2, 3;
+  const HingeBending e(hinge, VectorXd::Constant(1, 2.0), VectorXd::Constant(1, 3.0));
+  EXPECT_NEAR(energyOf(e, flap(-3.0, 1, 1)), std::pow(2 * M_PI - 6.0, 2), 1e-12);
+}
+
+TEST(HingeBending, DegenerateFacesStayFinite)
+{
+  Eigen::Matrix4Xi hinge(4, 1);
+  hinge << 0, 1, 2, 3;
+  const HingeBending e(hinge, VectorXd::Constant(1, 1.0), VectorXd::Constant(1, 0.2));
+  Derivatives<HingeBending> d(e, 4, hinge);
+  Matrix3Xd line = flap(0.3, 0.0, 1.0), same = flap(0.3, 1.0, 1.0);
+  same.col(1) = same.col(0);
+  for (const Matrix3Xd& x : {line, same, Matrix3Xd(Matrix3Xd::Zero(3, 4))})
+  {
+    EXPECT_TRUE(std::isfinite(energyOf(e, x)));
+    EXPECT_TRUE(d.gradient(x).allFinite());
+    EXPECT_TRUE(d.hessian(x, HessianKind::exact).allFinite());
+    EXPECT_TRUE(d.hessian(x, HessianKind::semidefinite).allFinite());
+  }
+}
+
+TEST(HingeBending, ViscousResponseIsElasticAndViscousMoment)
+{
+  Random random(7);
+  const Sheet s(GridPattern::irregular);
+  HingeBending hinges = hingesOf(s, random, 0.4);
+  const Matrix3Xd x = s.shaken(random, 0.2), before = s.shaken(random, 0.2);
+  const double ratio = 0.6;
+  const int n = hinges.count();
+  VectorXd angles(hinges.paddedCount());
+  hinges.angles(pointsOf(before).data(), angles.data());
+  Derivatives<HingeBending> d(hinges, s.points(), s.topology.hinges);
+  const Matrix3Xd elastic = d.gradient(x);
+  hinges.setResponse(ratio, angles.data());
+  const Matrix3Xd whole = d.gradient(x);
+  const HingeBending about(s.topology.hinges, hingeStiffness(s.mesh, s.topology, 0.7), angles.head(n));
+  Derivatives<HingeBending> viscous(about, s.points(), s.topology.hinges);
+  EXPECT_LT((whole - elastic - ratio * viscous.gradient(x)).norm(), 1e-12 * whole.norm());
+  hinges.setResponse(0.0, nullptr);
+  EXPECT_EQ(d.gradient(x), elastic);
+}
+
+TEST(HingeBending, RigidMotionsDoNothing)
+{
+  Random random(9);
+  const Sheet s(GridPattern::alternating);
+  const HingeBending hinges = hingesOf(s, random, 0.4);
+  Derivatives<HingeBending> d(hinges, s.points(), s.topology.hinges);
+  const Matrix3Xd x = s.shaken(random, 0.3), g = d.gradient(x);
+  EXPECT_LT(g.rowwise().sum().norm(), 1e-12 * g.norm());
+  Vector3d torque = Vector3d::Zero();
+  for (Eigen::Index i = 0; i < x.cols(); ++i)
+    torque += x.col(i).cross(g.col(i));
+  EXPECT_LT(torque.norm(), 1e-11 * g.norm());
+  const Matrix3Xd moved = (random.rotation().toRotationMatrix() * x).colwise() + Vector3d(3, 4, 5);
+  EXPECT_NEAR(energyOf(hinges, moved) / energyOf(hinges, x), 1.0, 1e-12);
+}
+
+TEST(Membrane, DerivativesMatchDifferences)
+{
+  Random random(11);
+  const MembraneModuli odd = orthotropicMembrane(3.0, 1.2, 0.4, 0.5);
+  for (const GridPattern pattern : {GridPattern::one_diagonal, GridPattern::irregular})
+    for (const double size : {0.02, 0.4})
+    {
+      const Sheet s(pattern);
+      MembraneEnergy membrane(s.mesh, odd, Vector3d(1, 0.4, 0.1));
+      Derivatives<MembraneEnergy> d(membrane, s.points(), s.mesh.triangles);
+      const Matrix3Xd x = s.shaken(random, size);
+      check(d, x, 1e-3, 1e-9);
+      check(d, 0.7 * x, 1e-3, 1e-9);   // compressed
+      AlignedVector<double> strains[3];
+      double* pointers[3];
+      for (int k = 0; k < 3; ++k)
+        strains[k].resize(membrane.paddedCount()), pointers[k] = strains[k].data();
+      membrane.strains(pointsOf(s.shaken(random, size)).data(), pointers);
+      membrane.setResponse(0.8, pointers);
+      check(d, x, 1e-3, 1e-9);
+    }
+}
+
+TEST(Membrane, TakesItsAxesAlongTheWarp)
+{
+  // stretched along a direction d by s: E = area/2 E_d G^2 to leading order, with the contraction across it left free
+  const MembraneModuli m = orthotropicMembrane(100, 40, 0.3, 10);
+  const Sheet s(GridPattern::irregular, 4);
+  const Vector3d warp = Eigen::AngleAxisd(0.6, Vector3d::UnitZ()) * Vector3d::UnitX();
+  const MembraneEnergy membrane(s.mesh, m, warp);
+  const double g = 1e-4, area = 16;
+  const auto stretched = [&](const Vector3d& d, double along, double across) {
+    const Vector3d c = Vector3d::UnitZ().cross(d);
+    const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + (std::sqrt(1 + 2 * along) - 1) * d * d.transpose() + (std::sqrt(1 + 2 * across) - 1) * c * c.transpose();
+    return energyOf(membrane, Matrix3Xd(F * s.mesh.vertices));
+  };
+  EXPECT_NEAR(stretched(warp, g, -0.3 * g) / (0.5 * area * 100 * g * g), 1.0, 1e-6);
+  const Vector3d weft = Vector3d::UnitZ().cross(warp);
+  EXPECT_NEAR(stretched(weft, g, -0.3 * 0.4 * g) / (0.5 * area * 40 * g * g), 1.0, 1e-6);
+}
+
+TEST(Membrane, PatchTest)
+{
+  Random random(13);
+  const Sheet s(GridPattern::irregular, 5);
+  const MembraneEnergy membrane(s.mesh, isotropicMembrane(1e5, 0.3, 1e-3));
+  Derivatives<MembraneEnergy> d(membrane, s.points(), s.mesh.triangles);
+  const Eigen::Matrix3d F = Eigen::Matrix3d::Random() + 2 * Eigen::Matrix3d::Identity();
+  const Matrix3Xd g = d.gradient(F * s.mesh.vertices);
+  for (int i = 0; i < s.points(); ++i)
+    if (!s.topology.on_boundary[i])
+    {
+      EXPECT_LT(g.col(i).norm(), 1e-12 * g.norm());
+    }
+}
+
+/// Reference 3f, 15 digits (reference/rod_plate/stvk_triangle.csv).
+TEST(Membrane, OneTriangleOfStVenantKirchhoff)
+{
+  TriangleMesh rest;
+  rest.vertices.resize(3, 3);
+  rest.vertices << 0, 1, 0.2, 0, 0.1, 0.8, 0, 0, 0;
+  rest.triangles.resize(3, 1);
+  rest.triangles << 0, 1, 2;
+  const MembraneEnergy membrane(rest, isotropicMembrane(1e5, 0.3, 1e-3));
+  std::ifstream file(std::string(SLENDER_SOURCE_DIR) + "/test/unit/data/stvk_triangle.csv");
+  ASSERT_TRUE(file);
+  int cases = 0;
+  for (std::string line; std::getline(file, line);)
+  {
+    if (line[0] == '#' || line.rfind("case", 0) == 0)
+      continue;
+    std::istringstream cells(line);
+    std::string name, cell;
+    std::getline(cells, name, ',');
+    std::vector<double> v;
+    while (std::getline(cells, cell, ','))
+      v.push_back(std::stod(cell));
+    const Matrix3Xd x = Eigen::Map<const Matrix3Xd>(v.data() + 1, 3, 3), force = Eigen::Map<const Matrix3Xd>(v.data() + 10, 3, 3);
+    Derivatives<MembraneEnergy> d(membrane, 3, rest.triangles);
+    EXPECT_NEAR(energyOf(membrane, x), v[0], 1e-13) << name;   // forces of order 1 N, energies of order 0.1 J
+    EXPECT_LT((d.gradient(x) + force).norm(), 1e-12) << name;
+    ++cases;
+  }
+  EXPECT_EQ(cases, 7);
+}
+
+TEST(Membrane, RefusesBadModuli)
+{
+  EXPECT_THROW(isotropicMembrane(-1, 0.3, 1e-3), std::invalid_argument);
+  EXPECT_THROW(isotropicMembrane(1, 0.6, 1e-3), std::invalid_argument);
+  EXPECT_THROW(isotropicMembrane(1, 0.3, 0), std::invalid_argument);
+  EXPECT_THROW(orthotropicMembrane(1, 4, 0.6, 1), std::invalid_argument);
+  EXPECT_THROW(orthotropicMembrane(1, 4, 0.1, NAN), std::invalid_argument);
+  const MembraneModuli a = isotropicMembrane(1e5, 0.3, 1e-3), b = orthotropicMembrane(100, 100, 0.3, 100 / 2.6);
+  EXPECT_NEAR(a.c11, b.c11, 1e-12);
+  EXPECT_NEAR(a.c12, b.c12, 1e-12);
+  EXPECT_NEAR(a.c33, b.c33, 1e-12);
+}
+
+}  // namespace
+}  // namespace slender::test

@@ -1,0 +1,111 @@
+// Factorisations of the matrices of points, against dense ones.
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include "slender_sim/linalg/sparse_cholesky.h"
+#include "test/support/cloths.h"
+
+namespace slender::test {
+namespace {
+
+struct System
+{
+  TriangleMesh mesh = gridMesh(1.0, 1.0, 12, 0, GridPattern::irregular);
+  MeshTopology topology = meshTopology(mesh);
+  PointMatrix bending = isometricBending(mesh, topology, IsometricElement::nonconforming, 0.3);
+  BlockMatrix blocks{static_cast<int>(mesh.vertices.cols()), {mesh.triangles, topology.hinges}};
+  std::vector<char> fixed = std::vector<char>(mesh.vertices.cols(), 0);
+
+  System()
+  {
+    const MembraneEnergy membrane(mesh, orthotropicMembrane(3.0, 1.2, 0.4, 0.5));
+    PointVector gradient(4 * points(), 0.0);
+    Random random(23);
+    Matrix3Xd x = mesh.vertices;
+    for (int i = 0; i < points(); ++i)
+      x.col(i) += random.vector(0.02);
+    membrane.addHessian(HessianKind::semidefinite, pointsOf(x).data(), membrane.slotsIn(blocks), gradient.data(), blocks.values());
+    blocks.add(1.0, bending, blocks.mapOf(bending));
+    std::vector<Eigen::Triplet<double>> mass;
+    for (int i = 0; i < points(); ++i)
+      mass.emplace_back(i, i, 0.5);
+    const PointMatrix M(points(), mass);
+    blocks.add(1.0, M, blocks.mapOf(M));
+    fixed[0] = fixed[17] = 1;
+  }
+  int points() const { return static_cast<int>(mesh.vertices.cols()); }
+};
+
+TEST(PointCholesky, SolvesBlocks)
+{
+  System s;
+  Random random(29);
+  SparseCholesky factor;
+  factor.setPattern(s.blocks);
+  PointVector b(4 * s.points(), 0.0), x(4 * s.points(), 0.0);
+  for (int i = 0; i < s.points(); ++i)
+    point(b, i) = random.vector();
+  MatrixXd dense = denseOf(s.blocks);
+  for (const bool pinned : {false, true, false})
+  {
+    MatrixXd A = dense;
+    for (int i = 0; i < s.points() && pinned; ++i)
+      if (s.fixed[i])
+      {
+        A.middleRows(3 * i, 3).setZero();
+        A.middleCols(3 * i, 3).setZero();
+        A.block<3, 3>(3 * i, 3 * i).setIdentity();
+      }
+    ASSERT_TRUE(factor.factor(s.blocks, pinned ? s.fixed.data() : nullptr));
+    factor.solvePoints(b.data(), x.data());
+    const VectorXd expected = A.llt().solve(flattened(matrixOf(b)));
+    EXPECT_LT((flattened(matrixOf(x)) - expected).norm(), 1e-11 * expected.norm()) << pinned;
+    EXPECT_EQ(x[3], 0.0);
+  }
+  // not definite: refused, and usable again
+  for (int k = 0; k < 3; ++k)
+    s.blocks.values()[9 * s.blocks.starts()[40] + 4 * k] -= 100.0;
+  EXPECT_FALSE(factor.factor(s.blocks, nullptr));
+  for (int k = 0; k < 3; ++k)
+    s.blocks.values()[9 * s.blocks.starts()[40] + 4 * k] += 100.0;
+  EXPECT_TRUE(factor.factor(s.blocks, nullptr));
+}
+
+TEST(PointCholesky, SolvesThreeCoordinatesAtATime)
+{
+  const System s;
+  std::vector<Eigen::Triplet<double>> entries;
+  const Eigen::SparseMatrix<double> K = s.bending.toEigen();
+  for (int j = 0; j < s.points(); ++j)
+  {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(K, j); it; ++it)
+      entries.emplace_back(static_cast<int>(it.row()), j, it.value());
+    entries.emplace_back(j, j, 1.0 + j);
+  }
+  const PointMatrix A(s.points(), entries);
+  Random random(31);
+  PointVector b(4 * s.points(), 0.0);
+  for (int i = 0; i < s.points(); ++i)
+    point(b, i) = random.vector();
+  SparseCholesky factor;
+  factor.setPattern(A);
+  for (const bool pinned : {false, true})
+  {
+    MatrixXd dense = A.toEigen();
+    for (int i = 0; i < s.points() && pinned; ++i)
+      if (s.fixed[i])
+      {
+        dense.row(i).setZero();
+        dense.col(i).setZero();
+        dense(i, i) = 1;
+      }
+    ASSERT_TRUE(factor.factor(A, pinned ? s.fixed.data() : nullptr));
+    PointVector x = b;
+    factor.solvePoints(x.data(), x.data());
+    const MatrixXd expected = dense.llt().solve(matrixOf(b).transpose());
+    EXPECT_LT((matrixOf(x).transpose() - expected).norm(), 1e-11 * expected.norm()) << pinned;
+  }
+}
+
+}  // namespace
+}  // namespace slender::test
