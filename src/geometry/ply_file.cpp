@@ -329,6 +329,12 @@ void writePly(const std::string& path, const TriangleMesh& mesh)
   finishWriting(file, path);
 }
 
+void requireMeshName(const std::string& path)
+{
+  if (!endsWith(path, ".obj") && !endsWith(path, ".ply"))
+    refuseName(path);
+}
+
 void writeMesh(const std::string& path, const TriangleMesh& mesh)
 {
   if (endsWith(path, ".obj"))

@@ -44,6 +44,9 @@ void runThreadTables(StudyContext&);
 void runSagging(StudyContext&);
 void runThreadImplicitVsExplicit(StudyContext&);
 void runClothCollisionSafety(StudyContext&);
+void runWillmoreSphere(StudyContext&);
+void runWillmoreHole(StudyContext&);
+void runWillmoreSmoothing(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -89,6 +92,9 @@ const std::vector<Study>& studies()
       {"thread_implicit_vs_explicit", "a coiling thread: largest steps and cost of implicit against explicit integration", runThreadImplicitVsExplicit},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
       {"cloth_collision_safety", "continuous tests of a million pairs, none missed; scenes in which cloth never passes through anything", runClothCollisionSafety},
+      {"willmore_sphere", "an icosahedron and rough spheres that Willmore flow makes round: int H^2 against 16 pi", runWillmoreSphere},
+      {"willmore_hole", "caps of spheres and pieces of a torus cut out and closed again by Willmore flow", runWillmoreHole},
+      {"willmore_smoothing", "rough meshes of 24,192 and 44,928 triangles: times of 16 steps and of the factorisation", runWillmoreSmoothing},
   };
   return all;
 }

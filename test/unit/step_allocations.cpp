@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/fairing/willmore_flow.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/linalg/banded_ldlt.h"
 #include "test/support/contact.h"
@@ -264,6 +265,20 @@ TEST(CollisionAllocations, WarmStepsMakeNone)
   EXPECT_EQ(allocations - before, 0);
   EXPECT_TRUE(report.ok);
   EXPECT_GT(report.impulses, 20);
+}
+
+TEST(WillmoreAllocations, AWarmStepMakesNone)
+{
+  TriangleMesh mesh = icosphere(1.0, 3);
+  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v)
+    mesh.vertices.col(v) *= 1.0 + 0.01 * (v % 5);
+  WillmoreFlow flow(mesh, meshTopology(mesh), 1e-3, 5);
+  flow.step(mesh.vertices);
+  const long before = allocations;
+  const FairingReport report = flow.step(mesh.vertices);
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_TRUE(report.ok);
+  EXPECT_GT(report.iterations, 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Integrators, Allocations, ::testing::ValuesIn(allIntegrators()), [](const auto& info) { return toString(info.param); });

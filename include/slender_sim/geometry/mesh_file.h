@@ -26,6 +26,9 @@ TriangleMesh readMesh(const std::string& path);
 void writeObj(const std::string& path, const TriangleMesh& mesh);
 void writePly(const std::string& path, const TriangleMesh& mesh);
 
+/// Throws what writeMesh would for the end of the name.
+void requireMeshName(const std::string& path);
+
 /// By the end of the name, as readMesh.
 void writeMesh(const std::string& path, const TriangleMesh& mesh);
 
