@@ -42,6 +42,7 @@ void runSewingMachine(StudyContext&);
 void runThreadTables(StudyContext&);
 void runSagging(StudyContext&);
 void runThreadImplicitVsExplicit(StudyContext&);
+void runPlate(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -85,6 +86,7 @@ const std::vector<Study>& studies()
       {"sagging", "viscous threads that sag between plates: paths in time, catenary or U", runSagging},
       {"thread_implicit_vs_explicit", "a coiling thread: largest steps and cost of implicit against explicit integration", runThreadImplicitVsExplicit},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
+      {"plate", "plates of every bending model on every mesh against plate theory: what D means", runPlate},
   };
   return all;
 }
