@@ -166,7 +166,7 @@ void uniformLoad(StudyContext& context)
           series.x.push_back(seconds);
           series.y.push_back(std::abs(fine / expected - 1));
         }
-        const double extrapolated = 2 * fine - coarse, ratio = (fine - expected) / (coarse - expected);
+        const double extrapolated = 2 * fine - coarse;
         Row& row = context.row();
         row.set("case", how + ", extrapolated").set("mesh", toString(pattern)).set("model", toString(model)).set("cells", sizes.back());
         if (!isIsotropic(pattern, model))
@@ -175,8 +175,12 @@ void uniformLoad(StudyContext& context)
           continue;
         }
         row.check(extrapolated, expected, 0.02 * expected, "Kirchhoff plate, centre D w/(q a^4)").set("relative_error", extrapolated / expected - 1);
-        context.row().set("case", how + ", error over the coarser one's").set("mesh", toString(pattern)).set("model", toString(model))
-          .set("cells", sizes.back()).check(std::max(std::abs(ratio), 0.5), 0.5, 0.1, "halves, or better").set("value", ratio);
+        if (std::abs(fine / expected - 1) > 0.01)   // nearer, other errors than the edge's are seen
+        {
+          const double ratio = (fine - expected) / (coarse - expected);
+          context.row().set("case", how + ", error over the coarser one's").set("mesh", toString(pattern)).set("model", toString(model))
+            .set("cells", sizes.back()).set("value", ratio).check(std::max(ratio, 0.5), 0.5, 0.1, "halves, or better");
+        }
       }
 }
 
@@ -217,7 +221,7 @@ double cantileverStrip(GridPattern pattern, BendingModel bending, double gamma, 
 void cantilevers(StudyContext& context)
 {
   constexpr double kStiffness = 1e5, kWidth = 0.5;
-  const std::vector<int> sizes = context.quick() ? std::vector<int>{20} : std::vector<int>{10, 20, 40};
+  const std::vector<int> sizes = context.quick() ? std::vector<int>{20} : std::vector<int>{20, 40};
   const std::vector<double> gammas = context.quick() ? std::vector<double>{10} : std::vector<double>{1, 10, 100};
   Plot& plot = context.plot("plate_cantilever", "Heavy cantilever strip: error of H/W against run time, Gamma = 10", "CPU time [s]", "relative error");
   for (const GridPattern pattern : kPatterns)
@@ -250,6 +254,13 @@ void lateralBuckling(StudyContext& context)
   for (const double width : {0.25, 0.5})
     for (const GridPattern pattern : kPatterns)
       for (const BendingModel model : kBendingModels)
+      {
+        if (isConforming(model))
+        {
+          context.row().set("case", "lateral buckling").set("mesh", toString(pattern)).set("model", toString(model)).set("width", width)
+            .set("reason", "no threshold: nu = 1, a free edge takes no moment and a strip no torque");
+          continue;
+        }
         for (const int n : sizes)
         {
           context.progress(n, sizes.back(), std::string("lateral buckling ") + toString(pattern) + " " + toString(model));
@@ -257,9 +268,13 @@ void lateralBuckling(StudyContext& context)
           const double expected = width == 0.25 ? 22.80473631 : 26.28742802;
           Row& row = context.row();
           row.set("case", "lateral buckling").set("mesh", toString(pattern)).set("model", toString(model)).set("cells", n).set("width", width);
-          row.set("cpu_seconds", threadSeconds() - start);
-          row.set("value", load).set("relative_error", load / expected - 1);
+          row.set("cpu_seconds", threadSeconds() - start).set("relative_error", load / expected - 1);
+          if (isIsotropic(pattern, model))
+            row.check(load, expected, expected * (0.02 + 2.0 / n), "lateral_plate_two_poisson.csv: nu -1/3 and 0.3; bound 2 % + 2/n");
+          else
+            row.set("value", load).set("reason", kAnisotropic);
         }
+      }
 }
 
 }  // namespace

@@ -43,6 +43,8 @@ void runThreadTables(StudyContext&);
 void runSagging(StudyContext&);
 void runThreadImplicitVsExplicit(StudyContext&);
 void runPlate(StudyContext&);
+void runIbmVsHinge(StudyContext&);
+void runImplicitStep(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -87,6 +89,8 @@ const std::vector<Study>& studies()
       {"thread_implicit_vs_explicit", "a coiling thread: largest steps and cost of implicit against explicit integration", runThreadImplicitVsExplicit},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
       {"plate", "plates of every bending model on every mesh against plate theory: what D means", runPlate},
+      {"ibm_vs_hinge", "isometric bending beside hinges, as thesis table 2.1: gradient, Hessian, explicit and implicit steps", runIbmVsHinge},
+      {"implicit_step", "a sheet pinned at two corners: a step and its parts beside one factorisation of its matrix", runImplicitStep},
   };
   return all;
 }
