@@ -45,6 +45,8 @@ void runThreadImplicitVsExplicit(StudyContext&);
 void runPlate(StudyContext&);
 void runIbmVsHinge(StudyContext&);
 void runImplicitStep(StudyContext&);
+void runClothStability(StudyContext&);
+void runClothAccuracy(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -91,6 +93,8 @@ const std::vector<Study>& studies()
       {"plate", "plates of every bending model on every mesh against plate theory: what D means", runPlate},
       {"ibm_vs_hinge", "isometric bending beside hinges, as thesis table 2.1: gradient, Hessian, explicit and implicit steps", runIbmVsHinge},
       {"implicit_step", "a sheet pinned at two corners: a step and its parts beside one factorisation of its matrix", runImplicitStep},
+      {"cloth_stability", "extreme stiffness, steps, random and crushed starts, needles, a yanked corner: done, recovered or refused with reason", runClothStability},
+      {"cloth_accuracy", "error against run time of the cloth's integrators and solvers, on a flag and a swinging cloth", runClothAccuracy},
   };
   return all;
 }
