@@ -121,7 +121,7 @@ void runClothStability(StudyContext& context)
           options.one_newton_step = !newton;
           char what[80];
           std::snprintf(what, sizeof what, "membrane 1e%d N/m, %s", decade, newton ? "Newton" : "one step");
-          report(what, cloth, h, run(cloth, options, h, 20, nullptr), false);
+          report(what, cloth, h, run(cloth, options, h, context.quick() ? 5 : 20, nullptr), false);
         }
   for (const BendingModel bending : kBendingModels)
     for (int decade = -8; decade <= 2; decade += 5)
