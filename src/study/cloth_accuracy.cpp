@@ -53,12 +53,14 @@ struct Method
   Integrator integrator;
   bool one_step;
   ClothSolver solver;
+  double linear_tolerance = ClothOptions{}.linear_tolerance;
 };
 
 constexpr Method kMethods[] = {{"implicit, Newton, cholesky", Integrator::implicit_euler, false, ClothSolver::cholesky},
                                {"implicit, Newton, conjugate gradients", Integrator::implicit_euler, false, ClothSolver::conjugate_gradients},
                                {"implicit, one step, cholesky", Integrator::implicit_euler, true, ClothSolver::cholesky},
                                {"implicit, one step, conjugate gradients", Integrator::implicit_euler, true, ClothSolver::conjugate_gradients},
+                               {"implicit, one step, conjugate gradients to 1e-3", Integrator::implicit_euler, true, ClothSolver::conjugate_gradients, 1e-3},
                                {"explicit", Integrator::symplectic_euler, false, ClothSolver::automatic}};
 
 }  // namespace
@@ -98,6 +100,7 @@ void runClothAccuracy(StudyContext& context)
         options.integrator = method.integrator;
         options.one_newton_step = method.one_step;
         options.solver = method.solver;
+        options.linear_tolerance = method.linear_tolerance;
         const Eigen::Matrix3Xd x = runTo(end, setup, options, step, seconds);
         Row& row = context.row();
         row.set("scene", name).set("method", method.name).set("step_ms", 1e3 * step);

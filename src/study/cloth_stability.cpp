@@ -133,6 +133,7 @@ void runClothStability(StudyContext& context)
       report(what, cloth, 0.1, run(cloth, {}, 0.1, 20, nullptr), false);
     }
 
+  const int settling = context.quick() ? 20 : 60;
   std::mt19937 random(17);
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (const BendingModel bending : kBendingModels)
@@ -144,40 +145,40 @@ void runClothStability(StudyContext& context)
         for (Eigen::Index i = 0; i < cloth.state.x.cols(); ++i)
           if (std::find(cloth.state.pins.begin(), cloth.state.pins.end(), static_cast<int>(i)) == cloth.state.pins.end())
             cloth.state.x.col(i) = 0.25 * Eigen::Vector3d(1 + uniform(random), 1 + uniform(random), uniform(random));
-        report("random positions", cloth, h, run(cloth, {}, h, 200, nullptr), true);
+        report("random positions", cloth, h, run(cloth, {}, h, settling, nullptr), true);
       }
       {   // mirrored: all faces turned over inside their plane
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         cloth.pin({0});
         cloth.state.x.row(0) *= -1.0;
-        report("mirrored", cloth, h, run(cloth, {}, h, 100, nullptr), true);
+        report("mirrored", cloth, h, run(cloth, {}, h, settling, nullptr), true);
       }
       {   // single vertices across the opposite edge: inverted triangles
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         hung(cloth, 13);
         for (int i = 20; i < 150; i += 13)
           cloth.state.x.col(i) += Eigen::Vector3d(0.1, 0.07, 0);
-        report("inverted triangles", cloth, h, run(cloth, {}, h, 200, nullptr), true);
+        report("inverted triangles", cloth, h, run(cloth, {}, h, settling, nullptr), true);
       }
       {   // all vertices on one line, and in one point
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         cloth.state.x.row(1).setZero();
-        report("crushed to a line", cloth, h, run(cloth, {}, h, 100, nullptr), false);
+        report("crushed to a line", cloth, h, run(cloth, {}, h, settling, nullptr), false);
         ClothSetup point = sheet(grid, bending, 1e3, 1e-4);
         point.state.x.setZero();
-        report("crushed to a point", point, h, run(point, {}, h, 100, nullptr), false);
+        report("crushed to a point", point, h, run(point, {}, h, settling, nullptr), false);
       }
       {
         ClothSetup cloth = sheet(needleMesh(), bending, 1e3, 1e-4);
         cloth.pin({0, 10});
-        report("needle triangles", cloth, h, run(cloth, {}, h, 100, nullptr), false);
+        report("needle triangles", cloth, h, run(cloth, {}, h, settling, nullptr), false);
       }
       {   // a corner yanked at 100 m/s for 20 ms, then held there until all is still
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         hung(cloth, 13);
         double travelled = 0.0;
         report("yanked at 100 m/s", cloth, h,
-               run(cloth, {}, h, h < 0.05 ? 300 : 60,
+               run(cloth, {}, h, h < 0.05 ? 5 * settling : settling,
                    [&](int, ClothInputs& inputs) {
                      const double move = std::min(100.0 * h, 2.0 - travelled);
                      inputs.pins.col(1) += Eigen::Vector3d(0, 0, move);
