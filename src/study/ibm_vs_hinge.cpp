@@ -220,7 +220,7 @@ void runIbmVsHinge(StudyContext& context)
   if (bound_large > 0)
     context.metric("product_over_bandwidth_bound_large", bound_large);
   context.note("Isometric Hessian: assembled once, spread over 1,000 steps; a step then does nothing for it.");
-  context.note("implicit step: hinges use conjugate gradients preconditioned by the isometric model's matrix, too; 'factored': what hinges had without it.");
+  context.note("implicit step: hinges, too, use conjugate gradients preconditioned by the isometric matrix; factored: without it.");
   context.note("hung sheet: from four corners, damped; the thesis's drape and its collisions are not in these steps.");
   context.note("bandwidth bound: least time of reading as many bytes as a product must move (matrix, x, y), in the same run.");
 }
