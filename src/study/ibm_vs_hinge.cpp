@@ -174,7 +174,7 @@ void runIbmVsHinge(StudyContext& context)
 {
   useOneBlasThread();
   Plot& plot = context.plot("ibm_vs_hinge", "Hinges over isometric bending: time", "vertices", "ratio");
-  double gradient = 1e300, hessian = 0, implicit = 1e300, factored = 1e300, bound = 0, bound_large = 0;
+  double gradient = 1e300, hessian = 0, implicit = 1e300, factored = 1e300, bound = 0;
   for (const bool flag : {false, true})
     for (const Published& p : flag ? kFlag : kDrape)
     {
@@ -208,21 +208,19 @@ void runIbmVsHinge(StudyContext& context)
       hessian = std::max(hessian, c.hessian[1] / c.hessian[0]);
       implicit = std::min(implicit, c.implicit_step[0] / c.implicit_step[1]);
       factored = std::min(factored, c.factored_step / c.implicit_step[1]);
-      bound = std::max(bound, c.product_over_bound);
-      if (p.vertices > 20000)
-        bound_large = std::max(bound_large, c.product_over_bound);
+      if (p.vertices > 20000)   // smaller ones stay in the cache next to the processor, where its arithmetic is the bound
+        bound = std::max(bound, c.product_over_bound);
     }
   context.metric("gradient_speedup_min", gradient);
   context.metric("hessian_cost_ratio_max", hessian);
   context.metric("implicit_step_speedup_min", implicit);
   context.metric("implicit_step_speedup_over_factored_hinges_min", factored);
-  context.metric("product_over_bandwidth_bound_max", bound);
-  if (bound_large > 0)
-    context.metric("product_over_bandwidth_bound_large", bound_large);
+  if (bound > 0)
+    context.metric("product_over_bandwidth_bound", bound);
   context.note("Isometric Hessian: assembled once, spread over 1,000 steps; a step then does nothing for it.");
   context.note("implicit step: hinges, too, use conjugate gradients preconditioned by the isometric matrix; factored: without it.");
   context.note("hung sheet: from four corners, damped; the thesis's drape and its collisions are not in these steps.");
-  context.note("bandwidth bound: least time of reading as many bytes as a product must move (matrix, x, y), in the same run.");
+  context.note("bandwidth bound: least time of reading as many bytes as a product must move (matrix, x, y), in the same run; the metric is of the largest meshes.");
 }
 
 }  // namespace slender::study
