@@ -105,6 +105,9 @@ void runClothStability(StudyContext& context)
     not_recovered += expects_recovery && v.refused == 0 && !recovered;
     context.progress(++cases, context.quick() ? 64 : 204, what);
   };
+  ClothOptions common;
+  if (context.quick())
+    common.newton.max_cuts = 4;   // refusals come sooner
   const int cells = context.quick() ? 8 : 12, side = cells + 1;
   const TriangleMesh grid = gridMesh(0.5, 0.5, cells, cells, GridPattern::alternating);
   const auto hung = [&](ClothSetup& cloth) { cloth.pin({0, side - 1}); };
@@ -121,7 +124,7 @@ void runClothStability(StudyContext& context)
         {
           ClothSetup cloth = sheet(grid, bending, std::pow(10.0, decade), 1e-4);
           hung(cloth);
-          ClothOptions options;
+          ClothOptions options = common;
           options.one_newton_step = !newton;
           char what[80];
           std::snprintf(what, sizeof what, "membrane 1e%d N/m, %s", decade, newton ? "Newton" : "one step");
@@ -134,7 +137,7 @@ void runClothStability(StudyContext& context)
       hung(cloth);
       char what[80];
       std::snprintf(what, sizeof what, "bending 1e%d N m", decade);
-      report(what, cloth, 0.1, run(cloth, {}, 0.1, 20, nullptr), false);
+      report(what, cloth, 0.1, run(cloth, common, 0.1, 20, nullptr), false);
     }
 
   const int settling = context.quick() ? 20 : 60;
@@ -149,40 +152,40 @@ void runClothStability(StudyContext& context)
         for (Eigen::Index i = 0; i < cloth.state.x.cols(); ++i)
           if (std::find(cloth.state.pins.begin(), cloth.state.pins.end(), static_cast<int>(i)) == cloth.state.pins.end())
             cloth.state.x.col(i) = 0.25 * Eigen::Vector3d(1 + uniform(random), 1 + uniform(random), uniform(random));
-        report("random positions", cloth, h, run(cloth, {}, h, settling, nullptr), true);
+        report("random positions", cloth, h, run(cloth, common, h, settling, nullptr), true);
       }
       {   // mirrored: all faces turned over inside their plane
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         cloth.pin({0});
         cloth.state.x.row(0) *= -1.0;
-        report("mirrored", cloth, h, run(cloth, {}, h, settling, nullptr), true);
+        report("mirrored", cloth, h, run(cloth, common, h, settling, nullptr), true);
       }
       {   // single vertices across the opposite edge: inverted triangles
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         hung(cloth);
         for (int i = side + 4; i < side * cells; i += side)
           cloth.state.x.col(i) += Eigen::Vector3d(0.1, 0.07, 0);
-        report("inverted triangles", cloth, h, run(cloth, {}, h, settling, nullptr), true);
+        report("inverted triangles", cloth, h, run(cloth, common, h, settling, nullptr), true);
       }
       {   // all vertices on one line, and in one point
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         cloth.state.x.row(1).setZero();
-        report("crushed to a line", cloth, h, run(cloth, {}, h, settling, nullptr), false);
+        report("crushed to a line", cloth, h, run(cloth, common, h, settling, nullptr), false);
         ClothSetup point = sheet(grid, bending, 1e3, 1e-4);
         point.state.x.setZero();
-        report("crushed to a point", point, h, run(point, {}, h, settling, nullptr), false);
+        report("crushed to a point", point, h, run(point, common, h, settling, nullptr), false);
       }
       {
         ClothSetup cloth = sheet(needleMesh(), bending, 1e3, 1e-4);
         cloth.pin({0, 10});
-        report("needle triangles", cloth, h, run(cloth, {}, h, settling, nullptr), false);
+        report("needle triangles", cloth, h, run(cloth, common, h, settling, nullptr), false);
       }
       {   // a corner yanked at 100 m/s for 20 ms, then held there until all is still
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         hung(cloth);
         double travelled = 0.0;
         report("yanked at 100 m/s", cloth, h,
-               run(cloth, {}, h, settling,
+               run(cloth, common, h, settling,
                    [&](int, ClothInputs& inputs) {
                      const double move = std::min(100.0 * h, 2.0 - travelled);
                      inputs.pins.col(1) += Eigen::Vector3d(0, 0, move);
@@ -200,7 +203,7 @@ void runClothStability(StudyContext& context)
     {
       ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
       hung(cloth);
-      ClothOptions options;
+      ClothOptions options = common;
       options.integrator = Integrator::symplectic_euler;
       report("explicit", cloth, h, run(cloth, options, h, 500, nullptr), false);
     }
