@@ -47,6 +47,11 @@ void runClothCollisionSafety(StudyContext&);
 void runWillmoreSphere(StudyContext&);
 void runWillmoreHole(StudyContext&);
 void runWillmoreSmoothing(StudyContext&);
+void runPlate(StudyContext&);
+void runIbmVsHinge(StudyContext&);
+void runImplicitStep(StudyContext&);
+void runClothStability(StudyContext&);
+void runClothAccuracy(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -95,6 +100,11 @@ const std::vector<Study>& studies()
       {"willmore_sphere", "an icosahedron and rough spheres that Willmore flow makes round: int H^2 against 16 pi", runWillmoreSphere},
       {"willmore_hole", "caps of spheres and pieces of a torus cut out and closed again by Willmore flow", runWillmoreHole},
       {"willmore_smoothing", "rough meshes of 24,192 and 44,928 triangles: times of 16 steps and of the factorisation", runWillmoreSmoothing},
+      {"plate", "plates of every bending model on every mesh against plate theory: what D means", runPlate},
+      {"ibm_vs_hinge", "isometric bending beside hinges, as thesis table 2.1: gradient, Hessian, explicit and implicit steps", runIbmVsHinge},
+      {"implicit_step", "a sheet pinned at two corners: a step and its parts beside one factorisation of its matrix", runImplicitStep},
+      {"cloth_stability", "extreme stiffness, steps, random and crushed starts, needles, a yanked corner: done, recovered or refused with reason", runClothStability},
+      {"cloth_accuracy", "error against run time of the cloth's integrators and solvers, on a flag and a swinging cloth", runClothAccuracy},
   };
   return all;
 }

@@ -1,0 +1,148 @@
+// A sheet pinned at two corners: what an implicit step costs beside one factorisation of its matrix.
+#include <cmath>
+#include <numeric>
+
+#include "cloth_cases.h"
+#include "slender_sim/energy/isometric_bending.h"
+#include "slender_sim/linalg/sparse_cholesky.h"
+#include "slender_sim/study/study.h"
+#include "src/cloth/cloth_system.h"
+
+namespace slender::study {
+
+namespace {
+
+constexpr double kStep = 0.01;   // [s]
+
+ClothSetup pinnedSheet(int side)
+{
+  ClothModel model = buildCloth("sheet", gridMesh(1.0, 1.0, side - 1, side - 1, GridPattern::alternating), 0.15, isotropicMembrane(1e6, 0.3, 1e-3));
+  model.bending_modulus = 1e-4;
+  ClothSetup cloth(std::move(model));
+  cloth.pin({0, side - 1});
+  cloth.inputs.gravity = Eigen::Vector3d(0, 0, -9.81);
+  return cloth;
+}
+
+/// Least time to factor the matrix of a step from this state, by CHOLMOD with nested dissection of points and wide supernodes.
+double factorSeconds(const ClothSetup& cloth, double budget)
+{
+  const ClothModel& model = *cloth.model;
+  const MeshTopology& t = model.topology;
+  const int n = model.vertices();
+  const auto element = IsometricElement::nonconforming;
+  const PointMatrix bending =
+    isometricBending(model.rest, t, element, model.bending_modulus * bendingCalibration(model.rest, t, element, model.warp));
+  BlockMatrix matrix(n, {model.rest.triangles, t.hinges});
+  const MembraneEnergy membrane(model.rest, model.membrane, model.warp);
+  PointVector x, gradient(4 * n, 0.0);
+  toPoints(cloth.state.x, x);
+  matrix.setZero();
+  membrane.addHessian(HessianKind::semidefinite, x.data(), membrane.slotsIn(matrix), gradient.data(), matrix.values());
+  matrix.add(1.0, bending, matrix.mapOf(bending));
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k)
+      matrix.values()[9 * static_cast<long>(matrix.starts()[i]) + 4 * k] += model.mass[i] / (kStep * kStep);
+  std::vector<char> held(n, 0);
+  for (const int p : cloth.state.pins)
+    held[p] = 1;
+  SparseCholesky factor;
+  factor.setPattern(matrix);
+  bool good = true;
+  const double seconds = leastSeconds(budget, [&] { good = factor.factor(matrix, held.data()) && good; });
+  return good ? seconds : std::numeric_limits<double>::quiet_NaN();
+}
+
+struct Parts
+{
+  double assembly = 0, solve = 0, evaluation = 0;   ///< [s]
+};
+
+Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budget)
+{
+  ClothSystem system(*cloth.model, options);
+  system.beginStep(cloth.state, cloth.inputs, kStep);
+  PointVector x, d;
+  toPoints(cloth.state.x, x);
+  Parts parts;
+  parts.assembly = leastSeconds(budget, [&] { system.evaluateHessian(x, HessianKind::semidefinite); });
+  int iterations = 0, factorizations = 0;
+  parts.solve = leastSeconds(budget, [&] {
+    toPoints(kStep * cloth.state.v, d);
+    for (const int p : cloth.state.pins)
+      point(d, p).setZero();
+    system.solve(d, iterations, factorizations);
+  });
+  parts.evaluation = leastSeconds(budget, [&] { system.evaluate(x); });
+  return parts;
+}
+
+}  // namespace
+
+void runImplicitStep(StudyContext& context)
+{
+  useOneBlasThread();
+  const std::vector<int> sides = context.quick() ? std::vector<int>{20, 40, 80} : std::vector<int>{20, 40, 80, 160};
+  Plot& plot = context.plot("implicit_step", "Sheet pinned at two corners, dt 10 ms: time of a step", "vertices", "CPU time [ms]");
+  std::vector<double> vertices, times;
+  for (const int side : sides)
+    for (const bool newton : {false, true})
+    {
+      if (newton && side > (context.quick() ? 40 : 80))
+        continue;
+      context.progress(side, sides.back(), std::to_string(side * side) + " vertices");
+      ClothSetup cloth = pinnedSheet(side);
+      ClothOptions options;
+      options.one_newton_step = !newton;
+      ClothStepper stepper(cloth.model, options);
+      std::vector<double> seconds, factorings;
+      int iterations = 0, linear = 0;
+      double strain = 0;
+      const int steps = newton ? 10 : context.quick() ? 30 : 60;
+      for (int k = 0; k < steps; ++k)
+      {
+        const double start = threadSeconds();
+        const StepReport report = stepper.step(cloth.state, cloth.inputs, kStep);
+        seconds.push_back(threadSeconds() - start);
+        if (!report.ok)
+          throw std::runtime_error("implicit_step: " + report.message);
+        iterations += report.iterations;
+        linear += report.linear_iterations;
+        strain = std::max(strain, report.max_strain);
+        if (k % 10 == 5)   // between the steps: both see the same machine
+          factorings.push_back(factorSeconds(cloth, 0.0));
+      }
+      seconds.erase(seconds.begin());   // factors what stays
+      std::sort(seconds.begin(), seconds.end());
+      const double median = seconds[seconds.size() / 2], factoring = *std::min_element(factorings.begin(), factorings.end());
+      Row& row = context.row();
+      row.set("vertices", side * side).set("newton", newton ? "full" : "one step")
+        .set("solver", stepper.solver() == ClothSolver::cholesky ? "cholesky" : "conjugate_gradients").set("step_ms", 1e3 * median)
+        .set("least_ms", 1e3 * seconds.front()).set("iterations", static_cast<double>(iterations) / steps)
+        .set("linear_iterations", static_cast<double>(linear) / steps).set("factorisation_ms", 1e3 * factoring)
+        .set("step_over_factorisation", median / factoring).set("largest_stretch", strain);
+      plot.at(newton ? "step, full Newton" : "step, one Newton step").x.push_back(side * side);
+      plot.at(newton ? "step, full Newton" : "step, one Newton step").y.push_back(1e3 * median);
+      if (newton)
+        continue;
+      plot.at("one factorisation").x.push_back(side * side);
+      plot.at("one factorisation").y.push_back(1e3 * factoring);
+      const Parts parts = partsOf(cloth, options, 0.05);
+      row.set("assembly_ms", 1e3 * parts.assembly).set("solve_ms", 1e3 * parts.solve).set("evaluation_ms", 1e3 * parts.evaluation);
+      // what the linear solver leaves, over what the step moves
+      ClothState one = cloth.state, exact = cloth.state;
+      ClothOptions direct = options;
+      direct.solver = ClothSolver::cholesky;
+      ClothStepper factored(cloth.model, direct);
+      if (stepper.step(one, cloth.inputs, kStep).ok && factored.step(exact, cloth.inputs, kStep).ok)
+        row.set("solve_error", (one.x - exact.x).norm() / (exact.x - cloth.state.x).norm());
+      vertices.push_back(side * side);
+      times.push_back(median);
+      context.metric("step_over_factorisation_" + std::to_string(side * side), median / factoring);
+    }
+  context.metric("growth_exponent", std::log(times.back() / times[1]) / std::log(vertices.back() / vertices[1]));
+  context.note("factorisation: CHOLMOD, METIS on the graph of points, wide supernodes, the same matrix, between the steps; least of all.");
+  context.note("solve_error: of the last step's positions against a factorised solve, over the step's motion.");
+}
+
+}  // namespace slender::study
