@@ -16,6 +16,8 @@ double angleBetween(const Pose& a, const Pose& b)
 
 bool mayTouch(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b, double gap)
 {
+  if (a.driven && b.driven)
+    return false;
   if (a.object == b.object)
     return surface.objects[a.object].self && !contactNeighbours(a, b, surface.objects[a.object], gap);
   return surface.objects[a.object].others && surface.objects[b.object].others;
@@ -23,7 +25,8 @@ bool mayTouch(const ContactSurface& surface, const ContactSegment& a, const Cont
 
 bool mayTouch(const ContactSurface& surface, const ContactSegment& segment, const ContactSolid& solid)
 {
-  return surface.objects[segment.object].solids &&
+  const ContactObject& object = surface.objects[segment.object];
+  return object.solids && !segment.driven && (solid.only < 0 || solid.only == object.owner) &&
          std::find(solid.ignores.begin(), solid.ignores.end(), segment.object) == solid.ignores.end();
 }
 

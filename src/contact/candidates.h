@@ -33,6 +33,7 @@ public:
   /// All pairs that may come within `gap` of each other while no coordinate leaves the boxes that the points' motions fill by more than
   /// `margin` [m], and no solid its own motion by more than `margin` and `turn` [rad].
   void build(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion, double gap, double margin, double turn);
+  void clear() { built_ = false; }
   bool holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
 
   const std::vector<GridPairs::Pair>& pairs() const { return pairs_; }

@@ -64,7 +64,7 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
   for (const GridPairs::Pair& pair : candidates->pairs())
   {
     const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
-    limit.thickness = a.radius + b.radius;
+    limit.thickness = a.coreRadius() + b.coreRadius();
     share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
   }
   int solid = -1;
@@ -79,6 +79,40 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
     share = std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids[on.solid].pieces[on.piece], rigid, limit));
   }
   return share;
+}
+
+bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+{
+  check(x, poses);
+  near_.build(surface, solids, {x, x, poses, poses}, options.gap, margin_, 0.0);
+  const double least = options.gap / 20, fifth = options.gap / 5;
+  // never thinner than what leaves half of the distance between centrelines
+  const auto room = [&](double distance) { return distance - std::min(fifth, 0.5 * distance); };
+  for (const GridPairs::Pair& pair : near_.pairs())
+  {
+    ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
+    const double distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)), thickness = a.coreRadius() + b.coreRadius();
+    if (distance - thickness >= least)
+      continue;
+    if (!(distance > 1e-3 * thickness))
+      return false;
+    const double share = room(distance) / thickness;
+    a.radius *= share;
+    b.radius *= share;
+  }
+  for (const Candidates::OnSolid& on : near_.onSolids())
+  {
+    ContactSegment& s = surface.segments[on.segment];
+    const Pose to_solid = poses[on.solid].inverse();
+    const double distance =
+      segmentPieceDistance(solids[on.solid].pieces[on.piece], to_solid * Eigen::Vector3d(x.col(s.a)), to_solid * Eigen::Vector3d(x.col(s.b))).distance;
+    if (distance - s.radius >= least)
+      continue;
+    if (!(distance > 1e-3 * s.radius))
+      return false;
+    s.radius = room(distance);
+  }
+  return true;
 }
 
 double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
@@ -101,9 +135,9 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     {
       const ContactSegment &a = surface.segments[order_[p]], &b = surface.segments[order_[q]];
       const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
-      const bool counts = a.object == b.object ? c.self && !contactNeighbours(a, b, c, options.gap) : c.others && d.others;
+      const bool counts = a.driven && b.driven ? false : a.object == b.object ? c.self && !contactNeighbours(a, b, c, options.gap) : c.others && d.others;
       if (counts && boxes_[order_[p]].overlaps(boxes_[order_[q]]))
-        least = std::min(least, segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - a.radius - b.radius);
+        least = std::min(least, segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - a.coreRadius() - b.coreRadius());
     }
   for (std::size_t k = 0; k < solids.size(); ++k)
   {
@@ -112,7 +146,8 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     const double reach = boundingRadius(solid.shape) + options.gap;
     for (const ContactSegment& s : surface.segments)
     {
-      if (!surface.objects[s.object].solids || std::count(solid.ignores.begin(), solid.ignores.end(), s.object))
+      const ContactObject& object = surface.objects[s.object];
+      if (!object.solids || s.driven || (solid.only >= 0 && solid.only != object.owner) || std::count(solid.ignores.begin(), solid.ignores.end(), s.object))
         continue;
       const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a)), e = to_solid * Eigen::Vector3d(x.col(s.b)) - a;
       if ((a + 0.5 * e).norm() > 0.5 * e.norm() + s.radius + reach)

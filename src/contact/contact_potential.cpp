@@ -118,7 +118,7 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
 {
   const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
   const Eigen::Vector3d a0 = x.col(a.a), a1 = x.col(a.b), b0 = x.col(b.a), b1 = x.col(b.b);
-  const double thickness = a.radius + b.radius, range = thickness + options.gap;
+  const double thickness = a.coreRadius() + b.coreRadius(), range = thickness + options.gap;
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0;
   const double middles2 = 0.25 * (a0 + a1 - b0 - b1).squaredNorm();
   // half the lengths and the range, squared: (p + q + r)^2 <= 3 (p^2 + q^2 + r^2)
@@ -131,7 +131,7 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
                   {1.0 - gap.s, gap.s, gap.t - 1.0, -gap.t},
                   -1,
                   Eigen::Vector3d::Zero(),
-                  b0 + gap.t * f + (b.radius + 0.5 * gap.gap / gap.weight) * gap.normal,
+                  b0 + gap.t * f + (b.coreRadius() + 0.5 * gap.gap / gap.weight) * gap.normal,
                   Eigen::Vector3d::Zero(),
                   std::sqrt(surface.objects[a.object].friction * surface.objects[b.object].friction)};
   return addContact(gap, contact, with_stiffness);
@@ -301,6 +301,24 @@ ContactPotential::ContactPotential(ContactSurface surface, const ContactOptions&
 
 ContactPotential::~ContactPotential() = default;
 ContactPotential::ContactPotential(ContactPotential&&) noexcept = default;
+
+void ContactPotential::setCurves(int points, const std::vector<ContactSegment>& segments, const std::vector<ContactObject>& objects)
+{
+  impl_->surface.points = points;
+  impl_->surface.segments = segments;
+  impl_->surface.objects = objects;
+  impl_->lagged.clear();
+  impl_->contacts.clear();
+  impl_->forgetCandidates();
+}
+
+bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
+{
+  return impl_->thinToFit(x, solids);
+}
+
+const std::vector<ContactSegment>& ContactPotential::segments() const { return impl_->surface.segments; }
+const std::vector<GridPairs::Pair>& ContactPotential::nearPairs() const { return impl_->nearPairs(); }
 
 double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
 {

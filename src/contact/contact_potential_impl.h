@@ -33,6 +33,13 @@ public:
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   double lagFriction();
+  bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
+  void forgetCandidates()
+  {
+    near_.clear();
+    swept_.clear();
+  }
   void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
 
   ContactSurface surface;

@@ -11,9 +11,11 @@ namespace slender {
 
 struct SparseCholesky::Impl
 {
-  Impl()
+  explicit Impl(bool simplicial)
   {
     cholmod_start(&common);
+    if (simplicial)
+      common.supernodal = CHOLMOD_SIMPLICIAL;
     common.final_ll = 1;   // LL^T finds out that a matrix is not definite; LDL^T would go on with negative pivots
     common.print = 0;
     common.error_handler = nullptr;
@@ -80,7 +82,7 @@ struct SparseCholesky::Impl
   std::vector<double> values;
 };
 
-SparseCholesky::SparseCholesky() : impl_(std::make_unique<Impl>()) {}
+SparseCholesky::SparseCholesky(bool simplicial) : impl_(std::make_unique<Impl>(simplicial)) {}
 SparseCholesky::~SparseCholesky() = default;
 SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 

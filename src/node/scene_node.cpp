@@ -29,9 +29,9 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
   // one kind of state on the topic `state`
   if (kind == NodeKind::rods && !scene.threads.empty())
     throw SceneError("scene " + scene.name + ": it has threads, which thread_node simulates; rods and threads do not meet: put them in two scenes");
-  if (kind == NodeKind::threads && (scene.threads.empty() || !scene.rods.empty() || !scene.bodies.empty() || !scene.obstacles.empty()))
+  if (kind == NodeKind::threads && (scene.threads.empty() || !scene.rods.empty() || !scene.bodies.empty()))
     throw SceneError("scene " + scene.name + (scene.threads.empty() ? ": it has no threads; rod_node simulates rods"
-                                                                    : ": it has rods, bodies or obstacles beside its threads, which do not meet them; put them in two scenes"));
+                                                                    : ": it has rods or bodies beside its threads, which do not meet them; put them in two scenes"));
   return scene;
 }
 

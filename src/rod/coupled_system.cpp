@@ -69,22 +69,15 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
   return sum;
 }
 
-/// With all of the contacts' second derivatives where the matrix is definite so: where rods run along each other, Newton's method converges
-/// slowly without the negative part.
 bool CoupledSystem::factor(const HessianShift& shift)
 {
-  constexpr int kLongestPause = 16;
-  if (contact_ && !contact_->terms().empty() && --whole_after_ < 0)
+  if (contact_ && !contact_->terms().empty() && whole_.due())
   {
     assemble(shift, true);
-    if (matrix_.factor())
-    {
-      whole_pause_ = 0;
-      whole_after_ = 0;
+    const bool definite = matrix_.factor();
+    whole_.tried(definite);
+    if (definite)
       return true;
-    }
-    whole_pause_ = std::min(kLongestPause, 2 * whole_pause_ + 1);
-    whole_after_ = whole_pause_;
   }
   assemble(shift, false);
   return matrix_.factor();

@@ -131,7 +131,7 @@ private:
   // matrix
   SparseCholesky matrix_;
   bool pattern_valid_ = false;
-  int whole_after_ = 0, whole_pause_ = 0;       ///< factorisations until contacts' whole derivatives are tried again, and after the next failure
+  WholeStiffness whole_;
   int unknowns_ = 0, body_offset_ = 0;
   std::vector<std::array<int, 5>> keys_;        ///< contacts (four points, a solid) the pattern has room for, sorted
   std::vector<double> rhs_;

@@ -198,7 +198,23 @@ std::optional<RodContact> readRodContact(const YamlCursor& at)
   return contact;
 }
 
-ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods)
+std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at)
+{
+  if (!at.present())
+  {
+    return std::nullopt;
+  }
+  ThreadContactConfig contact;
+  YamlMap map(at);
+  assign(contact.self, map.get("self").boolean());
+  assign(contact.threads, map.get("threads").boolean());
+  assign(contact.obstacles, map.get("obstacles").boolean());
+  assign(contact.friction, map.get("friction").number(friction));
+  map.finish();
+  return contact;
+}
+
+ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods, const std::vector<ThreadConfig>& threads)
 {
   ContactConfig contact;
   const std::size_t before = at.problems().size();
@@ -217,6 +233,17 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods
       }
     }
   }
+  for (const ThreadConfig& thread : threads)
+  {
+    if (thread.contact)
+    {
+      smallest = std::min(smallest, thread.nozzle ? 0.125 * thread.nozzle->diameter : std::numeric_limits<double>::infinity());
+      for (double radius : thread.radius)
+      {
+        smallest = std::min(smallest, radius);
+      }
+    }
+  }
   const bool any = std::isfinite(smallest);
   contact.gap = any ? 0.1 * smallest : 0.0;
   assign(contact.gap, map.get("gap").number(Range::above(0, 1, "m")));
@@ -224,7 +251,7 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods
   map.finish();
   if (at.present() && !any && at.problems().size() == before)
   {
-    at.problem("no rod takes part; give those that do a contact of their own, for example contact: {friction: 0.3}");
+    at.problem("no rod or thread takes part; give those that do a contact of their own, for example contact: {friction: 0.3}");
   }
   return contact;
 }

@@ -129,7 +129,13 @@ FloorConfig readFloor(const YamlCursor& at)
       floor.belt_y.table = NumberTable({{0.0, (*velocity)[1]}});
     }
   }
-  assign(floor.on_surface, map.get("centreline_on_surface").boolean());
+  const YamlCursor on_surface = map.get("centreline_on_surface"), friction = map.get("friction");
+  assign(floor.on_surface, on_surface.boolean());
+  floor.friction = friction.number(Range::closed(0, 100, "[-]"));
+  if (floor.friction && floor.on_surface)
+  {
+    on_surface.problem("is for floors that the thread sticks to, without floor.friction");
+  }
   map.finish();
   return floor;
 }
@@ -151,6 +157,31 @@ void readEdges(const YamlCursor& at, ThreadConfig& thread)
     shortest.problem("must be at most 0.4 of edges.longest (" + shortNumber(0.4 * thread.longest_edge) + " m), or edges would be joined and divided in turn");
   }
   map.finish();
+}
+
+/// true, false or {until: SHARE}.
+void readMerging(const YamlCursor& at, ThreadConfig& thread)
+{
+  constexpr double half_discs = 0.6;   // distance of the centroids of the halves of a round section, over twice the radius before
+  if (!at.present())
+  {
+    return;
+  }
+  if (at.isMap())
+  {
+    YamlMap map(at);
+    thread.merging = half_discs;
+    assign(thread.merging, map.get("until").number(Range::closed(0.05, 0.95, "of the sum of the radii")));
+    map.finish();
+  }
+  else if (at.boolean().value_or(false))
+  {
+    thread.merging = half_discs;
+  }
+  if (thread.merging > 0 && !thread.contact)
+  {
+    at.problem("is for parts that touch; give the thread a contact, for example contact: {self: true}");
+  }
 }
 
 ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
@@ -212,6 +243,13 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
   if (floor.present())
   {
     thread.floor = readFloor(floor);
+  }
+  thread.contact = readThreadContact(map.get("contact"));
+  readMerging(map.get("merging"), thread);
+  if (thread.floor && thread.floor->friction && !(thread.contact && thread.contact->obstacles))
+  {
+    YamlMap(floor).get("friction").problem("makes the floor an obstacle, which this thread does not touch; give it contact: {obstacles: true}, or leave "
+                                           "friction out, then it sticks");
   }
   readEdges(map.get("edges"), thread);
   const double most = greatestFlow(thread, context.step);

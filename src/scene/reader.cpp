@@ -135,7 +135,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
   takeGeneratedRods(generated, rods);
   scene.threads = readThreads(at_threads, context);
-  scene.contact = readContact(map.get("contact"), rods);
+  scene.contact = readContact(map.get("contact"), rods, scene.threads);
   scene.obstacles = readObstacles(at_obstacles, context);
   scene.bodies = readBodies(at_bodies, context, rods);
 

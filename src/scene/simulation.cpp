@@ -44,6 +44,7 @@ Simulation::Simulation(SceneConfig config) : config_(std::move(config))
   buildRods();
   buildThreads();
   buildBodies();
+  buildTouchingThreads();
   buildGroup();
   state_.grasp_offsets.resize(grasps_.size());
   state_.wrenches.resize(grasps_.size());
@@ -239,11 +240,13 @@ StepReport Simulation::step(const SceneInputs& inputs)
   const bool several = apart > 1;
   const std::vector<RodState> before = several ? state_.rods : std::vector<RodState>();
   const std::vector<ThreadGroupState> threads_before = several ? state_.threads : std::vector<ThreadGroupState>();
+  const double stiffness_before = state_.thread_contact_stiffness;
   const auto restore = [&] {
     if (several)
     {
       state_.rods = before;
       state_.threads = threads_before;
+      state_.thread_contact_stiffness = stiffness_before;
     }
   };
   StepReport total;
@@ -358,7 +361,7 @@ void Simulation::takeWrenches()
   }
   for (std::size_t k = 0; k < thread_steppers_.size(); ++k)
   {
-    state_.end_loads[k] = thread_steppers_[k].endLoads();
+    state_.end_loads[k] = thread_steppers_[k] ? thread_steppers_[k]->endLoads() : touching_->endLoads(touching_index_[k]);
   }
 }
 

@@ -208,7 +208,7 @@ const GraspTarget* Simulation::followed(const BodyMotion& motion, const SceneInp
 const std::vector<ContactTerm>& Simulation::contacts() const
 {
   static const std::vector<ContactTerm> none;
-  return group_ ? group_->contacts() : none;
+  return group_ ? group_->contacts() : touching_ ? touching_->contacts() : none;
 }
 
 }  // namespace slender

@@ -27,6 +27,7 @@ ThreadModel modelOf(const ThreadConfig& config)
     model.floor.present = true;
     model.floor.height = config.floor->height;
     model.floor.touches_at_radius = !config.floor->on_surface;
+    model.floor.friction = config.floor->friction.value_or(-1.0);
   }
   if (config.longest_edge > 0)
   {
@@ -75,7 +76,15 @@ void Simulation::buildThreads()
     try
     {
       thread_models_.push_back(std::make_shared<const ThreadModel>(modelOf(config_.threads[k])));
-      thread_steppers_.emplace_back(thread_models_.back(), config_.time.newton);
+      thread_steppers_.emplace_back();
+      if (!config_.threads[k].contact)
+      {
+        thread_steppers_.back().emplace(thread_models_.back(), config_.time.newton);
+      }
+      else
+      {
+        checkThreadModel(*thread_models_.back());
+      }
       state_.threads.emplace_back();
       state_.end_loads.emplace_back();
       state_.threads.back().threads.push_back(stateOf(config_.threads[k], *thread_models_.back(), config_.gravity));
@@ -85,6 +94,58 @@ void Simulation::buildThreads()
       throw SceneError("scene " + config_.name + ": threads." + std::to_string(k) + ": " + error.what());
     }
   }
+}
+
+/// Those with contact.
+void Simulation::buildTouchingThreads()
+{
+  TouchingModel model;
+  touching_index_.assign(config_.threads.size(), -1);
+  for (std::size_t k = 0; k < config_.threads.size(); ++k)
+  {
+    if (const auto& contact = config_.threads[k].contact)
+    {
+      touching_index_[k] = static_cast<int>(model.threads.size());
+      model.threads.push_back(thread_models_[k]);
+      model.touches.push_back({contact->self, contact->threads, contact->obstacles, contact->friction, config_.threads[k].merging});
+    }
+  }
+  if (model.threads.empty())
+  {
+    return;
+  }
+  for (const ObstacleConfig& obstacle : config_.obstacles)
+  {
+    model.obstacles.push_back({obstacle.shape, obstacle.friction.value_or(-1.0)});
+  }
+  model.options.gap = config_.contact.gap;
+  model.options.slip_speed = config_.contact.slip_speed;
+  try
+  {
+    touching_.emplace(std::move(model), config_.time.newton);
+    exchangeTouching();
+    touching_->checkClearance(touching_state_);
+    exchangeTouching();
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw SceneError((config_.file.empty() ? "scene " + config_.name : config_.file) + ": " + error.what());
+  }
+}
+
+/// Hands the part of the state over that threads with contact need, or back. Obstacles are given back by those that move them.
+void Simulation::exchangeTouching()
+{
+  touching_state_.threads.resize(touching_->model().threads.size());
+  for (std::size_t k = 0; k < touching_index_.size(); ++k)
+  {
+    if (touching_index_[k] >= 0)
+    {
+      std::swap(touching_state_.threads[touching_index_[k]], state_.threads[k]);
+    }
+  }
+  touching_state_.obstacles = state_.obstacles;
+  std::swap(touching_state_.contact_stiffness, state_.thread_contact_stiffness);
 }
 
 void Simulation::addThreadInputs(SceneInputs& inputs, double time) const
@@ -108,25 +169,53 @@ void Simulation::addThreadInputs(SceneInputs& inputs, double time) const
   }
 }
 
+ThreadInputs Simulation::threadInputs(std::size_t k, const SceneInputs& inputs) const
+{
+  ThreadInputs in;
+  in.gravity = config_.gravity;
+  for (int end = 0; end < 2; ++end)
+  {
+    in.ends[end] = initial_.threads.empty() ? state_.threads[k].threads.front().ends[end].X_WE : initial_.threads[k].threads.front().ends[end].X_WE;
+  }
+  if (config_.threads[k].nozzle)
+  {
+    in.ends[1] = inputs.threads[k].nozzle;
+    in.flow_rate = inputs.threads[k].flow_rate;
+  }
+  in.belt_velocity = inputs.threads[k].belt_velocity;
+  return in;
+}
+
 StepReport Simulation::stepThreads(const SceneInputs& inputs)
 {
   StepReport total;
   for (std::size_t k = 0; k < thread_steppers_.size() && total.ok; ++k)
   {
-    ThreadInputs in;
-    in.gravity = config_.gravity;
-    for (int end = 0; end < 2; ++end)
+    if (thread_steppers_[k])
     {
-      in.ends[end] = initial_.threads.empty() ? state_.threads[k].threads.front().ends[end].X_WE : initial_.threads[k].threads.front().ends[end].X_WE;
+      total.merge(thread_steppers_[k]->step(state_.threads[k], threadInputs(k, inputs), config_.time.step));
     }
-    if (config_.threads[k].nozzle)
-    {
-      in.ends[1] = inputs.threads[k].nozzle;
-      in.flow_rate = inputs.threads[k].flow_rate;
-    }
-    in.belt_velocity = inputs.threads[k].belt_velocity;
-    total.merge(thread_steppers_[k].step(state_.threads[k], in, config_.time.step));
   }
+  if (!touching_ || !total.ok)
+  {
+    return total;
+  }
+  touching_inputs_.threads.resize(touching_->model().threads.size());
+  for (std::size_t k = 0; k < touching_index_.size(); ++k)
+  {
+    if (touching_index_[k] >= 0)
+    {
+      touching_inputs_.threads[touching_index_[k]] = threadInputs(k, inputs);
+    }
+  }
+  touching_inputs_.obstacles.clear();
+  for (const GraspTarget& obstacle : inputs.obstacles)
+  {
+    touching_inputs_.obstacles.push_back({obstacle.X_WG.position, obstacle.X_WG.orientation.normalized()});
+  }
+  exchangeTouching();
+  total.merge(touching_->step(touching_state_, touching_inputs_, config_.time.step));
+  exchangeTouching();
   return total;
 }
 

@@ -18,7 +18,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 4;
+constexpr std::uint64_t version = 5;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -163,6 +163,7 @@ void visitScene(Archive& archive, State& scene)
     visitTwist(archive, velocity);
   }
   archive(scene.contact_stiffness);
+  archive(scene.thread_contact_stiffness);
   archive.list(scene.grasp_offsets);
   for (auto& offset : scene.grasp_offsets)
   {
@@ -323,7 +324,18 @@ std::uint64_t Simulation::fingerprint() const
       out(value);
     }
     out(model->floor.present);
+    out(model->floor.friction);
     out(model->limits.max_deposited);
+  }
+  for (const ThreadConfig& thread : config_.threads)
+  {
+    const ThreadContactConfig touch = thread.contact.value_or(ThreadContactConfig{});
+    out(thread.contact.has_value());
+    out(touch.self);
+    out(touch.threads);
+    out(touch.obstacles);
+    out(touch.friction);
+    out(thread.merging);
   }
   for (const BodyConfig& body : config_.bodies)
   {

@@ -34,6 +34,7 @@ void runRodTables(StudyContext&);
 void runTrouton(StudyContext&);
 void runThreadTwist(StudyContext&);
 void runRetraction(StudyContext&);
+void runMerging(StudyContext&);
 void runFiberExtrusion(StudyContext&);
 void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
@@ -77,6 +78,7 @@ const std::vector<Study>& studies()
       {"trouton", "straight viscous threads stretched by plates and by their weight", runTrouton},
       {"thread_twist", "torque of straight viscous threads twisted at a steady rate", runThreadTwist},
       {"retraction", "a free viscous thread drawn together by surface tension", runRetraction},
+      {"merging", "two parallel viscous threads in touch flow together at the rate of the model; a pile of honey", runMerging},
       {"fiber_extrusion", "a viscous thread drawn steadily from a nozzle by a roll", runFiberExtrusion},
       {"dragged_catenary", "a viscous thread that falls onto a fast belt, with and without surface tension", runDraggedCatenary},
       {"coiling", "a viscous thread that coils: frequency and radius against height, up and down", runCoiling},

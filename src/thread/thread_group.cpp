@@ -35,38 +35,36 @@ StepReport ThreadGroup::step(ThreadGroupState& state, const ThreadInputs& inputs
       if (thread.ends[end].held)
         loads[end] = stepper_.endLoads()[end];
   }
-  breakUp();
-  drop();
+  breakThreads(work_, stepper_.model().limits);
+  dropThreads(work_, stepper_.model().limits);
   loads_ = loads;
   std::swap(state, work_);
   return report;
 }
 
-void ThreadGroup::breakUp()
+void breakThreads(ThreadGroupState& state, const ThreadLimits& limits)
 {
-  const double min_radius = stepper_.model().limits.min_radius;
+  const double min_radius = limits.min_radius;
   if (min_radius == 0.0)
     return;
-  for (std::size_t k = 0; k < work_.threads.size(); ++k)
+  for (std::size_t k = 0; k < state.threads.size(); ++k)
   {
     ThreadState older;
-    while (breakThread(work_.threads[k], min_radius, older))
+    while (breakThread(state.threads[k], min_radius, older))
     {
-      older.thread_id = work_.next_thread_id++;
-      work_.threads.insert(work_.threads.begin() + k + 1, older);
+      older.thread_id = state.next_thread_id++;
+      state.threads.insert(state.threads.begin() + k + 1, older);
     }
   }
 }
 
-/// Whole threads that have left the scene, and the oldest of those that only lie about.
-void ThreadGroup::drop()
+void dropThreads(ThreadGroupState& state, const ThreadLimits& limits)
 {
-  const ThreadLimits& limits = stepper_.model().limits;
   const auto isHeld = [](const ThreadState& t) { return t.ends[0].held || t.ends[1].held; };
   int lying = 0;
-  for (std::size_t k = 0; k < work_.threads.size();)
+  for (std::size_t k = 0; k < state.threads.size();)
   {
-    const ThreadState& t = work_.threads[k];
+    const ThreadState& t = state.threads[k];
     const bool outside = std::none_of(t.x.begin(), t.x.end(), [&](const Eigen::Vector3d& x) { return limits.scene.contains(x); });
     const bool lies = std::all_of(t.deposited.begin(), t.deposited.end(), [](char d) { return d != 0; });
     if (lies)
@@ -74,8 +72,8 @@ void ThreadGroup::drop()
     // the stepper leaves max_deposited nodes behind the youngest one
     if (!isHeld(t) && (outside || (lies && lying > limits.max_deposited + 1)))
     {
-      work_.dropped_volume += t.totalVolume() + t.dropped_volume - t.fed_volume;
-      work_.threads.erase(work_.threads.begin() + k);
+      state.dropped_volume += t.totalVolume() + t.dropped_volume - t.fed_volume;
+      state.threads.erase(state.threads.begin() + k);
     }
     else
       ++k;

@@ -33,15 +33,14 @@ Eigen::Vector3d carried(const Eigen::Vector3d& d1, const Eigen::Vector3d& from, 
 
 }  // namespace
 
-void splitEdge(ThreadState& state, int j, double fraction)
+Eigen::Vector3d splitPoint(const ThreadState& state, int j, double fraction)
 {
   const int last = state.nodes() - 1;
   const Eigen::Vector3d a = state.x[j], b = state.x[j + 1], e = b - a;
   const double length = e.norm();
-  const Eigen::Vector3d t = e / length;
 
   // arc lengths from the new node; beyond a held end the straight inside of its holder
-  double s[4], radius_at[3];
+  double s[4];
   Eigen::Vector3d y[4];
   int count = 0;
   const auto add = [&](double at, const Eigen::Vector3d& x) {
@@ -49,26 +48,39 @@ void splitEdge(ThreadState& state, int j, double fraction)
     y[count++] = x;
   };
   const double to_a = fraction * length, to_b = length - to_a;
-  double before = 0.0, after = 0.0;   // lengths of the neighbouring edges
   if (j > 0)
-    add(-to_a - (before = state.edge(j - 1).norm()), state.x[j - 1]);
+    add(-to_a - state.edge(j - 1).norm(), state.x[j - 1]);
   else if (state.ends[0].held)
     add(-to_a - length, a - state.ends[0].X_WE.orientation * Eigen::Vector3d(length, 0, 0));
   add(-to_a, a);
   add(to_b, b);
   if (j + 1 < last)
-    add(to_b + (after = state.edge(j + 1).norm()), state.x[j + 2]);
+    add(to_b + state.edge(j + 1).norm(), state.x[j + 2]);
   else if (state.ends[1].held)
     add(to_b + length, b - state.ends[1].X_WE.orientation * Eigen::Vector3d(length, 0, 0));
-  Eigen::Vector3d x = interpolate(s, y, count);
+  const Eigen::Vector3d x = interpolate(s, y, count);
   // next to a much longer edge the cubic may swing out; the chord is then the better guess
   if ((x - (a + fraction * e)).norm() > 0.25 * std::min(to_a, to_b))
-    x = a + fraction * e;
+    return a + fraction * e;
+  return x;
+}
+
+void splitEdge(ThreadState& state, int j, double fraction) { splitEdge(state, j, fraction, splitPoint(state, j, fraction)); }
+
+void splitEdge(ThreadState& state, int j, double fraction, const Eigen::Vector3d& x)
+{
+  const int last = state.nodes() - 1;
+  const Eigen::Vector3d a = state.x[j], b = state.x[j + 1], e = b - a;
+  const double length = e.norm();
+  const Eigen::Vector3d t = e / length;
+  const double to_a = fraction * length, to_b = length - to_a;
+  const double before = j > 0 ? state.edge(j - 1).norm() : 0.0, after = j + 1 < last ? state.edge(j + 1).norm() : 0.0;
 
   // radii at the middles of three edges, seen from the middles of the two new ones
   double volume_ratio = fraction;
   if (j > 0 && j + 1 < last)
   {
+    double radius_at[3];
     const double radii[3] = {state.radius(j - 1), state.radius(j), state.radius(j + 1)};
     const double middles[3] = {-0.5 * before, 0.5 * length, length + 0.5 * after};   // from node j
     const auto radius = [&](double where) {
@@ -143,14 +155,23 @@ void removeNode(ThreadState& state, int i)
     state.twist.back() = 0.0;
 }
 
-bool mendFold(ThreadState& state, int fold)
+bool mayRemove(const ThreadState& state, int i, const RemeshGuard* guard)
+{
+  if (!guard)
+    return true;
+  const double le = state.edge(i - 1).norm(), lf = state.edge(i).norm();
+  return guard->allows(state, i - 1, i, state.x[i], state.x[i - 1] + le / (le + lf) * (state.x[i + 1] - state.x[i - 1]));
+}
+
+bool mendFold(ThreadState& state, int fold, const RemeshGuard* guard)
 {
   if (!state.deposited[fold] || (state.deposited[fold - 1] && state.deposited[fold + 1]))
   {
     // the node itself, or a neighbour where the two edges lie so close on each other that nothing would be left of them
     for (const int i : {fold, fold + 1, fold - 1})
       if (i > 0 && i + 1 < state.nodes() && state.deposited[i] == state.deposited[fold] &&
-          (state.x[i + 1] - state.x[i - 1]).norm() > 0.1 * std::min(state.edge(i - 1).norm(), state.edge(i).norm()))
+          (state.x[i + 1] - state.x[i - 1]).norm() > 0.1 * std::min(state.edge(i - 1).norm(), state.edge(i).norm()) &&
+          mayRemove(state, i, guard))
       {
         removeNode(state, i);
         return true;

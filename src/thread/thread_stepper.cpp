@@ -4,8 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "slender_sim/thread/thread_remesh.h"
-#include "thread_stepper_impl.h"
+#include "thread_loop.h"
 
 namespace slender {
 
@@ -14,6 +13,9 @@ ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const New
   checkThreadModel(*model);
   if (integrator != Integrator::implicit_euler && integrator != Integrator::symplectic_euler)
     throw std::invalid_argument("thread '" + model->name + "': integrator is " + toString(integrator) + ", allowed: implicit_euler, symplectic_euler");
+  if (model->floor.slips())
+    throw std::invalid_argument("thread '" + model->name + "': floor.friction is " + std::to_string(model->floor.friction) +
+                                ", but a floor that slips needs TouchingThreads");
   impl_ = std::make_unique<Impl>(std::move(model), newton, integrator == Integrator::symplectic_euler);
 }
 ThreadStepper::~ThreadStepper() = default;
@@ -22,7 +24,8 @@ ThreadStepper& ThreadStepper::operator=(ThreadStepper&&) noexcept = default;
 
 StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, double duration)
 {
-  return impl_->step(state, inputs, duration);
+  const ThreadPart part{impl_.get(), &state, &inputs};
+  return advanceThreads(&part, 1, duration, nullptr);
 }
 const std::array<EndLoad, 2>& ThreadStepper::endLoads() const
 {
@@ -89,61 +92,34 @@ std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double leng
       return "the matrix could not be made definite" + at + ": radii or edge lengths differ by too many orders of magnitude";
     case StepFailure::state_not_finite:
       return "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
+    case StepFailure::squeezed:
+      return "contact leaves no room for what lies between what is held or driven" + at + ": give way, or move it more slowly";
     default:
       return "Newton's method did not converge" + at + ": use a shorter step, more time.newton.max_iterations or max_cuts, or move the nozzle slowly";
   }
 }
 
-StepReport ThreadStepper::Impl::step(ThreadState& state, const ThreadInputs& inputs, double duration)
+bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& inputs, double duration, StepReport& report)
 {
-  StepReport report;
   std::string what;
   if (!inputsFinite(state, inputs, duration, what))
-    return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
+  {
+    refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
+    return false;
+  }
+  inputs_ = &inputs;
   work = state;
   start_ends = state.ends;
   loads = {};
   flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
   constexpr double kMostFed = 1e4;   // edges in one step
   if (!(flow_speed_ * duration <= kMostFed * model->feed_length))
-    return refuse(report, StepFailure::input_not_finite,
-                  "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or longer feed_length");
-  // no more than an edge leaves the nozzle at a time
-  const double longest = flow_speed_ > 0 ? std::min(duration, model->feed_length / flow_speed_) : duration;
-  const double first = duration / std::ceil(duration / longest * (1 - 1e-9)), shortest = std::ldexp(first, -newton.max_cuts);
-  constexpr int kMostFolds = 20;   // in one step
-  double t = 0.0, h = first;
-  while (t < duration)
   {
-    const bool last = t + h > duration * (1 - 1e-9);
-    const double length = last ? duration - t : h;
-    StepReport sub;
-    const StepFailure failure = substep(inputs, t, last ? duration : t + length, duration, sub);
-    report.merge(sub);
-    if (failure != StepFailure::none)
-    {
-      // a shorter step now would only hide that all of them are too long, or draw the thread out bit by bit
-      if (explicit_step || failure == StepFailure::overstretched)
-        return refuse(report, failure, explainFailure(failure, length));
-      if (0.5 * length < shortest * (1 - 1e-9))
-      {
-        const int fold = foldedNode();
-        if (report.mended_folds >= kMostFolds || fold < 0 || !mendFold(work, fold))
-          return refuse(report, failure, explainFailure(failure, length));
-        ++report.mended_folds;
-        h = first;
-        continue;
-      }
-      ++report.cut_steps;
-      h = 0.5 * length;
-      continue;
-    }
-    ++report.substeps;
-    t = last ? duration : t + length;
-    h = std::min(2.0 * length, first);
+    refuse(report, StepFailure::input_not_finite,
+           "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or longer feed_length");
+    return false;
   }
-  std::swap(state, work);
-  return report;
+  return true;
 }
 
 /// The inner node at which the last trial turns most, if that is more than a right angle; -1: there is none.
@@ -162,22 +138,30 @@ Pose ThreadStepper::Impl::endPose(int end, const ThreadInputs& inputs, double fr
   return {a.position + fraction * (b.position - a.position), a.orientation.slerp(fraction, b.orientation).normalized()};
 }
 
-StepFailure ThreadStepper::Impl::substep(const ThreadInputs& inputs, double from, double to, double duration, StepReport& report)
+StepFailure ThreadStepper::Impl::prepare(double from, double to, double duration)
 {
   const double h = to - from;
   for (int end = 0; end < 2; ++end)
     if (work.ends[end].held)
-      end_poses[end] = endPose(end, inputs, to / duration);
+      end_poses[end] = endPose(end, *inputs_, to / duration);
+  landed.assign(work.nodes(), 0);
   if (!loadSystem(h))
     return StepFailure::folded_back;
-  setResponse(inputs, h);
-  setTrial(inputs, h);
-  if (const StepFailure failure = explicit_step ? move(inputs, h) : solve(inputs, h, report); failure != StepFailure::none)
-    return failure;
-  finish(inputs, h);
+  setResponse(*inputs_, h);
+  setTrial(*inputs_, h);
+  return StepFailure::none;
+}
+
+StepFailure ThreadStepper::Impl::solveAlone(double h, StepReport& report)
+{
+  return explicit_step ? move(h) : solve(h, report);
+}
+
+void ThreadStepper::Impl::takeOver(double h)
+{
+  finish(*inputs_, h);
   if (explicit_step)
     push(h);
-  return remesh() ? StepFailure::none : StepFailure::overstretched;
 }
 
 }  // namespace slender

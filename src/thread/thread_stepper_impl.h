@@ -3,6 +3,7 @@
 #include <string>
 
 #include "slender_sim/dynamics/newton.h"
+#include "slender_sim/thread/thread_remesh.h"
 #include "slender_sim/thread/thread_stepper.h"
 #include "slender_sim/thread/thread_system.h"
 
@@ -17,8 +18,40 @@ class ThreadStepper::Impl
 public:
   Impl(std::shared_ptr<const ThreadModel> m, const NewtonConfig& n, bool is_explicit) : model(std::move(m)), newton(n), explicit_step(is_explicit) {}
 
-  StepReport step(ThreadState& state, const ThreadInputs& inputs, double duration);
+  // ---- a step in substeps, see advanceThreads()
+  /// No: an input or the state is not sound, and the report says so.
+  bool begin(const ThreadState& state, const ThreadInputs& inputs, double duration, StepReport& report);
+  /// Of a substep: no more than an edge leaves the nozzle at a time.
+  double longestSubstep(double duration) const { return flow_speed_ > 0 ? std::min(duration, model->feed_length / flow_speed_) : duration; }
+  /// The equations of a substep and a first guess.
+  StepFailure prepare(double from, double to, double duration);
+  /// Solves them for this thread on its own.
+  StepFailure solveAlone(double h, StepReport& report);
+  /// Takes the solution over.
+  void takeOver(double h);
+  /// Divides, joins and takes away edges, as far as the guard (may be null) allows; nothing of it when the step needs none. No: it
+  /// would take more edges than a motion can mean.
+  bool remesh(const RemeshGuard* guard);
+  int foldedNode() const;
+  StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
+  std::string explainFailure(StepFailure failure, double length) const;
 
+  /// When the first node goes through the floor, as a fraction of the substep; above 1: none does.
+  double firstLanding() const;
+  /// Stops those that do about then where they meet the floor, and holds them.
+  void stopLanding(double h, double earliest);
+
+  bool endHeld(int node) const { return (node == 0 && work.ends[0].held) || (node + 1 == work.nodes() && work.ends[1].held); }
+  bool isHeld(int node) const { return work.deposited[node] || endHeld(node); }
+  /// Its number in the system; less than 0: it lies on the floor and moves with that.
+  int inSystem(int node) const { return node < first_ ? -1 : node - first_ + offset_; }
+  int lastInSystem() const { return inSystem(work.nodes() - 1); }
+  const ThreadInputs& inputs() const { return *inputs_; }
+  /// Puts a node of the system somewhere, and with an end the inside of its holder.
+  void placeNode(int node, const Eigen::Vector3d& x);
+
+  ThreadSystem system;
+  ThreadState work;
   std::shared_ptr<const ThreadModel> model;
   NewtonConfig newton;
   bool explicit_step;
@@ -26,25 +59,20 @@ public:
 
 private:
   bool inputsFinite(const ThreadState& state, const ThreadInputs& inputs, double duration, std::string& what) const;
-  StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
-  std::string explainFailure(StepFailure failure, double length) const;
-
-  StepFailure substep(const ThreadInputs& inputs, double from, double to, double duration, StepReport& report);
   bool loadSystem(double h);
   void setResponse(const ThreadInputs& inputs, double h);
   void setTrial(const ThreadInputs& inputs, double h);
-  StepFailure solve(const ThreadInputs& inputs, double h, StepReport& report);
-  StepFailure move(const ThreadInputs& inputs, double h);
+  StepFailure solve(double h, StepReport& report);
+  StepFailure move(double h);
   void push(double h);
-  bool land(const ThreadInputs& inputs, double h);
+  bool land(double h);
+  bool meetsFloor(int node, double& when) const;
   void finish(const ThreadInputs& inputs, double h);
-  bool remesh();
-  int foldedNode() const;
+  void split(int j, double fraction, const RemeshGuard* guard);
   EndLoad endLoad(int end) const;
   double fedVolume(double h) const { return flow_speed_ * model->nozzleArea() * h; }
   /// Volume of an edge with what flows in during the substep.
   double volume(int j, double h) const { return work.volume[j] + (j + 2 == work.nodes() && work.ends[1].held ? fedVolume(h) : 0.0); }
-  bool endHeld(int node) const { return (node == 0 && work.ends[0].held) || (node + 1 == work.nodes() && work.ends[1].held); }
   /// Both its nodes lie on the floor: it moves as a solid.
   bool isSolid(int j) const { return work.deposited[j] && work.deposited[j + 1]; }
   /// Where a held end goes on this substep.
@@ -52,11 +80,7 @@ private:
   double restingHeight(int node) const;
   double deformingShare(int j) const;
 
-  int inSystem(int node) const { return node - first_ + offset_; }
-  int lastInSystem() const { return inSystem(work.nodes() - 1); }
-
-  ThreadSystem system;
-  ThreadState work;
+  const ThreadInputs* inputs_ = nullptr;
   std::array<ThreadEnd, 2> start_ends;   ///< at the start of the step
   std::array<Pose, 2> end_poses;         ///< at the end of the substep
   std::vector<char> landed;              ///< per node: touched the floor in this substep

@@ -146,9 +146,8 @@ void ThreadStepper::Impl::setTrial(const ThreadInputs& inputs, double h)
   }
 }
 
-StepFailure ThreadStepper::Impl::solve(const ThreadInputs& inputs, double h, StepReport& report)
+StepFailure ThreadStepper::Impl::solve(double h, StepReport& report)
 {
-  landed.assign(work.nodes(), 0);
   do
   {
     const NewtonResult result = minimize(system, newton);
@@ -158,19 +157,17 @@ StepFailure ThreadStepper::Impl::solve(const ThreadInputs& inputs, double h, Ste
       return result.failure;
     report.residual = result.residual;
     report.max_strain = std::max(report.max_strain, result.max_strain);
-  } while (model->floor.present && land(inputs, h));
+  } while (land(h));
   return StepFailure::none;
 }
 
 /// Explicit step, first half: everything goes on as it moves. What resists this motion is then known.
-StepFailure ThreadStepper::Impl::move(const ThreadInputs& inputs, double h)
+StepFailure ThreadStepper::Impl::move(double h)
 {
-  landed.assign(work.nodes(), 0);
   for (int j = first_; j + 1 < work.nodes(); ++j)
     if (!isSolid(j))
       system.setTurn(inSystem(j), h * work.spin[j]);
-  if (model->floor.present)
-    land(inputs, h);
+  land(h);
   const RodEvaluation there = system.evaluate(false);
   if (there.min_chi <= kFoldedChi)
     return StepFailure::folded_back;
@@ -200,39 +197,62 @@ double ThreadStepper::Impl::restingHeight(int i) const
   return model->floor.height + 0.5 * (work.radius(std::max(i - 1, 0)) + work.radius(std::min(i, last)));
 }
 
-/// Stops the nodes that go through the floor where they meet it; from there they move with the belt. Those that get there first hold
-/// back the others, so these are looked at again after the next solution. No: there were none.
-bool ThreadStepper::Impl::land(const ThreadInputs& inputs, double h)
+bool ThreadStepper::Impl::meetsFloor(int i, double& when) const
+{
+  if (work.deposited[i] || landed[i] || endHeld(i))
+    return false;
+  const double height = restingHeight(i), above = work.x[i].z() - height, after = system.node(inSystem(i)).z() - height;
+  if (after >= 0)
+    return false;
+  when = above > 0 ? above / (above - after) : 0.0;
+  return true;
+}
+
+double ThreadStepper::Impl::firstLanding() const
+{
+  double earliest = 2.0, when = 0.0;
+  if (model->floor.sticks())
+    for (int i = first_; i < work.nodes(); ++i)
+      if (meetsFloor(i, when))
+        earliest = std::min(earliest, when);
+  return earliest;
+}
+
+void ThreadStepper::Impl::stopLanding(double h, double earliest)
 {
   constexpr double kTogether = 0.1;   // of the step
-  const int n = work.nodes();
-  const auto meets = [&](int i, double& when) {
-    if (work.deposited[i] || landed[i] || endHeld(i))
-      return false;
-    const double height = restingHeight(i), above = work.x[i].z() - height, after = system.node(inSystem(i)).z() - height;
-    if (after >= 0)
-      return false;
-    when = above > 0 ? above / (above - after) : 0.0;
-    return true;
-  };
-  double earliest = 2.0, when = 0.0;
-  for (int i = first_; i < n; ++i)
-    if (meets(i, when))
-      earliest = std::min(earliest, when);
+  double when = 0.0;
+  for (int i = first_; i < work.nodes(); ++i)
+    if (meetsFloor(i, when) && when <= earliest + kTogether)
+    {
+      const int k = inSystem(i);
+      const Eigen::Vector3d x = work.x[i] + when * (system.node(k) - work.x[i]);
+      system.setNode(k, x + (1.0 - when) * h * inputs_->belt_velocity);
+      system.holdNode(k);
+      landed[i] = 1;
+    }
+}
+
+/// Stops the nodes that go through the floor where they meet it; from there they move with the belt. Those that get there first hold
+/// back the others, so these are looked at again after the next solution. No: there were none.
+bool ThreadStepper::Impl::land(double h)
+{
+  const double earliest = firstLanding();
   if (earliest > 1.0)
     return false;
   if (!explicit_step)   // the next solution begins here
     system.accept();
-  for (int i = first_; i < n; ++i)
-    if (meets(i, when) && when <= earliest + kTogether)
-    {
-      const int k = inSystem(i);
-      const Eigen::Vector3d x = work.x[i] + when * (system.node(k) - work.x[i]);
-      system.setNode(k, x + (1.0 - when) * h * inputs.belt_velocity);
-      system.holdNode(k);
-      landed[i] = 1;
-    }
+  stopLanding(h, earliest);
   return true;
+}
+
+void ThreadStepper::Impl::placeNode(int node, const Eigen::Vector3d& x)
+{
+  const int k = inSystem(node);
+  const int inside = node == 0 && offset_ ? 0 : node + 1 == work.nodes() && work.ends[1].held ? k + 1 : -1;
+  if (inside >= 0)
+    system.setNode(inside, system.node(inside) + x - system.node(k));
+  system.setNode(k, x);
 }
 
 /// Takes the solution over.
@@ -291,8 +311,17 @@ EndLoad ThreadStepper::Impl::endLoad(int end) const
   return load;
 }
 
-/// Divides, joins and takes away edges; nothing of it when the step needs none. No: it would take more edges than a motion can mean.
-bool ThreadStepper::Impl::remesh()
+/// The new node lies where the curve suggests, or on the edge when something is in the way.
+void ThreadStepper::Impl::split(int j, double fraction, const RemeshGuard* guard)
+{
+  Eigen::Vector3d x = splitPoint(work, j, fraction);
+  if (guard)
+    if (const Eigen::Vector3d chord = work.x[j] + fraction * work.edge(j); !guard->allows(work, j, j, chord, x))
+      x = chord;
+  splitEdge(work, j, fraction, x);
+}
+
+bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
 {
   constexpr double kMostNew = 1e4;
   const ThreadLimits& limits = model->limits;
@@ -308,8 +337,9 @@ bool ThreadStepper::Impl::remesh()
   {
     // the edge at the nozzle grows from half a feed length to one and a half
     for (double length = work.edge(work.edges() - 1).norm(); length >= 1.5 * feed; length = work.edge(work.edges() - 1).norm())
-      splitEdge(work, work.edges() - 1, feed / length);
-    if (work.edges() > 1 && !work.deposited[work.nodes() - 2] && work.edge(work.edges() - 1).norm() < 0.2 * feed)
+      split(work.edges() - 1, feed / length, guard);
+    if (work.edges() > 1 && !work.deposited[work.nodes() - 2] && work.edge(work.edges() - 1).norm() < 0.2 * feed &&
+        mayRemove(work, work.nodes() - 2, guard))
       removeNode(work, work.nodes() - 2);
   }
   for (int j = first_; j < work.edges(); ++j)
@@ -318,11 +348,11 @@ bool ThreadStepper::Impl::remesh()
       continue;
     const double length = work.edge(j).norm();
     if (length > limits.max_edge_length)
-      splitEdge(work, j--, 0.5);
+      split(j--, 0.5, guard);
   }
   for (int i = first_ + 1; i + 1 < work.nodes(); ++i)
     if (!work.deposited[i] && std::min(work.edge(i - 1).norm(), work.edge(i).norm()) < limits.min_edge_length &&
-        (work.x[i + 1] - work.x[i - 1]).norm() < 0.9 * limits.max_edge_length)
+        (work.x[i + 1] - work.x[i - 1]).norm() < 0.9 * limits.max_edge_length && mayRemove(work, i, guard))
       removeNode(work, i--);
 
   if (work.ends[0].held)

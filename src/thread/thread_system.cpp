@@ -55,6 +55,7 @@ void ThreadSystem::resize(int nodes)
   for (auto* v : {&volume_, &spin_weight_, &spin_target_, &turn_base_})
     std::fill_n(v->begin(), nodes, 0.0);
   std::fill_n(held_.begin(), 4 * nodes, 0);
+  held_[4 * nodes - 1] = 1;   // the last node has no edge
   gamma_ = max_modulus_ = 0.0;
 }
 
@@ -127,36 +128,45 @@ RodEvaluation ThreadSystem::evaluateWhole(bool with_hessian)
   if (gamma_ != 0.0)
     result.stretch += addSurface(with_hessian);
   result.potential += addSpin(with_hessian);
+  if (with_hessian)
+  {
+    // what a shift adds is measured by the bending, twisting and inertia that are there
+    double bend = 0.0;
+    shift_theta_ = 0.0;
+    for (int i = 0; i < a_.nodes; ++i)
+    {
+      bend = std::max(bend, a_.b11[i]);
+      shift_theta_ = std::max(shift_theta_, a_.beta[i]);
+    }
+    shift_x_ = 1e-2 * bend / (min_rest_length_ * min_rest_length_);
+  }
   return result;
+}
+
+void ThreadSystem::closeGradient()
+{
+  const int unknowns = 4 * a_.nodes;
+  std::copy_n(gradient_.begin(), unknowns, reactions_.begin());
+  for (int u = 0; u < unknowns; ++u)
+    if (held_[u])
+      gradient_[u] = 0.0;
 }
 
 RodEvaluation ThreadSystem::evaluate(bool with_hessian, const HessianShift& shift)
 {
   RodEvaluation result = evaluateWhole(with_hessian);
   const int n = a_.nodes;
-  held_[4 * n - 1] = 1;   // the last node has no edge
-  std::copy_n(gradient_.begin(), 4 * n, reactions_.begin());
-  for (int u = 0; u < 4 * n; ++u)
-    if (held_[u])
-      gradient_[u] = 0.0;
+  closeGradient();
   if (!with_hessian)
     return result;
 
-  // what a shift adds is measured by the bending, twisting and inertia that are there
-  double bend = 0.0, twist = 0.0;
-  for (int i = 0; i < n; ++i)
-  {
-    bend = std::max(bend, a_.b11[i]);
-    twist = std::max(twist, a_.beta[i]);
-  }
-  const double shift_x = 1e-2 * bend / (min_rest_length_ * min_rest_length_);
   for (int i = 0; i < n; ++i)
   {
     fixHeld(i);
     RodPanel& p = matrix_.panels()[i];
     for (int c = 0; c < 3; ++c)
-      p.diag[c][c] += shift.position * (a_.weight[i] + shift_x);
-    p.diag[3][3] += shift.angle * twist;
+      p.diag[c][c] += diagonalShift(i, shift)[0];
+    p.diag[3][3] += diagonalShift(i, shift)[1];
   }
   for (int u = 0; u < 4 * n; ++u)
     reduced_[u] = -gradient_[u];

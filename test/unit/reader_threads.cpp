@@ -178,5 +178,126 @@ threads:
   EXPECT_NEAR(simulation.endLoads(0)[0].force.z() + simulation.endLoads(0)[1].force.z(), expected, 1e-6 * weight);
 }
 
+const char* const touching = R"(
+name: touching
+time: {step: 0.002, duration: 1}
+obstacles:
+  - {name: tray, shape: {box: {size: [0.2, 0.2, 0.01]}}, pose: {position: [0, 0, -0.02]}, friction: 0.5}
+threads:
+  - name: nozzle
+    fluid: {density: 1400, viscosity: 100, surface_tension: 0.05}
+    nozzle: {position: [0, 0, 0.02], direction: [0.02, 0, -1], diameter: 0.008, flow: 4.0e-6}
+    floor: {height: -0.01, friction: 0.2, belt: [0.01, 0]}
+    edges: {feed: 0.003, longest: 0.004, shortest: 0.001}
+    contact: {friction: 0.4, threads: true}
+    merging: {until: 0.5}
+  - name: bridge
+    fluid: {viscosity: 1000}
+    centerline: {straight: {from: [-0.05, 0.001, 0.005], to: [0.05, 0, 0.005], edges: 40}}
+    radius: 0.002
+    ends: {oldest: held, newest: held}
+    contact: {self: false}
+)";
+
+std::string problemsOfTouching(const std::string& override_text)
+{
+  try
+  {
+    Simulation simulation(parseScene(touching, "t", {override_text}));
+  }
+  catch (const SceneError& error)
+  {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ThreadContactReader, ReadsWhatTouches)
+{
+  const SceneConfig scene = parseScene(touching, "t");
+  const ThreadConfig &a = scene.threads[0], &b = scene.threads[1];
+  ASSERT_TRUE(a.contact && b.contact && a.floor && a.floor->friction);
+  EXPECT_TRUE(a.contact->self);
+  EXPECT_EQ(a.contact->friction, 0.4);
+  EXPECT_EQ(a.merging, 0.5);
+  EXPECT_EQ(*a.floor->friction, 0.2);
+  EXPECT_FALSE(b.contact->self);
+  EXPECT_TRUE(b.contact->threads);
+  EXPECT_EQ(b.contact->friction, 0.3);
+  EXPECT_EQ(b.merging, 0.0);
+  EXPECT_DOUBLE_EQ(scene.contact.gap, 0.1 * 0.001);   // a quarter of the nozzle's radius is less than the bridge's
+  EXPECT_EQ(parseScene(touching, "t", {"threads.0.merging=true"}).threads[0].merging, 0.6);
+  EXPECT_EQ(parseScene(touching, "t", {"threads.0.merging=false"}).threads[0].merging, 0.0);
+  EXPECT_FALSE(parseScene(honey, "t").threads[0].contact);
+}
+
+TEST(ThreadContactReader, NamesWhatIsWrong)
+{
+  const std::pair<const char*, const char*> cases[] = {
+      {"threads.0.contact.friction=-0.1", "threads.0.contact.friction = -0.1"},
+      {"threads.0.contact.rods=true", "unknown key"},
+      {"threads.0.contact.self=3", "threads.0.contact.self"},
+      {"threads.0.merging.until=1", "must be a number in [0.05, 0.95]"},
+      {"threads.0.merging=0.5", "threads.0.merging"},
+      {"threads.0.merging={from: 1}", "unknown key"},
+      {"threads.0.floor.friction=-1", "threads.0.floor.friction = -1"},
+      {"threads.0.floor.centreline_on_surface=true", "is for floors that the thread sticks to"},
+      {"threads.0.contact.obstacles=false", "makes the floor an obstacle"},
+      {"contact.gap=0", "contact.gap = 0"},
+      {"threads.1.centerline.straight={from: [-0.05, 0, -0.0145], to: [0.05, 0, -0.0145], edges: 40}", "touch or cross"},
+  };
+  for (const auto& [assignment, expected] : cases)
+    EXPECT_NE(problemsOfTouching(assignment).find(expected), std::string::npos) << assignment << "\ngave: " << problemsOfTouching(assignment);
+  EXPECT_EQ(problemsOfTouching("name=touching"), "");
+  // merging without anything that touches
+  std::string text = touching;
+  text.erase(text.find("    contact: {friction: 0.4"), std::string("    contact: {friction: 0.4, threads: true}\n").size());
+  text.erase(text.find(", friction: 0.2"), std::string(", friction: 0.2").size());
+  try
+  {
+    parseScene(text, "t");
+    ADD_FAILURE() << "merging without contact was taken";
+  }
+  catch (const SceneError& error)
+  {
+    EXPECT_NE(std::string(error.what()).find("is for parts that touch"), std::string::npos) << error.what();
+  }
+}
+
+TEST(ThreadContactScene, AThreadFallsOnAnotherAndOnATrayAndARestartIsExact)
+{
+  Simulation simulation(parseScene(touching, "t"));
+  const auto advance = [](Simulation& s, int steps) {
+    for (int k = 0; k < steps; ++k)
+    {
+      const StepReport report = s.step(s.defaultInputs());
+      ASSERT_TRUE(report.ok) << k << " " << report.message;
+    }
+  };
+  const double sag = simulation.state().threads[1].threads[0].x[20].z();
+  advance(simulation, 250);
+  EXPECT_GT(simulation.state().thread_contact_stiffness, 0.0);
+  EXPECT_FALSE(simulation.contacts().empty());
+  const std::string file = ::testing::TempDir() + "touching.state";
+  simulation.save(file);
+  Simulation other(parseScene(touching, "t"));
+  other.load(file);
+  std::remove(file.c_str());
+  advance(simulation, 100);
+  advance(other, 100);
+  for (int k = 0; k < 2; ++k)
+  {
+    const ThreadState &a = simulation.state().threads[k].threads[0], &b = other.state().threads[k].threads[0];
+    EXPECT_EQ(a.x, b.x);
+    EXPECT_EQ(a.v, b.v);
+    EXPECT_EQ(a.volume, b.volume);
+  }
+  EXPECT_LT(simulation.state().threads[1].threads[0].x[20].z(), sag - 1e-4);   // it carries the other one
+  for (const Eigen::Vector3d& x : simulation.state().threads[0].threads[0].x)
+    EXPECT_GT(x.z(), -0.01);
+  simulation.reset();
+  EXPECT_EQ(simulation.state().thread_contact_stiffness, 0.0);
+}
+
 }  // namespace
 }  // namespace slender

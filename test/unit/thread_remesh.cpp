@@ -174,5 +174,52 @@ TEST(ThreadRemesh, DroppingCountsTheVolume)
   EXPECT_EQ(s.nodes(), 2);
 }
 
+/// Lets nothing sweep below a height.
+struct Shelf : RemeshGuard
+{
+  double height;
+  explicit Shelf(double h) : height(h) {}
+  bool allows(const ThreadState&, int, int, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const override
+  {
+    return std::min(from.z(), to.z()) > height;
+  }
+};
+
+TEST(ThreadRemesh, AGuardKeepsNodes)
+{
+  Eigen::Matrix3Xd x(3, 5);
+  for (int i = 0; i < 5; ++i)
+    x.col(i) << i, 0, i == 2 ? 1.0 : 0.0;
+  ThreadState s = makeThread(x, Eigen::VectorXd::Constant(4, 0.1));
+  EXPECT_TRUE(mayRemove(s, 2, nullptr));
+  const Shelf high(0.5), low(-0.5);
+  EXPECT_FALSE(mayRemove(s, 2, &high));   // it would come down to the line between its neighbours
+  EXPECT_TRUE(mayRemove(s, 2, &low));
+  ThreadState folded = s;
+  folded.x[3] << 1.2, 0, 0;
+  folded.x[4] << 1.5, 0, -1.0;
+  const int nodes = folded.nodes();
+  EXPECT_FALSE(mendFold(folded, 2, &high));
+  EXPECT_EQ(folded.nodes(), nodes);
+  EXPECT_TRUE(mendFold(folded, 2, &low));
+  EXPECT_EQ(folded.nodes(), nodes - 1);
+}
+
+TEST(ThreadRemesh, ADividedEdgeMayStayStraight)
+{
+  Random random(8);
+  ThreadState s = wigglyThread(9, random), curved = s;
+  const Eigen::Vector3d chord = s.x[4] + 0.5 * s.edge(4), point = splitPoint(s, 4, 0.5);
+  EXPECT_GT((point - chord).norm(), 1e-3);
+  const double volume = s.totalVolume();
+  const Eigen::Vector3d momentum = momentumOf(s);
+  splitEdge(s, 4, 0.5, chord);
+  splitEdge(curved, 4, 0.5);
+  EXPECT_EQ(s.x[5], chord);
+  EXPECT_EQ(curved.x[5], point);
+  EXPECT_NEAR(s.totalVolume(), volume, 1e-14);
+  EXPECT_LT((momentumOf(s) - momentum).norm(), 1e-14);
+}
+
 }  // namespace
 }  // namespace slender::test

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "slender_sim/contact/broad_phase.h"
 #include "slender_sim/contact/shape.h"
 #include "slender_sim/geometry/pose.h"
 
@@ -18,6 +20,10 @@ struct ContactSegment
   int object = 0;
   double start = 0.0;      ///< arc length of a along the object's curve [m]; b is at start + length
   double length = 0.0;     ///< at rest [m]
+  double core = 1.0;       ///< share of the radius that other segments may not enter (fluid parts merge down to it)
+  bool driven = false;     ///< moves as prescribed: passes through what does so, too, solids included
+
+  double coreRadius() const { return core * radius; }
 };
 
 /// What a curve (later: a surface) touches. Pieces of one curve that are closer along it than about a quarter of a turn at its
@@ -28,6 +34,7 @@ struct ContactObject
   bool closed = false;
   bool self = true, others = true, solids = true;
   double friction = 0.0;       ///< Coulomb [-]
+  int owner = 0;               ///< see ContactSolid::only
 };
 
 /// An obstacle or a rigid body: a shape that moves rigidly.
@@ -36,6 +43,7 @@ struct ContactSolid
   Shape shape;
   double friction = -1.0;      ///< negative: that of whatever touches it; otherwise the geometric mean of both counts
   std::vector<int> ignores;    ///< objects it never touches
+  int only = -1;               ///< touches nothing but the objects of this owner; -1: those of all
 };
 
 struct ContactSurface
@@ -81,6 +89,22 @@ struct ContactRow
   double stiffness = 0.0;
 };
 
+/// When to factor with contacts' whole second derivatives, which Newton's method wants where curves run along each other but which may leave
+/// the matrix indefinite: after a failure not for the next 1, 3, 7, 15 factorisations.
+class WholeStiffness
+{
+public:
+  bool due() { return --after_ < 0; }
+  void tried(bool definite)
+  {
+    pause_ = definite ? 0 : std::min(15, 2 * pause_ + 1);
+    after_ = pause_;
+  }
+
+private:
+  int after_ = 0, pause_ = 0;
+};
+
 /// Barrier potential of surfaces that may not touch, with Coulomb friction by lagged normal forces
 /// [Li et al., Incremental Potential Contact, SIGGRAPH 2020; Codimensional IPC, 2021]. Infinite where surfaces meet; with stepLimit() the
 /// iterates of a minimisation never get there. Memory is reused from step to step.
@@ -90,6 +114,15 @@ public:
   ContactPotential(ContactSurface surface, const ContactOptions& options);
   ~ContactPotential();
   ContactPotential(ContactPotential&&) noexcept;
+
+  /// Other points, segments and objects (sound ones) from now on; the solids stay. For curves that are fed and divided while they move.
+  void setCurves(int points, const std::vector<ContactSegment>& segments, const std::vector<ContactObject>& objects);
+  /// Thins segments where others, or solids, are nearer than a twentieth of the gap, or overlap: to a fifth of it. What was brought together by
+  /// something else than motion (a division, growing radii) can so begin a step. False: two centrelines, or one and a solid, meet.
+  bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  const std::vector<ContactSegment>& segments() const;
+  /// Segments that thinToFit() found near each other: all those within the gap, and more. First and second are in order.
+  const std::vector<GridPairs::Pair>& nearPairs() const;
 
   /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less: they meet. Shares no
   /// search structure and no minimisation with the rest of this class. The surface of a mesh is touched from both sides.

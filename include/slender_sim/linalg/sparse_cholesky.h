@@ -11,7 +11,9 @@ namespace slender {
 class SparseCholesky
 {
 public:
-  SparseCholesky();
+  /// `simplicial`: column by column, without BLAS; better for matrices that are nearly banded, whose dense blocks are too small for BLAS (and its
+  /// threads).
+  explicit SparseCholesky(bool simplicial = false);
   ~SparseCholesky();
   SparseCholesky(SparseCholesky&&) noexcept;
 

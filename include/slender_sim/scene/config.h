@@ -149,7 +149,7 @@ struct RodConfig
 struct ContactConfig
 {
   double gap = 0.0;            ///< distance at which surfaces begin to repel [m]; the reader's default: a tenth of the smallest
-                               ///< radius that takes part, 0 when no rod does
+                               ///< radius that takes part (of a nozzle: a quarter of its radius), 0 when nothing does
   double slip_speed = 1e-4;    ///< friction sticks below it [m/s] > 0
 };
 
@@ -199,12 +199,22 @@ struct NozzleConfig
   GivenMotion motion = FixedMotion{};      ///< topic: `nozzle/pose`
 };
 
-/// A horizontal floor that the thread sticks to, or a belt.
+/// A horizontal floor that the thread sticks to or slips on, or a belt.
 struct FloorConfig
 {
   double height = 0.0;                     ///< [m]
   TimedNumber belt_x, belt_y;              ///< velocity [m/s]; topic: `belt/velocity`
   bool on_surface = false;                 ///< the centreline comes to lie on the surface instead of one radius above
+  std::optional<double> friction;          ///< it slips with this coefficient of Coulomb [-]; nothing: it sticks
+};
+
+/// What a thread touches.
+struct ThreadContactConfig
+{
+  bool self = true;
+  bool threads = true;       ///< other threads that have this set, too, and parts that broke off
+  bool obstacles = true;
+  double friction = 0.3;     ///< Coulomb [-] >= 0
 };
 
 /// A thread that leaves a nozzle, or one that is there from the start: one of `nozzle` and `centerline`.
@@ -224,6 +234,8 @@ struct ThreadConfig
   double breakup_radius = 0.0;             ///< the thread parts where it is thinner [m]; 0: never; the reader's default: 0.002 nozzle diameters
   int most_deposited = 0;                  ///< nodes on the floor; 0: all are kept
   std::optional<std::array<Eigen::Vector3d, 2>> region;   ///< corners; what lies outside is dropped, oldest first
+  std::optional<ThreadContactConfig> contact;  ///< nothing: touches nothing but the floor
+  double merging = 0.0;                    ///< parts in touch are drawn together down to this share of the sum of their radii; 0: never
 };
 
 /// [m^3/s] At this flow a nozzle feeds a thousand edges per step of `step` [s]; more is a mistaken unit, and one step would take for ever.

@@ -10,7 +10,7 @@
 #include "slender_sim/rod/rod_group.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
-#include "slender_sim/thread/thread_group.h"
+#include "slender_sim/thread/touching_threads.h"
 
 namespace slender {
 
@@ -25,6 +25,7 @@ struct SceneState
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
   double contact_stiffness = 0.0;      ///< of the barrier [N]
+  double thread_contact_stiffness = 0.0;   ///< of that between threads [N]
   /// Per grasp of the scene: the held section seen from the pose that drives it; with `attach: section` identity until attach().
   std::vector<Pose> grasp_offsets;
   std::vector<Wrench> wrenches;   ///< per grasp of the scene, of the last step
@@ -123,8 +124,11 @@ private:
 
   // simulation_threads.cpp
   void buildThreads();
+  void buildTouchingThreads();
   void addThreadInputs(SceneInputs& inputs, double time) const;
   StepReport stepThreads(const SceneInputs& inputs);
+  ThreadInputs threadInputs(std::size_t thread, const SceneInputs& inputs) const;
+  void exchangeTouching();
 
   // simulation_group.cpp: rods that bodies join or that touch something
   void buildBodies();
@@ -145,7 +149,11 @@ private:
   std::vector<std::shared_ptr<const RodModel>> models_;
   std::vector<std::optional<RodStepper>> steppers_;   ///< per rod; none for those of the group
   std::vector<std::shared_ptr<const ThreadModel>> thread_models_;
-  std::vector<ThreadGroup> thread_steppers_;
+  std::vector<std::optional<ThreadGroup>> thread_steppers_;   ///< per thread; none for those with contact
+  std::optional<TouchingThreads> touching_;
+  std::vector<int> touching_index_;                   ///< per thread: in touching_, -1: on its own
+  TouchingState touching_state_;
+  TouchingInputs touching_inputs_;
   std::optional<RodGroup> group_;
   std::vector<int> group_rods_, group_bodies_;        ///< what of the scene is in the group
   std::vector<int> group_index_;                      ///< per rod: in the group, -1: on its own

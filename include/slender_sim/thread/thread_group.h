@@ -17,6 +17,11 @@ struct ThreadGroupState
   double volumeBalance() const;
 };
 
+/// Breaks threads where they are thinner than ThreadLimits::min_radius; and takes away whole ones that have left the scene, and the oldest of
+/// those that only lie about.
+void breakThreads(ThreadGroupState& state, const ThreadLimits& limits);
+void dropThreads(ThreadGroupState& state, const ThreadLimits& limits);
+
 /// Steps a thread that may break (ThreadLimits::min_radius), and all that has broken off it.
 class ThreadGroup
 {
@@ -32,9 +37,6 @@ public:
   const std::array<EndLoad, 2>& endLoads() const { return loads_; }
 
 private:
-  void breakUp();
-  void drop();
-
   ThreadStepper stepper_;
   ThreadGroupState work_;
   std::array<EndLoad, 2> loads_;

@@ -10,12 +10,17 @@
 
 namespace slender {
 
-/// A horizontal floor or belt. A node whose section touches it stays there (no slip) and moves with the belt.
+/// A horizontal floor or belt. A node whose section touches it stays there (no slip) and moves with the belt; or it slips, see
+/// TouchingThreads.
 struct ThreadFloor
 {
   bool present = false;
   double height = 0.0;       ///< z of its surface [m]
   bool touches_at_radius = true;   ///< a thread lies with its centreline one radius above the surface; false: on the surface
+  double friction = -1.0;    ///< Coulomb [-], 0: slips freely; negative: sticks
+
+  bool slips() const { return present && friction >= 0.0; }
+  bool sticks() const { return present && friction < 0.0; }
 };
 
 /// Where edges are divided, joined or taken away. The values given here switch all of it off.

@@ -45,8 +45,9 @@ public:
 
   const ThreadModel& model() const;
 
+  class Impl;   ///< for TouchingThreads
+
 private:
-  class Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include <Eigen/Core>
@@ -36,6 +37,7 @@ public:
   /// Lengths and strains at the nodes set become those of rest. Returns the evaluation, for its min_chi.
   RodEvaluation takeRestStrains();
   double restLength(int j) const { return 1.0 / a_.inverse_rest_length[j]; }
+  double leastRestLength() const { return min_rest_length_; }
 
   /// Stretching modulus k_s [N] and fluid volume [m^3] of edge j.
   void setEdge(int j, double modulus, double volume);
@@ -56,6 +58,7 @@ public:
   void holdNode(int i) { held_[4 * i] = held_[4 * i + 1] = held_[4 * i + 2] = 1; }
   void holdAngle(int j) { held_[4 * j + 3] = 1; }
   bool nodeHeld(int i) const { return held_[4 * i]; }
+  bool held(int unknown) const { return held_[unknown]; }
 
   /// Turn of edge j about its tangent since the start of the step [rad].
   double turn(int j) const { return turn_base_[j] + a_.turn[j]; }
@@ -64,6 +67,19 @@ public:
 
   /// Joint of the last trial with the sharpest turn beyond a right angle, -1: none.
   int sharpestJoint() const;
+
+  /// For systems of several threads that touch: energy, gradient() and panels() of all unknowns, held ones included, without factoring.
+  /// closeGradient() then keeps the held ones' entries as reactions and clears them.
+  RodEvaluation evaluateWhole(bool with_hessian);
+  void closeGradient();
+  const RodPanel* panels() { return matrix_.panels(); }
+  double* gradient() { return gradient_.data(); }     ///< 4 per node
+  double* direction() { return direction_.data(); }   ///< 4 per node
+  /// What a shift adds to the diagonal of panels() of node i: {position, angle}; after evaluateWhole(true).
+  std::array<double, 2> diagonalShift(int i, const HessianShift& shift) const
+  {
+    return {shift.position * (a_.weight[i] + shift_x_), shift.angle * shift_theta_};
+  }
 
   // for minimize()
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
@@ -89,7 +105,6 @@ private:
   }
   static Eigen::Vector3d get(double* const (&p)[3], int i) { return {p[0][i], p[1][i], p[2][i]}; }
   void allocate(int capacity);
-  RodEvaluation evaluateWhole(bool with_hessian);
   double addSurface(bool with_hessian);
   double addSpin(bool with_hessian);
   void fixHeld(int i);
@@ -104,7 +119,7 @@ private:
   std::vector<char> held_;
   double gamma_ = 0;
   SurfaceShape shape_ = SurfaceShape::cone;
-  double max_modulus_ = 0, min_rest_length_ = 0;
+  double max_modulus_ = 0, min_rest_length_ = 0, shift_x_ = 0, shift_theta_ = 0;
 };
 
 }  // namespace slender

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "merging.h"
+#include "slender_sim/linalg/sparse_cholesky.h"
+#include "slender_sim/thread/touching_threads.h"
+#include "thread_loop.h"
+
+namespace slender {
+
+/// Equations of threads with contact and merging, for minimize(). Threads that nothing touches keep their own band matrices; the others
+/// share one sparse matrix.
+class ThreadContact : public RemeshGuard
+{
+public:
+  explicit ThreadContact(const TouchingModel& model);
+
+  struct Thread
+  {
+    ThreadStepper::Impl* thread;
+    int kind;   ///< index into the model's threads
+  };
+
+  // ---- a step (thread_contact_step.cpp)
+  /// Of these threads; obstacles move from `from` to `to` in `duration` seconds, floors with the velocities `belts` of the model's threads.
+  void beginStep(const std::vector<Thread>& threads, const std::vector<Pose>& from, const std::vector<Pose>& to,
+                 const std::vector<Eigen::Vector3d>& belts, double duration, double stiffness);
+  /// A substep of h seconds from the fraction `from` of the step to `to`, after all threads' prepare().
+  StepFailure solve(double from, double to, double h, StepReport& report);
+  double stiffness() const { return stiffness_now_; }
+  double clearance(const std::vector<const ThreadState*>& states, const std::vector<int>& kinds, const std::vector<Pose>& obstacles);
+  const std::vector<ContactTerm>& terms() const { return contact_.terms(); }
+  bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const override;
+
+  // ---- the system of a substep, as minimize() needs it (thread_contact.cpp)
+  RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
+  void solve();
+  void moveAlong(double alpha);
+  void accept();
+  void saveBase();
+  void restoreBase();
+  double stepLimit();
+  double incrementSize() const;
+  static constexpr bool anglesMayKeepShift() { return false; }
+  double slope() const;
+  double residual() const;
+  double forceScale() const;
+  double noiseLevel() const;
+
+private:
+  struct Part
+  {
+    ThreadStepper::Impl* thread = nullptr;
+    int kind = 0;
+    int point = 0;                 ///< its first contact point
+    bool touched = false;          ///< has its unknowns in the matrix
+    int offset = 0, unknowns = 0;
+    std::vector<int> dof;          ///< own number of every unknown of its system, -1: held
+    std::vector<int> slots;        ///< where the entries of its panels go, -1: nowhere
+    RodEvaluation evaluation;
+  };
+  const ThreadSystem& systemOf(const Part& part) const { return part.thread->system; }
+  template <class F>
+  void forTerms(F&& f) const
+  {
+    for (const auto* list : {&contact_.terms(), &merging_.terms()})
+      for (const ContactTerm& term : *list)
+        f(term);
+  }
+  /// Of a contact point: its unknowns' first number in its part, -1: held.
+  int dofOf(int point) const;
+
+  void addCurve(const ThreadState& state, int kind);
+  bool load(double from, double h);
+  void gather(Eigen::Matrix3Xd& x) const;
+  void placeSolids(double fraction, std::vector<Pose>& solids) const;
+  void mapUnknowns();
+  bool takeKeys();
+  void buildPattern();
+  void assemble(const HessianShift& shift, bool whole);
+  bool factor(const HessianShift& shift);
+  NewtonResult solveConfined(double from, double to);
+  bool approach(double from, double to, double& reached);
+  void adaptStiffness();
+  bool stiffen(bool converged);
+
+  const TouchingModel& model_;
+  ContactPotential contact_;
+  MergingPotential merging_;
+  bool merges_ = false;
+  std::vector<Part> parts_;
+  std::size_t part_count_ = 0;                  ///< of parts_ in use
+  double duration_ = 0, least_edge_ = 0, stiffness_now_ = 0, most_stiffness_ = 0;
+  bool still_driven_ = false;                   ///< after approach(): something held or driven has not arrived
+  std::vector<Pose> solids_from_, solids_to_;   ///< over the step
+  Eigen::Matrix3Xd points_, points_base_, points_end_, points_target_;
+  std::vector<Pose> solids_, solids_base_, solids_end_;
+  std::vector<ContactSegment> segments_;        ///< with their full radii
+  std::vector<ContactObject> objects_;
+  std::vector<MergingFluid> fluids_;            ///< per object
+  std::vector<char> held_;                      ///< per point
+  std::vector<int> point_part_;
+  double tolerance_ = 0, gap_tolerance_ = 0;    ///< of increments: over the shortest edge, and at contacts over the smallest gap
+
+  // matrix
+  SparseCholesky matrix_{true};
+  bool pattern_valid_ = false;
+  WholeStiffness whole_;
+  int unknowns_ = 0;
+  std::vector<std::array<int, 4>> keys_, keys_before_;   ///< points of terms that the pattern has room for, sorted
+  std::vector<std::vector<int>> columns_;
+  std::vector<double> rhs_;
+};
+
+}  // namespace slender

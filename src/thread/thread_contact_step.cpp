@@ -1,0 +1,395 @@
+// What happens to threads that touch in a substep.
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/contact/ccd.h"
+#include "slender_sim/contact/distance.h"
+#include "thread_contact.h"
+
+namespace slender {
+
+namespace {
+
+constexpr double kLeastGap = 1.0 / 12;   // of the contact's gap: as ContactPotential::adaptStiffness()
+
+ContactSurface solidsOf(const TouchingModel& model)
+{
+  ContactSurface surface;
+  for (const TouchingModel::Obstacle& o : model.obstacles)
+    surface.solids.push_back({o.shape, o.friction, {}});
+  for (std::size_t k = 0; k < model.threads.size(); ++k)
+    if (const ThreadFloor& floor = model.threads[k]->floor; floor.slips())
+    {
+      surface.solids.push_back({Plane{}, floor.friction, {}});
+      surface.solids.back().only = static_cast<int>(k);
+    }
+  return surface;
+}
+
+}  // namespace
+
+ThreadContact::ThreadContact(const TouchingModel& model) : model_(model), contact_(solidsOf(model), model.options)
+{
+  for (const ThreadTouch& touch : model.touches)
+    merges_ = merges_ || touch.merging > 0.0;
+}
+
+void ThreadContact::addCurve(const ThreadState& state, int kind)
+{
+  const ThreadTouch& touch = model_.touches[kind];
+  const ThreadModel& model = *model_.threads[kind];
+  ContactSegment s;
+  s.object = static_cast<int>(objects_.size());
+  s.core = touch.merging > 0.0 ? touch.merging : 1.0;
+  const int base = static_cast<int>(held_.size());
+  const auto isHeld = [&](int i) {
+    return state.deposited[i] || (i == 0 && state.ends[0].held) || (i + 1 == state.nodes() && state.ends[1].held);
+  };
+  for (int i = 0; i < state.nodes(); ++i)
+    held_.push_back(isHeld(i));
+  for (int j = 0; j < state.edges(); ++j)
+  {
+    s.a = base + j;
+    s.b = base + j + 1;
+    s.radius = state.radius(j);
+    s.length = state.edge(j).norm();
+    s.driven = held_[s.a] && held_[s.b];
+    segments_.push_back(s);
+    s.start += s.length;
+  }
+  objects_.push_back({s.start, false, touch.self, touch.others, touch.solids, touch.friction, kind});
+  fluids_.push_back({touch.merging > 0.0, model.surface_tension, model.viscosity});
+}
+
+void ThreadContact::beginStep(const std::vector<Thread>& threads, const std::vector<Pose>& from, const std::vector<Pose>& to,
+                              const std::vector<Eigen::Vector3d>& belts, double duration, double stiffness)
+{
+  pattern_valid_ = pattern_valid_ && part_count_ == threads.size();
+  part_count_ = threads.size();
+  if (parts_.size() < part_count_)
+    parts_.resize(part_count_);
+  for (std::size_t p = 0; p < part_count_; ++p)
+  {
+    parts_[p].thread = threads[p].thread;
+    parts_[p].kind = threads[p].kind;
+  }
+  duration_ = duration;
+  solids_from_ = from;
+  solids_to_ = to;
+  for (std::size_t k = 0; k < model_.threads.size(); ++k)
+    if (const ThreadFloor& floor = model_.threads[k]->floor; floor.slips())
+    {
+      const Eigen::Vector3d start(0, 0, floor.height);
+      solids_from_.push_back({start, Eigen::Quaterniond::Identity()});
+      solids_to_.push_back({start + duration * belts[k], Eigen::Quaterniond::Identity()});
+    }
+  stiffness_now_ = stiffness > 0.0 ? stiffness : contact_.stiffness();
+}
+
+void ThreadContact::placeSolids(double fraction, std::vector<Pose>& solids) const
+{
+  solids.resize(solids_from_.size());
+  for (std::size_t k = 0; k < solids.size(); ++k)
+    solids[k] = RigidMotion(solids_from_[k], solids_to_[k]).at(fraction);
+}
+
+void ThreadContact::gather(Eigen::Matrix3Xd& x) const
+{
+  for (std::size_t p = 0; p < part_count_; ++p)
+  {
+    const Part& part = parts_[p];
+    for (int i = 0; i < part.thread->work.nodes(); ++i)
+      if (const int k = part.thread->inSystem(i); k >= 0)
+        x.col(part.point + i) = part.thread->system.node(k);
+  }
+}
+
+/// Curves as they are, and where the substep wants to go. No: centrelines meet.
+bool ThreadContact::load(double from, double h)
+{
+  segments_.clear();
+  objects_.clear();
+  fluids_.clear();
+  held_.clear();
+  point_part_.clear();
+  least_edge_ = std::numeric_limits<double>::infinity();
+  for (std::size_t p = 0; p < part_count_; ++p)
+  {
+    Part& part = parts_[p];
+    part.point = static_cast<int>(held_.size());
+    addCurve(part.thread->work, part.kind);
+    point_part_.resize(held_.size(), static_cast<int>(p));
+    least_edge_ = std::min(least_edge_, systemOf(part).leastRestLength());
+  }
+  const int count = static_cast<int>(held_.size());
+  for (auto* x : {&points_, &points_base_, &points_end_, &points_target_})
+    x->resize(3, count);
+  for (std::size_t p = 0; p < part_count_; ++p)
+  {
+    const Part& part = parts_[p];
+    const ThreadState& work = part.thread->work;
+    for (int i = 0; i < work.nodes(); ++i)
+    {
+      points_base_.col(part.point + i) = work.x[i];
+      points_target_.col(part.point + i) = work.x[i] + h * part.thread->inputs().belt_velocity;   // others: gather()
+    }
+  }
+  placeSolids(from, solids_base_);
+  solids_ = solids_base_;
+  contact_.setCurves(count, segments_, objects_);
+  if (!contact_.thinToFit(points_base_, solids_base_))
+    return false;
+  // not what an attempt that failed left; no less than weights, what stops a node within the gap, and merging ask for
+  double least = std::max(stiffness_now_, model_.options.least_stiffness);
+  most_stiffness_ = model_.options.least_stiffness;
+  for (std::size_t p = 0; p < part_count_; ++p)
+  {
+    const double gravity = parts_[p].thread->inputs().gravity.norm();
+    const RodArrays& a = systemOf(parts_[p]).arrays();
+    for (int i = 0; i < a.nodes; ++i)
+      least = std::max(least, a.weight[i] * h * h * std::max(gravity, model_.options.gap / (duration_ * duration_)));
+    const ThreadStepper::Impl& thread = *parts_[p].thread;
+    most_stiffness_ = std::max(most_stiffness_, 3.0 * thread.model->viscosityAt(0.0) * thread.work.totalVolume() / (objects_[p].curve_length * duration_));
+  }
+  if (merges_)
+  {
+    merging_.begin(points_base_, segments_, fluids_, contact_.nearPairs(), held_, model_.options.gap, h);
+    least = std::max(least, merging_.largestAttraction());
+  }
+  most_stiffness_ = std::max(most_stiffness_, least);
+  contact_.setStiffness(least);
+  whole_ = {};
+  contact_.begin(points_base_, solids_base_, duration_);   // friction sticks below a speed over the whole step, cut or not
+
+  mapUnknowns();
+  keys_before_.swap(keys_);
+  keys_.clear();
+  contact_.evaluate(points_base_, solids_base_, false);
+  if (merges_)
+    merging_.evaluate(points_base_, false);
+  takeKeys();
+  pattern_valid_ = pattern_valid_ && keys_ == keys_before_;
+  return true;
+}
+
+StepFailure ThreadContact::solve(double from, double to, double h, StepReport& report)
+{
+  if (!load(from, h))
+    return StepFailure::squeezed;
+  for (;;)
+  {
+    const NewtonResult result = solveConfined(from, to);
+    report.iterations += result.iterations;
+    report.factorizations += result.factorizations;
+    if (!result.ok())
+      return result.failure;
+    report.residual = result.residual;
+    report.max_strain = std::max(report.max_strain, result.max_strain);
+    bool lands = false;
+    for (std::size_t p = 0; p < part_count_; ++p)
+      lands = lands || parts_[p].thread->firstLanding() <= 1.0;
+    if (!lands)
+      break;
+    accept();   // the next solution begins here
+    for (std::size_t p = 0; p < part_count_; ++p)
+      if (const double earliest = parts_[p].thread->firstLanding(); earliest <= 1.0)
+        parts_[p].thread->stopLanding(h, earliest);
+    mapUnknowns();
+    points_target_ = points_;
+    from = to;
+  }
+  adaptStiffness();
+  stiffness_now_ = contact_.stiffness();
+  return StepFailure::none;
+}
+
+/// Moves from the base towards the targets of what is held and the present guess of all else, as far as nothing touches; solids go from
+/// where they stand at the fraction `from` of the step to `to`. That becomes the base. No: there is no way at all.
+bool ThreadContact::approach(double from, double to, double& reached)
+{
+  gather(points_target_);
+  placeSolids(to, solids_end_);
+  double alpha = contact_.stepLimit(points_base_, points_target_, solids_base_, solids_end_);
+  reached = to;
+  for (int attempt = 0; attempt < 20; ++attempt, alpha *= 0.5)
+  {
+    solids_ = solids_end_;
+    points_ = points_target_;
+    if (alpha < 1.0)
+    {
+      points_ = points_base_ + alpha * (points_target_ - points_base_);
+      placeSolids(from + alpha * (to - from), solids_);
+    }
+    bool driven = alpha < 1.0 && from < to && !solids_.empty();
+    for (std::size_t p = 0; p < part_count_; ++p)
+      for (int i = 0; i < parts_[p].thread->work.nodes(); ++i)
+      {
+        const int point = parts_[p].point + i, k = parts_[p].thread->inSystem(i);
+        if (k >= 0)
+          parts_[p].thread->placeNode(i, points_.col(point));
+        if ((k < 0 || systemOf(parts_[p]).nodeHeld(k)) && points_.col(point) != points_target_.col(point))
+          driven = true;
+      }
+    const RodEvaluation trial = evaluate(false);
+    if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
+    {
+      reached = driven ? from + alpha * (to - from) : to;
+      still_driven_ = driven;
+      accept();
+      return true;
+    }
+    if (alpha == 1.0 && trial.min_chi <= kFoldedChi && std::isfinite(trial.potential))
+    {
+      still_driven_ = false;
+      return true;   // not a matter of contact: minimize() will say so
+    }
+  }
+  return false;
+}
+
+/// What would double the length of the thread in a step is force enough: where parts are jammed, gaps do not open however stiff the barrier is.
+void ThreadContact::adaptStiffness()
+{
+  contact_.adaptStiffness();
+  contact_.setStiffness(std::min(contact_.stiffness(), most_stiffness_));
+}
+
+/// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. True if it was made stiffer.
+bool ThreadContact::stiffen(bool converged)
+{
+  if (contact_.smallestGap() > kLeastGap * model_.options.gap)
+    return false;
+  const double before = contact_.stiffness();
+  if (converged)
+    adaptStiffness();
+  else   // forces mean nothing yet
+    contact_.setStiffness(std::min(4.0 * before, most_stiffness_));
+  return contact_.stiffness() > before;
+}
+
+NewtonResult ThreadContact::solveConfined(double from, double to)
+{
+  constexpr int kMaxApproaches = 200, kMaxSolutions = 24, kMaxFailures = 8;
+  constexpr double kLagTolerance = 1e-2;
+  const NewtonConfig& newton = parts_[0].thread->newton;
+  NewtonResult total;
+  const auto solveWith = [&](const NewtonConfig& config, double gap_tolerance) {
+    gap_tolerance_ = gap_tolerance;
+    tolerance_ = config.tolerance;
+    const NewtonResult r = minimize(*this, config);
+    const int iterations = total.iterations + r.iterations, factorizations = total.factorizations + r.factorizations;
+    total = r;
+    total.iterations = iterations;
+    total.factorizations = factorizations;
+    if (!r.ok())   // back to the last good configuration
+    {
+      moveAlong(0.0);
+      evaluate(false);
+    }
+    return r.ok();
+  };
+  // Friction that is about to slip and contacts that run along threads converge slowly at the end, far below what gaps resolve.
+  NewtonConfig fine = newton, loose = newton;
+  fine.tolerance = std::max(newton.tolerance, 1e-3 * model_.options.gap / least_edge_);
+  loose.tolerance = std::max(newton.tolerance, 0.02 * model_.options.gap / least_edge_);
+  loose.max_iterations = 12;
+  for (int k = 0;; ++k)
+  {
+    double reached = to;
+    if (k == kMaxApproaches || !approach(from, to, reached))
+    {
+      total.failure = StepFailure::squeezed;
+      return total;
+    }
+    if (!still_driven_)
+      break;
+    // what is in the way gives way, then on from there
+    stiffen(solveWith(loose, 0.1));
+    accept();
+    from = reached;
+    for (std::size_t p = 0; p < part_count_; ++p)
+      for (int i = 0; i < parts_[p].thread->work.nodes(); ++i)
+        if (const int n = parts_[p].thread->inSystem(i); n >= 0 && systemOf(parts_[p]).nodeHeld(n))
+          parts_[p].thread->placeNode(i, points_target_.col(parts_[p].point + i));
+  }
+  for (int k = 0, failures = 0;; ++k)
+  {
+    const bool good = solveWith(fine, 0.01);
+    const bool softer = stiffen(good);
+    if (!good && !(softer && ++failures <= kMaxFailures))
+      return total;
+    if (good && !softer && (contact_.lagFriction() < kLagTolerance || k >= kMaxSolutions))
+      return total;
+    accept();
+  }
+}
+
+double ThreadContact::clearance(const std::vector<const ThreadState*>& states, const std::vector<int>& kinds, const std::vector<Pose>& solids)
+{
+  segments_.clear();
+  objects_.clear();
+  fluids_.clear();
+  held_.clear();
+  for (std::size_t k = 0; k < states.size(); ++k)
+    addCurve(*states[k], kinds[k]);
+  Eigen::Matrix3Xd x(3, held_.size());
+  int point = 0;
+  for (const ThreadState* state : states)
+    for (const Eigen::Vector3d& node : state->x)
+      x.col(point++) = node;
+  contact_.setCurves(point, segments_, objects_);
+  solids_ = solids;
+  for (const auto& thread : model_.threads)
+    if (thread->floor.slips())
+      solids_.push_back({Eigen::Vector3d(0, 0, thread->floor.height), Eigen::Quaterniond::Identity()});
+  return contact_.clearance(x, solids_);
+}
+
+bool ThreadContact::allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const
+{
+  const MovingPoint node{from, to}, a{state.x[first], state.x[first]}, b{state.x[last + 1], state.x[last + 1]};
+  const double reach_a = std::max((from - a.from).norm(), (to - a.from).norm()), reach_b = std::max((from - b.from).norm(), (to - b.from).norm());
+  const double radius = std::max(state.radius(first), state.radius(last)), gap = model_.options.gap;
+  const auto isFree = [&](const ThreadState& other, int j, double core) {
+    const Eigen::Vector3d &p = other.x[j], &q = other.x[j + 1];
+    const double thickness = core * radius + core * other.radius(j);
+    if ((p - from).norm() > thickness + gap + 2.0 * std::max(reach_a, reach_b) + (q - p).norm())
+      return true;
+    const MovingPoint s{p, p}, t{q, q};
+    const auto side = [&](const MovingPoint& end) {
+      ApproachLimit limit;
+      limit.thickness = std::min(thickness, 0.9 * segmentDistance(end.from, node.from, p, q));
+      limit.reach = gap;
+      return segmentsLimit(end, node, s, t, limit) >= 1.0;
+    };
+    return side(a) && side(b);
+  };
+  for (std::size_t p = 0; p < part_count_; ++p)
+    if (&parts_[p].thread->work == &state)
+    {
+      const ThreadTouch& own = model_.touches[parts_[p].kind];
+      const double core = own.merging > 0.0 ? own.merging : 1.0;
+      for (std::size_t q = 0; q < part_count_; ++q)
+      {
+        const ThreadState& other = parts_[q].thread->work;
+        if (q != p && own.others && model_.touches[parts_[q].kind].others)
+          for (int j = 0; j < other.edges(); ++j)
+            if (!isFree(other, j, core))
+              return false;
+      }
+      if (!own.self)
+        return true;
+      const auto neighbours = [&](double apart, int j) { return apart < 0.5 * M_PI * (radius + state.radius(j)) + gap; };
+      double apart = 0.0;
+      for (int j = first - 1; j >= 0; apart += state.edge(j--).norm())
+        if (!neighbours(apart, j) && !isFree(state, j, core))
+          return false;
+      apart = 0.0;
+      for (int j = last + 1; j < state.edges(); apart += state.edge(j++).norm())
+        if (!neighbours(apart, j) && !isFree(state, j, core))
+          return false;
+    }
+  return true;
+}
+
+}  // namespace slender

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "thread_stepper_impl.h"
+
+namespace slender {
+
+class ThreadContact;
+
+struct ThreadPart
+{
+  ThreadStepper::Impl* thread;
+  ThreadState* state;
+  const ThreadInputs* inputs;
+};
+
+/// Advances threads together by `duration` [s], in substeps common to all. `contact` (null: a single thread that touches nothing) solves
+/// their equations. On failure the states are untouched and the report says why.
+StepReport advanceThreads(const ThreadPart* parts, int count, double duration, ThreadContact* contact);
+
+}  // namespace slender
