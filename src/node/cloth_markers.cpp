@@ -98,7 +98,7 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
     Marker marker = makeMarker(header, "grasps", static_cast<int>(g), Marker::SPHERE_LIST);
     const SceneCloth& held = simulation.state().cloths[ref.cloth];
     const ClothGrasp& grasp = held.grasps[ref.index];
-    marker.scale.x = marker.scale.y = marker.scale.z = 0.6 * spacing[ref.cloth];
+    marker.scale.x = marker.scale.y = marker.scale.z = 0.4 * spacing[ref.cloth];
     marker.color = std::holds_alternative<FixedMotion>(ref.config->motion) ? color(0.35, 0.37, 0.40) : color(0.22, 0.27, 0.33);
     for (const int vertex : grasp.vertices)
       marker.points.push_back(toPoint(held.cloth.x.col(vertex)));

@@ -136,7 +136,7 @@ class Cloth(NodeCase):
             self.assertEqual(after.vertices[i].z, before.vertices[i].z)
 
     def test_mesh_points_markers(self):
-        second = SCENE.split("cloths:\n")[1].replace("towel", "napkin").replace("[0, 0, 1]", "[1, 0, 1]").replace("left", "a").replace("right", "b")
+        second = SCENE.split("cloths:\n")[1].replace("towel", "napkin").replace("point: [0", "point: [1").replace("[0, 0, 1]", "[1, 0, 1]").replace("left", "a").replace("right", "b")
         self.begin(SCENE + second)
         markers = self.listen("/t/markers", MarkerArray)
         points = self.listen("/t/points", PointCloud2)
@@ -160,7 +160,7 @@ class Cloth(NodeCase):
         drawn = {(m.ns, m.id): m for m in markers.last().markers}
         self.assertEqual(len(drawn[("cloths/napkin", 0)].points), 3 * 96)
         self.assertEqual(len(drawn[("cloths/napkin", 0)].colors), 3 * 96)
-        self.assertEqual(len(drawn[("grasps", 0)].points), 3)
+        self.assertEqual(len(drawn[("grasps", 0)].points), 4)
         self.assertEqual(int(self.diagnostics("simulation")["vertices"]), 126)
 
     def test_services(self):
