@@ -344,7 +344,6 @@ NewtonResult CoupledSystem::solveConfined(double from, double to, const NewtonCo
       moveAlong(0.0);
       evaluate(false);
     }
-    accept();
     return r.ok();
   };
   // Friction that is about to slip and contacts that run along rods converge slowly at the end, far below what gaps resolve.
@@ -364,6 +363,7 @@ NewtonResult CoupledSystem::solveConfined(double from, double to, const NewtonCo
       break;
     // what is in the way gives way, then on from there
     stiffen(solve(loose, 0.1));
+    accept();
     from = reached;
     placeDriven(to);
     for (RodPart& part : parts_)
@@ -377,7 +377,8 @@ NewtonResult CoupledSystem::solveConfined(double from, double to, const NewtonCo
     if (!good && !(softer && ++failures <= kMaxFailures))
       return total;
     if (good && !softer && (contact_->lagFriction() < kLagTolerance || k >= kMaxSolutions))
-      return total;
+      return total;   // with the solution as the trial, which is what rods store
+    accept();
   }
 }
 

@@ -44,7 +44,7 @@ std::vector<Loop> pullKnot(StudyContext& context, double radius, const std::vect
   model->bend_modulus.colwise() = Eigen::Vector3d(1, 0, 1);
   model->twist_modulus.setConstant(1 / 1.3);
   model->stretch_modulus.setConstant(1e6);
-  model->mass.setConstant(1e-3 * edge);
+  model->mass.setConstant(1.0 * edge);   // heavy enough that short steps help
   rod.model = model;
   rod.hold(0, 0, true);
   rod.hold(edges, edges, true);

@@ -1,6 +1,7 @@
 // Rods against obstacles, bodies, each other and themselves.
 #include <gtest/gtest.h>
 
+#include "slender_sim/geometry/rotation.h"
 #include "test/support/groups.h"
 
 namespace slender::test {
@@ -113,6 +114,33 @@ TEST(RodContact, MovedObstaclePushesARope)
   }
   EXPECT_LT(g.state.rods[0].x.row(2).minCoeff(), -0.05);
   EXPECT_LT(force, 0.0);
+}
+
+/// The twist of a straight rod that may touch is the turn of its ends, whatever the solver did on the way: frames belong to the same instant
+/// as positions.
+TEST(RodContact, TwistFollowsTheClamps)
+{
+  for (Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
+  {
+    Rod rod = rope(41, 0.4, 0.003, 0.0, 1e5);
+    rod.inputs.gravity.setZero();
+    rod.hold(0, 0);
+    rod.hold(40, 40);
+    Group g;
+    g.addRod(rod);
+    touch(g, 3e-4);
+    RodGroup group(g.model, withIntegrator(integrator));
+    for (double turn : {1e-4, 0.01, 0.5})
+    {
+      g.inputs.rods[0].grasps[1].X_WG.orientation = fromRotationVector(Vector3d(turn, 0, 0)) * rod.inputs.grasps[1].X_WG.orientation;
+      ASSERT_TRUE(group.step(g.state, g.inputs, 1e-3).ok);
+      const RodState& state = g.state.rods[0];
+      double twist = state.twist.sum();
+      for (const GraspState& grasp : state.grasps)
+        twist += grasp.section_twist[0] + grasp.section_twist[1];
+      EXPECT_NEAR(twist, turn, 1e-12) << static_cast<int>(integrator);   // round-off of 40 joints
+    }
+  }
 }
 
 TEST(RodContact, CrossingRopesCarryEachOther)
