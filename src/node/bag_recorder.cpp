@@ -19,6 +19,7 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
   const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
   state_topic_ = prefix + "state";
   scene_topic_ = prefix + "scene";
+  mesh_topic_ = prefix + "mesh";
   bodies_topic_ = prefix + "body_states";
   for (const std::string& name : grasp_names)
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
@@ -56,6 +57,8 @@ void BagRecorder::recordScene(const std::string& yaml, const ros::Time& stamp)
   bag_.write(scene_topic_, stamp, message);
 }
 
+void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh) { bag_.write(mesh_topic_, mesh.header.stamp, mesh); }
+
 void BagRecorder::record(const SceneMessages& messages)
 {
   try
@@ -64,6 +67,8 @@ void BagRecorder::record(const SceneMessages& messages)
       bag_.write(state_topic_, state.header.stamp, state);
     for (const slender_sim::ThreadState& state : messages.threads)
       bag_.write(state_topic_, state.header.stamp, state);
+    if (!messages.cloths.names.empty())
+      bag_.write(state_topic_, messages.cloths.header.stamp, messages.cloths);
     for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
       bag_.write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
     if (!messages.bodies.name.empty())
@@ -109,6 +114,8 @@ public:
     {
       bag_ = std::make_unique<BagRecorder>(path_, "/", graspTopicNames(simulation), threadTopicPrefixes(simulation));
       bag_->recordScene(simulation.config().source, clock.stamp());
+      if (!simulation.config().cloths.empty())
+        bag_->recordMesh(clothMesh(simulation, clock.stamp(), "world"));
     }
     messages_.fill(simulation, clock.stamp(), "world", 0);
     bag_->record(messages_);

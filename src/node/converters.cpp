@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include <sensor_msgs/point_cloud2_iterator.h>
+
 namespace slender {
 
 geometry_msgs::Point toPoint(const Eigen::Vector3d& p)
@@ -190,6 +192,48 @@ void appendPoses(const ThreadState& state, std::vector<geometry_msgs::Pose>& out
   for (int j = 0; j < state.edges(); ++j)
     out.push_back(toMessage(Pose{0.5 * (state.x[j] + state.x[j + 1]), edgeFrame(state, j)}));
 }
+
+void append(const std::string& name, const ClothState& state, slender_sim::ClothState& out)
+{
+  out.names.push_back(name);
+  out.offsets.push_back(static_cast<std::uint32_t>(out.vertices.size()));
+  for (Eigen::Index i = 0; i < state.x.cols(); ++i)
+  {
+    out.vertices.push_back(toPoint(state.x.col(i)));
+    out.velocities.push_back(toVector3(state.v.col(i)));
+  }
+}
+
+void append(const ClothModel& model, slender_sim::MeshStamped& out)
+{
+  const auto first = static_cast<std::uint32_t>(out.vertices.size());
+  out.names.push_back(model.name);
+  out.vertex_offsets.push_back(first);
+  out.triangle_offsets.push_back(static_cast<std::uint32_t>(out.triangles.size() / 3));
+  for (Eigen::Index i = 0; i < model.rest.vertices.cols(); ++i)
+    out.vertices.push_back(toPoint(model.rest.vertices.col(i)));
+  for (Eigen::Index f = 0; f < model.rest.triangles.cols(); ++f)
+    for (int corner = 0; corner < 3; ++corner)
+      out.triangles.push_back(first + static_cast<std::uint32_t>(model.rest.triangles(corner, f)));
+}
+
+void toPoints(const slender_sim::ClothState& state, sensor_msgs::PointCloud2& out)
+{
+  sensor_msgs::PointCloud2Modifier modifier(out);
+  modifier.setPointCloud2FieldsByString(1, "xyz");
+  modifier.resize(state.vertices.size());
+  out.is_dense = true;
+  sensor_msgs::PointCloud2Iterator<float> to(out, "x");
+  for (const geometry_msgs::Point& p : state.vertices)
+  {
+    to[0] = static_cast<float>(p.x);
+    to[1] = static_cast<float>(p.y);
+    to[2] = static_cast<float>(p.z);
+    ++to;
+  }
+}
+
+bool isFinite(const ClothState& state) { return state.x.allFinite() && state.v.allFinite(); }
 
 bool isFinite(const ThreadState& state)
 {

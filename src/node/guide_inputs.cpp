@@ -15,18 +15,6 @@ constexpr std::size_t kMaxPending = 1000;
 constexpr double kMaxAhead = 3600.0;           // [s] whole trajectories may be sent in advance, another clock's stamps may not
 constexpr int kGuidesSource = -1, kBodiesSource = -2;
 
-const Pose& graspPose(const Simulation& simulation, const GraspRef& ref)
-{
-  return simulation.state().rods[ref.rod].grasps[ref.index].X_WG;
-}
-
-std::string text(double value)
-{
-  char out[32];
-  std::snprintf(out, sizeof(out), "%.6g", value);
-  return out;
-}
-
 /// Names of the scene's own bodies and obstacles: grasps follow those without messages.
 std::set<std::string> solidNames(const SceneConfig& scene)
 {
@@ -63,7 +51,7 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
       guided.body = body->body;
     const bool topic = std::holds_alternative<TopicMotion>(ref.config->motion);
     if (topic || !guided.body.empty())
-      guided.buffer = std::make_unique<GuideBuffer>(buffer_options, ref.config->attach, graspPose(simulation, ref));
+      guided.buffer = std::make_unique<GuideBuffer>(buffer_options, ref.config->attach, simulation.graspPose(static_cast<int>(g)));
     guided_.push_back(std::move(guided));
     if (topic)
     {
@@ -79,7 +67,10 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
     subscribers_.push_back(nh.subscribe("guides", kQueueSize, &GuideInputs::onGuides, this, ros::TransportHints().tcpNoDelay()));
   if (bodies)
     subscribers_.push_back(nh.subscribe("bodies", kQueueSize, &GuideInputs::onBodies, this, ros::TransportHints().tcpNoDelay()));
-  if (topics || bodies || threads)
+  wind_topic_ = simulation.config().wind_topic;
+  if (wind_topic_)
+    subscribers_.push_back(nh.subscribe("wind", kQueueSize, &GuideInputs::onWind, this, ros::TransportHints().tcpNoDelay()));
+  if (topics || bodies || threads || wind_topic_)
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
 }
 
@@ -132,49 +123,6 @@ bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, 
     }
   }
   return framed;
-}
-
-void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
-{
-  const std::string what = prefixes_[thread] + "nozzle/flow";
-  if (!std::isfinite(message.data))
-    drops_.drop(Drop::not_finite, what, "it must be finite [m^3/s]");
-  else if (message.data < 0.0 || message.data > threads_[thread].greatest_flow)
-    drops_.drop(Drop::out_of_range, what, text(message.data) + "; it must be from 0 to " + text(threads_[thread].greatest_flow) +
-                                              " m^3/s, with which a thousand edges leave the nozzle per step");
-  else
-    threads_[thread].flow = message.data;
-}
-
-/// In whatever frame the message names, as that stands now; only its horizontal part can be a belt's.
-void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped& message)
-{
-  const std::string what = prefixes_[thread] + "belt/velocity";
-  Eigen::Vector3d velocity(message.vector.x, message.vector.y, message.vector.z);
-  if (!velocity.allFinite())
-    return drops_.drop(Drop::not_finite, what, "it must be finite [m/s]");
-  const std::string& name = message.header.frame_id;
-  if (name.empty())
-    return drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");
-  const std::string frame = name.front() == '/' ? name.substr(1) : name;
-  if (frame != options_.frame_id)
-  {
-    Pose X_WF;
-    try
-    {
-      const PoseFault fault = fromMessage(tf_buffer_.lookupTransform(options_.frame_id, frame, ros::Time(0)).transform, X_WF);
-      if (fault != PoseFault::none)
-        return dropTransform(fault, what, frame);
-    }
-    catch (const tf2::TransformException& e)
-    {
-      return drops_.drop(Drop::no_transform, what, e.what());
-    }
-    velocity = X_WF.orientation * velocity;
-  }
-  if (!(velocity.head<2>().cwiseAbs().maxCoeff() <= max_belt_speed))
-    return drops_.drop(Drop::out_of_range, what, "components must be within " + text(max_belt_speed) + " m/s");
-  threads_[thread].belt = Eigen::Vector3d(velocity.x(), velocity.y(), 0.0);
 }
 
 void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Options& options)
@@ -349,7 +297,7 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
   for (const Entry& entry : message.entries)
     if (!((X_WF * entry.X_FH).position.cwiseAbs().maxCoeff() <= max_coordinate))
     {
-      drops_.drop(Drop::out_of_range, message.what, "coordinates must be within " + text(max_coordinate) + " m");
+      drops_.drop(Drop::out_of_range, message.what, "coordinates must be within " + std::to_string(static_cast<long>(max_coordinate)) + " m");
       return true;
     }
   const double time = clock_.secondsAt(message.stamp);
@@ -403,6 +351,8 @@ void GuideInputs::apply(double time, SceneInputs& inputs)
       GraspTarget& target = g < grasps_ ? inputs.grasps[g] : solid < bodies_ ? inputs.bodies[solid] : inputs.obstacles[solid - bodies_];
       target = guided_[g].buffer->target(time);
     }
+  if (wind_)
+    inputs.wind = *wind_;
   for (std::size_t k = 0; k < threads_.size(); ++k)
   {
     if (threads_[k].flow)
@@ -416,7 +366,7 @@ Pose GuideInputs::poseOf(const Simulation& simulation, std::size_t guided) const
 {
   const std::size_t solid = guided - grasps_;
   if (guided < grasps_)
-    return graspPose(simulation, simulation.grasps()[guided]);
+    return simulation.graspPose(static_cast<int>(guided));
   if (solid < bodies_)
     return simulation.state().bodies[solid].X_WB;
   if (solid < bodies_ + obstacles_)
@@ -440,6 +390,7 @@ void GuideInputs::attachAll(const Simulation& simulation)
 void GuideInputs::restart(const Simulation& simulation)
 {
   pending_.clear();
+  wind_.reset();
   for (Driven& thread : threads_)
     thread.flow.reset(), thread.belt.reset();
   for (std::size_t g = 0; g < guided_.size(); ++g)
@@ -460,20 +411,6 @@ std::vector<GuideInputs::Age> GuideInputs::ages() const
     ages.push_back({guided.name, age});
   }
   return ages;
-}
-
-std::vector<GuideInputs::Setting> GuideInputs::settings() const
-{
-  std::vector<Setting> settings;
-  for (std::size_t k = 0; k < threads_.size(); ++k)
-  {
-    const Driven& thread = threads_[k];
-    if (thread.flow_topic)
-      settings.push_back({prefixes_[k] + "nozzle/flow [m^3/s]", thread.flow ? text(*thread.flow) : "none yet"});
-    if (thread.belt_topic)
-      settings.push_back({prefixes_[k] + "belt/velocity [m/s]", thread.belt ? text(thread.belt->x()) + " " + text(thread.belt->y()) : "none yet"});
-  }
-  return settings;
 }
 
 }  // namespace slender

@@ -22,8 +22,7 @@ void RunStatistics::add(const StepReport& report, const Simulation& simulation, 
   max_torque.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < max_force.size(); ++g)
   {
-    const GraspRef& ref = simulation.grasps()[g];
-    if (!simulation.state().rods[ref.rod].grasps[ref.index].active)
+    if (!simulation.isActive(static_cast<int>(g)))
       continue;
     const Wrench& wrench = simulation.wrench(static_cast<int>(g));
     max_force[g] = std::max(max_force[g], wrench.force.norm());

@@ -276,10 +276,13 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {
     const GraspRef& ref = simulation.grasps()[g];
+    if (ref.cloth >= 0)
+      continue;
     out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config, simulation.state().rods[ref.rod].grasps[ref.index],
                                       simulation.rodModel(ref.rod)));
   }
   addThreadMarkers(simulation, header, style, out);
+  addClothMarkers(simulation, header, style, out);
   addSolidMarkers(simulation, header, out);
   return out;
 }

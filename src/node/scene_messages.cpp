@@ -24,6 +24,8 @@ std::vector<std::string> graspTopicNames(const Simulation& simulation)
 {
   for (const RodConfig& rod : simulation.config().rods)
     checkName(rod.name, "rod");
+  for (const ClothConfig& cloth : simulation.config().cloths)
+    checkName(cloth.name, "cloth");
   std::vector<std::string> names;
   for (const GraspRef& grasp : simulation.grasps())
   {
@@ -42,6 +44,16 @@ std::vector<std::string> threadTopicPrefixes(const Simulation& simulation)
     prefixes.push_back(simulation.config().threads.size() == 1 ? std::string() : "threads/" + thread.name + "/");
   }
   return prefixes;
+}
+
+slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id)
+{
+  slender_sim::MeshStamped mesh;
+  mesh.header.stamp = stamp;
+  mesh.header.frame_id = frame_id;
+  for (std::size_t k = 0; k < simulation.config().cloths.size(); ++k)
+    append(simulation.clothModel(static_cast<int>(k)), mesh);
+  return mesh;
 }
 
 void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch)
@@ -81,13 +93,21 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     nozzles[k].wrench.torque = toVector3(load.torque);
   }
   threads.resize(piece);
+  cloths.header = poses.header;
+  cloths.epoch = epoch;
+  cloths.step = scene.steps;
+  cloths.names.clear();
+  cloths.offsets.clear();
+  cloths.vertices.clear();
+  cloths.velocities.clear();
+  for (std::size_t k = 0; k < scene.cloths.size(); ++k)
+    append(simulation.config().cloths[k].name, scene.cloths[k].cloth, cloths);
   wrenches.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < wrenches.size(); ++g)
   {
-    const GraspRef& ref = simulation.grasps()[g];
+    const int grasp = static_cast<int>(g);
     wrenches[g].header = poses.header;
-    wrenches[g].wrench = scene.rods[ref.rod].grasps[ref.index].active ? toMessage(simulation.wrench(static_cast<int>(g)))
-                                                                      : geometry_msgs::Wrench();
+    wrenches[g].wrench = simulation.isActive(grasp) ? toMessage(simulation.wrench(grasp)) : geometry_msgs::Wrench();
   }
   const std::vector<BodyConfig>& configs = simulation.config().bodies;
   bodies.header = poses.header;

@@ -8,8 +8,11 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/WrenchStamped.h>
 #include <rosgraph_msgs/Clock.h>
+#include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/String.h>
 
+#include "slender_sim/ClothState.h"
+#include "slender_sim/MeshStamped.h"
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
 #include "slender_sim/node/converters.h"
@@ -27,17 +30,31 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
   SceneConfig scene = options.scene.find('\n') != std::string::npos ? parseScene(options.scene, "~scene", options.overrides)
                                                                     : readScene(options.scene, options.overrides);
   // one kind of state on the topic `state`
-  if (kind == NodeKind::rods && !scene.threads.empty())
-    throw SceneError("scene " + scene.name + ": it has threads, which thread_node simulates; rods and threads do not meet: put them in two scenes");
-  if (kind == NodeKind::threads && (scene.threads.empty() || !scene.rods.empty() || !scene.bodies.empty()))
-    throw SceneError("scene " + scene.name + (scene.threads.empty() ? ": it has no threads; rod_node simulates rods"
-                                                                    : ": it has rods or bodies beside its threads, which do not meet them; put them in two scenes"));
+  const std::string who = "scene " + scene.name + ": ";
+  const auto refuse = [&](const std::string& has, const std::string& other) {
+    throw SceneError(who + "it has " + has + ", which " + other + " simulates; they do not meet what " + toString(kind) + " simulates: put them in two scenes");
+  };
+  if (kind != NodeKind::rods && !scene.rods.empty())
+    refuse("rods", toString(NodeKind::rods));
+  if (kind != NodeKind::threads && !scene.threads.empty())
+    refuse("threads", toString(NodeKind::threads));
+  if (kind != NodeKind::cloths && !scene.cloths.empty())
+    refuse("cloths", toString(NodeKind::cloths));
+  if (kind == NodeKind::threads && scene.threads.empty())
+    throw SceneError(who + "it has no threads; rod_node simulates rods");
+  if (kind == NodeKind::threads && !scene.bodies.empty())
+    throw SceneError(who + "it has bodies beside its threads, which do not meet them; put them in two scenes");
+  if (kind == NodeKind::cloths && scene.cloths.empty())
+    throw SceneError(who + "it has no cloths; rod_node simulates rods and bodies");
   return scene;
 }
 
 }  // namespace
 
-const char* toString(NodeKind kind) { return kind == NodeKind::rods ? "rod_node" : "thread_node"; }
+const char* toString(NodeKind kind)
+{
+  return kind == NodeKind::rods ? "rod_node" : kind == NodeKind::threads ? "thread_node" : "cloth_node";
+}
 
 SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, NodeKind kind)
   : nh_(nh), nh_priv_(nh_priv), kind_(kind), options_(NodeOptions::read(nh_priv))
@@ -100,17 +117,37 @@ void SceneNode::startClock()
   scene_pub_.publish(scene);
   if (bag_)
     bag_->recordScene(scene.data, clock_.stamp());
+  if (kind_ == NodeKind::cloths)
+    publishMesh();
   wall_start_ = ros::WallTime::now();
   total_ = recent_ = RunStatistics();
   publishState();
 }
 
+void SceneNode::publishMesh()
+{
+  const slender_sim::MeshStamped mesh = clothMesh(*simulation_, clock_.stamp(), options_.frame_id);
+  mesh_pub_.publish(mesh);
+  if (bag_)
+    bag_->recordMesh(mesh);
+}
+
 void SceneNode::advertise()
 {
-  state_pub_ = kind_ == NodeKind::rods ? nh_.advertise<slender_sim::RodState>("state", 1000) : nh_.advertise<slender_sim::ThreadState>("state", 1000);
+  switch (kind_)
+  {
+    case NodeKind::rods: state_pub_ = nh_.advertise<slender_sim::RodState>("state", 1000); break;
+    case NodeKind::threads: state_pub_ = nh_.advertise<slender_sim::ThreadState>("state", 1000); break;
+    case NodeKind::cloths:
+      state_pub_ = nh_.advertise<slender_sim::ClothState>("state", 1000);
+      points_pub_ = nh_.advertise<sensor_msgs::PointCloud2>("points", 100);
+      mesh_pub_ = nh_.advertise<slender_sim::MeshStamped>("mesh", 1, true);
+      break;
+  }
   for (const std::string& prefix : thread_prefixes_)
     nozzle_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>(prefix + "nozzle/wrench", 100));
-  poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>("poses", 100);
+  if (kind_ != NodeKind::cloths)
+    poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>("poses", 100);
   if (simulation_->config().rods.size() > 1)
     for (const RodConfig& rod : simulation_->config().rods)
       rod_poses_pubs_.push_back(nh_.advertise<geometry_msgs::PoseArray>("rods/" + rod.name + "/poses", 100));
@@ -128,6 +165,16 @@ void SceneNode::advertise()
     clock_pub_ = nh_.advertise<rosgraph_msgs::Clock>("/clock", 100, true);
 }
 
+bool SceneNode::isStateFinite() const
+{
+  const SceneState& state = simulation_->state();
+  const auto all = [](const auto& parts, const auto& finite) { return std::all_of(parts.begin(), parts.end(), finite); };
+  return all(state.rods, [](const RodState& rod) { return isFinite(rod); }) && all(state.threads, [&](const ThreadGroupState& group) {
+           return all(group.threads, [](const ThreadState& thread) { return isFinite(thread); });
+         }) && all(state.cloths, [](const SceneCloth& held) { return isFinite(held.cloth); }) &&
+         all(state.bodies, [](const RigidBodyState& body) { return isFinite(body); });
+}
+
 bool SceneNode::advance()
 {
   const ros::WallTime begin = ros::WallTime::now();
@@ -140,25 +187,11 @@ bool SceneNode::advance()
     fail(std::string(toString(report.failure)) + ": " + report.message);
     return false;
   }
-  for (const RodState& rod : simulation_->state().rods)
-    if (!isFinite(rod))
-    {
-      fail("the state is not finite any more");
-      return false;
-    }
-  for (const ThreadGroupState& group : simulation_->state().threads)
-    for (const ThreadState& thread : group.threads)
-      if (!isFinite(thread))
-      {
-        fail("the state is not finite any more");
-        return false;
-      }
-  for (const RigidBodyState& body : simulation_->state().bodies)
-    if (!isFinite(body))
-    {
-      fail("the state is not finite any more");
-      return false;
-    }
+  if (!isStateFinite())
+  {
+    fail("the state is not finite any more");
+    return false;
+  }
   clock_.tick();
   if (simulation_->state().steps % static_cast<std::uint64_t>(options_.state_every) == 0)
     publishState();
@@ -195,7 +228,7 @@ void SceneNode::publishState()
   }
   broadcastBodies();
   const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
-  if (!bag_ && !heard(state_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) &&
+  if (!bag_ && !heard(state_pub_) && !heard(points_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) &&
       std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) && std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard) && std::none_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard))
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
@@ -205,7 +238,19 @@ void SceneNode::publishState()
     state_pub_.publish(state);
   for (std::size_t k = 0; k < nozzle_pubs_.size(); ++k)
     nozzle_pubs_[k].publish(messages_.nozzles[k]);
-  poses_pub_.publish(messages_.poses);
+  if (kind_ == NodeKind::cloths)
+  {
+    state_pub_.publish(messages_.cloths);
+    if (heard(points_pub_))
+    {
+      sensor_msgs::PointCloud2 points;
+      points.header = messages_.cloths.header;
+      toPoints(messages_.cloths, points);
+      points_pub_.publish(points);
+    }
+  }
+  else
+    poses_pub_.publish(messages_.poses);
   for (std::size_t r = 0; r < rod_poses_pubs_.size(); ++r)
   {
     geometry_msgs::PoseArray poses;

@@ -112,11 +112,20 @@ DiagnosticStatus SceneNode::simulationStatus() const
     add(status, "projection iterations", static_cast<std::uint64_t>(recent_.projection_iterations));
     add(status, "constraint error", recent_.constraint_error);
   }
-  if (kind_ == NodeKind::rods)   // viscous threads keep none
+  if (kind_ == NodeKind::cloths)
+  {
+    std::uint64_t vertices = 0;
+    for (const SceneCloth& held : simulation_->state().cloths)
+      vertices += static_cast<std::uint64_t>(held.cloth.x.cols());
+    add(status, "vertices", vertices);
+  }
+  if (kind_ != NodeKind::threads)   // viscous threads keep none
   {
     double energy = 0.0;
     for (std::size_t r = 0; r < simulation_->state().rods.size(); ++r)
       energy += simulation_->energies(static_cast<int>(r)).total();
+    for (std::size_t k = 0; k < simulation_->state().cloths.size(); ++k)
+      energy += simulation_->clothEnergies(static_cast<int>(k)).total();
     add(status, "energy [J]", energy);
   }
   add(status, "recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);

@@ -13,7 +13,7 @@ void SceneNode::advertiseServices()
                nh_priv_.advertiseService("step", &SceneNode::onStep, this),
                nh_priv_.advertiseService("save_state", &SceneNode::onSave, this),
                nh_priv_.advertiseService("load_state", &SceneNode::onLoad, this)};
-  if (kind_ == NodeKind::rods)
+  if (kind_ != NodeKind::threads)
     services_.push_back(nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this));
 }
 
@@ -89,8 +89,7 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
     return true;
   }
   const int g = static_cast<int>(found - grasp_names_.begin());
-  const GraspRef& ref = simulation_->grasps()[g];
-  const bool active = simulation_->state().rods[ref.rod].grasps[ref.index].active;
+  const bool active = simulation_->isActive(g);
   if (request.action == slender_sim::SetGrasp::Request::RELEASE)
   {
     if (!active)
@@ -101,7 +100,7 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
     return true;
   }
   if (active)
-    response.message = request.name + " holds the rod already; release it first";
+    response.message = request.name + " holds the " + (kind_ == NodeKind::cloths ? "cloth" : "rod") + " already; release it first";
   else
     response.message = attach(request, g, response);
   response.success = response.message.empty();
@@ -112,8 +111,10 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
 std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response)
 {
   const GraspRef& ref = simulation_->grasps()[grasp];
-  const RodState& rod = simulation_->state().rods[ref.rod];
-  const int nodes = static_cast<int>(rod.x.cols());
+  const bool cloth = ref.cloth >= 0;
+  const Eigen::Matrix3Xd& x = cloth ? simulation_->state().cloths[ref.cloth].cloth.x : simulation_->state().rods[ref.rod].x;
+  const int nodes = static_cast<int>(x.cols());
+  std::vector<int> within;
   int first = request.first_node, last = request.last_node;
   if (request.action == slender_sim::SetGrasp::Request::ATTACH_NODES)
   {
@@ -123,29 +124,42 @@ std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int
       return "nodes " + std::to_string(request.first_node) + " .. " + std::to_string(request.last_node) +
              ": must be in order and within " + std::to_string(-nodes) + " .. " + std::to_string(nodes - 1);
   }
-  else if (request.action == slender_sim::SetGrasp::Request::ATTACH_NEAREST)
+  else if (request.action == slender_sim::SetGrasp::Request::ATTACH_NEAREST ||
+           (cloth && request.action == slender_sim::SetGrasp::Request::ATTACH_WITHIN))
   {
     const Eigen::Vector3d point = fromMessage(request.point);
     if (!point.allFinite() || !std::isfinite(request.max_distance) || request.max_distance < 0.0)
       return "point must be finite, max_distance finite and not negative";
-    const double distance = (rod.x.colwise() - point).colwise().norm().minCoeff(&first);
+    const Eigen::VectorXd distances = (x.colwise() - point).colwise().norm();
+    const double distance = distances.minCoeff(&first);
+    const bool all = request.action == slender_sim::SetGrasp::Request::ATTACH_WITHIN;
     last = first;
-    if (request.max_distance > 0.0 && distance > request.max_distance)
+    if ((all || request.max_distance > 0.0) && distance > request.max_distance)
       return "the nearest node " + std::to_string(first) + " is " + std::to_string(distance) + " m away";
+    for (int i = 0; all && i < nodes; ++i)
+      if (distances[i] <= request.max_distance)
+        within.push_back(i);
+    if (all)
+      first = within.front(), last = within.back();
   }
   else
-    return "action " + std::to_string(request.action) + ": must be RELEASE, ATTACH_NODES or ATTACH_NEAREST";
+    return "action " + std::to_string(request.action) + ": must be RELEASE, ATTACH_NODES" + (cloth ? ", ATTACH_NEAREST or ATTACH_WITHIN" : " or ATTACH_NEAREST");
+  if (request.position_only && cloth)
+    return "position_only is for rods; a cloth's vertices have no frames";
   if (request.position_only && first != last)
     return "position_only holds a single node: first_node must be last_node";
   try
   {
-    simulation_->attach(grasp, first, last, request.position_only ? Hold::position : Hold::frame);
+    if (!within.empty())
+      simulation_->attachVertices(grasp, within);
+    else
+      simulation_->attach(grasp, first, last, request.position_only ? Hold::position : Hold::frame);
   }
   catch (const std::exception& e)
   {
     return e.what();
   }
-  inputs_->attachAt(grasp, simulation_->state().rods[ref.rod].grasps[ref.index].X_WG);
+  inputs_->attachAt(grasp, simulation_->graspPose(grasp));
   response.first_node = first;
   response.last_node = last;
   return "";

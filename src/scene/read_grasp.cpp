@@ -8,44 +8,14 @@ namespace slender {
 
 namespace {
 
-/// Indices first..last of edges or nodes: a list of consecutive whole numbers; an entry "3..7" stands for all between. Negative
-/// ones count from the end. Reported and empty otherwise.
+/// Consecutive indices first..last of edges or nodes. Reported and empty otherwise.
 std::optional<std::pair<int, int>> readIndices(const YamlCursor& at, int count)
 {
-  std::vector<int> indices;
-  const int limit = count > 0 ? count : max_edges + 1;
-  const auto resolve = [&](int index) { return index < 0 && count > 0 ? index + count : index; };
-  for (const YamlCursor& item : at.items(1, static_cast<std::size_t>(limit)))
-  {
-    const std::string text = item.isScalar() ? item.tree()->scalar : "";
-    const auto dots = text.find("..");
-    if (dots == std::string::npos)
-    {
-      const auto index = item.integer(-limit, limit - 1);
-      if (!index)
-      {
-        return std::nullopt;
-      }
-      indices.push_back(resolve(*index));
-      continue;
-    }
-    const auto first = parseNumber(text.substr(0, dots)), last = parseNumber(text.substr(dots + 2));
-    const auto fits = [&](const std::optional<double>& x) { return x && *x == std::floor(*x) && *x >= -limit && *x < limit; };
-    if (!fits(first) || !fits(last) || resolve(static_cast<int>(*first)) > resolve(static_cast<int>(*last)))
-    {
-      item.problem("must be FIRST..LAST with whole numbers in [" + std::to_string(-limit) + ", " + std::to_string(limit - 1) + "]");
-      return std::nullopt;
-    }
-    for (int index = resolve(static_cast<int>(*first)); index <= resolve(static_cast<int>(*last)); ++index)
-    {
-      indices.push_back(index);
-    }
-  }
+  const std::vector<int> indices = readIndexList(at, count);
   if (indices.empty())
   {
     return std::nullopt;
   }
-  std::sort(indices.begin(), indices.end());
   for (std::size_t k = 1; k < indices.size(); ++k)
   {
     if (indices[k] != indices[k - 1] + 1)
@@ -87,6 +57,41 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
 }
 
 }  // namespace
+
+std::vector<int> readIndexList(const YamlCursor& at, int count)
+{
+  std::vector<int> indices;
+  const int limit = count > 0 ? count : max_edges + 1;
+  const auto resolve = [&](int index) { return index < 0 && count > 0 ? index + count : index; };
+  for (const YamlCursor& item : at.items(1, static_cast<std::size_t>(limit)))
+  {
+    const std::string text = item.isScalar() ? item.tree()->scalar : "";
+    const auto dots = text.find("..");
+    if (dots == std::string::npos)
+    {
+      const auto index = item.integer(-limit, limit - 1);
+      if (!index)
+      {
+        return {};
+      }
+      indices.push_back(resolve(*index));
+      continue;
+    }
+    const auto first = parseNumber(text.substr(0, dots)), last = parseNumber(text.substr(dots + 2));
+    const auto fits = [&](const std::optional<double>& x) { return x && *x == std::floor(*x) && *x >= -limit && *x < limit; };
+    if (!fits(first) || !fits(last) || resolve(static_cast<int>(*first)) > resolve(static_cast<int>(*last)))
+    {
+      item.problem("must be FIRST..LAST with whole numbers in [" + std::to_string(-limit) + ", " + std::to_string(limit - 1) + "]");
+      return {};
+    }
+    for (int index = resolve(static_cast<int>(*first)); index <= resolve(static_cast<int>(*last)); ++index)
+    {
+      indices.push_back(index);
+    }
+  }
+  std::sort(indices.begin(), indices.end());
+  return indices;
+}
 
 std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges)
 {

@@ -20,6 +20,9 @@ struct ReadContext
 
 constexpr int max_edges = 1'000'000;
 
+/// Whole numbers of [0, count), sorted; an entry "3..7" stands for all between, negative ones count from the end. `count` 0: not known,
+/// not checked. Empty when reported.
+std::vector<int> readIndexList(const YamlCursor& at, int count);
 std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context);
 /// `edges` of the rod, or 0 when its centreline could not be read: then indices are not checked.
 /// Nodes held when edges first..last of the rod are (see GraspConfig); reports the joining edge of a closed rod.
@@ -52,6 +55,7 @@ std::optional<Pose> readPose(const YamlCursor& at);
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
 std::optional<RodContact> readRodContact(const YamlCursor& at);
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context);
+std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context);
 ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods, const std::vector<ThreadConfig>& threads);
 std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);

@@ -95,7 +95,7 @@ private:
 };
 
 /// A grasp cannot follow what it may hold back.
-void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods)
+void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods, const std::vector<YamlCursor>& cloths)
 {
   std::set<std::string> simulated;
   for (const BodyConfig& body : scene.bodies)
@@ -105,15 +105,46 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
       simulated.insert(body.name);
     }
   }
-  for (std::size_t r = 0; r < rods.size(); ++r)
-  {
-    for (const GraspConfig& grasp : scene.rods[r].grasps)
+  const auto check = [&simulated](const std::vector<GraspConfig>& grasps, const YamlCursor& entry, const char* instead) {
+    for (const GraspConfig& grasp : grasps)
     {
       const auto* motion = std::get_if<BodyMotion>(&grasp.motion);
       if (motion && simulated.count(motion->body))
       {
-        YamlMap(YamlMap(YamlMap(rods[r]).get("grasps")).get(grasp.name))
-          .get("motion").problem("body " + motion->body + " is simulated; weld the rod to it instead (bodies: welds)");
+        YamlMap(YamlMap(YamlMap(entry).get("grasps")).get(grasp.name)).get("motion").problem("body " + motion->body + " is simulated; " + instead);
+      }
+    }
+  };
+  for (std::size_t r = 0; r < rods.size(); ++r)
+  {
+    check(scene.rods[r].grasps, rods[r], "weld the rod to it instead (bodies: welds)");
+  }
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+  {
+    check(scene.cloths[k].grasps, cloths[k], "cloth follows obstacles and driven bodies only");
+  }
+}
+
+/// Grasps of rods and of cloths are entries of one list of topics.
+void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cloths)
+{
+  std::map<std::string, std::string> owners;   // to the rod or cloth that has it
+  for (const RodConfig& rod : scene.rods)
+  {
+    for (const GraspConfig& grasp : rod.grasps)
+    {
+      owners.emplace(grasp.name, rod.name);
+    }
+  }
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+  {
+    for (const GraspConfig& grasp : scene.cloths[k].grasps)
+    {
+      const auto [other, is_new] = owners.emplace(grasp.name, scene.cloths[k].name);
+      if (!is_new)
+      {
+        YamlMap(YamlMap(cloths[k]).get("grasps")).get(grasp.name).problem("has the same name as a grasp of " + other->second +
+                                                                        "; grasps of a scene need different names");
       }
     }
   }
@@ -124,17 +155,18 @@ std::vector<YamlCursor> entriesOf(const YamlCursor& list) { return list.isList()
 /// All that has a place in space.
 void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
 {
-  const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads");
+  const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads"), at_cloths = map.get("cloths");
   const YamlCursor at_rods = map.get("rods");
-  if (!at_rods.present() && !at_generate.present() && !at_threads.present())
+  if (!at_rods.present() && !at_generate.present() && !at_threads.present() && !at_cloths.present())
   {
-    at_rods.problem("is missing; a scene has rods: [{...}], threads: [{...}] or generate: [{...}]");
+    at_rods.problem("is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}] or generate: [{...}]");
   }
   const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
   std::vector<RodPart> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<RodPart>{};
   Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
   takeGeneratedRods(generated, rods);
   scene.threads = readThreads(at_threads, context);
+  scene.cloths = readCloths(at_cloths, context);
   scene.contact = readContact(map.get("contact"), rods, scene.threads);
   scene.obstacles = readObstacles(at_obstacles, context);
   scene.bodies = readBodies(at_bodies, context, rods);
@@ -163,7 +195,25 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   {
     scene.rods.push_back(std::move(part.config));
   }
-  checkFollowed(scene, entriesOf(at_rods));
+  checkFollowed(scene, entriesOf(at_rods), entriesOf(at_cloths));
+  checkGraspNames(scene, entriesOf(at_cloths));
+}
+
+void checkClothTime(YamlMap& map, SceneConfig& scene)
+{
+  const YamlCursor time = map.get("time");
+  if (!YamlMap(time).has("integrator"))
+  {
+    scene.time.integrator = Integrator::implicit_euler;
+  }
+  else if (scene.time.integrator != Integrator::implicit_euler && scene.time.integrator != Integrator::symplectic_euler)
+  {
+    YamlMap(time).get("integrator").problem("is not for cloth; must be implicit_euler or symplectic_euler");
+  }
+  if (scene.start == Start::equilibrium)
+  {
+    map.get("start").problem("is not for cloth; must be as_given");
+  }
 }
 
 SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::string& directory)
@@ -174,15 +224,17 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   if (tree.kind != YamlTree::Kind::map)
   {
     throw SceneError(name + ":" + std::to_string(std::max(1, tree.line)) + ": scene: is " + toString(tree.kind) +
-                     "; must be a map, at least with rods: [{...}] or threads: [{...}]");
+                     "; must be a map, at least with rods: [{...}], threads: [{...}] or cloths: [{...}]");
   }
   YamlMap map(root);
-  const Range acceleration = Range::closed(-1e4, 1e4, "m/s^2"), speed = Range::closed(-1e3, 1e3, "m/s");
+  const Range acceleration = Range::closed(-1e4, 1e4, "m/s^2"), speed = Range::closed(-max_wind_speed, max_wind_speed, "m/s");
   assign(scene.name, map.get("name").text());
   assign(scene.gravity, map.get("gravity").vector3(acceleration));
   const YamlCursor wind = map.get("wind");
   YamlMap wind_map(wind);
   assign(scene.wind, wind_map.get("velocity").vector3(speed));
+  const YamlCursor wind_topic = wind_map.get("topic");
+  assign(scene.wind_topic, wind_topic.boolean());
   wind_map.finish();
   assign(scene.start, map.get("start").choice<Start>({{"as_given", Start::as_given}, {"equilibrium", Start::equilibrium}}));
   const YamlCursor time = map.get("time");
@@ -205,7 +257,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
     YamlMap(time).get("integrator").problem("takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
                                             "bdf2 or tr_bdf2, or no rod may have contact");
   }
-  const bool only_threads = !scene.threads.empty() && scene.rods.empty() && scene.bodies.empty();
+  const bool only_threads = !scene.threads.empty() && scene.rods.empty() && scene.bodies.empty() && scene.cloths.empty();
   if (only_threads && YamlMap(time).has("integrator") && scene.time.integrator != Integrator::implicit_euler)
   {
     YamlMap(time).get("integrator").problem("is not for threads; must be implicit_euler");
@@ -213,6 +265,10 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   if (only_threads && scene.start == Start::equilibrium)
   {
     map.get("start").problem("is not for threads, which flow; must be as_given");
+  }
+  if (!scene.cloths.empty())
+  {
+    checkClothTime(map, scene);
   }
   map.finish();
   if (!problems.empty())

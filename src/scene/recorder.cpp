@@ -118,15 +118,20 @@ public:
         recordThread(state.time, simulation.threadModel(static_cast<int>(k)).name, thread);
       }
     }
+    for (std::size_t k = 0; k < state.cloths.size(); ++k)
+    {
+      recordCloth(state.time, simulation.clothModel(static_cast<int>(k)).name, state.cloths[k].cloth);
+    }
     for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
     {
       const GraspRef& ref = simulation.grasps()[g];
-      const GraspState& held = state.rods[ref.rod].grasps[ref.index];
-      const Wrench& wrench = simulation.wrench(static_cast<int>(g));
-      grasps_.number(state.time) << ',' << simulation.config().rods[ref.rod].name << ',' << ref.config->name << ',';
-      grasps_ << (held.active ? "1," : "0,");
-      const Eigen::Vector4d q = held.X_WG.orientation.coeffs();
-      grasps_.vector(held.X_WG.position, ',') << ',';
+      const int grasp = static_cast<int>(g);
+      const Pose& X_WG = simulation.graspPose(grasp);
+      const Wrench& wrench = simulation.wrench(grasp);
+      grasps_.number(state.time) << ',' << simulation.heldObject(grasp) << ',' << ref.config->name << ',';
+      grasps_ << (simulation.isActive(grasp) ? "1," : "0,");
+      const Eigen::Vector4d q = X_WG.orientation.coeffs();
+      grasps_.vector(X_WG.position, ',') << ',';
       grasps_.vector(q.head<3>(), ',') << ',';
       grasps_.number(q[3]) << ',';
       grasps_.vector(wrench.force, ',') << ',';
@@ -148,7 +153,7 @@ public:
   {
     nodes_.close();
     grasps_.close();
-    for (auto* file : {&bodies_, &threads_})
+    for (auto* file : {&bodies_, &threads_, &cloths_})
     {
       if (*file)
       {
@@ -192,6 +197,24 @@ private:
     }
   }
 
+  void recordCloth(double time, const std::string& name, const ClothState& cloth)
+  {
+    if (!cloths_)
+    {
+      cloths_.emplace(folder_ + "/cloths.csv");
+      *cloths_ << "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s]";
+      cloths_->endLine();
+    }
+    for (Eigen::Index i = 0; i < cloth.x.cols(); ++i)
+    {
+      cloths_->number(time) << ',' << name << ',';
+      cloths_->number(i) << ',';
+      cloths_->vector(cloth.x.col(i), ',') << ',';
+      cloths_->vector(cloth.v.col(i), ',');
+      cloths_->endLine();
+    }
+  }
+
   void recordSolid(double time, const std::string& name, const Pose& pose, const Twist& velocity)
   {
     if (!bodies_)
@@ -212,7 +235,7 @@ private:
 
   std::string folder_;
   TextFile nodes_, grasps_;
-  std::optional<TextFile> bodies_, threads_;   // only scenes that have any
+  std::optional<TextFile> bodies_, threads_, cloths_;   // only scenes that have any
 };
 
 class ObjRecorder final : public Recorder
@@ -271,6 +294,30 @@ public:
         file.endLine();
         first += thread.nodes();
       }
+    }
+    for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
+    {
+      const ClothModel& model = simulation.clothModel(static_cast<int>(k));
+      file << "o " << model.name;
+      file.endLine();
+      const Eigen::Matrix3Xd& x = simulation.state().cloths[k].cloth.x;
+      for (int i = 0; i < model.vertices(); ++i)
+      {
+        file << "v ";
+        file.vector(x.col(i), ' ');
+        file.endLine();
+      }
+      for (Eigen::Index f = 0; f < model.rest.triangles.cols(); ++f)
+      {
+        file << 'f';
+        for (int corner = 0; corner < 3; ++corner)
+        {
+          file << ' ';
+          file.number(first + model.rest.triangles(corner, f));
+        }
+        file.endLine();
+      }
+      first += model.vertices();
     }
     file.close();
   }

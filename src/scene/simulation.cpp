@@ -1,6 +1,8 @@
 #include "slender_sim/scene/simulation.h"
 
+#include <algorithm>
 #include <exception>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -43,6 +45,7 @@ Simulation::Simulation(SceneConfig config) : config_(std::move(config))
 {
   buildRods();
   buildThreads();
+  buildCloths();
   buildBodies();
   buildTouchingThreads();
   buildGroup();
@@ -158,9 +161,8 @@ SceneInputs Simulation::inputsAt(double time) const
   inputs.grasps.reserve(grasps_.size());
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
-    const GraspState& held = graspState(static_cast<int>(g));
     const auto* table = std::get_if<TableMotion>(&grasps_[g].config->motion);
-    if (table && held.active)
+    if (table && isActive(static_cast<int>(g)))
     {
       Twist velocity;
       const Pose pose = table->poses.evaluate(time, &velocity);
@@ -168,7 +170,7 @@ SceneInputs Simulation::inputsAt(double time) const
     }
     else
     {
-      inputs.grasps.push_back({held.X_WG, Twist{}});
+      inputs.grasps.push_back({graspPose(static_cast<int>(g)), Twist{}});
     }
   }
   return inputs;
@@ -195,7 +197,7 @@ GraspTarget Simulation::targetOf(int grasp, const Pose& X_WM, const std::optiona
 void Simulation::setOffset(int grasp, const Pose& X_WM)
 {
   checkGrasp(grasp);
-  state_.grasp_offsets[grasp] = sectionOffset(X_WM, graspState(grasp).X_WG);
+  state_.grasp_offsets[grasp] = sectionOffset(X_WM, graspPose(grasp));
 }
 
 void Simulation::checkInputs(const SceneInputs& inputs) const
@@ -225,27 +227,37 @@ void Simulation::fillRodInputs(const SceneInputs& inputs)
   }
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
-    GraspTarget& target = rod_inputs_[grasps_[g].rod].grasps[grasps_[g].index];
-    const auto* body = std::get_if<BodyMotion>(&grasps_[g].config->motion);
-    const GraspTarget* frame = body && graspState(static_cast<int>(g)).active ? followed(*body, inputs) : nullptr;
-    target = frame ? targetOf(static_cast<int>(g), frame->X_WG, frame->velocity) : inputs.grasps[g];
+    if (grasps_[g].rod >= 0)
+    {
+      rod_inputs_[grasps_[g].rod].grasps[grasps_[g].index] = drivenTarget(static_cast<int>(g), inputs);
+    }
   }
+}
+
+GraspTarget Simulation::drivenTarget(int grasp, const SceneInputs& inputs) const
+{
+  const auto* body = std::get_if<BodyMotion>(&grasps_[grasp].config->motion);
+  const GraspTarget* frame = body && isActive(grasp) ? followed(*body, inputs) : nullptr;
+  return frame ? targetOf(grasp, frame->X_WG, frame->velocity) : inputs.grasps[grasp];
 }
 
 StepReport Simulation::step(const SceneInputs& inputs)
 {
   fillRodInputs(inputs);
   // One part's failure must leave the others where they were, too.
-  const std::size_t threads = config_.threads.size(), apart = models_.size() - group_rods_.size() + (group_ ? 1 : 0) + threads;
+  const std::size_t apart =
+    models_.size() - group_rods_.size() + (group_ ? 1 : 0) + config_.threads.size() + config_.cloths.size();
   const bool several = apart > 1;
   const std::vector<RodState> before = several ? state_.rods : std::vector<RodState>();
   const std::vector<ThreadGroupState> threads_before = several ? state_.threads : std::vector<ThreadGroupState>();
+  const std::vector<SceneCloth> cloths_before = several ? state_.cloths : std::vector<SceneCloth>();
   const double stiffness_before = state_.thread_contact_stiffness;
   const auto restore = [&] {
     if (several)
     {
       state_.rods = before;
       state_.threads = threads_before;
+      state_.cloths = cloths_before;
       state_.thread_contact_stiffness = stiffness_before;
     }
   };
@@ -253,6 +265,10 @@ StepReport Simulation::step(const SceneInputs& inputs)
   try
   {
     total = stepThreads(inputs);
+    if (total.ok)
+    {
+      total.merge(stepCloths(inputs));
+    }
     if (total.ok)
     {
       total.merge(stepAll());
@@ -276,6 +292,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
   ++state_.steps;
   state_.time = static_cast<double>(state_.steps) * config_.time.step;   // no sum of round-off
   takeWrenches();
+  takeClothWrenches();
   return total;
 }
 
@@ -357,7 +374,10 @@ void Simulation::takeWrenches()
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
     const int rod = grasps_[g].rod;
-    state_.wrenches[g] = (steppers_[rod] ? steppers_[rod]->wrenches() : group_->wrenches(group_index_[rod]))[grasps_[g].index];
+    if (rod >= 0)
+    {
+      state_.wrenches[g] = (steppers_[rod] ? steppers_[rod]->wrenches() : group_->wrenches(group_index_[rod]))[grasps_[g].index];
+    }
   }
   for (std::size_t k = 0; k < thread_steppers_.size(); ++k)
   {
@@ -379,6 +399,13 @@ void Simulation::attach(int grasp, int first_node, int last_node, Hold hold)
 {
   checkGrasp(grasp);
   const GraspRef& ref = grasps_[grasp];
+  if (ref.cloth >= 0)
+  {
+    std::vector<int> vertices(static_cast<std::size_t>(std::max(0, last_node - first_node + 1)));
+    std::iota(vertices.begin(), vertices.end(), first_node);
+    attachVertices(grasp, std::move(vertices));
+    return;
+  }
   RodState& rod = state_.rods[ref.rod];
   const RodModel& model = rodModel(ref.rod);
   const std::string nodes = "nodes " + std::to_string(first_node) + " to " + std::to_string(last_node);
@@ -431,14 +458,6 @@ void Simulation::takeOffset(int grasp, double time)
       setOffset(grasp, frame->X_WG);
     }
   }
-}
-
-void Simulation::release(int grasp)
-{
-  checkGrasp(grasp);
-  graspState(grasp).active = false;
-  state_.rods[grasps_[grasp].rod].forgetHistory();
-  state_.wrenches[grasp] = {};
 }
 
 const Wrench& Simulation::wrench(int grasp) const

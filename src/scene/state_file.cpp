@@ -18,7 +18,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 5;
+constexpr std::uint64_t version = 6;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -108,6 +108,30 @@ void visitThread(Archive& archive, State& thread)
 }
 
 template <class Archive, class State>
+void visitCloth(Archive& archive, State& held)
+{
+  archive(held.cloth.x);
+  archive(held.cloth.v);
+  archive(held.cloth.rest_angles);
+  const auto indices = [&archive](auto& values) {
+    archive.list(values);
+    for (auto& value : values)
+    {
+      archive(value);
+    }
+  };
+  indices(held.cloth.pins);
+  archive.list(held.grasps);
+  for (auto& grasp : held.grasps)
+  {
+    archive(grasp.active);
+    indices(grasp.vertices);
+    archive(grasp.points_G);
+    visitPose(archive, grasp.X_WG);
+  }
+}
+
+template <class Archive, class State>
 void visitTwist(Archive& archive, State& twist)
 {
   archive(twist.linear);
@@ -146,6 +170,11 @@ void visitScene(Archive& archive, State& scene)
     }
     archive(group.next_thread_id);
     archive(group.dropped_volume);
+  }
+  archive.list(scene.cloths);
+  for (auto& cloth : scene.cloths)
+  {
+    visitCloth(archive, cloth);
   }
   archive.list(scene.bodies);
   for (auto& body : scene.bodies)
@@ -262,98 +291,24 @@ bool fits(const ThreadState& thread)
                     thread.deposited.size() == nodes && thread.d1.size() == edges && thread.spin.size() == edges;
 }
 
-}  // namespace
-
-std::uint64_t Simulation::fingerprint() const
+/// Likewise of a cloth: the stepper checks the rest.
+bool fits(const SceneCloth& held, const SceneCloth& now)
 {
-  ByteWriter out;
-  const auto text = [&out](const std::string& word) {
-    out(static_cast<std::uint64_t>(word.size()));
-    for (char c : word)
-    {
-      out(c);
-    }
-  };
-  out(config_.gravity);
-  const TimeConfig& time = config_.time;
-  out(time.step);
-  out(static_cast<int>(time.integrator));
-  out(time.spectral_radius);
-  out(time.error_tolerance);
-  out(time.min_step);
-  out(time.newton.tolerance);
-  out(time.newton.max_iterations);
-  out(time.newton.max_cuts);
-  for (std::size_t r = 0; r < models_.size(); ++r)
+  bool good = held.cloth.x.cols() == now.cloth.x.cols() && held.cloth.v.cols() == now.cloth.v.cols() &&
+              held.cloth.rest_angles.size() == now.cloth.rest_angles.size() && held.grasps.size() == now.grasps.size();
+  const auto there = [&held](int vertex) { return vertex >= 0 && vertex < held.cloth.x.cols(); };
+  good = good && std::all_of(held.cloth.pins.begin(), held.cloth.pins.end(), there);
+  std::size_t pins = 0;
+  for (const ClothGrasp& grasp : held.grasps)
   {
-    const RodModel& model = *models_[r];
-    text(model.name);
-    out(model.closed);
-    out(model.isotropic);
-    out(model.inextensible);
-    out(static_cast<int>(model.curvature));
-    for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a, &model.radius_b,
-                                          &model.twist_modulus, &model.rest_twist, &model.drag})
-    {
-      out(*values);
-    }
-    out(model.bend_modulus);
-    out(model.rest_curvature);
-    out(model.mass_damping);
-    out(model.stiffness_damping);
-    out(model.isotropic);
-    out(model.inextensible);
-    for (const GraspConfig& grasp : config_.rods[r].grasps)
-    {
-      text(grasp.name);
-      out(static_cast<int>(grasp.attach));
-    }
-    const RodContact touch = config_.rods[r].contact.value_or(RodContact{});
-    out(config_.rods[r].contact.has_value());
-    out(touch.self);
-    out(touch.rods);
-    out(touch.obstacles);
-    out(touch.friction);
+    good = good && static_cast<std::size_t>(grasp.points_G.cols()) == grasp.vertices.size() &&
+           std::all_of(grasp.vertices.begin(), grasp.vertices.end(), there);
+    pins += grasp.active ? grasp.vertices.size() : 0;
   }
-  for (const auto& model : thread_models_)
-  {
-    text(model->name);
-    for (const double value : {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
-                               model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length, model->limits.min_radius})
-    {
-      out(value);
-    }
-    out(model->floor.present);
-    out(model->floor.friction);
-    out(model->limits.max_deposited);
-  }
-  for (const ThreadConfig& thread : config_.threads)
-  {
-    const ThreadContactConfig touch = thread.contact.value_or(ThreadContactConfig{});
-    out(thread.contact.has_value());
-    out(touch.self);
-    out(touch.threads);
-    out(touch.obstacles);
-    out(touch.friction);
-    out(thread.merging);
-  }
-  for (const BodyConfig& body : config_.bodies)
-  {
-    text(body.name);
-    out(body.motion.has_value());
-    out(body.mass);
-    out(body.inertia);
-    out(static_cast<std::uint64_t>(body.welds.size()));
-  }
-  for (const ObstacleConfig& obstacle : config_.obstacles)
-  {
-    text(obstacle.name);
-  }
-  out(config_.contact.gap);
-  Checksum checksum;
-  checksum.add(out.bytes().data(), out.bytes().size());
-  return checksum.value();
+  return good && pins == held.cloth.pins.size();
 }
+
+}  // namespace
 
 void Simulation::save(const std::string& path) const
 {
@@ -420,7 +375,7 @@ void Simulation::load(const std::string& path)
   }
   if (header[2] != fingerprint())
   {
-    throw std::runtime_error(path + ": belongs to another scene (rods, moduli, grasps, threads, gravity, step and integrator must be the same)");
+    throw std::runtime_error(path + ": belongs to another scene (rods, moduli, grasps, threads, cloths, gravity, step and integrator must be the same)");
   }
 
   SceneState loaded;
@@ -433,11 +388,12 @@ void Simulation::load(const std::string& path)
     throw std::runtime_error(path + ": " + error.what());
   }
   std::string problem = reader.left() != 0 ? "has bytes after its end" : "";
-  if (loaded.rods.size() != models_.size() || loaded.threads.size() != thread_models_.size() || loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
+  if (loaded.rods.size() != models_.size() || loaded.threads.size() != thread_models_.size() || loaded.cloths.size() != cloth_models_.size() ||
+      loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
       loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||
       loaded.wrenches.size() != grasps_.size() || loaded.end_loads.size() != thread_models_.size())
   {
-    problem = "has another number of rods, threads, bodies, obstacles or grasps";
+    problem = "has another number of rods, threads, cloths, bodies, obstacles or grasps";
   }
   for (std::size_t r = 0; problem.empty() && r < models_.size(); ++r)
   {
@@ -451,6 +407,13 @@ void Simulation::load(const std::string& path)
     if (gone || !std::all_of(threads.begin(), threads.end(), [](const ThreadState& thread) { return fits(thread); }))
     {
       problem = "thread " + thread_models_[k]->name + " does not fit together";
+    }
+  }
+  for (std::size_t k = 0; problem.empty() && k < cloth_models_.size(); ++k)
+  {
+    if (!fits(loaded.cloths[k], state_.cloths[k]))
+    {
+      problem = "cloth " + cloth_models_[k]->name + " does not fit together";
     }
   }
   if (!problem.empty())

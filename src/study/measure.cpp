@@ -63,7 +63,8 @@ public:
   Row finish() const override { return Row().set("force_max [N]", force_).set("torque_max [N m]", torque_); }
   static std::unique_ptr<Measure> make(const SceneConfig& scene)
   {
-    if (std::all_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.grasps.empty(); }))
+    const auto holds_nothing = [](const auto& object) { return object.grasps.empty(); };
+    if (std::all_of(scene.rods.begin(), scene.rods.end(), holds_nothing) && std::all_of(scene.cloths.begin(), scene.cloths.end(), holds_nothing))
       throw std::invalid_argument("loads: the scene has no grasp");
     return std::make_unique<Loads>();
   }

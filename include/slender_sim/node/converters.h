@@ -7,10 +7,14 @@
 #include <geometry_msgs/Transform.h>
 #include <geometry_msgs/Twist.h>
 #include <geometry_msgs/Wrench.h>
+#include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
 
+#include "slender_sim/ClothState.h"
+#include "slender_sim/MeshStamped.h"
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
+#include "slender_sim/cloth/cloth_model.h"
 #include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/rod/rod_stepper.h"
@@ -44,6 +48,14 @@ void toMessage(const RodModel& model, const RodState& state, slender_sim::RodSta
 
 void toMessage(const ThreadState& state, slender_sim::ThreadState& out);
 
+/// Appends a cloth. Fills everything but the header, epoch and step.
+void append(const std::string& name, const ClothState& state, slender_sim::ClothState& out);
+/// Appends a cloth's undeformed mesh.
+void append(const ClothModel& model, slender_sim::MeshStamped& out);
+
+/// Vertices of all cloths as x, y, z in float32. Fills everything but the header.
+void toPoints(const slender_sim::ClothState& state, sensor_msgs::PointCloud2& out);
+
 /// Appends the middle of each edge with the edge's frame.
 void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out);
 
@@ -53,5 +65,6 @@ void appendPoses(const ThreadState& state, std::vector<geometry_msgs::Pose>& out
 bool isFinite(const RodState& state);
 bool isFinite(const RigidBodyState& state);
 bool isFinite(const ThreadState& state);
+bool isFinite(const ClothState& state);
 
 }  // namespace slender

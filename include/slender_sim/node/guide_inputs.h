@@ -26,7 +26,7 @@
 namespace slender {
 
 /// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`, `bodies`, `nozzle/pose`,
-/// through tf2 into the node's frame; and `nozzle/flow` and `belt/velocity`, which hold from the next step on. Subscribes only to what the
+/// through tf2 into the node's frame; and `nozzle/flow`, `belt/velocity` and `wind`, which hold from the next step on. Subscribes only to what the
 /// scene asks for. Bad messages are dropped and counted; what they would have moved keeps its previous input.
 /// A stamp of zero means now, as everywhere in tf.
 class GuideInputs
@@ -57,7 +57,7 @@ public:
   /// Age of the last pose at the clock's present; nothing while none came.
   std::vector<Age> ages() const;
 
-  /// Per flow and belt driven from outside: the value by message.
+  /// Per flow, belt and wind driven from outside: the value by message.
   struct Setting { std::string name, value; };
   std::vector<Setting> settings() const;
 
@@ -76,6 +76,8 @@ private:
   void onPose(int guided, const geometry_msgs::PoseStamped& message);
   void onFlow(std::size_t thread, const std_msgs::Float64& message);
   void onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped& message);
+  void onWind(const geometry_msgs::Vector3Stamped& message);
+  std::optional<Eigen::Vector3d> velocityOf(const geometry_msgs::Vector3Stamped& message, const std::string& what);
   void onGuides(const geometry_msgs::PoseArray& message);
   void onBodies(const slender_sim::BodyStates& message);
   Pose poseOf(const Simulation& simulation, std::size_t guided) const;
@@ -100,6 +102,8 @@ private:
     std::optional<Eigen::Vector3d> belt;
   };
   std::vector<Driven> threads_;
+  bool wind_topic_ = false;
+  std::optional<Eigen::Vector3d> wind_;                   // last by message
   std::vector<std::string> prefixes_;                     // of their topics
   std::deque<Message> pending_;
   DropCounter drops_;

@@ -11,9 +11,10 @@ namespace slender {
 
 /// Pictures of a scene for rviz, derived from the state. One marker per thing with a stable ns and id:
 /// `rods/NAME` 0 the rod, `frames/NAME` 0 its material frames, `grasps` i the gripper of grasp i, `bodies` i and `obstacles` i their shapes
-/// (of a plane a piece); `threads/NAME` i piece i of a thread with its true radius, `nozzles` i, `floors` i.
+/// (of a plane a piece); `threads/NAME` i piece i of a thread with its true radius, `nozzles` i, `floors` i; `cloths/NAME` 0 the
+/// triangles of a cloth, `grasps` i what grasp i holds of it.
 ///
-/// tube: true to scale, drawn through a smooth curve, with a stripe along d1 that shows the twist; line: one line strip.
+/// Cloth is shaded by its vertices' normals, alike on both sides; with style line its edges are drawn. tube: true to scale, drawn through a smooth curve, with a stripe along d1 that shows the twist; line: one line strip.
 /// Very fine rods are thinned out to a few hundred sections: a picture has no more pixels.
 visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,
                                            bool material_frames);

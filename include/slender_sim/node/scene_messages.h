@@ -7,6 +7,8 @@
 #include <geometry_msgs/WrenchStamped.h>
 
 #include "slender_sim/BodyStates.h"
+#include "slender_sim/ClothState.h"
+#include "slender_sim/MeshStamped.h"
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
 #include "slender_sim/scene/simulation.h"
@@ -14,17 +16,21 @@
 namespace slender {
 
 /// Names of the grasps in scene order, as they stand in topics (the reader has made sure that they differ). Throws
-/// std::invalid_argument for a rod or a grasp whose name cannot be part of a topic.
+/// std::invalid_argument for a rod, a cloth or a grasp whose name cannot be part of a topic.
 std::vector<std::string> graspTopicNames(const Simulation& simulation);
 
 /// Before the topics of a thread: nothing in a scene of one thread, else "threads/NAME/". Throws like graspTopicNames().
 std::vector<std::string> threadTopicPrefixes(const Simulation& simulation);
+
+/// The undeformed cloths.
+slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id);
 
 /// What is published and recorded of one instant, in scene order.
 struct SceneMessages
 {
   std::vector<slender_sim::RodState> states;            ///< per rod
   std::vector<slender_sim::ThreadState> threads;        ///< per thread and piece of it
+  slender_sim::ClothState cloths;                       ///< all of them in one message; none: not published
   geometry_msgs::PoseArray poses;                       ///< the edges' frames at their middles, all rods and threads one after the other
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
   std::vector<geometry_msgs::WrenchStamped> nozzles;    ///< per thread: what it does to its nozzle, about the outlet; zero without one

@@ -25,10 +25,10 @@
 namespace slender {
 
 /// What a node simulates, and its name in what it prints.
-enum class NodeKind { rods, threads };
+enum class NodeKind { rods, threads, cloths };
 const char* toString(NodeKind kind);
 
-/// Simulates a scene of rods and bodies, or of viscous threads: poses of what moves them come in as messages, their motion goes out.
+/// Simulates a scene of rods and bodies, of viscous threads, or of cloth: poses of what moves them come in as messages, their motion goes out.
 /// README lists topics, services and parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
 class SceneNode
 {
@@ -48,6 +48,8 @@ private:
   void checkClock() const;
   void startClock();
   void advertise();
+  void publishMesh();
+  bool isStateFinite() const;
   bool advance();                        // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
   void publishState();
@@ -103,6 +105,7 @@ private:
 
   ros::Publisher bodies_pub_;            // only when the scene has bodies, like the next
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
+  ros::Publisher points_pub_, mesh_pub_;   // cloth only; poses_pub_ is for the others
   ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
   std::vector<ros::Publisher> rod_poses_pubs_, wrench_pubs_, nozzle_pubs_;
   std::vector<ros::ServiceServer> services_;

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/contact/shape.h"
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/number_table.h"
@@ -21,6 +22,7 @@ namespace slender {
 
 constexpr double max_coordinate = 1e6;   ///< [m] of what a scene or a message places
 constexpr double max_belt_speed = 1e3;   ///< [m/s] of each component
+constexpr double max_wind_speed = 1e3;   ///< [m/s] of each component
 
 /// A curve as the scene file states it. Exactly one alternative.
 struct StraightCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; int edges = 50; double grading = 1; };   ///< last edge length over the first
@@ -98,7 +100,7 @@ enum class Hold { frame, position };                      ///< clamp (position a
 /// Where the gripper sits relative to its motion's poses.
 enum class Attach
 {
-  section,   ///< poses are those of the held section itself: x along the tangent, y along d1
+  section,   ///< poses are those of the held section itself: x along the tangent, y along d1; of a cloth's grasp: of its frame
   initial,   ///< keep the offset between the first pose and the section as the scene starts (or as it is at attaching)
 };
 
@@ -108,6 +110,7 @@ struct GraspConfig
   /// Held nodes, first..last (resolved by the reader: negative indices counted from the end).
   /// `edges: [0]` (or [-1]) of an open rod is the end section: first == last == the end node. More edges hold all their nodes.
   int first_node = 0, last_node = 0;
+  std::vector<int> vertices;   ///< of a cloth, instead of nodes: ascending
   Hold hold = Hold::frame;
   Motion motion = FixedMotion{};
   Attach attach = Attach::section;
@@ -246,6 +249,35 @@ inline double greatestFlow(const ThreadConfig& thread, double step)
   return 1000 * feed * 0.25 * M_PI * diameter * diameter / step;
 }
 
+/// A rectangle of cloth as the scene file states it; see geometry/mesh_shapes.h.
+struct ClothGrid
+{
+  Eigen::Vector3d corner{0, 0, 0};                                    ///< lower left [m]
+  std::array<Eigen::Vector3d, 2> sides{Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)};   ///< to the lower right, to the upper left; at right angles
+};
+
+/// A grasp's frame has its origin at the mean of the held vertices and the world's axes when it takes hold; then it moves with its motion,
+/// and the vertices rigidly with it.
+struct ClothConfig
+{
+  std::string name;
+  std::string place;                           ///< "FILE:LINE: PATH" for messages; empty when not read from a file
+  TriangleMesh mesh;                           ///< undeformed, which is also how it starts [m]
+  std::optional<ClothGrid> grid;               ///< that the mesh was made from
+  double area_density = 0.15;                  ///< [kg/m^2]
+  MembraneModuli membrane;
+  Eigen::Vector3d warp{1, 0, 0};               ///< direction in the undeformed shape; of a grid the first side
+  BendingModel bending = BendingModel::isometric_nonconforming;
+  double bending_modulus = 0.0;                ///< D [N m]
+  double mass_damping = 0.0;                   ///< [1/s]
+  double stiffness_damping = 0.0;              ///< [s]
+  double drag = 0.0;                           ///< pressure per velocity along the normal, against the air [N s/m^3]
+  ClothSolver solver = ClothSolver::automatic;
+  bool one_newton_step = false;
+  double linear_tolerance = 0.02;
+  std::vector<GraspConfig> grasps;
+};
+
 enum class Start { as_given, equilibrium };    ///< equilibrium: the static solver runs first
 
 struct RecordConfig { int every = 1; };        ///< record every n-th step (`simulate`)
@@ -257,12 +289,14 @@ struct SceneConfig
   std::string source;                          ///< the YAML text after --set overrides (what `scene` publishes)
   Eigen::Vector3d gravity{0, 0, -9.81};        ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};               ///< [m/s]
+  bool wind_topic = false;                     ///< `wind` messages set it; until the first one it is as above
   Start start = Start::as_given;
   TimeConfig time;
   RecordConfig record;
   ContactConfig contact;
   std::vector<RodConfig> rods;
   std::vector<ThreadConfig> threads;
+  std::vector<ClothConfig> cloths;
   std::vector<ObstacleConfig> obstacles;
   std::vector<BodyConfig> bodies;              ///< names differ from each other and from the obstacles'
 };

@@ -7,12 +7,28 @@
 #include <string>
 #include <vector>
 
+#include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/rod/rod_group.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
 #include "slender_sim/thread/touching_threads.h"
 
 namespace slender {
+
+/// Vertices of a cloth that move as one rigid body.
+struct ClothGrasp
+{
+  bool active = true;
+  std::vector<int> vertices;    ///< ascending; no other active grasp of the cloth holds them
+  Eigen::Matrix3Xd points_G;    ///< where they are in the grasp's frame [m]
+  Pose X_WG;
+};
+
+struct SceneCloth
+{
+  ClothState cloth;
+  std::vector<ClothGrasp> grasps;   ///< those of the scene; cloth.pins are what the active ones hold
+};
 
 /// State of all objects of a scene at one instant.
 struct SceneState
@@ -21,6 +37,7 @@ struct SceneState
   std::uint64_t steps = 0;
   std::vector<RodState> rods;          ///< grasps of the scene first, then welds
   std::vector<ThreadGroupState> threads;   ///< per thread of the scene: it and what has broken off it
+  std::vector<SceneCloth> cloths;
   std::vector<RigidBodyState> bodies;  ///< per body of the scene, driven ones included
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
@@ -47,7 +64,7 @@ struct ThreadDrive
   Eigen::Vector3d belt_velocity{0, 0, 0};   ///< [m/s]
 };
 
-/// Inputs of one step, latched before it. Indices follow the scene's order of grasps (over all rods).
+/// Inputs of one step, latched before it. Indices follow the scene's order of grasps (over all rods, then all cloths).
 struct SceneInputs
 {
   std::vector<GraspTarget> grasps;
@@ -56,8 +73,8 @@ struct SceneInputs
   Eigen::Vector3d wind{0, 0, 0};
 };
 
-/// A grasp of the scene: which rod, which of its grasps, and its configuration.
-struct GraspRef { int rod; int index; const GraspConfig* config; };
+/// A grasp of the scene: of which rod or cloth (the other is -1), which of its grasps, and its configuration.
+struct GraspRef { int rod; int index; const GraspConfig* config; int cloth = -1; };
 
 /// The scene composed once from its checked configuration: models, steppers, initial state.
 class Simulation
@@ -75,6 +92,11 @@ public:
   /// Contacts of the last step.
   const std::vector<ContactTerm>& contacts() const;
   const std::vector<GraspRef>& grasps() const { return grasps_; }
+  bool isActive(int grasp) const;
+  /// Where the held section, or the frame of a cloth's grasp, is.
+  const Pose& graspPose(int grasp) const;
+  /// Name of the rod or cloth that it holds.
+  const std::string& heldObject(int grasp) const;
 
   /// Inputs as the scene itself defines them at the end of the coming step: tables evaluated, everything else held where it is.
   SceneInputs defaultInputs() const;
@@ -99,6 +121,8 @@ public:
   /// offset from a table, or from a body or obstacle of the scene, is taken anew, whatever `attach` says of the scene's start.
   /// Throws std::invalid_argument: no such grasp or nodes, overlap with another active grasp, several nodes held by position.
   void attach(int grasp, int first_node, int last_node, Hold hold);
+  /// Likewise of vertices of a cloth, in any order. Throws std::invalid_argument: no such vertices, none, held by another grasp.
+  void attachVertices(int grasp, std::vector<int> vertices);
   void release(int grasp);
 
   const Wrench& wrench(int grasp) const;
@@ -106,6 +130,8 @@ public:
   /// What a thread does to the holders of its ends (the newest: the nozzle), of the last step.
   const std::array<EndLoad, 2>& endLoads(int thread) const { return state_.end_loads.at(thread); }
   const ThreadModel& threadModel(int thread) const { return *thread_models_[thread]; }
+  const ClothModel& clothModel(int cloth) const { return *cloth_models_[cloth]; }
+  ClothEnergies clothEnergies(int cloth) const;
 
   /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could
   /// not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a shortened one is refused
@@ -130,6 +156,14 @@ private:
   ThreadInputs threadInputs(std::size_t thread, const SceneInputs& inputs) const;
   void exchangeTouching();
 
+  // simulation_cloths.cpp
+  void buildCloths();
+  StepReport stepCloths(const SceneInputs& inputs);
+  /// What drives a grasp: its target, or the body or obstacle that it follows.
+  GraspTarget drivenTarget(int grasp, const SceneInputs& inputs) const;
+  void takeClothWrenches();
+  void gatherPins(SceneCloth& cloth) const;
+
   // simulation_group.cpp: rods that bodies join or that touch something
   void buildBodies();
   void buildGroup();
@@ -142,7 +176,7 @@ private:
   const GraspState& graspState(int grasp) const { return state_.rods[grasps_[grasp].rod].grasps[grasps_[grasp].index]; }
   void checkGrasp(int grasp) const;
   void takeWrenches();
-  std::uint64_t fingerprint() const;
+  std::uint64_t fingerprint() const;   // state_fingerprint.cpp
 
   SceneConfig config_;
   SceneState state_, initial_;
@@ -154,6 +188,10 @@ private:
   std::vector<int> touching_index_;                   ///< per thread: in touching_, -1: on its own
   TouchingState touching_state_;
   TouchingInputs touching_inputs_;
+  std::vector<std::shared_ptr<const ClothModel>> cloth_models_;
+  std::vector<ClothStepper> cloth_steppers_;
+  std::vector<ClothInputs> cloth_inputs_;
+  std::vector<Pose> cloth_targets_;                   ///< per grasp of the scene
   std::optional<RodGroup> group_;
   std::vector<int> group_rods_, group_bodies_;        ///< what of the scene is in the group
   std::vector<int> group_index_;                      ///< per rod: in the group, -1: on its own

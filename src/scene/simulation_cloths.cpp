@@ -1,0 +1,236 @@
+// Cloths of a scene and what holds them.
+#include <algorithm>
+#include <stdexcept>
+
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+namespace {
+
+ClothModel modelOf(const ClothConfig& config)
+{
+  ClothModel model = buildCloth(config.name, config.mesh, config.area_density, config.membrane, config.warp);
+  model.bending = config.bending;
+  model.bending_modulus = config.bending_modulus;
+  model.mass_damping = config.mass_damping;
+  model.stiffness_damping = config.stiffness_damping;
+  model.wind_coefficient = config.drag;
+  return model;
+}
+
+ClothGrasp graspOf(const ClothState& cloth, std::vector<int> vertices)
+{
+  ClothGrasp grasp;
+  const auto count = static_cast<Eigen::Index>(vertices.size());
+  grasp.points_G.resize(3, count);
+  for (Eigen::Index k = 0; k < count; ++k)
+  {
+    grasp.points_G.col(k) = cloth.x.col(vertices[k]);
+  }
+  grasp.X_WG.position = grasp.points_G.rowwise().mean();
+  grasp.points_G.colwise() -= grasp.X_WG.position;
+  grasp.vertices = std::move(vertices);
+  return grasp;
+}
+
+/// Throws unless the vertices, ascending, are those of the cloth, differ, and no active grasp but the one at `index` holds them.
+void checkVertices(const std::vector<int>& vertices, const ClothConfig& config, const SceneCloth& held, std::size_t index)
+{
+  const std::string name = "grasp " + config.grasps[index].name;
+  const auto count = held.cloth.x.cols();
+  if (vertices.empty())
+  {
+    throw std::invalid_argument(name + " holds no vertex; give it at least one");
+  }
+  if (vertices.front() < 0 || vertices.back() >= count)
+  {
+    throw std::invalid_argument(name + " holds vertex " + std::to_string(vertices.front() < 0 ? vertices.front() : vertices.back()) +
+                                "; must be in [0, " + std::to_string(count - 1) + "]");
+  }
+  for (std::size_t other = 0; other < held.grasps.size(); ++other)
+  {
+    const ClothGrasp& grasp = held.grasps[other];
+    for (const int vertex : grasp.vertices)
+    {
+      if (other != index && grasp.active && std::binary_search(vertices.begin(), vertices.end(), vertex))
+      {
+        throw std::invalid_argument(name + " holds vertex " + std::to_string(vertex) + ", which grasp " + config.grasps[other].name +
+                                    " holds already");
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void Simulation::buildCloths()
+{
+  for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+  {
+    const ClothConfig& config = config_.cloths[k];
+    try
+    {
+      cloth_models_.push_back(std::make_shared<const ClothModel>(modelOf(config)));
+      ClothOptions options;
+      options.integrator = config_.time.integrator;
+      options.one_newton_step = config.one_newton_step;
+      options.solver = config.solver;
+      options.linear_tolerance = config.linear_tolerance;
+      options.newton = config_.time.newton;
+      cloth_steppers_.emplace_back(cloth_models_.back(), options);
+      SceneCloth held;
+      held.cloth = makeClothState(*cloth_models_.back(), config.mesh.vertices);
+      for (std::size_t g = 0; g < config.grasps.size(); ++g)
+      {
+        checkVertices(config.grasps[g].vertices, config, held, g);
+        held.grasps.push_back(graspOf(held.cloth, config.grasps[g].vertices));
+        grasps_.push_back({-1, static_cast<int>(g), &config.grasps[g], static_cast<int>(k)});
+      }
+      gatherPins(held);
+      state_.cloths.push_back(std::move(held));
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw SceneError((config.place.empty() ? "scene " + config_.name + ": cloths." + std::to_string(k) : config.place) + ": " + error.what());
+    }
+  }
+  cloth_inputs_.resize(config_.cloths.size());
+  cloth_targets_.resize(grasps_.size());
+}
+
+void Simulation::gatherPins(SceneCloth& cloth) const
+{
+  cloth.cloth.pins.clear();
+  for (const ClothGrasp& grasp : cloth.grasps)
+  {
+    if (grasp.active)
+    {
+      pinVertices(cloth.cloth, grasp.vertices);
+    }
+  }
+}
+
+StepReport Simulation::stepCloths(const SceneInputs& inputs)
+{
+  StepReport total;
+  for (std::size_t k = 0; k < cloth_inputs_.size(); ++k)
+  {
+    cloth_inputs_[k].gravity = config_.gravity;
+    cloth_inputs_[k].wind = inputs.wind;
+    cloth_inputs_[k].pins.resize(3, static_cast<Eigen::Index>(state_.cloths[k].cloth.pins.size()));
+  }
+  for (std::size_t g = 0; g < grasps_.size(); ++g)
+  {
+    const GraspRef& ref = grasps_[g];
+    if (ref.cloth < 0 || !isActive(static_cast<int>(g)))
+    {
+      continue;
+    }
+    Pose& X_WG = cloth_targets_[g];
+    X_WG = drivenTarget(static_cast<int>(g), inputs).X_WG;
+    X_WG.orientation.normalize();
+    const SceneCloth& cloth = state_.cloths[ref.cloth];
+    const ClothGrasp& grasp = cloth.grasps[ref.index];
+    for (std::size_t p = 0; p < grasp.vertices.size(); ++p)
+    {
+      const auto pin = std::lower_bound(cloth.cloth.pins.begin(), cloth.cloth.pins.end(), grasp.vertices[p]) - cloth.cloth.pins.begin();
+      cloth_inputs_[ref.cloth].pins.col(pin) = X_WG * grasp.points_G.col(static_cast<Eigen::Index>(p));
+    }
+  }
+  for (std::size_t k = 0; k < cloth_steppers_.size() && total.ok; ++k)
+  {
+    total.merge(cloth_steppers_[k].step(state_.cloths[k].cloth, cloth_inputs_[k], config_.time.step));
+  }
+  return total;
+}
+
+/// After a step: the grasps are where they were to go.
+void Simulation::takeClothWrenches()
+{
+  for (std::size_t g = 0; g < grasps_.size(); ++g)
+  {
+    const GraspRef& ref = grasps_[g];
+    if (ref.cloth < 0 || !isActive(static_cast<int>(g)))
+    {
+      continue;
+    }
+    SceneCloth& held = state_.cloths[ref.cloth];
+    ClothGrasp& grasp = held.grasps[ref.index];
+    grasp.X_WG = cloth_targets_[g];
+    const Eigen::Matrix3Xd& forces = cloth_steppers_[ref.cloth].pinForces();
+    Wrench wrench;
+    for (const int vertex : grasp.vertices)
+    {
+      const auto pin = std::lower_bound(held.cloth.pins.begin(), held.cloth.pins.end(), vertex) - held.cloth.pins.begin();
+      const Eigen::Vector3d force = forces.col(pin);
+      wrench.force += force;
+      wrench.torque += (held.cloth.x.col(vertex) - grasp.X_WG.position).cross(force);
+    }
+    state_.wrenches[g] = wrench;
+  }
+}
+
+void Simulation::attachVertices(int grasp, std::vector<int> vertices)
+{
+  checkGrasp(grasp);
+  const GraspRef& ref = grasps_[grasp];
+  if (ref.cloth < 0)
+  {
+    throw std::invalid_argument("grasp " + ref.config->name + " holds a rod, which has nodes");
+  }
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  SceneCloth& held = state_.cloths[ref.cloth];
+  checkVertices(vertices, config_.cloths[ref.cloth], held, static_cast<std::size_t>(ref.index));
+  held.grasps[ref.index] = graspOf(held.cloth, std::move(vertices));
+  gatherPins(held);
+  takeOffset(grasp, state_.time);
+}
+
+void Simulation::release(int grasp)
+{
+  checkGrasp(grasp);
+  const GraspRef& ref = grasps_[grasp];
+  if (ref.cloth >= 0)
+  {
+    SceneCloth& held = state_.cloths[ref.cloth];
+    held.grasps[ref.index].active = false;
+    gatherPins(held);
+  }
+  else
+  {
+    graspState(grasp).active = false;
+    state_.rods[ref.rod].forgetHistory();
+  }
+  state_.wrenches[grasp] = {};
+}
+
+bool Simulation::isActive(int grasp) const
+{
+  checkGrasp(grasp);
+  const GraspRef& ref = grasps_[grasp];
+  return ref.cloth >= 0 ? state_.cloths[ref.cloth].grasps[ref.index].active : graspState(grasp).active;
+}
+
+const Pose& Simulation::graspPose(int grasp) const
+{
+  checkGrasp(grasp);
+  const GraspRef& ref = grasps_[grasp];
+  return ref.cloth >= 0 ? state_.cloths[ref.cloth].grasps[ref.index].X_WG : graspState(grasp).X_WG;
+}
+
+const std::string& Simulation::heldObject(int grasp) const
+{
+  checkGrasp(grasp);
+  const GraspRef& ref = grasps_[grasp];
+  return ref.cloth >= 0 ? config_.cloths[ref.cloth].name : config_.rods[ref.rod].name;
+}
+
+ClothEnergies Simulation::clothEnergies(int cloth) const
+{
+  return cloth_steppers_.at(static_cast<std::size_t>(cloth)).energies(state_.cloths[static_cast<std::size_t>(cloth)].cloth, config_.gravity);
+}
+
+}  // namespace slender

@@ -1,0 +1,127 @@
+#include "byte_archive.h"
+#include "slender_sim/scene/simulation.h"
+
+/// What a saved state must have in common with the scene that takes it up again.
+namespace slender {
+
+std::uint64_t Simulation::fingerprint() const
+{
+  ByteWriter out;
+  const auto text = [&out](const std::string& word) {
+    out(static_cast<std::uint64_t>(word.size()));
+    for (char c : word)
+    {
+      out(c);
+    }
+  };
+  out(config_.gravity);
+  const TimeConfig& time = config_.time;
+  out(time.step);
+  out(static_cast<int>(time.integrator));
+  out(time.spectral_radius);
+  out(time.error_tolerance);
+  out(time.min_step);
+  out(time.newton.tolerance);
+  out(time.newton.max_iterations);
+  out(time.newton.max_cuts);
+  for (std::size_t r = 0; r < models_.size(); ++r)
+  {
+    const RodModel& model = *models_[r];
+    text(model.name);
+    out(model.closed);
+    out(model.isotropic);
+    out(model.inextensible);
+    out(static_cast<int>(model.curvature));
+    for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a, &model.radius_b,
+                                          &model.twist_modulus, &model.rest_twist, &model.drag})
+    {
+      out(*values);
+    }
+    out(model.bend_modulus);
+    out(model.rest_curvature);
+    out(model.mass_damping);
+    out(model.stiffness_damping);
+    out(model.isotropic);
+    out(model.inextensible);
+    for (const GraspConfig& grasp : config_.rods[r].grasps)
+    {
+      text(grasp.name);
+      out(static_cast<int>(grasp.attach));
+    }
+    const RodContact touch = config_.rods[r].contact.value_or(RodContact{});
+    out(config_.rods[r].contact.has_value());
+    out(touch.self);
+    out(touch.rods);
+    out(touch.obstacles);
+    out(touch.friction);
+  }
+  for (const auto& model : thread_models_)
+  {
+    text(model->name);
+    for (const double value : {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
+                               model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length, model->limits.min_radius})
+    {
+      out(value);
+    }
+    out(model->floor.present);
+    out(model->floor.friction);
+    out(model->limits.max_deposited);
+  }
+  for (const ThreadConfig& thread : config_.threads)
+  {
+    const ThreadContactConfig touch = thread.contact.value_or(ThreadContactConfig{});
+    out(thread.contact.has_value());
+    out(touch.self);
+    out(touch.threads);
+    out(touch.obstacles);
+    out(touch.friction);
+    out(thread.merging);
+  }
+  for (std::size_t k = 0; k < cloth_models_.size(); ++k)
+  {
+    const ClothModel& model = *cloth_models_[k];
+    text(model.name);
+    out(model.rest.vertices);
+    out(static_cast<std::uint64_t>(model.rest.triangles.cols()));
+    for (Eigen::Index f = 0; f < model.rest.triangles.cols(); ++f)
+    {
+      for (int corner = 0; corner < 3; ++corner)
+      {
+        out(model.rest.triangles(corner, f));
+      }
+    }
+    out(model.mass);
+    out(model.warp);
+    for (const double value : {model.membrane.c11, model.membrane.c12, model.membrane.c22, model.membrane.c33, model.bending_modulus,
+                               model.mass_damping, model.stiffness_damping, model.wind_coefficient, config_.cloths[k].linear_tolerance})
+    {
+      out(value);
+    }
+    out(static_cast<int>(model.bending));
+    out(static_cast<int>(config_.cloths[k].solver));
+    out(config_.cloths[k].one_newton_step);
+    for (const GraspConfig& grasp : config_.cloths[k].grasps)
+    {
+      text(grasp.name);
+      out(static_cast<int>(grasp.attach));
+    }
+  }
+  for (const BodyConfig& body : config_.bodies)
+  {
+    text(body.name);
+    out(body.motion.has_value());
+    out(body.mass);
+    out(body.inertia);
+    out(static_cast<std::uint64_t>(body.welds.size()));
+  }
+  for (const ObstacleConfig& obstacle : config_.obstacles)
+  {
+    text(obstacle.name);
+  }
+  out(config_.contact.gap);
+  Checksum checksum;
+  checksum.add(out.bytes().data(), out.bytes().size());
+  return checksum.value();
+}
+
+}  // namespace slender
