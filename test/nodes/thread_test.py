@@ -141,7 +141,10 @@ class Thread(NodeCase):
         wrenches = self.listen("/t/nozzle/wrench", WrenchStamped)
 
         def next_wrench(act):
-            before = wrenches.count()
+            before = -1
+            while before != wrenches.count():   # those of earlier steps may still be on their way
+                before = wrenches.count()
+                rospy.sleep(0.3)
             act()
             wait_until(lambda: wrenches.count() > before, what="a wrench")
             return wrenches.last().wrench.force.z
