@@ -336,7 +336,8 @@ TEST(HoleFilling, RefusesWithReasonAndLeavesTheMesh)
   EXPECT_NE(longer.message.find("1001"), std::string::npos);
   TriangleMesh face;
   face.vertices = Matrix3Xd::Identity(3, 3);
-  face.triangles = Eigen::Vector3i(0, 1, 2);
+  face.triangles.resize(3, 1);
+  face.triangles << 0, 1, 2;
   const HoleReport lone = fillHole(face, meshTopology(face).boundaries.front());
   EXPECT_FALSE(lone.ok);
   EXPECT_EQ(face.triangles.cols(), 1);
