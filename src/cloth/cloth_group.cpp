@@ -13,12 +13,14 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
 {
   if (model_.contact.size() != model_.cloths.size())
     throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " contact settings expected, one per cloth");
+  if (!model_.options.empty() && model_.options.size() != model_.cloths.size())
+    throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " options expected, one per cloth, or none");
   first_.push_back(0);
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     const ClothModel& cloth = *model_.cloths[k];
     const ClothContact& contact = model_.contact[k];
-    steppers_.emplace_back(model_.cloths[k], options);
+    steppers_.emplace_back(model_.cloths[k], model_.options.empty() ? options : model_.options[k]);
     surface_.rest.conservativeResize(3, first_.back() + cloth.vertices());
     surface_.rest.rightCols(cloth.vertices()) = cloth.rest.vertices;
     CollisionSheet sheet;
@@ -38,7 +40,8 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   inverse_mass_.resize(first_.back());
   sub_.cloths.resize(model_.cloths.size());
   sub_.solids.resize(model_.solids.size());
-  pins_start_.resize(model_.cloths.size());
+  for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_})
+    pins->resize(model_.cloths.size());
 }
 
 StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inputs, double duration)
@@ -54,6 +57,7 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   {
     const std::vector<int>& pins = state.cloths[k].pins;
     pins_start_[k].resize(3, static_cast<Eigen::Index>(pins.size()));
+    pin_sums_[k].setZero(3, static_cast<Eigen::Index>(pins.size()));
     for (std::size_t p = 0; p < pins.size(); ++p)
       pins_start_[k].col(static_cast<Eigen::Index>(p)) = state.cloths[k].x.col(pins[p]);
   }
@@ -79,11 +83,28 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
     }
     report.merge(sub);
     std::swap(work_, next_);
+    addPinForces(end - done, (end - done) * duration);
     done = end;
     share *= 2.0;
   }
   std::swap(state, work_);
+  std::swap(pin_forces_, pin_sums_);
+  report.repulsions = collisions_.repulsions;
+  report.impulses = collisions_.impulses;
+  report.zones = collisions_.zones;
   return report;
+}
+
+/// Of a substep that was just done.
+void ClothGroup::addPinForces(double share, double h)
+{
+  const Eigen::Matrix3Xd& impulses = collider_->heldImpulses();
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    pin_sums_[k] += share * steppers_[k].pinForces();
+    for (std::size_t p = 0; p < work_.cloths[k].pins.size(); ++p)
+      pin_sums_[k].col(static_cast<Eigen::Index>(p)) += share / h * impulses.col(first_[k] + work_.cloths[k].pins[p]);
+  }
 }
 
 /// From work_ to next_; times as shares of the step.
@@ -116,7 +137,7 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
   {
     report.ok = false;
     report.failure = StepFailure::squeezed;
-    report.message = "collisions: " + found.reason + "; use a shorter step, or leave the cloth more room";
+    report.message = "collisions: " + found.reason + whereIs(found) + "; use a shorter step, or leave the cloth more room";
     return report;
   }
   collisions_.repulsions += found.repulsions;
@@ -145,18 +166,74 @@ std::size_t ClothGroup::intersections(const ClothGroupState& state) const
   return slender::intersections(surface_, positions(state), state.solids).size();
 }
 
+int ClothGroup::clothOf(int point) const
+{
+  return static_cast<int>(std::upper_bound(first_.begin(), first_.end(), point) - first_.begin()) - 1;
+}
+
+std::string ClothGroup::solidName(int solid) const
+{
+  const bool named = solid < static_cast<int>(model_.solid_names.size());
+  return named ? "'" + model_.solid_names[solid] + "'" : "solid " + std::to_string(solid);
+}
+
+/// A point as the collider counts them.
+std::string ClothGroup::placeOf(int point) const
+{
+  if (point >= first_.back())
+    return solidName(collider_->solidOf(point));
+  const int cloth = clothOf(point);
+  return "cloth '" + model_.cloths[cloth]->name + "' at vertex " + std::to_string(point - first_[cloth]);
+}
+
+std::string ClothGroup::whereIs(const CollisionReport& failure) const
+{
+  std::string text;
+  for (const int point : failure.points)
+    if (point >= 0)
+      text += (text.empty() ? " (" : " and ") + placeOf(point);
+  return text.empty() ? text : text + ")";
+}
+
 void ClothGroup::checkIntersections(const ClothGroupState& state) const
 {
-  const auto found = slender::intersections(surface_, positions(state), state.solids);
+  const Eigen::Matrix3Xd x = positions(state);
+  const CollisionSurface taken = asTaken(surface_);
+  auto found = slender::intersections(surface_, x, state.solids);
+  bool prism = false;
+  if (found.empty())
+  {
+    found = slender::intersections(taken, x, state.solids);
+    prism = true;
+  }
   if (found.empty())
     return;
-  const int point = found[0].edge[0];
-  const auto cloth = std::upper_bound(first_.begin(), first_.end(), point) - first_.begin() - 1;
-  const std::string where = cloth < static_cast<std::ptrdiff_t>(model_.cloths.size())
-                              ? "cloth '" + model_.cloths[cloth]->name + "' at vertex " + std::to_string(point - first_[cloth])
-                              : "a solid";
-  throw std::invalid_argument(where + " intersects itself, another cloth or a solid as the scene starts (" + std::to_string(found.size()) +
-                              " places): move them apart");
+  // points of solids follow those of the cloths, and edges of a mesh may meet a cloth's face
+  const Intersection& first = found[0];
+  const auto solidAt = [&](int point) {
+    std::size_t solid = 0;
+    int end = first_.back();
+    for (;; ++solid)
+    {
+      const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&(prism ? taken : surface_).solids[solid].shape);
+      end += mesh ? static_cast<int>((*mesh)->vertices.cols()) : 0;
+      if (point < end)
+        return static_cast<int>(solid);
+    }
+  };
+  const bool edge = first.edge[0] < first_.back();
+  const int vertex = edge ? first.edge[0] : first.triangle[0], other = edge ? first.triangle[0] : first.edge[0], cloth = clothOf(vertex);
+  std::string meets;
+  if (other < 0)
+    meets = solidName(first.triangle[2]);
+  else if (other >= first_.back())
+    meets = solidName(solidAt(other));
+  else if (clothOf(other) == cloth)
+    meets = "itself at vertex " + std::to_string(other - first_[cloth]);
+  else
+    meets = "cloth '" + model_.cloths[clothOf(other)]->name + "'";
+  throw std::invalid_argument(placeOf(vertex) + " meets " + meets + (prism ? " or the prism that stands for it" : "") + " (" +
+                              std::to_string(found.size()) + " places in all): move them apart");
 }
 
 }  // namespace slender

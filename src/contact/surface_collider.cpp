@@ -42,6 +42,9 @@ public:
 
   CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v);
 
+  const Eigen::Matrix3Xd& heldImpulses() const { return held_impulses_; }
+  int solidOf(int point) const { return elements_.point_object.at(point) - elements_.sheet_count; }
+
 private:
   struct PlaneHit
   {
@@ -63,7 +66,8 @@ private:
   bool moveZones();
   bool followPrescribed(const ImpactZones::Zone& zone);
   void solveVelocities();
-  bool fail(const std::string& reason);
+  void takeHeldImpulses();
+  bool fail(const std::string& reason, int first = -1, int second = -1);
   int node(int point) const;
 
   CollisionElements elements_;
@@ -77,15 +81,18 @@ private:
   Eigen::Matrix3Xd tested_;         ///< ends at the last detection
   Eigen::Matrix3Xd displacement_, velocity_;
   Eigen::VectorXd inverse_mass_;
+  Eigen::Matrix3Xd held_impulses_;
   std::vector<char> changed_;
   std::vector<CollisionPair> hits_;
   std::vector<PlaneHit> plane_hits_;
 };
 
-bool SurfaceCollider::Impl::fail(const std::string& reason)
+bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int second)
 {
   report_.ok = false;
   report_.reason = reason;
+  report_.points[0] = first;
+  report_.points[1] = second;
   return false;
 }
 
@@ -148,7 +155,7 @@ bool SurfaceCollider::Impl::examineStart()
   for (const CollisionPair& pair : pairs_.find(from_, to_))
   {
     if (!(pair.gap > 0.0))
-      return fail("surfaces meet at the start of the step, at points " + std::to_string(pair.point[0]) + " and " + std::to_string(pair.point[3]));
+      return fail("surfaces meet at the start of the step", pair.point[0], pair.point[3]);
     if (pair.gap >= kNear * pairs_.shell(pair))
       continue;
     const double range = reach(pair);
@@ -217,7 +224,7 @@ bool SurfaceCollider::Impl::examinePlanes()
         continue;
       const double gap = planeGap(static_cast<int>(plane), step_->solids, from_.col(i));
       if (!(gap > 0.0))
-        return fail("point " + std::to_string(i) + " is behind a plane at the start of the step");
+        return fail("a plane is passed through at the start of the step", i);
       const double shell = elements_.objects[sheet].shell;
       if (gap < kNear * shell && std::min(gap, planeGap(static_cast<int>(plane), step_->solids_end, to_.col(i))) < shell)
         addPlaneRow(i, static_cast<int>(plane), gap, false);
@@ -342,7 +349,7 @@ bool SurfaceCollider::Impl::followPrescribed(const ImpactZones::Zone& zone)
       for (const Eigen::Vector3d& p : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)})
         one = one && agrees(step_->solids[solid] * p, step_->solids_end[solid] * p);
   if (!one)
-    return fail("prescribed motions squeeze or tear a piece at point " + std::to_string(zone.count > 0 ? zone.members[0] : zone.prescribed[0]));
+    return fail("prescribed motions squeeze or tear a piece", zone.count > 0 ? zone.members[0] : zone.prescribed[0] < points ? zone.prescribed[0] : -1);
   if (motion.linear().trace() <= 1.0)   // 1 + 2 cos(angle)
     return fail("a solid or grasp turns by more than a quarter in a step");
   for (int k = 0; k < zone.count; ++k)
@@ -362,7 +369,7 @@ bool SurfaceCollider::Impl::moveZones()
     }
     const RigidFit fit = rigidFit(zone.members, zone.count, inverse_mass_, from_, displacement_);
     if (fit.angular.norm() > 0.5 * M_PI)
-      return fail("the piece at point " + std::to_string(zone.members[0]) + " would turn by more than a quarter in a step");
+      return fail("a piece would turn by more than a quarter in a step", zone.members[0]);
     const Eigen::Matrix3d turn = fromRotationVector(fit.angular).toRotationMatrix();
     for (int k = 0; k < zone.count; ++k)
       to_.col(zone.members[k]) = fit.center + fit.linear + turn * (from_.col(zone.members[k]) - fit.center);
@@ -389,6 +396,7 @@ void SurfaceCollider::Impl::solveVelocities()
   }
   rows_.restart(inverse_mass_, 1.0 / h, velocity_);
   rows_.relax(inverse_mass_, kSweeps, velocity_);
+  takeHeldImpulses();
   if (zones_.empty())
     return;
   for (const ImpactZones::Zone& zone : zones_.zones(inverse_mass_))
@@ -399,12 +407,27 @@ void SurfaceCollider::Impl::solveVelocities()
       continue;
     const bool free = zone.prescribed_count == 0;
     const RigidFit fit = rigidFit(zone.members, zone.count, inverse_mass_, to_, velocity_);
+    Eigen::Vector3d gained = Eigen::Vector3d::Zero();
     for (int k = 0; k < zone.count; ++k)
     {
       const int i = zone.members[k];
-      velocity_.col(i) = free ? fit.rate(to_.col(i)) : Eigen::Vector3d((to_.col(i) - from_.col(i)) / h);
+      const Eigen::Vector3d v = free ? fit.rate(to_.col(i)) : Eigen::Vector3d((to_.col(i) - from_.col(i)) / h);
+      gained += (v - velocity_.col(i)) / inverse_mass_[i];
+      velocity_.col(i) = v;
     }
+    if (!free && zone.prescribed[zone.prescribed_count - 1] < elements_.sheet_points)   // bodies come last
+      for (int k = 0; k < zone.prescribed_count; ++k)
+        held_impulses_.col(zone.prescribed[k]) -= gained / zone.prescribed_count;
   }
+}
+
+void SurfaceCollider::Impl::takeHeldImpulses()
+{
+  held_impulses_.setZero(3, elements_.sheet_points);
+  for (const CollisionRow& row : rows_.rows)
+    for (int i = 0; i < 4; ++i)
+      if (const int p = row.point[i]; row.mobility > 0.0 && p < elements_.sheet_points && inverse_mass_[p] == 0.0)
+        held_impulses_.col(p) += row.weight[i] * (row.impulse * row.normal + row.rubbing);
 }
 
 CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v)
@@ -439,6 +462,9 @@ CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen:
 SurfaceCollider::SurfaceCollider(const CollisionSurface& surface) : impl_(std::make_unique<Impl>(surface)) {}
 SurfaceCollider::~SurfaceCollider() = default;
 SurfaceCollider::SurfaceCollider(SurfaceCollider&&) noexcept = default;
+
+const Eigen::Matrix3Xd& SurfaceCollider::heldImpulses() const { return impl_->heldImpulses(); }
+int SurfaceCollider::solidOf(int point) const { return impl_->solidOf(point); }
 
 CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v)
 {

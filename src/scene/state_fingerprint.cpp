@@ -100,6 +100,13 @@ std::uint64_t Simulation::fingerprint() const
     out(static_cast<int>(model.bending));
     out(static_cast<int>(config_.cloths[k].solver));
     out(config_.cloths[k].one_newton_step);
+    const ClothContactConfig touch = config_.cloths[k].contact.value_or(ClothContactConfig{});
+    out(config_.cloths[k].contact.has_value());
+    out(touch.self);
+    out(touch.cloths);
+    out(touch.obstacles);
+    out(touch.friction);
+    out(touch.thickness);
     for (const GraspConfig& grasp : config_.cloths[k].grasps)
     {
       text(grasp.name);
