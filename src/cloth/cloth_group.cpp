@@ -9,6 +9,12 @@
 
 namespace slender {
 
+namespace {
+
+constexpr int kLoadPasses = 2;
+
+}  // namespace
+
 ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : model_(std::move(model)), options_(options)
 {
   if (model_.contact.size() != model_.cloths.size())
@@ -35,7 +41,7 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   }
   surface_.solids = model_.solids;
   collider_ = std::make_unique<SurfaceCollider>(surface_);
-  for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_})
+  for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_, &push_, &answer_})
     m->resize(3, first_.back());
   inverse_mass_.resize(first_.back());
   sub_.cloths.resize(model_.cloths.size());
@@ -95,6 +101,42 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   return report;
 }
 
+/// Collisions change the velocities of what touches only. Where that is little mass, as under the point of a needle, it would carry little of the load,
+/// while the next solve, which knows nothing of contact, relaxes it at the cost of the few that touch. So the forces that stand for the correction act on
+/// the whole cloth as well: along its response to them, as far as the energy of the step says (a step of steepest descent on the dual problem of contact).
+/// Returns false when there is nothing left to do.
+bool ClothGroup::shareLoads(double h)
+{
+  corrected_ = x_;
+  corrected_v_ = v_;
+  if (!collider_->resolve({x_start_, inverse_mass_, work_.solids, next_.solids, h}, corrected_, corrected_v_).ok)
+    return false;
+  double work = 0.0, answered = 0.0;
+  for (int i = 0; i < first_.back(); ++i)
+  {
+    const bool free = inverse_mass_[i] > 0.0;
+    push_.col(i) = free ? Eigen::Vector3d((corrected_.col(i) - x_.col(i)) / (inverse_mass_[i] * h * h)) : Eigen::Vector3d(0, 0, 0);
+    work += push_.col(i).dot(corrected_.col(i) - x_.col(i));
+  }
+  if (!(work > 0.0))
+    return false;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    const int first = first_[k], count = first_[k + 1] - first;
+    own_push_ = push_.middleCols(first, count);
+    own_answer_.resize(3, count);
+    if (!steppers_[k].respond(own_push_, own_answer_))
+      return false;
+    answer_.middleCols(first, count) = own_answer_;
+    answered += own_push_.cwiseProduct(own_answer_).sum();
+  }
+  if (!(answered > 0.0))
+    return false;
+  x_ += work / answered * answer_;
+  v_ += work / answered / h * answer_;
+  return true;
+}
+
 /// Of a substep that was just done.
 void ClothGroup::addPinForces(double share, double h)
 {
@@ -132,6 +174,9 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
   }
   for (std::size_t s = 0; s < model_.solids.size(); ++s)   // uniformly from here to the end of the step
     next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
+  for (int pass = 0; pass < kLoadPasses && shareLoads(h); ++pass)
+  {
+  }
   const CollisionReport found = collider_->resolve({x_start_, inverse_mass_, work_.solids, next_.solids, h}, x_, v_);
   if (!found.ok)
   {

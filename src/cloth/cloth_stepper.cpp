@@ -16,6 +16,9 @@ public:
 
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
 
+  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement);
+  void moveEnd(const Eigen::Matrix3Xd& x);
+
   std::shared_ptr<const ClothModel> model;
   ClothOptions options;
   ClothSystem system;
@@ -286,6 +289,34 @@ StepFailure ClothStepper::Impl::finish(double h, StepReport& report)
   return StepFailure::none;
 }
 
+bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement)
+{
+  if (options.integrator == Integrator::symplectic_euler)
+    return false;
+  for (int i = 0; i < model->vertices(); ++i)
+    point(system.gradient(), i) = -forces.col(i);
+  std::fill(d_.begin(), d_.end(), 0.0);
+  int iterations = 0, factorizations = 0;
+  constexpr double kTolerance = 0.3;
+  if (!system.solve(d_, iterations, factorizations, kTolerance))
+    return false;
+  for (int i = 0; i < model->vertices(); ++i)
+    displacement.col(i) = point(d_, i);
+  return true;
+}
+
+void ClothStepper::Impl::moveEnd(const Eigen::Matrix3Xd& x)
+{
+  if (options.integrator == Integrator::symplectic_euler || pin_forces.cols() == 0)
+    return;
+  toPoints(x, x_);
+  system.evaluate(x_);
+  int pin = 0;
+  for (int i = 0; i < model->vertices(); ++i)
+    if (system.held()[i])
+      pin_forces.col(pin++) = -point(system.gradient(), i);
+}
+
 /// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step ago.
 StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report)
 {
@@ -336,6 +367,8 @@ ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
+bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement) { return impl_->respond(forces, displacement); }
+void ClothStepper::moveEnd(const Eigen::Matrix3Xd& x) { impl_->moveEnd(x); }
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 ClothSolver ClothStepper::solver() const { return impl_->system.solver(); }
 const ClothModel& ClothStepper::model() const { return *impl_->model; }

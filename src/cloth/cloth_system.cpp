@@ -343,7 +343,7 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
     bending_.addProduct(1.0 + ratio_, p.data(), ap.data());
 }
 
-bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizations)
+bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizations, double least)
 {
   // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
   bool moved = false;
@@ -374,7 +374,7 @@ bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizati
   }
   clearHeld(right_);
   const LinearResult result = cg_.solve(
-    right_, correction_, linear_tolerance_, 2000,
+    right_, correction_, std::max(least, linear_tolerance_), 2000,
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);

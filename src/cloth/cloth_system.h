@@ -49,7 +49,8 @@ public:
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient);
   PointVector& gradient() { return gradient_; }
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. False: not positive definite. `linear` grows by iterations.
-  bool solve(PointVector& d, int& linear_iterations, int& factorizations);
+  /// `least` : conjugate gradients do not go below this tolerance, whatever the options.
+  bool solve(PointVector& d, int& linear_iterations, int& factorizations, double least = 0.0);
 
   const PointVector& start() const { return start_; }
   const PointVector& target() const { return target_; }
