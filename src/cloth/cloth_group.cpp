@@ -105,11 +105,11 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
 /// while the next solve, which knows nothing of contact, relaxes it at the cost of the few that touch. So the forces that stand for the correction act on
 /// the whole cloth as well: along its response to them, as far as the energy of the step says (a step of steepest descent on the dual problem of contact).
 /// Returns false when there is nothing left to do.
-bool ClothGroup::shareLoads(double h)
+bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
 {
+  const double h = step.h;
   corrected_ = x_;
-  corrected_v_ = v_;
-  if (!collider_->resolve({x_start_, inverse_mass_, work_.solids, next_.solids, h}, corrected_, corrected_v_).ok)
+  if (!collider_->approach(step, corrected_, again))
     return false;
   double work = 0.0, answered = 0.0;
   for (int i = 0; i < first_.back(); ++i)
@@ -174,10 +174,17 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
   }
   for (std::size_t s = 0; s < model_.solids.size(); ++s)   // uniformly from here to the end of the step
     next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
-  for (int pass = 0; pass < kLoadPasses && shareLoads(h); ++pass)
-  {
-  }
-  const CollisionReport found = collider_->resolve({x_start_, inverse_mass_, work_.solids, next_.solids, h}, x_, v_);
+  const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h};
+  int pass = 0;
+  while (pass < kLoadPasses && shareLoads(step, pass > 0))
+    ++pass;
+  for (std::size_t k = 0; k < model_.cloths.size() && pass > 0; ++k)
+    if (!work_.cloths[k].pins.empty())
+    {
+      own_answer_ = x_.middleCols(first_[k], first_[k + 1] - first_[k]);
+      steppers_[k].moveEnd(own_answer_);
+    }
+  const CollisionReport found = collider_->resolve(step, x_, v_, true);
   if (!found.ok)
   {
     report.ok = false;

@@ -40,7 +40,8 @@ public:
     changed_.resize(n);
   }
 
-  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v);
+  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again);
+  bool approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again);
 
   const Eigen::Matrix3Xd& heldImpulses() const { return held_impulses_; }
   int solidOf(int point) const { return elements_.point_object.at(point) - elements_.sheet_count; }
@@ -51,8 +52,9 @@ private:
     int point, plane;
   };
 
-  bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v);
+  bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again);
   bool examineStart();
+  void addHits();
   bool examinePlanes();
   void detect();
   ApproachLimit limitOf(const CollisionPair& pair) const;
@@ -83,6 +85,7 @@ private:
   Eigen::VectorXd inverse_mass_;
   Eigen::Matrix3Xd held_impulses_;
   std::vector<char> changed_;
+  bool known_ = false;              ///< pairs_ are those of the step's start
   std::vector<CollisionPair> hits_;
   std::vector<PlaneHit> plane_hits_;
 };
@@ -96,7 +99,7 @@ bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int secon
   return false;
 }
 
-bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v)
+bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again)
 {
   const int n = elements_.sheet_points;
   const std::size_t solids = elements_.objects.size() - elements_.sheet_count;
@@ -106,6 +109,7 @@ bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3
     throw std::invalid_argument("collisions: poses of " + std::to_string(solids) + " solids expected");
   if (!(step.h > 0.0) || !(step.inverse_mass.minCoeff() >= 0.0))
     throw std::invalid_argument("collisions: the step must be positive, inverse masses not negative");
+  known_ = known_ && again;
   step_ = &step;
   report_ = CollisionReport();
   from_.leftCols(n) = step.x_start;
@@ -152,7 +156,9 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
 /// Finds all pairs that may come near each other; those within their shells, or near them and about to enter, get repulsions.
 bool SurfaceCollider::Impl::examineStart()
 {
-  for (const CollisionPair& pair : pairs_.find(from_, to_))
+  const std::vector<CollisionPair>& pairs = known_ ? pairs_.update(from_, to_) : pairs_.find(from_, to_);
+  known_ = true;
+  for (const CollisionPair& pair : pairs)
   {
     if (!(pair.gap > 0.0))
       return fail("surfaces meet at the start of the step", pair.point[0], pair.point[3]);
@@ -430,19 +436,40 @@ void SurfaceCollider::Impl::takeHeldImpulses()
         held_impulses_.col(p) += row.weight[i] * (row.impulse * row.normal + row.rubbing);
 }
 
-CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v)
+void SurfaceCollider::Impl::addHits()
 {
-  if (!load(step, x, v) || !examineStart() || !examinePlanes())
+  for (const CollisionPair& pair : hits_)
+    stop(pair);
+  for (const PlaneHit& hit : plane_hits_)
+    addPlaneRow(hit.point, hit.plane, planeGap(hit.plane, step_->solids, from_.col(hit.point)), true);
+}
+
+bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again)
+{
+  if (!load(step, x, step.x_start, again) || !examineStart() || !examinePlanes())
+    return false;
+  hits_.clear();
+  rows_.relax(inverse_mass_, kSweeps, to_);
+  detect();
+  if (!(hits_.empty() && plane_hits_.empty()))
+  {
+    addHits();
+    rows_.relax(inverse_mass_, kSweeps, to_);
+  }
+  x = to_.leftCols(elements_.sheet_points);
+  return true;
+}
+
+CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again)
+{
+  if (!load(step, x, v, again) || !examineStart() || !examinePlanes())
     return report_;
   hits_.clear();
   rows_.relax(inverse_mass_, kSweeps, to_);
   detect();
   while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds)
   {
-    for (const CollisionPair& pair : hits_)
-      stop(pair);
-    for (const PlaneHit& hit : plane_hits_)
-      addPlaneRow(hit.point, hit.plane, planeGap(hit.plane, step.solids, from_.col(hit.point)), true);
+    addHits();
     rows_.relax(inverse_mass_, kSweeps, to_);
     detect();
   }
@@ -466,9 +493,11 @@ SurfaceCollider::SurfaceCollider(SurfaceCollider&&) noexcept = default;
 const Eigen::Matrix3Xd& SurfaceCollider::heldImpulses() const { return impl_->heldImpulses(); }
 int SurfaceCollider::solidOf(int point) const { return impl_->solidOf(point); }
 
-CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v)
+CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again)
 {
-  return impl_->resolve(step, x, v);
+  return impl_->resolve(step, x, v, again);
 }
+
+bool SurfaceCollider::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again) { return impl_->approach(step, x, again); }
 
 }  // namespace slender

@@ -67,7 +67,7 @@ public:
 
 private:
   StepReport substep(const ClothGroupInputs& inputs, double from, double to, double duration);
-  bool shareLoads(double h);
+  bool shareLoads(const CollisionStep& step, bool again);
   void addPinForces(double share, double h);
   Eigen::Matrix3Xd positions(const ClothGroupState& state) const;
   int clothOf(int point) const;
@@ -87,7 +87,7 @@ private:
   ClothGroupInputs sub_;
   std::vector<Eigen::Matrix3Xd> pins_start_, pin_forces_, pin_sums_;
   Eigen::Matrix3Xd x_start_, x_, v_;
-  Eigen::Matrix3Xd corrected_, corrected_v_, push_, answer_, own_push_, own_answer_;
+  Eigen::Matrix3Xd corrected_, push_, answer_, own_push_, own_answer_;
   Eigen::VectorXd inverse_mass_;
 };
 

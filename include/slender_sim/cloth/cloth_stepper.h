@@ -55,7 +55,7 @@ public:
   /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step: linear, with the matrix of its last Newton
   /// iteration; held vertices stay. Conjugate gradients stop early, where forces . displacement is the energy of the displacement all the same. Returns false after explicit steps, or if that matrix cannot be used.
   bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement);
-  /// Takes other positions for the end of the last successful implicit step, which contact moved there: pinForces() are then those.
+  /// Takes other positions (3 x n) for the end of the last successful implicit step, to which contact moved it: pinForces() are then those there.
   void moveEnd(const Eigen::Matrix3Xd& x);
   /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step.
   const Eigen::Matrix3Xd& pinForces() const;
