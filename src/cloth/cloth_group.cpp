@@ -12,6 +12,7 @@ namespace slender {
 namespace {
 
 constexpr int kLoadPasses = 2;
+constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
 
 }  // namespace
 
@@ -46,7 +47,7 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   inverse_mass_.resize(first_.back());
   sub_.cloths.resize(model_.cloths.size());
   sub_.solids.resize(model_.solids.size());
-  for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_})
+  for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_, &shared_pins_, &pin_answers_})
     pins->resize(model_.cloths.size());
 }
 
@@ -125,15 +126,18 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
     const int first = first_[k], count = first_[k + 1] - first;
     own_push_ = push_.middleCols(first, count);
     own_answer_.resize(3, count);
-    if (!steppers_[k].respond(own_push_, own_answer_))
+    if (!steppers_[k].respond(own_push_, own_answer_, pin_answers_[k]))
       return false;
     answer_.middleCols(first, count) = own_answer_;
     answered += own_push_.cwiseProduct(own_answer_).sum();
   }
   if (!(answered > 0.0))
     return false;
-  x_ += work / answered * answer_;
-  v_ += work / answered / h * answer_;
+  const double share = kLoadShare * work / answered;
+  x_ += share * answer_;
+  v_ += share / h * answer_;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+    shared_pins_[k] += share * pin_answers_[k];
   return true;
 }
 
@@ -143,7 +147,7 @@ void ClothGroup::addPinForces(double share, double h)
   const Eigen::Matrix3Xd& impulses = collider_->heldImpulses();
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
-    pin_sums_[k] += share * steppers_[k].pinForces();
+    pin_sums_[k] += share * (steppers_[k].pinForces() + shared_pins_[k]);
     for (std::size_t p = 0; p < work_.cloths[k].pins.size(); ++p)
       pin_sums_[k].col(static_cast<Eigen::Index>(p)) += share / h * impulses.col(first_[k] + work_.cloths[k].pins[p]);
   }
@@ -176,14 +180,10 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
     next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
   const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h};
   int pass = 0;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+    shared_pins_[k].setZero(3, static_cast<Eigen::Index>(work_.cloths[k].pins.size()));
   while (pass < kLoadPasses && shareLoads(step, pass > 0))
     ++pass;
-  for (std::size_t k = 0; k < model_.cloths.size() && pass > 0; ++k)
-    if (!work_.cloths[k].pins.empty())
-    {
-      own_answer_ = x_.middleCols(first_[k], first_[k + 1] - first_[k]);
-      steppers_[k].moveEnd(own_answer_);
-    }
   const CollisionReport found = collider_->resolve(step, x_, v_, true);
   if (!found.ok)
   {

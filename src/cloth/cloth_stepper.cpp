@@ -16,8 +16,7 @@ public:
 
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
 
-  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement);
-  void moveEnd(const Eigen::Matrix3Xd& x);
+  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
 
   std::shared_ptr<const ClothModel> model;
   ClothOptions options;
@@ -289,7 +288,7 @@ StepFailure ClothStepper::Impl::finish(double h, StepReport& report)
   return StepFailure::none;
 }
 
-bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement)
+bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
 {
   if (options.integrator == Integrator::symplectic_euler)
     return false;
@@ -297,24 +296,20 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3X
     point(system.gradient(), i) = -forces.col(i);
   std::fill(d_.begin(), d_.end(), 0.0);
   int iterations = 0, factorizations = 0;
-  constexpr double kTolerance = 0.3;
+  constexpr double kTolerance = 0.05;
   if (!system.solve(d_, iterations, factorizations, kTolerance))
     return false;
   for (int i = 0; i < model->vertices(); ++i)
     displacement.col(i) = point(d_, i);
-  return true;
-}
-
-void ClothStepper::Impl::moveEnd(const Eigen::Matrix3Xd& x)
-{
-  if (options.integrator == Integrator::symplectic_euler || pin_forces.cols() == 0)
-    return;
-  toPoints(x, x_);
-  system.evaluate(x_);
-  int pin = 0;
+  pin_forces_change.resize(3, pin_forces.cols());
+  if (pin_forces.cols() == 0)
+    return true;
+  system.applyMatrix(d_, trial_);
+  Eigen::Index pin = 0;
   for (int i = 0; i < model->vertices(); ++i)
     if (system.held()[i])
-      pin_forces.col(pin++) = -point(system.gradient(), i);
+      pin_forces_change.col(pin++) = -point(trial_, i);
+  return true;
 }
 
 /// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step ago.
@@ -367,8 +362,10 @@ ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
-bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement) { return impl_->respond(forces, displacement); }
-void ClothStepper::moveEnd(const Eigen::Matrix3Xd& x) { impl_->moveEnd(x); }
+bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+{
+  return impl_->respond(forces, displacement, pin_forces_change);
+}
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 ClothSolver ClothStepper::solver() const { return impl_->system.solver(); }
 const ClothModel& ClothStepper::model() const { return *impl_->model; }

@@ -52,6 +52,9 @@ public:
   /// `least` : conjugate gradients do not go below this tolerance, whatever the options.
   bool solve(PointVector& d, int& linear_iterations, int& factorizations, double least = 0.0);
 
+  /// The matrix of solve() times p.
+  void applyMatrix(const PointVector& p, PointVector& ap);
+
   const PointVector& start() const { return start_; }
   const PointVector& target() const { return target_; }
   const std::vector<char>& held() const { return held_; }
@@ -61,7 +64,6 @@ public:
 private:
   void setWeights(double h, double ratio);
   void gatherDrag(const PointVector& x, double factor);
-  void applyMatrix(const PointVector& p, PointVector& ap);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);

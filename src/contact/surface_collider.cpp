@@ -85,6 +85,7 @@ private:
   Eigen::VectorXd inverse_mass_;
   Eigen::Matrix3Xd held_impulses_;
   std::vector<char> changed_;
+  double push_ = kPush;
   bool known_ = false;              ///< pairs_ are those of the step's start
   std::vector<CollisionPair> hits_;
   std::vector<PlaneHit> plane_hits_;
@@ -145,7 +146,7 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
     row.weight[i] = place.weight[i];
     row.anchor += place.weight[i] * from_.col(place.point[i]);
   }
-  row.push = kPush * std::max(0.0, range - pair.gap);
+  row.push = push_ * std::max(0.0, range - pair.gap);
   row.bound = pairs_.core(pair) + std::min(pair.gap, range) + row.push;
   row.tolerance = 0.02 * std::min(pair.gap, range);
   row.friction = elements_.friction(pairs_.object(pair, false), pairs_.object(pair, true));
@@ -212,7 +213,7 @@ void SurfaceCollider::Impl::addPlaneRow(int point, int plane, double gap, bool h
   row.weight[0] = 1.0;
   row.normal = end.orientation * Eigen::Vector3d::UnitZ();
   row.anchor = end * (step_->solids[solid].inverse() * Eigen::Vector3d(from_.col(point)));
-  row.push = hit ? 0.0 : kPush * std::max(0.0, shell - gap);
+  row.push = hit ? 0.0 : push_ * std::max(0.0, shell - gap);
   row.bound = row.normal.dot(end.position) + (hit ? kTarget : 1.0) * std::min(gap, shell) + row.push;
   row.tolerance = 0.02 * std::min(gap, shell);
   row.friction = elements_.friction(sheet, object);
@@ -446,7 +447,10 @@ void SurfaceCollider::Impl::addHits()
 
 bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again)
 {
-  if (!load(step, x, step.x_start, again) || !examineStart() || !examinePlanes())
+  push_ = 0.0;   // which moves pieces apart but causes no velocity
+  const bool fine = load(step, x, step.x_start, again) && examineStart() && examinePlanes();
+  push_ = kPush;
+  if (!fine)
     return false;
   hits_.clear();
   rows_.relax(inverse_mass_, kSweeps, to_);

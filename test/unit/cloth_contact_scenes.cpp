@@ -171,7 +171,7 @@ TEST(ClothContact, RestsOnEveryShape)
     EXPECT_GT(report.repulsions, 0);
     const Eigen::Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
     EXPECT_GT(x.row(2).maxCoeff(), top + 1e-4);
-    EXPECT_LT(x.row(2).maxCoeff(), top + 0.012);
+    EXPECT_LT(x.row(2).maxCoeff(), top + 0.02);   // folds
   }
 }
 

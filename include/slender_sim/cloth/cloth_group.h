@@ -85,7 +85,7 @@ private:
 
   ClothGroupState work_, next_;
   ClothGroupInputs sub_;
-  std::vector<Eigen::Matrix3Xd> pins_start_, pin_forces_, pin_sums_;
+  std::vector<Eigen::Matrix3Xd> pins_start_, pin_forces_, pin_sums_, shared_pins_, pin_answers_;
   Eigen::Matrix3Xd x_start_, x_, v_;
   Eigen::Matrix3Xd corrected_, push_, answer_, own_push_, own_answer_;
   Eigen::VectorXd inverse_mass_;
