@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <tuple>
 
@@ -32,25 +31,19 @@ public:
   explicit Impl(const CollisionSurface& surface) : elements_(surface), pairs_(elements_)
   {
     const Eigen::Index n = elements_.reference.cols();
-    from_.resize(3, n);
-    to_.resize(3, n);
-    tested_.resize(3, n);
-    velocity_.resize(3, n);
+    for (Eigen::Matrix3Xd* m : {&from_, &to_, &tested_, &velocity_})
+      m->resize(3, n);
     inverse_mass_.setZero(n);
     changed_.resize(n);
   }
 
   CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again);
   bool approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again);
-
   const Eigen::Matrix3Xd& heldImpulses() const { return held_impulses_; }
   int solidOf(int point) const { return elements_.point_object.at(point) - elements_.sheet_count; }
 
 private:
-  struct PlaneHit
-  {
-    int point, plane;
-  };
+  struct PlaneHit { int point, plane; };
 
   bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again);
   bool examineStart();
@@ -95,8 +88,7 @@ bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int secon
 {
   report_.ok = false;
   report_.reason = reason;
-  report_.points[0] = first;
-  report_.points[1] = second;
+  report_.points[0] = first, report_.points[1] = second;
   return false;
 }
 
@@ -450,9 +442,9 @@ bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd
   push_ = 0.0;   // which moves pieces apart but causes no velocity
   const bool fine = load(step, x, step.x_start, again) && examineStart() && examinePlanes();
   push_ = kPush;
+  hits_.clear();
   if (!fine)
     return false;
-  hits_.clear();
   rows_.relax(inverse_mass_, kSweeps, to_);
   detect();
   if (!(hits_.empty() && plane_hits_.empty()))
