@@ -91,11 +91,11 @@ void writeSurfaceScript(std::ostream& out, const SurfacePicture& picture, const 
   const double pixels = std::min(1500.0 / (columns * width), 1800.0 / (rows * height));
   char line[160];
   std::snprintf(line, sizeof line, "set terminal pngcairo size %.0f,%.0f noenhanced font \"sans,14\"\n", columns * width * pixels,
-                rows * height * pixels + 40);
-  out << line << "set output " << gnuplotString(png) << "\nset title " << gnuplotString(picture.title) << "\n"
+                rows * height * pixels + 60);
+  out << line << "set output " << gnuplotString(png) << "\nset title " << gnuplotString(picture.title) << " offset 0,-0.3\n"
       << "unset key\nunset tics\nunset border\nunset colorbox\nset lmargin at screen 0\nset rmargin at screen 1\n"
       << "set bmargin at screen 0\nset tmargin at screen "
-      << 1.0 - 40.0 / (rows * height * pixels + 40) << "\nset view map\nset pm3d explicit scansforward corners2color mean border retrace\nset cbrange [0:3]\n"
+      << 1.0 - 60.0 / (rows * height * pixels + 60) << "\nset view map\nset pm3d explicit scansforward corners2color mean border retrace\nset cbrange [0:3]\n"
       << "set palette defined (0 \"#20120c\", 1 \"#f4c9a0\", 2 \"#101418\", 3 \"#b4bcc8\")\n";
   std::snprintf(line, sizeof line, "set xrange [0:%.6g]\nset yrange [0:%.6g]\n", columns * width, rows * height);
   out << line;
