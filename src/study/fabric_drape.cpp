@@ -166,7 +166,6 @@ struct Draped
 Draped drapeFabric(StudyContext& context, const Fabric& fabric, const Disc& disc, Integrator integrator, unsigned seed)
 {
   constexpr double kTensile = 300;   // [N/m]; its own weight strains the disc by less than a thousandth
-  constexpr double kEnd = 2.0;       // [s]
   ClothModel model = buildCloth(fabric.name, disc.mesh, fabric.area_density, orthotropicMembrane(kTensile, kTensile, 0.0, fabric.shear));
   model.bending_modulus = fabric.bending;
   model.mass_damping = 8.0;
@@ -182,6 +181,7 @@ Draped drapeFabric(StudyContext& context, const Fabric& fabric, const Disc& disc
   options.integrator = integrator;
   options.one_newton_step = true;
   ClothStepper stepper(cloth.model, options);
+  const double end = context.quick() ? 2.0 : 3.0;   // [s]
   double h = 1e-2;
   if (integrator == Integrator::symplectic_euler)   // half the time in which a wave runs along the shortest edge
   {
@@ -191,14 +191,14 @@ Draped drapeFabric(StudyContext& context, const Fabric& fabric, const Disc& disc
       shortest = std::min(shortest, (disc.mesh.vertices.col(edges(0, e)) - disc.mesh.vertices.col(edges(1, e))).norm());
     h = 0.5 * shortest / std::sqrt(kTensile / fabric.area_density);
   }
-  const int steps = static_cast<int>(std::ceil(kEnd / h));
+  const int steps = static_cast<int>(std::ceil(end / h));
   const std::string label = std::string(fabric.name) + ", " + toString(integrator);
   const double start = threadSeconds();
   for (int k = 0; k < steps; ++k)
   {
     if (k % 20 == 0)
       context.progress(k, steps, label);
-    const StepReport report = stepper.step(cloth.state, cloth.inputs, kEnd / steps);
+    const StepReport report = stepper.step(cloth.state, cloth.inputs, end / steps);
     if (!report.ok)
       throw std::runtime_error("fabric_drape: " + label + " refused: " + report.message);
   }

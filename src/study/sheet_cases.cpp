@@ -40,7 +40,7 @@ SheetRun runSheet(StudyContext& context, const SheetScene& scene, BendingModel b
     input.pins.col(static_cast<Eigen::Index>(k)) = scene.start.col(state.cloths[0].pins[k]);
 
   ClothOptions options;
-  options.one_newton_step = getenv("NEWTON") == nullptr;
+  options.one_newton_step = true;
   ClothGroup group(group_model, options);
   ClothStepper alone(cloth, options);
   group.checkIntersections(state);
@@ -73,7 +73,7 @@ SheetRun runSheet(StudyContext& context, const SheetScene& scene, BendingModel b
   }
   run.seconds_per_step /= steps;
   run.cloth_seconds /= timed;
-  run.speed = state.cloths[0].v.colwise().norm().maxCoeff();
+  run.speed = std::sqrt(state.cloths[0].v.squaredNorm() / static_cast<double>(start.cols()));
   run.intersections = group.intersections(state);
   return run;
 }

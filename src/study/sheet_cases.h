@@ -30,7 +30,7 @@ struct SheetRun
   std::vector<Eigen::Vector3d> corner;    ///< the vertex farthest from the first one, after each step from keep_from on
   double seconds_per_step = 0;            ///< CPU time, collisions included
   double cloth_seconds = 0;             ///< CPU time per step of the cloth's own, without collisions
-  double speed = 0;                       ///< largest at the end [m/s]
+  double speed = 0;                       ///< RMS at the end [m/s]
   std::size_t intersections = 0;          ///< at the end
 };
 
