@@ -9,7 +9,8 @@ constexpr double kSphere = 0.2;       // [m]
 constexpr double kThickness = 4e-3;
 
 /// 1 m x 1 m over a sphere about the origin.
-SheetScene sheetOverSphere(const std::string& name, int cells, double stiffness, double area_density, double bending_modulus, double step, double duration)
+SheetScene sheetOverSphere(const std::string& name, int cells, double stiffness, double area_density, double bending_modulus, double step,
+                           double duration)
 {
   SheetScene s;
   s.name = name;
@@ -34,42 +35,61 @@ SurfacePicture::Panel panelOf(const std::string& label, const SheetScene& scene,
   return {label, {{{x, scene.mesh.triangles}}, {icosphere(0.95 * kSphere, 4), false}}};
 }
 
-/// Runs the scene with both models, and once more with a start shaken by a thousandth of a cell: what the model changes beside what chance does.
-void compare(StudyContext& context, const SheetScene& scene, double ratio, const std::string& suffix, SurfacePicture& picture, Plot& plot)
+struct Runs
 {
-  const double shake = 1e-3 / scene.columns;
-  const SheetRun ibm = runSheet(context, scene, BendingModel::isometric_nonconforming, 0.0);
-  const SheetRun hinge = runSheet(context, scene, BendingModel::hinge, 0.0);
-  const SheetRun shaken = runSheet(context, scene, BendingModel::isometric_nonconforming, shake);
-  const Spectrum of_ibm = wrinkles(scene, ibm.frames);
-  const auto compared = [&](const char* model, const char* metric, const SheetRun& run) {
-    const Spectrum spectrum = wrinkles(scene, run.frames);
-    const ShapeDifference apart = difference(scene, run.frames.back(), ibm.frames.back());
-    context.row().set("scene", scene.name).set("model", model).set("bending_over_membrane", ratio)
-      .set("vertices", static_cast<double>(scene.start.cols())).set("step_ms", 1e3 * scene.step).set("rms_difference", apart.rms).set("max_difference", apart.most).set("spectrum_distance", distance(spectrum, of_ibm))
-      .set("mean_wavelength_m", spectrum.mean()).set("lowest_m", run.frames.back().row(2).minCoeff()).set("rms_speed_left_mm_s", 1e3 * run.speed)
-      .set("ms_per_step", 1e3 * run.seconds_per_step).set("cloth_alone_ms", 1e3 * run.cloth_seconds)
-      .set("intersections", static_cast<double>(run.intersections));
-    Series& series = plot.at(scene.name + ", " + model);
-    series.x = spectrum.wavelength;
-    series.y = spectrum.share;
-    if (!metric)
-      return;
-    context.metric("rms_difference" + (metric + suffix), apart.rms);
-    context.metric("max_difference" + (metric + suffix), apart.most);
-    context.metric("spectrum_distance" + (metric + suffix), distance(spectrum, of_ibm));
-  };
-  compared("isometric", nullptr, ibm);
-  compared("hinge", "", hinge);
-  compared("isometric, shaken start", "_of_chance", shaken);
-  context.metric("hinge_over_isometric_step" + suffix, hinge.seconds_per_step / ibm.seconds_per_step);
-  context.metric("hinge_over_isometric_cloth_alone" + suffix, hinge.cloth_seconds / ibm.cloth_seconds);
-  picture.panels.push_back(panelOf(scene.name + ", isometric bending", scene, ibm.frames.back()));
-  picture.panels.push_back(panelOf(scene.name + ", nonlinear hinges", scene, hinge.frames.back()));
+  std::vector<SheetRun> of_start;
+  std::vector<Eigen::Matrix3Xd> ends;
+  Spectrum spectrum;            ///< of all ends
+  double step = 0, alone = 0;   ///< mean CPU times per step [s]
+};
+
+/// Runs the scene with both models from several starts, which differ by thousandths of a cell: what the model changes beside what chance does.
+void compare(StudyContext& context, const SheetScene& scene, double ratio, int starts, const std::string& suffix, SurfacePicture& picture, Plot& plot)
+{
+  Runs models[2];
+  for (int model = 0; model < 2; ++model)
+  {
+    Runs& runs = models[model];
+    for (int k = 0; k < starts; ++k)
+    {
+      runs.of_start.push_back(runSheet(context, scene, model ? BendingModel::hinge : BendingModel::isometric_nonconforming, k * 1e-3 / scene.columns));
+      const SheetRun& run = runs.of_start.back();
+      runs.ends.push_back(run.frames.back());
+      runs.step += run.seconds_per_step / starts;
+      runs.alone += run.cloth_seconds / starts;
+      const ShapeDifference apart = difference(scene, runs.ends.back(), models[0].ends.front());
+      const Spectrum spectrum = wrinkles(scene, {runs.ends.back()});
+      context.row().set("scene", scene.name).set("model", model ? "hinge" : "isometric").set("start_shaken", k).set("bending_over_membrane", ratio)
+        .set("vertices", static_cast<double>(scene.start.cols())).set("step_ms", 1e3 * scene.step).set("rms_difference", apart.rms)
+        .set("max_difference", apart.most).set("mean_wavelength_m", spectrum.mean()).set("lowest_m", runs.ends.back().row(2).minCoeff())
+        .set("rms_speed_left_mm_s", 1e3 * run.speed).set("ms_per_step", 1e3 * run.seconds_per_step)
+        .set("cloth_alone_ms", 1e3 * run.cloth_seconds).set("intersections", static_cast<double>(run.intersections));
+    }
+    runs.spectrum = wrinkles(scene, runs.ends);
+    Series& series = plot.at(scene.name + (model ? ", hinge" : ", isometric"));
+    series.x = runs.spectrum.wavelength;
+    series.y = runs.spectrum.share;
+    picture.panels.push_back(panelOf(scene.name + (model ? ", nonlinear hinges" : ", isometric bending"), scene, runs.ends.front()));
+  }
+  const Runs &ibm = models[0], &hinge = models[1];
+  const ShapeDifference apart = difference(scene, hinge.ends.front(), ibm.ends.front());
+  double chance = 0, spectrum_chance = 0;
+  for (int k = 1; k < starts; ++k)
+  {
+    chance += difference(scene, ibm.ends[k], ibm.ends.front()).rms / (starts - 1);
+    spectrum_chance += distance(wrinkles(scene, {ibm.ends[k]}), wrinkles(scene, {ibm.ends.front()})) / (starts - 1);
+  }
+  context.metric("rms_difference" + suffix, apart.rms);
+  context.metric("max_difference" + suffix, apart.most);
+  context.metric("rms_difference_of_chance" + suffix, chance);
+  context.metric("spectrum_distance" + suffix, distance(hinge.spectrum, ibm.spectrum));
+  context.metric("spectrum_distance_of_chance" + suffix, spectrum_chance);
+  context.metric("hinge_over_isometric_step" + suffix, hinge.step / ibm.step);
+  context.metric("hinge_over_isometric_cloth_alone" + suffix, hinge.alone / ibm.alone);
 }
 
-const char kNote[] = "differences from the isometric run at the end, over the side; of_chance: what a start shaken by a thousandth of a cell changes; "
-                     "spectra: half the sum of differences of the shares (0 the same, 1 nothing in common)";
+const char kNote[] = "differences over the side, of the ends from unshaken starts; of_chance: what shaking the start by thousandths of a cell changes "
+                     "with isometric bending; spectra of all ends: half the sum of differences of the shares (0 the same, 1 nothing in common)";
 
 }  // namespace
 
@@ -78,10 +98,12 @@ void runDrape(StudyContext& context)
   useOneBlasThread();
   SurfacePicture& picture = context.picture("drape", "A sheet of 1 m draped over a sphere (thesis figure 2.2)");
   picture.view = {0.35, 1.0, -0.55};
-  Plot& plot = context.plot("drape_wrinkles", "Draped sheet: where its curvature lies", "wavelength [m]", "share of the variance of mean curvature");
+  Plot& plot = context.plot("drape_wrinkles", "Draped sheet: where its curvature lies", "wavelength [m]",
+                            "share of the variance of mean curvature");
   constexpr double kStiffness = 500, kModulus = 3e-4;
   const int n = context.quick() ? 40 : 70;
-  compare(context, sheetOverSphere("drape", n, kStiffness, 0.2, kModulus, 5e-3, context.quick() ? 3.0 : 5.0), kModulus / kStiffness, "", picture, plot);
+  const SheetScene scene = sheetOverSphere("drape", n, kStiffness, 0.2, kModulus, 5e-3, context.quick() ? 3.0 : 5.0);
+  compare(context, scene, kModulus / kStiffness, context.quick() ? 2 : 3, "", picture, plot);
   context.note(kNote);
 }
 
@@ -103,8 +125,10 @@ void runStiffnessRange(StudyContext& context)
   // contact) into the solid and is pushed out, so stiffer sheets need shorter steps.
   const int n = context.quick() ? 30 : 50;
   for (const Range& r : {Range{"1e-5", 1e-5, 2.5e-3}, Range{"1e-3", 1e-3, 1e-3}, Range{"1e-2", 1e-2, 5e-4}})
-    compare(context, sheetOverSphere(r.name, n, kStiffness, kDensity, r.ratio * kStiffness, r.step, context.quick() ? 2.0 : 3.0), r.ratio,
-            std::string("_") + r.name, picture, plot);
+  {
+    const SheetScene scene = sheetOverSphere(r.name, n, kStiffness, kDensity, r.ratio * kStiffness, r.step, context.quick() ? 2.0 : 3.0);
+    compare(context, scene, r.ratio, 2, std::string("_") + r.name, picture, plot);
+  }
   context.note(kNote);
 }
 

@@ -29,15 +29,20 @@ struct Fabric
   const char* source;
 };
 
-// 1 gf cm^2/cm = 9.807e-5 N m/m; 1 gf/(cm degree) = 56.2 N/m. B lies within what Feng et al. (SIGGRAPH Asia 2022) measured on fabrics of such weight.
+// Typical of their class: specimens differ by a factor of two and more. 1 gf cm^2/cm = 9.807e-5 N m/m, 1 gf/(cm degree) = 56.2 N/m.
+// The rigidities lie within those that Feng et al. (SIGGRAPH Asia 2022, 618 fabrics) measured on fabrics of such weight.
 constexpr Fabric kFabrics[] = {
-  {"silk", 0.065, 0.9e-6, 17, 0.20, 0.40, "65 g/m2 (15 momme), B 0.009 gf cm2/cm, G 0.3 gf/(cm deg): typical of habotai and crepe de chine in KES tests"},
-  {"cotton", 0.13, 8.8e-6, 56, 0.60, 0.76, "130 g/m2, B 0.09 gf cm2/cm, G 1.0 gf/(cm deg): typical of shirting (poplin) in KES tests"},
-  {"wool", 0.2635, 13.3e-6, 48, 0.40, 0.70, "men's winter suiting, means of 214 fabrics (Kawabata 1980): 263.5 g/m2, B 0.136 gf cm2/cm, G 0.86 gf/(cm deg)"},
-  {"denim", 0.407, 6.5e-5, 150, 0.70, 0.90, "12 oz/yd2, B 0.66 gf cm2/cm, G 2.7 gf/(cm deg): typical of raw denim in KES tests"}};
+  {"silk", 0.065, 0.9e-6, 17, 0.20, 0.40, 
+   "65 g/m2 (15 momme), B 0.009 gf cm2/cm, G 0.3 gf/(cm deg): typical of habotai and crepe de chine in KES tests"},
+  {"cotton", 0.13, 8.8e-6, 56, 0.60, 0.76, 
+   "130 g/m2, B 0.09 gf cm2/cm, G 1.0 gf/(cm deg): typical of shirting (poplin) in KES tests"},
+  {"wool", 0.2635, 13.3e-6, 48, 0.40, 0.70, 
+   "263.5 g/m2, B 0.136 gf cm2/cm, G 0.86 gf/(cm deg): typical of men's winter suiting in KES tests (Kawabata 1980)"},
+  {"denim", 0.407, 6.5e-5, 150, 0.70, 0.90, 
+   "12 oz/yd2, B 0.66 gf cm2/cm, G 2.7 gf/(cm deg): typical of raw denim in KES tests"}};
 
-/// A disc in rings of nearly equilateral triangles, `free_rings` of them outside the support, turned against each other at random so that no
-/// number of waves is preferred. The clamped section is the middle of the cells within the last pinned ring.
+/// A disc in rings of nearly equilateral triangles, `free_rings` of them outside the support, turned against each other at random so that
+/// no number of waves is preferred. The clamped section is the middle of the cells within the last pinned ring.
 struct Disc
 {
   TriangleMesh mesh;
@@ -225,7 +230,8 @@ void drapes(StudyContext& context)
   for (const Fabric& fabric : kFabrics)
   {
     double least = 1.0, most = 0.0, finest = 0.0;
-    for (const Case& c : {Case{coarse, Integrator::implicit_euler}, Case{coarse, Integrator::symplectic_euler}, Case{fine, Integrator::implicit_euler}})
+    for (const Case& c : {Case{coarse, Integrator::implicit_euler}, Case{coarse, Integrator::symplectic_euler},
+                          Case{fine, Integrator::implicit_euler}})
     {
       const Disc disc = drapeDisc(c.rings);
       double mean = 0.0, ms = 0.0, speed = 0.0;
@@ -245,8 +251,8 @@ void drapes(StudyContext& context)
         }
       }
       context.row().set("case", "drape").set("fabric", fabric.name).set("integrator", toString(c.integrator))
-        .set("vertices", static_cast<double>(disc.mesh.vertices.cols())).set("coefficient", mean).set("waves", waves).set("speed_left_mm_s", 1e3 * speed)
-        .set("ms_per_step", ms);
+        .set("vertices", static_cast<double>(disc.mesh.vertices.cols())).set("coefficient", mean).set("waves", waves)
+        .set("speed_left_mm_s", 1e3 * speed).set("ms_per_step", ms);
       least = std::min(least, mean);
       most = std::max(most, mean);
       finest = mean;
@@ -255,7 +261,8 @@ void drapes(StudyContext& context)
     context.row().set("case", "drape, in the published range").set("fabric", fabric.name)
       .set("bending_length_mm", 1e3 * std::cbrt(fabric.bending / (kGravity * fabric.area_density)))
       .check(finest, 0.5 * (fabric.least + fabric.most), 0.5 * (fabric.most - fabric.least), fabric.source);
-    context.row().set("case", "drape, spread over meshes and integrators").set("fabric", fabric.name).check(most - least, 0.0, 0.05, "the same within 0.05");
+    context.row().set("case", "drape, spread over meshes and integrators").set("fabric", fabric.name)
+      .check(most - least, 0.0, 0.05, "the same within 0.05");
   }
 }
 
@@ -268,11 +275,13 @@ void droops(StudyContext& context)
   {
     context.progress(0, 1, std::string("droop of ") + fabric.name);
     const double gamma = fabric.area_density * kGravity * std::pow(kLength, 3) / fabric.bending, stiffness = 1e5;
-    const CantileverTip exact = heavyCantilever(gamma, gamma / stiffness), narrow = heavyCantilever(kNarrowStrip * gamma, gamma / stiffness);
+    const CantileverTip exact = heavyCantilever(gamma, gamma / stiffness);
+    const CantileverTip narrow = heavyCantilever(kNarrowStrip * gamma, gamma / stiffness);
     const double wide_ratio = exact.drop / exact.extent, narrow_ratio = narrow.drop / narrow.extent;
     const double expected = 0.5 * (wide_ratio + narrow_ratio), range = 0.5 * (narrow_ratio - wide_ratio);
     double seconds = 0;
-    const double ratio = cantileverStrip(GridPattern::equilateral, BendingModel::isometric_nonconforming, gamma, stiffness, kWidth, cells, seconds);
+    const double ratio =
+      cantileverStrip(GridPattern::equilateral, BendingModel::isometric_nonconforming, gamma, stiffness, kWidth, cells, seconds);
     context.row().set("case", "droop of a strip, H/W").set("fabric", fabric.name).set("Gamma", gamma).set("cpu_seconds", seconds)
       .check(ratio, expected, range + expected * (0.02 + 0.25 * gamma / (cells * cells)), "cantilever_master.csv, as in study plate");
   }
@@ -285,7 +294,7 @@ void runFabricDrape(StudyContext& context)
   useOneBlasThread();
   drapes(context);
   droops(context);
-  context.note("coefficient: (shadow - support) / (disc - support), the mean of the drapes; waves: strongest along the edge; B typical of the class, see the source");
+  context.note("coefficient: (shadow - support) / (disc - support), the mean of the drapes; waves: the strongest along the edge, drape by drape");
 }
 
 }  // namespace slender::study

@@ -61,7 +61,8 @@ void runFlag(StudyContext& context)
   const SheetScene scene = flagScene(context.quick() ? 36 : 60, context.quick() ? 4.0 : 12.0);
   SurfacePicture& picture = context.picture("flag", "A flag of 1.2 m x 0.8 m in wind (thesis figure 2.1), at the same times");
   picture.view = {0.4, 1.0, -0.25};
-  Plot& spectra = context.plot("flag_wrinkles", "Flag: where its curvature lies", "wavelength [m]", "share of the variance of mean curvature");
+  Plot& spectra = context.plot("flag_wrinkles", "Flag: where its curvature lies", "wavelength [m]",
+                               "share of the variance of mean curvature");
   Plot& paths = context.plot("flag_corner", "Flag: its free upper corner", "time [s]", "out of the plane [m]");
   paths.log_x = paths.log_y = paths.markers = false;
 
@@ -110,8 +111,8 @@ void runFlag(StudyContext& context)
   context.metric("spectrum_distance_of_chance", distance(of_runs[2], of_runs[0]));
   context.metric("hinge_over_isometric_step", runs[1].seconds_per_step / runs[0].seconds_per_step);
   context.metric("hinge_over_isometric_cloth_alone", runs[1].cloth_seconds / runs[0].cloth_seconds);
-  context.note("means over the time after " + std::to_string(scene.keep_from).substr(0, 3) + " s; the shaken start says how far apart runs of one model are; "
-               "rms_difference: of the last states, over the width");
+  context.note("means over the time after " + std::to_string(scene.keep_from).substr(0, 3) + " s; the shaken start says how far apart runs of one "
+               "model are; rms_difference: of the last states, over the width");
   const std::size_t frames = runs[0].frames.size();
   for (const std::size_t k : {frames / 3, 2 * frames / 3, frames - 1})
     for (int model = 0; model < 2; ++model)

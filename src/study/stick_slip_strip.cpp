@@ -30,8 +30,8 @@ struct Result
   int steps = 0;
 };
 
-/// L = D = 1, mass per area 1. `crossed`: share of a cell that a wave crosses in a step. Contact comes after the cloth's own step: only where
-/// that moves the foot little against its neighbours are its impulses in the proportion of the forces.
+/// L = D = 1, mass per area 1. `crossed`: share of a cell that a wave crosses in a step. Contact comes after the cloth's own step: only
+/// where that moves the foot little against its neighbours are its impulses in the proportion of the forces.
 Result press(StudyContext& context, int cells, const Slip& slip, double crossed)
 {
   constexpr double kThickness = 4e-4;
@@ -140,8 +140,8 @@ void runStickSlipStrip(StudyContext& context)
       if (checked)
         row.check(mu, slip.mu, 0.03 * slip.mu, "stickslip_inverse.csv: mu at the compression of the first slip");
     }
-  context.note("cells_per_step: cells that a stretching wave crosses in a step; contact comes after the cloth's own step, and is in the proportion of the "
-               "forces for short steps only. compression 0: no slip up to 1.15 of the expected compression");
+  context.note("cells_per_step: cells that a stretching wave crosses in a step; contact comes after the cloth's own step, and is in the "
+               "proportion of the forces for short steps only. compression 0: no slip up to 1.15 of the expected compression");
 }
 
 }  // namespace slender::study

@@ -95,7 +95,8 @@ void writeSurfaceScript(std::ostream& out, const SurfacePicture& picture, const 
   out << line << "set output " << gnuplotString(png) << "\nset title " << gnuplotString(picture.title) << " offset 0,-0.3\n"
       << "unset key\nunset tics\nunset border\nunset colorbox\nset lmargin at screen 0\nset rmargin at screen 1\n"
       << "set bmargin at screen 0\nset tmargin at screen "
-      << 1.0 - 60.0 / (rows * height * pixels + 60) << "\nset view map\nset pm3d explicit scansforward corners2color mean border retrace\nset cbrange [0:3]\n"
+      << 1.0 - 60.0 / (rows * height * pixels + 60) << "\nset view map\nset pm3d explicit scansforward corners2color mean border retrace\n"
+      << "set cbrange [0:3]\n"
       << "set palette defined (0 \"#20120c\", 1 \"#f4c9a0\", 2 \"#101418\", 3 \"#b4bcc8\")\n";
   std::snprintf(line, sizeof line, "set xrange [0:%.6g]\nset yrange [0:%.6g]\n", columns * width, rows * height);
   out << line;
@@ -114,8 +115,8 @@ void writeSurfaceScript(std::ostream& out, const SurfacePicture& picture, const 
     {
       for (const int k : {0, 1, 2, 2})
       {
-        std::snprintf(line, sizeof line, "%.5g %.5g 0 %.3f\n%s", facet.corner[k].x() + shift.x(), facet.corner[k].y() + shift.y(), facet.shade[k],
-                      k == 1 ? "\n" : "");
+        const Eigen::Vector2d at = facet.corner[k] + shift;
+        std::snprintf(line, sizeof line, "%.5g %.5g 0 %.3f\n%s", at.x(), at.y(), facet.shade[k], k == 1 ? "\n" : "");
         out << line;
       }
       out << "\n\n";
