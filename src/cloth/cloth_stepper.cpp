@@ -303,7 +303,8 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
   std::fill(d_.begin(), d_.end(), 0.0);
   const ClothEvaluation here = system.addInternal(x_, d_);
   std::fill(force_.begin(), force_.end(), 0.0);
-  system.addWind(x_, v_, inputs.wind, force_);
+  if (system.wind().active())
+    system.wind().addForces(x_, v_, inputs.wind, force_);
   for (int i = 0; i < n; ++i)
   {
     Eigen::Vector3d f = point(force_, i) - point(d_, i) + model->mass[i] * (inputs.gravity - model->mass_damping * point(v_, i));
