@@ -74,6 +74,8 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     constant_bending_ = model.bending != BendingModel::hinge;
     if (!constant_bending_)
       hinges_ = std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()));
+    if (hinges_ && std::isfinite(model.plasticity.yield_curvature))
+      hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient);
     if (constant_bending_ || !direct)
       bending_ = isometricBending(model.rest, t, element, coefficient);
   }
@@ -113,11 +115,13 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
   }
 }
 
-void ClothSystem::setRestAngles(const Eigen::VectorXd& angles)
+void ClothSystem::setHinges(const ClothState& state)
 {
   if (hinges_)
     for (int h = 0; h < hinges_->count(); ++h)
-      hinges_->setRestAngle(h, angles[h]);
+      hinges_->setRestAngle(h, state.rest_angles[h]);
+  for (Eigen::Index h = 0; h < hinge_stiffness_.size(); ++h)
+    hinges_->setStiffness(static_cast<int>(h), state.stiffening[h] * hinge_stiffness_[h]);
 }
 
 void ClothSystem::setViscosity(double ratio, const PointVector& x)
@@ -176,7 +180,7 @@ void ClothSystem::beginStep(const ClothState& state, const ClothInputs& inputs, 
     held_[p] = 1;
   toPoints(state.x, start_);
   h_ = h;
-  setRestAngles(state.rest_angles);
+  setHinges(state);
   setViscosity(model_.stiffness_damping / h, start_);
   setWeights(h, ratio_);
   const bool extra = inputs.forces.cols() > 0;
@@ -188,7 +192,7 @@ void ClothSystem::beginStep(const ClothState& state, const ClothInputs& inputs, 
       point(force_, i) += inputs.forces.col(i);
   }
   if (wind_.active())
-    wind_.begin(start_, start_, inputs.wind, h);
+    wind_.begin(start_, start_, state.v, inputs.wind, h, force_);
 }
 
 ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)

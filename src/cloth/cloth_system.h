@@ -35,7 +35,7 @@ public:
   /// A step of length h from (x, v), and what is held.
   void beginStep(const ClothState& state, const ClothInputs& inputs, double h);
   /// Elastic response and loads only, for explicit steps and energies.
-  void setRestAngles(const Eigen::VectorXd& angles);
+  void setHinges(const ClothState& state);
   /// Strains at x as those that viscous response of the given ratio starts from; 0: none.
   void setViscosity(double ratio, const PointVector& x);
 
@@ -70,6 +70,7 @@ private:
   MembraneEnergy membrane_;
   WindLoad wind_;
   std::unique_ptr<HingeBending> hinges_;      ///< hinge bending only
+  Eigen::VectorXd hinge_stiffness_;           ///< without stiffening; with plasticity only
   PointMatrix bending_, stand_in_;            ///< isometric model, or for hinges what preconditions; rest membrane
   bool constant_bending_ = false;             ///< bending_ is the model, not a stand-in
   bool bending_in_blocks_ = false;
