@@ -10,7 +10,7 @@ namespace slender {
 
 namespace {
 
-TriangleMesh meshOf(const FairMesh::Request& request)
+TriangleMesh meshOf(const slender_sim::FairMesh::Request& request)
 {
   if (request.triangles.size() % 3 != 0)
     throw std::invalid_argument("triangles: " + std::to_string(request.triangles.size()) + " numbers; must be three per triangle");
@@ -34,7 +34,7 @@ int countOf(std::uint32_t value)
   return value > static_cast<std::uint32_t>(std::numeric_limits<int>::max()) ? std::numeric_limits<int>::max() : static_cast<int>(value);
 }
 
-FairingOptions optionsOf(const FairMesh::Request& request)
+FairingOptions optionsOf(const slender_sim::FairMesh::Request& request)
 {
   FairingOptions options;
   options.fill_holes = request.fill_holes;
@@ -57,7 +57,7 @@ FairingOptions optionsOf(const FairMesh::Request& request)
 
 FairingNode::FairingNode(ros::NodeHandle nh_priv) : server_(nh_priv.advertiseService("fair_mesh", &FairingNode::fair)) {}
 
-bool FairingNode::fair(FairMesh::Request& request, FairMesh::Response& response)
+bool FairingNode::fair(slender_sim::FairMesh::Request& request, slender_sim::FairMesh::Response& response)
 try
 {
   TriangleMesh mesh = meshOf(request);
@@ -78,7 +78,7 @@ try
 }
 catch (const std::exception& error)   // a bad mesh or option; out of memory
 {
-  response = FairMesh::Response();
+  response = slender_sim::FairMesh::Response();
   response.message = error.what();
   return true;
 }

@@ -87,7 +87,7 @@ TEST(ClothPlasticity, AReleasedStripKeepsTheResidualCurvature)
   for (const int cells : {3, 6})
   {
     auto model = std::make_shared<ClothModel>(strip({kYield, 0.0, 0.0}, cells));
-    model->mass_damping = 30.0;
+    model->stiffness_damping = 0.3;   // it creeps back: waves would bend it beyond the yield again
     ClothState state = makeClothState(*model, model->rest.vertices);
     ClothStepper stepper(model, {});
     const double curvature = 1.0 / 0.08;
@@ -118,7 +118,7 @@ TEST(ClothPlasticity, BelowTheYieldNothingFlows)
     auto model = std::make_shared<ClothModel>(strip(plasticity));
     ClothState state = makeClothState(*model, model->rest.vertices);
     ClothStepper stepper(model, {});
-    roll(stepper, state, 1.9 * kYield, 5);   // mean curvature 0.95 of the yield
+    roll(stepper, state, 0.8 * kYield, 5);   // mean curvature 0.4 of the yield, and waves when it is let go
     ClothInputs free;
     for (int k = 0; k < 10; ++k)
       EXPECT_TRUE(stepper.step(state, free, 0.01).ok);
@@ -250,8 +250,9 @@ TEST(ClothPlasticity, FlowsFromWhatCollisionsLeave)
     plastic.flow(expected, 5e-3);
     const StepReport report = stepper.step(state, inputs, 5e-3);
     ASSERT_TRUE(report.ok) << report.message;
-    if (report.cut_steps == 0)
-      EXPECT_EQ(state.cloths[0].rest_angles, expected.rest_angles);
+    if (report.cut_steps > 0)
+      continue;
+    EXPECT_EQ(state.cloths[0].rest_angles, expected.rest_angles);
     touched += stepper.collisions().repulsions + stepper.collisions().impulses > 0;
   }
   EXPECT_GT(touched, 5);

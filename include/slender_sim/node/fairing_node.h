@@ -13,7 +13,7 @@ public:
   explicit FairingNode(ros::NodeHandle nh_priv);
 
   /// Answers a request; a mesh or options that cannot be used are refused with the reason in the answer.
-  static bool fair(FairMesh::Request& request, FairMesh::Response& response);
+  static bool fair(slender_sim::FairMesh::Request& request, slender_sim::FairMesh::Response& response);
 
 private:
   ros::ServiceServer server_;
