@@ -1,20 +1,20 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "slender_sim/fairing/fair_mesh.h"
 #include "slender_sim/geometry/mesh_file.h"
 
 /// fair_mesh IN OUT: smooths meshes and closes their holes by Willmore flow. Exit status 0 done, 2 bad input, 3 the fairing failed.
 namespace {
 
+using slender::BadInput, slender::parseCount, slender::parseNumber, slender::parsePositive;
 using Clock = std::chrono::steady_clock;
 
 constexpr int exit_done = 0, exit_bad_input = 2, exit_failed = 3;
@@ -31,11 +31,6 @@ const char* const usage =
   "  --quiet             print nothing but errors\n"
   "A boundary and the vertices next to it keep their places. Exit status: 0 done, 2 bad input, 3 the fairing failed (no OUT then).\n";
 
-struct BadInput : std::runtime_error
-{
-  using std::runtime_error::runtime_error;
-};
-
 struct Options
 {
   std::vector<std::string> files;
@@ -43,36 +38,6 @@ struct Options
   std::optional<int> steps;
   bool quiet = false, help = false;
 };
-
-bool parseNumber(const std::string& text, double& value)
-{
-  std::size_t end = 0;
-  try
-  {
-    value = std::stod(text, &end);
-  }
-  catch (const std::exception&)
-  {
-    return false;
-  }
-  return end == text.size() && std::isfinite(value);
-}
-
-double parsePositive(const std::string& name, const std::string& text)
-{
-  double value = 0.0;
-  if (!parseNumber(text, value) || !(value > 0))
-    throw BadInput(name + " " + text + ": must be a positive number");
-  return value;
-}
-
-int parseCount(const std::string& name, const std::string& text, int low, int high)
-{
-  double value = 0.0;
-  if (!parseNumber(text, value) || value != std::floor(value) || value < low || value > high)
-    throw BadInput(name + " " + text + ": must be a whole number in [" + std::to_string(low) + ", " + std::to_string(high) + "]");
-  return static_cast<int>(value);
-}
 
 slender::FairingOptions::Ball parseBall(const std::string& name, const std::string& text)
 {
