@@ -107,8 +107,8 @@ TEST(ClothPlasticity, AReleasedStripKeepsTheResidualCurvature)
     double worst = 0.0;
     for (const int h : creases(*model))
       worst = std::max(worst, std::abs(std::abs(released[h]) / (0.5 * width[h]) - (curvature - 2 * kYield)));
-    EXPECT_LT(worst, 0.01 * curvature) << cells;   // chords for arcs: (angle)^2 / 24
-    EXPECT_LT(stepper.energies(state, Vector3d::Zero()).total(), 1e-9);
+    EXPECT_LT(worst, 1e-6 * curvature) << cells;
+    EXPECT_LT(stepper.energies(state, Vector3d::Zero()).total(), 1e-15);
   }
 }
 
