@@ -1,18 +1,108 @@
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 #include <algorithm>
+#include <cstdlib>
+#include <mutex>
 #include <new>
 
 #include <suitesparse/cholmod.h>
 
 #include "slender_sim/linalg/point_kernel.h"
 
+// Absent from other BLAS libraries than OpenBLAS.
+extern "C" __attribute__((weak)) void openblas_set_num_threads(int);
+
 namespace slender {
+
+namespace {
+
+/// Memory that one factorisation takes and gives back, kept for the next one: CHOLMOD asks for workspace every time.
+class Workspace
+{
+public:
+  Workspace() = default;
+  Workspace(const Workspace&) = delete;
+  ~Workspace()
+  {
+    for (const Piece& piece : pieces_)
+      std::free(piece.memory);
+  }
+  /// While it lives, what SuiteSparse takes in this thread comes from the workspace. All of it must be given back meanwhile.
+  class Use
+  {
+  public:
+    explicit Use(Workspace& workspace) { current_ = &workspace; }
+    ~Use() { current_ = nullptr; }
+  };
+
+  static void* take(std::size_t size)
+  {
+    if (!current_)
+      return std::malloc(size);
+    Piece* room = nullptr;   // for another piece, or one that is too small
+    for (Piece& piece : current_->pieces_)
+    {
+      if (piece.used)
+        continue;
+      room = &piece;
+      if (piece.size >= size)
+        break;
+    }
+    if (!room)
+      return std::malloc(size);
+    if (room->size < size)
+    {
+      std::free(room->memory);
+      room->memory = std::malloc(size);
+      room->size = room->memory ? size : 0;
+    }
+    room->used = room->memory != nullptr;
+    return room->memory;
+  }
+  static void giveBack(void* memory)
+  {
+    for (std::size_t k = 0; current_ && k < kPieces; ++k)
+      if (memory && memory == current_->pieces_[k].memory)
+      {
+        current_->pieces_[k].used = false;
+        return;
+      }
+    std::free(memory);
+  }
+
+private:
+  struct Piece
+  {
+    void* memory = nullptr;
+    std::size_t size = 0;
+    bool used = false;
+  };
+  static constexpr std::size_t kPieces = 4;
+  static thread_local Workspace* current_;
+  Piece pieces_[kPieces];
+};
+
+thread_local Workspace* Workspace::current_ = nullptr;
+
+/// BLAS stays in its caller's thread: dense blocks here are too small for more, whose threads only spin, and sums must not depend on their number.
+void prepareLibraries()
+{
+  static std::once_flag once;
+  std::call_once(once, [] {
+    if (openblas_set_num_threads)
+      openblas_set_num_threads(1);
+    SuiteSparse_config.malloc_func = Workspace::take;
+    SuiteSparse_config.free_func = Workspace::giveBack;
+  });
+}
+
+}  // namespace
 
 struct SparseCholesky::Impl
 {
   explicit Impl(bool simplicial)
   {
+    prepareLibraries();
     cholmod_start(&common);
     if (simplicial)
       common.supernodal = CHOLMOD_SIMPLICIAL;
@@ -76,6 +166,7 @@ struct SparseCholesky::Impl
   PointVector permuted;           ///< for numbers
 
   cholmod_common common;
+  Workspace workspace;
   cholmod_factor* factor = nullptr;
   cholmod_dense *solution = nullptr, *work_y = nullptr, *work_e = nullptr;
   std::vector<int> starts{0}, rows;
@@ -177,8 +268,9 @@ void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
   m.values.assign(m.rows.size(), 0.0);
   m.common.method[0].ordering = CHOLMOD_NATURAL;
   m.common.postorder = 0;
-  const std::size_t widths[3] = {16, 48, 128};
-  const double zeros[3] = {0.8, 0.3, 0.1};
+  // wide supernodes make factoring faster; factors of numbers are made for their back-solves, which read less without the zeros
+  const std::size_t widths[3] = {d == 1 ? 4u : 16u, d == 1 ? 16u : 48u, d == 1 ? 48u : 128u};
+  const double zeros[3] = {0.8, d == 1 ? 0.1 : 0.3, d == 1 ? 0.05 : 0.1};
   for (int k = 0; k < 3; ++k)
   {
     m.common.nrelax[k] = widths[k];
@@ -217,7 +309,9 @@ bool SparseCholesky::factor(const BlockMatrix& matrix, const char* fixed)
   return factorValues();
 }
 
-bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed)
+bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed) { return factor(matrix, matrix.values().data(), fixed); }
+
+bool SparseCholesky::factor(const PointMatrix& matrix, const double* values, const char* fixed)
 {
   Impl& m = *impl_;
   std::size_t next = 0;
@@ -228,7 +322,7 @@ bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed)
       if (j > i)
         continue;
       const bool leave_out = fixed && (fixed[i] || fixed[j]);
-      m.values[m.targets[next++].at] = leave_out ? i == j : matrix.values()[k];
+      m.values[m.targets[next++].at] = leave_out ? i == j : values[k];
     }
   return factorValues();
 }
@@ -280,7 +374,13 @@ bool SparseCholesky::factorValues()
   Impl& m = *impl_;
   cholmod_sparse a = m.view();
   m.common.status = CHOLMOD_OK;
-  cholmod_factorize(&a, m.factor, &m.common);
+  if (m.factor->xtype == CHOLMOD_PATTERN || !m.factor->is_super)
+    cholmod_factorize(&a, m.factor, &m.common);   // takes the factor's own memory
+  else
+  {
+    const Workspace::Use use(m.workspace);
+    cholmod_factorize(&a, m.factor, &m.common);
+  }
   return m.common.status == CHOLMOD_OK && m.factor->minor == m.factor->n;
 }
 

@@ -61,9 +61,14 @@ struct Parts
 Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budget)
 {
   ClothSystem system(*cloth.model, options);
-  system.beginStep(cloth.state, cloth.inputs, kStep);
-  PointVector x, d;
+  PointVector x, v, ahead, d;
   toPoints(cloth.state.x, x);
+  toPoints(cloth.state.v, v);
+  ahead = x;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    ahead[i] += kStep * v[i];
+  system.hold(cloth.state);
+  system.beginStage({kStep, &ahead, &x, &x, &x}, cloth.inputs);
   Parts parts;
   parts.assembly = leastSeconds(budget, [&] { system.evaluateHessian(x, HessianKind::semidefinite); });
   int iterations = 0, factorizations = 0;
@@ -71,7 +76,7 @@ Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budge
     toPoints(kStep * cloth.state.v, d);
     for (const int p : cloth.state.pins)
       point(d, p).setZero();
-    system.solve(d, iterations, factorizations);
+    system.solve(d, nullptr, iterations, factorizations);
   });
   parts.evaluation = leastSeconds(budget, [&] { system.evaluate(x); });
   return parts;
