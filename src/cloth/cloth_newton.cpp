@@ -15,17 +15,23 @@ double ClothStepper::Impl::largest(const PointVector& d) const
   return std::sqrt(square);
 }
 
-/// One Newton step from the start of the stage, what is held moving as prescribed.
+/// One Newton step, what is held moving as prescribed: from the start of the stage, where the cloth is balanced, or for methods of second order
+/// from the motion carried on, which is near enough to the end that the semidefinite matrix costs no order.
 StepFailure ClothStepper::Impl::linearized(StepReport& report)
 {
-  system.evaluateHessian(system.start(), HessianKind::semidefinite);
+  const bool ahead = order(options.integrator) == 2;
   for (int i = 0; i < model->vertices(); ++i)
-    point(d_, i) = system.held()[i] ? Eigen::Vector3d(point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i) - point(system.start(), i));
+  {
+    const Eigen::Vector3d end = system.held()[i] ? Eigen::Vector3d(point(system.start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
+    point(trial_, i) = ahead ? end : Eigen::Vector3d(point(system.start(), i));
+    point(d_, i) = end - point(trial_, i);
+  }
+  system.evaluateHessian(trial_, HessianKind::semidefinite);
   if (!system.solve(d_, nullptr, report.linear_iterations, report.factorizations))
     return StepFailure::singular_matrix;
   ++report.iterations;
   for (std::size_t i = 0; i < x_.size(); ++i)
-    x_[i] = system.start()[i] + d_[i];
+    x_[i] = trial_[i] + d_[i];
   return StepFailure::none;
 }
 

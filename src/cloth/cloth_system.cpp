@@ -9,15 +9,6 @@ namespace slender {
 
 namespace {
 
-/// One Newton step needs few iterations of conjugate gradients; many exact ones are faster by factoring as long as that is cheap.
-ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
-{
-  constexpr int kLargestFactored = 5000;
-  if (options.solver != ClothSolver::automatic)
-    return options.solver;
-  return options.one_newton_step || model.vertices() > kLargestFactored ? ClothSolver::conjugate_gradients : ClothSolver::cholesky;
-}
-
 Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
 {
   std::vector<int> pairs;
@@ -33,7 +24,7 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
-  : model_(model), solver_(chosen(model, options)), linear_tolerance_(options.linear_tolerance)
+  : model_(model), solver_(options.solver == ClothSolver::automatic ? ClothSolver::conjugate_gradients : options.solver), linear_tolerance_(options.linear_tolerance)
   , membrane_(model.rest, model.membrane, model.warp)
 {
   const int n = points();

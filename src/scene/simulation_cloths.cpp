@@ -79,6 +79,8 @@ void Simulation::buildCloths()
       options.solver = config.solver;
       options.linear_tolerance = config.linear_tolerance;
       options.newton = config_.time.newton;
+      options.error_tolerance = config_.time.error_tolerance;
+      options.min_step = config_.time.min_step;
       cloth_steppers_.emplace_back(cloth_models_.back(), options);
       SceneCloth held;
       held.cloth = makeClothState(*cloth_models_.back(), config.mesh.vertices);

@@ -25,9 +25,9 @@ struct ClothEnergies
 
 enum class ClothSolver
 {
-  automatic,             ///< conjugate gradients for one Newton step or more than 5000 vertices, else cholesky
+  automatic,             ///< conjugate gradients: measured to be faster at equal error from 150 vertices on (study cloth_accuracy)
   cholesky,              ///< factorisation of the whole matrix
-  conjugate_gradients    ///< preconditioned by a constant matrix of points (mass, bending, rest membrane)
+  conjugate_gradients    ///< preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the normals
 };
 
 /// How a cloth is advanced.
