@@ -1,7 +1,6 @@
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <mutex>
 #include <new>
 
@@ -16,83 +15,13 @@ namespace slender {
 
 namespace {
 
-/// Memory that one factorisation takes and gives back, kept for the next one: CHOLMOD asks for workspace every time.
-class Workspace
-{
-public:
-  Workspace() = default;
-  Workspace(const Workspace&) = delete;
-  ~Workspace()
-  {
-    for (const Piece& piece : pieces_)
-      std::free(piece.memory);
-  }
-  /// While it lives, what SuiteSparse takes in this thread comes from the workspace. All of it must be given back meanwhile.
-  class Use
-  {
-  public:
-    explicit Use(Workspace& workspace) { current_ = &workspace; }
-    ~Use() { current_ = nullptr; }
-  };
-
-  static void* take(std::size_t size)
-  {
-    if (!current_)
-      return std::malloc(size);
-    Piece* room = nullptr;   // for another piece, or one that is too small
-    for (Piece& piece : current_->pieces_)
-    {
-      if (piece.used)
-        continue;
-      room = &piece;
-      if (piece.size >= size)
-        break;
-    }
-    if (!room)
-      return std::malloc(size);
-    if (room->size < size)
-    {
-      std::free(room->memory);
-      room->memory = std::malloc(size);
-      room->size = room->memory ? size : 0;
-    }
-    room->used = room->memory != nullptr;
-    return room->memory;
-  }
-  static void giveBack(void* memory)
-  {
-    for (std::size_t k = 0; current_ && k < kPieces; ++k)
-      if (memory && memory == current_->pieces_[k].memory)
-      {
-        current_->pieces_[k].used = false;
-        return;
-      }
-    std::free(memory);
-  }
-
-private:
-  struct Piece
-  {
-    void* memory = nullptr;
-    std::size_t size = 0;
-    bool used = false;
-  };
-  static constexpr std::size_t kPieces = 4;
-  static thread_local Workspace* current_;
-  Piece pieces_[kPieces];
-};
-
-thread_local Workspace* Workspace::current_ = nullptr;
-
 /// BLAS stays in its caller's thread: dense blocks here are too small for more, whose threads only spin, and sums must not depend on their number.
-void prepareLibraries()
+void useOneBlasThread()
 {
   static std::once_flag once;
   std::call_once(once, [] {
     if (openblas_set_num_threads)
       openblas_set_num_threads(1);
-    SuiteSparse_config.malloc_func = Workspace::take;
-    SuiteSparse_config.free_func = Workspace::giveBack;
   });
 }
 
@@ -102,7 +31,7 @@ struct SparseCholesky::Impl
 {
   explicit Impl(bool simplicial)
   {
-    prepareLibraries();
+    useOneBlasThread();
     cholmod_start(&common);
     if (simplicial)
       common.supernodal = CHOLMOD_SIMPLICIAL;
@@ -166,7 +95,6 @@ struct SparseCholesky::Impl
   PointVector permuted;           ///< for numbers
 
   cholmod_common common;
-  Workspace workspace;
   cholmod_factor* factor = nullptr;
   cholmod_dense *solution = nullptr, *work_y = nullptr, *work_e = nullptr;
   std::vector<int> starts{0}, rows;
@@ -374,13 +302,7 @@ bool SparseCholesky::factorValues()
   Impl& m = *impl_;
   cholmod_sparse a = m.view();
   m.common.status = CHOLMOD_OK;
-  if (m.factor->xtype == CHOLMOD_PATTERN || !m.factor->is_super)
-    cholmod_factorize(&a, m.factor, &m.common);   // takes the factor's own memory
-  else
-  {
-    const Workspace::Use use(m.workspace);
-    cholmod_factorize(&a, m.factor, &m.common);
-  }
+  cholmod_factorize(&a, m.factor, &m.common);
   return m.common.status == CHOLMOD_OK && m.factor->minor == m.factor->n;
 }
 
