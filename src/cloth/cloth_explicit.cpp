@@ -12,7 +12,8 @@ ClothEvaluation ClothStepper::Impl::addForces(const ClothInputs& inputs, bool wi
   std::fill(d_.begin(), d_.end(), 0.0);
   const ClothEvaluation here = system.addInternal(x_, d_, with_bending);
   std::fill(force_.begin(), force_.end(), 0.0);
-  system.addWind(x_, v_, inputs.wind, force_);
+  if (system.wind().active())
+    system.wind().addForces(x_, v_, inputs.wind, force_);
   for (int i = 0; i < model->vertices(); ++i)
   {
     point(force_, i) += model->mass[i] * inputs.gravity - point(d_, i);
@@ -46,7 +47,7 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
   toPoints(work_.x, x_);
   toPoints(work_.v, v_);
   next_ = work_;
-  system.setRestAngles(work_.rest_angles);
+  system.setHinges(work_);
   if (model->stiffness_damping > 0)
   {
     for (std::size_t i = 0; i < x_.size(); ++i)

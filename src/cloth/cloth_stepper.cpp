@@ -10,7 +10,7 @@
 namespace slender {
 
 ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
-  : model(std::move(m)), options(o), system(*model, o)
+  : model(std::move(m)), options(o), system(*model, o), plastic_(*model)
 {
   const std::string who = "cloth '" + model->name + "': ";
   if (o.integrator != Integrator::implicit_euler && o.integrator != Integrator::tr_bdf2 && !isExplicit())
@@ -62,6 +62,8 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
   check(s.x.allFinite() && s.v.allFinite() && s.next_step >= 0, "the state");
   check(model->bending != BendingModel::hinge || (s.rest_angles.size() == model->topology.hingeCount() && s.rest_angles.allFinite()),
         "rest angles of the state (one per hinge)");
+  check(!plastic_.active() || (s.stiffening.size() == model->topology.hingeCount() && s.stiffening.allFinite() && (s.stiffening.array() > 0).all()),
+        "stiffening of the state (positive, one per hinge)");
   bool sound = true;
   for (std::size_t k = 0; k < s.pins.size(); ++k)
     sound = sound && s.pins[k] >= 0 && s.pins[k] < n && (k == 0 || s.pins[k] > s.pins[k - 1]);
@@ -102,6 +104,7 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   if (!inputsFine(state, inputs, duration, what))
     return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   work_ = state;
+  plastic_.flow(work_, duration);   // at the start, which sees what collisions made of the last step (thesis 6.4.4)
   pins_start_.resize(3, static_cast<Eigen::Index>(state.pins.size()));
   for (std::size_t k = 0; k < state.pins.size(); ++k)
     pins_start_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
@@ -188,7 +191,10 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
         trial_[i] = stage.q_tilde[kV] * v_start_[i];
       system.setViscosity(model->stiffness_damping / stage.tau_v, x_start_, stage.q_tilde[kV] != 0 ? &trial_ : nullptr, stage.q_tilde[kQStage], &x_stage_);
     }
-    system.beginStage({stage.tau_v, &q_hat_, &q_tilde_, &start, second_order ? &guess_ : &start}, inputs);
+    wind_v_ = work_.v;
+    for (int i = 0; i < n && second_order; ++i)
+      wind_v_.col(i) += stage.time * h * point(a_start_, i);
+    system.beginStage({stage.tau_v, &q_hat_, &q_tilde_, &start, second_order ? &guess_ : &start, &wind_v_}, inputs);
     const StepFailure failure = options.one_newton_step ? linearized(report) : minimize(report);
     if (failure != StepFailure::none)
       return failure;
@@ -256,7 +262,7 @@ ClothEnergies ClothStepper::energies(const ClothState& state, const Eigen::Vecto
   PointVector x;
   toPoints(state.x, x);
   PointVector unused(x.size(), 0.0);
-  system.setRestAngles(state.rest_angles);
+  system.setHinges(state);
   system.setViscosity(0.0, x);
   const ClothEvaluation e = system.addInternal(x, unused);
   result.membrane = e.membrane;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "cloth_system.h"
+#include "slender_sim/cloth/plastic_flow.h"
 #include "slender_sim/dynamics/integrator.h"
 
 namespace slender {
@@ -43,8 +44,9 @@ private:
   ClothEvaluation addForces(const ClothInputs& inputs, bool with_bending);
   void acceleration(const ClothInputs& inputs, double delta);
 
+  PlasticFlow plastic_;
   ClothState work_, next_;   ///< start of a substep, and its end
-  Eigen::Matrix3Xd pins_start_;
+  Eigen::Matrix3Xd pins_start_, wind_v_;
   StepPlan plan_;
   PointVector x_, best_, trial_, d_, pin_motion_, v_, force_;
   PointVector x_start_, v_start_, a_start_, x_stage_, v_stage_, q_hat_, q_tilde_, guess_;   ///< of an implicit step

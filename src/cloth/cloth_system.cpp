@@ -24,8 +24,8 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
-  : model_(model), solver_(options.solver == ClothSolver::automatic ? ClothSolver::conjugate_gradients : options.solver), linear_tolerance_(options.linear_tolerance)
-  , membrane_(model.rest, model.membrane, model.warp)
+  : model_(model), solver_(options.solver == ClothSolver::automatic ? ClothSolver::conjugate_gradients : options.solver)
+  , linear_tolerance_(options.linear_tolerance), membrane_(model.rest, model.membrane, model.warp), wind_(model)
 {
   const int n = points();
   const bool direct = solver_ == ClothSolver::cholesky;
@@ -37,6 +37,8 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     constant_bending_ = model.bending != BendingModel::hinge;
     if (!constant_bending_)
       hinges_ = std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()));
+    if (hinges_ && std::isfinite(model.plasticity.yield_curvature))
+      hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient);
     if (constant_bending_ || !direct)
       bending_ = isometricBending(model.rest, t, element, coefficient);
   }
@@ -63,11 +65,6 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     v->assign(4 * n, 0.0);
   weight_.assign(n, 0.0);
   held_.assign(n, 0);
-  if (model.wind_coefficient > 0)
-  {
-    drag_.assign(n, Eigen::Matrix3d::Zero());
-    wind_target_.assign(4 * n, 0.0);
-  }
   if (model.stiffness_damping > 0)
   {
     viscous_start_.assign(4 * n, 0.0);
@@ -81,11 +78,13 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
   }
 }
 
-void ClothSystem::setRestAngles(const Eigen::VectorXd& angles)
+void ClothSystem::setHinges(const ClothState& state)
 {
   if (hinges_)
     for (int h = 0; h < hinges_->count(); ++h)
-      hinges_->setRestAngle(h, angles[h]);
+      hinges_->setRestAngle(h, state.rest_angles[h]);
+  for (Eigen::Index h = 0; h < hinge_stiffness_.size(); ++h)
+    hinges_->setStiffness(static_cast<int>(h), state.stiffening[h] * hinge_stiffness_[h]);
 }
 
 void ClothSystem::setViscosity(double ratio, const PointVector& x) { setViscosity(ratio, x, nullptr, 0.0, nullptr); }
@@ -139,37 +138,6 @@ void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVe
     hinges_->setResponse(ratio, angles_.data());
 }
 
-/// D of the wind: on each vertex a third of c A n n^T of its faces, times the factor.
-void ClothSystem::gatherDrag(const PointVector& x, double factor)
-{
-  std::fill(drag_.begin(), drag_.end(), Eigen::Matrix3d::Zero());
-  for (Eigen::Index f = 0; f < model_.rest.triangles.cols(); ++f)
-  {
-    const Eigen::Vector3i t = model_.rest.triangles.col(f);
-    const Eigen::Vector3d origin = point(x, t[0]);
-    const Eigen::Vector3d area = 0.5 * (point(x, t[1]) - origin).cross(point(x, t[2]) - origin);
-    const double size = area.norm();
-    if (!(size > 0))
-      continue;
-    const Eigen::Matrix3d drag = factor * model_.wind_coefficient / (3.0 * size) * area * area.transpose();
-    for (int k = 0; k < 3; ++k)
-      drag_[t[k]] += drag;
-  }
-}
-
-void ClothSystem::addWind(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind, PointVector& force) const
-{
-  for (Eigen::Index f = 0; f < model_.rest.triangles.cols() && !drag_.empty(); ++f)
-  {
-    const Eigen::Vector3i t = model_.rest.triangles.col(f);
-    const Eigen::Vector3d origin = point(x, t[0]);
-    const Eigen::Vector3d area = 0.5 * (point(x, t[1]) - origin).cross(point(x, t[2]) - origin);
-    const double size = area.norm();
-    for (int k = 0; k < 3 && size > 0; ++k)
-      point(force, t[k]) += model_.wind_coefficient / (3.0 * size) * area.dot(wind - point(v, t[k])) * area;
-  }
-}
-
 void ClothSystem::setWeights(double tau, double ratio)
 {
   if (tau == base_tau_ && ratio == base_ratio_ && held_ == base_held_)
@@ -197,7 +165,7 @@ void ClothSystem::hold(const ClothState& state)
   std::fill(held_.begin(), held_.end(), 0);
   for (const int p : state.pins)
     held_[p] = 1;
-  setRestAngles(state.rest_angles);
+  setHinges(state);
 }
 
 void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
@@ -214,12 +182,8 @@ void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
     if (extra)
       point(force_, i) += inputs.forces.col(i);
   }
-  if (!drag_.empty())
-  {
-    gatherDrag(*stage.wind_at, 1.0 / stage.tau);
-    for (int i = 0; i < n; ++i)
-      point(wind_target_, i) = point(*stage.q_tilde, i) + stage.tau * inputs.wind;
-  }
+  if (wind_.active())
+    wind_.begin(*stage.wind_at, *stage.q_tilde, *stage.velocity, inputs.wind, stage.tau, force_);
 }
 
 ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)
@@ -230,12 +194,8 @@ ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)
     const Eigen::Vector3d away = point(x, i) - point(target_, i);
     Eigen::Vector3d slope = weight_[i] * away - point(force_, i);
     result.potential += 0.5 * weight_[i] * away.squaredNorm() - point(force_, i).dot(point(x, i) - point(start_, i));
-    if (!drag_.empty())
-    {
-      const Eigen::Vector3d past = point(x, i) - point(wind_target_, i), drag = drag_[i] * past;
-      result.potential += 0.5 * past.dot(drag);
-      slope += drag;
-    }
+    if (wind_.active())
+      result.potential += wind_.addGradient(i, point(x, i), slope);
     if (with_gradient)
       point(gradient_, i) += slope;
   }
@@ -309,8 +269,8 @@ ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind k
     result.bending = hinges_->addHessian(kind, x.data(), hinge_slots_, gradient_.data(), matrix_.values());
   else if (constant_bending_)
     result.bending = addIsometric(x, gradient_);
-  for (std::size_t i = 0; i < drag_.size(); ++i)
-    Eigen::Map<Eigen::Matrix3d>(matrix_.values() + 9 * matrix_.starts()[i]) += drag_[i];
+  if (wind_.active())
+    wind_.addHessian(matrix_);
   return result;
 }
 

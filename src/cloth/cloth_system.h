@@ -9,6 +9,7 @@
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
+#include "wind_load.h"
 
 namespace slender {
 
@@ -28,6 +29,7 @@ struct ClothStage
   const PointVector *q_hat = nullptr, *q_tilde = nullptr;
   const PointVector* start = nullptr;            ///< where the stage starts: potentials count from there
   const PointVector* wind_at = nullptr;          ///< where the wind sees the cloth
+  const Eigen::Matrix3Xd* velocity = nullptr;    ///< at which it does, as far as its force is not linear in the end's
 };
 
 /// Energy of one implicit stage of a cloth, with gradient and Hessian, and the solution of its Newton equations:
@@ -41,11 +43,11 @@ public:
   int points() const { return model_.vertices(); }
   ClothSolver solver() const { return solver_; }
 
-  /// What is held, and the rest angles.
+  /// What is held, and the hinges.
   void hold(const ClothState& state);
   /// After setViscosity(stiffness damping / tau, ...).
   void beginStage(const ClothStage& stage, const ClothInputs& inputs);
-  void setRestAngles(const Eigen::VectorXd& angles);
+  void setHinges(const ClothState& state);
   /// Strains at x as those that viscous response of the given ratio starts from; 0: none.
   void setViscosity(double ratio, const PointVector& x);
   /// The same for strains that are combined like the points x + move + share (other - x), to second order in `move`; `move` and `other` may be null.
@@ -71,12 +73,10 @@ public:
   bool constantBending() const { return constant_bending_; }
   const PointVector& target() const { return target_; }
   const std::vector<char>& held() const { return held_; }
-  /// Wind and drag on the vertices for velocities v [N], added.
-  void addWind(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind, PointVector& force) const;
+  const WindLoad& wind() const { return wind_; }
 
 private:
   void setWeights(double tau, double ratio);
-  void gatherDrag(const PointVector& x, double factor);
   void applyMatrix(const PointVector& p, PointVector& ap);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
@@ -86,7 +86,9 @@ private:
   ClothSolver solver_;
   const double linear_tolerance_;
   MembraneEnergy membrane_;
+  WindLoad wind_;
   std::unique_ptr<HingeBending> hinges_;      ///< hinge bending only
+  Eigen::VectorXd hinge_stiffness_;           ///< without stiffening; with plasticity only
   PointMatrix bending_;                       ///< isometric model, or for hinges what preconditions
   bool constant_bending_ = false;             ///< bending_ is the model, not a stand-in
   bool bending_in_blocks_ = false;
@@ -101,9 +103,8 @@ private:
   ConjugateGradients cg_;
 
   double ratio_ = 0;
-  PointVector start_, viscous_start_, shifted_, target_, force_, wind_target_, gradient_, product_, right_, correction_;
+  PointVector start_, viscous_start_, shifted_, target_, force_, gradient_, product_, right_, correction_;
   std::vector<double> weight_;                ///< of inertia, per point
-  std::vector<Eigen::Matrix3d> drag_;         ///< empty without wind
   std::vector<char> held_;
   AlignedVector<double> strains_[3], angles_, other_strains_[3], other_angles_, start_angles_;
 };

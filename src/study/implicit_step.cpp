@@ -68,7 +68,7 @@ Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budge
   for (std::size_t i = 0; i < x.size(); ++i)
     ahead[i] += kStep * v[i];
   system.hold(cloth.state);
-  system.beginStage({kStep, &ahead, &x, &x, &x}, cloth.inputs);
+  system.beginStage({kStep, &ahead, &x, &x, &x, &cloth.state.v}, cloth.inputs);
   Parts parts;
   parts.assembly = leastSeconds(budget, [&] { system.evaluateHessian(x, HessianKind::semidefinite); });
   int iterations = 0, factorizations = 0;
