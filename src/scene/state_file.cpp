@@ -113,6 +113,7 @@ void visitCloth(Archive& archive, State& held)
   archive(held.cloth.x);
   archive(held.cloth.v);
   archive(held.cloth.rest_angles);
+  archive(held.cloth.next_step);
   archive(held.cloth.stiffening);
   const auto indices = [&archive](auto& values) {
     archive.list(values);
