@@ -126,7 +126,7 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
     const int first = first_[k], count = first_[k + 1] - first;
     own_push_ = push_.middleCols(first, count);
     own_answer_.resize(3, count);
-    if (!steppers_[k].respond(own_push_, own_answer_, pin_answers_[k]))
+    if (!steppers_[k].respond(own_push_, h, own_answer_, pin_answers_[k]))
       return false;
     answer_.middleCols(first, count) = own_answer_;
     answered += own_push_.cwiseProduct(own_answer_).sum();

@@ -246,18 +246,26 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
   return StepFailure::none;
 }
 
-/// With the matrix of the last stage.
-bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+/// With the stiffness of the last stage.
+bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
 {
   if (isExplicit())
     return false;
-  for (int i = 0; i < model->vertices(); ++i)
-    point(system.gradient(), i) = -forces.col(i);
-  std::fill(d_.begin(), d_.end(), 0.0);
   int iterations = 0, factorizations = 0;
-  constexpr double kTolerance = 0.05;
-  if (!system.solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance))
-    return false;
+  constexpr double kTolerance = 5e-3;
+  const auto solve = [&] {
+    system.setInertia(duration);
+    for (int i = 0; i < model->vertices(); ++i)
+      point(system.gradient(), i) = -forces.col(i);
+    std::fill(d_.begin(), d_.end(), 0.0);
+    return system.solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance);
+  };
+  if (!solve())   // the inertia of a longer step does not hold up what a short stage's does
+  {
+    system.evaluateHessian(x_, HessianKind::semidefinite);
+    if (!solve())
+      return false;
+  }
   for (int i = 0; i < model->vertices(); ++i)
     displacement.col(i) = point(d_, i);
   pin_forces_change.resize(3, pin_forces.cols());
@@ -276,9 +284,9 @@ ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
-bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
 {
-  return impl_->respond(forces, displacement, pin_forces_change);
+  return impl_->respond(forces, duration, displacement, pin_forces_change);
 }
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 ClothSolver ClothStepper::solver() const { return impl_->system.solver(); }
