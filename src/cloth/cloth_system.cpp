@@ -304,7 +304,7 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
     bending_.addProduct(1.0 + ratio_, p.data(), ap.data());
 }
 
-bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double least)
+bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance)
 {
   // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
   bool moved = false;
@@ -339,7 +339,7 @@ bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_itera
   else
     preconditioner_->useConstant();
   const LinearResult result = cg_.solve(
-    right_, correction_, std::max(least, linear_tolerance_), 2000,
+    right_, correction_, tolerance > 0 ? tolerance : linear_tolerance_, 2000,
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);
