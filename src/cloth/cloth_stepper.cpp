@@ -241,7 +241,10 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
   {
     next_.x.col(work_.pins[k]) = pinAt(inputs, k, fraction);
-    pin_forces.col(static_cast<Eigen::Index>(k)) = -point(system.gradient(), work_.pins[k]);
+    // a pin's speed changes at the start of the step: its inertia over the whole step counts, not that at the end, which the last stage guesses from both
+    const int p = work_.pins[k];
+    const Eigen::Vector3d inertia = (point(x_, p) - point(q_hat_, p)) / (stage.tau_a * stage.tau_a) - (next_.v.col(p) - work_.v.col(p)) / h;
+    pin_forces.col(static_cast<Eigen::Index>(k)) = model->mass[p] * inertia - point(system.gradient(), p);
   }
   return StepFailure::none;
 }
@@ -284,6 +287,15 @@ ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
+StepReport ClothStepper::stepFirstOrder(ClothState& state, const ClothInputs& inputs, double duration)
+{
+  const Integrator own = impl_->options.integrator;
+  impl_->options.integrator = own == Integrator::tr_bdf2 ? Integrator::implicit_euler : own;
+  const StepReport report = impl_->step(state, inputs, duration);
+  impl_->options.integrator = own;
+  return report;
+}
+
 bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
 {
   return impl_->respond(forces, duration, displacement, pin_forces_change);
