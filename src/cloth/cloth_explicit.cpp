@@ -1,6 +1,7 @@
 // Steps without Newton's method: explicit ones, and those whose matrix is constant.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "cloth_stepper_impl.h"
 
@@ -37,6 +38,52 @@ void ClothStepper::Impl::acceleration(const ClothInputs& inputs, double delta)
   addForces(inputs, true);
   for (int i = 0; i < model->vertices(); ++i)
     point(a_start_, i) = system.held()[i] ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(point(force_, i) / model->mass[i] - model->mass_damping * point(v_, i));
+}
+
+/// h^2 w^2 + 2 b h w^2 < 4 with viscous forces from the strains one step ago, b the damping by stiffness.
+double ClothStepper::Impl::stableStep()
+{
+  constexpr int kIterations = 60;
+  if (!isExplicit())
+    return std::numeric_limits<double>::infinity();
+  const int n = model->vertices();
+  const bool with_bending = options.integrator == Integrator::symplectic_euler;
+  PointVector rest, away(4 * n), up(4 * n), down(4 * n);
+  toPoints(model->rest.vertices, rest);
+  ClothState at_rest = makeClothState(*model, model->rest.vertices);
+  system.setHinges(at_rest);
+  system.setViscosity(0.0, rest);
+  const double small = 1e-4 * shortest_edge_;
+  PointVector mode(4 * n, 0.0);
+  for (int i = 0; i < n; ++i)   // anything that is not orthogonal to the stiffest
+    point(mode, i) << std::sin(12.9898 * i), std::sin(78.233 * i + 1.0), std::sin(37.719 * i + 2.0);
+  double square = 0.0;
+  for (int k = 0; k < kIterations; ++k)
+  {
+    const double scale = small / std::max(largest(mode), 1e-300);
+    for (std::size_t i = 0; i < mode.size(); ++i)
+    {
+      mode[i] *= scale;
+      away[i] = rest[i] + mode[i];
+    }
+    std::fill(up.begin(), up.end(), 0.0);
+    system.addInternal(away, up, with_bending);
+    for (std::size_t i = 0; i < mode.size(); ++i)
+      away[i] = rest[i] - mode[i];
+    std::fill(down.begin(), down.end(), 0.0);
+    system.addInternal(away, down, with_bending);
+    double work = 0.0, inertia = 0.0;   // Rayleigh's quotient
+    for (int i = 0; i < n; ++i)
+    {
+      const Eigen::Vector3d force = 0.5 * (point(up, i) - point(down, i));
+      work += point(mode, i).dot(force);
+      inertia += model->mass[i] * point(mode, i).squaredNorm();
+      point(mode, i) = force / model->mass[i];
+    }
+    square = std::max(square, work / inertia);
+  }
+  const double b = model->stiffness_damping;
+  return 4.0 / square / (b + std::sqrt(b * b + 4.0 / square));
 }
 
 /// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step ago.

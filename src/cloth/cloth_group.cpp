@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <sstream>
 #include <stdexcept>
 
 #include "slender_sim/contact/ccd.h"
@@ -15,6 +17,27 @@ namespace {
 constexpr int kLoadPasses = 2;
 constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
 constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
+
+/// Layers much thicker than edges are long: everything touches what is some edges away, at the price of the square of that, and folds cannot form.
+void checkThickness(const ClothModel& cloth, double thickness)
+{
+  constexpr double kMost = 4.0;   // shortest edges
+  const Eigen::Matrix2Xi& edges = cloth.topology.edges;
+  double shortest = std::numeric_limits<double>::infinity();
+  Eigen::Index at = 0;
+  for (Eigen::Index e = 0; e < edges.cols(); ++e)
+    if (const double length = (cloth.rest.vertices.col(edges(0, e)) - cloth.rest.vertices.col(edges(1, e))).norm(); length < shortest)
+    {
+      shortest = length;
+      at = e;
+    }
+  if (thickness <= kMost * shortest)
+    return;
+  std::ostringstream text;
+  text << "cloth '" << cloth.name << "': contact: thickness " << thickness << " m is more than " << kMost << " times its shortest edge (" << shortest
+       << " m, vertices " << edges(0, at) << " and " << edges(1, at) << "): use at most " << kMost * shortest << " m, or a mesh with longer edges";
+  throw std::invalid_argument(text.str());
+}
 
 }  // namespace
 
@@ -40,6 +63,7 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
     sheet.others = contact.others;
     sheet.solids = contact.solids;
     surface_.sheets.push_back(sheet);
+    checkThickness(cloth, contact.thickness);
     first_.push_back(first_.back() + cloth.vertices());
   }
   surface_.solids = model_.solids;
@@ -73,6 +97,7 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
       pins_start_[k].col(static_cast<Eigen::Index>(p)) = state.cloths[k].x.col(pins[p]);
   }
   double done = 0.0, share = 1.0;
+  hopeless_ = false;
   const double shortest = std::ldexp(1.0 - 1e-9, -options_.newton.max_cuts);
   while (done < 1.0)
   {
@@ -81,11 +106,12 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
     if (!sub.ok)
     {
       report.iterations += sub.iterations;
-      if (sub.failure == StepFailure::input_not_finite || 0.5 * share < shortest)
+      if (sub.failure == StepFailure::input_not_finite || hopeless_ || 0.5 * share < shortest)
       {
         report.ok = false;
         report.failure = sub.failure;
         report.message = sub.message;
+        blameExplicit(duration, report);
         return report;
       }
       ++report.cut_steps;
@@ -143,6 +169,21 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
     shared_pins_[k] += share * pin_answers_[k];
   return true;
+}
+
+/// Steps that blow up move pieces until no collision can be solved any more, or meet the end of all halving: what is said then is why.
+void ClothGroup::blameExplicit(double duration, StepReport& report) const
+{
+  if (hopeless_ || (report.failure != StepFailure::squeezed && report.failure != StepFailure::state_not_finite))
+    return;
+  for (const ClothStepper& stepper : steppers_)
+    if (const double stable = stepper.stableStep(); duration > stable)
+    {
+      report.failure = StepFailure::state_not_finite;
+      report.message = "cloth '" + stepper.model().name + "': explicit steps of " + milliseconds(duration) + " are too long for its membrane (stable below " +
+                       milliseconds(stable) + " at rest): use a shorter time.step or implicit_euler; at last " + report.message;
+      return;
+    }
 }
 
 /// Of a substep that was just done.
@@ -234,7 +275,9 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
   {
     report.ok = false;
     report.failure = StepFailure::squeezed;
-    report.message = "collisions: " + found.reason + whereIs(found) + "; use a shorter step, or leave the cloth more room";
+    report.message = "collisions: " + found.reason + whereIs(found) +
+                     (found.at_start ? "; start from a state in which nothing intersects" : "; use a shorter step, or leave the cloth more room");
+    hopeless_ = found.at_start;
     return report;
   }
   collisions_.repulsions += found.repulsions;

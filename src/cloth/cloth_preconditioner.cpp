@@ -130,11 +130,11 @@ ClothPreconditioner::ClothPreconditioner(const ClothModel& model, const PointMat
     v->assign(4 * n, 0.0);
 }
 
-void ClothPreconditioner::setConstant(const std::vector<double>& weights, double factor, const std::vector<char>& held)
+bool ClothPreconditioner::setConstant(const std::vector<double>& weights, double factor, const std::vector<char>& held)
 {
   factor_ = factor;
   aligned_ = false;
-  constant_.factor(weights, factor, held);
+  return constant_.factor(weights, factor, held);
 }
 
 void ClothPreconditioner::align(const PointVector& x, const BlockMatrix& matrix, const std::vector<char>& held)

@@ -39,8 +39,8 @@ public:
   /// `bending`: of the model, or like it; empty without. `in_blocks`: what align() is given holds the bending.
   ClothPreconditioner(const ClothModel& model, const PointMatrix& bending, const BlockMatrix& pattern, bool in_blocks);
 
-  /// Weights of inertia [n], factor of the stiffness.
-  void setConstant(const std::vector<double>& weights, double factor, const std::vector<char>& held);
+  /// Weights of inertia [n], factor of the stiffness. False: not positive definite, and not to be applied.
+  bool setConstant(const std::vector<double>& weights, double factor, const std::vector<char>& held);
   /// Along the normals at x of the matrix given. Where that is not positive definite, the constant part stands for all.
   void align(const PointVector& x, const BlockMatrix& matrix, const std::vector<char>& held);
   void useConstant() { aligned_ = false; }

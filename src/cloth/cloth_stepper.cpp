@@ -79,11 +79,11 @@ StepReport ClothStepper::Impl::refuse(StepReport& report, StepFailure failure, c
   return report;
 }
 
-std::string ClothStepper::Impl::explain(StepFailure failure, double length) const
+std::string ClothStepper::Impl::explain(StepFailure failure, double length)
 {
-  const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
+  const std::string at = " at a step of " + milliseconds(length);
   if (isExplicit())
-    return "the explicit step blew up" + at + ": use a shorter step or implicit_euler";
+    return "the explicit step blew up" + at + ": use a shorter step (stable below " + milliseconds(stableStep()) + " at rest) or implicit_euler";
   if (failure == StepFailure::singular_matrix)
     return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude";
   if (failure == StepFailure::state_not_finite)
@@ -111,7 +111,7 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   const bool adaptive = options.error_tolerance > 0;
   // cuts that come again and again do not help: what fails everywhere should fail soon
   const int most_cuts = 3 * options.newton.max_cuts;
-  double t = 0.0, h = adaptive && state.next_step > 0 ? std::min(state.next_step, duration) : duration;
+  double t = 0.0, h = adaptive && state.next_step > 0 ? std::clamp(state.next_step, std::min(options.min_step, duration), duration) : duration;
   while (t < duration)
   {
     const bool last = t + h > duration * (1 - 1e-9);
@@ -252,8 +252,15 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
 /// With the stiffness of the last stage.
 bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
 {
-  if (isExplicit())
-    return false;
+  if (isExplicit())   // whose forces do not know the end of the step
+  {
+    for (int i = 0; i < model->vertices(); ++i)
+      displacement.col(i) = duration * duration / model->mass[i] * forces.col(i);
+    for (const int p : work_.pins)
+      displacement.col(p).setZero();
+    pin_forces_change.setZero(3, pin_forces.cols());
+    return true;
+  }
   int iterations = 0, factorizations = 0;
   constexpr double kTolerance = 5e-4;   // what it leaves unbalanced the grasps' wrenches lack: below a thousandth of the load
   const auto solve = [&] {
@@ -301,6 +308,7 @@ bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, double duration, Eige
   return impl_->respond(forces, duration, displacement, pin_forces_change);
 }
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
+double ClothStepper::stableStep() const { return impl_->stableStep(); }
 ClothSolver ClothStepper::solver() const { return impl_->system.solver(); }
 const ClothModel& ClothStepper::model() const { return *impl_->model; }
 

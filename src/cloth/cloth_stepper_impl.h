@@ -15,6 +15,7 @@ public:
   Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
 
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
+  double stableStep();
   bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
 
   std::shared_ptr<const ClothModel> model;
@@ -26,7 +27,7 @@ private:
   // cloth_stepper.cpp
   bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
-  std::string explain(StepFailure failure, double length) const;
+  std::string explain(StepFailure failure, double length);
   double stepFactor(double ratio) const;
   StepFailure implicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
   void combine(const Combination& c, PointVector& result) const;

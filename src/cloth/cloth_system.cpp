@@ -152,8 +152,7 @@ void ClothSystem::setWeights(double tau, double ratio)
     for (int k = 0; k < 3; ++k)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += weight_[i];
   base_.assign(matrix_.values(), matrix_.values() + 9 * matrix_.blocks());
-  if (preconditioner_)
-    preconditioner_->setConstant(weight_, 1.0 + ratio, held_);
+  preconditioned_ = !preconditioner_ || preconditioner_->setConstant(weight_, 1.0 + ratio, held_);
   base_tau_ = tau;
   base_ratio_ = ratio;
   base_held_ = held_;
@@ -333,6 +332,8 @@ bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_itera
     factor_.solvePoints(right_.data(), d.data());
     return true;
   }
+  if (!preconditioned_)
+    return false;
   clearHeld(right_);
   if (at)
     preconditioner_->align(*at, matrix_, held_);

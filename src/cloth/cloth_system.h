@@ -106,6 +106,7 @@ private:
   std::vector<char> base_held_;
   SparseCholesky factor_;                     ///< of matrix_
   std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
+  bool preconditioned_ = true;                ///< its constant part could be factored
   ConjugateGradients cg_;
 
   double ratio_ = 0;

@@ -64,6 +64,7 @@ private:
   void solveVelocities();
   void takeHeldImpulses();
   bool fail(const std::string& reason, int first = -1, int second = -1);
+  bool failAtStart(const std::string& reason, int first, int second = -1) { return !(report_.at_start = true) || fail(reason, first, second); }
   int node(int point) const;
 
   CollisionElements elements_;
@@ -155,7 +156,7 @@ bool SurfaceCollider::Impl::examineStart()
   for (const CollisionPair& pair : pairs)
   {
     if (!(pair.gap > 0.0))
-      return fail("surfaces meet at the start of the step", pair.point[0], pair.point[3]);
+      return failAtStart("surfaces meet at the start of the step", pair.point[0], pair.point[3]);
     if (pair.gap >= kNear * pairs_.shell(pair))
       continue;
     const double range = reach(pair);
@@ -224,7 +225,7 @@ bool SurfaceCollider::Impl::examinePlanes()
         continue;
       const double gap = planeGap(static_cast<int>(plane), step_->solids, from_.col(i));
       if (!(gap > 0.0))
-        return fail("a plane is passed through at the start of the step", i);
+        return failAtStart("a plane is passed through at the start of the step", i);
       const double shell = elements_.objects[sheet].shell;
       if (gap < kNear * shell && std::min(gap, planeGap(static_cast<int>(plane), step_->solids_end, to_.col(i))) < shell)
         addPlaneRow(i, static_cast<int>(plane), gap, false);

@@ -1,6 +1,7 @@
 #include "slender_sim/dynamics/step_report.h"
 
 #include <algorithm>
+#include <cstdio>
 
 namespace slender {
 
@@ -45,6 +46,13 @@ const char* toString(StepFailure failure)
     case StepFailure::turned_too_far: return "turned_too_far";
   }
   return "unknown";
+}
+
+std::string milliseconds(double seconds)
+{
+  char text[40];
+  std::snprintf(text, sizeof text, "%.3g ms", 1e3 * seconds);
+  return text;
 }
 
 }  // namespace slender

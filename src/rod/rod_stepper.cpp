@@ -170,7 +170,7 @@ StepReport RodStepper::Impl::refuse(StepReport& report, StepFailure failure, con
 
 std::string RodStepper::Impl::explainFailure(StepFailure failure, double length, bool explicit_step) const
 {
-  const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
+  const std::string at = " at a step of " + milliseconds(length);
   switch (failure)
   {
     case StepFailure::folded_back:

@@ -77,7 +77,7 @@ StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, 
 
 std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double length) const
 {
-  const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
+  const std::string at = " at a step of " + milliseconds(length);
   if (failure == StepFailure::overstretched)
     return "it is drawn out so far that more than 10000 edges would have to be divided" + at +
            ": check the motion of nozzle and belt, or use a longer max_edge_length";

@@ -75,6 +75,7 @@ private:
   StepReport substep(const ClothGroupInputs& inputs, double from, double to, double duration);
   bool lowerOrder();
   bool shareLoads(const CollisionStep& step, bool again);
+  void blameExplicit(double duration, StepReport& report) const;
   void addPinForces(double share, double h);
   Eigen::Matrix3Xd positions(const ClothGroupState& state) const;
   int clothOf(int point) const;
@@ -91,6 +92,7 @@ private:
   std::vector<Order> order_;               ///< of what was done of each cloth in the present substep; lowered: to be done again
   std::vector<int> first_;                 ///< point of each cloth; one more at the end
   CollisionReport collisions_;
+  bool hopeless_ = false;                  ///< the failure of the last substep is one of its start
 
   ClothGroupState work_, next_;
   ClothGroupInputs sub_;

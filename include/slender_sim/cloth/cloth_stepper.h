@@ -66,8 +66,12 @@ public:
 
   /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step, and by how much the pins' forces
   /// [N] change: linear, with the stiffness of its last Newton iteration and the inertia of a step of implicit Euler of `duration` [s], whatever the
-  /// stages and substeps were, so that responses of several cloths go together. Returns false after explicit steps, or if the matrix cannot be used.
+  /// stages and substeps were, so that responses of several cloths go together; after explicit steps that of the masses alone. Returns false if the matrix
+  /// cannot be used.
   bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
+  /// Of explicit integrators: the longest step for which the cloth at rest is stable [s], by the largest eigenvalue of M^-1 K (power iteration); damping by stiffness
+  /// makes it shorter. Infinite for implicit ones. Not cheap: for messages.
+  double stableStep() const;
   /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step.
   const Eigen::Matrix3Xd& pinForces() const;
 

@@ -43,6 +43,7 @@ struct CollisionReport
 {
   bool ok = true;
   std::string reason;     ///< of a failure
+  bool at_start = false;  ///< the failure is there before anything moves: no shorter step helps
   int points[2] = {-1, -1};   ///< that a failure concerns, if any: those of the sheets, then corners of the solids
   int repulsions = 0;     ///< pairs nearer than the thickness, or about to be
   int impulses = 0;       ///< collisions found and stopped

@@ -46,5 +46,7 @@ struct StepReport
 };
 
 const char* toString(StepFailure failure);
+/// "2.5 ms", for messages: three digits however short the time [s] is.
+std::string milliseconds(double seconds);
 
 }  // namespace slender
