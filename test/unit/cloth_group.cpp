@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "slender_sim/cloth/cloth_group.h"
@@ -197,6 +199,123 @@ TEST(ClothGroup, RefusesIntersectionsAtTheStart)
   c.model.contact.pop_back();
   EXPECT_THROW(ClothGroup(c.model, {}), std::invalid_argument);
   EXPECT_THROW(group.step(c.state, ClothGroupInputs(), 0.01), std::invalid_argument);
+}
+
+/// Shorter steps would not help.
+TEST(ClothGroup, WhatMeetsAtTheStartIsRefusedAtOnce)
+{
+  Cloths c;
+  c.add("cloth", 4, 0.2, {-0.1, -0.1, 0.01});
+  c.addSolid(Plane{});
+  ClothGroup group(c.model, {});
+  c.state.cloths[0].x(2, 3) = -0.01;
+  const StepReport report = group.step(c.state, c.inputs, 0.005);
+  EXPECT_FALSE(report.ok);
+  EXPECT_EQ(report.cut_steps, 0);
+  EXPECT_EQ(report.message.find("shorter step"), std::string::npos) << report.message;
+}
+
+TEST(ClothGroup, LayersMuchThickerThanEdgesAreRefused)
+{
+  Cloths c;
+  c.add("quilt", 20, 0.1, {0, 0, 0});   // edges of 5 mm, and diagonals
+  c.model.contact[0].thickness = 0.019;
+  EXPECT_NO_THROW(ClothGroup(c.model, {}));
+  c.model.contact[0].thickness = 0.025;
+  try
+  {
+    ClothGroup group(c.model, {});
+    ADD_FAILURE();
+  }
+  catch (const std::invalid_argument& e)
+  {
+    EXPECT_NE(std::string(e.what()).find("cloth 'quilt': contact: thickness 0.025"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("use at most 0.02 m"), std::string::npos) << e.what();
+  }
+}
+
+/// Not as if something had squeezed them.
+TEST(ClothGroup, ExplicitStepsThatAreTooLongAreSaidToBe)
+{
+  for (const Integrator integrator : {Integrator::imex, Integrator::symplectic_euler})
+  {
+    Cloths c;
+    c.add("cloth", 8, 0.2, {-0.1, -0.1, 0.053});
+    c.addSolid(Sphere{0.05});
+    ClothOptions options;
+    options.integrator = integrator;
+    options.newton.max_cuts = 2;
+    ClothGroup group(c.model, options);
+    const double stable = group.stepper(0).stableStep();
+    StepReport report;
+    for (int k = 0; k < 200 && report.ok; ++k)
+      report = group.step(c.state, c.inputs, 8.0 * stable);
+    ASSERT_FALSE(report.ok);
+    EXPECT_EQ(report.failure, StepFailure::state_not_finite);
+    EXPECT_NE(report.message.find("too long for its membrane"), std::string::npos) << report.message;
+  }
+}
+
+/// The estimate is the limit: oscillations of the cloth at rest grow beyond it and stay below.
+TEST(ClothGroup, StableStepIsTheLimitOfExplicitSteps)
+{
+  Cloths c;
+  c.add("cloth", 8, 0.2, {0, 0, 0});
+  for (const Integrator integrator : {Integrator::imex, Integrator::symplectic_euler})
+  {
+    ClothOptions options;
+    options.integrator = integrator;
+    ClothStepper stepper(c.model.cloths[0], options);
+    const auto speedAfter = [&](double share) {
+      ClothState state = c.state.cloths[0];
+      for (Eigen::Index i = 0; i < state.x.cols(); ++i)
+        state.v.col(i) = 1e-6 * Vector3d(std::sin(7.0 * i), std::cos(5.0 * i), std::sin(3.0 * i));
+      ClothInputs inputs;
+      inputs.gravity.setZero();
+      for (int k = 0; k < 300; ++k)
+        if (!stepper.step(state, inputs, share * stepper.stableStep()).ok)
+          return 1e9;
+      return state.v.cwiseAbs().maxCoeff();
+    };
+    EXPECT_LT(speedAfter(0.95), 1e-5);
+    EXPECT_GT(speedAfter(1.1), 1e-3);
+  }
+  EXPECT_TRUE(std::isinf(ClothStepper(c.model.cloths[0], {}).stableStep()));
+}
+
+/// An explicit cloth beside it answers with its masses, the other as ever.
+TEST(ClothGroup, AnExplicitClothLeavesLoadsOfOthersShared)
+{
+  Cloths c;
+  c.add("cloth", 4, 0.1, {0, 0, 0});
+  ClothOptions options;
+  options.integrator = Integrator::symplectic_euler;
+  ClothStepper stepper(c.model.cloths[0], options);
+  ClothState state = c.state.cloths[0];
+  pinVertices(state, {3});
+  ClothInputs inputs;
+  inputs.pins = state.x.col(3);
+  const double h = 1e-5;
+  ASSERT_TRUE(stepper.step(state, inputs, h).ok);
+  const Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Constant(3, state.x.cols(), 2.0);
+  Eigen::Matrix3Xd moved(3, state.x.cols()), pins;
+  ASSERT_TRUE(stepper.respond(force, h, moved, pins));
+  EXPECT_NEAR(moved(1, 5), 2.0 * h * h / c.model.cloths[0]->mass[5], 1e-15);
+  EXPECT_EQ(moved.col(3), Vector3d(0, 0, 0));
+}
+
+/// A step length from a state file that is far below min_step.
+TEST(ClothGroup, ErrorControlDoesNotStartBelowItsShortestStep)
+{
+  Cloths c;
+  c.add("cloth", 4, 0.1, {0, 0, 0});
+  ClothOptions options;
+  options.error_tolerance = 1e-4;
+  ClothStepper stepper(c.model.cloths[0], options);
+  c.state.cloths[0].next_step = 1e-300;
+  const StepReport report = stepper.step(c.state.cloths[0], c.inputs.cloths[0], 0.005);
+  EXPECT_TRUE(report.ok) << report.message;
+  EXPECT_EQ(milliseconds(2.5e-9), "2.5e-06 ms");
 }
 
 }  // namespace
