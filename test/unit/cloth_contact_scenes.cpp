@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
@@ -354,6 +355,39 @@ TEST(ClothContact, ReportsCollisions)
   const StepReport report = run(simulation, 20);
   EXPECT_GT(report.repulsions, 0);
   EXPECT_GT(report.impulses, 0);
+}
+
+/// What is called a cloth there is not rubber; and the ring's has really been pulled through.
+TEST(ClothContact, ScenesOfFabricStretchLikeFabric)
+{
+  for (const char* name : {"twisted_cloth", "pulled_through_ring"})
+  {
+    SCOPED_TRACE(name);
+    Simulation simulation(readScene(std::string(SLENDER_SOURCE_DIR) + "/config/scenes/" + name + ".yaml"));
+    const TriangleMesh& mesh = simulation.config().cloths[0].mesh;
+    const Eigen::Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
+    const int steps = static_cast<int>(std::lround(simulation.config().time.duration / simulation.config().time.step));
+    double most = 0.0;
+    long touching = 0;
+    for (int k = 1; k <= steps; ++k)
+    {
+      const StepReport report = simulation.step(simulation.defaultInputs());
+      ASSERT_TRUE(report.ok) << report.message;
+      touching += report.repulsions;
+      for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+        for (int c = 0; c < 3; ++c)
+        {
+          const int a = mesh.triangles(c, f), b = mesh.triangles((c + 1) % 3, f);
+          most = std::max(most, (x.col(b) - x.col(a)).norm() / (mesh.vertices.col(b) - mesh.vertices.col(a)).norm() - 1.0);
+        }
+      if (k % 20 == 0)
+        ASSERT_EQ(intersectionsOf(simulation), 0u) << k;
+    }
+    EXPECT_LT(most, 0.1);
+    EXPECT_GT(touching, 1000);
+    if (!simulation.config().obstacles.empty())
+      EXPECT_LT(x.row(2).maxCoeff(), -0.0288);   // all of it below the ring
+  }
 }
 
 }  // namespace

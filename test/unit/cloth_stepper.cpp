@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "src/cloth/cloth_preconditioner.h"
 #include "test/support/cloths.h"
 
 namespace slender::test {
@@ -325,6 +326,16 @@ TEST(ClothStepper, RefusesBadInputAndLeavesTheStateAlone)
   EXPECT_THROW(pinVertices(cloth.state, {-1}), std::invalid_argument);
   EXPECT_THROW(buildCloth("c", cloth.model->rest, 0.0, cloth.model->membrane), std::invalid_argument);
   EXPECT_THROW(makeClothState(*cloth.model, Matrix3Xd::Zero(3, 4)), std::invalid_argument);
+}
+
+TEST(ClothPreconditioner, SaysWhenItsConstantPartCannotBeFactored)
+{
+  const ClothModel model = buildCloth("cloth", gridMesh(0.1, 0.1, 4, 4, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 5e-4));
+  const BlockMatrix pattern(model.vertices(), {model.rest.triangles});
+  ClothPreconditioner preconditioner(model, PointMatrix(), pattern, false);
+  const std::vector<char> held(model.vertices(), 0);
+  EXPECT_TRUE(preconditioner.setConstant(std::vector<double>(model.vertices(), 1.0), 1.0, held));
+  EXPECT_FALSE(preconditioner.setConstant(std::vector<double>(model.vertices(), -1e9), 1.0, held));
 }
 
 }  // namespace
