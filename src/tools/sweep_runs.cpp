@@ -71,22 +71,6 @@ std::string csvLine(const std::vector<std::string>& cells)
   return line;
 }
 
-std::vector<std::string> cellsOf(const std::string& line)
-{
-  std::vector<std::string> cells(1);
-  bool quoted = false;
-  for (std::size_t i = 0; i < line.size(); ++i)
-    if (line[i] == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"')
-      cells.back() += line[i++];
-    else if (line[i] == '"')
-      quoted = !quoted;
-    else if (line[i] == ',' && !quoted)
-      cells.emplace_back();
-    else
-      cells.back() += line[i];
-  return cells;
-}
-
 /// One line of results.csv; `measured`: empty when the run failed.
 std::string resultLine(const SweepPlan& plan, long point, const std::string& reason, const std::vector<study::Row>& measured)
 {
@@ -236,7 +220,7 @@ long collect(const SweepPlan& plan, const std::string& out, const std::map<long,
         throw std::runtime_error("cannot read " + pointFile(out, point));
     }
     all += line + "\n";
-    lines.push_back(cellsOf(line));
+    lines.push_back(study::csvCells(line));
     if (lines.back()[status] == "done")
       continue;
     ++failed;
