@@ -4,8 +4,9 @@
 // rest membrane. At these stiffnesses there is no bending in it, so hinges lose nothing with it; most of either step is its back-solves, and the
 // ratio is near 1 (implicit_step_speedup_min): the isometric model saves the assembly of its Hessian, not the solution. Hinges solved as is usual,
 // without a factor that acts on each coordinate alike, are compared besides: factored in every step, or by conjugate gradients preconditioned by
-// the inverse diagonal blocks or by their own Hessian at rest, to the same error; whichever is fastest (..._over_usual_hinge_solvers_min). On small meshes that is diagonal blocks, and
-// faster than the isometric step, which does not use them: that ratio, below 1, says something of preconditioners and nothing of the models.
+// the inverse diagonal blocks or by their own Hessian at rest, to the same error; whichever is fastest (..._over_usual_hinge_solvers_min). On
+// small meshes that is diagonal blocks, and faster than the isometric step, which does not use them: that ratio, below 1, says something of
+// preconditioners and nothing of the models.
 #include <cmath>
 
 #include <Eigen/LU>
