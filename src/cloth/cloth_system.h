@@ -69,6 +69,8 @@ public:
   /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `tolerance`: theirs, 0: that of the options.
   /// False: not positive definite. The numbers grow by what was needed.
   bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0);
+  /// The blocks of solve()'s matrix as last evaluated; those of isometric bending are among them only for Cholesky.
+  const BlockMatrix& matrix() const { return matrix_; }
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
 
