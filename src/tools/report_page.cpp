@@ -4,13 +4,14 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
 
-#include <yaml-cpp/yaml.h>
-
+#include "../scene/yaml_tree.h"
+#include "slender_sim/scene/reader.h"
 #include "slender_sim/study/output.h"
 
 namespace slender {
@@ -104,19 +105,20 @@ Loaded load(const ReportedStudy& study)
     return loaded;
   try
   {
-    const YAML::Node result = YAML::Load(readFile(file))["studies"][0];
-    for (const auto& metric : result["metrics"])
-      loaded.metrics.emplace_back(metric.first.as<std::string>(), metric.second.IsNull() ? "not a number" : metric.second.as<std::string>());
-    if (result["notes"])
-      for (const auto& note : result["notes"])
-        loaded.notes.push_back(note.as<std::string>());
-    if (result["error"])
-      loaded.error = result["error"].as<std::string>();
-    loaded.seconds = result["wall_seconds"].as<double>();
+    const YamlTree tree = parseYaml(readFile(file), file);   // JSON is YAML
+    const YamlTree& result = tree.find("studies")->items.at(0);
+    for (const auto& [name, value] : result.find("metrics")->members)
+      loaded.metrics.emplace_back(name, value.kind == YamlTree::Kind::null ? "not a number" : value.scalar);
+    if (const YamlTree* notes = result.find("notes"))
+      for (const YamlTree& note : notes->items)
+        loaded.notes.push_back(note.scalar);
+    if (const YamlTree* error = result.find("error"))
+      loaded.error = error->scalar;
+    loaded.seconds = std::strtod(result.find("wall_seconds")->scalar.c_str(), nullptr);
   }
-  catch (const YAML::Exception& error)
+  catch (const SceneError& error)
   {
-    loaded.error = file + " cannot be read: " + error.what();
+    loaded.error = error.what();
   }
   return loaded;
 }
