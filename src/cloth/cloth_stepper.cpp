@@ -19,7 +19,7 @@ public:
   std::shared_ptr<const ClothModel> model;
   ClothOptions options;
   ClothSystem system;
-  Eigen::Matrix3Xd pin_forces;
+  Eigen::Matrix3Xd pin_forces, average_forces;
 
 private:
   bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
@@ -34,7 +34,7 @@ private:
   double largest(const PointVector& d) const;
 
   ClothState work_;
-  Eigen::Matrix3Xd pins_start_;
+  Eigen::Matrix3Xd pins_start_, averages_start_, averages_;
   PointVector x_, best_, trial_, d_, pin_motion_, v_, force_;
   double shortest_edge_ = 0;
 };
@@ -52,6 +52,15 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
       throw std::invalid_argument(who + "bending modulus, damping and wind coefficient must be zero or more");
   if (model->mass.size() != model->vertices() || !(model->mass.minCoeff() > 0))
     throw std::invalid_argument(who + "every vertex needs a mass");
+  if (model->averages)
+  {
+    if (model->averages->cols() != model->vertices())
+      throw std::invalid_argument(who + "averages of " + std::to_string(model->averages->cols()) + " vertices do not fit");
+    if (o.integrator == Integrator::symplectic_euler)
+      throw std::invalid_argument(who + "prescribed averages need implicit steps: use implicit_euler");
+    if (o.solver == ClothSolver::cholesky)
+      throw std::invalid_argument(who + "prescribed averages need solver: conjugate_gradients (or auto)");
+  }
   shortest_edge_ = std::numeric_limits<double>::infinity();
   for (Eigen::Index e = 0; e < model->topology.edges.cols(); ++e)
     shortest_edge_ = std::min(shortest_edge_, (model->rest.vertices.col(model->topology.edges(0, e)) -
@@ -75,6 +84,8 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
   check(inputs.forces.allFinite(), "forces");
   check(inputs.pins.cols() == static_cast<Eigen::Index>(s.pins.size()), "number of pin positions (one per pin of the state)");
   check(inputs.pins.allFinite(), "pin positions");
+  check(inputs.averages.cols() == model->averageCount(), "number of averages (one per average of the model)");
+  check(inputs.averages.allFinite(), "averages");
   check(s.x.cols() == n && s.v.cols() == n, "number of vertices of the state");
   check(s.x.allFinite() && s.v.allFinite(), "the state");
   check(model->bending != BendingModel::hinge || (s.rest_angles.size() == model->topology.hingeCount() && s.rest_angles.allFinite()),
@@ -122,6 +133,11 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   pins_start_.resize(3, static_cast<Eigen::Index>(state.pins.size()));
   for (std::size_t k = 0; k < state.pins.size(); ++k)
     pins_start_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
+  if (model->averages)
+  {
+    toPoints(state.x, x_);
+    system.averagesOf(x_, averages_start_);
+  }
   const bool explicit_step = options.integrator == Integrator::symplectic_euler;
   double t = 0.0, h = duration;
   while (t < duration)
@@ -162,6 +178,8 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
   std::fill(pin_motion_.begin(), pin_motion_.end(), 0.0);
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
     point(pin_motion_, work_.pins[k]) = pinAt(inputs, k, to / duration) - work_.x.col(work_.pins[k]);
+  if (model->averages)
+    averages_ = averages_start_ + to / duration * (inputs.averages - averages_start_);
   const StepFailure failure = options.one_newton_step ? linearized(report) : minimize(report);
   return failure != StepFailure::none ? failure : finish(h, report);
 }
@@ -172,6 +190,14 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
   system.evaluateHessian(system.start(), HessianKind::semidefinite);
   for (int i = 0; i < model->vertices(); ++i)
     point(d_, i) = system.held()[i] ? Eigen::Vector3d(point(pin_motion_, i)) : Eigen::Vector3d(point(system.target(), i) - point(system.start(), i));
+  if (model->averages)   // conjugate gradients keep what the first guess meets
+  {
+    for (std::size_t i = 0; i < x_.size(); ++i)
+      x_[i] = system.start()[i] + d_[i];
+    system.meetAverages(averages_, x_);
+    for (std::size_t i = 0; i < x_.size(); ++i)
+      d_[i] = x_[i] - system.start()[i];
+  }
   if (!system.solve(d_, report.linear_iterations, report.factorizations))
     return StepFailure::singular_matrix;
   ++report.iterations;
@@ -190,6 +216,8 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
   constexpr int kPatience = 5;
   for (int i = 0; i < model->vertices(); ++i)
     point(x_, i) = system.held()[i] ? Eigen::Vector3d(point(system.start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(system.target(), i));
+  if (model->averages)
+    system.meetAverages(averages_, x_);
   bool near = false, strict = false;
   double best = std::numeric_limits<double>::infinity(), shift = 0.0;
   int misses = 0;
@@ -266,9 +294,14 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
 /// Takes x_ as the end of the step.
 StepFailure ClothStepper::Impl::finish(double h, StepReport& report)
 {
+  if (model->averages)   // to rounding
+    system.meetAverages(averages_, x_);
   const ClothEvaluation end = system.evaluate(x_);
   if (!std::isfinite(end.energy()))
     return StepFailure::state_not_finite;
+  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
+  if (model->averages)
+    system.balanceAverages(average_forces);
   double unbalanced = 0.0, force = 1e-300;
   for (int i = 0; i < model->vertices(); ++i)
   {
@@ -280,7 +313,6 @@ StepFailure ClothStepper::Impl::finish(double h, StepReport& report)
   }
   report.residual = std::max(report.residual, unbalanced / force);
   report.max_strain = std::max(report.max_strain, end.max_strain);
-  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
     pin_forces.col(static_cast<Eigen::Index>(k)) = -point(system.gradient(), work_.pins[k]);
   return StepFailure::none;
@@ -337,6 +369,7 @@ ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
+const Eigen::Matrix3Xd& ClothStepper::averageForces() const { return impl_->average_forces; }
 ClothSolver ClothStepper::solver() const { return impl_->system.solver(); }
 const ClothModel& ClothStepper::model() const { return *impl_->model; }
 

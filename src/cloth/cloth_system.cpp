@@ -15,6 +15,8 @@ ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
   constexpr int kLargestFactored = 5000;
   if (options.solver != ClothSolver::automatic)
     return options.solver;
+  if (model.averages)
+    return ClothSolver::conjugate_gradients;
   return options.one_newton_step || model.vertices() > kLargestFactored ? ClothSolver::conjugate_gradients : ClothSolver::cholesky;
 }
 
@@ -99,6 +101,13 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
       addScaled(*part, 1.0, entries);
     factor_.setPattern(PointMatrix(n, entries));
     cg_.resize(n);
+    if (model.averages)
+    {
+      averages_ = std::make_unique<ConstrainedCholesky>();
+      averages_->setConstraints(*model.averages);
+      gap_.assign(4 * model.averageCount(), 0.0);
+      multipliers_ = gap_;
+    }
   }
   for (PointVector* v : {&start_, &target_, &force_, &gradient_, &product_, &right_, &correction_})
     v->assign(4 * n, 0.0);
@@ -198,6 +207,7 @@ void ClothSystem::setWeights(double h, double ratio)
     for (int i = 0; i < n; ++i)
       entries.emplace_back(i, i, weight_[i]);
     factor_.factor(PointMatrix(n, entries), held_.data());
+    independent_ = !averages_ || averages_->factor(factor_, held_.data());
   }
   base_h_ = h;
   base_ratio_ = ratio;
@@ -343,8 +353,63 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
     bending_.addProduct(1.0 + ratio_, p.data(), ap.data());
 }
 
+void ClothSystem::averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const
+{
+  const auto& c = *model_.averages;
+  averages.setZero(3, c.rows());
+  for (Eigen::Index i = 0; i < c.rows(); ++i)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
+      averages.col(i) += entry.value() * point(x, entry.col());
+}
+
+void ClothSystem::meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x)
+{
+  averagesOf(x, averages_now_);
+  for (Eigen::Index i = 0; i < averages.cols(); ++i)
+    point(gap_, i) = averages.col(i) - averages_now_.col(i);
+  std::fill(right_.begin(), right_.end(), 0.0);
+  averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
+  for (std::size_t i = 0; i < x.size(); ++i)
+    x[i] += correction_[i];
+}
+
+void ClothSystem::takeOutMultipliers(PointVector& r)
+{
+  const auto& c = *model_.averages;
+  for (Eigen::Index i = 0; i < c.rows(); ++i)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
+      point(r, entry.col()) -= entry.value() * point(multipliers_, i);
+}
+
+void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces)
+{
+  std::copy(gradient_.begin(), gradient_.end(), right_.begin());
+  clearHeld(right_);
+  averages_->solve(right_.data(), nullptr, correction_.data(), multipliers_.data());
+  takeOutMultipliers(gradient_);
+  forces.resize(3, model_.averageCount());
+  for (Eigen::Index i = 0; i < forces.cols(); ++i)
+    forces.col(i) = point(multipliers_, i);
+}
+
+/// z = P r, among directions that leave the averages alone. What the averages balance is taken out of r, where it would drown the rest in rounding errors
+/// [Gould, Hribar, Nocedal, SIAM J. Sci. Comput. 23 (2001), 5].
+void ClothSystem::precondition(PointVector& r, PointVector& z)
+{
+  if (!averages_)
+  {
+    factor_.solvePoints(r.data(), z.data());
+    return;
+  }
+  averages_->solve(r.data(), nullptr, z.data(), multipliers_.data());
+  takeOutMultipliers(r);
+  clearHeld(r);
+}
+
 bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizations)
 {
+  if (!independent_)
+    return false;
   // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
   bool moved = false;
   for (int i = 0; i < points(); ++i)
@@ -373,13 +438,15 @@ bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizati
     return true;
   }
   clearHeld(right_);
+  if (averages_)
+    precondition(right_, correction_);
   const LinearResult result = cg_.solve(
     right_, correction_, linear_tolerance_, 2000,
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);
     },
-    [&](const PointVector& r, PointVector& z) { factor_.solvePoints(r.data(), z.data()); });
+    [&](PointVector& r, PointVector& z) { precondition(r, z); });
   linear_iterations += result.iterations;
   for (std::size_t i = 0; i < d.size(); ++i)
     d[i] += correction_[i];

@@ -7,6 +7,7 @@
 #include "slender_sim/energy/hinge.h"
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
+#include "slender_sim/linalg/constrained_cholesky.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 namespace slender {
@@ -51,6 +52,13 @@ public:
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. False: not positive definite. `linear` grows by iterations.
   bool solve(PointVector& d, int& linear_iterations, int& factorizations);
 
+  /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x count).
+  void meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x);
+  /// Takes the part out of the gradient that the averages balance: their forces (3 x count).
+  void balanceAverages(Eigen::Matrix3Xd& forces);
+  /// What they are at x.
+  void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
+
   const PointVector& start() const { return start_; }
   const PointVector& target() const { return target_; }
   const std::vector<char>& held() const { return held_; }
@@ -63,6 +71,9 @@ private:
   void applyMatrix(const PointVector& p, PointVector& ap);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
+  void precondition(PointVector& r, PointVector& z);
+  /// r -= C^T multipliers
+  void takeOutMultipliers(PointVector& r);
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
 
   const ClothModel& model_;
@@ -81,6 +92,10 @@ private:
   std::vector<char> base_held_;
   SparseCholesky factor_;                     ///< of matrix_, or of the preconditioner
   ConjugateGradients cg_;
+  std::unique_ptr<ConstrainedCholesky> averages_;   ///< of the preconditioner, where averages are prescribed
+  bool independent_ = true;                         ///< these, with what is held
+  PointVector gap_, multipliers_;                   ///< one point per average
+  Eigen::Matrix3Xd averages_now_;
 
   double h_ = 0, ratio_ = 0;
   PointVector start_, viscous_start_, target_, force_, wind_target_, gradient_, product_, right_, correction_, weight_;

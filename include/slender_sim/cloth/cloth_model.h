@@ -1,8 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include <Eigen/Core>
+#include <Eigen/SparseCore>
 
 #include "slender_sim/cloth/cloth_state.h"
 #include "slender_sim/energy/membrane.h"
@@ -35,6 +37,10 @@ struct ClothModel
   double stiffness_damping = 0.0;    ///< Rayleigh [s]
   double wind_coefficient = 0.0;     ///< [N s/m^3]: pressure per normal velocity of the air against the cloth
 
+  /// Weighted averages of vertices that are prescribed (averages x vertices, rows sum to 1; see WeakConstraints); null: none. Implicit steps only.
+  std::shared_ptr<const Eigen::SparseMatrix<double, Eigen::RowMajor>> averages;
+
+  int averageCount() const { return averages ? static_cast<int>(averages->rows()) : 0; }
   int vertices() const { return static_cast<int>(rest.vertices.cols()); }
   double totalMass() const { return mass.sum(); }
 };

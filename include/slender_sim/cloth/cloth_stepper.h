@@ -12,6 +12,7 @@ namespace slender {
 struct ClothInputs
 {
   Eigen::Matrix3Xd pins;                  ///< where each pin shall be at the end of the step, 3 x pins; the motion inside it is uniform
+  Eigen::Matrix3Xd averages;              ///< what the model's averages shall be at the end of the step, 3 x count; in between their motion is uniform
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
   Eigen::Matrix3Xd forces;                ///< extra forces on the vertices, 3 x n [N], or empty
@@ -54,6 +55,10 @@ public:
 
   /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step.
   const Eigen::Matrix3Xd& pinForces() const;
+
+  /// Force [N] with which each prescribed average acts on the cloth (3 x count), spread over its vertices by their weights: the Lagrange multipliers at the end
+  /// of the last successful step.
+  const Eigen::Matrix3Xd& averageForces() const;
 
   ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;
   /// What `automatic` took.

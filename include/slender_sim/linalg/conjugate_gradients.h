@@ -25,7 +25,8 @@ public:
       v->assign(4 * points, 0.0);
   }
 
-  /// Solves A x = b from x = 0. apply(p, ap) writes A p, precondition(r, z) writes P r; both leave fixed points zero. Stops at the
+  /// Solves A x = b from x = 0. apply(p, ap) writes A p, precondition(r, z) writes P r and may take out of r what no
+  /// direction of the search sees; both leave fixed points zero. Stops at the
   /// tolerance, after max_iterations, or at negative curvature with the x so far.
   template <class Apply, class Precondition>
   LinearResult solve(const PointVector& b, PointVector& x, double tolerance, int max_iterations, Apply apply, Precondition precondition)
