@@ -48,15 +48,20 @@ ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& verti
   ClothState state;
   state.x = vertices;
   state.v = Eigen::Matrix3Xd::Zero(3, vertices.cols());
+  if (model.undeformed.cols() != 0 && (model.undeformed.cols() != model.vertices() || !model.undeformed.allFinite()))
+    throw std::invalid_argument("cloth '" + model.name + "': the undeformed shape needs " + std::to_string(model.vertices()) + " finite vertices, got " +
+                                std::to_string(model.undeformed.cols()));
   if (model.bending == BendingModel::hinge)
   {
     const Eigen::VectorXd none = Eigen::VectorXd::Zero(model.topology.hingeCount());
     const HingeBending hinges(model.topology.hinges, none, none);
     PointVector points;
-    toPoints(model.rest.vertices, points);
+    toPoints(model.undeformed.cols() ? model.undeformed : model.rest.vertices, points);
     Eigen::VectorXd angles(hinges.paddedCount());
     hinges.angles(points.data(), angles.data());
     state.rest_angles = angles.head(hinges.count());
+    if (std::isfinite(model.plasticity.yield_curvature))
+      state.stiffening = Eigen::VectorXd::Ones(hinges.count());
   }
   return state;
 }

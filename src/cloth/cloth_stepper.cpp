@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "cloth_system.h"
+#include "slender_sim/cloth/plastic_flow.h"
 
 namespace slender {
 
@@ -33,6 +34,7 @@ private:
   Eigen::Vector3d pinAt(const ClothInputs& inputs, std::size_t pin, double fraction) const;
   double largest(const PointVector& d) const;
 
+  PlasticFlow plastic_;
   ClothState work_;
   Eigen::Matrix3Xd pins_start_, averages_start_, averages_;
   PointVector x_, best_, trial_, d_, pin_motion_, v_, force_;
@@ -40,7 +42,7 @@ private:
 };
 
 ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
-  : model(std::move(m)), options(o), system(*model, o)
+  : model(std::move(m)), options(o), system(*model, o), plastic_(*model)
 {
   const std::string who = "cloth '" + model->name + "': ";
   if (o.integrator != Integrator::implicit_euler && o.integrator != Integrator::symplectic_euler)
@@ -90,6 +92,8 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
   check(s.x.allFinite() && s.v.allFinite(), "the state");
   check(model->bending != BendingModel::hinge || (s.rest_angles.size() == model->topology.hingeCount() && s.rest_angles.allFinite()),
         "rest angles of the state (one per hinge)");
+  check(!plastic_.active() || (s.stiffening.size() == model->topology.hingeCount() && s.stiffening.allFinite() && (s.stiffening.array() > 0).all()),
+        "stiffening of the state (positive, one per hinge)");
   bool sound = true;
   for (std::size_t k = 0; k < s.pins.size(); ++k)
     sound = sound && s.pins[k] >= 0 && s.pins[k] < n && (k == 0 || s.pins[k] > s.pins[k - 1]);
@@ -130,6 +134,7 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   if (!inputsFine(state, inputs, duration, what))
     return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   work_ = state;
+  plastic_.flow(work_, duration);   // at the start, which sees what collisions made of the last step (thesis 6.4.4)
   pins_start_.resize(3, static_cast<Eigen::Index>(state.pins.size()));
   for (std::size_t k = 0; k < state.pins.size(); ++k)
     pins_start_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
@@ -325,7 +330,7 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
   const int n = model->vertices();
   toPoints(work_.x, x_);
   toPoints(work_.v, v_);
-  system.setRestAngles(work_.rest_angles);
+  system.setHinges(work_);
   if (model->stiffness_damping > 0)
   {
     for (std::size_t i = 0; i < x_.size(); ++i)
@@ -335,7 +340,8 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
   std::fill(d_.begin(), d_.end(), 0.0);
   const ClothEvaluation here = system.addInternal(x_, d_);
   std::fill(force_.begin(), force_.end(), 0.0);
-  system.addWind(x_, v_, inputs.wind, force_);
+  if (system.wind().active())
+    system.wind().addForces(x_, v_, inputs.wind, force_);
   for (int i = 0; i < n; ++i)
   {
     Eigen::Vector3d f = point(force_, i) - point(d_, i) + model->mass[i] * (inputs.gravity - model->mass_damping * point(v_, i));
@@ -380,7 +386,7 @@ ClothEnergies ClothStepper::energies(const ClothState& state, const Eigen::Vecto
   PointVector x;
   toPoints(state.x, x);
   PointVector unused(x.size(), 0.0);
-  system.setRestAngles(state.rest_angles);
+  system.setHinges(state);
   system.setViscosity(0.0, x);
   const ClothEvaluation e = system.addInternal(x, unused);
   result.membrane = e.membrane;

@@ -64,7 +64,7 @@ double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs
 
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
   : model_(model), solver_(chosen(model, options)), linear_tolerance_(options.linear_tolerance)
-  , membrane_(model.rest, model.membrane, model.warp)
+  , membrane_(model.rest, model.membrane, model.warp), wind_(model)
 {
   const int n = points();
   const bool direct = solver_ == ClothSolver::cholesky;
@@ -76,6 +76,8 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     constant_bending_ = model.bending != BendingModel::hinge;
     if (!constant_bending_)
       hinges_ = std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()));
+    if (hinges_ && std::isfinite(model.plasticity.yield_curvature))
+      hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient);
     if (constant_bending_ || !direct)
       bending_ = isometricBending(model.rest, t, element, coefficient);
   }
@@ -113,11 +115,6 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     v->assign(4 * n, 0.0);
   weight_.assign(n, 0.0);
   held_.assign(n, 0);
-  if (model.wind_coefficient > 0)
-  {
-    drag_.assign(n, Eigen::Matrix3d::Zero());
-    wind_target_.assign(4 * n, 0.0);
-  }
   if (model.stiffness_damping > 0)
   {
     for (auto& s : strains_)
@@ -127,11 +124,13 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
   }
 }
 
-void ClothSystem::setRestAngles(const Eigen::VectorXd& angles)
+void ClothSystem::setHinges(const ClothState& state)
 {
   if (hinges_)
     for (int h = 0; h < hinges_->count(); ++h)
-      hinges_->setRestAngle(h, angles[h]);
+      hinges_->setRestAngle(h, state.rest_angles[h]);
+  for (Eigen::Index h = 0; h < hinge_stiffness_.size(); ++h)
+    hinges_->setStiffness(static_cast<int>(h), state.stiffening[h] * hinge_stiffness_[h]);
 }
 
 void ClothSystem::setViscosity(double ratio, const PointVector& x)
@@ -150,37 +149,6 @@ void ClothSystem::setViscosity(double ratio, const PointVector& x)
     if (ratio > 0)
       hinges_->angles(x.data(), angles_.data());
     hinges_->setResponse(ratio, angles_.data());
-  }
-}
-
-/// D of the wind: on each vertex a third of c A n n^T of its faces, times the factor.
-void ClothSystem::gatherDrag(const PointVector& x, double factor)
-{
-  std::fill(drag_.begin(), drag_.end(), Eigen::Matrix3d::Zero());
-  for (Eigen::Index f = 0; f < model_.rest.triangles.cols(); ++f)
-  {
-    const Eigen::Vector3i t = model_.rest.triangles.col(f);
-    const Eigen::Vector3d origin = point(x, t[0]);
-    const Eigen::Vector3d area = 0.5 * (point(x, t[1]) - origin).cross(point(x, t[2]) - origin);
-    const double size = area.norm();
-    if (!(size > 0))
-      continue;
-    const Eigen::Matrix3d drag = factor * model_.wind_coefficient / (3.0 * size) * area * area.transpose();
-    for (int k = 0; k < 3; ++k)
-      drag_[t[k]] += drag;
-  }
-}
-
-void ClothSystem::addWind(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind, PointVector& force) const
-{
-  for (Eigen::Index f = 0; f < model_.rest.triangles.cols() && !drag_.empty(); ++f)
-  {
-    const Eigen::Vector3i t = model_.rest.triangles.col(f);
-    const Eigen::Vector3d origin = point(x, t[0]);
-    const Eigen::Vector3d area = 0.5 * (point(x, t[1]) - origin).cross(point(x, t[2]) - origin);
-    const double size = area.norm();
-    for (int k = 0; k < 3 && size > 0; ++k)
-      point(force, t[k]) += model_.wind_coefficient / (3.0 * size) * area.dot(wind - point(v, t[k])) * area;
   }
 }
 
@@ -222,7 +190,7 @@ void ClothSystem::beginStep(const ClothState& state, const ClothInputs& inputs, 
     held_[p] = 1;
   toPoints(state.x, start_);
   h_ = h;
-  setRestAngles(state.rest_angles);
+  setHinges(state);
   setViscosity(model_.stiffness_damping / h, start_);
   setWeights(h, ratio_);
   const bool extra = inputs.forces.cols() > 0;
@@ -233,12 +201,8 @@ void ClothSystem::beginStep(const ClothState& state, const ClothInputs& inputs, 
     if (extra)
       point(force_, i) += inputs.forces.col(i);
   }
-  if (!drag_.empty())
-  {
-    gatherDrag(start_, 1.0 / h);
-    for (int i = 0; i < n; ++i)
-      point(wind_target_, i) = state.x.col(i) + h * inputs.wind;
-  }
+  if (wind_.active())
+    wind_.begin(start_, start_, state.v, inputs.wind, h, force_);
 }
 
 ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)
@@ -249,12 +213,8 @@ ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)
     const Eigen::Vector3d away = point(x, i) - point(target_, i);
     Eigen::Vector3d slope = weight_[i] * away - point(force_, i);
     result.potential += 0.5 * weight_[i] * away.squaredNorm() - point(force_, i).dot(point(x, i) - point(start_, i));
-    if (!drag_.empty())
-    {
-      const Eigen::Vector3d past = point(x, i) - point(wind_target_, i), drag = drag_[i] * past;
-      result.potential += 0.5 * past.dot(drag);
-      slope += drag;
-    }
+    if (wind_.active())
+      result.potential += wind_.addGradient(i, point(x, i), slope);
     if (with_gradient)
       point(gradient_, i) += slope;
   }
@@ -326,8 +286,8 @@ ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind k
     result.bending = hinges_->addHessian(kind, x.data(), hinge_slots_, gradient_.data(), matrix_.values());
   else if (constant_bending_)
     result.bending = addIsometric(x, gradient_);
-  for (std::size_t i = 0; i < drag_.size(); ++i)
-    Eigen::Map<Eigen::Matrix3d>(matrix_.values() + 9 * matrix_.starts()[i]) += drag_[i];
+  if (wind_.active())
+    wind_.addHessian(matrix_);
   return result;
 }
 

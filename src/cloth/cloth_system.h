@@ -9,6 +9,7 @@
 #include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/constrained_cholesky.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
+#include "wind_load.h"
 
 namespace slender {
 
@@ -35,7 +36,7 @@ public:
   /// A step of length h from (x, v), and what is held.
   void beginStep(const ClothState& state, const ClothInputs& inputs, double h);
   /// Elastic response and loads only, for explicit steps and energies.
-  void setRestAngles(const Eigen::VectorXd& angles);
+  void setHinges(const ClothState& state);
   /// Strains at x as those that viscous response of the given ratio starts from; 0: none.
   void setViscosity(double ratio, const PointVector& x);
 
@@ -62,12 +63,10 @@ public:
   const PointVector& start() const { return start_; }
   const PointVector& target() const { return target_; }
   const std::vector<char>& held() const { return held_; }
-  /// Wind and drag on the vertices for velocities v [N], added.
-  void addWind(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind, PointVector& force) const;
+  const WindLoad& wind() const { return wind_; }
 
 private:
   void setWeights(double h, double ratio);
-  void gatherDrag(const PointVector& x, double factor);
   void applyMatrix(const PointVector& p, PointVector& ap);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
@@ -80,7 +79,9 @@ private:
   ClothSolver solver_;
   const double linear_tolerance_;
   MembraneEnergy membrane_;
+  WindLoad wind_;
   std::unique_ptr<HingeBending> hinges_;      ///< hinge bending only
+  Eigen::VectorXd hinge_stiffness_;           ///< without stiffening; with plasticity only
   PointMatrix bending_, stand_in_;            ///< isometric model, or for hinges what preconditions; rest membrane
   bool constant_bending_ = false;             ///< bending_ is the model, not a stand-in
   bool bending_in_blocks_ = false;
@@ -98,8 +99,7 @@ private:
   Eigen::Matrix3Xd averages_now_;
 
   double h_ = 0, ratio_ = 0;
-  PointVector start_, viscous_start_, target_, force_, wind_target_, gradient_, product_, right_, correction_, weight_;
-  std::vector<Eigen::Matrix3d> drag_;         ///< empty without wind
+  PointVector start_, viscous_start_, target_, force_, gradient_, product_, right_, correction_, weight_;
   std::vector<char> held_;
   AlignedVector<double> strains_[3], angles_;
 };

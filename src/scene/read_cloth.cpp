@@ -4,10 +4,7 @@
 #include <stdexcept>
 
 #include "generators.h"
-#include "read_parts.h"
-#include "slender_sim/geometry/mesh_defects.h"
-#include "slender_sim/geometry/mesh_file.h"
-#include "slender_sim/geometry/mesh_shapes.h"
+#include "read_cloth_mesh.h"
 
 /// Cloths, their meshes, materials and grasps.
 namespace slender {
@@ -15,123 +12,32 @@ namespace slender {
 namespace {
 
 const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
-constexpr int max_cells = 2000;   // per side of a grid
-
-std::optional<ClothGrid> readGrid(const YamlCursor& at, TriangleMesh& mesh)
+void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
 {
-  ClothGrid grid;
+  if (!at.present())
+  {
+    return;
+  }
   YamlMap map(at);
-  assign(grid.corner, map.get("corner").vector3(coordinate));
-  const YamlCursor at_sides = map.require("sides"), at_cells = map.require("cells"), at_seed = map.get("seed");
-  const auto sides = at_sides.present() ? at_sides.items(2, 2) : std::vector<YamlCursor>{};
-  bool good = sides.size() == 2;
-  for (std::size_t k = 0; k < sides.size(); ++k)
-  {
-    const auto side = sides[k].vector3(coordinate);
-    good = good && side;
-    assign(grid.sides[k], side);
-    if (side && !(side->norm() > 0))
-    {
-      sides[k].problem("has no length");
-      good = false;
-    }
-  }
-  const double width = grid.sides[0].norm(), height = grid.sides[1].norm();
-  if (good && std::abs(grid.sides[0].dot(grid.sides[1])) > 1e-6 * width * height)
-  {
-    at_sides.problem("must be at right angles; other shapes come from a mesh file");
-    good = false;
-  }
-  int columns = 0, rows = 0;
-  if (at_cells.isList())
-  {
-    const auto cells = at_cells.items(2, 2);
-    for (std::size_t k = 0; k < cells.size(); ++k)
-    {
-      assign(k == 0 ? columns : rows, cells[k].integer(1, max_cells, "cells"));
-    }
-    good = good && columns > 0 && rows > 0;
-  }
-  else if (at_cells.present())
-  {
-    assign(columns, at_cells.integer(1, max_cells, "cells"));
-    good = good && columns > 0;
-    if (good && height / width * columns > max_cells)
-    {
-      at_cells.problem("makes more than " + std::to_string(max_cells) + " rows; give [columns, rows]");
-      good = false;
-    }
-  }
-  else
-  {
-    good = false;
-  }
-  GridPattern pattern = GridPattern::equilateral;
-  assign(pattern, map.get("pattern").choice<GridPattern>({{"one_diagonal", GridPattern::one_diagonal},
-                                                          {"alternating", GridPattern::alternating},
-                                                          {"equilateral", GridPattern::equilateral},
-                                                          {"irregular", GridPattern::irregular}}));
-  int seed = 1;
-  assign(seed, at_seed.integer(0, 2'000'000'000));
-  if (at_seed.present() && pattern != GridPattern::irregular)
-  {
-    at_seed.problem("is for pattern: irregular");
-  }
+  assign(cloth.plasticity.yield_curvature, map.require("yield_curvature").number(Range::closed(0, 1e9, "1/m")));
+  assign(cloth.plasticity.hardening, map.get("hardening").number(Range::closed(-1e6, 1e6, "m")));
+  assign(cloth.plasticity.creep_time, map.get("creep_time").number(Range::closed(0, 1e9, "s")));
   map.finish();
-  if (!good)
+  if (cloth.bending != BendingModel::hinge)
   {
-    return std::nullopt;
+    at.problem("needs rest angles that can flow, which only bending: {model: hinge} has; the isometric models are for flat rest shapes");
   }
-  try
-  {
-    mesh = gridMesh(width, height, columns, rows, pattern, static_cast<unsigned>(seed));
-  }
-  catch (const std::invalid_argument& error)
-  {
-    at.problem(error.what());
-    return std::nullopt;
-  }
-  Eigen::Matrix<double, 3, 2> axes;
-  axes << grid.sides[0] / width, grid.sides[1] / height;
-  mesh.vertices = ((axes * mesh.vertices.topRows<2>()).colwise() + grid.corner).eval();
-  return grid;
 }
 
-/// False when there is none to be used; reported.
-bool readMeshFile(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh)
+Aerodynamics readAerodynamics(const YamlCursor& at)
 {
+  Aerodynamics air;
   YamlMap map(at);
-  const YamlCursor file = map.require("file");
-  double scale = 1.0;
-  assign(scale, map.get("scale").number(Range::above(0, 1e6)));
-  const Pose pose = readPose(map.get("pose")).value_or(Pose{});
+  assign(air.air_density, map.get("air_density").number(Range::above(0, 1e5, "kg/m^3")));
+  assign(air.drag, map.get("drag").number(Range::closed(0, 1e3)));
+  assign(air.lift, map.get("lift").number(Range::closed(0, 1e3)));
   map.finish();
-  const auto path = file.text();
-  if (!path)
-  {
-    return false;
-  }
-  try
-  {
-    mesh = slender::readMesh(context.resolve(*path));
-    mesh.vertices *= scale;
-    for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
-    {
-      mesh.vertices.col(i) = pose * Eigen::Vector3d(mesh.vertices.col(i));
-    }
-    requireSoundMesh(mesh, *path);
-  }
-  catch (const std::exception& error)
-  {
-    file.problem(error.what());
-    return false;
-  }
-  if (!(mesh.vertices.cwiseAbs().maxCoeff() <= max_coordinate))
-  {
-    file.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m after scale and pose");
-    return false;
-  }
-  return true;
+  return air;
 }
 
 /// Mass, membrane and bending.
@@ -163,6 +69,7 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
                                                                    {"none", BendingModel::none}}));
   const YamlCursor bending_modulus = bending.get("modulus");
   bending.finish();
+  readPlasticity(map.get("plasticity"), cloth);
   if (at_membrane.present())
   {
     double warp = 300, weft = 300, poisson = 0.0, shear = 100;
@@ -221,7 +128,7 @@ std::vector<int> alongSide(const ClothConfig& cloth, int axis, bool far)
   return found;
 }
 
-std::vector<int> readNear(const YamlCursor& at, const TriangleMesh& mesh)
+std::vector<int> readNear(const YamlCursor& at, const Eigen::Matrix3Xd& vertices)
 {
   YamlMap map(at);
   const auto point = map.require("point").vector3(coordinate);
@@ -231,7 +138,7 @@ std::vector<int> readNear(const YamlCursor& at, const TriangleMesh& mesh)
   {
     return {};
   }
-  const Eigen::VectorXd distance = (mesh.vertices.colwise() - *point).colwise().norm();
+  const Eigen::VectorXd distance = (vertices.colwise() - *point).colwise().norm();
   Eigen::Index nearest = 0;
   const double least = distance.minCoeff(&nearest);
   std::vector<int> found;
@@ -279,7 +186,7 @@ std::vector<int> readHeldVertices(YamlMap& map, const ClothConfig& cloth)
   }
   if (near.present())
   {
-    return readNear(near, cloth.mesh);
+    return readNear(near, cloth.start.cols() ? cloth.start : cloth.mesh.vertices);
   }
   using Sides = std::pair<int, int>;   // 1: far, 0: near, -1: all, along the first and the second side
   const YamlCursor& word = corner.present() ? corner : edge;
@@ -349,14 +256,22 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
   }
   else if (grid.present())
   {
-    cloth.grid = readGrid(grid, cloth.mesh);
+    cloth.grid = readClothGrid(grid, cloth.mesh);
     cloth.warp = cloth.grid ? Eigen::Vector3d(cloth.grid->sides[0].normalized()) : cloth.warp;
   }
-  else if (!readMeshFile(mesh, context, cloth.mesh))
+  else if (!readClothMesh(mesh, context, cloth.mesh))
   {
     cloth.mesh = TriangleMesh{};
   }
   readMaterials(map, cloth);
+  const YamlCursor undeformed = map.get("undeformed");
+  cloth.undeformed = readClothShape(undeformed, context, cloth.mesh);
+  cloth.start = readClothShape(map.get("start"), context, cloth.mesh);
+  if (undeformed.present() && cloth.bending != BendingModel::hinge)
+  {
+    undeformed.problem("gives angles at rest, which only bending: {model: hinge} has; the isometric models are for flat rest shapes");
+  }
+  cloth.aerodynamics = readAerodynamics(map.get("aerodynamics"));
   YamlMap damping(map.get("damping"));
   assign(cloth.mass_damping, damping.get("mass").number(Range::closed(0, 1e6, "1/s")));
   assign(cloth.stiffness_damping, damping.get("stiffness").number(Range::closed(0, 1e3, "s")));

@@ -17,6 +17,9 @@ ClothModel modelOf(const ClothConfig& config)
   model.mass_damping = config.mass_damping;
   model.stiffness_damping = config.stiffness_damping;
   model.wind_coefficient = config.drag;
+  model.aerodynamics = config.aerodynamics;
+  model.plasticity = config.plasticity;
+  model.undeformed = config.undeformed;
   return model;
 }
 
@@ -81,7 +84,7 @@ void Simulation::buildCloths()
       options.newton = config_.time.newton;
       cloth_steppers_.emplace_back(cloth_models_.back(), options);
       SceneCloth held;
-      held.cloth = makeClothState(*cloth_models_.back(), config.mesh.vertices);
+      held.cloth = makeClothState(*cloth_models_.back(), config.start.cols() ? config.start : config.mesh.vertices);
       for (std::size_t g = 0; g < config.grasps.size(); ++g)
       {
         checkVertices(config.grasps[g].vertices, config, held, g);

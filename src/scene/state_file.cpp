@@ -18,7 +18,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 6;
+constexpr std::uint64_t version = 7;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -113,6 +113,7 @@ void visitCloth(Archive& archive, State& held)
   archive(held.cloth.x);
   archive(held.cloth.v);
   archive(held.cloth.rest_angles);
+  archive(held.cloth.stiffening);
   const auto indices = [&archive](auto& values) {
     archive.list(values);
     for (auto& value : values)
@@ -295,7 +296,8 @@ bool fits(const ThreadState& thread)
 bool fits(const SceneCloth& held, const SceneCloth& now)
 {
   bool good = held.cloth.x.cols() == now.cloth.x.cols() && held.cloth.v.cols() == now.cloth.v.cols() &&
-              held.cloth.rest_angles.size() == now.cloth.rest_angles.size() && held.grasps.size() == now.grasps.size();
+              held.cloth.rest_angles.size() == now.cloth.rest_angles.size() &&
+              held.cloth.stiffening.size() == now.cloth.stiffening.size() && held.grasps.size() == now.grasps.size();
   const auto there = [&held](int vertex) { return vertex >= 0 && vertex < held.cloth.x.cols(); };
   good = good && std::all_of(held.cloth.pins.begin(), held.cloth.pins.end(), there);
   std::size_t pins = 0;

@@ -92,8 +92,11 @@ std::uint64_t Simulation::fingerprint() const
     }
     out(model.mass);
     out(model.warp);
+    out(model.undeformed);
     for (const double value : {model.membrane.c11, model.membrane.c12, model.membrane.c22, model.membrane.c33, model.bending_modulus,
-                               model.mass_damping, model.stiffness_damping, model.wind_coefficient, config_.cloths[k].linear_tolerance})
+                               model.mass_damping, model.stiffness_damping, model.wind_coefficient, model.aerodynamics.air_density,
+                               model.aerodynamics.drag, model.aerodynamics.lift, model.plasticity.yield_curvature, model.plasticity.hardening,
+                               model.plasticity.creep_time, config_.cloths[k].linear_tolerance})
     {
       out(value);
     }

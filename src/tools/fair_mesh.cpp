@@ -1,28 +1,22 @@
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "slender_sim/fairing/hole_filling.h"
-#include "slender_sim/fairing/willmore_flow.h"
-#include "slender_sim/geometry/mesh_defects.h"
+#include "arguments.h"
+#include "slender_sim/fairing/fair_mesh.h"
 #include "slender_sim/geometry/mesh_file.h"
 
 /// fair_mesh IN OUT: smooths meshes and closes their holes by Willmore flow. Exit status 0 done, 2 bad input, 3 the fairing failed.
 namespace {
 
-using slender::TriangleMesh;
+using slender::BadInput, slender::parseCount, slender::parseNumber, slender::parsePositive;
 using Clock = std::chrono::steady_clock;
 
-/// Newton-like, of a step at most: enough for the implicit Euler method to the eye.
-constexpr int iterations = 10;
 constexpr int exit_done = 0, exit_bad_input = 2, exit_failed = 3;
 
 const char* const usage =
@@ -37,64 +31,15 @@ const char* const usage =
   "  --quiet             print nothing but errors\n"
   "A boundary and the vertices next to it keep their places. Exit status: 0 done, 2 bad input, 3 the fairing failed (no OUT then).\n";
 
-struct BadInput : std::runtime_error
-{
-  using std::runtime_error::runtime_error;
-};
-
-struct Failed : std::runtime_error
-{
-  using std::runtime_error::runtime_error;
-};
-
-struct Ball
-{
-  Eigen::Vector3d middle;
-  double radius;
-};
-
 struct Options
 {
   std::vector<std::string> files;
+  slender::FairingOptions fairing;
   std::optional<int> steps;
-  std::optional<double> smoothing;
-  std::vector<Ball> region;
-  int largest_hole = slender::kLongestHole;
-  double edge_length = 0.0;
-  bool fill_holes = false, quiet = false, help = false;
+  bool quiet = false, help = false;
 };
 
-bool parseNumber(const std::string& text, double& value)
-{
-  std::size_t end = 0;
-  try
-  {
-    value = std::stod(text, &end);
-  }
-  catch (const std::exception&)
-  {
-    return false;
-  }
-  return end == text.size() && std::isfinite(value);
-}
-
-double parsePositive(const std::string& name, const std::string& text)
-{
-  double value = 0.0;
-  if (!parseNumber(text, value) || !(value > 0))
-    throw BadInput(name + " " + text + ": must be a positive number");
-  return value;
-}
-
-int parseCount(const std::string& name, const std::string& text, int low, int high)
-{
-  double value = 0.0;
-  if (!parseNumber(text, value) || value != std::floor(value) || value < low || value > high)
-    throw BadInput(name + " " + text + ": must be a whole number in [" + std::to_string(low) + ", " + std::to_string(high) + "]");
-  return static_cast<int>(value);
-}
-
-Ball parseBall(const std::string& name, const std::string& text)
+slender::FairingOptions::Ball parseBall(const std::string& name, const std::string& text)
 {
   double numbers[4];
   std::size_t begin = 0;
@@ -122,15 +67,15 @@ Options parseOptions(int argc, char** argv)
     if (argument == "--steps")
       options.steps = parseCount(argument, value(), 0, 1000000);
     else if (argument == "--smoothing")
-      options.smoothing = parsePositive(argument, value());
+      options.fairing.smoothing = parsePositive(argument, value());
     else if (argument == "--region")
-      options.region.push_back(parseBall(argument, value()));
+      options.fairing.region.push_back(parseBall(argument, value()));
     else if (argument == "--fill-holes")
-      options.fill_holes = true;
+      options.fairing.fill_holes = true;
     else if (argument == "--largest-hole")
-      options.largest_hole = parseCount(argument, value(), 3, slender::kLongestHole);
+      options.fairing.largest_hole = parseCount(argument, value(), 3, slender::kLongestHole);
     else if (argument == "--edge-length")
-      options.edge_length = parsePositive(argument, value());
+      options.fairing.edge_length = parsePositive(argument, value());
     else if (argument == "--quiet")
       options.quiet = true;
     else if (argument == "--help" || argument == "-h")
@@ -142,6 +87,7 @@ Options parseOptions(int argc, char** argv)
   }
   if (!options.help && options.files.size() != 2)
     throw BadInput(std::string("one mesh to read and one to write are needed\n") + usage);
+  options.fairing.steps = options.steps.value_or(options.fairing.fill_holes ? 0 : 10);
   return options;
 }
 
@@ -176,93 +122,33 @@ private:
   Clock::time_point last_{};
 };
 
-/// What was done, for the summary.
-struct Outcome
-{
-  int holes = 0, open_holes = 0, patch_vertices = 0;
-  int steps = 0, cuts = 0;
-  bool stationary = false;
-  double energy_before = 0.0, energy = 0.0;
-};
-
-void fillHoles(TriangleMesh& mesh, const Options& options, Progress& progress, Outcome& outcome)
-{
-  const auto loops = slender::meshTopology(mesh).boundaries;   // later vertices are added behind: these stay valid
-  slender::HoleOptions hole;
-  hole.edge_length = options.edge_length;
-  for (std::size_t k = 0; k < loops.size(); ++k)
-  {
-    progress.show("hole", k, loops.size());
-    if (static_cast<int>(loops[k].size()) > options.largest_hole)
-    {
-      ++outcome.open_holes;
-      continue;
-    }
-    const slender::HoleReport report = slender::fillHole(mesh, loops[k], hole);
-    if (!report.ok)
-      throw Failed("the hole of " + std::to_string(loops[k].size()) + " edges at vertex " + std::to_string(loops[k].front()) + " (from 0) failed: " + report.message +
-                   "; --largest-hole leaves long ones open");
-    ++outcome.holes;
-    outcome.patch_vertices += report.vertices;
-  }
-}
-
-double meanEdge(const TriangleMesh& mesh, const slender::MeshTopology& topology)
-{
-  double sum = 0.0;
-  for (Eigen::Index e = 0; e < topology.edges.cols(); ++e)
-    sum += (mesh.vertices.col(topology.edges(0, e)) - mesh.vertices.col(topology.edges(1, e))).norm();
-  return sum / static_cast<double>(topology.edges.cols());
-}
-
-void smooth(TriangleMesh& mesh, int steps, const Options& options, Progress& progress, Outcome& outcome)
-{
-  const slender::MeshTopology topology = slender::meshTopology(mesh);
-  std::vector<char> selected;
-  for (Eigen::Index v = 0; !options.region.empty() && v < mesh.vertices.cols(); ++v)
-    selected.push_back(std::any_of(options.region.begin(), options.region.end(),
-                                   [&](const Ball& ball) { return (mesh.vertices.col(v) - ball.middle).norm() <= ball.radius; }));
-  const double length = options.smoothing ? *options.smoothing : meanEdge(mesh, topology);
-  slender::WillmoreFlow flow(mesh, topology, std::pow(length, 4), iterations, selected);
-  outcome.energy_before = outcome.energy = flow.energy(mesh.vertices);
-  for (int k = 0; k < steps && !outcome.stationary; ++k)
-  {
-    progress.show("step", static_cast<std::size_t>(k), static_cast<std::size_t>(steps));
-    const slender::FairingReport report = flow.step(mesh.vertices);
-    if (!report.ok)
-      throw Failed("step " + std::to_string(k + 1) + " of " + std::to_string(steps) + " failed: " + report.message);
-    outcome.steps += !report.stationary;
-    outcome.cuts += report.cuts;
-    outcome.energy = report.energy;
-    outcome.stationary = report.stationary;
-  }
-}
-
 int run(const Options& options)
 {
   const auto start = Clock::now();
   const std::string &in = options.files[0], &out = options.files[1];
-  TriangleMesh mesh = slender::readMesh(in);
+  slender::TriangleMesh mesh = slender::readMesh(in);
   slender::requireMeshName(out);
-  slender::requireSoundMesh(mesh, in);
-  const int steps = options.steps.value_or(options.fill_holes ? 0 : 10);
-  Outcome outcome;
+  const bool fills = options.fairing.fill_holes, flows = options.fairing.steps > 0;
+  slender::FairingSummary summary;
   {
     Progress progress(!options.quiet && ::isatty(STDERR_FILENO));
-    if (options.fill_holes)
-      fillHoles(mesh, options, progress, outcome);
-    if (steps > 0)
-      smooth(mesh, steps, options, progress, outcome);
+    summary = slender::fairMesh(mesh, in, options.fairing,
+                                [&progress](const char* what, std::size_t done, std::size_t total) { progress.show(what, done, total); });
+  }
+  if (!summary.ok)
+  {
+    std::fprintf(stderr, "fair_mesh: %s\n", summary.message.c_str());
+    return exit_failed;
   }
   slender::writeMesh(out, mesh);
   if (options.quiet)
     return exit_done;
   std::printf("mesh              %s, %ld vertices, %ld faces\n", out.c_str(), static_cast<long>(mesh.vertices.cols()), static_cast<long>(mesh.triangles.cols()));
-  if (options.fill_holes)
-    std::printf("holes             %d closed by %d vertices, %d left open\n", outcome.holes, outcome.patch_vertices, outcome.open_holes);
-  if (steps > 0)
-    std::printf("steps             %d%s, %d halvings\n1/2 int H^2       %.6g, was %.6g (a sphere has 8 pi = 25.13)\n", outcome.steps,
-                outcome.stationary ? " (stationary)" : "", outcome.cuts, outcome.energy, outcome.energy_before);
+  if (fills)
+    std::printf("holes             %d closed by %d vertices, %d left open\n", summary.holes, summary.patch_vertices, summary.open_holes);
+  if (flows)
+    std::printf("steps             %d%s, %d halvings\n1/2 int H^2       %.6g, was %.6g (a sphere has 8 pi = 25.13)\n", summary.steps,
+                summary.stationary ? " (stationary)" : "", summary.cuts, summary.energy, summary.energy_before);
   std::printf("wall              %.4g s\n", std::chrono::duration<double>(Clock::now() - start).count());
   return exit_done;
 }
@@ -280,11 +166,6 @@ int main(int argc, char** argv)
       return exit_done;
     }
     return run(options);
-  }
-  catch (const Failed& error)
-  {
-    std::fprintf(stderr, "fair_mesh: %s\n", error.what());
-    return exit_failed;
   }
   catch (const std::exception& error)   // BadInput, a mesh with defects, a file that cannot be read or written
   {

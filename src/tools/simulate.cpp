@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
 #include "slender_sim/scene/simulation.h"
@@ -20,6 +21,7 @@
 /// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed.
 namespace {
 
+using slender::BadInput;
 using slender::Recorder;
 using slender::Simulation;
 using slender::StepReport;
@@ -38,11 +40,6 @@ const char* const usage =
   "  --quiet             print nothing but errors\n"
   "record.every of the scene says which steps are recorded. Exit status: 0 done, 2 bad input, 3 the simulation failed.\n";
 
-struct BadInput : std::runtime_error
-{
-  using std::runtime_error::runtime_error;
-};
-
 struct Options
 {
   std::string scene, bag, csv, obj;
@@ -51,28 +48,6 @@ struct Options
   std::optional<int> threads;
   bool quiet = false, help = false;
 };
-
-double parseOption(const std::string& name, const std::string& text, double low, double high, bool whole)
-{
-  std::size_t end = 0;
-  double value = 0;
-  try
-  {
-    value = std::stod(text, &end);
-  }
-  catch (const std::exception&)
-  {
-    end = 0;
-  }
-  const bool number = end == text.size() && !text.empty();
-  if (!number || !(value > low) || !(value <= high) || (whole && value != std::floor(value)))
-  {
-    char range[64];
-    std::snprintf(range, sizeof range, "(%g, %g]", low, high);
-    throw BadInput(name + " " + text + ": must be a " + (whole ? "whole " : "") + "number in " + range);
-  }
-  return value;
-}
 
 Options parseOptions(int argc, char** argv)
 {
@@ -89,11 +64,11 @@ Options parseOptions(int argc, char** argv)
     };
     if (argument == "--duration")
     {
-      options.duration = parseOption(argument, value(), 0, 1e7, false);
+      options.duration = slender::parsePositive(argument, value(), 1e7);
     }
     else if (argument == "--threads")
     {
-      options.threads = static_cast<int>(parseOption(argument, value(), 0, 1024, true));
+      options.threads = slender::parseCount(argument, value(), 1, 1024);
     }
     else if (argument == "--bag")
     {

@@ -14,12 +14,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
+#include "arguments.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/scene/sweep_plan.h"
@@ -31,6 +33,7 @@ extern char** environ;
 namespace {
 
 namespace fs = std::filesystem;
+using slender::BadInput;
 using slender::SweepPlan;
 using slender::study::csvCell;
 
@@ -45,34 +48,12 @@ const char kUsage[] =
     "  --count  prints the number of runs\n"
     "exit status: 0 done, 1 some runs failed (results.csv names the reasons), 2 bad input\n";
 
-struct BadInput : std::runtime_error
-{
-  using std::runtime_error::runtime_error;
-};
-
 struct Options
 {
   std::string plan, out;
   long jobs = std::max(1u, std::thread::hardware_concurrency()), point = -1;
   bool count = false;
 };
-
-long wholeNumber(const std::string& option, const std::string& text, long low)
-{
-  std::size_t end = 0;
-  long value = -1;
-  try
-  {
-    value = std::stol(text, &end);
-  }
-  catch (const std::exception&)
-  {
-    end = 0;
-  }
-  if (end == 0 || end != text.size() || value < low)
-    throw BadInput(option + " " + text + ": must be a whole number of at least " + std::to_string(low));
-  return value;
-}
 
 Options parse(const std::vector<std::string>& words)
 {
@@ -88,9 +69,9 @@ Options parse(const std::vector<std::string>& words)
     if (word == "--out")
       options.out = value();
     else if (word == "--jobs")
-      options.jobs = wholeNumber(word, value(), 1);
+      options.jobs = slender::parseCount(word, value(), 1, 100000);
     else if (word == "--point")
-      options.point = wholeNumber(word, value(), 0);
+      options.point = slender::parseCount(word, value(), 0, std::numeric_limits<int>::max());
     else if (word == "--count")
       options.count = true;
     else if (word.rfind("-", 0) == 0)

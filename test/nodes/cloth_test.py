@@ -193,9 +193,9 @@ class Cloth(NodeCase):
 
     def test_bad_meshes_are_refused_by_name(self):
         square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
-        meshes = {"needle.obj": (square + "v 2 0 0\nf 1 2 3\nf 1 3 4\nf 1 2 5\n", "face"),
-                  "fan.obj": (square + "v 0.5 0.5 1\nf 1 2 3\nf 1 3 4\nf 1 3 5\n", "edge"),
-                  "twice.obj": (square + "v 1 1 0\nf 1 2 3\nf 1 5 4\n", "same place")}
+        meshes = {"needle.obj": (square + "v 2 0 0\nf 1 2 3\nf 1 3 4\nf 1 2 5\n", "face 2"),
+                  "fan.obj": (square + "v 0.5 0.5 1\nf 1 2 3\nf 1 3 4\nf 1 3 5\n", "the edge between vertices 0 and 2"),
+                  "twice.obj": (square + "v 1 1 0\nf 1 2 3\nf 1 5 4\n", "vertices 2 and 4")}
         for name, (text, word) in sorted(meshes.items()):
             with open(self.path(name), "w") as file:
                 file.write(text)

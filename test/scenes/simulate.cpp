@@ -135,6 +135,27 @@ TEST_F(Simulate, namesFileLineKeyValueAndRange)
   EXPECT_EQ(result.output, "simulate: " + scene + ":3: rods.0.cross_section.radius = -1: is out of range; must be a number in (0, 10] m\n");
 }
 
+TEST_F(Simulate, refusesBadMeshesByName)
+{
+  const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+  const std::pair<std::string, const char*> cases[] = {
+    {square + "v 2 0 0\nf 1 2 3\nf 1 3 4\nf 1 2 5\n", "face 2 (vertices 0, 1 and 4, from 0) has (nearly) no area"},
+    {square + "v 0.5 0.5 1\nf 1 2 3\nf 1 3 4\nf 1 3 5\n", "the edge between vertices 0 and 2 (from 0) has 3 faces: 0, 1 and 2"},
+    {square + "v 1 1 0\nf 1 2 3\nf 1 5 4\n", "vertices 2 and 4 (from 0) lie at the same place"},
+  };
+  for (const auto& [obj, expected] : cases)
+  {
+    std::ofstream(folder_ + "/bad.obj") << obj;
+    std::ofstream(folder_ + "/bad.yaml") << "name: bad\ncloths:\n  - mesh: {file: bad.obj}\n";
+    const Result result = simulate(folder_ + "/bad.yaml");
+    EXPECT_EQ(result.status, 2) << result.output;
+    for (const std::string& word : {std::string("bad.yaml:3: cloths.0.mesh.file = bad.obj: bad.obj: "), std::string(expected)})
+    {
+      EXPECT_NE(result.output.find(word), std::string::npos) << word << " not in\n" << result.output;
+    }
+  }
+}
+
 TEST_F(Simulate, aFailingSimulationIsStatus3)
 {
   // Explicit steps far above the stability limit, and no step cutting to save them.

@@ -176,6 +176,9 @@ TEST(ClothAllocations, AWarmStepMakesNone)
         model->bending_modulus = 1e-4;
         model->stiffness_damping = 1e-4;
         model->wind_coefficient = 0.5;
+        model->aerodynamics = {1.2, 1.0, 0.5};
+        if (bending == BendingModel::hinge)
+          model->plasticity = {1e-6, 0.1, 0.01};
         ClothState state = makeClothState(*model, model->rest.vertices);
         pinVertices(state, {0, 8});
         ClothInputs inputs;

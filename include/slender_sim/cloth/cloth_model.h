@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -22,6 +23,24 @@ enum class BendingModel
 
 const char* toString(BendingModel model);
 
+/// Drag and lift of a thin plate, quadratic in the velocity u of the air relative to it [Keckeisen et al. 2004, Modelling Effects of Wind Fields in
+/// Cloth Animations]: with the unit normal n and c = |n . u| / |u|, an area A feels 1/2 rho A |u|^2 C_D c along u and 1/2 rho A |u|^2 C_L c sqrt(1 - c^2) across it,
+/// in the plane of u and n. Flow along the plate does nothing.
+struct Aerodynamics
+{
+  double air_density = 1.2;   ///< rho [kg/m^3] > 0
+  double drag = 0.0;          ///< C_D [-] >= 0; a plate across the flow: about 1.2
+  double lift = 0.0;          ///< C_L [-] >= 0; largest at 45 degrees, where the lift is that of C_L / 2
+};
+
+/// Curvature plasticity with hardening (thesis 6.4.4), for hinge bending; see PlasticFlow.
+struct Plasticity
+{
+  double yield_curvature = std::numeric_limits<double>::infinity();   ///< largest elastic curvature deviation [1/m] >= 0; infinity: elastic
+  double hardening = 0.0;    ///< eta [m]: creases get exp(eta * plastic curvature) times as stiff; negative: softer
+  double creep_time = 0.0;   ///< [s] in which all but 1/e of what is beyond the yield flows; 0: at once
+};
+
 /// Fixed properties of one cloth (thesis 2).
 struct ClothModel
 {
@@ -33,9 +52,12 @@ struct ClothModel
   Eigen::Vector3d warp = Eigen::Vector3d::UnitX();   ///< direction in the rest shape
   BendingModel bending = BendingModel::isometric_nonconforming;
   double bending_modulus = 0.0;      ///< D [N m], as in plate theory (see bendingCalibration)
+  Eigen::Matrix3Xd undeformed;       ///< 3 x n: its bend angles are those at rest (hinge bending); empty: those of `rest`
+  Plasticity plasticity;
   double mass_damping = 0.0;         ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;    ///< Rayleigh [s]
   double wind_coefficient = 0.0;     ///< [N s/m^3]: pressure per normal velocity of the air against the cloth
+  Aerodynamics aerodynamics;         ///< in addition
 
   /// Weighted averages of vertices that are prescribed (averages x vertices, rows sum to 1; see WeakConstraints); null: none. Implicit steps only.
   std::shared_ptr<const Eigen::SparseMatrix<double, Eigen::RowMajor>> averages;
@@ -45,12 +67,13 @@ struct ClothModel
   double totalMass() const { return mass.sum(); }
 };
 
-/// Model of a cloth of the given mass per area [kg/m^2] with a mesh as its rest shape, without bending, damping and wind; these are set
+/// Model of a cloth of the given mass per area [kg/m^2] with a mesh as its rest shape, without bending, plasticity, damping and wind; these are set
 /// afterwards. Throws std::invalid_argument naming the bad value, or the mesh's defects.
 ClothModel buildCloth(const std::string& name, const TriangleMesh& rest, double area_density, const MembraneModuli& membrane,
                       const Eigen::Vector3d& warp = Eigen::Vector3d::UnitX());
 
-/// A state at rest at the given vertices (3 x n [m]). Rest angles (hinge bending only) are those of the rest shape.
+/// A state at rest at the given vertices (3 x n [m]). Rest angles (hinge bending only) are those of the undeformed shape. Throws
+/// std::invalid_argument for vertices or an undeformed shape that do not fit.
 ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& vertices);
 
 /// Pins vertices where they are, in addition to those that already are. Throws std::invalid_argument for one that is not there.

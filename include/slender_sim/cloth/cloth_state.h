@@ -12,6 +12,7 @@ struct ClothState
   Eigen::Matrix3Xd x;            ///< vertices [m], 3 x n
   Eigen::Matrix3Xd v;            ///< velocities [m/s], 3 x n
   Eigen::VectorXd rest_angles;   ///< per hinge [rad], hinge bending only: plastic flow moves them
+  Eigen::VectorXd stiffening;    ///< per hinge: what plastic flow multiplied its stiffness by; with plasticity only
   std::vector<int> pins;         ///< held vertices, ascending
 };
 

@@ -28,6 +28,7 @@ public:
   const Eigen::Matrix4Xi& hinges() const { return hinges_; }
   double stiffness(int hinge) const { return stiffness_[hinge]; }
   double restAngle(int hinge) const { return rest_angle_[hinge]; }
+  void setStiffness(int hinge, double stiffness) { stiffness_[hinge] = response_stiffness_[hinge] = stiffness; }
   void setRestAngle(int hinge, double angle) { rest_angle_[hinge] = response_rest_[hinge] = angle; }
 
   /// Elastic response; with ratio > 0 a viscous one as well, of moment ratio k (theta - viscous_angle): the one of stiffness

@@ -262,15 +262,19 @@ struct ClothConfig
 {
   std::string name;
   std::string place;                           ///< "FILE:LINE: PATH" for messages; empty when not read from a file
-  TriangleMesh mesh;                           ///< undeformed, which is also how it starts [m]
+  TriangleMesh mesh;                           ///< undeformed [m]
+  Eigen::Matrix3Xd start;                      ///< vertices where the scene starts [m]; empty: those of the mesh
+  Eigen::Matrix3Xd undeformed;                 ///< vertices of the shape whose bend angles are those at rest (hinge bending); empty: those of the mesh
   std::optional<ClothGrid> grid;               ///< that the mesh was made from
   double area_density = 0.15;                  ///< [kg/m^2]
   MembraneModuli membrane;
   Eigen::Vector3d warp{1, 0, 0};               ///< direction in the undeformed shape; of a grid the first side
   BendingModel bending = BendingModel::isometric_nonconforming;
   double bending_modulus = 0.0;                ///< D [N m]
+  Plasticity plasticity;
   double mass_damping = 0.0;                   ///< [1/s]
   double stiffness_damping = 0.0;              ///< [s]
+  Aerodynamics aerodynamics;
   double drag = 0.0;                           ///< pressure per velocity along the normal, against the air [N s/m^3]
   ClothSolver solver = ClothSolver::automatic;
   bool one_newton_step = false;

@@ -1,0 +1,20 @@
+#include <exception>
+#include <iostream>
+
+#include <ros/ros.h>
+
+#include "slender_sim/node/fairing_node.h"
+
+int main(int argc, char** argv)
+try
+{
+  ros::init(argc, argv, "fairing_node");
+  const slender::FairingNode node(ros::NodeHandle("~"));
+  ros::spin();
+  return 0;
+}
+catch (const std::exception& e)
+{
+  std::cerr << "fairing_node: " << e.what() << std::endl;
+  return 2;
+}

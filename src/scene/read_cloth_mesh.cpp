@@ -1,0 +1,201 @@
+#include "read_cloth_mesh.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "slender_sim/geometry/mesh_defects.h"
+#include "slender_sim/geometry/mesh_file.h"
+#include "slender_sim/geometry/mesh_shapes.h"
+
+namespace slender {
+
+namespace {
+
+const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
+constexpr int max_cells = 2000;   // per side of a grid
+
+/// As it is in the file, scaled and placed. False when there is none to be used; reported.
+bool readMeshFile(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh, std::string& path)
+{
+  YamlMap map(at);
+  const YamlCursor file = map.require("file");
+  double scale = 1.0;
+  assign(scale, map.get("scale").number(Range::above(0, 1e6)));
+  const Pose pose = readPose(map.get("pose")).value_or(Pose{});
+  map.finish();
+  const auto text = file.text();
+  if (!text)
+  {
+    return false;
+  }
+  path = *text;
+  try
+  {
+    mesh = slender::readMesh(context.resolve(path));
+  }
+  catch (const std::exception& error)
+  {
+    file.problem(error.what());
+    return false;
+  }
+  mesh.vertices *= scale;
+  for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
+  {
+    mesh.vertices.col(i) = pose * Eigen::Vector3d(mesh.vertices.col(i));
+  }
+  if (!(mesh.vertices.cwiseAbs().maxCoeff() <= max_coordinate))
+  {
+    file.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m after scale and pose");
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<ClothGrid> readClothGrid(const YamlCursor& at, TriangleMesh& mesh)
+{
+  ClothGrid grid;
+  YamlMap map(at);
+  assign(grid.corner, map.get("corner").vector3(coordinate));
+  const YamlCursor at_sides = map.require("sides"), at_cells = map.require("cells"), at_seed = map.get("seed");
+  const auto sides = at_sides.present() ? at_sides.items(2, 2) : std::vector<YamlCursor>{};
+  bool good = sides.size() == 2;
+  for (std::size_t k = 0; k < sides.size(); ++k)
+  {
+    const auto side = sides[k].vector3(coordinate);
+    good = good && side;
+    assign(grid.sides[k], side);
+    if (side && !(side->norm() > 0))
+    {
+      sides[k].problem("has no length");
+      good = false;
+    }
+  }
+  const double width = grid.sides[0].norm(), height = grid.sides[1].norm();
+  if (good && std::abs(grid.sides[0].dot(grid.sides[1])) > 1e-6 * width * height)
+  {
+    at_sides.problem("must be at right angles; other shapes come from a mesh file");
+    good = false;
+  }
+  int columns = 0, rows = 0;
+  if (at_cells.isList())
+  {
+    const auto cells = at_cells.items(2, 2);
+    for (std::size_t k = 0; k < cells.size(); ++k)
+    {
+      assign(k == 0 ? columns : rows, cells[k].integer(1, max_cells, "cells"));
+    }
+    good = good && columns > 0 && rows > 0;
+  }
+  else if (at_cells.present())
+  {
+    assign(columns, at_cells.integer(1, max_cells, "cells"));
+    good = good && columns > 0;
+    if (good && height / width * columns > max_cells)
+    {
+      at_cells.problem("makes more than " + std::to_string(max_cells) + " rows; give [columns, rows]");
+      good = false;
+    }
+  }
+  else
+  {
+    good = false;
+  }
+  GridPattern pattern = GridPattern::equilateral;
+  assign(pattern, map.get("pattern").choice<GridPattern>({{"one_diagonal", GridPattern::one_diagonal},
+                                                          {"alternating", GridPattern::alternating},
+                                                          {"equilateral", GridPattern::equilateral},
+                                                          {"irregular", GridPattern::irregular}}));
+  int seed = 1;
+  assign(seed, at_seed.integer(0, 2'000'000'000));
+  if (at_seed.present() && pattern != GridPattern::irregular)
+  {
+    at_seed.problem("is for pattern: irregular");
+  }
+  map.finish();
+  if (!good)
+  {
+    return std::nullopt;
+  }
+  try
+  {
+    mesh = gridMesh(width, height, columns, rows, pattern, static_cast<unsigned>(seed));
+  }
+  catch (const std::invalid_argument& error)
+  {
+    at.problem(error.what());
+    return std::nullopt;
+  }
+  Eigen::Matrix<double, 3, 2> axes;
+  axes << grid.sides[0] / width, grid.sides[1] / height;
+  mesh.vertices = ((axes * mesh.vertices.topRows<2>()).colwise() + grid.corner).eval();
+  return grid;
+}
+
+bool readClothMesh(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh)
+{
+  std::string path;
+  if (!readMeshFile(at, context, mesh, path))
+  {
+    return false;
+  }
+  try
+  {
+    requireSoundMesh(mesh, path);
+  }
+  catch (const std::exception& error)
+  {
+    YamlMap(at).get("file").problem(error.what());
+    return false;
+  }
+  return true;
+}
+
+Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context, const TriangleMesh& cloth)
+{
+  TriangleMesh mesh;
+  std::string path;
+  if (!at.present() || !readMeshFile(at, context, mesh, path) || cloth.vertices.cols() == 0)
+  {
+    return {};   // none, or reported
+  }
+  const YamlCursor file = YamlMap(at).get("file");
+  const auto differs = [&](const std::string& what, Eigen::Index here, Eigen::Index there) {
+    file.problem(path + " has " + std::to_string(here) + " " + what + ", the cloth's mesh has " + std::to_string(there) +
+                 "; both must have the same triangles of the same vertices, in the same order");
+  };
+  if (mesh.vertices.cols() != cloth.vertices.cols())
+  {
+    differs("vertices", mesh.vertices.cols(), cloth.vertices.cols());
+    return {};
+  }
+  if (mesh.triangles.cols() != cloth.triangles.cols())
+  {
+    differs("triangles", mesh.triangles.cols(), cloth.triangles.cols());
+    return {};
+  }
+  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+  {
+    const Eigen::Vector3i here = mesh.triangles.col(f), there = cloth.triangles.col(f);
+    if (here != there)
+    {
+      const auto text = [](const Eigen::Vector3i& t) { return std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]); };
+      file.problem(path + ": triangle " + std::to_string(f) + " has the vertices " + text(here) + " (from 0), that of the cloth's mesh " + text(there) +
+                   "; both must have the same triangles of the same vertices, in the same order");
+      return {};
+    }
+  }
+  // unlike a cloth's mesh it may touch itself
+  for (const MeshDefect& defect : meshDefects(mesh))
+  {
+    if (defect.kind == MeshDefect::degenerate_face)
+    {
+      file.problem(path + ": " + defect.message);
+      return {};
+    }
+  }
+  return mesh.vertices;
+}
+
+}  // namespace slender
