@@ -42,6 +42,8 @@ void PointTrajectory::forgetBefore(double time)
 
 Eigen::Vector3d PointTrajectory::slope(std::size_t k, Eigen::Index i) const
 {
+  if (k > 0 && k + 1 == times_.size() && coast_ > 0)
+    return (frames_[k].col(i) - frames_[k - 1].col(i)) / (times_[k] - times_[k - 1]);
   if (k == 0 || k + 1 >= times_.size())
     return Eigen::Vector3d::Zero();   // held beyond the ends
   const Eigen::Vector3d here = frames_[k].col(i);
@@ -55,6 +57,16 @@ void PointTrajectory::evaluate(double time, Eigen::Matrix3Xd& points, Eigen::Mat
     points = time <= times_.front() ? frames_.front() : frames_.back();
     if (velocities)
       velocities->setZero(3, points.cols());
+    if (time < times_.back() || times_.size() == 1 || !(coast_ > 0))
+      return;
+    const double after = std::min(time - times_.back(), coast_);
+    for (Eigen::Index i = 0; i < points.cols(); ++i)
+    {
+      const Eigen::Vector3d v = slope(times_.size() - 1, i);
+      points.col(i) += after * (1.0 - 0.5 * after / coast_) * v;
+      if (velocities)
+        velocities->col(i) = (1.0 - after / coast_) * v;
+    }
     return;
   }
   const std::size_t k = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin() - 1;

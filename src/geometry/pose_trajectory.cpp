@@ -69,6 +69,12 @@ void PoseTrajectory::forgetBefore(double time)
 
 Twist PoseTrajectory::slope(std::size_t k) const
 {
+  if (k > 0 && k + 1 == times_.size() && coast_ > 0)
+  {
+    const double h = times_[k] - times_[k - 1];
+    return {(poses_[k].position - poses_[k - 1].position) / h,
+            rotationVector(poses_[k - 1].orientation.conjugate() * poses_[k].orientation) / h};
+  }
   if (k == 0 || k + 1 >= times_.size())
   {
     return {};   // held beyond the ends
@@ -91,7 +97,19 @@ Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
     {
       *velocity = {};
     }
-    return time <= times_.front() ? poses_.front() : poses_.back();
+    if (time < times_.back() || times_.size() == 1 || !(coast_ > 0))
+    {
+      return time <= times_.front() ? poses_.front() : poses_.back();
+    }
+    const double after = std::min(time - times_.back(), coast_), way = after * (1.0 - 0.5 * after / coast_), speed = 1.0 - after / coast_;
+    const Twist last = slope(times_.size() - 1);   // the turn about a fixed axis: body and world rates agree
+    const Pose& end = poses_.back();
+    if (velocity)
+    {
+      velocity->linear = speed * last.linear;
+      velocity->angular = end.orientation * (speed * last.angular);
+    }
+    return {end.position + way * last.linear, (end.orientation * fromRotationVector(way * last.angular)).normalized()};
   }
   const std::size_t k = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin() - 1;
   const double h = times_[k + 1] - times_[k];

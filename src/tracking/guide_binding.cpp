@@ -32,4 +32,11 @@ void GuideBinding::place(const std::vector<Pose>& poses, Eigen::Matrix3Xd& verti
     vertices.col(c.vertex) += c.weight * (poses[c.body] * c.in_body);
 }
 
+void GuideBinding::velocities(const std::vector<Pose>& poses, const std::vector<Twist>& twists, Eigen::Matrix3Xd& out) const
+{
+  out.setZero(3, count_);
+  for (const Carried& c : carried_)
+    out.col(c.vertex) += c.weight * (twists[c.body].linear + twists[c.body].angular.cross(poses[c.body].orientation * c.in_body));
+}
+
 }  // namespace slender

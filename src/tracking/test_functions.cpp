@@ -47,6 +47,27 @@ TestFunctions paintedRegions(const std::vector<PaintedRegion>& regions, int guid
   return functions;
 }
 
+TestFunctions paintedRegions(const std::vector<PaintedRegion>& regions, const Subdivision& subdivision)
+{
+  TestFunctions functions;
+  Triplets guide, painted;
+  const auto coarse = subdivision.weights.cols(), fine = subdivision.weights.rows();
+  for (std::size_t r = 0; r < regions.size(); ++r)
+  {
+    paint(regions[r], regions[r].guide, static_cast<int>(coarse), "guide", static_cast<int>(r), guide);
+    if (!regions[r].tracked.empty())
+      paint(regions[r], regions[r].tracked, static_cast<int>(fine), "tracked", static_cast<int>(r), painted);
+    functions.names.push_back(regions[r].name);
+  }
+  functions.guide = valuesOf(guide, regions.size(), coarse);
+  const TestFunctions::Values prolonged = functions.guide * subdivision.weights.transpose();
+  for (std::size_t r = 0; r < regions.size(); ++r)
+    for (TestFunctions::Values::InnerIterator entry(prolonged, static_cast<Eigen::Index>(r)); entry && regions[r].tracked.empty(); ++entry)
+      painted.emplace_back(static_cast<int>(r), static_cast<int>(entry.col()), entry.value());
+  functions.tracked = valuesOf(painted, regions.size(), fine);
+  return functions;
+}
+
 TestFunctions subdivisionBasis(const Subdivision& subdivision, const std::vector<int>& vertices)
 {
   const auto coarse = subdivision.weights.cols();

@@ -8,7 +8,7 @@
 namespace slender {
 
 /// A motion of several points through timed frames, once continuously differentiable: each point as the positions of PoseTrajectory (cubic Hermite
-/// with three-point slopes; held with zero velocity before the first and after the last frame).
+/// with three-point slopes; held with zero velocity before the first and after the last frame, unless it coasts).
 class PointTrajectory
 {
 public:
@@ -18,6 +18,8 @@ public:
 
   /// Appends a later frame; throws std::invalid_argument when time is not after the last one, sizes differ or a number is not finite.
   void append(double time, const Eigen::Matrix3Xd& points);
+  /// After the last frame the points go on with the mean velocity since the one before, which dies out linearly within `duration` [s] (>= 0; 0: held).
+  void coast(double duration) { coast_ = duration; }
   /// Forgets frames that no query at or after `time` needs.
   void forgetBefore(double time);
 
@@ -33,6 +35,7 @@ private:
 
   std::vector<double> times_;
   std::vector<Eigen::Matrix3Xd> frames_;
+  double coast_ = 0.0;
 };
 
 }  // namespace slender

@@ -24,6 +24,8 @@ public:
   Eigen::Index vertices() const { return count_; }
   /// The vertices for the bodies' poses.
   void place(const std::vector<Pose>& poses, Eigen::Matrix3Xd& vertices) const;
+  /// Their velocities [m/s], for those of the bodies.
+  void velocities(const std::vector<Pose>& poses, const std::vector<Twist>& twists, Eigen::Matrix3Xd& out) const;
 
 private:
   struct Carried { int vertex, body; double weight; Eigen::Vector3d in_body; };

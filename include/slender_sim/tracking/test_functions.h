@@ -31,6 +31,9 @@ struct PaintedRegion
 /// or without any.
 TestFunctions paintedRegions(const std::vector<PaintedRegion>& regions, int guide_vertices, int tracked_vertices);
 
+/// Likewise on a linear subdivision of the guide, where a region without tracked vertices has the guide's function, prolonged.
+TestFunctions paintedRegions(const std::vector<PaintedRegion>& regions, const Subdivision& subdivision);
+
 /// The guide's hat functions, one per vertex, prolonged to its linear subdivision. With `vertices` only those of these guide vertices.
 TestFunctions subdivisionBasis(const Subdivision& subdivision, const std::vector<int>& vertices = {});
 
