@@ -53,7 +53,7 @@ void ownKdop(benchmark::State& state)
   for (int t = 0; t < m; ++t)
     centers.col(t) = (s.x.col(s.triangles(0, t)) + s.x.col(s.triangles(1, t)) + s.x.col(s.triangles(2, t))) / 3;
   KdopTree tree;
-  tree.build(centers, std::vector<int>(m, 0));
+  tree.build(centers, std::vector<int>(m, 0), {1}, 1);
   std::vector<Kdop> points(s.x.cols()), volumes(m);
   std::vector<char> active(m, 1);
   std::vector<KdopTree::Pair> pairs;

@@ -9,16 +9,25 @@
 
 namespace slender {
 
+namespace {
+
+constexpr int kLoadPasses = 2;
+constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
+
+}  // namespace
+
 ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : model_(std::move(model)), options_(options)
 {
   if (model_.contact.size() != model_.cloths.size())
     throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " contact settings expected, one per cloth");
+  if (!model_.options.empty() && model_.options.size() != model_.cloths.size())
+    throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " options expected, one per cloth, or none");
   first_.push_back(0);
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     const ClothModel& cloth = *model_.cloths[k];
     const ClothContact& contact = model_.contact[k];
-    steppers_.emplace_back(model_.cloths[k], options);
+    steppers_.emplace_back(model_.cloths[k], model_.options.empty() ? options : model_.options[k]);
     surface_.rest.conservativeResize(3, first_.back() + cloth.vertices());
     surface_.rest.rightCols(cloth.vertices()) = cloth.rest.vertices;
     CollisionSheet sheet;
@@ -33,12 +42,13 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   }
   surface_.solids = model_.solids;
   collider_ = std::make_unique<SurfaceCollider>(surface_);
-  for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_})
+  for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_, &push_, &answer_})
     m->resize(3, first_.back());
   inverse_mass_.resize(first_.back());
   sub_.cloths.resize(model_.cloths.size());
   sub_.solids.resize(model_.solids.size());
-  pins_start_.resize(model_.cloths.size());
+  for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_, &shared_pins_, &pin_answers_, &averages_start_})
+    pins->resize(model_.cloths.size());
 }
 
 StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inputs, double duration)
@@ -54,8 +64,11 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   {
     const std::vector<int>& pins = state.cloths[k].pins;
     pins_start_[k].resize(3, static_cast<Eigen::Index>(pins.size()));
+    pin_sums_[k].setZero(3, static_cast<Eigen::Index>(pins.size()));
     for (std::size_t p = 0; p < pins.size(); ++p)
       pins_start_[k].col(static_cast<Eigen::Index>(p)) = state.cloths[k].x.col(pins[p]);
+    if (model_.cloths[k]->averages)
+      averages_start_[k] = state.cloths[k].x * model_.cloths[k]->averages->transpose();
   }
   double done = 0.0, share = 1.0;
   const double shortest = std::ldexp(1.0 - 1e-9, -options_.newton.max_cuts);
@@ -79,11 +92,67 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
     }
     report.merge(sub);
     std::swap(work_, next_);
+    addPinForces(end - done, (end - done) * duration);
     done = end;
     share *= 2.0;
   }
   std::swap(state, work_);
+  std::swap(pin_forces_, pin_sums_);
+  report.repulsions = collisions_.repulsions;
+  report.impulses = collisions_.impulses;
+  report.zones = collisions_.zones;
   return report;
+}
+
+/// Collisions change the velocities of what touches only. Where that is little mass, as under the point of a needle, it would carry little of the load,
+/// while the next solve, which knows nothing of contact, relaxes it at the cost of the few that touch. So the forces that stand for the correction act on
+/// the whole cloth as well: along its response to them, as far as the energy of the step says (a step of steepest descent on the dual problem of contact).
+/// Returns false when there is nothing left to do.
+bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
+{
+  const double h = step.h;
+  corrected_ = x_;
+  if (!collider_->approach(step, corrected_, again))
+    return false;
+  double work = 0.0, answered = 0.0;
+  for (int i = 0; i < first_.back(); ++i)
+  {
+    const bool free = inverse_mass_[i] > 0.0;
+    push_.col(i) = free ? Eigen::Vector3d((corrected_.col(i) - x_.col(i)) / (inverse_mass_[i] * h * h)) : Eigen::Vector3d(0, 0, 0);
+    work += push_.col(i).dot(corrected_.col(i) - x_.col(i));
+  }
+  if (!(work > 0.0))
+    return false;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    const int first = first_[k], count = first_[k + 1] - first;
+    own_push_ = push_.middleCols(first, count);
+    own_answer_.resize(3, count);
+    if (!steppers_[k].respond(own_push_, own_answer_, pin_answers_[k]))
+      return false;
+    answer_.middleCols(first, count) = own_answer_;
+    answered += own_push_.cwiseProduct(own_answer_).sum();
+  }
+  if (!(answered > 0.0))
+    return false;
+  const double share = kLoadShare * work / answered;
+  x_ += share * answer_;
+  v_ += share / h * answer_;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+    shared_pins_[k] += share * pin_answers_[k];
+  return true;
+}
+
+/// Of a substep that was just done.
+void ClothGroup::addPinForces(double share, double h)
+{
+  const Eigen::Matrix3Xd& impulses = collider_->heldImpulses();
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    pin_sums_[k] += share * (steppers_[k].pinForces() + shared_pins_[k]);
+    for (std::size_t p = 0; p < work_.cloths[k].pins.size(); ++p)
+      pin_sums_[k].col(static_cast<Eigen::Index>(p)) += share / h * impulses.col(first_[k] + work_.cloths[k].pins[p]);
+  }
 }
 
 /// From work_ to next_; times as shares of the step.
@@ -98,6 +167,8 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
     sub_.cloths[k] = inputs.cloths[k];
     if (to < 1.0 && inputs.cloths[k].pins.cols() == pins_start_[k].cols())
       sub_.cloths[k].pins = pins_start_[k] + to * (inputs.cloths[k].pins - pins_start_[k]);
+    if (to < 1.0 && inputs.cloths[k].averages.cols() == averages_start_[k].cols())
+      sub_.cloths[k].averages = averages_start_[k] + to * (inputs.cloths[k].averages - averages_start_[k]);
     const StepReport own = steppers_[k].step(next_.cloths[k], sub_.cloths[k], h);
     report.merge(own);
     if (!report.ok)
@@ -111,12 +182,18 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
   }
   for (std::size_t s = 0; s < model_.solids.size(); ++s)   // uniformly from here to the end of the step
     next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
-  const CollisionReport found = collider_->resolve({x_start_, inverse_mass_, work_.solids, next_.solids, h}, x_, v_);
+  const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h};
+  int pass = 0;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+    shared_pins_[k].setZero(3, static_cast<Eigen::Index>(work_.cloths[k].pins.size()));
+  while (pass < kLoadPasses && shareLoads(step, pass > 0))
+    ++pass;
+  const CollisionReport found = collider_->resolve(step, x_, v_, true);
   if (!found.ok)
   {
     report.ok = false;
     report.failure = StepFailure::squeezed;
-    report.message = "collisions: " + found.reason + "; use a shorter step, or leave the cloth more room";
+    report.message = "collisions: " + found.reason + whereIs(found) + "; use a shorter step, or leave the cloth more room";
     return report;
   }
   collisions_.repulsions += found.repulsions;
@@ -145,18 +222,74 @@ std::size_t ClothGroup::intersections(const ClothGroupState& state) const
   return slender::intersections(surface_, positions(state), state.solids).size();
 }
 
+int ClothGroup::clothOf(int point) const
+{
+  return static_cast<int>(std::upper_bound(first_.begin(), first_.end(), point) - first_.begin()) - 1;
+}
+
+std::string ClothGroup::solidName(int solid) const
+{
+  const bool named = solid < static_cast<int>(model_.solid_names.size());
+  return named ? "'" + model_.solid_names[solid] + "'" : "solid " + std::to_string(solid);
+}
+
+/// A point as the collider counts them.
+std::string ClothGroup::placeOf(int point) const
+{
+  if (point >= first_.back())
+    return solidName(collider_->solidOf(point));
+  const int cloth = clothOf(point);
+  return "cloth '" + model_.cloths[cloth]->name + "' at vertex " + std::to_string(point - first_[cloth]);
+}
+
+std::string ClothGroup::whereIs(const CollisionReport& failure) const
+{
+  std::string text;
+  for (const int point : failure.points)
+    if (point >= 0)
+      text += (text.empty() ? " (" : " and ") + placeOf(point);
+  return text.empty() ? text : text + ")";
+}
+
 void ClothGroup::checkIntersections(const ClothGroupState& state) const
 {
-  const auto found = slender::intersections(surface_, positions(state), state.solids);
+  const Eigen::Matrix3Xd x = positions(state);
+  const CollisionSurface taken = asTaken(surface_);
+  auto found = slender::intersections(surface_, x, state.solids);
+  bool prism = false;
+  if (found.empty())
+  {
+    found = slender::intersections(taken, x, state.solids);
+    prism = true;
+  }
   if (found.empty())
     return;
-  const int point = found[0].edge[0];
-  const auto cloth = std::upper_bound(first_.begin(), first_.end(), point) - first_.begin() - 1;
-  const std::string where = cloth < static_cast<std::ptrdiff_t>(model_.cloths.size())
-                              ? "cloth '" + model_.cloths[cloth]->name + "' at vertex " + std::to_string(point - first_[cloth])
-                              : "a solid";
-  throw std::invalid_argument(where + " intersects itself, another cloth or a solid as the scene starts (" + std::to_string(found.size()) +
-                              " places): move them apart");
+  // points of solids follow those of the cloths, and edges of a mesh may meet a cloth's face
+  const Intersection& first = found[0];
+  const auto solidAt = [&](int point) {
+    std::size_t solid = 0;
+    int end = first_.back();
+    for (;; ++solid)
+    {
+      const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&(prism ? taken : surface_).solids[solid].shape);
+      end += mesh ? static_cast<int>((*mesh)->vertices.cols()) : 0;
+      if (point < end)
+        return static_cast<int>(solid);
+    }
+  };
+  const bool edge = first.edge[0] < first_.back();
+  const int vertex = edge ? first.edge[0] : first.triangle[0], other = edge ? first.triangle[0] : first.edge[0], cloth = clothOf(vertex);
+  std::string meets;
+  if (other < 0)
+    meets = solidName(first.triangle[2]);
+  else if (other >= first_.back())
+    meets = solidName(solidAt(other));
+  else if (clothOf(other) == cloth)
+    meets = "itself at vertex " + std::to_string(other - first_[cloth]);
+  else
+    meets = "cloth '" + model_.cloths[clothOf(other)]->name + "'";
+  throw std::invalid_argument(placeOf(vertex) + " meets " + meets + (prism ? " or the prism that stands for it" : "") + " (" +
+                              std::to_string(found.size()) + " places in all): move them apart");
 }
 
 }  // namespace slender

@@ -17,6 +17,8 @@ public:
 
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
 
+  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
+
   std::shared_ptr<const ClothModel> model;
   ClothOptions options;
   ClothSystem system;
@@ -323,6 +325,30 @@ StepFailure ClothStepper::Impl::finish(double h, StepReport& report)
   return StepFailure::none;
 }
 
+bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+{
+  if (options.integrator == Integrator::symplectic_euler)
+    return false;
+  for (int i = 0; i < model->vertices(); ++i)
+    point(system.gradient(), i) = -forces.col(i);
+  std::fill(d_.begin(), d_.end(), 0.0);
+  int iterations = 0, factorizations = 0;
+  constexpr double kTolerance = 0.05;
+  if (!system.solve(d_, iterations, factorizations, kTolerance))
+    return false;
+  for (int i = 0; i < model->vertices(); ++i)
+    displacement.col(i) = point(d_, i);
+  pin_forces_change.resize(3, pin_forces.cols());
+  if (pin_forces.cols() == 0)
+    return true;
+  system.applyMatrix(d_, trial_);
+  Eigen::Index pin = 0;
+  for (int i = 0; i < model->vertices(); ++i)
+    if (system.held()[i])
+      pin_forces_change.col(pin++) = -point(trial_, i);
+  return true;
+}
+
 /// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step ago.
 StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report)
 {
@@ -374,6 +400,10 @@ ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
+bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+{
+  return impl_->respond(forces, displacement, pin_forces_change);
+}
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 const Eigen::Matrix3Xd& ClothStepper::averageForces() const { return impl_->average_forces; }
 ClothSolver ClothStepper::solver() const { return impl_->system.solver(); }

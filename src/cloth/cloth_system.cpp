@@ -366,7 +366,7 @@ void ClothSystem::precondition(PointVector& r, PointVector& z)
   clearHeld(r);
 }
 
-bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizations)
+bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizations, double least)
 {
   if (!independent_)
     return false;
@@ -401,7 +401,7 @@ bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizati
   if (averages_)
     precondition(right_, correction_);
   const LinearResult result = cg_.solve(
-    right_, correction_, linear_tolerance_, 2000,
+    right_, correction_, std::max(least, linear_tolerance_), 2000,
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);

@@ -51,7 +51,11 @@ public:
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient);
   PointVector& gradient() { return gradient_; }
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. False: not positive definite. `linear` grows by iterations.
-  bool solve(PointVector& d, int& linear_iterations, int& factorizations);
+  /// `least` : conjugate gradients do not go below this tolerance, whatever the options.
+  bool solve(PointVector& d, int& linear_iterations, int& factorizations, double least = 0.0);
+
+  /// The matrix of solve() times p.
+  void applyMatrix(const PointVector& p, PointVector& ap);
 
   /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x count).
   void meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x);
@@ -67,7 +71,6 @@ public:
 
 private:
   void setWeights(double h, double ratio);
-  void applyMatrix(const PointVector& p, PointVector& ap);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
   void precondition(PointVector& r, PointVector& z);

@@ -147,17 +147,29 @@ private:
 
 }  // namespace
 
-CollisionElements::CollisionElements(const CollisionSurface& surface)
+CollisionSurface asTaken(CollisionSurface surface)
 {
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (const CollisionSheet& sheet : surface.sheets)
+    thinnest = std::min(thinnest, sheet.thickness);
+  for (ContactSolid& solid : surface.solids)
+    if (const auto* cylinder = std::get_if<Cylinder>(&solid.shape))
+      solid.shape = std::make_shared<const TriangleMesh>(prism(*cylinder, 0.05 * thinnest));
+  return surface;
+}
+
+CollisionElements::CollisionElements(const CollisionSurface& given)
+{
+  for (const ContactSolid& solid : given.solids)
+    checkShape(solid.shape);
+  const CollisionSurface surface = asTaken(given);
   sheet_points = static_cast<int>(surface.rest.cols());
   sheet_count = static_cast<int>(surface.sheets.size());
   if (!surface.rest.allFinite())
     throw std::invalid_argument("a point at rest is not finite");
-  double thinnest = std::numeric_limits<double>::infinity();
   for (int s = 0; s < sheet_count; ++s)
   {
     checkSheet(surface.sheets[s], s, surface.rest);
-    thinnest = std::min(thinnest, surface.sheets[s].thickness);
     objects.push_back({0.5 * surface.sheets[s].thickness, 0.0, surface.sheets[s].friction, false});
   }
   std::vector<Eigen::Matrix3Xd> solid_points;
@@ -165,7 +177,6 @@ CollisionElements::CollisionElements(const CollisionSurface& surface)
   int points = sheet_points;
   for (const ContactSolid& solid : surface.solids)
   {
-    checkShape(solid.shape);
     Object object{0.0, 0.0, solid.friction, true};
     TriangleMesh mesh;
     if (std::holds_alternative<Plane>(solid.shape))
@@ -183,8 +194,6 @@ CollisionElements::CollisionElements(const CollisionSurface& surface)
     }
     else if (const auto* box = std::get_if<Box>(&solid.shape))
       mesh = boxMesh(*box);
-    else if (const auto* cylinder = std::get_if<Cylinder>(&solid.shape))
-      mesh = prism(*cylinder, 0.05 * thinnest);
     else
       mesh = *std::get<std::shared_ptr<const TriangleMesh>>(solid.shape);
     objects.push_back(object);

@@ -51,7 +51,7 @@ CollisionPairs::CollisionPairs(const CollisionElements& elements) : elements_(el
     groups[i] = e.object;
     centers.col(i) = (elements.reference.col(e.v[0]) + elements.reference.col(e.v[1]) + elements.reference.col(e.v[2])) / 3.0;
   }
-  tree_.build(centers, groups);
+  tree_.build(centers, groups, elements.touching, elements.objects.size());
 }
 
 const std::vector<CollisionPair>& CollisionPairs::find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
@@ -112,11 +112,10 @@ void CollisionPairs::search(const Eigen::Matrix3Xd& from)
   tree_.refit(volumes_, active_);
   tree_.selfPairs(found_);
   for (const KdopTree::Pair& p : found_)
-    if (elements_.mayTouch(elements_.elements[p.first].object, elements_.elements[p.second].object))
-    {
-      testElements(p.first, p.second, from);
-      testElements(p.second, p.first, from);
-    }
+  {
+    testElements(p.first, p.second, from);
+    testElements(p.second, p.first, from);
+  }
 }
 
 void CollisionPairs::add(int first, int second, bool edges, const int (&point)[4], const Eigen::Matrix3Xd& from)

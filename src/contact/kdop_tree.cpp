@@ -45,8 +45,11 @@ Kdop Kdop::none()
   return out;
 }
 
-void KdopTree::build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups)
+void KdopTree::build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups, const std::vector<char>& touching, std::size_t count)
 {
+  touching_ = touching;
+  groups_ = count;
+  group_.clear();
   const int n = static_cast<int>(centers.cols());
   order_.resize(n);
   for (int i = 0; i < n; ++i)
@@ -64,6 +67,7 @@ void KdopTree::divide(int from, int to, const Eigen::Matrix3Xd& centers, const s
 {
   const std::size_t node = second_.size();
   leaves_.push_back(to - from);
+  group_.push_back(groups[order_[from]] == groups[order_[to - 1]] ? groups[order_[from]] : -1);
   if (to - from == 1)
   {
     second_.push_back(-1 - order_[from]);
@@ -126,7 +130,7 @@ void KdopTree::selfPairs(std::vector<Pair>& pairs) const
 void KdopTree::inside(int node, std::vector<Pair>& pairs) const
 {
   const int second = second_[node];
-  if (second < 0 || !active_[node])
+  if (second < 0 || !active_[node] || apart(node, node))
     return;
   inside(node + 1, pairs);
   inside(second, pairs);
@@ -137,7 +141,7 @@ void KdopTree::inside(int node, std::vector<Pair>& pairs) const
 /// Of two nodes that overlap.
 void KdopTree::between(int a, int b, std::vector<Pair>& pairs) const
 {
-  if (!(active_[a] | active_[b]))
+  if (!(active_[a] | active_[b]) || apart(a, b))
     return;
   if (leaves_[a] == 1 && leaves_[b] == 1)
   {

@@ -43,8 +43,9 @@ public:
     int first, second;   ///< elements
   };
 
-  /// Groups of elements (rising from 0) get subtrees of their own, divided at medians of the centres [m].
-  void build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups);
+  /// Groups of elements (rising from 0) get subtrees of their own, divided at medians of the centres [m]. Pairs of groups a and b are looked for
+  /// where `touching[a * count + b]` of `count` groups says so.
+  void build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups, const std::vector<char>& touching, std::size_t count);
 
   /// Takes over the elements' volumes. Pairs are looked for among those of which one is `active`.
   void refit(const std::vector<Kdop>& volumes, const std::vector<char>& active);
@@ -56,11 +57,18 @@ private:
   void divide(int from, int to, const Eigen::Matrix3Xd& centers, const std::vector<int>& groups);
   void inside(int node, std::vector<Pair>& pairs) const;
   void between(int a, int b, std::vector<Pair>& pairs) const;
+  bool apart(int a, int b) const
+  {
+    return group_[a] >= 0 && group_[b] >= 0 && !touching_[static_cast<std::size_t>(group_[a]) * groups_ + static_cast<std::size_t>(group_[b])];
+  }
 
   std::vector<int> order_;         ///< elements, as the leaves follow each other
   std::vector<Kdop> volumes_;      ///< nodes in depth-first order: the first child follows its parent
   std::vector<int> second_;        ///< second child; of a leaf: -1 - element
   std::vector<int> leaves_;        ///< below a node
+  std::vector<int> group_;         ///< of a node; -1: several
+  std::vector<char> touching_;
+  std::size_t groups_ = 0;
   std::vector<char> active_;
 };
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <tuple>
 
@@ -32,24 +31,23 @@ public:
   explicit Impl(const CollisionSurface& surface) : elements_(surface), pairs_(elements_)
   {
     const Eigen::Index n = elements_.reference.cols();
-    from_.resize(3, n);
-    to_.resize(3, n);
-    tested_.resize(3, n);
-    velocity_.resize(3, n);
+    for (Eigen::Matrix3Xd* m : {&from_, &to_, &tested_, &velocity_})
+      m->resize(3, n);
     inverse_mass_.setZero(n);
     changed_.resize(n);
   }
 
-  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v);
+  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again);
+  bool approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again);
+  const Eigen::Matrix3Xd& heldImpulses() const { return held_impulses_; }
+  int solidOf(int point) const { return elements_.point_object.at(point) - elements_.sheet_count; }
 
 private:
-  struct PlaneHit
-  {
-    int point, plane;
-  };
+  struct PlaneHit { int point, plane; };
 
-  bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v);
+  bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again);
   bool examineStart();
+  void addHits();
   bool examinePlanes();
   void detect();
   ApproachLimit limitOf(const CollisionPair& pair) const;
@@ -63,7 +61,8 @@ private:
   bool moveZones();
   bool followPrescribed(const ImpactZones::Zone& zone);
   void solveVelocities();
-  bool fail(const std::string& reason);
+  void takeHeldImpulses();
+  bool fail(const std::string& reason, int first = -1, int second = -1);
   int node(int point) const;
 
   CollisionElements elements_;
@@ -77,19 +76,23 @@ private:
   Eigen::Matrix3Xd tested_;         ///< ends at the last detection
   Eigen::Matrix3Xd displacement_, velocity_;
   Eigen::VectorXd inverse_mass_;
+  Eigen::Matrix3Xd held_impulses_;
   std::vector<char> changed_;
+  double push_ = kPush;
+  bool known_ = false;              ///< pairs_ are those of the step's start
   std::vector<CollisionPair> hits_;
   std::vector<PlaneHit> plane_hits_;
 };
 
-bool SurfaceCollider::Impl::fail(const std::string& reason)
+bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int second)
 {
   report_.ok = false;
   report_.reason = reason;
+  report_.points[0] = first, report_.points[1] = second;
   return false;
 }
 
-bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v)
+bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again)
 {
   const int n = elements_.sheet_points;
   const std::size_t solids = elements_.objects.size() - elements_.sheet_count;
@@ -99,6 +102,7 @@ bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3
     throw std::invalid_argument("collisions: poses of " + std::to_string(solids) + " solids expected");
   if (!(step.h > 0.0) || !(step.inverse_mass.minCoeff() >= 0.0))
     throw std::invalid_argument("collisions: the step must be positive, inverse masses not negative");
+  known_ = known_ && again;
   step_ = &step;
   report_ = CollisionReport();
   from_.leftCols(n) = step.x_start;
@@ -134,7 +138,7 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
     row.weight[i] = place.weight[i];
     row.anchor += place.weight[i] * from_.col(place.point[i]);
   }
-  row.push = kPush * std::max(0.0, range - pair.gap);
+  row.push = push_ * std::max(0.0, range - pair.gap);
   row.bound = pairs_.core(pair) + std::min(pair.gap, range) + row.push;
   row.tolerance = 0.02 * std::min(pair.gap, range);
   row.friction = elements_.friction(pairs_.object(pair, false), pairs_.object(pair, true));
@@ -145,10 +149,12 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
 /// Finds all pairs that may come near each other; those within their shells, or near them and about to enter, get repulsions.
 bool SurfaceCollider::Impl::examineStart()
 {
-  for (const CollisionPair& pair : pairs_.find(from_, to_))
+  const std::vector<CollisionPair>& pairs = known_ ? pairs_.update(from_, to_) : pairs_.find(from_, to_);
+  known_ = true;
+  for (const CollisionPair& pair : pairs)
   {
     if (!(pair.gap > 0.0))
-      return fail("surfaces meet at the start of the step, at points " + std::to_string(pair.point[0]) + " and " + std::to_string(pair.point[3]));
+      return fail("surfaces meet at the start of the step", pair.point[0], pair.point[3]);
     if (pair.gap >= kNear * pairs_.shell(pair))
       continue;
     const double range = reach(pair);
@@ -199,7 +205,7 @@ void SurfaceCollider::Impl::addPlaneRow(int point, int plane, double gap, bool h
   row.weight[0] = 1.0;
   row.normal = end.orientation * Eigen::Vector3d::UnitZ();
   row.anchor = end * (step_->solids[solid].inverse() * Eigen::Vector3d(from_.col(point)));
-  row.push = hit ? 0.0 : kPush * std::max(0.0, shell - gap);
+  row.push = hit ? 0.0 : push_ * std::max(0.0, shell - gap);
   row.bound = row.normal.dot(end.position) + (hit ? kTarget : 1.0) * std::min(gap, shell) + row.push;
   row.tolerance = 0.02 * std::min(gap, shell);
   row.friction = elements_.friction(sheet, object);
@@ -217,7 +223,7 @@ bool SurfaceCollider::Impl::examinePlanes()
         continue;
       const double gap = planeGap(static_cast<int>(plane), step_->solids, from_.col(i));
       if (!(gap > 0.0))
-        return fail("point " + std::to_string(i) + " is behind a plane at the start of the step");
+        return fail("a plane is passed through at the start of the step", i);
       const double shell = elements_.objects[sheet].shell;
       if (gap < kNear * shell && std::min(gap, planeGap(static_cast<int>(plane), step_->solids_end, to_.col(i))) < shell)
         addPlaneRow(i, static_cast<int>(plane), gap, false);
@@ -342,7 +348,7 @@ bool SurfaceCollider::Impl::followPrescribed(const ImpactZones::Zone& zone)
       for (const Eigen::Vector3d& p : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)})
         one = one && agrees(step_->solids[solid] * p, step_->solids_end[solid] * p);
   if (!one)
-    return fail("prescribed motions squeeze or tear a piece at point " + std::to_string(zone.count > 0 ? zone.members[0] : zone.prescribed[0]));
+    return fail("prescribed motions squeeze or tear a piece", zone.count > 0 ? zone.members[0] : zone.prescribed[0] < points ? zone.prescribed[0] : -1);
   if (motion.linear().trace() <= 1.0)   // 1 + 2 cos(angle)
     return fail("a solid or grasp turns by more than a quarter in a step");
   for (int k = 0; k < zone.count; ++k)
@@ -362,7 +368,7 @@ bool SurfaceCollider::Impl::moveZones()
     }
     const RigidFit fit = rigidFit(zone.members, zone.count, inverse_mass_, from_, displacement_);
     if (fit.angular.norm() > 0.5 * M_PI)
-      return fail("the piece at point " + std::to_string(zone.members[0]) + " would turn by more than a quarter in a step");
+      return fail("a piece would turn by more than a quarter in a step", zone.members[0]);
     const Eigen::Matrix3d turn = fromRotationVector(fit.angular).toRotationMatrix();
     for (int k = 0; k < zone.count; ++k)
       to_.col(zone.members[k]) = fit.center + fit.linear + turn * (from_.col(zone.members[k]) - fit.center);
@@ -389,6 +395,7 @@ void SurfaceCollider::Impl::solveVelocities()
   }
   rows_.restart(inverse_mass_, 1.0 / h, velocity_);
   rows_.relax(inverse_mass_, kSweeps, velocity_);
+  takeHeldImpulses();
   if (zones_.empty())
     return;
   for (const ImpactZones::Zone& zone : zones_.zones(inverse_mass_))
@@ -399,27 +406,66 @@ void SurfaceCollider::Impl::solveVelocities()
       continue;
     const bool free = zone.prescribed_count == 0;
     const RigidFit fit = rigidFit(zone.members, zone.count, inverse_mass_, to_, velocity_);
+    Eigen::Vector3d gained = Eigen::Vector3d::Zero();
     for (int k = 0; k < zone.count; ++k)
     {
       const int i = zone.members[k];
-      velocity_.col(i) = free ? fit.rate(to_.col(i)) : Eigen::Vector3d((to_.col(i) - from_.col(i)) / h);
+      const Eigen::Vector3d v = free ? fit.rate(to_.col(i)) : Eigen::Vector3d((to_.col(i) - from_.col(i)) / h);
+      gained += (v - velocity_.col(i)) / inverse_mass_[i];
+      velocity_.col(i) = v;
     }
+    if (!free && zone.prescribed[zone.prescribed_count - 1] < elements_.sheet_points)   // bodies come last
+      for (int k = 0; k < zone.prescribed_count; ++k)
+        held_impulses_.col(zone.prescribed[k]) -= gained / zone.prescribed_count;
   }
 }
 
-CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v)
+void SurfaceCollider::Impl::takeHeldImpulses()
 {
-  if (!load(step, x, v) || !examineStart() || !examinePlanes())
+  held_impulses_.setZero(3, elements_.sheet_points);
+  for (const CollisionRow& row : rows_.rows)
+    for (int i = 0; i < 4; ++i)
+      if (const int p = row.point[i]; row.mobility > 0.0 && p < elements_.sheet_points && inverse_mass_[p] == 0.0)
+        held_impulses_.col(p) += row.weight[i] * (row.impulse * row.normal + row.rubbing);
+}
+
+void SurfaceCollider::Impl::addHits()
+{
+  for (const CollisionPair& pair : hits_)
+    stop(pair);
+  for (const PlaneHit& hit : plane_hits_)
+    addPlaneRow(hit.point, hit.plane, planeGap(hit.plane, step_->solids, from_.col(hit.point)), true);
+}
+
+bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again)
+{
+  push_ = 0.0;   // which moves pieces apart but causes no velocity
+  const bool fine = load(step, x, step.x_start, again) && examineStart() && examinePlanes();
+  push_ = kPush;
+  hits_.clear();
+  if (!fine)
+    return false;
+  rows_.relax(inverse_mass_, kSweeps, to_);
+  detect();
+  if (!(hits_.empty() && plane_hits_.empty()))
+  {
+    addHits();
+    rows_.relax(inverse_mass_, kSweeps, to_);
+  }
+  x = to_.leftCols(elements_.sheet_points);
+  return true;
+}
+
+CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again)
+{
+  if (!load(step, x, v, again) || !examineStart() || !examinePlanes())
     return report_;
   hits_.clear();
   rows_.relax(inverse_mass_, kSweeps, to_);
   detect();
   while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds)
   {
-    for (const CollisionPair& pair : hits_)
-      stop(pair);
-    for (const PlaneHit& hit : plane_hits_)
-      addPlaneRow(hit.point, hit.plane, planeGap(hit.plane, step.solids, from_.col(hit.point)), true);
+    addHits();
     rows_.relax(inverse_mass_, kSweeps, to_);
     detect();
   }
@@ -440,9 +486,14 @@ SurfaceCollider::SurfaceCollider(const CollisionSurface& surface) : impl_(std::m
 SurfaceCollider::~SurfaceCollider() = default;
 SurfaceCollider::SurfaceCollider(SurfaceCollider&&) noexcept = default;
 
-CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v)
+const Eigen::Matrix3Xd& SurfaceCollider::heldImpulses() const { return impl_->heldImpulses(); }
+int SurfaceCollider::solidOf(int point) const { return impl_->solidOf(point); }
+
+CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again)
 {
-  return impl_->resolve(step, x, v);
+  return impl_->resolve(step, x, v, again);
 }
+
+bool SurfaceCollider::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again) { return impl_->approach(step, x, again); }
 
 }  // namespace slender

@@ -17,6 +17,9 @@ void StepReport::merge(const StepReport& other)
   iterations += other.iterations;
   linear_iterations += other.linear_iterations;
   factorizations += other.factorizations;
+  repulsions += other.repulsions;
+  impulses += other.impulses;
+  zones += other.zones;
   mended_folds += other.mended_folds;
   residual = std::max(residual, other.residual);
   max_strain = std::max(max_strain, other.max_strain);

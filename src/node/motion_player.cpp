@@ -6,6 +6,7 @@
 
 #include <XmlRpcValue.h>
 #include <geometry_msgs/PoseStamped.h>
+#include <slender_sim/BodyStates.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include "slender_sim/node/converters.h"
@@ -45,6 +46,12 @@ MotionPlayer::MotionPlayer(const ros::NodeHandle& nh, const ros::NodeHandle& nh_
           nh_.advertise<geometry_msgs::PoseStamped>("grasps/" + static_cast<std::string>(entry.second) + "/pose", 1000);
     }
   }
+  nh_priv.getParam("solids", solids_);
+  for (const std::string& solid : solids_)
+    if (std::none_of(table_.begin(), table_.end(), [&solid](const BodyTrajectory& body) { return body.body == solid; }))
+      throw std::runtime_error("~solids: " + solid + " is not in " + file);
+  if (!solids_.empty())
+    bodies_pub_ = nh_.advertise<slender_sim::BodyStates>("bodies", 1000);
   if (tf_)
     tf_pub_ = nh_.advertise<tf2_msgs::TFMessage>("/tf", 1000);
   instants_ = instants(rate);
@@ -76,7 +83,7 @@ void MotionPlayer::waitForSubscribers()
 {
   const ros::WallTime give_up = ros::WallTime::now() + ros::WallDuration(wait_);
   const auto missing = [this]() {
-    return (tf_ && tf_pub_.getNumSubscribers() == 0) ||
+    return (tf_ && tf_pub_.getNumSubscribers() == 0) || (!solids_.empty() && bodies_pub_.getNumSubscribers() == 0) ||
            std::any_of(pose_pubs_.begin(), pose_pubs_.end(), [](const auto& p) { return p.second.getNumSubscribers() == 0; });
   };
   while (nh_.ok() && missing() && ros::WallTime::now() < give_up)
@@ -102,6 +109,17 @@ void MotionPlayer::publish(const Instant& instant, const ros::Time& stamp)
     }
     tf_pub_.publish(message);
   }
+  slender_sim::BodyStates solids;
+  solids.header.stamp = stamp;
+  solids.header.frame_id = frame_id_;
+  for (const std::string& name : solids_)
+    if (const auto body = instant.bodies.find(name); body != instant.bodies.end())
+    {
+      solids.name.push_back(name);
+      solids.pose.push_back(toMessage(Pose{body->second.position + offset_, body->second.orientation}));
+    }
+  if (!solids.name.empty())
+    bodies_pub_.publish(solids);
   for (const auto& [name, publisher] : pose_pubs_)
   {
     const auto body = instant.bodies.find(name);

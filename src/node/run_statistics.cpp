@@ -15,6 +15,9 @@ void RunStatistics::add(const StepReport& report, const Simulation& simulation, 
   worst_step = std::max(worst_step, busy_seconds);
   residual = std::max(residual, report.residual);
   max_strain = std::max(max_strain, report.max_strain);
+  repulsions += static_cast<std::uint64_t>(report.repulsions);
+  impulses += static_cast<std::uint64_t>(report.impulses);
+  zones += static_cast<std::uint64_t>(report.zones);
   mended_folds += static_cast<std::uint64_t>(report.mended_folds);
   projection_iterations = std::max(projection_iterations, report.projection_iterations);
   constraint_error = std::max(constraint_error, report.constraint_error);

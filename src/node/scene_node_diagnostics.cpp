@@ -118,6 +118,13 @@ DiagnosticStatus SceneNode::simulationStatus() const
     for (const SceneCloth& held : simulation_->state().cloths)
       vertices += static_cast<std::uint64_t>(held.cloth.x.cols());
     add(status, "vertices", vertices);
+    const auto& cloths = simulation_->config().cloths;
+    if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.contact.has_value(); }))
+    {
+      add(status, "contacts per step", recent_.steps ? static_cast<double>(recent_.repulsions) / static_cast<double>(recent_.steps) : 0.0);
+      add(status, "collisions stopped", recent_.impulses);
+      add(status, "rigid pieces", recent_.zones);
+    }
   }
   if (kind_ != NodeKind::threads)   // viscous threads keep none
   {

@@ -251,7 +251,8 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods
   map.finish();
   if (at.present() && !any && at.problems().size() == before)
   {
-    at.problem("no rod or thread takes part; give those that do a contact of their own, for example contact: {friction: 0.3}");
+    at.problem("no rod or thread takes part; give those that do a contact of their own, for example contact: {friction: 0.3} (a cloth's own says its "
+               "thickness instead of a gap)");
   }
   return contact;
 }

@@ -1,5 +1,6 @@
 #include "slender_sim/scene/reader.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -125,6 +126,21 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
   }
 }
 
+/// Cloth is corrected after its step so that it gives way, which nothing that is simulated along with it would notice.
+void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cloths)
+{
+  const auto body = std::find_if(scene.bodies.begin(), scene.bodies.end(),
+                                 [](const BodyConfig& b) { return !b.motion && b.shape && b.contact; });
+  for (std::size_t k = 0; body != scene.bodies.end() && k < cloths.size(); ++k)
+  {
+    if (scene.cloths[k].contact && scene.cloths[k].contact->obstacles)
+    {
+      YamlMap(cloths[k]).get("contact").problem("body " + body->name + " is simulated, and cloth does not push bodies; give the body a motion or "
+                                                "contact: false, or the cloth contact: {obstacles: false}");
+    }
+  }
+}
+
 /// Grasps of rods and of cloths are entries of one list of topics.
 void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cloths)
 {
@@ -203,6 +219,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   }
   checkFollowed(scene, entriesOf(at_rods), cloths);
   checkGraspNames(scene, cloths);
+  checkUnderCloth(scene, cloths);
 }
 
 void checkClothTime(YamlMap& map, SceneConfig& scene)

@@ -48,6 +48,7 @@ Simulation::Simulation(SceneConfig config) : config_(std::move(config))
   buildCloths();
   buildBodies();
   buildTouchingThreads();
+  buildTouchingCloths();
   buildGroup();
   state_.grasp_offsets.resize(grasps_.size());
   state_.wrenches.resize(grasps_.size());

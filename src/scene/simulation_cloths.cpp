@@ -27,6 +27,19 @@ ClothModel modelOf(const ClothConfig& config)
   return model;
 }
 
+ClothOptions optionsOf(const ClothConfig& config, const TimeConfig& time)
+{
+  ClothOptions options;
+  options.integrator = time.integrator;
+  options.one_newton_step = config.one_newton_step;
+  options.solver = config.solver;
+  options.linear_tolerance = config.linear_tolerance;
+  options.newton = time.newton;
+  return options;
+}
+
+Pose normalized(const Pose& pose) { return {pose.position, pose.orientation.normalized()}; }
+
 ClothGrasp graspOf(const ClothState& cloth, std::vector<int> vertices)
 {
   ClothGrasp grasp;
@@ -80,13 +93,11 @@ void Simulation::buildCloths()
     try
     {
       cloth_models_.push_back(std::make_shared<const ClothModel>(modelOf(config)));
-      ClothOptions options;
-      options.integrator = config_.time.integrator;
-      options.one_newton_step = config.one_newton_step;
-      options.solver = config.solver;
-      options.linear_tolerance = config.linear_tolerance;
-      options.newton = config_.time.newton;
-      cloth_steppers_.emplace_back(cloth_models_.back(), options);
+      cloth_steppers_.emplace_back();
+      if (!config.contact)
+      {
+        cloth_steppers_.back().emplace(cloth_models_.back(), optionsOf(config, config_.time));
+      }
       SceneCloth held;
       held.cloth = makeClothState(*cloth_models_.back(), config.start.cols() ? config.start : config.mesh.vertices);
       if (config.start_velocity.cols())
@@ -113,6 +124,100 @@ void Simulation::buildCloths()
   }
   cloth_inputs_.resize(config_.cloths.size());
   cloth_targets_.resize(grasps_.size());
+}
+
+/// Those with contact.
+void Simulation::buildTouchingCloths()
+{
+  ClothGroupModel model;
+  bool obstacles = false;
+  touching_cloth_index_.assign(config_.cloths.size(), -1);
+  for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+  {
+    if (const auto& contact = config_.cloths[k].contact)
+    {
+      touching_cloth_index_[k] = static_cast<int>(model.cloths.size());
+      model.cloths.push_back(cloth_models_[k]);
+      model.contact.push_back({contact->thickness, contact->friction, contact->self, contact->cloths, contact->obstacles});
+      model.options.push_back(optionsOf(config_.cloths[k], config_.time));
+      obstacles = obstacles || contact->obstacles;
+    }
+  }
+  if (model.cloths.empty())
+  {
+    return;
+  }
+  const auto add = [&model](const std::string& name, const Shape& shape, const std::optional<double>& friction) {
+    ContactSolid solid;
+    solid.shape = shape;
+    solid.friction = friction.value_or(-1.0);
+    model.solids.push_back(std::move(solid));
+    model.solid_names.push_back(name);
+  };
+  try
+  {
+    for (const ObstacleConfig& obstacle : config_.obstacles)
+    {
+      add(obstacle.name, obstacle.shape, obstacle.friction);
+    }
+    for (std::size_t b = 0; b < config_.bodies.size(); ++b)
+    {
+      const BodyConfig& body = config_.bodies[b];
+      if (!body.shape || !body.contact)
+      {
+        continue;
+      }
+      if (!isSimulated(static_cast<int>(b)))
+      {
+        add(body.name, *body.shape, body.friction);
+        cloth_bodies_.push_back(static_cast<int>(b));
+      }
+      else if (obstacles)
+      {
+        throw std::invalid_argument("body " + body.name + " is simulated, and cloth does not push bodies; give it a motion or contact: false");
+      }
+    }
+    touching_cloths_.emplace(std::move(model), ClothOptions{config_.time.integrator, false, ClothSolver::automatic, 0.02, config_.time.newton});
+    checkTouchingCloths(state_);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw SceneError((config_.file.empty() ? "scene " + config_.name : config_.file) + ": " + error.what());
+  }
+}
+
+/// Hands the part of a state over that cloths with contact need, or back. Obstacles and bodies are moved by others.
+void Simulation::exchangeTouchingCloths(SceneState& state)
+{
+  touching_cloth_state_.cloths.resize(touching_cloths_->size());
+  for (std::size_t k = 0; k < touching_cloth_index_.size(); ++k)
+  {
+    if (touching_cloth_index_[k] >= 0)
+    {
+      std::swap(touching_cloth_state_.cloths[touching_cloth_index_[k]], state.cloths[k].cloth);
+    }
+  }
+  touching_cloth_state_.solids = state.obstacles;
+  for (const int b : cloth_bodies_)
+  {
+    touching_cloth_state_.solids.push_back(state.bodies[b].X_WB * config_.bodies[b].X_BS);
+  }
+}
+
+/// Throws std::invalid_argument where cloths meet something.
+void Simulation::checkTouchingCloths(SceneState& state)
+{
+  exchangeTouchingCloths(state);
+  try
+  {
+    touching_cloths_->checkIntersections(touching_cloth_state_);
+  }
+  catch (...)
+  {
+    exchangeTouchingCloths(state);
+    throw;
+  }
+  exchangeTouchingCloths(state);
 }
 
 void Simulation::gatherPins(SceneCloth& cloth) const
@@ -160,8 +265,35 @@ StepReport Simulation::stepCloths(const SceneInputs& inputs)
   }
   for (std::size_t k = 0; k < cloth_steppers_.size() && total.ok; ++k)
   {
-    total.merge(cloth_steppers_[k].step(state_.cloths[k].cloth, cloth_inputs_[k], config_.time.step));
+    if (cloth_steppers_[k])
+    {
+      total.merge(cloth_steppers_[k]->step(state_.cloths[k].cloth, cloth_inputs_[k], config_.time.step));
+    }
   }
+  if (!touching_cloths_ || !total.ok)
+  {
+    return total;
+  }
+  touching_cloth_inputs_.cloths.resize(touching_cloths_->size());
+  for (std::size_t k = 0; k < touching_cloth_index_.size(); ++k)
+  {
+    if (touching_cloth_index_[k] >= 0)
+    {
+      touching_cloth_inputs_.cloths[touching_cloth_index_[k]] = cloth_inputs_[k];
+    }
+  }
+  touching_cloth_inputs_.solids.clear();
+  for (const GraspTarget& obstacle : inputs.obstacles)
+  {
+    touching_cloth_inputs_.solids.push_back(normalized(obstacle.X_WG));
+  }
+  for (const int b : cloth_bodies_)
+  {
+    touching_cloth_inputs_.solids.push_back(normalized(inputs.bodies[b].X_WG) * config_.bodies[b].X_BS);
+  }
+  exchangeTouchingCloths(state_);
+  total.merge(touching_cloths_->step(touching_cloth_state_, touching_cloth_inputs_, config_.time.step));
+  exchangeTouchingCloths(state_);
   return total;
 }
 
@@ -178,7 +310,7 @@ void Simulation::takeClothWrenches()
     SceneCloth& held = state_.cloths[ref.cloth];
     ClothGrasp& grasp = held.grasps[ref.index];
     grasp.X_WG = cloth_targets_[g];
-    const Eigen::Matrix3Xd& forces = cloth_steppers_[ref.cloth].pinForces();
+    const Eigen::Matrix3Xd& forces = pinForces(ref.cloth);
     Wrench wrench;
     for (const int vertex : grasp.vertices)
     {
@@ -247,9 +379,21 @@ const std::string& Simulation::heldObject(int grasp) const
   return ref.cloth >= 0 ? config_.cloths[ref.cloth].name : config_.rods[ref.rod].name;
 }
 
+const Eigen::Matrix3Xd& Simulation::pinForces(int cloth) const
+{
+  const auto& stepper = cloth_steppers_.at(static_cast<std::size_t>(cloth));
+  return stepper ? stepper->pinForces() : touching_cloths_->pinForces(touching_cloth_index_[cloth]);
+}
+
+const ClothStepper& Simulation::clothStepper(int cloth) const
+{
+  const auto& own = cloth_steppers_.at(static_cast<std::size_t>(cloth));
+  return own ? *own : touching_cloths_->stepper(touching_cloth_index_[cloth]);
+}
+
 ClothEnergies Simulation::clothEnergies(int cloth) const
 {
-  return cloth_steppers_.at(static_cast<std::size_t>(cloth)).energies(state_.cloths[static_cast<std::size_t>(cloth)].cloth, config_.gravity);
+  return clothStepper(cloth).energies(state_.cloths[static_cast<std::size_t>(cloth)].cloth, config_.gravity);
 }
 
 }  // namespace slender

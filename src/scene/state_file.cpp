@@ -425,6 +425,17 @@ void Simulation::load(const std::string& path)
   {
     throw std::runtime_error(path + ": " + problem);
   }
+  if (touching_cloths_)
+  {
+    try
+    {
+      checkTouchingCloths(loaded);
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw std::runtime_error(path + ": " + error.what());
+    }
+  }
   state_ = std::move(loaded);
 }
 

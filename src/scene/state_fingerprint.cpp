@@ -120,6 +120,13 @@ std::uint64_t Simulation::fingerprint() const
         }
       }
     }
+    const ClothContactConfig touch = config_.cloths[k].contact.value_or(ClothContactConfig{});
+    out(config_.cloths[k].contact.has_value());
+    out(touch.self);
+    out(touch.cloths);
+    out(touch.obstacles);
+    out(touch.friction);
+    out(touch.thickness);
     for (const GraspConfig& grasp : config_.cloths[k].grasps)
     {
       text(grasp.name);

@@ -13,6 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "surface_script.h"
+
 extern char** environ;
 
 namespace slender::study {
@@ -76,15 +78,6 @@ std::string jsonString(const std::string& text)
 }
 
 std::string jsonNumber(double value) { return std::isfinite(value) ? format(value, "%.15g") : "null"; }
-
-/// Double-quoted gnuplot string.
-std::string gnuplotString(const std::string& text)
-{
-  std::string out = "\"";
-  for (const char c : text)
-    out += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
-  return out + "\"";
-}
 
 void writeScript(std::ostream& out, const Plot& plot, const std::string& picture)
 {
@@ -261,17 +254,11 @@ void writeCsv(std::ostream& out, const StudyContext& context)
 
 std::string writePlots(const std::string& directory, const StudyContext& context)
 {
-  for (const Plot& plot : context.plots())
-  {
-    bool drawable = false;
-    for (const Series& s : plot.series)
-      drawable = drawable || !s.x.empty();
-    if (!drawable)
-      continue;
-    const std::string base = directory + "/" + plot.name;
+  const auto drawn = [&](const std::string& name, const auto& write) -> std::string {
+    const std::string base = directory + "/" + name;
     {
       std::ofstream script(base + ".gp");
-      writeScript(script, plot, base + ".png");
+      write(script, base + ".png");
       if (!script)
         return "cannot write " + base + ".gp";
     }
@@ -279,8 +266,19 @@ std::string writePlots(const std::string& directory, const StudyContext& context
     if (!runGnuplot(base + ".gp", missing))
       return missing ? "gnuplot is not installed: no PNG; the script " + base + ".gp draws it (apt install gnuplot-nox)"
                      : "gnuplot failed on " + base + ".gp";
+    return "";
+  };
+  std::string problem;
+  for (const Plot& plot : context.plots())
+  {
+    const bool drawable = std::any_of(plot.series.begin(), plot.series.end(), [](const Series& s) { return !s.x.empty(); });
+    if (drawable && problem.empty())
+      problem = drawn(plot.name, [&](std::ostream& out, const std::string& png) { writeScript(out, plot, png); });
   }
-  return "";
+  for (const SurfacePicture& picture : context.pictures())
+    if (problem.empty() && !picture.panels.empty())
+      problem = drawn(picture.name, [&](std::ostream& out, const std::string& png) { writeSurfaceScript(out, picture, png); });
+  return problem;
 }
 
 }  // namespace slender::study

@@ -52,6 +52,11 @@ void runIbmVsHinge(StudyContext&);
 void runImplicitStep(StudyContext&);
 void runClothStability(StudyContext&);
 void runClothAccuracy(StudyContext&);
+void runStickSlipStrip(StudyContext&);
+void runFlag(StudyContext&);
+void runDrape(StudyContext&);
+void runFabricDrape(StudyContext&);
+void runStiffnessRange(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -105,6 +110,11 @@ const std::vector<Study>& studies()
       {"implicit_step", "a sheet pinned at two corners: a step and its parts beside one factorisation of its matrix", runImplicitStep},
       {"cloth_stability", "extreme stiffness, steps, random and crushed starts, needles, a yanked corner: done, recovered or refused with reason", runClothStability},
       {"cloth_accuracy", "error against run time of the cloth's integrators and solvers, on a flag and a swinging cloth", runClothAccuracy},
+      {"stick_slip_strip", "compression at which the foot of a cloth strip pressed on a floor slips, against the coefficient of friction", runStickSlipStrip},
+      {"flag", "a flag in wind, as thesis figure 2.1: isometric bending beside hinges, statistics and wrinkles", runFlag},
+      {"fabric_drape", "drape coefficient (Cusick) and droop of strips of silk, cotton, wool and denim against published values", runFabricDrape},
+      {"drape", "a sheet draped over a sphere, as thesis figure 2.2: isometric bending beside hinges, shapes and wrinkles", runDrape},
+      {"stiffness_range", "draped sheets of bending over membrane stiffness 1e-5, 1e-3, 1e-2, as thesis figure 2.3: isometric bending beside hinges", runStiffnessRange},
   };
   return all;
 }

@@ -118,6 +118,14 @@ Plot& StudyContext::plot(const std::string& name, const std::string& title, cons
   return plot;
 }
 
+SurfacePicture& StudyContext::picture(const std::string& name, const std::string& title)
+{
+  SurfacePicture& picture = pictures_.emplace_back();
+  picture.name = name;
+  picture.title = title;
+  return picture;
+}
+
 void StudyContext::finish()
 {
   clearProgress();

@@ -185,6 +185,11 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   std::printf("iterations        %d (%.2f per step)\n", total.iterations,
               total.iterations / std::max(1.0, static_cast<double>(simulation.state().steps)));
   std::printf("cut steps         %d\n", total.cut_steps);
+  if (total.repulsions > 0 || total.impulses > 0)
+  {
+    std::printf("cloth contacts    %.1f per step, %ld collisions stopped, %ld rigid pieces\n",
+                total.repulsions / std::max(1.0, static_cast<double>(simulation.state().steps)), total.impulses, total.zones);
+  }
   if (total.mended_folds > 0)
   {
     std::printf("mended folds      %d\n", total.mended_folds);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "slender_sim/cloth/cloth_stepper.h"
@@ -21,7 +22,9 @@ struct ClothGroupModel
 {
   std::vector<std::shared_ptr<const ClothModel>> cloths;
   std::vector<ClothContact> contact;     ///< of each cloth
+  std::vector<ClothOptions> options;     ///< of each cloth; empty: those of the group
   std::vector<ContactSolid> solids;      ///< `ignores` names cloths
+  std::vector<std::string> solid_names;  ///< for messages; may be shorter or empty
 };
 
 struct ClothGroupState
@@ -49,16 +52,28 @@ public:
 
   /// Intersections of a state, by a check of all pairs (see intersection.h).
   std::size_t intersections(const ClothGroupState& state) const;
-  /// Throws std::invalid_argument where a state has any: collisions keep what is apart apart, no more.
+  /// Throws std::invalid_argument where a state has any, naming cloth, vertex and what it meets: collisions keep what is apart apart, no more.
   void checkIntersections(const ClothGroupState& state) const;
+
+  /// Force of a cloth on each of its pins [N], 3 x pins, mean over the last successful step: that of its elements and inertia, and what contacts
+  /// exert on the held vertices. The sum of all forces changes the cloths' momentum; how a contact's load comes to the pins within a step is
+  /// the solver's, so that single steps scatter where cloth rubs or falls onto something.
+  const Eigen::Matrix3Xd& pinForces(int cloth) const { return pin_forces_.at(cloth); }
 
   /// Sums and maxima over the last step.
   const CollisionReport& collisions() const { return collisions_; }
+  std::size_t size() const { return model_.cloths.size(); }   ///< cloths
   const ClothStepper& stepper(int cloth) const { return steppers_.at(cloth); }
 
 private:
   StepReport substep(const ClothGroupInputs& inputs, double from, double to, double duration);
+  bool shareLoads(const CollisionStep& step, bool again);
+  void addPinForces(double share, double h);
   Eigen::Matrix3Xd positions(const ClothGroupState& state) const;
+  int clothOf(int point) const;
+  std::string placeOf(int point) const;
+  std::string whereIs(const CollisionReport& failure) const;
+  std::string solidName(int solid) const;
 
   ClothGroupModel model_;
   ClothOptions options_;
@@ -70,8 +85,9 @@ private:
 
   ClothGroupState work_, next_;
   ClothGroupInputs sub_;
-  std::vector<Eigen::Matrix3Xd> pins_start_;
+  std::vector<Eigen::Matrix3Xd> pins_start_, pin_forces_, pin_sums_, shared_pins_, pin_answers_, averages_start_;
   Eigen::Matrix3Xd x_start_, x_, v_;
+  Eigen::Matrix3Xd corrected_, push_, answer_, own_push_, own_answer_;
   Eigen::VectorXd inverse_mass_;
 };
 

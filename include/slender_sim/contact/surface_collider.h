@@ -27,6 +27,9 @@ struct CollisionSurface
   std::vector<ContactSolid> solids;
 };
 
+/// The surface with the prisms that SurfaceCollider takes for cylinders.
+CollisionSurface asTaken(CollisionSurface surface);
+
 /// What happens in a step, as far as it is not in the surface.
 struct CollisionStep
 {
@@ -40,6 +43,7 @@ struct CollisionReport
 {
   bool ok = true;
   std::string reason;     ///< of a failure
+  int points[2] = {-1, -1};   ///< that a failure concerns, if any: those of the sheets, then corners of the solids
   int repulsions = 0;     ///< pairs nearer than the thickness, or about to be
   int impulses = 0;       ///< collisions found and stopped
   int rounds = 0;         ///< of detection, all stages
@@ -65,7 +69,18 @@ public:
 
   /// Corrects the end of a step x [m] and the velocities v [m/s] there (3 x points). A failure changes nothing: surfaces meet at the start,
   /// motions that are prescribed squeeze a piece, a piece would have to turn by more than a quarter; a shorter step may help.
-  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v);
+  /// `again`: after approach() for the same step, from the same start.
+  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again = false);
+
+  /// Where repulsions and the first impulses would move the end of a step, so that the load can be shared with what does not touch. `again`: after
+  /// another approach() for the same step, from the same start. False where that cannot be told, as in failures of resolve().
+  bool approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again);
+
+  /// What contacts in the last successful step gave to points without inverse mass, which whatever holds them takes up: 3 x points [N s].
+  /// Of zones that follow held points the change of momentum, shared out equally; of those that follow a solid as well, nothing: it is not determined.
+  const Eigen::Matrix3Xd& heldImpulses() const;
+  /// The solid that a point beyond those of the sheets is a corner of.
+  int solidOf(int point) const;
 
 private:
   class Impl;

@@ -32,6 +32,9 @@ struct StepReport
   int factorizations = 0;         ///< banded factorisations (more than iterations when a Hessian was shifted)
   double residual = 0.0;          ///< largest unbalanced nodal force over the largest force in the rod [-]
   double max_strain = 0.0;        ///< largest |stretch strain| over all edges [-]
+  long repulsions = 0;            ///< cloth: pairs of pieces nearer than the thickness, or about to be
+  long impulses = 0;              ///< cloth: collisions found and stopped
+  long zones = 0;                 ///< cloth: pieces that could only be kept apart by moving them rigidly
   int mended_folds = 0;           ///< threads: sharp folds that were taken out because the step could not be done with them
   bool stable = true;             ///< statics: the equilibrium is a minimum of the energy (false: stationary only, a saddle)
   int projection_iterations = 0;  ///< of fast projection (explicit steps of inextensible rods), the most in a step

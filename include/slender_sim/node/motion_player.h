@@ -15,7 +15,9 @@ namespace slender {
 /// Publishes each body of the table as a tf frame BODY in ~frame_id, and for each entry `BODY: GRASP` of ~bodies a PoseStamped on
 /// `grasps/GRASP/pose`, in the frame BODY itself (its pose there is the identity), so that the receiver has to ask tf.
 ///
-/// Parameters: ~file (CSV); ~bodies (map); ~frame_id ("world"); ~tf (true; false: poses in ~frame_id, no tf); ~rate [Hz] (0: at the
+/// Bodies that ~solids lists go into `bodies` messages, in ~frame_id: those that move obstacles and driven bodies of a scene.
+///
+/// Parameters: ~file (CSV); ~bodies (map); ~solids (list of names); ~frame_id ("world"); ~tf (true; false: poses in ~frame_id, no tf); ~rate [Hz] (0: at the
 /// table's own times, otherwise resampled); ~speed (1); ~loop (false; true: back and forth for ever, without a jump);
 /// ~wait [s] (30: how long to wait for subscribers at most); ~offset ([x, y, z], added to all positions [m]).
 class MotionPlayer
@@ -44,7 +46,8 @@ private:
   Eigen::Vector3d offset_{0, 0, 0};
   std::vector<BodyTrajectory> table_;
   std::vector<Instant> instants_;
-  ros::Publisher tf_pub_;
+  std::vector<std::string> solids_;
+  ros::Publisher tf_pub_, bodies_pub_;
   std::map<std::string, ros::Publisher> pose_pubs_;   // by body
 };
 

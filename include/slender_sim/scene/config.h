@@ -258,6 +258,16 @@ struct ClothGrid
   std::array<Eigen::Vector3d, 2> sides{Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)};   ///< to the lower right, to the upper left; at right angles
 };
 
+/// What a cloth touches.
+struct ClothContactConfig
+{
+  bool self = true;
+  bool cloths = true;        ///< other cloths that have this set, too
+  bool obstacles = true;     ///< obstacles and driven bodies
+  double friction = 0.3;     ///< Coulomb [-] >= 0
+  double thickness = 1e-3;   ///< distance of two layers in contact [m] > 0; half of it from an obstacle
+};
+
 /// A grasp's frame has its origin at the mean of the held vertices and the world's axes when it takes hold; then it moves with its motion,
 /// and the vertices rigidly with it.
 struct ClothConfig
@@ -284,6 +294,7 @@ struct ClothConfig
   double linear_tolerance = 0.02;
   std::vector<GraspConfig> grasps;
   std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`tracked`); null: nothing
+  std::optional<ClothContactConfig> contact;   ///< nothing: touches nothing
 };
 
 enum class Start { as_given, equilibrium };    ///< equilibrium: the static solver runs first

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/rod/rod_group.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
@@ -163,6 +163,11 @@ private:
 
   // simulation_cloths.cpp
   void buildCloths();
+  void buildTouchingCloths();
+  void exchangeTouchingCloths(SceneState& state);
+  void checkTouchingCloths(SceneState& state);
+  const Eigen::Matrix3Xd& pinForces(int cloth) const;
+  const ClothStepper& clothStepper(int cloth) const;
   StepReport stepCloths(const SceneInputs& inputs);
   /// What drives a grasp: its target, or the body or obstacle that it follows.
   GraspTarget drivenTarget(int grasp, const SceneInputs& inputs) const;
@@ -200,7 +205,12 @@ private:
   TouchingState touching_state_;
   TouchingInputs touching_inputs_;
   std::vector<std::shared_ptr<const ClothModel>> cloth_models_;
-  std::vector<ClothStepper> cloth_steppers_;
+  std::vector<std::optional<ClothStepper>> cloth_steppers_;   ///< per cloth; none for those with contact
+  std::optional<ClothGroup> touching_cloths_;
+  std::vector<int> touching_cloth_index_;             ///< per cloth: in touching_cloths_, -1: on its own
+  std::vector<int> cloth_bodies_;                     ///< of the scene, that these meet, beside all obstacles
+  ClothGroupState touching_cloth_state_;
+  ClothGroupInputs touching_cloth_inputs_;
   std::vector<ClothInputs> cloth_inputs_;
   std::vector<Pose> cloth_targets_;                   ///< per grasp of the scene
   std::optional<RodGroup> group_;

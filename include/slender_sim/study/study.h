@@ -8,6 +8,10 @@
 #include <variant>
 #include <vector>
 
+#include <Eigen/Core>
+
+#include "slender_sim/geometry/triangle_mesh.h"
+
 namespace slender::study {
 
 /// One row of a study's table: keys in the order in which they were set, each a number or a word.
@@ -53,6 +57,27 @@ struct Plot
   Series& at(const std::string& label);
 };
 
+/// Shaded surfaces in panels beside each other, all seen along the same direction and at the same scale.
+struct SurfacePicture
+{
+  struct Surface
+  {
+    TriangleMesh mesh;
+    bool cloth = true;   ///< else something that stands behind: grey
+  };
+  struct Panel
+  {
+    std::string label;
+    std::vector<Surface> surfaces;
+  };
+
+  std::string name;      ///< file name without ending
+  std::string title;
+  Eigen::Vector3d view{0, 1, 0}, up{0, 0, 1};
+  int columns = 2;       ///< panels in a row
+  std::vector<Panel> panels;
+};
+
 /// What a study gets to work with: the extent asked for, a progress line, and a place for its results.
 class StudyContext
 {
@@ -73,6 +98,8 @@ public:
   void note(const std::string& text) { notes_.push_back(text); }   ///< one line below the table
   Plot& plot(const std::string& name, const std::string& title, const std::string& x_label, const std::string& y_label);
 
+  SurfacePicture& picture(const std::string& name, const std::string& title);
+
   /// Adds worst_error_over_bound = max |measured - expected| / bound over all check rows (NaN if any is NaN), if there are any.
   void finish();
 
@@ -81,6 +108,7 @@ public:
   const std::vector<std::pair<std::string, double>>& metrics() const { return metrics_; }
   const std::vector<std::string>& notes() const { return notes_; }
   const std::deque<Plot>& plots() const { return plots_; }
+  const std::deque<SurfacePicture>& pictures() const { return pictures_; }
 
 private:
   std::string name_;
@@ -90,6 +118,7 @@ private:
   std::vector<std::pair<std::string, double>> metrics_;
   std::vector<std::string> notes_;
   std::deque<Plot> plots_;
+  std::deque<SurfacePicture> pictures_;
 };
 
 struct Study
