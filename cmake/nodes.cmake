@@ -6,7 +6,7 @@ target_include_directories(slender_sim_node PUBLIC
   $<BUILD_INTERFACE:${CATKIN_DEVEL_PREFIX}/include> ${catkin_INCLUDE_DIRS})
 target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES})
 
-foreach(node rod_node thread_node cloth_node fairing_node motion_player)
+foreach(node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
   add_executable(${node} ${PROJECT_SOURCE_DIR}/src/nodes/${node}.cpp)
   target_link_libraries(${node} PRIVATE slender_sim_node)
 endforeach()
@@ -24,6 +24,6 @@ if(BUILD_TESTING)
 
   file(GLOB ROSTESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/nodes/*.test)
   foreach(test ${ROSTESTS})
-    add_rostest(${test} DEPENDENCIES rod_node thread_node cloth_node fairing_node motion_player slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
+    add_rostest(${test} DEPENDENCIES rod_node thread_node cloth_node tracking_node fairing_node motion_player slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
   endforeach()
 endif()

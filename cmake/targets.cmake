@@ -45,7 +45,7 @@ install(TARGETS slender_sim_simulate slender_sim_fair_mesh RUNTIME DESTINATION $
 if(TARGET slender_sim_node)
   set_target_properties(slender_sim_node PROPERTIES INSTALL_RPATH "$ORIGIN")
   install(TARGETS slender_sim_node ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB})
-  foreach(node rod_node thread_node cloth_node fairing_node motion_player)
+  foreach(node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
     if(TARGET ${node})
       install(TARGETS ${node} RUNTIME DESTINATION ${INSTALL_BIN})
     endif()
