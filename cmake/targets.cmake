@@ -39,9 +39,13 @@ add_executable(slender_sim_fair_mesh src/tools/fair_mesh.cpp)
 set_target_properties(slender_sim_fair_mesh PROPERTIES OUTPUT_NAME fair_mesh)
 target_link_libraries(slender_sim_fair_mesh PRIVATE slender_sim)
 
+add_executable(slender_sim_regions src/tools/regions.cpp)
+set_target_properties(slender_sim_regions PROPERTIES OUTPUT_NAME regions)
+target_link_libraries(slender_sim_regions PRIVATE slender_sim)
+
 install(TARGETS slender_sim EXPORT slender_sim_targets
   ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS slender_sim_simulate slender_sim_fair_mesh RUNTIME DESTINATION ${INSTALL_BIN})
+install(TARGETS slender_sim_simulate slender_sim_fair_mesh slender_sim_regions RUNTIME DESTINATION ${INSTALL_BIN})
 if(TARGET slender_sim_node)
   set_target_properties(slender_sim_node PROPERTIES INSTALL_RPATH "$ORIGIN")
   install(TARGETS slender_sim_node ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB})

@@ -5,50 +5,22 @@
 #include <limits>
 #include <stdexcept>
 
-#include "cloth_system.h"
-#include "slender_sim/cloth/plastic_flow.h"
+#include "cloth_stepper_impl.h"
 
 namespace slender {
-
-class ClothStepper::Impl
-{
-public:
-  Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
-
-  StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
-
-  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
-
-  std::shared_ptr<const ClothModel> model;
-  ClothOptions options;
-  ClothSystem system;
-  Eigen::Matrix3Xd pin_forces, average_forces;
-
-private:
-  bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
-  StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
-  std::string explain(StepFailure failure, double length) const;
-  StepFailure implicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
-  StepFailure explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
-  StepFailure minimize(StepReport& report);
-  StepFailure linearized(StepReport& report);
-  StepFailure finish(double h, StepReport& report);
-  Eigen::Vector3d pinAt(const ClothInputs& inputs, std::size_t pin, double fraction) const;
-  double largest(const PointVector& d) const;
-
-  PlasticFlow plastic_;
-  ClothState work_;
-  Eigen::Matrix3Xd pins_start_, averages_start_, averages_;
-  PointVector x_, best_, trial_, d_, pin_motion_, v_, force_;
-  double shortest_edge_ = 0;
-};
 
 ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
   : model(std::move(m)), options(o), system(*model, o), plastic_(*model)
 {
   const std::string who = "cloth '" + model->name + "': ";
-  if (o.integrator != Integrator::implicit_euler && o.integrator != Integrator::symplectic_euler)
-    throw std::invalid_argument(who + "integrator must be implicit_euler or symplectic_euler");
+  if (o.integrator != Integrator::implicit_euler && o.integrator != Integrator::tr_bdf2 && !isExplicit())
+    throw std::invalid_argument(who + "integrator must be implicit_euler, tr_bdf2, imex or symplectic_euler");
+  if (o.integrator == Integrator::imex && model->bending == BendingModel::hinge)
+    throw std::invalid_argument(who + "imex needs a constant matrix: bending must be isometric or none, or use another integrator");
+  if (!(o.error_tolerance >= 0) || !std::isfinite(o.error_tolerance) || !(o.min_step > 0))
+    throw std::invalid_argument(who + "error_tolerance must be zero or more, min_step positive");
+  if (o.error_tolerance > 0 && isExplicit())
+    throw std::invalid_argument(who + "error_tolerance is for implicit_euler and tr_bdf2; leave it out, or use one of these");
   if (!(o.linear_tolerance > 0 && o.linear_tolerance < 1))
     throw std::invalid_argument(who + "linear_tolerance must be in (0, 1)");
   for (const double value : {model->bending_modulus, model->mass_damping, model->stiffness_damping, model->wind_coefficient})
@@ -60,8 +32,8 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
   {
     if (model->averages->cols() != model->vertices())
       throw std::invalid_argument(who + "averages of " + std::to_string(model->averages->cols()) + " vertices do not fit");
-    if (o.integrator == Integrator::symplectic_euler)
-      throw std::invalid_argument(who + "prescribed averages need implicit steps: use implicit_euler");
+    if (o.integrator != Integrator::implicit_euler)
+      throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler");
     if (o.solver == ClothSolver::cholesky)
       throw std::invalid_argument(who + "prescribed averages need solver: conjugate_gradients (or auto)");
   }
@@ -69,8 +41,15 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
   for (Eigen::Index e = 0; e < model->topology.edges.cols(); ++e)
     shortest_edge_ = std::min(shortest_edge_, (model->rest.vertices.col(model->topology.edges(0, e)) -
                                                model->rest.vertices.col(model->topology.edges(1, e))).norm());
-  for (PointVector* v : {&x_, &best_, &trial_, &d_, &pin_motion_, &v_, &force_})
+  for (PointVector* v : {&x_, &best_, &trial_, &d_, &pin_motion_, &v_, &force_, &x_start_, &v_start_, &a_start_, &x_stage_, &v_stage_, &q_hat_, &q_tilde_,
+                         &guess_})
     v->assign(4 * model->vertices(), 0.0);
+  plan_.stages.reserve(2);
+  if (o.integrator == Integrator::imex)
+  {
+    constant_ = std::make_unique<ShiftedMatrix>(system.bending().size() > 0 ? system.bending() : PointMatrix(model->vertices(), {}));
+    constant_weight_.assign(model->vertices(), 0.0);
+  }
 }
 
 bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inputs, double duration, std::string& what) const
@@ -91,7 +70,7 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
   check(inputs.averages.cols() == model->averageCount(), "number of averages (one per average of the model)");
   check(inputs.averages.allFinite(), "averages");
   check(s.x.cols() == n && s.v.cols() == n, "number of vertices of the state");
-  check(s.x.allFinite() && s.v.allFinite(), "the state");
+  check(s.x.allFinite() && s.v.allFinite() && s.next_step >= 0, "the state");
   check(model->bending != BendingModel::hinge || (s.rest_angles.size() == model->topology.hingeCount() && s.rest_angles.allFinite()),
         "rest angles of the state (one per hinge)");
   check(!plastic_.active() || (s.stiffening.size() == model->topology.hingeCount() && s.stiffening.allFinite() && (s.stiffening.array() > 0).all()),
@@ -114,7 +93,7 @@ StepReport ClothStepper::Impl::refuse(StepReport& report, StepFailure failure, c
 std::string ClothStepper::Impl::explain(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
-  if (options.integrator == Integrator::symplectic_euler)
+  if (isExplicit())
     return "the explicit step blew up" + at + ": use a shorter step or implicit_euler";
   if (failure == StepFailure::singular_matrix)
     return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude";
@@ -145,196 +124,161 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
     toPoints(state.x, x_);
     system.averagesOf(x_, averages_start_);
   }
-  const bool explicit_step = options.integrator == Integrator::symplectic_euler;
-  double t = 0.0, h = duration;
+  const bool adaptive = options.error_tolerance > 0;
+  // cuts that come again and again do not help: what fails everywhere should fail soon
+  const int most_cuts = 3 * options.newton.max_cuts;
+  double t = 0.0, h = adaptive && state.next_step > 0 ? std::min(state.next_step, duration) : duration;
   while (t < duration)
   {
     const bool last = t + h > duration * (1 - 1e-9);
-    const double to = last ? duration : t + h;
+    const double to = last ? duration : t + h, length = to - t;
     StepReport sub;
-    const StepFailure failure = explicit_step ? explicitStep(inputs, t, to, duration, sub) : implicitStep(inputs, t, to, duration, sub);
-    report.merge(sub);
-    if (failure != StepFailure::none)
+    StepFailure failure;
+    if (options.integrator == Integrator::imex)
+      failure = imexStep(inputs, t, to, duration, sub);
+    else
+      failure = isExplicit() ? explicitStep(inputs, t, to, duration, sub) : implicitStep(inputs, t, to, duration, sub);
+    const double ratio = adaptive ? sub.error_estimate / options.error_tolerance : 0.0;
+    const bool inaccurate = failure == StepFailure::none && ratio > 1 && 0.5 * length >= options.min_step;
+    if (failure != StepFailure::none || inaccurate)
     {
-      if (explicit_step || 0.5 * (to - t) < duration * std::ldexp(1 - 1e-9, -options.newton.max_cuts))
-        return refuse(report, failure, explain(failure, to - t));
-      ++report.cut_steps;
-      h = 0.5 * (to - t);
+      report.iterations += sub.iterations;
+      report.linear_iterations += sub.linear_iterations;
+      report.factorizations += sub.factorizations;
+      const bool shortest = 0.5 * length < (adaptive ? options.min_step : duration * std::ldexp(1 - 1e-9, -options.newton.max_cuts));
+      if (!inaccurate && (isExplicit() || shortest || report.cut_steps >= most_cuts))
+        return refuse(report, failure, explain(failure, length));
+      report.cut_steps += !inaccurate;
+      h = length * (inaccurate ? std::clamp(stepFactor(ratio), 0.2, 0.8) : 0.5);
       continue;
     }
-    ++report.substeps;
-    h = std::min(2.0 * (to - t), duration);
+    std::swap(work_, next_);
+    ++sub.substeps;
+    report.merge(sub);
+    h = std::max(last && adaptive ? h : 0.0, length * (adaptive ? std::clamp(stepFactor(ratio), 0.5, 2.0) : 2.0));
+    h = std::min(h, duration);
     t = to;
   }
+  work_.next_step = adaptive ? h : 0.0;
   std::swap(state, work_);
   return report;
 }
 
-double ClothStepper::Impl::largest(const PointVector& d) const
+/// Next step length over this one for a local error that is `ratio` times the tolerance, with a margin.
+double ClothStepper::Impl::stepFactor(double ratio) const
 {
-  double square = 0.0;
-  for (int i = 0; i < model->vertices(); ++i)
-    square = std::max(square, point(d, i).squaredNorm());
-  return std::sqrt(square);
+  return 0.9 * std::pow(std::max(ratio, 1e-12), -1.0 / (order(options.integrator) + 1));
 }
 
+void ClothStepper::Impl::combine(const Combination& c, PointVector& result) const
+{
+  for (std::size_t i = 0; i < result.size(); ++i)
+    result[i] = c[kQ] * x_start_[i] + c[kV] * v_start_[i] + c[kA] * a_start_[i] + c[kQStage] * x_stage_[i] + c[kVStage] * v_stage_[i];
+}
+
+/// From work_ to next_.
 StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report)
 {
   const double h = to - from;
-  system.beginStep(work_, inputs, h);
-  std::fill(pin_motion_.begin(), pin_motion_.end(), 0.0);
-  for (std::size_t k = 0; k < work_.pins.size(); ++k)
-    point(pin_motion_, work_.pins[k]) = pinAt(inputs, k, to / duration) - work_.x.col(work_.pins[k]);
+  const int n = model->vertices();
+  planStep(options.integrator, 1.0, h, 0.0, plan_);
+  toPoints(work_.x, x_start_);
+  toPoints(work_.v, v_start_);
+  system.hold(work_);
   if (model->averages)
     averages_ = averages_start_ + to / duration * (inputs.averages - averages_start_);
-  const StepFailure failure = options.one_newton_step ? linearized(report) : minimize(report);
-  return failure != StepFailure::none ? failure : finish(h, report);
-}
-
-/// One Newton step from the start, what is held moving as prescribed.
-StepFailure ClothStepper::Impl::linearized(StepReport& report)
-{
-  system.evaluateHessian(system.start(), HessianKind::semidefinite);
-  for (int i = 0; i < model->vertices(); ++i)
-    point(d_, i) = system.held()[i] ? Eigen::Vector3d(point(pin_motion_, i)) : Eigen::Vector3d(point(system.target(), i) - point(system.start(), i));
-  if (model->averages)   // conjugate gradients keep what the first guess meets
+  const bool second_order = order(options.integrator) == 2;
+  if (second_order)
+    acceleration(inputs, plan_.stages[0].tau_v);
+  double reached = 0.0;
+  for (std::size_t s = 0; s < plan_.stages.size(); ++s)
   {
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      x_[i] = system.start()[i] + d_[i];
-    system.meetAverages(averages_, x_);
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      d_[i] = x_[i] - system.start()[i];
+    const Stage& stage = plan_.stages[s];
+    const PointVector& start = s == 0 ? x_start_ : x_stage_;
+    const PointVector& velocity = s == 0 ? v_start_ : v_stage_;
+    combine(stage.q_hat, q_hat_);
+    combine(stage.q_tilde, q_tilde_);
+    for (int i = 0; i < n; ++i)
+      point(guess_, i) = point(start, i) + (stage.time - reached) * h * point(velocity, i);
+    std::fill(pin_motion_.begin(), pin_motion_.end(), 0.0);
+    for (std::size_t k = 0; k < work_.pins.size(); ++k)
+      point(pin_motion_, work_.pins[k]) = pinAt(inputs, k, stage.time == 1.0 ? to / duration : (from + stage.time * h) / duration) - point(start, work_.pins[k]);
+    if (model->stiffness_damping > 0)
+    {
+      for (std::size_t i = 0; i < trial_.size(); ++i)
+        trial_[i] = stage.q_tilde[kV] * v_start_[i];
+      system.setViscosity(model->stiffness_damping / stage.tau_v, x_start_, stage.q_tilde[kV] != 0 ? &trial_ : nullptr, stage.q_tilde[kQStage], &x_stage_);
+    }
+    wind_v_ = work_.v;
+    for (int i = 0; i < n && second_order; ++i)
+      wind_v_.col(i) += stage.time * h * point(a_start_, i);
+    system.beginStage({stage.tau_v, &q_hat_, &q_tilde_, &start, second_order ? &guess_ : &start, &wind_v_}, inputs);
+    const StepFailure failure = options.one_newton_step ? linearized(report) : minimize(report);
+    if (failure != StepFailure::none)
+      return failure;
+    reached = stage.time;
+    if (s + 1 == plan_.stages.size())
+      return finish(stage, inputs, h, to / duration, report);
+    for (int i = 0; i < n; ++i)
+    {
+      const Eigen::Vector3d q = point(x_, i);
+      point(v_stage_, i) = system.held()[i] ? Eigen::Vector3d((q - point(x_start_, i)) / (stage.time * h))
+                                            : Eigen::Vector3d((q - point(q_tilde_, i)) / stage.tau_v);
+    }
+    x_stage_ = x_;
   }
-  if (!system.solve(d_, report.linear_iterations, report.factorizations))
-    return StepFailure::singular_matrix;
-  ++report.iterations;
-  for (std::size_t i = 0; i < x_.size(); ++i)
-    x_[i] = system.start()[i] + d_[i];
   return StepFailure::none;
 }
 
-/// Newton's method on the energy of the step, with a watchdog as in minimize() of rods: nearly inextensible cloth gains a little membrane
-/// energy in every full step that turns it, and a strict line search would creep. Where full steps do not get below the best energy
-/// for a while, it returns there and becomes strict.
-StepFailure ClothStepper::Impl::minimize(StepReport& report)
-{
-  constexpr double kArmijo = 1e-4;
-  constexpr double kMostShift = 10.0;   // of the weight of inertia
-  constexpr int kPatience = 5;
-  for (int i = 0; i < model->vertices(); ++i)
-    point(x_, i) = system.held()[i] ? Eigen::Vector3d(point(system.start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(system.target(), i));
-  if (model->averages)
-    system.meetAverages(averages_, x_);
-  bool near = false, strict = false;
-  double best = std::numeric_limits<double>::infinity(), shift = 0.0;
-  int misses = 0;
-  for (int iteration = 0; iteration < options.newton.max_iterations; ++iteration)
-  {
-    // far away the matrix that is never indefinite; near by the exact one, shifted where wrinkles are about to grow
-    HessianKind kind = near ? HessianKind::exact : HessianKind::semidefinite;
-    ClothEvaluation here = system.evaluateHessian(x_, kind);
-    if (!std::isfinite(here.energy()))
-      return StepFailure::state_not_finite;
-    if (!strict && here.energy() > best + 1e-13 * here.magnitude())
-    {
-      strict = ++misses > kPatience;
-      if (strict)
-      {
-        std::copy(best_.begin(), best_.end(), x_.begin());
-        kind = HessianKind::semidefinite;
-        here = system.evaluateHessian(x_, kind);
-      }
-    }
-    else if (!strict)
-    {
-      best = here.energy();
-      misses = 0;
-      std::copy(x_.begin(), x_.end(), best_.begin());
-    }
-    bool solved = false;
-    for (double added = 0.0; !solved;)
-    {
-      if (kind == HessianKind::exact && shift > added)
-      {
-        system.shiftMatrix(shift - added);
-        added = shift;
-      }
-      std::fill(d_.begin(), d_.end(), 0.0);
-      solved = system.solve(d_, report.linear_iterations, report.factorizations);
-      if (solved || kind == HessianKind::semidefinite)
-        break;
-      shift = std::max(0.2, 4.0 * shift);
-      if (shift > kMostShift)
-      {
-        shift = 0.0;
-        kind = HessianKind::semidefinite;
-        system.evaluateHessian(x_, kind);
-      }
-    }
-    if (!solved)
-      return StepFailure::singular_matrix;
-    ++report.iterations;
-    const double increment = largest(d_) / shortest_edge_;
-    if (!std::isfinite(increment))
-      return StepFailure::state_not_finite;
-    const double slope = pointKernels().dot(model->vertices(), system.gradient().data(), d_.data());
-    const double noise = 1e-13 * here.magnitude();
-    double alpha = 1.0;
-    for (;; alpha *= 0.5)
-    {
-      for (std::size_t i = 0; i < x_.size(); ++i)
-        trial_[i] = x_[i] + alpha * d_[i];
-      if (!strict || increment <= options.newton.tolerance || system.energy(trial_).energy() <= here.energy() + kArmijo * alpha * slope + noise)
-        break;
-      if (alpha < 1e-8)
-        return StepFailure::newton_diverged;
-    }
-    std::swap(x_, trial_);
-    if (alpha == 1.0 && increment <= options.newton.tolerance)
-      return StepFailure::none;
-    near = increment < 0.1;
-    shift = shift > 0.1 ? 0.25 * shift : 0.0;
-  }
-  return StepFailure::newton_diverged;
-}
-
 /// Takes x_ as the end of the step.
-StepFailure ClothStepper::Impl::finish(double h, StepReport& report)
+StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& inputs, double h, double fraction, StepReport& report)
 {
   if (model->averages)   // to rounding
     system.meetAverages(averages_, x_);
   const ClothEvaluation end = system.evaluate(x_);
   if (!std::isfinite(end.energy()))
     return StepFailure::state_not_finite;
-  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
   if (model->averages)
     system.balanceAverages(average_forces);
-  double unbalanced = 0.0, force = 1e-300;
+  next_ = work_;
+  const bool second_order = order(options.integrator) == 2;
+  double unbalanced = 0.0, force = 1e-300, jump = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
   {
+    const bool held = system.held()[i];
     const double size = point(system.gradient(), i).norm();
-    (system.held()[i] ? force : unbalanced) = std::max(system.held()[i] ? force : unbalanced, size);
-    force = std::max(force, model->mass[i] * (point(x_, i) - point(system.target(), i)).norm() / (h * h));
-    work_.v.col(i) = (point(x_, i) - point(system.start(), i)) / h;
-    work_.x.col(i) = point(x_, i);
+    (held ? force : unbalanced) = std::max(held ? force : unbalanced, size);
+    const Eigen::Vector3d q = point(x_, i), a = (q - point(q_hat_, i)) / (stage.tau_a * stage.tau_a);
+    force = std::max(force, model->mass[i] * a.norm());
+    if (!held)
+      jump = std::max(jump, second_order ? (a - point(a_start_, i)).norm() : a.norm());
+    next_.v.col(i) = held ? Eigen::Vector3d((q - point(x_start_, i)) / h) : Eigen::Vector3d((q - point(q_tilde_, i)) / stage.tau_v);
+    next_.x.col(i) = q;
   }
   report.residual = std::max(report.residual, unbalanced / force);
   report.max_strain = std::max(report.max_strain, end.max_strain);
+  if (options.error_tolerance > 0)
+    report.error_estimate = std::max(report.error_estimate, errorConstant(options.integrator) * h * h * jump);
+  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
+  {
+    next_.x.col(work_.pins[k]) = pinAt(inputs, k, fraction);
     pin_forces.col(static_cast<Eigen::Index>(k)) = -point(system.gradient(), work_.pins[k]);
+  }
   return StepFailure::none;
 }
 
+/// With the matrix of the last stage.
 bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
 {
-  if (options.integrator == Integrator::symplectic_euler)
+  if (isExplicit())
     return false;
   for (int i = 0; i < model->vertices(); ++i)
     point(system.gradient(), i) = -forces.col(i);
   std::fill(d_.begin(), d_.end(), 0.0);
   int iterations = 0, factorizations = 0;
   constexpr double kTolerance = 0.05;
-  if (!system.solve(d_, iterations, factorizations, kTolerance))
+  if (!system.solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance))
     return false;
   for (int i = 0; i < model->vertices(); ++i)
     displacement.col(i) = point(d_, i);
@@ -347,52 +291,6 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3X
     if (system.held()[i])
       pin_forces_change.col(pin++) = -point(trial_, i);
   return true;
-}
-
-/// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step ago.
-StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report)
-{
-  const double h = to - from;
-  const int n = model->vertices();
-  toPoints(work_.x, x_);
-  toPoints(work_.v, v_);
-  system.setHinges(work_);
-  if (model->stiffness_damping > 0)
-  {
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      trial_[i] = x_[i] - h * v_[i];
-    system.setViscosity(model->stiffness_damping / h, trial_);
-  }
-  std::fill(d_.begin(), d_.end(), 0.0);
-  const ClothEvaluation here = system.addInternal(x_, d_);
-  std::fill(force_.begin(), force_.end(), 0.0);
-  if (system.wind().active())
-    system.wind().addForces(x_, v_, inputs.wind, force_);
-  for (int i = 0; i < n; ++i)
-  {
-    Eigen::Vector3d f = point(force_, i) - point(d_, i) + model->mass[i] * (inputs.gravity - model->mass_damping * point(v_, i));
-    if (inputs.forces.cols() > 0)
-      f += inputs.forces.col(i);
-    point(force_, i) = f;
-    point(v_, i) += h / model->mass[i] * f;
-  }
-  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
-  for (std::size_t k = 0; k < work_.pins.size(); ++k)
-  {
-    const int p = work_.pins[k];
-    const Eigen::Vector3d v = (pinAt(inputs, k, to / duration) - work_.x.col(p)) / h;
-    pin_forces.col(static_cast<Eigen::Index>(k)) = point(force_, p) - model->mass[p] * (v - work_.v.col(p)) / h;
-    point(v_, p) = v;
-  }
-  double fastest = 0.0;
-  for (int i = 0; i < n; ++i)
-  {
-    work_.v.col(i) = point(v_, i);
-    work_.x.col(i) += h * point(v_, i);
-    fastest = std::max(fastest, work_.v.col(i).cwiseAbs().maxCoeff());
-  }
-  report.max_strain = std::max(report.max_strain, here.max_strain);
-  return std::isfinite(here.energy()) && work_.x.allFinite() && fastest < 1e8 ? StepFailure::none : StepFailure::state_not_finite;
 }
 
 ClothStepper::ClothStepper(std::shared_ptr<const ClothModel> model, const ClothOptions& options) : impl_(std::make_unique<Impl>(std::move(model), options)) {}

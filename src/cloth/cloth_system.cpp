@@ -9,38 +9,6 @@ namespace slender {
 
 namespace {
 
-/// One Newton step needs few iterations of conjugate gradients; many exact ones are faster by factoring as long as that is cheap.
-ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
-{
-  constexpr int kLargestFactored = 5000;
-  if (options.solver != ClothSolver::automatic)
-    return options.solver;
-  if (model.averages)
-    return ClothSolver::conjugate_gradients;
-  return options.one_newton_step || model.vertices() > kLargestFactored ? ClothSolver::conjugate_gradients : ClothSolver::cholesky;
-}
-
-/// Cotangent stiffness of the rest mesh times a modulus: the membrane as if it acted on each coordinate alike.
-PointMatrix scalarMembrane(const ClothModel& model)
-{
-  std::vector<Eigen::Triplet<double>> entries;
-  const double modulus = 0.5 * (model.membrane.c11 + model.membrane.c22);
-  const Eigen::Matrix3Xd& x = model.rest.vertices;
-  for (Eigen::Index f = 0; f < model.rest.triangles.cols(); ++f)
-    for (int k = 0; k < 3; ++k)
-    {
-      const auto corner = [&](int c) { return model.rest.triangles((k + c) % 3, f); };
-      const int a = corner(1), b = corner(2);
-      const Eigen::Vector3d u = x.col(a) - x.col(corner(0)), v = x.col(b) - x.col(corner(0));
-      const double weight = 0.5 * modulus * u.dot(v) / u.cross(v).norm();
-      entries.emplace_back(a, a, weight);
-      entries.emplace_back(b, b, weight);
-      entries.emplace_back(a, b, -weight);
-      entries.emplace_back(b, a, -weight);
-    }
-  return PointMatrix(model.vertices(), entries);
-}
-
 Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
 {
   std::vector<int> pairs;
@@ -51,20 +19,13 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
   return Eigen::Map<const Eigen::MatrixXi>(pairs.data(), 2, static_cast<Eigen::Index>(pairs.size() / 2));
 }
 
-void addScaled(const PointMatrix& matrix, double factor, std::vector<Eigen::Triplet<double>>& entries)
-{
-  for (int i = 0; i < matrix.size(); ++i)
-    for (int k = matrix.starts()[i]; k < matrix.starts()[i + 1]; ++k)
-      entries.emplace_back(i, matrix.column(k), factor * matrix.values()[k]);
-}
-
 }  // namespace
 
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
-  : model_(model), solver_(chosen(model, options)), linear_tolerance_(options.linear_tolerance)
-  , membrane_(model.rest, model.membrane, model.warp), wind_(model)
+  : model_(model), solver_(options.solver == ClothSolver::automatic ? ClothSolver::conjugate_gradients : options.solver)
+  , linear_tolerance_(options.linear_tolerance), membrane_(model.rest, model.membrane, model.warp), wind_(model)
 {
   const int n = points();
   const bool direct = solver_ == ClothSolver::cholesky;
@@ -97,11 +58,7 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     factor_.setPattern(matrix_);
   else
   {
-    stand_in_ = scalarMembrane(model);
-    std::vector<Eigen::Triplet<double>> entries;
-    for (const PointMatrix* part : {&bending_, &stand_in_})
-      addScaled(*part, 1.0, entries);
-    factor_.setPattern(PointMatrix(n, entries));
+    preconditioner_ = std::make_unique<ClothPreconditioner>(model, bending_, matrix_, !constant_bending_);
     cg_.resize(n);
     if (model.averages)
     {
@@ -117,10 +74,14 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
   held_.assign(n, 0);
   if (model.stiffness_damping > 0)
   {
-    for (auto& s : strains_)
-      s.assign(membrane_.paddedCount(), 0.0);
+    viscous_start_.assign(4 * n, 0.0);
+    shifted_.assign(4 * n, 0.0);
+    for (int k = 0; k < 3; ++k)
+      for (auto* s : {&strains_[k], &other_strains_[k]})
+        s->assign(membrane_.paddedCount(), 0.0);
     if (hinges_)
-      angles_.assign(hinges_->paddedCount(), 0.0);
+      for (auto* a : {&angles_, &other_angles_, &start_angles_})
+        a->assign(hinges_->paddedCount(), 0.0);
   }
 }
 
@@ -133,31 +94,63 @@ void ClothSystem::setHinges(const ClothState& state)
     hinges_->setStiffness(static_cast<int>(h), state.stiffening[h] * hinge_stiffness_[h]);
 }
 
-void ClothSystem::setViscosity(double ratio, const PointVector& x)
+void ClothSystem::setViscosity(double ratio, const PointVector& x) { setViscosity(ratio, x, nullptr, 0.0, nullptr); }
+
+void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVector* move, double share, const PointVector* other)
 {
   if (ratio == 0.0 && ratio_ == 0.0)
     return;
   ratio_ = ratio;
   double* strains[3] = {strains_[0].data(), strains_[1].data(), strains_[2].data()};
+  double* others[3] = {other_strains_[0].data(), other_strains_[1].data(), other_strains_[2].data()};
+  const auto add = [&](const PointVector& there, double part) {
+    membrane_.strains(there.data(), others);
+    for (int k = 0; k < 3; ++k)
+      for (std::size_t i = 0; i < strains_[k].size(); ++i)
+        strains[k][i] += part * others[k][i];
+    if (!hinges_)
+      return;
+    hinges_->angles(there.data(), other_angles_.data());
+    for (std::size_t i = 0; i < angles_.size(); ++i)   // the shorter way round
+      angles_[i] += part * std::remainder(other_angles_[i] - start_angles_[i], 2 * M_PI);
+  };
   if (ratio > 0)
-    membrane_.strains(x.data(), strains);
-  membrane_.setResponse(ratio, strains);
-  if (constant_bending_ && ratio > 0)
-    viscous_start_ = x;
-  if (hinges_)
   {
-    if (ratio > 0)
+    viscous_start_ = x;
+    membrane_.strains(x.data(), strains);
+    if (hinges_)
+    {
       hinges_->angles(x.data(), angles_.data());
-    hinges_->setResponse(ratio, angles_.data());
+      start_angles_ = angles_;
+    }
+    if (share != 0.0)
+    {
+      for (auto& array : strains_)
+        for (double& value : array)
+          value *= 1.0 - share;
+      add(*other, share);
+    }
+    for (const double side : {0.5, -0.5})
+      if (move)
+      {
+        for (std::size_t i = 0; i < x.size(); ++i)
+          shifted_[i] = x[i] + 2.0 * side * (*move)[i];
+        add(shifted_, side);
+      }
+    for (std::size_t i = 0; i < x.size(); ++i)
+      viscous_start_[i] += (move ? (*move)[i] : 0.0) + (share != 0.0 ? share * ((*other)[i] - x[i]) : 0.0);
   }
+  membrane_.setResponse(ratio, strains);
+  if (hinges_)
+    hinges_->setResponse(ratio, angles_.data());
 }
 
-void ClothSystem::setWeights(double h, double ratio)
+void ClothSystem::setWeights(double tau, double ratio)
 {
-  if (h == base_h_ && ratio == base_ratio_ && held_ == base_held_)
+  if (tau == base_tau_ && ratio == base_ratio_ && held_ == base_held_)
     return;
   const int n = points();
-  const double rate = 1.0 / (h * h) + model_.mass_damping / h;
+  const double rate = 1.0 / (tau * tau) + model_.mass_damping / tau;
   for (int i = 0; i < n; ++i)
     weight_[i] = rate * model_.mass[i];
   matrix_.setZero();
@@ -167,42 +160,40 @@ void ClothSystem::setWeights(double h, double ratio)
     for (int k = 0; k < 3; ++k)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += weight_[i];
   base_.assign(matrix_.values(), matrix_.values() + 9 * matrix_.blocks());
-  if (solver_ == ClothSolver::conjugate_gradients)
+  if (preconditioner_)
   {
-    std::vector<Eigen::Triplet<double>> entries;
-    for (const PointMatrix* part : {&bending_, &stand_in_})
-      addScaled(*part, 1.0 + ratio, entries);
-    for (int i = 0; i < n; ++i)
-      entries.emplace_back(i, i, weight_[i]);
-    factor_.factor(PointMatrix(n, entries), held_.data());
-    independent_ = !averages_ || averages_->factor(factor_, held_.data());
+    preconditioner_->setConstant(weight_, 1.0 + ratio, held_);
+    independent_ = !averages_ || averages_->factor(preconditioner_->constantFactor(), held_.data());
   }
-  base_h_ = h;
+  base_tau_ = tau;
   base_ratio_ = ratio;
   base_held_ = held_;
 }
 
-void ClothSystem::beginStep(const ClothState& state, const ClothInputs& inputs, double h)
+void ClothSystem::hold(const ClothState& state)
 {
-  const int n = points();
   std::fill(held_.begin(), held_.end(), 0);
   for (const int p : state.pins)
     held_[p] = 1;
-  toPoints(state.x, start_);
-  h_ = h;
   setHinges(state);
-  setViscosity(model_.stiffness_damping / h, start_);
-  setWeights(h, ratio_);
+}
+
+void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
+{
+  const int n = points();
+  start_ = *stage.start;
+  setWeights(stage.tau, ratio_);
   const bool extra = inputs.forces.cols() > 0;
+  const double damping = model_.mass_damping * stage.tau;
   for (int i = 0; i < n; ++i)
   {
-    point(target_, i) = state.x.col(i) + h / (1.0 + model_.mass_damping * h) * state.v.col(i);
+    point(target_, i) = (point(*stage.q_hat, i) + damping * point(*stage.q_tilde, i)) / (1.0 + damping);
     point(force_, i) = model_.mass[i] * inputs.gravity;
     if (extra)
       point(force_, i) += inputs.forces.col(i);
   }
   if (wind_.active())
-    wind_.begin(start_, start_, state.v, inputs.wind, h, force_);
+    wind_.begin(*stage.wind_at, *stage.q_tilde, *stage.velocity, inputs.wind, stage.tau, force_);
 }
 
 ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)
@@ -221,12 +212,14 @@ ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)
   return result;
 }
 
-ClothEvaluation ClothSystem::addInternal(const PointVector& x, PointVector& gradient)
+ClothEvaluation ClothSystem::addInternal(const PointVector& x, PointVector& gradient, bool with_bending)
 {
   ClothEvaluation result;
   const MembraneSums sums = membrane_.addGradient(x.data(), gradient.data());
   result.membrane = sums.energy;
   result.max_strain = std::max(sums.max_strain, -sums.min_strain);
+  if (!with_bending)
+    return result;
   if (hinges_)
     result.bending = hinges_->addGradient(x.data(), gradient.data());
   else if (constant_bending_)
@@ -358,7 +351,7 @@ void ClothSystem::precondition(PointVector& r, PointVector& z)
 {
   if (!averages_)
   {
-    factor_.solvePoints(r.data(), z.data());
+    preconditioner_->apply(r, z);
     return;
   }
   averages_->solve(r.data(), nullptr, z.data(), multipliers_.data());
@@ -366,7 +359,7 @@ void ClothSystem::precondition(PointVector& r, PointVector& z)
   clearHeld(r);
 }
 
-bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizations, double least)
+bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double least)
 {
   if (!independent_)
     return false;
@@ -398,6 +391,10 @@ bool ClothSystem::solve(PointVector& d, int& linear_iterations, int& factorizati
     return true;
   }
   clearHeld(right_);
+  if (at && !averages_)   // averages are met with the constant matrix
+    preconditioner_->align(*at, matrix_, held_);
+  else
+    preconditioner_->useConstant();
   if (averages_)
     precondition(right_, correction_);
   const LinearResult result = cg_.solve(

@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "cloth_preconditioner.h"
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/energy/hinge.h"
 #include "slender_sim/energy/isometric_bending.h"
@@ -22,7 +23,17 @@ struct ClothEvaluation
   double magnitude() const;
 };
 
-/// Energy of one implicit step of a cloth, with gradient and Hessian, and the solution of its Newton equations:
+/// One implicit stage M (x - q_hat) / tau^2 = F(x, (x - q_tilde) / tau) of a step (see Stage).
+struct ClothStage
+{
+  double tau = 0;                                ///< [s]
+  const PointVector *q_hat = nullptr, *q_tilde = nullptr;
+  const PointVector* start = nullptr;            ///< where the stage starts: potentials count from there
+  const PointVector* wind_at = nullptr;          ///< where the wind sees the cloth
+  const Eigen::Matrix3Xd* velocity = nullptr;    ///< at which it does, as far as its force is not linear in the end's
+};
+
+/// Energy of one implicit stage of a cloth, with gradient and Hessian, and the solution of its Newton equations:
 ///   E(x) + sum 1/2 w |x - target|^2 + 1/2 (x - y)^T D (x - y) - f . x,
 /// w from mass and mass damping, D and y from the wind; stiffness damping makes E viscous (see HingeBending::setResponse).
 class ClothSystem
@@ -33,12 +44,15 @@ public:
   int points() const { return model_.vertices(); }
   ClothSolver solver() const { return solver_; }
 
-  /// A step of length h from (x, v), and what is held.
-  void beginStep(const ClothState& state, const ClothInputs& inputs, double h);
-  /// Elastic response and loads only, for explicit steps and energies.
+  /// What is held, and the hinges.
+  void hold(const ClothState& state);
+  /// After setViscosity(stiffness damping / tau, ...).
+  void beginStage(const ClothStage& stage, const ClothInputs& inputs);
   void setHinges(const ClothState& state);
   /// Strains at x as those that viscous response of the given ratio starts from; 0: none.
   void setViscosity(double ratio, const PointVector& x);
+  /// The same for strains that are combined like the points x + move + share (other - x), to second order in `move`; `move` and `other` may be null.
+  void setViscosity(double ratio, const PointVector& x, const PointVector* move, double share, const PointVector* other);
 
   ClothEvaluation energy(const PointVector& x);
   /// Overwrites gradient().
@@ -48,12 +62,12 @@ public:
   /// Adds a multiple of the weights of inertia to the matrix.
   void shiftMatrix(double factor);
   /// Elastic and viscous parts only, added.
-  ClothEvaluation addInternal(const PointVector& x, PointVector& gradient);
+  ClothEvaluation addInternal(const PointVector& x, PointVector& gradient, bool with_bending = true);
   PointVector& gradient() { return gradient_; }
-  /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. False: not positive definite. `linear` grows by iterations.
-  /// `least` : conjugate gradients do not go below this tolerance, whatever the options.
-  bool solve(PointVector& d, int& linear_iterations, int& factorizations, double least = 0.0);
-
+  /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
+  /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `least`: they do not go below
+  /// this tolerance, whatever the options. False: not positive definite. The numbers grow by what was needed.
+  bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double least = 0.0);
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
 
@@ -65,12 +79,14 @@ public:
   void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
 
   const PointVector& start() const { return start_; }
+  const PointMatrix& bending() const { return bending_; }
+  bool constantBending() const { return constant_bending_; }
   const PointVector& target() const { return target_; }
   const std::vector<char>& held() const { return held_; }
   const WindLoad& wind() const { return wind_; }
 
 private:
-  void setWeights(double h, double ratio);
+  void setWeights(double tau, double ratio);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
   void precondition(PointVector& r, PointVector& z);
@@ -85,26 +101,28 @@ private:
   WindLoad wind_;
   std::unique_ptr<HingeBending> hinges_;      ///< hinge bending only
   Eigen::VectorXd hinge_stiffness_;           ///< without stiffening; with plasticity only
-  PointMatrix bending_, stand_in_;            ///< isometric model, or for hinges what preconditions; rest membrane
+  PointMatrix bending_;                       ///< isometric model, or for hinges what preconditions
   bool constant_bending_ = false;             ///< bending_ is the model, not a stand-in
   bool bending_in_blocks_ = false;
 
   BlockMatrix matrix_;
   std::vector<int> membrane_slots_, hinge_slots_, bending_map_;
   std::vector<double> base_;                  ///< constant part of matrix_
-  double base_h_ = 0, base_ratio_ = -1;
+  double base_tau_ = 0, base_ratio_ = -1;
   std::vector<char> base_held_;
-  SparseCholesky factor_;                     ///< of matrix_, or of the preconditioner
+  SparseCholesky factor_;                     ///< of matrix_
+  std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
   ConjugateGradients cg_;
   std::unique_ptr<ConstrainedCholesky> averages_;   ///< of the preconditioner, where averages are prescribed
   bool independent_ = true;                         ///< these, with what is held
   PointVector gap_, multipliers_;                   ///< one point per average
   Eigen::Matrix3Xd averages_now_;
 
-  double h_ = 0, ratio_ = 0;
-  PointVector start_, viscous_start_, target_, force_, gradient_, product_, right_, correction_, weight_;
+  double ratio_ = 0;
+  PointVector start_, viscous_start_, shifted_, target_, force_, gradient_, product_, right_, correction_;
+  std::vector<double> weight_;                ///< of inertia, per point
   std::vector<char> held_;
-  AlignedVector<double> strains_[3], angles_;
+  AlignedVector<double> strains_[3], angles_, other_strains_[3], other_angles_, start_angles_;
 };
 
 }  // namespace slender

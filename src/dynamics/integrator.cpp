@@ -14,6 +14,7 @@ const char* toString(Integrator integrator)
     case Integrator::implicit_midpoint: return "implicit_midpoint";
     case Integrator::generalized_alpha: return "generalized_alpha";
     case Integrator::symplectic_euler: return "symplectic_euler";
+    case Integrator::imex: return "imex";
   }
   return "unknown";
 }
@@ -127,7 +128,7 @@ double errorConstant(Integrator integrator)
 
 int order(Integrator integrator)
 {
-  return integrator == Integrator::implicit_euler || integrator == Integrator::symplectic_euler ? 1 : 2;
+  return integrator == Integrator::implicit_euler || integrator == Integrator::symplectic_euler || integrator == Integrator::imex ? 1 : 2;
 }
 
 }  // namespace slender

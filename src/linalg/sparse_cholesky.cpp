@@ -1,18 +1,37 @@
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 #include <algorithm>
+#include <mutex>
 #include <new>
 
 #include <suitesparse/cholmod.h>
 
 #include "slender_sim/linalg/point_kernel.h"
 
+// Absent from other BLAS libraries than OpenBLAS.
+extern "C" __attribute__((weak)) void openblas_set_num_threads(int);
+
 namespace slender {
+
+namespace {
+
+/// BLAS stays in its caller's thread: dense blocks here are too small for more, whose threads only spin, and sums must not depend on their number.
+void useOneBlasThread()
+{
+  static std::once_flag once;
+  std::call_once(once, [] {
+    if (openblas_set_num_threads)
+      openblas_set_num_threads(1);
+  });
+}
+
+}  // namespace
 
 struct SparseCholesky::Impl
 {
   explicit Impl(bool simplicial)
   {
+    useOneBlasThread();
     cholmod_start(&common);
     if (simplicial)
       common.supernodal = CHOLMOD_SIMPLICIAL;
@@ -183,8 +202,9 @@ void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
   m.values.assign(m.rows.size(), 0.0);
   m.common.method[0].ordering = CHOLMOD_NATURAL;
   m.common.postorder = 0;
-  const std::size_t widths[3] = {16, 48, 128};
-  const double zeros[3] = {0.8, 0.3, 0.1};
+  // wide supernodes make factoring faster; factors of numbers are made for their back-solves, which read less without the zeros
+  const std::size_t widths[3] = {d == 1 ? 4u : 16u, d == 1 ? 16u : 48u, d == 1 ? 48u : 128u};
+  const double zeros[3] = {0.8, d == 1 ? 0.1 : 0.3, d == 1 ? 0.05 : 0.1};
   for (int k = 0; k < 3; ++k)
   {
     m.common.nrelax[k] = widths[k];
@@ -223,7 +243,9 @@ bool SparseCholesky::factor(const BlockMatrix& matrix, const char* fixed)
   return factorValues();
 }
 
-bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed)
+bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed) { return factor(matrix, matrix.values().data(), fixed); }
+
+bool SparseCholesky::factor(const PointMatrix& matrix, const double* values, const char* fixed)
 {
   Impl& m = *impl_;
   std::size_t next = 0;
@@ -234,7 +256,7 @@ bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed)
       if (j > i)
         continue;
       const bool leave_out = fixed && (fixed[i] || fixed[j]);
-      m.values[m.targets[next++].at] = leave_out ? i == j : matrix.values()[k];
+      m.values[m.targets[next++].at] = leave_out ? i == j : values[k];
     }
   return factorValues();
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "rod_stepper_impl.h"
 #include "slender_sim/geometry/rotation.h"
@@ -35,6 +36,8 @@ const RodModel& RodStepper::model() const
 
 RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t) : model(std::move(m)), time(t), system(*model)
 {
+  if (time.integrator == Integrator::imex)
+    throw std::invalid_argument("rod '" + model->name + "': imex is for cloth only");
   if (model->isotropic && time.integrator == Integrator::symplectic_euler)
     isotropic = std::make_unique<IsotropicRod>(*model, system);
 }

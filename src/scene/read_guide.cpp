@@ -203,7 +203,12 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSour
     }
     return;
   }
-  const bool by_points = topic.choice<bool>({{"points", true}, {"bodies", false}}).value_or(false);
+  const std::optional<bool> chosen = topic.choice<bool>({{"points", true}, {"bodies", false}});
+  if (topic.present() && !chosen)
+  {
+    return;
+  }
+  const bool by_points = chosen.value_or(false);
   const bool by_bodies = bodies.present() || (topic.present() && !by_points);
   const auto only_for = [](const YamlCursor& key, bool fits, const char* what) {
     if (key.present() && !fits)

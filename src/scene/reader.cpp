@@ -229,9 +229,14 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   {
     scene.time.integrator = Integrator::implicit_euler;
   }
-  else if (scene.time.integrator != Integrator::implicit_euler && scene.time.integrator != Integrator::symplectic_euler)
+  else if (scene.time.integrator != Integrator::implicit_euler && scene.time.integrator != Integrator::tr_bdf2 &&
+           scene.time.integrator != Integrator::imex && scene.time.integrator != Integrator::symplectic_euler)
   {
-    YamlMap(time).get("integrator").problem("is not for cloth; must be implicit_euler or symplectic_euler");
+    YamlMap(time).get("integrator").problem("is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler");
+  }
+  if (YamlMap(time).has("spectral_radius"))
+  {
+    YamlMap(time).get("spectral_radius").problem("is for generalized_alpha, which cloth does not have; leave it out");
   }
   if (scene.start == Start::equilibrium)
   {
@@ -293,6 +298,10 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   {
     checkClothTime(map, scene);
   }
+  if (scene.time.integrator == Integrator::imex && !(scene.rods.empty() && scene.threads.empty() && scene.bodies.empty()))
+  {
+    YamlMap(time).get("integrator").problem("is for cloth only; must be another one in scenes with rods, threads or bodies");
+  }
   map.finish();
   if (!problems.empty())
   {
@@ -314,13 +323,14 @@ TimeConfig readTime(const YamlCursor& at)
                                                                     {"tr_bdf2", Integrator::tr_bdf2},
                                                                     {"implicit_midpoint", Integrator::implicit_midpoint},
                                                                     {"generalized_alpha", Integrator::generalized_alpha},
-                                                                    {"symplectic_euler", Integrator::symplectic_euler}}));
+                                                                    {"symplectic_euler", Integrator::symplectic_euler},
+                                                                    {"imex", Integrator::imex}}));
   assign(time.spectral_radius, map.get("spectral_radius").number(Range::closed(0, 1)));
   const YamlCursor error_tolerance = map.get("error_tolerance");
   assign(time.error_tolerance, error_tolerance.number(Range::closed(0, 1, "m")));
-  if (time.error_tolerance > 0 && time.integrator == Integrator::symplectic_euler)
+  if (time.error_tolerance > 0 && (time.integrator == Integrator::symplectic_euler || time.integrator == Integrator::imex))
   {
-    error_tolerance.problem("is for implicit integrators; steps of symplectic_euler are of fixed length");
+    error_tolerance.problem("is for implicit integrators; steps of symplectic_euler and imex are of fixed length");
   }
   const YamlCursor min_step = map.get("min_step");
   if (const auto value = min_step.number(Range::above(0, 10, "s")))

@@ -35,6 +35,8 @@ ClothOptions optionsOf(const ClothConfig& config, const TimeConfig& time)
   options.solver = config.solver;
   options.linear_tolerance = config.linear_tolerance;
   options.newton = time.newton;
+  options.error_tolerance = time.error_tolerance;
+  options.min_step = time.min_step;
   return options;
 }
 
@@ -177,7 +179,8 @@ void Simulation::buildTouchingCloths()
         throw std::invalid_argument("body " + body.name + " is simulated, and cloth does not push bodies; give it a motion or contact: false");
       }
     }
-    touching_cloths_.emplace(std::move(model), ClothOptions{config_.time.integrator, false, ClothSolver::automatic, 0.02, config_.time.newton});
+    const ClothOptions common = model.options.front();
+    touching_cloths_.emplace(std::move(model), common);
     checkTouchingCloths(state_);
   }
   catch (const std::invalid_argument& error)

@@ -18,7 +18,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 9;
+constexpr std::uint64_t version = 8;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -113,6 +113,7 @@ void visitCloth(Archive& archive, State& held)
   archive(held.cloth.x);
   archive(held.cloth.v);
   archive(held.cloth.rest_angles);
+  archive(held.cloth.next_step);
   archive(held.cloth.stiffening);
   const auto indices = [&archive](auto& values) {
     archive.list(values);

@@ -131,7 +131,8 @@ TEST(ClothReader, NamesWhatIsWrong)
     {"cloths.0.grasps.left={near: {point: [9, 9, 9], radius: 0.1}}", "reaches no vertex; the nearest, 62"},
     {"cloths.0.grasps.left={corner: upper_left, attach: frame, motion: {table: [[0, 0, 0, 1]]}}", "must be [t, x, y, z, qx, qy, qz, qw]"},
     {"cloths.0.stiff=1", "unknown key"},
-    {"time.integrator=bdf2", "is not for cloth; must be implicit_euler or symplectic_euler"},
+    {"time.integrator=bdf2", "is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler"},
+    {"time.spectral_radius=0.5", "is for generalized_alpha, which cloth does not have"},
     {"start=equilibrium", "is not for cloth"},
     {"wind={velocity: [2000, 0, 0]}", "wind.velocity"},
   };

@@ -31,7 +31,7 @@ struct StepPlan
 };
 
 /// Plan for a step of h seconds. `previous_step` is the length of the step before (0: there was none, multistep methods
-/// then start with implicit Euler). Not for symplectic_euler. Reuses the memory of `plan`.
+/// then start with implicit Euler). Not for symplectic_euler and imex. Reuses the memory of `plan`.
 ///  - implicit_euler: first order, L-stable.
 ///  - bdf2: variable-step second order, L-stable [Hairer & Wanner, Solving ODEs II, V.1].
 ///  - tr_bdf2: trapezoid to gamma h, then BDF2, gamma = 2 - sqrt 2; second order, L-stable [Bank et al. 1985; Hosea & Shampine 1996].

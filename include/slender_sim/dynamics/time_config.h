@@ -2,7 +2,7 @@
 
 namespace slender {
 
-enum class Integrator { implicit_euler, bdf2, tr_bdf2, implicit_midpoint, generalized_alpha, symplectic_euler };
+enum class Integrator { implicit_euler, bdf2, tr_bdf2, implicit_midpoint, generalized_alpha, symplectic_euler, imex };
 
 const char* toString(Integrator integrator);
 

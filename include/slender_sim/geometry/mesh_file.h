@@ -37,6 +37,10 @@ TriangleMesh readMesh(const std::string& path);
 void writeObj(const std::string& path, const TriangleMesh& mesh);
 void writePly(const std::string& path, const TriangleMesh& mesh);
 
+/// With a colour per vertex (3 x n: red, green, blue in [0, 1]): PLY with uchar red, green, blue, OBJ with three more numbers per vertex.
+/// By the end of the name; throws likewise.
+void writeColoredMesh(const std::string& path, const TriangleMesh& mesh, const Eigen::Matrix3Xd& colors);
+
 /// Throws what writeMesh would for the end of the name.
 void requireMeshName(const std::string& path);
 

@@ -29,6 +29,8 @@ public:
   /// As factor(), of a matrix with that pattern. Points with fixed[i] != 0 keep their place: their rows and columns are those of the identity.
   bool factor(const BlockMatrix& matrix, const char* fixed);
   bool factor(const PointMatrix& matrix, const char* fixed);
+  /// Likewise with other values in the matrix's pattern, one per entry; those above the diagonal are not read.
+  bool factor(const PointMatrix& matrix, const double* values, const char* fixed);
   /// x = A^-1 b for points (4 doubles each; x may be b). Fixed points: x = b.
   void solvePoints(const double* b, double* x) const;
   /// The two halves of solvePoints of a PointMatrix: y = L^-1 b, with y in the order of elimination and not b, and x = L^-T y, which overwrites y.

@@ -1,0 +1,142 @@
+// Steps without Newton's method: explicit ones, and those whose matrix is constant.
+#include <algorithm>
+#include <cmath>
+
+#include "cloth_stepper_impl.h"
+
+namespace slender {
+
+/// Elastic and viscous forces at (x_, v_), wind, gravity and extra forces into force_. Mass damping is left out.
+ClothEvaluation ClothStepper::Impl::addForces(const ClothInputs& inputs, bool with_bending)
+{
+  std::fill(d_.begin(), d_.end(), 0.0);
+  const ClothEvaluation here = system.addInternal(x_, d_, with_bending);
+  std::fill(force_.begin(), force_.end(), 0.0);
+  if (system.wind().active())
+    system.wind().addForces(x_, v_, inputs.wind, force_);
+  for (int i = 0; i < model->vertices(); ++i)
+  {
+    point(force_, i) += model->mass[i] * inputs.gravity - point(d_, i);
+    if (inputs.forces.cols() > 0)
+      point(force_, i) += inputs.forces.col(i);
+  }
+  return here;
+}
+
+/// a_start_ = F(x, v) / m at the start of a step; `delta`: a time over which strain rates are found to second order [s].
+void ClothStepper::Impl::acceleration(const ClothInputs& inputs, double delta)
+{
+  x_ = x_start_;
+  v_ = v_start_;
+  if (model->stiffness_damping > 0)
+  {
+    for (std::size_t i = 0; i < trial_.size(); ++i)
+      trial_[i] = -delta * v_[i];
+    system.setViscosity(model->stiffness_damping / delta, x_, &trial_, 0.0, nullptr);
+  }
+  addForces(inputs, true);
+  for (int i = 0; i < model->vertices(); ++i)
+    point(a_start_, i) = system.held()[i] ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(point(force_, i) / model->mass[i] - model->mass_damping * point(v_, i));
+}
+
+/// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step ago.
+StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report)
+{
+  const double h = to - from;
+  const int n = model->vertices();
+  toPoints(work_.x, x_);
+  toPoints(work_.v, v_);
+  next_ = work_;
+  system.setHinges(work_);
+  if (model->stiffness_damping > 0)
+  {
+    for (std::size_t i = 0; i < x_.size(); ++i)
+      trial_[i] = x_[i] - h * v_[i];
+    system.setViscosity(model->stiffness_damping / h, trial_);
+  }
+  const ClothEvaluation here = addForces(inputs, true);
+  for (int i = 0; i < n; ++i)
+  {
+    point(force_, i) -= model->mass[i] * model->mass_damping * point(v_, i);
+    point(v_, i) += h / model->mass[i] * point(force_, i);
+  }
+  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
+  for (std::size_t k = 0; k < work_.pins.size(); ++k)
+  {
+    const int p = work_.pins[k];
+    const Eigen::Vector3d v = (pinAt(inputs, k, to / duration) - work_.x.col(p)) / h;
+    pin_forces.col(static_cast<Eigen::Index>(k)) = point(force_, p) - model->mass[p] * (v - work_.v.col(p)) / h;
+    point(v_, p) = v;
+  }
+  double fastest = 0.0;
+  for (int i = 0; i < n; ++i)
+  {
+    next_.v.col(i) = point(v_, i);
+    next_.x.col(i) += h * point(v_, i);
+    fastest = std::max(fastest, next_.v.col(i).cwiseAbs().maxCoeff());
+  }
+  report.max_strain = std::max(report.max_strain, here.max_strain);
+  return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none : StepFailure::state_not_finite;
+}
+
+/// (M (1/h^2 + a/h) + (1 + b/h) K) d = M v/h + f - K x for the motion d of the step, with a and b of the damping, K of the bending, and f the
+/// membrane's forces (elastic and viscous) and the wind at the start, and the loads.
+StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report)
+{
+  const double h = to - from, viscous = 1.0 + model->stiffness_damping / h;
+  const int n = model->vertices();
+  toPoints(work_.x, x_);
+  toPoints(work_.v, v_);
+  next_ = work_;
+  system.hold(work_);
+  if (h != constant_h_ || system.held() != constant_held_)
+  {
+    for (int i = 0; i < n; ++i)
+      constant_weight_[i] = model->mass[i] * (1.0 / (h * h) + model->mass_damping / h);
+    constant_h_ = 0.0;
+    ++report.factorizations;
+    if (!constant_->factor(constant_weight_, viscous, system.held()))
+      return StepFailure::singular_matrix;
+    constant_h_ = h;
+    constant_held_ = system.held();
+  }
+  if (model->stiffness_damping > 0)
+  {
+    for (std::size_t i = 0; i < x_.size(); ++i)
+      trial_[i] = x_[i] - h * v_[i];
+    system.setViscosity(model->stiffness_damping / h, trial_);
+  }
+  const ClothEvaluation here = addForces(inputs, false);
+  std::fill(trial_.begin(), trial_.end(), 0.0);
+  if (system.bending().size() > 0)
+    system.bending().addProduct(-1.0, x_.data(), trial_.data());
+  std::fill(d_.begin(), d_.end(), 0.0);
+  for (int i = 0; i < n; ++i)
+    point(force_, i) += point(trial_, i) + model->mass[i] / h * point(v_, i);
+  for (std::size_t k = 0; k < work_.pins.size(); ++k)
+    point(d_, work_.pins[k]) = pinAt(inputs, k, to / duration) - work_.x.col(work_.pins[k]);
+  // what is held moves as given
+  std::fill(trial_.begin(), trial_.end(), 0.0);
+  constant_->addProduct(d_.data(), trial_.data());
+  for (int i = 0; i < n; ++i)
+    point(trial_, i) = system.held()[i] ? Eigen::Vector3d(point(d_, i)) : Eigen::Vector3d(point(force_, i) - point(trial_, i));
+  constant_->solve(trial_, d_);
+  std::fill(trial_.begin(), trial_.end(), 0.0);
+  constant_->addProduct(d_.data(), trial_.data());
+  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
+  for (std::size_t k = 0; k < work_.pins.size(); ++k)
+    pin_forces.col(static_cast<Eigen::Index>(k)) = point(force_, work_.pins[k]) - point(trial_, work_.pins[k]);
+  double fastest = 0.0;
+  for (int i = 0; i < n; ++i)
+  {
+    next_.v.col(i) = point(d_, i) / h;
+    next_.x.col(i) += point(d_, i);
+    fastest = std::max(fastest, next_.v.col(i).cwiseAbs().maxCoeff());
+  }
+  for (std::size_t k = 0; k < work_.pins.size(); ++k)
+    next_.x.col(work_.pins[k]) = pinAt(inputs, k, to / duration);
+  report.max_strain = std::max(report.max_strain, here.max_strain);
+  return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none : StepFailure::state_not_finite;
+}
+
+}  // namespace slender

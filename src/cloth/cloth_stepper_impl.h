@@ -1,0 +1,61 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "cloth_system.h"
+#include "slender_sim/cloth/plastic_flow.h"
+#include "slender_sim/dynamics/integrator.h"
+
+namespace slender {
+
+class ClothStepper::Impl
+{
+public:
+  Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
+
+  StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
+  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
+
+  std::shared_ptr<const ClothModel> model;
+  ClothOptions options;
+  ClothSystem system;
+  Eigen::Matrix3Xd pin_forces, average_forces;
+
+private:
+  // cloth_stepper.cpp
+  bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
+  StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
+  std::string explain(StepFailure failure, double length) const;
+  double stepFactor(double ratio) const;
+  StepFailure implicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
+  void combine(const Combination& c, PointVector& result) const;
+  StepFailure finish(const Stage& stage, const ClothInputs& inputs, double h, double fraction, StepReport& report);
+  Eigen::Vector3d pinAt(const ClothInputs& inputs, std::size_t pin, double fraction) const;
+  bool isExplicit() const { return options.integrator == Integrator::symplectic_euler || options.integrator == Integrator::imex; }
+
+  // cloth_newton.cpp: a stage's equation
+  StepFailure minimize(StepReport& report);
+  StepFailure linearized(StepReport& report);
+  double largest(const PointVector& d) const;
+
+  // cloth_explicit.cpp
+  StepFailure explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
+  StepFailure imexStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
+  ClothEvaluation addForces(const ClothInputs& inputs, bool with_bending);
+  void acceleration(const ClothInputs& inputs, double delta);
+
+  PlasticFlow plastic_;
+  ClothState work_, next_;   ///< start of a substep, and its end
+  Eigen::Matrix3Xd pins_start_, averages_start_, averages_, wind_v_;
+  StepPlan plan_;
+  PointVector x_, best_, trial_, d_, pin_motion_, v_, force_;
+  PointVector x_start_, v_start_, a_start_, x_stage_, v_stage_, q_hat_, q_tilde_, guess_;   ///< of an implicit step
+  std::unique_ptr<ShiftedMatrix> constant_;       ///< imex only
+  double constant_h_ = 0;
+  std::vector<char> constant_held_;
+  std::vector<double> constant_weight_;
+  double shortest_edge_ = 0;
+};
+
+}  // namespace slender
