@@ -269,7 +269,8 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
 }
 
 /// With the matrix of the last stage.
-bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+                                 Eigen::Matrix3Xd& average_forces_change)
 {
   if (isExplicit())
     return false;
@@ -283,13 +284,18 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3X
   for (int i = 0; i < model->vertices(); ++i)
     displacement.col(i) = point(d_, i);
   pin_forces_change.resize(3, pin_forces.cols());
-  if (pin_forces.cols() == 0)
+  average_forces_change.resize(3, model->averageCount());
+  if (pin_forces.cols() == 0 && !model->averages)
     return true;
   system.applyMatrix(d_, trial_);
+  for (std::size_t i = 0; i < trial_.size(); ++i)
+    system.gradient()[i] += trial_[i];
+  if (model->averages)
+    system.balanceAverages(average_forces_change);
   Eigen::Index pin = 0;
   for (int i = 0; i < model->vertices(); ++i)
     if (system.held()[i])
-      pin_forces_change.col(pin++) = -point(trial_, i);
+      pin_forces_change.col(pin++) = -point(system.gradient(), i);
   return true;
 }
 
@@ -298,9 +304,10 @@ ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
-bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+                           Eigen::Matrix3Xd& average_forces_change)
 {
-  return impl_->respond(forces, displacement, pin_forces_change);
+  return impl_->respond(forces, displacement, pin_forces_change, average_forces_change);
 }
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 const Eigen::Matrix3Xd& ClothStepper::averageForces() const { return impl_->average_forces; }

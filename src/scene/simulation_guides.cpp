@@ -60,7 +60,7 @@ void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
     {
       SceneCloth& held = state_.cloths[k];
       held.guide = inputs.guides[k];
-      held.guide_forces = clothStepper(static_cast<int>(k)).averageForces();
+      held.guide_forces = touching_cloth_index_[k] >= 0 ? touching_cloths_->averageForces(touching_cloth_index_[k]) : cloth_steppers_[k]->averageForces();
       report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)) / tracking->size);
     }
   }

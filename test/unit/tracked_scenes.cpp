@@ -277,6 +277,46 @@ TEST_F(TrackedScenes, RestartExactly)
   EXPECT_THROW(other.load(folder_ + "/state"), std::runtime_error);
 }
 
+TEST_F(TrackedScenes, KeepTheirAveragesInContact)
+{
+  // pressed through a ball by its guide, free and held at one side
+  const std::vector<std::string> set{"tracked.0.guide.motion={bodies: poses.csv, groups: {all: [0..8]}}", "tracked.0.contact={thickness: 0.004}",
+                                     "tracked.0.test_functions={regions: {near: {guide: [0, 1, 2]}, far: {guide: [6, 7, 8]}}}",
+                                     "obstacles=[{name: ball, shape: {sphere: {radius: 0.05}}, pose: {position: [0.2, 0.2, -0.06]}, motion: fixed}]"};
+  write("poses.csv", "t,body,x,y,z,qx,qy,qz,qw\n0,all,0,0,0,0,0,0,1\n0.3,all,0,0,-0.05,0,0,0,1\n");
+  for (const bool held : {false, true})
+  {
+    std::vector<std::string> all = set;
+    if (held)
+      all.push_back("tracked.0.grasps={corner: {vertices: [0, 1]}}");
+    Simulation simulation(parseScene(flap, "t", all, folder_));
+    int contacts = 0;
+    for (int k = 0; k < 60; ++k)
+    {
+      const StepReport report = simulation.step(simulation.defaultInputs());
+      ASSERT_TRUE(report.ok) << report.message;
+      contacts += report.repulsions;
+      ASSERT_LT(report.tracking_error, 2e-12) << held << " step " << k;
+    }
+    EXPECT_GT(contacts, 100);
+    const Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
+    EXPECT_GT((x.colwise() - Vector3d(0.2, 0.2, -0.06)).colwise().norm().minCoeff(), 0.05);
+    // ball, guide and holder bear it together
+    double down = 0.0;
+    for (int k = 0; k < 20; ++k)
+    {
+      ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
+      down -= simulation.state().cloths[0].guide_forces.row(2).sum() / 20;
+    }
+    const double weight = 9.81 * simulation.clothModel(0).totalMass();
+    EXPECT_LT(-down, 1.01 * weight) << held;   // the ball does not pull
+    if (held)
+    {
+      EXPECT_GT(down, weight);                 // and the guide presses against it
+    }
+  }
+}
+
 TEST_F(TrackedScenes, StayWithGuidesByTopicUntilTheyMove)
 {
   Simulation simulation(parseScene(flap, "t", {"tracked.0.guide.motion={topic: points}"}));

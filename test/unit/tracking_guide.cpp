@@ -1,4 +1,6 @@
 // Guides: motions of points, and points carried by bodies.
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "slender_sim/geometry/point_trajectory.h"
@@ -11,6 +13,37 @@ namespace {
 
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
+
+TEST(Trajectories, CoastWhenNothingComes)
+{
+  // at 2 m/s and 0.5 rad/s; the speed dies out within 0.4 s, once continuously differentiable
+  PointTrajectory points;
+  PoseTrajectory poses;
+  points.coast(0.4);
+  for (int k = 0; k < 4; ++k)
+  {
+    const double t = 0.1 * k;
+    points.append(t, Vector3d(2 * t, 0, 1));
+    poses = k == 0 ? PoseTrajectory({t}, {Pose{{2 * t, 0, 1}, Eigen::Quaterniond::Identity()}}) : poses;
+    if (k > 0)
+      poses.append(t, Pose{{2 * t, 0, 1}, Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * t, Vector3d::UnitZ()))});
+  }
+  poses.coast(0.4);
+  Matrix3Xd x, v;
+  for (const double t : {0.25, 0.3, 0.4, 0.5, 0.7, 0.9})
+  {
+    points.evaluate(t, x, &v);
+    Twist twist;
+    const Pose pose = poses.evaluate(t, &twist);
+    const double after = std::clamp(t - 0.3, 0.0, 0.4), way = std::min(t, 0.3) + after - after * after / 0.8, speed = 1.0 - after / 0.4;
+    EXPECT_NEAR(x(0, 0), 2 * way, 1e-12) << t;
+    EXPECT_NEAR(v(0, 0), 2 * speed, 1e-12) << t;
+    EXPECT_NEAR(pose.position.x(), 2 * way, 1e-12) << t;
+    EXPECT_NEAR(twist.linear.x(), 2 * speed, 1e-12) << t;
+    EXPECT_NEAR(pose.orientation.angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * way, Vector3d::UnitZ()))), 0.0, 1e-7) << t;
+    EXPECT_NEAR(twist.angular.z(), 0.5 * speed, 1e-9) << t;
+  }
+}
 
 TEST(PointTrajectory, MovesEachPointAsThePositionsOfPoses)
 {

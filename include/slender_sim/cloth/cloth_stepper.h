@@ -64,8 +64,10 @@ public:
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
 
   /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step, and by how much the pins' forces
-  /// [N] change: linear, with the matrix of its last Newton iteration. Returns false after explicit steps, or if that matrix cannot be used.
-  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
+  /// and those of the averages, which stay, change [N]: linear, with the matrix of its last Newton iteration. Returns false after explicit steps, or if that
+  /// matrix cannot be used.
+  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+               Eigen::Matrix3Xd& average_forces_change);
   /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step.
   const Eigen::Matrix3Xd& pinForces() const;
 
