@@ -95,6 +95,8 @@ std::string ClothStepper::Impl::explain(StepFailure failure, double length) cons
   const std::string at = " at a step of " + std::to_string(1e3 * length) + " ms";
   if (isExplicit())
     return "the explicit step blew up" + at + ": use a shorter step or implicit_euler";
+  if (failure == StepFailure::singular_matrix && !system.averagesIndependent())
+    return "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the averages there";
   if (failure == StepFailure::singular_matrix)
     return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude";
   if (failure == StepFailure::state_not_finite)

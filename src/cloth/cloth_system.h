@@ -75,6 +75,8 @@ public:
   void meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x);
   /// Takes the part out of the gradient that the averages balance: their forces (3 x count).
   void balanceAverages(Eigen::Matrix3Xd& forces);
+  /// False when averages depend on each other on what is not held: then nothing can be solved.
+  bool averagesIndependent() const { return independent_; }
   /// What they are at x.
   void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
 

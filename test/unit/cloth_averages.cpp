@@ -138,6 +138,18 @@ TEST(ClothAverages, RefuseWhatCannotBe)
   o = options(false);
   o.solver = ClothSolver::cholesky;
   EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
+  // held vertices that leave nothing of an average
+  Tracked held;
+  pinVertices(held.state, [&] {
+    std::vector<int> all;
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*held.model->averages, 0); entry; ++entry)
+      all.push_back(static_cast<int>(entry.col()));
+    return all;
+  }());
+  ClothStepper stuck(held.model, options(true));
+  const StepReport refused = held.step(stuck, held.guide, 0.01);
+  EXPECT_FALSE(refused.ok);
+  EXPECT_NE(refused.message.find("hold fewer vertices"), std::string::npos) << refused.message;
   ClothStepper stepper(t.model, options(true));
   const ClothState before = t.state;
   t.inputs.averages = Matrix3Xd::Zero(3, 3);

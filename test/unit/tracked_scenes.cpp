@@ -9,6 +9,7 @@
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/recorder.h"
 #include "slender_sim/scene/simulation.h"
 
 namespace slender {
@@ -315,6 +316,30 @@ TEST_F(TrackedScenes, KeepTheirAveragesInContact)
       EXPECT_GT(down, weight);                 // and the guide presses against it
     }
   }
+}
+
+TEST_F(TrackedScenes, AreRecorded)
+{
+  Simulation simulation(parseScene(flap, "t"));
+  const auto recorder = makeCsvRecorder(folder_ + "/csv");
+  recorder->record(simulation, {});
+  ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
+  recorder->record(simulation, {});
+  recorder->finish();
+  std::ifstream file(folder_ + "/csv/tracking.csv");
+  std::string line;
+  std::getline(file, line);
+  EXPECT_EQ(line, "t [s],object,function,x [m],y [m],z [m],fx [N],fy [N],fz [N]");
+  int rows = 0;
+  double up = 0.0;
+  while (std::getline(file, line))
+  {
+    EXPECT_NE(line.find(",flap,vertex " + std::to_string(rows % 9) + ","), std::string::npos) << line;
+    up += std::stod(line.substr(line.rfind(',') + 1));
+    ++rows;
+  }
+  EXPECT_EQ(rows, 18);
+  EXPECT_GT(up, 0.1);
 }
 
 TEST_F(TrackedScenes, StayWithGuidesByTopicUntilTheyMove)
