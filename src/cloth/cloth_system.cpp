@@ -359,7 +359,7 @@ void ClothSystem::precondition(PointVector& r, PointVector& z)
   clearHeld(r);
 }
 
-bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double least)
+bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance)
 {
   if (!independent_)
     return false;
@@ -398,7 +398,7 @@ bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_itera
   if (averages_)
     precondition(right_, correction_);
   const LinearResult result = cg_.solve(
-    right_, correction_, std::max(least, linear_tolerance_), 2000,
+    right_, correction_, tolerance > 0 ? tolerance : linear_tolerance_, 2000,
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);

@@ -65,9 +65,9 @@ public:
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient, bool with_bending = true);
   PointVector& gradient() { return gradient_; }
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
-  /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `least`: they do not go below
-  /// this tolerance, whatever the options. False: not positive definite. The numbers grow by what was needed.
-  bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double least = 0.0);
+  /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `tolerance`: theirs, 0: that of the options.
+  /// False: not positive definite. The numbers grow by what was needed.
+  bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0);
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
 

@@ -291,7 +291,7 @@ struct ClothConfig
   double drag = 0.0;                           ///< pressure per velocity along the normal, against the air [N s/m^3]
   ClothSolver solver = ClothSolver::automatic;
   bool one_newton_step = false;
-  double linear_tolerance = 0.02;
+  double linear_tolerance = 5e-3;
   std::vector<GraspConfig> grasps;
   std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`tracked`); null: nothing
   std::optional<ClothContactConfig> contact;   ///< nothing: touches nothing
