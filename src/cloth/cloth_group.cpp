@@ -6,6 +6,7 @@
 
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/contact/intersection.h"
+#include "slender_sim/dynamics/integrator.h"
 
 namespace slender {
 
@@ -47,6 +48,7 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_, &push_, &answer_})
     m->resize(3, first_.back());
   inverse_mass_.resize(first_.back());
+  order_.resize(model_.cloths.size());
   sub_.cloths.resize(model_.cloths.size());
   sub_.solids.resize(model_.solids.size());
   for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_, &shared_pins_, &pin_answers_, &averages_start_, &average_forces_, &average_sums_, &shared_averages_,
@@ -69,6 +71,7 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   StepReport report;
   collisions_ = CollisionReport();
   work_ = state;
+  next_ = state;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     const std::vector<int>& pins = state.cloths[k].pins;
@@ -139,7 +142,7 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
     const int first = first_[k], count = first_[k + 1] - first;
     own_push_ = push_.middleCols(first, count);
     own_answer_.resize(3, count);
-    if (!steppers_[k].respond(own_push_, own_answer_, pin_answers_[k], average_answers_[k]))
+    if (!steppers_[k].respond(own_push_, h, own_answer_, pin_answers_[k], average_answers_[k]))
       return false;
     answer_.middleCols(first, count) = own_answer_;
     answered += own_push_.cwiseProduct(own_answer_).sum();
@@ -170,43 +173,82 @@ void ClothGroup::addPinForces(double share, double h)
   }
 }
 
-/// From work_ to next_; times as shares of the step.
-StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, double to, double duration)
+/// On their own, from work_ to next_: all, or those whose order was lowered.
+bool ClothGroup::stepCloths(const ClothGroupInputs& inputs, double to, double h, bool all, StepReport& report)
 {
-  StepReport report;
-  const double h = (to - from) * duration;
-  next_ = work_;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
-    const int first = first_[k], count = first_[k + 1] - first;
+    if (!all && order_[k] != Order::lowered)
+      continue;
+    next_.cloths[k] = work_.cloths[k];
     sub_.cloths[k] = inputs.cloths[k];
     if (to < 1.0 && inputs.cloths[k].pins.cols() == pins_start_[k].cols())
       sub_.cloths[k].pins = pins_start_[k] + to * (inputs.cloths[k].pins - pins_start_[k]);
     if (to < 1.0 && inputs.cloths[k].averages.cols() == averages_start_[k].cols())
       sub_.cloths[k].averages = averages_start_[k] + to * (inputs.cloths[k].averages - averages_start_[k]);
-    const StepReport own = steppers_[k].step(next_.cloths[k], sub_.cloths[k], h);
+    StepReport own = all ? steppers_[k].step(next_.cloths[k], sub_.cloths[k], h) : steppers_[k].stepFirstOrder(next_.cloths[k], sub_.cloths[k], h);
+    if (!all)   // counted already
+      own.substeps = 0;
     report.merge(own);
     if (!report.ok)
-      return report;
+      return false;
+    const ClothOptions& options = model_.options.empty() ? options_ : model_.options[k];
+    order_[k] = all && order(options.integrator) == 2 && options.error_tolerance == 0.0 ? Order::second : Order::first;
+  }
+  return true;
+}
+
+/// Whether the order of any has to be lowered, now that it is known what touches.
+bool ClothGroup::lowerOrder()
+{
+  bool any = false;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+    if (order_[k] == Order::second && collider_->touched(first_[k], first_[k + 1] - first_[k]))
+    {
+      order_[k] = Order::lowered;
+      any = true;
+    }
+  return any;
+}
+
+/// What contacts make of the cloths' own steps, into x_ and v_.
+CollisionReport ClothGroup::collide(double h)
+{
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    const int first = first_[k], count = first_[k + 1] - first;
     x_start_.middleCols(first, count) = work_.cloths[k].x;
     x_.middleCols(first, count) = next_.cloths[k].x;
     v_.middleCols(first, count) = next_.cloths[k].v;
     inverse_mass_.segment(first, count) = model_.cloths[k]->mass.cwiseInverse();
     for (const int pin : work_.cloths[k].pins)
       inverse_mass_[first + pin] = 0.0;
-  }
-  for (std::size_t s = 0; s < model_.solids.size(); ++s)   // uniformly from here to the end of the step
-    next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
-  const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h};
-  int pass = 0;
-  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
-  {
     shared_pins_[k].setZero(3, static_cast<Eigen::Index>(work_.cloths[k].pins.size()));
     shared_averages_[k].setZero(3, model_.cloths[k]->averageCount());
   }
+  const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h};
+  int pass = 0;
   while (pass < kLoadPasses && shareLoads(step, pass > 0))
     ++pass;
-  const CollisionReport found = resolve(step);
+  return resolve(step);
+}
+
+/// From work_ to next_; times as shares of the step.
+StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, double to, double duration)
+{
+  StepReport report;
+  const double h = (to - from) * duration;
+  for (std::size_t s = 0; s < model_.solids.size(); ++s)   // uniformly from here to the end of the step
+    next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
+  if (!stepCloths(inputs, to, h, true, report))
+    return report;
+  CollisionReport found = collide(h);
+  while (found.ok && lowerOrder())
+  {
+    if (!stepCloths(inputs, to, h, false, report))
+      return report;
+    found = collide(h);
+  }
   if (!found.ok)
   {
     report.ok = false;

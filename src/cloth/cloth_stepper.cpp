@@ -265,24 +265,35 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
   {
     next_.x.col(work_.pins[k]) = pinAt(inputs, k, fraction);
-    pin_forces.col(static_cast<Eigen::Index>(k)) = -point(system.gradient(), work_.pins[k]);
+    // a pin's speed changes at the start of the step: its inertia over the whole step counts, not that at the end, which the last stage guesses from both
+    const int p = work_.pins[k];
+    const Eigen::Vector3d inertia = (point(x_, p) - point(q_hat_, p)) / (stage.tau_a * stage.tau_a) - (next_.v.col(p) - work_.v.col(p)) / h;
+    pin_forces.col(static_cast<Eigen::Index>(k)) = model->mass[p] * inertia - point(system.gradient(), p);
   }
   return StepFailure::none;
 }
 
-/// With the matrix of the last stage.
-bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+/// With the stiffness of the last stage.
+bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
                                  Eigen::Matrix3Xd& average_forces_change)
 {
   if (isExplicit())
     return false;
-  for (int i = 0; i < model->vertices(); ++i)
-    point(system.gradient(), i) = -forces.col(i);
-  std::fill(d_.begin(), d_.end(), 0.0);
   int iterations = 0, factorizations = 0;
   constexpr double kTolerance = 5e-4;   // what it leaves unbalanced the grasps' wrenches lack: below a thousandth of the load
-  if (!system.solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance))
-    return false;
+  const auto solve = [&] {
+    system.setInertia(duration);
+    for (int i = 0; i < model->vertices(); ++i)
+      point(system.gradient(), i) = -forces.col(i);
+    std::fill(d_.begin(), d_.end(), 0.0);
+    return system.solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance);
+  };
+  if (!solve())   // the inertia of a longer step does not hold up what a short stage's does
+  {
+    system.evaluateHessian(x_, HessianKind::semidefinite);
+    if (!solve())
+      return false;
+  }
   for (int i = 0; i < model->vertices(); ++i)
     displacement.col(i) = point(d_, i);
   pin_forces_change.resize(3, pin_forces.cols());
@@ -306,10 +317,19 @@ ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
-bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+StepReport ClothStepper::stepFirstOrder(ClothState& state, const ClothInputs& inputs, double duration)
+{
+  const Integrator own = impl_->options.integrator;
+  impl_->options.integrator = own == Integrator::tr_bdf2 ? Integrator::implicit_euler : own;
+  const StepReport report = impl_->step(state, inputs, duration);
+  impl_->options.integrator = own;
+  return report;
+}
+
+bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
                            Eigen::Matrix3Xd& average_forces_change)
 {
-  return impl_->respond(forces, displacement, pin_forces_change, average_forces_change);
+  return impl_->respond(forces, duration, displacement, pin_forces_change, average_forces_change);
 }
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 const Eigen::Matrix3Xd& ClothStepper::averageForces() const { return impl_->average_forces; }

@@ -15,7 +15,7 @@ public:
   Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
 
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
-  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+  bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
                Eigen::Matrix3Xd& average_forces_change);
 
   std::shared_ptr<const ClothModel> model;

@@ -150,9 +150,8 @@ void ClothSystem::setWeights(double tau, double ratio)
   if (tau == base_tau_ && ratio == base_ratio_ && held_ == base_held_)
     return;
   const int n = points();
-  const double rate = 1.0 / (tau * tau) + model_.mass_damping / tau;
   for (int i = 0; i < n; ++i)
-    weight_[i] = rate * model_.mass[i];
+    weight_[i] = rate(tau) * model_.mass[i];
   matrix_.setZero();
   if (bending_in_blocks_)
     matrix_.add(1.0 + ratio, bending_, bending_map_);
@@ -270,6 +269,7 @@ ClothEvaluation ClothSystem::evaluate(const PointVector& x)
 ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind kind)
 {
   std::copy(base_.begin(), base_.end(), matrix_.values());
+  matrix_tau_ = base_tau_;
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
   ClothEvaluation result = addLoads(x, true);
   const MembraneSums sums = membrane_.addHessian(kind, x.data(), membrane_slots_, gradient_.data(), matrix_.values());
@@ -289,6 +289,14 @@ void ClothSystem::shiftMatrix(double factor)
   for (int i = 0; i < points(); ++i)
     for (int k = 0; k < 3; ++k)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += factor * weight_[i];
+}
+
+void ClothSystem::setInertia(double tau)
+{
+  if (tau == matrix_tau_)
+    return;
+  shiftMatrix((rate(tau) - rate(matrix_tau_)) / rate(base_tau_));
+  matrix_tau_ = tau;
 }
 
 void ClothSystem::clearHeld(PointVector& v) const

@@ -61,6 +61,8 @@ public:
   ClothEvaluation evaluateHessian(const PointVector& x, HessianKind kind);
   /// Adds a multiple of the weights of inertia to the matrix.
   void shiftMatrix(double factor);
+  /// Makes the inertia in the matrix, and mass damping, that of a stage with this tau [s].
+  void setInertia(double tau);
   /// Elastic and viscous parts only, added.
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient, bool with_bending = true);
   PointVector& gradient() { return gradient_; }
@@ -88,6 +90,8 @@ public:
   const WindLoad& wind() const { return wind_; }
 
 private:
+  /// Weight of inertia per mass [1/s^2].
+  double rate(double tau) const { return 1.0 / (tau * tau) + model_.mass_damping / tau; }
   void setWeights(double tau, double ratio);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
@@ -111,6 +115,7 @@ private:
   std::vector<int> membrane_slots_, hinge_slots_, bending_map_;
   std::vector<double> base_;                  ///< constant part of matrix_
   double base_tau_ = 0, base_ratio_ = -1;
+  double matrix_tau_ = 0;
   std::vector<char> base_held_;
   SparseCholesky factor_;                     ///< of matrix_
   std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients

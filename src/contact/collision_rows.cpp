@@ -12,6 +12,13 @@ constexpr double kOverRelaxation = 1.3;  // three sheets in a heap: 10 instead o
 
 }  // namespace
 
+bool CollisionRows::touch(int first, int count) const
+{
+  return std::any_of(rows.begin(), rows.end(), [&](const CollisionRow& row) {
+    return std::any_of(row.point, row.point + 4, [&](int p) { return p >= first && p < first + count; });
+  });
+}
+
 void CollisionRows::clear(int points)
 {
   rows.clear();

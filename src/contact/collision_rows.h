@@ -32,6 +32,8 @@ class CollisionRows
 public:
   std::vector<CollisionRow> rows;
 
+  /// Whether any row acts on any of these points.
+  bool touch(int first, int count) const;
   /// Everything is forgotten but the memory.
   void clear(int points);
   /// Begins on other vectors y, for which bounds and anchors may have been changed since: a share of all impulses but pushes is the start.

@@ -40,6 +40,7 @@ public:
   CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again);
   bool approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again);
   const Eigen::Matrix3Xd& heldImpulses() const { return held_impulses_; }
+  bool touched(int first, int count) const { return rows_.touch(first, count); }
   int solidOf(int point) const { return elements_.point_object.at(point) - elements_.sheet_count; }
 
 private:
@@ -303,10 +304,8 @@ bool SurfaceCollider::Impl::joinHits()
     zones_.join(a, b);
   };
   for (const CollisionPair& pair : hits_)
-  {
     for (int i = 1; i < 4; ++i)
       join(node(pair.point[0]), node(pair.point[i]));
-  }
   for (const PlaneHit& hit : plane_hits_)
     join(hit.point, static_cast<int>(from_.cols()) + elements_.planes[hit.plane] - elements_.sheet_count);
   return grown;
@@ -487,6 +486,7 @@ SurfaceCollider::~SurfaceCollider() = default;
 SurfaceCollider::SurfaceCollider(SurfaceCollider&&) noexcept = default;
 
 const Eigen::Matrix3Xd& SurfaceCollider::heldImpulses() const { return impl_->heldImpulses(); }
+bool SurfaceCollider::touched(int first, int count) const { return impl_->touched(first, count); }
 int SurfaceCollider::solidOf(int point) const { return impl_->solidOf(point); }
 
 CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again)

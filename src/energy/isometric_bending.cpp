@@ -171,8 +171,9 @@ PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& t, Is
 double bendingCalibration(const TriangleMesh& mesh, const MeshTopology& t, IsometricElement element, const Vector3d& warp)
 {
   const Sample sample = element == IsometricElement::nonconforming ? sampleHinges(mesh, t, warp) : sampleVertices(mesh, t, warp);
-  if (!(sample.energy > 0))
-    throw std::invalid_argument("bending: the mesh has no inner edges or vertices, or the warp is normal to it everywhere");
+  if (!(sample.energy > 1e-9 * sample.area))   // per area a mesh of more than a few triangles has about 1
+    throw std::invalid_argument("bending: the mesh is too coarse to bend along or across its warp, or the warp is normal to it everywhere; "
+                                "refine it, or choose bending: {model: none}");
   return 0.5 * sample.area / sample.energy;
 }
 

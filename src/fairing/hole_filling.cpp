@@ -6,6 +6,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
+
 #include "slender_sim/fairing/willmore_flow.h"
 #include "patch_mesh.h"
 
@@ -62,6 +64,15 @@ Rim rimOf(const TriangleMesh& mesh, const MeshTopology& t, const std::vector<int
   return rim;
 }
 
+/// Edges of a patch must at least be so long that it has kMostFaces [m].
+double shortestEdges(const TriangleMesh& mesh, const std::vector<Eigen::Vector3i>& faces)
+{
+  double twice = 0.0;
+  for (const Eigen::Vector3i& f : faces)
+    twice += (mesh.vertices.col(f[1]) - mesh.vertices.col(f[0])).cross(mesh.vertices.col(f[2]) - mesh.vertices.col(f[0])).norm();
+  return std::sqrt(2.0 * twice / (std::sqrt(3.0) * kMostFaces));
+}
+
 HoleReport refused(const std::string& message)
 {
   HoleReport report;
@@ -85,6 +96,10 @@ HoleReport fillHole(TriangleMesh& mesh, const std::vector<int>& loop, const Hole
   std::vector<Eigen::Vector3i> faces = triangulateLoop(mesh.vertices, rim.loop, rim.beyond, rim.taken);
   if (faces.empty())
     return refused("the hole cannot be closed: each way needs an edge that the mesh already has");
+  const double shortest = shortestEdges(mesh, faces);
+  if (options.edge_length > 0 && options.edge_length < shortest)
+    return refused("the patch would have more than " + std::to_string(kMostFaces) + " faces: its edges must be longer than " +
+                   std::to_string(1e3 * shortest) + " mm");
   PatchMesh patch(mesh, rim.loop, rim.lengths, std::move(faces), rim.taken);
   patch.flip();
   HoleReport report;

@@ -108,6 +108,8 @@ void findBadVertices(const TriangleMesh& mesh, const std::vector<HalfEdge>& side
 void findDuplicates(const TriangleMesh& mesh, double tolerance, std::vector<MeshDefect>& defects)
 {
   const auto n = mesh.vertices.cols();
+  if (n == 0)   // no bounding box
+    return;
   const double reach = tolerance * (mesh.vertices.rowwise().maxCoeff() - mesh.vertices.rowwise().minCoeff()).norm();
   // along a direction that no lattice is square to, so that few vertices have neighbours in this order
   const Eigen::VectorXd along = mesh.vertices.transpose() * Eigen::Vector3d(0.5641895, 0.7071068, 0.4263267);

@@ -107,6 +107,18 @@ TEST(PlateBending, CylindersHaveTheEnergyOfPlateTheory)
   }
 }
 
+/// The one inner edge is a straight line in every cylinder along or across the warp: no calibration can give these an energy.
+TEST(PlateBending, TooCoarseMeshesAreRefused)
+{
+  TriangleMesh square;
+  square.vertices.resize(3, 4);
+  square.vertices << 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0;
+  square.triangles.resize(3, 2);
+  square.triangles << 0, 1, 1, 3, 2, 2;
+  for (const auto element : {IsometricElement::nonconforming, IsometricElement::conforming})
+    EXPECT_THROW(bendingCalibration(square, meshTopology(square), element, Vector3d::UnitX()), std::invalid_argument);
+}
+
 TEST(PlateBending, CalibrationsOfLatticesAreThird)
 {
   for (const GridPattern pattern : {GridPattern::one_diagonal, GridPattern::alternating, GridPattern::equilateral})

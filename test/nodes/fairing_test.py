@@ -137,6 +137,7 @@ class Fairing(NodeCase):
         self.refused(["triangle 1", "vertex 7"], square, [(0, 1, 2), (0, 2, 7)])
         self.refused(["no face"], square + [(5, 5, 5)], two)
         self.refused(["no faces"], square, [])
+        self.refused(["no faces"], [], [])
         odd = request(square, two, steps=1)
         odd.triangles = odd.triangles[:5]
         self.assertIn("5 numbers", self.fair(odd).message)
@@ -148,6 +149,8 @@ class Fairing(NodeCase):
         self.refused(["steps"], vertices, triangles, steps=4000000000)
         self.refused(["smoothing"], vertices, triangles, smoothing=-1)
         self.refused(["edge length"], vertices, triangles, fill_holes=True, edge_length=float("inf"))
+        open_box = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 2, 1), (0, 1, 3), (0, 3, 2)]
+        self.refused(["1000000 faces", "longer than"], *open_box, steps=0, fill_holes=True, edge_length=1e-6)
         self.refused(["1 centers and 0 radii"], vertices, triangles, region_centers=[Point()])
         self.refused(["radius"], vertices, triangles, region_centers=[Point()], region_radii=[-1])
         self.refused(["no vertex may move"], vertices, triangles, region_centers=[Point(9, 9, 9)], region_radii=[1])

@@ -156,6 +156,29 @@ TEST(ClothIntegrators, PinsCarryTheWeight)
   }
 }
 
+/// All vertices held and accelerated: the pins feel the weight and the inertia, whatever the integrator.
+TEST(ClothIntegrators, PinsFeelTheInertiaOfWhatTheyMove)
+{
+  for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2, Integrator::imex, Integrator::symplectic_euler})
+  {
+    Cloth cloth(buildCloth("sheet", gridMesh(0.3, 0.3, 4, 4, GridPattern::alternating), 0.2, isotropicMembrane(1e5, 0.3, 1e-3)));
+    std::vector<int> all;
+    for (int i = 0; i < cloth.model->vertices(); ++i)
+      all.push_back(i);
+    cloth.pin(all);
+    ClothStepper stepper(cloth.model, with(integrator));
+    const double h = 0.005;
+    for (int k = 1; k <= 4; ++k)
+    {
+      cloth.inputs.pins = cloth.model->rest.vertices;
+      cloth.inputs.pins.row(0).array() += 0.5 * 2.0 * (k * h) * (k * h);   // 2 m/s^2
+      ASSERT_TRUE(stepper.step(cloth.state, cloth.inputs, h).ok);
+    }
+    const Vector3d force = stepper.pinForces().rowwise().sum() / cloth.model->totalMass();
+    EXPECT_LT((force - Vector3d(-2, 0, -9.81)).norm(), 1e-6) << toString(integrator) << force.transpose();
+  }
+}
+
 TEST(ClothIntegrators, RestartBitEqual)
 {
   for (const Integrator integrator : {Integrator::tr_bdf2, Integrator::imex})

@@ -176,6 +176,8 @@ TEST(MeshDefects, AreNamed)
   const TriangleMesh sound = made({a, b, c, d}, {{0, 1, 2}, {2, 1, 3}});
   EXPECT_TRUE(meshDefects(sound).empty());
   EXPECT_NO_THROW(requireSoundMesh(sound, "sheet"));
+  EXPECT_EQ(meshDefects(TriangleMesh()).size(), 1u);   // nothing at all
+  EXPECT_EQ(meshDefects(TriangleMesh())[0].kind, MeshDefect::empty);
 
   const auto degenerate = defectsOf(made({a, b, c, {0.5, 1e-9, 0}}, {{0, 1, 2}, {1, 0, 3}}), MeshDefect::degenerate_face);
   ASSERT_EQ(degenerate.size(), 1u);

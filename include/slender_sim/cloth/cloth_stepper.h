@@ -62,11 +62,14 @@ public:
 
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
+  /// The same, by implicit Euler instead of tr_bdf2.
+  StepReport stepFirstOrder(ClothState& state, const ClothInputs& inputs, double duration);
 
   /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step, and by how much the pins' forces
-  /// and those of the averages, which stay, change [N]: linear, with the matrix of its last Newton iteration. Returns false after explicit steps, or if that
+  /// and those of the averages, which stay, change [N]: linear, with the stiffness of its last Newton iteration and the inertia of a step of implicit Euler of
+  /// `duration` [s], whatever the stages and substeps were, so that responses of several cloths go together. Returns false after explicit steps, or if the
   /// matrix cannot be used.
-  bool respond(const Eigen::Matrix3Xd& forces, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+  bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
                Eigen::Matrix3Xd& average_forces_change);
   /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step.
   const Eigen::Matrix3Xd& pinForces() const;

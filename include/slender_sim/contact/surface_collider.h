@@ -79,6 +79,8 @@ public:
   /// What contacts in the last successful step gave to points without inverse mass, which whatever holds them takes up: 3 x points [N s].
   /// Of zones that follow held points the change of momentum, shared out equally; of those that follow a solid as well, nothing: it is not determined.
   const Eigen::Matrix3Xd& heldImpulses() const;
+  /// Whether any of these points had a repulsion or an impulse in the last call of resolve().
+  bool touched(int first, int count) const;
   /// The solid that a point beyond those of the sheets is a corner of.
   int solidOf(int point) const;
 

@@ -25,7 +25,7 @@ PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& topol
 /// (nonconforming). The calibration makes the energies of cylinders bent along `warp` and across it D area / (2 R^2) in the mean of
 /// the two, for cylinders that the vertices lie on. It is 1/3 for nonconforming elements and 1 for conforming ones on equilateral and right-angled
 /// lattices with edges along the warp. `warp` is a direction in space, projected onto the mesh; where it is normal to it nothing is counted.
-/// Throws std::invalid_argument if nothing is left.
+/// Throws std::invalid_argument if nothing is left, or if no such cylinder bends the mesh (two triangles with their edge across the warp's corner).
 double bendingCalibration(const TriangleMesh& mesh, const MeshTopology& topology, IsometricElement element, const Eigen::Vector3d& warp);
 
 /// Stiffnesses k of hinges E = sum 1/2 k (theta - rest)^2 that have nonconforming isometric bending as their small-angle limit:

@@ -9,7 +9,7 @@ namespace slender {
 
 struct HoleOptions
 {
-  double edge_length = 0.0;   ///< of the patch [m]; 0: that of the edges around, from place to place
+  double edge_length = 0.0;   ///< of the patch [m]; 0: that of the edges around, from place to place; so that kMostFaces suffice
   int max_rounds = 30;        ///< of flowing and remeshing the patch
 };
 
@@ -27,6 +27,7 @@ struct HoleReport
 
 /// Longest loop that is closed [edges]: work grows with its third power.
 constexpr int kLongestHole = 1000;
+constexpr int kMostFaces = 1000000;   ///< of a patch
 
 /// Closes a boundary loop of the mesh (one of MeshTopology::boundaries) by a patch that continues the surface around it smoothly (G1): triangles over
 /// the loop of least dihedral angle and area [Barequet & Sharir 1995; Liepa 2003], refined to the edge length, then Willmore flow to the
