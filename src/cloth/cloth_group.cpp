@@ -15,6 +15,7 @@ namespace {
 constexpr int kMeetRounds = 20;
 constexpr double kMeetTolerance = 1e-12;   // of the cloth's size
 constexpr int kLoadPasses = 2;
+constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
 constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
 
 }  // namespace
@@ -147,7 +148,7 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
     answer_.middleCols(first, count) = own_answer_;
     answered += own_push_.cwiseProduct(own_answer_).sum();
   }
-  if (!(answered > 0.0))
+  if (!(answered > 0.0) || answered > kLocalAnswer * work)
     return false;
   const double share = kLoadShare * work / answered;
   x_ += share * answer_;
