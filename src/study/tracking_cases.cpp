@@ -162,6 +162,26 @@ TrackedCase walkingFigure()
 
 }  // namespace
 
+TrackedCase breathingSurface()
+{
+  TrackedCase c;
+  c.name = "breathing surface";
+  c.section = "6.4";
+  c.guide = gridMesh(1.0, 1.0, 4, 4, GridPattern::alternating);
+  c.tracked = subdivide(c.guide, 3);
+  finish(c, subdivisionBasis(c.tracked), 0.2, isotropicMembrane(3e4, 0.3, 1e-3), 3e4 * 1e-9 / (12 * 0.91), 1e-3);
+  c.motion = [rest = c.guide.vertices](double t) {
+    Eigen::Matrix3Xd x = rest;
+    const double size = 1.0 + 0.25 * (1 - std::cos(12 * t));
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+      x.col(i) = Eigen::Vector3d(0.5 + size * (rest(0, i) - 0.5), 0.5 + size * (rest(1, i) - 0.5),
+                                 0.1 * std::sin(12 * t) * std::cos(2 * kPi * rest(0, i)) * std::cos(2 * kPi * rest(1, i)));
+    return x;
+  };
+  c.gravity.setZero();
+  return c;
+}
+
 ClothState TrackedCase::start() const
 {
   constexpr double kMoment = 1e-4;
