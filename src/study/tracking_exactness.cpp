@@ -57,11 +57,12 @@ std::vector<Scene> scenes(bool quick)
     return Eigen::Matrix3Xd(rest.colwise() - Eigen::Vector3d(0, 0, 0.15 * (1 - std::cos(std::min(4 * t, 3.14159)))));
   };
   all.push_back(ball);
-  Scene crumpled{"bag pressed flat", bag};
+  Scene crumpled{"bag whose rim is pressed together", bag};
   crumpled.contact = true;
-  crumpled.cloth.motion = [rest = bag.guide.vertices](double t) {   // pressed flat
+  crumpled.cloth.motion = [rest = bag.guide.vertices](double t) {   // its rim is pressed together
     Eigen::Matrix3Xd x = rest;
-    x.row(1) *= 1 - 0.98 * std::min(1.0, 4 * t);
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+      x(1, i) *= 1 - 0.97 * std::min(1.0, 4 * t) * rest(2, i) / rest.row(2).maxCoeff();
     return x;
   };
   all.push_back(crumpled);

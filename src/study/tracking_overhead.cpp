@@ -11,7 +11,7 @@ namespace slender::study {
 namespace {
 
 constexpr double kStep = 0.01;     // [s]
-constexpr int kRepeats = 3;        // of each step, from the same state; the quickest counts
+constexpr int kRepeats = 3;        // of each step that is timed, from the same state; the quickest counts
 constexpr double kExact = 1e-9;    // tolerance of the linear solver in steps that others are compared with
 
 /// Sums over the steps of a run.
@@ -47,12 +47,12 @@ public:
   }
 
   /// A step from the state given, which stays. Counted, and compared with an exact solution, if told so.
-  ClothState step(const ClothState& from, const ClothInputs& inputs, bool counts, bool compares)
+  ClothState step(const ClothState& from, const ClothInputs& inputs, bool counts, bool compares, int repeats)
   {
     ClothState end;
     StepReport report;
     double least = 1e300;
-    for (int k = 0; k < (counts ? kRepeats : 1); ++k)
+    for (int k = 0; k < repeats; ++k)
     {
       end = from;
       const double start = threadSeconds();
@@ -101,9 +101,11 @@ struct Costs
   Cost tracked, beside, alone;   ///< beside: free steps from the tracked cloth's states; alone: of a free run
 };
 
-/// Compares with exact solutions in each of `every` steps; 0: never.
-Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int steps, int every, bool collides = false)
+enum class Purpose { errors, times, times_with_collisions };
+
+Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int steps, Purpose purpose)
 {
+  const bool collides = purpose == Purpose::times_with_collisions;
   auto free_model = std::make_shared<ClothModel>(*c.model);
   free_model->averages.reset();
   ClothOptions options;
@@ -119,11 +121,13 @@ Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int ste
   {
     if (i % 10 == 0)
       context.progress(i, steps, c.name);
-    const bool counts = i > 0, compares = counts && every > 0 && i % every == 0;   // what stays is factored in the first one
+    const bool counts = i > 0, compares = counts && !collides && i % 5 == 0;   // what stays is factored in the first one
     inputs.averages = c.constraints->averages(c.motion((i + 1) * kStep));
-    beside.step(state, free_inputs, counts, compares);
-    free_state = alone.step(free_state, free_inputs, counts, compares);
-    state = tracked.step(state, inputs, counts, compares);
+    const int repeats = counts && purpose != Purpose::errors ? kRepeats : 1;
+    beside.step(state, free_inputs, counts, compares, repeats);
+    if (purpose == Purpose::times)
+      free_state = alone.step(free_state, free_inputs, counts, compares, repeats);
+    state = tracked.step(state, inputs, counts, compares, repeats);
   }
   return {tracked.cost, beside.cost, alone.cost};
 }
@@ -133,7 +137,7 @@ Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int ste
 void runTrackingOverhead(StudyContext& context)
 {
   useOneBlasThread();
-  const int steps = context.quick() ? 40 : 120;
+  const int steps = context.quick() ? 30 : 120;
   double worst = -1.0, worst_run = -1.0, worst_colliding = -1.0, worst_error = 0.0;
   for (const TrackedCase& c : thesisCases())
   {
@@ -142,12 +146,12 @@ void runTrackingOverhead(StudyContext& context)
     double tolerance = usual;
     for (int pass = 0; pass < 2; ++pass)
     {
-      const Costs costs = run(context, c, tolerance, steps / 2, 5);
+      const Costs costs = run(context, c, tolerance, steps / 2, Purpose::errors);
       tolerance = std::min(usual, tolerance * costs.beside.error() / costs.tracked.error());
     }
-    const Costs costs = run(context, c, tolerance, steps, 5);
+    const Costs costs = run(context, c, tolerance, steps, Purpose::times);
     const Cost &tracked = costs.tracked, &beside = costs.beside, &alone = costs.alone;
-    const Costs colliding = run(context, c, tolerance, steps / 2, 0, true);
+    const Costs colliding = run(context, c, tolerance, steps / 2, Purpose::times_with_collisions);
     const double overhead = tracked.seconds / beside.seconds - 1, run_overhead = tracked.seconds / alone.seconds - 1;
     worst = std::max(worst, overhead);
     const double colliding_overhead = colliding.tracked.seconds / colliding.beside.seconds - 1;
