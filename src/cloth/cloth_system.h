@@ -72,6 +72,8 @@ public:
   /// Averages stay what the first guess makes them; with `averages` (3 x count) the points x + d, x the start of the stage, get these.
   bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0,
              const Eigen::Matrix3Xd* averages = nullptr);
+  /// The blocks of solve()'s matrix as last evaluated; those of isometric bending are among them only for Cholesky.
+  const BlockMatrix& matrix() const { return matrix_; }
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
 
@@ -97,7 +99,7 @@ private:
   void setWeights(double tau, double ratio);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
-  /// gap_: what the averages at x are short of.
+  /// gap_: by how much the averages at x fall short.
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
   void preconditionWithin(PointVector& r, PointVector& z);
   double takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages);

@@ -38,6 +38,7 @@ void runMerging(StudyContext&);
 void runFiberExtrusion(StudyContext&);
 void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
+void runThreadAccuracy(StudyContext&);
 void runThreadStability(StudyContext&);
 void runSewingMachine(StudyContext&);
 void runThreadTables(StudyContext&);
@@ -102,6 +103,7 @@ const std::vector<Study>& studies()
       {"thread_tables", "time per frame of the thesis's thread examples and of hair, beside its table 5.1", runThreadTables},
       {"sagging", "viscous threads that sag between plates: paths in time, catenary or U", runSagging},
       {"thread_implicit_vs_explicit", "a coiling thread: largest steps and cost of implicit against explicit integration", runThreadImplicitVsExplicit},
+      {"thread_accuracy", "error against run time of a viscous thread that sags between two plates", runThreadAccuracy},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
       {"cloth_collision_safety", "continuous tests of a million pairs, none missed; scenes in which cloth never passes through anything", runClothCollisionSafety},
       {"willmore_sphere", "an icosahedron and rough spheres that Willmore flow makes round: int H^2 against 16 pi", runWillmoreSphere},
