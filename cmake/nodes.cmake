@@ -6,7 +6,7 @@ target_include_directories(slender_sim_node PUBLIC
   $<BUILD_INTERFACE:${CATKIN_DEVEL_PREFIX}/include> ${catkin_INCLUDE_DIRS})
 target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES})
 
-foreach(node rod_node thread_node cloth_node fairing_node motion_player)
+foreach(node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
   add_executable(${node} ${PROJECT_SOURCE_DIR}/src/nodes/${node}.cpp)
   target_link_libraries(${node} PRIVATE slender_sim_node)
 endforeach()
@@ -16,7 +16,8 @@ if(BUILD_TESTING)
   # Pure functions and buffers: no master needed.
   add_executable(node_unit_tests
     ${PROJECT_SOURCE_DIR}/test/nodes/guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/converters_test.cpp
-    ${PROJECT_SOURCE_DIR}/test/nodes/markers_test.cpp)
+    ${PROJECT_SOURCE_DIR}/test/nodes/markers_test.cpp
+    ${PROJECT_SOURCE_DIR}/test/nodes/point_guide_buffer_test.cpp)
   target_compile_definitions(node_unit_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   find_package(GTest REQUIRED)
   target_link_libraries(node_unit_tests PRIVATE slender_sim_node GTest::gtest GTest::gtest_main)
@@ -24,6 +25,6 @@ if(BUILD_TESTING)
 
   file(GLOB ROSTESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/nodes/*.test)
   foreach(test ${ROSTESTS})
-    add_rostest(${test} DEPENDENCIES rod_node thread_node cloth_node fairing_node motion_player slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
+    add_rostest(${test} DEPENDENCIES rod_node thread_node cloth_node tracking_node fairing_node motion_player slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
   endforeach()
 endif()

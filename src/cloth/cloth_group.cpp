@@ -14,6 +14,8 @@ namespace slender {
 
 namespace {
 
+constexpr int kMeetRounds = 200;
+constexpr double kMeetTolerance = 1e-12;   // of the cloth's size
 constexpr int kLoadPasses = 2;
 constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
 constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
@@ -74,8 +76,15 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   order_.resize(model_.cloths.size());
   sub_.cloths.resize(model_.cloths.size());
   sub_.solids.resize(model_.solids.size());
-  for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_, &shared_pins_, &pin_answers_})
+  for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_, &shared_pins_, &pin_answers_, &averages_start_, &average_forces_, &average_sums_, &shared_averages_,
+                     &average_answers_})
     pins->resize(model_.cloths.size());
+  corrections_.resize(model_.cloths.size());
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    const Eigen::Matrix3Xd& x = model_.cloths[k]->rest.vertices;
+    corrections_[k].tolerance = kMeetTolerance * (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm();
+  }
 }
 
 StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inputs, double duration)
@@ -93,8 +102,11 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
     const std::vector<int>& pins = state.cloths[k].pins;
     pins_start_[k].resize(3, static_cast<Eigen::Index>(pins.size()));
     pin_sums_[k].setZero(3, static_cast<Eigen::Index>(pins.size()));
+    average_sums_[k].setZero(3, model_.cloths[k]->averageCount());
     for (std::size_t p = 0; p < pins.size(); ++p)
       pins_start_[k].col(static_cast<Eigen::Index>(p)) = state.cloths[k].x.col(pins[p]);
+    if (model_.cloths[k]->averages)
+      averages_start_[k] = state.cloths[k].x * model_.cloths[k]->averages->transpose();
   }
   double done = 0.0, share = 1.0;
   hopeless_ = false;
@@ -126,6 +138,7 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   }
   std::swap(state, work_);
   std::swap(pin_forces_, pin_sums_);
+  std::swap(average_forces_, average_sums_);
   report.repulsions = collisions_.repulsions;
   report.impulses = collisions_.impulses;
   report.zones = collisions_.zones;
@@ -156,7 +169,7 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
     const int first = first_[k], count = first_[k + 1] - first;
     own_push_ = push_.middleCols(first, count);
     own_answer_.resize(3, count);
-    if (!steppers_[k].respond(own_push_, h, own_answer_, pin_answers_[k]))
+    if (!steppers_[k].respond(own_push_, h, own_answer_, pin_answers_[k], average_answers_[k]))
       return false;
     answer_.middleCols(first, count) = own_answer_;
     answered += own_push_.cwiseProduct(own_answer_).sum();
@@ -167,7 +180,10 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
   x_ += share * answer_;
   v_ += share / h * answer_;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
     shared_pins_[k] += share * pin_answers_[k];
+    shared_averages_[k] += share * average_answers_[k];
+  }
   return true;
 }
 
@@ -189,12 +205,13 @@ void ClothGroup::blameExplicit(double duration, StepReport& report) const
 /// Of a substep that was just done.
 void ClothGroup::addPinForces(double share, double h)
 {
-  const Eigen::Matrix3Xd& impulses = collider_->heldImpulses();
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     pin_sums_[k] += share * (steppers_[k].pinForces() + shared_pins_[k]);
+    if (model_.cloths[k]->averages)
+      average_sums_[k] += share * (steppers_[k].averageForces() + shared_averages_[k]);
     for (std::size_t p = 0; p < work_.cloths[k].pins.size(); ++p)
-      pin_sums_[k].col(static_cast<Eigen::Index>(p)) += share / h * impulses.col(first_[k] + work_.cloths[k].pins[p]);
+      pin_sums_[k].col(static_cast<Eigen::Index>(p)) += share / h * held_impulses_.col(first_[k] + work_.cloths[k].pins[p]);
   }
 }
 
@@ -209,6 +226,8 @@ bool ClothGroup::stepCloths(const ClothGroupInputs& inputs, double to, double h,
     sub_.cloths[k] = inputs.cloths[k];
     if (to < 1.0 && inputs.cloths[k].pins.cols() == pins_start_[k].cols())
       sub_.cloths[k].pins = pins_start_[k] + to * (inputs.cloths[k].pins - pins_start_[k]);
+    if (to < 1.0 && inputs.cloths[k].averages.cols() == averages_start_[k].cols())
+      sub_.cloths[k].averages = averages_start_[k] + to * (inputs.cloths[k].averages - averages_start_[k]);
     StepReport own = all ? steppers_[k].step(next_.cloths[k], sub_.cloths[k], h) : steppers_[k].stepFirstOrder(next_.cloths[k], sub_.cloths[k], h);
     if (!all)   // counted already
       own.substeps = 0;
@@ -247,12 +266,13 @@ CollisionReport ClothGroup::collide(double h)
     for (const int pin : work_.cloths[k].pins)
       inverse_mass_[first + pin] = 0.0;
     shared_pins_[k].setZero(3, static_cast<Eigen::Index>(work_.cloths[k].pins.size()));
+    shared_averages_[k].setZero(3, model_.cloths[k]->averageCount());
   }
   const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h};
   int pass = 0;
   while (pass < kLoadPasses && shareLoads(step, pass > 0))
     ++pass;
-  return collider_->resolve(step, x_, v_, true);
+  return resolve(step);
 }
 
 /// From work_ to next_; times as shares of the step.
@@ -291,6 +311,72 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
     next_.cloths[k].v = v_.middleCols(first_[k], first_[k + 1] - first_[k]);
   }
   return report;
+}
+
+/// Collisions move averages that are prescribed. Going back and forth between both leads to where both are met, by a factor of about a thousand each time
+/// where what touches is little of what an average is taken over; where a cloth is pressed flat a hundred rounds were seen. Collisions have the last word.
+CollisionReport ClothGroup::resolve(const CollisionStep& step)
+{
+  CollisionReport report = collider_->resolve(step, x_, v_, true);
+  if (report.ok)
+    held_impulses_ = collider_->heldImpulses();
+  for (int round = 0; report.ok && round < kMeetRounds && meetAverages(step.h); ++round)
+  {
+    const CollisionReport again = collider_->resolve(step, x_, v_, true);
+    if (!again.ok)
+      return again;
+    held_impulses_ += collider_->heldImpulses();
+    report.impulses += again.impulses;
+    report.rounds += again.rounds;
+    report.zones = again.zones;
+    report.zone_points = again.zone_points;
+  }
+  return report;
+}
+
+/// Moves what is free, by as little as its mass allows. Returns false when all averages were what they shall be.
+bool ClothGroup::meetAverages(double h)
+{
+  bool moved = false;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  {
+    if (!model_.cloths[k]->averages)
+      continue;
+    const auto& c = *model_.cloths[k]->averages;
+    AverageCorrection& to = corrections_[k];
+    const int first = first_[k], count = first_[k + 1] - first;
+    const auto x = x_.middleCols(first, count);
+    to.gap = sub_.cloths[k].averages;
+    for (Eigen::Index i = 0; i < c.rows(); ++i)
+      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
+        to.gap.col(i) -= entry.value() * x.col(entry.col());
+    if (!(to.gap.colwise().norm().maxCoeff() > to.tolerance))
+      continue;
+    if (!to.ready || to.pins != work_.cloths[k].pins)
+    {
+      to.weights = c * inverse_mass_.segment(first, count).asDiagonal();
+      to.gram.compute(Eigen::MatrixXd(to.weights * c.transpose()));
+      to.pins = work_.cloths[k].pins;
+      to.ready = true;
+    }
+    moved = true;
+    to.columns = to.gap.transpose();
+    to.gram.solveInPlace(to.columns);
+    to.multipliers = to.columns.transpose();
+    for (Eigen::Index i = 0; i < c.rows(); ++i)
+      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(to.weights, i); entry; ++entry)
+      {
+        const Eigen::Vector3d shift = entry.value() * to.multipliers.col(i);
+        x_.col(first + entry.col()) += shift;
+        v_.col(first + entry.col()) += shift / h;
+      }
+    to.multipliers /= h * h;   // forces
+    shared_averages_[k] += to.multipliers;
+    for (std::size_t p = 0; p < to.pins.size(); ++p)
+      for (Eigen::Index i = 0; i < c.rows(); ++i)
+        shared_pins_[k].col(static_cast<Eigen::Index>(p)) += c.coeff(i, to.pins[p]) * to.multipliers.col(i);
+  }
+  return moved;
 }
 
 Eigen::Matrix3Xd ClothGroup::positions(const ClothGroupState& state) const

@@ -27,7 +27,7 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
     point(d_, i) = end - point(trial_, i);
   }
   system.evaluateHessian(trial_, HessianKind::semidefinite);
-  if (!system.solve(d_, nullptr, report.linear_iterations, report.factorizations))
+  if (!system.solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, model->averages ? &averages_ : nullptr))
     return StepFailure::singular_matrix;
   ++report.iterations;
   for (std::size_t i = 0; i < x_.size(); ++i)
@@ -45,6 +45,8 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
   constexpr int kPatience = 5;
   for (int i = 0; i < model->vertices(); ++i)
     point(x_, i) = system.held()[i] ? Eigen::Vector3d(point(system.start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
+  if (model->averages)
+    system.meetAverages(averages_, x_);
   bool near = false, strict = false;
   double best = std::numeric_limits<double>::infinity(), shift = 0.0;
   int misses = 0;

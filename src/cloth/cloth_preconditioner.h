@@ -20,6 +20,7 @@ public:
   /// y += (diag(w) + c A) x, held points as all others.
   void addProduct(const double* x, double* y) const;
   void solve(const PointVector& b, PointVector& x) const { factor_.solvePoints(b.data(), x.data()); }
+  const SparseCholesky& factorization() const { return factor_; }
 
 private:
   PointMatrix a_;                 ///< with a whole diagonal
@@ -45,6 +46,7 @@ public:
   void align(const PointVector& x, const BlockMatrix& matrix, const std::vector<char>& held);
   void useConstant() { aligned_ = false; }
   void apply(const PointVector& r, PointVector& z);
+  const SparseCholesky& constantFactor() const { return constant_.factorization(); }
 
 private:
   const ClothModel& model_;

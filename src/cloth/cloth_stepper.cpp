@@ -28,6 +28,15 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
       throw std::invalid_argument(who + "bending modulus, damping and wind coefficient must be zero or more");
   if (model->mass.size() != model->vertices() || !(model->mass.minCoeff() > 0))
     throw std::invalid_argument(who + "every vertex needs a mass");
+  if (model->averages)
+  {
+    if (model->averages->cols() != model->vertices())
+      throw std::invalid_argument(who + "averages of " + std::to_string(model->averages->cols()) + " vertices do not fit");
+    if (o.integrator != Integrator::implicit_euler)
+      throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler");
+    if (o.solver == ClothSolver::cholesky)
+      throw std::invalid_argument(who + "prescribed averages need solver: conjugate_gradients (or auto)");
+  }
   shortest_edge_ = std::numeric_limits<double>::infinity();
   for (Eigen::Index e = 0; e < model->topology.edges.cols(); ++e)
     shortest_edge_ = std::min(shortest_edge_, (model->rest.vertices.col(model->topology.edges(0, e)) -
@@ -58,6 +67,8 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
   check(inputs.forces.allFinite(), "forces");
   check(inputs.pins.cols() == static_cast<Eigen::Index>(s.pins.size()), "number of pin positions (one per pin of the state)");
   check(inputs.pins.allFinite(), "pin positions");
+  check(inputs.averages.cols() == model->averageCount(), "number of averages (one per average of the model)");
+  check(inputs.averages.allFinite(), "averages");
   check(s.x.cols() == n && s.v.cols() == n, "number of vertices of the state");
   check(s.x.allFinite() && s.v.allFinite() && s.next_step >= 0, "the state");
   check(model->bending != BendingModel::hinge || (s.rest_angles.size() == model->topology.hingeCount() && s.rest_angles.allFinite()),
@@ -84,6 +95,8 @@ std::string ClothStepper::Impl::explain(StepFailure failure, double length)
   const std::string at = " at a step of " + milliseconds(length);
   if (isExplicit())
     return "the explicit step blew up" + at + ": use a shorter step (stable below " + milliseconds(stableStep()) + " at rest) or implicit_euler";
+  if (failure == StepFailure::singular_matrix && !system.averagesIndependent())
+    return "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the averages there";
   if (failure == StepFailure::singular_matrix)
     return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude";
   if (failure == StepFailure::state_not_finite)
@@ -108,6 +121,11 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   pins_start_.resize(3, static_cast<Eigen::Index>(state.pins.size()));
   for (std::size_t k = 0; k < state.pins.size(); ++k)
     pins_start_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
+  if (model->averages)
+  {
+    toPoints(state.x, x_);
+    system.averagesOf(x_, averages_start_);
+  }
   const bool adaptive = options.error_tolerance > 0;
   // cuts that come again and again do not help: what fails everywhere should fail soon
   const int most_cuts = 3 * options.newton.max_cuts;
@@ -169,6 +187,8 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
   toPoints(work_.x, x_start_);
   toPoints(work_.v, v_start_);
   system.hold(work_);
+  if (model->averages)
+    averages_ = averages_start_ + to / duration * (inputs.averages - averages_start_);
   const bool second_order = order(options.integrator) == 2;
   if (second_order)
     acceleration(inputs, plan_.stages[0].tau_v);
@@ -215,9 +235,13 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
 /// Takes x_ as the end of the step.
 StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& inputs, double h, double fraction, StepReport& report)
 {
+  if (model->averages)   // to rounding
+    system.meetAverages(averages_, x_);
   const ClothEvaluation end = system.evaluate(x_);
   if (!std::isfinite(end.energy()))
     return StepFailure::state_not_finite;
+  if (model->averages)
+    system.balanceAverages(average_forces);
   next_ = work_;
   const bool second_order = order(options.integrator) == 2;
   double unbalanced = 0.0, force = 1e-300, jump = 0.0;
@@ -250,7 +274,8 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
 }
 
 /// With the stiffness of the last stage.
-bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+                                 Eigen::Matrix3Xd& average_forces_change)
 {
   if (isExplicit())   // whose forces do not know the end of the step
   {
@@ -259,6 +284,7 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
     for (const int p : work_.pins)
       displacement.col(p).setZero();
     pin_forces_change.setZero(3, pin_forces.cols());
+    average_forces_change.setZero(3, average_forces.cols());
     return true;
   }
   int iterations = 0, factorizations = 0;
@@ -279,13 +305,18 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
   for (int i = 0; i < model->vertices(); ++i)
     displacement.col(i) = point(d_, i);
   pin_forces_change.resize(3, pin_forces.cols());
-  if (pin_forces.cols() == 0)
+  average_forces_change.resize(3, model->averageCount());
+  if (pin_forces.cols() == 0 && !model->averages)
     return true;
   system.applyMatrix(d_, trial_);
+  for (std::size_t i = 0; i < trial_.size(); ++i)
+    system.gradient()[i] += trial_[i];
+  if (model->averages)
+    system.balanceAverages(average_forces_change);
   Eigen::Index pin = 0;
   for (int i = 0; i < model->vertices(); ++i)
     if (system.held()[i])
-      pin_forces_change.col(pin++) = -point(trial_, i);
+      pin_forces_change.col(pin++) = -point(system.gradient(), i);
   return true;
 }
 
@@ -303,12 +334,14 @@ StepReport ClothStepper::stepFirstOrder(ClothState& state, const ClothInputs& in
   return report;
 }
 
-bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change)
+bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+                           Eigen::Matrix3Xd& average_forces_change)
 {
-  return impl_->respond(forces, duration, displacement, pin_forces_change);
+  return impl_->respond(forces, duration, displacement, pin_forces_change, average_forces_change);
 }
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 double ClothStepper::stableStep() const { return impl_->stableStep(); }
+const Eigen::Matrix3Xd& ClothStepper::averageForces() const { return impl_->average_forces; }
 ClothSolver ClothStepper::solver() const { return impl_->system.solver(); }
 const ClothModel& ClothStepper::model() const { return *impl_->model; }
 

@@ -16,12 +16,13 @@ public:
 
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
   double stableStep();
-  bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
+  bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+               Eigen::Matrix3Xd& average_forces_change);
 
   std::shared_ptr<const ClothModel> model;
   ClothOptions options;
   ClothSystem system;
-  Eigen::Matrix3Xd pin_forces;
+  Eigen::Matrix3Xd pin_forces, average_forces;
 
 private:
   // cloth_stepper.cpp
@@ -48,7 +49,7 @@ private:
 
   PlasticFlow plastic_;
   ClothState work_, next_;   ///< start of a substep, and its end
-  Eigen::Matrix3Xd pins_start_, wind_v_;
+  Eigen::Matrix3Xd pins_start_, averages_start_, averages_, wind_v_;
   StepPlan plan_;
   PointVector x_, best_, trial_, d_, pin_motion_, v_, force_;
   PointVector x_start_, v_start_, a_start_, x_stage_, v_stage_, q_hat_, q_tilde_, guess_;   ///< of an implicit step

@@ -8,6 +8,7 @@
 #include "slender_sim/energy/hinge.h"
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
+#include "slender_sim/linalg/constrained_cholesky.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 #include "wind_load.h"
 
@@ -68,11 +69,22 @@ public:
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
   /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `tolerance`: theirs, 0: that of the options.
   /// False: not positive definite. The numbers grow by what was needed.
-  bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0);
+  /// Averages stay what the first guess makes them; with `averages` (3 x count) the points x + d, x the start of the stage, get these.
+  bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0,
+             const Eigen::Matrix3Xd* averages = nullptr);
   /// The blocks of solve()'s matrix as last evaluated; those of isometric bending are among them only for Cholesky.
   const BlockMatrix& matrix() const { return matrix_; }
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
+
+  /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x count).
+  void meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x);
+  /// Takes the part out of the gradient that the averages balance: their forces (3 x count).
+  void balanceAverages(Eigen::Matrix3Xd& forces);
+  /// False when averages depend on each other on what is not held: then nothing can be solved.
+  bool averagesIndependent() const { return independent_; }
+  /// What they are at x.
+  void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
 
   const PointVector& start() const { return start_; }
   const PointMatrix& bending() const { return bending_; }
@@ -87,6 +99,10 @@ private:
   void setWeights(double tau, double ratio);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
+  /// gap_: by how much the averages at x fall short.
+  void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
+  void preconditionWithin(PointVector& r, PointVector& z);
+  double takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages);
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
 
   const ClothModel& model_;
@@ -110,6 +126,10 @@ private:
   std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
   bool preconditioned_ = true;                ///< its constant part could be factored
   ConjugateGradients cg_;
+  std::unique_ptr<ConstrainedCholesky> averages_;   ///< of the preconditioner, where averages are prescribed
+  bool independent_ = true;                         ///< these, with what is held
+  PointVector gap_, multipliers_;                   ///< one point per average
+  Eigen::Matrix3Xd averages_now_;
 
   double ratio_ = 0;
   PointVector start_, viscous_start_, shifted_, target_, force_, gradient_, product_, right_, correction_;

@@ -27,6 +27,7 @@ void StepReport::merge(const StepReport& other)
   stable = stable && other.stable;
   projection_iterations = std::max(projection_iterations, other.projection_iterations);
   constraint_error = std::max(constraint_error, other.constraint_error);
+  tracking_error = std::max(tracking_error, other.tracking_error);
   error_estimate = std::max(error_estimate, other.error_estimate);
 }
 

@@ -37,6 +37,16 @@ class ObjReader
 public:
   explicit ObjReader(const std::string& path) : path_(path) {}
 
+  std::vector<VertexGroup> groups()
+  {
+    for (VertexGroup& g : groups_)
+    {
+      std::sort(g.vertices.begin(), g.vertices.end());
+      g.vertices.erase(std::unique(g.vertices.begin(), g.vertices.end()), g.vertices.end());
+    }
+    return groups_;
+  }
+
   TriangleMesh read()
   {
     std::ifstream file(path_);
@@ -85,6 +95,28 @@ private:
     {
       readFace(words);
     }
+    else if (kind == "g")
+    {
+      current_.clear();
+      for (std::string name = words.next(); !name.empty(); name = words.next())
+      {
+        if (name != "default")
+        {
+          current_.push_back(group(name));
+        }
+      }
+    }
+  }
+
+  std::size_t group(const std::string& name)
+  {
+    const auto known = std::find_if(groups_.begin(), groups_.end(), [&](const VertexGroup& g) { return g.name == name; });
+    if (known == groups_.end())
+    {
+      groups_.push_back({name, {}});
+      return groups_.size() - 1;
+    }
+    return static_cast<std::size_t>(known - groups_.begin());
   }
 
   double coordinate(const std::string& word) const
@@ -119,6 +151,10 @@ private:
     if (polygon.size() < 3)
     {
       fail(line_, "face with " + std::to_string(polygon.size()) + " vertices; must have at least 3");
+    }
+    for (const std::size_t g : current_)
+    {
+      groups_[g].vertices.insert(groups_[g].vertices.end(), polygon.begin(), polygon.end());
     }
     for (std::size_t k = 2; k < polygon.size(); ++k)
     {
@@ -171,10 +207,19 @@ private:
   int line_ = 0;
   std::vector<double> coordinates_;
   std::vector<Face> triangles_;
+  std::vector<VertexGroup> groups_;
+  std::vector<std::size_t> current_;   ///< groups of the faces to come
 };
 
 }  // namespace
 
 TriangleMesh readObj(const std::string& path) { return ObjReader(path).read(); }
+
+std::vector<VertexGroup> readObjGroups(const std::string& path)
+{
+  ObjReader reader(path);
+  reader.read();
+  return reader.groups();
+}
 
 }  // namespace slender

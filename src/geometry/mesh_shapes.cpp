@@ -12,6 +12,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "slender_sim/geometry/mesh_subdivision.h"
+
 namespace slender {
 
 namespace {
@@ -214,27 +216,15 @@ TriangleMesh icosphere(double radius, int levels)
                                         {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
   Faces faces{{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
               {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8}, {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
-  for (Eigen::Vector3d& v : vertices)
-    v *= radius / v.norm();
+  TriangleMesh mesh = meshOf(vertices, faces);
+  const auto blowUp = [&] { mesh.vertices = radius * mesh.vertices.colwise().normalized(); };
+  blowUp();
   for (int level = 0; level < levels; ++level)
   {
-    std::map<std::pair<int, int>, int> middles;
-    const auto middle = [&](int a, int b) {
-      const auto [at, fresh] = middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<int>(vertices.size()));
-      if (fresh)
-        vertices.push_back((vertices[a] + vertices[b]).normalized() * radius);
-      return at->second;
-    };
-    Faces finer;
-    for (const Eigen::Vector3i& f : faces)
-    {
-      const int a = middle(f[0], f[1]), b = middle(f[1], f[2]), c = middle(f[2], f[0]);
-      for (const Eigen::Vector3i& t : {Eigen::Vector3i(f[0], a, c), Eigen::Vector3i(f[1], b, a), Eigen::Vector3i(f[2], c, b), Eigen::Vector3i(a, b, c)})
-        finer.push_back(t);
-    }
-    faces.swap(finer);
+    mesh = subdivide(mesh, 1).mesh;
+    blowUp();
   }
-  return meshOf(vertices, faces);
+  return mesh;
 }
 
 }  // namespace slender

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -325,6 +326,34 @@ void writePly(const std::string& path, const TriangleMesh& mesh)
     put(3, 1);
     for (int k = 0; k < 3; ++k)
       put(static_cast<std::uint32_t>(mesh.triangles(k, f)), 4);
+  }
+  finishWriting(file, path);
+}
+
+void writeColoredMesh(const std::string& path, const TriangleMesh& mesh, const Eigen::Matrix3Xd& colors)
+{
+  requireMeshName(path);
+  const bool ply = endsWith(path, ".ply");
+  std::ofstream file(path, std::ios::binary);
+  if (ply)
+    file << "ply\nformat ascii 1.0\nelement vertex " << mesh.vertices.cols()
+         << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face "
+         << mesh.triangles.cols() << "\nproperty list uchar int vertex_indices\nend_header\n";
+  char line[160];
+  for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
+  {
+    const Eigen::Vector3d x = mesh.vertices.col(i), c = colors.col(i).cwiseMax(0.0).cwiseMin(1.0);
+    if (ply)
+      std::snprintf(line, sizeof line, "%.17g %.17g %.17g %d %d %d\n", x[0], x[1], x[2], static_cast<int>(std::lround(255 * c[0])),
+                    static_cast<int>(std::lround(255 * c[1])), static_cast<int>(std::lround(255 * c[2])));
+    else
+      std::snprintf(line, sizeof line, "v %.17g %.17g %.17g %.4f %.4f %.4f\n", x[0], x[1], x[2], c[0], c[1], c[2]);
+    file << line;
+  }
+  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+  {
+    const Eigen::Vector3i t = mesh.triangles.col(f).array() + (ply ? 0 : 1);
+    file << (ply ? "3 " : "f ") << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
   }
   finishWriting(file, path);
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "hermite.h"
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
@@ -14,23 +15,6 @@ namespace {
 
 constexpr double same_position = 0.0;        // [m] only a sample that truly repeats counts as a pause
 constexpr double same_orientation = 1e-12;   // [rad] round-off of q^-1 q
-constexpr double burst_ratio = 4.0;          // intervals more uneven than this are a burst, see the header
-
-/// Slope at the middle of three samples; `before`, `after`: the neighbours' values minus its own.
-Eigen::Vector3d threePointSlope(double h_before, const Eigen::Vector3d& before, double h_after, const Eigen::Vector3d& after,
-                                double same)
-{
-  if (before.norm() <= same || after.norm() <= same)
-  {
-    return Eigen::Vector3d::Zero();
-  }
-  const double span = h_before + h_after;
-  if (h_before * burst_ratio < h_after || h_after * burst_ratio < h_before)
-  {
-    return (after - before) / span;
-  }
-  return (h_before / (span * h_after)) * after - (h_after / (span * h_before)) * before;
-}
 
 void checkSample(double time, const Pose& pose)
 {
@@ -85,6 +69,12 @@ void PoseTrajectory::forgetBefore(double time)
 
 Twist PoseTrajectory::slope(std::size_t k) const
 {
+  if (k > 0 && k + 1 == times_.size() && coast_ > 0)
+  {
+    const double h = times_[k] - times_[k - 1];
+    return {(poses_[k].position - poses_[k - 1].position) / h,
+            rotationVector(poses_[k - 1].orientation.conjugate() * poses_[k].orientation) / h};
+  }
   if (k == 0 || k + 1 >= times_.size())
   {
     return {};   // held beyond the ends
@@ -107,31 +97,40 @@ Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
     {
       *velocity = {};
     }
-    return time <= times_.front() ? poses_.front() : poses_.back();
+    if (time < times_.back() || times_.size() == 1 || !(coast_ > 0))
+    {
+      return time <= times_.front() ? poses_.front() : poses_.back();
+    }
+    const double after = std::min(time - times_.back(), coast_), way = after * (1.0 - 0.5 * after / coast_), speed = 1.0 - after / coast_;
+    const Twist last = slope(times_.size() - 1);   // the turn about a fixed axis: body and world rates agree
+    const Pose& end = poses_.back();
+    if (velocity)
+    {
+      velocity->linear = speed * last.linear;
+      velocity->angular = end.orientation * (speed * last.angular);
+    }
+    return {end.position + way * last.linear, (end.orientation * fromRotationVector(way * last.angular)).normalized()};
   }
   const std::size_t k = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin() - 1;
   const double h = times_[k + 1] - times_[k];
   const double s = (time - times_[k]) / h;
   const Twist from = slope(k), to = slope(k + 1);
 
-  // Cubic Hermite: value u(1) h01 + h (m0 h10 + m1 h11), with the start at zero.
-  const double h01 = s * s * (3 - 2 * s), h10 = s * (1 - s) * (1 - s), h11 = s * s * (s - 1);
-  const double d01 = 6 * s * (1 - s) / h, d10 = (1 - s) * (1 - 3 * s) / h, d11 = s * (3 * s - 2) / h;
-
+  const HermiteWeights w(s, h);
   const Pose& a = poses_[k];
   const Pose& b = poses_[k + 1];
   const Eigen::Vector3d whole = rotationVector(a.orientation.conjugate() * b.orientation);
   const Eigen::Vector3d rate0 = from.angular;                                   // phi' = body rate where phi = 0
   const Eigen::Vector3d rate1 = rotationRate(-whole).inverse() * to.angular;
-  const Eigen::Vector3d phi = h01 * whole + h * (h10 * rate0 + h11 * rate1);
+  const Eigen::Vector3d phi = w.h01 * whole + w.h10 * rate0 + w.h11 * rate1;
 
   Pose pose;
-  pose.position = a.position + h01 * (b.position - a.position) + h * (h10 * from.linear + h11 * to.linear);
+  pose.position = a.position + w.h01 * (b.position - a.position) + w.h10 * from.linear + w.h11 * to.linear;
   pose.orientation = (a.orientation * fromRotationVector(phi)).normalized();
   if (velocity)
   {
-    velocity->linear = d01 * (b.position - a.position) + h * (d10 * from.linear + d11 * to.linear);
-    velocity->angular = pose.orientation * (rotationRate(-phi) * (d01 * whole + h * (d10 * rate0 + d11 * rate1)));
+    velocity->linear = w.d01 * (b.position - a.position) + w.d10 * from.linear + w.d11 * to.linear;
+    velocity->angular = pose.orientation * (rotationRate(-phi) * (w.d01 * whole + w.d10 * rate0 + w.d11 * rate1));
   }
   return pose;
 }

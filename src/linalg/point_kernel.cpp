@@ -121,7 +121,7 @@ inline __attribute__((always_inline)) void backward(const double* l, int count, 
   }
 }
 
-void solveSupernodal(const SupernodalFactor& f, double* x)
+void forwardSupernodal(const SupernodalFactor& f, double* x)
 {
   for (int s = 0; s < f.supernodes; ++s)
   {
@@ -136,6 +136,10 @@ void solveSupernodal(const SupernodalFactor& f, double* x)
     for (; c < columns; ++c)
       forward<1>(l, count, rows, c, x);
   }
+}
+
+void backwardSupernodal(const SupernodalFactor& f, double* x)
+{
   for (int s = f.supernodes - 1; s >= 0; --s)
   {
     const int columns = f.first[s + 1] - f.first[s], count = f.row_starts[s + 1] - f.row_starts[s];
@@ -169,7 +173,7 @@ double dot(int points, const double* x, const double* y)
 }  // namespace
 
 extern const PointKernels point_kernels;
-const PointKernels point_kernels = {multiply, multiplyBlocks, solveSupernodal, dot};
+const PointKernels point_kernels = {multiply, multiplyBlocks, forwardSupernodal, backwardSupernodal, dot};
 
 }  // namespace SLENDER_ISA
 }  // namespace slender

@@ -82,6 +82,12 @@ struct SparseCholesky::Impl
     return a;
   }
 
+  SupernodalFactor supernodes() const
+  {
+    return {static_cast<int>(factor->nsuper),      static_cast<const int*>(factor->super), static_cast<const int*>(factor->pi),
+            static_cast<const int*>(factor->px), static_cast<const int*>(factor->s),     static_cast<const double*>(factor->x)};
+  }
+
   /// Where the values of a block (or number) of a matrix of points go; its columns follow each other, each one shorter by one.
   struct Target
   {
@@ -261,15 +267,8 @@ void SparseCholesky::solvePoints(const double* b, double* x) const
   const int points = static_cast<int>(m.place.size());
   if (m.unknowns == 1)
   {
-    // three right-hand sides are too few for BLAS: a kernel of our own takes a third of the time
-    for (int i = 0; i < points; ++i)
-      std::copy_n(b + 4 * i, 4, m.permuted.data() + 4 * m.place[i]);
-    const cholmod_factor& f = *m.factor;
-    pointKernels().solveSupernodal({static_cast<int>(f.nsuper), static_cast<const int*>(f.super), static_cast<const int*>(f.pi),
-                                    static_cast<const int*>(f.px), static_cast<const int*>(f.s), static_cast<const double*>(f.x)},
-                                   m.permuted.data());
-    for (int i = 0; i < points; ++i)
-      std::copy_n(m.permuted.data() + 4 * m.place[i], 4, x + 4 * i);
+    forwardPoints(b, m.permuted.data());
+    backwardPoints(m.permuted.data(), x);
     return;
   }
   double* right = static_cast<double*>(m.right->x);
@@ -282,6 +281,21 @@ void SparseCholesky::solvePoints(const double* b, double* x) const
     std::copy_n(solution + 3 * m.place[i], 3, x + 4 * i);
     x[4 * i + 3] = 0.0;
   }
+}
+
+// three right-hand sides are too few for BLAS: kernels of our own take a third of the time
+void SparseCholesky::forwardPoints(const double* b, double* y) const
+{
+  for (std::size_t i = 0; i < impl_->place.size(); ++i)
+    std::copy_n(b + 4 * i, 4, y + 4 * impl_->place[i]);
+  pointKernels().forwardSupernodal(impl_->supernodes(), y);
+}
+
+void SparseCholesky::backwardPoints(double* y, double* x) const
+{
+  pointKernels().backwardSupernodal(impl_->supernodes(), y);
+  for (std::size_t i = 0; i < impl_->place.size(); ++i)
+    std::copy_n(y + 4 * impl_->place[i], 4, x + 4 * i);
 }
 
 int SparseCholesky::size() const { return static_cast<int>(impl_->starts.size()) - 1; }

@@ -7,6 +7,7 @@
 #include "marker_tools.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_markers.h"
+#include "slender_sim/tracking/function_colors.h"
 
 namespace slender {
 namespace {
@@ -31,7 +32,8 @@ std_msgs::ColorRGBA shaded(const std_msgs::ColorRGBA& paint, const Vector3d& nor
   return color(shade(paint.r), shade(paint.g), shade(paint.b), paint.a);
 }
 
-void addTriangles(const Eigen::Matrix3Xi& triangles, const Eigen::Matrix3Xd& x, const std_msgs::ColorRGBA& paint, Marker& marker)
+/// `paints`: of each vertex (3 x n), or none.
+void addTriangles(const Eigen::Matrix3Xi& triangles, const Eigen::Matrix3Xd& x, const std_msgs::ColorRGBA& paint, const Eigen::Matrix3Xd& paints, Marker& marker)
 {
   Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, x.cols());   // weighted by area
   for (Eigen::Index f = 0; f < triangles.cols(); ++f)
@@ -47,7 +49,7 @@ void addTriangles(const Eigen::Matrix3Xi& triangles, const Eigen::Matrix3Xd& x, 
   {
     points[i] = toPoint(x.col(i));
     const double length = normals.col(i).norm();
-    colors[i] = shaded(paint, length > 0.0 ? Vector3d(normals.col(i) / length) : Vector3d::UnitZ());
+    colors[i] = shaded(paints.cols() ? color(paints(0, i), paints(1, i), paints(2, i)) : paint, length > 0.0 ? Vector3d(normals.col(i) / length) : Vector3d::UnitZ());
   }
   marker.points.reserve(static_cast<std::size_t>(triangles.size()));
   marker.colors.reserve(static_cast<std::size_t>(triangles.size()));
@@ -87,8 +89,20 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
       addEdges(model.topology, x, marker);
     }
     else
-      addTriangles(model.rest.triangles, x, paint, marker);
+    {
+      const auto& tracking = simulation.config().cloths[k].tracking;
+      const bool regions = style == MarkerStyle::regions && tracking;
+      addTriangles(model.rest.triangles, x, paint, regions ? functionColors(tracking->functions.tracked) : Eigen::Matrix3Xd(), marker);
+    }
     out.markers.push_back(std::move(marker));
+    if (const auto& tracking = simulation.config().cloths[k].tracking)
+    {
+      Marker guide = makeMarker(header, "guides/" + model.name, 0, Marker::LINE_LIST);
+      guide.scale.x = 0.08 * spacing.back();
+      guide.color = color(0.15, 0.15, 0.18, 0.8);
+      addEdges(meshTopology(tracking->guide.mesh), simulation.state().cloths[k].guide, guide);
+      out.markers.push_back(std::move(guide));
+    }
   }
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {

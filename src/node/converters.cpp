@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include <array>
 #include <cmath>
+#include <cstring>
 
 #include <sensor_msgs/point_cloud2_iterator.h>
 
@@ -15,6 +17,42 @@ geometry_msgs::Point toPoint(const Eigen::Vector3d& p)
   out.y = p.y();
   out.z = p.z();
   return out;
+}
+
+std::string fromPoints(const sensor_msgs::PointCloud2& message, Eigen::Matrix3Xd& out)
+{
+  if (message.is_bigendian)
+    return "is_bigendian must be false";
+  std::array<const sensor_msgs::PointField*, 3> fields{};
+  for (const sensor_msgs::PointField& field : message.fields)
+    for (int k = 0; k < 3; ++k)
+      if (field.name == std::string(1, "xyz"[k]))
+        fields[k] = &field;
+  for (const auto* field : fields)
+  {
+    if (!field || field->count != 1 || (field->datatype != sensor_msgs::PointField::FLOAT32 && field->datatype != sensor_msgs::PointField::FLOAT64))
+      return "it must have the fields x, y and z, float32 or float64";
+    if (field->offset + (field->datatype == sensor_msgs::PointField::FLOAT32 ? 4u : 8u) > message.point_step)
+      return "a field reaches beyond point_step";
+  }
+  const std::uint64_t row = std::uint64_t{message.width} * message.point_step;
+  if (message.row_step < row || message.data.size() < std::uint64_t{message.height} * message.row_step)
+    return "data is shorter than width, height and steps say";
+  out.resize(3, static_cast<Eigen::Index>(message.width) * message.height);
+  for (Eigen::Index i = 0; i < out.cols(); ++i)
+  {
+    const std::uint8_t* at = message.data.data() + (i / message.width) * message.row_step + (i % message.width) * message.point_step;
+    for (int k = 0; k < 3; ++k)
+      if (fields[k]->datatype == sensor_msgs::PointField::FLOAT32)
+      {
+        float value;
+        std::memcpy(&value, at + fields[k]->offset, sizeof value);
+        out(k, i) = value;
+      }
+      else
+        std::memcpy(&out(k, i), at + fields[k]->offset, sizeof(double));
+  }
+  return "";
 }
 
 geometry_msgs::Vector3 toVector3(const Eigen::Vector3d& v)
@@ -202,6 +240,17 @@ void append(const std::string& name, const ClothState& state, slender_sim::Cloth
     out.vertices.push_back(toPoint(state.x.col(i)));
     out.velocities.push_back(toVector3(state.v.col(i)));
   }
+}
+
+void appendTracking(double error, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces, slender_sim::ClothState& out)
+{
+  out.constraint_errors.push_back(error);
+  out.guide_offsets.push_back(static_cast<std::uint32_t>(out.guide_vertices.size()));
+  out.function_offsets.push_back(static_cast<std::uint32_t>(out.guide_forces.size()));
+  for (Eigen::Index i = 0; i < guide.cols(); ++i)
+    out.guide_vertices.push_back(toPoint(guide.col(i)));
+  for (Eigen::Index i = 0; i < forces.cols(); ++i)
+    out.guide_forces.push_back(toVector3(forces.col(i)));
 }
 
 void append(const ClothModel& model, slender_sim::MeshStamped& out)

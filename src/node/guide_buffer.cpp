@@ -26,7 +26,10 @@ GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG
 bool GuideBuffer::push(double time, const Pose& X_WH)
 {
   if (trajectory_.empty())
+  {
     trajectory_ = PoseTrajectory({time}, {X_WH});
+    trajectory_.coast(options_.coast);
+  }
   else if (time > trajectory_.lastTime())
     trajectory_.append(time, X_WH);
   else

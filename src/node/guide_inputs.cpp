@@ -12,7 +12,6 @@ namespace {
 
 constexpr int kQueueSize = 1000;               // a burst of fast trackers; in wall pace it is emptied every step
 constexpr std::size_t kMaxPending = 1000;
-constexpr double kMaxAhead = 3600.0;           // [s] whole trajectories may be sent in advance, another clock's stamps may not
 constexpr int kGuidesSource = -1, kBodiesSource = -2;
 
 /// Names of the scene's own bodies and obstacles: grasps follow those without messages.
@@ -70,7 +69,8 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   wind_topic_ = simulation.config().wind_topic;
   if (wind_topic_)
     subscribers_.push_back(nh.subscribe("wind", kQueueSize, &GuideInputs::onWind, this, ros::TransportHints().tcpNoDelay()));
-  if (topics || bodies || threads || wind_topic_)
+  tracking_ = std::make_unique<TrackingInputs>(nh, options_, buffer_options, simulation, clock_, tf_buffer_, drops_);
+  if (topics || bodies || threads || wind_topic_ || tracking_->any())
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
 }
 
@@ -311,6 +311,7 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
 
 void GuideInputs::processPending()
 {
+  tracking_->processPending();
   if (pending_.empty())
     return;
   const auto now = std::chrono::steady_clock::now();
@@ -351,6 +352,7 @@ void GuideInputs::apply(double time, SceneInputs& inputs)
       GraspTarget& target = g < grasps_ ? inputs.grasps[g] : solid < bodies_ ? inputs.bodies[solid] : inputs.obstacles[solid - bodies_];
       target = guided_[g].buffer->target(time);
     }
+  tracking_->apply(time, inputs);
   if (wind_)
     inputs.wind = *wind_;
   for (std::size_t k = 0; k < threads_.size(); ++k)
@@ -385,6 +387,7 @@ void GuideInputs::attachAll(const Simulation& simulation)
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
       guided_[g].buffer->attachAt(poseOf(simulation, g));
+  tracking_->attachAll(simulation);
 }
 
 void GuideInputs::restart(const Simulation& simulation)
@@ -396,6 +399,7 @@ void GuideInputs::restart(const Simulation& simulation)
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
       guided_[g].buffer->restart(poseOf(simulation, g));
+  tracking_->restart(simulation);
 }
 
 std::vector<GuideInputs::Age> GuideInputs::ages() const
@@ -410,6 +414,8 @@ std::vector<GuideInputs::Age> GuideInputs::ages() const
       age = clock_.seconds() - *age;
     ages.push_back({guided.name, age});
   }
+  for (const TrackingInputs::Age& age : tracking_->ages())
+    ages.push_back({age.name, age.seconds});
   return ages;
 }
 

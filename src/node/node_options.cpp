@@ -180,7 +180,7 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
   params.read("tf_timeout", o.tf_timeout, 0.0, 100.0);
   params.read("diagnostics_rate", o.diagnostics_rate, 0.0, 1000.0, true);
   params.read("marker_rate", o.marker_rate, 0.0, 30.0, true);
-  params.read<MarkerStyle>("marker_style", o.marker_style, {{"tube", MarkerStyle::tube}, {"line", MarkerStyle::line}});
+  params.read<MarkerStyle>("marker_style", o.marker_style, {{"tube", MarkerStyle::tube}, {"line", MarkerStyle::line}, {"regions", MarkerStyle::regions}});
   params.read("marker_frames", o.marker_frames);
   params.refuseUnknown();
   if (o.scene.empty())

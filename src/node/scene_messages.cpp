@@ -100,8 +100,16 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
   cloths.offsets.clear();
   cloths.vertices.clear();
   cloths.velocities.clear();
+  cloths.constraint_errors.clear();
+  cloths.guide_offsets.clear();
+  cloths.guide_vertices.clear();
+  cloths.function_offsets.clear();
+  cloths.guide_forces.clear();
   for (std::size_t k = 0; k < scene.cloths.size(); ++k)
+  {
     append(simulation.config().cloths[k].name, scene.cloths[k].cloth, cloths);
+    appendTracking(simulation.trackingError(static_cast<int>(k)), scene.cloths[k].guide, scene.cloths[k].guide_forces, cloths);
+  }
   wrenches.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < wrenches.size(); ++g)
   {

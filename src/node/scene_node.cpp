@@ -38,8 +38,13 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
     refuse("rods", toString(NodeKind::rods));
   if (kind != NodeKind::threads && !scene.threads.empty())
     refuse("threads", toString(NodeKind::threads));
-  if (kind != NodeKind::cloths && !scene.cloths.empty())
-    refuse("cloths", toString(NodeKind::cloths));
+  const bool tracked = std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking != nullptr; });
+  if (!hasCloths(kind) && !scene.cloths.empty())
+    refuse(tracked ? "tracked cloths" : "cloths", toString(tracked ? NodeKind::tracking : NodeKind::cloths));
+  if (kind == NodeKind::cloths && tracked)
+    throw SceneError(who + "it has tracked cloths; tracking_node simulates them, and cloths beside them");
+  if (kind == NodeKind::tracking && !tracked)
+    throw SceneError(who + "it has no tracked cloths; cloth_node simulates cloths that follow no guide");
   if (kind == NodeKind::threads && scene.threads.empty())
     throw SceneError(who + "it has no threads; rod_node simulates rods");
   if (kind == NodeKind::threads && !scene.bodies.empty())
@@ -53,7 +58,7 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
 
 const char* toString(NodeKind kind)
 {
-  return kind == NodeKind::rods ? "rod_node" : kind == NodeKind::threads ? "thread_node" : "cloth_node";
+  return kind == NodeKind::rods ? "rod_node" : kind == NodeKind::threads ? "thread_node" : kind == NodeKind::cloths ? "cloth_node" : "tracking_node";
 }
 
 SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, NodeKind kind)
@@ -117,7 +122,7 @@ void SceneNode::startClock()
   scene_pub_.publish(scene);
   if (bag_)
     bag_->recordScene(scene.data, clock_.stamp());
-  if (kind_ == NodeKind::cloths)
+  if (hasCloths(kind_))
     publishMesh();
   wall_start_ = ros::WallTime::now();
   total_ = recent_ = RunStatistics();
@@ -139,6 +144,7 @@ void SceneNode::advertise()
     case NodeKind::rods: state_pub_ = nh_.advertise<slender_sim::RodState>("state", 1000); break;
     case NodeKind::threads: state_pub_ = nh_.advertise<slender_sim::ThreadState>("state", 1000); break;
     case NodeKind::cloths:
+    case NodeKind::tracking:
       state_pub_ = nh_.advertise<slender_sim::ClothState>("state", 1000);
       points_pub_ = nh_.advertise<sensor_msgs::PointCloud2>("points", 100);
       mesh_pub_ = nh_.advertise<slender_sim::MeshStamped>("mesh", 1, true);
@@ -146,7 +152,7 @@ void SceneNode::advertise()
   }
   for (const std::string& prefix : thread_prefixes_)
     nozzle_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>(prefix + "nozzle/wrench", 100));
-  if (kind_ != NodeKind::cloths)
+  if (!hasCloths(kind_))
     poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>("poses", 100);
   if (simulation_->config().rods.size() > 1)
     for (const RodConfig& rod : simulation_->config().rods)
@@ -238,7 +244,7 @@ void SceneNode::publishState()
     state_pub_.publish(state);
   for (std::size_t k = 0; k < nozzle_pubs_.size(); ++k)
     nozzle_pubs_[k].publish(messages_.nozzles[k]);
-  if (kind_ == NodeKind::cloths)
+  if (hasCloths(kind_))
   {
     state_pub_.publish(messages_.cloths);
     if (heard(points_pub_))

@@ -112,7 +112,20 @@ DiagnosticStatus SceneNode::simulationStatus() const
     add(status, "projection iterations", static_cast<std::uint64_t>(recent_.projection_iterations));
     add(status, "constraint error", recent_.constraint_error);
   }
-  if (kind_ == NodeKind::cloths)
+  if (kind_ == NodeKind::tracking)
+  {
+    double error = 0.0, force = 0.0;
+    for (std::size_t k = 0; k < simulation_->state().cloths.size(); ++k)
+    {
+      error = std::max(error, simulation_->trackingError(static_cast<int>(k)));
+      const Eigen::Matrix3Xd& forces = simulation_->state().cloths[k].guide_forces;
+      force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
+    }
+    add(status, "constraint residual [m]", error);
+    add(status, "worst constraint residual over size", recent_.tracking_error);
+    add(status, "largest guide force [N]", force);
+  }
+  if (hasCloths(kind_))
   {
     std::uint64_t vertices = 0;
     for (const SceneCloth& held : simulation_->state().cloths)

@@ -100,7 +100,7 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
     return true;
   }
   if (active)
-    response.message = request.name + " holds the " + (kind_ == NodeKind::cloths ? "cloth" : "rod") + " already; release it first";
+    response.message = request.name + " holds the " + (hasCloths(kind_) ? "cloth" : "rod") + " already; release it first";
   else
     response.message = attach(request, g, response);
   response.success = response.message.empty();

@@ -280,10 +280,20 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
   {
     cloth.mesh = TriangleMesh{};
   }
+  readClothTraits(map, context, cloth);
+  map.finish();
+  return cloth;
+}
+
+}  // namespace
+
+void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& cloth)
+{
   readMaterials(map, cloth);
   const YamlCursor undeformed = map.get("undeformed");
   cloth.undeformed = readClothShape(undeformed, context, cloth.mesh);
-  cloth.start = readClothShape(map.get("start"), context, cloth.mesh);
+  const Eigen::Matrix3Xd start = readClothShape(map.get("start"), context, cloth.mesh);
+  cloth.start = start.cols() ? start : cloth.start;
   if (undeformed.present() && cloth.bending != BendingModel::hinge)
   {
     undeformed.problem("gives angles at rest, which only bending: {model: hinge} has; the isometric models are for flat rest shapes");
@@ -303,11 +313,7 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
   solver.finish();
   readGrasps(map.get("grasps"), context, cloth);
   cloth.contact = readClothContact(map.get("contact"));
-  map.finish();
-  return cloth;
 }
-
-}  // namespace
 
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context)
 {

@@ -14,44 +14,48 @@ namespace {
 const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
 constexpr int max_cells = 2000;   // per side of a grid
 
-/// As it is in the file, scaled and placed. False when there is none to be used; reported.
-bool readMeshFile(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh, std::string& path)
+}  // namespace
+
+void MeshFile::place(Eigen::Matrix3Xd& vertices) const
 {
+  vertices *= scale;
+  for (Eigen::Index i = 0; i < vertices.cols(); ++i)
+  {
+    vertices.col(i) = pose * Eigen::Vector3d(vertices.col(i));
+  }
+}
+
+std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& context)
+{
+  MeshFile read;
   YamlMap map(at);
   const YamlCursor file = map.require("file");
-  double scale = 1.0;
-  assign(scale, map.get("scale").number(Range::above(0, 1e6)));
-  const Pose pose = readPose(map.get("pose")).value_or(Pose{});
+  assign(read.scale, map.get("scale").number(Range::above(0, 1e6)));
+  read.pose = readPose(map.get("pose")).value_or(Pose{});
   map.finish();
   const auto text = file.text();
   if (!text)
   {
-    return false;
+    return std::nullopt;
   }
-  path = *text;
+  read.path = *text;
   try
   {
-    mesh = slender::readMesh(context.resolve(path));
+    read.mesh = slender::readMesh(context.resolve(read.path));
   }
   catch (const std::exception& error)
   {
     file.problem(error.what());
-    return false;
+    return std::nullopt;
   }
-  mesh.vertices *= scale;
-  for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
-  {
-    mesh.vertices.col(i) = pose * Eigen::Vector3d(mesh.vertices.col(i));
-  }
-  if (!(mesh.vertices.cwiseAbs().maxCoeff() <= max_coordinate))
+  read.place(read.mesh.vertices);
+  if (!(read.mesh.vertices.cwiseAbs().maxCoeff() <= max_coordinate))
   {
     file.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m after scale and pose");
-    return false;
+    return std::nullopt;
   }
-  return true;
+  return read;
 }
-
-}  // namespace
 
 std::optional<ClothGrid> readClothGrid(const YamlCursor& at, TriangleMesh& mesh)
 {
@@ -135,14 +139,15 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, TriangleMesh& mesh)
 
 bool readClothMesh(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh)
 {
-  std::string path;
-  if (!readMeshFile(at, context, mesh, path))
+  const auto read = readMeshFile(at, context);
+  if (!read)
   {
     return false;
   }
+  mesh = read->mesh;
   try
   {
-    requireSoundMesh(mesh, path);
+    requireSoundMesh(mesh, read->path);
   }
   catch (const std::exception& error)
   {
@@ -154,12 +159,13 @@ bool readClothMesh(const YamlCursor& at, const ReadContext& context, TriangleMes
 
 Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context, const TriangleMesh& cloth)
 {
-  TriangleMesh mesh;
-  std::string path;
-  if (!at.present() || !readMeshFile(at, context, mesh, path) || cloth.vertices.cols() == 0)
+  const auto read = at.present() ? readMeshFile(at, context) : std::nullopt;
+  if (!read || cloth.vertices.cols() == 0)
   {
     return {};   // none, or reported
   }
+  const TriangleMesh& mesh = read->mesh;
+  const std::string& path = read->path;
   const YamlCursor file = YamlMap(at).get("file");
   const auto differs = [&](const std::string& what, Eigen::Index here, Eigen::Index there) {
     file.problem(path + " has " + std::to_string(here) + " " + what + ", the cloth's mesh has " + std::to_string(there) +

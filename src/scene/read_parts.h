@@ -56,6 +56,8 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
 std::optional<RodContact> readRodContact(const YamlCursor& at);
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context);
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context);
+/// The list `tracked`: appends to the cloths.
+void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
 ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods, const std::vector<ThreadConfig>& threads);
 std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);

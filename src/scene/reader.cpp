@@ -171,11 +171,11 @@ std::vector<YamlCursor> entriesOf(const YamlCursor& list) { return list.isList()
 /// All that has a place in space.
 void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
 {
-  const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads"), at_cloths = map.get("cloths");
+  const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads"), at_cloths = map.get("cloths"), at_tracked = map.get("tracked");
   const YamlCursor at_rods = map.get("rods");
-  if (!at_rods.present() && !at_generate.present() && !at_threads.present() && !at_cloths.present())
+  if (!at_rods.present() && !at_generate.present() && !at_threads.present() && !at_cloths.present() && !at_tracked.present())
   {
-    at_rods.problem("is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}] or generate: [{...}]");
+    at_rods.problem("is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}], tracked: [{...}] or generate: [{...}]");
   }
   const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
   std::vector<RodPart> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<RodPart>{};
@@ -183,6 +183,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   takeGeneratedRods(generated, rods);
   scene.threads = readThreads(at_threads, context);
   scene.cloths = readCloths(at_cloths, context);
+  readTrackedCloths(at_tracked, context, scene.cloths);
   scene.contact = readContact(map.get("contact"), rods, scene.threads);
   scene.obstacles = readObstacles(at_obstacles, context);
   scene.bodies = readBodies(at_bodies, context, rods);
@@ -211,9 +212,14 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   {
     scene.rods.push_back(std::move(part.config));
   }
-  checkFollowed(scene, entriesOf(at_rods), entriesOf(at_cloths));
-  checkGraspNames(scene, entriesOf(at_cloths));
-  checkUnderCloth(scene, entriesOf(at_cloths));
+  std::vector<YamlCursor> cloths = entriesOf(at_cloths);
+  for (const YamlCursor& entry : entriesOf(at_tracked))
+  {
+    cloths.push_back(entry);
+  }
+  checkFollowed(scene, entriesOf(at_rods), cloths);
+  checkGraspNames(scene, cloths);
+  checkUnderCloth(scene, cloths);
 }
 
 void checkClothTime(YamlMap& map, SceneConfig& scene)

@@ -121,6 +121,10 @@ public:
     for (std::size_t k = 0; k < state.cloths.size(); ++k)
     {
       recordCloth(state.time, simulation.clothModel(static_cast<int>(k)).name, state.cloths[k].cloth);
+      if (simulation.config().cloths[k].tracking)
+      {
+        recordTracking(state.time, simulation.config().cloths[k], state.cloths[k]);
+      }
     }
     for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
     {
@@ -153,7 +157,7 @@ public:
   {
     nodes_.close();
     grasps_.close();
-    for (auto* file : {&bodies_, &threads_, &cloths_})
+    for (auto* file : {&bodies_, &threads_, &cloths_, &tracking_})
     {
       if (*file)
       {
@@ -215,6 +219,25 @@ private:
     }
   }
 
+  void recordTracking(double time, const ClothConfig& cloth, const SceneCloth& state)
+  {
+    if (!tracking_)
+    {
+      tracking_.emplace(folder_ + "/tracking.csv");
+      *tracking_ << "t [s],object,function,x [m],y [m],z [m],fx [N],fy [N],fz [N]";
+      tracking_->endLine();
+    }
+    const WeakConstraints& constraints = *cloth.tracking->constraints;
+    const Eigen::Matrix3Xd averages = constraints.averages(state.guide);
+    for (int i = 0; i < constraints.count(); ++i)
+    {
+      tracking_->number(time) << ',' << cloth.name << ',' << constraints.name(i) << ',';
+      tracking_->vector(averages.col(i), ',') << ',';
+      tracking_->vector(state.guide_forces.col(i), ',');
+      tracking_->endLine();
+    }
+  }
+
   void recordSolid(double time, const std::string& name, const Pose& pose, const Twist& velocity)
   {
     if (!bodies_)
@@ -235,7 +258,7 @@ private:
 
   std::string folder_;
   TextFile nodes_, grasps_;
-  std::optional<TextFile> bodies_, threads_, cloths_;   // only scenes that have any
+  std::optional<TextFile> bodies_, threads_, cloths_, tracking_;   // only scenes that have any
 };
 
 class ObjRecorder final : public Recorder

@@ -159,6 +159,7 @@ SceneInputs Simulation::inputsAt(double time) const
     inputs.obstacles.push_back(given(config_.obstacles[k].motion, state_.obstacles[k]));
   }
   addThreadInputs(inputs, time);
+  addGuideInputs(inputs, time);
   inputs.grasps.reserve(grasps_.size());
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
@@ -214,6 +215,7 @@ void Simulation::checkInputs(const SceneInputs& inputs) const
   check("bodies", inputs.bodies.size(), config_.bodies.size(), "body");
   check("threads", inputs.threads.size(), config_.threads.size(), "thread");
   check("obstacles", inputs.obstacles.size(), config_.obstacles.size(), "obstacle");
+  checkGuides(inputs);
 }
 
 void Simulation::fillRodInputs(const SceneInputs& inputs)
@@ -294,6 +296,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
   state_.time = static_cast<double>(state_.steps) * config_.time.step;   // no sum of round-off
   takeWrenches();
   takeClothWrenches();
+  takeGuides(inputs, total);
   return total;
 }
 

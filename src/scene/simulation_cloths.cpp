@@ -20,6 +20,10 @@ ClothModel modelOf(const ClothConfig& config)
   model.aerodynamics = config.aerodynamics;
   model.plasticity = config.plasticity;
   model.undeformed = config.undeformed;
+  if (config.tracking)
+  {
+    model.averages = {config.tracking->constraints, &config.tracking->constraints->matrix()};
+  }
   return model;
 }
 
@@ -98,6 +102,10 @@ void Simulation::buildCloths()
       }
       SceneCloth held;
       held.cloth = makeClothState(*cloth_models_.back(), config.start.cols() ? config.start : config.mesh.vertices);
+      if (config.start_velocity.cols())
+      {
+        held.cloth.v = config.start_velocity;
+      }
       for (std::size_t g = 0; g < config.grasps.size(); ++g)
       {
         checkVertices(config.grasps[g].vertices, config, held, g);
@@ -106,6 +114,10 @@ void Simulation::buildCloths()
       }
       gatherPins(held);
       state_.cloths.push_back(std::move(held));
+      if (config.tracking)
+      {
+        startTracking(static_cast<int>(k));
+      }
     }
     catch (const std::invalid_argument& error)
     {
@@ -230,6 +242,10 @@ StepReport Simulation::stepCloths(const SceneInputs& inputs)
   {
     cloth_inputs_[k].gravity = config_.gravity;
     cloth_inputs_[k].wind = inputs.wind;
+    if (const auto& tracking = config_.cloths[k].tracking)
+    {
+      cloth_inputs_[k].averages = tracking->constraints->averages(inputs.guides[k]);
+    }
     cloth_inputs_[k].pins.resize(3, static_cast<Eigen::Index>(state_.cloths[k].cloth.pins.size()));
   }
   for (std::size_t g = 0; g < grasps_.size(); ++g)
@@ -372,11 +388,15 @@ const Eigen::Matrix3Xd& Simulation::pinForces(int cloth) const
   return stepper ? stepper->pinForces() : touching_cloths_->pinForces(touching_cloth_index_[cloth]);
 }
 
-ClothEnergies Simulation::clothEnergies(int cloth) const
+const ClothStepper& Simulation::clothStepper(int cloth) const
 {
   const auto& own = cloth_steppers_.at(static_cast<std::size_t>(cloth));
-  const ClothStepper& stepper = own ? *own : touching_cloths_->stepper(touching_cloth_index_[cloth]);
-  return stepper.energies(state_.cloths[static_cast<std::size_t>(cloth)].cloth, config_.gravity);
+  return own ? *own : touching_cloths_->stepper(touching_cloth_index_[cloth]);
+}
+
+ClothEnergies Simulation::clothEnergies(int cloth) const
+{
+  return clothStepper(cloth).energies(state_.cloths[static_cast<std::size_t>(cloth)].cloth, config_.gravity);
 }
 
 }  // namespace slender

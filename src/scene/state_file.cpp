@@ -18,7 +18,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 7;
+constexpr std::uint64_t version = 8;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -131,6 +131,8 @@ void visitCloth(Archive& archive, State& held)
     archive(grasp.points_G);
     visitPose(archive, grasp.X_WG);
   }
+  archive(held.guide);
+  archive(held.guide_forces);
 }
 
 template <class Archive, class State>
@@ -298,7 +300,8 @@ bool fits(const SceneCloth& held, const SceneCloth& now)
 {
   bool good = held.cloth.x.cols() == now.cloth.x.cols() && held.cloth.v.cols() == now.cloth.v.cols() &&
               held.cloth.rest_angles.size() == now.cloth.rest_angles.size() &&
-              held.cloth.stiffening.size() == now.cloth.stiffening.size() && held.grasps.size() == now.grasps.size();
+              held.cloth.stiffening.size() == now.cloth.stiffening.size() && held.grasps.size() == now.grasps.size() &&
+              held.guide.cols() == now.guide.cols() && held.guide_forces.cols() == now.guide_forces.cols();
   const auto there = [&held](int vertex) { return vertex >= 0 && vertex < held.cloth.x.cols(); };
   good = good && std::all_of(held.cloth.pins.begin(), held.cloth.pins.end(), there);
   std::size_t pins = 0;

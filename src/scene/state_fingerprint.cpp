@@ -103,6 +103,23 @@ std::uint64_t Simulation::fingerprint() const
     out(static_cast<int>(model.bending));
     out(static_cast<int>(config_.cloths[k].solver));
     out(config_.cloths[k].one_newton_step);
+    if (const auto& tracking = config_.cloths[k].tracking)
+    {
+      out(tracking->guide.mesh.vertices);
+      for (const WeakConstraints::Matrix* weights : {&tracking->constraints->matrix(), &tracking->constraints->guideMatrix()})
+      {
+        out(static_cast<std::uint64_t>(weights->rows()));
+        for (Eigen::Index i = 0; i < weights->rows(); ++i)
+        {
+          for (WeakConstraints::Matrix::InnerIterator entry(*weights, i); entry; ++entry)
+          {
+            out(static_cast<int>(i));
+            out(static_cast<int>(entry.col()));
+            out(entry.value());
+          }
+        }
+      }
+    }
     const ClothContactConfig touch = config_.cloths[k].contact.value_or(ClothContactConfig{});
     out(config_.cloths[k].contact.has_value());
     out(touch.self);

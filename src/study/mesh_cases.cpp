@@ -1,6 +1,5 @@
 #include "mesh_cases.h"
 
-#include <map>
 #include <set>
 
 #include <Eigen/Geometry>
@@ -39,35 +38,6 @@ TriangleMesh cutAway(const TriangleMesh& mesh, const std::function<bool(const Ve
   for (std::size_t f = 0; f < faces.size(); ++f)
     kept.triangles.col(static_cast<Eigen::Index>(f)) = faces[f];
   return kept;
-}
-
-TriangleMesh subdivided(TriangleMesh mesh, int levels)
-{
-  for (; levels > 0; --levels)
-  {
-    std::vector<Vector3d> vertices;
-    for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v)
-      vertices.push_back(mesh.vertices.col(v));
-    std::map<std::pair<int, int>, int> middles;
-    const auto middle = [&](int a, int b) {
-      const auto [at, fresh] = middles.try_emplace({std::min(a, b), std::max(a, b)}, static_cast<int>(vertices.size()));
-      if (fresh)
-        vertices.push_back(0.5 * (vertices[a] + vertices[b]));
-      return at->second;
-    };
-    Eigen::Matrix3Xi faces(3, 4 * mesh.triangles.cols());
-    for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
-    {
-      const Eigen::Vector3i t = mesh.triangles.col(f);
-      const int a = middle(t[0], t[1]), b = middle(t[1], t[2]), c = middle(t[2], t[0]);
-      faces.middleCols<4>(4 * f) << t[0], t[1], t[2], a, a, b, c, b, c, a, b, c;
-    }
-    mesh.triangles = faces;
-    mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
-    for (std::size_t v = 0; v < vertices.size(); ++v)
-      mesh.vertices.col(static_cast<Eigen::Index>(v)) = vertices[v];
-  }
-  return mesh;
 }
 
 TriangleMesh closedGrid(int along, int around, const std::function<Vector3d(double, double)>& at)

@@ -11,9 +11,6 @@ namespace slender::study {
 /// The faces whose middle is to be kept, and their vertices.
 TriangleMesh cutAway(const TriangleMesh& mesh, const std::function<bool(const Eigen::Vector3d&)>& keep);
 
-/// Each face divided into four plane ones, `levels` times.
-TriangleMesh subdivided(TriangleMesh mesh, int levels);
-
 /// Closed grid of `along` x `around` vertices on at(s, t), s and t from 0 to 2 pi; two triangles per cell, outside where d/ds x d/dt points.
 TriangleMesh closedGrid(int along, int around, const std::function<Eigen::Vector3d(double, double)>& at);
 

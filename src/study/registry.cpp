@@ -58,6 +58,8 @@ void runFlag(StudyContext&);
 void runDrape(StudyContext&);
 void runFabricDrape(StudyContext&);
 void runStiffnessRange(StudyContext&);
+void runTrackingOverhead(StudyContext&);
+void runTrackingExactness(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -117,6 +119,8 @@ const std::vector<Study>& studies()
       {"fabric_drape", "drape coefficient (Cusick) and droop of strips of silk, cotton, wool and denim against published values", runFabricDrape},
       {"drape", "a sheet draped over a sphere, as thesis figure 2.2: isometric bending beside hinges, shapes and wrinkles", runDrape},
       {"stiffness_range", "draped sheets of bending over membrane stiffness 1e-5, 1e-3, 1e-2, as thesis figure 2.3: isometric bending beside hinges", runStiffnessRange},
+      {"tracking_overhead", "steps of cloth with and without tracking, in the sizes of the thesis's table 6.1, beside it", runTrackingOverhead},
+      {"tracking_exactness", "averages of tracked cloths against their guides' after every step, with wind, jumps, contact", runTrackingExactness},
   };
   return all;
 }

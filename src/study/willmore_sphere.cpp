@@ -7,6 +7,7 @@
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/fairing/willmore_flow.h"
 #include "slender_sim/geometry/mesh_shapes.h"
+#include "slender_sim/geometry/mesh_subdivision.h"
 #include "slender_sim/study/cpu_clock.h"
 
 namespace slender::study {
@@ -21,7 +22,7 @@ struct Start
   TriangleMesh mesh;
 };
 
-Start icosahedron(int levels) { return {"icosahedron, subdivided " + std::to_string(levels) + " times", subdivided(icosphere(1.0, 0), levels)}; }
+Start icosahedron(int levels) { return {"icosahedron, subdivided " + std::to_string(levels) + " times", subdivide(icosphere(1.0, 0), levels).mesh}; }
 
 Start roughSphere(int levels, double roughness)
 {

@@ -194,6 +194,11 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   {
     std::printf("mended folds      %d\n", total.mended_folds);
   }
+  const auto& cloths = simulation.config().cloths;
+  if (std::any_of(cloths.begin(), cloths.end(), [](const slender::ClothConfig& cloth) { return cloth.tracking != nullptr; }))
+  {
+    std::printf("tracking          averages at most %.2g of the guide's size away\n", total.tracking_error);
+  }
   if (total.projection_iterations > 0)
   {
     std::printf("projection        at most %d iterations a step, edge lengths squared to %.2g\n", total.projection_iterations, total.constraint_error);

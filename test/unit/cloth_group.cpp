@@ -298,8 +298,8 @@ TEST(ClothGroup, AnExplicitClothLeavesLoadsOfOthersShared)
   const double h = 1e-5;
   ASSERT_TRUE(stepper.step(state, inputs, h).ok);
   const Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Constant(3, state.x.cols(), 2.0);
-  Eigen::Matrix3Xd moved(3, state.x.cols()), pins;
-  ASSERT_TRUE(stepper.respond(force, h, moved, pins));
+  Eigen::Matrix3Xd moved(3, state.x.cols()), pins, averages;
+  ASSERT_TRUE(stepper.respond(force, h, moved, pins, averages));
   EXPECT_NEAR(moved(1, 5), 2.0 * h * h / c.model.cloths[0]->mass[5], 1e-15);
   EXPECT_EQ(moved.col(3), Vector3d(0, 0, 0));
 }

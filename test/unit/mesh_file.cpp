@@ -54,6 +54,17 @@ TEST_F(MeshFile, readsPolygonsAndKeepsTheOrderOfVertices)
   EXPECT_NEAR(volume, 1, 1e-14);
 }
 
+TEST_F(MeshFile, readsGroupsByTheirFaces)
+{
+  std::ofstream(path_) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\ng foot left\nf 2 1 4\ng left\nf 1 3 4\ng default\nf 2 4 3\n";
+  const std::vector<VertexGroup> groups = readObjGroups(path_);
+  ASSERT_EQ(groups.size(), 2u);
+  EXPECT_EQ(groups[0].name, "foot");
+  EXPECT_EQ(groups[0].vertices, (std::vector<int>{0, 1, 3}));
+  EXPECT_EQ(groups[1].name, "left");
+  EXPECT_EQ(groups[1].vertices, (std::vector<int>{0, 1, 2, 3}));
+}
+
 TEST_F(MeshFile, namesFileLineAndReason)
 {
   EXPECT_NE(problemOf("").find(": has no faces"), std::string::npos);

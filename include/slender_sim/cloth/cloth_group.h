@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/contact/surface_collider.h"
@@ -64,6 +66,9 @@ public:
   /// the solver's, so that single steps scatter where cloth rubs or falls onto something.
   const Eigen::Matrix3Xd& pinForces(int cloth) const { return pin_forces_.at(cloth); }
 
+  /// Force [N] with which each prescribed average of a cloth acts on it, mean over the last successful step, as pinForces().
+  const Eigen::Matrix3Xd& averageForces(int cloth) const { return average_forces_.at(cloth); }
+
   /// Sums and maxima over the last step.
   const CollisionReport& collisions() const { return collisions_; }
   std::size_t size() const { return model_.cloths.size(); }   ///< cloths
@@ -77,6 +82,8 @@ private:
   bool shareLoads(const CollisionStep& step, bool again);
   void blameExplicit(double duration, StepReport& report) const;
   void addPinForces(double share, double h);
+  CollisionReport resolve(const CollisionStep& step);
+  bool meetAverages(double h);
   Eigen::Matrix3Xd positions(const ClothGroupState& state) const;
   int clothOf(int point) const;
   std::string placeOf(int point) const;
@@ -96,7 +103,22 @@ private:
 
   ClothGroupState work_, next_;
   ClothGroupInputs sub_;
-  std::vector<Eigen::Matrix3Xd> pins_start_, pin_forces_, pin_sums_, shared_pins_, pin_answers_;
+  std::vector<Eigen::Matrix3Xd> pins_start_, pin_forces_, pin_sums_, shared_pins_, pin_answers_, averages_start_;
+  std::vector<Eigen::Matrix3Xd> average_forces_, average_sums_, shared_averages_, average_answers_;
+
+  /// How a cloth with prescribed averages moves so that it has them again.
+  struct AverageCorrection
+  {
+    double tolerance = 0.0;                                   ///< [m]
+    std::vector<int> pins;                                    ///< that `gram` is for
+    Eigen::SparseMatrix<double, Eigen::RowMajor> weights;     ///< averages over masses
+    Eigen::LDLT<Eigen::MatrixXd> gram;
+    Eigen::Matrix3Xd gap, multipliers;
+    Eigen::MatrixXd columns;                                  ///< count x 3
+    bool ready = false;
+  };
+  std::vector<AverageCorrection> corrections_;
+  Eigen::Matrix3Xd held_impulses_;
   Eigen::Matrix3Xd x_start_, x_, v_;
   Eigen::Matrix3Xd corrected_, push_, answer_, own_push_, own_answer_;
   Eigen::VectorXd inverse_mass_;

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <string>
 
 #include <Eigen/Core>
+#include <Eigen/SparseCore>
 
 #include "slender_sim/cloth/cloth_state.h"
 #include "slender_sim/energy/membrane.h"
@@ -57,6 +59,10 @@ struct ClothModel
   double wind_coefficient = 0.0;     ///< [N s/m^3]: pressure per normal velocity of the air against the cloth
   Aerodynamics aerodynamics;         ///< in addition
 
+  /// Weighted averages of vertices that are prescribed (averages x vertices, rows sum to 1; see WeakConstraints); null: none. Implicit steps only.
+  std::shared_ptr<const Eigen::SparseMatrix<double, Eigen::RowMajor>> averages;
+
+  int averageCount() const { return averages ? static_cast<int>(averages->rows()) : 0; }
   int vertices() const { return static_cast<int>(rest.vertices.cols()); }
   double totalMass() const { return mass.sum(); }
 };

@@ -12,6 +12,7 @@ namespace slender {
 struct ClothInputs
 {
   Eigen::Matrix3Xd pins;                  ///< where each pin shall be at the end of the step, 3 x pins; the motion inside it is uniform
+  Eigen::Matrix3Xd averages;              ///< what the model's averages shall be at the end of the step, 3 x count; in between their motion is uniform
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
   Eigen::Matrix3Xd forces;                ///< extra forces on the vertices, 3 x n [N], or empty
@@ -44,6 +45,7 @@ struct ClothOptions
   bool one_newton_step = false;          ///< implicit stages: linearised about their start [Baraff & Witkin 1998]
   ClothSolver solver = ClothSolver::automatic;
   /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged velocity.
+  /// With averages and one_newton_step it is that of the same cloth without them, and of what it takes to move them.
   double linear_tolerance = 5e-3;
   double error_tolerance = 0.0;          ///< [m] local error per substep, implicit_euler and tr_bdf2 only; 0: fixed steps
   double min_step = 1e-7;                ///< [s] adaptive steps never get shorter
@@ -65,15 +67,20 @@ public:
   StepReport stepFirstOrder(ClothState& state, const ClothInputs& inputs, double duration);
 
   /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step, and by how much the pins' forces
-  /// [N] change: linear, with the stiffness of its last Newton iteration and the inertia of a step of implicit Euler of `duration` [s], whatever the
-  /// stages and substeps were, so that responses of several cloths go together; after explicit steps that of the masses alone. Returns false if the matrix
-  /// cannot be used.
-  bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change);
-  /// Of explicit integrators: the longest step for which the cloth at rest is stable [s], by the largest eigenvalue of M^-1 K (power iteration); damping by stiffness
-  /// makes it shorter. Infinite for implicit ones. Not cheap: for messages.
+  /// and those of the averages, which stay, change [N]: linear, with the stiffness of its last Newton iteration and the inertia of a step of implicit
+  /// Euler of `duration` [s], whatever the stages and substeps were, so that responses of several cloths go together; after explicit steps that of the
+  /// masses alone. Returns false if the matrix cannot be used.
+  bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
+               Eigen::Matrix3Xd& average_forces_change);
+  /// Of explicit integrators: the longest step for which the cloth at rest is stable [s], by the largest eigenvalue of M^-1 K (power iteration);
+  /// damping by stiffness makes it shorter. Infinite for implicit ones. Not cheap: for messages.
   double stableStep() const;
   /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step.
   const Eigen::Matrix3Xd& pinForces() const;
+
+  /// Force [N] with which each prescribed average acts on the cloth (3 x count), spread over its vertices by their weights: the Lagrange multipliers at the end
+  /// of the last successful step.
+  const Eigen::Matrix3Xd& averageForces() const;
 
   ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;
   /// What `automatic` took.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "slender_sim/geometry/triangle_mesh.h"
 
@@ -11,6 +12,16 @@ namespace slender {
 /// std::runtime_error "FILE:LINE: reason": not readable, not a number or not finite, a face with fewer than three vertices, with
 /// one twice, or with one that the file does not have (later vertices may be named only by absolute indices), no faces at all.
 TriangleMesh readObj(const std::string& path);
+
+struct VertexGroup
+{
+  std::string name;
+  std::vector<int> vertices;   ///< from 0, ascending
+};
+
+/// The vertices of the faces of each group (`g NAME ...`) of an OBJ file, in the order in which the names first occur; faces before the first
+/// one, and those of "default", are in none. Throws as readObj.
+std::vector<VertexGroup> readObjGroups(const std::string& path);
 
 /// Reads x, y, z of the element "vertex" and the list vertex_indices (or vertex_index) of the element "face" of a Stanford PLY file [m]:
 /// ascii, binary_little_endian or binary_big_endian; order of vertices and polygons as in readObj, other elements and properties are
@@ -25,6 +36,10 @@ TriangleMesh readMesh(const std::string& path);
 /// std::runtime_error "FILE: cannot be written".
 void writeObj(const std::string& path, const TriangleMesh& mesh);
 void writePly(const std::string& path, const TriangleMesh& mesh);
+
+/// With a colour per vertex (3 x n: red, green, blue in [0, 1]): PLY with uchar red, green, blue, OBJ with three more numbers per vertex.
+/// By the end of the name; throws likewise.
+void writeColoredMesh(const std::string& path, const TriangleMesh& mesh, const Eigen::Matrix3Xd& colors);
 
 /// Throws what writeMesh would for the end of the name.
 void requireMeshName(const std::string& path);

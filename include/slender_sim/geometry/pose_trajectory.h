@@ -28,6 +28,8 @@ public:
 
   /// Appends a later sample; throws std::invalid_argument when time is not after the last one.
   void append(double time, const Pose& pose);
+  /// After the last sample the motion goes on with the mean velocity since the one before, which dies out linearly within `duration` [s] (>= 0; 0: held).
+  void coast(double duration) { coast_ = duration; }
   /// Forgets samples that no query at or after `time` needs.
   void forgetBefore(double time);
 
@@ -48,6 +50,7 @@ private:
 
   std::vector<double> times_;
   std::vector<Pose> poses_;
+  double coast_ = 0.0;
 };
 
 }  // namespace slender

@@ -18,8 +18,9 @@ struct PointKernels
   double (*multiply)(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y);
   /// y += A x for a symmetric matrix of 3 x 3 blocks: lower triangle by columns, the diagonal block first, blocks by columns.
   void (*multiplyBlocks)(int columns, const int* starts, const int* rows, const double* values, const double* x, double* y);
-  /// x := (L L^T)^-1 x for each coordinate.
-  void (*solveSupernodal)(const SupernodalFactor& factor, double* x);
+  /// x := L^-1 x, and x := L^-T x, for each coordinate.
+  void (*forwardSupernodal)(const SupernodalFactor& factor, double* x);
+  void (*backwardSupernodal)(const SupernodalFactor& factor, double* x);
   /// Sum of x . y over points; the unused parts do not count.
   double (*dot)(int points, const double* x, const double* y);
 };

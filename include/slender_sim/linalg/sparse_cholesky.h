@@ -33,6 +33,9 @@ public:
   bool factor(const PointMatrix& matrix, const double* values, const char* fixed);
   /// x = A^-1 b for points (4 doubles each; x may be b). Fixed points: x = b.
   void solvePoints(const double* b, double* x) const;
+  /// The two halves of solvePoints of a PointMatrix: y = L^-1 b, with y in the order of elimination and not b, and x = L^-T y, which overwrites y.
+  void forwardPoints(const double* b, double* y) const;
+  void backwardPoints(double* y, double* x) const;
 
   int size() const;
   /// One per entry of the pattern.

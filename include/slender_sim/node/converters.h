@@ -48,10 +48,15 @@ void toMessage(const RodModel& model, const RodState& state, slender_sim::RodSta
 
 void toMessage(const ThreadState& state, slender_sim::ThreadState& out);
 
-/// Appends a cloth. Fills everything but the header, epoch and step.
+/// Appends a cloth. Fills everything but the header, epoch and step, and what it tracks.
 void append(const std::string& name, const ClothState& state, slender_sim::ClothState& out);
+/// Appends what the cloth that was appended last tracks; of one that tracks nothing, too.
+void appendTracking(double error, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces, slender_sim::ClothState& out);
 /// Appends a cloth's undeformed mesh.
 void append(const ClothModel& model, slender_sim::MeshStamped& out);
+
+/// Reads x, y, z (float32 or float64) of all points, in order; returns why not, empty when done. `out` may hold NaN as the message does.
+std::string fromPoints(const sensor_msgs::PointCloud2& message, Eigen::Matrix3Xd& out);
 
 /// Vertices of all cloths as x, y, z in float32. Fills everything but the header.
 void toPoints(const slender_sim::ClothState& state, sensor_msgs::PointCloud2& out);

@@ -25,6 +25,7 @@ public:
     double catch_up_time = 0.1;     ///< [s] > 0, shortest blending time
     double catch_up_speed = 1.0;    ///< [m/s] > 0, mean speed of catching up
     double catch_up_turning = 3.0;  ///< [rad/s] > 0, mean speed of catching up in orientation
+    double coast = 0.0;             ///< [s] >= 0 in which the speed dies out when no sample comes; 0: the last sample is held
   };
 
   /// `X_WG`: where the grasp is now. attach section: samples are poses of the held section; initial: the offset between the

@@ -21,13 +21,14 @@
 #include "slender_sim/node/guide_buffer.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/sim_clock.h"
+#include "slender_sim/node/tracking_inputs.h"
 #include "slender_sim/scene/simulation.h"
 
 namespace slender {
 
 /// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`, `bodies`, `nozzle/pose`,
 /// through tf2 into the node's frame; and `nozzle/flow`, `belt/velocity` and `wind`, which hold from the next step on. Subscribes only to what the
-/// scene asks for. Bad messages are dropped and counted; what they would have moved keeps its previous input.
+/// scene asks for. Guides of tracked cloths: TrackingInputs. Bad messages are dropped and counted; what they would have moved keeps its previous input.
 /// A stamp of zero means now, as everywhere in tf.
 class GuideInputs
 {
@@ -50,7 +51,7 @@ public:
   void restart(const Simulation& simulation);
 
   const DropCounter& drops() const { return drops_; }
-  bool waiting() const { return !pending_.empty(); }
+  bool waiting() const { return !pending_.empty() || tracking_->waiting(); }
 
   /// Per grasp, body and obstacle driven from outside.
   struct Age { std::string name; std::optional<double> seconds; };
@@ -109,6 +110,7 @@ private:
   DropCounter drops_;
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<TrackingInputs> tracking_;
   std::vector<ros::Subscriber> subscribers_;
 };
 

@@ -9,6 +9,8 @@
 
 namespace slender {
 
+constexpr double kMaxAhead = 3600.0;   ///< [s] whole trajectories may be sent in advance, another clock's stamps may not
+
 /// A private parameter that cannot be used; what() names it, its value and what is allowed.
 class OptionError : public std::runtime_error
 {
@@ -24,7 +26,7 @@ enum class Pace
   step,     ///< only when the step service is called
 };
 
-enum class MarkerStyle { tube, line };
+enum class MarkerStyle { tube, line, regions };
 
 /// Private parameters of rod_node, with their defaults.
 struct NodeOptions
@@ -46,7 +48,7 @@ struct NodeOptions
   double tf_timeout = 0.5;                      ///< ~tf_timeout [s] wall time that a message waits for its transform
   double diagnostics_rate = 1.0;                ///< ~diagnostics_rate [Hz]
   double marker_rate = 30.0;                    ///< ~marker_rate [Hz] at most, up to 30
-  MarkerStyle marker_style = MarkerStyle::tube; ///< ~marker_style: tube | line
+  MarkerStyle marker_style = MarkerStyle::tube; ///< ~marker_style: tube | line | regions (of tracked cloths)
   bool marker_frames = false;                   ///< ~marker_frames: show material frames
 
   /// Reads and checks them all; throws OptionError on the first that does not fit, unknown names included.

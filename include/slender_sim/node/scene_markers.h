@@ -14,6 +14,7 @@ namespace slender {
 /// (of a plane a piece); `threads/NAME` i piece i of a thread with its true radius, `nozzles` i, `floors` i; `cloths/NAME` 0 the
 /// triangles of a cloth, `grasps` i what grasp i holds of it.
 ///
+/// `guides/NAME` 0 the edges of the guide of a tracked cloth. Style regions colours tracked cloths by their test functions.
 /// Cloth is shaded by its vertices' normals, alike on both sides; with style line its edges are drawn. tube: true to scale, drawn through a smooth curve, with a stripe along d1 that shows the twist; line: one line strip.
 /// Very fine rods are thinned out to a few hundred sections: a picture has no more pixels.
 visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,

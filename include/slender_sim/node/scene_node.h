@@ -25,10 +25,11 @@
 namespace slender {
 
 /// What a node simulates, and its name in what it prints.
-enum class NodeKind { rods, threads, cloths };
+enum class NodeKind { rods, threads, cloths, tracking };
 const char* toString(NodeKind kind);
+inline bool hasCloths(NodeKind kind) { return kind == NodeKind::cloths || kind == NodeKind::tracking; }
 
-/// Simulates a scene of rods and bodies, of viscous threads, or of cloth: poses of what moves them come in as messages, their motion goes out.
+/// Simulates a scene of rods and bodies, of viscous threads, of cloth, or of cloth that tracks guides: poses of what moves them come in as messages, their motion goes out.
 /// README lists topics, services and parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
 class SceneNode
 {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -16,6 +17,7 @@
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
 #include "slender_sim/rod/rod_model.h"
+#include "slender_sim/scene/tracking_config.h"
 
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
 namespace slender {
@@ -274,6 +276,7 @@ struct ClothConfig
   std::string place;                           ///< "FILE:LINE: PATH" for messages; empty when not read from a file
   TriangleMesh mesh;                           ///< undeformed [m]
   Eigen::Matrix3Xd start;                      ///< vertices where the scene starts [m]; empty: those of the mesh
+  Eigen::Matrix3Xd start_velocity;             ///< of the vertices [m/s]; empty: at rest
   Eigen::Matrix3Xd undeformed;                 ///< vertices of the shape whose bend angles are those at rest (hinge bending); empty: those of the mesh
   std::optional<ClothGrid> grid;               ///< that the mesh was made from
   double area_density = 0.15;                  ///< [kg/m^2]
@@ -290,6 +293,7 @@ struct ClothConfig
   bool one_newton_step = false;
   double linear_tolerance = 5e-3;
   std::vector<GraspConfig> grasps;
+  std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`tracked`); null: nothing
   std::optional<ClothContactConfig> contact;   ///< nothing: touches nothing
 };
 
@@ -311,7 +315,7 @@ struct SceneConfig
   ContactConfig contact;
   std::vector<RodConfig> rods;
   std::vector<ThreadConfig> threads;
-  std::vector<ClothConfig> cloths;
+  std::vector<ClothConfig> cloths;             ///< and then those that are tracked
   std::vector<ObstacleConfig> obstacles;
   std::vector<BodyConfig> bodies;              ///< names differ from each other and from the obstacles'
 };

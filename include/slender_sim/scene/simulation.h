@@ -28,6 +28,8 @@ struct SceneCloth
 {
   ClothState cloth;
   std::vector<ClothGrasp> grasps;   ///< those of the scene; cloth.pins are what the active ones hold
+  Eigen::Matrix3Xd guide;           ///< of a tracked cloth: vertices of its guide now [m]
+  Eigen::Matrix3Xd guide_forces;    ///< with which it acted in the last step, per test function [N] (ClothStepper::averageForces)
 };
 
 /// State of all objects of a scene at one instant.
@@ -70,6 +72,7 @@ struct SceneInputs
   std::vector<GraspTarget> grasps;
   std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
   std::vector<ThreadDrive> threads;             ///< per thread of the scene
+  std::vector<Eigen::Matrix3Xd> guides;         ///< per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]); of others empty
   Eigen::Vector3d wind{0, 0, 0};
 };
 
@@ -132,6 +135,8 @@ public:
   const ThreadModel& threadModel(int thread) const { return *thread_models_[thread]; }
   const ClothModel& clothModel(int cloth) const { return *cloth_models_[cloth]; }
   ClothEnergies clothEnergies(int cloth) const;
+  /// Greatest distance of an average of a tracked cloth from that of its guide [m]; 0 for others.
+  double trackingError(int cloth) const;
 
   /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could
   /// not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a shortened one is refused
@@ -162,11 +167,18 @@ private:
   void exchangeTouchingCloths(SceneState& state);
   void checkTouchingCloths(SceneState& state);
   const Eigen::Matrix3Xd& pinForces(int cloth) const;
+  const ClothStepper& clothStepper(int cloth) const;
   StepReport stepCloths(const SceneInputs& inputs);
   /// What drives a grasp: its target, or the body or obstacle that it follows.
   GraspTarget drivenTarget(int grasp, const SceneInputs& inputs) const;
   void takeClothWrenches();
   void gatherPins(SceneCloth& cloth) const;
+
+  // simulation_guides.cpp: what tracked cloths follow
+  void startTracking(int cloth);
+  void addGuideInputs(SceneInputs& inputs, double time) const;
+  void checkGuides(const SceneInputs& inputs) const;
+  void takeGuides(const SceneInputs& inputs, StepReport& report);
 
   // simulation_group.cpp: rods that bodies join or that touch something
   void buildBodies();

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace slender {
+
+/// A motion of several points through timed frames, once continuously differentiable: each point as the positions of PoseTrajectory (cubic Hermite
+/// with three-point slopes; held with zero velocity before the first and after the last frame, unless it coasts).
+class PointTrajectory
+{
+public:
+  PointTrajectory() = default;
+  /// times [s] strictly increasing, as many as frames (3 x n [m], all the same n), at least one; throws std::invalid_argument naming the frame otherwise.
+  PointTrajectory(const std::vector<double>& times, const std::vector<Eigen::Matrix3Xd>& frames);
+
+  /// Appends a later frame; throws std::invalid_argument when time is not after the last one, sizes differ or a number is not finite.
+  void append(double time, const Eigen::Matrix3Xd& points);
+  /// After the last frame the points go on with the mean velocity since the one before, which dies out linearly within `duration` [s] (>= 0; 0: held).
+  void coast(double duration) { coast_ = duration; }
+  /// Forgets frames that no query at or after `time` needs.
+  void forgetBefore(double time);
+
+  bool empty() const { return times_.empty(); }
+  const std::vector<double>& times() const { return times_; }
+  const std::vector<Eigen::Matrix3Xd>& frames() const { return frames_; }
+
+  /// Points (3 x n [m]) and velocities [m/s] at `time`; not empty.
+  void evaluate(double time, Eigen::Matrix3Xd& points, Eigen::Matrix3Xd* velocities = nullptr) const;
+
+private:
+  Eigen::Vector3d slope(std::size_t frame, Eigen::Index point) const;
+
+  std::vector<double> times_;
+  std::vector<Eigen::Matrix3Xd> frames_;
+  double coast_ = 0.0;
+};
+
+}  // namespace slender

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/SparseCore>
+
+#include "slender_sim/linalg/point_matrix.h"
+#include "slender_sim/linalg/sparse_cholesky.h"
+
+namespace slender {
+
+/// Solves [P C^T; C 0] [z; mu] = [r; g] for the three coordinates of points alike, given P = L L^T: with V = L^-1 C^T and S = V^T V, one solve costs one forward and one
+/// backward substitution, two products with V (sparse: constraints are local) and one with S^-1.
+class ConstrainedCholesky
+{
+public:
+  using Constraints = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+  /// Constraints x points. Takes the memory of solve().
+  void setConstraints(const Constraints& c);
+  /// After P was factored with these fixed points (null: none), whose columns of C count as zero. False: constraints depend on each other.
+  bool factor(const SparseCholesky& p, const char* fixed);
+
+  int count() const { return static_cast<int>(c_.rows()); }
+  /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero. r may be z. mu: 4 doubles per constraint. Fixed points: r must be
+  /// zero there, and z is.
+  /// With g, returns sqrt(r . P^-1 r + g . S^-1 g): the norm of r without constraints, and that of the smallest z that has C z = g.
+  double solve(const double* r, const double* g, double* z, double* mu) const;
+  /// mu alone, g zero: half the work.
+  void multipliers(const double* r, double* mu) const;
+  /// r -= C^T mu, but for fixed points.
+  void takeOut(const double* mu, double* r) const;
+
+private:
+  struct Rows   ///< of a matrix for PointKernels::multiply
+  {
+    std::vector<int> starts{0};
+    AlignedVector<unsigned> offsets;
+    AlignedVector<double> values;
+    void multiply(double factor, const double* x, double* y) const;
+  };
+
+  Constraints c_;
+  const SparseCholesky* p_ = nullptr;
+  Rows v_, v_transposed_, s_inverse_, c_transposed_;
+  mutable PointVector y_, t_, mu_;   ///< of points each: the kernels read as many points of x as there are rows
+};
+
+}  // namespace slender

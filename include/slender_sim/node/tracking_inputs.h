@@ -1,0 +1,87 @@
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <ros/node_handle.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <tf2_ros/buffer.h>
+
+#include "slender_sim/BodyStates.h"
+#include "slender_sim/node/drop_counter.h"
+#include "slender_sim/node/guide_buffer.h"
+#include "slender_sim/node/node_options.h"
+#include "slender_sim/node/point_guide_buffer.h"
+#include "slender_sim/node/sim_clock.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+/// Guides of tracked cloths by message: `guide/points` (the guide's vertices in the order of its mesh) and `guide/bodies` (of the bodies that carry them),
+/// through tf2 into the node's frame; in scenes of several tracked cloths `tracked/NAME/guide/points`. A message is taken or dropped as a whole.
+class TrackingInputs
+{
+public:
+  /// Subscribes to what the scene asks for. The three must outlive it.
+  TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers, const Simulation& simulation,
+                 const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops);
+
+  bool any() const { return !guides_.empty(); }
+  void processPending();
+  bool waiting() const { return !pending_.empty(); }
+  /// Replaces the guides that are driven from outside by where they shall be at `time` [s since the clock's start].
+  void apply(double time, SceneInputs& inputs);
+  /// Everything was moved: a state was loaded.
+  void attachAll(const Simulation& simulation);
+  /// The scene was reset: forgets all input.
+  void restart(const Simulation& simulation);
+
+  struct Age { std::string name; std::optional<double> seconds; };
+  std::vector<Age> ages() const;
+
+private:
+  struct Guide
+  {
+    int cloth = 0;
+    std::string topic;
+    std::unique_ptr<PointGuideBuffer> points;               // by points
+    const CarriedGuide* carried = nullptr;                   // by bodies, one buffer each:
+    std::vector<GuideBuffer> bodies;
+    std::vector<Pose> poses;
+    bool catches_up = true;                                  // from `held` at the next apply()
+    Eigen::Matrix3Xd held, gap;                              // by bodies: where it was, and what of the way is left
+    double gap_start = 0.0, gap_duration = 0.0;
+    std::optional<double> lastTime() const;
+  };
+  struct Message
+  {
+    int guide;
+    std::string frame;
+    ros::Time stamp;
+    Eigen::Matrix3Xd points;                                 // in the message's frame
+    std::vector<std::pair<int, Pose>> bodies;
+    std::chrono::steady_clock::time_point deadline;
+  };
+
+  void onPoints(int guide, const sensor_msgs::PointCloud2& message);
+  void onBodies(int guide, const slender_sim::BodyStates& message);
+  void take(Message message, const std_msgs::Header& header);
+  bool deliver(const Message& message, std::string* why);
+  void start(Guide& guide, const Eigen::Matrix3Xd& vertices) const;
+  void placeBodies(Guide& guide, double time, Eigen::Matrix3Xd& vertices) const;
+
+  const NodeOptions& options_;
+  const GuideBuffer::Options buffers_;
+  const SimClock& clock_;
+  const tf2_ros::Buffer& tf_;
+  DropCounter& drops_;
+  std::vector<Guide> guides_;
+  std::deque<Message> pending_;
+  std::vector<ros::Subscriber> subscribers_;
+};
+
+}  // namespace slender

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "slender_sim/geometry/point_trajectory.h"
+#include "slender_sim/geometry/pose_trajectory.h"
+#include "slender_sim/geometry/triangle_mesh.h"
+#include "slender_sim/tracking/guide_binding.h"
+#include "slender_sim/tracking/weak_constraints.h"
+
+/// Plain structs: what a tracked cloth follows, as checked by the reader.
+namespace slender {
+
+struct FixedGuide {};
+/// Through timed frames, held before the first and after the last.
+struct FrameGuide { PointTrajectory points; };
+/// Vertices carried by rigid bodies; the binding's own poses are identities.
+struct CarriedGuide
+{
+  std::vector<std::string> bodies;
+  GuideBinding binding;
+  bool keeps_offset = true;             ///< bodies carry the mesh from where it and they are at first; else vertices are in the bodies' frames
+  std::vector<PoseTrajectory> poses;    ///< per body; none: by `guide/bodies`
+};
+/// By `guide/points`.
+struct TopicGuide {};
+using GuideMotion = std::variant<FixedGuide, FrameGuide, CarriedGuide, TopicGuide>;
+
+struct GuideConfig
+{
+  TriangleMesh mesh;                    ///< reference shape [m], over which averages are taken
+  GuideMotion motion;
+  double coast = 0.0;                   ///< [s] within which the speed of a guide by topic dies out when no message comes; 0: it is held
+
+  bool byTopic() const;
+  /// Vertices at `time` [s] (3 x n [m]) and their velocities [m/s]; of a guide by topic those of the mesh, at rest.
+  void evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd* velocities = nullptr) const;
+};
+
+struct TrackingConfig
+{
+  GuideConfig guide;
+  TestFunctions functions;
+  std::shared_ptr<const WeakConstraints> constraints;
+  double size = 1.0;                    ///< diagonal of the box around the guide's mesh [m]: what errors are measured by
+};
+
+}  // namespace slender

@@ -1,0 +1,282 @@
+#include "slender_sim/node/tracking_inputs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "slender_sim/node/converters.h"
+
+namespace slender {
+namespace {
+
+constexpr int kQueueSize = 100;
+constexpr std::size_t kMaxPending = 300;
+
+bool withinReach(const Eigen::Matrix3Xd& points) { return points.cols() == 0 || points.cwiseAbs().maxCoeff() <= max_coordinate; }
+
+}  // namespace
+
+TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers, const Simulation& simulation,
+                               const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops)
+  : options_(options), buffers_(buffers), clock_(clock), tf_(tf), drops_(drops)
+{
+  const std::vector<ClothConfig>& cloths = simulation.config().cloths;
+  const auto tracked = std::count_if(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking != nullptr; });
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+  {
+    if (!cloths[k].tracking || !cloths[k].tracking->guide.byTopic())
+      continue;
+    const GuideConfig& config = cloths[k].tracking->guide;
+    Guide guide;
+    guide.cloth = static_cast<int>(k);
+    guide.carried = std::get_if<CarriedGuide>(&config.motion);
+    guide.topic = (tracked == 1 ? std::string() : "tracked/" + cloths[k].name + "/") + (guide.carried ? "guide/bodies" : "guide/points");
+    GuideBuffer::Options own = buffers_;
+    own.coast = config.coast;
+    if (guide.carried)
+      for (std::size_t b = 0; b < guide.carried->bodies.size(); ++b)
+        guide.bodies.emplace_back(own, guide.carried->keeps_offset ? Attach::initial : Attach::section, Pose());
+    else
+      guide.points = std::make_unique<PointGuideBuffer>(own, simulation.state().cloths[k].guide);
+    guide.held = simulation.state().cloths[k].guide;
+    guides_.push_back(std::move(guide));
+  }
+  for (std::size_t g = 0; g < guides_.size(); ++g)
+  {
+    const int index = static_cast<int>(g);
+    const auto hints = ros::TransportHints().tcpNoDelay();
+    if (guides_[g].carried)
+    {
+      const boost::function<void(const slender_sim::BodyStates&)> callback = [this, index](const slender_sim::BodyStates& m) { onBodies(index, m); };
+      subscribers_.push_back(nh.subscribe<const slender_sim::BodyStates&>(guides_[g].topic, kQueueSize, callback, ros::VoidConstPtr(), hints));
+    }
+    else
+    {
+      const boost::function<void(const sensor_msgs::PointCloud2&)> callback = [this, index](const sensor_msgs::PointCloud2& m) { onPoints(index, m); };
+      subscribers_.push_back(nh.subscribe<const sensor_msgs::PointCloud2&>(guides_[g].topic, kQueueSize, callback, ros::VoidConstPtr(), hints));
+    }
+  }
+}
+
+void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message)
+{
+  const std::string& what = guides_[guide].topic;
+  Message taken;
+  taken.guide = guide;
+  const std::string why = fromPoints(message, taken.points);
+  if (!why.empty())
+    return drops_.drop(Drop::wrong_length, what, why);
+  if (taken.points.cols() != guides_[guide].held.cols())
+    return drops_.drop(Drop::wrong_length, what, std::to_string(taken.points.cols()) + " points, but the guide's mesh has " +
+                                                     std::to_string(guides_[guide].held.cols()) + " vertices");
+  if (!taken.points.allFinite())
+    return drops_.drop(Drop::not_finite, what, "all points must be finite");
+  take(std::move(taken), message.header);
+}
+
+void TrackingInputs::onBodies(int guide, const slender_sim::BodyStates& message)
+{
+  const std::string& what = guides_[guide].topic;
+  if (message.pose.size() != message.name.size() || (!message.twist.empty() && message.twist.size() != message.name.size()))
+    return drops_.drop(Drop::wrong_length, what, "name, pose and twist must be equally long (twist may be empty)");
+  if (std::set<std::string>(message.name.begin(), message.name.end()).size() != message.name.size())
+    return drops_.drop(Drop::wrong_length, what, "a name comes twice; there must be one pose per body");
+  Message taken;
+  taken.guide = guide;
+  const std::vector<std::string>& names = guides_[guide].carried->bodies;
+  for (std::size_t b = 0; b < message.name.size(); ++b)
+  {
+    Pose pose;
+    const PoseFault fault = fromMessage(message.pose[b], pose);
+    if (fault == PoseFault::not_finite)
+      return drops_.drop(Drop::not_finite, what, "position and orientation of " + message.name[b] + " must be finite");
+    if (fault == PoseFault::bad_quaternion)
+      return drops_.drop(Drop::bad_quaternion, what, "its length must be 1 within 1 %");
+    const auto found = std::find(names.begin(), names.end(), message.name[b]);
+    if (found == names.end())
+      drops_.drop(Drop::unknown_name, what, "\"" + message.name[b] + "\" carries no vertices of the guide");
+    else
+      taken.bodies.emplace_back(static_cast<int>(found - names.begin()), pose);
+  }
+  if (!taken.bodies.empty())
+    take(std::move(taken), message.header);
+}
+
+void TrackingInputs::take(Message message, const std_msgs::Header& header)
+{
+  const std::string& what = guides_[message.guide].topic;
+  if (header.frame_id.empty())
+    return drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");
+  message.frame = header.frame_id.front() == '/' ? header.frame_id.substr(1) : header.frame_id;   // tf2 wants no slash
+  message.stamp = header.stamp.isZero() ? clock_.stamp() : header.stamp;
+  const double age = clock_.seconds() - clock_.secondsAt(message.stamp);
+  if (age > options_.guide_timeout || -age > kMaxAhead)
+    return drops_.drop(age > 0.0 ? Drop::stale : Drop::from_future, what,
+                       "its stamp is " + std::to_string(std::abs(age)) + " s " + (age > 0.0 ? "before" : "after") + " the simulated time");
+  const bool queued = std::any_of(pending_.begin(), pending_.end(), [&](const Message& m) { return m.guide == message.guide; });
+  if (!queued && deliver(message, nullptr))
+    return;
+  if (pending_.size() >= kMaxPending)
+    return drops_.drop(Drop::queue_full, what);
+  message.deadline = std::chrono::steady_clock::now() + std::chrono::microseconds(static_cast<std::int64_t>(options_.tf_timeout * 1e6));
+  pending_.push_back(std::move(message));
+}
+
+/// False when the transform is not known yet.
+bool TrackingInputs::deliver(const Message& message, std::string* why)
+{
+  Guide& guide = guides_[message.guide];
+  Pose X_WF;
+  if (message.frame != options_.frame_id)
+  {
+    try
+    {
+      if (!tf_.canTransform(options_.frame_id, message.frame, message.stamp, why))
+        return false;
+      if (fromMessage(tf_.lookupTransform(options_.frame_id, message.frame, message.stamp).transform, X_WF) != PoseFault::none)
+      {
+        drops_.drop(Drop::bad_quaternion, guide.topic, "in the transform from " + message.frame);
+        return true;
+      }
+    }
+    catch (const tf2::TransformException& e)
+    {
+      if (why)
+        *why = e.what();
+      return false;
+    }
+  }
+  const double time = clock_.secondsAt(message.stamp);
+  Eigen::Matrix3Xd points = message.points;
+  if (message.frame != options_.frame_id)   // an identity would round
+    for (Eigen::Index i = 0; i < points.cols(); ++i)
+      points.col(i) = X_WF * Eigen::Vector3d(points.col(i));
+  bool good = withinReach(points);
+  for (const auto& [body, pose] : message.bodies)
+    good = good && (X_WF * pose.position).cwiseAbs().maxCoeff() <= max_coordinate;
+  if (!good)
+  {
+    drops_.drop(Drop::out_of_range, guide.topic, "coordinates must be within " + std::to_string(static_cast<long>(max_coordinate)) + " m");
+    return true;
+  }
+  bool late = false;
+  if (guide.points)
+    late = !guide.points->push(time, points);
+  for (const auto& [body, pose] : message.bodies)
+    late |= !guide.bodies[body].push(time, X_WF * pose);
+  if (late)
+    drops_.drop(Drop::out_of_order, guide.topic, "its stamp is not after that of an earlier message");
+  return true;
+}
+
+void TrackingInputs::processPending()
+{
+  const auto now = std::chrono::steady_clock::now();
+  std::set<int> blocked;   // guides whose earlier message still waits
+  for (std::size_t i = 0; i < pending_.size();)
+  {
+    const Message& message = pending_[i];
+    std::string why;
+    const bool done = !blocked.count(message.guide) && deliver(message, &why);
+    if (!done && (blocked.count(message.guide) || now < message.deadline))
+    {
+      blocked.insert(message.guide);
+      ++i;
+      continue;
+    }
+    if (!done)
+      drops_.drop(Drop::no_transform, guides_[message.guide].topic, "from " + message.frame + " to " + options_.frame_id + ": " + why);
+    pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
+void TrackingInputs::apply(double time, SceneInputs& inputs)
+{
+  for (Guide& guide : guides_)
+  {
+    Eigen::Matrix3Xd& vertices = inputs.guides[guide.cloth];
+    if (guide.points)
+      vertices = guide.points->target(time);
+    else if (guide.lastTime())   // until then it stays
+      placeBodies(guide, time, vertices);
+  }
+}
+
+void TrackingInputs::placeBodies(Guide& guide, double time, Eigen::Matrix3Xd& vertices) const
+{
+  guide.poses.clear();
+  for (GuideBuffer& body : guide.bodies)
+    guide.poses.push_back(body.target(time).X_WG);
+  guide.carried->binding.place(guide.poses, vertices);
+  if (guide.catches_up)
+  {
+    guide.catches_up = false;
+    guide.gap = guide.held - vertices;
+    const double way = guide.gap.colwise().norm().maxCoeff();
+    guide.gap_start = time;
+    guide.gap_duration = way > 1e-9 ? std::max(buffers_.catch_up_time, way / buffers_.catch_up_speed) : 0.0;
+  }
+  const double s = guide.gap_duration > 0.0 ? (time - guide.gap_start) / guide.gap_duration : 1.0;
+  if (s < 1.0)
+    vertices += (1.0 + 2.0 * s) * (1.0 - s) * (1.0 - s) * guide.gap;
+}
+
+void TrackingInputs::start(Guide& guide, const Eigen::Matrix3Xd& vertices) const
+{
+  guide.held = vertices;
+  guide.catches_up = true;
+}
+
+void TrackingInputs::attachAll(const Simulation& simulation)
+{
+  for (Guide& guide : guides_)
+  {
+    const Eigen::Matrix3Xd& now = simulation.state().cloths[guide.cloth].guide;
+    start(guide, now);
+    if (guide.points)
+      guide.points->attachAt(now);
+  }
+}
+
+void TrackingInputs::restart(const Simulation& simulation)
+{
+  pending_.clear();
+  for (Guide& guide : guides_)
+  {
+    const Eigen::Matrix3Xd& now = simulation.state().cloths[guide.cloth].guide;
+    start(guide, now);
+    if (guide.points)
+      guide.points->restart(now);
+    for (GuideBuffer& body : guide.bodies)
+      body.restart(Pose());
+  }
+}
+
+std::optional<double> TrackingInputs::Guide::lastTime() const
+{
+  if (points)
+    return points->lastTime();
+  std::optional<double> oldest;
+  for (const GuideBuffer& body : bodies)
+  {
+    const std::optional<double> last = body.lastTime();
+    if (last)
+      oldest = std::min(*last, oldest.value_or(*last));
+  }
+  return oldest;
+}
+
+std::vector<TrackingInputs::Age> TrackingInputs::ages() const
+{
+  std::vector<Age> ages;
+  for (const Guide& guide : guides_)
+  {
+    std::optional<double> age = guide.lastTime();
+    if (age)
+      age = clock_.seconds() - *age;
+    ages.push_back({guide.topic, age});
+  }
+  return ages;
+}
+
+}  // namespace slender

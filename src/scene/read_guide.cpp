@@ -1,0 +1,328 @@
+// The guide of a tracked cloth: its mesh and how it moves.
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+
+#include "read_tracking.h"
+#include "slender_sim/geometry/mesh_defects.h"
+#include "slender_sim/scene/pose_file.h"
+#include "slender_sim/scene/reader.h"
+#include "yaml_number.h"
+
+namespace slender {
+
+namespace {
+
+constexpr std::size_t max_frame_numbers = 200'000'000;   // of all frames of a guide together: 1.6 GB
+
+/// Files that a path with one '*' in its last part stands for, by the number in place of the star, else by name.
+std::vector<std::string> matchingFiles(const std::string& pattern)
+{
+  const std::filesystem::path path(pattern);
+  const std::string name = path.filename().string();
+  const auto star = name.find('*');
+  const std::string head = name.substr(0, star), tail = name.substr(star + 1);
+  std::vector<std::pair<std::pair<double, std::string>, std::string>> found;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(path.parent_path().empty() ? "." : path.parent_path(), error))
+  {
+    const std::string file = entry.path().filename().string();
+    if (file.size() < head.size() + tail.size() || file.compare(0, head.size(), head) != 0 ||
+        file.compare(file.size() - tail.size(), tail.size(), tail) != 0)
+    {
+      continue;
+    }
+    const std::string middle = file.substr(head.size(), file.size() - head.size() - tail.size());
+    found.push_back({{parseNumber(middle).value_or(-1.0), file}, entry.path().string()});
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<std::string> files;
+  for (const auto& entry : found)
+  {
+    files.push_back(entry.second);
+  }
+  return files;
+}
+
+std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double begin, const ReadContext& context, const GuideSource& source)
+{
+  const auto pattern = at.text();
+  if (!pattern || source.config.mesh.vertices.cols() == 0)
+  {
+    return std::nullopt;
+  }
+  const auto star = pattern->find('*');
+  if (star == std::string::npos || pattern->find('*', star + 1) != std::string::npos || pattern->find('/', star) != std::string::npos)
+  {
+    at.problem("must have one * in the name of the file, for example guide/frame_*.obj");
+    return std::nullopt;
+  }
+  const std::vector<std::string> files = matchingFiles(context.resolve(*pattern));
+  if (files.empty())
+  {
+    at.problem("no such file; there must be at least one");
+    return std::nullopt;
+  }
+  const TriangleMesh& mesh = source.config.mesh;
+  if (3 * static_cast<std::size_t>(mesh.vertices.cols()) * files.size() > max_frame_numbers)
+  {
+    at.problem("has " + std::to_string(files.size()) + " frames, too many for memory; leave out some and lower the rate");
+    return std::nullopt;
+  }
+  FrameGuide guide;
+  for (std::size_t k = 0; k < files.size(); ++k)
+  {
+    try
+    {
+      TriangleMesh frame = readMesh(files[k]);
+      if (frame.vertices.cols() != mesh.vertices.cols() || frame.triangles != mesh.triangles)
+      {
+        at.problem(files[k] + " has " + std::to_string(frame.vertices.cols()) + " vertices and " + std::to_string(frame.triangles.cols()) +
+                   " triangles, the guide's mesh has " + std::to_string(mesh.vertices.cols()) + " and " + std::to_string(mesh.triangles.cols()) +
+                   "; all frames must have the mesh's triangles, in its order");
+        return std::nullopt;
+      }
+      if (source.file)
+      {
+        source.file->place(frame.vertices);
+      }
+      if (!(frame.vertices.cwiseAbs().maxCoeff() <= max_coordinate))
+      {
+        at.problem(files[k] + " has coordinates beyond " + shortNumber(max_coordinate) + " m");
+        return std::nullopt;
+      }
+      guide.points.append(begin + static_cast<double>(k) / rate, frame.vertices);
+    }
+    catch (const std::exception& error)
+    {
+      at.problem(error.what());
+      return std::nullopt;
+    }
+  }
+  return GuideMotion(std::move(guide));
+}
+
+/// Which bodies carry which vertices.
+std::optional<CarriedGuide> readGroups(const YamlCursor& at, const ReadContext& context, const GuideSource& source)
+{
+  const int vertices = static_cast<int>(source.config.mesh.vertices.cols());
+  CarriedGuide guide{{}, GuideBinding(Eigen::Matrix3Xd(3, 0), {}, {}), true, {}};
+  std::vector<GuideBinding::Share> shares;
+  const auto add = [&](const std::string& name, const std::vector<int>& group) {
+    for (const int vertex : group)
+    {
+      shares.push_back({vertex, static_cast<int>(guide.bodies.size()), 1.0});
+    }
+    guide.bodies.push_back(name);
+  };
+  if (at.isScalar())
+  {
+    for (const VertexGroup& group : readGroupsOf(at, context, source.file))
+    {
+      add(group.name, group.vertices);
+    }
+  }
+  else if (at.present())
+  {
+    for (const auto& [name, list] : at.members())
+    {
+      add(name, readIndexList(list, vertices));
+    }
+  }
+  if (vertices == 0 || guide.bodies.empty())
+  {
+    return std::nullopt;
+  }
+  try
+  {
+    guide.binding = GuideBinding(source.config.mesh.vertices, std::vector<Pose>(guide.bodies.size()), shares);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    at.problem(error.what());
+    return std::nullopt;
+  }
+  return guide;
+}
+
+void readBodyPoses(const YamlCursor& at, const ReadContext& context, CarriedGuide& guide)
+{
+  const auto file = at.text();
+  if (!file)
+  {
+    return;
+  }
+  try
+  {
+    const auto recorded = readPoseFile(context.resolve(*file));
+    std::vector<std::string> names;
+    for (const BodyTrajectory& body : recorded)
+    {
+      names.push_back(body.body);
+    }
+    for (const std::string& name : guide.bodies)
+    {
+      const auto found = std::find(names.begin(), names.end(), name);
+      if (found == names.end())
+      {
+        at.problem("has no body " + name + ", which carries vertices; it has: " + joinWords(names));
+        return;
+      }
+      guide.poses.push_back(recorded[found - names.begin()].poses);
+    }
+  }
+  catch (const SceneError& error)
+  {
+    at.problem(error.what());
+  }
+}
+
+void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSource& source)
+{
+  GuideMotion& motion = source.config.motion;
+  if (!at.present())
+  {
+    return;
+  }
+  if (at.isScalar())
+  {
+    at.choice<bool>({{"fixed", true}});
+    return;
+  }
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  const YamlCursor frames = map.get("frames"), bodies = map.get("bodies"), topic = map.get("topic");
+  const YamlCursor rate = map.get("rate"), begin = map.get("begin"), groups = map.get("groups"), attach = map.get("attach"), late = map.get("late");
+  map.finish();
+  if (frames.present() + bodies.present() + topic.present() != 1)
+  {
+    if (at.problems().size() == before)
+    {
+      at.problem("must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {topic: points}, {topic: bodies, groups: obj}");
+    }
+    return;
+  }
+  const std::optional<bool> chosen = topic.choice<bool>({{"points", true}, {"bodies", false}});
+  if (topic.present() && !chosen)
+  {
+    return;
+  }
+  const bool by_points = chosen.value_or(false);
+  const bool by_bodies = bodies.present() || (topic.present() && !by_points);
+  const auto only_for = [](const YamlCursor& key, bool fits, const char* what) {
+    if (key.present() && !fits)
+    {
+      key.problem(std::string("is for ") + what);
+    }
+  };
+  only_for(rate, frames.present(), "frames");
+  only_for(begin, frames.present(), "frames");
+  only_for(groups, by_bodies, "bodies");
+  only_for(attach, by_bodies, "bodies");
+  only_for(late, topic.present(), "guides by topic");
+  if (late.isMap())
+  {
+    YamlMap extrapolated(late);
+    assign(source.config.coast, extrapolated.require("extrapolate").number(Range::above(0, 60, "s")));
+    extrapolated.finish();
+  }
+  else
+  {
+    assign(source.config.coast, late.choice<double>({{"hold", 0.0}, {"extrapolate", 0.2}}));
+  }
+  if (frames.present())
+  {
+    if (!rate.present())
+    {
+      YamlMap(at).require("rate");
+    }
+    const auto hertz = rate.number(Range::above(0, 1e6, "Hz"));
+    const double first = begin.number(Range::closed(-1e6, 1e6, "s")).value_or(0.0);
+    if (hertz)
+    {
+      assign(motion, readFrames(frames, *hertz, first, context, source));
+    }
+    return;
+  }
+  if (by_points)
+  {
+    motion = TopicGuide{};
+    return;
+  }
+  if (!groups.present())
+  {
+    YamlMap(at).require("groups");
+    return;
+  }
+  auto carried = readGroups(groups, context, source);
+  if (!carried)
+  {
+    return;
+  }
+  assign(carried->keeps_offset, attach.choice<bool>({{"initial", true}, {"frame", false}}));
+  readBodyPoses(bodies, context, *carried);
+  motion = std::move(*carried);
+}
+
+}  // namespace
+
+std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& context, const std::optional<MeshFile>& file)
+{
+  if (!at.choice<bool>({{"obj", true}}))
+  {
+    return {};
+  }
+  if (!file)
+  {
+    at.problem("needs a mesh from an OBJ file, whose groups (g NAME) it takes; give {NAME: [vertices]} instead");
+    return {};
+  }
+  try
+  {
+    std::vector<VertexGroup> groups = readObjGroups(context.resolve(file->path));
+    if (groups.empty())
+    {
+      at.problem(file->path + " has no groups (g NAME); give {NAME: [vertices]} instead");
+    }
+    return groups;
+  }
+  catch (const std::exception& error)
+  {
+    at.problem(error.what());
+    return {};
+  }
+}
+
+GuideSource readGuide(const YamlCursor& at, const ReadContext& context)
+{
+  GuideSource source;
+  YamlMap map(at);
+  const YamlCursor mesh = map.get("mesh"), grid = map.get("grid"), motion = map.get("motion");
+  if (mesh.present() == grid.present())
+  {
+    if (at.isMap())
+    {
+      at.problem("must have either mesh: {file: PATH} or grid: {corner: [...], sides: [[...], [...]], cells: N}");
+    }
+  }
+  else if (grid.present())
+  {
+    source.grid = readClothGrid(grid, source.config.mesh);
+  }
+  else if ((source.file = readMeshFile(mesh, context)))
+  {
+    source.config.mesh = source.file->mesh;
+    const std::vector<MeshDefect> defects = topologyDefects(source.config.mesh);   // it may meet itself
+    if (!defects.empty())
+    {
+      YamlMap(mesh).get("file").problem(source.file->path + ": " + defects.front().message);
+      source.config.mesh = TriangleMesh{};
+    }
+  }
+  readGuideMotion(motion, context, source);
+  map.finish();
+  return source;
+}
+
+}  // namespace slender

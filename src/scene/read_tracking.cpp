@@ -1,0 +1,313 @@
+#include "read_tracking.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+
+#include "slender_sim/geometry/mesh_defects.h"
+#include "slender_sim/tracking/clustering.h"
+
+/// Cloths that track a guide.
+namespace slender {
+
+namespace {
+
+constexpr double max_fine_vertices = 1e6;
+
+/// The mesh that tracks, and how it comes from the guide's.
+struct TrackedMesh
+{
+  enum Kind { same, subdivided, separate } kind = subdivided;
+  Subdivision subdivision;            ///< of the guide; separate: its mesh only
+  std::optional<MeshFile> file;       ///< separate
+  bool good = false;
+};
+
+TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, const GuideSource& guide)
+{
+  TrackedMesh tracked;
+  int levels = 0;
+  const TriangleMesh& coarse = guide.config.mesh;
+  if (!at.present() || at.isScalar())
+  {
+    tracked.kind = TrackedMesh::same;
+    if (at.present() && !at.choice<bool>({{"same", true}}))
+    {
+      return tracked;
+    }
+  }
+  else
+  {
+    YamlMap map(at);
+    if (map.has("file"))
+    {
+      tracked.kind = TrackedMesh::separate;
+      tracked.file = readMeshFile(at, context);
+      tracked.good = tracked.file.has_value();
+      if (tracked.good)
+      {
+        tracked.subdivision.mesh = tracked.file->mesh;
+      }
+    }
+    else
+    {
+      const auto given = map.require("subdivide").integer(1, 10, "levels");
+      map.finish();
+      if (!given)
+      {
+        return tracked;
+      }
+      levels = *given;
+      if (std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols()) > 2 * max_fine_vertices)
+      {
+        map.get("subdivide").problem("makes more than " + std::to_string(static_cast<int>(max_fine_vertices)) + " vertices");
+        return tracked;
+      }
+    }
+  }
+  if (tracked.kind != TrackedMesh::separate)
+  {
+    if (coarse.vertices.cols() == 0)
+    {
+      return tracked;   // reported
+    }
+    tracked.subdivision = subdivide(coarse, levels);
+    tracked.good = true;
+  }
+  try
+  {
+    if (tracked.good)
+    {
+      requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path : "undeformed");
+    }
+  }
+  catch (const std::invalid_argument& error)
+  {
+    at.problem(error.what());
+    tracked.good = false;
+  }
+  return tracked;
+}
+
+/// Frames of the guide's motion for clustering: all that it has, or instants spread over the motion of its bodies.
+std::vector<Eigen::Matrix3Xd> framesOf(const GuideConfig& guide, int sampled)
+{
+  if (const auto* frames = std::get_if<FrameGuide>(&guide.motion))
+  {
+    return frames->points.frames();
+  }
+  std::vector<Eigen::Matrix3Xd> shapes(1, guide.mesh.vertices);
+  const auto* carried = std::get_if<CarriedGuide>(&guide.motion);
+  if (carried && !carried->poses.empty())
+  {
+    double first = 1e300, last = -1e300;
+    for (const PoseTrajectory& body : carried->poses)
+    {
+      first = std::min(first, body.firstTime());
+      last = std::max(last, body.lastTime());
+    }
+    shapes.resize(static_cast<std::size_t>(std::max(2, 5 * sampled)));
+    for (std::size_t k = 0; k < shapes.size(); ++k)
+    {
+      guide.evaluate(first + (last - first) * static_cast<double>(k) / static_cast<double>(shapes.size() - 1), shapes[k]);
+    }
+  }
+  return shapes;
+}
+
+TestFunctions readClusters(const YamlCursor& at, const GuideConfig& guide)
+{
+  ClusteringOptions options;
+  YamlMap map(at);
+  assign(options.regions, map.require("count").integer(1, 1'000'000, "regions"));
+  assign(options.compactness, map.get("compactness").number(Range::closed(0, 1)));
+  int seed = 1;
+  assign(seed, map.get("seed").integer(0, 2'000'000'000));
+  options.seed = static_cast<unsigned>(seed);
+  assign(options.sampled_frames, map.get("frames").integer(1, 10'000));
+  map.finish();
+  return regionBasis(guide.mesh, clusterFaces(guide.mesh.triangles, framesOf(guide, options.sampled_frames), options).region);
+}
+
+std::vector<PaintedRegion> readRegions(const YamlCursor& at, const ReadContext& context, const GuideSource& guide, const TrackedMesh& tracked)
+{
+  std::vector<PaintedRegion> regions;
+  if (at.isScalar())
+  {
+    for (const VertexGroup& group : readGroupsOf(at, context, guide.file))
+    {
+      regions.push_back({group.name, group.vertices, {}});
+    }
+    if (tracked.kind != TrackedMesh::separate)
+    {
+      return regions;
+    }
+    for (const VertexGroup& group : readGroupsOf(at, context, tracked.file))
+    {
+      for (PaintedRegion& region : regions)
+      {
+        region.tracked = region.name == group.name ? group.vertices : region.tracked;
+      }
+    }
+    return regions;
+  }
+  for (const auto& [name, entry] : at.members())
+  {
+    PaintedRegion region{name, {}, {}};
+    YamlMap map(entry);
+    region.guide = readIndexList(map.require("guide"), static_cast<int>(guide.config.mesh.vertices.cols()));
+    const YamlCursor own = tracked.kind == TrackedMesh::separate ? map.require("tracked") : map.get("tracked");
+    if (own.present())
+    {
+      region.tracked = readIndexList(own, static_cast<int>(tracked.subdivision.mesh.vertices.cols()));
+    }
+    map.finish();
+    regions.push_back(std::move(region));
+  }
+  return regions;
+}
+
+/// Throws std::invalid_argument for functions that do not fit the meshes.
+TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, const GuideSource& guide, const TrackedMesh& tracked)
+{
+  YamlMap map(at);
+  const YamlCursor basis = map.get("basis"), vertices = map.get("vertices"), regions = map.get("regions"), clusters = map.get("clusters");
+  map.finish();
+  if (basis.present() + regions.present() + clusters.present() > 1)
+  {
+    at.problem("must be one of {basis: subdivision}, {regions: obj}, {regions: {NAME: {guide: [...], tracked: [...]}}}, {clusters: {count: N}}");
+    return {};
+  }
+  if (vertices.present() && (regions.present() || clusters.present()))
+  {
+    vertices.problem("is for basis: subdivision");
+  }
+  if (clusters.present())
+  {
+    if (tracked.kind != TrackedMesh::same)
+    {
+      clusters.problem("are regions of faces that guide and tracked mesh share; take mesh: same");
+      return {};
+    }
+    return readClusters(clusters, guide.config);
+  }
+  if (regions.present())
+  {
+    const std::vector<PaintedRegion> painted = readRegions(regions, context, guide, tracked);
+    if (painted.empty())
+    {
+      return {};
+    }
+    return tracked.kind == TrackedMesh::separate
+             ? paintedRegions(painted, static_cast<int>(guide.config.mesh.vertices.cols()), static_cast<int>(tracked.subdivision.mesh.vertices.cols()))
+             : paintedRegions(painted, tracked.subdivision);
+  }
+  if (basis.present() && !basis.choice<bool>({{"subdivision", true}}))
+  {
+    return {};
+  }
+  if (tracked.kind == TrackedMesh::separate)
+  {
+    at.problem("must be given as regions: {NAME: {guide: [...], tracked: [...]}} (or obj) when the tracked mesh is a file of its own");
+    return {};
+  }
+  return subdivisionBasis(tracked.subdivision,
+                          vertices.present() ? readIndexList(vertices, static_cast<int>(guide.config.mesh.vertices.cols())) : std::vector<int>{});
+}
+
+std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const ReadContext& context, const GuideSource& guide,
+                                                   const TrackedMesh& tracked, const ClothConfig& cloth)
+{
+  auto tracking = std::make_shared<TrackingConfig>();
+  tracking->guide = guide.config;
+  const Eigen::Matrix3Xd& coarse = guide.config.mesh.vertices;
+  tracking->size = (coarse.rowwise().maxCoeff() - coarse.rowwise().minCoeff()).norm();
+  try
+  {
+    tracking->functions = readFunctions(at, context, guide, tracked);
+    if (tracking->functions.count() == 0)
+    {
+      return tracking;   // reported
+    }
+    auto constraints = std::make_shared<WeakConstraints>(tracking->functions, hatMassMatrix(guide.config.mesh), hatMassMatrix(cloth.mesh));
+    std::vector<char> held;
+    for (const GraspConfig& grasp : cloth.grasps)
+    {
+      held.resize(static_cast<std::size_t>(cloth.mesh.vertices.cols()), 0);
+      for (const int vertex : grasp.vertices)
+      {
+        held[vertex] = 1;
+      }
+    }
+    constraints->requireIndependent(held);
+    tracking->constraints = std::move(constraints);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    at.problem(error.what());
+  }
+  return tracking;
+}
+
+ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
+{
+  ClothConfig cloth;
+  cloth.name = default_name;
+  cloth.place = at.place();
+  YamlMap map(at);
+  assign(cloth.name, map.get("name").name());
+  const YamlCursor at_functions = map.get("test_functions");
+  const GuideSource guide = readGuide(map.require("guide"), context);
+  const TrackedMesh tracked = readTrackedMesh(map.get("mesh"), context, guide);
+  if (tracked.good)
+  {
+    cloth.mesh = tracked.subdivision.mesh;
+  }
+  if (tracked.kind != TrackedMesh::separate)
+  {
+    cloth.grid = guide.grid;
+    cloth.warp = guide.grid ? Eigen::Vector3d(guide.grid->sides[0].normalized()) : cloth.warp;
+  }
+  if (tracked.good && tracked.kind != TrackedMesh::separate)
+  {
+    Eigen::Matrix3Xd points, velocities;
+    guide.config.evaluate(0.0, points, &velocities);
+    cloth.start = points * tracked.subdivision.weights.transpose();
+    cloth.start_velocity = velocities * tracked.subdivision.weights.transpose();
+  }
+  readClothTraits(map, context, cloth);
+  map.finish();
+  if (tracked.good && guide.config.mesh.vertices.cols() > 0)
+  {
+    cloth.tracking = readTracking(at_functions, context, guide, tracked, cloth);
+  }
+  return cloth;
+}
+
+}  // namespace
+
+void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths)
+{
+  if (!at.present())
+  {
+    return;
+  }
+  std::map<std::string, std::string> names;   // to what has it
+  for (const ClothConfig& cloth : cloths)
+  {
+    names.emplace(cloth.name, "a cloth");
+  }
+  const auto entries = at.items(1, 1000);
+  for (std::size_t k = 0; k < entries.size(); ++k)
+  {
+    cloths.push_back(readTrackedCloth(entries[k], context, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
+    const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
+    if (!is_new)
+    {
+      YamlMap(entries[k]).get("name").problem("is also the name of " + other->second + "; names must differ");
+    }
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,76 @@
+// What the tracked cloths of a scene follow.
+#include <algorithm>
+#include <stdexcept>
+
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+void Simulation::startTracking(int cloth)
+{
+  const TrackingConfig& tracking = *config_.cloths[cloth].tracking;
+  SceneCloth& held = state_.cloths[cloth];
+  tracking.guide.evaluate(0.0, held.guide);
+  held.guide_forces.setZero(3, tracking.constraints->count());
+}
+
+void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
+{
+  inputs.guides.resize(config_.cloths.size());
+  for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+  {
+    if (const auto& tracking = config_.cloths[k].tracking)
+    {
+      if (tracking->guide.byTopic())
+      {
+        inputs.guides[k] = state_.cloths[k].guide;
+      }
+      else
+      {
+        tracking->guide.evaluate(time, inputs.guides[k]);
+      }
+    }
+  }
+}
+
+void Simulation::checkGuides(const SceneInputs& inputs) const
+{
+  if (inputs.guides.size() != config_.cloths.size())
+  {
+    throw std::invalid_argument("inputs.guides has " + std::to_string(inputs.guides.size()) + " entries; must have " +
+                                std::to_string(config_.cloths.size()) + ", one per cloth of the scene");
+  }
+  for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+  {
+    const Eigen::Index expected = config_.cloths[k].tracking ? config_.cloths[k].tracking->guide.mesh.vertices.cols() : 0;
+    if (inputs.guides[k].cols() != expected)
+    {
+      throw std::invalid_argument("inputs.guides of " + config_.cloths[k].name + " has " + std::to_string(inputs.guides[k].cols()) +
+                                  " vertices; must have " + std::to_string(expected));
+    }
+  }
+}
+
+/// After a step.
+void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
+{
+  for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+  {
+    if (const auto& tracking = config_.cloths[k].tracking)
+    {
+      SceneCloth& held = state_.cloths[k];
+      held.guide = inputs.guides[k];
+      held.guide_forces = touching_cloth_index_[k] >= 0 ? touching_cloths_->averageForces(touching_cloth_index_[k]) : cloth_steppers_[k]->averageForces();
+      report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)) / tracking->size);
+    }
+  }
+}
+
+double Simulation::trackingError(int cloth) const
+{
+  const auto& tracking = config_.cloths.at(static_cast<std::size_t>(cloth)).tracking;
+  const SceneCloth& held = state_.cloths[static_cast<std::size_t>(cloth)];
+  return tracking ? tracking->constraints->error(tracking->constraints->averages(held.guide), held.cloth.x) : 0.0;
+}
+
+}  // namespace slender

@@ -1,0 +1,133 @@
+#include "slender_sim/tracking/weak_constraints.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Cholesky>
+
+namespace slender {
+
+namespace {
+
+using Triplets = std::vector<Eigen::Triplet<double>>;
+
+MassMatrix assembled(const Triplets& entries, Eigen::Index size)
+{
+  MassMatrix mass(size, size);
+  mass.setFromTriplets(entries.begin(), entries.end());
+  return mass;
+}
+
+WeakConstraints::Matrix scaledRows(const TestFunctions::Values& values, const MassMatrix& mass, const std::vector<std::string>& names, const char* mesh)
+{
+  if (values.cols() != mass.rows())
+    throw std::invalid_argument("test functions of " + std::to_string(values.cols()) + " vertices do not fit a " + mesh + " mesh of " +
+                                std::to_string(mass.rows()));
+  WeakConstraints::Matrix c = values * mass;
+  const Eigen::VectorXd sums = c * Eigen::VectorXd::Ones(c.cols());
+  for (Eigen::Index i = 0; i < c.rows(); ++i)
+  {
+    if (!(sums[i] > 0) || !std::isfinite(sums[i]))
+      throw std::invalid_argument("test function '" + names[i] + "' is empty on the " + mesh + " mesh (its integral is not positive): leave it out");
+    c.row(i) *= 1.0 / sums[i];
+  }
+  c.makeCompressed();
+  return c;
+}
+
+}  // namespace
+
+MassMatrix hatMassMatrix(const TriangleMesh& rest)
+{
+  const Eigen::VectorXd areas = faceAreas(rest);
+  Triplets entries;
+  for (Eigen::Index f = 0; f < rest.triangles.cols(); ++f)
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        entries.emplace_back(rest.triangles(a, f), rest.triangles(b, f), areas[f] / (a == b ? 6.0 : 12.0));
+  return assembled(entries, rest.vertices.cols());
+}
+
+MassMatrix hatMassMatrix(const Eigen::Matrix3Xd& rest_nodes, bool closed)
+{
+  const int nodes = static_cast<int>(rest_nodes.cols());
+  Triplets entries;
+  for (int i = 0; i < (closed ? nodes : nodes - 1); ++i)
+  {
+    const int j = (i + 1) % nodes;
+    const double length = (rest_nodes.col(j) - rest_nodes.col(i)).norm();
+    for (const int end : {i, j})
+      entries.emplace_back(end, end, length / 3.0);
+    entries.emplace_back(i, j, length / 6.0);
+    entries.emplace_back(j, i, length / 6.0);
+  }
+  return assembled(entries, nodes);
+}
+
+WeakConstraints::WeakConstraints(const TestFunctions& functions, const MassMatrix& guide, const MassMatrix& tracked)
+  : names_(functions.names), c_(scaledRows(functions.tracked, tracked, names_, "tracked")), guide_(scaledRows(functions.guide, guide, names_, "guide"))
+{
+  if (c_.rows() != functions.count() || guide_.rows() != functions.count())
+    throw std::invalid_argument("test functions: one row per name expected on both meshes");
+}
+
+double WeakConstraints::error(const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& tracked) const
+{
+  double worst = 0.0;
+  for (Eigen::Index i = 0; i < c_.rows(); ++i)
+  {
+    Eigen::Vector3d away = -targets.col(i);
+    for (Matrix::InnerIterator entry(c_, i); entry; ++entry)
+      away += entry.value() * tracked.col(entry.col());
+    worst = std::max(worst, away.norm());
+  }
+  return worst;
+}
+
+void WeakConstraints::requireIndependent(const std::vector<char>& held) const
+{
+  const int n = count();
+  Matrix free = c_;
+  if (!held.empty())
+    free.prune([&](Eigen::Index, Eigen::Index column, double) { return !held[column]; });
+  // the Gram matrix of rows of unit length: what is left of a row after those before it is the square of its distance from their span
+  constexpr double kDependent = 1e-10;
+  Eigen::MatrixXd gram = Eigen::MatrixXd(Matrix(free * free.transpose()));
+  Eigen::VectorXd scale(n);
+  for (int i = 0; i < n; ++i)
+  {
+    if (!(gram(i, i) > 0))
+      throw std::invalid_argument("test function '" + names_[i] + "' acts on held vertices only: leave it out or release some");
+    scale[i] = 1.0 / std::sqrt(gram(i, i));
+  }
+  gram = scale.asDiagonal() * gram * scale.asDiagonal();
+  // those that are independent in their own order, then the first that is not, with its partners
+  Eigen::MatrixXd l = Eigen::MatrixXd::Zero(n, n);
+  for (int i = 0; i < n; ++i)
+  {
+    for (int j = 0; j < i; ++j)
+      l(i, j) = (gram(i, j) - l.row(i).head(j).dot(l.row(j).head(j))) / l(j, j);
+    const double rest = gram(i, i) - l.row(i).head(i).squaredNorm();
+    if (rest > kDependent)
+    {
+      l(i, i) = std::sqrt(rest);
+      continue;
+    }
+    const Eigen::VectorXd share = l.topLeftCorner(i, i).transpose().triangularView<Eigen::Upper>().solve(l.row(i).head(i).transpose());
+    std::string others;
+    int more = 0;
+    for (int j = 0; j < i; ++j)
+      if (std::abs(share[j]) > 1e-3)
+      {
+        if (++more <= 5)
+          others += (others.empty() ? "'" : ", '") + names_[j] + "'";
+      }
+    if (more > 5)
+      others += " and " + std::to_string(more - 5) + " more";
+    throw std::invalid_argument("test function '" + names_[i] + "' depends on " + others + (held.empty() ? "" : " (on the vertices that are not held)") +
+                                ": leave it out or change its region");
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,239 @@
+#!/usr/bin/python3
+"""tracking_node: guides by points and by bodies, refused and late ones, live against offline, restart, markers."""
+import csv
+import math
+import os
+import struct
+import subprocess
+
+import rospy
+from geometry_msgs.msg import Pose
+from sensor_msgs.msg import PointCloud2, PointField
+from slender_sim.msg import BodyStates, ClothState, MeshStamped
+from slender_sim.srv import FilePath
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+from node_harness import NodeCase, fill, find_program, run, wait_until
+
+STEP = 0.01
+RATE = 25.0
+SCENE = """
+name: flap
+time: {step: 0.01, duration: 1}
+tracked:
+  - name: flap
+    guide:
+      mesh: {file: %s}
+      motion: %s
+    mesh: {subdivide: 2}
+    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 2.0e5}
+    bending: {model: hinge}
+    damping: {stiffness: 0.002}
+    solver: {one_newton_step: true}
+"""
+REST = [(0.2 * i, 0.2 * j, 0.5) for j in range(3) for i in range(3)]
+FACES = [(1, 2, 5), (1, 5, 4), (2, 3, 6), (2, 6, 5), (4, 5, 8), (4, 8, 7), (5, 6, 9), (5, 9, 8)]
+
+
+def obj(points):
+    return "".join("v %.17g %.17g %.17g\n" % p for p in points) + "".join("f %d %d %d\n" % f for f in FACES)
+
+
+def wave(t):
+    """The guide at rest until 0.1 s, then waving."""
+    s = min(max((t - 0.1) / 0.2, 0.0), 1.0)
+    return [(x + 0.02 * s * math.sin(7 * t), y, z + 0.06 * s * math.sin(9 * t + 4 * x)) for x, y, z in REST]
+
+
+def cloud(points, stamp, kind=PointField.FLOAT64, frame="world"):
+    message = PointCloud2()
+    message.header.stamp = rospy.Time.from_sec(stamp)
+    message.header.frame_id = frame
+    size = 8 if kind == PointField.FLOAT64 else 4
+    message.fields = [PointField(n, k * size, kind, 1) for k, n in enumerate("xyz")]
+    message.height, message.width, message.point_step = 1, len(points), 3 * size
+    message.row_step = 3 * size * len(points)
+    message.data = b"".join(struct.pack("<3d" if size == 8 else "<3f", *p) for p in points)
+    return message
+
+
+def bodies(poses, stamp):
+    message = BodyStates()
+    message.header.stamp = rospy.Time.from_sec(stamp)
+    message.header.frame_id = "world"
+    for name, (p, q) in poses:
+        message.name.append(name)
+        message.pose.append(fill(Pose(), p, q))
+    return message
+
+
+def vertices(points):
+    return [(p.x, p.y, p.z) for p in points]
+
+
+def distance(a, b):
+    return max(math.dist(p, q) for p, q in zip(a, b))
+
+
+class Tracking(NodeCase):
+
+    def begin(self, motion, **parameters):
+        with open(self.path("rest.obj"), "w") as file:
+            file.write(obj(REST))
+        self.start(SCENE % (self.path("rest.obj"), motion), program="tracking_node", **parameters)
+        self.states = self.listen("/t/state", ClothState)
+
+    def after(self, n):
+        return self.states_after(self.states, n)
+
+    def send_wave(self, guide, until):
+        for k in range(int(until * RATE) + 1):
+            guide.publish(cloud(wave(k / RATE), 1.0 + k / RATE))
+        rospy.sleep(0.3)
+
+    def test_points_live_equal_offline(self):
+        self.begin("{topic: points}")
+        guide = self.publisher("/t/guide/points", PointCloud2)
+        self.send_wave(guide, 1.0)
+        live = {}
+        for k in range(1, 81):
+            state = self.after(1)
+            live[k] = state
+            self.assertLess(state.constraint_errors[0], 1e-12)
+        for k in range(int(RATE) + 1):
+            with open(self.path("frame_%02d.obj" % k), "w") as file:
+                file.write(obj(wave(k / RATE)))
+        with open(self.path("offline.yaml"), "w") as file:
+            file.write(SCENE % ("rest.obj", '{frames: "frame_*.obj", rate: %g}' % RATE))
+        done = subprocess.run([find_program("simulate"), self.path("offline.yaml"), "--duration", "0.8", "--csv", self.path("csv"), "--quiet"])
+        self.assertEqual(done.returncode, 0)
+        offline = {}
+        with open(self.path("csv/cloths.csv")) as file:
+            for row in csv.DictReader(file):
+                offline.setdefault(round(float(row["t [s]"]) / STEP), []).append(tuple(float(row[c + " [m]"]) for c in "xyz"))
+        for k, state in live.items():
+            self.assertLess(distance(vertices(state.vertices), offline[k]), 1e-6, "step %d" % k)   # stamps are whole nanoseconds
+        self.assertGreater(distance(vertices(live[80].vertices), offline[0]), 0.03)
+        # between messages the guide is interpolated: at one of them it is there
+        self.assertLess(distance(vertices(live[20].guide_vertices), wave(0.2)), 1e-6)
+        self.assertEqual(len(live[80].guide_forces), 9)
+        self.assertGreater(sum(f.z for f in live[80].guide_forces), 0.0)
+
+    def test_bodies(self):
+        self.begin("{topic: bodies, groups: {left: [0, 3, 6, 1, 4, 7], right: [2, 5, 8, 1, 4, 7]}}")
+        guide = self.publisher("/t/guide/bodies", BodyStates)
+        start = self.after(1)
+        for k in range(26):
+            t = k / RATE
+            lift = 0.1 * (3 * t ** 2 - 2 * t ** 3)
+            q = (0, 0, 0, 1)
+            guide.publish(bodies([("left", ((5, 5, 5), q)), ("right", ((7, 0, lift), q))], 1.0 + 0.01 + t))
+        rospy.sleep(0.3)
+        state = self.after(105)
+        moved = [q[2] - p[2] for p, q in zip(REST, vertices(state.guide_vertices))]
+        for i, up in enumerate(moved):   # the offset at the first message stays; the middle column is shared
+            self.assertAlmostEqual(up, (0.0, 0.05, 0.1)[i % 3], delta=1e-9)
+        self.assertLess(state.constraint_errors[0], 1e-12)
+        self.assertLess(distance(vertices(start.guide_vertices), REST), 1e-12)
+        guide.publish(bodies([("left", ((0, 0, 0), (0, 0, 0, 3)))], 3.0))
+        guide.publish(bodies([("foot", ((0, 0, 0), (0, 0, 0, 1)))], 3.0))
+        self.expect_drop("bad_quaternion")
+        self.expect_drop("unknown_name")
+
+    def test_bad_points_are_dropped(self):
+        self.begin("{topic: points}")
+        guide = self.publisher("/t/guide/points", PointCloud2)
+        self.after(1)
+        guide.publish(cloud(REST[:8], 1.02))
+        guide.publish(cloud(REST + REST[:1], 1.02))
+        bad = list(REST)
+        bad[3] = (0.0, float("nan"), 0.0)
+        guide.publish(cloud(bad, 1.02))
+        guide.publish(cloud([(1e9, 0, 0)] * 9, 1.02))
+        guide.publish(cloud(REST, 1.02, frame="nowhere"))
+        guide.publish(cloud(REST, 1.02, frame=""))
+        short = cloud(REST, 1.02)
+        short.data = short.data[:-1]
+        guide.publish(short)
+        flat = cloud(REST, 1.02)
+        flat.fields = flat.fields[:2]
+        guide.publish(flat)
+        self.expect_drop("wrong_length", 4)
+        for reason in ("not_finite", "out_of_range", "no_transform", "bad_frame"):
+            self.expect_drop(reason)
+        state = self.after(5)
+        self.assertLess(distance(vertices(state.guide_vertices), REST), 1e-12)
+        guide.publish(cloud(REST, 1.10, kind=PointField.FLOAT32))
+        guide.publish(cloud(REST, 1.10))
+        self.expect_drop("out_of_order")
+
+    def late(self, motion):
+        """A guide that rises by 0.5 m/s, is silent from 0.4 s to 1 s, and comes back where it would be."""
+        self.begin(motion, guide_timeout=0.3, catch_up_time=0.2)
+        guide = self.publisher("/t/guide/points", PointCloud2)
+        up = lambda t: [(x, y, z + 0.5 * t) for x, y, z in REST]
+        heights = []
+        for k in range(11):
+            guide.publish(cloud(up(k / RATE), 1.0 + k / RATE))
+        rospy.sleep(0.3)
+        for k in range(150):
+            if k == 100:
+                self.assertEqual(self.diagnostics("inputs")["message"], "no input for guide/points")
+                for j in range(20):
+                    guide.publish(cloud(up(1.0 + (j + 1) / RATE), 2.0 + (j + 1) / RATE))
+                rospy.sleep(0.3)
+            state = self.after(1)
+            heights.append(state.guide_vertices[0].z - 0.5)
+            self.assertLess(state.constraint_errors[0], 1e-12)
+        speeds = [(b - a) / STEP for a, b in zip(heights, heights[1:])]
+        jolts = [abs(b - a) for a, b in zip(speeds, speeds[1:])]
+        self.assertLess(max(jolts), 0.5)                  # [m/s] between two steps
+        self.assertAlmostEqual(heights[-1], 0.75, delta=1e-6)
+        return heights
+
+    def test_late_guide_is_held(self):
+        heights = self.late("{topic: points}")
+        self.assertAlmostEqual(heights[90], 0.2, delta=1e-9)
+
+    def test_late_guide_is_extrapolated(self):
+        heights = self.late("{topic: points, late: {extrapolate: 0.2}}")
+        self.assertAlmostEqual(heights[90], 0.2 + 0.5 * 0.1, delta=1e-6)
+
+    def test_services_mesh_markers(self):
+        self.begin("{topic: points}", marker_style="regions")
+        markers = self.listen("/t/markers", MarkerArray)
+        guide = self.publisher("/t/guide/points", PointCloud2)
+        self.send_wave(guide, 1.0)
+        self.after(40)
+        saved = self.after(1)
+        self.assertTrue(self.call("save_state", FilePath, self.path("state")).success)
+        self.after(20)
+        self.assertTrue(self.call("load_state", FilePath, self.path("state")).success)
+        state = self.after(1)
+        # the guide goes on from where it was, towards the messages
+        self.assertLess(distance(vertices(state.guide_vertices), vertices(saved.guide_vertices)), 0.02)
+        self.assertTrue(self.call("reset", Trigger).success)
+        state = self.after(5)
+        self.assertLess(distance(vertices(state.guide_vertices), REST), 1e-12)   # forgets what was sent
+        mesh = rospy.wait_for_message("/t/mesh", MeshStamped, 10)
+        self.assertEqual(len(mesh.vertices), 81)
+        wait_until(lambda: markers.count() > 0, what="markers")
+        drawn = {(m.ns, m.id): m for m in markers.last().markers}
+        self.assertEqual(len(drawn[("guides/flap", 0)].points), 2 * 16)
+        colors = set((round(c.r, 2), round(c.g, 2), round(c.b, 2)) for c in drawn[("cloths/flap", 0)].colors)
+        self.assertGreater(len(colors), 20)
+        values = self.diagnostics("simulation")
+        self.assertLess(float(values["worst constraint residual over size"]), 1e-10)
+        self.assertGreater(float(values["largest guide force [N]"]), 0.0)
+
+    def test_other_nodes_say_who_tracks(self):
+        with open(self.path("rest.obj"), "w") as file:
+            file.write(obj(REST))
+        process = self.start(SCENE % (self.path("rest.obj"), "fixed"), wait=False, program="cloth_node")
+        self.assertEqual(process.wait(20), 2)
+        self.assertIn("tracking_node", self.output("rod.err"))
+
+
+if __name__ == "__main__":
+    run("tracking_test", Tracking)

@@ -1,0 +1,165 @@
+// Cloth whose averages are prescribed.
+#include <gtest/gtest.h>
+
+#include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/tracking/weak_constraints.h"
+#include "test/support/cloths.h"
+
+namespace slender::test {
+namespace {
+
+struct Tracked
+{
+  Subdivision fine;
+  std::shared_ptr<ClothModel> model;
+  std::unique_ptr<WeakConstraints> constraints;
+  Matrix3Xd guide;   // at rest
+  ClothState state;
+  ClothInputs inputs;
+
+  explicit Tracked(BendingModel bending = BendingModel::hinge, int levels = 2)
+  {
+    const TriangleMesh coarse = gridMesh(1.0, 1.0, 4, 4, GridPattern::alternating);
+    fine = subdivide(coarse, levels);
+    guide = coarse.vertices;
+    constraints = std::make_unique<WeakConstraints>(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
+    model = std::make_shared<ClothModel>(buildCloth("tracked", fine.mesh, 0.2, orthotropicMembrane(500, 500, 0.3, 190)));
+    model->bending = bending;
+    model->bending_modulus = 1e-4;
+    model->stiffness_damping = 1e-3;
+    model->averages = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(constraints->matrix());
+    state = makeClothState(*model, fine.mesh.vertices);
+  }
+
+  StepReport step(ClothStepper& stepper, const Matrix3Xd& q, double h)
+  {
+    inputs.averages = constraints->averages(q);
+    inputs.pins.resize(3, static_cast<Eigen::Index>(state.pins.size()));
+    for (std::size_t k = 0; k < state.pins.size(); ++k)
+      inputs.pins.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
+    return stepper.step(state, inputs, h);
+  }
+};
+
+ClothOptions options(bool one_newton_step)
+{
+  ClothOptions o;
+  o.one_newton_step = one_newton_step;
+  o.linear_tolerance = one_newton_step ? 1e-2 : 1e-4;
+  return o;
+}
+
+TEST(ClothAverages, AreExactWhateverTheGuideDoes)
+{
+  for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
+    for (const bool one : {true, false})
+    {
+      Tracked t(bending);
+      pinVertices(t.state, {7});
+      ClothStepper stepper(t.model, options(one));
+      Random random(8);
+      for (int k = 1; k <= 12; ++k)
+      {
+        Matrix3Xd q = t.guide;
+        for (Eigen::Index i = 0; i < q.cols(); ++i)
+          q.col(i) += Vector3d(0, 0, 0.05 * std::sin(0.4 * k + 3 * q(0, i))) + random.vector(0.01);
+        const StepReport report = t.step(stepper, q, 0.01);
+        ASSERT_TRUE(report.ok) << report.message;
+        EXPECT_LT(t.constraints->error(t.inputs.averages, t.state.x), 1e-14) << one << " step " << k;
+        EXPECT_TRUE(t.state.x.col(7) == t.fine.mesh.vertices.col(7));
+        EXPECT_LT(report.residual, one ? 1e9 : 1e-6) << "step " << k;   // what the averages do not balance
+      }
+    }
+}
+
+TEST(ClothAverages, CarryTheClothWithTheForcesOfMechanics)
+{
+  // a guide that is moved rigidly with constant acceleration carries the cloth rigidly; forces are m (a - g), of each its share
+  Tracked t;
+  ClothStepper stepper(t.model, options(false));
+  const Vector3d a(3, -2, 1);
+  const double h = 0.01;
+  // both begin at the speed that implicit Euler's parabola has one step before
+  for (int k = 1; k <= 20; ++k)
+  {
+    const Matrix3Xd q = t.guide.colwise() + Vector3d(0.5 * h * h * k * (k + 1) * a);
+    const StepReport report = t.step(stepper, q, h);
+    ASSERT_TRUE(report.ok) << report.message;
+  }
+  const Matrix3Xd expected = t.fine.mesh.vertices.colwise() + Vector3d(0.5 * h * h * 20 * 21 * a);
+  EXPECT_LT((t.state.x - expected).cwiseAbs().maxCoeff(), 2e-5);   // hats' weights are not those of the mass: it bends a little
+  const Vector3d total = stepper.averageForces().rowwise().sum(), law = t.model->totalMass() * (a - t.inputs.gravity);
+  EXPECT_LT((total - law).norm(), 1e-4 * law.norm());
+}
+
+TEST(ClothAverages, AreStationaryUnderTheConstraints)
+{
+  // gradient of the step's energy = C^T forces: checked by an independent energy, by differences along random directions with C d = 0
+  Tracked t(BendingModel::hinge, 1);
+  t.model->stiffness_damping = 0.0;
+  ClothOptions o = options(false);
+  o.newton.tolerance = 1e-10;
+  o.linear_tolerance = 1e-8;
+  ClothStepper stepper(t.model, o);
+  Matrix3Xd q = t.guide;
+  for (Eigen::Index i = 0; i < q.cols(); ++i)
+    q(2, i) += 0.05 * std::cos(5 * q(0, i));
+  const ClothState before = t.state;
+  const double h = 0.02;
+  ASSERT_TRUE(t.step(stepper, q, h).ok);
+  const auto energy = [&](const Matrix3Xd& x) {
+    ClothState s = t.state;
+    s.x = x;
+    const ClothEnergies e = stepper.energies(s, t.inputs.gravity);
+    double kinetic = 0.0;
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+      kinetic += 0.5 * t.model->mass[i] * (x.col(i) - before.x.col(i) - h * before.v.col(i)).squaredNorm() / (h * h);
+    return e.membrane + e.bending + e.gravity + kinetic;
+  };
+  Random random(2);
+  const Matrix3Xd forces = stepper.averageForces();
+  for (int k = 0; k < 5; ++k)
+  {
+    Matrix3Xd d(3, t.state.x.cols());
+    for (Eigen::Index i = 0; i < d.cols(); ++i)
+      d.col(i) = random.vector();
+    const double eps = 1e-5, slope = (energy(t.state.x + eps * d) - energy(t.state.x - eps * d)) / (2 * eps);
+    const double work = (forces.array() * Matrix3Xd(d * t.constraints->matrix().transpose()).array()).sum();
+    EXPECT_NEAR(slope, work, 1e-5 * std::abs(work)) << k;
+  }
+}
+
+TEST(ClothAverages, RefuseWhatCannotBe)
+{
+  Tracked t;
+  ClothOptions o = options(false);
+  o.integrator = Integrator::symplectic_euler;
+  EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
+  o = options(false);
+  o.solver = ClothSolver::cholesky;
+  EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
+  // held vertices that leave nothing of an average
+  Tracked held;
+  pinVertices(held.state, [&] {
+    std::vector<int> all;
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*held.model->averages, 0); entry; ++entry)
+      all.push_back(static_cast<int>(entry.col()));
+    return all;
+  }());
+  ClothStepper stuck(held.model, options(true));
+  const StepReport refused = held.step(stuck, held.guide, 0.01);
+  EXPECT_FALSE(refused.ok);
+  EXPECT_NE(refused.message.find("hold fewer vertices"), std::string::npos) << refused.message;
+  ClothStepper stepper(t.model, options(true));
+  const ClothState before = t.state;
+  t.inputs.averages = Matrix3Xd::Zero(3, 3);
+  StepReport report = stepper.step(t.state, t.inputs, 0.01);
+  EXPECT_FALSE(report.ok);
+  EXPECT_NE(report.message.find("number of averages"), std::string::npos) << report.message;
+  t.inputs.averages = Matrix3Xd::Constant(3, t.constraints->count(), NAN);
+  EXPECT_FALSE(stepper.step(t.state, t.inputs, 0.01).ok);
+  EXPECT_TRUE(t.state.x == before.x);
+}
+
+}  // namespace
+}  // namespace slender::test

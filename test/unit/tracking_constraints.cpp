@@ -1,0 +1,250 @@
+// Test functions, averaged constraints, regions, and the saddle-point solve behind them.
+#include <numeric>
+#include <set>
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "slender_sim/linalg/constrained_cholesky.h"
+#include "slender_sim/tracking/clustering.h"
+#include "slender_sim/tracking/weak_constraints.h"
+#include "test/support/cloths.h"
+
+namespace slender::test {
+namespace {
+
+template <class Action>
+std::string messageOf(Action action)
+{
+  try
+  {
+    action();
+  }
+  catch (const std::invalid_argument& e)
+  {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Subdivision, KeepsThePlaneAndTheCoarseVertices)
+{
+  const TriangleMesh coarse = gridMesh(2.0, 1.0, 4, 3, GridPattern::irregular);
+  const Subdivision fine = subdivide(coarse, 3);
+  EXPECT_EQ(fine.mesh.triangles.cols(), 64 * coarse.triangles.cols());
+  EXPECT_EQ(fine.mesh.vertices.leftCols(coarse.vertices.cols()), coarse.vertices);
+  EXPECT_LT((fine.mesh.vertices - coarse.vertices * fine.weights.transpose()).cwiseAbs().maxCoeff(), 1e-15);
+  EXPECT_NEAR(faceAreas(fine.mesh).sum(), 2.0, 1e-13);
+  EXPECT_EQ(meshTopology(fine.mesh).boundaries.size(), 1u);
+  EXPECT_THROW(subdivide(coarse, -1), std::invalid_argument);
+}
+
+TEST(WeakConstraints, MassMatrixIntegratesProductsOfHats)
+{
+  const TriangleMesh mesh = gridMesh(1.5, 1.0, 5, 4, GridPattern::irregular);
+  const MassMatrix mass = hatMassMatrix(mesh);
+  // int x y over the rectangle: linear functions are in the span of the hats
+  const VectorXd x = mesh.vertices.row(0), y = mesh.vertices.row(1);
+  EXPECT_NEAR(x.dot(mass * y), 0.5 * 1.5 * 1.5 * 0.5, 1e-14);
+  EXPECT_NEAR(VectorXd::Ones(x.size()).dot(mass * x), 0.5 * 1.5 * 1.5, 1e-14);
+  Matrix3Xd nodes(3, 4);
+  nodes << 0, 0.3, 0.7, 1.0, 0, 0, 0, 0, 0, 0, 0, 0;
+  const VectorXd s = nodes.row(0);
+  EXPECT_NEAR(s.dot(hatMassMatrix(nodes, false) * s), 1.0 / 3.0, 1e-15);
+  EXPECT_NEAR(hatMassMatrix(nodes, true).sum(), 2.0, 1e-15);
+}
+
+TEST(WeakConstraints, CloseUnderRigidMotionAndAreAreaIndependent)
+{
+  // guide half as large at rest as what tracks it: (6.3) keeps rigid transformations of both permissible
+  const TriangleMesh coarse = gridMesh(1.0, 1.0, 3, 3, GridPattern::alternating);
+  const Subdivision fine = subdivide(coarse, 2);
+  TriangleMesh guide = coarse;
+  guide.vertices *= 0.5;
+  const WeakConstraints constraints(subdivisionBasis(fine), hatMassMatrix(guide), hatMassMatrix(fine.mesh));
+  constraints.requireIndependent({});
+  EXPECT_EQ(constraints.count(), 16);
+  Random random(3);
+  const Eigen::Matrix3d R = random.rotation().toRotationMatrix();
+  const Vector3d shift = random.vector();
+  // a guide stretched as the rest shapes are has the same averages only for affine maps of the same surface
+  const Matrix3Xd q_guide = (R * coarse.vertices).colwise() + shift, q = (R * fine.mesh.vertices).colwise() + shift;
+  EXPECT_LT(constraints.error(constraints.averages(q_guide), q), 1e-15);
+  EXPECT_NEAR(constraints.error(constraints.averages(q_guide), q.colwise() + Vector3d(0, 0.25, 0)), 0.25, 1e-14);
+}
+
+TEST(WeakConstraints, NamesEmptyAndDependentFunctions)
+{
+  const TriangleMesh mesh = gridMesh(1.0, 1.0, 4, 4, GridPattern::alternating);
+  const int n = static_cast<int>(mesh.vertices.cols());
+  const MassMatrix mass = hatMassMatrix(mesh);
+  std::vector<int> all(n), left, right;
+  std::iota(all.begin(), all.end(), 0);
+  for (int v = 0; v < n; ++v)
+    (mesh.vertices(0, v) < 0.4 ? left : right).push_back(v);
+  const auto paint = [&](std::vector<PaintedRegion> r) { return WeakConstraints(paintedRegions(r, n, n), mass, mass); };
+  EXPECT_EQ(messageOf([&] { paint({{"left", left, left}, {"right", right, right}}).requireIndependent({}); }), "");
+  const std::string dependent = messageOf([&] { paint({{"left", left, left}, {"right", right, right}, {"all", all, all}}).requireIndependent({}); });
+  EXPECT_NE(dependent.find("'all' depends on 'left', 'right'"), std::string::npos) << dependent;
+  EXPECT_NE(messageOf([&] { paint({{"left", left, {}}}); }).find("'left': has no vertices on the tracked mesh"), std::string::npos);
+  EXPECT_NE(messageOf([&] { paint({{"left", {99}, left}}); }).find("vertex 99 is not on the guide mesh"), std::string::npos);
+  // held vertices leave nothing to act on
+  std::vector<char> held(n, 0);
+  for (const int v : all)
+    held[v] = mesh.vertices(0, v) < 0.6;
+  EXPECT_NE(messageOf([&] { paint({{"left", left, left}}).requireIndependent(held); }).find("'left' acts on held vertices only"), std::string::npos);
+  // an empty one: a vertex in no face
+  TriangleMesh loose = mesh;
+  loose.vertices.conservativeResize(3, n + 1);
+  loose.vertices.col(n).setZero();
+  const MassMatrix with_loose = hatMassMatrix(loose);
+  EXPECT_NE(messageOf([&] { WeakConstraints(paintedRegions({{"speck", {n}, {n}}}, n + 1, n + 1), with_loose, with_loose); }).find("'speck' is empty"),
+            std::string::npos);
+}
+
+TEST(ConstrainedCholesky, SolvesTheSaddlePointSystem)
+{
+  const TriangleMesh coarse = gridMesh(1.0, 1.0, 3, 3, GridPattern::alternating);
+  const Subdivision fine = subdivide(coarse, 2);
+  const int n = static_cast<int>(fine.mesh.vertices.cols());
+  const WeakConstraints constraints(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
+  const int m = constraints.count();
+  std::vector<Eigen::Triplet<double>> entries;
+  const PointMatrix bending = isometricBending(fine.mesh, meshTopology(fine.mesh), IsometricElement::nonconforming, 1e-3);
+  for (int i = 0; i < n; ++i)
+    for (int k = bending.starts()[i]; k < bending.starts()[i + 1]; ++k)
+      entries.emplace_back(i, bending.column(k), bending.values()[k]);
+  for (int i = 0; i < n; ++i)
+    entries.emplace_back(i, i, 1.0 + 0.01 * i);
+  const PointMatrix P(n, entries);
+  SparseCholesky factor;
+  factor.setPattern(P);
+  ConstrainedCholesky saddle;
+  saddle.setConstraints(constraints.matrix());
+  Random random(5);
+  for (const bool pinned : {false, true})
+  {
+    std::vector<char> fixed(n, 0);
+    fixed[2] = fixed[n - 1] = pinned;
+    ASSERT_TRUE(factor.factor(P, fixed.data()));
+    ASSERT_TRUE(saddle.factor(factor, fixed.data()));
+    PointVector r(4 * n, 0.0), z(4 * n, 0.0), g(4 * m, 0.0), mu(4 * m, 0.0);
+    for (int i = 0; i < n; ++i)
+      if (!fixed[i])
+        point(r, i) = random.vector();
+    for (int i = 0; i < m; ++i)
+      point(g, i) = random.vector();
+    saddle.solve(r.data(), g.data(), z.data(), mu.data());
+    MatrixXd dense = MatrixXd::Zero(n + m, n + m);
+    dense.topLeftCorner(n, n) = MatrixXd(P.toEigen());
+    dense.bottomLeftCorner(m, n) = MatrixXd(constraints.matrix());
+    for (int i = 0; i < n; ++i)
+      if (fixed[i])
+      {
+        dense.row(i).setZero();
+        dense.col(i).setZero();
+        dense(i, i) = 1.0;
+      }
+    dense.topRightCorner(n, m) = dense.bottomLeftCorner(m, n).transpose();
+    MatrixXd right(n + m, 3), solution(n + m, 3);
+    right << matrixOf(r).transpose(), matrixOf(g).transpose();
+    solution << matrixOf(z).transpose(), matrixOf(mu).transpose();
+    const MatrixXd expected = dense.partialPivLu().solve(right);
+    EXPECT_LT((solution - expected).norm(), 1e-10 * expected.norm()) << pinned;
+    // what it is for: the constraints hold to rounding
+    EXPECT_LT((dense.bottomLeftCorner(m, n) * solution.topRows(n) - right.bottomRows(m)).cwiseAbs().maxCoeff(), 1e-12);
+  }
+  ConstrainedCholesky::Constraints twice(2, n);
+  twice.insert(0, 4) = twice.insert(1, 4) = 1.0;
+  ConstrainedCholesky dependent;
+  dependent.setConstraints(twice);
+  EXPECT_FALSE(dependent.factor(factor, nullptr));
+}
+
+/// Two stiff plates beside each other with a hinge between them at x = 0, of which only one frame shows the bend.
+std::vector<Matrix3Xd> foldingFrames(const TriangleMesh& mesh)
+{
+  std::vector<Matrix3Xd> frames;
+  for (int t = 0; t <= 20; ++t)
+  {
+    Matrix3Xd x = mesh.vertices;
+    const double angle = 2.0 * std::sin(M_PI * t / 20.0);
+    for (int v = 0; v < x.cols(); ++v)
+      if (x(0, v) > 0)
+        x.col(v) = Eigen::AngleAxisd(-angle, Vector3d::UnitY()) * x.col(v);
+    frames.push_back(x);
+  }
+  return frames;
+}
+
+TriangleMesh plate()
+{
+  TriangleMesh mesh = gridMesh(2.0, 0.9, 30, 14, GridPattern::alternating);
+  mesh.vertices.row(0).array() -= 1.2;   // the seam is not where regions of equal size would meet
+  return mesh;
+}
+
+TEST(Clustering, FindsTheSeamOfAnAnimationOnly)
+{
+  const TriangleMesh mesh = plate();
+  const auto frames = foldingFrames(mesh);
+  const auto across = [&](const std::vector<int>& region) {
+    // faces whose region lies on both sides of the hinge
+    std::map<int, std::pair<int, int>> sides;
+    for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+    {
+      double x = 0;
+      for (const int v : mesh.triangles.col(f))
+        x += mesh.vertices(0, v) / 3.0;
+      ++(x > 0 ? sides[region[f]].first : sides[region[f]].second);
+    }
+    int wrong = 0;
+    for (const auto& [r, count] : sides)
+      wrong += std::min(count.first, count.second);
+    return wrong;
+  };
+  ClusteringOptions options;
+  options.regions = 6;
+  options.compactness = 0.3;
+  const Clustering moving = clusterFaces(mesh.triangles, frames, options), still = clusterFaces(mesh.triangles, {frames[0]}, options);
+  EXPECT_EQ(moving.frames.size(), 20u);
+  EXPECT_EQ(across(moving.region), 0);
+  EXPECT_GT(across(still.region), 20);
+  for (const Clustering& c : {moving, still})
+  {
+    EXPECT_EQ(std::set<int>(c.region.begin(), c.region.end()).size(), 6u);
+    EXPECT_LT(c.iterations, options.max_iterations);
+    // functions of the regions sum to 1 and are independent
+    const TestFunctions functions = regionBasis(mesh, c.region);
+    EXPECT_LT((Eigen::RowVectorXd::Ones(6) * functions.tracked - Eigen::RowVectorXd::Ones(mesh.vertices.cols())).cwiseAbs().maxCoeff(), 1e-14);
+    WeakConstraints(functions, hatMassMatrix(mesh), hatMassMatrix(mesh)).requireIndependent({});
+  }
+  EXPECT_EQ(clusterFaces(mesh.triangles, frames, options).region, moving.region);
+  options.seed = 2;
+  EXPECT_NE(clusterFaces(mesh.triangles, frames, options).region, moving.region);
+}
+
+TEST(Clustering, RefusesWithReason)
+{
+  const TriangleMesh mesh = plate();
+  ClusteringOptions options;
+  options.regions = 0;
+  EXPECT_NE(messageOf([&] { clusterFaces(mesh.triangles, {mesh.vertices}, options); }).find("regions must be from 1"), std::string::npos);
+  options.regions = 4;
+  EXPECT_NE(messageOf([&] { clusterFaces(mesh.triangles, {}, options); }).find("at least one frame"), std::string::npos);
+  EXPECT_NE(messageOf([&] { clusterFaces(mesh.triangles, {mesh.vertices, mesh.vertices.leftCols(5)}, options); }).find("frame 1 has 5 vertices"),
+            std::string::npos);
+  TriangleMesh two = mesh;
+  two.vertices.conservativeResize(3, 2 * mesh.vertices.cols());
+  two.vertices.rightCols(mesh.vertices.cols()) = mesh.vertices.colwise() + Vector3d(0, 0, 1);
+  two.triangles.conservativeResize(3, 2 * mesh.triangles.cols());
+  two.triangles.rightCols(mesh.triangles.cols()) = mesh.triangles.array() + mesh.vertices.cols();
+  options.regions = 1;
+  EXPECT_NE(messageOf([&] { clusterFaces(two.triangles, {two.vertices}, options); }).find("2 connected parts"), std::string::npos);
+  options.regions = 2;
+  const Clustering c = clusterFaces(two.triangles, {two.vertices}, options);
+  EXPECT_NE(c.region.front(), c.region.back());
+}
+
+}  // namespace
+}  // namespace slender::test
