@@ -57,6 +57,7 @@ void runFlag(StudyContext&);
 void runDrape(StudyContext&);
 void runFabricDrape(StudyContext&);
 void runStiffnessRange(StudyContext&);
+void runRubberBand(StudyContext&);
 void runBreathingSurface(StudyContext&);
 void runTrackingMethods(StudyContext&);
 void runPartitions(StudyContext&);
@@ -120,6 +121,7 @@ const std::vector<Study>& studies()
       {"fabric_drape", "drape coefficient (Cusick) and droop of strips of silk, cotton, wool and denim against published values", runFabricDrape},
       {"drape", "a sheet draped over a sphere, as thesis figure 2.2: isometric bending beside hinges, shapes and wrinkles", runDrape},
       {"stiffness_range", "draped sheets of bending over membrane stiffness 1e-5, 1e-3, 1e-2, as thesis figure 2.3: isometric bending beside hinges", runStiffnessRange},
+      {"rubber_band", "an elastic curve that follows an accelerated guide (thesis figure 6.3): averaged against pointwise constraints", runRubberBand},
       {"breathing_surface", "a guide that rapidly expands and contracts (thesis figure 6.4): averaged against pointwise constraints", runBreathingSurface},
       {"tracking_methods", "error against run time of ways to keep averages: Lagrange multipliers, penalty, manifold projection", runTrackingMethods},
       {"partitions", "16 to 1024 regions, of one size and of two, set the scale of folds (thesis figures 6.5, 6.6)", runPartitions},
