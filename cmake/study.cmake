@@ -13,10 +13,11 @@ target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/incl
 target_link_libraries(slender_sim_studies PUBLIC slender_sim)
 
 # `study` is too common a name for a target in a shared catkin workspace.
-add_executable(slender_sim_study_program ${PROJECT_SOURCE_DIR}/src/tools/study.cpp)
+set(TOOLS ${PROJECT_SOURCE_DIR}/src/tools)
+add_executable(slender_sim_study_program ${TOOLS}/study.cpp ${TOOLS}/study_report.cpp ${TOOLS}/report_page.cpp ${TOOLS}/processes.cpp)
 set_target_properties(slender_sim_study_program PROPERTIES OUTPUT_NAME study)
-target_link_libraries(slender_sim_study_program PRIVATE slender_sim_studies)
-add_executable(slender_sim_sweep_program ${PROJECT_SOURCE_DIR}/src/tools/sweep.cpp)
+target_link_libraries(slender_sim_study_program PRIVATE slender_sim_studies yaml-cpp)
+add_executable(slender_sim_sweep_program ${TOOLS}/sweep.cpp ${TOOLS}/sweep_runs.cpp ${TOOLS}/sweep_engines.cpp ${TOOLS}/processes.cpp)
 set_target_properties(slender_sim_sweep_program PROPERTIES OUTPUT_NAME sweep)
 target_link_libraries(slender_sim_sweep_program PRIVATE slender_sim_studies)
 install(TARGETS slender_sim_study_program slender_sim_sweep_program RUNTIME DESTINATION ${INSTALL_BIN})

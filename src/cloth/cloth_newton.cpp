@@ -26,16 +26,8 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
     point(trial_, i) = ahead ? end : Eigen::Vector3d(point(system.start(), i));
     point(d_, i) = end - point(trial_, i);
   }
-  if (model->averages)   // conjugate gradients keep what the first guess meets
-  {
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      x_[i] = trial_[i] + d_[i];
-    system.meetAverages(averages_, x_);
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      d_[i] = x_[i] - trial_[i];
-  }
   system.evaluateHessian(trial_, HessianKind::semidefinite);
-  if (!system.solve(d_, nullptr, report.linear_iterations, report.factorizations))
+  if (!system.solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, model->averages ? &averages_ : nullptr))
     return StepFailure::singular_matrix;
   ++report.iterations;
   for (std::size_t i = 0; i < x_.size(); ++i)

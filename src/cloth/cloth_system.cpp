@@ -323,31 +323,31 @@ void ClothSystem::averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) c
       averages.col(i) += entry.value() * point(x, entry.col());
 }
 
-void ClothSystem::meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x)
+void ClothSystem::setGap(const Eigen::Matrix3Xd& averages, const PointVector& x)
 {
   averagesOf(x, averages_now_);
   for (Eigen::Index i = 0; i < averages.cols(); ++i)
     point(gap_, i) = averages.col(i) - averages_now_.col(i);
+}
+
+void ClothSystem::meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x)
+{
+  constexpr double kRounding = 4e-15;   // of the coordinates: what is left after one solve, or conjugate gradients that began there
+  setGap(averages, x);
+  if ((averages - averages_now_).cwiseAbs().maxCoeff() <= kRounding * averages.cwiseAbs().maxCoeff())
+    return;
   std::fill(right_.begin(), right_.end(), 0.0);
   averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
   for (std::size_t i = 0; i < x.size(); ++i)
     x[i] += correction_[i];
 }
 
-void ClothSystem::takeOutMultipliers(PointVector& r)
-{
-  const auto& c = *model_.averages;
-  for (Eigen::Index i = 0; i < c.rows(); ++i)
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
-      point(r, entry.col()) -= entry.value() * point(multipliers_, i);
-}
-
 void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces)
 {
   std::copy(gradient_.begin(), gradient_.end(), right_.begin());
   clearHeld(right_);
-  averages_->solve(right_.data(), nullptr, correction_.data(), multipliers_.data());
-  takeOutMultipliers(gradient_);
+  averages_->multipliers(right_.data(), multipliers_.data());
+  averages_->takeOut(multipliers_.data(), gradient_.data());
   forces.resize(3, model_.averageCount());
   for (Eigen::Index i = 0; i < forces.cols(); ++i)
     forces.col(i) = point(multipliers_, i);
@@ -355,19 +355,39 @@ void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces)
 
 /// z = P r, among directions that leave the averages alone. What the averages balance is taken out of r, where it would drown the rest in rounding errors
 /// [Gould, Hribar, Nocedal, SIAM J. Sci. Comput. 23 (2001), 5].
-void ClothSystem::precondition(PointVector& r, PointVector& z)
+void ClothSystem::preconditionWithin(PointVector& r, PointVector& z)
 {
-  if (!averages_)
-  {
-    preconditioner_->apply(r, z);
-    return;
-  }
   averages_->solve(r.data(), nullptr, z.data(), multipliers_.data());
-  takeOutMultipliers(r);
-  clearHeld(r);
+  averages_->takeOut(multipliers_.data(), r.data());
 }
 
-bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance)
+/// Before conjugate gradients with averages: takes out of right_ what these balance. With `averages` d is moved there, and on by a step of the preconditioned gradient, which comes for nothing; returns what
+/// the load on the cloth was without the forces of the averages, which the tolerance counts from as it does for a cloth without.
+double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages)
+{
+  if (!averages)
+  {
+    averages_->multipliers(right_.data(), multipliers_.data());
+    averages_->takeOut(multipliers_.data(), right_.data());
+    return 0.0;
+  }
+  for (std::size_t i = 0; i < d.size(); ++i)
+    product_[i] = start_[i] + d[i];
+  setGap(*averages, product_);
+  const double load = averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
+  averages_->takeOut(multipliers_.data(), right_.data());
+  applyMatrix(correction_, product_);
+  clearHeld(product_);
+  for (std::size_t i = 0; i < d.size(); ++i)
+  {
+    d[i] += correction_[i];
+    right_[i] -= product_[i];
+  }
+  return load;
+}
+
+bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance,
+                        const Eigen::Matrix3Xd* averages)
 {
   if (!independent_)
     return false;
@@ -403,15 +423,20 @@ bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_itera
     preconditioner_->align(*at, matrix_, held_);
   else
     preconditioner_->useConstant();
-  if (averages_)
-    precondition(right_, correction_);
+  const double reference = averages_ ? takeFirstStep(d, averages) : 0.0;
   const LinearResult result = cg_.solve(
     right_, correction_, tolerance > 0 ? tolerance : linear_tolerance_, 2000,
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);
     },
-    [&](PointVector& r, PointVector& z) { precondition(r, z); });
+    [&](PointVector& r, PointVector& z) {
+      if (averages_)
+        preconditionWithin(r, z);
+      else
+        preconditioner_->apply(r, z);
+    },
+    reference);
   linear_iterations += result.iterations;
   for (std::size_t i = 0; i < d.size(); ++i)
     d[i] += correction_[i];

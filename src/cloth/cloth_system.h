@@ -69,7 +69,11 @@ public:
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
   /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `tolerance`: theirs, 0: that of the options.
   /// False: not positive definite. The numbers grow by what was needed.
-  bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0);
+  /// Averages stay what the first guess makes them; with `averages` (3 x count) the points x + d, x the start of the stage, get these.
+  bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0,
+             const Eigen::Matrix3Xd* averages = nullptr);
+  /// The blocks of solve()'s matrix as last evaluated; those of isometric bending are among them only for Cholesky.
+  const BlockMatrix& matrix() const { return matrix_; }
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
 
@@ -95,9 +99,10 @@ private:
   void setWeights(double tau, double ratio);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
-  void precondition(PointVector& r, PointVector& z);
-  /// r -= C^T multipliers
-  void takeOutMultipliers(PointVector& r);
+  /// gap_: by how much the averages at x fall short.
+  void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
+  void preconditionWithin(PointVector& r, PointVector& z);
+  double takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages);
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
 
   const ClothModel& model_;

@@ -54,6 +54,9 @@ bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
   };
   fill(v, v_);
   fill(Constraints(v.transpose()), v_transposed_);
+  Constraints free = c_.transpose();
+  free.prune([fixed](Eigen::Index point, Eigen::Index, double) { return !fixed || !fixed[point]; });
+  fill(free, c_transposed_);
   const Eigen::MatrixXd s = Eigen::MatrixXd(Constraints(v * v.transpose()));
   const Eigen::LLT<Eigen::MatrixXd> factor(s);
   if (factor.info() != Eigen::Success || !s.allFinite() || (m > 0 && !(factor.rcond() > 1e-14)))
@@ -69,10 +72,17 @@ bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
   return true;
 }
 
-void ConstrainedCholesky::solve(const double* r, const double* g, double* z, double* mu) const
+double ConstrainedCholesky::solve(const double* r, const double* g, double* z, double* mu) const
 {
-  const int m = count();
+  const int m = count(), n = static_cast<int>(c_.cols());
   p_->forwardPoints(r, y_.data());
+  double square = 0.0;
+  if (g)
+  {
+    std::copy_n(g, 4 * m, t_.data());
+    s_inverse_.multiply(0.0, t_.data(), mu_.data());
+    square = pointKernels().dot(n, y_.data(), y_.data()) + pointKernels().dot(m, t_.data(), mu_.data());
+  }
   v_.multiply(0.0, y_.data(), t_.data());
   for (int i = 0; g && i < 4 * m; ++i)
     t_[i] -= g[i];
@@ -80,6 +90,21 @@ void ConstrainedCholesky::solve(const double* r, const double* g, double* z, dou
   std::copy_n(mu_.data(), 4 * m, mu);
   v_transposed_.multiply(-1.0, mu_.data(), y_.data());
   p_->backwardPoints(y_.data(), z);
+  return std::sqrt(square);
+}
+
+void ConstrainedCholesky::multipliers(const double* r, double* mu) const
+{
+  p_->forwardPoints(r, y_.data());
+  v_.multiply(0.0, y_.data(), t_.data());
+  s_inverse_.multiply(0.0, t_.data(), mu_.data());
+  std::copy_n(mu_.data(), 4 * count(), mu);
+}
+
+void ConstrainedCholesky::takeOut(const double* mu, double* r) const
+{
+  std::copy_n(mu, 4 * count(), mu_.data());
+  c_transposed_.multiply(-1.0, mu_.data(), r);
 }
 
 }  // namespace slender

@@ -78,6 +78,7 @@ SweepPlot readPlot(const YamlCursor& at)
   assign(plot.by, map.get("by").text());
   plot.x_label = plot.x;
   plot.y_label = plot.y;
+  plot.log = map.get("log").boolean().value_or(false);
   const YamlCursor labels = map.get("labels");
   if (labels.present())
   {

@@ -18,6 +18,11 @@ using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846, kGravity = 9.81;
 constexpr double kDisc = 0.15, kSupport = 0.09;   // radii [m]
+// As in the test, the rim is lowered, not dropped: its weight comes on over this time. Folds are multistable, and in a fall those win that grow
+// fastest, which the damping of the integrator decides: silk dropped at once came to rest at 0.34 (implicit, 10 ms) and 0.28 (explicit), each
+// an equilibrium that the other integrator keeps.
+constexpr double kLowering = 1.5, kMostWaiting = 2.1;              // [s]
+constexpr double kRestInterval = 0.2, kRestDisplacement = 1e-4;    // [s, m] at rest: no vertex has moved farther
 
 struct Fabric
 {
@@ -163,10 +168,28 @@ int folds(const Eigen::Matrix3Xd& x, const MeshTopology& topology)
 
 struct Draped
 {
-  double coefficient = 0, speed = 0, ms_per_step = 0;
+  double coefficient = 0, ms_per_step = 0;
+  double moved = 0;   ///< farthest in the last interval [m]
   int folds = 0;
   Eigen::Matrix3Xd x;
 };
+
+/// No specimen is quite flat: gentle waves of the overhang, about 1 mm at the rim, whatever the mesh. They, not its irregularities, decide on the folds.
+void addCreases(unsigned seed, Eigen::Matrix3Xd& x)
+{
+  constexpr double kAmplitude = 5e-4;   // [m] of each wave
+  std::mt19937 random(seed);
+  std::normal_distribution<double> amplitude(0.0, kAmplitude);
+  for (int wave = 2; wave <= 12; ++wave)
+  {
+    const double c = amplitude(random), s = amplitude(random);
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+    {
+      const double angle = std::atan2(x(1, i), x(0, i)), overhang = (x.col(i).head<2>().norm() - kSupport) / (kDisc - kSupport);
+      x(2, i) += std::max(0.0, overhang) * overhang * (c * std::cos(wave * angle) + s * std::sin(wave * angle));
+    }
+  }
+}
 
 Draped drapeFabric(StudyContext& context, const Fabric& fabric, const Disc& disc, Integrator integrator, unsigned seed)
 {
@@ -175,18 +198,12 @@ Draped drapeFabric(StudyContext& context, const Fabric& fabric, const Disc& disc
   model.bending_modulus = fabric.bending;
   model.mass_damping = 8.0;
   ClothSetup cloth(std::move(model));
+  addCreases(seed, cloth.state.x);
   cloth.pin(disc.pinned);
-  cloth.inputs.gravity = Vector3d(0, 0, -kGravity);
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> shift(-1e-4, 1e-4);   // some wave or other has to win
-  for (Eigen::Index i = 0; i < cloth.state.x.cols(); ++i)
-    if (!std::binary_search(disc.pinned.begin(), disc.pinned.end(), static_cast<int>(i)))
-      cloth.state.x(2, i) += shift(random);
   ClothOptions options;
   options.integrator = integrator;
   options.one_newton_step = true;
   ClothStepper stepper(cloth.model, options);
-  const double end = context.quick() ? 2.0 : 3.0;   // [s]
   double h = 1e-2;
   if (integrator == Integrator::symplectic_euler)   // half the time in which a wave runs along the shortest edge
   {
@@ -196,21 +213,28 @@ Draped drapeFabric(StudyContext& context, const Fabric& fabric, const Disc& disc
       shortest = std::min(shortest, (disc.mesh.vertices.col(edges(0, e)) - disc.mesh.vertices.col(edges(1, e))).norm());
     h = 0.5 * shortest / std::sqrt(kTensile / fabric.area_density);
   }
-  const int steps = static_cast<int>(std::ceil(end / h));
+  const int steps = static_cast<int>(std::ceil(kRestInterval / h)), intervals = static_cast<int>(std::lround((kLowering + kMostWaiting) / kRestInterval));
+  const double step = kRestInterval / steps;
   const std::string label = std::string(fabric.name) + ", " + toString(integrator);
-  const double start = threadSeconds();
-  for (int k = 0; k < steps; ++k)
-  {
-    if (k % 20 == 0)
-      context.progress(k, steps, label);
-    const StepReport report = stepper.step(cloth.state, cloth.inputs, end / steps);
-    if (!report.ok)
-      throw std::runtime_error("fabric_drape: " + label + " refused: " + report.message);
-  }
   Draped draped;
-  draped.ms_per_step = 1e3 * (threadSeconds() - start) / steps;
+  const double start = threadSeconds();
+  int interval = 0;
+  for (double t = 0.0; interval < intervals && (t < kLowering + kRestInterval || draped.moved > kRestDisplacement); ++interval)
+  {
+    context.progress(interval, intervals, label);
+    const Eigen::Matrix3Xd before = cloth.state.x;
+    for (int k = 0; k < steps; ++k)
+    {
+      t = interval * kRestInterval + (k + 1) * step;
+      cloth.inputs.gravity.z() = -kGravity * std::min(1.0, t / kLowering);
+      const StepReport report = stepper.step(cloth.state, cloth.inputs, step);
+      if (!report.ok)
+        throw std::runtime_error("fabric_drape: " + label + " refused: " + report.message);
+    }
+    draped.moved = (cloth.state.x - before).colwise().norm().maxCoeff();
+  }
+  draped.ms_per_step = 1e3 * (threadSeconds() - start) / (interval * steps);
   draped.x = cloth.state.x;
-  draped.speed = cloth.state.v.colwise().norm().maxCoeff();
   draped.coefficient = drapeCoefficient(disc.mesh, draped.x);
   draped.folds = folds(draped.x, cloth.model->topology);
   return draped;
@@ -225,8 +249,8 @@ void drapes(StudyContext& context)
     int rings;
     Integrator integrator;
   };
-  const int coarse = context.quick() ? 10 : 12, fine = context.quick() ? 13 : 18;
-  const unsigned drapes = context.quick() ? 1 : 3;   // the test, too, is repeated: waves differ from drape to drape
+  const int coarse = context.quick() ? 8 : 12, fine = context.quick() ? 11 : 18;
+  const unsigned drapes = context.quick() ? 2 : 3;   // the test, too, is repeated: waves differ from drape to drape
   for (const Fabric& fabric : kFabrics)
   {
     double least = 1.0, most = 0.0, finest = 0.0;
@@ -234,14 +258,16 @@ void drapes(StudyContext& context)
                           Case{fine, Integrator::implicit_euler}})
     {
       const Disc disc = drapeDisc(c.rings);
-      double mean = 0.0, ms = 0.0, speed = 0.0;
+      double mean = 0.0, lowest = 1.0, highest = 0.0, ms = 0.0, moved = 0.0;
       std::string waves;
       for (unsigned seed = 1; seed <= drapes; ++seed)
       {
         const Draped d = drapeFabric(context, fabric, disc, c.integrator, seed);
         mean += d.coefficient / drapes;
         ms += d.ms_per_step / drapes;
-        speed = std::max(speed, d.speed);
+        moved = std::max(moved, d.moved);
+        lowest = std::min(lowest, d.coefficient);
+        highest = std::max(highest, d.coefficient);
         waves += (seed > 1 ? " " : "") + std::to_string(d.folds);
         if (c.rings == fine && seed == 1)
         {
@@ -251,8 +277,8 @@ void drapes(StudyContext& context)
         }
       }
       context.row().set("case", "drape").set("fabric", fabric.name).set("integrator", toString(c.integrator))
-        .set("vertices", static_cast<double>(disc.mesh.vertices.cols())).set("coefficient", mean).set("waves", waves)
-        .set("speed_left_mm_s", 1e3 * speed).set("ms_per_step", ms);
+        .set("vertices", static_cast<double>(disc.mesh.vertices.cols())).set("coefficient", mean).set("lowest_drape", lowest)
+        .set("highest_drape", highest).set("waves", waves).set("moved_last_mm", 1e3 * moved).set("ms_per_step", ms);
       least = std::min(least, mean);
       most = std::max(most, mean);
       finest = mean;
@@ -294,6 +320,7 @@ void runFabricDrape(StudyContext& context)
   useOneBlasThread();
   drapes(context);
   droops(context);
+  context.note("drape: lowered over 1.5 s, then left until no vertex moves farther than 0.1 mm in 0.2 s, but at most 2.1 s (moved_last_mm: what was left).");
   context.note("coefficient: (shadow - support) / (disc - support), the mean of the drapes; waves: the strongest along the edge, drape by drape");
 }
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include <Eigen/Eigenvalues>
+
 #include "belt_pattern.h"
 
 namespace slender::study {
@@ -106,6 +108,85 @@ private:
   double belt_ = 0.0, thinnest_ = std::numeric_limits<double>::infinity();
 };
 
+/// How far the first rod ever leaves a plane. What buckles out of it does so by a third of its width and more; ends that are not quite in
+/// line bend it out by less.
+class Planarity : public Measure
+{
+public:
+  void look(const Simulation& simulation) override
+  {
+    const Eigen::Matrix3Xd& x = simulation.state().rods[0].x;
+    const Eigen::Matrix3Xd centered = x.colwise() - x.rowwise().mean();
+    const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(centered * centered.transpose()).eigenvalues().cwiseMax(0).cwiseSqrt();
+    farthest_ = std::max(farthest_, spread[0] / spread[2]);
+  }
+  Row finish() const override { return Row().set("shape", farthest_ < 0.2 ? "planar" : "spatial").set("thickness_over_width", farthest_); }
+  static std::unique_ptr<Measure> make(const SceneConfig& scene)
+  {
+    if (scene.rods.empty())
+      throw std::invalid_argument("planarity: the scene has no rod");
+    return std::make_unique<Planarity>();
+  }
+
+private:
+  double farthest_ = 0.0;
+};
+
+/// Whether the first thread, held at both ends at one height, stops as a U on its way down or hangs on as a catenary (thesis 5.5).
+class Sagging : public Measure
+{
+public:
+  explicit Sagging(const ThreadConfig& thread) : thread_(thread) {}
+
+  void look(const Simulation& simulation) override
+  {
+    const ThreadState& s = simulation.state().threads[0].threads[0];
+    const double time = simulation.state().time;
+    if (distance_ == 0.0)
+    {
+      distance_ = (s.x[s.nodes() - 1] - s.x[0]).norm();
+      middle_ = 0.5 * (s.x[0] + s.x[s.nodes() - 1]);
+      speed_unit_ = thread_.density * simulation.config().gravity.norm() * distance_ * distance_ / thread_.viscosity;
+    }
+    const double sag = middle_.z() - heightOfMiddle(s);
+    if (over_ || simulation.state().threads[0].threads.size() > 1 || sag > distance_)
+      over_ = true;
+    else if (time * speed_unit_ > distance_ && sag > 0.02 * distance_)   // it has got going
+      slowest_ = std::min(slowest_, (sag - sag_) / (time - time_) / speed_unit_);
+    if (!over_)
+      sag_ = sag;
+    time_ = time;
+  }
+  Row finish() const override
+  {
+    // 0.18: the lowest of a string without surface tension or inertia; a fifth of that has all but stopped
+    return Row().set("shape", slowest_ < 0.035 ? "U" : "catenary").set("slowest", slowest_).set("sag_over_distance", sag_ / distance_);
+  }
+  static std::unique_ptr<Measure> make(const SceneConfig& scene)
+  {
+    if (scene.threads.empty() || !scene.threads[0].held[0] || !scene.threads[0].held[1])
+      throw std::invalid_argument("sagging: the scene's first thread is not held at both ends");
+    return std::make_unique<Sagging>(scene.threads[0]);
+  }
+
+private:
+  double heightOfMiddle(const ThreadState& s) const
+  {
+    for (int j = 0; j < s.edges(); ++j)
+    {
+      const double from = s.x[j].x() - middle_.x(), to = s.x[j + 1].x() - middle_.x();
+      if (from <= 0 && to > 0)
+        return s.x[j].z() - from / (to - from) * (s.x[j + 1].z() - s.x[j].z());
+    }
+    return middle_.z();
+  }
+
+  const ThreadConfig thread_;
+  Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();
+  double distance_ = 0.0, speed_unit_ = 0.0, sag_ = 0.0, time_ = 0.0, slowest_ = std::numeric_limits<double>::infinity();
+  bool over_ = false;
+};
+
 }  // namespace
 
 const std::vector<MeasureKind>& measureKinds()
@@ -116,6 +197,9 @@ const std::vector<MeasureKind>& measureKinds()
       {"loads", "largest force and torque on a grasp", {"force_max [N]", "torque_max [N m]"}, &Loads::make},
       {"belt_pattern", "what the first thread draws on its belt",
        {"pattern", "amplitude [m]", "frequency_across [rad/s]", "frequency_along [rad/s]", "windings", "swing [turns]"}, &BeltPattern::make},
+      {"planarity", "whether the first rod stays in a plane", {"shape", "thickness_over_width"}, &Planarity::make},
+      {"sagging", "whether the first thread, held at both ends, stops as a U or sags on as a catenary; slowest in units of rho g L^2 / mu",
+       {"shape", "slowest", "sag_over_distance"}, &Sagging::make},
   };
   return kinds;
 }

@@ -116,8 +116,9 @@ void writeScript(std::ostream& out, const Plot& plot, const std::string& picture
   index = 0;
   for (const Series& s : plot.series)
   {
-    out << (index ? ", \\\n     " : "") << "$series" << index << " using 1:2 with " << (!plot.lines || s.points ? "points" : plot.markers ? "linespoints" : "lines");
-    if (!plot.lines || s.points || plot.markers)
+    const bool line = s.line || (plot.lines && !s.points), markers = !s.line && (!line || plot.markers);
+    out << (index ? ", \\\n     " : "") << "$series" << index << " using 1:2 with " << (!line ? "points" : markers ? "linespoints" : "lines");
+    if (markers)
       out << " pointtype " << index % 13 + 4;
     out << " title " << gnuplotString(s.label);
     ++index;
@@ -231,6 +232,22 @@ std::string csvCell(const std::string& text)
   for (const char c : text)
     out += c == '"' ? std::string("\"\"") : std::string(1, c);
   return out + "\"";
+}
+
+std::vector<std::string> csvCells(const std::string& line)
+{
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i)
+    if (line[i] == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"')
+      cells.back() += line[i++];
+    else if (line[i] == '"')
+      quoted = !quoted;
+    else if (line[i] == ',' && !quoted)
+      cells.emplace_back();
+    else
+      cells.back() += line[i];
+  return cells;
 }
 
 std::string valueText(const Row& row, const std::string& key)

@@ -38,6 +38,7 @@ void runMerging(StudyContext&);
 void runFiberExtrusion(StudyContext&);
 void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
+void runThreadAccuracy(StudyContext&);
 void runThreadStability(StudyContext&);
 void runSewingMachine(StudyContext&);
 void runThreadTables(StudyContext&);
@@ -63,6 +64,8 @@ void runTrackingMethods(StudyContext&);
 void runPartitions(StudyContext&);
 void runClustering(StudyContext&);
 void runTrackingStability(StudyContext&);
+void runTrackingOverhead(StudyContext&);
+void runTrackingExactness(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -106,6 +109,7 @@ const std::vector<Study>& studies()
       {"thread_tables", "time per frame of the thesis's thread examples and of hair, beside its table 5.1", runThreadTables},
       {"sagging", "viscous threads that sag between plates: paths in time, catenary or U", runSagging},
       {"thread_implicit_vs_explicit", "a coiling thread: largest steps and cost of implicit against explicit integration", runThreadImplicitVsExplicit},
+      {"thread_accuracy", "error against run time of a viscous thread that sags between two plates", runThreadAccuracy},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
       {"cloth_collision_safety", "continuous tests of a million pairs, none missed; scenes in which cloth never passes through anything", runClothCollisionSafety},
       {"willmore_sphere", "an icosahedron and rough spheres that Willmore flow makes round: int H^2 against 16 pi", runWillmoreSphere},
@@ -127,6 +131,8 @@ const std::vector<Study>& studies()
       {"partitions", "16 to 1024 regions, of one size and of two, set the scale of folds (thesis figures 6.5, 6.6)", runPartitions},
       {"clustering", "regions of a walking character: animation-aware clustering beside static (thesis figure 6.7)", runClustering},
       {"tracking_stability", "guides that collapse, explode, jump or are not numbers, constraints that conflict: done or refused with reason", runTrackingStability},
+      {"tracking_overhead", "steps of cloth with and without tracking, in the sizes of the thesis's table 6.1, beside it", runTrackingOverhead},
+      {"tracking_exactness", "averages of tracked cloths against their guides' after every step: box, breathing surface, wind, jumps, contact", runTrackingExactness},
   };
   return all;
 }

@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <string>
 
 #include "rod_cases.h"
 #include "slender_sim/study/cpu_clock.h"
 #include "slender_sim/study/study.h"
+#include "work_precision.h"
 
 namespace slender::study {
 namespace {
@@ -127,7 +129,7 @@ void runSwing(StudyContext& context)
       candidates.push_back({kNodes - 1, timeConfig(Integrator::symplectic_euler, step), "fixed step"});
   }
 
-  Plot& plot = context.plot("swing_pareto", "Swinging rod, 200 nodes: tip error at 1 s against run time", "CPU seconds per simulated second", "tip error [mm]");
+  WorkPrecision front(context, "swing_pareto", "Swinging rod, 200 nodes", "tip error at 1 s [mm]", 1e3);
   double at8 = std::numeric_limits<double>::infinity(), at06 = at8;
   std::string best8 = "none", best06 = "none";
   int done = 0;
@@ -140,8 +142,9 @@ void runSwing(StudyContext& context)
     const double error = run.ok ? 1e3 * (run.tip - converged).norm() : std::numeric_limits<double>::quiet_NaN();
     Row& row = context.row();
     row.set("integrator", name).set("how", candidate.how).set("edges", candidate.edges).set("step_s", candidate.time.step);
-    row.set("newton_tolerance", candidate.time.newton.tolerance).set("tip_error_mm", error).set("cpu_per_second", run.cpu_seconds);
+    row.set("newton_tolerance", candidate.time.newton.tolerance).set("tip_error_mm", error);
     row.set("steps", run.steps).set("iterations", run.iterations).set("cuts", run.cuts).set("energy_drift", run.energy_drift);
+    row.set("cpu_per_second", run.cpu_seconds);
     if (!run.ok)
       row.set("failure", run.message);
     if (candidate.edges != kNodes - 1 || !run.ok)
@@ -154,12 +157,9 @@ void runSwing(StudyContext& context)
       at8 = run.cpu_seconds, best8 = setting;
     if (counts && error <= 0.6 && run.cpu_seconds < at06)
       at06 = run.cpu_seconds, best06 = setting;
-    if (candidate.how == "fixed step" && candidate.time.newton.tolerance > 2e-6)
-      continue;
-    Series& s = plot.at(candidate.how == "fixed step" ? name : std::string(name) + " adaptive");
-    s.x.push_back(run.cpu_seconds);
-    s.y.push_back(error);
+    front.add(row, candidate.how == "fixed step" ? name : std::string(name) + " adaptive", setting + std::strlen(name) + 2, error, run.cpu_seconds, counts);
   }
+  front.conclude();
   context.metric("cpu_per_second_at_8mm", at8);
   context.metric("cpu_per_second_at_0.6mm", at06);
   context.note("8 mm: " + best8 + "; best published code 0.25 s");

@@ -1,4 +1,4 @@
-// study list | run NAME... [--quick] [--json FILE] [--out DIR]: the experiments behind the package's claims.
+// study list | run NAME... | report: the experiments behind the package's claims.
 
 #include <chrono>
 #include <cstring>
@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "slender_sim/study/output.h"
 #include "slender_sim/study/study.h"
+#include "study_report.h"
 
 namespace {
 
@@ -24,10 +26,13 @@ constexpr int kDone = 0, kStudyFailed = 1, kBadUsage = 2;
 const char kUsage[] =
     "usage: study list\n"
     "       study run NAME... [--quick] [--json FILE] [--out DIR]\n"
+    "       study report --out DIR [--quick] [--jobs N]\n"
     "  NAME     a study of `study list`, or all\n"
     "  --quick  fewer cases and coarser ones: well under a minute each\n"
     "  --json   metrics and rows of all studies run\n"
-    "  --out    a CSV table and PNG plots of each study (the directory is made)\n"
+    "  --out    a CSV table and PNG plots of each study (the directory is made); report: DIR/report.html, one page with all of them.\n"
+    "           Stopped, it goes on where it was\n"
+    "  --jobs   studies at a time (default 1; times are of CPUs, but more of them disturb each other a little)\n"
     "exit status: 0 done, 1 a study failed, 2 bad usage\n";
 
 int badUsage(const std::string& what)
@@ -175,6 +180,28 @@ int run(const Options& options)
   return status;
 }
 
+int report(const std::vector<std::string>& words)
+{
+  slender::ReportOptions options;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    if (words[i] == "--quick")
+      options.quick = true;
+    else if ((words[i] == "--out" || words[i] == "--jobs") && i + 1 < words.size())
+    {
+      const std::string& value = words[i + 1];
+      if (words[i] == "--out")
+        options.out = value;
+      else
+        options.jobs = slender::parseCount("--jobs", value, 1, 1000);
+      ++i;
+    }
+    else
+      return badUsage("report: " + words[i] + " is not an option, or its value is missing");
+  if (options.out.empty())
+    return badUsage("report needs --out DIR");
+  return slender::makeReport(options) == 0 ? kDone : kStudyFailed;
+}
+
 }  // namespace
 
 int main(int argc, char** argv)
@@ -189,6 +216,16 @@ int main(int argc, char** argv)
   }
   if (words[0] == "list")
     return words.size() == 1 ? list() : badUsage("list takes no arguments");
+  try
+  {
+    if (words[0] == "report")
+      return report({words.begin() + 1, words.end()});
+  }
+  catch (const std::exception& error)   // BadInput, a process that cannot be started
+  {
+    std::cerr << "study: " << error.what() << "\n";
+    return kBadUsage;
+  }
   if (words[0] != "run")
     return badUsage("unknown command " + words[0]);
   Options options;

@@ -73,7 +73,7 @@ protected:
   }
   void writePlan(const std::string& axes) const { write("plan.yaml", "name: test\nscene: scene.yaml\nmeasures: [extents, loads]\naxes:\n" + axes); }
 
-  pid_t start(const std::string& out) const
+  pid_t start(const std::string& out, const std::string& engine = "local") const
   {
     const pid_t pid = fork();
     if (pid == 0)
@@ -81,7 +81,8 @@ protected:
       setpgid(0, 0);
       freopen("/dev/null", "w", stderr);
       freopen("/dev/null", "w", stdout);
-      execl(SLENDER_SWEEP, SLENDER_SWEEP, (folder_ + "/plan.yaml").c_str(), "--out", (folder_ + "/" + out).c_str(), "--jobs", "2", nullptr);
+      execl(SLENDER_SWEEP, SLENDER_SWEEP, (folder_ + "/plan.yaml").c_str(), "--out", (folder_ + "/" + out).c_str(), "--jobs", "2",
+            "--engine", engine.c_str(), nullptr);
       _exit(127);
     }
     return pid;
@@ -136,6 +137,16 @@ TEST_F(Sweep, killedHalfWayAndResumedGivesTheSameTable)
   EXPECT_EQ(read("killed/results.csv"), read("whole/results.csv"));
   const std::string table = read("whole/results.csv");
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 21);
+}
+
+TEST_F(Sweep, givesTheSameTableOnAnotherEngine)
+{
+  writePlan("  gravity.2: {from: -12, to: -8, count: 5}\n");
+  ASSERT_EQ(wait(start("local")), 0);
+  ASSERT_EQ(wait(start("parallel", "parallel")), 0);
+  EXPECT_EQ(read("parallel/results.csv"), read("local/results.csv"));
+  EXPECT_FALSE(fs::exists(folder_ + "/parallel/todo"));
+  EXPECT_EQ(wait(start("other", "paralel")), 2);
 }
 
 TEST_F(Sweep, namesFailedRunsAndKeepsTheOthers)

@@ -10,7 +10,7 @@ namespace slender {
 struct LinearResult
 {
   int iterations = 0;
-  double residual = 0.0;   ///< over the right-hand side's, in the preconditioner's norm sqrt(r . P r)
+  double residual = 0.0;   ///< over the right-hand side's (or the reference), in the preconditioner's norm sqrt(r . P r)
   bool definite = true;    ///< no direction of negative curvature was met
 };
 
@@ -26,10 +26,11 @@ public:
   }
 
   /// Solves A x = b from x = 0. apply(p, ap) writes A p, precondition(r, z) writes P r and may take out of r what no
-  /// direction of the search sees; both leave fixed points zero. Stops at the
-  /// tolerance, after max_iterations, or at negative curvature with the x so far.
+  /// direction of the search sees; both leave fixed points zero. Stops when the residual is the
+  /// tolerance times that of b, or times `reference` if that is positive; after max_iterations; or at negative curvature with the x so far.
   template <class Apply, class Precondition>
-  LinearResult solve(const PointVector& b, PointVector& x, double tolerance, int max_iterations, Apply apply, Precondition precondition)
+  LinearResult solve(const PointVector& b, PointVector& x, double tolerance, int max_iterations, Apply apply, Precondition precondition,
+                     double reference = 0.0)
   {
     const PointKernels& k = pointKernels();
     LinearResult result;
@@ -37,14 +38,15 @@ public:
     std::copy(b.begin(), b.end(), r_.begin());
     precondition(r_, z_);
     double rz = k.dot(points_, r_.data(), z_.data());
-    const double start = rz;
-    if (!(start > 0))
+    const double scale = reference > 0 ? reference * reference : rz;
+    if (!(rz > 0))
     {
-      result.definite = start == 0.0;
+      result.definite = rz == 0.0;
       return result;
     }
+    result.residual = std::sqrt(rz / scale);
     std::copy(z_.begin(), z_.end(), p_.begin());
-    while (result.iterations < max_iterations)
+    while (result.residual > tolerance && result.iterations < max_iterations)
     {
       apply(p_, ap_);
       const double curvature = k.dot(points_, p_.data(), ap_.data());
@@ -62,9 +64,7 @@ public:
       ++result.iterations;
       precondition(r_, z_);
       const double next = k.dot(points_, r_.data(), z_.data());
-      result.residual = std::sqrt(std::abs(next) / start);
-      if (!(result.residual > tolerance))
-        break;
+      result.residual = std::sqrt(std::abs(next) / scale);
       const double beta = next / rz;
       rz = next;
       for (std::size_t i = 0; i < p_.size(); ++i)

@@ -24,7 +24,12 @@ public:
   int count() const { return static_cast<int>(c_.rows()); }
   /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero. r may be z. mu: 4 doubles per constraint. Fixed points: r must be
   /// zero there, and z is.
-  void solve(const double* r, const double* g, double* z, double* mu) const;
+  /// With g, returns sqrt(r . P^-1 r + g . S^-1 g): the norm of r without constraints, and that of the smallest z that has C z = g.
+  double solve(const double* r, const double* g, double* z, double* mu) const;
+  /// mu alone, g zero: half the work.
+  void multipliers(const double* r, double* mu) const;
+  /// r -= C^T mu, but for fixed points.
+  void takeOut(const double* mu, double* r) const;
 
 private:
   struct Rows   ///< of a matrix for PointKernels::multiply
@@ -37,7 +42,7 @@ private:
 
   Constraints c_;
   const SparseCholesky* p_ = nullptr;
-  Rows v_, v_transposed_, s_inverse_;
+  Rows v_, v_transposed_, s_inverse_, c_transposed_;
   mutable PointVector y_, t_, mu_;   ///< of points each: the kernels read as many points of x as there are rows
 };
 

@@ -20,6 +20,7 @@ struct SweepPlot
 {
   std::string x, y, by;         ///< columns: paths of axes, or what the measures give; `by` may be empty
   std::string x_label, y_label;
+  bool log = false;             ///< logarithmic axes
 };
 
 /// Runs of one scene over every combination of the axes' values. The last axis varies fastest.

@@ -39,6 +39,7 @@ struct Series
   std::string label;
   std::vector<double> x, y;
   bool points = false;   ///< no line, whatever the plot says
+  bool line = false;     ///< a line without markers, whatever the plot says
 };
 
 /// A plot with units in its axis labels; series in order of the legend. Logarithmic axes unless told otherwise.

@@ -1,0 +1,236 @@
+#include "report_page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include <yaml-cpp/yaml.h>
+
+#include "slender_sim/study/output.h"
+
+namespace slender {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const char kStyle[] =
+    "body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;padding:0 1em;color:#222}"
+    "h1{border-bottom:3px solid #246}h2{margin-top:2.5em;border-bottom:1px solid #999}h3{margin:2em 0 .3em}"
+    "table{border-collapse:collapse;font-size:13px;margin:.7em 0}td,th{border:1px solid #ccc;padding:2px 7px;text-align:left}"
+    "th{background:#eef2f6;position:sticky;top:0}td.n{text-align:right;font-variant-numeric:tabular-nums}"
+    "img{max-width:100%;border:1px solid #ddd;margin:.5em 0}.wide{overflow:auto;max-height:32em}.bad{color:#b00020;font-weight:bold}"
+    ".good{color:#166534}.words{color:#444}summary{cursor:pointer;color:#246}nav a{margin-right:1.2em}";
+
+std::string readFile(const std::string& path)
+{
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::string escaped(const std::string& text)
+{
+  std::string out;
+  for (const char c : text)
+    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '"' ? "&quot;" : std::string(1, c);
+  return out;
+}
+
+std::string base64(const std::string& bytes)
+{
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve(4 * (bytes.size() + 2) / 3);
+  for (std::size_t i = 0; i < bytes.size(); i += 3)
+  {
+    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8 | (k < left ? static_cast<unsigned char>(bytes[i + k]) : 0);
+    for (std::size_t k = 0; k < 4; ++k)
+      out += k <= left ? digits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return out;
+}
+
+bool isNumber(const std::string& text, double& value)
+{
+  char* end = nullptr;
+  value = std::strtod(text.c_str(), &end);
+  return !text.empty() && *end == '\0';
+}
+
+std::string cell(const std::string& text)
+{
+  double value = 0.0;
+  if (!isNumber(text, value))
+    return "<td>" + escaped(text) + "</td>";
+  char number[32];
+  std::snprintf(number, sizeof number, "%.4g", value);
+  return std::string("<td class=n>") + number + "</td>";
+}
+
+/// Bars on named figures: what is fine is on the side that the name says.
+std::string rating(const std::string& metric, double value)
+{
+  if (metric == "worst_error_over_bound")
+    return value <= 1 ? "<span class=good>met</span>" : "<span class=bad>missed</span>";
+  if (metric == "nan_count" || metric == "missed" || metric == "intersections")
+    return value == 0 ? "<span class=good>met</span>" : "<span class=bad>missed</span>";
+  return "";
+}
+
+struct Loaded
+{
+  std::vector<std::pair<std::string, std::string>> metrics;
+  std::vector<std::string> notes;
+  double seconds = 0.0;
+  std::string error;
+};
+
+Loaded load(const ReportedStudy& study)
+{
+  Loaded loaded;
+  loaded.error = study.failure;
+  const std::string file = study.folder + "/result.json";
+  if (!fs::exists(file))
+    return loaded;
+  try
+  {
+    const YAML::Node result = YAML::Load(readFile(file))["studies"][0];
+    for (const auto& metric : result["metrics"])
+      loaded.metrics.emplace_back(metric.first.as<std::string>(), metric.second.IsNull() ? "not a number" : metric.second.as<std::string>());
+    if (result["notes"])
+      for (const auto& note : result["notes"])
+        loaded.notes.push_back(note.as<std::string>());
+    if (result["error"])
+      loaded.error = result["error"].as<std::string>();
+    loaded.seconds = result["wall_seconds"].as<double>();
+  }
+  catch (const YAML::Exception& error)
+  {
+    loaded.error = file + " cannot be read: " + error.what();
+  }
+  return loaded;
+}
+
+void writeRows(std::ostream& page, const std::string& csv)
+{
+  std::istringstream lines(readFile(csv));
+  std::string line;
+  std::size_t rows = 0;
+  std::ostringstream table;
+  while (std::getline(lines, line))
+  {
+    table << "<tr>";
+    for (const std::string& text : study::csvCells(line))
+      table << (rows == 0 ? "<th>" + escaped(text) + "</th>" : cell(text));
+    table << "</tr>\n";
+    ++rows;
+  }
+  if (rows > 1)
+    page << "<details" << (rows <= 25 ? " open" : "") << "><summary>" << rows - 1 << " rows</summary><div class=wide><table>\n"
+         << table.str() << "</table></div></details>\n";
+}
+
+void writeStudy(std::ostream& page, const ReportedStudy& study, const Loaded& loaded)
+{
+  page << "<h3 id=\"" << escaped(study.name) << "\">" << escaped(study.name) << "</h3>\n<p class=words>" << escaped(study.description) << "</p>\n";
+  if (!loaded.error.empty())
+    page << "<p class=bad>failed: " << escaped(loaded.error) << "</p>\n";
+  std::vector<std::string> pictures;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(study.folder, error))
+    if (entry.path().extension() == ".png")
+      pictures.push_back(entry.path().string());
+  std::sort(pictures.begin(), pictures.end());
+  for (const std::string& picture : pictures)
+    page << "<img alt=\"" << escaped(fs::path(picture).stem().string()) << "\" src=\"data:image/png;base64," << base64(readFile(picture)) << "\">\n";
+  if (!loaded.metrics.empty())
+  {
+    page << "<table>";
+    for (const auto& [key, text] : loaded.metrics)
+    {
+      double value = 0.0;
+      page << "<tr><td>" << escaped(key) << "</td>" << cell(text) << "<td>" << (isNumber(text, value) ? rating(key, value) : "") << "</td></tr>\n";
+    }
+    page << "</table>\n";
+  }
+  if (!loaded.notes.empty())
+  {
+    page << "<ul>";
+    for (const std::string& note : loaded.notes)
+      page << "<li>" << escaped(note) << "</li>\n";
+    page << "</ul>\n";
+  }
+  writeRows(page, study.folder + "/" + study.name + ".csv");
+  if (loaded.seconds > 0)
+  {
+    char text[48];
+    std::snprintf(text, sizeof text, "<p class=words>took %.1f s</p>\n", loaded.seconds);
+    page << text;
+  }
+}
+
+}  // namespace
+
+std::string reportPage(const std::string& title, const std::vector<std::pair<std::string, std::string>>& facts,
+                       const std::vector<ReportSection>& sections)
+{
+  std::map<std::string, Loaded> loaded;
+  for (const ReportSection& section : sections)
+    for (const ReportedStudy& study : section.studies)
+      loaded[study.name] = load(study);
+
+  std::ostringstream page;
+  page << "<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8><title>" << escaped(title) << "</title><style>" << kStyle << "</style></head><body>\n<h1>"
+       << escaped(title) << "</h1>\n<table>";
+  for (const auto& [key, text] : facts)
+    page << "<tr><td>" << escaped(key) << "</td><td>" << escaped(text) << "</td></tr>\n";
+  page << "</table>\n<nav><a href=\"#advice\">Advice</a><a href=\"#bars\">Bars</a>";
+  for (std::size_t k = 0; k < sections.size(); ++k)
+    page << "<a href=\"#section" << k << "\">" << escaped(sections[k].title) << "</a>";
+  page << "</nav>\n<h2 id=advice>What to take</h2>\n<p class=words>From the fronts of error against run time below; errors against each problem's own "
+          "size, CPU time of one thread of this machine.</p><ul>\n";
+  for (const ReportSection& section : sections)
+    for (const ReportedStudy& study : section.studies)
+      for (const std::string& note : loaded[study.name].notes)
+        if (note.find(" error take ") != std::string::npos)
+          page << "<li>" << escaped(note) << "</li>\n";
+  page << "</ul>\n<h2 id=bars>Bars</h2>\n<p class=words>worst_error_over_bound: the largest error of a study's checks over its bound.</p>\n<table>"
+          "<tr><th>study</th><th>figure</th><th>measured</th><th></th></tr>\n";
+  for (const ReportSection& section : sections)
+    for (const ReportedStudy& study : section.studies)
+    {
+      const Loaded& result = loaded[study.name];
+      if (!result.error.empty())
+        page << "<tr><td><a href=\"#" << escaped(study.name) << "\">" << escaped(study.name) << "</a></td><td colspan=3 class=bad>failed</td></tr>\n";
+      for (const auto& [key, text] : result.metrics)
+      {
+        double value = std::nan("");
+        const bool number = isNumber(text, value);
+        const std::string verdict = number ? rating(key, value) : "<span class=bad>not a number</span>";
+        if (!verdict.empty())
+          page << "<tr><td><a href=\"#" << escaped(study.name) << "\">" << escaped(study.name) << "</a></td><td>" << escaped(key) << "</td>" << cell(text)
+               << "<td>" << verdict << "</td></tr>\n";
+      }
+    }
+  page << "</table>\n";
+  for (std::size_t k = 0; k < sections.size(); ++k)
+  {
+    page << "<h2 id=\"section" << k << "\">" << escaped(sections[k].title) << "</h2>\n<p class=words>" << escaped(sections[k].words) << "</p>\n";
+    for (const ReportedStudy& study : sections[k].studies)
+      writeStudy(page, study, loaded[study.name]);
+  }
+  page << "</body></html>\n";
+  return page.str();
+}
+
+}  // namespace slender

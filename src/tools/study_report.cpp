@@ -1,0 +1,178 @@
+#include "study_report.h"
+
+#include <sys/utsname.h>
+
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "arguments.h"
+#include "processes.h"
+#include "report_page.h"
+#include "slender_sim/study/study.h"
+
+namespace slender {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Plan
+{
+  const char* title;
+  const char* words;
+  std::vector<const char*> quick, more;   ///< studies of both extents, and of the full report only
+};
+
+const std::vector<Plan>& plans()
+{
+  static const std::vector<Plan> all = {
+      {"Error against run time", "Each problem once, every way to solve it: integrators, steps, resolutions, tolerances; against one converged run.",
+       {"swing", "thread_accuracy", "cloth_accuracy"}, {"cantilever", "rods_at_rest", "peer_cases", "projection"}},
+      {"Stability", "Stiff and extreme cases. Done, done with cut steps, or refused with a reason; never NaN, a crash or silently wrong.",
+       {"rod_stability", "thread_stability", "cloth_stability"}, {"rod_contact_safety", "cloth_collision_safety"}},
+      {"Beside the thesis's tables", "Times per step or frame of the thesis's examples, whose machine was of 2008.",
+       {"rod_tables", "thread_tables", "ibm_vs_hinge", "implicit_step"}, {"willmore_smoothing", "hair", "tree"}},
+      {"Cost against size", "", {"rod_scaling"}, {"rod_implicit_vs_explicit", "thread_implicit_vs_explicit"}},
+      {"Phase diagrams", "Where one behaviour ends and the next begins.", {"michell", "sagging"}, {"sewing_machine", "coiling", "bend_twist", "greenhill"}},
+      {"Rods against formulas", "", {"elastica", "torsion", "torsional_pendulum", "twist_asymmetry", "bend_twist"},
+       {"beam_frequencies", "lateral_buckling", "perversion", "wilberforce", "helical_buckling", "stick_slip", "knot", "plectoneme", "chain"}},
+      {"Threads against formulas", "", {"trouton", "thread_twist", "retraction"}, {"merging", "fiber_extrusion", "dragged_catenary"}},
+      {"Cloth against formulas and measurements", "", {"willmore_sphere", "willmore_hole", "fabric_drape"}, {"plate", "stick_slip_strip", "flag", "drape", "stiffness_range"}},
+  };
+  return all;
+}
+
+std::string readFile(const std::string& path)
+{
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// Of /proc, the value behind `key`.
+std::string systemValue(const char* file, const std::string& key)
+{
+  std::ifstream lines(file);
+  for (std::string line; std::getline(lines, line);)
+    if (line.rfind(key, 0) == 0)
+    {
+      const std::size_t at = line.find_first_not_of(" \t:", key.size());
+      return at == std::string::npos ? "" : line.substr(at);
+    }
+  return "unknown";
+}
+
+std::string localTime()
+{
+  const std::time_t now = std::time(nullptr);
+  char text[64];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M %Z", std::localtime(&now));
+  return text;
+}
+
+/// What results must not be mixed with: another program or extent.
+std::string extent(bool quick)
+{
+  return std::string(quick ? "quick" : "full") + " report by " + thisProgram() + " of " +
+         std::to_string(fs::last_write_time(thisProgram()).time_since_epoch().count()) + "\n";
+}
+
+void prepare(const ReportOptions& options)
+{
+  std::error_code error;
+  fs::create_directories(options.out + "/data", error);
+  if (error)
+    throw BadInput("cannot make directory " + options.out + "/data: " + error.message());
+  const std::string file = options.out + "/data/extent.txt", wanted = extent(options.quick);
+  if (!fs::exists(file))
+    std::ofstream(file) << wanted;
+  else if (readFile(file) != wanted)
+    throw BadInput(options.out + " holds the results of another program or extent (" + file + "); give another --out or delete it");
+}
+
+std::vector<std::pair<std::string, std::string>> facts(const ReportOptions& options, double seconds, std::size_t studies)
+{
+  utsname system{};
+  uname(&system);
+  char took[64];
+  std::snprintf(took, sizeof took, "%.0f s for %zu studies, %ld at a time", seconds, studies, options.jobs);
+  return {{"made", localTime()},
+          {"extent", options.quick ? "quick: fewer and coarser cases" : "full"},
+          {"processor", systemValue("/proc/cpuinfo", "model name")},
+          {"memory", systemValue("/proc/meminfo", "MemTotal")},
+          {"system", std::string(system.sysname) + " " + system.release},
+          {"compiler", "GCC " __VERSION__},
+          {"Eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." + std::to_string(EIGEN_MINOR_VERSION)},
+          {"this call", took}};
+}
+
+}  // namespace
+
+int makeReport(const ReportOptions& options)
+{
+  prepare(options);
+  std::vector<ReportSection> sections;
+  std::vector<ReportedStudy*> todo;
+  for (const Plan& plan : plans())
+  {
+    sections.push_back({plan.title, plan.words, {}});
+    std::vector<const char*> names = plan.quick;
+    if (!options.quick)
+      names.insert(names.end(), plan.more.begin(), plan.more.end());
+    for (const char* name : names)
+      if (const study::Study* found = study::findStudy(name))
+        sections.back().studies.push_back({name, found->description, options.out + "/data/" + name, ""});
+      else
+        throw std::logic_error(std::string("report: no study ") + name);
+  }
+  for (ReportSection& section : sections)
+    for (ReportedStudy& s : section.studies)
+      if (!fs::exists(s.folder + "/result.json"))
+        todo.push_back(&s);
+
+  const auto command = [&](std::size_t k) {
+    const ReportedStudy& s = *todo[k];
+    fs::create_directories(s.folder);
+    const std::string json = s.folder + "/result.json";
+    // under its own name only once it is whole
+    return std::vector<std::string>{"/bin/sh", "-c",
+                                    shellWord(thisProgram()) + " run " + s.name + (options.quick ? " --quick" : "") + " --out " + shellWord(s.folder) + " --json " +
+                                        shellWord(json + ".part") + " > " + shellWord(s.folder + "/log.txt") + " 2>&1; status=$?; [ $status -le 1 ] && mv " +
+                                        shellWord(json + ".part") + " " + shellWord(json) + "; exit $status"};
+  };
+  const auto start = std::chrono::steady_clock::now();
+  Progress progress("report", "studies", todo.size());
+  std::size_t done = 0;
+  int failed = 0;
+  runProcesses(todo.size(), static_cast<std::size_t>(options.jobs), command, [&](std::size_t k, const std::string& why) {
+    if (!why.empty())
+    {
+      ++failed;
+      std::cerr << "study: " << todo[k]->name << " " << why << ", see " << todo[k]->folder << "/log.txt\n";
+      if (!fs::exists(todo[k]->folder + "/result.json"))
+        todo[k]->failure = why;
+    }
+    progress.show(++done);
+  });
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const std::string page = options.out + "/report.html";
+  std::ofstream file(page);
+  file << reportPage("slender_sim: error against run time, stability, cost", facts(options, seconds, todo.size()), sections);
+  file.close();
+  if (!file)
+    throw BadInput("cannot write " + page);
+  std::cout << page << ": " << todo.size() << " studies in " << static_cast<long>(seconds) << " s, " << failed << " failed\n";
+  return failed;
+}
+
+}  // namespace slender
