@@ -63,6 +63,7 @@ void runBreathingSurface(StudyContext&);
 void runTrackingMethods(StudyContext&);
 void runPartitions(StudyContext&);
 void runClustering(StudyContext&);
+void runCharacter(StudyContext&);
 void runTrackingStability(StudyContext&);
 void runTrackingOverhead(StudyContext&);
 void runTrackingExactness(StudyContext&);
@@ -130,6 +131,7 @@ const std::vector<Study>& studies()
       {"tracking_methods", "error against run time of ways to keep averages: Lagrange multipliers, penalty, manifold projection", runTrackingMethods},
       {"partitions", "16 to 1024 regions, of one size and of two, set the scale of folds (thesis figures 6.5, 6.6)", runPartitions},
       {"clustering", "regions of a walking character: animation-aware clustering beside static (thesis figure 6.7)", runClustering},
+      {"character", "a character of 3,050 vertices that walks as its guide does (thesis figures 6.2, 6.10): as it is, in a headwind, crinkled", runCharacter},
       {"tracking_stability", "guides that collapse, explode, jump or are not numbers, constraints that conflict: done or refused with reason", runTrackingStability},
       {"tracking_overhead", "steps of cloth with and without tracking, in the sizes of the thesis's table 6.1, beside it", runTrackingOverhead},
       {"tracking_exactness", "averages of tracked cloths against their guides' after every step: box, breathing surface, wind, jumps, contact", runTrackingExactness},
