@@ -113,7 +113,9 @@ Biped::Biped(double cell)
         if (!used(i, j))
           continue;
         const int a = vertex(i, j, sheet), b = vertex(i + 1, j, sheet), c = vertex(i + 1, j + 1, sheet), d = vertex(i, j + 1, sheet);
-        const bool rising = (i + j) % 2 == 0;
+        // by turns, but no edge within a sheet joins two vertices of the outline: the other sheet would have it, too
+        const bool rises = isInner(i, j) || isInner(i + 1, j + 1), falls = isInner(i + 1, j) || isInner(i, j + 1);
+        const bool rising = rises && (!falls || (i + j) % 2 == 0);
         Eigen::Vector3i one = rising ? Eigen::Vector3i(a, b, c) : Eigen::Vector3i(a, b, d);
         Eigen::Vector3i two = rising ? Eigen::Vector3i(a, c, d) : Eigen::Vector3i(b, c, d);
         if (sheet)   // faces backwards

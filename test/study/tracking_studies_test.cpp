@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/study/study.h"
 #include "src/study/biped.h"
 #include "src/study/region_cases.h"
@@ -39,6 +40,7 @@ TEST(TrackingStudies, BipedIsClosedAndWalks)
 {
   const Biped biped;
   const TriangleMesh& mesh = biped.mesh();
+  EXPECT_NO_THROW(requireSoundMesh(mesh, "biped"));
   EXPECT_EQ(mesh.vertices.cols() - mesh.triangles.cols() / 2, 2);   // closed: V - F / 2 = 2 for a sphere
   EXPECT_LT((biped.at(0.0) - mesh.vertices).cwiseAbs().maxCoeff(), 1e-12);
   double volume = 0.0;
