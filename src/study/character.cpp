@@ -35,14 +35,16 @@ Matrix3Xd crinkled(const TriangleMesh& mesh, double size)
   return x;
 }
 
-TrackedCase character(const Biped& biped, const std::vector<int>& region)
+/// `crinkles` [m]: of the undeformed shape.
+TrackedCase character(const Biped& biped, const std::vector<int>& region, double crinkles)
 {
   TrackedCase c;
   c.name = "character";
   c.guide = biped.mesh();
   c.fine = subdivide(c.guide, 0);
+  c.fine.mesh.vertices = crinkled(c.guide, crinkles);
   c.functions = regionBasis(c.guide, region);
-  c.model = buildCloth("character", c.fine.mesh, 0.15, isotropicMembrane(1e6, 0.3, 5e-4));
+  c.model = buildCloth("character", c.fine.mesh, 0.15, isotropicMembrane(1e5, 0.3, 5e-4));
   c.model.bending = BendingModel::hinge;
   c.model.bending_modulus = 2e-5;
   c.model.stiffness_damping = 1e-3;
@@ -75,18 +77,13 @@ void runCharacter(StudyContext& context)
   for (const char* look : {"plain", "headwind", "crinkled"})
   {
     context.progress(done++, 3, look);
-    TrackedCase c = character(biped, region);
     const std::string name = look;
+    TrackedCase c = character(biped, region, name == "crinkled" ? 0.005 : 0.0);
     if (name == "headwind")
     {
-      c.wind = Vector3d(-15, 0, 0);
+      c.wind = Vector3d(-25, 0, 0);
       c.model.aerodynamics.drag = 1.2;
       c.model.aerodynamics.lift = 0.6;
-    }
-    if (name == "crinkled")
-    {
-      c.model.undeformed = crinkled(c.guide, 0.004);
-      c.model.bending_modulus *= 20;
     }
     TrackedStepper run(c, Follow::averages);
     const int steps = static_cast<int>(std::lround(duration / c.step));
