@@ -11,7 +11,11 @@ using Eigen::Vector3d;
 
 namespace {
 
-enum Body { hips, chest, right_upper_arm, right_forearm, left_upper_arm, left_forearm, right_thigh, right_shin, right_foot, left_thigh, left_shin, left_foot, kBodies };
+enum Body
+{
+  hips, chest, right_upper_arm, right_forearm, left_upper_arm, left_forearm, right_thigh, right_shin, right_foot, left_thigh, left_shin, left_foot,
+  kBodies
+};
 
 // Of the outline [m]: half widths and heights of the trunk, arms and legs in the plane y, z before they are drawn apart to an X.
 constexpr double kHip = 0.76, kWaist = 1.02, kArmLow = 1.12, kTop = 1.28, kTrunk = 0.18, kArm = 0.56, kLegInside = 0.02;

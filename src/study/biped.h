@@ -18,7 +18,7 @@ public:
 
   const TriangleMesh& mesh() const { return mesh_; }                     ///< at rest, facing outwards
   const std::vector<int>& bodyOfFace() const { return body_of_face_; }   ///< that moves it, for the most part
-  Eigen::Matrix3Xd at(double t) const;                                   ///< vertices [m] at a time [s]; at rest at t <= 0, in full swing from a quarter of a second on
+  Eigen::Matrix3Xd at(double t) const;                                   ///< vertices [m] at a time [s]; at rest at t <= 0, in full swing from 0.25 s on
   static constexpr double kPeriod = 1.25;                                ///< of two steps [s]
 
 private:

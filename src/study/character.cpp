@@ -113,7 +113,8 @@ void runCharacter(StudyContext& context)
       .set("ms_per_step", 1e3 * run.seconds() / steps).set("seconds_per_simulated_second", run.seconds() / duration);
   }
   context.metric("worst_average_error_m", worst);
-  context.note("steps of 10 ms, without collisions; flutter: kinetic energy of the velocities relative to the guide's, mean. The thesis: 3038 vertices, 280 constraints, 43.2 s per frame.");
+  context.note("steps of 10 ms, without collisions; flutter: kinetic energy of the velocities relative to the guide's, mean. The thesis: 3038 vertices, 280 "
+               "constraints, 43.2 s per frame.");
 }
 
 }  // namespace slender::study

@@ -105,7 +105,8 @@ void runClustering(StudyContext& context)
           const char* what = aware ? "animation-aware" : "static";
           picture.panels.push_back({std::string(what) + ", at rest", {{mesh, true, hues}}});
           const Eigen::Matrix3Xd& frame = walk[12];
-          picture.panels.push_back({std::string(what) + ", walking", {{{frame.colwise() - Eigen::Vector3d(frame.row(0).mean(), 0, 0), mesh.triangles}, true, hues}}});
+          const Eigen::Matrix3Xd here = frame.colwise() - Eigen::Vector3d(frame.row(0).mean(), 0, 0);
+          picture.panels.push_back({std::string(what) + ", walking", {{{here, mesh.triangles}, true, hues}}});
         }
       }
       joints_of[aware] = mean.joint_seams;
@@ -126,8 +127,9 @@ void runClustering(StudyContext& context)
   context.metric("seams_at_joints_gain", gain);
   context.metric("seconds", seconds_200);
   context.metric("iterations", iterations_200);
-  context.note("seams_at_joints: share of the length of edges between faces of different bodies that lie between two regions; seams_anywhere: of all edges; impure_area: of faces "
-               "that move with another body than most of their region; means over seeds. The thesis: 3038 vertices, 200 regions, 32 iterations, less than five minutes.");
+  context.note("seams_at_joints: share of the length of edges between faces of different bodies that lie between two regions; seams_anywhere: "
+               "of all edges; impure_area: of faces that move with another body than most of their region; means over seeds. The thesis: 3038 vertices, "
+               "200 regions, 32 iterations, less than five minutes.");
 }
 
 }  // namespace slender::study

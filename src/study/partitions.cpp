@@ -165,8 +165,8 @@ void runPartitions(StudyContext& context)
     below.push_back({"", {{{folded.x, sheet.triangles}}}});
   }
   spread.panels.insert(spread.panels.end(), below.begin(), below.end());
-  context.note("the guide contracts by 12 % in both directions of its plane; wavelength: geometric mean over the spectrum of mean curvature; out_of_order: how often more regions "
-               "did not mean finer folds and closer tracking");
+  context.note("the guide contracts by 12 % in both directions of its plane; wavelength: geometric mean over the spectrum of mean curvature; "
+               "out_of_order: how often more regions did not mean finer folds and closer tracking");
 }
 
 }  // namespace slender::study

@@ -158,7 +158,8 @@ void runRubberBand(StudyContext& context)
   };
   std::vector<Case> cases{{Motion::shift, 10}, {Motion::shift, 1000}, {Motion::turn, 100}};
   if (!context.quick())
-    cases.insert(cases.end(), {{Motion::shift, 100}, {Motion::shift, 300}, {Motion::shift, 3000}, {Motion::turn, 10}, {Motion::turn, 30}, {Motion::turn, 300}});
+    cases.insert(cases.end(), {{Motion::shift, 100}, {Motion::shift, 300}, {Motion::shift, 3000},
+                               {Motion::turn, 10}, {Motion::turn, 30}, {Motion::turn, 300}});
   int done = 0;
   for (const auto& [motion, acceleration] : cases)
   {
@@ -196,8 +197,9 @@ void runRubberBand(StudyContext& context)
     if (acceleration == (shifts ? 1000 : 100))
       context.metric(shifts ? "tugging_ratio_shift" : "tugging_ratio", kinetic[0] / kinetic[1]);
   }
-  context.note("the guide is accelerated for 20 ms, sideways or in a turn (acceleration at 0.1 m from its middle); fine_kinetic: of velocities seen from the guide, less their L2 "
-               "projection onto the segments' functions, mean from then on for 100 ms; tugging_ratio: points over averages, turned at 100 m/s^2; shifted, averages change nothing");
+  context.note("the guide is accelerated for 20 ms, sideways or in a turn (acceleration at 0.1 m from its middle); fine_kinetic: of "
+               "velocities seen from the guide, less their L2 projection onto the segments' functions, mean from then on for 100 ms; tugging_ratio: points over averages, "
+               "turned at 100 m/s^2; shifted, averages change nothing");
 }
 
 }  // namespace slender::study

@@ -215,8 +215,8 @@ void runTrackingMethods(StudyContext& context)
   context.metric("constraint_error_penalty_best", best_penalty);
   context.metric("projection_over_multipliers_20ms", coarse_projection / coarse_multipliers);
   context.metric("penalty_blown_up", blown_up);
-  context.note("errors against multipliers at a quarter of the shortest step; penalty: forces of springs and dampers as they are when the step begins, unstable above "
-               "stable_stiffness; projection: free step, then the nearest positions by mass that have the averages.");
+  context.note("errors against multipliers at a quarter of the shortest step; penalty: forces of springs and dampers as they are when the step begins, "
+               "unstable above stable_stiffness; projection: free step, then the nearest positions by mass that have the averages.");
 }
 
 }  // namespace slender::study

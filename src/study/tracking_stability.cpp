@@ -63,7 +63,8 @@ std::vector<GuideCase> guideCases()
     {"collapses at once and stays", false, false, [=](const Matrix3Xd& rest, int, int) { return about_middle(rest, Eigen::Matrix3d::Zero()); }},
     {"explodes a thousandfold and comes back", false, true,
      [=](const Matrix3Xd& rest, int k, int steps) { return about_middle(rest, std::pow(1000.0, 1.0 - there_and_back(k, steps)) * Eigen::Matrix3d::Identity()); }},
-    {"explodes by half in every step", false, false, [=](const Matrix3Xd& rest, int k, int) { return about_middle(rest, std::pow(1.5, std::min(k, 60)) * Eigen::Matrix3d::Identity()); }},
+    {"explodes by half in every step", false, false,
+     [=](const Matrix3Xd& rest, int k, int) { return about_middle(rest, std::pow(1.5, std::min(k, 60)) * Eigen::Matrix3d::Identity()); }},
     {"moves at 10 m/s and stops dead", false, true,
      [](const Matrix3Xd& rest, int k, int steps) { return Matrix3Xd(rest.colwise() + Vector3d(0.1 * (std::min(k, steps / 2) - steps / 2), 0, 0)); }},
     {"jumps by 10 m", false, true, [](const Matrix3Xd& rest, int k, int) { return Matrix3Xd(rest.colwise() + Vector3d(0, 0, k >= 5 && k < 10 ? 10.0 : 0.0)); }},
@@ -189,7 +190,8 @@ void runTrackingStability(StudyContext& context)
     for (const bool newton : {false, true})
       for (const char* step : {"0.01", "0.1"})
         settings.push_back({std::string(bending) + (newton ? ", Newton, " : ", one step, ") + step + " s",
-                            {s + "bending={model: " + bending + "}", s + "solver={one_newton_step: " + (newton ? "false" : "true") + "}", std::string("time.step=") + step}});
+                            {s + "bending={model: " + bending + "}", s + "solver={one_newton_step: " + (newton ? "false" : "true") + "}",
+                             std::string("time.step=") + step}});
   if (context.quick())
     settings = {settings[0], settings[3], settings[5]};
   settings.push_back({"hinge, one step, 0.01 s, self-contact", {s + "solver={one_newton_step: true}", s + "contact={thickness: 0.002}"}});
@@ -226,7 +228,8 @@ void runTrackingStability(StudyContext& context)
   // Constraints: the same region twice, but for less and less at one vertex; all vertices prescribed; held vertices whose average is prescribed
   const TriangleMesh guide = guideSheet(0.4, 3, 0.0);
   const Subdivision fine = subdivide(guide, 2);
-  const auto constrained = [&](const std::string& what, const TestFunctions& functions, const std::vector<int>& held, const TriangleMesh& of, const Subdivision& on) {
+  const auto constrained = [&](const std::string& what, const TestFunctions& functions, const std::vector<int>& held, const TriangleMesh& of,
+                               const Subdivision& on) {
     Verdict v;
     const TrackedCase c = sheetWith(functions, on, of);
     std::string outcome = "done";
@@ -329,8 +332,10 @@ void runTrackingStability(StudyContext& context)
   context.metric("cells", cells);
   context.metric("worst_average_error_over_size", worst);
   context.metric("worst_average_error_over_size_in_contact", worst_in_contact);
-  context.note("refused: with a reason, the state as before the step; guides that are no good must be refused for as long as they are, and the run goes on. unfinished: cells stopped after 20 s of CPU time (quick: 1.5 s), for the most part of contact in guides that crush the shell. not_recovered: strained "
-               "by half or more at the end though the guide came back; in contact, collisions have the last word where both cannot be had; errors are over the shell's size, with a thousandth of its distance from the origin added for rounding.");
+  context.note("refused: with a reason, the state as before the step; guides that are no good must be refused for as long as they are, and the run "
+               "goes on. unfinished: cells stopped after 20 s of CPU time (quick: 1.5 s), for the most part of contact in guides that crush the "
+               "shell. not_recovered: strained by half or more at the end though the guide came back; in contact, collisions have the last word "
+               "where both cannot be had; errors are over the shell's size, with a thousandth of its distance from the origin added for rounding.");
 }
 
 }  // namespace slender::study

@@ -24,8 +24,8 @@ public:
   ~AveragedRod();
   AveragedRod(AveragedRod&&) noexcept;
 
-  /// Advances by `duration` [s] to averages `targets` (3 x count [m]), which move uniformly from where the rod's are. A step that fails is halved, at most newton.max_cuts
-  /// times. On failure the state is untouched and the report says why; averages that depend on each other on the nodes that are free make every step fail.
+  /// Advances by `duration` [s] to averages `targets` (3 x count [m]), which move uniformly from where the rod's are. A step that fails is halved, at
+  /// most newton.max_cuts times. On failure the state is untouched and the report says why; averages that depend on each other on the nodes that are free make every step fail.
   StepReport step(RodState& state, const RodInputs& inputs, const Eigen::Matrix3Xd& targets, double duration);
 
   /// Force [N] with which each average acts on the rod (3 x count), spread over its nodes by their weights, at the end of the last successful step.
