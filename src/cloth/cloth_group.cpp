@@ -12,7 +12,7 @@ namespace slender {
 
 namespace {
 
-constexpr int kMeetRounds = 20;
+constexpr int kMeetRounds = 200;
 constexpr double kMeetTolerance = 1e-12;   // of the cloth's size
 constexpr int kLoadPasses = 2;
 constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
@@ -270,8 +270,8 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
   return report;
 }
 
-/// Collisions move averages that are prescribed. Going back and forth between both leads to where both are met, by a factor of about a thousand each time:
-/// what touches is little of what an average is taken over. Collisions have the last word.
+/// Collisions move averages that are prescribed. Going back and forth between both leads to where both are met, by a factor of about a thousand each time
+/// where what touches is little of what an average is taken over; where a cloth is pressed flat a hundred rounds were seen. Collisions have the last word.
 CollisionReport ClothGroup::resolve(const CollisionStep& step)
 {
   CollisionReport report = collider_->resolve(step, x_, v_, true);

@@ -361,8 +361,8 @@ void ClothSystem::preconditionWithin(PointVector& r, PointVector& z)
   averages_->takeOut(multipliers_.data(), r.data());
 }
 
-/// Before conjugate gradients with averages: takes out of right_ what these balance. With `averages` d is moved there, and on by a step of the preconditioned gradient, which comes for nothing; returns what
-/// the load on the cloth was without the forces of the averages, which the tolerance counts from as it does for a cloth without.
+/// Before conjugate gradients with averages: takes out of right_ what these balance. With `averages` d is moved there, and on by a step of the
+/// preconditioned gradient, which comes for nothing; returns what the load on the cloth was without the forces of the averages, which the tolerance counts from as it does for a cloth without.
 double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages)
 {
   if (!averages)

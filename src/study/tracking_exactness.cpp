@@ -43,7 +43,7 @@ std::vector<Scene> scenes(bool quick)
   Scene jumps{"sheet whose guide jumps", sheet};
   jumps.cloth.motion = [rest = sheet.guide.vertices](double t) {
     const int jump = static_cast<int>(std::floor(t / (10 * kStep) + 1e-6));   // by its own size and more, turned each time
-    const Eigen::Vector3d to = jump == 0 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(3 * std::sin(7.0 * jump), 2 * std::cos(5.0 * jump), 2 * std::sin(3.0 * jump));
+    const Eigen::Vector3d to(3 * std::sin(7.0 * jump), 2 * (1 - std::cos(5.0 * jump)), 2 * std::sin(3.0 * jump));
     return Eigen::Matrix3Xd((Eigen::AngleAxisd(2.0 * jump, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix() * rest).colwise() + to);
   };
   all.push_back(jumps);

@@ -146,7 +146,7 @@ void runTrackingOverhead(StudyContext& context)
     double tolerance = usual;
     for (int pass = 0; pass < 2; ++pass)
     {
-      const Costs costs = run(context, c, tolerance, steps / 2, Purpose::errors);
+      const Costs costs = run(context, c, tolerance, steps, Purpose::errors);
       tolerance = std::min(usual, tolerance * costs.beside.error() / costs.tracked.error());
     }
     const Costs costs = run(context, c, tolerance, steps, Purpose::times);
