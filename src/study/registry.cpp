@@ -58,6 +58,13 @@ void runFlag(StudyContext&);
 void runDrape(StudyContext&);
 void runFabricDrape(StudyContext&);
 void runStiffnessRange(StudyContext&);
+void runRubberBand(StudyContext&);
+void runBreathingSurface(StudyContext&);
+void runTrackingMethods(StudyContext&);
+void runPartitions(StudyContext&);
+void runClustering(StudyContext&);
+void runCharacter(StudyContext&);
+void runTrackingStability(StudyContext&);
 void runTrackingOverhead(StudyContext&);
 void runTrackingExactness(StudyContext&);
 
@@ -119,6 +126,13 @@ const std::vector<Study>& studies()
       {"fabric_drape", "drape coefficient (Cusick) and droop of strips of silk, cotton, wool and denim against published values", runFabricDrape},
       {"drape", "a sheet draped over a sphere, as thesis figure 2.2: isometric bending beside hinges, shapes and wrinkles", runDrape},
       {"stiffness_range", "draped sheets of bending over membrane stiffness 1e-5, 1e-3, 1e-2, as thesis figure 2.3: isometric bending beside hinges", runStiffnessRange},
+      {"rubber_band", "an elastic curve that follows an accelerated guide (thesis figure 6.3): averaged against pointwise constraints", runRubberBand},
+      {"breathing_surface", "a guide that rapidly expands and contracts (thesis figure 6.4): averaged against pointwise constraints", runBreathingSurface},
+      {"tracking_methods", "error against run time of ways to keep averages: Lagrange multipliers, penalty, manifold projection", runTrackingMethods},
+      {"partitions", "16 to 1024 regions, of one size and of two, set the scale of folds (thesis figures 6.5, 6.6)", runPartitions},
+      {"clustering", "regions of a walking character: animation-aware clustering beside static (thesis figure 6.7)", runClustering},
+      {"character", "a character of 3,050 vertices that walks as its guide does (thesis figures 6.2, 6.10): as it is, in a headwind, crinkled", runCharacter},
+      {"tracking_stability", "guides that collapse, explode, jump or are not numbers, constraints that conflict: done or refused with reason", runTrackingStability},
       {"tracking_overhead", "steps of cloth with and without tracking, in the sizes of the thesis's table 6.1, beside it", runTrackingOverhead},
       {"tracking_exactness", "averages of tracked cloths against their guides' after every step, with wind, jumps, contact", runTrackingExactness},
   };

@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// A triangle on the page, and the brightness of its corners (a grey one's lies between 2 and 3).
+/// A triangle on the page, and the brightness of its corners (a grey one's lies between 2 and 3, of hue k between 4 + 2 k and 5 + 2 k).
 struct Facet
 {
   Eigen::Vector2d corner[3];
@@ -47,6 +47,7 @@ std::vector<Facet> facetsOf(const SurfacePicture::Panel& panel, const SurfacePic
     for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
     {
       Facet facet{};
+      const double shift = surface.hues.size() > 0 ? 4.0 + 2.0 * surface.hues[f] : surface.cloth ? 0.0 : 2.0;
       for (int k = 0; k < 3; ++k)
       {
         const Vector3d x = mesh.vertices.col(mesh.triangles(k, f));
@@ -54,7 +55,7 @@ std::vector<Facet> facetsOf(const SurfacePicture::Panel& panel, const SurfacePic
         if (normal.dot(view) > 0)   // the side that is seen
           normal = -normal;
         facet.corner[k] = {right.dot(x), up.dot(x)};
-        facet.shade[k] = 0.15 + 0.85 * std::max(0.0, normal.dot(light)) + (surface.cloth ? 0.0 : 2.0);
+        facet.shade[k] = 0.15 + 0.85 * std::max(0.0, normal.dot(light)) + shift;
         facet.depth += view.dot(x) / 3.0;
       }
       facets.push_back(facet);
@@ -62,6 +63,15 @@ std::vector<Facet> facetsOf(const SurfacePicture::Panel& panel, const SurfacePic
   }
   std::stable_sort(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.depth > b.depth; });   // far ones first
   return facets;
+}
+
+bool hasHues(const SurfacePicture& picture)
+{
+  for (const SurfacePicture::Panel& panel : picture.panels)
+    for (const SurfacePicture::Surface& surface : panel.surfaces)
+      if (surface.hues.size() > 0)
+        return true;
+  return false;
 }
 
 }  // namespace
@@ -96,8 +106,15 @@ void writeSurfaceScript(std::ostream& out, const SurfacePicture& picture, const 
       << "unset key\nunset tics\nunset border\nunset colorbox\nset lmargin at screen 0\nset rmargin at screen 1\n"
       << "set bmargin at screen 0\nset tmargin at screen "
       << 1.0 - 60.0 / (rows * height * pixels + 60) << "\nset view map\nset pm3d explicit scansforward corners2color mean border retrace\n"
-      << "set cbrange [0:3]\n"
-      << "set palette defined (0 \"#20120c\", 1 \"#f4c9a0\", 2 \"#101418\", 3 \"#b4bcc8\")\n";
+      << "set palette defined (0 \"#20120c\", 1 \"#f4c9a0\", 2 \"#101418\", 3 \"#b4bcc8\"";
+  int last = 3;
+  if (hasHues(picture))
+    for (const char* light : {"#f28e7c", "#8ec6f0", "#b6dd8a", "#f5d76e", "#c9a5e6", "#f4b3cf", "#8fdccb"})
+    {
+      out << ", " << last + 1 << " \"#1c1c1c\", " << last + 2 << " \"" << light << "\"";
+      last += 2;
+    }
+  out << ")\nset cbrange [0:" << last << "]\n";
   std::snprintf(line, sizeof line, "set xrange [0:%.6g]\nset yrange [0:%.6g]\n", columns * width, rows * height);
   out << line;
   for (std::size_t p = 0; p < panels.size(); ++p)

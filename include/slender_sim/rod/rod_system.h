@@ -75,6 +75,8 @@ public:
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
   /// direction() := -K^-1 gradient of the last evaluate(true).
   void solve();
+  /// x := K^-1 x with that matrix, four doubles per node; zero at held nodes if x is.
+  void solveFor(double* x) const { matrix_.solve(x); }
 
   /// For systems of several rods, bodies and contact: energy, gradient() and panels() of all unknowns, prescribed ones included, without
   /// factoring. closeGradient() then keeps the prescribed ones' entries as reactions and clears them.

@@ -61,10 +61,12 @@ struct Plot
 /// Shaded surfaces in panels beside each other, all seen along the same direction and at the same scale.
 struct SurfacePicture
 {
+  static constexpr int kHues = 7;
   struct Surface
   {
     TriangleMesh mesh;
     bool cloth = true;   ///< else something that stands behind: grey
+    Eigen::VectorXi hues{};   ///< of each face, 0 ... kHues - 1; empty: all of cloth's colour
   };
   struct Panel
   {

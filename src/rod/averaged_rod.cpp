@@ -1,0 +1,245 @@
+#include "slender_sim/rod/averaged_rod.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Cholesky>
+
+#include "rod_stepper_impl.h"
+
+namespace slender {
+
+namespace {
+
+/// A rod's equations under constraints C x = targets, as minimize() wants them.
+class ConstrainedRod
+{
+public:
+  ConstrainedRod(RodSystem& rod, const AveragedRod::Averages& c)
+    : rod_(rod), c_(c), rows_(3 * c.rows()), columns_(4 * c.cols(), rows_), schur_(rows_, rows_), factor_(rows_), gap_(rows_), multipliers_(rows_), pull_(c.rows())
+    , weighted_(c.rows(), c.cols()), gram_(c.rows(), c.rows()), gram_factor_(c.rows())
+  {
+    multipliers_.setZero();
+  }
+
+  /// Trial positions of free nodes, moved by the least sum of mass times distance squared so that they have the averages. False: averages depend on each other.
+  bool meet(const Eigen::VectorXd& mass, const Eigen::Matrix3Xd& targets)
+  {
+    targets_ = &targets;
+    weighted_.setZero();
+    for (Eigen::Index i = 0; i < c_.rows(); ++i)
+      for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
+        if (rod_.isFree(static_cast<int>(entry.col())))
+          weighted_(i, entry.col()) = entry.value() / std::sqrt(mass[entry.col()]);
+    gram_.noalias() = weighted_ * weighted_.transpose();
+    const double scale = gram_.diagonal().maxCoeff();
+    gram_factor_.compute(gram_);
+    for (Eigen::Index i = 0; i < c_.rows(); ++i)   // what is left of a row beside the others
+      if (!(gram_factor_.vectorD()[i] > 1e-12 * scale))
+        return false;
+    for (int k = 0; k < 3; ++k)
+    {
+      for (Eigen::Index i = 0; i < c_.rows(); ++i)
+        pull_[i] = targets(k, i) - average(i, rod_.arrays().x[k]);
+      gram_factor_.solveInPlace(pull_);
+      for (Eigen::Index j = 0; j < c_.cols(); ++j)
+        if (rod_.isFree(static_cast<int>(j)))
+        {
+          Eigen::Vector3d x = rod_.position(static_cast<int>(j));
+          x[k] += weighted_.col(j).dot(pull_) / std::sqrt(mass[j]);
+          rod_.setPosition(static_cast<int>(j), x);
+        }
+    }
+    return true;
+  }
+
+  /// Of averages, in the rod's axes: three per average [N].
+  const Eigen::VectorXd& multipliers() const { return multipliers_; }
+
+  RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {}) { return rod_.evaluate(with_hessian, shift); }
+  void solve()
+  {
+    rod_.solve();
+    columns_.setZero();
+    for (Eigen::Index i = 0; i < c_.rows(); ++i)
+      for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
+        if (rod_.isFree(static_cast<int>(entry.col())))
+          for (int k = 0; k < 3; ++k)
+            columns_(4 * entry.col() + k, 3 * i + k) = entry.value();
+    for (Eigen::Index r = 0; r < rows_; ++r)
+      rod_.solveFor(columns_.col(r).data());
+    Eigen::Map<Eigen::VectorXd> direction(rod_.direction(), columns_.rows());
+    for (Eigen::Index i = 0; i < c_.rows(); ++i)
+      for (int k = 0; k < 3; ++k)
+      {
+        const Eigen::Index row = 3 * i + k;
+        schur_.row(row).setZero();
+        gap_[row] = -(*targets_)(k, i);
+        for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
+        {
+          const Eigen::Index at = 4 * entry.col() + k;
+          schur_.row(row) += entry.value() * columns_.row(at);
+          gap_[row] += entry.value() * (rod_.basePosition(static_cast<int>(entry.col()))[k] + direction[at]);
+        }
+      }
+    factor_.compute(schur_);
+    multipliers_ = gap_;
+    factor_.solveInPlace(multipliers_);
+    direction.noalias() -= columns_ * multipliers_;
+  }
+  void moveAlong(double alpha) { rod_.moveAlong(alpha); }
+  void accept() { rod_.accept(); }
+  void saveBase() { rod_.saveBase(); }
+  void restoreBase() { rod_.restoreBase(); }
+  double stepLimit() const { return rod_.stepLimit(); }
+  double incrementSize() const { return rod_.incrementSize(); }
+  static constexpr bool anglesMayKeepShift() { return RodSystem::anglesMayKeepShift(); }
+  double slope() const { return rod_.slope(); }
+  double residual()
+  {
+    addMultipliers(1.0);
+    const double residual = rod_.residual();
+    addMultipliers(-1.0);
+    return residual;
+  }
+  double forceScale() const { return std::max(rod_.forceScale(), multipliers_.cwiseAbs().maxCoeff() / std::max<Eigen::Index>(1, c_.cols() / c_.rows())); }
+  double noiseLevel() const { return rod_.noiseLevel(); }
+
+private:
+  double average(Eigen::Index i, const double* x) const
+  {
+    double sum = 0.0;
+    for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
+      sum += entry.value() * x[entry.col()];
+    return sum;
+  }
+
+  void addMultipliers(double factor)
+  {
+    for (Eigen::Index i = 0; i < c_.rows(); ++i)
+      for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
+        if (rod_.isFree(static_cast<int>(entry.col())))
+          for (int k = 0; k < 3; ++k)
+            rod_.gradient()[4 * entry.col() + k] += factor * entry.value() * multipliers_[3 * i + k];
+  }
+
+  RodSystem& rod_;
+  const AveragedRod::Averages& c_;
+  const Eigen::Matrix3Xd* targets_ = nullptr;
+  Eigen::Index rows_;
+  Eigen::MatrixXd columns_;   ///< K^-1 C^T, 4 nodes x 3 averages
+  Eigen::MatrixXd schur_;     ///< C K^-1 C^T
+  Eigen::LDLT<Eigen::MatrixXd> factor_;
+  Eigen::VectorXd gap_, multipliers_, pull_;
+  Eigen::MatrixXd weighted_, gram_;
+  Eigen::LDLT<Eigen::MatrixXd> gram_factor_;
+};
+
+}  // namespace
+
+class AveragedRod::Impl
+{
+public:
+  Impl(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> a, const TimeConfig& time)
+    : rod(std::move(model), time), averages(std::move(a)), equations(rod.system, *averages)
+  {
+    plan.stages.reserve(2);
+  }
+
+  StepFailure substep(const RodInputs& inputs, double duration, double t, double h, StepReport& report)
+  {
+    planStep(Integrator::implicit_euler, rod.time.spectral_radius, h, rod.work.last_step, plan);
+    if (const StepFailure failure = rod.beginStep(plan, inputs, duration, t, h); failure != StepFailure::none)
+      return failure;
+    rod.beginStage(0, inputs, duration, t, h);
+    at = start + (t + h) / duration * (*targets - start);
+    if (!equations.meet(rod.model->mass, at))
+      return StepFailure::singular_matrix;
+    const NewtonResult newton = minimize(equations, rod.time.newton);
+    report.iterations += newton.iterations;
+    report.factorizations += newton.factorizations;
+    if (!newton.ok())
+      return newton.failure;
+    report.residual = std::max(report.residual, newton.residual);
+    report.max_strain = std::max(report.max_strain, newton.max_strain);
+    rod.finishStep(inputs, duration, t, h, report);
+    return StepFailure::none;
+  }
+
+  RodStepper::Impl rod;
+  std::shared_ptr<const Averages> averages;
+  ConstrainedRod equations;
+  StepPlan plan;
+  Eigen::Matrix3Xd start, at, forces;
+  const Eigen::Matrix3Xd* targets = nullptr;
+};
+
+AveragedRod::AveragedRod(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> averages, const TimeConfig& time)
+{
+  const std::string who = "rod '" + model->name + "': ";
+  if (!averages || averages->rows() == 0 || averages->cols() != model->nodes())
+    throw std::invalid_argument(who + "averages of its " + std::to_string(model->nodes()) + " nodes expected, at least one");
+  if (time.integrator != Integrator::implicit_euler || time.error_tolerance > 0)
+    throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler, with fixed steps");
+  const Eigen::VectorXd weights = *averages * Eigen::VectorXd::Ones(averages->cols());
+  for (Eigen::Index i = 0; i < weights.size(); ++i)
+    if (!(std::abs(weights[i] - 1.0) < 1e-9))
+      throw std::invalid_argument(who + "the weights of average " + std::to_string(i) + " sum to " + std::to_string(weights[i]) + "; must be 1");
+  impl_ = std::make_unique<Impl>(std::move(model), std::move(averages), time);
+}
+AveragedRod::~AveragedRod() = default;
+AveragedRod::AveragedRod(AveragedRod&&) noexcept = default;
+
+StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eigen::Matrix3Xd& targets, double duration)
+{
+  RodStepper::Impl& rod = impl_->rod;
+  StepReport report;
+  std::string what;
+  if (!(duration > 0) || !std::isfinite(duration))
+    what = "step length";
+  else if (targets.cols() != impl_->averages->rows())
+    what = "number of averages (" + std::to_string(targets.cols()) + " for " + std::to_string(impl_->averages->rows()) + ")";
+  else if (!targets.allFinite())
+    what = "averages";
+  if (!what.empty() || !rod.inputsFinite(state, inputs, what))
+    return rod.refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
+  rod.begin(state);
+  impl_->start = state.x * impl_->averages->transpose();
+  impl_->targets = &targets;
+  double t = 0.0, h = duration;
+  while (t < duration)
+  {
+    const bool last = t + h > duration * (1 - 1e-9);
+    const double length = last ? duration - t : h;
+    StepReport sub;
+    const StepFailure failure = impl_->substep(inputs, duration, t, length, sub);
+    if (failure != StepFailure::none)
+    {
+      report.iterations += sub.iterations;
+      report.factorizations += sub.factorizations;
+      if (0.5 * length < duration * std::ldexp(1.0 - 1e-9, -rod.time.newton.max_cuts))
+        return rod.refuse(report, failure, failure == StepFailure::singular_matrix
+                                             ? "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes"
+                                             : rod.explainFailure(failure, length, false));
+      ++report.cut_steps;
+      h = 0.5 * length;
+      continue;
+    }
+    t = last ? duration : t + length;
+    rod.moveGrasps(inputs, duration, t);
+    std::swap(rod.work, rod.next);
+    ++sub.substeps;
+    report.merge(sub);
+    h = 2.0 * length;
+  }
+  state = rod.work;
+  impl_->forces = -Eigen::Map<const Eigen::Matrix3Xd>(impl_->equations.multipliers().data(), 3, targets.cols());
+  return report;
+}
+
+const Eigen::Matrix3Xd& AveragedRod::averageForces() const { return impl_->forces; }
+const std::vector<Wrench>& AveragedRod::wrenches() const { return impl_->rod.wrenches; }
+RodEnergies AveragedRod::energies(const RodState& state, const Eigen::Vector3d& gravity) const { return impl_->rod.energies(state, gravity); }
+
+}  // namespace slender
