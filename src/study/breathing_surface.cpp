@@ -3,7 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "tracked_cases.h"
+#include "guided_cloth.h"
 
 namespace slender::study {
 
@@ -12,9 +12,9 @@ namespace {
 constexpr double kRapid = 6.0;      // [Hz]
 constexpr double kDamping = 1e-3;   // [s]
 
-TrackedCase breathing(int levels, double frequency, double damping)
+GuidedCloth breathing(int levels, double frequency, double damping)
 {
-  TrackedCase c;
+  GuidedCloth c;
   c.name = "breathing surface";
   c.guide = guideSheet(0.5, 4, 0.5);
   for (Eigen::Index i = 0; i < c.guide.vertices.cols(); ++i)
@@ -63,13 +63,13 @@ void runBreathingSurface(StudyContext& context)
   for (const auto& [frequency, damping] : cases)
   {
     context.progress(done++, static_cast<int>(cases.size()), "breathing");
-    const TrackedCase c = breathing(3, frequency, damping);
+    const GuidedCloth c = breathing(3, frequency, damping);
     const FineScale fine(c);
     double energies[2] = {0, 0};
     for (const Follow how : {Follow::averages, Follow::points})
     {
       const std::string label = how == Follow::averages ? "averages" : "points";
-      TrackedStepper run(c, how);
+      GuidedStepper run(c, how);
       double kinetic = 0, bending = 0, worst = 0;
       const double period = 1.0 / frequency;
       const int steps = static_cast<int>(std::lround(breaths * period / c.step)), shown = static_cast<int>(std::lround((breaths - 0.5) * period / c.step));

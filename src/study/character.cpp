@@ -8,7 +8,7 @@
 #include "biped.h"
 #include "region_cases.h"
 #include "slender_sim/tracking/clustering.h"
-#include "tracked_cases.h"
+#include "guided_cloth.h"
 
 namespace slender::study {
 
@@ -36,9 +36,9 @@ Matrix3Xd crinkled(const TriangleMesh& mesh, double size)
 }
 
 /// `crinkles` [m]: of the undeformed shape.
-TrackedCase character(const Biped& biped, const std::vector<int>& region, double crinkles)
+GuidedCloth character(const Biped& biped, const std::vector<int>& region, double crinkles)
 {
-  TrackedCase c;
+  GuidedCloth c;
   c.name = "character";
   c.guide = biped.mesh();
   c.fine = subdivide(c.guide, 0);
@@ -78,14 +78,14 @@ void runCharacter(StudyContext& context)
   {
     context.progress(done++, 3, look);
     const std::string name = look;
-    TrackedCase c = character(biped, region, name == "crinkled" ? 0.005 : 0.0);
+    GuidedCloth c = character(biped, region, name == "crinkled" ? 0.005 : 0.0);
     if (name == "headwind")
     {
       c.wind = Vector3d(-25, 0, 0);
       c.model.aerodynamics.drag = 1.2;
       c.model.aerodynamics.lift = 0.6;
     }
-    TrackedStepper run(c, Follow::averages);
+    GuidedStepper run(c, Follow::averages);
     const int steps = static_cast<int>(std::lround(duration / c.step));
     double error = 0, away = 0, flutter = 0;
     Matrix3Xd guide;

@@ -6,7 +6,7 @@
 #include "region_cases.h"
 #include "sheet_cases.h"
 #include "slender_sim/tracking/clustering.h"
-#include "tracked_cases.h"
+#include "guided_cloth.h"
 
 namespace slender::study {
 
@@ -16,9 +16,9 @@ namespace {
 
 constexpr double kSide = 0.6, kContraction = 0.12, kDuration = 1.5;
 
-TrackedCase contracting(int cells, const std::vector<int>& region)
+GuidedCloth contracting(int cells, const std::vector<int>& region)
 {
-  TrackedCase c;
+  GuidedCloth c;
   c.name = "contracting sheet";
   c.guide = guideSheet(kSide, cells, 0.0);
   c.fine = subdivide(c.guide, 0);
@@ -55,9 +55,9 @@ struct Folded
   double away = 0, error = 0, ms = 0;   ///< RMS distance from the guide, greatest of an average [m]; per step
 };
 
-Folded fold(const TrackedCase& c)
+Folded fold(const GuidedCloth& c)
 {
-  TrackedStepper run(c, Follow::averages);
+  GuidedStepper run(c, Follow::averages);
   std::mt19937 random(3);
   Matrix3Xd& x = run.cloth().state.x;
   for (Eigen::Index i = 0; i < x.cols(); ++i)   // off the plane, or it could not leave it
@@ -121,7 +121,7 @@ void runPartitions(StudyContext& context)
     options.regions = count;
     options.compactness = 1.0;
     const Clustering clusters = clusterFaces(sheet.triangles, {sheet.vertices}, options);
-    const TrackedCase c = contracting(cells, clusters.region);
+    const GuidedCloth c = contracting(cells, clusters.region);
     const Folded folded = fold(c);
     const double length = wavelength(sheet, folded.x, cells, 0, cells), size = kSide / std::sqrt(static_cast<double>(count));
     const double out = std::sqrt(folded.x.row(2).squaredNorm() / static_cast<double>(folded.x.cols()));

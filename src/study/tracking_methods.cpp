@@ -5,7 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "tracked_cases.h"
+#include "guided_cloth.h"
 
 namespace slender::study {
 
@@ -16,9 +16,9 @@ namespace {
 constexpr double kDuration = 1.0;   // [s]
 
 /// A sheet that is shaken and turned by its averages.
-TrackedCase shakenSheet()
+GuidedCloth shakenSheet()
 {
-  TrackedCase c;
+  GuidedCloth c;
   c.name = "shaken sheet";
   c.guide = guideSheet(0.5, 3, 0.0);
   c.fine = subdivide(c.guide, 3);
@@ -45,7 +45,7 @@ TrackedCase shakenSheet()
 class Outside
 {
 public:
-  explicit Outside(const TrackedCase& c)
+  explicit Outside(const GuidedCloth& c)
     : case_(c), constraints_(c.constraints()), inverse_mass_(c.model.mass.cwiseInverse()), weights_(constraints_.matrix())
     , gram_(Eigen::MatrixXd(weights_ * inverse_mass_.asDiagonal() * weights_.transpose()))
   {
@@ -82,7 +82,7 @@ public:
   }
 
 private:
-  const TrackedCase& case_;
+  const GuidedCloth& case_;
   WeakConstraints constraints_;
   Eigen::VectorXd inverse_mass_;
   WeakConstraints::Matrix weights_;
@@ -101,11 +101,11 @@ struct Run
 
 enum class Method { multipliers, penalty, projection };
 
-Run follow(const TrackedCase& base, const Outside& outside, Method method, double h, double stiffness)
+Run follow(const GuidedCloth& base, const Outside& outside, Method method, double h, double stiffness)
 {
-  TrackedCase c = base;
+  GuidedCloth c = base;
   c.step = h;
-  TrackedStepper stepper(c, method == Method::multipliers ? Follow::averages : Follow::nothing);
+  GuidedStepper stepper(c, method == Method::multipliers ? Follow::averages : Follow::nothing);
   const int steps = static_cast<int>(std::lround(kDuration / h));
   const WeakConstraints& constraints = stepper.constraints();
   Run run;
@@ -155,7 +155,7 @@ double distance(const std::vector<Matrix3Xd>& a, const std::vector<Matrix3Xd>& b
 void runTrackingMethods(StudyContext& context)
 {
   useOneBlasThread();
-  const TrackedCase c = shakenSheet();
+  const GuidedCloth c = shakenSheet();
   const Outside outside(c);
   Plot& paths = context.plot("tracking_methods", "Ways of tracking: error against run time, steps of 20 ms down", "CPU time per simulated second [s]",
                              "RMS distance from the converged motion [m]");

@@ -6,7 +6,7 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
-#include "tracked_cases.h"
+#include "guided_cloth.h"
 
 namespace slender::study {
 
@@ -151,9 +151,9 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
 }
 
 /// A sheet with test functions of its own making.
-TrackedCase sheetWith(const TestFunctions& functions, const Subdivision& fine, const TriangleMesh& guide)
+GuidedCloth sheetWith(const TestFunctions& functions, const Subdivision& fine, const TriangleMesh& guide)
 {
-  TrackedCase c;
+  GuidedCloth c;
   c.guide = guide;
   c.fine = fine;
   c.functions = functions;
@@ -200,6 +200,9 @@ void runTrackingStability(StudyContext& context)
   for (const Setting& setting : settings)
     for (const GuideCase& guide : guides)
     {
+      const bool crushes = !guide.to_be_refused && guide.name.find("jumps") == std::string::npos;
+      if (context.quick() && &setting == &settings.back() && crushes)
+        continue;   // in contact: single steps of many seconds
       context.progress(cells, total, guide.name);
       Simulation simulation(parseScene(kScene, "sheet.yaml", setting.set));
       const Verdict v = run(simulation, guide, steps, context.quick() ? 1.5 : 20.0);
@@ -231,7 +234,7 @@ void runTrackingStability(StudyContext& context)
   const auto constrained = [&](const std::string& what, const TestFunctions& functions, const std::vector<int>& held, const TriangleMesh& of,
                                const Subdivision& on) {
     Verdict v;
-    const TrackedCase c = sheetWith(functions, on, of);
+    const GuidedCloth c = sheetWith(functions, on, of);
     std::string outcome = "done";
     double force = 0;
     try
@@ -240,7 +243,7 @@ void runTrackingStability(StudyContext& context)
       for (const int vertex : held)
         is_held[vertex] = 1;
       c.constraints().requireIndependent(is_held);
-      TrackedStepper stepper(c, Follow::averages);
+      GuidedStepper stepper(c, Follow::averages);
       if (!held.empty())
         stepper.cloth().pin(held);
       for (int k = 0; k < steps && v.refused == 0; ++k)

@@ -6,7 +6,7 @@
 #include "slender_sim/study/study.h"
 #include "src/study/biped.h"
 #include "src/study/region_cases.h"
-#include "src/study/tracked_cases.h"
+#include "src/study/guided_cloth.h"
 
 using namespace slender;
 using namespace slender::study;
@@ -74,7 +74,7 @@ TEST(TrackingStudies, HuesTellRegionsApart)
 
 TEST(TrackingStudies, FineScaleLeavesOutWhatTheGuideHas)
 {
-  TrackedCase c;
+  GuidedCloth c;
   c.guide = guideSheet(0.4, 2, 0.0);
   c.fine = subdivide(c.guide, 2);
   c.functions = subdivisionBasis(c.fine);

@@ -1,12 +1,12 @@
-#include "tracked_cases.h"
+#include "guided_cloth.h"
 
 namespace slender::study {
 
 using Eigen::Matrix3Xd;
 
-WeakConstraints TrackedCase::constraints() const { return {functions, hatMassMatrix(guide), hatMassMatrix(fine.mesh)}; }
+WeakConstraints GuidedCloth::constraints() const { return {functions, hatMassMatrix(guide), hatMassMatrix(fine.mesh)}; }
 
-Matrix3Xd TrackedCase::velocity(double t) const
+Matrix3Xd GuidedCloth::velocity(double t) const
 {
   constexpr double kDelta = 1e-5;   // [s]: errors of a ten-thousandth of motions within 0.1 s
   return (at(t + kDelta) - at(t - kDelta)) / (2 * kDelta);
@@ -14,7 +14,7 @@ Matrix3Xd TrackedCase::velocity(double t) const
 
 namespace {
 
-ClothModel modelOf(const TrackedCase& c, Follow how, const WeakConstraints& constraints)
+ClothModel modelOf(const GuidedCloth& c, Follow how, const WeakConstraints& constraints)
 {
   ClothModel model = c.model;
   if (how == Follow::averages)
@@ -22,7 +22,7 @@ ClothModel modelOf(const TrackedCase& c, Follow how, const WeakConstraints& cons
   return model;
 }
 
-ClothOptions optionsOf(const TrackedCase& c)
+ClothOptions optionsOf(const GuidedCloth& c)
 {
   ClothOptions options;
   options.one_newton_step = c.one_newton_step;
@@ -31,7 +31,7 @@ ClothOptions optionsOf(const TrackedCase& c)
 
 }  // namespace
 
-TrackedStepper::TrackedStepper(const TrackedCase& c, Follow how)
+GuidedStepper::GuidedStepper(const GuidedCloth& c, Follow how)
   : case_(c), how_(how), constraints_(std::make_shared<const WeakConstraints>(c.constraints())), cloth_(modelOf(c, how, *constraints_))
   , stepper_(cloth_.model, optionsOf(c)), guide_(c.at(0.0))
 {
@@ -48,9 +48,9 @@ TrackedStepper::TrackedStepper(const TrackedCase& c, Follow how)
   }
 }
 
-StepReport TrackedStepper::step() { return step(case_.at(time_ + case_.step)); }
+StepReport GuidedStepper::step() { return step(case_.at(time_ + case_.step)); }
 
-StepReport TrackedStepper::step(const Matrix3Xd& guide)
+StepReport GuidedStepper::step(const Matrix3Xd& guide)
 {
   if (how_ == Follow::averages)
     cloth_.inputs.averages = constraints_->averages(guide);
@@ -67,7 +67,7 @@ StepReport TrackedStepper::step(const Matrix3Xd& guide)
   return report;
 }
 
-FineScale::FineScale(const TrackedCase& c)
+FineScale::FineScale(const GuidedCloth& c)
   : weights_(c.fine.weights), mass_(hatMassMatrix(c.fine.mesh)), coarse_(Eigen::MatrixXd(weights_.transpose() * mass_ * weights_))
   , density_(c.model.totalMass() / faceAreas(c.fine.mesh).sum())
 {

@@ -22,7 +22,7 @@ enum class Follow
   points      ///< the vertices that the meshes share are held where the guide's are (subdivided meshes only)
 };
 
-struct TrackedCase
+struct GuidedCloth
 {
   std::string name;
   Subdivision fine;                             ///< of the guide's undeformed mesh
@@ -41,10 +41,10 @@ struct TrackedCase
 };
 
 /// One way of following the guide, step by step.
-class TrackedStepper
+class GuidedStepper
 {
 public:
-  TrackedStepper(const TrackedCase& c, Follow how);
+  GuidedStepper(const GuidedCloth& c, Follow how);
 
   /// Goes to the next instant, at which the guide is at `guide` (default: where the case's is). On failure nothing changes.
   StepReport step();
@@ -59,7 +59,7 @@ public:
   double seconds() const { return seconds_; }   ///< CPU time of all steps
 
 private:
-  const TrackedCase& case_;
+  const GuidedCloth& case_;
   Follow how_;
   std::shared_ptr<const WeakConstraints> constraints_;
   ClothSetup cloth_;
@@ -72,7 +72,7 @@ private:
 class FineScale
 {
 public:
-  explicit FineScale(const TrackedCase& c);
+  explicit FineScale(const GuidedCloth& c);
   Eigen::Matrix3Xd of(const Eigen::Matrix3Xd& field) const;
   /// Of velocities [m/s]: 1/2 integral of area density times square [J].
   double kineticEnergy(const Eigen::Matrix3Xd& velocities) const;
