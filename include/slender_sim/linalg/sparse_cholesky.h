@@ -52,7 +52,6 @@ public:
 
 private:
   void setPointPattern(const BlockMatrix& pattern, int unknowns);
-  bool factorValues();
 
   struct Impl;
   std::unique_ptr<Impl> impl_;
