@@ -228,14 +228,14 @@ bool ClothGroup::stepCloths(const ClothGroupInputs& inputs, double to, double h,
       sub_.cloths[k].pins = pins_start_[k] + to * (inputs.cloths[k].pins - pins_start_[k]);
     if (to < 1.0 && inputs.cloths[k].averages.cols() == averages_start_[k].cols())
       sub_.cloths[k].averages = averages_start_[k] + to * (inputs.cloths[k].averages - averages_start_[k]);
-    StepReport own = all ? steppers_[k].step(next_.cloths[k], sub_.cloths[k], h) : steppers_[k].stepFirstOrder(next_.cloths[k], sub_.cloths[k], h);
+    StepReport own = all ? steppers_[k].step(next_.cloths[k], sub_.cloths[k], h) : steppers_[k].stepUndivided(next_.cloths[k], sub_.cloths[k], h);
     if (!all)   // counted already
       own.substeps = 0;
     report.merge(own);
     if (!report.ok)
       return false;
     const ClothOptions& options = model_.options.empty() ? options_ : model_.options[k];
-    order_[k] = all && order(options.integrator) == 2 && options.error_tolerance == 0.0 ? Order::second : Order::first;
+    order_[k] = all && (order(options.integrator) == 2 || options.error_tolerance > 0) ? Order::own : Order::first;
   }
   return true;
 }
@@ -245,7 +245,7 @@ bool ClothGroup::lowerOrder()
 {
   bool any = false;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
-    if (order_[k] == Order::second && collider_->touched(first_[k], first_[k + 1] - first_[k]))
+    if (order_[k] == Order::own && collider_->touched(first_[k], first_[k + 1] - first_[k]))
     {
       order_[k] = Order::lowered;
       any = true;

@@ -325,12 +325,17 @@ ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
-StepReport ClothStepper::stepFirstOrder(ClothState& state, const ClothInputs& inputs, double duration)
+StepReport ClothStepper::stepUndivided(ClothState& state, const ClothInputs& inputs, double duration)
 {
-  const Integrator own = impl_->options.integrator;
-  impl_->options.integrator = own == Integrator::tr_bdf2 ? Integrator::implicit_euler : own;
+  const ClothOptions own = impl_->options;
+  const double next_step = state.next_step;
+  impl_->options.error_tolerance = 0.0;
+  if (own.integrator == Integrator::tr_bdf2)
+    impl_->options.integrator = Integrator::implicit_euler;
   const StepReport report = impl_->step(state, inputs, duration);
-  impl_->options.integrator = own;
+  if (report.ok)
+    state.next_step = next_step;
+  impl_->options = own;
   return report;
 }
 

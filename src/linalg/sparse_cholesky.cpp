@@ -7,6 +7,7 @@
 #include <suitesparse/cholmod.h>
 
 #include "slender_sim/linalg/point_kernel.h"
+#include "supernodal_factor.h"
 
 // Absent from other BLAS libraries than OpenBLAS.
 extern "C" __attribute__((weak)) void openblas_set_num_threads(int);
@@ -99,6 +100,7 @@ struct SparseCholesky::Impl
   int unknowns = 1;               ///< per point
   cholmod_dense* right = nullptr; ///< work space of solvePoints: for blocks
   PointVector permuted;           ///< for numbers
+  SupernodalNumeric numeric;      ///< of matrices of points
 
   cholmod_common common;
   cholmod_factor* factor = nullptr;
@@ -219,8 +221,9 @@ void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
     m.permuted.assign(4 * points, 0.0);
   else
     m.right = cholmod_allocate_dense(d * points, 1, d * points, CHOLMOD_REAL, &m.common);
-  if (!m.factor || (d != 1 && !m.right))
+  if (!m.factor || (d != 1 && !m.right) || !cholmod_change_factor(CHOLMOD_REAL, 1, 1, 1, 1, m.factor, &m.common))
     throw std::bad_alloc();
+  m.numeric.setPattern(m.supernodes(), m.starts, m.rows);
 }
 
 bool SparseCholesky::factor(const BlockMatrix& matrix, const char* fixed)
@@ -240,7 +243,7 @@ bool SparseCholesky::factor(const BlockMatrix& matrix, const char* fixed)
           out[r] = leave_out ? (t.diagonal && r == c) : t.transposed ? block[3 * r + c] : block[3 * c + r];
       }
     }
-  return factorValues();
+  return m.numeric.factor(m.values.data(), static_cast<double*>(m.factor->x));
 }
 
 bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed) { return factor(matrix, matrix.values().data(), fixed); }
@@ -258,7 +261,7 @@ bool SparseCholesky::factor(const PointMatrix& matrix, const double* values, con
       const bool leave_out = fixed && (fixed[i] || fixed[j]);
       m.values[m.targets[next++].at] = leave_out ? i == j : values[k];
     }
-  return factorValues();
+  return m.numeric.factor(m.values.data(), static_cast<double*>(m.factor->x));
 }
 
 void SparseCholesky::solvePoints(const double* b, double* x) const
@@ -309,9 +312,7 @@ int SparseCholesky::index(int row, int column) const
   return static_cast<int>(std::lower_bound(begin + impl_->starts[column], begin + impl_->starts[column + 1], row) - begin);
 }
 
-bool SparseCholesky::factor() { return factorValues(); }
-
-bool SparseCholesky::factorValues()
+bool SparseCholesky::factor()
 {
   Impl& m = *impl_;
   cholmod_sparse a = m.view();

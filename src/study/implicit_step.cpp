@@ -24,7 +24,7 @@ ClothSetup pinnedSheet(int side)
   return cloth;
 }
 
-/// Least time to factor the matrix of a step from this state, by CHOLMOD with nested dissection of points and wide supernodes.
+/// Least time to factor the matrix of a step from this state, by supernodes as CHOLMOD does, with nested dissection of points and wide supernodes.
 double factorSeconds(const ClothSetup& cloth, double budget)
 {
   const ClothModel& model = *cloth.model;
@@ -230,7 +230,7 @@ void runImplicitStep(StudyContext& context)
     }
   compareSolvers(context, context.quick() ? 20 : 40);
   context.metric("growth_exponent", std::log(times.back() / times[1]) / std::log(vertices.back() / vertices[1]));
-  context.note("factorisation: CHOLMOD, METIS on the graph of points, wide supernodes, the same matrix, between the steps; least of all.");
+  context.note("factorisation: METIS on the graph of points, CHOLMOD's analysis, wide supernodes, one thread, the same matrix, between the steps; least of all.");
   context.note("rows with error_mm: over one trajectory, against full Newton with an eighth of the step; solver_error_mm: against one Newton step, factorised. "
                "The stretch is that of the two triangles at the pins: it grows as the mesh gets finer and the sheet swings through, whatever the solver.");
   context.note("solve_error: of the last step's positions against a factorised solve, over the step's motion.");

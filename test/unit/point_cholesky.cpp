@@ -1,5 +1,7 @@
 // Factorisations of the matrices of points, against dense ones.
 #include <Eigen/Cholesky>
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "slender_sim/linalg/sparse_cholesky.h"
@@ -68,6 +70,19 @@ TEST(PointCholesky, SolvesBlocks)
   EXPECT_FALSE(factor.factor(s.blocks, nullptr));
   for (int k = 0; k < 3; ++k)
     s.blocks.values()[9 * s.blocks.starts()[40] + 4 * k] += 100.0;
+  EXPECT_TRUE(factor.factor(s.blocks, nullptr));
+  const int last = s.points() - 1;
+  for (const int point : {0, 40, last})
+  {
+    double& value = s.blocks.values()[9 * s.blocks.starts()[point]];
+    const double good = value;
+    for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+    {
+      value = bad;
+      EXPECT_FALSE(factor.factor(s.blocks, nullptr)) << point << " " << bad;
+    }
+    value = good;
+  }
   EXPECT_TRUE(factor.factor(s.blocks, nullptr));
 }
 

@@ -140,7 +140,7 @@ INSTANTIATE_TEST_SUITE_P(Scene, BadValue, testing::Values(
   Case{"contact.self=true", "unknown key; known here: gap, slip_speed"},
   Case{"contact.gap=0.001", "no rod or thread takes part; give those that do a contact of their own"},
   Case{"threads=[]", "threads = []: has 0 entries; must have 1 to 10000"}, Case{"cloths=[]", "cloths = []: has 0 entries; must have 1 to 1000"},
-  Case{"tracked=[]", "unknown key"},
+  Case{"tracked=[]", "tracked = []: has 0 entries; must have 1 to 1000"},
   Case{"rod=[]", "unknown key (did you mean rods?)"},
   Case{"name=", "must be a text"},
   Case{"rods=[]", "has 0 entries; must have 1 to 100000"},

@@ -44,9 +44,10 @@ struct ClothGroupInputs
 /// Steps cloths on their own, then corrects the end of the step so that nothing passes through anything (SurfaceCollider). Where that fails, or
 /// a cloth's step does, the step is halved.
 ///
-/// Cloths that touch something in a fixed step by tr_bdf2 do that step by implicit Euler. A contact holds stiff cloth away from its balance by some d, and the
-/// next solve, which does not know it, lets go: implicit Euler with a velocity -d / h, which contact takes back exactly, tr_bdf2 with 4.8 d / h (its
-/// stability function goes as that over z), so that contacts would pump energy into the cloth.
+/// Cloths that touch something in a step by tr_bdf2, or in one that error control may divide, do that step by implicit Euler, undivided. A contact holds stiff
+/// cloth away from its balance by some d, and the next solve, which does not know it, lets go: implicit Euler with a velocity -d / h, which contact takes back
+/// exactly, tr_bdf2 with 4.8 d / h (its stability function goes as that over z), a step in m parts with up to m d / h, so that contacts would pump energy into
+/// the cloth.
 class ClothGroup
 {
 public:
@@ -95,7 +96,7 @@ private:
   std::vector<ClothStepper> steppers_;
   CollisionSurface surface_;
   std::unique_ptr<SurfaceCollider> collider_;
-  enum class Order : char { second, lowered, first };
+  enum class Order : char { own, lowered, first };
   std::vector<Order> order_;               ///< of what was done of each cloth in the present substep; lowered: to be done again
   std::vector<int> first_;                 ///< point of each cloth; one more at the end
   CollisionReport collisions_;

@@ -64,8 +64,8 @@ public:
 
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
-  /// The same, by implicit Euler instead of tr_bdf2.
-  StepReport stepFirstOrder(ClothState& state, const ClothInputs& inputs, double duration);
+  /// The same by one step of implicit Euler, for tr_bdf2 and controlled steps; it is cut only where it cannot be solved.
+  StepReport stepUndivided(ClothState& state, const ClothInputs& inputs, double duration);
 
   /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step, and by how much the pins' forces
   /// and those of the averages, which stay, change [N]: linear, with the stiffness of its last Newton iteration and the inertia of a step of implicit

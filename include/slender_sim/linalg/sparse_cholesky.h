@@ -22,8 +22,8 @@ public:
   void setPattern(int size, std::vector<int> starts, std::vector<int> rows);
 
   /// Likewise for the matrices of points: 3 x 3 blocks, or one number for all three coordinates. The order is found by nested dissection of
-  /// the graph of points (METIS), with the unknowns of a point next to each other and supernodes wider than CHOLMOD's. values(), starts(), rows() and index() are then not
-  /// to be used.
+  /// the graph of points (METIS), with the unknowns of a point next to each other and supernodes wider than CHOLMOD's; factoring and solving take no memory.
+  /// values(), starts(), rows() and index() are then not to be used.
   void setPattern(const BlockMatrix& matrix);
   void setPattern(const PointMatrix& matrix);
   /// As factor(), of a matrix with that pattern. Points with fixed[i] != 0 keep their place: their rows and columns are those of the identity.
@@ -52,7 +52,6 @@ public:
 
 private:
   void setPointPattern(const BlockMatrix& pattern, int unknowns);
-  bool factorValues();
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

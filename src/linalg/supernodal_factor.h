@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "slender_sim/linalg/point_kernel.h"
+
+namespace slender {
+
+/// Numeric part of a sparse Cholesky factorisation by supernodes, left-looking [Ng & Peyton, SIAM J. Sci. Comput. 14 (1993), 1034] as in CHOLMOD, whose own
+/// takes memory in each call (workspace, teams of OpenMP threads). This one has all of it from setPattern() on and stays in its caller's thread.
+class SupernodalNumeric
+{
+public:
+  /// `starts`, `rows`: lower triangle of the matrix by columns. `factor`: where the supernodes of L lie; its arrays must stay, its values are not read.
+  void setPattern(const SupernodalFactor& factor, const std::vector<int>& starts, const std::vector<int>& rows);
+  /// Factors the matrix with these values (one per entry of the pattern) into x, the values of L.
+  /// False when it is not positive definite (or not finite).
+  bool factor(const double* values, double* x);
+
+private:
+  int columns(int s) const { return f_.first[s + 1] - f_.first[s]; }
+  int rows(int s) const { return f_.row_starts[s + 1] - f_.row_starts[s]; }
+  void subtract(int descendant, int s, double* x);
+  bool finish(int s, double* x) const;
+  void queue(int s, int row);
+
+  SupernodalFactor f_{};
+  std::vector<int> starts_, targets_;                ///< entries of each column of the matrix; where each goes in x
+  std::vector<int> supernode_of_, place_, relative_; ///< per row: its supernode, its place in the present one; places of the rows of an update
+  std::vector<int> head_, next_, row_;               ///< per supernode: list of those that update it next; of each the first row that does
+  std::vector<double> update_;
+};
+
+}  // namespace slender
