@@ -360,7 +360,9 @@ void ClothSystem::preconditionWithin(PointVector& r, PointVector& z)
 }
 
 /// Before conjugate gradients with averages: takes out of right_ what these balance. With `averages` d is moved there, and on by a step of the
-/// preconditioned gradient, which comes for nothing; returns what the load on the cloth was without the forces of the averages, which the tolerance counts from as it does for a cloth without.
+/// preconditioned gradient, which comes for nothing; returns what the load on the cloth was without the forces of the averages, which the tolerance counts
+/// from as it does for a cloth without. Where cloth is strained so much that the step leads uphill, it is far stiffer than the preconditioner: then
+/// that load says nothing about motions. d is moved by the least, and the tolerance counts from what is left: 0.
 double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages)
 {
   if (!averages)
@@ -372,16 +374,24 @@ double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averag
   for (std::size_t i = 0; i < d.size(); ++i)
     product_[i] = start_[i] + d[i];
   setGap(*averages, product_);
-  const double load = averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
+  const ConstrainedCholesky::Norms norms = averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
   averages_->takeOut(multipliers_.data(), right_.data());
   applyMatrix(correction_, product_);
   clearHeld(product_);
+  const bool downhill = pointKernels().dot(points(), correction_.data(), product_.data()) < 2.0 * norms.step * norms.step;
+  if (!downhill)
+  {
+    std::fill(correction_.begin(), correction_.end(), 0.0);
+    averages_->solve(correction_.data(), gap_.data(), correction_.data(), multipliers_.data());
+    applyMatrix(correction_, product_);
+    clearHeld(product_);
+  }
   for (std::size_t i = 0; i < d.size(); ++i)
   {
     d[i] += correction_[i];
     right_[i] -= product_[i];
   }
-  return load;
+  return downhill ? norms.load : 0.0;
 }
 
 bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance,

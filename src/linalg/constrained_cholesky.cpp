@@ -72,16 +72,16 @@ bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
   return true;
 }
 
-double ConstrainedCholesky::solve(const double* r, const double* g, double* z, double* mu) const
+ConstrainedCholesky::Norms ConstrainedCholesky::solve(const double* r, const double* g, double* z, double* mu) const
 {
   const int m = count(), n = static_cast<int>(c_.cols());
   p_->forwardPoints(r, y_.data());
-  double square = 0.0;
+  Norms norms;
   if (g)
   {
     std::copy_n(g, 4 * m, t_.data());
     s_inverse_.multiply(0.0, t_.data(), mu_.data());
-    square = pointKernels().dot(n, y_.data(), y_.data()) + pointKernels().dot(m, t_.data(), mu_.data());
+    norms.load = std::sqrt(pointKernels().dot(n, y_.data(), y_.data()) + pointKernels().dot(m, t_.data(), mu_.data()));
   }
   v_.multiply(0.0, y_.data(), t_.data());
   for (int i = 0; g && i < 4 * m; ++i)
@@ -89,8 +89,10 @@ double ConstrainedCholesky::solve(const double* r, const double* g, double* z, d
   s_inverse_.multiply(0.0, t_.data(), mu_.data());
   std::copy_n(mu_.data(), 4 * m, mu);
   v_transposed_.multiply(-1.0, mu_.data(), y_.data());
+  if (g)
+    norms.step = std::sqrt(pointKernels().dot(n, y_.data(), y_.data()));
   p_->backwardPoints(y_.data(), z);
-  return std::sqrt(square);
+  return norms;
 }
 
 void ConstrainedCholesky::multipliers(const double* r, double* mu) const

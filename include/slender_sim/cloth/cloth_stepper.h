@@ -45,7 +45,8 @@ struct ClothOptions
   bool one_newton_step = false;          ///< implicit stages: linearised about their start [Baraff & Witkin 1998]
   ClothSolver solver = ClothSolver::automatic;
   /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged velocity.
-  /// With averages and one_newton_step it is that of the same cloth without them, and of what it takes to move them.
+  /// With averages and one_newton_step it is that of the same cloth without them, and of what it takes to move them, unless strains are so large that
+  /// these say nothing about motions.
   double linear_tolerance = 5e-3;
   double error_tolerance = 0.0;          ///< [m] local error per substep, implicit_euler and tr_bdf2 only; 0: fixed steps
   double min_step = 1e-7;                ///< [s] adaptive steps never get shorter

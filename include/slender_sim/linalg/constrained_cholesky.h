@@ -22,10 +22,14 @@ public:
   bool factor(const SparseCholesky& p, const char* fixed);
 
   int count() const { return static_cast<int>(c_.rows()); }
-  /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero. r may be z. mu: 4 doubles per constraint. Fixed points: r must be
-  /// zero there, and z is.
-  /// With g, returns sqrt(r . P^-1 r + g . S^-1 g): the norm of r without constraints, and that of the smallest z that has C z = g.
-  double solve(const double* r, const double* g, double* z, double* mu) const;
+  struct Norms   ///< of a solve with g, in the norm of P
+  {
+    double load = 0.0;   ///< sqrt(r . P^-1 r + g . S^-1 g): of r without constraints, and of the smallest z that has C z = g
+    double step = 0.0;   ///< sqrt(z . P z)
+  };
+  /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero, and no norms. r may be z. mu: 4 doubles per constraint. Fixed points: r
+  /// must be zero there, and z is.
+  Norms solve(const double* r, const double* g, double* z, double* mu) const;
   /// mu alone, g zero: half the work.
   void multipliers(const double* r, double* mu) const;
   /// r -= C^T mu, but for fixed points.
