@@ -15,6 +15,7 @@ namespace slender {
 namespace {
 
 constexpr int kMeetRounds = 200;
+constexpr int kStallRounds = 8;   // that must halve the averages' errors; slow convergence as it was seen makes a third of them
 constexpr double kMeetTolerance = 1e-12;   // of the cloth's size
 constexpr int kLoadPasses = 2;
 constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
@@ -320,8 +321,12 @@ CollisionReport ClothGroup::resolve(const CollisionStep& step)
   CollisionReport report = collider_->resolve(step, x_, v_, true);
   if (report.ok)
     held_impulses_ = collider_->heldImpulses();
-  for (int round = 0; report.ok && round < kMeetRounds && meetAverages(step.h); ++round)
+  double earlier = std::numeric_limits<double>::infinity();
+  for (int round = 1; report.ok && round <= kMeetRounds; ++round)
   {
+    const double gap = meetAverages(step.h);
+    if (gap <= 1)
+      break;
     const CollisionReport again = collider_->resolve(step, x_, v_, true);
     if (!again.ok)
       return again;
@@ -330,14 +335,21 @@ CollisionReport ClothGroup::resolve(const CollisionStep& step)
     report.rounds += again.rounds;
     report.zones = again.zones;
     report.zone_points = again.zone_points;
+    if (round % kStallRounds == 0)
+    {
+      if (gap > 0.5 * earlier)   // both cannot be had
+        break;
+      earlier = gap;
+    }
   }
   return report;
 }
 
-/// Moves what is free, by as little as its mass allows. Returns false when all averages were what they shall be.
-bool ClothGroup::meetAverages(double h)
+/// Moves what is free, by as little as its mass allows. Returns the largest error of an average that there was, in units of what is tolerated; nothing
+/// moves when that is at most 1.
+double ClothGroup::meetAverages(double h)
 {
-  bool moved = false;
+  double worst = 0.0;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     if (!model_.cloths[k]->averages)
@@ -350,7 +362,9 @@ bool ClothGroup::meetAverages(double h)
     for (Eigen::Index i = 0; i < c.rows(); ++i)
       for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
         to.gap.col(i) -= entry.value() * x.col(entry.col());
-    if (!(to.gap.colwise().norm().maxCoeff() > to.tolerance))
+    const double gap = to.gap.colwise().norm().maxCoeff() / to.tolerance;
+    worst = std::max(worst, gap);
+    if (!(gap > 1))
       continue;
     if (!to.ready || to.pins != work_.cloths[k].pins)
     {
@@ -359,7 +373,6 @@ bool ClothGroup::meetAverages(double h)
       to.pins = work_.cloths[k].pins;
       to.ready = true;
     }
-    moved = true;
     to.columns = to.gap.transpose();
     to.gram.solveInPlace(to.columns);
     to.multipliers = to.columns.transpose();
@@ -376,7 +389,7 @@ bool ClothGroup::meetAverages(double h)
       for (Eigen::Index i = 0; i < c.rows(); ++i)
         shared_pins_[k].col(static_cast<Eigen::Index>(p)) += c.coeff(i, to.pins[p]) * to.multipliers.col(i);
   }
-  return moved;
+  return worst;
 }
 
 Eigen::Matrix3Xd ClothGroup::positions(const ClothGroupState& state) const

@@ -109,10 +109,11 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
   if (!offset_ || time >= offset_->start + offset_->duration)
     return followed;
   const Offset& o = *offset_;
-  const double d = o.duration, s = std::clamp((time - o.start) / d, 0.0, 1.0);
-  // cubic Hermite from (value, rate) at s = 0 to (0, 0) at s = 1
-  const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = d * s * (1 - s) * (1 - s);
-  const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - s) * (1 - 3 * s);
+  // cubic Hermite from (value, rate) at the start to (0, 0) at the end of d; the rate, however long d is, within the shortest blending time:
+  // over a long one it would lead far away
+  const double d = o.duration, t = options_.catch_up_time, s = std::clamp((time - o.start) / d, 0.0, 1.0), u = std::clamp((time - o.start) / t, 0.0, 1.0);
+  const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = t * u * (1 - u) * (1 - u);
+  const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - u) * (1 - 3 * u);
   const Vector3d r = h0 * o.r + h1 * o.r_rate, r_rate = dh0 * o.r + dh1 * o.r_rate;
   const Eigen::Quaterniond turn = fromRotationVector(r);
   Motion m;

@@ -87,10 +87,11 @@ void PointGuideBuffer::addOffset(double time, Eigen::Matrix3Xd& x, Eigen::Matrix
   const double d = offset_duration_;
   if (!(d > 0.0) || time >= offset_start_ + d)
     return;
-  const double s = std::clamp((time - offset_start_) / d, 0.0, 1.0);
-  // cubic Hermite from (value, rate) at s = 0 to (0, 0) at s = 1
-  const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = d * s * (1 - s) * (1 - s);
-  const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - s) * (1 - 3 * s);
+  // cubic Hermite from (value, rate) at the start to (0, 0) at the end of d; the rate, however long d is, within the shortest blending time:
+  // over a long one it would lead far away
+  const double t = options_.catch_up_time, s = std::clamp((time - offset_start_) / d, 0.0, 1.0), u = std::clamp((time - offset_start_) / t, 0.0, 1.0);
+  const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = t * u * (1 - u) * (1 - u);
+  const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - u) * (1 - 3 * u);
   x += h0 * offset_ + h1 * offset_rate_;
   v += dh0 * offset_ + dh1 * offset_rate_;
 }

@@ -54,11 +54,10 @@ class Services(NodeCase):
         self.start(pace="wall")
         state = self.listen("/t/state", RodState)
         wait_until(lambda: state.count() > 0, what="a state")
-        begin, now = state.last().header.stamp, rospy.get_time()
-        rospy.sleep(2.0)
-        simulated, real = (state.last().header.stamp - begin).to_sec(), rospy.get_time() - now
-        self.assertAlmostEqual(simulated, real, delta=0.2)
-        self.assertAlmostEqual(state.last().header.stamp.to_sec(), rospy.get_time(), delta=0.2)
+        begin = state.last().header.stamp
+        wait_until(lambda: (state.last().header.stamp - begin).to_sec() > 2.0, what="two simulated seconds")
+        # a node that runs ahead never gets there; a busy machine may need some time
+        wait_until(lambda: abs(state.last().header.stamp.to_sec() - rospy.get_time()) < 0.2, what="a state of now")
 
     def test_reset(self):
         self.start()

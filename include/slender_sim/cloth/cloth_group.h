@@ -84,7 +84,7 @@ private:
   void blameExplicit(double duration, StepReport& report) const;
   void addPinForces(double share, double h);
   CollisionReport resolve(const CollisionStep& step);
-  bool meetAverages(double h);
+  double meetAverages(double h);
   Eigen::Matrix3Xd positions(const ClothGroupState& state) const;
   int clothOf(int point) const;
   std::string placeOf(int point) const;
