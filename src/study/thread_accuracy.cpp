@@ -107,7 +107,7 @@ void runThreadAccuracy(StudyContext& context)
     const double error = 10 * rms(run.depth);
     row.set("error_mm", error);
     char setting[96];
-    std::snprintf(setting, sizeof setting, "%d edges, step %g s, tolerance %g", c.edges, c.step, c.tolerance);
+    std::snprintf(setting, sizeof setting, "step %g s, tolerance %g", c.step, c.tolerance);
     // A loose Newton tolerance leaves an error of its own, which may happen to cancel: shown, but not counted.
     front.add(row, name + ", " + std::to_string(c.edges) + " edges", setting, error, run.cpu, c.tolerance < 2e-3);
   }

@@ -36,17 +36,19 @@ const std::vector<Plan>& plans()
 {
   static const std::vector<Plan> all = {
       {"Error against run time", "Each problem once, every way to solve it: integrators, steps, resolutions, tolerances; against one converged run.",
-       {"swing", "thread_accuracy", "cloth_accuracy"}, {"cantilever", "rods_at_rest", "peer_cases", "projection"}},
+       {"swing", "thread_accuracy", "cloth_accuracy", "tracking_methods"}, {"cantilever", "rods_at_rest", "peer_cases", "projection"}},
       {"Stability", "Stiff and extreme cases. Done, done with cut steps, or refused with a reason; never NaN, a crash or silently wrong.",
-       {"rod_stability", "thread_stability", "cloth_stability"}, {"rod_contact_safety", "cloth_collision_safety"}},
+       {"rod_stability", "thread_stability", "cloth_stability", "tracking_stability"}, {"rod_contact_safety", "cloth_collision_safety"}},
       {"Beside the thesis's tables", "Times per step or frame of the thesis's examples, whose machine was of 2008.",
-       {"rod_tables", "thread_tables", "ibm_vs_hinge", "implicit_step"}, {"willmore_smoothing", "hair", "tree"}},
+       {"rod_tables", "thread_tables", "ibm_vs_hinge", "implicit_step"}, {"tracking_overhead", "willmore_smoothing", "hair", "tree"}},
       {"Cost against size", "", {"rod_scaling"}, {"rod_implicit_vs_explicit", "thread_implicit_vs_explicit"}},
       {"Phase diagrams", "Where one behaviour ends and the next begins.", {"michell", "sagging"}, {"sewing_machine", "coiling", "bend_twist", "greenhill"}},
       {"Rods against formulas", "", {"elastica", "torsion", "torsional_pendulum", "twist_asymmetry", "bend_twist"},
        {"beam_frequencies", "lateral_buckling", "perversion", "wilberforce", "helical_buckling", "stick_slip", "knot", "plectoneme", "chain"}},
       {"Threads against formulas", "", {"trouton", "thread_twist", "retraction"}, {"merging", "fiber_extrusion", "dragged_catenary"}},
       {"Cloth against formulas and measurements", "", {"willmore_sphere", "willmore_hole", "fabric_drape"}, {"plate", "stick_slip_strip", "flag", "drape", "stiffness_range"}},
+      {"Tracking", "Shells that follow a guide exactly on average.", {"breathing_surface", "rubber_band", "clustering"},
+       {"tracking_exactness", "partitions", "character"}},
   };
   return all;
 }
