@@ -43,6 +43,10 @@ add_executable(slender_sim_regions src/tools/regions.cpp)
 set_target_properties(slender_sim_regions PROPERTIES OUTPUT_NAME regions)
 target_link_libraries(slender_sim_regions PRIVATE slender_sim)
 
+if(TARGET slender_sim_node)
+  include(${PROJECT_SOURCE_DIR}/cmake/exports.cmake)
+endif()
+
 install(TARGETS slender_sim EXPORT slender_sim_targets
   ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS slender_sim_simulate slender_sim_fair_mesh slender_sim_regions RUNTIME DESTINATION ${INSTALL_BIN})

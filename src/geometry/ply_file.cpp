@@ -285,9 +285,11 @@ TriangleMesh readMesh(const std::string& path)
   refuseName(path);
 }
 
-void writeObj(const std::string& path, const TriangleMesh& mesh)
+namespace {
+
+/// The file counts from 1, over all objects: `first` vertices stand before.
+void putObj(std::ofstream& file, const TriangleMesh& mesh, Eigen::Index first)
 {
-  std::ofstream file(path, std::ios::binary);
   std::string line;
   for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
   {
@@ -300,8 +302,41 @@ void writeObj(const std::string& path, const TriangleMesh& mesh)
     }
     file << line << '\n';
   }
+  const Eigen::Index base = first + 1;
   for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
-    file << "f " << mesh.triangles(0, f) + 1 << ' ' << mesh.triangles(1, f) + 1 << ' ' << mesh.triangles(2, f) + 1 << '\n';
+    file << "f " << base + mesh.triangles(0, f) << ' ' << base + mesh.triangles(1, f) << ' ' << base + mesh.triangles(2, f) << '\n';
+}
+
+}  // namespace
+
+void writeObj(const std::string& path, const TriangleMesh& mesh)
+{
+  std::ofstream file(path, std::ios::binary);
+  putObj(file, mesh, 0);
+  finishWriting(file, path);
+}
+
+void writeObj(const std::string& path, const std::string& comment, const std::vector<ObjObject>& objects)
+{
+  std::ofstream file(path, std::ios::binary);
+  file << "# ";
+  for (const char c : comment)
+    file << (c == '\n' || c == '\r' ? ' ' : c);
+  file << '\n';
+  Eigen::Index first = 0;
+  for (const ObjObject& object : objects)
+  {
+    file << "o " << object.name << '\n';
+    putObj(file, object.mesh, first);
+    if (!object.line.empty())
+    {
+      file << 'l';
+      for (const int vertex : object.line)
+        file << ' ' << first + 1 + vertex;
+      file << '\n';
+    }
+    first += object.mesh.vertices.cols();
+  }
   finishWriting(file, path);
 }
 

@@ -21,6 +21,8 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
   scene_topic_ = prefix + "scene";
   mesh_topic_ = prefix + "mesh";
   bodies_topic_ = prefix + "body_states";
+  grasps_topic_ = prefix + "grasp_states";
+  obstacles_topic_ = prefix + "obstacle_states";
   for (const std::string& name : grasp_names)
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
   for (const std::string& thread : thread_prefixes)
@@ -75,6 +77,10 @@ void BagRecorder::record(const SceneMessages& messages)
       bag_.write(bodies_topic_, messages.bodies.header.stamp, messages.bodies);
     for (std::size_t k = 0; k < messages.nozzles.size(); ++k)
       bag_.write(nozzle_topics_[k], messages.nozzles[k].header.stamp, messages.nozzles[k]);
+    if (!messages.grasps.name.empty())
+      bag_.write(grasps_topic_, messages.grasps.header.stamp, messages.grasps);
+    if (!messages.obstacles.name.empty())
+      bag_.write(obstacles_topic_, messages.obstacles.header.stamp, messages.obstacles);
   }
   catch (const rosbag::BagException& e)
   {

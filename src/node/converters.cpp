@@ -133,16 +133,6 @@ bool isFinite(const geometry_msgs::Twist& t)
          std::isfinite(t.angular.y) && std::isfinite(t.angular.z);
 }
 
-Eigen::Quaterniond edgeFrame(const RodModel& model, const RodState& state, int edge)
-{
-  Eigen::Matrix3d axes;
-  axes.col(0) = (state.x.col((edge + 1) % model.nodes()) - state.x.col(edge)).normalized();
-  // the solver keeps d1 normal to the edge up to round-off; the quaternion needs an exact frame
-  axes.col(1) = (state.d1.col(edge) - axes.col(0) * axes.col(0).dot(state.d1.col(edge))).normalized();
-  axes.col(2) = axes.col(0).cross(axes.col(1));
-  return Eigen::Quaterniond(axes).normalized();
-}
-
 void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out)
 {
   const int nodes = model.nodes(), edges = model.edges();
@@ -187,15 +177,6 @@ bool isFinite(const RigidBodyState& state)
 {
   return state.X_WB.position.allFinite() && state.X_WB.orientation.coeffs().allFinite() && state.velocity.linear.allFinite() &&
          state.velocity.angular.allFinite();
-}
-
-Eigen::Quaterniond edgeFrame(const ThreadState& state, int edge)
-{
-  Eigen::Matrix3d axes;
-  axes.col(0) = state.edge(edge).normalized();
-  axes.col(1) = state.d1[edge];
-  axes.col(2) = axes.col(0).cross(axes.col(1));
-  return Eigen::Quaterniond(axes).normalized();
 }
 
 void toMessage(const ThreadState& state, slender_sim::ThreadState& out)

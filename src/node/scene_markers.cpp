@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 
 #include "marker_tools.h"
 #include "slender_sim/node/converters.h"
+#include "slender_sim/scene/snapshot_meshes.h"
 
 namespace slender {
 namespace {
@@ -26,116 +26,25 @@ const std::array<std_msgs::ColorRGBA, 4>& rodColors()
   return colors;
 }
 
-struct Section
+/// The stripes' edges are sharp because each side has one colour.
+void addTube(const std::vector<TubeSection>& sections, const std_msgs::ColorRGBA& base, bool striped, bool closed, Marker& marker)
 {
-  Vector3d x, u, w;   ///< centre, and the cross-section's semi-axes as vectors (u along d1)
-};
-
-/// What a tube is drawn around.
-struct Line
-{
-  bool closed;
-  int nodes, edges;
-  std::function<Vector3d(int)> x, d1;        ///< of a node, of an edge
-  std::function<std::array<double, 2>(int)> semi_axes;   ///< of an edge [m]
-};
-
-Line lineOf(const RodModel& model, const RodState& s)
-{
-  return {model.closed, model.nodes(), model.edges(), [&s](int i) -> Vector3d { return s.x.col(i); }, [&s](int j) -> Vector3d { return s.d1.col(j); },
-          [&model](int j) { return std::array<double, 2>{model.radius_a[j], model.radius_b[j]}; }};
-}
-
-Line lineOf(const ThreadState& s)
-{
-  return {false, s.nodes(), s.edges(), [&s](int i) { return s.x[i]; }, [&s](int j) { return s.d1[j]; },
-          [&s](int j) { return std::array<double, 2>{s.radius(j), s.radius(j)}; }};
-}
-
-Vector3d directorAt(const Line& line, int node)
-{
-  const int edges = line.edges;
-  const int after = line.closed ? node % edges : std::min(node, edges - 1);
-  const int before = line.closed ? (node + edges - 1) % edges : std::max(node - 1, 0);
-  const Vector3d sum = line.d1(before) + line.d1(after);   // opposite only beyond half a turn per edge
-  return sum.norm() > 1e-6 ? Vector3d(sum.normalized()) : line.d1(after);
-}
-
-/// Sections through the nodes and, on cubic Hermite curves with three-point tangents, between them.
-std::vector<Section> sections(const Line& line, int most)
-{
-  const int nodes = line.nodes, edges = line.edges;
-  const int stride = std::max(1, (edges + most - 1) / most);
-  const int pieces = std::clamp(most / (2 * edges), 1, 4);   // per edge
-  const auto x = [&](int i) -> Vector3d { return line.x(line.closed ? (i + nodes) % nodes : std::clamp(i, 0, nodes - 1)); };
-  const auto tangent = [&](int i) -> Vector3d {
-    const bool end = !line.closed && (i == 0 || i == nodes - 1);
-    return (end ? 1.0 : 0.5) * (x(i + stride) - x(i - stride));
-  };
-  std::vector<Section> out;
-  for (int j = 0; j < edges; j += stride)
-  {
-    const int next = std::min(j + stride, edges);
-    const Vector3d x0 = x(j), x1 = x(next), m0 = tangent(j), m1 = tangent(next % (line.closed ? nodes : nodes + 1));
-    const Vector3d d0 = directorAt(line, j), d1 = directorAt(line, next);
-    const std::array<double, 2> axes = line.semi_axes(std::min(j, edges - 1));
-    const int last = next == edges ? pieces : pieces - 1;
-    for (int k = 0; k <= last; ++k)
-    {
-      const double f = static_cast<double>(k) / pieces, g = 1.0 - f;
-      const Vector3d t = (6 * f * g * (x1 - x0) + g * (1 - 3 * f) * m0 + f * (3 * f - 2) * m1).normalized();
-      Vector3d d = g * d0 + f * d1;
-      d = (d - d.dot(t) * t).normalized();
-      out.push_back({(1 + 2 * f) * g * g * x0 + f * g * g * m0 + f * f * (3 - 2 * f) * x1 - f * f * g * m1, axes[0] * d, axes[1] * t.cross(d)});
-    }
-  }
-  return out;
-}
-
-/// Two triangles per side and section; the stripes' edges are sharp because each side has one colour.
-void addTube(const std::vector<Section>& sections, const std_msgs::ColorRGBA& base, bool striped, bool closed, Marker& marker)
-{
-  struct Corner
-  {
-    geometry_msgs::Point x;
-    Vector3d normal;
-  };
   const int sides = sections.size() > kManySections ? kCoarseSides : kSides;
   const std_msgs::ColorRGBA stripe = color(0.20, 0.24, 0.30);
-  const auto corner = [sides](const Section& s, int side) {
-    const double angle = 2.0 * M_PI * (side - 0.5) / sides;   // the first side faces d1
-    const Vector3d out = std::cos(angle) * s.u / s.u.squaredNorm() + std::sin(angle) * s.w / s.w.squaredNorm();
-    return Corner{toPoint(s.x + std::cos(angle) * s.u + std::sin(angle) * s.w), out.normalized()};
-  };
-  const auto triangle = [&](const Corner& a, const Corner& b, const Corner& c, const std_msgs::ColorRGBA& paint) {
-    for (const Corner* p : {&a, &b, &c})
-    {
-      marker.points.push_back(p->x);
-      marker.colors.push_back(lit(paint, p->normal));
-    }
-  };
-  marker.points.reserve(sections.size() * sides * 6);
-  marker.colors.reserve(sections.size() * sides * 6);
-  for (std::size_t i = 0; i + 1 < sections.size(); ++i)
-    for (int side = 0; side < sides; ++side)
-    {
-      const std_msgs::ColorRGBA& paint = striped && side % (sides / 2) <= 1 ? stripe : base;   // two stripes: seen from everywhere
-      const Corner a = corner(sections[i], side), b = corner(sections[i + 1], side);
-      const Corner c = corner(sections[i + 1], side + 1), d = corner(sections[i], side + 1);
-      triangle(a, c, b, paint);
-      triangle(a, d, c, paint);
-    }
-  if (closed)
-    return;
-  for (const bool front : {false, true})   // caps
+  const TriangleMesh mesh = tubeMesh(sections, sides, closed);
+  const Eigen::Index walls = 2 * sides * (static_cast<Eigen::Index>(sections.size()) - 1);
+  marker.points.reserve(static_cast<std::size_t>(mesh.triangles.size()));
+  marker.colors.reserve(static_cast<std::size_t>(mesh.triangles.size()));
+  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
   {
-    const Section& s = front ? sections.back() : sections.front();
-    const Vector3d normal = (front ? 1.0 : -1.0) * s.u.cross(s.w).normalized();
-    for (int side = 0; side < sides; ++side)
+    const Eigen::Vector3i t = mesh.triangles.col(f);
+    const bool wall = f < walls;
+    const bool dark = wall && striped && (f / 2) % sides % (sides / 2) <= 1;   // two stripes: seen from everywhere
+    const Vector3d a = mesh.vertices.col(t[0]), cap = (mesh.vertices.col(t[1]) - a).cross(mesh.vertices.col(t[2]) - a).normalized();
+    for (const int vertex : {t[0], t[1], t[2]})
     {
-      const Corner middle{toPoint(s.x), normal};
-      const Corner a{corner(s, side).x, normal}, b{corner(s, side + 1).x, normal};
-      triangle(middle, front ? a : b, front ? b : a, base);
+      marker.points.push_back(toPoint(mesh.vertices.col(vertex)));
+      marker.colors.push_back(lit(dark ? stripe : base, wall ? tubeNormal(sections[vertex / sides], vertex % sides, sides) : cap));
     }
   }
 }
@@ -178,7 +87,7 @@ Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& co
   return marker;
 }
 
-Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id, MarkerStyle style, const std::vector<Section>& curve,
+Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id, MarkerStyle style, const std::vector<TubeSection>& curve,
                    const std_msgs::ColorRGBA& paint, bool striped, bool closed, double width)
 {
   Marker marker = makeMarker(header, ns, id, style == MarkerStyle::tube ? Marker::TRIANGLE_LIST : Marker::LINE_STRIP);
@@ -188,7 +97,7 @@ Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id
   {
     marker.scale.x = width;
     marker.color = paint;
-    for (const Section& s : curve)
+    for (const TubeSection& s : curve)
       marker.points.push_back(toPoint(s.x));
   }
   return marker;
@@ -211,7 +120,7 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
       double volume = 0.0, length = 0.0;
       for (int j = 0; j < thread.edges(); ++j)
         volume += thread.volume[j], length += thread.edge(j).norm();
-      out.markers.push_back(curveMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id), style, sections(lineOf(thread), share),
+      out.markers.push_back(curveMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id), style, tubeSections(lineOf(snapshotOf(config.name, thread)), share),
                                         honey, false, false, 2.0 * std::sqrt(volume / (M_PI * length))));
     }
     if (config.nozzle)
@@ -264,7 +173,7 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
     const RodModel& model = simulation.rodModel(static_cast<int>(r));
     const RodState& state = simulation.state().rods[r];
     const std_msgs::ColorRGBA& base = rodColors()[r % rodColors().size()];
-    out.markers.push_back(curveMarker(header, "rods/" + model.name, 0, style, sections(lineOf(model, state), kMaxSections), base, true, model.closed,
+    out.markers.push_back(curveMarker(header, "rods/" + model.name, 0, style, tubeSections(lineOf(snapshotOf(model, state)), kMaxSections), base, true, model.closed,
                                       2.0 * model.radius_a.mean()));
     if (material_frames)
     {

@@ -18,6 +18,13 @@ void checkName(const std::string& name, const std::string& kind)
                                 "\": the name cannot be part of a topic; use letters, digits and _, with a letter first");
 }
 
+void resize(slender_sim::BodyStates& states, std::size_t size)
+{
+  states.name.resize(size);
+  states.pose.resize(size);
+  states.twist.resize(size);
+}
+
 }  // namespace
 
 std::vector<std::string> graspTopicNames(const Simulation& simulation)
@@ -117,16 +124,35 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     wrenches[g].header = poses.header;
     wrenches[g].wrench = simulation.isActive(grasp) ? toMessage(simulation.wrench(grasp)) : geometry_msgs::Wrench();
   }
+  grasps.header = poses.header;
+  grasps.name.resize(wrenches.size());
+  grasps.object.resize(wrenches.size());
+  grasps.active.resize(wrenches.size());
+  grasps.pose.resize(wrenches.size());
+  for (std::size_t g = 0; g < wrenches.size(); ++g)
+  {
+    const int grasp = static_cast<int>(g);
+    grasps.name[g] = simulation.grasps()[g].config->name;
+    grasps.object[g] = simulation.heldObject(grasp);
+    grasps.active[g] = simulation.isActive(grasp);
+    grasps.pose[g] = toMessage(simulation.graspPose(grasp));
+  }
   const std::vector<BodyConfig>& configs = simulation.config().bodies;
   bodies.header = poses.header;
-  bodies.name.resize(configs.size());
-  bodies.pose.resize(configs.size());
-  bodies.twist.resize(configs.size());
+  resize(bodies, configs.size());
   for (std::size_t b = 0; b < configs.size(); ++b)
   {
     bodies.name[b] = configs[b].name;
     bodies.pose[b] = toMessage(scene.bodies[b].X_WB);
     bodies.twist[b] = toMessage(scene.bodies[b].velocity);
+  }
+  obstacles.header = poses.header;
+  resize(obstacles, scene.obstacles.size());
+  for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
+  {
+    obstacles.name[k] = simulation.config().obstacles[k].name;
+    obstacles.pose[k] = toMessage(scene.obstacles[k]);
+    obstacles.twist[k] = toMessage(scene.obstacle_velocities[k]);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "marker_tools.h"
 #include "slender_sim/node/converters.h"
+#include "slender_sim/scene/snapshot_meshes.h"
 
 namespace slender {
 
@@ -46,7 +47,6 @@ std_msgs::ColorRGBA lit(const std_msgs::ColorRGBA& paint, const Vector3d& normal
 
 namespace {
 
-constexpr int kSides = 24, kRings = 8;   // around a capsule, from its equator to a pole
 constexpr double kPlaneSize = 10.0;      // [m] a piece of it is drawn
 
 /// Fills type, scale and points of a marker whose pose is `X` and whose colour is set.
@@ -84,25 +84,7 @@ struct Drawing
   void operator()(const Box& b) { simple(Marker::CUBE, b.size); }
   void operator()(const Cylinder& c) { simple(Marker::CYLINDER, {2 * c.radius, 2 * c.radius, c.length}); }
 
-  void operator()(const Capsule& c)
-  {
-    marker.type = Marker::TRIANGLE_LIST;
-    const auto point = [&](int ring, int side) {   // rings from the lower pole to the upper, two at the equators
-      const bool upper = ring > kRings;
-      const double latitude = 0.5 * M_PI * (upper ? ring - kRings - 1 : ring - kRings) / kRings, turn = 2 * M_PI * side / kSides;
-      return Vector3d(c.radius * std::cos(latitude) * std::cos(turn), c.radius * std::cos(latitude) * std::sin(turn),
-                      c.radius * std::sin(latitude) + (upper ? 0.5 : -0.5) * c.length);
-    };
-    for (int ring = 0; ring < 2 * kRings + 1; ++ring)
-      for (int side = 0; side < kSides; ++side)
-      {
-        const Vector3d a = point(ring, side), b = point(ring, side + 1), d = point(ring + 1, side), e = point(ring + 1, side + 1);
-        if (ring > 0)
-          triangle(a, b, e);
-        if (ring < 2 * kRings)
-          triangle(a, e, d);
-      }
-  }
+  void operator()(const Capsule& c) { (*this)(std::make_shared<const TriangleMesh>(shapeMesh(c))); }
 
   void operator()(const std::shared_ptr<const TriangleMesh>& mesh)
   {

@@ -165,7 +165,8 @@ class Topics(NodeCase):
                 self.assertEqual(message.header.stamp, stamp)
                 self.assertEqual(message.step, 0 if last is None else last + 1)
                 last = message.step
-        self.assertEqual(counts, {"/t/scene": 1, "/t/state": 201, "/t/grasps/left/wrench": 201, "/t/grasps/right/wrench": 201})
+        self.assertEqual(counts, {"/t/scene": 1, "/t/state": 201, "/t/grasps/left/wrench": 201, "/t/grasps/right/wrench": 201,
+                                  "/t/grasp_states": 201})
         self.assertIn("real-time factor", self.output("rod.out"))
 
     def test_simulate_writes_the_same_states(self):

@@ -37,6 +37,17 @@ TriangleMesh readMesh(const std::string& path);
 void writeObj(const std::string& path, const TriangleMesh& mesh);
 void writePly(const std::string& path, const TriangleMesh& mesh);
 
+/// A named part of an OBJ file: triangles, or a polyline through vertices (from 0), or both.
+struct ObjObject
+{
+  std::string name;
+  TriangleMesh mesh;
+  std::vector<int> line;
+};
+
+/// Several objects in one file, after a line of comment (line breaks in it become blanks). Digits and errors as above.
+void writeObj(const std::string& path, const std::string& comment, const std::vector<ObjObject>& objects);
+
 /// With a colour per vertex (3 x n: red, green, blue in [0, 1]): PLY with uchar red, green, blue, OBJ with three more numbers per vertex.
 /// By the end of the name; throws likewise.
 void writeColoredMesh(const std::string& path, const TriangleMesh& mesh, const Eigen::Matrix3Xd& colors);

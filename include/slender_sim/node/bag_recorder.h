@@ -26,7 +26,8 @@ public:
   void recordScene(const std::string& yaml, const ros::Time& stamp);
   /// The undeformed cloths, on `mesh`; likewise, in scenes that have any.
   void recordMesh(const slender_sim::MeshStamped& mesh);
-  /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies, and `nozzle/wrench` per thread; the rest can be derived from these.
+  /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies, `nozzle/wrench` per
+  /// thread, `grasp_states` and `obstacle_states` if there are any; the rest can be derived from these.
   void record(const SceneMessages& messages);
   /// Throws std::runtime_error when the file cannot be completed.
   void close();
@@ -34,7 +35,7 @@ public:
   const std::string& path() const { return path_; }
 
 private:
-  std::string path_, state_topic_, scene_topic_, mesh_topic_, bodies_topic_;
+  std::string path_, state_topic_, scene_topic_, mesh_topic_, bodies_topic_, grasps_topic_, obstacles_topic_;
   std::vector<std::string> wrench_topics_, nozzle_topics_;
   rosbag::Bag bag_;
   bool open_ = false;

@@ -18,6 +18,7 @@
 #include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/rod/rod_stepper.h"
+#include "slender_sim/scene/snapshot.h"
 #include "slender_sim/thread/thread_state.h"
 
 /// Between the solver's types and messages. Pure functions: no clock, no node handle.
@@ -39,9 +40,6 @@ enum class PoseFault { none, not_finite, bad_quaternion };
 PoseFault fromMessage(const geometry_msgs::Pose& message, Pose& X);
 PoseFault fromMessage(const geometry_msgs::Transform& message, Pose& X);
 bool isFinite(const geometry_msgs::Twist& twist);
-
-/// Material frame of edge j: x along the tangent, y along d1.
-Eigen::Quaterniond edgeFrame(const RodModel& model, const RodState& state, int edge);
 
 /// Fills everything but header, epoch and step. `out` may hold an earlier message: its memory is reused.
 void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out);

@@ -8,6 +8,7 @@
 
 #include "slender_sim/BodyStates.h"
 #include "slender_sim/ClothState.h"
+#include "slender_sim/GraspStates.h"
 #include "slender_sim/MeshStamped.h"
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
@@ -35,6 +36,9 @@ struct SceneMessages
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
   std::vector<geometry_msgs::WrenchStamped> nozzles;    ///< per thread: what it does to its nozzle, about the outlet; zero without one
   slender_sim::BodyStates bodies;                       ///< the scene's bodies, simulated and driven; none: not published
+
+  slender_sim::GraspStates grasps;                      ///< recorded only; none: not recorded
+  slender_sim::BodyStates obstacles;                    ///< likewise
 
   void fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch);
 };

@@ -1,0 +1,463 @@
+#include "slender_sim/node/bag_reader.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <set>
+#include <vector>
+
+#include <ros/exception.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <std_msgs/String.h>
+
+#include "slender_sim/node/converters.h"
+#include "slender_sim/node/scene_messages.h"
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+
+namespace {
+
+/// The messages of one topic, in the order of their stamps.
+class Stream
+{
+public:
+  virtual ~Stream() = default;
+  bool alive() const { return alive_; }
+  const ros::Time& stamp() const { return stamp_; }
+  /// Hands the current message over and goes on to the next one.
+  virtual void take() = 0;
+
+protected:
+  bool alive_ = false;
+  ros::Time stamp_;
+};
+
+template <class Message>
+class TopicStream final : public Stream
+{
+public:
+  TopicStream(const rosbag::Bag& bag, const std::string& topic, const std::string& type, std::function<void(const Message&)> use)
+    : use_(std::move(use)), topic_(topic),
+      view_(bag, [topic, type](const rosbag::ConnectionInfo* c) { return c->topic == topic && c->datatype == type; }), at_(view_.begin())
+  {
+    load();
+  }
+
+  void take() override
+  {
+    use_(*message_);
+    ++at_;
+    load();
+  }
+
+private:
+  void load()
+  {
+    alive_ = at_ != view_.end();
+    if (!alive_)
+      return;
+    message_ = at_->template instantiate<Message>();
+    if (!message_)
+      throw BagError(topic_ + ": its messages are of another version of slender_sim; export with the version that recorded them");
+    stamp_ = message_->header.stamp;
+  }
+
+  std::function<void(const Message&)> use_;
+  std::string topic_;
+  rosbag::View view_;
+  rosbag::View::iterator at_;
+  boost::shared_ptr<Message> message_;
+};
+
+template <class Vectors>
+Eigen::Matrix3Xd columns(const Vectors& from, std::size_t first, std::size_t last)
+{
+  Eigen::Matrix3Xd out(3, static_cast<Eigen::Index>(last - first));
+  for (std::size_t i = first; i < last; ++i)
+    out.col(static_cast<Eigen::Index>(i - first)) << from[i].x, from[i].y, from[i].z;
+  return out;
+}
+template <class Vectors>
+Eigen::Matrix3Xd columns(const Vectors& from)
+{
+  return columns(from, 0, from.size());
+}
+
+Eigen::VectorXd numbers(const std::vector<double>& from) { return Eigen::Map<const Eigen::VectorXd>(from.data(), static_cast<Eigen::Index>(from.size())); }
+
+std::vector<Eigen::Quaterniond> quaternions(const std::vector<geometry_msgs::Quaternion>& from)
+{
+  std::vector<Eigen::Quaterniond> out;
+  for (const geometry_msgs::Quaternion& q : from)
+    out.emplace_back(q.w, q.x, q.y, q.z);
+  return out;
+}
+
+/// Not normalized: tables show what was recorded.
+Pose poseOf(const geometry_msgs::Pose& from)
+{
+  const geometry_msgs::Quaternion& q = from.orientation;
+  return {fromMessage(from.position), Eigen::Quaterniond(q.w, q.x, q.y, q.z)};
+}
+
+Eigen::Vector3d vectorOf(const geometry_msgs::Vector3& v) { return {v.x, v.y, v.z}; }
+
+void require(bool fits, const std::string& what)
+{
+  if (!fits)
+    throw BagError("a message of " + what + " has arrays that do not fit each other: the bag was not written by slender_sim, or is damaged");
+}
+
+/// The shortest step [s] that explains so many nanoseconds in so many steps: stamps are rounded, scenes say 0.002.
+double shortestStep(double span_ns, double steps)
+{
+  for (int digits = 1; digits < 17; ++digits)
+  {
+    char text[40];
+    std::snprintf(text, sizeof text, "%.*g", digits, 1e-9 * span_ns / steps);
+    const double step = std::strtod(text, nullptr);
+    if (std::abs(1e9 * step * steps - span_ns) <= 1.0)
+      return step;
+  }
+  return 1e-9 * span_ns / steps;
+}
+
+}  // namespace
+
+struct BagReader::Contents
+{
+  std::string path, prefix;
+  rosbag::Bag bag;
+  std::optional<SceneConfig> scene;
+  std::string scene_problem;
+  slender_sim::MeshStamped mesh;
+  std::vector<std::unique_ptr<Stream>> streams;
+  std::size_t messages = 0, done = 0;
+  double step_length = 0.0;   ///< [s]; 0: one instant only
+  std::optional<std::int64_t> first_stamp;
+  std::int64_t stamp = 0;
+  std::uint64_t step = 0;
+  bool step_known = false;    ///< of this instant
+
+  SceneSnapshot* out = nullptr;   ///< what the streams fill
+
+  void open();
+  void choosePrefix(const std::string& topic_namespace);
+  void readScene(const std::string& folder);
+  void openStreams();
+  void findStepLength();
+  template <class Message>
+  void stream(const std::string& topic, const char* type, std::function<void(const Message&)> use)
+  {
+    streams.push_back(std::make_unique<TopicStream<Message>>(bag, topic, std::string("slender_sim/") + type, std::move(use)));
+  }
+  GraspSnapshot& grasp(const std::string& name);
+  void add(const slender_sim::RodState& rod);
+  void add(const slender_sim::ThreadState& thread);
+  void add(const slender_sim::ClothState& cloths);
+  void add(const slender_sim::BodyStates& states, std::vector<SolidSnapshot>& solids);
+};
+
+void BagReader::Contents::open()
+{
+  namespace fs = std::filesystem;
+  if (!fs::exists(path))
+  {
+    if (fs::exists(path + ".active"))
+      throw BagError(path + ": is still being written to " + path + ".active; wait for its recorder, or if that has died: rosbag reindex " + path + ".active");
+    throw BagError(path + ": there is no such file");
+  }
+  if (fs::is_directory(path))
+    throw BagError(path + ": is a directory; name a bag");
+  try
+  {
+    bag.open(path, rosbag::bagmode::Read);
+  }
+  catch (const rosbag::BagUnindexedException&)
+  {
+    throw BagError(path + ": was not finished: its recorder still runs, or was killed; in the latter case: rosbag reindex " + path);
+  }
+  catch (const rosbag::BagException& e)
+  {
+    throw BagError(path + ": is no ROS bag, or is cut off or damaged (" + e.what() + "); copy it anew, or try: rosbag reindex " + path);
+  }
+}
+
+void BagReader::Contents::choosePrefix(const std::string& topic_namespace)
+{
+  static const std::set<std::string> ours{"slender_sim/RodState", "slender_sim/ThreadState", "slender_sim/ClothState", "slender_sim/BodyStates"};
+  std::set<std::string> found;
+  rosbag::View all(bag);
+  for (const rosbag::ConnectionInfo* connection : all.getConnections())
+    for (const char* name : {"/state", "/body_states"})
+    {
+      const std::string& topic = connection->topic;
+      const std::size_t length = std::string(name).size();
+      if (ours.count(connection->datatype) && topic.size() >= length && topic.compare(topic.size() - length, length, name) == 0)
+        found.insert(topic.substr(0, topic.size() - length));
+    }
+  if (found.empty())
+    throw BagError(path + ": holds no states of slender_sim; record with simulate --bag, with ~record_bag of a node, or at least its topic `state`");
+  std::string wanted = topic_namespace, list;
+  while (!wanted.empty() && wanted.back() == '/')
+    wanted.pop_back();
+  for (const std::string& prefix_found : found)
+    list += (list.empty() ? "" : ", ") + (prefix_found.empty() ? std::string("/") : prefix_found);
+  if (topic_namespace.empty() ? found.size() > 1 : found.count(wanted) == 0)
+    throw BagError(path + ": holds the states of " + list + "; choose one with --namespace");
+  prefix = (topic_namespace.empty() ? *found.begin() : wanted) + "/";
+}
+
+void BagReader::Contents::readScene(const std::string& folder)
+{
+  rosbag::View scenes(bag, rosbag::TopicQuery(prefix + "scene"));
+  for (const rosbag::MessageInstance& instance : scenes)
+    if (const auto text = instance.instantiate<std_msgs::String>())
+      try
+      {
+        scene = parseScene(text->data, "the recorded scene", {}, folder);
+        break;
+      }
+      catch (const SceneError& e)
+      {
+        scene_problem = e.what();
+      }
+  if (!scene && scene_problem.empty())
+    scene_problem = "the topic " + prefix + "scene is not in the bag";
+  rosbag::View meshes(bag, rosbag::TopicQuery(prefix + "mesh"));
+  for (const rosbag::MessageInstance& instance : meshes)
+    if (const auto message = instance.instantiate<slender_sim::MeshStamped>())
+    {
+      mesh = *message;
+      for (std::size_t k = 0; k < mesh.names.size(); ++k)
+        require(mesh.vertex_offsets.size() == mesh.names.size() && mesh.triangle_offsets.size() == mesh.names.size() &&
+                  mesh.vertex_offsets[k] <= mesh.vertices.size() && 3 * std::size_t{mesh.triangle_offsets[k]} <= mesh.triangles.size(),
+                "mesh");
+      break;
+    }
+}
+
+void BagReader::Contents::openStreams()
+{
+  std::set<std::pair<std::string, std::string>> seen;
+  rosbag::View all(bag, [this](const rosbag::ConnectionInfo* c) { return c->topic.compare(0, prefix.size(), prefix) == 0; });
+  for (const rosbag::ConnectionInfo* connection : all.getConnections())
+  {
+    const std::string& topic = connection->topic;
+    const std::string name = topic.substr(prefix.size());
+    if (!seen.insert({topic, connection->datatype}).second)
+      continue;
+    const std::string type = connection->datatype.substr(connection->datatype.find('/') + 1);
+    if (name == "state" && type == "RodState")
+      stream<slender_sim::RodState>(topic, "RodState", [this](const auto& m) { add(m); });
+    else if (name == "state" && type == "ThreadState")
+      stream<slender_sim::ThreadState>(topic, "ThreadState", [this](const auto& m) { add(m); });
+    else if (name == "state" && type == "ClothState")
+      stream<slender_sim::ClothState>(topic, "ClothState", [this](const auto& m) { add(m); });
+    else if (name == "body_states" && type == "BodyStates")
+      stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { add(m, out->bodies); });
+    else if (name == "obstacle_states" && type == "BodyStates")
+      stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { add(m, out->obstacles); });
+    else if (name == "grasp_states" && type == "GraspStates")
+      stream<slender_sim::GraspStates>(topic, "GraspStates", [this](const auto& m) {
+        require(m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(), "grasp_states");
+        for (std::size_t g = 0; g < m.name.size(); ++g)
+          grasp(m.name[g]).held = GraspSnapshot::Held{m.object[g], m.active[g] != 0, poseOf(m.pose[g])};
+      });
+    else if (name.compare(0, 7, "grasps/") == 0 && name.size() > 14 && name.compare(name.size() - 7, 7, "/wrench") == 0 && type == "WrenchStamped")
+    {
+      const std::string of = name.substr(7, name.size() - 14);
+      streams.push_back(std::make_unique<TopicStream<geometry_msgs::WrenchStamped>>(bag, topic, connection->datatype, [this, of](const auto& m) {
+        grasp(of).wrench = {vectorOf(m.wrench.force), vectorOf(m.wrench.torque)};
+      }));
+    }
+    else
+      continue;
+    rosbag::View view(bag, [&](const rosbag::ConnectionInfo* c) { return c->topic == topic && c->datatype == connection->datatype; });
+    messages += view.size();
+  }
+}
+
+void BagReader::Contents::findStepLength()
+{
+  if (scene)
+  {
+    step_length = scene->time.step;
+    return;
+  }
+  // what is published says how many steps were taken until when
+  std::optional<std::pair<std::int64_t, std::uint64_t>> first;
+  const auto look = [&](const auto& message) {
+    const std::int64_t ns = static_cast<std::int64_t>(message.header.stamp.toNSec());
+    if (!first)
+      first = {ns, message.step};
+    else if (message.step > first->second)
+      step_length = shortestStep(static_cast<double>(ns - first->first), static_cast<double>(message.step - first->second));
+  };
+  rosbag::View states(bag, rosbag::TopicQuery(prefix + "state"));
+  for (const rosbag::MessageInstance& instance : states)
+  {
+    if (const auto rod = instance.instantiate<slender_sim::RodState>())
+      look(*rod);
+    else if (const auto thread = instance.instantiate<slender_sim::ThreadState>())
+      look(*thread);
+    else if (const auto cloth = instance.instantiate<slender_sim::ClothState>())
+      look(*cloth);
+  }
+}
+
+GraspSnapshot& BagReader::Contents::grasp(const std::string& name)
+{
+  for (GraspSnapshot& grasp : out->grasps)
+    if (grasp.name == name)
+      return grasp;
+  out->grasps.emplace_back();
+  out->grasps.back().name = name;
+  return out->grasps.back();
+}
+
+void BagReader::Contents::add(const slender_sim::RodState& rod)
+{
+  const std::size_t nodes = rod.nodes.size(), edges = rod.frames.size();
+  require(nodes >= 2 && edges == (rod.closed ? nodes : nodes - 1) && rod.velocities.size() == nodes && rod.twists.size() == nodes &&
+            rod.radii.size() == edges && (rod.radii_b.empty() || rod.radii_b.size() == edges),
+          "rod " + rod.name);
+  step = rod.step;
+  step_known = true;
+  out->rods.push_back({rod.name, rod.closed != 0, columns(rod.nodes), columns(rod.velocities), quaternions(rod.frames), numbers(rod.twists),
+                       numbers(rod.radii), numbers(rod.radii_b.empty() ? rod.radii : rod.radii_b)});
+}
+
+void BagReader::Contents::add(const slender_sim::ThreadState& thread)
+{
+  const std::size_t nodes = thread.nodes.size(), edges = thread.frames.size();
+  require(nodes >= 2 && edges == nodes - 1 && thread.ids.size() == nodes && thread.velocities.size() == nodes &&
+            thread.deposited.size() == nodes && thread.radii.size() == edges,
+          "thread " + thread.name);
+  step = thread.step;
+  step_known = true;
+  out->threads.push_back({thread.name, thread.thread_id, thread.ids, columns(thread.nodes), columns(thread.velocities), thread.deposited,
+                          quaternions(thread.frames), numbers(thread.radii)});
+}
+
+void BagReader::Contents::add(const slender_sim::ClothState& cloths)
+{
+  const std::size_t count = cloths.names.size();
+  require(cloths.offsets.size() == count && cloths.velocities.size() == cloths.vertices.size() && cloths.guide_offsets.size() == count &&
+            cloths.function_offsets.size() == count,
+          "state");
+  step = cloths.step;
+  step_known = true;
+  const auto range = [count](const std::vector<std::uint32_t>& offsets, std::size_t k, std::size_t size) {
+    const std::size_t first = offsets[k], last = k + 1 < count ? offsets[k + 1] : size;
+    require(first <= last && last <= size, "state");
+    return std::pair(first, last);
+  };
+  for (std::size_t k = 0; k < count; ++k)
+  {
+    const auto [first, last] = range(cloths.offsets, k, cloths.vertices.size());
+    ClothSnapshot cloth{cloths.names[k], columns(cloths.vertices, first, last), columns(cloths.velocities, first, last), {}};
+    if (mesh.names == cloths.names)
+    {
+      const auto [from, to] = range(mesh.triangle_offsets, k, mesh.triangles.size() / 3);
+      cloth.triangles.resize(3, static_cast<Eigen::Index>(to - from));
+      for (std::size_t i = 3 * from; i < 3 * to; ++i)
+      {
+        require(mesh.triangles[i] >= first && mesh.triangles[i] < last, "mesh");
+        cloth.triangles.data()[i - 3 * from] = static_cast<int>(mesh.triangles[i] - first);
+      }
+    }
+    out->cloths.push_back(std::move(cloth));
+    const auto [guide, guide_end] = range(cloths.guide_offsets, k, cloths.guide_vertices.size());
+    const auto [force, force_end] = range(cloths.function_offsets, k, cloths.guide_forces.size());
+    if (scene && guide < guide_end)
+    {
+      const ClothConfig* config = nullptr;
+      for (const ClothConfig& candidate : scene->cloths)
+        if (candidate.name == cloths.names[k])
+          config = &candidate;
+      require(config && config->tracking && static_cast<std::size_t>(config->tracking->constraints->count()) == force_end - force &&
+                static_cast<std::size_t>(config->tracking->guide.mesh.vertices.cols()) == guide_end - guide,
+              "state (what " + cloths.names[k] + " tracks)");
+      appendFunctions(*config, columns(cloths.guide_vertices, guide, guide_end), columns(cloths.guide_forces, force, force_end), out->functions);
+    }
+  }
+}
+
+void BagReader::Contents::add(const slender_sim::BodyStates& states, std::vector<SolidSnapshot>& solids)
+{
+  require(states.pose.size() == states.name.size() && states.twist.size() == states.name.size(), "body_states");
+  for (std::size_t b = 0; b < states.name.size(); ++b)
+    solids.push_back({states.name[b], poseOf(states.pose[b]), {vectorOf(states.twist[b].linear), vectorOf(states.twist[b].angular)}});
+}
+
+BagReader::BagReader(const std::string& path, const std::string& topic_namespace, const std::string& scene_folder)
+  : contents_(std::make_unique<Contents>())
+{
+  contents_->path = path;
+  contents_->open();
+  try
+  {
+    contents_->choosePrefix(topic_namespace);
+    contents_->readScene(scene_folder);
+    contents_->findStepLength();
+    contents_->openStreams();
+  }
+  catch (const ros::Exception& e)   // rosbag's, and messages cut short
+  {
+    throw BagError(path + ": is damaged (" + e.what() + "); copy it anew, or try: rosbag fix");
+  }
+}
+
+BagReader::BagReader(BagReader&&) noexcept = default;
+BagReader::~BagReader() = default;
+
+bool BagReader::next(SceneSnapshot& out)
+{
+  Contents& c = *contents_;
+  std::optional<ros::Time> stamp;
+  for (const auto& stream : c.streams)
+    if (stream->alive() && (!stamp || stream->stamp() < *stamp))
+      stamp = stream->stamp();
+  if (!stamp)
+    return false;
+  out = SceneSnapshot();
+  c.out = &out;
+  c.step_known = false;
+  const std::int64_t before = c.stamp;
+  const std::uint64_t step_before = c.step;
+  c.stamp = static_cast<std::int64_t>(stamp->toNSec());
+  try
+  {
+    for (const auto& stream : c.streams)
+      for (; stream->alive() && stream->stamp() == *stamp; ++c.done)
+        stream->take();
+  }
+  catch (const ros::Exception& e)   // rosbag's, and messages cut short
+  {
+    throw BagError(c.path + ": is damaged (" + e.what() + "); copy it anew, or try: rosbag fix");
+  }
+  catch (const BagError& e)
+  {
+    throw BagError(c.path + ": " + e.what());
+  }
+  if (!c.step_known && c.first_stamp && c.step_length > 0)   // bodies only, or their states were dropped
+    c.step = step_before + static_cast<std::uint64_t>(std::llround(1e-9 * static_cast<double>(c.stamp - before) / c.step_length));
+  if (!c.first_stamp)
+    c.first_stamp = c.stamp;
+  out.time = static_cast<double>(c.step) * c.step_length;
+  return true;
+}
+
+double BagReader::seconds() const { return 1e-9 * static_cast<double>(contents_->stamp - contents_->first_stamp.value_or(contents_->stamp)); }
+const SceneConfig* BagReader::scene() const { return contents_->scene ? &*contents_->scene : nullptr; }
+const std::string& BagReader::sceneProblem() const { return contents_->scene_problem; }
+std::size_t BagReader::messages() const { return contents_->messages; }
+std::size_t BagReader::done() const { return contents_->done; }
+
+}  // namespace slender

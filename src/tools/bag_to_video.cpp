@@ -1,0 +1,204 @@
+#include <sys/wait.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+#include "arguments.h"
+#include "export_program.h"
+#include "picture.h"
+#include "processes.h"
+
+/// bag_to_video BAG --out FILE.mp4|FILE.gif: pictures of what was recorded, joined by ffmpeg.
+namespace {
+
+using slender::BadInput;
+using slender::ObjectMesh;
+
+const char* const name = "bag_to_video";
+const char* const usage =
+  "usage: bag_to_video BAG --out FILE.mp4|FILE.gif [options]\n"
+  "  --fps N          frames per second of the video (default: mp4 25, gif 12.5)\n"
+  "  --speed X        recorded seconds per second of the video (default 1)\n"
+  "  --size WxH       of the picture in pixels, even numbers (default: mp4 1280x720, gif 640x360)\n"
+  "  --from X,Y,Z     direction from what is seen to the eye (default 0.55,-1,0.45); the distance is such that all recorded motion is seen\n"
+  "  --namespace NS   of the recorded topics, e.g. /rod_node; needed for a bag of several nodes\n"
+  "  --scene-dir DIR  where the files lie that the recorded scene names (default: here); needed for bodies, obstacles and floors\n"
+  "  --quiet          print nothing but errors\n"
+  "Exit status: 0 done, 2 bad input, 3 failed.\n";
+
+struct VideoOptions
+{
+  std::optional<double> fps;
+  double speed = 1.0;
+  std::optional<std::pair<int, int>> size;
+  Eigen::Vector3d from = slender::PictureView().from;
+};
+
+bool endsWith(const std::string& text, const std::string& end)
+{
+  return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+/// The pictures go through a pipe.
+class Ffmpeg
+{
+public:
+  Ffmpeg(const std::string& file, bool gif, double fps, int width, int height) : gif_(gif)
+  {
+    if (std::system("command -v ffmpeg >/dev/null") != 0)
+      throw BadInput("ffmpeg is not installed; it joins the pictures: apt install ffmpeg");
+    std::signal(SIGPIPE, SIG_IGN);   // told by fwrite
+    char input[200];
+    std::snprintf(input, sizeof input, "ffmpeg -y -loglevel error -f rawvideo -pixel_format rgb24 -video_size %dx%d -framerate %.9g -i - ", width, height, fps);
+    const std::string output = gif ? "-filter_complex 'split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4' -f gif "
+                                   : "-c:v libx264 -preset medium -crf 18 -pix_fmt yuv420p -movflags +faststart -f mp4 ";
+    pipe_ = popen((input + output + slender::shellWord(file)).c_str(), "w");
+    if (!pipe_)
+      throw std::runtime_error(std::string("ffmpeg cannot be started: ") + std::strerror(errno));
+  }
+  ~Ffmpeg()
+  {
+    if (pipe_)
+      pclose(pipe_);
+  }
+  void add(const std::vector<std::uint8_t>& picture)
+  {
+    if (std::fwrite(picture.data(), 1, picture.size(), pipe_) != picture.size())
+      fail();
+  }
+  void finish()
+  {
+    const int status = pclose(pipe_);
+    pipe_ = nullptr;
+    if (status != 0)
+      fail();
+  }
+
+private:
+  [[noreturn]] void fail() const { throw std::runtime_error(std::string("ffmpeg failed to write the ") + (gif_ ? "gif" : "mp4") + "; its message is above (is there room on the disk?)"); }
+
+  bool gif_;
+  FILE* pipe_ = nullptr;
+};
+
+/// What the motion reaches; obstacles are not counted, they may be large.
+Eigen::AlignedBox3d reach(const slender::ExportOptions& options)
+{
+  slender::BagReader bag(options.bag, options.topic_namespace, options.scene_folder);
+  Eigen::AlignedBox3d box;
+  const auto extend = [&box](const Eigen::Matrix3Xd& x, double margin) {
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+    {
+      box.extend(Eigen::Vector3d(x.col(i).array() - margin));
+      box.extend(Eigen::Vector3d(x.col(i).array() + margin));
+    }
+  };
+  slender::SceneSnapshot instant;
+  while (bag.next(instant))
+  {
+    for (const slender::RodSnapshot& rod : instant.rods)
+      extend(rod.x, std::max(rod.radius_a.maxCoeff(), rod.radius_b.maxCoeff()));
+    for (const slender::ThreadSnapshot& thread : instant.threads)
+      extend(thread.x, thread.radius.maxCoeff());
+    for (const slender::ClothSnapshot& cloth : instant.cloths)
+      extend(cloth.x, 0.0);
+    for (std::size_t b = 0; bag.scene() && b < std::min(instant.bodies.size(), bag.scene()->bodies.size()); ++b)
+      if (const auto& shape = bag.scene()->bodies[b].shape; shape && !std::holds_alternative<slender::Plane>(*shape))
+        extend(instant.bodies[b].pose.position, slender::shapeMesh(*shape).vertices.colwise().norm().maxCoeff());
+  }
+  if (box.isEmpty())
+    throw BadInput(options.bag + ": holds nothing that can be seen");
+  return box;
+}
+
+std::optional<double> groundOf(const slender::SceneConfig* scene)
+{
+  if (!scene)
+    return std::nullopt;
+  for (const slender::ThreadConfig& thread : scene->threads)
+    if (thread.floor)
+      return thread.floor->height;
+  for (const slender::ObstacleConfig& obstacle : scene->obstacles)
+    if (std::holds_alternative<slender::Plane>(obstacle.shape) && (obstacle.pose.orientation * Eigen::Vector3d::UnitZ()).z() > 0.9999)
+      return obstacle.pose.position.z();
+  return std::nullopt;
+}
+
+void run(const slender::ExportOptions& options, const VideoOptions& video)
+{
+  const bool gif = endsWith(options.out, ".gif");
+  if (!gif && !endsWith(options.out, ".mp4"))
+    throw BadInput("--out " + options.out + ": must end in .mp4 or .gif");
+  slender::BagReader bag = slender::openBag(name, options, "bodies, obstacles and floors are left out,");
+  slender::PictureView view;
+  std::tie(view.width, view.height) = video.size.value_or(gif ? std::pair(640, 360) : std::pair(1280, 720));
+  view.from = video.from;
+  view.box = reach(options);
+  view.ground = groundOf(bag.scene());
+  slender::TubeResolution resolution;
+  view.tube_sides = resolution.sides;
+  slender::PicturePainter painter(view);
+  const double fps = video.fps.value_or(gif ? 12.5 : 25.0);
+  slender::Staged file(slender::Staged::Kind::file, options.out);
+  Ffmpeg ffmpeg(file.part(), gif, fps, view.width, view.height);
+
+  slender::SceneSnapshot last;
+  std::optional<std::vector<std::uint8_t>> picture;   // of `last`
+  long frame = 0;
+  const auto due = [&] { return static_cast<double>(frame) * video.speed / fps; };
+  const auto show = [&] {   // what was recorded last, until there is something newer
+    if (!picture)
+      picture = painter.paint(slender::objectMeshes(last, bag.scene(), resolution));
+    ffmpeg.add(*picture);
+    ++frame;
+  };
+  constexpr double rounding = 1e-7;   // [s]; stamps are rounded to 1e-9
+  slender::eachInstant(name, options, bag, [&](const slender::SceneSnapshot& instant) {
+    while (due() < bag.seconds() - rounding)
+      show();
+    last = instant;
+    picture.reset();
+  });
+  while (frame == 0 || due() <= bag.seconds() + rounding)
+    show();
+  ffmpeg.finish();
+  file.keep();
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+  VideoOptions video;
+  const std::map<std::string, slender::OptionTaker> own = {
+    {"--fps", [&](const std::string& option, const std::string& value) { video.fps = slender::parsePositive(option, value, 1000); }},
+    {"--speed", [&](const std::string& option, const std::string& value) { video.speed = slender::parsePositive(option, value, 1e6); }},
+    {"--size", [&](const std::string& option, const std::string& value) {
+       const auto x = value.find('x');
+       if (x == std::string::npos)
+         throw BadInput(option + " " + value + ": must be like 1280x720");
+       video.size = {slender::parseCount(option, value.substr(0, x), 16, 4096), slender::parseCount(option, value.substr(x + 1), 16, 4096)};
+       if (video.size->first % 2 || video.size->second % 2)
+         throw BadInput(option + " " + value + ": must be even numbers, which videos need");
+     }},
+    {"--from", [&](const std::string& option, const std::string& value) {
+       std::size_t at = 0;
+       for (int k = 0; k < 3; ++k)
+       {
+         const std::size_t comma = k < 2 ? value.find(',', at) : value.size();
+         if (comma == std::string::npos || !slender::parseNumber(value.substr(at, comma - at), video.from[k]))
+           throw BadInput(option + " " + value + ": must be three numbers like 1,-1,0.5");
+         at = comma + 1;
+       }
+       if (!(video.from.norm() > 1e-9))
+         throw BadInput(option + " " + value + ": must not be zero");
+     }},
+  };
+  return slender::exportProgram(name, usage, argc, argv, own, [&](const slender::ExportOptions& options) { run(options, video); });
+}

@@ -1,0 +1,264 @@
+#include <cstdio>
+#include <cstring>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "export_program.h"
+#include "harness.h"
+#include "picture.h"
+#include "slender_sim/geometry/mesh_file.h"
+#include "slender_sim/node/bag_reader.h"
+#include "slender_sim/scene/snapshot_meshes.h"
+#ifdef SLENDER_WITH_GLTF
+#include <tiny_gltf.h>
+#endif
+
+/// simulate --bag, then every exporter. No master is needed.
+namespace slender {
+namespace {
+
+struct Recording
+{
+  const char *scene, *options;
+  std::set<std::string> tables;
+};
+
+class Tables : public Exports, public testing::WithParamInterface<Recording> {};
+
+TEST_P(Tables, areThoseOfTheRunItself)
+{
+  const Recording& recording = GetParam();
+  const std::string bag = record(recording.scene, std::string(recording.options) + " --csv " + path("direct"));
+  expectExported(csv + " " + bag + " --quiet --scene-dir " + source + "/config/scenes --out " + path("exported"));
+  ASSERT_EQ(namesIn(path("direct")), recording.tables);
+  ASSERT_EQ(namesIn(path("exported")), recording.tables);
+  for (const std::string& table : recording.tables)
+  {
+    const std::string direct = contentsOf(path("direct/" + table));
+    EXPECT_TRUE(direct == contentsOf(path("exported/" + table))) << table;
+    EXPECT_EQ(direct.find("nan"), std::string::npos);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+  All, Tables,
+  testing::Values(Recording{"demo_rope", "--duration 0.1", {"nodes.csv", "grasps.csv"}},
+                  Recording{"honey_coil", "--duration 1.2", {"nodes.csv", "grasps.csv", "threads.csv"}},
+                  Recording{"handkerchief", "--duration 0.1", {"nodes.csv", "grasps.csv", "cloths.csv"}},
+                  Recording{"obstacle_course", "--duration 0.1", {"nodes.csv", "grasps.csv", "bodies.csv"}},
+                  Recording{"box", "--duration 0.1", {"nodes.csv", "grasps.csv", "cloths.csv", "tracking.csv"}}),
+  [](const auto& info) { return std::string(info.param.scene); });
+
+TEST_F(Exports, withoutTheScenesFilesTablesLackOnlyTheirAverages)
+{
+  const std::string bag = record("box", "--duration 0.1 --csv " + path("direct"));
+  const Result result = shell("cd / && " + csv + " " + bag + " --out " + path("exported"));
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_NE(result.output.find("tracking.csv is left out"), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("box_guide.obj"), std::string::npos) << result.output;
+  EXPECT_EQ(namesIn(path("exported")), (std::set<std::string>{"nodes.csv", "grasps.csv", "cloths.csv"}));
+  EXPECT_TRUE(contentsOf(path("direct/cloths.csv")) == contentsOf(path("exported/cloths.csv")));   // times from the stamps
+}
+
+TEST_F(Exports, objAndPlySequencesOfACloth)
+{
+  const std::string bag = record("handkerchief", "--duration 0.2");   // 11 instants, 0.02 s apart
+  expectExported(mesh + " " + bag + " --quiet --out " + path("obj"));
+  expectExported(mesh + " " + bag + " --quiet --format ply --fps 25 --out " + path("ply"));
+  EXPECT_EQ(namesIn(path("obj")).size(), 11u);
+  EXPECT_EQ(namesIn(path("ply")).size(), 6u);
+  BagReader reader(bag);
+  SceneSnapshot instant;
+  for (int k = 0; reader.next(instant); ++k)
+  {
+    char name[32];
+    std::snprintf(name, sizeof name, "frame_%06d.obj", k);
+    const TriangleMesh obj = readObj(path("obj/") + name);
+    ASSERT_EQ(instant.cloths.size(), 1u);
+    EXPECT_TRUE(obj.vertices == instant.cloths[0].x) << k;   // to the last digit
+    EXPECT_TRUE(obj.triangles == instant.cloths[0].triangles);
+    if (k % 2 == 0)
+    {
+      std::snprintf(name, sizeof name, "frame_%06d.ply", k / 2);
+      EXPECT_TRUE(readPly(path("ply/") + name).vertices == obj.vertices);
+    }
+  }
+  const std::string text = contentsOf(path("obj/frame_000010.obj"));
+  EXPECT_NE(text.find("t = 0.2 s"), std::string::npos) << text.substr(0, 200);
+}
+
+TEST_F(Exports, rodsAreTubesAroundTheirNodes)
+{
+  const std::string bag = record("demo_rope", "--duration 0.02");
+  expectExported(mesh + " " + bag + " --quiet --sides 8 --out " + path("obj"));
+  BagReader reader(bag);
+  SceneSnapshot instant;
+  ASSERT_TRUE(reader.next(instant));
+  const RodSnapshot& rod = instant.rods.at(0);
+  const TriangleMesh tube = readObj(path("obj/frame_000000.obj"));
+  for (Eigen::Index i = 0; i < rod.x.cols(); ++i)   // eight vertices at the radius around each node
+  {
+    int near = 0;
+    for (Eigen::Index k = 0; k < tube.vertices.cols(); ++k)
+      near += std::abs((tube.vertices.col(k) - rod.x.col(i)).norm() - rod.radius_a[0]) < 1e-9;
+    EXPECT_GE(near, 8) << i;
+  }
+}
+
+#ifdef SLENDER_WITH_GLTF
+/// A moving file as a viewer sees it.
+struct Glb
+{
+  tinygltf::Model model;
+
+  explicit Glb(const std::string& path)
+  {
+    tinygltf::TinyGLTF loader;
+    std::string error, warning;
+    EXPECT_TRUE(loader.LoadBinaryFromFile(&model, &error, &warning, path)) << error;
+    EXPECT_EQ(error + warning, "");
+  }
+
+  Eigen::MatrixXf values(int accessor) const
+  {
+    const tinygltf::Accessor& a = model.accessors.at(accessor);
+    const tinygltf::BufferView& view = model.bufferViews.at(a.bufferView);
+    const int rows = a.type == TINYGLTF_TYPE_VEC3 ? 3 : 1;
+    EXPECT_EQ(a.componentType, TINYGLTF_COMPONENT_TYPE_FLOAT);
+    Eigen::MatrixXf out(rows, static_cast<Eigen::Index>(a.count));
+    std::memcpy(out.data(), model.buffers[view.buffer].data.data() + view.byteOffset + a.byteOffset, out.size() * sizeof(float));
+    return out;
+  }
+
+  /// Index of the key at or before a time.
+  static Eigen::Index keyAt(const Eigen::MatrixXf& times, double seconds)
+  {
+    Eigen::Index key = 0;
+    while (key + 1 < times.cols() && times(0, key + 1) <= seconds + 1e-6)
+      ++key;
+    return key;
+  }
+
+  /// Vertices of all nodes that are seen at the time of a frame, in the file's axes below its root.
+  std::vector<Eigen::Matrix3Xf> seenAt(double seconds) const
+  {
+    std::vector<Eigen::Matrix3Xf> out;
+    for (const int node : model.nodes.at(0).children)
+    {
+      const tinygltf::Primitive& primitive = model.meshes.at(model.nodes[node].mesh).primitives.at(0);
+      Eigen::Matrix3Xf x = values(primitive.attributes.at("POSITION"));
+      float scale = 1;
+      if (!model.animations.empty())
+        for (const tinygltf::AnimationChannel& channel : model.animations[0].channels)
+        {
+          if (channel.target_node != node)
+            continue;
+          const tinygltf::AnimationSampler& sampler = model.animations[0].samplers.at(channel.sampler);
+          const Eigen::MatrixXf times = values(sampler.input), keys = values(sampler.output);
+          const Eigen::Index key = keyAt(times, seconds), targets = static_cast<Eigen::Index>(primitive.targets.size());
+          if (channel.target_path == "scale")
+            scale = keys(0, key);
+          else if (seconds >= times(0, 0) - 1e-6)
+            for (Eigen::Index t = 0; t < targets; ++t)
+              x += keys(0, key * targets + t) * values(primitive.targets[t].at("POSITION"));
+        }
+      if (scale > 0)
+        out.push_back(x);
+    }
+    return out;
+  }
+};
+
+TEST_F(Exports, glbShowsTheRecordedFrames)
+{
+  for (const auto& [scene, duration] : {std::pair("handkerchief", "0.2"), {"demo_rope", "0.2"}, {"honey_coil", "1.0"}})
+  {
+    const std::string bag = record(scene, std::string("--duration ") + duration), file = path(std::string(scene) + ".glb");
+    expectExported(mesh + " " + bag + " --quiet --fps 12.5 --scene-dir " + source + "/config/scenes --out " + file);
+    const Glb glb(file);
+    const std::vector<double>& turn = glb.model.nodes.at(0).rotation;   // our z to glTF's y
+    EXPECT_LT((Eigen::Quaterniond(turn.at(3), turn[0], turn[1], turn[2]) * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitY()).norm(), 1e-12);
+    BagReader reader(bag);
+    SceneSnapshot instant;
+    FrameChoice choice(12.5);
+    int frames = 0;
+    while (reader.next(instant))
+    {
+      if (!choice.takes(reader.seconds()))
+        continue;
+      ++frames;
+      const std::vector<ObjectMesh> objects = objectMeshes(instant, nullptr, TubeResolution());
+      const std::vector<Eigen::Matrix3Xf> seen = glb.seenAt(reader.seconds());
+      ASSERT_EQ(seen.size(), objects.size()) << scene << " " << reader.seconds();
+      for (std::size_t k = 0; k < seen.size(); ++k)
+      {
+        ASSERT_EQ(seen[k].cols(), objects[k].mesh.vertices.cols());
+        EXPECT_LT((seen[k].cast<double>() - objects[k].mesh.vertices).cwiseAbs().maxCoeff(), 3e-7) << scene << " " << reader.seconds();
+      }
+    }
+    EXPECT_GE(frames, 3);
+  }
+}
+#endif
+
+TEST_F(Exports, videosHaveTheirFramesAndSize)
+{
+  if (shell("command -v ffprobe").status != 0)
+    GTEST_SKIP() << "no ffmpeg";
+  const std::string bag = record("handkerchief", "--duration 0.2");
+  expectExported(video + " " + bag + " --quiet --size 160x96 --out " + path("x.mp4"));
+  expectExported(video + " " + bag + " --quiet --size 160x96 --speed 0.5 --out " + path("x.gif"));
+  const std::string probe = "ffprobe -v error -count_frames -show_entries stream=codec_name,width,height,nb_read_frames -of csv=p=0 ";
+  EXPECT_EQ(shell(probe + path("x.mp4")).output, "h264,160,96,6\n");   // 0, 0.04 ... 0.2 s
+  EXPECT_EQ(shell(probe + path("x.gif")).output, "gif,160,96,6\n");
+}
+
+TEST(Picture, showsTheNearerSurfaceLitFromAboveAndItsShadow)
+{
+  const auto ball = [](const Eigen::Vector3d& at, double radius, ObjectKind kind) {
+    ObjectMesh object{kind, "ball", 0, shapeMesh(Sphere{radius}), {}};
+    object.mesh.vertices.colwise() += at;
+    return object;
+  };
+  PictureView view;
+  view.width = view.height = 200;
+  view.from = {0, -1, 0.3};
+  view.box.extend(Eigen::Vector3d(-1, -1, 0));
+  view.box.extend(Eigen::Vector3d(1, 1, 2));
+  view.ground = 0;
+  PicturePainter painter(view);
+  const auto pixel = [](const std::vector<std::uint8_t>& picture, int x, int y) {
+    return Eigen::Vector3d(picture[3 * (200 * y + x)], picture[3 * (200 * y + x) + 1], picture[3 * (200 * y + x) + 2]);
+  };
+  const auto empty = painter.paint({});
+  const auto behind = painter.paint({ball({0, 1, 0.7}, 0.5, ObjectKind::body), ball({0, 0, 1}, 0.5, ObjectKind::thread)});
+  const auto turned = painter.paint({ball({0, 0, 1}, 0.5, ObjectKind::thread), ball({0, 1, 0.7}, 0.5, ObjectKind::body)});
+  EXPECT_TRUE(behind == turned);   // the order does not matter
+  EXPECT_GT(pixel(behind, 100, 100).x(), 2 * pixel(behind, 100, 100).z());            // honey-coloured, not red
+  EXPECT_GT(pixel(behind, 100, 80).sum(), pixel(behind, 100, 120).sum() + 60);        // brighter above
+  EXPECT_TRUE(pixel(behind, 2, 2) == pixel(empty, 2, 2));
+  int darker = 0;
+  for (int y = 100; y < 200; ++y)
+    for (int x = 0; x < 200; ++x)
+      darker += pixel(behind, x, y).minCoeff() > 100 && pixel(behind, x, y).sum() < pixel(empty, x, y).sum() - 60;
+  EXPECT_GT(darker, 100);   // grey: the shadow on the floor
+}
+
+TEST(FrameChoice, thinsToTheRateFromTheFirstOn)
+{
+  FrameChoice all(0), thin(10);
+  int of_all = 0, of_thin = 0;
+  for (int k = 0; k <= 100; ++k)   // 1 s
+  {
+    of_all += all.takes(0.01 * k);
+    of_thin += thin.takes(0.01 * k + (k % 2 ? 4e-10 : -4e-10));
+  }
+  EXPECT_EQ(of_all, 101);
+  EXPECT_EQ(of_thin, 11);
+}
+
+}  // namespace
+}  // namespace slender
