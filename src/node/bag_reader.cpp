@@ -1,5 +1,6 @@
 #include "slender_sim/node/bag_reader.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -98,6 +99,11 @@ std::vector<Eigen::Quaterniond> quaternions(const std::vector<geometry_msgs::Qua
   return out;
 }
 
+bool allFinite(const std::vector<Eigen::Quaterniond>& all)
+{
+  return std::all_of(all.begin(), all.end(), [](const Eigen::Quaterniond& q) { return q.coeffs().allFinite(); });
+}
+
 /// Not normalized: tables show what was recorded.
 Pose poseOf(const geometry_msgs::Pose& from)
 {
@@ -111,6 +117,13 @@ void require(bool fits, const std::string& what)
 {
   if (!fits)
     throw BagError("a message of " + what + " has arrays that do not fit each other: the bag was not written by slender_sim, or is damaged");
+}
+
+/// The solvers never let a NaN out.
+void requireFinite(bool finite, const std::string& what)
+{
+  if (!finite)
+    throw BagError("a message of " + what + " has numbers that are not finite: the bag is damaged; copy it anew");
 }
 
 /// The shortest step [s] that explains so many nanoseconds in so many steps: stamps are rounded, scenes say 0.002.
@@ -331,6 +344,10 @@ void BagReader::Contents::add(const slender_sim::RodState& rod)
   step_known = true;
   out->rods.push_back({rod.name, rod.closed != 0, columns(rod.nodes), columns(rod.velocities), quaternions(rod.frames), numbers(rod.twists),
                        numbers(rod.radii), numbers(rod.radii_b.empty() ? rod.radii : rod.radii_b)});
+  const RodSnapshot& read = out->rods.back();
+  requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.twist.allFinite() && read.radius_a.allFinite() &&
+                  read.radius_b.allFinite(),
+                "rod " + rod.name);
 }
 
 void BagReader::Contents::add(const slender_sim::ThreadState& thread)
@@ -343,6 +360,8 @@ void BagReader::Contents::add(const slender_sim::ThreadState& thread)
   step_known = true;
   out->threads.push_back({thread.name, thread.thread_id, thread.ids, columns(thread.nodes), columns(thread.velocities), thread.deposited,
                           quaternions(thread.frames), numbers(thread.radii)});
+  const ThreadSnapshot& read = out->threads.back();
+  requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.radius.allFinite(), "thread " + thread.name);
 }
 
 void BagReader::Contents::add(const slender_sim::ClothState& cloths)
@@ -362,6 +381,7 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
   {
     const auto [first, last] = range(cloths.offsets, k, cloths.vertices.size());
     ClothSnapshot cloth{cloths.names[k], columns(cloths.vertices, first, last), columns(cloths.velocities, first, last), {}};
+    requireFinite(cloth.x.allFinite() && cloth.v.allFinite(), "cloth " + cloth.name);
     if (mesh.names == cloths.names)
     {
       const auto [from, to] = range(mesh.triangle_offsets, k, mesh.triangles.size() / 3);

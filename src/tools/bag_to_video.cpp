@@ -1,13 +1,11 @@
-#include <sys/wait.h>
-
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
-#include <filesystem>
-#include <limits>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 
 #include "arguments.h"
 #include "export_program.h"
@@ -49,9 +47,9 @@ bool endsWith(const std::string& text, const std::string& end)
 class Ffmpeg
 {
 public:
-  Ffmpeg(const std::string& file, bool gif, double fps, int width, int height) : gif_(gif)
+  Ffmpeg(const std::string& file, bool gif, double fps, int width, int height) : file_(file), gif_(gif)
   {
-    if (std::system("command -v ffmpeg >/dev/null") != 0)
+    if (std::system("command -v ffmpeg >/dev/null && command -v ffprobe >/dev/null") != 0)
       throw BadInput("ffmpeg is not installed; it joins the pictures: apt install ffmpeg");
     std::signal(SIGPIPE, SIG_IGN);   // told by fwrite
     char input[200];
@@ -71,20 +69,38 @@ public:
   {
     if (std::fwrite(picture.data(), 1, picture.size(), pipe_) != picture.size())
       fail();
+    ++pictures_;
   }
   void finish()
   {
     const int status = pclose(pipe_);
     pipe_ = nullptr;
-    if (status != 0)
+    if (status != 0 || inFile() != pictures_)
       fail();
   }
 
 private:
-  [[noreturn]] void fail() const { throw std::runtime_error(std::string("ffmpeg failed to write the ") + (gif_ ? "gif" : "mp4") + "; its message is above (is there room on the disk?)"); }
+  /// Pictures that a player finds: ffmpeg's exit status does not tell when the end of the file could not be written.
+  long inFile() const
+  {
+    const std::string probe = "ffprobe -v error -count_packets -select_streams v -show_entries stream=nb_read_packets -of csv=p=0 ";
+    FILE* pipe = popen((probe + slender::shellWord(file_)).c_str(), "r");
+    long count = 0;
+    if (pipe && std::fscanf(pipe, "%ld", &count) != 1)
+      count = 0;
+    if (pipe)
+      pclose(pipe);
+    return count;
+  }
+  [[noreturn]] void fail() const
+  {
+    throw std::runtime_error(std::string("ffmpeg failed to write the ") + (gif_ ? "gif" : "mp4") + "; its message is above (is there room on the disk?)");
+  }
 
+  std::string file_;
   bool gif_;
   FILE* pipe_ = nullptr;
+  long pictures_ = 0;
 };
 
 /// What the motion reaches; obstacles are not counted, they may be large.
@@ -145,6 +161,8 @@ void run(const slender::ExportOptions& options, const VideoOptions& video)
   view.tube_sides = resolution.sides;
   slender::PicturePainter painter(view);
   const double fps = video.fps.value_or(gif ? 12.5 : 25.0);
+  if (gif && fps > 50)
+    throw BadInput("--fps " + std::to_string(fps) + ": a gif counts in hundredths of a second and has at most 50 pictures per second");
   slender::Staged file(slender::Staged::Kind::file, options.out);
   Ffmpeg ffmpeg(file.part(), gif, fps, view.width, view.height);
 

@@ -37,7 +37,8 @@ void fill(const Eigen::Vector2d& p0, const Eigen::Vector2d& p1, const Eigen::Vec
     }
 }
 
-Vector3d skyColor(double height) { return Vector3d(0.93, 0.94, 0.95) + std::clamp(height, 0.0, 1.0) * Vector3d(-0.20, -0.14, -0.06); }
+/// Grey: videos keep hues coarsely, and show stripes in a faint gradient of them.
+Vector3d skyColor(double height) { return Vector3d::Constant(0.95 - 0.20 * std::clamp(height, 0.0, 1.0)); }
 
 }  // namespace
 
@@ -148,11 +149,12 @@ Vector3d PicturePainter::shade(const ObjectMesh& object, const Eigen::Matrix3Xd&
   if (object.kind == ObjectKind::rod && (sample.triangle < walls || object.mesh.vertices.cols() % view_.tube_sides == 0) &&
       (sample.triangle / 2) % view_.tube_sides % (view_.tube_sides / 2) <= 1)
     paint = {0.20, 0.24, 0.30};
-  const double bias = (1.5 + 2.5 * (1 - std::abs(normal.dot(sun_)))) / sun_scale_;
+  const double slope = std::sqrt(1 / std::max(0.01, face.dot(sun_) * face.dot(sun_)) - 1);   // how much higher the next cell is
+  const double bias = (1 + 2.2 * slope) / sun_scale_;
   const double direct = std::max(0.0, normal.dot(sun_)) * lit(x, bias), sky = 0.5 + 0.5 * normal.z();
   const Vector3d half = (sun_ + to_eye).normalized();
   const double gloss = object.kind == ObjectKind::cloth ? 0.0 : 0.3 * std::pow(std::max(0.0, normal.dot(half)), 40.0) * (direct > 0);
-  return paint * (0.30 + 0.18 * sky + 0.62 * direct) + Vector3d::Constant(gloss);
+  return paint * (0.38 + 0.17 * sky + 0.55 * direct) + Vector3d::Constant(gloss);
 }
 
 Vector3d PicturePainter::background(int row, int column) const
@@ -177,8 +179,9 @@ std::vector<std::uint8_t> PicturePainter::paint(const std::vector<ObjectMesh>& o
   std::vector<Eigen::Matrix3Xd> normals;
   for (const ObjectMesh& object : objects)
     normals.push_back(vertexNormals(object.mesh));
-  // a floor hides what is below it, but for what lies on it
-  const double below = view_.ground ? *view_.ground - 0.02 * view_.box.diagonal().norm() : -std::numeric_limits<double>::infinity();
+  // a floor hides what is below it, but for what sinks in a little
+  const bool floor = view_.ground && eye_.z() > *view_.ground;
+  const double below = floor ? *view_.ground - 0.004 * view_.box.diagonal().norm() : -std::numeric_limits<double>::infinity();
   std::vector<std::uint8_t> out;
   out.reserve(3u * view_.width * view_.height);
   for (int y = 0; y < view_.height; ++y)
@@ -193,7 +196,8 @@ std::vector<std::uint8_t> PicturePainter::paint(const std::vector<ObjectMesh>& o
           if (!hidden)
           {
             const TriangleMesh& mesh = objects[sample.object].mesh;
-            hidden = mesh.vertices(2, mesh.triangles(0, sample.triangle)) < below;
+            const auto height = [&](int corner) { return mesh.vertices(2, mesh.triangles(corner, sample.triangle)); };
+            hidden = (1 - sample.b - sample.c) * height(0) + sample.b * height(1) + sample.c * height(2) < below;
           }
           sum += (hidden ? background(row, column) : shade(objects[sample.object], normals[sample.object], sample)).cwiseMin(1.0);
         }

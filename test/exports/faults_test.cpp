@@ -59,6 +59,7 @@ TEST_F(ExportFaults, bagsThatWereNotFinished)
   std::ofstream(path("damaged.bag"), std::ios::binary) << damaged;
   const Result result = shell(csv + " " + path("damaged.bag") + " --quiet --out " + path("tables"));
   EXPECT_EQ(result.status, 2) << result.output;
+  EXPECT_NE(result.output.find("damaged"), std::string::npos) << result.output;
   EXPECT_FALSE(fs::exists(path("tables")) || fs::exists(path("tables.part")));
 }
 
