@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <new>
 #include <set>
 #include <vector>
 
@@ -461,6 +462,10 @@ bool BagReader::next(SceneSnapshot& out)
   catch (const ros::Exception& e)   // rosbag's, and messages cut short
   {
     throw BagError(c.path + ": is damaged (" + e.what() + "); copy it anew, or try: rosbag fix");
+  }
+  catch (const std::bad_alloc&)   // a length that is none
+  {
+    throw BagError(c.path + ": is damaged (a message of impossible length); copy it anew, or try: rosbag fix");
   }
   catch (const BagError& e)
   {

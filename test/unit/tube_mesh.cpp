@@ -61,19 +61,23 @@ TEST(TubeMesh, ellipticTubeHasItsVolumeAndAxesAlongTheFrame)
 TEST(TubeMesh, closedTubeIsATorusAlsoWithTurningFrames)
 {
   const int edges = 60;
-  FramedLine line{true, Eigen::Matrix3Xd(3, edges), Eigen::Matrix3Xd(3, edges), Eigen::Matrix2Xd::Constant(2, edges, 0.1)};
-  for (int j = 0; j < edges; ++j)
+  for (const int turns : {0, 2})
   {
-    const double angle = 2 * M_PI * j / edges, middle = angle + M_PI / edges, roll = 2 * middle;   // two full turns
-    line.x.col(j) << std::cos(angle), std::sin(angle), 0;
-    line.d1.col(j) << std::cos(roll) * std::cos(middle), std::cos(roll) * std::sin(middle), std::sin(roll);
+    FramedLine line{true, Eigen::Matrix3Xd(3, edges), Eigen::Matrix3Xd(3, edges), Eigen::Matrix2Xd::Constant(2, edges, 0.1)};
+    for (int j = 0; j < edges; ++j)
+    {
+      const double angle = 2 * M_PI * j / edges, middle = angle + M_PI / edges, roll = turns * middle;
+      line.x.col(j) << std::cos(angle), std::sin(angle), 0;
+      line.d1.col(j) << std::cos(roll) * std::cos(middle), std::cos(roll) * std::sin(middle), std::sin(roll);
+    }
+    const std::vector<TubeSection> sections = tubeSections(line, 240);
+    ASSERT_EQ(sections.size(), 121u);
+    EXPECT_LT((sections.front().x - sections.back().x).norm() + (sections.front().u - sections.back().u).norm(), 1e-12);
+    const TriangleMesh mesh = tubeMesh(sections, 24, true);
+    expectWatertight(mesh);
+    const double exact = 2 * M_PI * M_PI * 0.01 * polygonShare(24);
+    EXPECT_NEAR(volumeOf(mesh), exact, (turns == 0 ? 2e-3 : 1e-2) * exact);   // sides that wind are not flat: their diagonals add a little
   }
-  const std::vector<TubeSection> sections = tubeSections(line, 240);
-  ASSERT_EQ(sections.size(), 121u);
-  EXPECT_LT((sections.front().x - sections.back().x).norm() + (sections.front().u - sections.back().u).norm(), 1e-12);
-  const TriangleMesh mesh = tubeMesh(sections, 24, true);
-  expectWatertight(mesh);
-  EXPECT_NEAR(volumeOf(mesh), 2 * M_PI * M_PI * 0.01 * polygonShare(24), 2e-3 * 2 * M_PI * M_PI * 0.01);
 }
 
 TEST(TubeMesh, radiiAreAveragedAtNodesAndSectionsPassThroughThem)
