@@ -1,4 +1,4 @@
-// The reference of scene files in docs is what the reader asks for today.
+// The reference of scene files in docs is what the reader asks for today, and the scenes in the text are ones.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -45,6 +45,32 @@ TEST(SceneReference, NamesRangesAndUnits)
   EXPECT_EQ(what("rods.N.grasps.NAME.hold"), "one of: frame, position");
   EXPECT_EQ(what("cloths.N.plasticity.yield_curvature"), "a number in [0, 1000000000] 1/m");
   EXPECT_EQ(what("rods.N.grasps.NAME.edges.N"), "a place, counted from 0, or from the end by negative numbers");
+}
+
+TEST(Documents, ShowScenesThatAreRead)
+{
+  int scenes = 0;
+  for (const char* name : {"/README.md", "/docs/tutorials.md"})
+  {
+    std::ifstream file(kSource + name);
+    std::string scene;
+    bool inside = false;
+    for (std::string line; std::getline(file, line);)
+    {
+      if (inside && line == "```")
+      {
+        EXPECT_NO_THROW(parseScene(scene, name)) << scene;
+        ++scenes;
+        scene.clear();
+        inside = false;
+      }
+      else if (line == "```yaml")
+        inside = true;
+      else if (inside)
+        scene += line + "\n";
+    }
+  }
+  EXPECT_GE(scenes, 5);
 }
 
 TEST(SceneReference, SaysWhichFileIsNotThere) { EXPECT_THROW(sceneKeys({kSource + "/none.yaml"}), SceneError); }
