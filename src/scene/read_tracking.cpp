@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 
@@ -216,8 +217,40 @@ TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, co
                           vertices.present() ? readIndexList(vertices, static_cast<int>(guide.config.mesh.vertices.cols())) : std::vector<int>{});
 }
 
-std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const ReadContext& context, const GuideSource& guide,
-                                                   const TrackedMesh& tracked, const ClothConfig& cloth)
+/// Bounds of forces [N] of all test functions, of a traction [Pa] for all or by name; empty without.
+Eigen::VectorXd readBounds(const YamlCursor& at, const WeakConstraints& constraints)
+{
+  const Range traction = Range::above(0, 1e12, "Pa");
+  const double infinite = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd bounds;
+  if (!at.present())
+  {
+    return bounds;
+  }
+  if (!at.isMap())
+  {
+    return at.number(traction).value_or(infinite) * constraints.measures();
+  }
+  bounds.setConstant(constraints.count(), infinite);
+  for (const auto& [name, entry] : at.members())
+  {
+    int function = 0;
+    while (function < constraints.count() && constraints.name(function) != name)
+    {
+      ++function;
+    }
+    if (function == constraints.count())
+    {
+      entry.problem("is for a test function that is not there");
+      continue;
+    }
+    bounds[function] = entry.number(traction).value_or(infinite) * constraints.measures()[function];
+  }
+  return bounds;
+}
+
+std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const YamlCursor& at_bounds, const ReadContext& context,
+                                                   const GuideSource& guide, const TrackedMesh& tracked, const ClothConfig& cloth)
 {
   auto tracking = std::make_shared<TrackingConfig>();
   tracking->guide = guide.config;
@@ -241,6 +274,7 @@ std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const R
       }
     }
     constraints->requireIndependent(held);
+    tracking->bounds = readBounds(at_bounds, *constraints);
     tracking->constraints = std::move(constraints);
   }
   catch (const std::invalid_argument& error)
@@ -257,7 +291,7 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   cloth.place = at.place();
   YamlMap map(at);
   assign(cloth.name, map.get("name").name());
-  const YamlCursor at_functions = map.get("test_functions");
+  const YamlCursor at_functions = map.get("test_functions"), at_bounds = map.get("max_traction");
   const GuideSource guide = readGuide(map.require("guide"), context);
   const TrackedMesh tracked = readTrackedMesh(map.get("mesh"), context, guide);
   if (tracked.good)
@@ -280,7 +314,7 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   map.finish();
   if (tracked.good && guide.config.mesh.vertices.cols() > 0)
   {
-    cloth.tracking = readTracking(at_functions, context, guide, tracked, cloth);
+    cloth.tracking = readTracking(at_functions, at_bounds, context, guide, tracked, cloth);
   }
   return cloth;
 }

@@ -118,6 +118,7 @@ class Tracking(NodeCase):
         # between messages the guide is interpolated: at one of them it is there
         self.assertLess(distance(vertices(live[20].guide_vertices), wave(0.2)), 1e-6)
         self.assertEqual(len(live[80].guide_forces), 9)
+        self.assertEqual((list(live[80].forces_at_bound), list(live[80].bound_distances)), ([0], [0.0]))
         self.assertGreater(sum(f.z for f in live[80].guide_forces), 0.0)
 
     def test_bodies(self):
