@@ -172,6 +172,34 @@ TEST(BoundedAverages, LetTheMaterialRefuseToStretch)
   EXPECT_LT(acceleration, 100.0);
 }
 
+TEST(BoundedAverages, AreGivenUpWhereCollisionsForbidThem)
+{
+  // a floor above which no average can be met: a hundred and more rounds of collisions against averages would come to nothing, as sixteen do
+  for (const double traction : {0.0, 20.0})
+  {
+    Bounded t(traction);
+    ClothGroupModel model;
+    model.cloths = {t.model};
+    model.contact.resize(1);
+    ContactSolid floor;
+    floor.shape = Plane{};
+    model.solids.push_back(floor);
+    ClothGroup group(model, t.options);
+    ClothGroupState state{{t.state}, {{{0, 0, -0.01}, Eigen::Quaterniond::Identity()}}};
+    ClothGroupInputs inputs{{t.inputs}, state.solids};
+    for (int k = 1; k <= 20; ++k)
+    {
+      inputs.cloths[0].averages = t.constraints.averages(t.coarse.vertices.colwise() - Vector3d(0, 0, 0.002 * k));
+      const StepReport report = group.step(state, inputs, 0.01);
+      ASSERT_TRUE(report.ok) << report.message;
+      EXPECT_GT(state.cloths[0].x.row(2).minCoeff(), -0.01);
+      EXPECT_LT(group.collisions().rounds, 60) << traction << " step " << k;
+    }
+    EXPECT_GT(t.constraints.error(inputs.cloths[0].averages, state.cloths[0].x), 0.029);
+    EXPECT_EQ(state.cloths[0].at_bound.size(), traction > 0 ? 25u : 0u);
+  }
+}
+
 TEST(BoundedAverages, TellWhatFitsNot)
 {
   Bounded t(10.0);
