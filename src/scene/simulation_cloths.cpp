@@ -23,6 +23,7 @@ ClothModel modelOf(const ClothConfig& config)
   if (config.tracking)
   {
     model.averages = {config.tracking->constraints, &config.tracking->constraints->matrix()};
+    model.average_bounds = config.tracking->bounds;
   }
   return model;
 }

@@ -61,16 +61,29 @@ void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
       SceneCloth& held = state_.cloths[k];
       held.guide = inputs.guides[k];
       held.guide_forces = touching_cloth_index_[k] >= 0 ? touching_cloths_->averageForces(touching_cloth_index_[k]) : cloth_steppers_[k]->averageForces();
-      report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)) / tracking->size);
+      report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)).met / tracking->size);
+      report.forces_at_bound += static_cast<int>(held.cloth.at_bound.size());
     }
   }
 }
 
-double Simulation::trackingError(int cloth) const
+Simulation::TrackingError Simulation::trackingError(int cloth) const
 {
   const auto& tracking = config_.cloths.at(static_cast<std::size_t>(cloth)).tracking;
+  TrackingError error;
+  if (!tracking)
+  {
+    return error;
+  }
   const SceneCloth& held = state_.cloths[static_cast<std::size_t>(cloth)];
-  return tracking ? tracking->constraints->error(tracking->constraints->averages(held.guide), held.cloth.x) : 0.0;
+  const WeakConstraints& constraints = *tracking->constraints;
+  const Eigen::Matrix3Xd targets = constraints.averages(held.guide);
+  for (int i = 0; i < constraints.count(); ++i)
+  {
+    double& worst = std::binary_search(held.cloth.at_bound.begin(), held.cloth.at_bound.end(), i) ? error.at_bound : error.met;
+    worst = std::max(worst, constraints.distance(i, targets, held.cloth.x));
+  }
+  return error;
 }
 
 }  // namespace slender

@@ -137,7 +137,7 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
       ++v.steps;
       const Matrix3Xd& x = now.cloth.x;
       const double reach = x.cwiseAbs().maxCoeff(), size = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm();
-      v.worst = std::max(v.worst, simulation.trackingError(0) / (size + 1e-3 * reach + 0.4));
+      v.worst = std::max(v.worst, simulation.trackingError(0).met / (size + 1e-3 * reach + 0.4));
       v.stretch = report.max_strain;
       continue;
     }

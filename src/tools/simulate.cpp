@@ -198,6 +198,10 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   if (std::any_of(cloths.begin(), cloths.end(), [](const slender::ClothConfig& cloth) { return cloth.tracking != nullptr; }))
   {
     std::printf("tracking          averages at most %.2g of the guide's size away\n", total.tracking_error);
+    if (total.forces_at_bound > 0)
+    {
+      std::printf("bounded forces    at most %d at their bounds, whose averages were not met\n", total.forces_at_bound);
+    }
   }
   if (total.projection_iterations > 0)
   {

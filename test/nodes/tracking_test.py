@@ -78,10 +78,10 @@ def distance(a, b):
 
 class Tracking(NodeCase):
 
-    def begin(self, motion, **parameters):
+    def begin(self, motion, more="", **parameters):
         with open(self.path("rest.obj"), "w") as file:
             file.write(obj(REST))
-        self.start(SCENE % (self.path("rest.obj"), motion), program="tracking_node", **parameters)
+        self.start(SCENE % (self.path("rest.obj"), motion) + more, program="tracking_node", **parameters)
         self.states = self.listen("/t/state", ClothState)
 
     def after(self, n):
@@ -118,7 +118,24 @@ class Tracking(NodeCase):
         # between messages the guide is interpolated: at one of them it is there
         self.assertLess(distance(vertices(live[20].guide_vertices), wave(0.2)), 1e-6)
         self.assertEqual(len(live[80].guide_forces), 9)
+        self.assertEqual((list(live[80].forces_at_bound), list(live[80].bound_distances)), ([0], [0.0]))
         self.assertGreater(sum(f.z for f in live[80].guide_forces), 0.0)
+
+    def test_forces_are_bounded(self):
+        self.begin("{topic: points}", more="    max_traction: 20\n")
+        guide = self.publisher("/t/guide/points", PointCloud2)
+        for k in range(6):
+            guide.publish(cloud([(x * (1 + 0.4 * k), y, z) for x, y, z in REST], 1.0 + k / RATE))
+        rospy.sleep(0.3)
+        state = self.after(40)
+        self.assertGreater(state.forces_at_bound[0], 2)
+        self.assertGreater(state.bound_distances[0], 0.05)
+        self.assertLess(state.constraint_errors[0], 1e-12)
+        total = sum(math.sqrt(f.x ** 2 + f.y ** 2 + f.z ** 2) for f in state.guide_forces)
+        self.assertLess(total, 20 * 0.16 * (1 + 1e-9))
+        told = self.diagnostics("simulation")
+        self.assertGreater(int(told["most guide forces at their bounds"]), 2)
+        self.assertGreater(float(told["greatest distance where forces are at their bounds [m]"]), 0.05)
 
     def test_bodies(self):
         self.begin("{topic: bodies, groups: {left: [0, 3, 6, 1, 4, 7], right: [2, 5, 8, 1, 4, 7]}}")

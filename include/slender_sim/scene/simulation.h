@@ -135,8 +135,13 @@ public:
   const ThreadModel& threadModel(int thread) const { return *thread_models_[thread]; }
   const ClothModel& clothModel(int cloth) const { return *cloth_models_[cloth]; }
   ClothEnergies clothEnergies(int cloth) const;
-  /// Greatest distance of an average of a tracked cloth from that of its guide [m]; 0 for others.
-  double trackingError(int cloth) const;
+  /// Greatest distances of averages of a tracked cloth from those of its guide [m]; 0 for others.
+  struct TrackingError
+  {
+    double met = 0.0;        ///< of those that are met
+    double at_bound = 0.0;   ///< of those whose forces are at their bounds
+  };
+  TrackingError trackingError(int cloth) const;
 
   /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could
   /// not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a shortened one is refused

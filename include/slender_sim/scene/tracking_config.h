@@ -45,6 +45,7 @@ struct TrackingConfig
   GuideConfig guide;
   TestFunctions functions;
   std::shared_ptr<const WeakConstraints> constraints;
+  Eigen::VectorXd bounds;               ///< of the force of each test function [N], infinite without; empty: of none
   double size = 1.0;                    ///< diagonal of the box around the guide's mesh [m]: what errors are measured by
 };
 
