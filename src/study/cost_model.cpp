@@ -235,7 +235,8 @@ void runCostModel(StudyContext& context)
                                                  : std::vector<int>{100, 300, 1000, 3000, 10000, 30000, 100000, 300000, 1000000};
   const double enough = context.quick() ? 0.1 : 1.0;    // [s] of steps
   const double longest = context.quick() ? 3.0 : 240;   // [s] for a size
-  Plot& time = context.plot("cost_model", "Cost of a step against size: measured, and powers fitted from 900 vertices on", "vertices", "CPU time per step [s]");
+  Plot& free = context.plot("cost_model", "Cost of a step against size, without contact: measured, and powers fitted from 900 vertices on", "vertices", "CPU time per step [s]");
+  Plot& touching = context.plot("cost_model_contact", "Likewise of what lies on a floor and may touch itself", "vertices", "CPU time per step [s]");
   Plot& memory = context.plot("cost_model_memory", "Memory against size", "vertices", "resident memory [bytes]");
   double worst_misfit = 0;
   int done = 0;
@@ -243,6 +244,7 @@ void runCostModel(StudyContext& context)
   for (const Family& family : families())
   {
     const std::string label = std::string(family.name) + (family.contact ? ", contact" : ""), key = std::string(family.name) + (family.contact ? "_contact" : "");
+    Plot& time = family.contact ? touching : free;
     std::vector<double> x, y, bytes;
     double last_time = 0, last_bytes = 0, last_size = 0;
     for (const int size : sizes)

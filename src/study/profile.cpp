@@ -199,8 +199,8 @@ std::string Profiler::run(const std::string& tool, const std::string& scene, dou
     fs::remove_all(old);
   const std::string file = folder_ + "/scene.yaml", log = folder_ + "/log.txt";
   std::ofstream(file) << scene;
-  // One thread: so that counts do not depend on the machine.
-  std::string command = "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 valgrind " + tool + " " + shellWord(simulate_) + " " + shellWord(file) + " --quiet --threads 1 --duration " +
+  // One thread, and instructions that valgrind knows: so that counts do not depend on the machine.
+  std::string command = "SLENDER_ISA=baseline OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 valgrind " + tool + " " + shellWord(simulate_) + " " + shellWord(file) + " --quiet --threads 1 --duration " +
                         std::to_string(step * steps);
   for (std::string word : options)
   {

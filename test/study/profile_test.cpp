@@ -55,10 +55,10 @@ TEST(Profile, instructionsOfLinesInlinedCodeAndCalls)
 
 TEST(Profile, allocationsWithTheirStacks)
 {
-  const std::vector<Allocation> all = readDhat(R"({"dhatFileVersion":2,"mode":"heap",
+  const std::vector<Allocation> all = readDhat(R"dhat({"dhatFileVersion":2,"mode":"heap",
     "pps":[{"tb":96,"tbk":2,"tl":5,"mb":48,"fs":[1,2,3]}],
     "ftbl":["[root]","0x48: operator new(unsigned long) (in /usr/lib/x.so)",
-            "0x4B: slender::Simulation::step(slender::SceneInputs const&) (work/src/scene/simulation.cpp:120)","0x11: main (work/src/tools/simulate.cpp:5)"]})",
+            "0x4B: slender::Simulation::step(slender::SceneInputs const&) (work/src/scene/simulation.cpp:120)","0x11: main (work/src/tools/simulate.cpp:5)"]})dhat",
                                                sources);
   ASSERT_EQ(all.size(), 1u);
   EXPECT_EQ(all[0].bytes, 96u);
