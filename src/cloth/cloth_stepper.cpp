@@ -264,7 +264,7 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
     const double size = point(system.gradient(), i).norm();
     (held ? force : unbalanced) = std::max(held ? force : unbalanced, size);
     const Eigen::Vector3d q = point(x_, i), a = (q - point(q_hat_, i)) / (stage.tau_a * stage.tau_a);
-    force = std::max(force, model->mass[i] * a.norm());
+    force = std::max({force, model->mass[i] * a.norm(), model->mass[i] * inputs.gravity.norm()});   // of cloth in free fall the weight alone
     if (!held)
       jump = std::max(jump, second_order ? (a - point(a_start_, i)).norm() : a.norm());
     next_.v.col(i) = held ? Eigen::Vector3d((q - point(x_start_, i)) / h) : Eigen::Vector3d((q - point(q_tilde_, i)) / stage.tau_v);

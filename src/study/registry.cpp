@@ -67,6 +67,8 @@ void runCharacter(StudyContext&);
 void runTrackingStability(StudyContext&);
 void runTrackingOverhead(StudyContext&);
 void runTrackingExactness(StudyContext&);
+void runLean(StudyContext&);
+void runCostModel(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -135,6 +137,8 @@ const std::vector<Study>& studies()
       {"tracking_stability", "guides that collapse, explode, jump or are not numbers, constraints that conflict: done or refused with reason", runTrackingStability},
       {"tracking_overhead", "steps of cloth with and without tracking, in the sizes of the thesis's table 6.1, beside it", runTrackingOverhead},
       {"tracking_exactness", "averages of tracked cloths against their guides' after every step, with wind, jumps, contact", runTrackingExactness},
+      {"lean", "instructions per step and memory of every feature in scenes that do not name it (needs valgrind)", runLean},
+      {"cost_model", "time per step and memory against size, all solvers with contact and without: measured and fitted", runCostModel},
   };
   return all;
 }
