@@ -291,7 +291,7 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
 {
   readMaterials(map, cloth);
   const YamlCursor undeformed = map.get("undeformed");
-  cloth.undeformed = readClothShape(undeformed, context, cloth.mesh);
+  cloth.undeformed = readUndeformed(undeformed, context, cloth.mesh);
   const Eigen::Matrix3Xd start = readClothShape(map.get("start"), context, cloth.mesh);
   cloth.start = start.cols() ? start : cloth.start;
   if (undeformed.present() && cloth.bending != BendingModel::hinge)
