@@ -4,15 +4,11 @@
 
 namespace slender {
 
-Eigen::Matrix3Xd readUndeformed(const YamlCursor& at, const ReadContext& context, const TriangleMesh& cloth)
+namespace {
+
+/// The cloth's mesh folded, ridged or crinkled; empty when reported.
+Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, const YamlCursor& ridges, const YamlCursor& crinkles, const TriangleMesh& cloth)
 {
-  YamlMap map(at);
-  if (!at.isMap() || !(map.has("folds") || map.has("ridges") || map.has("crinkles")))
-  {
-    return readClothShape(at, context, cloth);
-  }
-  const YamlCursor folds = map.get("folds"), ridges = map.get("ridges"), crinkles = map.get("crinkles");
-  map.finish();
   if (folds.present() + ridges.present() + crinkles.present() != 1)
   {
     at.problem("must have one of {file: PATH}, {folds: {along: [...], wavelength: L, height: H}}, {ridges: {axis: [...], count: N, height: H}}, "
@@ -54,6 +50,33 @@ Eigen::Matrix3Xd readUndeformed(const YamlCursor& at, const ReadContext& context
   return folds.present()    ? folded(cloth, direction, wavelength, *height)
          : ridges.present() ? ridged(cloth, direction, count, *height)
                             : crinkled(cloth, *height, static_cast<unsigned>(seed));
+}
+
+}  // namespace
+
+void readUndeformed(const YamlCursor& at, const ReadContext& context, ClothConfig& cloth)
+{
+  YamlMap map(at);
+  if (!at.isMap() || !(map.has("folds") || map.has("ridges") || map.has("crinkles")))
+  {
+    cloth.undeformed = readClothShape(at, context, cloth.mesh);
+    return;
+  }
+  bool lengths = false;
+  const YamlCursor folds = map.get("folds"), ridges = map.get("ridges"), crinkles = map.get("crinkles");
+  assign(lengths, map.get("lengths").boolean());
+  map.finish();
+  const Eigen::Matrix3Xd shape = readOffsets(at, folds, ridges, crinkles, cloth.mesh);
+  if (shape.cols() == 0 || !lengths)
+  {
+    cloth.undeformed = shape;
+    return;
+  }
+  if (cloth.start.cols() == 0)
+  {
+    cloth.start = cloth.mesh.vertices;
+  }
+  cloth.mesh.vertices = shape;
 }
 
 }  // namespace slender

@@ -30,10 +30,10 @@ const std::vector<Look>& looks()
 {
   static const std::vector<Look> all{
     {"vinyl", {}},
-    {"silk", {"tracked.0.damping.stiffness=0.0005"}},
-    {"accordion", {"tracked.0.undeformed={folds: {along: [0, 0, 1], wavelength: 0.3, height: 0.06}}", "tracked.0.bending.modulus=3e-4"}},
-    {"cellophane", {"tracked.0.undeformed={crinkles: {height: 0.02}}", "tracked.0.bending.modulus=3e-4"}},
-    {"wind", {"tracked.0.damping.stiffness=0.0005", "tracked.0.aerodynamics={drag: 1.2, lift: 0.8}", "wind.velocity=[-15, 4, 0]"}},
+    {"silk", {"tracked.0.damping.stiffness=0", "time.step=0.0025"}},
+    {"ribbed", {"tracked.0.undeformed={ridges: {axis: [0, 0, 1], count: 16, height: 0.02}, lengths: true}", "tracked.0.bending.modulus=3e-4"}},
+    {"cellophane", {"tracked.0.undeformed={crinkles: {height: 0.015}, lengths: true}", "tracked.0.bending.modulus=3e-4"}},
+    {"wind", {"tracked.0.damping.stiffness=0", "tracked.0.aerodynamics={drag: 1.2, lift: 0.8}", "wind.velocity=[-25, 8, 0]"}},
   };
   return all;
 }
@@ -90,7 +90,7 @@ void runBackflip(StudyContext& context)
   picture.columns = 6;
   Plot& plot = context.plot("backflip_folds", "Looks of a backflip: angles between faces", "time [s]", "root mean square [rad]");
   plot.log_x = plot.log_y = plot.markers = false;
-  constexpr double kShown = 1.25;   // [s] just landed
+  constexpr double kShown = 1.4;   // [s] landed
   const double duration = context.quick() ? 0.5 : 2.0;
   std::vector<Course> courses;
   std::size_t meetings = 0;
@@ -113,7 +113,7 @@ void runBackflip(StudyContext& context)
 
     Course course;
     const double step = config.time.step;
-    const int steps = static_cast<int>(std::lround(duration / step)), every = 20, shown = static_cast<int>(std::lround(std::min(kShown, duration) / step));
+    const int steps = static_cast<int>(std::lround(duration / step)), every = static_cast<int>(std::lround(0.1 / step)), shown = static_cast<int>(std::lround(std::min(kShown, duration) / step));
     double folds = 0, stretch = 0, away = 0, error = 0;
     std::size_t guide_meetings = 0, own = 0;
     int kept = 0, cuts = 0;

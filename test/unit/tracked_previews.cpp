@@ -196,6 +196,10 @@ TEST_F(TrackedPreviews, UndeformedShapesAreMadeFromTheMesh)
   EXPECT_LE(crinkles.undeformed.row(2).cwiseAbs().maxCoeff(), 0.03);
   EXPECT_NEAR(std::sqrt(crinkles.undeformed.row(2).squaredNorm() / 441), 0.03 / std::sqrt(3.0), 0.002);
   EXPECT_TRUE(crinkles.undeformed == crinkled(crinkles.mesh, 0.03, 5));
+  const ClothConfig longer = undeformed("{crinkles: {height: 0.03, seed: 5}, lengths: true}");
+  EXPECT_TRUE(longer.mesh.vertices == crinkles.undeformed);
+  EXPECT_TRUE(longer.start == crinkles.mesh.vertices);
+  EXPECT_EQ(longer.undeformed.cols(), 0);
   EXPECT_THROW(undeformed("{folds: {wavelength: 0.5}}"), SceneError);
   EXPECT_THROW(undeformed("{folds: {wavelength: 0.5, height: 0.1, along: [0, 0, 0]}}"), SceneError);
   EXPECT_THROW(undeformed("{folds: {wavelength: 0.5, height: 0.1}, crinkles: {height: 0.1}}"), SceneError);
