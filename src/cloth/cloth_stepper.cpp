@@ -34,7 +34,7 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
       throw std::invalid_argument(who + "averages of " + std::to_string(model->averages->cols()) + " vertices do not fit");
     if (o.integrator != Integrator::implicit_euler)
       throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler");
-    if (o.solver == ClothSolver::cholesky)
+    if (o.solver == ClothSolver::cholesky || o.solver == ClothSolver::gauss_seidel)
       throw std::invalid_argument(who + "prescribed averages need solver: conjugate_gradients (or auto)");
   }
   shortest_edge_ = std::numeric_limits<double>::infinity();

@@ -19,12 +19,22 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
   return Eigen::Map<const Eigen::MatrixXi>(pairs.data(), 2, static_cast<Eigen::Index>(pairs.size() / 2));
 }
 
+/// Measured (study implicit_step): sweeps are faster below, the constant factor above.
+constexpr int kMostSwept = 3000;
+
+ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
+{
+  if (options.solver != ClothSolver::automatic)
+    return options.solver;
+  return model.averages || model.vertices() > kMostSwept ? ClothSolver::conjugate_gradients : ClothSolver::gauss_seidel;
+}
+
 }  // namespace
 
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
-  : model_(model), solver_(options.solver == ClothSolver::automatic ? ClothSolver::conjugate_gradients : options.solver)
+  : model_(model), solver_(chosen(model, options))
   , linear_tolerance_(options.linear_tolerance), membrane_(model.rest, model.membrane, model.warp), wind_(model)
 {
   const int n = points();
@@ -39,7 +49,7 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
       hinges_ = std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()));
     if (hinges_ && std::isfinite(model.plasticity.yield_curvature))
       hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient);
-    if (constant_bending_ || !direct)
+    if (constant_bending_ || solver_ == ClothSolver::conjugate_gradients)
       bending_ = isometricBending(model.rest, t, element, coefficient);
   }
   std::vector<Eigen::MatrixXi> elements{model.rest.triangles};
@@ -56,6 +66,8 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     bending_map_ = matrix_.mapOf(bending_);
   if (direct)
     factor_.setPattern(matrix_);
+  else if (solver_ == ClothSolver::gauss_seidel)
+    sweeps_ = SymmetricSweeps(matrix_, constant_bending_ ? &bending_ : nullptr);
   else
   {
     preconditioner_ = std::make_unique<ClothPreconditioner>(model, bending_, matrix_, !constant_bending_);
@@ -429,13 +441,17 @@ bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_itera
   if (!preconditioned_)
     return false;
   clearHeld(right_);
+  constexpr int kMostIterations = 2000;
+  const double allowed = tolerance > 0 ? tolerance : linear_tolerance_;
+  if (solver_ == ClothSolver::gauss_seidel)
+    return correct(d, sweeps_.solve(1.0 + ratio_, held_, right_, correction_, allowed, kMostIterations), linear_iterations);
   if (at && !averages_)   // averages are met with the constant matrix
     preconditioner_->align(*at, matrix_, held_);
   else
     preconditioner_->useConstant();
   const double reference = averages_ ? takeFirstStep(d, averages) : 0.0;
   const LinearResult result = cg_.solve(
-    right_, correction_, tolerance > 0 ? tolerance : linear_tolerance_, 2000,
+    right_, correction_, allowed, kMostIterations,
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);
@@ -447,6 +463,11 @@ bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_itera
         preconditioner_->apply(r, z);
     },
     reference);
+  return correct(d, result, linear_iterations);
+}
+
+bool ClothSystem::correct(PointVector& d, const LinearResult& result, int& linear_iterations) const
+{
   linear_iterations += result.iterations;
   for (std::size_t i = 0; i < d.size(); ++i)
     d[i] += correction_[i];

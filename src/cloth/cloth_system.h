@@ -10,6 +10,7 @@
 #include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/constrained_cholesky.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
+#include "slender_sim/linalg/symmetric_sweeps.h"
 #include "wind_load.h"
 
 namespace slender {
@@ -99,6 +100,8 @@ private:
   void setWeights(double tau, double ratio);
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
+  /// Adds correction_, the solution of conjugate gradients, to d.
+  bool correct(PointVector& d, const LinearResult& result, int& linear_iterations) const;
   /// gap_: by how much the averages at x fall short.
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
   void preconditionWithin(PointVector& r, PointVector& z);
@@ -126,6 +129,7 @@ private:
   std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
   bool preconditioned_ = true;                ///< its constant part could be factored
   ConjugateGradients cg_;
+  SymmetricSweeps sweeps_;
   std::unique_ptr<ConstrainedCholesky> averages_;   ///< of the preconditioner, where averages are prescribed
   bool independent_ = true;                         ///< these, with what is held
   PointVector gap_, multipliers_;                   ///< one point per average

@@ -70,6 +70,63 @@ void multiplyBlocks(int columns, const int* starts, const int* rows, const doubl
   }
 }
 
+/// Three columns, `stride` apart; the fourth lane of the product is not to be looked at where that is 3.
+inline __attribute__((always_inline)) Quad times(const double* columns, int stride, Quad x)
+{
+  return loadAnywhere(columns) * x[0] + loadAnywhere(columns + stride) * x[1] + loadAnywhere(columns + 2 * stride) * x[2];
+}
+
+void sweepDown(const SweptMatrix& m, double* x)
+{
+  for (int visited = 0; visited < m.points; ++visited)
+  {
+    const int j = m.order[visited];
+    Quad& own = *reinterpret_cast<Quad*>(x + 4 * j);
+    const Quad xj = own = times(m.inverse + 12 * static_cast<long>(j), 4, own);
+    for (int k = m.starts[j] + 1; k < m.starts[j + 1]; ++k)
+      *reinterpret_cast<Quad*>(x + 4 * m.rows[k]) -= times(m.blocks + 9 * static_cast<long>(k), 3, xj);
+    if (!m.right)
+      continue;
+    const Quad scaled = m.factor * xj;
+    for (int k = m.right[j]; k < m.ends[j]; ++k)
+      *reinterpret_cast<Quad*>(x + m.offsets[k]) -= m.values[k] * scaled;
+  }
+}
+
+void sweepUp(const SweptMatrix& m, const double* b, double* x)
+{
+  for (int left = m.points; left-- > 0;)
+  {
+    const int j = m.order[left];
+    Quad s0 = {}, s1 = {}, s2 = {}, s3 = {};
+    for (int k = m.starts[j] + 1; k < m.starts[j + 1]; ++k)
+    {
+      const double* a = m.blocks + 9 * static_cast<long>(k);
+      const Quad xi = load(x + 4 * m.rows[k]);
+      s0 += loadAnywhere(a) * xi;
+      s1 += loadAnywhere(a + 3) * xi;
+      s2 += loadAnywhere(a + 6) * xi;
+    }
+    if (m.right)
+      for (int k = m.right[j]; k < m.ends[j]; ++k)
+        s3 += m.values[k] * load(x + m.offsets[k]);
+    const Quad below = Quad{s0[0] + s0[1] + s0[2], s1[0] + s1[1] + s1[2], s2[0] + s2[1] + s2[2], 0.0} + m.factor * s3;
+    *reinterpret_cast<Quad*>(x + 4 * j) = times(m.inverse + 12 * static_cast<long>(j), 4, load(b + 4 * j) - below);
+  }
+}
+
+double multiplyDiagonal(int points, const double* diagonal, const double* x, double* y)
+{
+  Quad form = {};
+  for (int i = 0; i < points; ++i)
+  {
+    const Quad xi = load(x + 4 * i), yi = times(diagonal + 12 * static_cast<long>(i), 4, xi);
+    *reinterpret_cast<Quad*>(y + 4 * i) = yi;
+    form += xi * yi;
+  }
+  return form[0] + form[1] + form[2];
+}
+
 /// Columns from .. from+Columns-1 of a supernode of `count` rows, whose first row is that of column 0: solve with the triangle, then take
 /// their part from the rows below.
 template <int Columns>
@@ -173,7 +230,7 @@ double dot(int points, const double* x, const double* y)
 }  // namespace
 
 extern const PointKernels point_kernels;
-const PointKernels point_kernels = {multiply, multiplyBlocks, forwardSupernodal, backwardSupernodal, dot};
+const PointKernels point_kernels = {multiply, multiplyBlocks, forwardSupernodal, backwardSupernodal, sweepDown, sweepUp, multiplyDiagonal, dot};
 
 }  // namespace SLENDER_ISA
 }  // namespace slender

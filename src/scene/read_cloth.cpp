@@ -307,7 +307,8 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
   YamlMap solver(map.get("solver"));
   assign(cloth.solver, solver.get("linear").choice<ClothSolver>({{"auto", ClothSolver::automatic},
                                                                  {"cholesky", ClothSolver::cholesky},
-                                                                 {"conjugate_gradients", ClothSolver::conjugate_gradients}}));
+                                                                 {"conjugate_gradients", ClothSolver::conjugate_gradients},
+                                                                 {"gauss_seidel", ClothSolver::gauss_seidel}}));
   assign(cloth.linear_tolerance, solver.get("tolerance").number(Range::between(0, 1)));
   assign(cloth.one_newton_step, solver.get("one_newton_step").boolean());
   solver.finish();

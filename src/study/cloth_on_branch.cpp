@@ -7,6 +7,7 @@
 #include "cloth_cases.h"
 #include "scene_cases.h"
 #include "slender_sim/geometry/mesh_shapes.h"
+#include "slender_sim/geometry/mesh_subdivision.h"
 #include "slender_sim/study/cpu_clock.h"
 
 namespace slender::study {
@@ -69,9 +70,9 @@ void runClothOnBranch(StudyContext& context)
   Plot& plot = context.plot("cloth_on_branch_distance", "Cloth on a branch: how far the averages of its quarters are from the preview's", "time [s]", "distance [m]");
   plot.log_x = plot.markers = false;
   const TriangleMesh branch = tube(std::get<Capsule>(config.obstacles.front().shape), config.obstacles.front().pose);
-  const auto draw = [&](int cloth, const std::string& label) {
-    const auto& mesh = config.cloths[cloth].mesh;
-    picture.panels.push_back({label, {{{scene.state().cloths[cloth].cloth.x, mesh.triangles}}, {branch, false}}});
+  const auto draw = [&](int cloth, const std::string& label) {   // in small triangles, which can be drawn one behind the other
+    const Subdivision fine = subdivide(config.cloths[cloth].mesh, cloth == preview ? 4 : 0);
+    picture.panels.push_back({label, {{{scene.state().cloths[cloth].cloth.x * fine.weights.transpose(), fine.mesh.triangles}}, {branch, false}}});
   };
   const double step = config.time.step;
   const int steps = static_cast<int>(std::lround(config.time.duration / step));

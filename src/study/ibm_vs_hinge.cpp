@@ -1,12 +1,10 @@
 // Quadratic isometric bending beside nonlinear hinges, as thesis table 2.1: what a gradient, a Hessian and whole steps cost.
 //
-// Implicit steps are compared twice. Both models may be solved by conjugate gradients whose preconditioner is the constant n x n factor of mass and
-// rest membrane. At these stiffnesses there is no bending in it, so hinges lose nothing with it; most of either step is its back-solves, and the
-// ratio is near 1 (implicit_step_speedup_min): the isometric model saves the assembly of its Hessian, not the solution. Hinges solved as is usual,
-// without a factor that acts on each coordinate alike, are compared besides: factored in every step, or by conjugate gradients preconditioned by
-// the inverse diagonal blocks or by their own Hessian at rest, to the same error; whichever is fastest (..._over_usual_hinge_solvers_min). On
-// small meshes that is diagonal blocks, and faster than the isometric step, which does not use them: that ratio, below 1, says something of
-// preconditioners and nothing of the models.
+// Implicit steps are compared twice. Solved as ClothStepper does, both models take the same conjugate gradients: small meshes by symmetric sweeps, large
+// ones by the constant n x n factor of mass and rest membrane, in which there is no bending at these stiffnesses, so that hinges lose nothing with it.
+// Either way most of a step is the solution, and the ratio is near 1 (implicit_step_speedup_min): the isometric model saves the assembly of its
+// Hessian, not the solution. Hinges solved as is usual are compared besides: factored in every step, or by conjugate gradients preconditioned by
+// the inverse diagonal blocks or by their own Hessian at rest, to the same error; whichever is fastest (..._over_usual_hinge_solvers_min).
 #include <cmath>
 
 #include <Eigen/LU>
@@ -345,7 +343,7 @@ void runIbmVsHinge(StudyContext& context)
   if (bound > 0)
     context.metric("product_over_bandwidth_bound", bound);
   context.note("Isometric Hessian: assembled once, spread over 1,000 steps; a step then does nothing for it.");
-  context.note("implicit step (implicit_step_speedup_min): both by conjugate gradients to the same tolerance, preconditioned by mass and rest membrane, the same matrix for both: bending is too small here to be in it, so hinges may use it as well.");
+  context.note("implicit step (implicit_step_speedup_min): both by conjugate gradients to the same tolerance, by sweeps or (above 3,000 vertices) preconditioned by mass and rest membrane, the same matrix for both: bending is too small here to be in it, so hinges may use it as well.");
   context.note("implicit_step_speedup_over_usual_hinge_solvers_min: over the fastest of hinges factored in every step, by CG with their diagonal blocks, and by CG with their Hessian at rest; the last two to the error of the step's own solution, assembly and solution only; no figure: slower than factoring.");
   context.note("hung sheet: from four corners, damped; the thesis's drape and its collisions are not in these steps.");
   context.note("bandwidth bound: least time of reading as many bytes as a product must move (matrix, x, y), in the same run; the metric is of the largest meshes.");

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/linalg/sparse_cholesky.h"
+#include "slender_sim/linalg/symmetric_sweeps.h"
 #include "test/support/cloths.h"
 
 namespace slender::test {
@@ -37,6 +38,55 @@ struct System
   }
   int points() const { return static_cast<int>(mesh.vertices.cols()); }
 };
+
+TEST(SymmetricSweeps, SolveWithAndWithoutAMatrixOfPoints)
+{
+  System s;
+  Random random(31);
+  PointVector b(4 * s.points(), 0.0), x(4 * s.points(), 0.0);
+  for (int i = 0; i < s.points(); ++i)
+    point(b, i) = random.vector();
+  for (const bool with : {false, true})
+  {
+    MatrixXd A = denseOf(s.blocks);
+    if (with)
+      for (int c = 0; c < 3; ++c)
+        A(Eigen::seqN(c, s.points(), 3), Eigen::seqN(c, s.points(), 3)) += 0.7 * MatrixXd(s.bending.toEigen());
+    for (int i = 0; i < s.points(); ++i)
+      if (s.fixed[i])
+      {
+        A.middleRows(3 * i, 3).setZero();
+        A.middleCols(3 * i, 3).setZero();
+        A.block<3, 3>(3 * i, 3 * i).setIdentity();
+        point(b, i).setZero();
+      }
+    SymmetricSweeps sweeps(s.blocks, with ? &s.bending : nullptr);
+    const VectorXd expected = A.llt().solve(flattened(matrixOf(b)));
+    const LinearResult result = sweeps.solve(0.7, s.fixed, b, x, 1e-12, 500);
+    EXPECT_TRUE(result.definite);
+    EXPECT_LT(result.residual, 1e-12);
+    ConjugateGradients plain;   // preconditioned by the diagonal blocks alone
+    plain.resize(s.points());
+    PointVector y = x;
+    const LinearResult slow = plain.solve(
+      b, y, 1e-12, 2000,
+      [&](const PointVector& p, PointVector& ap) {
+        const VectorXd product = A * flattened(matrixOf(p));
+        ap = pointsOf(Eigen::Map<const Matrix3Xd>(product.data(), 3, s.points()));
+      },
+      [&](const PointVector& r, PointVector& z) {
+        for (int i = 0; i < s.points(); ++i)
+          point(z, i) = A.block<3, 3>(3 * i, 3 * i).inverse() * point(r, i);
+      });
+    EXPECT_LT(result.iterations, 0.6 * slow.iterations);   // a model problem's halve
+    EXPECT_LT((flattened(matrixOf(x)) - expected).norm(), 1e-10 * expected.norm()) << with;   // the condition number times the tolerance
+    EXPECT_EQ(x[3], 0.0);
+    EXPECT_EQ(point(x, 17).norm(), 0.0);
+  }
+  for (int k = 0; k < 3; ++k)
+    s.blocks.values()[9 * s.blocks.starts()[40] + 4 * k] -= 100.0;
+  EXPECT_FALSE(SymmetricSweeps(s.blocks, nullptr).solve(1.0, s.fixed, b, x, 1e-12, 500).definite);
+}
 
 TEST(PointCholesky, SolvesBlocks)
 {

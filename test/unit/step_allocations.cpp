@@ -205,7 +205,7 @@ std::vector<ClothCase> clothCases()
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
   {
     for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
-      for (const ClothSolver solver : {ClothSolver::conjugate_gradients, ClothSolver::cholesky})
+      for (const ClothSolver solver : {ClothSolver::gauss_seidel, ClothSolver::conjugate_gradients, ClothSolver::cholesky})
         for (const bool one_newton_step : {true, false})
           for (const double tolerance : {0.0, 1e-4})
             cases.push_back({bending, integrator, solver, one_newton_step, tolerance});
@@ -279,7 +279,7 @@ TEST_P(ClothAllocations, AWarmStepInContactMakesNone)
 
 INSTANTIATE_TEST_SUITE_P(Cases, ClothAllocations, ::testing::ValuesIn(clothCases()), [](const auto& info) {
   const ClothCase& c = info.param;
-  return std::string(toString(c.bending)) + "_" + toString(c.integrator) + (c.solver == ClothSolver::cholesky ? "_cholesky" : "") +
+  return std::string(toString(c.bending)) + "_" + toString(c.integrator) + (c.solver == ClothSolver::cholesky ? "_cholesky" : c.solver == ClothSolver::gauss_seidel ? "_sweeps" : "") +
          (c.one_newton_step ? "_one" : "_full") + (c.error_tolerance > 0 ? "_controlled" : "");
 });
 

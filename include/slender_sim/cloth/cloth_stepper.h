@@ -26,9 +26,10 @@ struct ClothEnergies
 
 enum class ClothSolver
 {
-  automatic,             ///< conjugate gradients: measured to be faster at equal error from 150 vertices on (study cloth_accuracy)
+  automatic,             ///< gauss_seidel up to 3,000 vertices without averages, else conjugate_gradients (measured: studies implicit_step, cloth_accuracy)
   cholesky,              ///< factorisation of the whole matrix
-  conjugate_gradients    ///< preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the normals
+  conjugate_gradients,   ///< preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the normals
+  gauss_seidel           ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps; no prescribed averages
 };
 
 /// How a cloth is advanced.

@@ -12,6 +12,21 @@ struct SupernodalFactor
   const double* values = nullptr;
 };
 
+/// A symmetric matrix D + L + L^T of points: blocks as for multiplyBlocks, and those of a matrix that acts on each coordinate alike, if any (full rows; what is
+/// right of the diagonal counts, from `right` on), times `factor`.
+struct SweptMatrix
+{
+  int points = 0;
+  const int *starts = nullptr, *rows = nullptr;
+  const double* blocks = nullptr;
+  const int *right = nullptr, *ends = nullptr;   ///< null: no such matrix
+  const unsigned* offsets = nullptr;             ///< four times the columns
+  const double* values = nullptr;
+  double factor = 0;
+  const int* order = nullptr;                    ///< in which points are visited downwards: each after its neighbours of lower number
+  const double* inverse = nullptr;               ///< D^-1: per point three columns of four; zero keeps a point zero
+};
+
 struct PointKernels
 {
   /// y = A x (factor 0) or y += factor A x, full rows; offsets are four times the columns. Returns x . A x.
@@ -21,6 +36,11 @@ struct PointKernels
   /// x := L^-1 x, and x := L^-T x, for each coordinate.
   void (*forwardSupernodal)(const SupernodalFactor& factor, double* x);
   void (*backwardSupernodal)(const SupernodalFactor& factor, double* x);
+  /// x := (D + L)^-1 x; x := (D + L^T)^-1 b.
+  void (*sweepDown)(const SweptMatrix& matrix, double* x);
+  void (*sweepUp)(const SweptMatrix& matrix, const double* b, double* x);
+  /// y = D x: per point three columns of four. Returns x . y.
+  double (*multiplyDiagonal)(int points, const double* diagonal, const double* x, double* y);
   /// Sum of x . y over points; the unused parts do not count.
   double (*dot)(int points, const double* x, const double* y);
 };

@@ -30,6 +30,8 @@ public:
   /// Row i has the entries starts()[i] .. starts()[i + 1] - 1, by ascending columns.
   const std::vector<int>& starts() const { return starts_; }
   int column(int entry) const { return static_cast<int>(offsets_[entry] / 4); }
+  /// Four times the columns.
+  const AlignedVector<unsigned>& offsets() const { return offsets_; }
   const AlignedVector<double>& values() const { return values_; }
   Eigen::SparseMatrix<double> toEigen() const;
 
