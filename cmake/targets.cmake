@@ -43,9 +43,13 @@ add_executable(slender_sim_regions src/tools/regions.cpp)
 set_target_properties(slender_sim_regions PROPERTIES OUTPUT_NAME regions)
 target_link_libraries(slender_sim_regions PRIVATE slender_sim)
 
+add_executable(slender_sim_scene_reference src/tools/scene_reference.cpp)
+set_target_properties(slender_sim_scene_reference PROPERTIES OUTPUT_NAME scene_reference)
+target_link_libraries(slender_sim_scene_reference PRIVATE slender_sim)
+
 install(TARGETS slender_sim EXPORT slender_sim_targets
   ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS slender_sim_simulate slender_sim_fair_mesh slender_sim_regions RUNTIME DESTINATION ${INSTALL_BIN})
+install(TARGETS slender_sim_simulate slender_sim_fair_mesh slender_sim_regions slender_sim_scene_reference RUNTIME DESTINATION ${INSTALL_BIN})
 if(TARGET slender_sim_node)
   set_target_properties(slender_sim_node PROPERTIES INSTALL_RPATH "$ORIGIN")
   install(TARGETS slender_sim_node ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB})
