@@ -1,11 +1,12 @@
 # The study program: experiments behind the package's claims, without ROS.
 file(GLOB STUDY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/study/*.cpp)
-# Scenes that studies run are built in: `study` finds them wherever it is installed, and they are those of the package.
-foreach(scene chain hair knot_twist plectoneme tree)
-  set(scene_file ${PROJECT_SOURCE_DIR}/config/scenes/${scene}.yaml)
-  file(READ ${scene_file} scene_text)
-  string(APPEND SCENE_TEXTS "    {\"${scene}\", R\"yaml(${scene_text})yaml\"},\n")
-  set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${scene_file})
+# Scenes that studies run, and what they refer to, are built in: `study` finds them wherever it is installed, and they are those of the package.
+foreach(path scenes/backflip.yaml scenes/chain.yaml scenes/cloth_on_branch.yaml scenes/hair.yaml scenes/knot_twist.yaml scenes/plectoneme.yaml scenes/tree.yaml
+        meshes/bag.obj motion/backflip_keys.csv)
+  set(package_file ${PROJECT_SOURCE_DIR}/config/${path})
+  file(READ ${package_file} file_text)
+  string(APPEND FILE_TEXTS "    {\"${path}\", R\"text(${file_text})text\"},\n")
+  set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${package_file})
 endforeach()
 configure_file(${CMAKE_CURRENT_LIST_DIR}/package_scenes.cpp.in ${PROJECT_BINARY_DIR}/package_scenes.cpp @ONLY)
 add_library(slender_sim_studies STATIC ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)

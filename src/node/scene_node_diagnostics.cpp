@@ -174,6 +174,8 @@ DiagnosticStatus SceneNode::inputStatus()
       add(status, "input age " + age.name + " [s]", std::string("none yet"));
     if (age.seconds && *age.seconds > options_.guide_timeout && mode_ == Mode::running)
       raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
+    if (age.missing)
+      raise(status, DiagnosticStatus::WARN, "no input yet for " + age.name);
   }
   const std::vector<GuideInputs::Setting> settings = inputs_->settings();
   for (const GuideInputs::Setting& setting : settings)
@@ -184,7 +186,12 @@ DiagnosticStatus SceneNode::inputStatus()
   reported_drops_ = drops.total();
   add(status, "dropped", drops.total());
   for (int r = 0; r < kDropReasons; ++r)
-    add(status, std::string("dropped ") + toString(static_cast<Drop>(r)), drops.count(static_cast<Drop>(r)));
+  {
+    const Drop reason = static_cast<Drop>(r);
+    add(status, std::string("dropped ") + toString(reason), drops.count(reason));
+    if (!drops.last(reason).empty())
+      add(status, std::string("last dropped ") + toString(reason), drops.last(reason));
+  }
   if (status.message.empty())
     status.message = inputs_->ages().empty() && settings.empty() ? "nothing is driven from outside" : "ok";
   return status;

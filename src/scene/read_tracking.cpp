@@ -80,7 +80,7 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
   {
     if (tracked.good)
     {
-      requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path : "undeformed");
+      requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path : guide.file ? guide.file->path : "undeformed");
     }
   }
   catch (const std::invalid_argument& error)
@@ -306,7 +306,7 @@ std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const s
   return tracking;
 }
 
-ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
+ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths, const std::string& default_name)
 {
   ClothConfig cloth;
   cloth.name = default_name;
@@ -315,7 +315,7 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   assign(cloth.name, map.get("name").name());
   const YamlCursor at_functions = map.get("test_functions");
   const std::vector<Traction> tractions = readTractions(map.get("max_traction"));
-  const GuideSource guide = readGuide(map.require("guide"), context);
+  const GuideSource guide = readGuide(map.require("guide"), context, cloths, cloth.name);
   const TrackedMesh tracked = readTrackedMesh(map.get("mesh"), context, guide);
   if (tracked.good)
   {
@@ -358,7 +358,7 @@ void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::ve
   const auto entries = at.items(1, 1000);
   for (std::size_t k = 0; k < entries.size(); ++k)
   {
-    cloths.push_back(readTrackedCloth(entries[k], context, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
+    cloths.push_back(readTrackedCloth(entries[k], context, cloths, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
     const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
     if (!is_new)
     {

@@ -21,7 +21,7 @@ void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
   {
     if (const auto& tracking = config_.cloths[k].tracking)
     {
-      if (tracking->guide.byTopic())
+      if (tracking->guide.byTopic() || std::holds_alternative<ClothGuide>(tracking->guide.motion))
       {
         inputs.guides[k] = state_.cloths[k].guide;
       }
@@ -51,6 +51,13 @@ void Simulation::checkGuides(const SceneInputs& inputs) const
   }
 }
 
+/// At the end of the step: a cloth that guides has been stepped when this is asked for.
+const Eigen::Matrix3Xd& Simulation::guideVertices(int cloth, const SceneInputs& inputs) const
+{
+  const auto* preview = std::get_if<ClothGuide>(&config_.cloths[cloth].tracking->guide.motion);
+  return preview ? state_.cloths[preview->cloth].cloth.x : inputs.guides[cloth];
+}
+
 /// After a step.
 void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
 {
@@ -59,8 +66,9 @@ void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
     if (const auto& tracking = config_.cloths[k].tracking)
     {
       SceneCloth& held = state_.cloths[k];
-      held.guide = inputs.guides[k];
-      held.guide_forces = touching_cloth_index_[k] >= 0 ? touching_cloths_->averageForces(touching_cloth_index_[k]) : cloth_steppers_[k]->averageForces();
+      const ClothPlace& place = cloth_places_[k];
+      held.guide = guideVertices(static_cast<int>(k), inputs);
+      held.guide_forces = place.group >= 0 ? touching_cloths_[place.group].group.averageForces(place.index) : cloth_steppers_[k]->averageForces();
       report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)).met / tracking->size);
       report.forces_at_bound += static_cast<int>(held.cloth.at_bound.size());
     }

@@ -427,16 +427,13 @@ void Simulation::load(const std::string& path)
   {
     throw std::runtime_error(path + ": " + problem);
   }
-  if (touching_cloths_)
+  try
   {
-    try
-    {
-      checkTouchingCloths(loaded);
-    }
-    catch (const std::invalid_argument& error)
-    {
-      throw std::runtime_error(path + ": " + error.what());
-    }
+    checkTouchingCloths(loaded);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::runtime_error(path + ": " + error.what());
   }
   state_ = std::move(loaded);
 }

@@ -7,6 +7,8 @@
 
 #include <Eigen/Geometry>
 
+#include "slender_sim/geometry/mesh_offsets.h"
+
 namespace slender::study {
 
 using Eigen::Vector3d;
@@ -19,21 +21,6 @@ struct Facet
   Eigen::Vector2d corner[3];
   double shade[3], depth;
 };
-
-/// Unit normals of the vertices, of the faces around them weighted by their areas.
-Eigen::Matrix3Xd vertexNormals(const TriangleMesh& mesh)
-{
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, mesh.vertices.cols());
-  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
-  {
-    const Eigen::Vector3i t = mesh.triangles.col(f);
-    const Vector3d a = mesh.vertices.col(t[0]), normal = (mesh.vertices.col(t[1]) - a).cross(Vector3d(mesh.vertices.col(t[2]) - a));
-    for (int k = 0; k < 3; ++k)
-      normals.col(t[k]) += normal;
-  }
-  normals.colwise().normalize();
-  return normals;
-}
 
 std::vector<Facet> facetsOf(const SurfacePicture::Panel& panel, const SurfacePicture& picture)
 {

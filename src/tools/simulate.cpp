@@ -16,6 +16,7 @@
 #include "slender_sim/scene/simulation.h"
 #ifdef SLENDER_WITH_BAG
 #include "slender_sim/node/bag_recorder.h"
+#include "slender_sim/node/guide_bag.h"
 #endif
 
 /// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed.
@@ -211,7 +212,9 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
 
 int run(const Options& options)
 {
-#ifndef SLENDER_WITH_BAG
+#ifdef SLENDER_WITH_BAG
+  slender::setBagReader(slender::readGuideBag);
+#else
   if (!options.bag.empty())
   {
     throw BadInput("--bag " + options.bag + ": this build has no ROS and cannot write bags; build with -DWITH_ROS=ON, or use --csv");

@@ -110,7 +110,7 @@ TEST_F(TrackedScenes, SayWhatIsWrong)
   const std::string t = "tracked.0.", m = t + "guide.motion=";
   const struct { std::vector<std::string> set; const char* expected; } cases[] = {
     {{t + "guide={mesh: {file: none.obj}, motion: fixed}"}, "none.obj"},
-    {{t + "guide={motion: fixed}"}, "must have either mesh"},
+    {{t + "guide={motion: fixed}"}, "must have one of mesh"},
     {{m + "{frames: \"frame_*.obj\"}"}, "motion.rate: is missing"},
     {{m + "{frames: \"none_*.obj\", rate: 30}"}, "no such file"},
     {{m + "{frames: frame.obj, rate: 30}"}, "must have one *"},
