@@ -1,23 +1,26 @@
 # The study program: experiments behind the package's claims, without ROS.
 file(GLOB STUDY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/study/*.cpp)
-# Scenes that studies run are built in: `study` finds them wherever it is installed, and they are those of the package.
-foreach(scene chain hair knot_twist plectoneme tree)
-  set(scene_file ${PROJECT_SOURCE_DIR}/config/scenes/${scene}.yaml)
-  file(READ ${scene_file} scene_text)
-  string(APPEND SCENE_TEXTS "    {\"${scene}\", R\"yaml(${scene_text})yaml\"},\n")
-  set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${scene_file})
+# Scenes that studies run, and what they refer to, are built in: `study` finds them wherever it is installed, and they are those of the package.
+foreach(path scenes/backflip.yaml scenes/chain.yaml scenes/cloth_on_branch.yaml scenes/hair.yaml scenes/knot_twist.yaml scenes/plectoneme.yaml scenes/tree.yaml
+        meshes/bag.obj motion/backflip_keys.csv)
+  set(package_file ${PROJECT_SOURCE_DIR}/config/${path})
+  file(READ ${package_file} file_text)
+  string(APPEND FILE_TEXTS "    {\"${path}\", R\"text(${file_text})text\"},\n")
+  set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${package_file})
 endforeach()
 configure_file(${CMAKE_CURRENT_LIST_DIR}/package_scenes.cpp.in ${PROJECT_BINARY_DIR}/package_scenes.cpp @ONLY)
 add_library(slender_sim_studies STATIC ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)
 target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include PRIVATE ${PROJECT_SOURCE_DIR})
 target_link_libraries(slender_sim_studies PUBLIC slender_sim)
+# Tells instructions apart by the lines that they come from.
+set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/lean.cpp PROPERTY COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 
 # `study` is too common a name for a target in a shared catkin workspace.
 set(TOOLS ${PROJECT_SOURCE_DIR}/src/tools)
-add_executable(slender_sim_study_program ${TOOLS}/study.cpp ${TOOLS}/study_report.cpp ${TOOLS}/report_page.cpp ${TOOLS}/processes.cpp)
+add_executable(slender_sim_study_program ${TOOLS}/study.cpp ${TOOLS}/study_report.cpp ${TOOLS}/report_page.cpp)
 set_target_properties(slender_sim_study_program PROPERTIES OUTPUT_NAME study)
 target_link_libraries(slender_sim_study_program PRIVATE slender_sim_studies)
-add_executable(slender_sim_sweep_program ${TOOLS}/sweep.cpp ${TOOLS}/sweep_runs.cpp ${TOOLS}/sweep_engines.cpp ${TOOLS}/processes.cpp)
+add_executable(slender_sim_sweep_program ${TOOLS}/sweep.cpp ${TOOLS}/sweep_runs.cpp ${TOOLS}/sweep_engines.cpp)
 set_target_properties(slender_sim_sweep_program PROPERTIES OUTPUT_NAME sweep)
 target_link_libraries(slender_sim_sweep_program PRIVATE slender_sim_studies)
 install(TARGETS slender_sim_study_program slender_sim_sweep_program RUNTIME DESTINATION ${INSTALL_BIN})
@@ -39,9 +42,10 @@ if(BUILD_TESTING)
   file(GLOB STUDY_TESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/study/*.cpp)
   add_executable(study_tests ${STUDY_TESTS})
   target_include_directories(study_tests PRIVATE ${PROJECT_SOURCE_DIR})
-  target_compile_definitions(study_tests PRIVATE SLENDER_SWEEP="$<TARGET_FILE:slender_sim_sweep_program>")
+  target_compile_definitions(study_tests PRIVATE SLENDER_SWEEP="$<TARGET_FILE:slender_sim_sweep_program>" SLENDER_STUDY="$<TARGET_FILE:slender_sim_study_program>"
+    SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_link_libraries(study_tests PRIVATE slender_sim_studies GTest::gtest GTest::gtest_main)
-  add_dependencies(study_tests slender_sim_sweep_program)
+  add_dependencies(study_tests slender_sim_sweep_program slender_sim_study_program)
   set_target_properties(study_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
   add_test(NAME study COMMAND study_tests)
 endif()

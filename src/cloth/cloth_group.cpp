@@ -14,11 +14,10 @@ namespace slender {
 
 namespace {
 
-constexpr int kMeetRounds = 200;
-constexpr int kStallRounds = 8;   // that must halve the averages' errors; slow convergence as it was seen makes a third of them
 constexpr double kMeetTolerance = 1e-12;   // of the cloth's size
 constexpr int kLoadPasses = 2;
 constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
+constexpr double kBalanced = 1e-6;   // of the work: what averages leave of pushes that they balance, rounding errors
 constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
 
 /// Layers much thicker than edges are long: everything touches what is some edges away, at the price of the square of that, and folds cannot form.
@@ -163,7 +162,11 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
     push_.col(i) = free ? Eigen::Vector3d((corrected_.col(i) - x_.col(i)) / (inverse_mass_[i] * h * h)) : Eigen::Vector3d(0, 0, 0);
     work += push_.col(i).dot(corrected_.col(i) - x_.col(i));
   }
-  if (!(work > 0.0))
+  const double all = work;
+  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+    if (model_.cloths[k]->averages)
+      work -= balancedWork(k, h);
+  if (!(work > kBalanced * all))
     return false;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
@@ -297,7 +300,8 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
     report.ok = false;
     report.failure = StepFailure::squeezed;
     report.message = "collisions: " + found.reason + whereIs(found) +
-                     (found.at_start ? "; start from a state in which nothing intersects" : "; use a shorter step, or leave the cloth more room");
+                     (found.at_start ? "; start from a state in which nothing intersects" : "; use a shorter step, or leave the cloth more room") +
+                     blameAverages(found);
     hopeless_ = found.at_start;
     return report;
   }
@@ -312,84 +316,6 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
     next_.cloths[k].v = v_.middleCols(first_[k], first_[k + 1] - first_[k]);
   }
   return report;
-}
-
-/// Collisions move averages that are prescribed. Going back and forth between both leads to where both are met, by a factor of about a thousand each time
-/// where what touches is little of what an average is taken over; where a cloth is pressed flat a hundred rounds were seen. Collisions have the last word.
-CollisionReport ClothGroup::resolve(const CollisionStep& step)
-{
-  CollisionReport report = collider_->resolve(step, x_, v_, true);
-  if (report.ok)
-    held_impulses_ = collider_->heldImpulses();
-  double earlier = std::numeric_limits<double>::infinity();
-  for (int round = 1; report.ok && round <= kMeetRounds; ++round)
-  {
-    const double gap = meetAverages(step.h);
-    if (gap <= 1)
-      break;
-    const CollisionReport again = collider_->resolve(step, x_, v_, true);
-    if (!again.ok)
-      return again;
-    held_impulses_ += collider_->heldImpulses();
-    report.impulses += again.impulses;
-    report.rounds += again.rounds;
-    report.zones = again.zones;
-    report.zone_points = again.zone_points;
-    if (round % kStallRounds == 0)
-    {
-      if (gap > 0.5 * earlier)   // both cannot be had
-        break;
-      earlier = gap;
-    }
-  }
-  return report;
-}
-
-/// Moves what is free, by as little as its mass allows. Returns the largest error of an average that there was, in units of what is tolerated; nothing
-/// moves when that is at most 1.
-double ClothGroup::meetAverages(double h)
-{
-  double worst = 0.0;
-  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
-  {
-    if (!model_.cloths[k]->averages)
-      continue;
-    const auto& c = *model_.cloths[k]->averages;
-    AverageCorrection& to = corrections_[k];
-    const int first = first_[k], count = first_[k + 1] - first;
-    const auto x = x_.middleCols(first, count);
-    to.gap = sub_.cloths[k].averages;
-    for (Eigen::Index i = 0; i < c.rows(); ++i)
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
-        to.gap.col(i) -= entry.value() * x.col(entry.col());
-    const double gap = to.gap.colwise().norm().maxCoeff() / to.tolerance;
-    worst = std::max(worst, gap);
-    if (!(gap > 1))
-      continue;
-    if (!to.ready || to.pins != work_.cloths[k].pins)
-    {
-      to.weights = c * inverse_mass_.segment(first, count).asDiagonal();
-      to.gram.compute(Eigen::MatrixXd(to.weights * c.transpose()));
-      to.pins = work_.cloths[k].pins;
-      to.ready = true;
-    }
-    to.columns = to.gap.transpose();
-    to.gram.solveInPlace(to.columns);
-    to.multipliers = to.columns.transpose();
-    for (Eigen::Index i = 0; i < c.rows(); ++i)
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(to.weights, i); entry; ++entry)
-      {
-        const Eigen::Vector3d shift = entry.value() * to.multipliers.col(i);
-        x_.col(first + entry.col()) += shift;
-        v_.col(first + entry.col()) += shift / h;
-      }
-    to.multipliers /= h * h;   // forces
-    shared_averages_[k] += to.multipliers;
-    for (std::size_t p = 0; p < to.pins.size(); ++p)
-      for (Eigen::Index i = 0; i < c.rows(); ++i)
-        shared_pins_[k].col(static_cast<Eigen::Index>(p)) += c.coeff(i, to.pins[p]) * to.multipliers.col(i);
-  }
-  return worst;
 }
 
 Eigen::Matrix3Xd ClothGroup::positions(const ClothGroupState& state) const

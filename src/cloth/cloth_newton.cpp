@@ -27,7 +27,10 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
     point(d_, i) = end - point(trial_, i);
   }
   system.evaluateHessian(trial_, HessianKind::semidefinite);
-  if (!system.solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, model->averages ? &averages_ : nullptr))
+  const bool solved = model->average_bounds.size() > 0
+                        ? system.solveBounded(d_, averages_, at_bound_, report.linear_iterations)
+                        : system.solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, model->averages ? &averages_ : nullptr);
+  if (!solved)
     return StepFailure::singular_matrix;
   ++report.iterations;
   for (std::size_t i = 0; i < x_.size(); ++i)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 
@@ -36,6 +37,13 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
       throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler");
     if (o.solver == ClothSolver::cholesky || o.solver == ClothSolver::gauss_seidel)
       throw std::invalid_argument(who + "prescribed averages need solver: conjugate_gradients (or auto)");
+  }
+  if (model->average_bounds.size() > 0)
+  {
+    if (model->average_bounds.size() != model->averageCount() || !(model->average_bounds.array() > 0).all())
+      throw std::invalid_argument(who + "bounds of forces must be positive, one per average");
+    if (!o.one_newton_step)
+      throw std::invalid_argument(who + "bounded forces of averages need solver: {one_newton_step: true}; set it, or leave out the bounds");
   }
   shortest_edge_ = std::numeric_limits<double>::infinity();
   for (Eigen::Index e = 0; e < model->topology.edges.cols(); ++e)
@@ -78,6 +86,9 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
   bool sound = true;
   for (std::size_t k = 0; k < s.pins.size(); ++k)
     sound = sound && s.pins[k] >= 0 && s.pins[k] < n && (k == 0 || s.pins[k] > s.pins[k - 1]);
+  check(std::all_of(s.at_bound.begin(), s.at_bound.end(), [&](int i) { return i >= 0 && i < model->average_bounds.size(); }) &&
+          std::adjacent_find(s.at_bound.begin(), s.at_bound.end(), std::greater_equal<int>()) == s.at_bound.end(),
+        "averages of the state that are at their bounds (ascending)");
   check(sound, "pins of the state (vertices, ascending)");
   return what.empty();
 }
@@ -187,6 +198,7 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
   toPoints(work_.x, x_start_);
   toPoints(work_.v, v_start_);
   system.hold(work_);
+  at_bound_ = work_.at_bound;
   if (model->averages)
     averages_ = averages_start_ + to / duration * (inputs.averages - averages_start_);
   const bool second_order = order(options.integrator) == 2;
@@ -243,6 +255,7 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
   if (model->averages)
     system.balanceAverages(average_forces);
   next_ = work_;
+  next_.at_bound = at_bound_;
   const bool second_order = order(options.integrator) == 2;
   double unbalanced = 0.0, force = 1e-300, jump = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
@@ -251,7 +264,7 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
     const double size = point(system.gradient(), i).norm();
     (held ? force : unbalanced) = std::max(held ? force : unbalanced, size);
     const Eigen::Vector3d q = point(x_, i), a = (q - point(q_hat_, i)) / (stage.tau_a * stage.tau_a);
-    force = std::max(force, model->mass[i] * a.norm());
+    force = std::max({force, model->mass[i] * a.norm(), model->mass[i] * inputs.gravity.norm()});   // of cloth in free fall the weight alone
     if (!held)
       jump = std::max(jump, second_order ? (a - point(a_start_, i)).norm() : a.norm());
     next_.v.col(i) = held ? Eigen::Vector3d((q - point(x_start_, i)) / h) : Eigen::Vector3d((q - point(q_tilde_, i)) / stage.tau_v);
@@ -312,7 +325,7 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
   for (std::size_t i = 0; i < trial_.size(); ++i)
     system.gradient()[i] += trial_[i];
   if (model->averages)
-    system.balanceAverages(average_forces_change);
+    system.balanceAverages(average_forces_change, true);
   Eigen::Index pin = 0;
   for (int i = 0; i < model->vertices(); ++i)
     if (system.held()[i])

@@ -50,6 +50,7 @@ private:
   PlasticFlow plastic_;
   ClothState work_, next_;   ///< start of a substep, and its end
   Eigen::Matrix3Xd pins_start_, averages_start_, averages_, wind_v_;
+  std::vector<int> at_bound_;
   StepPlan plan_;
   PointVector x_, best_, trial_, d_, pin_motion_, v_, force_;
   PointVector x_start_, v_start_, a_start_, x_stage_, v_stage_, q_hat_, q_tilde_, guess_;   ///< of an implicit step

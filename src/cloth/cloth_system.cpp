@@ -75,9 +75,16 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     if (model.averages)
     {
       averages_ = std::make_unique<ConstrainedCholesky>();
-      averages_->setConstraints(*model.averages);
+      averages_->setConstraints(*model.averages, model.average_bounds.size() > 0);
       gap_.assign(4 * model.averageCount(), 0.0);
       multipliers_ = gap_;
+      if (model.average_bounds.size() > 0)
+      {
+        bounds_ = std::make_unique<AverageBounds>();
+        bounds_->taken = bounds_->pulls = gap_;
+        bounds_->first_guess = bounds_->before = bounds_->image = bounds_->image_before = PointVector(4 * n, 0.0);
+        bounds_->forces.setZero(3, model.averageCount());
+      }
     }
   }
   for (PointVector* v : {&start_, &target_, &force_, &gradient_, &product_, &right_, &correction_})
@@ -322,88 +329,6 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
   matrix_.addProduct(p.data(), ap.data());
   if (constant_bending_ && !bending_in_blocks_)
     bending_.addProduct(1.0 + ratio_, p.data(), ap.data());
-}
-
-void ClothSystem::averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const
-{
-  const auto& c = *model_.averages;
-  averages.setZero(3, c.rows());
-  for (Eigen::Index i = 0; i < c.rows(); ++i)
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
-      averages.col(i) += entry.value() * point(x, entry.col());
-}
-
-void ClothSystem::setGap(const Eigen::Matrix3Xd& averages, const PointVector& x)
-{
-  averagesOf(x, averages_now_);
-  for (Eigen::Index i = 0; i < averages.cols(); ++i)
-    point(gap_, i) = averages.col(i) - averages_now_.col(i);
-}
-
-void ClothSystem::meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x)
-{
-  constexpr double kRounding = 4e-15;   // of the coordinates: what is left after one solve, or conjugate gradients that began there
-  setGap(averages, x);
-  if ((averages - averages_now_).cwiseAbs().maxCoeff() <= kRounding * averages.cwiseAbs().maxCoeff())
-    return;
-  std::fill(right_.begin(), right_.end(), 0.0);
-  averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
-  for (std::size_t i = 0; i < x.size(); ++i)
-    x[i] += correction_[i];
-}
-
-void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces)
-{
-  std::copy(gradient_.begin(), gradient_.end(), right_.begin());
-  clearHeld(right_);
-  averages_->multipliers(right_.data(), multipliers_.data());
-  averages_->takeOut(multipliers_.data(), gradient_.data());
-  forces.resize(3, model_.averageCount());
-  for (Eigen::Index i = 0; i < forces.cols(); ++i)
-    forces.col(i) = point(multipliers_, i);
-}
-
-/// z = P r, among directions that leave the averages alone. What the averages balance is taken out of r, where it would drown the rest in rounding errors
-/// [Gould, Hribar, Nocedal, SIAM J. Sci. Comput. 23 (2001), 5].
-void ClothSystem::preconditionWithin(PointVector& r, PointVector& z)
-{
-  averages_->solve(r.data(), nullptr, z.data(), multipliers_.data());
-  averages_->takeOut(multipliers_.data(), r.data());
-}
-
-/// Before conjugate gradients with averages: takes out of right_ what these balance. With `averages` d is moved there, and on by a step of the
-/// preconditioned gradient, which comes for nothing; returns what the load on the cloth was without the forces of the averages, which the tolerance counts
-/// from as it does for a cloth without. Where cloth is strained so much that the step leads uphill, it is far stiffer than the preconditioner: then
-/// that load says nothing about motions. d is moved by the least, and the tolerance counts from what is left: 0.
-double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages)
-{
-  if (!averages)
-  {
-    averages_->multipliers(right_.data(), multipliers_.data());
-    averages_->takeOut(multipliers_.data(), right_.data());
-    return 0.0;
-  }
-  for (std::size_t i = 0; i < d.size(); ++i)
-    product_[i] = start_[i] + d[i];
-  setGap(*averages, product_);
-  const ConstrainedCholesky::Norms norms = averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
-  averages_->takeOut(multipliers_.data(), right_.data());
-  applyMatrix(correction_, product_);
-  clearHeld(product_);
-  const bool downhill = pointKernels().dot(points(), correction_.data(), product_.data()) < 2.0 * norms.step * norms.step;
-  if (!downhill)
-  {
-    std::fill(correction_.begin(), correction_.end(), 0.0);
-    averages_->solve(correction_.data(), gap_.data(), correction_.data(), multipliers_.data());
-    applyMatrix(correction_, product_);
-    clearHeld(product_);
-  }
-  for (std::size_t i = 0; i < d.size(); ++i)
-  {
-    d[i] += correction_[i];
-    right_[i] -= product_[i];
-  }
-  return downhill ? norms.load : 0.0;
 }
 
 bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance,

@@ -78,10 +78,13 @@ public:
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
 
+  /// The same for a linearised step of a model with bounds of its averages' forces. `at_bound`: which were, and are, at their bounds.
+  bool solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound, int& linear_iterations);
   /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x count).
   void meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x);
-  /// Takes the part out of the gradient that the averages balance: their forces (3 x count).
-  void balanceAverages(Eigen::Matrix3Xd& forces);
+  /// Takes the part out of the gradient that the averages balance: their forces (3 x count). With bounds these are those of solveBounded(),
+  /// and of the `response` to other forces those of averages that are not at their bounds.
+  void balanceAverages(Eigen::Matrix3Xd& forces, bool response = false);
   /// False when averages depend on each other on what is not held: then nothing can be solved.
   bool averagesIndependent() const { return independent_; }
   /// What they are at x.
@@ -106,6 +109,8 @@ private:
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
   void preconditionWithin(PointVector& r, PointVector& z);
   double takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages);
+  bool minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound, int& linear_iterations);
+  void takeOutAverages(PointVector& r);
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
 
   const ClothModel& model_;
@@ -134,6 +139,15 @@ private:
   bool independent_ = true;                         ///< these, with what is held
   PointVector gap_, multipliers_;                   ///< one point per average
   Eigen::Matrix3Xd averages_now_;
+
+  struct AverageBounds
+  {
+    std::vector<int> at;           ///< averages that are not met because their forces are at their bounds, ascending
+    Eigen::Matrix3Xd forces;       ///< of all [N]
+    PointVector taken, pulls;      ///< multipliers of the averages that are met, so far; forces of all
+    PointVector first_guess, before, image, image_before;
+  };
+  std::unique_ptr<AverageBounds> bounds_;      ///< of models with bounds
 
   double ratio_ = 0;
   PointVector start_, viscous_start_, shifted_, target_, force_, gradient_, product_, right_, correction_;

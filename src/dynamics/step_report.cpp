@@ -28,6 +28,7 @@ void StepReport::merge(const StepReport& other)
   projection_iterations = std::max(projection_iterations, other.projection_iterations);
   constraint_error = std::max(constraint_error, other.constraint_error);
   tracking_error = std::max(tracking_error, other.tracking_error);
+  forces_at_bound = std::max(forces_at_bound, other.forces_at_bound);
   error_estimate = std::max(error_estimate, other.error_estimate);
 }
 

@@ -10,7 +10,6 @@ namespace {
 
 using Pack = double __attribute__((vector_size(64)));
 using PackU = double __attribute__((vector_size(64), aligned(8), may_alias));
-using Lanes = long long __attribute__((vector_size(64)));
 constexpr int W = 8;
 constexpr double kTwoPi = 6.283185307179586476925286766559;
 
@@ -100,20 +99,20 @@ SLENDER_INLINE void transpose(Pack (&m)[8])
   Pack u[8];
   for (int k = 0; k < 8; k += 2)
   {
-    u[k] = __builtin_shuffle(m[k], m[k + 1], Lanes{0, 8, 2, 10, 4, 12, 6, 14});
-    u[k + 1] = __builtin_shuffle(m[k], m[k + 1], Lanes{1, 9, 3, 11, 5, 13, 7, 15});
+    u[k] = __builtin_shufflevector(m[k], m[k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+    u[k + 1] = __builtin_shufflevector(m[k], m[k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
   }
   Pack v[8];
   for (int k = 0; k < 8; k += 4)
     for (int a = 0; a < 2; ++a)
     {
-      v[k + a] = __builtin_shuffle(u[k + a], u[k + a + 2], Lanes{0, 1, 8, 9, 4, 5, 12, 13});
-      v[k + a + 2] = __builtin_shuffle(u[k + a], u[k + a + 2], Lanes{2, 3, 10, 11, 6, 7, 14, 15});
+      v[k + a] = __builtin_shufflevector(u[k + a], u[k + a + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+      v[k + a + 2] = __builtin_shufflevector(u[k + a], u[k + a + 2], 2, 3, 10, 11, 6, 7, 14, 15);
     }
   for (int a = 0; a < 4; ++a)
   {
-    m[a] = __builtin_shuffle(v[a], v[a + 4], Lanes{0, 1, 2, 3, 8, 9, 10, 11});
-    m[a + 4] = __builtin_shuffle(v[a], v[a + 4], Lanes{4, 5, 6, 7, 12, 13, 14, 15});
+    m[a] = __builtin_shufflevector(v[a], v[a + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+    m[a + 4] = __builtin_shufflevector(v[a], v[a + 4], 4, 5, 6, 7, 12, 13, 14, 15);
   }
 }
 
@@ -128,20 +127,20 @@ SLENDER_INLINE Vec3<Pack> gatherPoints(const double* x, const int* ids)
     const Quad low = *reinterpret_cast<const Quad*>(x + 4 * ids[k]), high = *reinterpret_cast<const Quad*>(x + 4 * ids[k + 4]);
     v[k] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
   }
-  const Pack xz01 = __builtin_shuffle(v[0], v[1], Lanes{0, 8, 2, 10, 4, 12, 6, 14}), y01 = __builtin_shuffle(v[0], v[1], Lanes{1, 9, 3, 11, 5, 13, 7, 15});
-  const Pack xz23 = __builtin_shuffle(v[2], v[3], Lanes{0, 8, 2, 10, 4, 12, 6, 14}), y23 = __builtin_shuffle(v[2], v[3], Lanes{1, 9, 3, 11, 5, 13, 7, 15});
-  return {__builtin_shuffle(xz01, xz23, Lanes{0, 1, 8, 9, 4, 5, 12, 13}), __builtin_shuffle(y01, y23, Lanes{0, 1, 8, 9, 4, 5, 12, 13}),
-          __builtin_shuffle(xz01, xz23, Lanes{2, 3, 10, 11, 6, 7, 14, 15})};
+  const Pack xz01 = __builtin_shufflevector(v[0], v[1], 0, 8, 2, 10, 4, 12, 6, 14), y01 = __builtin_shufflevector(v[0], v[1], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Pack xz23 = __builtin_shufflevector(v[2], v[3], 0, 8, 2, 10, 4, 12, 6, 14), y23 = __builtin_shufflevector(v[2], v[3], 1, 9, 3, 11, 5, 13, 7, 15);
+  return {__builtin_shufflevector(xz01, xz23, 0, 1, 8, 9, 4, 5, 12, 13), __builtin_shufflevector(y01, y23, 0, 1, 8, 9, 4, 5, 12, 13),
+          __builtin_shufflevector(xz01, xz23, 2, 3, 10, 11, 6, 7, 14, 15)};
 }
 
 /// Adds to them, one after another: ids may repeat.
 SLENDER_INLINE void scatterPoints(double* x, const int* ids, const Vec3<Pack>& v)
 {
   const Pack zero = {};
-  const Pack even = __builtin_shuffle(v.x, v.y, Lanes{0, 8, 2, 10, 4, 12, 6, 14}), odd = __builtin_shuffle(v.x, v.y, Lanes{1, 9, 3, 11, 5, 13, 7, 15});
-  const Pack even_z = __builtin_shuffle(v.z, zero, Lanes{0, 8, 2, 10, 4, 12, 6, 14}), odd_z = __builtin_shuffle(v.z, zero, Lanes{1, 9, 3, 11, 5, 13, 7, 15});
-  const Pack quads[4] = {__builtin_shuffle(even, even_z, Lanes{0, 1, 8, 9, 4, 5, 12, 13}), __builtin_shuffle(odd, odd_z, Lanes{0, 1, 8, 9, 4, 5, 12, 13}),
-                         __builtin_shuffle(even, even_z, Lanes{2, 3, 10, 11, 6, 7, 14, 15}), __builtin_shuffle(odd, odd_z, Lanes{2, 3, 10, 11, 6, 7, 14, 15})};
+  const Pack even = __builtin_shufflevector(v.x, v.y, 0, 8, 2, 10, 4, 12, 6, 14), odd = __builtin_shufflevector(v.x, v.y, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Pack even_z = __builtin_shufflevector(v.z, zero, 0, 8, 2, 10, 4, 12, 6, 14), odd_z = __builtin_shufflevector(v.z, zero, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Pack quads[4] = {__builtin_shufflevector(even, even_z, 0, 1, 8, 9, 4, 5, 12, 13), __builtin_shufflevector(odd, odd_z, 0, 1, 8, 9, 4, 5, 12, 13),
+                         __builtin_shufflevector(even, even_z, 2, 3, 10, 11, 6, 7, 14, 15), __builtin_shufflevector(odd, odd_z, 2, 3, 10, 11, 6, 7, 14, 15)};
   for (int k = 0; k < 4; ++k)
     *reinterpret_cast<Quad*>(x + 4 * ids[k]) += __builtin_shufflevector(quads[k], quads[k], 0, 1, 2, 3);
   for (int k = 0; k < 4; ++k)
@@ -152,7 +151,6 @@ SLENDER_INLINE void scatterPoints(double* x, const int* ids, const Vec3<Pack>& v
 /// 2 b + 1 its transpose. `slots` are those of lane 0; the next lane's follow `stride` later.
 SLENDER_INLINE void scatterBlocks(double* values, const int* slots, int stride, const Pack (&m)[9])
 {
-  const Lanes order[2] = {{0, 1, 2, 3, 4, 5, 6, 7}, {0, 3, 6, 1, 4, 7, 2, 5}};
   Pack t[8];
   for (int k = 0; k < 8; ++k)
     t[k] = m[k];
@@ -161,7 +159,8 @@ SLENDER_INLINE void scatterBlocks(double* values, const int* slots, int stride, 
   {
     const int slot = slots[k * stride];
     double* block = values + 9 * static_cast<long>(slot >> 1);
-    store(block, load(block) + __builtin_shuffle(t[k], order[slot & 1]));
+    const Pack turned = __builtin_shufflevector(t[k], t[k], 0, 3, 6, 1, 4, 7, 2, 5);
+    store(block, load(block) + (slot & 1 ? turned : t[k]));
     block[8] += m[8][k];
   }
 }

@@ -19,13 +19,13 @@ inline __attribute__((always_inline)) V8 join(V4 a, V4 b) { return V8{a[0], a[1]
 /// Past the cache when the factors are too many to stay in it: they are next read when all the others have been written.
 inline __attribute__((always_inline)) void storeFactor(double* p, V8 v, bool stream)
 {
-#if defined(__AVX512F__)
+#if defined(__AVX512F__) && !defined(__clang__)   // whose builtins differ
   if (stream)
   {
     __builtin_ia32_movntpd512(p, v);
     return;
   }
-#elif defined(__AVX__)
+#elif defined(__AVX__) && !defined(__clang__)   // whose builtins differ
   if (stream)
   {
     __builtin_ia32_movntpd256(p, low(v));

@@ -14,9 +14,16 @@ void ConstrainedCholesky::Rows::multiply(double factor, const double* x, double*
   pointKernels().multiply(static_cast<int>(starts.size()) - 1, starts.data(), offsets.data(), values.data(), factor, x, y);
 }
 
-void ConstrainedCholesky::setConstraints(const Constraints& c)
+void ConstrainedCholesky::setConstraints(const Constraints& c, bool bounded)
 {
   c_ = c;
+  if (bounded)
+  {
+    s_.resize(c.rows(), c.rows());
+    inner_.resize(c.rows(), c.rows());
+    give_.resize(c.rows(), 3);
+    pull_.assign(4 * static_cast<std::size_t>(c.cols()), 0.0);
+  }
   const std::size_t size = 4 * static_cast<std::size_t>(std::max(c.rows(), c.cols()));
   for (PointVector* v : {&y_, &t_, &mu_})
     v->assign(size, 0.0);
@@ -25,6 +32,7 @@ void ConstrainedCholesky::setConstraints(const Constraints& c)
 bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
 {
   p_ = &p;
+  left_out_.clear();
   const int m = count(), n = static_cast<int>(c_.cols());
   // three rows of C at a time, as the coordinates of points
   std::vector<Eigen::Triplet<double>> entries;
@@ -58,6 +66,8 @@ bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
   free.prune([fixed](Eigen::Index point, Eigen::Index, double) { return !fixed || !fixed[point]; });
   fill(free, c_transposed_);
   const Eigen::MatrixXd s = Eigen::MatrixXd(Constraints(v * v.transpose()));
+  if (s_.size() > 0)
+    s_ = s;
   const Eigen::LLT<Eigen::MatrixXd> factor(s);
   if (factor.info() != Eigen::Success || !s.allFinite() || (m > 0 && !(factor.rcond() > 1e-14)))
     return false;
@@ -72,6 +82,45 @@ bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
   return true;
 }
 
+void ConstrainedCholesky::leaveOut(const std::vector<int>& rows)
+{
+  left_out_ = rows;
+  const auto k = static_cast<Eigen::Index>(rows.size());
+  auto inner = inner_.topLeftCorner(k, k);
+  for (Eigen::Index b = 0; b < k; ++b)
+    for (Eigen::Index a = b; a < k; ++a)
+      inner(a, b) = s_inverse_.values[static_cast<std::size_t>(rows[a]) * count() + rows[b]];
+  for (Eigen::Index b = 0; b < k; ++b)   // positive definite: its own factor in its place
+  {
+    for (Eigen::Index j = 0; j < b; ++j)
+      inner.col(b).tail(k - b) -= inner(b, j) * inner.col(j).tail(k - b);
+    inner.col(b).tail(k - b) /= std::sqrt(inner(b, b));
+  }
+}
+
+/// mu = S^-1 t of what is not left out (Woodbury's formula)
+void ConstrainedCholesky::inverse(const double* t, double* mu) const
+{
+  s_inverse_.multiply(0.0, t, mu);
+  const auto k = static_cast<Eigen::Index>(left_out_.size());
+  if (k == 0)
+    return;
+  auto give = give_.topRows(k);
+  for (Eigen::Index a = 0; a < k; ++a)
+    give.row(a) = Eigen::Map<const Eigen::RowVector3d>(mu + 4 * left_out_[a]);
+  const auto inner = inner_.topLeftCorner(k, k).triangularView<Eigen::Lower>();
+  inner.solveInPlace(give);
+  inner.transpose().solveInPlace(give);
+  const int m = count();
+  for (Eigen::Index a = 0; a < k; ++a)
+  {
+    const double* column = s_inverse_.values.data() + static_cast<std::size_t>(left_out_[a]) * m;
+    for (int i = 0; i < m; ++i)
+      for (int c = 0; c < 3; ++c)
+        mu[4 * i + c] -= column[i] * give(a, c);
+  }
+}
+
 ConstrainedCholesky::Norms ConstrainedCholesky::solve(const double* r, const double* g, double* z, double* mu) const
 {
   const int m = count(), n = static_cast<int>(c_.cols());
@@ -80,13 +129,13 @@ ConstrainedCholesky::Norms ConstrainedCholesky::solve(const double* r, const dou
   if (g)
   {
     std::copy_n(g, 4 * m, t_.data());
-    s_inverse_.multiply(0.0, t_.data(), mu_.data());
+    inverse(t_.data(), mu_.data());
     norms.load = std::sqrt(pointKernels().dot(n, y_.data(), y_.data()) + pointKernels().dot(m, t_.data(), mu_.data()));
   }
   v_.multiply(0.0, y_.data(), t_.data());
   for (int i = 0; g && i < 4 * m; ++i)
     t_[i] -= g[i];
-  s_inverse_.multiply(0.0, t_.data(), mu_.data());
+  inverse(t_.data(), mu_.data());
   std::copy_n(mu_.data(), 4 * m, mu);
   v_transposed_.multiply(-1.0, mu_.data(), y_.data());
   if (g)
@@ -95,11 +144,66 @@ ConstrainedCholesky::Norms ConstrainedCholesky::solve(const double* r, const dou
   return norms;
 }
 
+ConstrainedCholesky::Norms ConstrainedCholesky::solveBounded(const double* r, const double* gap, const double* bounds, double l, double tolerance, double* z,
+                                                             double* f)
+{
+  constexpr int kSweeps = 200;
+  const int m = count(), n = static_cast<int>(c_.cols());
+  p_->forwardPoints(r, y_.data());
+  Norms norms;
+  norms.load = pointKernels().dot(n, y_.data(), y_.data());
+  v_.multiply(0.0, y_.data(), t_.data());
+  for (int i = 0; i < 4 * m; ++i)
+    t_[i] = gap[i] - t_[i] / l;
+  for (int j = 0; j < m; ++j)
+    for (int i = 0; i < m; ++i)
+      for (int c = 0; c < 3; ++c)
+        t_[4 * i + c] -= s_(i, j) / l * f[4 * j + c];
+  for (int sweep = 0; sweep < kSweeps; ++sweep)
+  {
+    double largest = 0.0;
+    for (int i = 0; i < m; ++i)
+    {
+      Eigen::Map<Eigen::Vector3d> now(f + 4 * i);
+      const double give = s_(i, i) / l;
+      Eigen::Vector3d wanted = now + Eigen::Map<const Eigen::Vector3d>(t_.data() + 4 * i) / give;
+      const double size = wanted.norm();
+      if (size > bounds[i])
+        wanted *= bounds[i] / size;
+      const Eigen::Vector3d change = wanted - now;
+      now = wanted;
+      largest = std::max(largest, change.norm() / std::min(bounds[i], std::max(size, 1e-300)));
+      for (int k = 0; k < m; ++k)
+        for (int c = 0; c < 3; ++c)
+          t_[4 * k + c] -= s_(k, i) / l * change[c];
+    }
+    if (largest <= tolerance)
+      break;
+  }
+  std::copy_n(f, 4 * m, mu_.data());
+  std::fill(pull_.begin(), pull_.end(), 0.0);
+  v_transposed_.multiply(1.0, mu_.data(), pull_.data());
+  norms.load = std::sqrt(norms.load + pointKernels().dot(n, pull_.data(), pull_.data()));
+  for (int i = 0; i < 4 * n; ++i)
+    y_[i] += pull_[i];
+  norms.step = std::sqrt(pointKernels().dot(n, y_.data(), y_.data()));
+  for (int i = 0; i < 4 * n; ++i)
+    y_[i] /= l;
+  p_->backwardPoints(y_.data(), z);
+  return norms;
+}
+
+void ConstrainedCholesky::addForces(const double* f, double* r) const
+{
+  std::copy_n(f, 4 * count(), mu_.data());
+  c_transposed_.multiply(1.0, mu_.data(), r);
+}
+
 void ConstrainedCholesky::multipliers(const double* r, double* mu) const
 {
   p_->forwardPoints(r, y_.data());
   v_.multiply(0.0, y_.data(), t_.data());
-  s_inverse_.multiply(0.0, t_.data(), mu_.data());
+  inverse(t_.data(), mu_.data());
   std::copy_n(mu_.data(), 4 * count(), mu);
 }
 

@@ -27,19 +27,24 @@ const char* toString(Drop reason)
 
 void DropCounter::drop(Drop reason, const std::string& what, const std::string& detail)
 {
-  ++counts_[static_cast<int>(reason)];
+  Reason& r = reasons_[static_cast<int>(reason)];
+  ++r.count;
+  r.last = what + (detail.empty() ? "" : ": " + detail);
   const auto now = std::chrono::steady_clock::now();
-  if (last_warning_.time_since_epoch().count() != 0 && now - last_warning_ < std::chrono::seconds(1))
+  if (r.warned.time_since_epoch().count() != 0 && now - r.warned < std::chrono::seconds(1))
   {
-    ++silent_;
+    ++r.silent;
     return;
   }
-  ROS_WARN("%s: dropped (%s)%s%s; %lu more since the last warning, %lu in all", what.c_str(), toString(reason),
-           detail.empty() ? "" : ": ", detail.c_str(), static_cast<unsigned long>(silent_), static_cast<unsigned long>(total()));
-  last_warning_ = now;
-  silent_ = 0;
+  ROS_WARN("%s: dropped (%s)%s%s; %lu more for this reason since the last warning, %lu in all", what.c_str(), toString(reason),
+           detail.empty() ? "" : ": ", detail.c_str(), static_cast<unsigned long>(r.silent), static_cast<unsigned long>(r.count));
+  r.warned = now;
+  r.silent = 0;
 }
 
-std::uint64_t DropCounter::total() const { return std::accumulate(counts_.begin(), counts_.end(), std::uint64_t{0}); }
+std::uint64_t DropCounter::total() const
+{
+  return std::accumulate(reasons_.begin(), reasons_.end(), std::uint64_t{0}, [](std::uint64_t sum, const Reason& r) { return sum + r.count; });
+}
 
 }  // namespace slender

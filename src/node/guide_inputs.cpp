@@ -146,13 +146,13 @@ void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Opt
   obstacles_ = scene.obstacles.size();
 }
 
-bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X)
+bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, const std::string& whose, Pose& X)
 {
   switch (fromMessage(message, X))
   {
     case PoseFault::none: return true;
-    case PoseFault::not_finite: drops_.drop(Drop::not_finite, what, "position and orientation must be finite"); return false;
-    case PoseFault::bad_quaternion: drops_.drop(Drop::bad_quaternion, what, "its length must be 1 within 1 %"); return false;
+    case PoseFault::not_finite: drops_.drop(Drop::not_finite, what, "position and orientation of " + whose + " must be finite"); return false;
+    case PoseFault::bad_quaternion: drops_.drop(Drop::bad_quaternion, what, "the orientation of " + whose + ", whose length must be 1 within 1 %"); return false;
   }
   return false;
 }
@@ -160,7 +160,7 @@ bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::strin
 void GuideInputs::onPose(int guided, const geometry_msgs::PoseStamped& message)
 {
   Entry entry{guided, Pose()};
-  if (checkPose(message.pose, guided_[guided].topic, entry.X_FH))
+  if (checkPose(message.pose, guided_[guided].topic, guided_[guided].name, entry.X_FH))
     take(guided, guided_[guided].topic, message.header, {entry});
 }
 
@@ -176,7 +176,7 @@ void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
   for (std::size_t g = 0; g < grasps_; ++g)
   {
     Entry entry{static_cast<int>(g), Pose()};
-    if (!checkPose(message.poses[g], "guides", entry.X_FH))
+    if (!checkPose(message.poses[g], "guides", guided_[g].name, entry.X_FH))
       return;   // all grasps at one instant, or none
     if (guided_[g].buffer && guided_[g].body.empty())
       entries.push_back(entry);
@@ -201,7 +201,7 @@ void GuideInputs::onBodies(const slender_sim::BodyStates& message)
   for (std::size_t b = 0; b < message.name.size(); ++b)
   {
     Entry entry{0, Pose()};
-    if (!checkPose(message.pose[b], "bodies", entry.X_FH))
+    if (!checkPose(message.pose[b], "bodies", message.name[b], entry.X_FH))
       return;
     if (!message.twist.empty() && !isFinite(message.twist[b]))
     {
@@ -238,10 +238,10 @@ void GuideInputs::take(int source, const std::string& what, const std_msgs::Head
   message.stamp = header.stamp.isZero() ? clock_.stamp() : header.stamp;
   message.entries = std::move(entries);
   const double age = -clock_.secondsAt(message.stamp) + clock_.seconds();
-  if (age > options_.guide_timeout || -age > kMaxAhead)
+  if (age > options_.guide_timeout || -age > options_.guide_ahead)
   {
     drops_.drop(age > 0.0 ? Drop::stale : Drop::from_future, what,
-                "its stamp is " + std::to_string(std::abs(age)) + " s " + (age > 0.0 ? "before" : "after") + " the simulated time");
+                "its stamp is " + std::to_string(std::abs(age)) + " s " + (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
     return;
   }
   for (const Message& waiting : pending_)
@@ -412,10 +412,10 @@ std::vector<GuideInputs::Age> GuideInputs::ages() const
     std::optional<double> age = guided.buffer->lastTime();
     if (age)
       age = clock_.seconds() - *age;
-    ages.push_back({guided.name, age});
+    ages.push_back({guided.name, age, false});
   }
   for (const TrackingInputs::Age& age : tracking_->ages())
-    ages.push_back({age.name, age.seconds});
+    ages.push_back({age.name, age.seconds, age.missing});
   return ages;
 }
 

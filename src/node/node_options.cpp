@@ -175,6 +175,7 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
   params.read("record_bag", o.record_bag);
   params.read("guide_delay", o.guide_delay, 0.0, 100.0);
   params.read("guide_timeout", o.guide_timeout, 0.0, 1e6, true);
+  params.read("guide_ahead", o.guide_ahead, 0.0, 1e6, true);
   params.read("catch_up_time", o.catch_up_time, 0.0, 100.0, true);
   params.read("catch_up_speed", o.catch_up_speed, 0.0, 1e6, true);
   params.read("tf_timeout", o.tf_timeout, 0.0, 100.0);

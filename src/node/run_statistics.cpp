@@ -21,6 +21,7 @@ void RunStatistics::add(const StepReport& report, const Simulation& simulation, 
   mended_folds += static_cast<std::uint64_t>(report.mended_folds);
   projection_iterations = std::max(projection_iterations, report.projection_iterations);
   tracking_error = std::max(tracking_error, report.tracking_error);
+  forces_at_bound = std::max(forces_at_bound, report.forces_at_bound);
   constraint_error = std::max(constraint_error, report.constraint_error);
   max_force.resize(simulation.grasps().size());
   max_torque.resize(simulation.grasps().size());

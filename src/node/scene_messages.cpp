@@ -112,10 +112,15 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
   cloths.guide_vertices.clear();
   cloths.function_offsets.clear();
   cloths.guide_forces.clear();
+  cloths.forces_at_bound.clear();
+  cloths.bound_distances.clear();
   for (std::size_t k = 0; k < scene.cloths.size(); ++k)
   {
     append(simulation.config().cloths[k].name, scene.cloths[k].cloth, cloths);
-    appendTracking(simulation.trackingError(static_cast<int>(k)), scene.cloths[k].guide, scene.cloths[k].guide_forces, cloths);
+    const Simulation::TrackingError error = simulation.trackingError(static_cast<int>(k));
+    appendTracking(error.met, scene.cloths[k].guide, scene.cloths[k].guide_forces, cloths);
+    cloths.forces_at_bound.push_back(static_cast<std::uint32_t>(scene.cloths[k].cloth.at_bound.size()));
+    cloths.bound_distances.push_back(error.at_bound);
   }
   wrenches.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < wrenches.size(); ++g)

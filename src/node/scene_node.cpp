@@ -16,6 +16,7 @@
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
 #include "slender_sim/node/converters.h"
+#include "slender_sim/node/guide_bag.h"
 #include "slender_sim/node/scene_markers.h"
 #include "slender_sim/scene/reader.h"
 
@@ -27,6 +28,7 @@ constexpr double kBurst = 0.02;        // [s] longest run of steps between two l
 
 SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
 {
+  setBagReader(readGuideBag);
   SceneConfig scene = options.scene.find('\n') != std::string::npos ? parseScene(options.scene, "~scene", options.overrides)
                                                                     : readScene(options.scene, options.overrides);
   // one kind of state on the topic `state`

@@ -114,16 +114,24 @@ DiagnosticStatus SceneNode::simulationStatus() const
   }
   if (kind_ == NodeKind::tracking)
   {
-    double error = 0.0, force = 0.0;
+    double error = 0.0, force = 0.0, refused = 0.0;
     for (std::size_t k = 0; k < simulation_->state().cloths.size(); ++k)
     {
-      error = std::max(error, simulation_->trackingError(static_cast<int>(k)));
+      const Simulation::TrackingError now = simulation_->trackingError(static_cast<int>(k));
+      error = std::max(error, now.met);
+      refused = std::max(refused, now.at_bound);
       const Eigen::Matrix3Xd& forces = simulation_->state().cloths[k].guide_forces;
       force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
     }
     add(status, "constraint residual [m]", error);
     add(status, "worst constraint residual over size", recent_.tracking_error);
     add(status, "largest guide force [N]", force);
+    const auto& cloths = simulation_->config().cloths;
+    if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking && cloth.tracking->bounds.size() > 0; }))
+    {
+      add(status, "most guide forces at their bounds", static_cast<std::uint64_t>(recent_.forces_at_bound));
+      add(status, "greatest distance where forces are at their bounds [m]", refused);
+    }
   }
   if (hasCloths(kind_))
   {
@@ -166,6 +174,8 @@ DiagnosticStatus SceneNode::inputStatus()
       add(status, "input age " + age.name + " [s]", std::string("none yet"));
     if (age.seconds && *age.seconds > options_.guide_timeout && mode_ == Mode::running)
       raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
+    if (age.missing)
+      raise(status, DiagnosticStatus::WARN, "no input yet for " + age.name);
   }
   const std::vector<GuideInputs::Setting> settings = inputs_->settings();
   for (const GuideInputs::Setting& setting : settings)
@@ -176,7 +186,12 @@ DiagnosticStatus SceneNode::inputStatus()
   reported_drops_ = drops.total();
   add(status, "dropped", drops.total());
   for (int r = 0; r < kDropReasons; ++r)
-    add(status, std::string("dropped ") + toString(static_cast<Drop>(r)), drops.count(static_cast<Drop>(r)));
+  {
+    const Drop reason = static_cast<Drop>(r);
+    add(status, std::string("dropped ") + toString(reason), drops.count(reason));
+    if (!drops.last(reason).empty())
+      add(status, std::string("last dropped ") + toString(reason), drops.last(reason));
+  }
   if (status.message.empty())
     status.message = inputs_->ages().empty() && settings.empty() ? "nothing is driven from outside" : "ok";
   return status;

@@ -91,7 +91,7 @@ void TrackingInputs::onBodies(int guide, const slender_sim::BodyStates& message)
     if (fault == PoseFault::not_finite)
       return drops_.drop(Drop::not_finite, what, "position and orientation of " + message.name[b] + " must be finite");
     if (fault == PoseFault::bad_quaternion)
-      return drops_.drop(Drop::bad_quaternion, what, "its length must be 1 within 1 %");
+      return drops_.drop(Drop::bad_quaternion, what, "the orientation of " + message.name[b] + ", whose length must be 1 within 1 %");
     const auto found = std::find(names.begin(), names.end(), message.name[b]);
     if (found == names.end())
       drops_.drop(Drop::unknown_name, what, "\"" + message.name[b] + "\" carries no vertices of the guide");
@@ -110,9 +110,10 @@ void TrackingInputs::take(Message message, const std_msgs::Header& header)
   message.frame = header.frame_id.front() == '/' ? header.frame_id.substr(1) : header.frame_id;   // tf2 wants no slash
   message.stamp = header.stamp.isZero() ? clock_.stamp() : header.stamp;
   const double age = clock_.seconds() - clock_.secondsAt(message.stamp);
-  if (age > options_.guide_timeout || -age > kMaxAhead)
+  if (age > options_.guide_timeout || -age > options_.guide_ahead)
     return drops_.drop(age > 0.0 ? Drop::stale : Drop::from_future, what,
-                       "its stamp is " + std::to_string(std::abs(age)) + " s " + (age > 0.0 ? "before" : "after") + " the simulated time");
+                       "its stamp is " + std::to_string(std::abs(age)) + " s " +
+                         (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
   const bool queued = std::any_of(pending_.begin(), pending_.end(), [&](const Message& m) { return m.guide == message.guide; });
   if (!queued && deliver(message, nullptr))
     return;
@@ -197,7 +198,7 @@ void TrackingInputs::apply(double time, SceneInputs& inputs)
     Eigen::Matrix3Xd& vertices = inputs.guides[guide.cloth];
     if (guide.points)
       vertices = guide.points->target(time);
-    else if (guide.lastTime())   // until then it stays
+    else if (guide.heard())   // until then it stays
       placeBodies(guide, time, vertices);
   }
 }
@@ -252,29 +253,24 @@ void TrackingInputs::restart(const Simulation& simulation)
   }
 }
 
-std::optional<double> TrackingInputs::Guide::lastTime() const
+bool TrackingInputs::Guide::heard() const
 {
-  if (points)
-    return points->lastTime();
-  std::optional<double> oldest;
-  for (const GuideBuffer& body : bodies)
-  {
-    const std::optional<double> last = body.lastTime();
-    if (last)
-      oldest = std::min(*last, oldest.value_or(*last));
-  }
-  return oldest;
+  return std::any_of(bodies.begin(), bodies.end(), [](const GuideBuffer& body) { return body.lastTime().has_value(); });
 }
 
 std::vector<TrackingInputs::Age> TrackingInputs::ages() const
 {
   std::vector<Age> ages;
+  const auto age = [this](const std::optional<double>& last) { return last ? std::optional<double>(clock_.seconds() - *last) : std::nullopt; };
   for (const Guide& guide : guides_)
   {
-    std::optional<double> age = guide.lastTime();
-    if (age)
-      age = clock_.seconds() - *age;
-    ages.push_back({guide.topic, age});
+    if (guide.points)
+      ages.push_back({guide.topic, age(guide.points->lastTime()), false});
+    for (std::size_t b = 0; b < guide.bodies.size(); ++b)   // one may fall silent while others speak
+    {
+      const std::optional<double> own = age(guide.bodies[b].lastTime());
+      ages.push_back({guide.topic + " " + guide.carried->bodies[b], own, !own && guide.heard()});
+    }
   }
   return ages;
 }

@@ -15,6 +15,15 @@ void GuideConfig::evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matri
     frames->points.evaluate(time, vertices, velocities);
     return;
   }
+  if (const auto* preview = std::get_if<ClothGuide>(&motion))
+  {
+    vertices = preview->start;
+    if (velocities)
+    {
+      *velocities = preview->velocity;
+    }
+    return;
+  }
   const auto* carried = std::get_if<CarriedGuide>(&motion);
   if (!carried || carried->poses.empty())
   {

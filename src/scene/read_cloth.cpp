@@ -291,9 +291,9 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
 {
   readMaterials(map, cloth);
   const YamlCursor undeformed = map.get("undeformed");
-  cloth.undeformed = readClothShape(undeformed, context, cloth.mesh);
   const Eigen::Matrix3Xd start = readClothShape(map.get("start"), context, cloth.mesh);
   cloth.start = start.cols() ? start : cloth.start;
+  readUndeformed(undeformed, context, cloth);
   if (undeformed.present() && cloth.bending != BendingModel::hinge)
   {
     undeformed.problem("gives angles at rest, which only bending: {model: hinge} has; the isometric models are for flat rest shapes");

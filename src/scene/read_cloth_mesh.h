@@ -25,5 +25,7 @@ bool readClothMesh(const YamlCursor& at, const ReadContext& context, TriangleMes
 void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& cloth);
 /// The same as another shape of a cloth: its vertices, or none when there is no such key, or no file with the cloth's triangles; reported.
 Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context, const TriangleMesh& cloth);
+/// The undeformed shape: such a file, or the cloth's mesh folded, ridged or crinkled; its angles, or (`lengths`) its lengths as well. The start is read before.
+void readUndeformed(const YamlCursor& at, const ReadContext& context, ClothConfig& cloth);
 
 }  // namespace slender

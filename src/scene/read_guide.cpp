@@ -8,24 +8,29 @@
 #include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/scene/pose_file.h"
 #include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/recorded_guide.h"
 #include "yaml_number.h"
 
 namespace slender {
 
 namespace {
 
-constexpr std::size_t max_frame_numbers = 200'000'000;   // of all frames of a guide together: 1.6 GB
-
-/// Files that a path with one '*' in its last part stands for, by the number in place of the star, else by name.
+/// Files that a path with one '*' in its last part stands for, by the number in place of the star. Throws std::runtime_error naming a folder that is not there,
+/// a file without a number, and numbers that are missing or come twice.
 std::vector<std::string> matchingFiles(const std::string& pattern)
 {
   const std::filesystem::path path(pattern);
+  const std::filesystem::path folder = path.parent_path().empty() ? "." : path.parent_path();
   const std::string name = path.filename().string();
   const auto star = name.find('*');
   const std::string head = name.substr(0, star), tail = name.substr(star + 1);
-  std::vector<std::pair<std::pair<double, std::string>, std::string>> found;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(path.parent_path().empty() ? "." : path.parent_path(), error))
+  if (!std::filesystem::is_directory(folder, error))
+  {
+    throw std::runtime_error("there is no folder " + folder.string());
+  }
+  std::vector<std::pair<long, std::string>> found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
   {
     const std::string file = entry.path().filename().string();
     if (file.size() < head.size() + tail.size() || file.compare(0, head.size(), head) != 0 ||
@@ -34,13 +39,28 @@ std::vector<std::string> matchingFiles(const std::string& pattern)
       continue;
     }
     const std::string middle = file.substr(head.size(), file.size() - head.size() - tail.size());
-    found.push_back({{parseNumber(middle).value_or(-1.0), file}, entry.path().string()});
+    if (middle.empty() || middle.size() > 9 || middle.find_first_not_of("0123456789") != std::string::npos)
+    {
+      throw std::runtime_error(entry.path().string() + " matches, but has no frame's number in place of the star; move it elsewhere");
+    }
+    found.emplace_back(std::stol(middle), entry.path().string());
   }
   std::sort(found.begin(), found.end());
   std::vector<std::string> files;
-  for (const auto& entry : found)
+  for (std::size_t k = 0; k < found.size(); ++k)
   {
-    files.push_back(entry.second);
+    const long stride = k > 0 ? found[1].first - found[0].first : 0, here = k > 0 ? found[k].first - found[k - 1].first : 0;
+    if (k > 0 && here == 0)
+    {
+      throw std::runtime_error(found[k - 1].second + " and " + found[k].second + " are the same frame");
+    }
+    if (here != stride)   // every so manieth frame is fine
+    {
+      const std::size_t gap = here > stride ? k : 1;
+      throw std::runtime_error("frame " + std::to_string(found[gap - 1].first + std::min(here, stride)) + " is missing between " + found[gap - 1].second +
+                               " and " + found[gap].second);
+    }
+    files.push_back(found[k].second);
   }
   return files;
 }
@@ -58,14 +78,23 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
     at.problem("must have one * in the name of the file, for example guide/frame_*.obj");
     return std::nullopt;
   }
-  const std::vector<std::string> files = matchingFiles(context.resolve(*pattern));
+  std::vector<std::string> files;
+  try
+  {
+    files = matchingFiles(context.resolve(*pattern));
+  }
+  catch (const std::runtime_error& error)
+  {
+    at.problem(error.what());
+    return std::nullopt;
+  }
   if (files.empty())
   {
     at.problem("no such file; there must be at least one");
     return std::nullopt;
   }
   const TriangleMesh& mesh = source.config.mesh;
-  if (3 * static_cast<std::size_t>(mesh.vertices.cols()) * files.size() > max_frame_numbers)
+  if (3 * static_cast<std::size_t>(mesh.vertices.cols()) * files.size() > max_guide_numbers)
   {
     at.problem("has " + std::to_string(files.size()) + " frames, too many for memory; leave out some and lower the rate");
     return std::nullopt;
@@ -146,6 +175,26 @@ std::optional<CarriedGuide> readGroups(const YamlCursor& at, const ReadContext& 
   return guide;
 }
 
+/// Takes the poses of those bodies that carry vertices.
+void takeBodyPoses(const YamlCursor& at, const std::vector<BodyTrajectory>& recorded, CarriedGuide& guide)
+{
+  std::vector<std::string> names;
+  for (const BodyTrajectory& body : recorded)
+  {
+    names.push_back(body.body);
+  }
+  for (const std::string& name : guide.bodies)
+  {
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+    {
+      at.problem("has no body " + name + ", which carries vertices; it has: " + joinWords(names));
+      return;
+    }
+    guide.poses.push_back(recorded[found - names.begin()].poses);
+  }
+}
+
 void readBodyPoses(const YamlCursor& at, const ReadContext& context, CarriedGuide& guide)
 {
   const auto file = at.text();
@@ -155,22 +204,7 @@ void readBodyPoses(const YamlCursor& at, const ReadContext& context, CarriedGuid
   }
   try
   {
-    const auto recorded = readPoseFile(context.resolve(*file));
-    std::vector<std::string> names;
-    for (const BodyTrajectory& body : recorded)
-    {
-      names.push_back(body.body);
-    }
-    for (const std::string& name : guide.bodies)
-    {
-      const auto found = std::find(names.begin(), names.end(), name);
-      if (found == names.end())
-      {
-        at.problem("has no body " + name + ", which carries vertices; it has: " + joinWords(names));
-        return;
-      }
-      guide.poses.push_back(recorded[found - names.begin()].poses);
-    }
+    takeBodyPoses(at, readPoseFile(context.resolve(*file)), guide);
   }
   catch (const SceneError& error)
   {
@@ -178,7 +212,7 @@ void readBodyPoses(const YamlCursor& at, const ReadContext& context, CarriedGuid
   }
 }
 
-void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSource& source)
+void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std::string& object, GuideSource& source)
 {
   GuideMotion& motion = source.config.motion;
   if (!at.present())
@@ -192,14 +226,15 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSour
   }
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const YamlCursor frames = map.get("frames"), bodies = map.get("bodies"), topic = map.get("topic");
+  const YamlCursor frames = map.get("frames"), bodies = map.get("bodies"), topic = map.get("topic"), bag = map.get("bag");
   const YamlCursor rate = map.get("rate"), begin = map.get("begin"), groups = map.get("groups"), attach = map.get("attach"), late = map.get("late");
   map.finish();
-  if (frames.present() + bodies.present() + topic.present() != 1)
+  if (frames.present() + bodies.present() + topic.present() + bag.present() != 1)
   {
     if (at.problems().size() == before)
     {
-      at.problem("must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {topic: points}, {topic: bodies, groups: obj}");
+      at.problem("must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {bag: FILE.bag}, {topic: points}, "
+                 "{topic: bodies, groups: obj}");
     }
     return;
   }
@@ -209,7 +244,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSour
     return;
   }
   const bool by_points = chosen.value_or(false);
-  const bool by_bodies = bodies.present() || (topic.present() && !by_points);
+  const bool by_bodies = bodies.present() || (topic.present() && !by_points) || (bag.present() && groups.present());
   const auto only_for = [](const YamlCursor& key, bool fits, const char* what) {
     if (key.present() && !fits)
     {
@@ -217,7 +252,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSour
     }
   };
   only_for(rate, frames.present(), "frames");
-  only_for(begin, frames.present(), "frames");
+  only_for(begin, frames.present() || bag.present(), "frames and bags");
   only_for(groups, by_bodies, "bodies");
   only_for(attach, by_bodies, "bodies");
   only_for(late, topic.present(), "guides by topic");
@@ -231,6 +266,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSour
   {
     assign(source.config.coast, late.choice<double>({{"hold", 0.0}, {"extrapolate", 0.2}}));
   }
+  const double first = begin.number(Range::closed(-1e6, 1e6, "s")).value_or(0.0);
   if (frames.present())
   {
     if (!rate.present())
@@ -238,7 +274,6 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSour
       YamlMap(at).require("rate");
     }
     const auto hertz = rate.number(Range::above(0, 1e6, "Hz"));
-    const double first = begin.number(Range::closed(-1e6, 1e6, "s")).value_or(0.0);
     if (hertz)
     {
       assign(motion, readFrames(frames, *hertz, first, context, source));
@@ -248,6 +283,11 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSour
   if (by_points)
   {
     motion = TopicGuide{};
+    return;
+  }
+  if (bag.present() && !by_bodies)
+  {
+    readBagPoints(bag, context, first, object, source);
     return;
   }
   if (!groups.present())
@@ -261,8 +301,53 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, GuideSour
     return;
   }
   assign(carried->keeps_offset, attach.choice<bool>({{"initial", true}, {"frame", false}}));
-  readBodyPoses(bodies, context, *carried);
+  if (bag.present())
+  {
+    const auto recorded = readBag(bag, context, true, first, object);
+    if (!recorded)
+    {
+      return;
+    }
+    takeBodyPoses(bag, recorded->bodies, *carried);
+  }
+  else
+  {
+    readBodyPoses(bodies, context, *carried);
+  }
   motion = std::move(*carried);
+}
+
+/// A cloth of the scene as the guide.
+void readPreview(const YamlCursor& at, const std::vector<ClothConfig>& cloths, GuideSource& source)
+{
+  const auto name = at.name();
+  if (!name)
+  {
+    return;
+  }
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+  {
+    const ClothConfig& cloth = cloths[k];
+    if (cloth.tracking)
+    {
+      continue;
+    }
+    names.push_back(cloth.name);
+    if (cloth.name == *name)
+    {
+      source.config.mesh = cloth.mesh;
+      source.grid = cloth.grid;
+      ClothGuide guide{static_cast<int>(k), cloth.start.cols() ? cloth.start : cloth.mesh.vertices, cloth.start_velocity};
+      if (guide.velocity.cols() == 0)
+      {
+        guide.velocity.setZero(3, guide.start.cols());
+      }
+      source.config.motion = std::move(guide);
+      return;
+    }
+  }
+  at.problem(names.empty() ? "there is no such cloth: the scene has no cloths: [{...}]" : "there is no such cloth; the scene's cloths are: " + joinWords(names));
 }
 
 }  // namespace
@@ -294,16 +379,29 @@ std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& c
   }
 }
 
-GuideSource readGuide(const YamlCursor& at, const ReadContext& context)
+GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths, const std::string& object)
 {
   GuideSource source;
   YamlMap map(at);
-  const YamlCursor mesh = map.get("mesh"), grid = map.get("grid"), motion = map.get("motion");
+  const YamlCursor mesh = map.get("mesh"), grid = map.get("grid"), motion = map.get("motion"), cloth = map.get("cloth");
+  if (cloth.present())
+  {
+    for (const YamlCursor& other : {mesh, grid, motion})
+    {
+      if (other.present())
+      {
+        other.problem("does not go with cloth, which is mesh and motion of the guide");
+      }
+    }
+    readPreview(cloth, cloths, source);
+    map.finish();
+    return source;
+  }
   if (mesh.present() == grid.present())
   {
     if (at.isMap())
     {
-      at.problem("must have either mesh: {file: PATH} or grid: {corner: [...], sides: [[...], [...]], cells: N}");
+      at.problem("must have one of mesh: {file: PATH}, grid: {corner: [...], sides: [[...], [...]], cells: N}, cloth: NAME");
     }
   }
   else if (grid.present())
@@ -320,7 +418,7 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context)
       source.config.mesh = TriangleMesh{};
     }
   }
-  readGuideMotion(motion, context, source);
+  readGuideMotion(motion, context, object, source);
   map.finish();
   return source;
 }

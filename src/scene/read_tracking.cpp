@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 
@@ -79,7 +80,7 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
   {
     if (tracked.good)
     {
-      requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path : "undeformed");
+      requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path : guide.file ? guide.file->path : "undeformed");
     }
   }
   catch (const std::invalid_argument& error)
@@ -216,8 +217,62 @@ TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, co
                           vertices.present() ? readIndexList(vertices, static_cast<int>(guide.config.mesh.vertices.cols())) : std::vector<int>{});
 }
 
-std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const ReadContext& context, const GuideSource& guide,
-                                                   const TrackedMesh& tracked, const ClothConfig& cloth)
+/// Largest traction [Pa] for a test function, or for all (no name).
+struct Traction
+{
+  std::string name;
+  YamlCursor at;
+  double value;
+};
+
+std::vector<Traction> readTractions(const YamlCursor& at)
+{
+  const Range range = Range::above(0, 1e12, "Pa");
+  std::vector<Traction> tractions;
+  if (at.present() && !at.isMap())
+  {
+    tractions.push_back({"", at, at.number(range).value_or(1.0)});
+  }
+  else if (at.present())
+  {
+    for (const auto& [name, entry] : at.members())
+    {
+      tractions.push_back({name, entry, entry.number(range).value_or(1.0)});
+    }
+  }
+  return tractions;
+}
+
+/// Bounds of forces [N] of all test functions; empty without.
+Eigen::VectorXd boundsOf(const std::vector<Traction>& tractions, const WeakConstraints& constraints)
+{
+  Eigen::VectorXd bounds;
+  if (tractions.empty())
+  {
+    return bounds;
+  }
+  bounds.setConstant(constraints.count(), std::numeric_limits<double>::infinity());
+  for (const Traction& traction : tractions)
+  {
+    bool found = traction.name.empty();
+    for (int i = 0; i < constraints.count(); ++i)
+    {
+      if (traction.name.empty() || traction.name == constraints.name(i))
+      {
+        bounds[i] = traction.value * constraints.measures()[i];
+        found = true;
+      }
+    }
+    if (!found)
+    {
+      traction.at.problem("is for a test function that is not there");
+    }
+  }
+  return bounds;
+}
+
+std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const std::vector<Traction>& tractions, const ReadContext& context,
+                                                   const GuideSource& guide, const TrackedMesh& tracked, const ClothConfig& cloth)
 {
   auto tracking = std::make_shared<TrackingConfig>();
   tracking->guide = guide.config;
@@ -241,6 +296,7 @@ std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const R
       }
     }
     constraints->requireIndependent(held);
+    tracking->bounds = boundsOf(tractions, *constraints);
     tracking->constraints = std::move(constraints);
   }
   catch (const std::invalid_argument& error)
@@ -250,7 +306,7 @@ std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const R
   return tracking;
 }
 
-ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
+ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths, const std::string& default_name)
 {
   ClothConfig cloth;
   cloth.name = default_name;
@@ -258,7 +314,8 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   YamlMap map(at);
   assign(cloth.name, map.get("name").name());
   const YamlCursor at_functions = map.get("test_functions");
-  const GuideSource guide = readGuide(map.require("guide"), context);
+  const std::vector<Traction> tractions = readTractions(map.get("max_traction"));
+  const GuideSource guide = readGuide(map.require("guide"), context, cloths, cloth.name);
   const TrackedMesh tracked = readTrackedMesh(map.get("mesh"), context, guide);
   if (tracked.good)
   {
@@ -280,7 +337,7 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   map.finish();
   if (tracked.good && guide.config.mesh.vertices.cols() > 0)
   {
-    cloth.tracking = readTracking(at_functions, context, guide, tracked, cloth);
+    cloth.tracking = readTracking(at_functions, tractions, context, guide, tracked, cloth);
   }
   return cloth;
 }
@@ -301,7 +358,7 @@ void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::ve
   const auto entries = at.items(1, 1000);
   for (std::size_t k = 0; k < entries.size(); ++k)
   {
-    cloths.push_back(readTrackedCloth(entries[k], context, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
+    cloths.push_back(readTrackedCloth(entries[k], context, cloths, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
     const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
     if (!is_new)
     {

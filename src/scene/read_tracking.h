@@ -5,6 +5,7 @@
 
 #include "read_cloth_mesh.h"
 #include "slender_sim/geometry/mesh_file.h"
+#include "slender_sim/scene/recorded_guide.h"
 
 /// Tracked cloths and their guides.
 namespace slender {
@@ -16,7 +17,13 @@ struct GuideSource
   std::optional<ClothGrid> grid;    ///< that it was made from
 };
 
-GuideSource readGuide(const YamlCursor& at, const ReadContext& context);
+/// `cloths`: those of the scene, which may be guides. `object`: what tracks it.
+GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths, const std::string& object);
+
+/// What a bag holds, its first message at `begin` [s]; nothing when reported.
+std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& context, bool bodies, double begin, const std::string& object);
+/// Points of a bag, which must be those of the guide's mesh, as its motion.
+void readBagPoints(const YamlCursor& at, const ReadContext& context, double begin, const std::string& object, GuideSource& source);
 
 /// The word obj: groups of vertices of a mesh's file; none when reported.
 std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& context, const std::optional<MeshFile>& file);

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "read_parts.h"
+#include "reader_log.h"
 
 namespace slender {
 
@@ -244,10 +245,10 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   }
 }
 
-SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::string& directory)
+SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::string& directory, KeyLog* log = nullptr)
 {
   SceneConfig scene;
-  Problems problems(name);
+  Problems problems(name, log);
   const YamlCursor root(&tree, nullptr, "", problems);
   if (tree.kind != YamlTree::Kind::map)
   {
@@ -310,6 +311,33 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   return scene;
 }
 
+std::string fileText(const std::string& path)
+{
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+  {
+    throw SceneError(path + ": " + (std::filesystem::exists(path, error) ? "is not a regular file" : "no such file"));
+  }
+  if (std::filesystem::file_size(path, error) > max_file_size)
+  {
+    throw SceneError(path + ": is larger than " + std::to_string(max_file_size >> 20) + " MiB");
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file)
+  {
+    throw SceneError(path + ": cannot be read");
+  }
+  return text.str();
+}
+
+std::string directoryOf(const std::string& path)
+{
+  const std::string directory = std::filesystem::path(path).parent_path().string();
+  return directory.empty() ? "." : directory;
+}
+
 }  // namespace
 
 TimeConfig readTime(const YamlCursor& at)
@@ -365,26 +393,14 @@ SceneConfig parseScene(const std::string& text, const std::string& name, const s
   return scene;
 }
 
+void logKeys(const std::string& path, KeyLog& log)
+{
+  readTree(parseYaml(fileText(path), path), path, directoryOf(path), &log);
+}
+
 SceneConfig readScene(const std::string& path, const std::vector<std::string>& overrides)
 {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error))
-  {
-    throw SceneError(path + ": " + (std::filesystem::exists(path, error) ? "is not a regular file" : "no such file"));
-  }
-  if (std::filesystem::file_size(path, error) > max_file_size)
-  {
-    throw SceneError(path + ": is larger than " + std::to_string(max_file_size >> 20) + " MiB");
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file)
-  {
-    throw SceneError(path + ": cannot be read");
-  }
-  const std::string directory = std::filesystem::path(path).parent_path().string();
-  return parseScene(text.str(), path, overrides, directory.empty() ? "." : directory);
+  return parseScene(fileText(path), path, overrides, directoryOf(path));
 }
 
 }  // namespace slender

@@ -23,6 +23,7 @@ ClothModel modelOf(const ClothConfig& config)
   if (config.tracking)
   {
     model.averages = {config.tracking->constraints, &config.tracking->constraints->matrix()};
+    model.average_bounds = config.tracking->bounds;
   }
   return model;
 }
@@ -126,19 +127,51 @@ void Simulation::buildCloths()
   }
   cloth_inputs_.resize(config_.cloths.size());
   cloth_targets_.resize(grasps_.size());
+  cloth_places_.resize(config_.cloths.size());
+  leads_.assign(config_.cloths.size(), 0);
+  for (const ClothConfig& config : config_.cloths)
+  {
+    if (const auto* preview = config.tracking ? std::get_if<ClothGuide>(&config.tracking->guide.motion) : nullptr)
+    {
+      leads_[preview->cloth] = 1;
+    }
+  }
 }
 
-/// Those with contact.
+/// Those with contact. Guides feel only each other: they are where they are before what tracks them is.
 void Simulation::buildTouchingCloths()
 {
+  for (std::size_t b = 0; b < config_.bodies.size(); ++b)
+  {
+    if (config_.bodies[b].shape && config_.bodies[b].contact && !isSimulated(static_cast<int>(b)))
+    {
+      cloth_bodies_.push_back(static_cast<int>(b));
+    }
+  }
+  try
+  {
+    buildTouchingCloths(true);
+    buildTouchingCloths(false);
+    checkTouchingCloths(state_);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw SceneError((config_.file.empty() ? "scene " + config_.name : config_.file) + ": " + error.what());
+  }
+}
+
+void Simulation::buildTouchingCloths(bool ahead)
+{
   ClothGroupModel model;
+  std::vector<int> cloths;
   bool obstacles = false;
-  touching_cloth_index_.assign(config_.cloths.size(), -1);
   for (std::size_t k = 0; k < config_.cloths.size(); ++k)
   {
-    if (const auto& contact = config_.cloths[k].contact)
+    const auto& contact = config_.cloths[k].contact;
+    if (contact && static_cast<bool>(leads_[k]) == ahead)
     {
-      touching_cloth_index_[k] = static_cast<int>(model.cloths.size());
+      cloth_places_[k] = {static_cast<int>(touching_cloths_.size()), static_cast<int>(cloths.size())};
+      cloths.push_back(static_cast<int>(k));
       model.cloths.push_back(cloth_models_[k]);
       model.contact.push_back({contact->thickness, contact->friction, contact->self, contact->cloths, contact->obstacles});
       model.options.push_back(optionsOf(config_.cloths[k], config_.time));
@@ -156,71 +189,58 @@ void Simulation::buildTouchingCloths()
     model.solids.push_back(std::move(solid));
     model.solid_names.push_back(name);
   };
-  try
+  for (const ObstacleConfig& obstacle : config_.obstacles)
   {
-    for (const ObstacleConfig& obstacle : config_.obstacles)
-    {
-      add(obstacle.name, obstacle.shape, obstacle.friction);
-    }
-    for (std::size_t b = 0; b < config_.bodies.size(); ++b)
-    {
-      const BodyConfig& body = config_.bodies[b];
-      if (!body.shape || !body.contact)
-      {
-        continue;
-      }
-      if (!isSimulated(static_cast<int>(b)))
-      {
-        add(body.name, *body.shape, body.friction);
-        cloth_bodies_.push_back(static_cast<int>(b));
-      }
-      else if (obstacles)
-      {
-        throw std::invalid_argument("body " + body.name + " is simulated, and cloth does not push bodies; give it a motion or contact: false");
-      }
-    }
-    const ClothOptions common = model.options.front();
-    touching_cloths_.emplace(std::move(model), common);
-    checkTouchingCloths(state_);
+    add(obstacle.name, obstacle.shape, obstacle.friction);
   }
-  catch (const std::invalid_argument& error)
+  for (const int b : cloth_bodies_)
   {
-    throw SceneError((config_.file.empty() ? "scene " + config_.name : config_.file) + ": " + error.what());
+    add(config_.bodies[b].name, *config_.bodies[b].shape, config_.bodies[b].friction);
   }
+  for (std::size_t b = 0; obstacles && b < config_.bodies.size(); ++b)
+  {
+    const BodyConfig& body = config_.bodies[b];
+    if (body.shape && body.contact && isSimulated(static_cast<int>(b)))
+    {
+      throw std::invalid_argument("body " + body.name + " is simulated, and cloth does not push bodies; give it a motion or contact: false");
+    }
+  }
+  const ClothOptions common = model.options.front();
+  touching_cloths_.push_back({ahead, std::move(cloths), ClothGroup(std::move(model), common)});
 }
 
 /// Hands the part of a state over that cloths with contact need, or back. Obstacles and bodies are moved by others.
-void Simulation::exchangeTouchingCloths(SceneState& state)
+void Simulation::exchangeTouchingCloths(SceneState& state, TouchingCloths& touching)
 {
-  touching_cloth_state_.cloths.resize(touching_cloths_->size());
-  for (std::size_t k = 0; k < touching_cloth_index_.size(); ++k)
+  touching.state.cloths.resize(touching.cloths.size());
+  for (std::size_t k = 0; k < touching.cloths.size(); ++k)
   {
-    if (touching_cloth_index_[k] >= 0)
-    {
-      std::swap(touching_cloth_state_.cloths[touching_cloth_index_[k]], state.cloths[k].cloth);
-    }
+    std::swap(touching.state.cloths[k], state.cloths[touching.cloths[k]].cloth);
   }
-  touching_cloth_state_.solids = state.obstacles;
+  touching.state.solids = state.obstacles;
   for (const int b : cloth_bodies_)
   {
-    touching_cloth_state_.solids.push_back(state.bodies[b].X_WB * config_.bodies[b].X_BS);
+    touching.state.solids.push_back(state.bodies[b].X_WB * config_.bodies[b].X_BS);
   }
 }
 
 /// Throws std::invalid_argument where cloths meet something.
 void Simulation::checkTouchingCloths(SceneState& state)
 {
-  exchangeTouchingCloths(state);
-  try
+  for (TouchingCloths& touching : touching_cloths_)
   {
-    touching_cloths_->checkIntersections(touching_cloth_state_);
+    exchangeTouchingCloths(state, touching);
+    try
+    {
+      touching.group.checkIntersections(touching.state);
+    }
+    catch (...)
+    {
+      exchangeTouchingCloths(state, touching);
+      throw;
+    }
+    exchangeTouchingCloths(state, touching);
   }
-  catch (...)
-  {
-    exchangeTouchingCloths(state);
-    throw;
-  }
-  exchangeTouchingCloths(state);
 }
 
 void Simulation::gatherPins(SceneCloth& cloth) const
@@ -242,10 +262,6 @@ StepReport Simulation::stepCloths(const SceneInputs& inputs)
   {
     cloth_inputs_[k].gravity = config_.gravity;
     cloth_inputs_[k].wind = inputs.wind;
-    if (const auto& tracking = config_.cloths[k].tracking)
-    {
-      cloth_inputs_[k].averages = tracking->constraints->averages(inputs.guides[k]);
-    }
     cloth_inputs_[k].pins.resize(3, static_cast<Eigen::Index>(state_.cloths[k].cloth.pins.size()));
   }
   for (std::size_t g = 0; g < grasps_.size(); ++g)
@@ -266,38 +282,53 @@ StepReport Simulation::stepCloths(const SceneInputs& inputs)
       cloth_inputs_[ref.cloth].pins.col(pin) = X_WG * grasp.points_G.col(static_cast<Eigen::Index>(p));
     }
   }
+  stepCloths(true, inputs, total);
+  stepCloths(false, inputs, total);
+  return total;
+}
+
+/// Guides, or what is none.
+void Simulation::stepCloths(bool ahead, const SceneInputs& inputs, StepReport& total)
+{
   for (std::size_t k = 0; k < cloth_steppers_.size() && total.ok; ++k)
   {
+    if (static_cast<bool>(leads_[k]) != ahead)
+    {
+      continue;
+    }
+    if (const auto& tracking = config_.cloths[k].tracking)
+    {
+      cloth_inputs_[k].averages = tracking->constraints->averages(guideVertices(static_cast<int>(k), inputs));
+    }
     if (cloth_steppers_[k])
     {
       total.merge(cloth_steppers_[k]->step(state_.cloths[k].cloth, cloth_inputs_[k], config_.time.step));
     }
   }
-  if (!touching_cloths_ || !total.ok)
+  for (TouchingCloths& touching : touching_cloths_)
   {
-    return total;
-  }
-  touching_cloth_inputs_.cloths.resize(touching_cloths_->size());
-  for (std::size_t k = 0; k < touching_cloth_index_.size(); ++k)
-  {
-    if (touching_cloth_index_[k] >= 0)
+    if (touching.ahead != ahead || !total.ok)
     {
-      touching_cloth_inputs_.cloths[touching_cloth_index_[k]] = cloth_inputs_[k];
+      continue;
     }
+    touching.inputs.cloths.resize(touching.cloths.size());
+    for (std::size_t k = 0; k < touching.cloths.size(); ++k)
+    {
+      touching.inputs.cloths[k] = cloth_inputs_[touching.cloths[k]];
+    }
+    touching.inputs.solids.clear();
+    for (const GraspTarget& obstacle : inputs.obstacles)
+    {
+      touching.inputs.solids.push_back(normalized(obstacle.X_WG));
+    }
+    for (const int b : cloth_bodies_)
+    {
+      touching.inputs.solids.push_back(normalized(inputs.bodies[b].X_WG) * config_.bodies[b].X_BS);
+    }
+    exchangeTouchingCloths(state_, touching);
+    total.merge(touching.group.step(touching.state, touching.inputs, config_.time.step));
+    exchangeTouchingCloths(state_, touching);
   }
-  touching_cloth_inputs_.solids.clear();
-  for (const GraspTarget& obstacle : inputs.obstacles)
-  {
-    touching_cloth_inputs_.solids.push_back(normalized(obstacle.X_WG));
-  }
-  for (const int b : cloth_bodies_)
-  {
-    touching_cloth_inputs_.solids.push_back(normalized(inputs.bodies[b].X_WG) * config_.bodies[b].X_BS);
-  }
-  exchangeTouchingCloths(state_);
-  total.merge(touching_cloths_->step(touching_cloth_state_, touching_cloth_inputs_, config_.time.step));
-  exchangeTouchingCloths(state_);
-  return total;
 }
 
 /// After a step: the grasps are where they were to go.
@@ -385,13 +416,15 @@ const std::string& Simulation::heldObject(int grasp) const
 const Eigen::Matrix3Xd& Simulation::pinForces(int cloth) const
 {
   const auto& stepper = cloth_steppers_.at(static_cast<std::size_t>(cloth));
-  return stepper ? stepper->pinForces() : touching_cloths_->pinForces(touching_cloth_index_[cloth]);
+  const ClothPlace& place = cloth_places_[cloth];
+  return stepper ? stepper->pinForces() : touching_cloths_[place.group].group.pinForces(place.index);
 }
 
 const ClothStepper& Simulation::clothStepper(int cloth) const
 {
   const auto& own = cloth_steppers_.at(static_cast<std::size_t>(cloth));
-  return own ? *own : touching_cloths_->stepper(touching_cloth_index_[cloth]);
+  const ClothPlace& place = cloth_places_[cloth];
+  return own ? *own : touching_cloths_[place.group].group.stepper(place.index);
 }
 
 ClothEnergies Simulation::clothEnergies(int cloth) const

@@ -21,7 +21,7 @@ void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
   {
     if (const auto& tracking = config_.cloths[k].tracking)
     {
-      if (tracking->guide.byTopic())
+      if (tracking->guide.byTopic() || std::holds_alternative<ClothGuide>(tracking->guide.motion))
       {
         inputs.guides[k] = state_.cloths[k].guide;
       }
@@ -51,6 +51,13 @@ void Simulation::checkGuides(const SceneInputs& inputs) const
   }
 }
 
+/// At the end of the step: a cloth that guides has been stepped when this is asked for.
+const Eigen::Matrix3Xd& Simulation::guideVertices(int cloth, const SceneInputs& inputs) const
+{
+  const auto* preview = std::get_if<ClothGuide>(&config_.cloths[cloth].tracking->guide.motion);
+  return preview ? state_.cloths[preview->cloth].cloth.x : inputs.guides[cloth];
+}
+
 /// After a step.
 void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
 {
@@ -59,18 +66,32 @@ void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
     if (const auto& tracking = config_.cloths[k].tracking)
     {
       SceneCloth& held = state_.cloths[k];
-      held.guide = inputs.guides[k];
-      held.guide_forces = touching_cloth_index_[k] >= 0 ? touching_cloths_->averageForces(touching_cloth_index_[k]) : cloth_steppers_[k]->averageForces();
-      report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)) / tracking->size);
+      const ClothPlace& place = cloth_places_[k];
+      held.guide = guideVertices(static_cast<int>(k), inputs);
+      held.guide_forces = place.group >= 0 ? touching_cloths_[place.group].group.averageForces(place.index) : cloth_steppers_[k]->averageForces();
+      report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)).met / tracking->size);
+      report.forces_at_bound += static_cast<int>(held.cloth.at_bound.size());
     }
   }
 }
 
-double Simulation::trackingError(int cloth) const
+Simulation::TrackingError Simulation::trackingError(int cloth) const
 {
   const auto& tracking = config_.cloths.at(static_cast<std::size_t>(cloth)).tracking;
+  TrackingError error;
+  if (!tracking)
+  {
+    return error;
+  }
   const SceneCloth& held = state_.cloths[static_cast<std::size_t>(cloth)];
-  return tracking ? tracking->constraints->error(tracking->constraints->averages(held.guide), held.cloth.x) : 0.0;
+  const WeakConstraints& constraints = *tracking->constraints;
+  const Eigen::Matrix3Xd targets = constraints.averages(held.guide);
+  for (int i = 0; i < constraints.count(); ++i)
+  {
+    double& worst = std::binary_search(held.cloth.at_bound.begin(), held.cloth.at_bound.end(), i) ? error.at_bound : error.met;
+    worst = std::max(worst, constraints.distance(i, targets, held.cloth.x));
+  }
+  return error;
 }
 
 }  // namespace slender

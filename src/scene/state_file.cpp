@@ -18,7 +18,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 8;
+constexpr std::uint64_t version = 9;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -123,6 +123,7 @@ void visitCloth(Archive& archive, State& held)
     }
   };
   indices(held.cloth.pins);
+  indices(held.cloth.at_bound);
   archive.list(held.grasps);
   for (auto& grasp : held.grasps)
   {
@@ -426,16 +427,13 @@ void Simulation::load(const std::string& path)
   {
     throw std::runtime_error(path + ": " + problem);
   }
-  if (touching_cloths_)
+  try
   {
-    try
-    {
-      checkTouchingCloths(loaded);
-    }
-    catch (const std::invalid_argument& error)
-    {
-      throw std::runtime_error(path + ": " + error.what());
-    }
+    checkTouchingCloths(loaded);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw std::runtime_error(path + ": " + error.what());
   }
   state_ = std::move(loaded);
 }

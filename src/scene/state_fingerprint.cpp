@@ -106,6 +106,7 @@ std::uint64_t Simulation::fingerprint() const
     if (const auto& tracking = config_.cloths[k].tracking)
     {
       out(tracking->guide.mesh.vertices);
+      out(tracking->bounds);
       for (const WeakConstraints::Matrix* weights : {&tracking->constraints->matrix(), &tracking->constraints->guideMatrix()})
       {
         out(static_cast<std::uint64_t>(weights->rows()));

@@ -164,6 +164,12 @@ bool YamlCursor::check(YamlTree::Kind kind, const char* expected) const
 
 std::optional<double> YamlCursor::number(const Range& range) const
 {
+  problems_->asked(path_, "a number " + range.text());
+  return numberIn(range);
+}
+
+std::optional<double> YamlCursor::numberIn(const Range& range) const
+{
   const std::string expected = "a number " + range.text();
   if (!check(YamlTree::Kind::scalar, expected.c_str()))
   {
@@ -191,7 +197,8 @@ std::optional<double> YamlCursor::number(const Range& range) const
 std::optional<int> YamlCursor::integer(long low, long high, const char* unit) const
 {
   const Range range = Range::closed(static_cast<double>(low), static_cast<double>(high), unit);
-  const auto value = number(range);
+  problems_->asked(path_, low == -high - 1 ? "a place, counted from 0, or from the end by negative numbers" : "a whole number " + range.text());
+  const auto value = numberIn(range);
   if (value && *value != std::floor(*value))
   {
     problem("must be a whole number " + range.text());
@@ -202,6 +209,7 @@ std::optional<int> YamlCursor::integer(long low, long high, const char* unit) co
 
 std::optional<bool> YamlCursor::boolean() const
 {
+  problems_->asked(path_, "true or false");
   if (!check(YamlTree::Kind::scalar, "true or false"))
   {
     return std::nullopt;
@@ -222,6 +230,12 @@ std::optional<bool> YamlCursor::boolean() const
 
 std::optional<std::string> YamlCursor::text() const
 {
+  problems_->asked(path_, "a text");
+  return word();
+}
+
+std::optional<std::string> YamlCursor::word() const
+{
   if (!check(YamlTree::Kind::scalar, "a text"))
   {
     return std::nullopt;
@@ -236,11 +250,12 @@ std::optional<std::string> YamlCursor::text() const
 
 std::optional<std::string> YamlCursor::name() const
 {
-  const auto word = text();
-  if (word)
+  problems_->asked(path_, "a name");
+  const auto name = word();
+  if (name)
   {
-    const bool fits = word->size() <= max_name && std::isalpha(static_cast<unsigned char>(word->front())) &&
-                      std::all_of(word->begin(), word->end(),
+    const bool fits = name->size() <= max_name && std::isalpha(static_cast<unsigned char>(name->front())) &&
+                      std::all_of(name->begin(), name->end(),
                                   [](unsigned char c) { return c < 128 && (std::isalnum(c) || c == '_'); });
     if (!fits)
     {
@@ -248,12 +263,13 @@ std::optional<std::string> YamlCursor::name() const
       return std::nullopt;
     }
   }
-  return word;
+  return name;
 }
 
 std::optional<Eigen::Vector3d> YamlCursor::vector3(const Range& range) const
 {
   const std::string expected = "a list [x, y, z] of numbers " + range.text();
+  problems_->asked(path_, expected);
   if (!check(YamlTree::Kind::list, expected.c_str()))
   {
     return std::nullopt;
@@ -268,7 +284,7 @@ std::optional<Eigen::Vector3d> YamlCursor::vector3(const Range& range) const
   const auto entries = items();
   for (int k = 0; k < 3; ++k)
   {
-    const auto value = entries[k].number(range);
+    const auto value = entries[k].numberIn(range);
     good = good && value;
     vector[k] = value.value_or(0.0);
   }
@@ -277,20 +293,21 @@ std::optional<Eigen::Vector3d> YamlCursor::vector3(const Range& range) const
 
 std::optional<std::vector<double>> YamlCursor::numbers(const Range& range) const
 {
+  problems_->asked(path_, "a number or a list of numbers " + range.text());
   if (!tree_)
   {
     return std::nullopt;
   }
   if (!isList())
   {
-    const auto value = number(range);
+    const auto value = numberIn(range);
     return value ? std::make_optional(std::vector<double>{*value}) : std::nullopt;
   }
   std::vector<double> values;
   bool good = true;
   for (const YamlCursor& item : items())
   {
-    const auto value = item.number(range);
+    const auto value = item.numberIn(range);
     good = good && value;
     values.push_back(value.value_or(0.0));
   }
@@ -300,6 +317,7 @@ std::optional<std::vector<double>> YamlCursor::numbers(const Range& range) const
 int YamlCursor::chosen(const std::vector<std::string>& words) const
 {
   const std::string expected = "one of: " + joinWords(words);
+  problems_->asked(path_, expected);
   if (!check(YamlTree::Kind::scalar, expected.c_str()))
   {
     return -1;
@@ -317,6 +335,7 @@ int YamlCursor::chosen(const std::vector<std::string>& words) const
 std::vector<YamlCursor> YamlCursor::items(std::size_t min_size, std::size_t max_size) const
 {
   std::vector<YamlCursor> entries;
+  problems_->asked(path_, "");
   if (!check(YamlTree::Kind::list, "a list"))
   {
     return entries;
@@ -343,6 +362,7 @@ std::vector<YamlCursor> YamlCursor::items(std::size_t min_size, std::size_t max_
 std::vector<std::pair<std::string, YamlCursor>> YamlCursor::members() const
 {
   std::vector<std::pair<std::string, YamlCursor>> entries;
+  problems_->named(path_);
   if (!check(YamlTree::Kind::map, "a map of names"))
   {
     return entries;
@@ -368,6 +388,7 @@ YamlMap::YamlMap(const YamlCursor& at) : at_(at)
 
 YamlCursor YamlMap::get(const std::string& key)
 {
+  at_.problems().asked(at_.path() + (at_.path().empty() ? "" : ".") + key, "");
   known_.push_back(key);
   const YamlTree* value = map_ ? map_->find(key) : nullptr;
   return YamlCursor(value, at_.tree(), at_.path() + (at_.path().empty() ? "" : ".") + key, at_.problems());

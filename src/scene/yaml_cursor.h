@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "key_log.h"
 #include "yaml_tree.h"
 
 namespace slender {
@@ -33,7 +34,8 @@ struct Range
 class Problems
 {
 public:
-  explicit Problems(std::string file) : file_(std::move(file)) {}
+  /// `log`: gets every key that is asked for; may be null.
+  explicit Problems(std::string file, KeyLog* log = nullptr) : file_(std::move(file)), log_(log) {}
 
   /// Adds "FILE:LINE: PATH = VALUE: reason" (or the override in place of file and line). `tree` may be null: then `parent` tells
   /// the line.
@@ -45,9 +47,22 @@ public:
   bool empty() const { return lines_.empty(); }
   std::size_t size() const { return lines_.size(); }
   std::string text() const;
+  /// A key that is asked for, and what it may be.
+  void asked(const std::string& path, const std::string& what) const
+  {
+    if (log_)
+      log_->note(path, what);
+  }
+  /// What is below has names that the user gives.
+  void named(const std::string& path) const
+  {
+    if (log_)
+      log_->noteNamed(path);
+  }
 
 private:
   std::string file_;
+  KeyLog* log_;
   std::vector<std::string> lines_;
 };
 
@@ -101,6 +116,8 @@ public:
   std::vector<std::pair<std::string, YamlCursor>> members() const;
 
 private:
+  std::optional<double> numberIn(const Range& range) const;
+  std::optional<std::string> word() const;
   bool check(YamlTree::Kind kind, const char* expected) const;
   int chosen(const std::vector<std::string>& words) const;
 

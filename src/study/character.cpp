@@ -1,12 +1,12 @@
 // A character of thin material that walks as its guide does (thesis 6.5.4, figures 6.2 and 6.10): as it is, in a headwind, crinkled.
 #include <cmath>
-#include <random>
 #include <stdexcept>
 
 #include <Eigen/Geometry>
 
 #include "biped.h"
 #include "region_cases.h"
+#include "slender_sim/geometry/mesh_offsets.h"
 #include "slender_sim/tracking/clustering.h"
 #include "guided_cloth.h"
 
@@ -17,24 +17,6 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Vertices moved at random by up to `size` [m] along their normals.
-Matrix3Xd crinkled(const TriangleMesh& mesh, double size)
-{
-  Matrix3Xd normals = Matrix3Xd::Zero(3, mesh.vertices.cols());
-  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
-  {
-    const Vector3d a = mesh.vertices.col(mesh.triangles(0, f)), b = mesh.vertices.col(mesh.triangles(1, f)), c = mesh.vertices.col(mesh.triangles(2, f));
-    for (const int v : mesh.triangles.col(f))
-      normals.col(v) += (b - a).cross(c - a);
-  }
-  normals.colwise().normalize();
-  std::mt19937 random(2);
-  Matrix3Xd x = mesh.vertices;
-  for (Eigen::Index i = 0; i < x.cols(); ++i)
-    x.col(i) += size * (2 * (random() * 0x1p-32) - 1) * normals.col(i);
-  return x;
-}
-
 /// `crinkles` [m]: of the undeformed shape.
 GuidedCloth character(const Biped& biped, const std::vector<int>& region, double crinkles)
 {
@@ -42,7 +24,7 @@ GuidedCloth character(const Biped& biped, const std::vector<int>& region, double
   c.name = "character";
   c.guide = biped.mesh();
   c.fine = subdivide(c.guide, 0);
-  c.fine.mesh.vertices = crinkled(c.guide, crinkles);
+  c.fine.mesh.vertices = crinkled(c.guide, crinkles, 2);
   c.functions = regionBasis(c.guide, region);
   c.model = buildCloth("character", c.fine.mesh, 0.15, isotropicMembrane(1e5, 0.3, 5e-4));
   c.model.bending = BendingModel::hinge;

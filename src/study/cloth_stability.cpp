@@ -1,54 +1,48 @@
 // Cloth under whatever may be asked of it: done, or refused with a reason and the state untouched, never NaN.
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <random>
 
 #include <Eigen/Geometry>
 
 #include "cloth_cases.h"
+#include "stability.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {
 
 namespace {
 
-struct Verdict
-{
-  int steps = 0, cuts = 0, nans = 0, refused = 0, unexplained = 0;
-  double cpu_seconds = 0, largest_stretch = 0, end_stretch = 0, fastest = 0;
-  std::string reason;
-};
-
 bool isFinite(const ClothState& s) { return s.x.allFinite() && s.v.allFinite() && s.rest_angles.allFinite(); }
 
-/// Runs up to `steps` steps of h; `motion` sets the inputs for the end of each. A refusal must say why and leave the state as it was.
-Verdict run(ClothSetup& cloth, const ClothOptions& options, double h, int steps, const std::function<void(int, ClothInputs&)>& motion)
+/// Runs up to `steps` steps of h; `motion` sets the inputs for the end of each. `keeps_energy`: beyond what there is to give (deformation,
+/// and the fall through the sheet's size) none may appear; not asked of what is moved or of explicit steps, which are bounded by refusal.
+StabilityCell run(ClothSetup& cloth, const ClothOptions& options, double h, int steps, const std::function<void(int, ClothInputs&)>& motion, bool keeps_energy = true)
 {
-  Verdict v;
+  StabilityCell cell;
+  cell.linear_steps = options.one_newton_step || options.integrator == Integrator::symplectic_euler;
   ClothStepper stepper(cloth.model, options);
+  const Eigen::Vector3d& gravity = cloth.inputs.gravity;
+  const ClothEnergies start = stepper.energies(cloth.state, gravity);
+  const Eigen::Matrix3Xd& rest = cloth.model->rest.vertices;
+  const double size = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).norm();
+  const double scale = start.membrane + start.bending + start.kinetic + cloth.model->totalMass() * gravity.norm() * size;
   const double begin = threadSeconds();
-  for (int k = 0; k < steps && v.refused == 0; ++k)
+  for (int k = 0; k < steps; ++k)
   {
     if (motion)
       motion(k, cloth.inputs);
     const ClothState before = cloth.state;
     const StepReport report = stepper.step(cloth.state, cloth.inputs, h);
-    v.cuts += report.cut_steps;
-    v.nans += !isFinite(cloth.state) || (report.ok && (!stepper.pinForces().allFinite() || !std::isfinite(report.max_strain)));
-    if (report.ok)
-    {
-      ++v.steps;
-      v.end_stretch = report.max_strain;
-      v.largest_stretch = std::max(v.largest_stretch, report.max_strain);
-      v.fastest = std::max(v.fastest, cloth.state.v.cwiseAbs().maxCoeff());
-      continue;
-    }
-    ++v.refused;
-    v.reason = report.message;
-    v.unexplained += report.message.empty() || cloth.state.x != before.x || cloth.state.v != before.v;
+    const bool finite = isFinite(cloth.state) && (!report.ok || (stepper.pinForces().allFinite() && std::isfinite(report.max_strain)));
+    if (!cell.took(report, finite, cloth.state.x == before.x && cloth.state.v == before.v))
+      break;
+    if (!motion && keeps_energy && !cell.energyIs((stepper.energies(cloth.state, gravity).total() - start.total()) / scale, 1e-2))
+      break;
   }
-  v.cpu_seconds = threadSeconds() - begin;
-  return v;
+  cell.cpu_seconds = threadSeconds() - begin;
+  return cell;
 }
 
 ClothSetup sheet(const TriangleMesh& mesh, BendingModel bending, double stiffness, double modulus)
@@ -89,20 +83,15 @@ TriangleMesh needleMesh()
 void runClothStability(StudyContext& context)
 {
   useOneBlasThread();
-  int nans = 0, refused = 0, unexplained = 0, cases = 0, not_recovered = 0;
-  const auto report = [&](const std::string& what, const ClothSetup& cloth, double h, const Verdict& v, bool expects_recovery) {
-    // stretch at the end: of a sheet that has come to hang again
-    const bool recovered = v.refused == 0 && v.end_stretch < 0.5;
+  StabilityTally tally(context);
+  int cases = 0, not_recovered = 0;
+  const auto report = [&](const std::string& what, const ClothSetup& cloth, double h, const StabilityCell& cell, bool expects_recovery) {
     Row& row = context.row();
-    row.set("case", what).set("model", toString(cloth.model->bending)).set("step_ms", 1e3 * h).set("steps", v.steps).set("cuts", v.cuts)
-      .set("largest_stretch", v.largest_stretch).set("end_stretch", v.end_stretch).set("cpu_seconds", v.cpu_seconds)
-      .set("outcome", v.refused ? "refused" : expects_recovery ? (recovered ? "recovered" : "not recovered") : "done");
-    if (v.refused)
-      row.set("reason", v.reason);
-    nans += v.nans;
-    refused += v.refused;
-    unexplained += v.unexplained;
-    not_recovered += expects_recovery && v.refused == 0 && !recovered;
+    row.set("case", what).set("model", toString(cloth.model->bending)).set("step_s", h);
+    tally.record(row, cell);
+    row.set("end_strain", cell.end_strain);
+    // of a sheet that has come to hang again
+    not_recovered += expects_recovery && !cell.refused && !(cell.end_strain < 0.5);
     context.progress(++cases, context.quick() ? 64 : 204, what);
   };
   ClothOptions common;
@@ -205,15 +194,29 @@ void runClothStability(StudyContext& context)
       hung(cloth);
       ClothOptions options = common;
       options.integrator = Integrator::symplectic_euler;
-      report("explicit", cloth, h, run(cloth, options, h, 500, nullptr), false);
+      report("explicit", cloth, h, run(cloth, options, h, 500, nullptr, h < 1e-4), false);
     }
 
-  context.metric("nan_count", nans);
-  context.metric("refused", refused);
-  context.metric("unexplained_failures", unexplained);
+  // Held at two corners and let go: soft and stiff, thin and thick.
+  const auto hanging = [](double youngs_modulus, double thickness) {
+    char text[700];
+    std::snprintf(text, sizeof text, R"(
+cloths:
+  - grid: {corner: [0, 0, 0], sides: [[0.5, 0, 0], [0, 0.5, 0]], cells: 8, pattern: alternating}
+    material: {density: 1000, thickness: %g, youngs_modulus: %g, poissons_ratio: 0.3}
+    grasps: {left: {corner: lower_left}, right: {corner: lower_right}}
+)", thickness, youngs_modulus);
+    return MapScene{text};
+  };
+  const std::vector<double> map_steps = context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
+  const int map_length = context.quick() ? 5 : 15;
+  stabilityMap(context, tally, "cloth_stability_stiffness", "Young's modulus [Pa]", context.quick() ? std::vector<double>{1e4, 1e8} : std::vector<double>{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10},
+               map_steps, map_length, [&](double modulus) { return hanging(modulus, 5e-4); });
+  stabilityMap(context, tally, "cloth_stability_slenderness", "thickness over side", context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1},
+               map_steps, map_length, [&](double slenderness) { return hanging(1e6, 0.5 * slenderness); });
   context.metric("not_recovered", not_recovered);
-  context.metric("cases", cases);
-  context.note("recovered: strained by less than half in the last step; refused: with a reason, the state as before the step.");
+  context.metric("cases", static_cast<double>(context.rows().size()));
+  context.note("not_recovered: of sheets crushed, mirrored or yanked, those strained by half or more in the last step.");
 }
 
 }  // namespace slender::study

@@ -5,7 +5,7 @@
 
 namespace slender::study {
 
-/// YAML of the scenes that studies run, by name: built in, so that a study needs no files (cmake/study.cmake).
-const std::map<std::string, const char*>& packageScenes();
+/// The scenes that studies run and what they refer to, by their paths in `config`: built in, so that a study needs no files (cmake/study.cmake).
+const std::map<std::string, const char*>& packageFiles();
 
 }  // namespace slender::study

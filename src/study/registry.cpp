@@ -64,9 +64,13 @@ void runTrackingMethods(StudyContext&);
 void runPartitions(StudyContext&);
 void runClustering(StudyContext&);
 void runCharacter(StudyContext&);
+void runBackflip(StudyContext&);
+void runClothOnBranch(StudyContext&);
 void runTrackingStability(StudyContext&);
 void runTrackingOverhead(StudyContext&);
 void runTrackingExactness(StudyContext&);
+void runLean(StudyContext&);
+void runCostModel(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -132,9 +136,13 @@ const std::vector<Study>& studies()
       {"partitions", "16 to 1024 regions, of one size and of two, set the scale of folds (thesis figures 6.5, 6.6)", runPartitions},
       {"clustering", "regions of a walking character: animation-aware clustering beside static (thesis figure 6.7)", runClustering},
       {"character", "a character of 3,050 vertices that walks as its guide does (thesis figures 6.2, 6.10): as it is, in a headwind, crinkled", runCharacter},
+      {"cloth_on_branch", "a preview of 35 vertices, its scene in full resolution, and the same tracked (thesis figure 6.1): where they end", runClothOnBranch},
+      {"backflip", "five looks of a bag of 1,297 vertices that tracks one of 88 through a backflip (thesis figure 6.9)", runBackflip},
       {"tracking_stability", "guides that collapse, explode, jump or are not numbers, constraints that conflict: done or refused with reason", runTrackingStability},
       {"tracking_overhead", "steps of cloth with and without tracking, in the sizes of the thesis's table 6.1, beside it", runTrackingOverhead},
       {"tracking_exactness", "averages of tracked cloths against their guides' after every step, with wind, jumps, contact", runTrackingExactness},
+      {"lean", "instructions per step and memory of every feature in scenes that do not name it (needs valgrind)", runLean},
+      {"cost_model", "time per step and memory against size, all solvers with contact and without: measured and fitted", runCostModel},
   };
   return all;
 }

@@ -6,26 +6,18 @@
 #include <vector>
 
 #include "rod_cases.h"
+#include "stability.h"
 #include "slender_sim/study/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {
 namespace {
 
-/// What became of one case, and whether that was honest.
-struct Verdict
+struct Run
 {
-  int steps = 0, cuts = 0, substeps = 0, iterations = 0;
-  double worst_strain = 0, energy_growth = 0, cpu_seconds = 0;
-  bool refused = false;
-  std::string reason;
-  int not_finite = 0;
-  std::string unexplained;   ///< empty: nothing to complain about
-};
-
-struct Tally
-{
-  int done = 0, cut = 0, refused = 0, not_finite = 0, unexplained = 0;
+  StabilityCell cell;
+  Eigen::Matrix3Xd end;
+  double moved = 0;   ///< the farthest that a node has been from its start [m]
 };
 
 using Motion = std::function<void(int step, RodSetup& rod)>;
@@ -33,10 +25,13 @@ using Motion = std::function<void(int step, RodSetup& rod)>;
 /// Runs up to `steps` steps; `motion` sets the inputs of each. Energy may not grow once the inputs stand still
 /// (from step `quiet` on): beyond a thousandth for implicit Euler, tenfold for methods that keep it only on average.
 /// `turned` [rad], if not zero: how far a straight rod must be twisted at the end, told by its energy beta turned^2/(2 L).
-Verdict run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motion, int quiet, double turned = 0.0)
+Run run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motion, int quiet, double turned = 0.0)
 {
-  Verdict v;
+  Run r;
+  StabilityCell& cell = r.cell;
+  cell.linear_steps = time.integrator == Integrator::symplectic_euler;
   RodStepper stepper(rod.model, time);
+  const Eigen::Matrix3Xd start = rod.state.x;
   double before = 0, scale = 0;
   const double begin = threadSeconds();
   for (int i = 0; i < steps; ++i)
@@ -51,61 +46,24 @@ Verdict run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motio
       scale = e.stretch + e.bend + e.twist + e.kinetic + rod.model->totalMass() * rod.inputs.gravity.norm() * rod.model->rest_length.sum();
     }
     const StepReport report = stepper.step(rod.state, rod.inputs, time.step);
-    v.cuts += report.cut_steps;
-    v.substeps += report.substeps;
-    v.iterations += report.iterations;
-    if (!isFinite(rod.state))
-    {
-      ++v.not_finite;
-      v.unexplained = "state is not finite";
+    if (!cell.took(report, isFinite(rod.state), sameBits(saved, rod.state)))
       break;
-    }
-    if (!report.ok)
-    {
-      v.refused = true;
-      v.reason = std::string(toString(report.failure)) + ": " + report.message;
-      if (report.message.empty() || report.failure == StepFailure::none)
-        v.unexplained = "refused without a reason";
-      else if (!sameBits(saved, rod.state))
-        v.unexplained = "refused, but the state has changed";
-      break;
-    }
-    ++v.steps;
-    v.worst_strain = std::max(v.worst_strain, report.max_strain);
+    r.moved = std::max(r.moved, (rod.state.x - start).colwise().norm().maxCoeff());
     if (i < quiet)
       continue;
     const double growth = (stepper.energies(rod.state, rod.inputs.gravity).total() - before) / scale;
-    v.energy_growth = std::max(v.energy_growth, growth);
-    const double allowed = time.integrator == Integrator::implicit_euler ? 1e-3 : 10.0;
-    if (!(growth <= allowed))
-    {
-      v.unexplained = "energy grew by " + std::to_string(growth) + " of what there was";
+    if (!cell.energyIs(growth, time.integrator == Integrator::implicit_euler ? 1e-3 : 10.0))
       break;
-    }
   }
-  v.cpu_seconds = threadSeconds() - begin;
-  if (turned > 0 && !v.refused && v.unexplained.empty())
+  r.end = rod.state.x;
+  cell.cpu_seconds = threadSeconds() - begin;
+  if (turned > 0 && !cell.refused && cell.complaint.empty())
   {
     const double found = std::sqrt(2 * stepper.energies(rod.state, rod.inputs.gravity).twist * rod.model->rest_length.sum() / rod.model->twist_modulus[1]);
     if (!(std::abs(found - turned) < 0.01 * turned))
-      v.unexplained = "twisted by " + std::to_string(found / (2 * M_PI)) + " turns instead of " + std::to_string(turned / (2 * M_PI));
+      cell.complaint = "twisted by " + std::to_string(found / (2 * M_PI)) + " turns instead of " + std::to_string(turned / (2 * M_PI));
   }
-  return v;
-}
-
-void record(StudyContext& context, Tally& tally, Row& row, const Verdict& v)
-{
-  const char* outcome = !v.unexplained.empty() ? "UNEXPLAINED" : v.refused ? "refused" : v.cuts > 0 ? "cut" : "done";
-  tally.not_finite += v.not_finite;
-  tally.unexplained += v.unexplained.empty() ? 0 : 1;
-  tally.refused += v.unexplained.empty() && v.refused ? 1 : 0;
-  tally.cut += v.unexplained.empty() && !v.refused && v.cuts > 0 ? 1 : 0;
-  tally.done += v.unexplained.empty() && !v.refused && v.cuts == 0 ? 1 : 0;
-  row.set("outcome", outcome).set("steps", v.steps).set("substeps", v.substeps).set("cuts", v.cuts).set("iterations", v.iterations)
-      .set("max_strain", v.worst_strain).set("energy_growth", v.energy_growth).set("cpu_seconds", v.cpu_seconds);
-  row.set("reason", v.unexplained.empty() ? v.reason : v.unexplained + (v.reason.empty() ? "" : " (" + v.reason + ")"));
-  context.metric("nan_count", tally.not_finite);
-  context.metric("unexplained_failures", tally.unexplained);
+  return r;
 }
 
 RodSetup heldRod(double radius, double youngs_modulus, int nodes)
@@ -173,9 +131,7 @@ RodSetup whippedRod(double radius, double youngs_modulus)
 
 void runRodStability(StudyContext& context)
 {
-  Tally tally;
-  context.metric("nan_count", 0);
-  context.metric("unexplained_failures", 0);
+  StabilityTally tally(context);
 
   // The map: held horizontally and released.
   const std::vector<double> decades = context.quick() ? std::vector<double>{3, 6, 9, 13} : std::vector<double>{3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13};
@@ -196,9 +152,16 @@ void runRodStability(StudyContext& context)
           context.progress(done++, total, toString(integrator));
           Row& row = context.row();
           row.set("case", "released").set("integrator", toString(integrator)).set("E_Pa", modulus).set("radius_over_length", radius).set("step_s", step);
-          const Verdict v = run(heldRod(radius, modulus, 50), timeConfig(integrator, step), 30, still, 0);
-          record(context, tally, row, v);
-          Series& s = plot.at(!v.unexplained.empty() ? "unexplained" : v.refused ? "refused" : v.cuts ? "cut" : "done");
+          const RodSetup rod = heldRod(radius, modulus, 50);
+          Run r = run(rod, timeConfig(integrator, step), 30, still, 0);
+          if (r.cell.complaint.empty() && !r.cell.refused)
+          {
+            const Run fine = run(rod, timeConfig(integrator, step / 4), 120, still, 0);
+            if (fine.cell.complaint.empty() && !fine.cell.refused)
+              r.cell.compare(r.end, fine.end, fine.moved, 1.0);
+          }
+          tally.record(row, r.cell);
+          Series& s = plot.at(toString(r.cell.outcome()));
           s.x.push_back(modulus);
           s.y.push_back(step * (1 + 0.12 * (std::log10(radius) + 5)));
         }
@@ -209,23 +172,21 @@ void runRodStability(StudyContext& context)
     context.progress(done++, total, name);
     Row& row = context.row();
     row.set("case", name).set("integrator", toString(integrator)).set("step_s", step);
+    StabilityCell cell;
     try
     {
-      record(context, tally, row, run(setup(), timeConfig(integrator, step), count, motion, quiet, turned));
+      cell = run(setup(), timeConfig(integrator, step), count, motion, quiet, turned).cell;
     }
     catch (const std::invalid_argument& e)   // what cannot even be set up is refused there
     {
-      Verdict v;
-      v.refused = true;
-      v.reason = e.what();
-      record(context, tally, row, v);
+      cell.refuseAtOnce(e.what());
     }
     catch (const std::exception& e)
     {
-      Verdict v;
-      v.unexplained = std::string("threw: ") + e.what();
-      record(context, tally, row, v);
+      cell.complaint = std::string("threw: ") + e.what();
+      cell.explained = false;
     }
+    tally.record(row, cell);
   };
   const int never = std::numeric_limits<int>::max();
   const auto teleport = [](const Eigen::Vector3d& by, double angle) {
@@ -278,12 +239,6 @@ void runRodStability(StudyContext& context)
   }
   special("beyond the explicit limit", Integrator::symplectic_euler, 1e-3, [] { return heldRod(0.002, 1e9, 50); }, 2000, still, never);
   special("within the explicit limit", Integrator::symplectic_euler, 1e-5, [] { return heldRod(0.002, 1e9, 50); }, 2000, still, 0);
-
-  context.metric("done", tally.done);
-  context.metric("cut", tally.cut);
-  context.metric("refused", tally.refused);
-  context.note("done: every step at once; cut: Newton needed shorter steps; refused: the step said why and left the state alone.");
-  context.note("unexplained: a refusal without reason, a changed state after one, a number that is not finite, or energy out of nothing.");
 }
 
 }  // namespace slender::study

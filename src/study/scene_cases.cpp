@@ -1,16 +1,57 @@
 #include "scene_cases.h"
 
+#include <filesystem>
+#include <fstream>
 #include <limits>
+#include <stdexcept>
+
+#include <stdlib.h>
 
 #include "package_scenes.h"
 #include "slender_sim/scene/reader.h"
 
 namespace slender::study {
 
-Simulation packageScene(const std::string& name, const std::vector<std::string>& overrides)
+namespace {
+
+/// The files that scenes refer to, where these expect them, for as long as this lives.
+class PackageFolder
 {
-  return Simulation(parseScene(packageScenes().at(name), name + ".yaml", overrides));
+public:
+  PackageFolder() : path_((std::filesystem::temp_directory_path() / "slender_sim_XXXXXX").string())
+  {
+    if (!mkdtemp(path_.data()))
+      throw std::runtime_error(path_ + ": cannot be made");
+    for (const auto& [path, text] : packageFiles())
+    {
+      const std::filesystem::path file = path_ + "/" + path;
+      std::filesystem::create_directories(file.parent_path());
+      std::ofstream(file) << text;
+    }
+  }
+  ~PackageFolder()
+  {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  PackageFolder(const PackageFolder&) = delete;
+  PackageFolder& operator=(const PackageFolder&) = delete;
+  std::string scenes() const { return path_ + "/scenes"; }
+
+private:
+  std::string path_;
+};
+
+}  // namespace
+
+SceneConfig packageSceneConfig(const std::string& name, const std::vector<std::string>& overrides)
+{
+  const char* const text = packageFiles().at("scenes/" + name + ".yaml");
+  const PackageFolder folder;
+  return parseScene(text, name + ".yaml", overrides, folder.scenes());
 }
+
+Simulation packageScene(const std::string& name, const std::vector<std::string>& overrides) { return Simulation(packageSceneConfig(name, overrides)); }
 
 GroupSetup groupOf(const Simulation& scene)
 {

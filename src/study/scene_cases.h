@@ -10,7 +10,9 @@
 namespace slender::study {
 
 /// config/scenes/NAME.yaml as it was when the package was built, with overrides as of `simulate --set`.
-/// Throws std::out_of_range for a scene that is not among those built in, SceneError and SimulationError as they do.
+/// Throws std::out_of_range for a scene that is not among those built in, SceneError as it does.
+SceneConfig packageSceneConfig(const std::string& name, const std::vector<std::string>& overrides = {});
+/// The same, composed. Throws SimulationError as well.
 Simulation packageScene(const std::string& name, const std::vector<std::string>& overrides = {});
 
 /// The rods, obstacles and contact of a scene without bodies, where they are now; grasps and obstacles stay.

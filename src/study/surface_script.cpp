@@ -7,7 +7,7 @@
 
 #include <Eigen/Geometry>
 
-#include "slender_sim/geometry/vertex_normals.h"
+#include "slender_sim/geometry/mesh_offsets.h"
 
 namespace slender::study {
 

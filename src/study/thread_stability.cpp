@@ -1,12 +1,14 @@
 // Viscous threads under whatever may be asked of them: done or refused with a reason, never NaN, no fluid lost, bounded memory.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "slender_sim/study/cpu_clock.h"
 #include "slender_sim/thread/thread_group.h"
+#include "stability.h"
 #include "thread_cases.h"
 
 namespace slender::study {
@@ -14,10 +16,10 @@ namespace {
 
 struct Verdict
 {
-  int steps = 0, cuts = 0, folds = 0, not_finite = 0;
-  std::size_t most_nodes = 0, most_threads = 0, last_nodes = 0;
-  double volume_drift = 0, cpu_seconds = 0;
-  std::string reason, unexplained;   ///< of a refusal; what is wrong with it
+  StabilityCell cell;
+  int folds = 0;
+  std::size_t most_nodes = 0, most_threads = 0;
+  double volume_drift = 0;
 };
 
 bool isFinite(const ThreadGroupState& s)
@@ -59,31 +61,15 @@ Verdict run(const ThreadSetup& setup, double h, int steps, const Motion& motion)
     const std::size_t before = nodesOf(state);
     const Eigen::Vector3d tip = state.threads[0].x.front();
     const StepReport report = group.step(state, inputs, h);
-    v.cuts += report.cut_steps;
     v.folds += report.mended_folds;
-    if (!isFinite(state))
-    {
-      ++v.not_finite;
-      v.unexplained = "state is not finite";
+    if (!v.cell.took(report, isFinite(state), before == nodesOf(state) && tip == state.threads[0].x.front()))
       break;
-    }
-    if (!report.ok)
-    {
-      v.reason = std::string(toString(report.failure)) + ": " + report.message;
-      if (report.message.empty() || report.failure == StepFailure::none)
-        v.unexplained = "refused without a reason";
-      else if (before != nodesOf(state) || tip != state.threads[0].x.front())
-        v.unexplained = "refused, but the state has changed";
-      break;
-    }
-    ++v.steps;
     fed += inputs.flow_rate * h;
     v.most_nodes = std::max(v.most_nodes, nodesOf(state));
     v.most_threads = std::max(v.most_threads, state.threads.size());
     v.volume_drift = std::max(v.volume_drift, std::abs(state.volumeBalance() - start) / (start + fed));
   }
-  v.last_nodes = nodesOf(state);
-  v.cpu_seconds = threadSeconds() - begin;
+  v.cell.cpu_seconds = threadSeconds() - begin;
   return v;
 }
 
@@ -110,28 +96,14 @@ ThreadSetup pour(double viscosity, double surface_tension, double speed = 0.05)
   return t;
 }
 
-struct Tally
-{
-  int done = 0, refused = 0, not_finite = 0, unexplained = 0;
-  double volume_drift = 0;
-};
-
-void record(StudyContext& context, Tally& tally, const std::string& test, double h, const Verdict& v)
+void record(StudyContext& context, StabilityTally& tally, double& volume_drift, const std::string& test, double h, const Verdict& v)
 {
   Row& row = context.row();
-  row.set("test", test).set("step", h).set("steps", v.steps).set("outcome", v.not_finite ? "NaN" : v.reason.empty() ? "done" : "refused");
+  row.set("case", test).set("step_s", h);
+  tally.record(row, v.cell);
   row.check(v.volume_drift, 0.0, 1e-10, "all fluid is accounted for");
-  row.set("cuts", v.cuts).set("folds", v.folds).set("most_nodes", static_cast<double>(v.most_nodes));
-  row.set("most_threads", static_cast<double>(v.most_threads));
-  row.set("cpu_seconds", v.cpu_seconds);
-  if (!v.reason.empty())
-    row.set("reason", v.reason);
-  if (!v.unexplained.empty())
-    row.set("complaint", v.unexplained);
-  ++(v.reason.empty() ? tally.done : tally.refused);
-  tally.not_finite += v.not_finite;
-  tally.unexplained += !v.unexplained.empty();
-  tally.volume_drift = std::max(tally.volume_drift, v.volume_drift);
+  row.set("folds", v.folds).set("most_nodes", static_cast<double>(v.most_nodes)).set("most_threads", static_cast<double>(v.most_threads));
+  volume_drift = std::max(volume_drift, v.volume_drift);
 }
 
 /// Fixed between plates, pulled to `ratio` times its length.
@@ -148,7 +120,8 @@ Verdict stretch(double ratio, double h, int steps)
 
 void runThreadStability(StudyContext& context)
 {
-  Tally tally;
+  StabilityTally tally(context);
+  double drift = 0;
   const Motion steady = [](double, ThreadInputs&) {};
   const auto name = [](const std::string& what, double value) {
     char text[64];
@@ -164,10 +137,29 @@ void runThreadStability(StudyContext& context)
       {
         const std::string test = name("viscosity", mu) + name(", surface tension", gamma);
         context.progress(done++, static_cast<int>(9 * viscosities.size()), test);
-        record(context, tally, test, h, run(pour(mu, gamma), h, h < 1e-4 ? 300 : h < 1e-2 ? 600 : 40, steady));
+        record(context, tally, drift, test, h, run(pour(mu, gamma), h, h < 1e-4 ? 300 : h < 1e-2 ? 600 : 40, steady));
       }
+  // Held at both ends and let go: thin and thick, thin and thick fluids.
+  const auto held = [](double viscosity, double radius, double gravity) {
+    char text[700];
+    std::snprintf(text, sizeof text, R"(
+gravity: [0, 0, %g]
+threads:
+  - fluid: {density: 1000, viscosity: %g, surface_tension: 0.02}
+    centerline: {straight: {from: [0, 0, 0], to: [0.1, 0, 0], edges: 20}}
+    radius: %g
+    ends: {oldest: held, newest: held}
+)", gravity, viscosity, radius);
+    return MapScene{text};
+  };
+  const std::vector<double> map_steps = context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 1e-1};
+  stabilityMap(context, tally, "thread_stability_viscosity", "viscosity [Pa s]",
+               context.quick() ? std::vector<double>{1e-2, 1e2, 1e6} : std::vector<double>{1e-3, 1e-2, 1e-1, 1, 1e1, 1e2, 1e4, 1e6, 1e9}, map_steps, 10,
+               [&](double viscosity) { return held(viscosity, 2e-3, -9.81); });
+  stabilityMap(context, tally, "thread_stability_slenderness", "radius over length", context.quick() ? std::vector<double>{1e-4, 1e-2, 0.1} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3},
+               map_steps, 10, [&](double slenderness) { return held(100, 0.1 * slenderness, -9.81); });
   for (const double ratio : {1e2, 1e5})
-    record(context, tally, name("stretched by", ratio), 0.1, stretch(ratio, 0.1, 200));
+    record(context, tally, drift, name("stretched by", ratio), 0.1, stretch(ratio, 0.1, 200));
 
   const double flow = pour(1, 0).inputs.flow_rate;
   const struct
@@ -189,20 +181,17 @@ void runThreadStability(StudyContext& context)
         context.progress(done, done + 1, m.name);
         ++done;
         const int steps = static_cast<int>((context.quick() ? 1.5 : 4.0) / h);
-        record(context, tally, std::string(m.name) + name(", viscosity", mu), h, run(pour(mu, 0.03), h, steps, m.motion));
+        record(context, tally, drift, std::string(m.name) + name(", viscosity", mu), h, run(pour(mu, 0.03), h, steps, m.motion));
       }
 
   context.progress(done, done + 1, "an hour");
   const double hour = context.quick() ? 300.0 : 3600.0, h = 0.02;
   const Verdict early = run(pour(1e2, 0.03), h, static_cast<int>(60 / h), steady);
   const Verdict late = run(pour(1e2, 0.03), h, static_cast<int>(hour / h), steady);
-  record(context, tally, name("poured, seconds:", hour), h, late);
+  record(context, tally, drift, name("poured, seconds:", hour), h, late);
   const double growth = static_cast<double>(late.most_nodes) / static_cast<double>(early.most_nodes);
-  context.row().set("test", "most nodes at a time, over those of the first minute").check(growth, 1.0, 0.1, "bounded memory");
-  context.metric("nan_count", tally.not_finite);
-  context.metric("unexplained_failures", tally.unexplained);
-  context.metric("refused", tally.refused);
-  context.metric("volume_drift", tally.volume_drift);
+  context.row().set("case", "most nodes at a time, over those of the first minute").check(growth, 1.0, 0.1, "bounded memory");
+  context.metric("volume_drift", drift);
   context.metric("most_nodes_in_the_long_run", static_cast<double>(late.most_nodes));
 }
 

@@ -32,9 +32,4 @@ std::vector<TrackedCase> thesisCases();
 /// A surface whose guide, 25 vertices, expands and contracts rapidly (6.4).
 TrackedCase breathingSurface();
 
-/// Bag of 88 vertices, a disc: an open rim of 16, four rings of 16 below it, a bottom of 8.
-TriangleMesh bagMesh();
-/// Closed figure of 3,038 vertices in the shape of an X in the plane y = 0.
-TriangleMesh figureMesh();
-
 }  // namespace slender::study

@@ -1,5 +1,6 @@
 // Tracking under whatever may be asked of it: done, or refused with a reason and the state untouched, never NaN.
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <random>
 #include <stdexcept>
@@ -7,6 +8,7 @@
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
 #include "guided_cloth.h"
+#include "stability.h"
 
 namespace slender::study {
 
@@ -90,12 +92,13 @@ std::vector<GuideCase> guideCases()
   };
 }
 
+/// A cell, and what else is asked of tracking. Refusals of guides that are no good do not end it.
 struct Verdict
 {
-  int steps = 0, refused = 0, unexplained = 0, nans = 0, cuts = 0;
+  StabilityCell cell;
+  int refused = 0;              ///< steps
   bool finished = true;         ///< within the time for a cell
-  double worst = 0, stretch = 0, fastest = 0, cpu = 0;   ///< of |c| over the shell's size; at the end; largest velocity at the end [m/s]
-  std::string reason;
+  double worst = 0, fastest = 0;   ///< of |c| over the shell's size; largest velocity at the end [m/s]
 };
 
 bool isFinite(const SceneCloth& s)
@@ -108,6 +111,8 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
 {
   Verdict v;
   const Matrix3Xd rest = simulation.config().cloths[0].tracking->guide.mesh.vertices;
+  v.cell.linear_steps = simulation.config().cloths[0].one_newton_step;
+  double still = 0, scale = 0;
   const double begin = threadSeconds();
   for (int k = 0; k < steps && v.refused < 10; ++k)
   {
@@ -130,23 +135,29 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
       report.message = error.what();
     }
     const SceneCloth& now = simulation.state().cloths[0];
-    v.nans += !isFinite(now);
-    v.cuts += report.cut_steps;
-    if (report.ok)
+    const bool unchanged = now.cloth.x == before.cloth.x && now.cloth.v == before.cloth.v && now.guide == before.guide;
+    if (v.cell.took(report, isFinite(now), unchanged))
     {
-      ++v.steps;
       const Matrix3Xd& x = now.cloth.x;
       const double reach = x.cwiseAbs().maxCoeff(), size = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm();
-      v.worst = std::max(v.worst, simulation.trackingError(0) / (size + 1e-3 * reach + 0.4));
-      v.stretch = report.max_strain;
+      v.worst = std::max(v.worst, simulation.trackingError(0).met / (size + 1e-3 * reach + 0.4));
+      // Once the guide is still, nothing puts energy in; what is strained then is what there is to give.
+      if (guide.comes_to_rest && !guide.to_be_refused && k == steps * 3 / 4)
+      {
+        const ClothEnergies e = simulation.clothEnergies(0);
+        still = e.total();
+        scale = e.membrane + e.bending + e.kinetic + simulation.clothModel(0).totalMass() * simulation.config().gravity.norm() * size;
+      }
+      if (scale > 0 && !v.cell.energyIs((simulation.clothEnergies(0).total() - still) / scale, 1.0))
+        break;
       continue;
     }
+    if (!v.cell.complaint.empty())
+      break;
     ++v.refused;
-    v.reason = report.message;
-    v.unexplained += report.message.empty() || now.cloth.x != before.cloth.x || now.cloth.v != before.cloth.v || now.guide != before.guide;
   }
   v.fastest = simulation.state().cloths[0].cloth.v.cwiseAbs().maxCoeff();
-  v.cpu = threadSeconds() - begin;
+  v.cell.cpu_seconds = threadSeconds() - begin;
   return v;
 }
 
@@ -175,7 +186,8 @@ GuidedCloth sheetWith(const TestFunctions& functions, const Subdivision& fine, c
 void runTrackingStability(StudyContext& context)
 {
   useOneBlasThread();
-  int nans = 0, unexplained = 0, cells = 0, refused_cells = 0, not_recovered = 0, unfinished = 0;
+  StabilityTally tally(context);
+  int cells = 0, not_recovered = 0, unfinished = 0;
   double worst = 0, worst_in_contact = 0;
 
   // Guides
@@ -205,25 +217,21 @@ void runTrackingStability(StudyContext& context)
         continue;   // in contact: single steps of many seconds
       context.progress(cells, total, guide.name);
       Simulation simulation(parseScene(kScene, "sheet.yaml", setting.set));
-      const Verdict v = run(simulation, guide, steps, context.quick() ? 1.5 : 20.0);
+      Verdict v = run(simulation, guide, steps, context.quick() ? 1.5 : 20.0);
       // refusals of good guides end the cell; those of bad ones are what is wanted, and the steps after them
-      const bool as_wanted = !guide.to_be_refused || (v.refused == 5 && (v.steps == steps - 5 || !v.finished));
+      if (guide.to_be_refused && v.cell.complaint.empty() && !(v.refused == 5 && (v.cell.steps == steps - 5 || !v.finished)))
+      {
+        v.cell.explained = false;
+        v.cell.complaint = "guides that are no good were refused " + std::to_string(v.refused) + " times instead of 5, or the run did not go on";
+      }
       Row& row = context.row();
-      row.set("case", "guide " + guide.name).set("setting", setting.name).set("steps", v.steps).set("refused", v.refused).set("cuts", v.cuts)
-        .set("average_error_over_size", v.worst).set("end_stretch", v.stretch).set("fastest_at_end", v.fastest).set("cpu_seconds", v.cpu)
-        .set("outcome", !as_wanted             ? "not as wanted"
-                        : guide.to_be_refused ? "refused, then done"
-                        : v.refused           ? "refused"
-                        : v.finished          ? "done"
-                                              : "no refusal, but slow");
-      if (!v.reason.empty())
-        row.set("reason", v.reason);
+      row.set("case", "guide " + guide.name).set("setting", setting.name);
+      tally.record(row, v.cell);
+      row.set("steps_refused", v.refused).set("finished", v.finished ? "yes" : "slow").set("average_error_over_size", v.worst).set("end_strain", v.cell.end_strain)
+        .set("fastest_at_end", v.fastest);
       ++cells;
-      nans += v.nans;
-      unexplained += v.unexplained + !as_wanted;
       unfinished += !v.finished;
-      refused_cells += !guide.to_be_refused && v.refused > 0;
-      not_recovered += guide.comes_to_rest && v.refused == 0 && v.finished && !(v.stretch < 0.5);
+      not_recovered += guide.comes_to_rest && v.refused == 0 && v.finished && !(v.cell.end_strain < 0.5);
       double& most = simulation.config().cloths[0].contact ? worst_in_contact : worst;
       most = std::max(most, v.worst);
     }
@@ -235,7 +243,7 @@ void runTrackingStability(StudyContext& context)
                                const Subdivision& on) {
     Verdict v;
     const GuidedCloth c = sheetWith(functions, on, of);
-    std::string outcome = "done";
+    v.cell.linear_steps = true;
     double force = 0;
     try
     {
@@ -246,42 +254,27 @@ void runTrackingStability(StudyContext& context)
       GuidedStepper stepper(c, Follow::averages);
       if (!held.empty())
         stepper.cloth().pin(held);
-      for (int k = 0; k < steps && v.refused == 0; ++k)
+      for (int k = 0; k < steps; ++k)
       {
         const ClothState before = stepper.cloth().state;
         const StepReport report = stepper.step();
         const ClothState& now = stepper.cloth().state;
-        v.nans += !now.x.allFinite() || !now.v.allFinite();
         if (report.ok)
-        {
-          ++v.steps;
-          v.worst = std::max(v.worst, stepper.error() / 0.56);
-          v.stretch = report.max_strain;
           force = stepper.stepper().averageForces().cwiseAbs().maxCoeff();
-          v.nans += !std::isfinite(force);
-          continue;
-        }
-        ++v.refused;
-        v.reason = report.message;
-        v.unexplained += report.message.empty() || now.x != before.x || now.v != before.v;
-        outcome = "refused";
+        if (!v.cell.took(report, now.x.allFinite() && now.v.allFinite() && std::isfinite(force), now.x == before.x && now.v == before.v))
+          break;
+        v.worst = std::max(v.worst, stepper.error() / 0.56);
       }
     }
     catch (const std::invalid_argument& error)   // as a scene that has them is
     {
-      outcome = "refused at once";
-      v.reason = error.what();
-      ++v.refused;
+      v.cell.refuseAtOnce(error.what());
     }
     Row& row = context.row();
-    row.set("case", what).set("setting", "hinge, one step, 0.01 s").set("steps", v.steps).set("refused", v.refused).set("average_error_over_size", v.worst)
-      .set("end_stretch", v.stretch).set("largest_force_N", force).set("outcome", outcome);
-    if (!v.reason.empty())
-      row.set("reason", v.reason);
+    row.set("case", what).set("setting", "hinge, one step, 0.01 s");
+    tally.record(row, v.cell);
+    row.set("average_error_over_size", v.worst).set("end_strain", v.cell.end_strain).set("largest_force_N", force);
     ++cells;
-    nans += v.nans;
-    unexplained += v.unexplained;
-    refused_cells += v.refused > 0;
     worst = std::max(worst, v.worst);
   };
   const TestFunctions hats = subdivisionBasis(fine);
@@ -327,15 +320,31 @@ void runTrackingStability(StudyContext& context)
   constrained("half of a region's vertices held", hats, part, guide, fine);
   constrained("all of a region's vertices held", hats, all, guide, fine);
 
-  context.metric("nan_count", nans);
-  context.metric("unexplained_failures", unexplained);
+  // A sheet that is lifted by its regions: soft and stiff, thin and thick.
+  const auto lifted = [](double youngs_modulus, double thickness) {
+    char text[900];
+    std::snprintf(text, sizeof text, R"(
+tracked:
+  - guide: {grid: {corner: [0, 0, 0], sides: [[0.4, 0, 0], [0, 0.4, 0]], cells: [2, 2], pattern: alternating}, motion: fixed}
+    mesh: {subdivide: 2}
+    material: {density: 1000, thickness: %g, youngs_modulus: %g, poissons_ratio: 0.3}
+    bending: {model: hinge}
+)", thickness, youngs_modulus);
+    return MapScene{text, 0.5};
+  };
+  const std::vector<double> map_steps = context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
+  const int map_length = context.quick() ? 5 : 15;
+  stabilityMap(context, tally, "tracking_stability_stiffness", "Young's modulus [Pa]", context.quick() ? std::vector<double>{1e4, 1e8} : std::vector<double>{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10},
+               map_steps, map_length, [&](double modulus) { return lifted(modulus, 5e-4); });
+  stabilityMap(context, tally, "tracking_stability_slenderness", "thickness over side", context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1},
+               map_steps, map_length, [&](double slenderness) { return lifted(1e6, 0.4 * slenderness); });
+
   context.metric("not_recovered", not_recovered);
-  context.metric("refused", refused_cells);
   context.metric("unfinished", unfinished);
-  context.metric("cells", cells);
+  context.metric("cells", static_cast<double>(context.rows().size()));
   context.metric("worst_average_error_over_size", worst);
   context.metric("worst_average_error_over_size_in_contact", worst_in_contact);
-  context.note("refused: with a reason, the state as before the step; guides that are no good must be refused for as long as they are, and the run "
+  context.note("Guides that are no good must be refused for as long as they are, and the run "
                "goes on. unfinished: cells stopped after 20 s of CPU time (quick: 1.5 s), for the most part of contact in guides that crush the "
                "shell. not_recovered: strained by half or more at the end though the guide came back; in contact, collisions have the last word "
                "where both cannot be had; errors are over the shell's size, with a thousandth of its distance from the origin added for rounding.");

@@ -12,7 +12,7 @@
 #include <tiny_gltf.h>
 
 #include "object_colors.h"
-#include "slender_sim/geometry/vertex_normals.h"
+#include "slender_sim/geometry/mesh_offsets.h"
 
 namespace slender {
 

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "object_colors.h"
-#include "slender_sim/geometry/vertex_normals.h"
+#include "slender_sim/geometry/mesh_offsets.h"
 
 namespace slender {
 

@@ -89,6 +89,10 @@ Options parseOptions(int argc, char** argv)
   if (options.files.size() != 2)
     throw BadInput(std::string("needs IN and OUT\n") + usage);
   slender::requireMeshName(options.files[1]);
+  const std::string& in = options.files[0];
+  const auto dot = in.rfind('.');
+  if (!options.count && dot != std::string::npos && (in.substr(dot) == ".obj" || in.substr(dot) == ".ply"))
+    throw BadInput(in + ": is a mesh; say into how many regions to divide it: --count N (or give a scene, whose test functions are shown)");
   if (!options.count && clustering)
     throw BadInput("--frames, --compactness, --seed and --sampled-frames cluster a mesh: give --count as well");
   return options;

@@ -16,6 +16,7 @@
 #include "slender_sim/scene/simulation.h"
 #ifdef SLENDER_WITH_BAG
 #include "slender_sim/node/bag_recorder.h"
+#include "slender_sim/node/guide_bag.h"
 #endif
 
 /// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed.
@@ -198,6 +199,10 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   if (std::any_of(cloths.begin(), cloths.end(), [](const slender::ClothConfig& cloth) { return cloth.tracking != nullptr; }))
   {
     std::printf("tracking          averages at most %.2g of the guide's size away\n", total.tracking_error);
+    if (total.forces_at_bound > 0)
+    {
+      std::printf("bounded forces    at most %d at their bounds, whose averages were not met\n", total.forces_at_bound);
+    }
   }
   if (total.projection_iterations > 0)
   {
@@ -207,7 +212,9 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
 
 int run(const Options& options)
 {
-#ifndef SLENDER_WITH_BAG
+#ifdef SLENDER_WITH_BAG
+  slender::setBagReader(slender::readGuideBag);
+#else
   if (!options.bag.empty())
   {
     throw BadInput("--bag " + options.bag + ": this build has no ROS and cannot write bags; build with -DWITH_ROS=ON, or use --csv");

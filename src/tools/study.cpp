@@ -26,12 +26,13 @@ constexpr int kDone = 0, kStudyFailed = 1, kBadUsage = 2;
 const char kUsage[] =
     "usage: study list\n"
     "       study run NAME... [--quick] [--json FILE] [--out DIR]\n"
-    "       study report --out DIR [--quick] [--jobs N]\n"
+    "       study report [NAME...] --out DIR [--quick] [--jobs N]\n"
     "  NAME     a study of `study list`, or all\n"
     "  --quick  fewer cases and coarser ones: well under a minute each\n"
     "  --json   metrics and rows of all studies run\n"
     "  --out    a CSV table and PNG plots of each study (the directory is made); report: DIR/report.html, one page with all of them.\n"
-    "           Stopped, it goes on where it was\n"
+    "           Stopped, it goes on where it was;\n"
+    "           with names: of these studies alone\n"
     "  --jobs   studies at a time (default 1; times are of CPUs, but more of them disturb each other a little)\n"
     "exit status: 0 done, 1 a study failed, 2 bad usage\n";
 
@@ -195,8 +196,10 @@ int report(const std::vector<std::string>& words)
         options.jobs = slender::parseCount("--jobs", value, 1, 1000);
       ++i;
     }
-    else
+    else if (words[i].rfind("-", 0) == 0)
       return badUsage("report: " + words[i] + " is not an option, or its value is missing");
+    else
+      options.only.push_back(words[i]);
   if (options.out.empty())
     return badUsage("report needs --out DIR");
   return slender::makeReport(options) == 0 ? kDone : kStudyFailed;

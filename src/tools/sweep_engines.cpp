@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "arguments.h"
-#include "processes.h"
+#include "../study/processes.h"
 #include "sweep_runs.h"
 
 namespace slender::sweep {

@@ -19,7 +19,7 @@ MassMatrix assembled(const Triplets& entries, Eigen::Index size)
   return mass;
 }
 
-WeakConstraints::Matrix scaledRows(const TestFunctions::Values& values, const MassMatrix& mass, const std::vector<std::string>& names, const char* mesh)
+WeakConstraints::Matrix scaledRows(const TestFunctions::Values& values, const MassMatrix& mass, const std::vector<std::string>& names, const char* mesh, Eigen::VectorXd* measures)
 {
   if (values.cols() != mass.rows())
     throw std::invalid_argument("test functions of " + std::to_string(values.cols()) + " vertices do not fit a " + mesh + " mesh of " +
@@ -32,6 +32,8 @@ WeakConstraints::Matrix scaledRows(const TestFunctions::Values& values, const Ma
       throw std::invalid_argument("test function '" + names[i] + "' is empty on the " + mesh + " mesh (its integral is not positive): leave it out");
     c.row(i) *= 1.0 / sums[i];
   }
+  if (measures)
+    *measures = sums;
   c.makeCompressed();
   return c;
 }
@@ -66,22 +68,26 @@ MassMatrix hatMassMatrix(const Eigen::Matrix3Xd& rest_nodes, bool closed)
 }
 
 WeakConstraints::WeakConstraints(const TestFunctions& functions, const MassMatrix& guide, const MassMatrix& tracked)
-  : names_(functions.names), c_(scaledRows(functions.tracked, tracked, names_, "tracked")), guide_(scaledRows(functions.guide, guide, names_, "guide"))
+  : names_(functions.names), c_(scaledRows(functions.tracked, tracked, names_, "tracked", &measures_))
+  , guide_(scaledRows(functions.guide, guide, names_, "guide", nullptr))
 {
   if (c_.rows() != functions.count() || guide_.rows() != functions.count())
     throw std::invalid_argument("test functions: one row per name expected on both meshes");
 }
 
+double WeakConstraints::distance(int i, const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& tracked) const
+{
+  Eigen::Vector3d away = -targets.col(i);
+  for (Matrix::InnerIterator entry(c_, i); entry; ++entry)
+    away += entry.value() * tracked.col(entry.col());
+  return away.norm();
+}
+
 double WeakConstraints::error(const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& tracked) const
 {
   double worst = 0.0;
-  for (Eigen::Index i = 0; i < c_.rows(); ++i)
-  {
-    Eigen::Vector3d away = -targets.col(i);
-    for (Matrix::InnerIterator entry(c_, i); entry; ++entry)
-      away += entry.value() * tracked.col(entry.col());
-    worst = std::max(worst, away.norm());
-  }
+  for (int i = 0; i < count(); ++i)
+    worst = std::max(worst, distance(i, targets, tracked));
   return worst;
 }
 

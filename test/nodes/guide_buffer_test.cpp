@@ -150,6 +150,31 @@ TEST(GuideBuffer, LateInputDoesNotJump)
   EXPECT_GT(follower.last.X_WG.position.norm(), 0.1);
 }
 
+TEST(GuideBuffer, DoesNotRunTheOtherWayAfterAPause)
+{
+  // silence from 0.3 s to 0.6 s, then 10 m away: the way is long, the speed that is left of the race through the gap dies out within catch_up_time
+  GuideBuffer::Options o = options(0.05);
+  o.catch_up_time = 0.2;
+  GuideBuffer buffer(o, Attach::section, Pose());
+  double lowest = 0.0, highest = 0.0, before = 0.0;
+  int sent = 0;
+  for (double time = 0.0; time < 12.0; time += 1e-3)
+  {
+    for (; 0.03 * sent <= time; ++sent)
+      if (0.03 * sent <= 0.3 || 0.03 * sent >= 0.6)
+        EXPECT_TRUE(buffer.push(0.03 * sent, {Eigen::Vector3d(0, 0, 0.03 * sent < 0.5 ? 0.0 : 10.0), Eigen::Quaterniond::Identity()}));
+    const double z = buffer.target(time).X_WG.position.z();
+    lowest = std::min(lowest, z);
+    highest = std::max(highest, z);
+    if (time > 1.0)   // what is left goes at catch_up_speed on average, 1.5 times that at most
+      EXPECT_LT(std::abs(z - before) / 1e-3, 1.6) << time;
+    before = z;
+  }
+  EXPECT_GT(lowest, -0.1);
+  EXPECT_LT(highest, 10.0 + 1e-9);
+  EXPECT_NEAR(before, 10.0, 1e-9);
+}
+
 TEST(GuideBuffer, AttachInitialKeepsTheOffset)
 {
   const Pose start = turned(0.7, 1.0);

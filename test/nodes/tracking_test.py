@@ -6,6 +6,7 @@ import os
 import struct
 import subprocess
 
+import rosbag
 import rospy
 from geometry_msgs.msg import Pose
 from sensor_msgs.msg import PointCloud2, PointField
@@ -78,10 +79,10 @@ def distance(a, b):
 
 class Tracking(NodeCase):
 
-    def begin(self, motion, **parameters):
+    def begin(self, motion, more="", **parameters):
         with open(self.path("rest.obj"), "w") as file:
             file.write(obj(REST))
-        self.start(SCENE % (self.path("rest.obj"), motion), program="tracking_node", **parameters)
+        self.start(SCENE % (self.path("rest.obj"), motion) + more, program="tracking_node", **parameters)
         self.states = self.listen("/t/state", ClothState)
 
     def after(self, n):
@@ -118,7 +119,24 @@ class Tracking(NodeCase):
         # between messages the guide is interpolated: at one of them it is there
         self.assertLess(distance(vertices(live[20].guide_vertices), wave(0.2)), 1e-6)
         self.assertEqual(len(live[80].guide_forces), 9)
+        self.assertEqual((list(live[80].forces_at_bound), list(live[80].bound_distances)), ([0], [0.0]))
         self.assertGreater(sum(f.z for f in live[80].guide_forces), 0.0)
+
+    def test_forces_are_bounded(self):
+        self.begin("{topic: points}", more="    max_traction: 20\n")
+        guide = self.publisher("/t/guide/points", PointCloud2)
+        for k in range(6):
+            guide.publish(cloud([(x * (1 + 0.4 * k), y, z) for x, y, z in REST], 1.0 + k / RATE))
+        rospy.sleep(0.3)
+        state = self.after(40)
+        self.assertGreater(state.forces_at_bound[0], 2)
+        self.assertGreater(state.bound_distances[0], 0.05)
+        self.assertLess(state.constraint_errors[0], 1e-12)
+        total = sum(math.sqrt(f.x ** 2 + f.y ** 2 + f.z ** 2) for f in state.guide_forces)
+        self.assertLess(total, 20 * 0.16 * (1 + 1e-9))
+        told = self.diagnostics("simulation")
+        self.assertGreater(int(told["most guide forces at their bounds"]), 2)
+        self.assertGreater(float(told["greatest distance where forces are at their bounds [m]"]), 0.05)
 
     def test_bodies(self):
         self.begin("{topic: bodies, groups: {left: [0, 3, 6, 1, 4, 7], right: [2, 5, 8, 1, 4, 7]}}")
@@ -136,10 +154,78 @@ class Tracking(NodeCase):
             self.assertAlmostEqual(up, (0.0, 0.05, 0.1)[i % 3], delta=1e-9)
         self.assertLess(state.constraint_errors[0], 1e-12)
         self.assertLess(distance(vertices(start.guide_vertices), REST), 1e-12)
+        inputs = self.diagnostics("inputs")
+        self.assertEqual(inputs["message"], "ok")
+        self.assertIn("input age guide/bodies right [s]", inputs)
         guide.publish(bodies([("left", ((0, 0, 0), (0, 0, 0, 3)))], 3.0))
         guide.publish(bodies([("foot", ((0, 0, 0), (0, 0, 0, 1)))], 3.0))
         self.expect_drop("bad_quaternion")
         self.expect_drop("unknown_name")
+        inputs = self.diagnostics("inputs")
+        self.assertIn("left", inputs["last dropped bad_quaternion"])
+        self.assertIn('"foot"', inputs["last dropped unknown_name"])
+
+    def test_a_body_that_never_speaks_is_named(self):
+        self.begin("{topic: bodies, groups: {left: [0, 3, 6, 1, 4, 7], right: [2, 5, 8]}}")
+        guide = self.publisher("/t/guide/bodies", BodyStates)
+        self.after(1)
+        self.assertEqual(self.diagnostics("inputs")["message"], "ok")
+        guide.publish(bodies([("left", ((0, 0, 0), (0, 0, 0, 1)))], 1.02))
+        wait_until(lambda: self.diagnostics("inputs")["message"] == "no input yet for guide/bodies right", what="a warning")
+        self.assertEqual(self.diagnostics("inputs")["input age guide/bodies right [s]"], "none yet")
+
+    def test_a_stamp_far_ahead_does_not_deafen(self):
+        self.begin("{topic: points}", guide_ahead=5.0)
+        guide = self.publisher("/t/guide/points", PointCloud2)
+        self.after(1)
+        guide.publish(cloud(REST, 8.0))
+        self.expect_drop("from_future")
+        self.assertIn("~guide_ahead", self.diagnostics("inputs")["last dropped from_future"])
+        guide.publish(cloud([(x, y, z + 0.1) for x, y, z in REST], 1.02))
+        guide.publish(cloud([(x, y, z + 0.1) for x, y, z in REST], 4.0))
+        rospy.sleep(0.3)
+        self.assertAlmostEqual(self.after(200).guide_vertices[0].z, 0.6, delta=1e-6)
+
+    def cloths(self, scene, *arguments):
+        """Vertices by step of all cloths of a scene that `simulate` ran."""
+        folder = self.path("csv_" + os.path.basename(scene))
+        done = subprocess.run([find_program("simulate"), scene, "--duration", "0.8", "--csv", folder, "--quiet"] + list(arguments))
+        self.assertEqual(done.returncode, 0)
+        steps = {}
+        with open(folder + "/cloths.csv") as file:
+            for row in csv.DictReader(file):
+                steps.setdefault((row["object"], round(float(row["t [s]"]) / STEP)), []).append(tuple(float(row[c + " [m]"]) for c in "xyz"))
+        return steps
+
+    def write_scene(self, name, motion):
+        with open(self.path(name), "w") as file:
+            file.write(SCENE % (self.path("rest.obj"), motion))
+        return self.path(name)
+
+    def test_guide_from_a_bag(self):
+        for k in range(int(RATE) + 1):
+            with open(self.path("frame_%02d.obj" % k), "w") as file:
+                file.write(obj(wave(k / RATE)))
+        with rosbag.Bag(self.path("guide.bag"), "w") as bag:
+            for k in range(int(RATE) + 1):
+                message = cloud(wave(k / RATE), 100.0 + k / RATE)
+                bag.write("/some/guide/points", message, message.header.stamp + rospy.Duration(0.02))
+            other = bodies([("left", ((0, 0, 0), (0, 0, 0, 1)))], 100.0)
+            bag.write("/others", other, other.header.stamp)
+        self.begin("{bag: %s}" % self.path("guide.bag"))
+        frames = self.cloths(self.write_scene("frames.yaml", '{frames: "frame_*.obj", rate: %g}' % RATE))
+        played = self.cloths(self.write_scene("bag.yaml", "{bag: guide.bag}"), "--bag", self.path("run.bag"))
+        again = self.cloths(self.write_scene("again.yaml", "{bag: {file: run.bag, topic: /state}}"))
+        for k in range(1, 81):
+            self.assertLess(distance(played[("flap", k)], frames[("flap", k)]), 1e-9, k)
+            self.assertLess(distance(vertices(self.after(1).vertices), frames[("flap", k)]), 1e-9, k)
+            self.assertLess(distance(again[("flap", k)], frames[("flap", k)]), 2e-3, k)   # the guide as it was at every step
+        self.assertGreater(distance(played[("flap", 80)], played[("flap", 0)]), 0.03)
+        for motion, expected in (("{bag: none.bag}", "none.bag"), ("{bag: {file: guide.bag, topic: /here}}", "on /here; it has: "),
+                                 ("{bag: run.bag, groups: {all: [0..8]}}", "slender_sim/BodyStates"), ("{bag: guide.bag, groups: {foot: [0..8]}}", "has no body foot")):
+            done = subprocess.run([find_program("simulate"), self.write_scene("bad.yaml", motion)], stderr=subprocess.PIPE, universal_newlines=True)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(expected, done.stderr)
 
     def test_bad_points_are_dropped(self):
         self.begin("{topic: points}")

@@ -110,7 +110,7 @@ TEST_F(TrackedScenes, SayWhatIsWrong)
   const std::string t = "tracked.0.", m = t + "guide.motion=";
   const struct { std::vector<std::string> set; const char* expected; } cases[] = {
     {{t + "guide={mesh: {file: none.obj}, motion: fixed}"}, "none.obj"},
-    {{t + "guide={motion: fixed}"}, "must have either mesh"},
+    {{t + "guide={motion: fixed}"}, "must have one of mesh"},
     {{m + "{frames: \"frame_*.obj\"}"}, "motion.rate: is missing"},
     {{m + "{frames: \"none_*.obj\", rate: 30}"}, "no such file"},
     {{m + "{frames: frame.obj, rate: 30}"}, "must have one *"},
@@ -173,7 +173,7 @@ TEST_F(TrackedScenes, FollowFramesFromTheGuidesShapeAndVelocity)
   const SceneCloth& start = simulation.state().cloths[0];
   EXPECT_TRUE(start.cloth.x.leftCols(9) == x);        // the subdivision keeps the guide's vertices
   EXPECT_TRUE(start.cloth.v.leftCols(9) == v);
-  EXPECT_LT(simulation.trackingError(0), 1e-14);
+  EXPECT_LT(simulation.trackingError(0).met, 1e-14);
   double travelled = 0.0;
   for (int k = 1; k <= 60; ++k)
   {
@@ -316,6 +316,90 @@ TEST_F(TrackedScenes, KeepTheirAveragesInContact)
       EXPECT_GT(down, weight);                 // and the guide presses against it
     }
   }
+}
+
+TEST_F(TrackedScenes, LieOnAFloorThatTheirGuidesGoThrough)
+{
+  // all of the shell is pressed at a floor, which no average can be met against: collisions have the last word, and bounded forces are at their bounds
+  const std::vector<std::string> set{"tracked.0.guide.motion={bodies: poses.csv, groups: {all: [0..8]}}", "tracked.0.contact={thickness: 0.004}",
+                                     "obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, -0.02]}}]"};
+  write("poses.csv", "t,body,x,y,z,qx,qy,qz,qw\n0,all,0,0,0,0,0,0,1\n0.3,all,0,0,-0.05,0,0,0,1\n0.6,all,0,0,-0.05,0,0,0,1\n0.9,all,0,0,0,0,0,0,1\n");
+  for (const double traction : {0.0, 5.0, 50.0})
+  {
+    std::vector<std::string> all = set;
+    if (traction > 0)
+      all.push_back("tracked.0.max_traction=" + std::to_string(traction));
+    Simulation simulation(parseScene(flap, "t", all, folder_));
+    const SceneCloth& held = simulation.state().cloths[0];
+    for (int k = 1; k <= 100; ++k)
+    {
+      const StepReport report = simulation.step(simulation.defaultInputs());
+      ASSERT_TRUE(report.ok) << traction << " step " << k << ": " << report.message;
+      ASSERT_GT(held.cloth.x.row(2).minCoeff(), -0.0181) << traction << " step " << k;
+      if (k < 12 || k > 79 || traction > 0)
+      {
+        EXPECT_LT(report.tracking_error, 1e-12) << traction << " step " << k;
+      }
+      if (traction > 0 && k == 60)
+      {
+        EXPECT_EQ(report.forces_at_bound, 9);
+        EXPECT_NEAR(simulation.trackingError(0).at_bound, 0.032, 1e-6);
+        EXPECT_NEAR(held.guide_forces.row(2).sum(), -0.16 * traction, 1e-9);   // traction times area
+      }
+    }
+    EXPECT_TRUE(held.cloth.at_bound.empty());
+    EXPECT_LT(simulation.trackingError(0).met, 1e-13);
+  }
+}
+
+TEST_F(TrackedScenes, BoundForcesByRegion)
+{
+  // a stiff flap whose guide stretches: one side is followed exactly, the other as far as the force allows, as often as it is restarted
+  TriangleMesh mesh = writeFrames(1);
+  for (int k = 0; k < 3; ++k)
+  {
+    TriangleMesh frame = mesh;
+    frame.vertices.row(1) *= k == 1 ? 3.0 : 1.0;
+    writeObj(folder_ + "/pull_" + std::to_string(k) + ".obj", frame);
+  }
+  const std::vector<std::string> set{"tracked.0.guide={mesh: {file: rest.obj}, motion: {frames: \"pull_*.obj\", rate: 2}}", "tracked.0.material.youngs_modulus=1.0e7",
+                                     "tracked.0.test_functions={regions: {left: {guide: [0, 1, 2]}, right: {guide: [6, 7, 8]}}}",
+                                     "tracked.0.max_traction={right: 200}"};
+  Simulation one(parseScene(flap, "t", set, folder_)), two(parseScene(flap, "t", set, folder_));
+  const TrackingConfig& tracking = *one.config().cloths[0].tracking;
+  EXPECT_TRUE(std::isinf(tracking.bounds[0]));
+  EXPECT_NEAR(tracking.bounds[1], 200 * tracking.constraints->measures()[1], 1e-12);
+  double furthest = 0.0, strain = 0.0;
+  for (int k = 1; k <= 300; ++k)
+  {
+    StepReport report = one.step(one.defaultInputs());
+    ASSERT_TRUE(report.ok) << report.message;
+    EXPECT_LT(report.tracking_error, 1e-13) << k;
+    EXPECT_LE(one.state().cloths[0].guide_forces.col(1).norm(), tracking.bounds[1] * (1 + 1e-9)) << k;
+    furthest = std::max(furthest, one.trackingError(0).at_bound);
+    strain = std::max(strain, report.max_strain);
+    if (k == 50)
+    {
+      EXPECT_EQ(one.state().cloths[0].cloth.at_bound, std::vector<int>{1});
+      one.save(folder_ + "/state");
+      two.load(folder_ + "/state");
+      EXPECT_EQ(two.state().cloths[0].cloth.at_bound, std::vector<int>{1});
+    }
+    if (k > 50 && k < 70)
+    {
+      ASSERT_TRUE(two.step(two.defaultInputs()).ok);
+      ASSERT_TRUE(one.state().cloths[0].cloth.x == two.state().cloths[0].cloth.x) << k;
+    }
+  }
+  EXPECT_GT(furthest, 0.3);
+  EXPECT_LT(strain, 0.05);
+  EXPECT_TRUE(one.state().cloths[0].cloth.at_bound.empty());
+  EXPECT_LT(one.trackingError(0).met, 1e-14);
+  EXPECT_NE(problems({"tracked.0.max_traction={top: 30}"}).find("test function that is not there"), std::string::npos);
+  EXPECT_NE(problems({"tracked.0.max_traction=0"}).find("Pa"), std::string::npos);
+  EXPECT_THROW(Simulation(parseScene(flap, "t", {"tracked.0.max_traction=10", "tracked.0.solver={one_newton_step: false}"})), SceneError);
+  Simulation other(parseScene(flap, "t", {set[0], set[1], set[2]}, folder_));
+  EXPECT_THROW(other.load(folder_ + "/state"), std::runtime_error);
 }
 
 TEST_F(TrackedScenes, AreRecorded)

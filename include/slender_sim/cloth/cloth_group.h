@@ -85,10 +85,14 @@ private:
   void addPinForces(double share, double h);
   CollisionReport resolve(const CollisionStep& step);
   double meetAverages(double h);
+  void prepareCorrection(std::size_t cloth);
+  double balancedWork(std::size_t cloth, double h);
+  double boundAverages(std::size_t cloth, double h, double gap);
   Eigen::Matrix3Xd positions(const ClothGroupState& state) const;
   int clothOf(int point) const;
   std::string placeOf(int point) const;
   std::string whereIs(const CollisionReport& failure) const;
+  std::string blameAverages(const CollisionReport& failure) const;
   std::string solidName(int solid) const;
 
   ClothGroupModel model_;
@@ -115,6 +119,8 @@ private:
     Eigen::SparseMatrix<double, Eigen::RowMajor> weights;     ///< averages over masses
     Eigen::LDLT<Eigen::MatrixXd> gram;
     Eigen::Matrix3Xd gap, multipliers;
+    Eigen::SparseMatrix<double, Eigen::RowMajor> gram_rows;   ///< with bounds only, as
+    Eigen::Matrix3Xd forces;                                  ///< [N]
     Eigen::MatrixXd columns;                                  ///< count x 3
     bool ready = false;
   };

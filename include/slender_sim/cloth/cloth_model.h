@@ -62,6 +62,10 @@ struct ClothModel
   /// Weighted averages of vertices that are prescribed (averages x vertices, rows sum to 1; see WeakConstraints); null: none. Implicit steps only.
   std::shared_ptr<const Eigen::SparseMatrix<double, Eigen::RowMajor>> averages;
 
+  /// Largest force [N] with which each may act, > 0 or infinite; empty: as large as it takes. An average whose force is there is not met, but pulled
+  /// towards where it should be. For one_newton_step only.
+  Eigen::VectorXd average_bounds;
+
   int averageCount() const { return averages ? static_cast<int>(averages->rows()) : 0; }
   int vertices() const { return static_cast<int>(rest.vertices.cols()); }
   double totalMass() const { return mass.sum(); }

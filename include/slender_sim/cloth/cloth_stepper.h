@@ -81,7 +81,7 @@ public:
   const Eigen::Matrix3Xd& pinForces() const;
 
   /// Force [N] with which each prescribed average acts on the cloth (3 x count), spread over its vertices by their weights: the Lagrange multipliers at the end
-  /// of the last successful step.
+  /// of the last successful step; with bounds those of its linear equations, which keep them.
   const Eigen::Matrix3Xd& averageForces() const;
 
   ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include <Eigen/Core>
 #include <Eigen/SparseCore>
 
 #include "slender_sim/linalg/point_matrix.h"
@@ -16,10 +17,13 @@ class ConstrainedCholesky
 public:
   using Constraints = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-  /// Constraints x points. Takes the memory of solve().
-  void setConstraints(const Constraints& c);
+  /// Constraints x points. Takes the memory of solve(), with `bounded` that of solveBounded() and leaveOut().
+  void setConstraints(const Constraints& c, bool bounded = false);
   /// After P was factored with these fixed points (null: none), whose columns of C count as zero. False: constraints depend on each other.
   bool factor(const SparseCholesky& p, const char* fixed);
+
+  /// Leaves constraints `rows` (ascending) out of all solves: their mu are rounding errors. None, and factor(): all count.
+  void leaveOut(const std::vector<int>& rows);
 
   int count() const { return static_cast<int>(c_.rows()); }
   struct Norms   ///< of a solve with g, in the norm of P
@@ -30,6 +34,12 @@ public:
   /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero, and no norms. r may be z. mu: 4 doubles per constraint. Fixed points: r
   /// must be zero there, and z is.
   Norms solve(const double* r, const double* g, double* z, double* mu) const;
+  /// z that minimises 1/2 l z . P z - r . z + sum_i bounds_i |gap_i - C_i z| (gap: 4 doubles per constraint): l P z = r + C^T f, where f_i is within its
+  /// bound and C_i z = gap_i, or f_i is at it and points along gap_i - C_i z. By block Gauss-Seidel from the f given (4 doubles per constraint) until no
+  /// f_i changes by more than `tolerance` of itself, or of its bound. load: sqrt(r . P^-1 r + f . S f), step: that of r + C^T f.
+  Norms solveBounded(const double* r, const double* gap, const double* bounds, double l, double tolerance, double* z, double* f);
+  /// r += C^T f, but for fixed points.
+  void addForces(const double* f, double* r) const;
   /// mu alone, g zero: half the work.
   void multipliers(const double* r, double* mu) const;
   /// r -= C^T mu, but for fixed points.
@@ -44,9 +54,15 @@ private:
     void multiply(double factor, const double* x, double* y) const;
   };
 
+  void inverse(const double* t, double* mu) const;
+
   Constraints c_;
   const SparseCholesky* p_ = nullptr;
   Rows v_, v_transposed_, s_inverse_, c_transposed_;
+  std::vector<int> left_out_;
+  Eigen::MatrixXd s_, inner_;        ///< S, with bounds; factor of the part of S^-1 that is left out
+  mutable Eigen::Matrix<double, Eigen::Dynamic, 3> give_;
+  PointVector pull_;
   mutable PointVector y_, t_, mu_;   ///< of points each: the kernels read as many points of x as there are rows
 };
 

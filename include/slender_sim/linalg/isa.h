@@ -4,7 +4,7 @@ namespace slender {
 
 enum class Isa { baseline, avx2, avx512 };
 
-/// Widest instruction set that both this machine and this build offer.
+/// Widest instruction set that both this machine and this build offer, and that SLENDER_ISA (baseline, avx2) in the environment does not forbid.
 Isa bestIsa();
 const char* toString(Isa isa);
 

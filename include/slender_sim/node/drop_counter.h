@@ -18,7 +18,7 @@ enum class Drop
   no_transform,     ///< tf2 did not know the transform at the message's stamp in time
   out_of_order,     ///< not later than the last one
   stale,            ///< older than ~guide_timeout
-  from_future,      ///< more than an hour ahead: another clock
+  from_future,      ///< more than ~guide_ahead ahead: another clock
   out_of_range,     ///< a number that cannot be (a negative flow, a belt at 1e9 m/s)
   queue_full,       ///< too many messages wait for transforms
 };
@@ -26,20 +26,26 @@ constexpr int kDropReasons = 11;
 
 const char* toString(Drop reason);
 
-/// Counts dropped messages by reason, and complains at most once a second.
+/// Counts dropped messages by reason, and complains at most once a second about each.
 class DropCounter
 {
 public:
   /// `what`: e.g. the topic; `detail` ends the sentence, e.g. the value.
   void drop(Drop reason, const std::string& what, const std::string& detail = "");
 
-  std::uint64_t count(Drop reason) const { return counts_[static_cast<int>(reason)]; }
+  std::uint64_t count(Drop reason) const { return reasons_[static_cast<int>(reason)].count; }
   std::uint64_t total() const;
+  /// What was dropped last for this reason, with its detail; empty: nothing.
+  const std::string& last(Drop reason) const { return reasons_[static_cast<int>(reason)].last; }
 
 private:
-  std::array<std::uint64_t, kDropReasons> counts_{};
-  std::chrono::steady_clock::time_point last_warning_{};   // wall time: simulated time may stand still
-  std::uint64_t silent_ = 0;
+  struct Reason
+  {
+    std::uint64_t count = 0, silent = 0;
+    std::chrono::steady_clock::time_point warned{};   // wall time: simulated time may stand still
+    std::string last;
+  };
+  std::array<Reason, kDropReasons> reasons_;
 };
 
 }  // namespace slender

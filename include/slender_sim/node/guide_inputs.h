@@ -53,8 +53,8 @@ public:
   const DropCounter& drops() const { return drops_; }
   bool waiting() const { return !pending_.empty() || tracking_->waiting(); }
 
-  /// Per grasp, body and obstacle driven from outside.
-  struct Age { std::string name; std::optional<double> seconds; };
+  /// Per grasp, body, obstacle and guide driven from outside. `missing`: see TrackingInputs::Age.
+  struct Age { std::string name; std::optional<double> seconds; bool missing; };
   /// Age of the last pose at the clock's present; nothing while none came.
   std::vector<Age> ages() const;
 
@@ -85,7 +85,7 @@ private:
   bool addThreads(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options, const std::vector<std::string>& prefixes);
   void subscribePose(ros::NodeHandle& nh);
   void addSolids(const Simulation& simulation, const GuideBuffer::Options& options);
-  bool checkPose(const geometry_msgs::Pose& message, const std::string& what, Pose& X);
+  bool checkPose(const geometry_msgs::Pose& message, const std::string& what, const std::string& whose, Pose& X);
   void take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries);
   void dropTransform(PoseFault fault, const std::string& what, const std::string& frame);
   /// False when the transform is not known yet.

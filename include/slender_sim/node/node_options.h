@@ -9,8 +9,6 @@
 
 namespace slender {
 
-constexpr double kMaxAhead = 3600.0;   ///< [s] whole trajectories may be sent in advance, another clock's stamps may not
-
 /// A private parameter that cannot be used; what() names it, its value and what is allowed.
 class OptionError : public std::runtime_error
 {
@@ -43,6 +41,7 @@ struct NodeOptions
   std::string record_bag;                       ///< ~record_bag: path; empty: no bag
   double guide_delay = 0.05;                    ///< ~guide_delay [s] behind which grasps follow their guides
   double guide_timeout = 1.0;                   ///< ~guide_timeout [s]: older guides are stale; no guide for so long: WARN
+  double guide_ahead = 10.0;                    ///< ~guide_ahead [s]: guides stamped later than that after the simulated time are refused
   double catch_up_time = 0.1;                   ///< ~catch_up_time [s] shortest time for closing a gap
   double catch_up_speed = 1.0;                  ///< ~catch_up_speed [m/s] when closing a gap
   double tf_timeout = 0.5;                      ///< ~tf_timeout [s] wall time that a message waits for its transform

@@ -40,7 +40,8 @@ public:
   /// The scene was reset: forgets all input.
   void restart(const Simulation& simulation);
 
-  struct Age { std::string name; std::optional<double> seconds; };
+  /// Of each guide by points, and of each body. `missing`: it has not spoken yet, though other bodies of its guide have.
+  struct Age { std::string name; std::optional<double> seconds; bool missing; };
   std::vector<Age> ages() const;
 
 private:
@@ -55,7 +56,7 @@ private:
     bool catches_up = true;                                  // from `held` at the next apply()
     Eigen::Matrix3Xd held, gap;                              // by bodies: where it was, and what of the way is left
     double gap_start = 0.0, gap_duration = 0.0;
-    std::optional<double> lastTime() const;
+    bool heard() const;                                      // from any body
   };
   struct Message
   {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -72,7 +73,8 @@ struct SceneInputs
   std::vector<GraspTarget> grasps;
   std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
   std::vector<ThreadDrive> threads;             ///< per thread of the scene
-  std::vector<Eigen::Matrix3Xd> guides;         ///< per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]); of others empty
+  std::vector<Eigen::Matrix3Xd> guides;         ///< per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]), ignored when it is a cloth;
+                                                  ///< of others empty
   Eigen::Vector3d wind{0, 0, 0};
 };
 
@@ -135,8 +137,13 @@ public:
   const ThreadModel& threadModel(int thread) const { return *thread_models_[thread]; }
   const ClothModel& clothModel(int cloth) const { return *cloth_models_[cloth]; }
   ClothEnergies clothEnergies(int cloth) const;
-  /// Greatest distance of an average of a tracked cloth from that of its guide [m]; 0 for others.
-  double trackingError(int cloth) const;
+  /// Greatest distances of averages of a tracked cloth from those of its guide [m]; 0 for others.
+  struct TrackingError
+  {
+    double met = 0.0;        ///< of those that are met
+    double at_bound = 0.0;   ///< of those whose forces are at their bounds
+  };
+  TrackingError trackingError(int cloth) const;
 
   /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could
   /// not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a shortened one is refused
@@ -145,6 +152,16 @@ public:
   void load(const std::string& path);
 
 private:
+  /// Cloths with contact that are stepped together: those that are guides of others, or those that are not.
+  struct TouchingCloths
+  {
+    bool ahead;                ///< guides
+    std::vector<int> cloths;   ///< of the scene
+    ClothGroup group;
+    ClothGroupState state{};
+    ClothGroupInputs inputs{};
+  };
+
   void buildRods();
   void takeOffset(int grasp, double time);
   void findEquilibrium();
@@ -164,11 +181,13 @@ private:
   // simulation_cloths.cpp
   void buildCloths();
   void buildTouchingCloths();
-  void exchangeTouchingCloths(SceneState& state);
+  void buildTouchingCloths(bool ahead);
+  void exchangeTouchingCloths(SceneState& state, TouchingCloths& touching);
   void checkTouchingCloths(SceneState& state);
   const Eigen::Matrix3Xd& pinForces(int cloth) const;
   const ClothStepper& clothStepper(int cloth) const;
   StepReport stepCloths(const SceneInputs& inputs);
+  void stepCloths(bool ahead, const SceneInputs& inputs, StepReport& total);
   /// What drives a grasp: its target, or the body or obstacle that it follows.
   GraspTarget drivenTarget(int grasp, const SceneInputs& inputs) const;
   void takeClothWrenches();
@@ -179,6 +198,7 @@ private:
   void addGuideInputs(SceneInputs& inputs, double time) const;
   void checkGuides(const SceneInputs& inputs) const;
   void takeGuides(const SceneInputs& inputs, StepReport& report);
+  const Eigen::Matrix3Xd& guideVertices(int cloth, const SceneInputs& inputs) const;
 
   // simulation_group.cpp: rods that bodies join or that touch something
   void buildBodies();
@@ -206,11 +226,11 @@ private:
   TouchingInputs touching_inputs_;
   std::vector<std::shared_ptr<const ClothModel>> cloth_models_;
   std::vector<std::optional<ClothStepper>> cloth_steppers_;   ///< per cloth; none for those with contact
-  std::optional<ClothGroup> touching_cloths_;
-  std::vector<int> touching_cloth_index_;             ///< per cloth: in touching_cloths_, -1: on its own
+  std::deque<TouchingCloths> touching_cloths_;
+  struct ClothPlace { int group = -1, index = 0; };   // group -1: on its own
+  std::vector<ClothPlace> cloth_places_;              ///< per cloth: in touching_cloths_
+  std::vector<char> leads_;                           ///< per cloth: it is the guide of another
   std::vector<int> cloth_bodies_;                     ///< of the scene, that these meet, beside all obstacles
-  ClothGroupState touching_cloth_state_;
-  ClothGroupInputs touching_cloth_inputs_;
   std::vector<ClothInputs> cloth_inputs_;
   std::vector<Pose> cloth_targets_;                   ///< per grasp of the scene
   std::optional<RodGroup> group_;

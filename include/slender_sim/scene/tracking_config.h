@@ -27,7 +27,13 @@ struct CarriedGuide
 };
 /// By `guide/points`.
 struct TopicGuide {};
-using GuideMotion = std::variant<FixedGuide, FrameGuide, CarriedGuide, TopicGuide>;
+/// A cloth of the scene, simulated beside what tracks it, and ahead of it in each step.
+struct ClothGuide
+{
+  int cloth = 0;                        ///< in the scene; not a tracked one
+  Eigen::Matrix3Xd start, velocity;     ///< its vertices where the scene starts [m], [m/s]
+};
+using GuideMotion = std::variant<FixedGuide, FrameGuide, CarriedGuide, TopicGuide, ClothGuide>;
 
 struct GuideConfig
 {
@@ -36,7 +42,8 @@ struct GuideConfig
   double coast = 0.0;                   ///< [s] within which the speed of a guide by topic dies out when no message comes; 0: it is held
 
   bool byTopic() const;
-  /// Vertices at `time` [s] (3 x n [m]) and their velocities [m/s]; of a guide by topic those of the mesh, at rest.
+  /// Vertices at `time` [s] (3 x n [m]) and their velocities [m/s]; of a guide by topic those of the mesh, at rest;
+  /// of a cloth those that the scene starts with.
   void evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd* velocities = nullptr) const;
 };
 
@@ -45,6 +52,7 @@ struct TrackingConfig
   GuideConfig guide;
   TestFunctions functions;
   std::shared_ptr<const WeakConstraints> constraints;
+  Eigen::VectorXd bounds;               ///< of the force of each test function [N], infinite without; empty: of none
   double size = 1.0;                    ///< diagonal of the box around the guide's mesh [m]: what errors are measured by
 };
 

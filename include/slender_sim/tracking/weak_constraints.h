@@ -33,9 +33,14 @@ public:
   const Matrix& matrix() const { return c_; }              ///< C, count x tracked vertices
   const Matrix& guideMatrix() const { return guide_; }     ///< Cbar, count x guide vertices
 
+  /// Integrals of the test functions over the tracked shape [m^2], of curves [m].
+  const Eigen::VectorXd& measures() const { return measures_; }
+
   /// What the averages shall be: 3 x count, of guide vertices 3 x nbar [m].
   Eigen::Matrix3Xd averages(const Eigen::Matrix3Xd& guide) const { return guide * guide_.transpose(); }
-  /// Greatest distance of an average of the tracked vertices (3 x n) from its target [m].
+  /// Distance of average i of the tracked vertices (3 x n) from its target [m].
+  double distance(int i, const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& tracked) const;
+  /// The greatest of all.
   double error(const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& tracked) const;
 
   /// Throws std::invalid_argument naming functions that can be had from others (see C), on the vertices that are free: no two constraints may prescribe
@@ -44,6 +49,7 @@ public:
 
 private:
   std::vector<std::string> names_;
+  Eigen::VectorXd measures_;
   Matrix c_, guide_;
 };
 

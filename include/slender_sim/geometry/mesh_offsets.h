@@ -1,0 +1,18 @@
+#pragma once
+
+#include "slender_sim/geometry/triangle_mesh.h"
+
+/// Shapes of a mesh with its vertices moved along their normals.
+namespace slender {
+
+/// Unit normals of the vertices (3 x n), of the faces around them weighted by their areas; zero where there is no face.
+Eigen::Matrix3Xd vertexNormals(const TriangleMesh& mesh);
+
+/// Folded like an accordion: by height sin(2 pi s / wavelength) [m], s along a direction, counted from the lowest vertex.
+Eigen::Matrix3Xd folded(const TriangleMesh& mesh, const Eigen::Vector3d& along, double wavelength, double height);
+/// Ridges along an axis through the mesh's centre (the mean of its vertices): by height cos(count times the angle about it) [m].
+Eigen::Matrix3Xd ridged(const TriangleMesh& mesh, const Eigen::Vector3d& axis, int count, double height);
+/// Each vertex by a random number within +-height [m]; the same everywhere for the same seed.
+Eigen::Matrix3Xd crinkled(const TriangleMesh& mesh, double height, unsigned seed);
+
+}  // namespace slender

@@ -1,0 +1,85 @@
+// Guides that a bag holds: what is in it is read by a program that knows ROS.
+#include <stdexcept>
+
+#include "read_tracking.h"
+#include "yaml_number.h"
+
+namespace slender {
+
+namespace {
+
+BagReader& bagReader()
+{
+  static BagReader reader;
+  return reader;
+}
+
+}  // namespace
+
+void setBagReader(BagReader reader) { bagReader() = std::move(reader); }
+
+std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& context, bool bodies, double begin, const std::string& object)
+{
+  BagSource source;
+  source.bodies = bodies;
+  source.begin = begin;
+  source.object = object;
+  if (at.isMap())
+  {
+    YamlMap map(at);
+    assign(source.file, map.require("file").text());
+    assign(source.topic, map.get("topic").text());
+    assign(source.object, map.get("cloth").text());
+    map.finish();
+  }
+  else
+  {
+    assign(source.file, at.text());
+  }
+  if (source.file.empty())
+  {
+    return std::nullopt;
+  }
+  source.file = context.resolve(source.file);
+  if (!bagReader())
+  {
+    at.problem("needs a program that reads bags: simulate or tracking_node, built with ROS (WITH_ROS)");
+    return std::nullopt;
+  }
+  try
+  {
+    return bagReader()(source);
+  }
+  catch (const std::runtime_error& error)
+  {
+    at.problem(error.what());
+    return std::nullopt;
+  }
+}
+
+void readBagPoints(const YamlCursor& at, const ReadContext& context, double begin, const std::string& object, GuideSource& source)
+{
+  const Eigen::Index vertices = source.config.mesh.vertices.cols();
+  auto recorded = readBag(at, context, false, begin, object);
+  if (!recorded || vertices == 0)
+  {
+    return;
+  }
+  const Eigen::Matrix3Xd& first = recorded->points.frames().front();
+  if (first.cols() != vertices)
+  {
+    at.problem("has " + std::to_string(first.cols()) + " points, but the guide's mesh has " + std::to_string(vertices) + " vertices");
+    return;
+  }
+  for (const Eigen::Matrix3Xd& frame : recorded->points.frames())
+  {
+    if (!(frame.cwiseAbs().maxCoeff() <= max_coordinate))
+    {
+      at.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m");
+      return;
+    }
+  }
+  source.config.motion = FrameGuide{std::move(recorded->points)};
+}
+
+}  // namespace slender

@@ -1,0 +1,155 @@
+// `study report` as a program: what is there is not done again, what fails is told, and the page needs nothing else.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Result
+{
+  int status = -1;
+  std::string output;   // stdout and stderr
+};
+
+Result call(const std::string& command)
+{
+  Result result;
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+  if (!pipe)
+    return result;
+  std::array<char, 4096> buffer;
+  for (std::size_t count = 0; (count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
+    result.output.append(buffer.data(), count);
+  const int status = pclose(pipe);
+  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
+  return result;
+}
+
+std::string contents(const fs::path& path)
+{
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::size_t countOf(const std::string& text, const std::string& part)
+{
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++count;
+  return count;
+}
+
+class Report : public testing::Test
+{
+protected:
+  void SetUp() override
+  {
+    folder_ = testing::TempDir() + "/slender_sim_report_" + std::to_string(getpid());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  Result report(const std::string& arguments, const std::string& environment = "") const
+  {
+    return call(environment + " " SLENDER_STUDY " report --quick --out " + folder_ + "/out " + arguments);
+  }
+  std::string page() const { return contents(folder_ + "/out/report.html"); }
+
+  std::string folder_;
+};
+
+TEST_F(Report, isOnePageWithFiguresAndTablesThatLoadsNothing)
+{
+  const Result made = report("trouton elastica");
+  ASSERT_EQ(made.status, 0) << made.output;
+  const std::string html = page();
+  for (const char* study : {"trouton", "elastica"})
+  {
+    EXPECT_NE(html.find("<h3 id=\"" + std::string(study) + "\">"), std::string::npos);
+    const fs::path data = folder_ + "/out/data/" + study;
+    EXPECT_TRUE(fs::exists(data / (std::string(study) + ".csv")));
+    // every picture of the study is in the page, whole
+    for (const auto& file : fs::directory_iterator(data))
+      if (file.path().extension() == ".png")
+      {
+        const std::string begin = "<img alt=\"" + file.path().stem().string() + "\" src=\"data:image/png;base64,iVBOR";
+        const std::size_t at = html.find(begin);
+        ASSERT_NE(at, std::string::npos) << file.path();
+        const std::size_t start = html.find("base64,", at) + 7;
+        EXPECT_EQ(html.find('"', start) - start, (fs::file_size(file.path()) + 2) / 3 * 4) << file.path();
+      }
+  }
+  EXPECT_GE(countOf(html, "<img "), 1u);
+  EXPECT_NE(html.find("worst_error_over_bound"), std::string::npos);
+  EXPECT_NE(html.find("<td>processor</td>"), std::string::npos);
+  // nothing is loaded: what refers to anything refers to the page itself
+  const std::regex reference("(src|href)=(\"[^\"]{0,40}|[^\" >]{1,40})");
+  for (auto match = std::sregex_iterator(html.begin(), html.end(), reference); match != std::sregex_iterator(); ++match)
+    EXPECT_TRUE((*match)[2].str().rfind("\"data:image/png", 0) == 0 || (*match)[2].str().rfind("\"#", 0) == 0) << match->str();
+  for (const char* loads : {"<link", "<script", "@import", "url("})
+    EXPECT_EQ(html.find(loads), std::string::npos) << loads;
+  // links lead somewhere
+  const std::regex inside("href=\"#([^\"]*)\"");
+  for (auto match = std::sregex_iterator(html.begin(), html.end(), inside); match != std::sregex_iterator(); ++match)
+    EXPECT_TRUE(html.find("id=\"" + (*match)[1].str() + "\"") != std::string::npos || html.find("id=" + (*match)[1].str() + ">") != std::string::npos) << match->str();
+}
+
+TEST_F(Report, goesOnWhereItWasStopped)
+{
+  ASSERT_EQ(report("trouton").status, 0);
+  const fs::path result = folder_ + "/out/data/trouton/result.json";
+  // A result that no run would give: if the study ran again it would be gone.
+  const std::string mark = "{\"studies\": [{\"name\": \"trouton\", \"metrics\": {\"mark_of_the_test\": 42.5}, \"rows\": [], \"wall_seconds\": 1}]}\n";
+  std::ofstream(result) << mark;
+  const Result more = report("trouton elastica");
+  ASSERT_EQ(more.status, 0) << more.output;
+  EXPECT_NE(more.output.find("1 studies in"), std::string::npos) << more.output;
+  EXPECT_EQ(contents(result), mark);
+  EXPECT_NE(page().find("<td>mark_of_the_test</td><td class=n>42.5</td>"), std::string::npos);
+  // killed while it was writing: a part of a result is none
+  fs::rename(result, result.string() + ".part");
+  ASSERT_EQ(report("trouton elastica").status, 0);
+  EXPECT_EQ(page().find("mark_of_the_test"), std::string::npos);
+  EXPECT_NE(contents(result).find("worst_error_over_bound"), std::string::npos);
+}
+
+TEST_F(Report, tellsWhichStudiesFailedAndWhy)
+{
+  // `lean` needs valgrind, which is not on this path
+  fs::create_directories(folder_ + "/bin");
+  for (const char* program : {"/bin/mv", "/usr/bin/gnuplot"})
+    fs::create_symlink(program, folder_ + "/bin/" + fs::path(program).filename().string());
+  const Result made = report("lean trouton", "PATH=" + folder_ + "/bin");
+  EXPECT_EQ(made.status, 1) << made.output;
+  EXPECT_NE(made.output.find("lean ended with exit status 1"), std::string::npos) << made.output;
+  const std::string html = page();
+  EXPECT_NE(html.find("<a href=\"#lean\">lean</a></td><td colspan=3 class=bad>failed</td>"), std::string::npos);
+  EXPECT_NE(html.find("<p class=bad>failed: valgrind is missing"), std::string::npos);
+  EXPECT_EQ(countOf(html, "class=bad>failed"), 2u) << "the other one has not failed";
+}
+
+TEST_F(Report, mixesNothingAndKnowsItsStudies)
+{
+  ASSERT_EQ(report("trouton").status, 0);
+  const Result full = call(SLENDER_STUDY " report trouton --out " + folder_ + "/out");
+  EXPECT_EQ(full.status, 2);
+  EXPECT_NE(full.output.find("holds the results of another program or extent"), std::string::npos) << full.output;
+  const Result unknown = report("trouton elastika");
+  EXPECT_EQ(unknown.status, 2);
+  EXPECT_NE(unknown.output.find("elastika"), std::string::npos) << unknown.output;
+}
+
+}  // namespace

@@ -1,0 +1,244 @@
+// Bounds of the forces by which a cloth gets its prescribed averages.
+#include <gtest/gtest.h>
+
+#include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/tracking/weak_constraints.h"
+#include "test/support/cloths.h"
+
+namespace slender::test {
+namespace {
+
+/// A stiff sheet of 0.5 m that follows 4 x 4 cells of a guide.
+struct Bounded
+{
+  TriangleMesh coarse = gridMesh(0.5, 0.5, 4, 4, GridPattern::alternating);
+  Subdivision fine = subdivide(coarse, 2);
+  WeakConstraints constraints{subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh)};
+  std::shared_ptr<ClothModel> model;
+  ClothOptions options;
+  ClothState state;
+  ClothInputs inputs;
+
+  explicit Bounded(double traction)
+  {
+    model = std::make_shared<ClothModel>(buildCloth("bounded", fine.mesh, 0.2, isotropicMembrane(2e5, 0.3, 5e-4)));
+    model->bending = BendingModel::hinge;
+    model->bending_modulus = 1e-4;
+    model->stiffness_damping = 1e-3;
+    model->averages = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(constraints.matrix());
+    if (traction > 0)
+      model->average_bounds = traction * constraints.measures();
+    options.one_newton_step = true;
+    state = makeClothState(*model, fine.mesh.vertices);
+    inputs.pins.resize(3, 0);
+  }
+
+  Matrix3Xd stretched(double factor) const
+  {
+    Matrix3Xd q = coarse.vertices;
+    q.row(0) *= factor;
+    return q;
+  }
+
+  StepReport step(ClothStepper& stepper, const Matrix3Xd& q, double h = 0.01)
+  {
+    inputs.averages = constraints.averages(q);
+    return stepper.step(state, inputs, h);
+  }
+
+  double greatestForce(const ClothStepper& stepper) const   // over its bound
+  {
+    return (stepper.averageForces().colwise().norm().transpose().array() / model->average_bounds.array()).maxCoeff();
+  }
+
+  /// Of the averages that are met [m]; at the others the force must be that of the bound, and point at the target.
+  double check(const ClothStepper& stepper) const
+  {
+    double met = 0.0;
+    for (int i = 0; i < constraints.count(); ++i)
+    {
+      const double away = constraints.distance(i, inputs.averages, state.x);
+      if (!std::binary_search(state.at_bound.begin(), state.at_bound.end(), i))
+      {
+        met = std::max(met, away);
+        continue;
+      }
+      const Vector3d gap = inputs.averages.col(i) - state.x * Eigen::VectorXd(constraints.matrix().row(i).transpose());
+      EXPECT_LT((stepper.averageForces().col(i) - model->average_bounds[i] * gap.normalized()).norm(), 0.01 * model->average_bounds[i]) << i;
+    }
+    return met;
+  }
+};
+
+TEST(BoundedAverages, MoveAFreeBodyByTheBoundAlone)
+{
+  // one function over all of a sheet whose guide is far away: it falls towards it with the bound's acceleration, and stays there
+  const TriangleMesh coarse = gridMesh(0.5, 0.5, 4, 4, GridPattern::alternating);
+  std::vector<int> all(coarse.vertices.cols());
+  for (std::size_t i = 0; i < all.size(); ++i)
+    all[i] = static_cast<int>(i);
+  const Subdivision fine = subdivide(coarse, 1);
+  const WeakConstraints one(paintedRegions({{"all", all, {}}}, fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
+  EXPECT_NEAR(one.measures()[0], 0.25, 1e-12);
+  auto model = std::make_shared<ClothModel>(buildCloth("sheet", fine.mesh, 0.2, isotropicMembrane(2e5, 0.3, 5e-4)));
+  model->averages = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(one.matrix());
+  model->average_bounds.setConstant(1, 0.4);
+  ClothOptions options;
+  options.one_newton_step = true;
+  options.linear_tolerance = 1e-6;
+  ClothStepper stepper(model, options);
+  ClothState state = makeClothState(*model, fine.mesh.vertices);
+  ClothInputs inputs;
+  inputs.gravity.setZero();
+  const Vector3d way(0.06, 0.08, 0.0), a = 0.4 / model->totalMass() * way.normalized();
+  inputs.averages = one.averages(coarse.vertices.colwise() + way);
+  const double h = 0.01;
+  int k = 0;
+  for (; k < 8; ++k)
+  {
+    const StepReport report = stepper.step(state, inputs, h);
+    ASSERT_TRUE(report.ok) << report.message;
+    EXPECT_EQ(state.at_bound, std::vector<int>{0});
+    EXPECT_LT((stepper.averageForces().col(0) - 0.4 * way.normalized()).norm(), 1e-5);
+    const Vector3d moved = (state.x - fine.mesh.vertices).rowwise().mean(), expected = 0.5 * h * h * (k + 1) * (k + 2) * a;
+    EXPECT_LT((moved - expected).norm(), 1e-5 * expected.norm() + 1e-9) << k;   // implicit Euler's parabola
+  }
+  // it comes back and forth, less each time, until the force needed to hold it is less than the bound
+  for (; k < 400 && !(state.at_bound.empty() && k > 300); ++k)
+    ASSERT_TRUE(stepper.step(state, inputs, h).ok);
+  EXPECT_TRUE(state.at_bound.empty());
+  EXPECT_LT(one.error(inputs.averages, state.x), 1e-14);
+}
+
+TEST(BoundedAverages, ChangeNothingWhereTheyAreNotReached)
+{
+  Bounded free(0.0), bounded(1e9);
+  ClothStepper one(free.model, free.options), two(bounded.model, bounded.options);
+  for (int k = 1; k <= 20; ++k)
+  {
+    Matrix3Xd q = free.coarse.vertices;
+    for (Eigen::Index i = 0; i < q.cols(); ++i)
+      q(2, i) += 0.0005 * k * std::sin(6 * q(0, i));
+    ASSERT_TRUE(free.step(one, q).ok);
+    ASSERT_TRUE(bounded.step(two, q).ok);
+    ASSERT_TRUE(free.state.x == bounded.state.x && free.state.v == bounded.state.v) << k;
+    EXPECT_TRUE(bounded.state.at_bound.empty());
+    // what balances the end of the step, and what its linear equations had: they differ as far as these are not linear
+    EXPECT_LT((one.averageForces() - two.averageForces()).norm(), 0.1 * one.averageForces().norm()) << k;
+  }
+}
+
+TEST(BoundedAverages, LetTheMaterialRefuseToStretch)
+{
+  // a guide that stretches threefold and comes back; 200 Pa are a hundred times the weight
+  double strain[2], acceleration = 0.0;
+  for (const bool with : {false, true})
+  {
+    Bounded t(with ? 200.0 : 0.0);
+    ClothStepper stepper(t.model, t.options);
+    double refused = 0.0;
+    std::size_t most = 0;
+    strain[with] = 0.0;
+    Matrix3Xd before = t.state.v;
+    for (int k = 1; k <= 200; ++k)
+    {
+      const double s = k < 100 ? 0.5 - 0.5 * std::cos(2 * M_PI * k / 100.0) : 0.0;
+      const StepReport report = t.step(stepper, t.stretched(1.0 + 2.0 * s));
+      ASSERT_TRUE(report.ok) << report.message;
+      ASSERT_TRUE(t.state.x.allFinite());
+      strain[with] = std::max(strain[with], report.max_strain);
+      most = std::max(most, t.state.at_bound.size());
+      if (with)
+      {
+        EXPECT_LT(t.check(stepper), 1e-14) << k;
+        EXPECT_LT(t.greatestForce(stepper), 1.0 + 1e-9) << k;
+        acceleration = std::max(acceleration, (t.state.v - before).colwise().norm().maxCoeff() / 0.01);
+        refused = std::max(refused, t.constraints.error(t.inputs.averages, t.state.x));
+      }
+      before = t.state.v;
+    }
+    EXPECT_TRUE(t.state.at_bound.empty()) << t.state.at_bound.size();
+    EXPECT_LT(t.constraints.error(t.inputs.averages, t.state.x), 1e-14);
+    EXPECT_EQ(most > 10, with);
+    if (with)
+    {
+      EXPECT_GT(refused, 0.3);   // half of the way
+    }
+  }
+  EXPECT_GT(strain[0], 1.9);
+  EXPECT_LT(strain[1], 0.3);
+  // coming back is no jolt: where the guide meets what hung behind, forces are bounded, too (200 Pa on 0.2 kg/m^2 are 1000 m/s^2)
+  EXPECT_LT(acceleration, 100.0);
+}
+
+TEST(BoundedAverages, AreGivenUpWhereCollisionsForbidThem)
+{
+  // a floor above which no average can be met: a hundred and more rounds of collisions against averages would come to nothing, as sixteen do
+  for (const double traction : {0.0, 20.0})
+  {
+    Bounded t(traction);
+    ClothGroupModel model;
+    model.cloths = {t.model};
+    model.contact.resize(1);
+    ContactSolid floor;
+    floor.shape = Plane{};
+    model.solids.push_back(floor);
+    ClothGroup group(model, t.options);
+    ClothGroupState state{{t.state}, {{{0, 0, -0.01}, Eigen::Quaterniond::Identity()}}};
+    ClothGroupInputs inputs{{t.inputs}, state.solids};
+    for (int k = 1; k <= 20; ++k)
+    {
+      inputs.cloths[0].averages = t.constraints.averages(t.coarse.vertices.colwise() - Vector3d(0, 0, 0.002 * k));
+      const StepReport report = group.step(state, inputs, 0.01);
+      ASSERT_TRUE(report.ok) << report.message;
+      EXPECT_GT(state.cloths[0].x.row(2).minCoeff(), -0.01);
+      EXPECT_LT(group.collisions().rounds, 60) << traction << " step " << k;
+    }
+    EXPECT_GT(t.constraints.error(inputs.cloths[0].averages, state.cloths[0].x), 0.029);
+    EXPECT_EQ(state.cloths[0].at_bound.size(), traction > 0 ? 25u : 0u);
+  }
+}
+
+TEST(BoundedAverages, TellWhatFitsNot)
+{
+  Bounded t(10.0);
+  const auto refused = [&](const ClothOptions& options) -> std::string {
+    try
+    {
+      ClothStepper stepper(t.model, options);
+    }
+    catch (const std::invalid_argument& error)
+    {
+      return error.what();
+    }
+    return "";
+  };
+  ClothOptions full = t.options;
+  full.one_newton_step = false;
+  EXPECT_NE(refused(full).find("one_newton_step: true"), std::string::npos);
+  t.model->average_bounds[3] = 0.0;
+  EXPECT_NE(refused(t.options).find("must be positive"), std::string::npos);
+  t.model->average_bounds.setOnes(3);
+  EXPECT_NE(refused(t.options).find("one per average"), std::string::npos);
+}
+
+TEST(BoundedAverages, DoNotDependOnWhatWasAtItsBoundBefore)
+{
+  // the state's list decides where to look first, not what is found
+  Bounded a(200.0), b(200.0);
+  a.options.linear_tolerance = b.options.linear_tolerance = 1e-6;
+  ClothStepper one(a.model, a.options), two(b.model, b.options);
+  for (int k = 1; k <= 10; ++k)
+  {
+    b.state.at_bound.clear();
+    ASSERT_TRUE(a.step(one, a.stretched(1.0 + 0.02 * k)).ok);
+    ASSERT_TRUE(b.step(two, b.stretched(1.0 + 0.02 * k)).ok);
+    EXPECT_EQ(a.state.at_bound, b.state.at_bound) << k;
+    EXPECT_LT((a.state.x - b.state.x).cwiseAbs().maxCoeff(), 1e-6) << k;
+  }
+  EXPECT_FALSE(a.state.at_bound.empty());
+}
+
+}  // namespace
+}  // namespace slender::test
