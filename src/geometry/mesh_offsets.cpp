@@ -20,10 +20,9 @@ Eigen::Matrix3Xd vertexNormals(const TriangleMesh& mesh)
       normals.col(v) += normal;
     }
   }
-  for (Eigen::Index i = 0; i < normals.cols(); ++i)   // of vertices without a face: z
+  for (Eigen::Index i = 0; i < normals.cols(); ++i)
   {
-    const double length = normals.col(i).norm();
-    normals.col(i) = length > 0 ? Eigen::Vector3d(normals.col(i) / length) : Eigen::Vector3d(0, 0, 1);
+    normals.col(i).normalize();   // one by one: this leaves zeros alone
   }
   return normals;
 }
