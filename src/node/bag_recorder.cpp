@@ -31,7 +31,7 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
     throw std::runtime_error("bag " + path + ": cannot be written: is a directory");
   try
   {
-    bag_.open(path + ".active", rosbag::bagmode::Write);
+    bag_ = std::make_unique<rosbag::Bag>(path + ".active", rosbag::bagmode::Write);
   }
   catch (const rosbag::BagException& e)
   {
@@ -56,35 +56,35 @@ void BagRecorder::recordScene(const std::string& yaml, const ros::Time& stamp)
 {
   std_msgs::String message;
   message.data = yaml;
-  bag_.write(scene_topic_, stamp, message);
+  bag_->write(scene_topic_, stamp, message);
 }
 
-void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh) { bag_.write(mesh_topic_, mesh.header.stamp, mesh); }
+void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh) { bag_->write(mesh_topic_, mesh.header.stamp, mesh); }
 
 void BagRecorder::record(const SceneMessages& messages)
 {
   try
   {
     for (const slender_sim::RodState& state : messages.states)
-      bag_.write(state_topic_, state.header.stamp, state);
+      bag_->write(state_topic_, state.header.stamp, state);
     for (const slender_sim::ThreadState& state : messages.threads)
-      bag_.write(state_topic_, state.header.stamp, state);
+      bag_->write(state_topic_, state.header.stamp, state);
     if (!messages.cloths.names.empty())
-      bag_.write(state_topic_, messages.cloths.header.stamp, messages.cloths);
+      bag_->write(state_topic_, messages.cloths.header.stamp, messages.cloths);
     for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
-      bag_.write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
+      bag_->write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
     if (!messages.bodies.name.empty())
-      bag_.write(bodies_topic_, messages.bodies.header.stamp, messages.bodies);
+      bag_->write(bodies_topic_, messages.bodies.header.stamp, messages.bodies);
     for (std::size_t k = 0; k < messages.nozzles.size(); ++k)
-      bag_.write(nozzle_topics_[k], messages.nozzles[k].header.stamp, messages.nozzles[k]);
+      bag_->write(nozzle_topics_[k], messages.nozzles[k].header.stamp, messages.nozzles[k]);
     if (!messages.grasps.name.empty())
-      bag_.write(grasps_topic_, messages.grasps.header.stamp, messages.grasps);
+      bag_->write(grasps_topic_, messages.grasps.header.stamp, messages.grasps);
     if (!messages.obstacles.name.empty())
-      bag_.write(obstacles_topic_, messages.obstacles.header.stamp, messages.obstacles);
+      bag_->write(obstacles_topic_, messages.obstacles.header.stamp, messages.obstacles);
   }
   catch (const rosbag::BagException& e)
   {
-    throw std::runtime_error("bag " + path_ + ": " + e.what());
+    throw std::runtime_error("bag " + path_ + ": " + e.what() + "; what came before is in " + path_ + ".active (rosbag reindex reads it)");
   }
 }
 
@@ -95,11 +95,12 @@ void BagRecorder::close()
   open_ = false;
   try
   {
-    bag_.close();
+    bag_->close();
   }
   catch (const rosbag::BagException& e)
   {
-    throw std::runtime_error("bag " + path_ + ": " + e.what());
+    (void)bag_.release();   // its destructor would try again, and end the program
+    throw std::runtime_error("bag " + path_ + ": " + e.what() + "; what came before is in " + path_ + ".active (rosbag reindex reads it)");
   }
   if (std::rename((path_ + ".active").c_str(), path_.c_str()) != 0)
     throw std::runtime_error("bag " + path_ + ": cannot be renamed from " + path_ + ".active: " + std::strerror(errno));

@@ -37,7 +37,7 @@ public:
 private:
   std::string path_, state_topic_, scene_topic_, mesh_topic_, bodies_topic_, grasps_topic_, obstacles_topic_;
   std::vector<std::string> wrench_topics_, nozzle_topics_;
-  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::Bag> bag_;
   bool open_ = false;
 };
 
