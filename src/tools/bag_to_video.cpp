@@ -10,7 +10,7 @@
 #include "arguments.h"
 #include "export_program.h"
 #include "picture.h"
-#include "processes.h"
+#include "../study/processes.h"
 
 /// bag_to_video BAG --out FILE.mp4|FILE.gif: pictures of what was recorded, joined by ffmpeg.
 namespace {

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "arguments.h"
-#include "processes.h"
+#include "../study/processes.h"
 
 namespace slender {
 
