@@ -11,6 +11,11 @@ foreach(node rod_node thread_node cloth_node tracking_node fairing_node motion_p
   target_link_libraries(${node} PRIVATE slender_sim_node)
 endforeach()
 
+# The same as nodelets. The library is loaded by name (nodelets.xml).
+add_library(slender_sim_nodelets MODULE ${PROJECT_SOURCE_DIR}/src/nodes/nodelets.cpp)
+target_link_libraries(slender_sim_nodelets PRIVATE slender_sim_node ${nodelet_LIBRARIES})
+target_include_directories(slender_sim_nodelets PRIVATE ${nodelet_INCLUDE_DIRS})
+
 if(BUILD_TESTING)
   find_package(rostest REQUIRED)
   # Pure functions and buffers: no master needed.
@@ -23,8 +28,12 @@ if(BUILD_TESTING)
   target_link_libraries(node_unit_tests PRIVATE slender_sim_node GTest::gtest GTest::gtest_main)
   add_test(NAME node_unit COMMAND node_unit_tests)
 
+  # Loads the nodelets into itself: what is copied between them can be counted.
+  add_executable(nodelet_tests ${PROJECT_SOURCE_DIR}/test/nodes/nodelet_test.cpp)
+  target_link_libraries(nodelet_tests PRIVATE slender_sim_node ${nodelet_LIBRARIES} GTest::gtest)
+
   file(GLOB ROSTESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/nodes/*.test)
   foreach(test ${ROSTESTS})
-    add_rostest(${test} DEPENDENCIES rod_node thread_node cloth_node tracking_node fairing_node motion_player slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
+    add_rostest(${test} DEPENDENCIES rod_node thread_node cloth_node tracking_node fairing_node motion_player slender_sim_nodelets nodelet_tests slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
   endforeach()
 endif()

@@ -55,6 +55,7 @@ std::vector<TubeSection> tubeSections(const FramedLine& line, int most)
     const Vector3d d0 = directorAt(line, j), d1 = directorAt(line, next);
     const Eigen::Vector2d a0 = semiAxesAt(line, j), a1 = semiAxesAt(line, next);
     const int last = next == edges ? pieces : pieces - 1;
+    const double v0 = line.values.empty() ? 0.0 : line.values[j], v1 = line.values.empty() ? 0.0 : line.values[next % nodes];
     for (int k = 0; k <= last; ++k)
     {
       const double f = static_cast<double>(k) / pieces, g = 1.0 - f;
@@ -62,7 +63,8 @@ std::vector<TubeSection> tubeSections(const FramedLine& line, int most)
       const Eigen::Vector2d axes = g * a0 + f * a1;
       Vector3d d = g * d0 + f * d1;
       d = (d - d.dot(t) * t).normalized();
-      out.push_back({(1 + 2 * f) * g * g * x0 + f * g * g * m0 + f * f * (3 - 2 * f) * x1 - f * f * g * m1, axes[0] * d, axes[1] * t.cross(d)});
+      out.push_back({(1 + 2 * f) * g * g * x0 + f * g * g * m0 + f * f * (3 - 2 * f) * x1 - f * f * g * m1, axes[0] * d, axes[1] * t.cross(d),
+                     g * v0 + f * v1});
     }
   }
   return out;

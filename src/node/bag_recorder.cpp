@@ -65,12 +65,12 @@ void BagRecorder::record(const SceneMessages& messages)
 {
   try
   {
-    for (const slender_sim::RodState& state : messages.states)
-      bag_->write(state_topic_, state.header.stamp, state);
-    for (const slender_sim::ThreadState& state : messages.threads)
-      bag_->write(state_topic_, state.header.stamp, state);
-    if (!messages.cloths.names.empty())
-      bag_->write(state_topic_, messages.cloths.header.stamp, messages.cloths);
+    for (const auto& state : messages.states)
+      bag_->write(state_topic_, state->header.stamp, *state);
+    for (const auto& state : messages.threads)
+      bag_->write(state_topic_, state->header.stamp, *state);
+    if (!messages.cloth_state->names.empty())
+      bag_->write(state_topic_, messages.cloth_state->header.stamp, *messages.cloth_state);
     for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
       bag_->write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
     if (!messages.bodies.name.empty())

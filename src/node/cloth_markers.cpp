@@ -71,8 +71,10 @@ void addEdges(const MeshTopology& topology, const Eigen::Matrix3Xd& x, Marker& m
 
 }  // namespace
 
-void addClothMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style, visualization_msgs::MarkerArray& out)
+void addClothMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
+                     visualization_msgs::MarkerArray& out)
 {
+  const MarkerStyle style = options.style;
   std::vector<double> spacing;   // mean distance of neighbours, per cloth [m]
   for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
   {
@@ -92,7 +94,16 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
     {
       const auto& tracking = simulation.config().cloths[k].tracking;
       const bool regions = style == MarkerStyle::regions && tracking;
-      addTriangles(model.rest.triangles, x, paint, regions ? functionColors(tracking->functions.tracked) : Eigen::Matrix3Xd(), marker);
+      Eigen::Matrix3Xd paints = regions ? functionColors(tracking->functions.tracked) : Eigen::Matrix3Xd();
+      const std::vector<double> values = shownValues(model, x, options.color);
+      if (!values.empty())
+        paints.resize(3, x.cols());
+      for (std::size_t i = 0; i < values.size(); ++i)
+      {
+        const std_msgs::ColorRGBA c = valueColor(values[i] / range);
+        paints.col(static_cast<Eigen::Index>(i)) << c.r, c.g, c.b;
+      }
+      addTriangles(model.rest.triangles, x, paint, paints, marker);
     }
     out.markers.push_back(std::move(marker));
     if (const auto& tracking = simulation.config().cloths[k].tracking)

@@ -12,7 +12,6 @@ namespace {
 
 constexpr int kQueueSize = 1000;               // a burst of fast trackers; in wall pace it is emptied every step
 constexpr std::size_t kMaxPending = 1000;
-constexpr int kGuidesSource = -1, kBodiesSource = -2;
 
 /// Names of the scene's own bodies and obstacles: grasps follow those without messages.
 std::set<std::string> solidNames(const SceneConfig& scene)
@@ -29,7 +28,7 @@ std::set<std::string> solidNames(const SceneConfig& scene)
 
 GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
                          const std::vector<std::string>& grasp_names, const std::vector<std::string>& thread_prefixes)
-  : options_(options), clock_(clock)
+  : options_(options), simulation_(&simulation), clock_(clock)
 {
   GuideBuffer::Options buffer_options;
   buffer_options.delay = options.guide_delay;
@@ -312,6 +311,7 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
 void GuideInputs::processPending()
 {
   tracking_->processPending();
+  takeHand();
   if (pending_.empty())
     return;
   const auto now = std::chrono::steady_clock::now();
@@ -384,6 +384,7 @@ void GuideInputs::attachAt(int grasp, const Pose& X_WG)
 
 void GuideInputs::attachAll(const Simulation& simulation)
 {
+  hand_.clear();
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
       guided_[g].buffer->attachAt(poseOf(simulation, g));
@@ -393,6 +394,7 @@ void GuideInputs::attachAll(const Simulation& simulation)
 void GuideInputs::restart(const Simulation& simulation)
 {
   pending_.clear();
+  hand_.clear();
   wind_.reset();
   for (Driven& thread : threads_)
     thread.flow.reset(), thread.belt.reset();

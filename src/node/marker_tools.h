@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 #include <visualization_msgs/MarkerArray.h>
@@ -16,8 +17,21 @@ visualization_msgs::Marker makeMarker(const std_msgs::Header& header, const std:
 /// rviz does not light triangles that have colours of their own, so light from above and the side is painted in.
 std_msgs::ColorRGBA lit(const std_msgs::ColorRGBA& paint, const Eigen::Vector3d& normal);
 
-/// One marker per cloth and per grasp of it.
-void addClothMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style, visualization_msgs::MarkerArray& out);
+/// What colours show, per node or vertex (see MarkerOptions::range for units); empty: nothing to show.
+std::vector<double> shownValues(const RodModel& model, const RodState& state, MarkerColor what);
+std::vector<double> shownValues(const ThreadState& state, MarkerColor what);
+std::vector<double> shownValues(const ClothModel& model, const Eigen::Matrix3Xd& x, MarkerColor what);
+/// Value of the full colour.
+double shownRange(const Simulation& simulation, const MarkerOptions& options);
+/// From -1 blue over 0 grey to 1 red.
+std_msgs::ColorRGBA valueColor(double share);
+
+/// One marker per cloth and per grasp of it. `range`: see shownRange().
+void addClothMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
+                     visualization_msgs::MarkerArray& out);
+
+/// Arrows of forces, `scale` [m/N] long.
+void addForceMarkers(const Simulation& simulation, const std_msgs::Header& header, double scale, visualization_msgs::MarkerArray& out);
 
 /// One marker per body and obstacle that has a shape.
 void addSolidMarkers(const Simulation& simulation, const std_msgs::Header& header, visualization_msgs::MarkerArray& out);

@@ -181,8 +181,13 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
   params.read("tf_timeout", o.tf_timeout, 0.0, 100.0);
   params.read("diagnostics_rate", o.diagnostics_rate, 0.0, 1000.0, true);
   params.read("marker_rate", o.marker_rate, 0.0, 30.0, true);
-  params.read<MarkerStyle>("marker_style", o.marker_style, {{"tube", MarkerStyle::tube}, {"line", MarkerStyle::line}, {"regions", MarkerStyle::regions}});
-  params.read("marker_frames", o.marker_frames);
+  params.read<MarkerStyle>("marker_style", o.markers.style, {{"tube", MarkerStyle::tube}, {"line", MarkerStyle::line}, {"regions", MarkerStyle::regions}});
+  params.read("interactive", o.interactive);
+  params.read("marker_frames", o.markers.frames);
+  params.read<MarkerColor>("marker_color", o.markers.color,
+                           {{"none", MarkerColor::none}, {"strain", MarkerColor::strain}, {"curvature", MarkerColor::curvature}, {"twist", MarkerColor::twist}});
+  params.read("marker_range", o.markers.range, 0.0, 1e9);
+  params.read("marker_forces", o.markers.forces, 0.0, 1e9);
   params.refuseUnknown();
   if (o.scene.empty())
     throw OptionError("~scene: missing; give the path of a scene file (or its YAML text)");

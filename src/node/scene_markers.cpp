@@ -26,13 +26,21 @@ const std::array<std_msgs::ColorRGBA, 4>& rodColors()
   return colors;
 }
 
+std::vector<double> shares(std::vector<double> values, double range)
+{
+  for (double& value : values)
+    value /= range;
+  return values;
+}
+
 /// The stripes' edges are sharp because each side has one colour.
-void addTube(const std::vector<TubeSection>& sections, const std_msgs::ColorRGBA& base, bool striped, bool closed, Marker& marker)
+void addTube(const std::vector<TubeSection>& sections, const std_msgs::ColorRGBA& base, bool valued, bool striped, bool closed, Marker& marker)
 {
   const int sides = sections.size() > kManySections ? kCoarseSides : kSides;
   const std_msgs::ColorRGBA stripe = color(0.20, 0.24, 0.30);
   const TriangleMesh mesh = tubeMesh(sections, sides, closed);
   const Eigen::Index walls = 2 * sides * (static_cast<Eigen::Index>(sections.size()) - 1);
+  const int rings = static_cast<int>(sections.size()) - (closed ? 1 : 0);
   marker.points.reserve(static_cast<std::size_t>(mesh.triangles.size()));
   marker.colors.reserve(static_cast<std::size_t>(mesh.triangles.size()));
   for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
@@ -43,8 +51,10 @@ void addTube(const std::vector<TubeSection>& sections, const std_msgs::ColorRGBA
     const Vector3d a = mesh.vertices.col(t[0]), cap = (mesh.vertices.col(t[1]) - a).cross(mesh.vertices.col(t[2]) - a).normalized();
     for (const int vertex : {t[0], t[1], t[2]})
     {
+      // of the cap's middle it is that of its end
+      const TubeSection& section = vertex < rings * sides ? sections[vertex / sides] : vertex == rings * sides ? sections.front() : sections.back();
       marker.points.push_back(toPoint(mesh.vertices.col(vertex)));
-      marker.colors.push_back(lit(dark ? stripe : base, wall ? tubeNormal(sections[vertex / sides], vertex % sides, sides) : cap));
+      marker.colors.push_back(lit(dark ? stripe : valued ? valueColor(section.value) : base, wall ? tubeNormal(section, vertex % sides, sides) : cap));
     }
   }
 }
@@ -87,24 +97,30 @@ Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& co
   return marker;
 }
 
-Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id, MarkerStyle style, const std::vector<TubeSection>& curve,
-                   const std_msgs::ColorRGBA& paint, bool striped, bool closed, double width)
+Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id, MarkerStyle style, const FramedLine& line, int most,
+                   const std_msgs::ColorRGBA& paint, bool striped, double width)
 {
   Marker marker = makeMarker(header, ns, id, style == MarkerStyle::tube ? Marker::TRIANGLE_LIST : Marker::LINE_STRIP);
+  const std::vector<TubeSection> curve = tubeSections(line, most);
   if (style == MarkerStyle::tube)
-    addTube(curve, paint, striped, closed, marker);
+    addTube(curve, paint, !line.values.empty(), striped, line.closed, marker);
   else
   {
     marker.scale.x = width;
     marker.color = paint;
     for (const TubeSection& s : curve)
+    {
       marker.points.push_back(toPoint(s.x));
+      if (!line.values.empty())
+        marker.colors.push_back(valueColor(s.value));
+    }
   }
   return marker;
 }
 
 /// Of a thread and its pieces: one marker each.
-void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style, visualization_msgs::MarkerArray& out)
+void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
+                      visualization_msgs::MarkerArray& out)
 {
   const std_msgs::ColorRGBA honey = color(0.90, 0.60, 0.12), metal = color(0.55, 0.57, 0.60), ground = color(0.42, 0.45, 0.50);
   double edges = 0.0;
@@ -120,8 +136,9 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
       double volume = 0.0, length = 0.0;
       for (int j = 0; j < thread.edges(); ++j)
         volume += thread.volume[j], length += thread.edge(j).norm();
-      out.markers.push_back(curveMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id), style, tubeSections(lineOf(snapshotOf(config.name, thread)), share),
-                                        honey, false, false, 2.0 * std::sqrt(volume / (M_PI * length))));
+      const FramedLine line = lineOf(snapshotOf(config.name, thread), shares(shownValues(thread, options.color), range));
+      out.markers.push_back(curveMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id), options.style, line, share, honey, false,
+                                        2.0 * std::sqrt(volume / (M_PI * length))));
     }
     if (config.nozzle)
     {
@@ -157,10 +174,10 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
 
 }  // namespace
 
-visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, MarkerStyle style,
-                                           bool material_frames)
+visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options)
 {
   visualization_msgs::MarkerArray out;
+  const double range = shownRange(simulation, options);
   if (!simulation.state().threads.empty())
   {
     // pieces come and go; rviz takes this for all namespaces, so it can stand here only
@@ -173,9 +190,11 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
     const RodModel& model = simulation.rodModel(static_cast<int>(r));
     const RodState& state = simulation.state().rods[r];
     const std_msgs::ColorRGBA& base = rodColors()[r % rodColors().size()];
-    out.markers.push_back(curveMarker(header, "rods/" + model.name, 0, style, tubeSections(lineOf(snapshotOf(model, state)), kMaxSections), base, true, model.closed,
+    FramedLine line = lineOf(snapshotOf(model, state));
+    line.values = shares(shownValues(model, state, options.color), range);
+    out.markers.push_back(curveMarker(header, "rods/" + model.name, 0, options.style, line, kMaxSections, base, true,
                                       2.0 * model.radius_a.mean()));
-    if (material_frames)
+    if (options.frames)
     {
       Marker frames = makeMarker(header, "frames/" + model.name, 0, Marker::LINE_LIST);
       addFrames(model, state, frames);
@@ -190,9 +209,11 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
     out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config, simulation.state().rods[ref.rod].grasps[ref.index],
                                       simulation.rodModel(ref.rod)));
   }
-  addThreadMarkers(simulation, header, style, out);
-  addClothMarkers(simulation, header, style, out);
+  addThreadMarkers(simulation, header, options, range, out);
+  addClothMarkers(simulation, header, options, range, out);
   addSolidMarkers(simulation, header, out);
+  if (options.forces > 0.0)
+    addForceMarkers(simulation, header, options.forces, out);
   return out;
 }
 

@@ -66,6 +66,8 @@ slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time
 void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch)
 {
   const SceneState& scene = simulation.state();
+  geometry_msgs::PoseArray& poses = edge_poses.renew();
+  slender_sim::ClothState& cloths = cloth_state.renew();
   states.resize(scene.rods.size());
   poses.header.stamp = stamp;
   poses.header.frame_id = frame_id;
@@ -73,10 +75,11 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
   for (std::size_t r = 0; r < scene.rods.size(); ++r)
   {
     const RodModel& model = simulation.rodModel(static_cast<int>(r));
-    toMessage(model, scene.rods[r], states[r]);
-    states[r].header = poses.header;
-    states[r].epoch = epoch;
-    states[r].step = scene.steps;
+    slender_sim::RodState& message = states[r].renew();
+    toMessage(model, scene.rods[r], message);
+    message.header = poses.header;
+    message.epoch = epoch;
+    message.step = scene.steps;
     appendPoses(model, scene.rods[r], poses.poses);
   }
   std::size_t piece = 0;
@@ -86,7 +89,7 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     for (const ThreadState& thread : scene.threads[k].threads)
     {
       threads.resize(std::max(threads.size(), piece + 1));
-      slender_sim::ThreadState& message = threads[piece++];
+      slender_sim::ThreadState& message = threads[piece++].renew();
       toMessage(thread, message);
       message.header = poses.header;
       message.epoch = epoch;

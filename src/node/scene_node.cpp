@@ -8,7 +8,6 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/WrenchStamped.h>
 #include <rosgraph_msgs/Clock.h>
-#include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/String.h>
 
 #include "slender_sim/ClothState.h"
@@ -117,6 +116,13 @@ void SceneNode::startClock()
   clock_ = SimClock(start, simulation_->config().time.step);
   clock_started_ = true;
   inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, grasp_names_, thread_prefixes_);
+  if (options_.interactive)
+  {
+    const std::string topic = nh_.resolveName("interactive");
+    hands_ = std::make_unique<HandMarkers>(topic, options_.frame_id);
+    inputs_->listenToHand(nh_, topic);
+    showHandles();
+  }
   advertise();
   advertiseServices();
   std_msgs::String scene;
@@ -159,6 +165,7 @@ void SceneNode::advertise()
   if (simulation_->config().rods.size() > 1)
     for (const RodConfig& rod : simulation_->config().rods)
       rod_poses_pubs_.push_back(nh_.advertise<geometry_msgs::PoseArray>("rods/" + rod.name + "/poses", 100));
+  rod_poses_.resize(rod_poses_pubs_.size());
   for (const std::string& name : grasp_names_)
     wrench_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>("grasps/" + name + "/wrench", 100));
   const std::vector<BodyConfig>& bodies = simulation_->config().bodies;
@@ -222,7 +229,7 @@ void SceneNode::fail(const std::string& reason)
   mode_before_failure_ = mode_;
   mode_ = Mode::failed;
   failure_ = "step " + std::to_string(simulation_->state().steps + 1) + ": " + reason;
-  ROS_ERROR("stopped at %s; call ~reset to start again", failure_.c_str());
+  ROS_ERROR("%s stopped at %s; call ~reset to start again", nh_priv_.getNamespace().c_str(), failure_.c_str());
   publishDiagnostics();
 }
 
@@ -240,46 +247,45 @@ void SceneNode::publishState()
       std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) && std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard) && std::none_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard))
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
-  for (const slender_sim::RodState& state : messages_.states)
-    state_pub_.publish(state);
-  for (const slender_sim::ThreadState& state : messages_.threads)
-    state_pub_.publish(state);
+  if (bag_)   // first: what is published belongs to others
+    try
+    {
+      bag_->record(messages_);
+    }
+    catch (const std::runtime_error& e)
+    {
+      recordingFailed(e.what());
+    }
+  if (heard(points_pub_))
+  {
+    sensor_msgs::PointCloud2& points = points_.renew();
+    points.header = messages_.cloth_state->header;
+    toPoints(*messages_.cloth_state, points);
+    points_pub_.publish(points_.pointer());
+  }
+  for (std::size_t r = 0; r < rod_poses_pubs_.size(); ++r)
+    if (heard(rod_poses_pubs_[r]))
+    {
+      geometry_msgs::PoseArray& poses = rod_poses_[r].renew();
+      poses.header = messages_.edge_poses->header;
+      poses.poses.clear();
+      appendPoses(simulation_->rodModel(static_cast<int>(r)), simulation_->state().rods[r], poses.poses);
+      rod_poses_pubs_[r].publish(rod_poses_[r].pointer());
+    }
+  for (const auto& state : messages_.states)
+    state_pub_.publish(state.pointer());
+  for (const auto& state : messages_.threads)
+    state_pub_.publish(state.pointer());
+  if (hasCloths(kind_))
+    state_pub_.publish(messages_.cloth_state.pointer());
+  else
+    poses_pub_.publish(messages_.edge_poses.pointer());
   for (std::size_t k = 0; k < nozzle_pubs_.size(); ++k)
     nozzle_pubs_[k].publish(messages_.nozzles[k]);
-  if (hasCloths(kind_))
-  {
-    state_pub_.publish(messages_.cloths);
-    if (heard(points_pub_))
-    {
-      sensor_msgs::PointCloud2 points;
-      points.header = messages_.cloths.header;
-      toPoints(messages_.cloths, points);
-      points_pub_.publish(points);
-    }
-  }
-  else
-    poses_pub_.publish(messages_.poses);
-  for (std::size_t r = 0; r < rod_poses_pubs_.size(); ++r)
-  {
-    geometry_msgs::PoseArray poses;
-    poses.header = messages_.poses.header;
-    appendPoses(simulation_->rodModel(static_cast<int>(r)), simulation_->state().rods[r], poses.poses);
-    rod_poses_pubs_[r].publish(poses);
-  }
   for (std::size_t g = 0; g < wrench_pubs_.size(); ++g)
     wrench_pubs_[g].publish(messages_.wrenches[g]);
   if (!messages_.bodies.name.empty())
     bodies_pub_.publish(messages_.bodies);
-  if (!bag_)
-    return;
-  try
-  {
-    bag_->record(messages_);
-  }
-  catch (const std::runtime_error& e)
-  {
-    recordingFailed(e.what());
-  }
 }
 
 void SceneNode::broadcastBodies()
@@ -304,11 +310,17 @@ void SceneNode::broadcastBodies()
   tf_broadcaster_->sendTransform(transforms);
 }
 
+void SceneNode::showHandles()
+{
+  if (hands_)
+    hands_->show(inputs_->handles(*simulation_));
+}
+
 void SceneNode::recordingFailed(const std::string& reason)
 {
   bag_failure_ = reason;
   bag_.reset();
-  ROS_ERROR("recording stopped: %s", reason.c_str());
+  ROS_ERROR("%s: recording stopped: %s", nh_priv_.getNamespace().c_str(), reason.c_str());
 }
 
 void SceneNode::publishMarkers()
@@ -322,13 +334,15 @@ void SceneNode::publishMarkers()
   std_msgs::Header header;
   header.stamp = clock_.stamp();
   header.frame_id = options_.frame_id;
-  markers_pub_.publish(sceneMarkers(*simulation_, header, options_.marker_style, options_.marker_frames));
+  markers_pub_.publish(boost::make_shared<visualization_msgs::MarkerArray>(
+      sceneMarkers(*simulation_, header, options_.markers)));
 }
 
 void SceneNode::jumped()
 {
   ++epoch_;
   clock_.tick();   // stamps grow even so
+  showHandles();
   realign();
   publishState();
 }
@@ -369,7 +383,7 @@ void SceneNode::work()
   }
   inputs_->processPending();
   const ros::WallTime begin = ros::WallTime::now();
-  while (mode_ == Mode::running && !finished_ && options_.pace != Pace::step && untilDue().toSec() == 0.0 &&
+  while (mode_ == Mode::running && !ended() && options_.pace != Pace::step && untilDue().toSec() == 0.0 &&
          (ros::WallTime::now() - begin).toSec() < kBurst)
   {
     if (!advance())
@@ -389,7 +403,7 @@ void SceneNode::tell()
 
 int SceneNode::spin()
 {
-  while (nh_.ok() && !finished_)
+  while (!ended())
   {
     queue_.callAvailable(untilDue());
     work();

@@ -2,7 +2,6 @@
 #include <cstdio>
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
-#include <ros/this_node.h>
 
 #include "slender_sim/node/scene_node.h"
 
@@ -70,7 +69,7 @@ void SceneNode::publishDiagnostics()
 DiagnosticStatus SceneNode::simulationStatus() const
 {
   DiagnosticStatus status;
-  status.name = ros::this_node::getName() + ": simulation";
+  status.name = nh_priv_.getNamespace() + ": simulation";
   status.hardware_id = simulation_->config().name;
   status.level = DiagnosticStatus::OK;
 
@@ -163,7 +162,7 @@ DiagnosticStatus SceneNode::simulationStatus() const
 DiagnosticStatus SceneNode::inputStatus()
 {
   DiagnosticStatus status;
-  status.name = ros::this_node::getName() + ": inputs";
+  status.name = nh_priv_.getNamespace() + ": inputs";
   status.hardware_id = simulation_->config().name;
   status.level = DiagnosticStatus::OK;
   for (const GuideInputs::Age& age : inputs_->ages())

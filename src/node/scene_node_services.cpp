@@ -61,7 +61,7 @@ bool SceneNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::R
   {
     inputs_->processPending();
     std::uint32_t done = 0;
-    while (done < request.n && nh_.ok() && !finished_ && advance())
+    while (done < request.n && !ended() && advance())
     {
       ++done;
       tell();
@@ -95,7 +95,10 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
     if (!active)
       response.message = request.name + " holds nothing";
     else
+    {
       simulation_->release(g);
+      showHandles();
+    }
     response.success = active;
     return true;
   }
@@ -160,6 +163,7 @@ std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int
     return e.what();
   }
   inputs_->attachAt(grasp, simulation_->graspPose(grasp));
+  showHandles();
   response.first_node = first;
   response.last_node = last;
   return "";

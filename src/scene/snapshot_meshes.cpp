@@ -77,7 +77,7 @@ FramedLine lineOf(const RodSnapshot& rod)
   return line;
 }
 
-FramedLine lineOf(const ThreadSnapshot& thread)
+FramedLine lineOf(const ThreadSnapshot& thread, const std::vector<double>& values)
 {
   Eigen::Index first = 0, last = thread.radius.size();
   while (last - first > 1 && !(thread.radius[first] > 0))
@@ -89,6 +89,8 @@ FramedLine lineOf(const ThreadSnapshot& thread)
   for (Eigen::Index j = 0; j < edges; ++j)
     line.d1.col(j) = thread.frames[static_cast<std::size_t>(first + j)] * Vector3d::UnitY();
   line.semi_axes = thread.radius.segment(first, edges).transpose().replicate(2, 1);
+  if (!values.empty())
+    line.values.assign(values.begin() + first, values.begin() + first + edges + 1);
   return line;
 }
 

@@ -1,4 +1,6 @@
+#include <fstream>
 #include <map>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -38,7 +40,7 @@ bodies:
   - {name: cube, density: 1, shape: {mesh: {file: cube.obj}}, pose: {position: [5, 0, 0]}}
 )", "scene", {}, std::string(SLENDER_SOURCE_DIR) + "/test/unit/data"));
   std::map<std::pair<std::string, int>, Marker> markers;
-  for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header(), MarkerStyle::line, false).markers)
+  for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header(), {MarkerStyle::line}).markers)
     markers[{marker.ns, marker.id}] = marker;
   ASSERT_EQ(markers.size(), 1u + 5u + 1u);   // no picture of the body without a shape
   const Marker& floor = markers[{"obstacles", 0}];
@@ -70,7 +72,7 @@ TEST(Markers, threadsAreTubesOrLinesOfBoundedSize)
   const Simulation simulation(parseScene("threads:\n  - {name: a, " + thread + "\n  - {name: b, " + thread, "scene"));
   int erased = 0, tubes = 0;
   std::size_t triangles = 0;
-  const auto markers = sceneMarkers(simulation, std_msgs::Header(), MarkerStyle::tube, false).markers;
+  const auto markers = sceneMarkers(simulation, std_msgs::Header()).markers;
   for (const Marker& marker : markers)
   {
     erased += marker.action == Marker::DELETEALL;
@@ -84,13 +86,103 @@ TEST(Markers, threadsAreTubesOrLinesOfBoundedSize)
   EXPECT_EQ(erased, 1);
   EXPECT_EQ(tubes, 2);
   EXPECT_LT(triangles, 60000u);
-  for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header(), MarkerStyle::line, false).markers)
+  for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header(), {MarkerStyle::line}).markers)
     if (marker.action == Marker::ADD)
     {
       EXPECT_EQ(marker.type, Marker::LINE_STRIP);
       EXPECT_NEAR(marker.scale.x, 0.004, 1e-9);
       EXPECT_NEAR(marker.points.back().x, 0.1, 1e-12);
     }
+}
+
+const Marker& find(const visualization_msgs::MarkerArray& markers, const std::string& ns, int id = 0)
+{
+  for (const Marker& marker : markers.markers)
+    if (marker.ns == ns && marker.id == id)
+      return marker;
+  throw std::runtime_error("no marker " + ns);
+}
+
+MarkerOptions colored(MarkerColor color, double range, MarkerStyle style = MarkerStyle::line)
+{
+  MarkerOptions options;
+  options.style = style;
+  options.color = color;
+  options.range = range;
+  return options;
+}
+
+/// A quarter of a circle of radius 0.5 m: its curvature is 2 per metre.
+TEST(Markers, coloursShowCurvature)
+{
+  const Simulation bent(parseScene("rods: [{name: arc, centerline: {arc: {start: [0.5, 0, 0], axis: [0, 0, 1], angle: 1.5707963, edges: 40}}}]", "scene"));
+  const auto at = [&](double range, MarkerStyle style = MarkerStyle::line) -> Marker {
+    return find(sceneMarkers(bent, std_msgs::Header(), colored(MarkerColor::curvature, range, style)), "rods/arc");
+  };
+  const Marker full = at(2.0), half = at(4.0), grey = at(1e6), tube = at(2.0, MarkerStyle::tube);
+  ASSERT_EQ(full.colors.size(), full.points.size());
+  const std::size_t middle = full.colors.size() / 2;
+  EXPECT_NEAR(full.colors[middle].g, 0.14, 0.01);   // full red
+  EXPECT_NEAR(grey.colors[middle].g, 0.86, 0.01);
+  EXPECT_LT(half.colors[middle].g, 0.6);
+  EXPECT_GT(half.colors[middle].g, 0.25);
+  EXPECT_NEAR(full.colors.front().g, 0.86, 0.01);      // none at a free end
+  EXPECT_NEAR(at(0.0).colors[middle].g, 0.14, 0.01);   // the largest is the full colour
+  EXPECT_EQ(tube.colors.size(), tube.points.size());
+  EXPECT_TRUE(find(sceneMarkers(bent, std_msgs::Header(), {MarkerStyle::line}), "rods/arc").colors.empty());
+}
+
+TEST(Markers, coloursShowStrainOfRodsAndCloths)
+{
+  const std::string folder = testing::TempDir();
+  const auto square = [&](const std::string& name, double width) {
+    std::ofstream(folder + "/" + name) << "v 0 0 0\nv " << width << " 0 0\nv " << width << " 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+  };
+  square("rest.obj", 1.0);
+  square("wide.obj", 1.1);
+  square("narrow.obj", 0.9);
+  const auto first = [&](const std::string& start) {
+    const Simulation simulation(parseScene("cloths: [{name: c, mesh: {file: rest.obj}, start: {file: " + start + "}}]", "scene", {}, folder));
+    return find(sceneMarkers(simulation, std_msgs::Header(), colored(MarkerColor::strain, 0.1, MarkerStyle::tube)), "cloths/c").colors.front();
+  };
+  const auto red = first("wide.obj"), blue = first("narrow.obj"), none = first("rest.obj");
+  EXPECT_GT(red.r, 4 * red.g);
+  EXPECT_GT(blue.b, 4 * blue.r);
+  EXPECT_NEAR(none.r, none.b, 0.03 * none.r);
+
+  const Simulation rod(parseScene("rods: [{name: r, centerline: {straight: {to: [1, 0, 0], edges: 4}}, initial: {straight: {to: [1.05, 0, 0]}}}]", "scene"));
+  const Marker line = find(sceneMarkers(rod, std_msgs::Header(), colored(MarkerColor::strain, 0.05)), "rods/r");
+  for (const auto& c : line.colors)
+    EXPECT_NEAR(c.g, 0.14, 0.01);
+}
+
+/// A weightless rod held at both ends and stretched: its arrows show what pulls at the holders.
+TEST(Markers, arrowsShowForces)
+{
+  Simulation simulation(parseScene(R"(
+gravity: [0, 0, 0]
+rods:
+  - name: r
+    centerline: {straight: {to: [1, 0, 0], edges: 4}}
+    initial: {straight: {to: [1.05, 0, 0]}}
+    cross_section: {radius: 0.01}
+    material: {youngs_modulus: 1.0e6}
+    grasps: {left: {edges: [0], motion: fixed}, right: {edges: [-1], motion: fixed}}
+)", "scene"));
+  for (int k = 0; k < 3; ++k)
+    ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
+  MarkerOptions options;
+  const auto plain = sceneMarkers(simulation, std_msgs::Header(), options);
+  for (const Marker& marker : plain.markers)
+    EXPECT_NE(marker.ns, "wrenches");
+  options.forces = 0.02;
+  const auto markers = sceneMarkers(simulation, std_msgs::Header(), options);
+  const Marker& left = find(markers, "wrenches", 0);
+  ASSERT_EQ(left.points.size(), 2u);
+  EXPECT_NEAR(left.points[1].x - left.points[0].x, 0.02 * simulation.wrench(0).force.x(), 1e-12);
+  EXPECT_GT(left.points[1].x, left.points[0].x + 0.1);   // about 0.02 * 15.7 N: inwards
+  EXPECT_LT(find(markers, "wrenches", 2).points[1].x, find(markers, "wrenches", 2).points[0].x - 0.1);
+  EXPECT_EQ(find(markers, "contacts").action, Marker::DELETE);
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ std::string includedHeader(const std::string& line)
 bool isRos(const std::string& header)
 {
   static const std::set<std::string> packages{"ros", "rosbag", "tf", "tf2", "tf2_ros", "std_srvs", "nodelet", "pluginlib",
-                                              "diagnostic_updater", "rosconsole", "xmlrpcpp"};
+                                              "diagnostic_updater", "interactive_markers", "rosconsole", "xmlrpcpp"};
   const auto slash = header.find('/');
   const std::string package = header.substr(0, slash);
   const bool messages = package.size() > 5 && package.compare(package.size() - 5, 5, "_msgs") == 0;

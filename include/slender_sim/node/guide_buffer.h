@@ -46,6 +46,9 @@ public:
   /// Stamp of the last sample [s], if there is any.
   std::optional<double> lastTime() const;
 
+  /// The grasp in the gripper's frame, once it follows; before, and with attach section, identity.
+  const Pose& graspInGripper() const { return X_HG_; }
+
 private:
   struct Motion
   {

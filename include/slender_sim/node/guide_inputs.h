@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,11 +15,13 @@
 #include <std_msgs/Float64.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
+#include <visualization_msgs/InteractiveMarkerFeedback.h>
 
 #include "slender_sim/BodyStates.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/drop_counter.h"
 #include "slender_sim/node/guide_buffer.h"
+#include "slender_sim/node/hand_markers.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/node/tracking_inputs.h"
@@ -50,8 +53,14 @@ public:
   /// The scene was reset: forgets all input.
   void restart(const Simulation& simulation);
 
+  /// What is driven by messages of its own may also be dragged by hand: TOPIC/feedback counts as poses of the present. Whoever drags should be
+  /// the only one who moves it.
+  void listenToHand(ros::NodeHandle nh, const std::string& topic);
+  /// Of what can be dragged, where it is now.
+  std::vector<Handle> handles(const Simulation& simulation) const;
+
   const DropCounter& drops() const { return drops_; }
-  bool waiting() const { return !pending_.empty() || tracking_->waiting(); }
+  bool waiting() const { return !pending_.empty() || !hand_.empty() || tracking_->waiting(); }
 
   /// Per grasp, body, obstacle and guide driven from outside. `missing`: see TrackingInputs::Age.
   struct Age { std::string name; std::optional<double> seconds; bool missing; };
@@ -78,6 +87,11 @@ private:
   void onFlow(std::size_t thread, const std_msgs::Float64& message);
   void onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped& message);
   void onWind(const geometry_msgs::Vector3Stamped& message);
+  // hand_inputs.cpp
+  void onHand(const visualization_msgs::InteractiveMarkerFeedback& message);
+  void takeHand();
+  bool isDraggable(std::size_t guided) const;
+  std::string handleName(std::size_t guided) const;
   std::optional<Eigen::Vector3d> velocityOf(const geometry_msgs::Vector3Stamped& message, const std::string& what);
   void onGuides(const geometry_msgs::PoseArray& message);
   void onBodies(const slender_sim::BodyStates& message);
@@ -91,7 +105,10 @@ private:
   /// False when the transform is not known yet.
   bool deliver(const Message& message, std::string* why);
 
+  static constexpr int kGuidesSource = -1, kBodiesSource = -2;
+
   const NodeOptions options_;
+  const Simulation* simulation_;
   const SimClock& clock_;
   std::vector<Guided> guided_;                            // grasps in scene order, then bodies, obstacles, nozzles
   std::size_t grasps_ = 0, bodies_ = 0, obstacles_ = 0;   // how many of the first three
@@ -106,6 +123,8 @@ private:
   bool wind_topic_ = false;
   std::optional<Eigen::Vector3d> wind_;                   // last by message
   std::vector<std::string> prefixes_;                     // of their topics
+  struct Dragged { Pose X_FH; std::string frame; };
+  std::map<std::size_t, Dragged> hand_;                   // per guided, not taken yet
   std::deque<Message> pending_;
   DropCounter drops_;
   tf2_ros::Buffer tf_buffer_;

@@ -25,6 +25,17 @@ enum class Pace
 };
 
 enum class MarkerStyle { tube, line, regions };
+enum class MarkerColor { none, strain, curvature, twist };
+
+/// What pictures show beside the shape.
+struct MarkerOptions
+{
+  MarkerStyle style = MarkerStyle::tube;   ///< ~marker_style: tube | line | regions (of tracked cloths)
+  bool frames = false;                     ///< ~marker_frames: material frames
+  MarkerColor color = MarkerColor::none;   ///< ~marker_color: none | strain | curvature | twist
+  double range = 0.0;                      ///< ~marker_range: magnitude of the full colour: strain [-], curvature [1/m], twist [rad/m]; 0: the picture's largest
+  double forces = 0.0;                     ///< ~marker_forces [m/N]: arrows of contacts' and holders' forces so long; 0: none
+};
 
 /// Private parameters of rod_node, with their defaults.
 struct NodeOptions
@@ -47,8 +58,8 @@ struct NodeOptions
   double tf_timeout = 0.5;                      ///< ~tf_timeout [s] wall time that a message waits for its transform
   double diagnostics_rate = 1.0;                ///< ~diagnostics_rate [Hz]
   double marker_rate = 30.0;                    ///< ~marker_rate [Hz] at most, up to 30
-  MarkerStyle marker_style = MarkerStyle::tube; ///< ~marker_style: tube | line | regions (of tracked cloths)
-  bool marker_frames = false;                   ///< ~marker_frames: show material frames
+  MarkerOptions markers;                        ///< ~marker_style, ~marker_frames, ~marker_color, ~marker_range, ~marker_forces
+  bool interactive = false;                     ///< ~interactive: handles in rviz for what messages move
 
   /// Reads and checks them all; throws OptionError on the first that does not fit, unknown names included.
   static NodeOptions read(const ros::NodeHandle& nh_priv);

@@ -12,6 +12,7 @@
 #include "slender_sim/MeshStamped.h"
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
+#include "slender_sim/node/shared_message.h"
 #include "slender_sim/scene/simulation.h"
 
 namespace slender {
@@ -26,13 +27,13 @@ std::vector<std::string> threadTopicPrefixes(const Simulation& simulation);
 /// The undeformed cloths.
 slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id);
 
-/// What is published and recorded of one instant, in scene order.
+/// What is published and recorded of one instant, in scene order. What is large is shared: record first, then publish, and do not read it afterwards.
 struct SceneMessages
 {
-  std::vector<slender_sim::RodState> states;            ///< per rod
-  std::vector<slender_sim::ThreadState> threads;        ///< per thread and piece of it
-  slender_sim::ClothState cloths;                       ///< all of them in one message; none: not published
-  geometry_msgs::PoseArray poses;                       ///< the edges' frames at their middles, all rods and threads one after the other
+  std::vector<SharedMessage<slender_sim::RodState>> states;       ///< per rod
+  std::vector<SharedMessage<slender_sim::ThreadState>> threads;   ///< per thread and piece of it
+  SharedMessage<slender_sim::ClothState> cloth_state;   ///< all of them in one message; none: not published
+  SharedMessage<geometry_msgs::PoseArray> edge_poses;   ///< the edges' frames at their middles, all rods and threads one after the other
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
   std::vector<geometry_msgs::WrenchStamped> nozzles;    ///< per thread: what it does to its nozzle, about the outlet; zero without one
   slender_sim::BodyStates bodies;                       ///< the scene's bodies, simulated and driven; none: not published

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
+#include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_ros/transform_broadcaster.h>
@@ -17,6 +19,7 @@
 #include "slender_sim/Step.h"
 #include "slender_sim/node/bag_recorder.h"
 #include "slender_sim/node/guide_inputs.h"
+#include "slender_sim/node/hand_markers.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/run_statistics.h"
 #include "slender_sim/node/scene_messages.h"
@@ -39,8 +42,10 @@ public:
   SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, NodeKind kind);
   ~SceneNode();
 
-  /// Until shut down, or ~stop_after. Returns the exit status: 0, or 3 when it ends after a failed step.
+  /// Until shut down, stop(), or ~stop_after; closes the bag. Returns the exit status: 0, or 3 when it ends after a failed step.
   int spin();
+  /// Ends spin() after the step that it is at. From any thread.
+  void stop() { stop_ = true; }
 
 private:
   enum class Mode { running, paused, failed };
@@ -51,10 +56,12 @@ private:
   void advertise();
   void publishMesh();
   bool isStateFinite() const;
+  bool ended() const { return !nh_.ok() || finished_ || stop_; }
   bool advance();                        // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
   void publishState();
   void broadcastBodies();
+  void showHandles();
   void publishMarkers();
   void jumped();                         // the state was replaced: a new epoch begins, one tick later
   void realign();                        // time went on while the rod stood still
@@ -88,11 +95,15 @@ private:
   SimClock clock_;
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;
+  std::unique_ptr<HandMarkers> hands_;   // only with ~interactive
   std::unique_ptr<BagRecorder> bag_;
   SceneMessages messages_;
+  SharedMessage<sensor_msgs::PointCloud2> points_;
+  std::vector<SharedMessage<geometry_msgs::PoseArray>> rod_poses_;   // as rod_poses_pubs_
 
   Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
+  std::atomic<bool> stop_{false};
   std::uint32_t epoch_ = 0;
   std::string failure_, bag_failure_;
   StepReport last_report_;

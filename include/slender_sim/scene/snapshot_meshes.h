@@ -12,7 +12,8 @@ namespace slender {
 
 /// Edges without volume at a thread's ends, the insides of holders, are left out.
 FramedLine lineOf(const RodSnapshot& rod);
-FramedLine lineOf(const ThreadSnapshot& thread);
+/// `values`: per node, or none.
+FramedLine lineOf(const ThreadSnapshot& thread, const std::vector<double>& values = {});
 
 /// Surface of a solid about the origin; round ones have their vertices on the true surface. A plane has none.
 TriangleMesh shapeMesh(const Shape& shape);

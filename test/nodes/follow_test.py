@@ -1,0 +1,77 @@
+#!/usr/bin/python3
+"""~pace: follow behind `rosbag play --clock`: recorded grippers move the rope as they did, at whatever rate the bag is played."""
+import subprocess
+
+import rosbag
+import rospy
+from slender_sim.msg import RodState
+
+from node_harness import Listener, NodeCase, pose, run, wait_until
+
+BEGIN, LENGTH, RATE = 100.0, 3.0, 50.0      # s, s, Hz
+DELAY = 0.1
+
+
+def height(t):
+    """Of the gripper, t [s] after the bag's first message [m]."""
+    s = min(max((t - 0.5) / 1.5, 0.0), 1.0)
+    return 0.3 * s * s * (3 - 2 * s)
+
+
+class Follow(NodeCase):
+
+    def tearDown(self):
+        NodeCase.tearDown(self)
+        if rospy.has_param("/use_sim_time"):
+            rospy.delete_param("/use_sim_time")
+
+    def play(self, *options):
+        bag = self.path("grippers.bag")
+        with rosbag.Bag(bag, "w") as out:
+            for k in range(int(LENGTH * RATE) + 1):
+                t = BEGIN + k / RATE
+                message = pose(1.0, 0.0, 1.0 + height(t - BEGIN), stamp=t)
+                out.write("/t/grasps/right/pose", message, rospy.Time.from_sec(t))
+        player = subprocess.Popen(["rosbag", "play", "--clock", "--hz=200", "-q"] + list(options) + [bag],
+                                  stdin=subprocess.DEVNULL, stdout=open(self.path("play.out"), "w"), stderr=subprocess.STDOUT)
+        self.processes.append(player)
+        return player
+
+    def follow(self, *options):
+        rospy.set_param("/use_sim_time", True)
+        self.start(wait=False, pace="follow", guide_delay=DELAY, record_bag=self.path("run.bag"))
+        state = Listener("/t/state", RodState)   # the node advertises when it has heard the clock
+        player = self.play(*options)
+        self.assertEqual(player.wait(30), 0, self.output("play.out"))
+        wait_until(lambda: state.count() > 0 and state.last().header.stamp.to_sec() > BEGIN + LENGTH - 0.05, what="the end of the bag")
+        node = self.processes[0]
+        node.terminate()
+        self.assertEqual(node.wait(20), 0)
+        with rosbag.Bag(self.path("run.bag")) as bag:
+            return [message for _, message, _ in bag.read_messages(topics=["/t/state"])]
+
+    def check(self, states):
+        stamps = [state.header.stamp.to_sec() for state in states]
+        self.assertGreaterEqual(stamps[0], BEGIN - 1.0)
+        self.assertLess(stamps[0], BEGIN + 0.5)   # the node listens when it has heard the clock; the gripper rests until then
+        self.assertLess(stamps[-1], BEGIN + LENGTH + 0.1)     # never ahead of the clock
+        for a, b in zip(stamps, stamps[1:]):
+            self.assertAlmostEqual(b - a, 0.005, delta=1e-6)  # no step is skipped
+        worst = 0.0
+        for stamp, state in zip(stamps, states):
+            if stamp > BEGIN + 0.5:
+                first = height(stamps[0] - BEGIN)
+                worst = max(worst, abs(state.nodes[-1].z - 1.0 - height(stamp - DELAY - BEGIN) + first))
+        print("worst distance of the grasp from the recorded gripper %.2e m" % worst)
+        self.assertLess(worst, 1e-3)       # cubics through 50 poses a second
+        self.assertAlmostEqual(states[-1].nodes[-1].z, 1.3, delta=1e-3)
+
+    def test_at_the_bags_own_rate(self):
+        self.check(self.follow())
+
+    def test_twice_as_fast(self):
+        self.check(self.follow("--rate=2"))
+
+
+if __name__ == "__main__":
+    run("follow", Follow)

@@ -1,0 +1,168 @@
+#!/usr/bin/python3
+"""~interactive: what is dragged by hand moves as by messages of its own."""
+import math
+
+import rospy
+from slender_sim.msg import BodyStates, RodState, ThreadState
+from std_srvs.srv import Trigger
+from slender_sim.srv import SetGrasp, SetGraspRequest
+from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
+
+from node_harness import SCENE, NodeCase, fill, run, wait_until
+
+STEP = 0.005
+BODIES = SCENE + """
+bodies:
+  - {name: paddle, shape: {box: {size: [0.1, 0.2, 0.02]}}, pose: {position: [0, 1, 0]}, motion: {topic: true}}
+  - {name: stone, mass: 1, inertia: [1, 1, 1], pose: {position: [0, 2, 0]}}
+obstacles:
+  - {name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0, 3, 0]}, motion: {topic: true}}
+  - {name: wall, shape: {sphere: {radius: 0.1}}, pose: {position: [0, 4, 0]}}
+"""
+HONEY = """
+name: honey
+time: {step: 0.002, duration: 1}
+threads:
+  - name: honey
+    fluid: {density: 1400, viscosity: 20, surface_tension: 0.05}
+    nozzle: {position: [0, 0, 0.03], diameter: 0.005, flow: 6.0e-7, motion: {topic: true}}
+    floor: {height: 0}
+    edges: {feed: 0.002, longest: 0.003, shortest: 0.0006, deposited: 25}
+"""
+
+
+def dragged(name, p, q=(0, 0, 0, 1), frame="world", event=InteractiveMarkerFeedback.POSE_UPDATE):
+    message = InteractiveMarkerFeedback()
+    message.header.frame_id = frame
+    message.client_id = "test"
+    message.marker_name = name
+    message.event_type = event
+    fill(message.pose, p, q)
+    return message
+
+
+class Hand(NodeCase):
+
+    def begin(self, scene=SCENE, kind=RodState, **parameters):
+        self.start(scene, interactive=True, **parameters)
+        self.states = self.listen("/t/state", kind)
+        self.shown = self.listen("/t/interactive/update_full", InteractiveMarkerInit)
+        self.hand = self.publisher("/t/interactive/feedback", InteractiveMarkerFeedback)
+
+    def drag(self, *arguments, **keywords):
+        self.hand.publish(dragged(*arguments, **keywords))
+        rospy.sleep(0.2)
+
+    def drag_by(self, name, dx, dy, dz, **keywords):
+        """From where the handle is, without turning it."""
+        self.drag(name, *self.beside(name, dx, dy, dz), **keywords)
+
+    def beside(self, name, dx, dy, dz):
+        wait_until(lambda: self.shown.count() and name in self.handles(), what="the handle " + name)
+        at = self.handles()[name].pose
+        q = at.orientation
+        return (at.position.x + dx, at.position.y + dy, at.position.z + dz), (q.x, q.y, q.z, q.w)
+
+    def after(self, n):
+        """Steps one by one: what the hand does is looked at before each call."""
+        for _ in range(n - 1):
+            self.step(1)
+        return self.states_after(self.states, 1)
+
+    def handles(self):
+        return {marker.name: marker for marker in self.shown.last().markers}
+
+    def test_only_what_messages_move_has_handles(self):
+        self.begin(BODIES)
+        wait_until(lambda: self.shown.count() and len(self.shown.last().markers) == 3, what="three handles")
+        handles = self.handles()
+        self.assertEqual(set(handles), {"grasps/right", "bodies/paddle", "bodies/ball"})
+        self.assertEqual(handles["bodies/ball"].header.frame_id, "world")
+        self.assertTrue(handles["bodies/ball"].header.stamp.is_zero())
+        self.assertAlmostEqual(handles["bodies/ball"].pose.position.y, 3.0)
+        self.assertEqual(len(handles["grasps/right"].controls), 7)
+
+    def test_without_it_nothing_is_advertised(self):
+        self.start()
+        names = [name for name, _ in rospy.get_published_topics("/t")]
+        self.assertNotIn("/t/interactive/update", names)
+
+    def test_drags_a_grasp(self):
+        self.begin()
+        start = self.after(1)
+        self.drag_by("grasps/right", 0, 0, 0, event=InteractiveMarkerFeedback.MOUSE_DOWN)
+        self.after(2)
+        self.drag_by("grasps/right", -0.1, 0.2, 0)
+        fastest, before = 0.0, start.nodes[-1]
+        for _ in range(80):
+            now = self.after(1).nodes[-1]
+            fastest = max(fastest, math.dist((now.x, now.y, now.z), (before.x, before.y, before.z)) / STEP)
+            before = now
+        self.assertAlmostEqual(before.x - start.nodes[-1].x, -0.1, delta=1e-6)   # attach: initial, as where the hand took hold
+        self.assertAlmostEqual(before.y - start.nodes[-1].y, 0.2, delta=1e-6)
+        self.assertGreater(fastest, 0.5)
+        self.assertLess(fastest, 1.6)       # catches up at 1 m/s on average: 1.5 at most
+        self.assertEqual(int(self.diagnostics("inputs")["dropped"]), 0)
+
+    def test_quick_hand_between_two_steps(self):
+        """A burst within one step: the last counts, nothing is dropped."""
+        self.begin()
+        start = self.after(1).nodes[-1]
+        p, q = self.beside("grasps/right", 0, 0, 0)
+        for k in range(1, 21):
+            self.hand.publish(dragged("grasps/right", (p[0], p[1] + 0.01 * k, p[2]), q))
+        rospy.sleep(0.3)
+        end = self.after(100).nodes[-1]
+        self.assertAlmostEqual(end.y - start.y, 0.2, delta=1e-6)
+        self.assertEqual(int(self.diagnostics("inputs")["dropped"]), 0)
+
+    def test_bodies_and_reset(self):
+        self.begin(BODIES)
+        bodies = self.listen("/t/body_states", BodyStates)
+        self.drag("bodies/paddle", (0.2, 1.0, 0.3), q=(0, 0, math.sin(0.25), math.cos(0.25)))
+        self.after(120)
+        wait_until(lambda: bodies.last().header.stamp == self.states.last().header.stamp, what="the bodies of that state")
+        paddle = bodies.last().pose[bodies.last().name.index("paddle")]
+        self.assertAlmostEqual(paddle.position.x, 0.2, delta=1e-6)
+        self.assertAlmostEqual(paddle.position.z, 0.3, delta=1e-6)
+        self.assertAlmostEqual(paddle.orientation.z, math.sin(0.25), delta=1e-6)
+        wait_until(lambda: abs(self.handles()["bodies/paddle"].pose.position.x - 0.2) < 1e-9, what="the handle where the hand left it")
+        self.assertTrue(self.call("reset", Trigger).success)
+        wait_until(lambda: abs(self.handles()["bodies/paddle"].pose.position.x) < 1e-9, what="the handle where the body is again")
+
+    def test_taken_up_where_it_was_attached_anew(self):
+        self.begin()
+        self.drag_by("grasps/right", 0, 0.1, 0)
+        self.after(80)
+        self.assertTrue(self.call("set_grasp", SetGrasp, SetGraspRequest(name="right", action=SetGraspRequest.RELEASE)).success)
+        wait_until(lambda: not self.handles(), what="no handle of a released grasp")
+        self.after(20)
+        answer = self.call("set_grasp", SetGrasp, SetGraspRequest(name="right", action=SetGraspRequest.ATTACH_NODES, first_node=-1, last_node=-1))
+        self.assertTrue(answer.success, answer.message)
+        wait_until(lambda: len(self.handles()) == 1, what="its handle")
+        start = self.after(1).nodes[-1]
+        self.drag_by("grasps/right", 0, 0, 0.1)
+        end = self.after(80).nodes[-1]
+        self.assertAlmostEqual(end.x, start.x, delta=1e-6)
+        self.assertAlmostEqual(end.z - start.z, 0.1, delta=1e-6)
+
+    def test_nozzle(self):
+        self.begin(HONEY, kind=ThreadState, program="thread_node")
+        self.drag_by("nozzle", 0.02, 0, 0)
+        self.assertEqual(set(self.handles()), {"nozzle"})
+        state = self.after(120)
+        self.assertAlmostEqual(state.nodes[-1].x, 0.02, delta=1e-6)
+
+    def test_bad_feedback(self):
+        self.begin()
+        self.drag("grasps/left", (0, 0, 0))              # fixed
+        self.expect_drop("unknown_name")
+        self.drag("grasps/right", (float("nan"), 0, 0))
+        self.expect_drop("not_finite")
+        self.drag("grasps/right", (0, 0, 0), q=(0, 0, 0, 2))
+        self.expect_drop("bad_quaternion")
+        self.assertEqual(self.after(5).step, 5)
+
+
+if __name__ == "__main__":
+    run("hand", Hand)
