@@ -15,10 +15,12 @@ class Diagnostics(NodeCase):
         def levels():
             return {status.name: status.level for status in gathered.last().status} if gathered.count() else {}
 
-        wait_until(lambda: "/Simulations/t_rod: simulation" in levels() or "/Simulations//t/rod: simulation" in levels(), what="the simulation")
+        def gathered_as(kind, what):
+            return [n for n in levels() if n.startswith(kind) and n.endswith(what)]
+
+        wait_until(lambda: gathered_as("/Simulations/", ": simulation") and gathered_as("/Inputs/", ": inputs"), what="the simulation")
         names = levels()
-        self.assertTrue([n for n in names if n.startswith("/Inputs/") and n.endswith("rod: inputs")], names)
-        own = [n for n in names if n.startswith("/Simulations/") and n.endswith("rod: simulation")][0]
+        own = gathered_as("/Simulations/", ": simulation")[0]
         self.assertLess(names[own], DiagnosticStatus.ERROR)
         node.terminate()
         node.wait(20)

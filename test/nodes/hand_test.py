@@ -3,7 +3,7 @@
 import math
 
 import rospy
-from slender_sim.msg import BodyStates, RodState, ThreadState
+from slender_sim.msg import BodyStates, RodState
 from std_srvs.srv import Trigger
 from slender_sim.srv import SetGrasp, SetGraspRequest
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
@@ -18,16 +18,6 @@ bodies:
 obstacles:
   - {name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0, 3, 0]}, motion: {topic: true}}
   - {name: wall, shape: {sphere: {radius: 0.1}}, pose: {position: [0, 4, 0]}}
-"""
-HONEY = """
-name: honey
-time: {step: 0.002, duration: 1}
-threads:
-  - name: honey
-    fluid: {density: 1400, viscosity: 20, surface_tension: 0.05}
-    nozzle: {position: [0, 0, 0.03], diameter: 0.005, flow: 6.0e-7, motion: {topic: true}}
-    floor: {height: 0}
-    edges: {feed: 0.002, longest: 0.003, shortest: 0.0006, deposited: 25}
 """
 
 
@@ -145,13 +135,6 @@ class Hand(NodeCase):
         end = self.after(80).nodes[-1]
         self.assertAlmostEqual(end.x, start.x, delta=1e-6)
         self.assertAlmostEqual(end.z - start.z, 0.1, delta=1e-6)
-
-    def test_nozzle(self):
-        self.begin(HONEY, kind=ThreadState, program="thread_node")
-        self.drag_by("nozzle", 0.02, 0, 0)
-        self.assertEqual(set(self.handles()), {"nozzle"})
-        state = self.after(120)
-        self.assertAlmostEqual(state.nodes[-1].x, 0.02, delta=1e-6)
 
     def test_bad_feedback(self):
         self.begin()

@@ -142,7 +142,7 @@ TEST(Markers, coloursShowStrainOfRodsAndCloths)
   square("wide.obj", 1.1);
   square("narrow.obj", 0.9);
   const auto first = [&](const std::string& start) {
-    const Simulation simulation(parseScene("cloths: [{name: c, mesh: {file: rest.obj}, start: {file: " + start + "}}]", "scene", {}, folder));
+    const Simulation simulation(parseScene("cloths: [{name: c, mesh: {file: rest.obj}, bending: {model: none}, start: {file: " + start + "}}]", "scene", {}, folder));
     return find(sceneMarkers(simulation, std_msgs::Header(), colored(MarkerColor::strain, 0.1, MarkerStyle::tube)), "cloths/c").colors.front();
   };
   const auto red = first("wide.obj"), blue = first("narrow.obj"), none = first("rest.obj");
