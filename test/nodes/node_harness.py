@@ -127,6 +127,7 @@ class NodeCase(unittest.TestCase):
         """Subscribes and waits for the connection."""
         listener = Listener(topic, kind)
         wait_until(listener.connected, what="a publisher of " + topic)
+        rospy.sleep(0.2)   # the publisher knows of it a little later
         return listener
 
     def publisher(self, topic, kind):
