@@ -311,6 +311,14 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   return scene;
 }
 
+std::string directoryOf(const std::string& path)
+{
+  const std::string directory = std::filesystem::path(path).parent_path().string();
+  return directory.empty() ? "." : directory;
+}
+
+}  // namespace
+
 std::string fileText(const std::string& path)
 {
   std::error_code error;
@@ -331,14 +339,6 @@ std::string fileText(const std::string& path)
   }
   return text.str();
 }
-
-std::string directoryOf(const std::string& path)
-{
-  const std::string directory = std::filesystem::path(path).parent_path().string();
-  return directory.empty() ? "." : directory;
-}
-
-}  // namespace
 
 TimeConfig readTime(const YamlCursor& at)
 {

@@ -6,6 +6,9 @@
 
 namespace slender {
 
+/// The whole of a file. Throws SceneError "FILE: reason": no such file, not a regular one, too large, cannot be read.
+std::string fileText(const std::string& path);
+
 /// Reads a scene file and notes what is asked for. Throws as readScene.
 void logKeys(const std::string& path, KeyLog& log);
 

@@ -2,9 +2,9 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
+#include "reader_log.h"
 #include "slender_sim/scene/reader.h"
 #include "yaml_cursor.h"
 
@@ -13,19 +13,6 @@ namespace slender {
 namespace {
 
 constexpr long max_points = 1'000'000;
-
-std::string readText(const std::string& path)
-{
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error))
-    throw SceneError(path + ": " + (std::filesystem::exists(path, error) ? "is not a regular file" : "no such file"));
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file)
-    throw SceneError(path + ": cannot be read");
-  return text.str();
-}
 
 std::vector<std::string> readSeries(const YamlCursor& at)
 {
@@ -106,7 +93,7 @@ std::string dependencies(const SweepPlan& plan)
   text << "measures:";
   for (const std::string& measure : plan.measures)
     text << " " << measure;
-  text << "\nafter: " << plan.after << "\nscene:\n" << readText(plan.scene);
+  text << "\nafter: " << plan.after << "\nscene:\n" << fileText(plan.scene);
   return text.str();
 }
 
@@ -159,7 +146,7 @@ SceneConfig SweepPlan::sceneOf(long point) const
 
 SweepPlan readSweepPlan(const std::string& path)
 {
-  const std::string text = readText(path);
+  const std::string text = fileText(path);
   const YamlTree tree = parseYaml(text, path);
   Problems problems(path);
   SweepPlan plan;
