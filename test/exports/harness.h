@@ -13,30 +13,14 @@
 
 #include <gtest/gtest.h>
 
+#include "test/support/shell.h"
+
 /// Programs run as a user runs them.
 namespace slender {
 
 namespace fs = std::filesystem;
-
-struct Result
-{
-  int status = -1;
-  std::string output;   // stdout and stderr
-};
-
-inline Result shell(const std::string& command)
-{
-  Result result;
-  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
-  if (!pipe)
-    return result;
-  std::array<char, 4096> buffer;
-  for (std::size_t count = 0; (count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-    result.output.append(buffer.data(), count);
-  const int status = pclose(pipe);
-  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
-  return result;
-}
+using test::Result;
+using test::shell;
 
 inline std::string contentsOf(const fs::path& path)
 {

@@ -10,6 +10,8 @@
 
 #include <gtest/gtest.h>
 
+#include "test/support/shell.h"
+
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/geometry/mesh_topology.h"
@@ -20,11 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using slender::TriangleMesh;
 
-struct Result
-{
-  int status = -1;
-  std::string output;   // stdout and stderr
-};
+using slender::test::Result;
 
 class FairMesh : public testing::Test
 {
@@ -36,19 +34,7 @@ protected:
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  Result run(const std::string& arguments)
-  {
-    Result result;
-    FILE* pipe = popen(("cd " + folder_ + " && " + SLENDER_FAIR_MESH + " " + arguments + " 2>&1").c_str(), "r");
-    if (!pipe)
-      return result;
-    std::array<char, 4096> buffer;
-    for (std::size_t count = 0; (count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-      result.output.append(buffer.data(), count);
-    const int status = pclose(pipe);
-    result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
-    return result;
-  }
+  Result run(const std::string& arguments) { return slender::test::shell("cd " + folder_ + " && " + SLENDER_FAIR_MESH + " " + arguments); }
 
   /// A sphere without the faces above `height`.
   void writeCup(const std::string& name, double height)

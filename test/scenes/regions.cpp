@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "test/support/shell.h"
+
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 
@@ -29,13 +31,9 @@ protected:
 
   int run(const std::string& arguments)
   {
-    output_.clear();
-    FILE* pipe = popen(("cd " + folder_ + " && " + SLENDER_REGIONS + " " + arguments + " 2>&1").c_str(), "r");
-    std::array<char, 4096> buffer;
-    for (std::size_t count = 0; pipe && (count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-      output_.append(buffer.data(), count);
-    const int status = pipe ? pclose(pipe) : -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
+    const slender::test::Result result = slender::test::shell("cd " + folder_ + " && " + SLENDER_REGIONS + " " + arguments);
+    output_ = result.output;
+    return result.status;
   }
   bool says(const std::string& words) const { return output_.find(words) != std::string::npos; }
   std::string read(const std::string& name) const

@@ -11,34 +11,16 @@
 
 #include <gtest/gtest.h>
 
+#include "test/support/shell.h"
+
 /// The program itself: exit codes, messages, files, and every scene of the package for a few steps.
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Result
-{
-  int status = -1;
-  std::string output;   // stdout and stderr
-};
+using slender::test::Result;
 
-Result simulate(const std::string& arguments)
-{
-  Result result;
-  FILE* pipe = popen((std::string(SLENDER_SIMULATE) + " " + arguments + " 2>&1").c_str(), "r");
-  if (!pipe)
-  {
-    return result;
-  }
-  std::array<char, 4096> buffer;
-  for (std::size_t count = 0; (count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-  {
-    result.output.append(buffer.data(), count);
-  }
-  const int status = pclose(pipe);
-  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
-  return result;
-}
+Result simulate(const std::string& arguments) { return slender::test::shell(std::string(SLENDER_SIMULATE) + " " + arguments); }
 
 const std::string scenes = std::string(SLENDER_SOURCE_DIR) + "/config/scenes/";
 const std::string cantilever = scenes + "cantilever.yaml";

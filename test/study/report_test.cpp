@@ -12,29 +12,13 @@
 
 #include <gtest/gtest.h>
 
+#include "test/support/shell.h"
+
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Result
-{
-  int status = -1;
-  std::string output;   // stdout and stderr
-};
-
-Result call(const std::string& command)
-{
-  Result result;
-  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
-  if (!pipe)
-    return result;
-  std::array<char, 4096> buffer;
-  for (std::size_t count = 0; (count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-    result.output.append(buffer.data(), count);
-  const int status = pclose(pipe);
-  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
-  return result;
-}
+using slender::test::Result;
 
 std::string contents(const fs::path& path)
 {
@@ -64,7 +48,7 @@ protected:
 
   Result report(const std::string& arguments, const std::string& environment = "") const
   {
-    return call(environment + " " SLENDER_STUDY " report --quick --out " + folder_ + "/out " + arguments);
+    return slender::test::shell(environment + " " SLENDER_STUDY " report --quick --out " + folder_ + "/out " + arguments);
   }
   std::string page() const { return contents(folder_ + "/out/report.html"); }
 
@@ -144,7 +128,7 @@ TEST_F(Report, tellsWhichStudiesFailedAndWhy)
 TEST_F(Report, mixesNothingAndKnowsItsStudies)
 {
   ASSERT_EQ(report("trouton").status, 0);
-  const Result full = call(SLENDER_STUDY " report trouton --out " + folder_ + "/out");
+  const Result full = slender::test::shell(SLENDER_STUDY " report trouton --out " + folder_ + "/out");
   EXPECT_EQ(full.status, 2);
   EXPECT_NE(full.output.find("holds the results of another program or extent"), std::string::npos) << full.output;
   const Result unknown = report("trouton elastika");
