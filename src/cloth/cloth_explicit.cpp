@@ -25,7 +25,7 @@ ClothEvaluation ClothStepper::Impl::addForces(const ClothInputs& inputs, bool wi
 }
 
 /// a_start_ = F(x, v) / m at the start of a step; `delta`: a time over which strain rates are found to second order [s].
-void ClothStepper::Impl::acceleration(const ClothInputs& inputs, double delta)
+ClothEvaluation ClothStepper::Impl::acceleration(const ClothInputs& inputs, double delta)
 {
   x_ = x_start_;
   v_ = v_start_;
@@ -35,9 +35,10 @@ void ClothStepper::Impl::acceleration(const ClothInputs& inputs, double delta)
       trial_[i] = -delta * v_[i];
     system.setViscosity(model->stiffness_damping / delta, x_, &trial_, 0.0, nullptr);
   }
-  addForces(inputs, true);
+  const ClothEvaluation here = addForces(inputs, true);
   for (int i = 0; i < model->vertices(); ++i)
     point(a_start_, i) = system.held()[i] ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(point(force_, i) / model->mass[i] - model->mass_damping * point(v_, i));
+  return here;
 }
 
 /// h^2 w^2 + 2 b h w^2 < 4 with viscous forces from the strains one step ago, b the damping by stiffness.

@@ -102,11 +102,12 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
     const std::vector<int>& pins = state.cloths[k].pins;
     pins_start_[k].resize(3, static_cast<Eigen::Index>(pins.size()));
     pin_sums_[k].setZero(3, static_cast<Eigen::Index>(pins.size()));
-    average_sums_[k].setZero(3, model_.cloths[k]->averageCount());
+    const PrescribedAverages* averages = averagesOf(k);
+    average_sums_[k].setZero(3, averages ? averages->count() : 0);
     for (std::size_t p = 0; p < pins.size(); ++p)
       pins_start_[k].col(static_cast<Eigen::Index>(p)) = state.cloths[k].x.col(pins[p]);
-    if (model_.cloths[k]->averages)
-      averages_start_[k] = state.cloths[k].x * model_.cloths[k]->averages->transpose();
+    if (averages)
+      averages_start_[k].noalias() = state.cloths[k].x * averages->weights->transpose();
   }
   double done = 0.0, share = 1.0;
   hopeless_ = false;
@@ -164,7 +165,7 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
   }
   const double all = work;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
-    if (model_.cloths[k]->averages)
+    if (averagesOf(k))
       work -= balancedWork(k, h);
   if (!(work > kBalanced * all))
     return false;
@@ -212,7 +213,7 @@ void ClothGroup::addPinForces(double share, double h)
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     pin_sums_[k] += share * (steppers_[k].pinForces() + shared_pins_[k]);
-    if (model_.cloths[k]->averages)
+    if (averagesOf(k))
       average_sums_[k] += share * (steppers_[k].averageForces() + shared_averages_[k]);
     for (std::size_t p = 0; p < work_.cloths[k].pins.size(); ++p)
       pin_sums_[k].col(static_cast<Eigen::Index>(p)) += share / h * held_impulses_.col(first_[k] + work_.cloths[k].pins[p]);
@@ -270,7 +271,7 @@ CollisionReport ClothGroup::collide(double h)
     for (const int pin : work_.cloths[k].pins)
       inverse_mass_[first + pin] = 0.0;
     shared_pins_[k].setZero(3, static_cast<Eigen::Index>(work_.cloths[k].pins.size()));
-    shared_averages_[k].setZero(3, model_.cloths[k]->averageCount());
+    shared_averages_[k].setZero(3, averagesOf(k) ? averagesOf(k)->count() : 0);
   }
   const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h};
   int pass = 0;

@@ -7,6 +7,15 @@
 
 namespace slender {
 
+namespace {
+
+StepFailure failureOf(LinearOutcome outcome)
+{
+  return outcome == LinearOutcome::not_converged ? StepFailure::linear_unconverged : StepFailure::singular_matrix;
+}
+
+}  // namespace
+
 double ClothStepper::Impl::largest(const PointVector& d) const
 {
   double square = 0.0;
@@ -26,16 +35,47 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
     point(trial_, i) = ahead ? end : Eigen::Vector3d(point(system.start(), i));
     point(d_, i) = end - point(trial_, i);
   }
-  system.evaluateHessian(trial_, HessianKind::semidefinite);
-  const bool solved = model->average_bounds.size() > 0
-                        ? system.solveBounded(d_, averages_, at_bound_, report.linear_iterations)
-                        : system.solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, model->averages ? &averages_ : nullptr);
-  if (!solved)
-    return StepFailure::singular_matrix;
+  const ClothEvaluation here = system.evaluateHessian(trial_, HessianKind::semidefinite);
+  if (!ahead)
+  {
+    energy_start_ = here.membrane + here.bending;
+    elastic_start_ = (1.0 + system.viscosity()) * energy_start_;   // strains are those that viscosity counts from
+  }
+  const LinearOutcome outcome =
+    system.bounded() ? system.solveBounded(d_, averages_, at_bound_, report.linear_iterations)
+                     : system.solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, system.averageCount() > 0 ? &averages_ : nullptr);
+  if (outcome != LinearOutcome::solved)
+    return failureOf(outcome);
   ++report.iterations;
   for (std::size_t i = 0; i < x_.size(); ++i)
     x_[i] = trial_[i] + d_[i];
   return StepFailure::none;
+}
+
+/// Of a linearised step from work_ to next_: whether its end has more energy than the start and the work of loads, pins and averages can give. A step
+/// of implicit Euler that is solved loses some, but for what buckling releases. A linearised one that turns or swings stretched cloth too far for its tangent leaves
+/// forces unbalanced, whose work is the energy that appears.
+bool ClothStepper::Impl::createsEnergy(double energy_end, double average_work) const
+{
+  constexpr double kCreated = 0.1;   // of what there was: sound steps lose energy, those that blow up create many times that
+  const double strains = 1e-12 * (model->membrane.c11 + model->membrane.c22) * static_cast<double>(model->rest.triangles.cols()) * shortest_edge_ * shortest_edge_;
+  double gain = energy_end - energy_start_ - average_work, loads = 0.0, pins = 0.0;
+  double given = strains + elastic_start_ + std::abs(average_work);   // strains of a millionth: of a cloth at rest
+  for (int i = 0; i < model->vertices(); ++i)
+  {
+    if (system.held()[i])
+      pins += system.internalGradient(i, x_).dot(point(x_, i) - point(x_start_, i));
+    else
+    {
+      const double before = 0.5 * model->mass[i] * work_.v.col(i).squaredNorm();
+      loads += system.loadWork(i, x_start_, x_);
+      gain += 0.5 * model->mass[i] * next_.v.col(i).squaredNorm() - before;
+      given += before;
+    }
+  }
+  gain -= loads + pins;
+  given += std::abs(loads) + std::abs(pins);
+  return gain > kCreated * given;
 }
 
 /// Newton's method on the energy of the step, with a watchdog as in minimize() of rods: nearly inextensible cloth gains a little membrane
@@ -48,7 +88,7 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
   constexpr int kPatience = 5;
   for (int i = 0; i < model->vertices(); ++i)
     point(x_, i) = system.held()[i] ? Eigen::Vector3d(point(system.start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
-  if (model->averages)
+  if (system.averageCount() > 0)
     system.meetAverages(averages_, x_);
   bool near = false, strict = false;
   double best = std::numeric_limits<double>::infinity(), shift = 0.0;
@@ -76,8 +116,8 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
       misses = 0;
       std::copy(x_.begin(), x_.end(), best_.begin());
     }
-    bool solved = false;
-    for (double added = 0.0; !solved;)
+    LinearOutcome outcome = LinearOutcome::not_definite;
+    for (double added = 0.0;;)
     {
       if (kind == HessianKind::exact && shift > added)
       {
@@ -85,8 +125,8 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
         added = shift;
       }
       std::fill(d_.begin(), d_.end(), 0.0);
-      solved = system.solve(d_, &x_, report.linear_iterations, report.factorizations);
-      if (solved || kind == HessianKind::semidefinite)
+      outcome = system.solve(d_, &x_, report.linear_iterations, report.factorizations);
+      if (outcome != LinearOutcome::not_definite || kind == HessianKind::semidefinite)
         break;
       shift = std::max(0.2, 4.0 * shift);
       if (shift > kMostShift)
@@ -96,8 +136,8 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
         system.evaluateHessian(x_, kind);
       }
     }
-    if (!solved)
-      return StepFailure::singular_matrix;
+    if (outcome != LinearOutcome::solved)
+      return failureOf(outcome);
     ++report.iterations;
     const double increment = largest(d_) / shortest_edge_;
     if (!std::isfinite(increment))

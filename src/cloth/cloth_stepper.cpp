@@ -29,18 +29,21 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
       throw std::invalid_argument(who + "bending modulus, damping and wind coefficient must be zero or more");
   if (model->mass.size() != model->vertices() || !(model->mass.minCoeff() > 0))
     throw std::invalid_argument(who + "every vertex needs a mass");
-  if (model->averages)
+  for (const PrescribedAverages& set : model->averages)
   {
-    if (model->averages->cols() != model->vertices())
-      throw std::invalid_argument(who + "averages of " + std::to_string(model->averages->cols()) + " vertices do not fit");
+    if (set.weights->cols() != model->vertices())
+      throw std::invalid_argument(who + "averages of " + std::to_string(set.weights->cols()) + " vertices do not fit");
+    if (set.count() == 0)
+      throw std::invalid_argument(who + "a set of averages is empty: leave it out");
     if (o.integrator != Integrator::implicit_euler)
       throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler");
     if (o.solver == ClothSolver::cholesky || o.solver == ClothSolver::gauss_seidel)
       throw std::invalid_argument(who + "prescribed averages need solver: conjugate_gradients (or auto)");
-  }
-  if (model->average_bounds.size() > 0)
-  {
-    if (model->average_bounds.size() != model->averageCount() || !(model->average_bounds.array() > 0).all())
+    if ((set.bounds.size() > 0) != (model->averages[0].bounds.size() > 0))
+      throw std::invalid_argument(who + "bounds of forces are for all sets of averages or for none (infinite: without)");
+    if (set.bounds.size() == 0)
+      continue;
+    if (set.bounds.size() != set.count() || !(set.bounds.array() > 0).all())
       throw std::invalid_argument(who + "bounds of forces must be positive, one per average");
     if (!o.one_newton_step)
       throw std::invalid_argument(who + "bounded forces of averages need solver: {one_newton_step: true}; set it, or leave out the bounds");
@@ -75,7 +78,9 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
   check(inputs.forces.allFinite(), "forces");
   check(inputs.pins.cols() == static_cast<Eigen::Index>(s.pins.size()), "number of pin positions (one per pin of the state)");
   check(inputs.pins.allFinite(), "pin positions");
-  check(inputs.averages.cols() == model->averageCount(), "number of averages (one per average of the model)");
+  const PrescribedAverages* prescribed = model->averagesOf(s);
+  check(prescribed || (model->averages.empty() && s.average_set == 0), "set of averages of the state (one of the model's)");
+  check(inputs.averages.cols() == (prescribed ? prescribed->count() : 0), "number of averages (one per average of the set)");
   check(inputs.averages.allFinite(), "averages");
   check(s.x.cols() == n && s.v.cols() == n, "number of vertices of the state");
   check(s.x.allFinite() && s.v.allFinite() && s.next_step >= 0, "the state");
@@ -86,7 +91,7 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
   bool sound = true;
   for (std::size_t k = 0; k < s.pins.size(); ++k)
     sound = sound && s.pins[k] >= 0 && s.pins[k] < n && (k == 0 || s.pins[k] > s.pins[k - 1]);
-  check(std::all_of(s.at_bound.begin(), s.at_bound.end(), [&](int i) { return i >= 0 && i < model->average_bounds.size(); }) &&
+  check(std::all_of(s.at_bound.begin(), s.at_bound.end(), [&](int i) { return i >= 0 && prescribed && i < prescribed->bounds.size(); }) &&
           std::adjacent_find(s.at_bound.begin(), s.at_bound.end(), std::greater_equal<int>()) == s.at_bound.end(),
         "averages of the state that are at their bounds (ascending)");
   check(sound, "pins of the state (vertices, ascending)");
@@ -110,9 +115,14 @@ std::string ClothStepper::Impl::explain(StepFailure failure, double length)
     return "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the averages there";
   if (failure == StepFailure::singular_matrix)
     return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude";
+  if (failure == StepFailure::linear_unconverged)
+    return "the linear equations did not converge" + at + ": use a shorter step, a larger solver.tolerance" +
+           (system.bounded() ? ", a larger max_traction" : "") + ", or softer cloth (thickness, moduli)";
+  if (failure == StepFailure::energy_grew)
+    return "one Newton step brings energy out of nothing" + at + ": use a shorter step, more time.newton.max_cuts, or one_newton_step: false";
   if (failure == StepFailure::state_not_finite)
     return "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
-  return "Newton's method did not converge" + at + ": use a shorter step, more time.newton.max_iterations or max_cuts, or move the pins slowly";
+  return "Newton's method did not converge" + at + ": use a shorter step, more time.newton.max_iterations or max_cuts, move the pins slowly, or start from a shape whose faces have area";
 }
 
 Eigen::Vector3d ClothStepper::Impl::pinAt(const ClothInputs& inputs, std::size_t pin, double fraction) const
@@ -132,7 +142,8 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   pins_start_.resize(3, static_cast<Eigen::Index>(state.pins.size()));
   for (std::size_t k = 0; k < state.pins.size(); ++k)
     pins_start_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
-  if (model->averages)
+  system.useAverages(state);
+  if (system.averageCount() > 0)
   {
     toPoints(state.x, x_);
     system.averagesOf(x_, averages_start_);
@@ -199,11 +210,14 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
   toPoints(work_.v, v_start_);
   system.hold(work_);
   at_bound_ = work_.at_bound;
-  if (model->averages)
+  if (system.averageCount() > 0)
     averages_ = averages_start_ + to / duration * (inputs.averages - averages_start_);
-  const bool second_order = order(options.integrator) == 2;
+  const bool second_order = order(options.integrator) == 2, damped = model->stiffness_damping > 0;
   if (second_order)
-    acceleration(inputs, plan_.stages[0].tau_v);
+  {
+    const ClothEvaluation here = acceleration(inputs, plan_.stages[0].tau_v);
+    energy_start_ = elastic_start_ = damped ? system.elasticEnergy(x_start_) : here.membrane + here.bending;
+  }
   double reached = 0.0;
   for (std::size_t s = 0; s < plan_.stages.size(); ++s)
   {
@@ -223,9 +237,12 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
         trial_[i] = stage.q_tilde[kV] * v_start_[i];
       system.setViscosity(model->stiffness_damping / stage.tau_v, x_start_, stage.q_tilde[kV] != 0 ? &trial_ : nullptr, stage.q_tilde[kQStage], &x_stage_);
     }
-    wind_v_ = work_.v;
-    for (int i = 0; i < n && second_order; ++i)
-      wind_v_.col(i) += stage.time * h * point(a_start_, i);
+    if (system.wind().active())
+    {
+      wind_v_ = work_.v;
+      for (int i = 0; i < n && second_order; ++i)
+        wind_v_.col(i) += stage.time * h * point(a_start_, i);
+    }
     system.beginStage({stage.tau_v, &q_hat_, &q_tilde_, &start, second_order ? &guess_ : &start, &wind_v_}, inputs);
     const StepFailure failure = options.one_newton_step ? linearized(report) : minimize(report);
     if (failure != StepFailure::none)
@@ -247,24 +264,32 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
 /// Takes x_ as the end of the step.
 StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& inputs, double h, double fraction, StepReport& report)
 {
-  if (model->averages)   // to rounding
+  constexpr double kUnbalanced = 0.1;   // of the largest force: not a solution
+  if (system.averageCount() > 0)   // to rounding
     system.meetAverages(averages_, x_);
   const ClothEvaluation end = system.evaluate(x_);
   if (!std::isfinite(end.energy()))
     return StepFailure::state_not_finite;
-  if (model->averages)
+  double average_work = 0.0;
+  if (system.averageCount() > 0)
+  {
+    average_work = workOnFree(system.gradient());
     system.balanceAverages(average_forces);
+    average_work -= workOnFree(system.gradient());
+  }
   next_ = work_;
   next_.at_bound = at_bound_;
   const bool second_order = order(options.integrator) == 2;
-  double unbalanced = 0.0, force = 1e-300, jump = 0.0;
+  // Newton stops by its increment, which says little where stiffness has no bound: bends of faces without area
+  const double resolved = options.newton.tolerance * (model->membrane.c11 + model->membrane.c22) * shortest_edge_;
+  double unbalanced = 0.0, force = resolved, jump = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
   {
     const bool held = system.held()[i];
     const double size = point(system.gradient(), i).norm();
     (held ? force : unbalanced) = std::max(held ? force : unbalanced, size);
     const Eigen::Vector3d q = point(x_, i), a = (q - point(q_hat_, i)) / (stage.tau_a * stage.tau_a);
-    force = std::max({force, model->mass[i] * a.norm(), model->mass[i] * inputs.gravity.norm()});   // of cloth in free fall the weight alone
+    force = std::max({force, model->mass[i] * a.norm(), model->mass[i] * inputs.gravity.norm(), system.internalGradient(i, x_).norm()});
     if (!held)
       jump = std::max(jump, second_order ? (a - point(a_start_, i)).norm() : a.norm());
     next_.v.col(i) = held ? Eigen::Vector3d((q - point(x_start_, i)) / h) : Eigen::Vector3d((q - point(q_tilde_, i)) / stage.tau_v);
@@ -283,7 +308,19 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
     const Eigen::Vector3d inertia = (point(x_, p) - point(q_hat_, p)) / (stage.tau_a * stage.tau_a) - (next_.v.col(p) - work_.v.col(p)) / h;
     pin_forces.col(static_cast<Eigen::Index>(k)) = model->mass[p] * inertia - point(system.gradient(), p);
   }
-  return StepFailure::none;
+  if (options.one_newton_step)
+    return createsEnergy(second_order && model->stiffness_damping > 0 ? system.elasticEnergy(x_) : end.membrane + end.bending, average_work) ? StepFailure::energy_grew : StepFailure::none;
+  return unbalanced > std::max(kUnbalanced * force, resolved) ? StepFailure::newton_diverged : StepFailure::none;
+}
+
+/// Of forces that change from the start of a step to x_ [J].
+double ClothStepper::Impl::workOnFree(const PointVector& forces) const
+{
+  double work = 0.0;
+  for (int i = 0; i < model->vertices(); ++i)
+    if (!system.held()[i])
+      work += point(forces, i).dot(point(x_, i) - point(x_start_, i));
+  return work;
 }
 
 /// With the stiffness of the last stage.
@@ -307,7 +344,7 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
     for (int i = 0; i < model->vertices(); ++i)
       point(system.gradient(), i) = -forces.col(i);
     std::fill(d_.begin(), d_.end(), 0.0);
-    return system.solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance);
+    return system.solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance) == LinearOutcome::solved;
   };
   if (!solve())   // the inertia of a longer step does not hold up what a short stage's does
   {
@@ -318,13 +355,13 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
   for (int i = 0; i < model->vertices(); ++i)
     displacement.col(i) = point(d_, i);
   pin_forces_change.resize(3, pin_forces.cols());
-  average_forces_change.resize(3, model->averageCount());
-  if (pin_forces.cols() == 0 && !model->averages)
+  average_forces_change.resize(3, system.averageCount());
+  if (pin_forces.cols() == 0 && system.averageCount() == 0)
     return true;
   system.applyMatrix(d_, trial_);
   for (std::size_t i = 0; i < trial_.size(); ++i)
     system.gradient()[i] += trial_[i];
-  if (model->averages)
+  if (system.averageCount() > 0)
     system.balanceAverages(average_forces_change, true);
   Eigen::Index pin = 0;
   for (int i = 0; i < model->vertices(); ++i)

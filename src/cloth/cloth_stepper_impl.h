@@ -33,6 +33,7 @@ private:
   StepFailure implicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
   void combine(const Combination& c, PointVector& result) const;
   StepFailure finish(const Stage& stage, const ClothInputs& inputs, double h, double fraction, StepReport& report);
+  double workOnFree(const PointVector& forces) const;
   Eigen::Vector3d pinAt(const ClothInputs& inputs, std::size_t pin, double fraction) const;
   bool isExplicit() const { return options.integrator == Integrator::symplectic_euler || options.integrator == Integrator::imex; }
 
@@ -40,12 +41,13 @@ private:
   StepFailure minimize(StepReport& report);
   StepFailure linearized(StepReport& report);
   double largest(const PointVector& d) const;
+  bool createsEnergy(double energy_end, double average_work) const;
 
   // cloth_explicit.cpp
   StepFailure explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
   StepFailure imexStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
   ClothEvaluation addForces(const ClothInputs& inputs, bool with_bending);
-  void acceleration(const ClothInputs& inputs, double delta);
+  ClothEvaluation acceleration(const ClothInputs& inputs, double delta);
 
   PlasticFlow plastic_;
   ClothState work_, next_;   ///< start of a substep, and its end
@@ -59,6 +61,9 @@ private:
   std::vector<char> constant_held_;
   std::vector<double> constant_weight_;
   double shortest_edge_ = 0;
+  /// At the start of an implicit step, as evaluate() counts it there, and the elastic energy itself [J]. Steps of one stage count that of the end in the same way;
+  /// steps of two, whose stages have viscous forces of their own, without these.
+  double energy_start_ = 0, elastic_start_ = 0;
 };
 
 }  // namespace slender

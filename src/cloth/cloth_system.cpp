@@ -21,12 +21,13 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
 
 /// Measured (study implicit_step): sweeps are faster below, the constant factor above.
 constexpr int kMostSwept = 3000;
+constexpr double kBesideLoad = 1e-2;
 
 ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
 {
   if (options.solver != ClothSolver::automatic)
     return options.solver;
-  return model.averages || model.vertices() > kMostSwept ? ClothSolver::conjugate_gradients : ClothSolver::gauss_seidel;
+  return !model.averages.empty() || model.vertices() > kMostSwept ? ClothSolver::conjugate_gradients : ClothSolver::gauss_seidel;
 }
 
 }  // namespace
@@ -72,19 +73,20 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
   {
     preconditioner_ = std::make_unique<ClothPreconditioner>(model, bending_, matrix_, !constant_bending_);
     cg_.resize(n);
-    if (model.averages)
+    average_sets_.resize(model.averages.size());
+    for (std::size_t s = 0; s < average_sets_.size(); ++s)
     {
-      averages_ = std::make_unique<ConstrainedCholesky>();
-      averages_->setConstraints(*model.averages, model.average_bounds.size() > 0);
-      gap_.assign(4 * model.averageCount(), 0.0);
-      multipliers_ = gap_;
-      if (model.average_bounds.size() > 0)
+      average_sets_[s].prescribed = &model.averages[s];
+      average_sets_[s].solver.setConstraints(*model.averages[s].weights, model.averages[s].bounds.size() > 0);
+    }
+    if (!average_sets_.empty())
+    {
+      if (model.averages[0].bounds.size() > 0)
       {
         bounds_ = std::make_unique<AverageBounds>();
-        bounds_->taken = bounds_->pulls = gap_;
         bounds_->first_guess = bounds_->before = bounds_->image = bounds_->image_before = PointVector(4 * n, 0.0);
-        bounds_->forces.setZero(3, model.averageCount());
       }
+      use(average_sets_[0]);
     }
   }
   for (PointVector* v : {&start_, &target_, &force_, &gradient_, &product_, &right_, &correction_})
@@ -119,7 +121,6 @@ void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVe
 {
   if (ratio == 0.0 && ratio_ == 0.0)
     return;
-  ratio_ = ratio;
   double* strains[3] = {strains_[0].data(), strains_[1].data(), strains_[2].data()};
   double* others[3] = {other_strains_[0].data(), other_strains_[1].data(), other_strains_[2].data()};
   const auto add = [&](const PointVector& there, double part) {
@@ -158,10 +159,32 @@ void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVe
       }
     for (std::size_t i = 0; i < x.size(); ++i)
       viscous_start_[i] += (move ? (*move)[i] : 0.0) + (share != 0.0 ? share * ((*other)[i] - x[i]) : 0.0);
+    if (constant_bending_)
+      viscous_form_ = bending_.multiply(viscous_start_.data(), product_.data());
   }
+  respond(ratio);
+}
+
+void ClothSystem::respond(double ratio)
+{
+  ratio_ = ratio;
+  const double* strains[3] = {strains_[0].data(), strains_[1].data(), strains_[2].data()};
   membrane_.setResponse(ratio, strains);
   if (hinges_)
     hinges_->setResponse(ratio, angles_.data());
+}
+
+double ClothSystem::elasticEnergy(const PointVector& x)
+{
+  const double ratio = ratio_;
+  respond(0.0);
+  double result = membrane_.energy(x.data()).energy;
+  if (hinges_)
+    result += hinges_->energy(x.data());
+  else if (constant_bending_)
+    result += 0.5 * bending_.multiply(x.data(), product_.data());
+  respond(ratio);
+  return result;
 }
 
 void ClothSystem::setWeights(double tau, double ratio)
@@ -179,11 +202,33 @@ void ClothSystem::setWeights(double tau, double ratio)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += weight_[i];
   base_.assign(matrix_.values(), matrix_.values() + 9 * matrix_.blocks());
   preconditioned_ = !preconditioner_ || preconditioner_->setConstant(weight_, 1.0 + ratio, held_);
-  if (preconditioner_ && preconditioned_)
-    independent_ = !averages_ || averages_->factor(preconditioner_->constantFactor(), held_.data());
+  for (AverageSet& set : average_sets_)
+    set.ready = false;
   base_tau_ = tau;
   base_ratio_ = ratio;
   base_held_ = held_;
+}
+
+void ClothSystem::use(AverageSet& set)
+{
+  used_ = &set;
+  averages_ = &set.solver;
+  gap_.assign(4 * static_cast<std::size_t>(set.prescribed->count()), 0.0);
+  multipliers_ = gap_;
+  if (bounds_)
+  {
+    bounds_->at.clear();
+    bounds_->taken = bounds_->pulls = bounds_->wanted = bounds_->bounded = bounds_->response = gap_;
+    bounds_->stiffness = bounds_->weights = set.prescribed->bounds;
+    bounds_->at.reserve(static_cast<std::size_t>(set.prescribed->count()));
+    bounds_->forces.setZero(3, set.prescribed->count());
+  }
+}
+
+void ClothSystem::useAverages(const ClothState& state)
+{
+  if (used_ && used_ != &average_sets_[static_cast<std::size_t>(state.average_set)])
+    use(average_sets_[static_cast<std::size_t>(state.average_set)]);
 }
 
 void ClothSystem::hold(const ClothState& state)
@@ -199,6 +244,11 @@ void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
   const int n = points();
   start_ = *stage.start;
   setWeights(stage.tau, ratio_);
+  if (used_ && preconditioned_ && !used_->ready)
+  {
+    used_->independent = averages_->factor(preconditioner_->constantFactor(), held_.data());
+    used_->ready = true;
+  }
   const bool extra = inputs.forces.cols() > 0;
   const double damping = model_.mass_damping * stage.tau;
   for (int i = 0; i < n; ++i)
@@ -250,7 +300,7 @@ double ClothSystem::addIsometric(const PointVector& x, PointVector& gradient)
   if (ratio_ > 0)
   {
     bending_.multiply(viscous_start_.data(), product_.data());
-    energy -= ratio_ * pointKernels().dot(points(), x.data(), product_.data());
+    energy += ratio_ * (0.5 * ratio_ / (1.0 + ratio_) * viscous_form_ - pointKernels().dot(points(), x.data(), product_.data()));
     for (std::size_t i = 0; i < gradient.size(); ++i)
       gradient[i] -= ratio_ * product_[i];
   }
@@ -270,7 +320,7 @@ ClothEvaluation ClothSystem::energy(const PointVector& x)
     const double form = bending_.multiply(x.data(), product_.data());
     result.bending = 0.5 * (1.0 + ratio_) * form;
     if (ratio_ > 0)
-      result.bending -= ratio_ * pointKernels().dot(points(), viscous_start_.data(), product_.data());
+      result.bending += ratio_ * (0.5 * ratio_ / (1.0 + ratio_) * viscous_form_ - pointKernels().dot(points(), viscous_start_.data(), product_.data()));
   }
   return result;
 }
@@ -299,6 +349,23 @@ ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind k
   if (wind_.active())
     wind_.addHessian(matrix_);
   return result;
+}
+
+double ClothSystem::loadWork(int i, const PointVector& from, const PointVector& to) const
+{
+  double work = point(force_, i).dot(point(to, i) - point(from, i));
+  Eigen::Vector3d unused(0, 0, 0);
+  if (wind_.active())
+    work += wind_.addGradient(i, point(from, i), unused) - wind_.addGradient(i, point(to, i), unused);
+  return work;
+}
+
+Eigen::Vector3d ClothSystem::internalGradient(int i, const PointVector& x) const
+{
+  Eigen::Vector3d loads = weight_[i] * (point(x, i) - point(target_, i)) - point(force_, i);
+  if (wind_.active())
+    wind_.addGradient(i, point(x, i), loads);
+  return point(gradient_, i) - loads;
 }
 
 void ClothSystem::shiftMatrix(double factor)
@@ -331,11 +398,11 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
     bending_.addProduct(1.0 + ratio_, p.data(), ap.data());
 }
 
-bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance,
-                        const Eigen::Matrix3Xd* averages)
+LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance,
+                                 const Eigen::Matrix3Xd* averages)
 {
-  if (!independent_)
-    return false;
+  if (!averagesIndependent())
+    return LinearOutcome::not_definite;
   // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
   bool moved = false;
   for (int i = 0; i < points(); ++i)
@@ -359,22 +426,23 @@ bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_itera
         point(right_, i) = point(d, i);
     ++factorizations;
     if (!factor_.factor(matrix_, held_.data()))
-      return false;
+      return LinearOutcome::not_definite;
     factor_.solvePoints(right_.data(), d.data());
-    return true;
+    return LinearOutcome::solved;
   }
   if (!preconditioned_)
-    return false;
+    return LinearOutcome::not_definite;
   clearHeld(right_);
   constexpr int kMostIterations = 2000;
+  load_ = 0.0;
   const double allowed = tolerance > 0 ? tolerance : linear_tolerance_;
   if (solver_ == ClothSolver::gauss_seidel)
-    return correct(d, sweeps_.solve(1.0 + ratio_, held_, right_, correction_, allowed, kMostIterations), linear_iterations);
+    return correct(d, sweeps_.solve(1.0 + ratio_, held_, right_, correction_, allowed, kMostIterations), allowed, linear_iterations);
   if (at && !averages_)   // averages are met with the constant matrix
     preconditioner_->align(*at, matrix_, held_);
   else
     preconditioner_->useConstant();
-  const double reference = averages_ ? takeFirstStep(d, averages) : 0.0;
+  const double reference = averages_ ? takeFirstStep(d, averages, allowed) : 0.0;
   const LinearResult result = cg_.solve(
     right_, correction_, allowed, kMostIterations,
     [&](const PointVector& p, PointVector& ap) {
@@ -388,15 +456,19 @@ bool ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_itera
         preconditioner_->apply(r, z);
     },
     reference);
-  return correct(d, result, linear_iterations);
+  return correct(d, result, allowed, linear_iterations);
 }
 
-bool ClothSystem::correct(PointVector& d, const LinearResult& result, int& linear_iterations) const
+LinearOutcome ClothSystem::correct(PointVector& d, const LinearResult& result, double tolerance, int& linear_iterations) const
 {
   linear_iterations += result.iterations;
   for (std::size_t i = 0; i < d.size(); ++i)
     d[i] += correction_[i];
-  return result.definite;
+  if (!result.definite)
+    return LinearOutcome::not_definite;
+  // of what is strained so much that little is left beside its load: far less of that than others are asked for
+  const bool beside_load = result.residual * result.scale <= kBesideLoad * tolerance * load_;
+  return result.residual <= tolerance || beside_load ? LinearOutcome::solved : LinearOutcome::not_converged;
 }
 
 }  // namespace slender

@@ -34,6 +34,14 @@ struct ClothStage
   const Eigen::Matrix3Xd* velocity = nullptr;    ///< at which it does, as far as its force is not linear in the end's
 };
 
+/// What became of linear equations.
+enum class LinearOutcome
+{
+  solved,
+  not_definite,    ///< the matrix is not positive definite, or prescribed averages depend on each other
+  not_converged    ///< the most iterations that are taken did not reach the tolerance
+};
+
 /// Energy of one implicit stage of a cloth, with gradient and Hessian, and the solution of its Newton equations:
 ///   E(x) + sum 1/2 w |x - target|^2 + 1/2 (x - y)^T D (x - y) - f . x,
 /// w from mass and mass damping, D and y from the wind; stiffness damping makes E viscous (see HingeBending::setResponse).
@@ -47,6 +55,10 @@ public:
 
   /// What is held, and the hinges.
   void hold(const ClothState& state);
+  /// The set of averages that acts from now on.
+  void useAverages(const ClothState& state);
+  bool bounded() const { return bounds_ != nullptr; }
+  int averageCount() const { return averages_ ? averages_->count() : 0; }
   /// After setViscosity(stiffness damping / tau, ...).
   void beginStage(const ClothStage& stage, const ClothInputs& inputs);
   void setHinges(const ClothState& state);
@@ -54,6 +66,10 @@ public:
   void setViscosity(double ratio, const PointVector& x);
   /// The same for strains that are combined like the points x + move + share (other - x), to second order in `move`; `move` and `other` may be null.
   void setViscosity(double ratio, const PointVector& x, const PointVector* move, double share, const PointVector* other);
+
+  double viscosity() const { return ratio_; }
+  /// Without what viscosity adds [J].
+  double elasticEnergy(const PointVector& x);
 
   ClothEvaluation energy(const PointVector& x);
   /// Overwrites gradient().
@@ -69,26 +85,31 @@ public:
   PointVector& gradient() { return gradient_; }
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
   /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `tolerance`: theirs, 0: that of the options.
-  /// False: not positive definite. The numbers grow by what was needed.
+  /// The numbers grow by what was needed.
   /// Averages stay what the first guess makes them; with `averages` (3 x count) the points x + d, x the start of the stage, get these.
-  bool solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0,
-             const Eigen::Matrix3Xd* averages = nullptr);
+  LinearOutcome solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0,
+                      const Eigen::Matrix3Xd* averages = nullptr);
   /// The blocks of solve()'s matrix as last evaluated; those of isometric bending are among them only for Cholesky.
   const BlockMatrix& matrix() const { return matrix_; }
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
 
   /// The same for a linearised step of a model with bounds of its averages' forces. `at_bound`: which were, and are, at their bounds.
-  bool solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound, int& linear_iterations);
+  LinearOutcome solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound, int& linear_iterations);
   /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x count).
   void meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x);
   /// Takes the part out of the gradient that the averages balance: their forces (3 x count). With bounds these are those of solveBounded(),
   /// and of the `response` to other forces those of averages that are not at their bounds.
   void balanceAverages(Eigen::Matrix3Xd& forces, bool response = false);
   /// False when averages depend on each other on what is not held: then nothing can be solved.
-  bool averagesIndependent() const { return independent_; }
+  bool averagesIndependent() const { return !averages_ || used_->independent; }
   /// What they are at x.
   void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
+
+  /// Work of gravity, extra forces and air on a point that moved between two places, the air as at the end of the stage [J].
+  double loadWork(int i, const PointVector& from, const PointVector& to) const;
+  /// Of the gradient at x, as last evaluated, what is elastic and viscous [N].
+  Eigen::Vector3d internalGradient(int i, const PointVector& x) const;
 
   const PointVector& start() const { return start_; }
   const PointMatrix& bending() const { return bending_; }
@@ -104,13 +125,17 @@ private:
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
   /// Adds correction_, the solution of conjugate gradients, to d.
-  bool correct(PointVector& d, const LinearResult& result, int& linear_iterations) const;
+  LinearOutcome correct(PointVector& d, const LinearResult& result, double tolerance, int& linear_iterations) const;
   /// gap_: by how much the averages at x fall short.
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
   void preconditionWithin(PointVector& r, PointVector& z);
-  double takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages);
-  bool minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound, int& linear_iterations);
+  double takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages, double tolerance);
+  LinearOutcome stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference, int& linear_iterations);
+  LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference, int& linear_iterations);
+  double boundedForces();
   void takeOutAverages(PointVector& r);
+  struct AverageSet;
+  void use(AverageSet& set);
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
 
   const ClothModel& model_;
@@ -135,8 +160,17 @@ private:
   bool preconditioned_ = true;                ///< its constant part could be factored
   ConjugateGradients cg_;
   SymmetricSweeps sweeps_;
-  std::unique_ptr<ConstrainedCholesky> averages_;   ///< of the preconditioner, where averages are prescribed
-  bool independent_ = true;                         ///< these, with what is held
+
+  struct AverageSet
+  {
+    const PrescribedAverages* prescribed;
+    ConstrainedCholesky solver;    ///< of the preconditioner
+    bool ready = false;            ///< factored, with the present one
+    bool independent = true;       ///< with what is held
+  };
+  std::vector<AverageSet> average_sets_;
+  AverageSet* used_ = nullptr;                      ///< of these, where averages are prescribed, and
+  ConstrainedCholesky* averages_ = nullptr;         ///< its solver
   PointVector gap_, multipliers_;                   ///< one point per average
   Eigen::Matrix3Xd averages_now_;
 
@@ -146,10 +180,16 @@ private:
     Eigen::Matrix3Xd forces;       ///< of all [N]
     PointVector taken, pulls;      ///< multipliers of the averages that are met, so far; forces of all
     PointVector first_guess, before, image, image_before;
+    PointVector wanted, bounded, response;   ///< of minimizeBounded(): directions of forces at their bounds, else zero; forces; what they are to a motion
+    Eigen::VectorXd stiffness, weights;      ///< [N/m]
   };
   std::unique_ptr<AverageBounds> bounds_;      ///< of models with bounds
 
+  void respond(double ratio);
+
   double ratio_ = 0;
+  double viscous_form_ = 0;                   ///< of isometric bending, at viscous_start_
+  double load_ = 0;   ///< with averages: on the cloth without them, as the tolerance counts it
   PointVector start_, viscous_start_, shifted_, target_, force_, gradient_, product_, right_, correction_;
   std::vector<double> weight_;                ///< of inertia, per point
   std::vector<char> held_;

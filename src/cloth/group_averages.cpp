@@ -10,6 +10,7 @@ namespace slender {
 namespace {
 
 constexpr int kMeetRounds = 200;
+constexpr double kBoundSlack = 1e-3;   // of forces' bounds
 constexpr int kStallRounds = 8;   // that must halve the averages' errors; slow convergence as it was seen makes a third of them
 
 }  // namespace
@@ -22,9 +23,9 @@ std::string ClothGroup::blameAverages(const CollisionReport& failure) const
   for (const int point : failure.points)
   {
     const ClothModel* cloth = point >= 0 && point < first_.back() ? model_.cloths[clothOf(point)].get() : nullptr;
-    if (cloth && cloth->averages)
+    if (cloth && !cloth->averages.empty())
       return "; the averages of cloth '" + cloth->name + "' are to be where its guide is, whatever is in the way: keep the guide clear of it, or " +
-             (cloth->average_bounds.size() > 0 ? "take a lower max_traction" : "bound their forces (max_traction)");
+             (cloth->averages[0].bounds.size() > 0 ? "take a lower max_traction" : "bound their forces (max_traction)");
   }
   return "";
 }
@@ -63,14 +64,15 @@ CollisionReport ClothGroup::resolve(const CollisionStep& step)
 void ClothGroup::prepareCorrection(std::size_t k)
 {
   AverageCorrection& to = corrections_[k];
-  if (to.ready && to.pins == work_.cloths[k].pins)
+  if (to.ready && to.pins == work_.cloths[k].pins && to.set == work_.cloths[k].average_set)
     return;
-  const auto& c = *model_.cloths[k]->averages;
+  const auto& c = *averagesOf(k)->weights;
   to.weights = c * inverse_mass_.segment(first_[k], first_[k + 1] - first_[k]).asDiagonal();
   to.gram.compute(Eigen::MatrixXd(to.weights * c.transpose()));
-  if (model_.cloths[k]->average_bounds.size() > 0)
+  if (averagesOf(k)->bounds.size() > 0)
     to.gram_rows = to.weights * c.transpose();
   to.pins = work_.cloths[k].pins;
+  to.set = work_.cloths[k].average_set;
   to.ready = true;
 }
 
@@ -81,7 +83,7 @@ double ClothGroup::balancedWork(std::size_t k, double h)
   constexpr int kSweeps = 100;
   prepareCorrection(k);
   AverageCorrection& to = corrections_[k];
-  const auto& c = *model_.cloths[k]->averages;
+  const auto& c = *averagesOf(k)->weights;
   const std::vector<int>& at_bound = next_.cloths[k].at_bound;
   to.gap.setZero(3, c.rows());
   for (Eigen::Index i = 0; i < c.rows(); ++i)
@@ -115,14 +117,14 @@ double ClothGroup::boundAverages(std::size_t k, double h, double gap)
 {
   constexpr int kSweeps = 2000;
   AverageCorrection& to = corrections_[k];
-  const double slack = (model_.options.empty() ? options_ : model_.options[k]).linear_tolerance;   // within which the cloth's own step keeps bounds
-  const Eigen::VectorXd& bounds = model_.cloths[k]->average_bounds;
+  const double unresolved = 2.0 * (model_.options.empty() ? options_ : model_.options[k]).linear_tolerance;   // of a force's direction, by the cloth's own step
+  const Eigen::VectorXd& bounds = averagesOf(k)->bounds;
   std::vector<int>& at_bound = next_.cloths[k].at_bound;
   at_bound.clear();
   to.forces = steppers_[k].averageForces() + shared_averages_[k];
   bool within = true;
   for (Eigen::Index i = 0; i < bounds.size(); ++i)
-    within = within && (to.forces.col(i) + to.multipliers.col(i) / (h * h)).norm() <= (1.0 + slack) * bounds[i];
+    within = within && (to.forces.col(i) + to.multipliers.col(i) / (h * h)).norm() <= (1.0 + kBoundSlack) * bounds[i];
   if (within)
     return gap;
   to.multipliers.setZero();
@@ -132,13 +134,13 @@ double ClothGroup::boundAverages(std::size_t k, double h, double gap)
     double largest = 0.0;
     for (Eigen::Index i = 0; i < bounds.size(); ++i)
     {
-      const double give = h * h * to.gram_rows.coeff(i, i), most = (1.0 + slack) * bounds[i];
+      const double give = h * h * to.gram_rows.coeff(i, i), most = (1.0 + kBoundSlack) * bounds[i];
       const Eigen::Vector3d wanted = to.forces.col(i) + to.gap.col(i) / give, now = to.forces.col(i);
       const bool beyond = wanted.norm() > most;
       const Eigen::Vector3d change = (beyond ? Eigen::Vector3d(most / wanted.norm() * wanted) : wanted) - now;
       if (sweep == 0 && beyond)
         at_bound.push_back(static_cast<int>(i));
-      if (sweep == 0 && !(beyond && change.norm() <= 2.0 * slack * bounds[i]))
+      if (sweep == 0 && !(beyond && now.norm() <= most && change.norm() <= unresolved * bounds[i]))
         needed = std::max(needed, give * change.norm() / to.tolerance);
       largest = std::max(largest, give * change.norm());
       to.forces.col(i) += change;
@@ -161,10 +163,10 @@ double ClothGroup::meetAverages(double h)
   double worst = 0.0;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
-    if (!model_.cloths[k]->averages)
+    if (!averagesOf(k))
       continue;
-    const bool bounded = model_.cloths[k]->average_bounds.size() > 0;
-    const auto& c = *model_.cloths[k]->averages;
+    const bool bounded = averagesOf(k)->bounds.size() > 0;
+    const auto& c = *averagesOf(k)->weights;
     AverageCorrection& to = corrections_[k];
     const int first = first_[k], count = first_[k + 1] - first;
     const auto x = x_.middleCols(first, count);

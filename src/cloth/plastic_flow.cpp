@@ -8,15 +8,15 @@ namespace slender {
 
 PlasticFlow::PlasticFlow(const ClothModel& model) : law_(model.plasticity)
 {
-  const std::string who = "cloth '" + model.name + "': plasticity ";
+  const auto refuse = [&](const std::string& why) { throw std::invalid_argument("cloth '" + model.name + "': plasticity " + why); };
   if (!(law_.yield_curvature >= 0))
-    throw std::invalid_argument(who + "needs a yield curvature of zero or more [1/m]");
+    refuse("needs a yield curvature of zero or more [1/m]");
   if (!std::isfinite(law_.hardening) || !(law_.creep_time >= 0) || !std::isfinite(law_.creep_time))
-    throw std::invalid_argument(who + "needs a finite hardening [m] and a creep time of zero or more [s]");
+    refuse("needs a finite hardening [m] and a creep time of zero or more [s]");
   if (!std::isfinite(law_.yield_curvature))
     return;
   if (model.bending != BendingModel::hinge)
-    throw std::invalid_argument(who + "is for hinge bending, not " + toString(model.bending) + ", which has no rest angles");
+    refuse(std::string("is for hinge bending, not ") + toString(model.bending) + ", which has no rest angles");
   const MeshTopology& t = model.topology;
   const Eigen::VectorXd areas = faceAreas(model.rest), none = Eigen::VectorXd::Zero(t.hingeCount());
   hinges_ = std::make_unique<HingeBending>(t.hinges, none, none);

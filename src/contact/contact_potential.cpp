@@ -19,25 +19,29 @@ constexpr double kTurnMargin = 0.02;   // [rad] a solid may turn before candidat
 
 void checkSurface(const ContactSurface& surface, const ContactOptions& options)
 {
-  const auto require = [](bool ok, const std::string& what) {
-    if (!ok)
-      throw std::invalid_argument("contact: " + what);
-  };
-  require(options.gap > 0.0 && std::isfinite(options.gap), "gap is " + std::to_string(options.gap) + " m; must be positive");
-  require(options.slip_speed > 0.0, "slip_speed is " + std::to_string(options.slip_speed) + " m/s; must be positive");
-  require(options.least_stiffness > 0.0, "least_stiffness is " + std::to_string(options.least_stiffness) + " N; must be positive");
+  const auto refuse = [](const std::string& why) { throw std::invalid_argument("contact: " + why); };
+  if (!(options.gap > 0.0 && std::isfinite(options.gap)))
+    refuse("gap is " + std::to_string(options.gap) + " m; must be positive");
+  if (!(options.slip_speed > 0.0))
+    refuse("slip_speed is " + std::to_string(options.slip_speed) + " m/s; must be positive");
+  if (!(options.least_stiffness > 0.0))
+    refuse("least_stiffness is " + std::to_string(options.least_stiffness) + " N; must be positive");
   for (std::size_t i = 0; i < surface.segments.size(); ++i)
   {
     const ContactSegment& s = surface.segments[i];
-    const std::string name = "segment " + std::to_string(i);
-    require(s.a >= 0 && s.a < surface.points && s.b >= 0 && s.b < surface.points && s.a != s.b,
-            name + " names points outside 0 ... " + std::to_string(surface.points - 1) + " or one point twice");
-    require(s.object >= 0 && s.object < static_cast<int>(surface.objects.size()), name + " names an object that does not exist");
-    require(s.radius > 0.0 && std::isfinite(s.radius), name + ": radius is " + std::to_string(s.radius) + " m; must be positive");
-    require(s.length >= 0.0, name + ": length is " + std::to_string(s.length) + " m; must not be negative");
+    const auto refuseThis = [&](const std::string& why) { refuse("segment " + std::to_string(i) + why); };
+    if (!(s.a >= 0 && s.a < surface.points && s.b >= 0 && s.b < surface.points && s.a != s.b))
+      refuseThis(" names points outside 0 ... " + std::to_string(surface.points - 1) + " or one point twice");
+    if (!(s.object >= 0 && s.object < static_cast<int>(surface.objects.size())))
+      refuseThis(" names an object that does not exist");
+    if (!(s.radius > 0.0 && std::isfinite(s.radius)))
+      refuseThis(": radius is " + std::to_string(s.radius) + " m; must be positive");
+    if (!(s.length >= 0.0))
+      refuseThis(": length is " + std::to_string(s.length) + " m; must not be negative");
   }
   for (std::size_t i = 0; i < surface.objects.size(); ++i)
-    require(surface.objects[i].friction >= 0.0, "object " + std::to_string(i) + ": friction is negative");
+    if (!(surface.objects[i].friction >= 0.0))
+      refuse("object " + std::to_string(i) + ": friction is negative");
   for (const ContactSolid& solid : surface.solids)
     checkShape(solid.shape);
 }

@@ -43,6 +43,7 @@ const char* toString(StepFailure failure)
     case StepFailure::input_not_finite: return "input_not_finite";
     case StepFailure::state_not_finite: return "state_not_finite";
     case StepFailure::squeezed: return "squeezed";
+    case StepFailure::linear_unconverged: return "linear_unconverged";
     case StepFailure::energy_grew: return "energy_grew";
     case StepFailure::overstretched: return "overstretched";
     case StepFailure::turned_too_far: return "turned_too_far";

@@ -9,6 +9,22 @@
 
 namespace slender {
 
+namespace {
+
+/// Lower triangle of a positive definite matrix: its factor.
+void factorInPlace(Eigen::Ref<Eigen::MatrixXd> a)
+{
+  const Eigen::Index n = a.rows();
+  for (Eigen::Index b = 0; b < n; ++b)
+  {
+    for (Eigen::Index j = 0; j < b; ++j)
+      a.col(b).tail(n - b) -= a(b, j) * a.col(j).tail(n - b);
+    a.col(b).tail(n - b) /= std::sqrt(a(b, b));
+  }
+}
+
+}  // namespace
+
 void ConstrainedCholesky::Rows::multiply(double factor, const double* x, double* y) const
 {
   pointKernels().multiply(static_cast<int>(starts.size()) - 1, starts.data(), offsets.data(), values.data(), factor, x, y);
@@ -21,6 +37,7 @@ void ConstrainedCholesky::setConstraints(const Constraints& c, bool bounded)
   {
     s_.resize(c.rows(), c.rows());
     inner_.resize(c.rows(), c.rows());
+    soft_.resize(c.rows(), c.rows());
     give_.resize(c.rows(), 3);
     pull_.assign(4 * static_cast<std::size_t>(c.cols()), 0.0);
   }
@@ -90,12 +107,7 @@ void ConstrainedCholesky::leaveOut(const std::vector<int>& rows)
   for (Eigen::Index b = 0; b < k; ++b)
     for (Eigen::Index a = b; a < k; ++a)
       inner(a, b) = s_inverse_.values[static_cast<std::size_t>(rows[a]) * count() + rows[b]];
-  for (Eigen::Index b = 0; b < k; ++b)   // positive definite: its own factor in its place
-  {
-    for (Eigen::Index j = 0; j < b; ++j)
-      inner.col(b).tail(k - b) -= inner(b, j) * inner.col(j).tail(k - b);
-    inner.col(b).tail(k - b) /= std::sqrt(inner(b, b));
-  }
+  factorInPlace(inner);
 }
 
 /// mu = S^-1 t of what is not left out (Woodbury's formula)
@@ -177,7 +189,8 @@ ConstrainedCholesky::Norms ConstrainedCholesky::solveBounded(const double* r, co
         for (int c = 0; c < 3; ++c)
           t_[4 * k + c] -= s_(k, i) / l * change[c];
     }
-    if (largest <= tolerance)
+    norms.converged = largest <= tolerance;
+    if (norms.converged)
       break;
   }
   std::copy_n(f, 4 * m, mu_.data());
@@ -191,6 +204,29 @@ ConstrainedCholesky::Norms ConstrainedCholesky::solveBounded(const double* r, co
     y_[i] /= l;
   p_->backwardPoints(y_.data(), z);
   return norms;
+}
+
+void ConstrainedCholesky::soften(const Eigen::VectorXd& weights)
+{
+  soft_ = s_;
+  soft_.diagonal() += weights.cwiseInverse();
+  factorInPlace(soft_);
+}
+
+/// Woodbury's formula.
+void ConstrainedCholesky::solveSoftened(const double* r, double* z) const
+{
+  p_->forwardPoints(r, y_.data());
+  v_.multiply(0.0, y_.data(), t_.data());
+  for (int i = 0; i < count(); ++i)
+    give_.row(i) = Eigen::Map<const Eigen::RowVector3d>(t_.data() + 4 * i);
+  const auto lower = soft_.triangularView<Eigen::Lower>();
+  lower.solveInPlace(give_);
+  lower.transpose().solveInPlace(give_);
+  for (int i = 0; i < count(); ++i)
+    Eigen::Map<Eigen::RowVector3d>(mu_.data() + 4 * i) = give_.row(i);
+  v_transposed_.multiply(-1.0, mu_.data(), y_.data());
+  p_->backwardPoints(y_.data(), z);
 }
 
 void ConstrainedCholesky::addForces(const double* f, double* r) const

@@ -27,7 +27,7 @@ struct Tracked
     model->bending = bending;
     model->bending_modulus = 1e-4;
     model->stiffness_damping = 1e-3;
-    model->averages = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(constraints->matrix());
+    model->averages = {{std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(constraints->matrix()), {}}};
     state = makeClothState(*model, fine.mesh.vertices);
   }
 
@@ -148,7 +148,7 @@ TEST(ClothAverages, StayExactWhereTheyTearAtTheCloth)
   model->bending = BendingModel::hinge;
   model->bending_modulus = 1e-5;
   model->stiffness_damping = 1e-3;
-  model->averages = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(constraints.matrix());
+  model->averages = {{std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(constraints.matrix()), {}}};
   ClothOptions o;
   o.one_newton_step = true;
   ClothStepper stepper(model, o);
@@ -179,7 +179,7 @@ TEST(ClothAverages, RefuseWhatCannotBe)
   Tracked held;
   pinVertices(held.state, [&] {
     std::vector<int> all;
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*held.model->averages, 0); entry; ++entry)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*held.model->averages[0].weights, 0); entry; ++entry)
       all.push_back(static_cast<int>(entry.col()));
     return all;
   }());

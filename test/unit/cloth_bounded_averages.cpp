@@ -20,15 +20,15 @@ struct Bounded
   ClothState state;
   ClothInputs inputs;
 
-  explicit Bounded(double traction)
+  explicit Bounded(double traction, double youngs_modulus = 2e5)
   {
-    model = std::make_shared<ClothModel>(buildCloth("bounded", fine.mesh, 0.2, isotropicMembrane(2e5, 0.3, 5e-4)));
+    model = std::make_shared<ClothModel>(buildCloth("bounded", fine.mesh, 0.2, isotropicMembrane(youngs_modulus, 0.3, 5e-4)));
     model->bending = BendingModel::hinge;
     model->bending_modulus = 1e-4;
     model->stiffness_damping = 1e-3;
-    model->averages = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(constraints.matrix());
+    model->averages = {{std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(constraints.matrix()), {}}};
     if (traction > 0)
-      model->average_bounds = traction * constraints.measures();
+      model->averages[0].bounds = traction * constraints.measures();
     options.one_newton_step = true;
     state = makeClothState(*model, fine.mesh.vertices);
     inputs.pins.resize(3, 0);
@@ -49,7 +49,7 @@ struct Bounded
 
   double greatestForce(const ClothStepper& stepper) const   // over its bound
   {
-    return (stepper.averageForces().colwise().norm().transpose().array() / model->average_bounds.array()).maxCoeff();
+    return (stepper.averageForces().colwise().norm().transpose().array() / model->averages[0].bounds.array()).maxCoeff();
   }
 
   /// Of the averages that are met [m]; at the others the force must be that of the bound, and point at the target.
@@ -65,7 +65,7 @@ struct Bounded
         continue;
       }
       const Vector3d gap = inputs.averages.col(i) - state.x * Eigen::VectorXd(constraints.matrix().row(i).transpose());
-      EXPECT_LT((stepper.averageForces().col(i) - model->average_bounds[i] * gap.normalized()).norm(), 0.01 * model->average_bounds[i]) << i;
+      EXPECT_LT((stepper.averageForces().col(i) - model->averages[0].bounds[i] * gap.normalized()).norm(), 0.01 * model->averages[0].bounds[i]) << i;
     }
     return met;
   }
@@ -82,8 +82,8 @@ TEST(BoundedAverages, MoveAFreeBodyByTheBoundAlone)
   const WeakConstraints one(paintedRegions({{"all", all, {}}}, fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
   EXPECT_NEAR(one.measures()[0], 0.25, 1e-12);
   auto model = std::make_shared<ClothModel>(buildCloth("sheet", fine.mesh, 0.2, isotropicMembrane(2e5, 0.3, 5e-4)));
-  model->averages = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(one.matrix());
-  model->average_bounds.setConstant(1, 0.4);
+  model->averages = {{std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(one.matrix()), {}}};
+  model->averages[0].bounds.setConstant(1, 0.4);
   ClothOptions options;
   options.one_newton_step = true;
   options.linear_tolerance = 1e-6;
@@ -200,6 +200,84 @@ TEST(BoundedAverages, AreGivenUpWhereCollisionsForbidThem)
   }
 }
 
+TEST(BoundedAverages, ConvergeForStiffCloth)
+{
+  // as paper: membrane forces of 5e5 N/m against a traction of 500 Pa
+  Matrix3Xd ends[3];
+  const double tolerances[] = {5e-3, 1e-4, 1e-6};
+  for (int r = 0; r < 3; ++r)
+  {
+    Bounded t(500.0, 1e9);
+    t.options.linear_tolerance = tolerances[r];
+    ClothStepper stepper(t.model, t.options);
+    for (int k = 1; k <= 10; ++k)
+    {
+      const StepReport report = t.step(stepper, t.stretched(1.0 + 0.01 * k * k));
+      ASSERT_TRUE(report.ok) << report.message;
+      EXPECT_EQ(report.cut_steps, 0);
+      if (r > 0)
+      {
+        EXPECT_LT(t.check(stepper), 1e-13);
+      }
+      EXPECT_LT(t.greatestForce(stepper), 1.0 + 1e-9);
+      EXPECT_LT(report.max_strain, 1e-3);
+      if (r < 2)
+      {
+        EXPECT_LT(report.linear_iterations, 500) << k;
+      }
+    }
+    EXPECT_GT(t.state.at_bound.size(), 10u);
+    ends[r] = t.state.x;
+  }
+  EXPECT_LT((ends[0] - ends[2]).cwiseAbs().maxCoeff(), 5e-4);   // of a guide that went 1 m
+  EXPECT_LT((ends[1] - ends[2]).cwiseAbs().maxCoeff(), 5e-4);
+}
+
+TEST(BoundedAverages, SayWhenTheyDoNotConverge)
+{
+  Bounded t(500.0, 1e9);
+  t.options.linear_tolerance = 1e-15;   // beyond rounding
+  t.options.newton.max_cuts = 1;
+  ClothStepper stepper(t.model, t.options);
+  const StepReport report = t.step(stepper, t.stretched(2.0));
+  EXPECT_FALSE(report.ok);
+  EXPECT_EQ(report.failure, StepFailure::linear_unconverged);
+  EXPECT_EQ(report.cut_steps, 1);
+  for (const char* fix : {"shorter step", "solver.tolerance", "max_traction", "softer cloth"})
+    EXPECT_NE(report.message.find(fix), std::string::npos) << report.message;
+  EXPECT_TRUE(t.state.x == t.fine.mesh.vertices);
+}
+
+TEST(BoundedAverages, HoldInContactWhateverTheTolerance)
+{
+  for (const double tolerance : {5e-3, 0.2})
+  {
+    Bounded t(20.0);
+    t.options.linear_tolerance = tolerance;
+    ClothGroupModel model;
+    model.cloths = {t.model};
+    model.contact.resize(1);
+    ContactSolid ball;
+    ball.shape = Sphere{0.1};
+    model.solids.push_back(ball);
+    ClothGroup group(model, t.options);
+    ClothGroupState state{{t.state}, {{{0.25, 0.25, -0.11}, Eigen::Quaterniond::Identity()}}};
+    ClothGroupInputs inputs{{t.inputs}, state.solids};
+    int contacts = 0;
+    double greatest = 0.0;
+    for (int k = 1; k <= 40; ++k)
+    {
+      inputs.cloths[0].averages = t.constraints.averages(t.coarse.vertices.colwise() - Vector3d(0, 0, 0.003 * k));
+      const StepReport report = group.step(state, inputs, 0.01);
+      ASSERT_TRUE(report.ok) << report.message;
+      contacts += report.repulsions;
+      greatest = std::max(greatest, (group.averageForces(0).colwise().norm().transpose().array() / t.model->averages[0].bounds.array()).maxCoeff());
+    }
+    EXPECT_GT(greatest, 0.99) << tolerance;
+    EXPECT_LT(greatest, 1.0011) << tolerance;
+  }
+}
+
 TEST(BoundedAverages, TellWhatFitsNot)
 {
   Bounded t(10.0);
@@ -217,9 +295,9 @@ TEST(BoundedAverages, TellWhatFitsNot)
   ClothOptions full = t.options;
   full.one_newton_step = false;
   EXPECT_NE(refused(full).find("one_newton_step: true"), std::string::npos);
-  t.model->average_bounds[3] = 0.0;
+  t.model->averages[0].bounds[3] = 0.0;
   EXPECT_NE(refused(t.options).find("must be positive"), std::string::npos);
-  t.model->average_bounds.setOnes(3);
+  t.model->averages[0].bounds.setOnes(3);
   EXPECT_NE(refused(t.options).find("one per average"), std::string::npos);
 }
 

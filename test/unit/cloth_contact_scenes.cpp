@@ -381,12 +381,16 @@ TEST(ClothContact, ScenesOfFabricStretchLikeFabric)
           most = std::max(most, (x.col(b) - x.col(a)).norm() / (mesh.vertices.col(b) - mesh.vertices.col(a)).norm() - 1.0);
         }
       if (k % 20 == 0)
+      {
         ASSERT_EQ(intersectionsOf(simulation), 0u) << k;
+      }
     }
     EXPECT_LT(most, 0.1);
     EXPECT_GT(touching, 1000);
     if (!simulation.config().obstacles.empty())
+    {
       EXPECT_LT(x.row(2).maxCoeff(), -0.0288);   // all of it below the ring
+    }
   }
 }
 

@@ -88,6 +88,8 @@ private:
   void prepareCorrection(std::size_t cloth);
   double balancedWork(std::size_t cloth, double h);
   double boundAverages(std::size_t cloth, double h, double gap);
+  /// Those that act on a cloth in the present step; null: none.
+  const PrescribedAverages* averagesOf(std::size_t cloth) const { return model_.cloths[cloth]->averagesOf(work_.cloths[cloth]); }
   Eigen::Matrix3Xd positions(const ClothGroupState& state) const;
   int clothOf(int point) const;
   std::string placeOf(int point) const;
@@ -115,7 +117,8 @@ private:
   struct AverageCorrection
   {
     double tolerance = 0.0;                                   ///< [m]
-    std::vector<int> pins;                                    ///< that `gram` is for
+    std::vector<int> pins;                                    ///< that `gram` is for, and
+    int set = 0;                                              ///< of averages
     Eigen::SparseMatrix<double, Eigen::RowMajor> weights;     ///< averages over masses
     Eigen::LDLT<Eigen::MatrixXd> gram;
     Eigen::Matrix3Xd gap, multipliers;

@@ -3,6 +3,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
@@ -41,6 +42,18 @@ struct Plasticity
   double creep_time = 0.0;   ///< [s] in which all but 1/e of what is beyond the yield flows; 0: at once
 };
 
+/// Weighted averages of a cloth's vertices that are prescribed (see WeakConstraints). Implicit steps only.
+struct PrescribedAverages
+{
+  std::shared_ptr<const Eigen::SparseMatrix<double, Eigen::RowMajor>> weights;   ///< averages x vertices, rows sum to 1
+
+  /// Largest force [N] with which each may act, > 0 or infinite; empty: as large as it takes. An average whose force is there is not met, but pulled
+  /// towards where it should be. For one_newton_step only, and for all sets of a cloth or for none.
+  Eigen::VectorXd bounds;
+
+  int count() const { return static_cast<int>(weights->rows()); }
+};
+
 /// Fixed properties of one cloth (thesis 2).
 struct ClothModel
 {
@@ -59,14 +72,14 @@ struct ClothModel
   double wind_coefficient = 0.0;     ///< [N s/m^3]: pressure per normal velocity of the air against the cloth
   Aerodynamics aerodynamics;         ///< in addition
 
-  /// Weighted averages of vertices that are prescribed (averages x vertices, rows sum to 1; see WeakConstraints); null: none. Implicit steps only.
-  std::shared_ptr<const Eigen::SparseMatrix<double, Eigen::RowMajor>> averages;
+  std::vector<PrescribedAverages> averages;   ///< sets of them, of which that of the state (ClothState::average_set) acts; empty: none
 
-  /// Largest force [N] with which each may act, > 0 or infinite; empty: as large as it takes. An average whose force is there is not met, but pulled
-  /// towards where it should be. For one_newton_step only.
-  Eigen::VectorXd average_bounds;
-
-  int averageCount() const { return averages ? static_cast<int>(averages->rows()) : 0; }
+  /// Null without any, and where the state names none.
+  const PrescribedAverages* averagesOf(const ClothState& state) const
+  {
+    const bool there = state.average_set >= 0 && state.average_set < static_cast<int>(averages.size());
+    return there ? &averages[static_cast<std::size_t>(state.average_set)] : nullptr;
+  }
   int vertices() const { return static_cast<int>(rest.vertices.cols()); }
   double totalMass() const { return mass.sum(); }
 };

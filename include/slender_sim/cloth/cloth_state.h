@@ -14,7 +14,8 @@ struct ClothState
   Eigen::VectorXd rest_angles;   ///< per hinge [rad], hinge bending only: plastic flow moves them
   Eigen::VectorXd stiffening;    ///< per hinge: what plastic flow multiplied its stiffness by; with plasticity only
   std::vector<int> pins;         ///< held vertices, ascending
-  std::vector<int> at_bound;     ///< averages whose forces were at their bounds in the last step, ascending
+  int average_set = 0;           ///< of the model's, that is prescribed; whoever changes it clears at_bound
+  std::vector<int> at_bound;     ///< averages of that set whose forces were at their bounds in the last step, ascending
   double next_step = 0;          ///< [s] of adaptive steps; 0: try the whole step
 };
 

@@ -12,7 +12,7 @@ namespace slender {
 struct ClothInputs
 {
   Eigen::Matrix3Xd pins;                  ///< where each pin shall be at the end of the step, 3 x pins; the motion inside it is uniform
-  Eigen::Matrix3Xd averages;              ///< what the model's averages shall be at the end of the step, 3 x count; in between their motion is uniform
+  Eigen::Matrix3Xd averages;              ///< what the averages of the state's set shall be at the end of the step, 3 x count; in between their motion is uniform
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
   Eigen::Matrix3Xd forces;                ///< extra forces on the vertices, 3 x n [N], or empty

@@ -11,6 +11,7 @@ enum class StepFailure
   newton_diverged,      ///< Newton did not reach its tolerance even after cutting the step
   folded_back,          ///< two consecutive tangents came (nearly) opposite: parallel transport is undefined there
   singular_matrix,      ///< the Hessian could not be made positive definite
+  linear_unconverged,   ///< cloth: conjugate gradients, or the averages' bounded forces, did not reach their tolerance
   input_not_finite,     ///< an input (pose, velocity, wind) was NaN or infinite
   state_not_finite,     ///< explicit step blew up
   squeezed,             ///< contact: prescribed motions leave no room for what lies between them

@@ -11,6 +11,7 @@ struct LinearResult
 {
   int iterations = 0;
   double residual = 0.0;   ///< over the right-hand side's (or the reference), in the preconditioner's norm sqrt(r . P r)
+  double scale = 0.0;      ///< that norm: of the right-hand side, or the reference
   bool definite = true;    ///< no direction of negative curvature was met
 };
 
@@ -44,6 +45,7 @@ public:
       result.definite = rz == 0.0;
       return result;
     }
+    result.scale = std::sqrt(scale);
     result.residual = std::sqrt(rz / scale);
     std::copy(z_.begin(), z_.end(), p_.begin());
     while (result.residual > tolerance && result.iterations < max_iterations)

@@ -30,6 +30,7 @@ public:
   {
     double load = 0.0;   ///< sqrt(r . P^-1 r + g . S^-1 g): of r without constraints, and of the smallest z that has C z = g
     double step = 0.0;   ///< sqrt(z . P z)
+    bool converged = true;   ///< solveBounded()
   };
   /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero, and no norms. r may be z. mu: 4 doubles per constraint. Fixed points: r
   /// must be zero there, and z is.
@@ -38,6 +39,11 @@ public:
   /// bound and C_i z = gap_i, or f_i is at it and points along gap_i - C_i z. By block Gauss-Seidel from the f given (4 doubles per constraint) until no
   /// f_i changes by more than `tolerance` of itself, or of its bound. load: sqrt(r . P^-1 r + f . S f), step: that of r + C^T f.
   Norms solveBounded(const double* r, const double* gap, const double* bounds, double l, double tolerance, double* z, double* f);
+  /// Makes solveSoftened() that of P + C^T diag(weights) C, weights positive. With `bounded` only.
+  void soften(const Eigen::VectorXd& weights);
+  void solveSoftened(const double* r, double* z) const;
+  /// Of one constraint when all others are met: entry of the diagonal of S^-1.
+  double stiffness(int i) const { return s_inverse_.values[static_cast<std::size_t>(i) * (count() + 1)]; }
   /// r += C^T f, but for fixed points.
   void addForces(const double* f, double* r) const;
   /// mu alone, g zero: half the work.
@@ -60,7 +66,7 @@ private:
   const SparseCholesky* p_ = nullptr;
   Rows v_, v_transposed_, s_inverse_, c_transposed_;
   std::vector<int> left_out_;
-  Eigen::MatrixXd s_, inner_;        ///< S, with bounds; factor of the part of S^-1 that is left out
+  Eigen::MatrixXd s_, inner_, soft_; ///< S, with bounds; factor of the part of S^-1 that is left out; of S + diag(1 / weights)
   mutable Eigen::Matrix<double, Eigen::Dynamic, 3> give_;
   PointVector pull_;
   mutable PointVector y_, t_, mu_;   ///< of points each: the kernels read as many points of x as there are rows
