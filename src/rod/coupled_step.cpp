@@ -238,7 +238,7 @@ void CoupledSystem::setCarriedInertia(const Stage& stage)
     for (int i = g.first_node; i <= g.last_node; ++i)
     {
       const Eigen::Vector3d r = weld.X_BG * g.nodes_G[i - g.first_node];
-      const double wm = m.mass[i] * inertia, wd = (m.mass_damping * m.mass[i] + m.drag[i]) * damping;
+      const double wm = m.mass[i] * inertia, wd = m.damping(i) * damping;
       part.rod->system.setInertia(i, wm + wd, (wm * body.inertiaTarget(r) + wd * body.dampingTarget(r)) / (wm + wd),
                                   part.rod->load(inputs_->rods[part.index], i));
     }

@@ -115,7 +115,7 @@ void ExplicitSystem::predictBody(Body& body, double h)
       torque += rod.wrenches[weld.grasp].torque + (g.X_WG.position - body.start.position).cross(rod.wrenches[weld.grasp].force);
       for (int i = g.first_node; i <= g.last_node; ++i)
       {
-        const Eigen::Vector3d drag = -(rod.model->mass_damping * rod.model->mass[i] + rod.model->drag[i]) * rod.work.v.col(i);
+        const Eigen::Vector3d drag = -rod.model->damping(i) * rod.work.v.col(i);
         force += drag;
         torque += (rod.work.x.col(i) - body.start.position).cross(drag);
       }

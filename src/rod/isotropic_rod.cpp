@@ -54,10 +54,10 @@ void IsotropicRod::compose()
 {
   composition_ = system_.composition();
   const int n = a_.nodes, edges = a_.edges;
-  const RodArrays& s = system_.arrays();
+  const double *twist_stiffness = system_.twistStiffness(), *rest_twist = system_.restTwist();
   for (int i = 0; i < n; ++i)
   {
-    a_.bend[i] = s.b11[i];
+    a_.bend[i] = system_.bendStiffness()[i];
     a_.torque[i] = 0.0;
     a_.stretch[i] = i < edges && !model_.inextensible ? model_.stretch_modulus[i] : 0.0;
   }
@@ -113,8 +113,8 @@ void IsotropicRod::compose()
   for (Span& span : spans_)
   {
     forJoints(span, [&](int i) {
-      span.rest += s.rest_twist[i];
-      span.compliance += s.beta[i] > 0 ? 1.0 / s.beta[i] : 0.0;
+      span.rest += rest_twist[i];
+      span.compliance += twist_stiffness[i] > 0 ? 1.0 / twist_stiffness[i] : 0.0;
     });
     for (int c : {span.before, span.after})
       if (c >= 0)
@@ -284,7 +284,7 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
       return StepFailure::folded_back;
     setDirector(edge, (d - d.dot(t) * t).normalized());
   }
-  double phi = 0.0, total = totalTwist(span, from);
+  double phi = 0.0, total = span.held() ? totalTwist(span, from) : span.rest;
   Section start, end;
   if (span.before >= 0)
   {
@@ -327,20 +327,22 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
   }
   else
   {
-    total = span.rest;
     phi = span.after >= 0 ? angle - total : 0.0;
   }
 
-  const RodArrays& s = system_.arrays();
+  const double *twist_stiffness = system_.twistStiffness(), *rest_twist = system_.restTwist();
   const auto setSection = [&](int clamp) {
     const double m = clamps[clamp].rest_twist + moment / clamps[clamp].beta;
     to.grasps[clamps[clamp].grasp].section_twist[clamps[clamp].side] = m;
     return m;
   };
-  forJoints(span, [&](int i) {
-    if (s.beta[i] > 0)   // else the whole rod is held
-      to.twist[i] = s.rest_twist[i] + moment / s.beta[i];
-  });
+  if (span.held())
+    forJoints(span, [&](int i) {
+      if (twist_stiffness[i] > 0)   // else the whole rod is held
+        to.twist[i] = rest_twist[i] + moment / twist_stiffness[i];
+    });
+  else if (span.count > 1 && twist_stiffness[span.first + 1] > 0)   // of an open rod, unless all of it is held
+    to.twist.segment(span.first + 1, span.count - 1) = Eigen::Map<const Eigen::VectorXd>(rest_twist + span.first + 1, span.count - 1);
   if (span.before >= 0)
     phi += setSection(span.before);
   if (span.after >= 0)

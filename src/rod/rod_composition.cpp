@@ -130,7 +130,8 @@ void RodSystem::compose(const RodState& state)
   shift_theta_ = twist;
   // A rod whose frames nobody holds can spin about itself without energy (if isotropic): keep its matrix definite.
   spin_ = clamps_.empty() && held_angles_.empty() ? 1e-8 * twist : 0.0;
-  setResponse(0.0, nullptr);
+  if (!storage_.empty())
+    setResponse(0.0, nullptr);
 }
 
 void RodSystem::placeGrasps(const std::vector<Pose>& X_WG)

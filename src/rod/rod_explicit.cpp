@@ -23,12 +23,16 @@ StepFailure RodStepper::Impl::explicitPredict(const RodInputs& inputs, double du
   next.last_step = h;
   for (int i = 0; i < n; ++i)
   {
-    // damping at the end of the step: linear, so it costs nothing to treat implicitly
-    const double damping = model->mass_damping * model->mass[i] + model->drag[i];
     const Eigen::Vector3d force = load(inputs, i) - (isotropic ? isotropic->nodeGradient(i) : system.nodeGradient(i));
-    next.v.col(i) = (model->mass[i] * work.v.col(i) + h * force) / (model->mass[i] + h * damping);
-    next.x.col(i) += h * next.v.col(i);
+    next.v.col(i) = model->mass[i] * work.v.col(i) + h * force;
   }
+  if (model->damped())   // by the velocity at the end of the step: linear, so it costs nothing to treat implicitly
+    for (int i = 0; i < n; ++i)
+      next.v.col(i) /= model->mass[i] + h * model->damping(i);
+  else
+    for (int i = 0; i < n; ++i)
+      next.v.col(i) /= model->mass[i];
+  next.x += h * next.v;
   holdNodes(inputs, duration, t + h);
   return StepFailure::none;
 }
@@ -111,7 +115,7 @@ StepFailure RodStepper::Impl::explicitFinish(const RodInputs& inputs, double dur
     for (int i = g.first_node; i <= g.last_node; ++i)
     {
       const Eigen::Vector3d force =
-          -model->mass[i] * (next.v.col(i) - work.v.col(i)) / h - (model->mass_damping * model->mass[i] + model->drag[i]) * next.v.col(i);
+          -model->mass[i] * (next.v.col(i) - work.v.col(i)) / h - model->damping(i) * next.v.col(i);
       wrenches[k].force += force;
       wrenches[k].torque += (work.x.col(i) - work.grasps[k].X_WG.position).cross(force);
     }

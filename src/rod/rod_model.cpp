@@ -12,10 +12,10 @@ namespace slender {
 
 namespace {
 
-void requirePositive(double value, const std::string& what)
+void requirePositive(double value, const char* what, int edge)
 {
   if (!(value > 0) || !std::isfinite(value))
-    throw std::invalid_argument(what + " must be positive and finite, got " + std::to_string(value));
+    throw std::invalid_argument(what + (" of edge " + std::to_string(edge)) + " must be positive and finite, got " + std::to_string(value));
 }
 
 void checkSections(const std::vector<RodSection>& sections, int edges)
@@ -25,16 +25,15 @@ void checkSections(const std::vector<RodSection>& sections, int edges)
   for (int j = 0; j < edges; ++j)
   {
     const RodSection& s = sections[j];
-    const std::string at = " of edge " + std::to_string(j);
-    requirePositive(s.a, "semi-axis a" + at);
-    requirePositive(s.b, "semi-axis b" + at);
-    requirePositive(s.linear_density, "linear density" + at);
-    requirePositive(s.stretch_modulus, "stretch modulus" + at);
-    requirePositive(s.twist_modulus, "twist modulus" + at);
-    requirePositive(s.bend_modulus(0, 0), "bend modulus B11" + at);
-    requirePositive(s.bend_modulus.determinant(), "determinant of the bend modulus" + at);
+    requirePositive(s.a, "semi-axis a", j);
+    requirePositive(s.b, "semi-axis b", j);
+    requirePositive(s.linear_density, "linear density", j);
+    requirePositive(s.stretch_modulus, "stretch modulus", j);
+    requirePositive(s.twist_modulus, "twist modulus", j);
+    requirePositive(s.bend_modulus(0, 0), "bend modulus B11", j);
+    requirePositive(s.bend_modulus.determinant(), "determinant of the bend modulus", j);
     if (std::abs(s.bend_modulus(0, 1) - s.bend_modulus(1, 0)) > 1e-9 * s.bend_modulus.norm())
-      throw std::invalid_argument("bend modulus" + at + " must be symmetric, got " + std::to_string(s.bend_modulus(0, 1)) + " and " + std::to_string(s.bend_modulus(1, 0)));
+      throw std::invalid_argument("bend modulus of edge " + std::to_string(j) + " must be symmetric, got " + std::to_string(s.bend_modulus(0, 1)) + " and " + std::to_string(s.bend_modulus(1, 0)));
   }
 }
 
@@ -98,7 +97,6 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
   model.twist_modulus = Eigen::VectorXd::Zero(n);
   model.rest_curvature = Eigen::Matrix2Xd::Zero(2, n);
   model.rest_twist = Eigen::VectorXd::Zero(n);
-  model.drag = Eigen::VectorXd::Zero(n);
 
   for (int j = 0; j < edges; ++j)
   {

@@ -19,8 +19,7 @@ StepFailure RodStepper::Impl::computeAcceleration(const RodInputs& inputs, doubl
   work.a.resize(3, model->nodes());
   for (int i = 0; i < model->nodes(); ++i)
   {
-    const double damping = model->mass_damping * model->mass[i] + model->drag[i];
-    work.a.col(i) = system.isFree(i) ? Eigen::Vector3d((-system.nodeGradient(i) - damping * work.v.col(i)) / model->mass[i])
+    work.a.col(i) = system.isFree(i) ? Eigen::Vector3d((-system.nodeGradient(i) - model->damping(i) * work.v.col(i)) / model->mass[i])
                                      : Eigen::Vector3d(Eigen::Vector3d::Zero());
   }
   system.store(work);
@@ -56,7 +55,7 @@ void RodStepper::Impl::beginStage(std::size_t s, const RodInputs& inputs, double
   for (int i = 0; i < model->nodes(); ++i)
   {
     const Eigen::Vector3d q_hat = combine(stage.q_hat, i), q_tilde = combine(stage.q_tilde, i);
-    const double wm = model->mass[i] * inertia, wd = (model->mass_damping * model->mass[i] + model->drag[i]) * damping;
+    const double wm = model->mass[i] * inertia, wd = model->damping(i) * damping;
     system.setInertia(i, system.isMoving(i) ? wm + wd : 0.0, (wm * q_hat + wd * q_tilde) / (wm + wd), load(inputs, i));
     Eigen::Vector3d guess = s == 0 ? Eigen::Vector3d(work.x.col(i) + ahead * work.v.col(i))
                                    : Eigen::Vector3d(stage_q.col(i) + (1 - plan->stages[0].time) * h * stage_v.col(i));
@@ -183,7 +182,7 @@ void RodStepper::Impl::computeWrenches(const RodInputs&, double h)
       // Newton's law of the held node: gripper's force = m a + damping - (internal and external forces); the rod's is the opposite
       Eigen::Vector3d force = -system.nodeGradient(i);
       if (h > 0 && g.body < 0)
-        force -= model->mass[i] * (next.v.col(i) - work.v.col(i)) / h + (model->mass_damping * model->mass[i] + model->drag[i]) * next.v.col(i);
+        force -= model->mass[i] * (next.v.col(i) - work.v.col(i)) / h + model->damping(i) * next.v.col(i);
       w.force += force;
       w.torque += (system.position(i) - stage_poses[k].position).cross(force);
     }

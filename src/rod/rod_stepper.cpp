@@ -210,7 +210,9 @@ void RodStepper::Impl::placeAt(const RodInputs& inputs, double duration, double 
 /// load per node that does not depend on the configuration: weight, wind drag, extra forces
 Eigen::Vector3d RodStepper::Impl::load(const RodInputs& inputs, int i) const
 {
-  Eigen::Vector3d f = model->mass[i] * inputs.gravity + model->drag[i] * inputs.wind;
+  Eigen::Vector3d f = model->mass[i] * inputs.gravity;
+  if (model->drag.size() > 0)
+    f += model->drag[i] * inputs.wind;
   if (inputs.forces.cols() > 0)
     f += inputs.forces.col(i);
   return f;

@@ -16,10 +16,17 @@ constexpr int kLongRod = 1 << 13;    ///< nodes beyond which all panels do not
 
 RodSystem::RodSystem(const RodModel& model) : model_(model)
 {
-  const int n = model.nodes();
-  a_.nodes = n;
+  a_.nodes = model.nodes();
   a_.edges = model.edges();
   a_.closed = model.closed;
+  max_stretch_modulus_ = model.stretch_modulus.maxCoeff();
+  min_rest_length_ = model.rest_length.minCoeff();
+}
+
+/// Arrays of the hot loops, which explicit steps of isotropic rods do without.
+void RodSystem::allocate()
+{
+  const int n = a_.nodes;
   const std::size_t padded = n + 2 * kHalo;
   const auto allocate = [&](double*& p, double fill) {
     storage_.emplace_back(padded, fill);
@@ -33,7 +40,7 @@ RodSystem::RodSystem(const RodModel& model) : model_(model)
                      &a_.b22, &a_.beta, &a_.rest_kappa1, &a_.rest_kappa2, &a_.rest_twist, &a_.weight, &a_.theta_diagonal, &a_.theta_off})
     allocate(*p, 0.0);
   a_.coupling = nullptr;
-  if (model.curvature == Curvature::compensated)
+  if (model_.curvature == Curvature::compensated)
     allocate(a_.coupling, 0.0);
   for (double** p : {&a_.inverse_length, &a_.inverse_rest_length})
     allocate(*p, 1.0);
@@ -45,14 +52,12 @@ RodSystem::RodSystem(const RodModel& model) : model_(model)
     x.assign(n, 0.0);
   for (auto& s : saved_)
     s.assign(padded, 0.0);
-  matrix_.resize(n, model.closed);
-  if (n > kLongRod && !model.closed)
+  matrix_.resize(n, model_.closed);
+  if (n > kLongRod && !model_.closed)
     piece_.resize(kPiece + RodSweep::kOvershoot + 2);
-  for (int j = 0; j < model.edges(); ++j)
-    a_.inverse_rest_length[j] = 1.0 / model.rest_length[j];
-  wrapHalo(a_.inverse_rest_length, model.edges());
-  max_stretch_modulus_ = model.stretch_modulus.maxCoeff();
-  min_rest_length_ = model.rest_length.minCoeff();
+  for (int j = 0; j < a_.edges; ++j)
+    a_.inverse_rest_length[j] = 1.0 / model_.rest_length[j];
+  wrapHalo(a_.inverse_rest_length, a_.edges);
 }
 
 void RodSystem::wrapHalo(double* p, int count) const
@@ -67,6 +72,12 @@ void RodSystem::wrapHalo(double* p, int count) const
 
 void RodSystem::load(const RodState& state)
 {
+  if (storage_.empty())
+  {
+    allocate();
+    if (!held_.empty())
+      setResponse(0.0, nullptr);
+  }
   compose(state);
   const int n = a_.nodes, edges = a_.edges;
   for (int i = 0; i < n; ++i)

@@ -31,11 +31,14 @@ struct RodModel
 
   double mass_damping = 0.0;        ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;   ///< Rayleigh [s]
-  Eigen::VectorXd drag;             ///< per node [N s/m]: linear drag times Voronoi length
+  Eigen::VectorXd drag;             ///< per node [N s/m]: linear drag times Voronoi length; empty: none
 
   int nodes() const { return static_cast<int>(mass.size()); }
   int edges() const { return static_cast<int>(rest_length.size()); }
   double totalMass() const { return mass.sum(); }
+  bool damped() const { return mass_damping > 0 || drag.size() > 0; }
+  /// Of a node's velocity against air at rest [N s/m].
+  double damping(int node) const { return mass_damping * mass[node] + (drag.size() > 0 ? drag[node] : 0.0); }
 };
 
 /// Elliptic cross-section and material of one edge, for buildRod.

@@ -40,6 +40,7 @@ struct ClampJoint
 class RodSystem
 {
 public:
+  /// Takes memory for what compose() finds only; load() takes the rest when it is first called, and comes before anything else.
   explicit RodSystem(const RodModel& model);
 
   const RodModel& model() const { return model_; }
@@ -130,8 +131,13 @@ public:
   Eigen::Vector3d clampTorque(int grasp) const;
   const std::vector<ClampJoint>& clamps() const { return clamps_; }
 
+  /// Elastic stiffness of the joints as composed, over their lengths, and their twist at rest; per node.
+  const double* bendStiffness() const { return b11_.data(); }
+  const double* twistStiffness() const { return beta_.data(); }
+  const double* restTwist() const { return rest_m_.data(); }
+
 private:
-  void composeClamp(int grasp, int side);
+  void allocate();
   void respond(ClampJoint& clamp) const;
   void evaluateClamp(ClampJoint& clamp, bool with_hessian, RodEvaluation& sum);
   void takeReactions(int from, int to);
