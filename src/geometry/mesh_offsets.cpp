@@ -27,6 +27,32 @@ Eigen::Matrix3Xd vertexNormals(const TriangleMesh& mesh)
   return normals;
 }
 
+double meanFaceEdge(const TriangleMesh& mesh)
+{
+  double sum = 0.0;
+  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+  {
+    for (int k = 0; k < 3; ++k)
+    {
+      sum += (mesh.vertices.col(mesh.triangles(k, f)) - mesh.vertices.col(mesh.triangles((k + 1) % 3, f))).norm();
+    }
+  }
+  return mesh.triangles.cols() > 0 ? sum / (3.0 * static_cast<double>(mesh.triangles.cols())) : 0.0;
+}
+
+double extent(const TriangleMesh& mesh, const Eigen::Vector3d& along)
+{
+  const Eigen::RowVectorXd s = along.normalized().transpose() * mesh.vertices;
+  return s.maxCoeff() - s.minCoeff();
+}
+
+double meanRadius(const TriangleMesh& mesh, const Eigen::Vector3d& axis)
+{
+  const Eigen::Vector3d n = axis.normalized(), middle = mesh.vertices.rowwise().mean();
+  const Eigen::Matrix3Xd away = mesh.vertices.colwise() - middle;
+  return (away - n * (n.transpose() * away)).colwise().norm().mean();
+}
+
 Eigen::Matrix3Xd folded(const TriangleMesh& mesh, const Eigen::Vector3d& along, double wavelength, double height)
 {
   const Eigen::RowVectorXd s = along.normalized().transpose() * mesh.vertices;

@@ -40,10 +40,17 @@ void PointTrajectory::forgetBefore(double time)
   frames_.erase(frames_.begin(), frames_.begin() + drop);
 }
 
+Eigen::Vector3d PointTrajectory::chord(std::size_t k, Eigen::Index i) const
+{
+  return (frames_[k].col(i) - frames_[k - 1].col(i)) / (times_[k] - times_[k - 1]);
+}
+
 Eigen::Vector3d PointTrajectory::slope(std::size_t k, Eigen::Index i) const
 {
   if (k > 0 && k + 1 == times_.size() && coast_ > 0)
-    return (frames_[k].col(i) - frames_[k - 1].col(i)) / (times_[k] - times_[k - 1]);
+    return chord(k, i);
+  if (k == 0 && times_.size() > 1 && moving_start_)   // of the parabola through the first three frames, whose mean slope over the first two is the chord
+    return 2.0 / (times_[1] - times_[0]) * (frames_[1].col(i) - frames_[0].col(i)) - (times_.size() > 2 ? slope(1, i) : chord(1, i));
   if (k == 0 || k + 1 >= times_.size())
     return Eigen::Vector3d::Zero();   // held beyond the ends
   const Eigen::Vector3d here = frames_[k].col(i);
@@ -52,7 +59,8 @@ Eigen::Vector3d PointTrajectory::slope(std::size_t k, Eigen::Index i) const
 
 void PointTrajectory::evaluate(double time, Eigen::Matrix3Xd& points, Eigen::Matrix3Xd* velocities) const
 {
-  if (time <= times_.front() || time >= times_.back() || times_.size() == 1)
+  const bool early = moving_start_ ? time < times_.front() : time <= times_.front();
+  if (early || time >= times_.back() || times_.size() == 1)
   {
     points = time <= times_.front() ? frames_.front() : frames_.back();
     if (velocities)

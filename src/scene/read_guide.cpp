@@ -129,6 +129,10 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
       return std::nullopt;
     }
   }
+  if (begin <= 0)   // else the guide stands still until then
+  {
+    guide.points.startInMotion();
+  }
   return GuideMotion(std::move(guide));
 }
 

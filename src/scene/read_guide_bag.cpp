@@ -79,6 +79,10 @@ void readBagPoints(const YamlCursor& at, const ReadContext& context, double begi
       return;
     }
   }
+  if (begin <= 0)   // else the guide stands still until then
+  {
+    recorded->points.startInMotion();
+  }
   source.config.motion = FrameGuide{std::move(recorded->points)};
 }
 

@@ -138,6 +138,11 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
     return std::nullopt;
   }
   const std::size_t before = at.problems().size();
+  if (!at.isMap())
+  {
+    at.problem("must be a map with one shape and its measures, e.g. {plane: {}} or {sphere: {radius: 0.1}}");
+    return std::nullopt;
+  }
   YamlMap kinds(at);
   std::optional<Shape> shape;
   int given = 0;

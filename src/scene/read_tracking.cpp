@@ -15,6 +15,7 @@ namespace slender {
 namespace {
 
 constexpr double max_fine_vertices = 1e6;
+constexpr double default_blend = 0.2;   // [s]
 
 /// The mesh that tracks, and how it comes from the guide's.
 struct TrackedMesh
@@ -169,11 +170,20 @@ std::vector<PaintedRegion> readRegions(const YamlCursor& at, const ReadContext& 
   return regions;
 }
 
-/// Throws std::invalid_argument for functions that do not fit the meshes.
-TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, const GuideSource& guide, const TrackedMesh& tracked)
+/// `named`: an entry of a list of sets, which gets its name and when it takes over, or null. Throws std::invalid_argument for functions that do not fit the meshes.
+TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, const GuideSource& guide, const TrackedMesh& tracked, FunctionSet* named)
 {
   YamlMap map(at);
   const YamlCursor basis = map.get("basis"), vertices = map.get("vertices"), regions = map.get("regions"), clusters = map.get("clusters");
+  if (named)
+  {
+    assign(named->name, map.require("name").name());
+    if (const auto from = map.get("from").number(Range::above(0, 1e7, "s")))
+    {
+      named->from = *from;
+    }
+    assign(named->blend, map.get("blend").number(Range::closed(0, 1e7, "s")));
+  }
   map.finish();
   if (basis.present() + regions.present() + clusters.present() > 1)
   {
@@ -243,8 +253,8 @@ std::vector<Traction> readTractions(const YamlCursor& at)
   return tractions;
 }
 
-/// Bounds of forces [N] of all test functions; empty without.
-Eigen::VectorXd boundsOf(const std::vector<Traction>& tractions, const WeakConstraints& constraints)
+/// Bounds of forces [N] of all test functions; empty without. `used`: of which of the tractions, per one of them.
+Eigen::VectorXd boundsOf(const std::vector<Traction>& tractions, const WeakConstraints& constraints, std::vector<char>& used)
 {
   Eigen::VectorXd bounds;
   if (tractions.empty())
@@ -252,40 +262,36 @@ Eigen::VectorXd boundsOf(const std::vector<Traction>& tractions, const WeakConst
     return bounds;
   }
   bounds.setConstant(constraints.count(), std::numeric_limits<double>::infinity());
-  for (const Traction& traction : tractions)
+  for (std::size_t t = 0; t < tractions.size(); ++t)
   {
-    bool found = traction.name.empty();
+    const Traction& traction = tractions[t];
     for (int i = 0; i < constraints.count(); ++i)
     {
       if (traction.name.empty() || traction.name == constraints.name(i))
       {
         bounds[i] = traction.value * constraints.measures()[i];
-        found = true;
+        used[t] = 1;
       }
-    }
-    if (!found)
-    {
-      traction.at.problem("is for a test function that is not there");
     }
   }
   return bounds;
 }
 
-std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const std::vector<Traction>& tractions, const ReadContext& context,
-                                                   const GuideSource& guide, const TrackedMesh& tracked, const ClothConfig& cloth)
+/// Those of one entry; without constraints when something was reported.
+FunctionSet readFunctionSet(const YamlCursor& at, bool named, const std::vector<Traction>& tractions, std::vector<char>& used, const ReadContext& context,
+                            const GuideSource& guide, const TrackedMesh& tracked, const ClothConfig& cloth)
 {
-  auto tracking = std::make_shared<TrackingConfig>();
-  tracking->guide = guide.config;
-  const Eigen::Matrix3Xd& coarse = guide.config.mesh.vertices;
-  tracking->size = (coarse.rowwise().maxCoeff() - coarse.rowwise().minCoeff()).norm();
+  FunctionSet set;
+  set.blend = named ? default_blend : 0.0;
   try
   {
-    tracking->functions = readFunctions(at, context, guide, tracked);
-    if (tracking->functions.count() == 0)
+    set.functions = readFunctions(at, context, guide, tracked, named ? &set : nullptr);
+    if (set.functions.count() == 0)
     {
-      return tracking;   // reported
+      return set;   // reported
     }
-    auto constraints = std::make_shared<WeakConstraints>(tracking->functions, hatMassMatrix(guide.config.mesh), hatMassMatrix(cloth.mesh));
+    // of the mesh as it lies on its guide, whatever its lengths at rest are
+    auto constraints = std::make_shared<WeakConstraints>(set.functions, hatMassMatrix(guide.config.mesh), hatMassMatrix(tracked.subdivision.mesh));
     std::vector<char> held;
     for (const GraspConfig& grasp : cloth.grasps)
     {
@@ -296,12 +302,51 @@ std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const s
       }
     }
     constraints->requireIndependent(held);
-    tracking->bounds = boundsOf(tractions, *constraints);
-    tracking->constraints = std::move(constraints);
+    set.bounds = boundsOf(tractions, *constraints, used);
+    set.constraints = std::move(constraints);
   }
   catch (const std::invalid_argument& error)
   {
     at.problem(error.what());
+  }
+  return set;
+}
+
+std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const std::vector<Traction>& tractions, const ReadContext& context,
+                                                   const GuideSource& guide, const TrackedMesh& tracked, const ClothConfig& cloth)
+{
+  auto tracking = std::make_shared<TrackingConfig>();
+  tracking->guide = guide.config;
+  const Eigen::Matrix3Xd& coarse = guide.config.mesh.vertices;
+  tracking->size = (coarse.rowwise().maxCoeff() - coarse.rowwise().minCoeff()).norm();
+  std::vector<char> used(tractions.size(), 0);
+  if (!at.isList())
+  {
+    tracking->sets.push_back(readFunctionSet(at, false, tractions, used, context, guide, tracked, cloth));
+  }
+  for (const YamlCursor& entry : at.isList() ? at.items(1, 100) : std::vector<YamlCursor>())
+  {
+    const FunctionSet set = readFunctionSet(entry, true, tractions, used, context, guide, tracked, cloth);
+    for (const FunctionSet& other : tracking->sets)
+    {
+      if (!set.name.empty() && other.name == set.name)
+      {
+        YamlMap(entry).get("name").problem("is also the name of another set; names must differ");
+      }
+      if (set.from && other.from == set.from)
+      {
+        YamlMap(entry).get("from").problem("is also when set " + other.name + " takes over; times must differ");
+      }
+    }
+    tracking->sets.push_back(set);
+  }
+  const bool good = std::all_of(tracking->sets.begin(), tracking->sets.end(), [](const FunctionSet& set) { return set.constraints != nullptr; });
+  for (std::size_t t = 0; good && t < tractions.size(); ++t)
+  {
+    if (!used[t])
+    {
+      tractions[t].at.problem("is for a test function that is not there");
+    }
   }
   return tracking;
 }

@@ -1,10 +1,47 @@
 // Undeformed shapes of cloths: from a file, or made from the cloth's mesh.
+#include <cmath>
+
 #include "read_cloth_mesh.h"
 #include "slender_sim/geometry/mesh_offsets.h"
+#include "yaml_number.h"
 
 namespace slender {
 
 namespace {
+
+constexpr double fewest_edges = 4.0;   // of a wave that a mesh can show
+
+/// Folds that the mesh cannot show would vanish, or come out as longer ones.
+bool foldsFit(const YamlCursor& at, const YamlCursor& at_along, const Eigen::Vector3d& along, double wavelength, const TriangleMesh& cloth)
+{
+  const double length = extent(cloth, along), edge = meanFaceEdge(cloth);
+  if (length < 0.25 * wavelength)
+  {
+    at_along.problem("the cloth is " + shortNumber(length) + " m long along it, less than a quarter of a wavelength, and gets no folds; "
+                     "take a direction within the cloth, or a shorter wavelength");
+    return false;
+  }
+  if (wavelength < fewest_edges * edge)
+  {
+    at.problem("is less than " + shortNumber(fewest_edges) + " edges of the mesh (" + shortNumber(edge) + " m on average), which cannot show it; take " +
+               shortNumber(fewest_edges * edge) + " m or more, or a finer mesh");
+    return false;
+  }
+  return true;
+}
+
+/// Likewise, by the mean distance from the axis.
+bool ridgesFit(const YamlCursor& at, const Eigen::Vector3d& axis, int count, const TriangleMesh& cloth)
+{
+  const double round = 2 * M_PI * meanRadius(cloth, axis), edge = meanFaceEdge(cloth);
+  if (round < count * fewest_edges * edge)
+  {
+    at.problem("makes ridges of less than " + shortNumber(fewest_edges) + " edges of the mesh (" + shortNumber(edge) + " m on average), which cannot show them; take " +
+               std::to_string(static_cast<int>(round / (fewest_edges * edge))) + " or fewer, or a finer mesh");
+    return false;
+  }
+  return true;
+}
 
 /// The cloth's mesh folded, ridged or crinkled; empty when reported.
 Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, const YamlCursor& ridges, const YamlCursor& crinkles, const TriangleMesh& cloth)
@@ -18,6 +55,7 @@ Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, cons
   YamlMap shape(folds.present() ? folds : ridges.present() ? ridges : crinkles);
   const auto height = shape.require("height").number(Range::above(0, 10, "m"));
   Eigen::Vector3d direction(0, 0, 1);
+  const std::size_t before = at.problems().size();
   double wavelength = 1.0;
   int count = 1, seed = 1;
   if (crinkles.present())
@@ -26,20 +64,26 @@ Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, cons
   }
   else
   {
-    const YamlCursor along = shape.get(folds.present() ? "along" : "axis");
+    const YamlCursor along = folds.present() ? shape.require("along") : shape.get("axis");
     assign(direction, along.vector3(Range::closed(-1e6, 1e6)));
     if (!(direction.norm() > 0))
     {
       along.problem("must not be zero");
       return {};
     }
+    const YamlCursor scale = shape.require(folds.present() ? "wavelength" : "count");
     if (folds.present())
     {
-      assign(wavelength, shape.require("wavelength").number(Range::above(0, 1e3, "m")));
+      assign(wavelength, scale.number(Range::above(0, 1e3, "m")));
     }
     else
     {
-      assign(count, shape.require("count").integer(1, 100'000, "ridges"));
+      assign(count, scale.integer(1, 100'000, "ridges"));
+    }
+    const bool known = along.problems().size() == before && cloth.vertices.cols() > 0;
+    if (known && !(folds.present() ? foldsFit(scale, along, direction, wavelength, cloth) : ridgesFit(scale, direction, count, cloth)))
+    {
+      return {};
     }
   }
   shape.finish();

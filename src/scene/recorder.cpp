@@ -15,11 +15,31 @@ namespace {
 class CsvRecorder final : public Recorder
 {
 public:
-  explicit CsvRecorder(const std::string& folder) : tables_(folder) {}
-  void record(const Simulation& simulation, const StepReport&) override { tables_.write(snapshotOf(simulation)); }
-  void finish() override { tables_.finish(); }
+  explicit CsvRecorder(const std::string& folder) : folder_(folder), tables_(folder) {}
+  void record(const Simulation& simulation, const StepReport&) override
+  {
+    guarded([&] { tables_.write(snapshotOf(simulation)); });
+  }
+  void finish() override
+  {
+    guarded([&] { tables_.finish(); });
+  }
 
 private:
+  template <class Write>
+  void guarded(const Write& write) const
+  {
+    try
+    {
+      write();
+    }
+    catch (const WriteError& error)
+    {
+      throw WriteError(std::string(error.what()) + "; the tables in " + folder_ + " are cut off");
+    }
+  }
+
+  std::string folder_;
   CsvTables tables_;
 };
 
@@ -48,8 +68,17 @@ public:
     for (const ClothSnapshot& cloth : instant.cloths)
       objects.push_back({cloth.name, {cloth.x, cloth.triangles}, {}});
     char name[32];
-    std::snprintf(name, sizeof name, "/frame_%06ld.obj", frame_++);
-    writeObj(folder_ + name, objComment(simulation.config().name, instant.time), objects);
+    std::snprintf(name, sizeof name, "/frame_%06ld.obj", frame_);
+    try
+    {
+      writeObj(folder_ + name, objComment(simulation.config().name, instant.time), objects);
+    }
+    catch (const std::runtime_error& error)
+    {
+      std::remove((folder_ + name).c_str());   // half of it
+      throw WriteError(std::string(error.what()) + "; " + std::to_string(frame_) + " whole files are before it");
+    }
+    ++frame_;
   }
 
   void finish() override {}

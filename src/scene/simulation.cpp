@@ -84,12 +84,15 @@ void Simulation::buildRods()
       }
       model.mass_damping = rod.damping.mass;
       model.stiffness_damping = rod.damping.stiffness;
-      model.drag.setZero(model.nodes());
-      for (int j = 0; j < model.edges(); ++j)
+      if (rod.damping.drag > 0)
       {
-        const double half = 0.5 * rod.damping.drag * model.rest_length[j];
-        model.drag[j] += half;
-        model.drag[(j + 1) % model.nodes()] += half;
+        model.drag.setZero(model.nodes());
+        for (int j = 0; j < model.edges(); ++j)
+        {
+          const double half = 0.5 * rod.damping.drag * model.rest_length[j];
+          model.drag[j] += half;
+          model.drag[(j + 1) % model.nodes()] += half;
+        }
       }
       chooseFormulation(rod, config_.time.integrator, model);
       RodState state = makeRodState(model, initial, rod.director, rod.initial_twist);
@@ -117,7 +120,8 @@ void Simulation::buildRods()
 
 void Simulation::findEquilibrium()
 {
-  const SceneInputs inputs = inputsAt(0.0);
+  SceneInputs inputs;
+  inputsAt(0.0, inputs);
   fillRodInputs(inputs);
   StepReport report;
   for (std::size_t r = 0; r < steppers_.size() && report.ok; ++r)
@@ -138,9 +142,8 @@ void Simulation::findEquilibrium()
   takeWrenches();
 }
 
-SceneInputs Simulation::inputsAt(double time) const
+void Simulation::inputsAt(double time, SceneInputs& inputs) const
 {
-  SceneInputs inputs;
   inputs.wind = config_.wind;
   const auto given = [time](const GivenMotion& motion, const Pose& now) {
     GraspTarget target{now, Twist{}};
@@ -150,16 +153,19 @@ SceneInputs Simulation::inputsAt(double time) const
     }
     return target;
   };
+  inputs.bodies.clear();
   for (std::size_t b = 0; b < config_.bodies.size(); ++b)
   {
     inputs.bodies.push_back(given(config_.bodies[b].motion.value_or(FixedMotion{}), state_.bodies[b].X_WB));
   }
+  inputs.obstacles.clear();
   for (std::size_t k = 0; k < config_.obstacles.size(); ++k)
   {
     inputs.obstacles.push_back(given(config_.obstacles[k].motion, state_.obstacles[k]));
   }
   addThreadInputs(inputs, time);
   addGuideInputs(inputs, time);
+  inputs.grasps.clear();
   inputs.grasps.reserve(grasps_.size());
   for (std::size_t g = 0; g < grasps_.size(); ++g)
   {
@@ -175,10 +181,16 @@ SceneInputs Simulation::inputsAt(double time) const
       inputs.grasps.push_back({graspPose(static_cast<int>(g)), Twist{}});
     }
   }
-  return inputs;
 }
 
-SceneInputs Simulation::defaultInputs() const { return inputsAt(static_cast<double>(state_.steps + 1) * config_.time.step); }
+void Simulation::defaultInputs(SceneInputs& inputs) const { inputsAt(static_cast<double>(state_.steps + 1) * config_.time.step, inputs); }
+
+SceneInputs Simulation::defaultInputs() const
+{
+  SceneInputs inputs;
+  defaultInputs(inputs);
+  return inputs;
+}
 
 GraspTarget Simulation::targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity) const
 {
@@ -250,7 +262,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
   // One part's failure must leave the others where they were, too.
   const std::size_t apart =
     models_.size() - group_rods_.size() + (group_ ? 1 : 0) + config_.threads.size() + config_.cloths.size();
-  const bool several = apart > 1;
+  const bool several = apart > 1 || functionsDue();
   const std::vector<RodState> before = several ? state_.rods : std::vector<RodState>();
   const std::vector<ThreadGroupState> threads_before = several ? state_.threads : std::vector<ThreadGroupState>();
   const std::vector<SceneCloth> cloths_before = several ? state_.cloths : std::vector<SceneCloth>();
@@ -267,6 +279,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
   StepReport total;
   try
   {
+    takeOver();
     total = stepThreads(inputs);
     if (total.ok)
     {

@@ -20,10 +20,10 @@ ClothModel modelOf(const ClothConfig& config)
   model.aerodynamics = config.aerodynamics;
   model.plasticity = config.plasticity;
   model.undeformed = config.undeformed;
-  if (config.tracking)
+  for (std::size_t s = 0; config.tracking && s < config.tracking->sets.size(); ++s)
   {
-    model.averages = {config.tracking->constraints, &config.tracking->constraints->matrix()};
-    model.average_bounds = config.tracking->bounds;
+    const FunctionSet& set = config.tracking->sets[s];
+    model.averages.push_back({{set.constraints, &set.constraints->matrix()}, set.bounds});
   }
   return model;
 }
@@ -127,7 +127,6 @@ void Simulation::buildCloths()
   }
   cloth_inputs_.resize(config_.cloths.size());
   cloth_targets_.resize(grasps_.size());
-  cloth_places_.resize(config_.cloths.size());
   leads_.assign(config_.cloths.size(), 0);
   for (const ClothConfig& config : config_.cloths)
   {
@@ -141,6 +140,11 @@ void Simulation::buildCloths()
 /// Those with contact. Guides feel only each other: they are where they are before what tracks them is.
 void Simulation::buildTouchingCloths()
 {
+  if (std::none_of(config_.cloths.begin(), config_.cloths.end(), [](const ClothConfig& cloth) { return cloth.contact.has_value(); }))
+  {
+    return;
+  }
+  cloth_places_.resize(config_.cloths.size());
   for (std::size_t b = 0; b < config_.bodies.size(); ++b)
   {
     if (config_.bodies[b].shape && config_.bodies[b].contact && !isSimulated(static_cast<int>(b)))
@@ -296,9 +300,10 @@ void Simulation::stepCloths(bool ahead, const SceneInputs& inputs, StepReport& t
     {
       continue;
     }
-    if (const auto& tracking = config_.cloths[k].tracking)
+    if (config_.cloths[k].tracking)
     {
-      cloth_inputs_[k].averages = tracking->constraints->averages(guideVertices(static_cast<int>(k), inputs));
+      cloth_inputs_[k].averages = functions(static_cast<int>(k)).constraints->averages(guideVertices(static_cast<int>(k), inputs));
+      state_.cloths[k].blend.apply(static_cast<double>(state_.steps + 1) * config_.time.step, cloth_inputs_[k].averages);
     }
     if (cloth_steppers_[k])
     {
@@ -416,15 +421,13 @@ const std::string& Simulation::heldObject(int grasp) const
 const Eigen::Matrix3Xd& Simulation::pinForces(int cloth) const
 {
   const auto& stepper = cloth_steppers_.at(static_cast<std::size_t>(cloth));
-  const ClothPlace& place = cloth_places_[cloth];
-  return stepper ? stepper->pinForces() : touching_cloths_[place.group].group.pinForces(place.index);
+  return stepper ? stepper->pinForces() : touching_cloths_[cloth_places_[cloth].group].group.pinForces(cloth_places_[cloth].index);
 }
 
 const ClothStepper& Simulation::clothStepper(int cloth) const
 {
   const auto& own = cloth_steppers_.at(static_cast<std::size_t>(cloth));
-  const ClothPlace& place = cloth_places_[cloth];
-  return own ? *own : touching_cloths_[place.group].group.stepper(place.index);
+  return own ? *own : touching_cloths_[cloth_places_[cloth].group].group.stepper(cloth_places_[cloth].index);
 }
 
 ClothEnergies Simulation::clothEnergies(int cloth) const

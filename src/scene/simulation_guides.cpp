@@ -1,5 +1,6 @@
 // What the tracked cloths of a scene follow.
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "slender_sim/scene/simulation.h"
@@ -10,8 +11,116 @@ void Simulation::startTracking(int cloth)
 {
   const TrackingConfig& tracking = *config_.cloths[cloth].tracking;
   SceneCloth& held = state_.cloths[cloth];
-  tracking.guide.evaluate(0.0, held.guide);
-  held.guide_forces.setZero(3, tracking.constraints->count());
+  if (tracking.sets.size() > 1)
+  {
+    tracking.guide.evaluate(0.0, held.guide, &held.guide_velocity);
+  }
+  else
+  {
+    tracking.guide.evaluate(0.0, held.guide);
+  }
+  held.guide_forces.setZero(3, tracking.sets[0].constraints->count());
+}
+
+namespace {
+
+/// The set takes over in the step that begins after so many.
+bool isDue(const FunctionSet& set, std::uint64_t steps, double step)
+{
+  return set.from && std::ceil(*set.from / step - 1e-6) == static_cast<double>(steps);
+}
+
+}  // namespace
+
+bool Simulation::functionsDue() const
+{
+  for (const ClothConfig& config : config_.cloths)
+  {
+    for (std::size_t s = 0; config.tracking && s < config.tracking->sets.size(); ++s)
+    {
+      if (isDue(config.tracking->sets[s], state_.steps, config_.time.step))
+      {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// Where the scene says so, at the start of a step; of several that are due in it the latest.
+void Simulation::takeOver()
+{
+  for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+  {
+    const auto& tracking = config_.cloths[k].tracking;
+    const FunctionSet* latest = nullptr;
+    for (std::size_t s = 0; tracking && s < tracking->sets.size(); ++s)
+    {
+      const FunctionSet& set = tracking->sets[s];
+      if (isDue(set, state_.steps, config_.time.step) && (!latest || *set.from > *latest->from))
+      {
+        latest = &set;
+      }
+    }
+    if (latest)
+    {
+      takeOver(state_.cloths[k], *tracking, static_cast<std::size_t>(latest - tracking->sets.data()), latest->blend);
+    }
+  }
+}
+
+/// The guide's speed is that of the last step, as the cloth's is: where it jumped just then the cloth did, too.
+void Simulation::takeOver(SceneCloth& held, const TrackingConfig& tracking, std::size_t set, double blend) const
+{
+  const WeakConstraints& functions = *tracking.sets[set].constraints;
+  held.blend = FunctionBlend::between(functions, held.guide, held.guide_velocity, held.cloth.x, held.cloth.v, state_.time, blend);
+  held.cloth.average_set = static_cast<int>(set);
+  held.cloth.at_bound.clear();
+  held.guide_forces.setZero(3, functions.count());
+}
+
+void Simulation::setFunctions(int cloth, const std::string& set, std::optional<double> blend)
+{
+  const ClothConfig& config = config_.cloths.at(static_cast<std::size_t>(cloth));
+  if (!config.tracking)
+  {
+    throw std::invalid_argument("cloth " + config.name + " tracks no guide");
+  }
+  const auto& sets = config.tracking->sets;
+  const auto found = std::find_if(sets.begin(), sets.end(), [&set](const FunctionSet& one) { return one.name == set; });
+  if (sets.size() < 2)
+  {
+    throw std::invalid_argument("cloth " + config.name + " has one set of test functions; give its test_functions as a list of named ones");
+  }
+  if (found == sets.end())
+  {
+    std::string known;
+    for (const FunctionSet& one : sets)
+    {
+      known += " " + one.name;
+    }
+    throw std::invalid_argument("no test functions \"" + set + "\"; cloth " + config.name + " has:" + known);
+  }
+  if (blend && !(std::isfinite(*blend) && *blend >= 0))
+  {
+    throw std::invalid_argument("blend must be a time [s], 0 or more");
+  }
+  SceneCloth& held = state_.cloths[static_cast<std::size_t>(cloth)];
+  if (!held.cloth.pins.empty())   // without any they are as independent as when they were read
+  {
+    std::vector<char> pinned(static_cast<std::size_t>(held.cloth.x.cols()), 0);
+    for (const int vertex : held.cloth.pins)
+    {
+      pinned[static_cast<std::size_t>(vertex)] = 1;
+    }
+    found->constraints->requireIndependent(pinned);
+  }
+  takeOver(held, *config.tracking, static_cast<std::size_t>(found - sets.begin()), blend.value_or(found->blend));
+}
+
+const FunctionSet& Simulation::functions(int cloth) const
+{
+  return config_.cloths.at(static_cast<std::size_t>(cloth)).tracking->sets.at(static_cast<std::size_t>(state_.cloths[cloth].cloth.average_set));
 }
 
 void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
@@ -29,6 +138,10 @@ void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
       {
         tracking->guide.evaluate(time, inputs.guides[k]);
       }
+    }
+    else
+    {
+      inputs.guides[k].resize(3, 0);
     }
   }
 }
@@ -66,9 +179,17 @@ void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
     if (const auto& tracking = config_.cloths[k].tracking)
     {
       SceneCloth& held = state_.cloths[k];
-      const ClothPlace& place = cloth_places_[k];
-      held.guide = guideVertices(static_cast<int>(k), inputs);
-      held.guide_forces = place.group >= 0 ? touching_cloths_[place.group].group.averageForces(place.index) : cloth_steppers_[k]->averageForces();
+      const Eigen::Matrix3Xd& guide = guideVertices(static_cast<int>(k), inputs);
+      if (tracking->sets.size() > 1)
+      {
+        held.guide_velocity = (guide - held.guide) / config_.time.step;
+      }
+      held.guide = guide;
+      if (!held.blend.active(state_.time))
+      {
+        held.blend = FunctionBlend();
+      }
+      held.guide_forces = cloth_steppers_[k] ? cloth_steppers_[k]->averageForces() : touching_cloths_[cloth_places_[k].group].group.averageForces(cloth_places_[k].index);
       report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)).met / tracking->size);
       report.forces_at_bound += static_cast<int>(held.cloth.at_bound.size());
     }
@@ -84,8 +205,10 @@ Simulation::TrackingError Simulation::trackingError(int cloth) const
     return error;
   }
   const SceneCloth& held = state_.cloths[static_cast<std::size_t>(cloth)];
-  const WeakConstraints& constraints = *tracking->constraints;
-  const Eigen::Matrix3Xd targets = constraints.averages(held.guide);
+  const WeakConstraints& constraints = *functions(cloth).constraints;
+  Eigen::Matrix3Xd targets = constraints.averages(held.guide);
+  held.blend.apply(state_.time, targets);
+  error.blend = held.blend.left(state_.time);
   for (int i = 0; i < constraints.count(); ++i)
   {
     double& worst = std::binary_search(held.cloth.at_bound.begin(), held.cloth.at_bound.end(), i) ? error.at_bound : error.met;

@@ -1,4 +1,5 @@
 // Viscous threads of a scene.
+#include <algorithm>
 #include <stdexcept>
 
 #include "slender_sim/geometry/rotation.h"
@@ -99,6 +100,10 @@ void Simulation::buildThreads()
 /// Those with contact.
 void Simulation::buildTouchingThreads()
 {
+  if (std::none_of(config_.threads.begin(), config_.threads.end(), [](const ThreadConfig& thread) { return thread.contact.has_value(); }))
+  {
+    return;
+  }
   TouchingModel model;
   touching_index_.assign(config_.threads.size(), -1);
   for (std::size_t k = 0; k < config_.threads.size(); ++k)
@@ -109,10 +114,6 @@ void Simulation::buildTouchingThreads()
       model.threads.push_back(thread_models_[k]);
       model.touches.push_back({contact->self, contact->threads, contact->obstacles, contact->friction, config_.threads[k].merging});
     }
-  }
-  if (model.threads.empty())
-  {
-    return;
   }
   for (const ObstacleConfig& obstacle : config_.obstacles)
   {
@@ -150,6 +151,7 @@ void Simulation::exchangeTouching()
 
 void Simulation::addThreadInputs(SceneInputs& inputs, double time) const
 {
+  inputs.threads.clear();
   for (std::size_t k = 0; k < config_.threads.size(); ++k)
   {
     const ThreadConfig& thread = config_.threads[k];

@@ -54,12 +54,13 @@ ThreadSnapshot snapshotOf(const std::string& name, const ThreadState& state)
   return out;
 }
 
-void appendFunctions(const ClothConfig& cloth, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces, std::vector<FunctionSnapshot>& out)
+void appendFunctions(const std::string& cloth, const FunctionSet& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
+                     std::vector<FunctionSnapshot>& out)
 {
-  const WeakConstraints& constraints = *cloth.tracking->constraints;
-  const Eigen::Matrix3Xd averages = constraints.averages(guide);
-  for (int i = 0; i < constraints.count(); ++i)
-    out.push_back({cloth.name, constraints.name(i), averages.col(i), forces.col(i)});
+  const std::string prefix = set.name.empty() ? "" : set.name + "/";
+  const Eigen::Matrix3Xd averages = set.constraints->averages(guide);
+  for (int i = 0; i < set.constraints->count(); ++i)
+    out.push_back({cloth, prefix + set.constraints->name(i), averages.col(i), forces.col(i)});
 }
 
 SceneSnapshot snapshotOf(const Simulation& simulation)
@@ -79,7 +80,7 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
     const ClothModel& model = simulation.clothModel(static_cast<int>(k));
     out.cloths.push_back({model.name, cloth.cloth.x, cloth.cloth.v, model.rest.triangles});
     if (scene.cloths[k].tracking)
-      appendFunctions(scene.cloths[k], cloth.guide, cloth.guide_forces, out.functions);
+      appendFunctions(model.name, simulation.functions(static_cast<int>(k)), cloth.guide, cloth.guide_forces, out.functions);
   }
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "byte_archive.h"
+#include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/simulation.h"
 
 /// Saving and loading of a simulation's state. The file: magic, version, fingerprint of the scene, size and checksum of the
@@ -18,7 +19,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 9;
+constexpr std::uint64_t version = 10;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 template <class Archive, class PoseType>
@@ -133,7 +134,13 @@ void visitCloth(Archive& archive, State& held)
     visitPose(archive, grasp.X_WG);
   }
   archive(held.guide);
+  archive(held.guide_velocity);
   archive(held.guide_forces);
+  archive(held.cloth.average_set);
+  archive(held.blend.gap);
+  archive(held.blend.rate);
+  archive(held.blend.start);
+  archive(held.blend.duration);
 }
 
 template <class Archive, class State>
@@ -222,11 +229,13 @@ void visitScene(Archive& archive, State& scene)
 
 std::string errorText(const std::string& path, const std::string& what) { return path + ": " + what + ": " + std::strerror(errno); }
 
-/// Writes all bytes to a temporary file beside `path` and then takes its place, so that there is never half a file.
-void writeDurably(const std::string& path, const std::string& bytes)
+/// Writes all bytes to a temporary file beside `wanted` and then takes its place, so that there is never half a file.
+void writeDurably(const std::string& wanted, const std::string& bytes)
 {
+  const std::string path = replaceablePath(wanted);
   const std::string temporary = path + ".tmp" + std::to_string(::getpid());
-  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  ::unlink(temporary.c_str());   // of a process that was killed
+  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (file < 0)
   {
     throw std::runtime_error(errorText(temporary, "cannot be opened for writing"));
@@ -297,12 +306,17 @@ bool fits(const ThreadState& thread)
 }
 
 /// Likewise of a cloth: the stepper checks the rest.
-bool fits(const SceneCloth& held, const SceneCloth& now)
+bool fits(const SceneCloth& held, const SceneCloth& now, const ClothModel& model)
 {
+  const PrescribedAverages* averages = model.averagesOf(held.cloth);
+  const Eigen::Index count = averages ? averages->count() : 0;
+  const bool blends = held.blend.gap.cols() > 0;
   bool good = held.cloth.x.cols() == now.cloth.x.cols() && held.cloth.v.cols() == now.cloth.v.cols() &&
               held.cloth.rest_angles.size() == now.cloth.rest_angles.size() &&
               held.cloth.stiffening.size() == now.cloth.stiffening.size() && held.grasps.size() == now.grasps.size() &&
-              held.guide.cols() == now.guide.cols() && held.guide_forces.cols() == now.guide_forces.cols();
+              held.guide.cols() == now.guide.cols() && held.guide_velocity.cols() == now.guide_velocity.cols() && held.guide_forces.cols() == count &&
+              (averages || held.cloth.average_set == 0) && held.blend.gap.cols() == (blends ? count : 0) &&
+              held.blend.rate.cols() == held.blend.gap.cols() && (held.blend.duration > 0) == blends;
   const auto there = [&held](int vertex) { return vertex >= 0 && vertex < held.cloth.x.cols(); };
   good = good && std::all_of(held.cloth.pins.begin(), held.cloth.pins.end(), there);
   std::size_t pins = 0;
@@ -333,6 +347,7 @@ void Simulation::save(const std::string& path) const
 
 void Simulation::load(const std::string& path)
 {
+  requireRegularFile(path);
   std::ifstream file(path, std::ios::binary);
   if (!file)
   {
@@ -418,7 +433,7 @@ void Simulation::load(const std::string& path)
   }
   for (std::size_t k = 0; problem.empty() && k < cloth_models_.size(); ++k)
   {
-    if (!fits(loaded.cloths[k], state_.cloths[k]))
+    if (!fits(loaded.cloths[k], state_.cloths[k], *cloth_models_[k]))
     {
       problem = "cloth " + cloth_models_[k]->name + " does not fit together";
     }

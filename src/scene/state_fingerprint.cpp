@@ -106,17 +106,24 @@ std::uint64_t Simulation::fingerprint() const
     if (const auto& tracking = config_.cloths[k].tracking)
     {
       out(tracking->guide.mesh.vertices);
-      out(tracking->bounds);
-      for (const WeakConstraints::Matrix* weights : {&tracking->constraints->matrix(), &tracking->constraints->guideMatrix()})
+      out(static_cast<std::uint64_t>(tracking->sets.size()));
+      for (const FunctionSet& set : tracking->sets)
       {
-        out(static_cast<std::uint64_t>(weights->rows()));
-        for (Eigen::Index i = 0; i < weights->rows(); ++i)
+        text(set.name);
+        out(set.from.value_or(0.0));
+        out(set.blend);
+        out(set.bounds);
+        for (const WeakConstraints::Matrix* weights : {&set.constraints->matrix(), &set.constraints->guideMatrix()})
         {
-          for (WeakConstraints::Matrix::InnerIterator entry(*weights, i); entry; ++entry)
+          out(static_cast<std::uint64_t>(weights->rows()));
+          for (Eigen::Index i = 0; i < weights->rows(); ++i)
           {
-            out(static_cast<int>(i));
-            out(static_cast<int>(entry.col()));
-            out(entry.value());
+            for (WeakConstraints::Matrix::InnerIterator entry(*weights, i); entry; ++entry)
+            {
+              out(static_cast<int>(i));
+              out(static_cast<int>(entry.col()));
+              out(entry.value());
+            }
           }
         }
       }

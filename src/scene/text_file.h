@@ -10,6 +10,8 @@
 
 #include <Eigen/Core>
 
+#include "slender_sim/scene/file_paths.h"
+
 namespace slender {
 
 /// Throws std::runtime_error.
@@ -23,7 +25,7 @@ inline void makeFolder(const std::string& folder)
   }
 }
 
-/// A text file written through a buffer; every failure is an exception.
+/// A text file written through a buffer; every failure is an exception: WriteError once it is open.
 class TextFile
 {
 public:
@@ -82,7 +84,7 @@ private:
   {
     if (!file_)
     {
-      throw std::runtime_error(path_ + ": writing failed: " + std::strerror(errno));
+      throw WriteError(path_ + ": writing failed: " + std::strerror(errno));
     }
   }
 

@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <cctype>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 
 #include "arguments.h"
@@ -82,7 +85,11 @@ int main(int argc, char** argv)
   return slender::exportProgram(name, usage, argc, argv, own, [&](const slender::ExportOptions& options) {
     const std::string& out = options.out;
     if (format.empty())
-      format = out.size() > 4 && out.compare(out.size() - 4, 4, ".glb") == 0 ? "glb" : "obj";
+    {
+      std::string suffix = std::filesystem::path(out).extension().string();
+      std::transform(suffix.begin(), suffix.end(), suffix.begin(), [](unsigned char c) { return std::tolower(c); });
+      format = suffix == ".glb" ? "glb" : "obj";
+    }
     slender::BagReader bag = slender::openBag(name, options, "bodies and obstacles are left out,");
     if (format == "glb")
     {

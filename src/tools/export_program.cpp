@@ -7,6 +7,7 @@
 
 #include "arguments.h"
 #include "../study/processes.h"
+#include "slender_sim/scene/file_paths.h"
 
 namespace slender {
 
@@ -126,8 +127,15 @@ Staged::Staged(Kind kind, std::string path) : path_(std::move(path))
       throw BadInput("--out " + path_ + ": cannot be made a folder: " + error.message());
     return;
   }
-  if (fs::is_directory(path_))
-    throw BadInput("--out " + path_ + ": is a folder; name a file");
+  try
+  {
+    path_ = replaceablePath(path_);
+    part_ = path_ + ".part";
+  }
+  catch (const std::runtime_error& problem)
+  {
+    throw BadInput("--out " + std::string(problem.what()));
+  }
   const fs::path parent = fs::path(path_).parent_path();
   if (!parent.empty() && !fs::is_directory(parent))
     throw BadInput("--out " + path_ + ": there is no folder " + parent.string() + "; make it first");

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <exception>
@@ -22,6 +23,7 @@ const char* const usage =
   "       regions MESH OUT --count N [options]    regions found by clustering the faces of a mesh\n"
   "  OUT                 coloured mesh: .ply or .obj (colours behind the coordinates)\n"
   "  --object NAME       of several tracked cloths (default: the first)\n"
+  "  --functions NAME    of several sets of test functions (default: the first)\n"
   "  --guide             the guide's mesh with its functions instead of the tracked one\n"
   "  --set PATH=VALUE    override a value of the scene; may be repeated\n"
   "  --count N           regions\n"
@@ -35,7 +37,7 @@ const char* const usage =
 struct Options
 {
   std::vector<std::string> files, overrides;
-  std::string object, frames;
+  std::string object, functions, frames;
   std::optional<int> count;
   double compactness = 0.5;
   int seed = 1, sampled = 20;
@@ -56,6 +58,8 @@ Options parseOptions(int argc, char** argv)
     };
     if (argument == "--object")
       options.object = value();
+    else if (argument == "--functions")
+      options.functions = value();
     else if (argument == "--set")
       options.overrides.push_back(value());
     else if (argument == "--count")
@@ -128,7 +132,11 @@ int run(const Options& options)
   if (!cloth)
     throw BadInput(options.files[0] + ": has no tracked cloth" + (options.object.empty() ? "" : " " + options.object));
   const slender::TrackingConfig& tracking = *cloth->tracking;
-  const slender::TestFunctions::Values& values = options.guide ? tracking.functions.guide : tracking.functions.tracked;
+  const auto set = std::find_if(tracking.sets.begin(), tracking.sets.end(),
+                                [&](const slender::FunctionSet& s) { return options.functions.empty() || options.functions == s.name; });
+  if (set == tracking.sets.end())
+    throw BadInput(options.files[0] + ": tracked cloth " + cloth->name + " has no test functions " + options.functions);
+  const slender::TestFunctions::Values& values = options.guide ? set->functions.guide : set->functions.tracked;
   const slender::TriangleMesh& mesh = options.guide ? tracking.guide.mesh : cloth->mesh;
   slender::writeColoredMesh(options.files[1], mesh, slender::functionColors(values));
   if (options.quiet)
@@ -142,7 +150,7 @@ int run(const Options& options)
   }
   std::printf("object            %s\n", cloth->name.c_str());
   std::printf("vertices          %ld\n", static_cast<long>(mesh.vertices.cols()));
-  std::printf("test functions    %d, over %ld to %ld vertices\n", tracking.functions.count(), static_cast<long>(fewest), static_cast<long>(most));
+  std::printf("test functions    %d, over %ld to %ld vertices\n", set->functions.count(), static_cast<long>(fewest), static_cast<long>(most));
   std::printf("wall              %.3g s\n", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   return exit_done;
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "arguments.h"
+#include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
 #include "slender_sim/scene/simulation.h"
@@ -19,7 +20,7 @@
 #include "slender_sim/node/guide_bag.h"
 #endif
 
-/// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed.
+/// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed, or its results could not be written.
 namespace {
 
 using slender::BadInput;
@@ -39,7 +40,8 @@ const char* const usage =
   "  --set PATH=VALUE    override a value of the scene, e.g. rods.0.material.youngs_modulus=1e7; may be repeated\n"
   "  --threads N         threads for scenes of several rods; results do not depend on it\n"
   "  --quiet             print nothing but errors\n"
-  "record.every of the scene says which steps are recorded. Exit status: 0 done, 2 bad input, 3 the simulation failed.\n";
+  "record.every of the scene says which steps are recorded. Exit status: 0 done, 2 bad input, 3 the simulation failed,\n"
+  "or its results could not be written (disk full): the message names what is left of them.\n";
 
 struct Options
 {
@@ -244,9 +246,11 @@ int run(const Options& options)
   }
   Progress progress(!options.quiet && ::isatty(STDERR_FILENO), steps);
   bool ok = true;
+  slender::SceneInputs inputs;
   for (long k = 1; ok && k <= steps; ++k)
   {
-    const StepReport report = simulation.step(simulation.defaultInputs());
+    simulation.defaultInputs(inputs);
+    const StepReport report = simulation.step(inputs);
     ok = report.ok;
     if (!ok)
     {
@@ -296,7 +300,12 @@ int main(int argc, char** argv)
     std::fprintf(stderr, "simulate: %s\n", error.what());
     return exit_failed;
   }
-  catch (const std::exception& error)   // SceneError, BadInput, a recorder that cannot write
+  catch (const slender::WriteError& error)
+  {
+    std::fprintf(stderr, "simulate: %s\n", error.what());
+    return exit_failed;
+  }
+  catch (const std::exception& error)   // SceneError, BadInput, a recorder that cannot begin
   {
     std::fprintf(stderr, "simulate: %s\n", error.what());
     return exit_bad_input;

@@ -138,6 +138,24 @@ TEST_F(Simulate, refusesBadMeshesByName)
   }
 }
 
+/// A limit on the size of files acts like a full disk.
+TEST_F(Simulate, aFullDiskIsStatus3AndNamesWhatIsLeft)
+{
+  std::vector<std::pair<std::string, std::string>> outputs = {{"--csv", "/csv are cut off"}, {"--obj", " whole files are before it"}};
+  if (SLENDER_HAS_BAG)
+    outputs.emplace_back("--bag", ".active (rosbag reindex reads it)");
+  for (const auto& [option, says] : outputs)
+  {
+    const std::string out = folder_ + "/" + option.substr(2), blocks = option == "--obj" ? "1" : "64";
+    const Result result = slender::test::shell("bash -c \"trap '' XFSZ; ulimit -f " + blocks + "; " SLENDER_SIMULATE " " + cantilever +
+                                               " --duration 2 --quiet " + option + " " + out + "\"");
+    EXPECT_EQ(result.status, 3) << result.output;
+    EXPECT_NE(result.output.find(says), std::string::npos) << result.output;
+    EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
+  }
+  EXPECT_TRUE(fs::is_empty(folder_ + "/obj"));   // no half file
+}
+
 TEST_F(Simulate, aFailingSimulationIsStatus3)
 {
   // Explicit steps far above the stability limit, and no step cutting to save them.

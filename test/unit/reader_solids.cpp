@@ -190,6 +190,7 @@ INSTANTIATE_TEST_SUITE_P(Contact, BadSolid, testing::Values(
 
 INSTANTIATE_TEST_SUITE_P(Obstacle, BadSolid, testing::Values(
   Case{"obstacles=3", "must be a list"},
+  Case{"obstacles.0.shape=plane", "obstacles.0.shape = plane: must be a map with one shape and its measures, e.g. {plane: {}}"},
   Case{"obstacles.0.name=the floor", "is not a name"},
   Case{"obstacles.0.name=pin", "is also the name of obstacles.0"},
   Case{"obstacles.0.name=bob", "bodies.0.name = bob: is also the name of obstacles.0; names of bodies and obstacles must differ"},

@@ -277,6 +277,65 @@ TEST_P(ClothAllocations, AWarmStepInContactMakesNone)
   EXPECT_GT(group.collisions().repulsions + group.collisions().impulses, 0);
 }
 
+/// Rows of `parts` averages over as many equal runs of the model's vertices.
+PrescribedAverages averagesOver(const ClothModel& model, int parts)
+{
+  auto weights = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(parts, model.vertices());
+  const int each = model.vertices() / parts;
+  for (int i = 0; i < each * parts; ++i)
+    weights->insert(i / each, i) = 1.0 / each;
+  return {weights, {}};
+}
+
+/// Prescribed averages, with bounds and without, before and after another set of them took over.
+TEST(AverageAllocations, AWarmStepMakesNone)
+{
+  for (const bool one_newton_step : {true, false})
+    for (const bool bounded : {true, false})
+      for (const bool touching : {true, false})
+      {
+        if (bounded && !one_newton_step)
+          continue;
+        auto model = std::make_shared<ClothModel>(*ClothCase{BendingModel::hinge, Integrator::implicit_euler, ClothSolver::automatic, one_newton_step, 0.0}.model());
+        model->averages = {averagesOver(*model, 2), averagesOver(*model, 9)};
+        for (PrescribedAverages& set : model->averages)
+          if (bounded)
+            set.bounds.setConstant(set.count(), 0.4 / set.count());   // less than the cloth's weight
+        ClothOptions options;
+        options.one_newton_step = one_newton_step;
+        ClothGroupModel together;
+        together.cloths = {model};
+        together.contact.resize(1);
+        ClothGroup group(together, options);
+        ClothStepper stepper(model, options);
+        ClothGroupState state;
+        state.cloths = {makeClothState(*model, model->rest.vertices)};
+        ClothGroupInputs inputs;
+        inputs.cloths.resize(1);
+        ClothInputs& follow = inputs.cloths[0];
+        ClothState& cloth = state.cloths[0];
+        for (const int set : {0, 1, 0})
+        {
+          cloth.average_set = set;
+          cloth.at_bound.clear();
+          follow.averages = cloth.x * model->averages[static_cast<std::size_t>(set)].weights->transpose();
+          bool ok = true;
+          const auto advance = [&] {
+            follow.averages.row(0).array() += 1e-4;
+            ok = (touching ? group.step(state, inputs, 5e-3).ok : stepper.step(cloth, follow, 5e-3).ok) && ok;
+          };
+          for (int k = 0; k < 10; ++k)
+            advance();
+          const long before = allocations;
+          for (int k = 0; k < 5; ++k)
+            advance();
+          EXPECT_EQ(allocations - before, 0) << one_newton_step << bounded << touching << " set " << set;
+          EXPECT_TRUE(ok);
+          EXPECT_EQ(cloth.at_bound.size() > 0, bounded);
+        }
+      }
+}
+
 INSTANTIATE_TEST_SUITE_P(Cases, ClothAllocations, ::testing::ValuesIn(clothCases()), [](const auto& info) {
   const ClothCase& c = info.param;
   return std::string(toString(c.bending)) + "_" + toString(c.integrator) + (c.solver == ClothSolver::cholesky ? "_cholesky" : c.solver == ClothSolver::gauss_seidel ? "_sweeps" : "") +

@@ -200,6 +200,27 @@ TEST_F(TrackedPreviews, UndeformedShapesAreMadeFromTheMesh)
   EXPECT_TRUE(longer.mesh.vertices == crinkles.undeformed);
   EXPECT_TRUE(longer.start == crinkles.mesh.vertices);
   EXPECT_EQ(longer.undeformed.cols(), 0);
+  const auto refused = [&](const std::string& shape) -> std::string {
+    try
+    {
+      undeformed(shape);
+    }
+    catch (const SceneError& error)
+    {
+      return error.what();
+    }
+    return "";
+  };
+  // edges of 0.05 and 0.05 sqrt(2) m, 0.057 on average
+  EXPECT_NE(refused("{folds: {wavelength: 0.5, height: 0.1}}").find("along"), std::string::npos);
+  EXPECT_NE(refused("{folds: {along: [0, 0, 1], wavelength: 0.5, height: 0.1}}").find("gets no folds; take a direction within the cloth"), std::string::npos);
+  EXPECT_NE(refused("{folds: {along: [1, 0, 0], wavelength: 0.22, height: 0.1}}").find("undeformed.folds.wavelength = 0.22: is less than 4 edges"), std::string::npos)
+    << refused("{folds: {along: [1, 0, 0], wavelength: 0.22, height: 0.1}}");
+  EXPECT_EQ(refused("{folds: {along: [1, 0, 0], wavelength: 0.23, height: 0.1}}"), "");
+  const std::string ridged = refused("{ridges: {count: 12, height: 0.01}}");
+  EXPECT_NE(ridged.find("undeformed.ridges.count = 12: makes ridges of less than 4 edges"), std::string::npos) << ridged;
+  EXPECT_NE(ridged.find("take 11 or fewer"), std::string::npos) << ridged;
+  EXPECT_EQ(refused("{ridges: {count: 11, height: 0.01}}"), "");
   EXPECT_THROW(undeformed("{folds: {wavelength: 0.5}}"), SceneError);
   EXPECT_THROW(undeformed("{folds: {wavelength: 0.5, height: 0.1, along: [0, 0, 0]}}"), SceneError);
   EXPECT_THROW(undeformed("{folds: {wavelength: 0.5, height: 0.1}, crinkles: {height: 0.1}}"), SceneError);

@@ -89,8 +89,8 @@ TEST_F(TrackedScenes, AreReadWithDefaults)
   const ClothConfig& c = scene.cloths[0];
   ASSERT_TRUE(c.tracking);
   EXPECT_EQ(c.mesh.vertices.cols(), 81);
-  EXPECT_EQ(c.tracking->functions.count(), 9);
-  EXPECT_EQ(c.tracking->constraints->count(), 9);
+  EXPECT_EQ(c.tracking->sets[0].functions.count(), 9);
+  EXPECT_EQ(c.tracking->sets[0].constraints->count(), 9);
   EXPECT_NEAR(c.tracking->size, 0.4 * std::sqrt(2.0), 1e-12);
   EXPECT_FALSE(c.tracking->guide.byTopic());
   EXPECT_LT((c.start - c.mesh.vertices).cwiseAbs().maxCoeff(), 1e-15);
@@ -229,11 +229,56 @@ TEST_F(TrackedScenes, FollowBodies)
   }
 }
 
+TEST_F(TrackedScenes, StartAsFastAsTheirFrames)
+{
+  TriangleMesh mesh = writeFrames(0);
+  const Matrix3Xd rest = mesh.vertices;
+  for (int k = 0; k < 8; ++k)
+  {
+    mesh.vertices = rest.colwise() + Vector3d(0.02 * k, 0, 0);
+    writeObj(folder_ + "/frame_" + std::to_string(k) + ".obj", mesh);
+  }
+  const auto guide = [](const char* begin) {
+    return std::string("tracked.0.guide={mesh: {file: rest.obj}, motion: {frames: \"frame_*.obj\", rate: 20, begin: ") + begin + "}}";
+  };
+  Simulation simulation(parseScene(flap, "t", {guide("0"), "gravity=[0, 0, 0]"}, folder_));
+  const Matrix3Xd start = simulation.state().cloths[0].cloth.x;
+  EXPECT_LT((simulation.state().cloths[0].cloth.v.colwise() - Vector3d(0.4, 0, 0)).cwiseAbs().maxCoeff(), 1e-12);
+  for (int k = 1; k <= 30; ++k)   // carried along, as if at rest
+  {
+    ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
+    ASSERT_LT((simulation.state().cloths[0].cloth.x - start).colwise().norm().maxCoeff(), 0.004 * k + 1e-9) << k;
+    ASSERT_LT(simulation.state().cloths[0].guide_forces.norm(), 1e-9) << k;
+  }
+  // a guide that begins later stands still until then
+  const SceneConfig late = parseScene(flap, "t", {guide("0.1")}, folder_);
+  EXPECT_EQ(late.cloths[0].start_velocity.norm(), 0.0);
+  Matrix3Xd x, v;
+  late.cloths[0].tracking->guide.evaluate(0.1, x, &v);
+  EXPECT_EQ(v.norm(), 0.0);
+}
+
+TEST_F(TrackedScenes, LieOnTheirGuidesWhateverTheirLengthsAtRest)
+{
+  // crumpled, of no stiffness and without weight: where the guide is their averages are the guide's, and they stay
+  for (const char* step : {"0.01", "0.001"})
+  {
+    Simulation simulation(parseScene(flap, "t", {"tracked.0.undeformed={crinkles: {height: 0.015}, lengths: true}", "tracked.0.material.youngs_modulus=1",
+                                                 std::string("time.step=") + step, "gravity=[0, 0, 0]"}));
+    const SceneCloth& cloth = simulation.state().cloths[0];
+    const Matrix3Xd start = cloth.cloth.x;
+    const WeakConstraints& constraints = *simulation.config().cloths[0].tracking->sets[0].constraints;
+    EXPECT_LT(constraints.error(constraints.averages(cloth.guide), start), 1e-15);
+    ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
+    EXPECT_LT((cloth.cloth.x - start).cwiseAbs().maxCoeff(), 1e-4) << step;
+  }
+}
+
 TEST_F(TrackedScenes, TakeGroupsOfFiles)
 {
   write("cross.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\ng left\nf 1 2 3\nf 1 3 4\ng right\nf 2 5 6\nf 2 6 3\n");
   const SceneConfig scene = parseScene(flap, "t", {"tracked.0.guide={mesh: {file: cross.obj}}", "tracked.0.test_functions={regions: obj}"}, folder_);
-  const TestFunctions& f = scene.cloths[0].tracking->functions;
+  const TestFunctions& f = scene.cloths[0].tracking->sets[0].functions;
   ASSERT_EQ(f.names, (std::vector<std::string>{"left", "right"}));
   // prolonged: the left function is 1 over its faces and falls to 0 within the right ones
   EXPECT_TRUE(Eigen::MatrixXd(f.guide).row(0) == Eigen::RowVectorXd(Eigen::Map<const Eigen::RowVectorXd>(std::vector<double>{1, 1, 1, 1, 0, 0}.data(), 6)));
@@ -246,8 +291,8 @@ TEST_F(TrackedScenes, ClusterReproducibly)
 {
   const std::vector<std::string> set{"tracked.0.guide.grid.cells=[12, 12]", "tracked.0.mesh=same", "tracked.0.test_functions={clusters: {count: 7, seed: 4}}"};
   const SceneConfig a = parseScene(flap, "t", set), b = parseScene(flap, "t", set);
-  EXPECT_EQ(a.cloths[0].tracking->functions.count(), 7);
-  EXPECT_EQ(Eigen::MatrixXd(a.cloths[0].tracking->functions.guide - b.cloths[0].tracking->functions.guide).norm(), 0.0);
+  EXPECT_EQ(a.cloths[0].tracking->sets[0].functions.count(), 7);
+  EXPECT_EQ(Eigen::MatrixXd(a.cloths[0].tracking->sets[0].functions.guide - b.cloths[0].tracking->sets[0].functions.guide).norm(), 0.0);
   Simulation simulation(a);
   for (int k = 0; k < 10; ++k)
   {
@@ -367,15 +412,15 @@ TEST_F(TrackedScenes, BoundForcesByRegion)
                                      "tracked.0.max_traction={right: 200}"};
   Simulation one(parseScene(flap, "t", set, folder_)), two(parseScene(flap, "t", set, folder_));
   const TrackingConfig& tracking = *one.config().cloths[0].tracking;
-  EXPECT_TRUE(std::isinf(tracking.bounds[0]));
-  EXPECT_NEAR(tracking.bounds[1], 200 * tracking.constraints->measures()[1], 1e-12);
+  EXPECT_TRUE(std::isinf(tracking.sets[0].bounds[0]));
+  EXPECT_NEAR(tracking.sets[0].bounds[1], 200 * tracking.sets[0].constraints->measures()[1], 1e-12);
   double furthest = 0.0, strain = 0.0;
   for (int k = 1; k <= 300; ++k)
   {
     StepReport report = one.step(one.defaultInputs());
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_LT(report.tracking_error, 1e-13) << k;
-    EXPECT_LE(one.state().cloths[0].guide_forces.col(1).norm(), tracking.bounds[1] * (1 + 1e-9)) << k;
+    EXPECT_LE(one.state().cloths[0].guide_forces.col(1).norm(), tracking.sets[0].bounds[1] * (1 + 1e-9)) << k;
     furthest = std::max(furthest, one.trackingError(0).at_bound);
     strain = std::max(strain, report.max_strain);
     if (k == 50)

@@ -45,6 +45,35 @@ TEST(Trajectories, CoastWhenNothingComes)
   }
 }
 
+TEST(PointTrajectory, StartsInMotionWhereToldSo)
+{
+  // exact for constant velocity (two frames, and more) and constant acceleration; at rest where frames repeat
+  const auto frames = [](const std::vector<double>& times, double v, double a) {
+    std::vector<Matrix3Xd> result;
+    for (const double t : times)
+      result.push_back(Vector3d(v * t + 0.5 * a * t * t, 0, 1));
+    PointTrajectory trajectory(times, result);
+    trajectory.startInMotion();
+    return trajectory;
+  };
+  Matrix3Xd x, v;
+  for (const double a : {0.0, 3.0})
+    for (const double t : {0.0, 0.03, 0.1, 0.17})
+    {
+      frames({0.0, 0.1, 0.25, 0.4}, 2.0, a).evaluate(t, x, &v);
+      EXPECT_NEAR(x(0, 0), 2.0 * t + 0.5 * a * t * t, 1e-14) << t;
+      EXPECT_NEAR(v(0, 0), 2.0 + a * t, 1e-13) << t;
+    }
+  frames({0.0, 0.1}, 2.0, 0.0).evaluate(0.0, x, &v);
+  EXPECT_NEAR(v(0, 0), 2.0, 1e-14);
+  frames({0.0, 0.1, 0.2}, 2.0, 0.0).evaluate(-0.01, x, &v);
+  EXPECT_EQ(v.norm(), 0.0);
+  PointTrajectory paused({0.0, 0.1, 0.2}, {Vector3d(1, 0, 0), Vector3d(1, 0, 0), Vector3d(2, 0, 0)});
+  paused.startInMotion();
+  paused.evaluate(0.0, x, &v);
+  EXPECT_EQ(v.norm(), 0.0);
+}
+
 TEST(PointTrajectory, MovesEachPointAsThePositionsOfPoses)
 {
   Random random(4);

@@ -8,6 +8,13 @@ namespace slender {
 /// Unit normals of the vertices (3 x n), of the faces around them weighted by their areas; zero where there is no face.
 Eigen::Matrix3Xd vertexNormals(const TriangleMesh& mesh);
 
+/// Mean length of the edges of all faces [m]; 0 without.
+double meanFaceEdge(const TriangleMesh& mesh);
+/// How far the mesh extends along a direction [m].
+double extent(const TriangleMesh& mesh, const Eigen::Vector3d& along);
+/// Mean distance of the vertices from an axis through their mean [m].
+double meanRadius(const TriangleMesh& mesh, const Eigen::Vector3d& axis);
+
 /// Folded like an accordion: by height sin(2 pi s / wavelength) [m], s along a direction, counted from the lowest vertex.
 Eigen::Matrix3Xd folded(const TriangleMesh& mesh, const Eigen::Vector3d& along, double wavelength, double height);
 /// Ridges along an axis through the mesh's centre (the mean of its vertices): by height cos(count times the angle about it) [m].

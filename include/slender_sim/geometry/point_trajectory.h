@@ -8,7 +8,7 @@
 namespace slender {
 
 /// A motion of several points through timed frames, once continuously differentiable: each point as the positions of PoseTrajectory (cubic Hermite
-/// with three-point slopes; held with zero velocity before the first and after the last frame, unless it coasts).
+/// with three-point slopes; held with zero velocity before the first and after the last frame, unless it coasts or starts in motion).
 class PointTrajectory
 {
 public:
@@ -20,6 +20,9 @@ public:
   void append(double time, const Eigen::Matrix3Xd& points);
   /// After the last frame the points go on with the mean velocity since the one before, which dies out linearly within `duration` [s] (>= 0; 0: held).
   void coast(double duration) { coast_ = duration; }
+  /// The slope at the first frame is that of the parabola through the first three (of two frames: their chord), and not zero: of a motion that was
+  /// under way when it was sampled. Before that frame points are held all the same, so that a query there sees a jump in velocity.
+  void startInMotion() { moving_start_ = true; }
   /// Forgets frames that no query at or after `time` needs.
   void forgetBefore(double time);
 
@@ -32,10 +35,13 @@ public:
 
 private:
   Eigen::Vector3d slope(std::size_t frame, Eigen::Index point) const;
+  /// Mean velocity since the frame before.
+  Eigen::Vector3d chord(std::size_t frame, Eigen::Index point) const;
 
   std::vector<double> times_;
   std::vector<Eigen::Matrix3Xd> frames_;
   double coast_ = 0.0;
+  bool moving_start_ = false;
 };
 
 }  // namespace slender

@@ -15,7 +15,7 @@ struct FramedLine
   Eigen::Matrix3Xd x;           ///< per node [m]
   Eigen::Matrix3Xd d1;          ///< per edge, unit
   Eigen::Matrix2Xd semi_axes;   ///< per edge, along d1 and d2 [m]
-  std::vector<double> values;   ///< per node, what its sections' `value` is taken from; empty: 0
+  std::vector<double> values = {};   ///< per node, what its sections' `value` is taken from; empty: 0
 };
 
 /// Centre of a cross-section, and its semi-axes as vectors (u along d1) [m].

@@ -13,6 +13,7 @@
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
 #include "slender_sim/thread/touching_threads.h"
+#include "slender_sim/tracking/function_blend.h"
 
 namespace slender {
 
@@ -30,7 +31,9 @@ struct SceneCloth
   ClothState cloth;
   std::vector<ClothGrasp> grasps;   ///< those of the scene; cloth.pins are what the active ones hold
   Eigen::Matrix3Xd guide;           ///< of a tracked cloth: vertices of its guide now [m]
+  Eigen::Matrix3Xd guide_velocity;  ///< of these over the last step [m/s], with several sets of test functions only
   Eigen::Matrix3Xd guide_forces;    ///< with which it acted in the last step, per test function [N] (ClothStepper::averageForces)
+  FunctionBlend blend;              ///< of the set in force, cloth.average_set
 };
 
 /// State of all objects of a scene at one instant.
@@ -105,6 +108,8 @@ public:
 
   /// Inputs as the scene itself defines them at the end of the coming step: tables evaluated, everything else held where it is.
   SceneInputs defaultInputs() const;
+  /// The same into those of an earlier step, which takes no memory.
+  void defaultInputs(SceneInputs& inputs) const;
 
   /// The pose of the held section when the driving frame M of a grasp (a gripper, a body) is at X_WM: X_WM and the offset that was
   /// taken as the scene began (none with `attach: section`), or last by attach() or setOffset().
@@ -142,12 +147,19 @@ public:
   {
     double met = 0.0;        ///< of those that are met
     double at_bound = 0.0;   ///< of those whose forces are at their bounds
+    double blend = 0.0;      ///< that functions which took over leave for now: the others count from there
   };
   TrackingError trackingError(int cloth) const;
+  /// Test functions in force of a tracked cloth.
+  const FunctionSet& functions(int cloth) const;
+  /// Has another set of test functions act from the next step on. What its averages are away from the guide's goes within `blend` [s] (none: that of the
+  /// scene), without a jump in position or velocity; 0: in one step. Throws std::invalid_argument: not a tracked cloth, no set of this name, not a
+  /// time, functions that depend on each other on the vertices that are free.
+  void setFunctions(int cloth, const std::string& set, std::optional<double> blend = std::nullopt);
 
   /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could
   /// not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a shortened one is refused
-  /// and the state stays as it is.
+  /// and the state stays as it is. An older file is replaced, of a symbolic link what it leads to; neither touches what is no regular file.
   void save(const std::string& path) const;
   void load(const std::string& path);
 
@@ -165,7 +177,7 @@ private:
   void buildRods();
   void takeOffset(int grasp, double time);
   void findEquilibrium();
-  SceneInputs inputsAt(double time) const;
+  void inputsAt(double time, SceneInputs& inputs) const;
   void fillRodInputs(const SceneInputs& inputs);
   void checkInputs(const SceneInputs& inputs) const;
   StepReport stepAll();
@@ -195,6 +207,9 @@ private:
 
   // simulation_guides.cpp: what tracked cloths follow
   void startTracking(int cloth);
+  bool functionsDue() const;
+  void takeOver();
+  void takeOver(SceneCloth& held, const TrackingConfig& tracking, std::size_t set, double blend) const;
   void addGuideInputs(SceneInputs& inputs, double time) const;
   void checkGuides(const SceneInputs& inputs) const;
   void takeGuides(const SceneInputs& inputs, StepReport& report);
@@ -221,14 +236,14 @@ private:
   std::vector<std::shared_ptr<const ThreadModel>> thread_models_;
   std::vector<std::optional<ThreadGroup>> thread_steppers_;   ///< per thread; none for those with contact
   std::optional<TouchingThreads> touching_;
-  std::vector<int> touching_index_;                   ///< per thread: in touching_, -1: on its own
+  std::vector<int> touching_index_;                   ///< per thread: in touching_, -1: on its own; empty when all are
   TouchingState touching_state_;
   TouchingInputs touching_inputs_;
   std::vector<std::shared_ptr<const ClothModel>> cloth_models_;
   std::vector<std::optional<ClothStepper>> cloth_steppers_;   ///< per cloth; none for those with contact
   std::deque<TouchingCloths> touching_cloths_;
   struct ClothPlace { int group = -1, index = 0; };   // group -1: on its own
-  std::vector<ClothPlace> cloth_places_;              ///< per cloth: in touching_cloths_
+  std::vector<ClothPlace> cloth_places_;              ///< per cloth: in touching_cloths_; empty when all are on their own
   std::vector<char> leads_;                           ///< per cloth: it is the guide of another
   std::vector<int> cloth_bodies_;                     ///< of the scene, that these meet, beside all obstacles
   std::vector<ClothInputs> cloth_inputs_;

@@ -89,7 +89,9 @@ RodSnapshot snapshotOf(const RodModel& model, const RodState& state);
 ThreadSnapshot snapshotOf(const std::string& name, const ThreadState& state);
 SceneSnapshot snapshotOf(const Simulation& simulation);
 
-/// The averages over the guide, vertices 3 x n [m], of a tracked cloth and the forces, 3 x functions [N], appended to `out`.
-void appendFunctions(const ClothConfig& cloth, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces, std::vector<FunctionSnapshot>& out);
+/// The averages over the guide, vertices 3 x n [m], by the functions in force of a tracked cloth and the forces, 3 x functions [N], appended to `out`;
+/// functions of a named set as SET/NAME.
+void appendFunctions(const std::string& cloth, const FunctionSet& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
+                     std::vector<FunctionSnapshot>& out);
 
 }  // namespace slender

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -47,12 +48,21 @@ struct GuideConfig
   void evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd* velocities = nullptr) const;
 };
 
+/// Test functions that act together.
+struct FunctionSet
+{
+  std::string name;                     ///< empty: of the only set, which needs none
+  TestFunctions functions;
+  std::shared_ptr<const WeakConstraints> constraints;
+  Eigen::VectorXd bounds;               ///< of the force of each [N], infinite without; empty: of none, in all sets
+  std::optional<double> from;           ///< simulated time at which they take over [s] > 0; none: when asked to
+  double blend = 0.0;                   ///< time within which the averages then become the guide's [s]
+};
+
 struct TrackingConfig
 {
   GuideConfig guide;
-  TestFunctions functions;
-  std::shared_ptr<const WeakConstraints> constraints;
-  Eigen::VectorXd bounds;               ///< of the force of each test function [N], infinite without; empty: of none
+  std::vector<FunctionSet> sets;        ///< the first acts where the scene starts
   double size = 1.0;                    ///< diagonal of the box around the guide's mesh [m]: what errors are measured by
 };
 

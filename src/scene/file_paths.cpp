@@ -1,0 +1,53 @@
+#include "slender_sim/scene/file_paths.h"
+
+#include <filesystem>
+
+namespace slender {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// `status` with links followed.
+void requireRegular(const std::string& path, const fs::file_status& status)
+{
+  if (fs::is_directory(status))
+  {
+    throw std::runtime_error(path + ": is a directory; name a file");
+  }
+  if (!fs::is_regular_file(status))
+  {
+    throw std::runtime_error(path + ": is no regular file but a device, FIFO or socket; name another file");
+  }
+}
+
+}  // namespace
+
+std::string replaceablePath(const std::string& path)
+{
+  std::error_code error;
+  const bool link = fs::is_symlink(fs::symlink_status(path, error));
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status))   // or a folder of it may not be read: opening it will tell
+  {
+    if (link)
+    {
+      throw std::runtime_error(path + ": is a symbolic link that leads nowhere; remove it, or name another file");
+    }
+    return path;
+  }
+  requireRegular(path, status);
+  return link ? fs::canonical(path).string() : path;
+}
+
+void requireRegularFile(const std::string& path)
+{
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::exists(status))
+  {
+    requireRegular(path, status);
+  }
+}
+
+}  // namespace slender
