@@ -21,7 +21,7 @@ if(BUILD_TESTING)
   # Pure functions and buffers: no master needed.
   add_executable(node_unit_tests
     ${PROJECT_SOURCE_DIR}/test/nodes/guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/converters_test.cpp
-    ${PROJECT_SOURCE_DIR}/test/nodes/markers_test.cpp
+    ${PROJECT_SOURCE_DIR}/test/nodes/bag_recorder_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/markers_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/point_guide_buffer_test.cpp)
   target_compile_definitions(node_unit_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   find_package(GTest REQUIRED)

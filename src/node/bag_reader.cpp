@@ -18,6 +18,7 @@
 
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_messages.h"
+#include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 
 namespace slender {
@@ -186,10 +187,9 @@ void BagReader::Contents::open()
       throw BagError(path + ": is still being written to " + path + ".active; wait for its recorder, or if that has died: rosbag reindex " + path + ".active");
     throw BagError(path + ": there is no such file");
   }
-  if (fs::is_directory(path))
-    throw BagError(path + ": is a directory; name a bag");
   try
   {
+    requireRegularFile(path);
     bag.open(path, rosbag::bagmode::Read);
   }
   catch (const rosbag::BagUnindexedException&)
@@ -199,6 +199,10 @@ void BagReader::Contents::open()
   catch (const rosbag::BagException& e)
   {
     throw BagError(path + ": is no ROS bag, or is cut off or damaged (" + e.what() + "); copy it anew, or try: rosbag reindex " + path);
+  }
+  catch (const std::runtime_error& e)   // a directory, a device
+  {
+    throw BagError(e.what());
   }
 }
 
@@ -369,7 +373,7 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
 {
   const std::size_t count = cloths.names.size();
   require(cloths.offsets.size() == count && cloths.velocities.size() == cloths.vertices.size() && cloths.guide_offsets.size() == count &&
-            cloths.function_offsets.size() == count,
+            cloths.function_offsets.size() == count && cloths.function_sets.size() == count,
           "state");
   step = cloths.step;
   step_known = true;
@@ -402,10 +406,15 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
       for (const ClothConfig& candidate : scene->cloths)
         if (candidate.name == cloths.names[k])
           config = &candidate;
-      require(config && config->tracking && static_cast<std::size_t>(config->tracking->constraints->count()) == force_end - force &&
+      const FunctionSet* set = nullptr;
+      if (config && config->tracking)
+        for (const FunctionSet& candidate : config->tracking->sets)
+          if (candidate.name == cloths.function_sets[k])
+            set = &candidate;
+      require(set && static_cast<std::size_t>(set->constraints->count()) == force_end - force &&
                 static_cast<std::size_t>(config->tracking->guide.mesh.vertices.cols()) == guide_end - guide,
               "state (what " + cloths.names[k] + " tracks)");
-      appendFunctions(*config, columns(cloths.guide_vertices, guide, guide_end), columns(cloths.guide_forces, force, force_end), out->functions);
+      appendFunctions(config->name, *set, columns(cloths.guide_vertices, guide, guide_end), columns(cloths.guide_forces, force, force_end), out->functions);
     }
   }
 }

@@ -3,18 +3,17 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <stdexcept>
 
 #include <std_msgs/String.h>
 
 #include "slender_sim/node/sim_clock.h"
+#include "slender_sim/scene/file_paths.h"
 
 namespace slender {
 
 BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names,
                          const std::vector<std::string>& thread_prefixes)
-  : path_(path)
 {
   const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
   state_topic_ = prefix + "state";
@@ -27,13 +26,12 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
   for (const std::string& thread : thread_prefixes)
     nozzle_topics_.push_back(prefix + thread + "nozzle/wrench");
-  if (std::filesystem::is_directory(path))
-    throw std::runtime_error("bag " + path + ": cannot be written: is a directory");
   try
   {
-    bag_ = std::make_unique<rosbag::Bag>(path + ".active", rosbag::bagmode::Write);
+    path_ = replaceablePath(path);
+    bag_ = std::make_unique<rosbag::Bag>(replaceablePath(path_ + ".active"), rosbag::bagmode::Write);
   }
-  catch (const rosbag::BagException& e)
+  catch (const std::exception& e)   // rosbag's, and a path that must not be replaced
   {
     throw std::runtime_error("bag " + path + ": cannot be written: " + e.what());
   }
@@ -52,40 +50,49 @@ BagRecorder::~BagRecorder()
   }
 }
 
+/// What a failure leaves behind.
+std::string BagRecorder::remains() const { return "; what came before is in " + path_ + ".active (rosbag reindex reads it)"; }
+
+template <class Message>
+void BagRecorder::write(const std::string& topic, const ros::Time& stamp, const Message& message)
+{
+  try
+  {
+    bag_->write(topic, stamp, message);
+  }
+  catch (const rosbag::BagException& e)
+  {
+    throw WriteError("bag " + path_ + ": " + e.what() + remains());
+  }
+}
+
 void BagRecorder::recordScene(const std::string& yaml, const ros::Time& stamp)
 {
   std_msgs::String message;
   message.data = yaml;
-  bag_->write(scene_topic_, stamp, message);
+  write(scene_topic_, stamp, message);
 }
 
-void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh) { bag_->write(mesh_topic_, mesh.header.stamp, mesh); }
+void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh) { write(mesh_topic_, mesh.header.stamp, mesh); }
 
 void BagRecorder::record(const SceneMessages& messages)
 {
-  try
-  {
-    for (const auto& state : messages.states)
-      bag_->write(state_topic_, state->header.stamp, *state);
-    for (const auto& state : messages.threads)
-      bag_->write(state_topic_, state->header.stamp, *state);
-    if (!messages.cloth_state->names.empty())
-      bag_->write(state_topic_, messages.cloth_state->header.stamp, *messages.cloth_state);
-    for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
-      bag_->write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
-    if (!messages.bodies.name.empty())
-      bag_->write(bodies_topic_, messages.bodies.header.stamp, messages.bodies);
-    for (std::size_t k = 0; k < messages.nozzles.size(); ++k)
-      bag_->write(nozzle_topics_[k], messages.nozzles[k].header.stamp, messages.nozzles[k]);
-    if (!messages.grasps.name.empty())
-      bag_->write(grasps_topic_, messages.grasps.header.stamp, messages.grasps);
-    if (!messages.obstacles.name.empty())
-      bag_->write(obstacles_topic_, messages.obstacles.header.stamp, messages.obstacles);
-  }
-  catch (const rosbag::BagException& e)
-  {
-    throw std::runtime_error("bag " + path_ + ": " + e.what() + "; what came before is in " + path_ + ".active (rosbag reindex reads it)");
-  }
+  for (const auto& state : messages.states)
+    write(state_topic_, state->header.stamp, *state);
+  for (const auto& state : messages.threads)
+    write(state_topic_, state->header.stamp, *state);
+  if (!messages.cloth_state->names.empty())
+    write(state_topic_, messages.cloth_state->header.stamp, *messages.cloth_state);
+  for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
+    write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
+  if (!messages.bodies.name.empty())
+    write(bodies_topic_, messages.bodies.header.stamp, messages.bodies);
+  for (std::size_t k = 0; k < messages.nozzles.size(); ++k)
+    write(nozzle_topics_[k], messages.nozzles[k].header.stamp, messages.nozzles[k]);
+  if (!messages.grasps.name.empty())
+    write(grasps_topic_, messages.grasps.header.stamp, messages.grasps);
+  if (!messages.obstacles.name.empty())
+    write(obstacles_topic_, messages.obstacles.header.stamp, messages.obstacles);
 }
 
 void BagRecorder::close()
@@ -100,10 +107,10 @@ void BagRecorder::close()
   catch (const rosbag::BagException& e)
   {
     (void)bag_.release();   // its destructor would try again, and end the program
-    throw std::runtime_error("bag " + path_ + ": " + e.what() + "; what came before is in " + path_ + ".active (rosbag reindex reads it)");
+    throw WriteError("bag " + path_ + ": " + e.what() + remains());
   }
   if (std::rename((path_ + ".active").c_str(), path_.c_str()) != 0)
-    throw std::runtime_error("bag " + path_ + ": cannot be renamed from " + path_ + ".active: " + std::strerror(errno));
+    throw WriteError("bag " + path_ + ": cannot be renamed from " + path_ + ".active: " + std::strerror(errno));
 }
 
 namespace {

@@ -94,7 +94,7 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
     {
       const auto& tracking = simulation.config().cloths[k].tracking;
       const bool regions = style == MarkerStyle::regions && tracking;
-      Eigen::Matrix3Xd paints = regions ? functionColors(tracking->functions.tracked) : Eigen::Matrix3Xd();
+      Eigen::Matrix3Xd paints = regions ? functionColors(simulation.functions(static_cast<int>(k)).functions.tracked) : Eigen::Matrix3Xd();
       const std::vector<double> values = shownValues(model, x, options.color);
       if (!values.empty())
         paints.resize(3, x.cols());

@@ -32,7 +32,7 @@ std::string fromPoints(const sensor_msgs::PointCloud2& message, Eigen::Matrix3Xd
   {
     if (!field || field->count != 1 || (field->datatype != sensor_msgs::PointField::FLOAT32 && field->datatype != sensor_msgs::PointField::FLOAT64))
       return "it must have the fields x, y and z, float32 or float64";
-    if (field->offset + (field->datatype == sensor_msgs::PointField::FLOAT32 ? 4u : 8u) > message.point_step)
+    if (std::uint64_t{field->offset} + (field->datatype == sensor_msgs::PointField::FLOAT32 ? 4 : 8) > message.point_step)   // 32 bits wrap
       return "a field reaches beyond point_step";
   }
   const std::uint64_t row = std::uint64_t{message.width} * message.point_step;

@@ -13,6 +13,7 @@
 #include "slender_sim/BodyStates.h"
 #include "slender_sim/ClothState.h"
 #include "slender_sim/node/converters.h"
+#include "slender_sim/scene/file_paths.h"
 
 namespace slender {
 namespace {
@@ -163,6 +164,7 @@ RecordedGuide read(const BagSource& source)
 
 RecordedGuide readGuideBag(const BagSource& source)
 {
+  requireRegularFile(source.file);
   try
   {
     return read(source);

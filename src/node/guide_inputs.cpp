@@ -210,7 +210,7 @@ void GuideInputs::onBodies(const slender_sim::BodyStates& message)
     bool known = false;
     for (std::size_t g = 0; g < guided_.size(); ++g)
     {
-      if (guided_[g].body != message.name[b])
+      if (guided_[g].body.empty() || guided_[g].body != message.name[b])   // a name may be empty, too
         continue;
       known = true;
       entry.guided = static_cast<int>(g);

@@ -117,6 +117,8 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
   cloths.guide_forces.clear();
   cloths.forces_at_bound.clear();
   cloths.bound_distances.clear();
+  cloths.function_sets.clear();
+  cloths.blend_distances.clear();
   for (std::size_t k = 0; k < scene.cloths.size(); ++k)
   {
     append(simulation.config().cloths[k].name, scene.cloths[k].cloth, cloths);
@@ -124,6 +126,8 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     appendTracking(error.met, scene.cloths[k].guide, scene.cloths[k].guide_forces, cloths);
     cloths.forces_at_bound.push_back(static_cast<std::uint32_t>(scene.cloths[k].cloth.at_bound.size()));
     cloths.bound_distances.push_back(error.at_bound);
+    cloths.function_sets.push_back(simulation.config().cloths[k].tracking ? simulation.functions(static_cast<int>(k)).name : std::string());
+    cloths.blend_distances.push_back(error.blend);
   }
   wrenches.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < wrenches.size(); ++g)

@@ -1,6 +1,7 @@
 #include "slender_sim/node/scene_node.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <iomanip>
 #include <iostream>
 
@@ -23,13 +24,19 @@ namespace slender {
 namespace {
 
 constexpr double kIdle = 0.02;         // [s] longest sleep: how late diagnostics and markers may be
-constexpr double kBurst = 0.02;        // [s] longest run of steps between two looks at the callbacks
+constexpr double kClockPatience = 2.0, kClockReminder = 10.0;   // [s] until the first and between later complaints that there is no /clock
+
+/// Text of a scene, not the path of one.
+bool isText(const std::string& scene)
+{
+  std::error_code error;
+  return scene.find('\n') != std::string::npos || (scene.find(": ") != std::string::npos && !std::filesystem::exists(scene, error));
+}
 
 SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
 {
   setBagReader(readGuideBag);
-  SceneConfig scene = options.scene.find('\n') != std::string::npos ? parseScene(options.scene, "~scene", options.overrides)
-                                                                    : readScene(options.scene, options.overrides);
+  SceneConfig scene = isText(options.scene) ? parseScene(options.scene, "~scene", options.overrides) : readScene(options.scene, options.overrides);
   // one kind of state on the topic `state`
   const std::string who = "scene " + scene.name + ": ";
   const auto refuse = [&](const std::string& has, const std::string& other) {
@@ -66,7 +73,7 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   : nh_(nh), nh_priv_(nh_priv), kind_(kind), options_(NodeOptions::read(nh_priv))
 {
   nh_.setCallbackQueue(&queue_);
-  nh_priv_.setCallbackQueue(&queue_);
+  nh_priv_.setCallbackQueue(&services_queue_);
   checkClock();
   simulation_ = std::make_unique<Simulation>(loadScene(options_, kind_));
   grasp_names_ = graspTopicNames(*simulation_);
@@ -109,7 +116,11 @@ void SceneNode::startClock()
   {
     start = ros::Time::now();
     if (start.isZero())
+    {
+      if (next_clock_reminder_.isZero())
+        next_clock_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockPatience);
       return;   // no /clock yet; asked again in work()
+    }
   }
   else if (options_.pace == Pace::wall && !options_.publish_clock)
     start = ros::Time::now();
@@ -171,6 +182,10 @@ void SceneNode::advertise()
   const std::vector<BodyConfig>& bodies = simulation_->config().bodies;
   if (!bodies.empty())
     bodies_pub_ = nh_.advertise<slender_sim::BodyStates>("body_states", 1000);
+  if (!simulation_->grasps().empty())
+    grasps_pub_ = nh_.advertise<slender_sim::GraspStates>("grasp_states", 1000);
+  if (!simulation_->config().obstacles.empty())
+    obstacles_pub_ = nh_.advertise<slender_sim::BodyStates>("obstacle_states", 1000);
   if (std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.broadcast_tf; }))
     tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   markers_pub_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
@@ -193,9 +208,9 @@ bool SceneNode::isStateFinite() const
 bool SceneNode::advance()
 {
   const ros::WallTime begin = ros::WallTime::now();
-  SceneInputs inputs = simulation_->defaultInputs();
-  inputs_->apply(clock_.seconds() + clock_.step(), inputs);
-  const StepReport report = simulation_->step(inputs);
+  simulation_->defaultInputs(step_inputs_);
+  inputs_->apply(clock_.seconds() + clock_.step(), step_inputs_);
+  const StepReport report = simulation_->step(step_inputs_);
   last_report_ = report;
   if (!report.ok)
   {
@@ -243,7 +258,7 @@ void SceneNode::publishState()
   }
   broadcastBodies();
   const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
-  if (!bag_ && !heard(state_pub_) && !heard(points_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) &&
+  if (!bag_ && !heard(state_pub_) && !heard(points_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) && !heard(grasps_pub_) && !heard(obstacles_pub_) &&
       std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) && std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard) && std::none_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard))
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
@@ -286,6 +301,10 @@ void SceneNode::publishState()
     wrench_pubs_[g].publish(messages_.wrenches[g]);
   if (!messages_.bodies.name.empty())
     bodies_pub_.publish(messages_.bodies);
+  if (!messages_.grasps.name.empty())
+    grasps_pub_.publish(messages_.grasps);
+  if (!messages_.obstacles.name.empty())
+    obstacles_pub_.publish(messages_.obstacles);
 }
 
 void SceneNode::broadcastBodies()
@@ -345,6 +364,7 @@ void SceneNode::jumped()
   showHandles();
   realign();
   publishState();
+  step_ended_ = "the state was replaced by ~reset or ~load_state";
 }
 
 void SceneNode::realign()
@@ -379,6 +399,11 @@ void SceneNode::work()
   if (!clock_started_)
   {
     startClock();
+    if (!clock_started_ && ros::WallTime::now() >= next_clock_reminder_)
+    {
+      next_clock_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
+      ROS_WARN("%s waits for /clock (~pace: follow), which nobody publishes yet", nh_priv_.getNamespace().c_str());
+    }
     return;
   }
   inputs_->processPending();
@@ -388,7 +413,7 @@ void SceneNode::work()
   {
     if (!advance())
       break;
-    if (!queue_.isEmpty())
+    if (!queue_.isEmpty() || !services_queue_.isEmpty())
       break;
   }
   tell();
@@ -401,11 +426,21 @@ void SceneNode::tell()
     publishDiagnostics();
 }
 
+/// Until a step is due, or a callback came whose effect shows at once: a message while the node runs by itself, else a service call.
+void SceneNode::waitForCallbacks()
+{
+  const bool running = mode_ == Mode::running && options_.pace != Pace::step;
+  if (running)
+    queue_.callAvailable(untilDue());
+  services_queue_.callAvailable(running ? ros::WallDuration(0.0) : untilDue());
+  queue_.callAvailable();
+}
+
 int SceneNode::spin()
 {
   while (!ended())
   {
-    queue_.callAvailable(untilDue());
+    waitForCallbacks();
     work();
   }
   if (clock_started_)

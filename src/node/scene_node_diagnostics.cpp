@@ -54,6 +54,19 @@ void addThreads(const Simulation& simulation, const RunStatistics& recent, Diagn
   add(status, "mended folds", recent.mended_folds);
 }
 
+/// Of tracked cloths with several sets.
+void addFunctions(const Simulation& simulation, int cloth, DiagnosticStatus& status)
+{
+  const ClothConfig& config = simulation.config().cloths[cloth];
+  if (!config.tracking || config.tracking->sets.size() < 2)
+    return;
+  const SceneCloth& held = simulation.state().cloths[cloth];
+  const double time = simulation.state().time;
+  add(status, "test functions of " + config.name, simulation.functions(cloth).name);
+  add(status, "blend of " + config.name + " goes on for [s]", held.blend.active(time) ? held.blend.start + held.blend.duration - time : 0.0);
+  add(status, "blend of " + config.name + " leaves at most [m]", held.blend.left(time));
+}
+
 }  // namespace
 
 void SceneNode::publishDiagnostics()
@@ -125,8 +138,10 @@ DiagnosticStatus SceneNode::simulationStatus() const
     add(status, "constraint residual [m]", error);
     add(status, "worst constraint residual over size", recent_.tracking_error);
     add(status, "largest guide force [N]", force);
+    for (std::size_t k = 0; k < simulation_->config().cloths.size(); ++k)
+      addFunctions(*simulation_, static_cast<int>(k), status);
     const auto& cloths = simulation_->config().cloths;
-    if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking && cloth.tracking->bounds.size() > 0; }))
+    if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking && cloth.tracking->sets[0].bounds.size() > 0; }))
     {
       add(status, "most guide forces at their bounds", static_cast<std::uint64_t>(recent_.forces_at_bound));
       add(status, "greatest distance where forces are at their bounds [m]", refused);
@@ -173,7 +188,8 @@ DiagnosticStatus SceneNode::inputStatus()
       add(status, "input age " + age.name + " [s]", std::string("none yet"));
     if (age.seconds && *age.seconds > options_.guide_timeout && mode_ == Mode::running)
       raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
-    if (age.missing)
+    const bool late = mode_ == Mode::running && clock_.seconds() - inputs_since_ > options_.guide_timeout;
+    if (age.missing || (!age.seconds && late))
       raise(status, DiagnosticStatus::WARN, "no input yet for " + age.name);
   }
   const std::vector<GuideInputs::Setting> settings = inputs_->settings();

@@ -15,6 +15,8 @@ void SceneNode::advertiseServices()
                nh_priv_.advertiseService("load_state", &SceneNode::onLoad, this)};
   if (kind_ != NodeKind::threads)
     services_.push_back(nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this));
+  if (kind_ == NodeKind::tracking)
+    services_.push_back(nh_priv_.advertiseService("set_functions", &SceneNode::onSetFunctions, this));
 }
 
 bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response)
@@ -28,6 +30,7 @@ bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::
   if (!request.data && mode_ == Mode::paused)
     realign();
   mode_ = request.data ? Mode::paused : Mode::running;
+  step_ended_ = "~pause was called";
   response.success = true;
   response.message = request.data ? "paused" : "running";
   return true;
@@ -35,6 +38,7 @@ bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::
 
 bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response)
 {
+  queue_.callAvailable();   // older than the reset
   simulation_->reset();
   inputs_->restart(*simulation_);
   if (mode_ == Mode::failed)
@@ -42,6 +46,7 @@ bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
   failure_.clear();
   last_report_ = StepReport();
   jumped();
+  inputs_since_ = clock_.seconds();
   publishDiagnostics();
   response.success = true;
   response.message = "epoch " + std::to_string(epoch_);
@@ -57,19 +62,32 @@ bool SceneNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::R
     response.message = std::string("the node runs by itself (~pace: ") + toString(options_.pace) + "); call ~pause first";
   else if (request.n == 0)
     response.message = "n must be at least 1";
+  else if (stepping_)
+    response.message = "another call of ~step is under way; wait, or end it with ~pause";
   else
   {
+    queue_.callAvailable();   // what came before counts, what comes meanwhile does not
     inputs_->processPending();
+    stepping_ = true;
+    step_ended_.clear();
+    ros::WallTime looked = ros::WallTime::now();
     std::uint32_t done = 0;
-    while (done < request.n && !ended() && advance())
+    while (done < request.n && !ended() && step_ended_.empty() && advance())
     {
       ++done;
       tell();
+      if ((ros::WallTime::now() - looked).toSec() < kBurst)
+        continue;
+      // one by one: callAvailable() within a callback counts those of the outer call twice
+      while (!ended() && step_ended_.empty() && services_queue_.callOne() == ros::CallbackQueue::Called)
+        continue;
+      looked = ros::WallTime::now();
     }
+    stepping_ = false;
     response.success = done == request.n;
     if (!response.success)
       response.message = "took " + std::to_string(done) + " of " + std::to_string(request.n) + " steps; " +
-                         (failure_.empty() ? "the node ends" : failure_);
+                         (!failure_.empty() ? failure_ : !step_ended_.empty() ? step_ended_ : "the node ends");
   }
   response.step = simulation_->state().steps;
   response.stamp = clock_.stamp();
@@ -107,6 +125,37 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
   else
     response.message = attach(request, g, response);
   response.success = response.message.empty();
+  return true;
+}
+
+bool SceneNode::onSetFunctions(slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response)
+{
+  const auto& cloths = simulation_->config().cloths;
+  std::string names;
+  int found = -1, tracked = 0;
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+    if (cloths[k].tracking)
+    {
+      names += " " + cloths[k].name;
+      if (cloths[k].name == request.name || (request.name.empty() && tracked == 0))
+        found = static_cast<int>(k);
+      ++tracked;
+    }
+  response.success = false;
+  if (found < 0)
+    response.message = "no tracked cloth \"" + request.name + "\"; the scene has:" + names;
+  else if (request.name.empty() && tracked > 1)
+    response.message = "name is empty; the scene has:" + names;
+  else
+    try
+    {
+      simulation_->setFunctions(found, request.set, request.blend < 0 ? std::nullopt : std::optional<double>(request.blend));
+      response.success = true;
+    }
+    catch (const std::invalid_argument& e)
+    {
+      response.message = e.what();
+    }
   return true;
 }
 

@@ -135,7 +135,8 @@ class Bodies(NodeCase):
         state = self.listen("/t/state", RodState)
         publisher = self.publisher("/t/bodies", BodyStates)
         publisher.publish(bodies("ball", (0, 0, 0), 1.0))   # simulated: nobody moves it
-        self.expect_drop("unknown_name")
+        publisher.publish(bodies("", (0, 0, 0), 1.0))
+        self.expect_drop("unknown_name", 2)
         publisher.publish(bodies("cart", (float("nan"), 0, 0), 1.0))
         self.expect_drop("not_finite")
         message = bodies("cart", (0, 0, 0), 1.0)

@@ -1,6 +1,7 @@
 #include "slender_sim/node/converters.h"
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -44,6 +45,57 @@ TEST(Converters, RefusesBadPosesAndKeepsTheOld)
   bad.orientation.w = 1.005;
   EXPECT_EQ(fromMessage(bad, X), PoseFault::none);
   EXPECT_EQ(X.orientation.w(), 1.0);
+}
+
+/// Two points in a row, as x, y and z of float32.
+sensor_msgs::PointCloud2 twoPoints()
+{
+  sensor_msgs::PointCloud2 cloud;
+  for (std::uint32_t k = 0; k < 3; ++k)
+  {
+    sensor_msgs::PointField field;
+    field.name = std::string(1, "xyz"[k]);
+    field.offset = 4 * k;
+    field.datatype = sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    cloud.fields.push_back(field);
+  }
+  const float points[] = {1, 2, 3, 4, 5, 6};
+  cloud.height = 1;
+  cloud.width = 2;
+  cloud.point_step = 12;
+  cloud.row_step = 24;
+  cloud.data.resize(24);
+  std::memcpy(cloud.data.data(), points, sizeof points);
+  return cloud;
+}
+
+TEST(Converters, PointsWhoseLayoutReachesOutOfTheDataAreRefused)
+{
+  Eigen::Matrix3Xd points;
+  ASSERT_EQ(fromPoints(twoPoints(), points), "");
+  ASSERT_EQ(points, (Eigen::Matrix3Xd(3, 2) << 1, 4, 2, 5, 3, 6).finished());
+
+  const auto refused = [&points](const auto& change) {
+    sensor_msgs::PointCloud2 bad = twoPoints();
+    change(bad);
+    return fromPoints(bad, points);
+  };
+  constexpr std::uint32_t top = 0xFFFFFFFF;   // sums and products with it wrap in 32 bits
+  for (const std::uint32_t offset : {9u, top - 7, top - 3, top})
+    EXPECT_EQ(refused([offset](auto& cloud) { cloud.fields[2].offset = offset; }), "a field reaches beyond point_step") << offset;
+  EXPECT_EQ(refused([](auto& cloud) { cloud.fields[0] = cloud.fields[1]; }), "it must have the fields x, y and z, float32 or float64");
+  const std::string shorter = "data is shorter than width, height and steps say";
+  EXPECT_EQ(refused([](auto& cloud) { cloud.data.pop_back(); }), shorter);
+  EXPECT_EQ(refused([](auto& cloud) { cloud.row_step = 23; }), shorter);
+  EXPECT_EQ(refused([](auto& cloud) { cloud.row_step = top; }), shorter);
+  EXPECT_EQ(refused([](auto& cloud) { cloud.point_step = top; }), shorter);
+  EXPECT_EQ(refused([](auto& cloud) { cloud.point_step = 0x80000000; }), shorter);           // twice that is 2^32
+  EXPECT_EQ(refused([](auto& cloud) { cloud.width = 0x15555556; }), shorter);                // 12 times that is 2^32 + 8
+  EXPECT_EQ(refused([](auto& cloud) { cloud.height = 0x20000000; }), shorter);               // 24 times that is 3 * 2^32
+  EXPECT_EQ(refused([](auto& cloud) { cloud.width = cloud.height = top; }), shorter);
+  EXPECT_EQ(refused([](auto& cloud) { cloud.width = 0; }), "");
+  EXPECT_EQ(points.cols(), 0);
 }
 
 TEST(Converters, RodStateMessage)

@@ -6,9 +6,10 @@ import rospy
 from slender_sim.msg import BodyStates, RodState
 from std_srvs.srv import Trigger
 from slender_sim.srv import SetGrasp, SetGraspRequest
-from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
+from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from node_harness import SCENE, NodeCase, fill, run, wait_until
+from hand_harness import HandCase, dragged
+from node_harness import SCENE, run, wait_until
 
 STEP = 0.005
 BODIES = SCENE + """
@@ -21,46 +22,10 @@ obstacles:
 """
 
 
-def dragged(name, p, q=(0, 0, 0, 1), frame="world", event=InteractiveMarkerFeedback.POSE_UPDATE):
-    message = InteractiveMarkerFeedback()
-    message.header.frame_id = frame
-    message.client_id = "test"
-    message.marker_name = name
-    message.event_type = event
-    fill(message.pose, p, q)
-    return message
+class Hand(HandCase):
 
-
-class Hand(NodeCase):
-
-    def begin(self, scene=SCENE, kind=RodState, **parameters):
-        self.start(scene, interactive=True, **parameters)
-        self.states = self.listen("/t/state", kind)
-        self.shown = self.listen("/t/interactive/update_full", InteractiveMarkerInit)
-        self.hand = self.publisher("/t/interactive/feedback", InteractiveMarkerFeedback)
-
-    def drag(self, *arguments, **keywords):
-        self.hand.publish(dragged(*arguments, **keywords))
-        rospy.sleep(0.2)
-
-    def drag_by(self, name, dx, dy, dz, **keywords):
-        """From where the handle is, without turning it."""
-        self.drag(name, *self.beside(name, dx, dy, dz), **keywords)
-
-    def beside(self, name, dx, dy, dz):
-        wait_until(lambda: self.shown.count() and name in self.handles(), what="the handle " + name)
-        at = self.handles()[name].pose
-        q = at.orientation
-        return (at.position.x + dx, at.position.y + dy, at.position.z + dz), (q.x, q.y, q.z, q.w)
-
-    def after(self, n):
-        """Steps one by one: what the hand does is looked at before each call."""
-        for _ in range(n - 1):
-            self.step(1)
-        return self.states_after(self.states, 1)
-
-    def handles(self):
-        return {marker.name: marker for marker in self.shown.last().markers}
+    def begin(self, scene=SCENE):
+        super().begin(scene, RodState)
 
     def test_only_what_messages_move_has_handles(self):
         self.begin(BODIES)

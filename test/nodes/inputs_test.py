@@ -3,6 +3,7 @@
 import math
 
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, PoseStamped, Twist
 from node_harness import SCENE, NodeCase, fill, pose, run, wait_until
 from slender_sim.msg import BodyStates, RodState
@@ -109,9 +110,11 @@ class Inputs(NodeCase):
     def test_diagnostics_warn_after_a_drop(self):
         self.start(diagnostics_rate=2.0)
         guide = self.publisher(RIGHT, PoseStamped)
+        reports = self.listen("/diagnostics", DiagnosticArray)   # all of them: the warning is in one
+        levels = lambda: [status.level for report in reports.all() for status in report.status if status.name == "/t/rod: inputs"]
         guide.publish(pose(NAN, 0, 1, 1.0))
-        wait_until(lambda: self.diagnostics("inputs")["level"] == 1, what="a warning")
-        wait_until(lambda: self.diagnostics("inputs")["level"] == 0, what="the warning to go")
+        wait_until(lambda: 1 in levels(), what="a warning")
+        wait_until(lambda: levels()[-1] == 0, what="the warning to go")
 
     def transform(self, parent, child, p, q, stamp):
         message = TransformStamped()

@@ -83,8 +83,12 @@ class NodeCase(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.mkdtemp(prefix="slender_sim_test_")
         self.processes = []
+        self.ends = []   # subscribers and publishers
 
     def tearDown(self):
+        # rospy has one subscription per topic and process, which keeps its first type: the next test may want another
+        for end in self.ends:
+            end.unregister()
         for process in self.processes:
             if process.poll() is None:
                 process.terminate()
@@ -126,12 +130,14 @@ class NodeCase(unittest.TestCase):
     def listen(self, topic, kind):
         """Subscribes and waits for the connection."""
         listener = Listener(topic, kind)
+        self.ends.append(listener.subscriber)
         wait_until(listener.connected, what="a publisher of " + topic)
         rospy.sleep(0.2)   # the publisher knows of it a little later
         return listener
 
     def publisher(self, topic, kind):
         publisher = rospy.Publisher(topic, kind, queue_size=1000)
+        self.ends.append(publisher)
         wait_until(lambda: publisher.get_num_connections() > 0, what="a subscriber of " + topic)
         return publisher
 

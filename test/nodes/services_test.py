@@ -1,6 +1,9 @@
 #!/usr/bin/python3
 """Services of rod_node (success and refusal), paces, and how it fails."""
 import math
+import os
+import threading
+import time
 
 import rosgraph
 import rospy
@@ -92,7 +95,9 @@ class Services(NodeCase):
         self.step(3)
         self.assertFalse(self.call("save_state", FilePath, "/nowhere/at/all").success)
         self.assertFalse(self.call("save_state", FilePath, "").success)
-        for path in ("", self.path("missing"), __file__):
+        os.mkfifo(self.path("fifo"))
+        self.assertFalse(self.call("save_state", FilePath, self.path("fifo")).success)
+        for path in ("", self.path("missing"), __file__, self.path("fifo")):   # of a FIFO it would wait for ever
             answer = self.call("load_state", FilePath, path)
             self.assertFalse(answer.success)
             self.assertTrue(answer.message)
@@ -193,6 +198,22 @@ class Services(NodeCase):
                  if value.key == "step"]
         self.assertTrue([s for s in steps if 0 < s < 30000], steps)
 
+    def test_a_long_step_lets_others_in(self):
+        self.start()
+        answers = []
+        stepping = threading.Thread(target=lambda: answers.append(self.call("step", Step, 2 ** 31)))
+        stepping.start()
+        wait_until(lambda: int(self.diagnostics("simulation")["step"]) > 0, what="steps")
+        begin = time.time()
+        self.assertIn("under way", self.call("step", Step, 1).message)
+        self.assertTrue(self.call("save_state", FilePath, self.path("meanwhile")).success)
+        self.assertTrue(self.call("pause", SetBool, True).success)
+        stepping.join(10)
+        self.assertLess(time.time() - begin, 5)
+        self.assertFalse(answers[0].success)
+        self.assertIn("of 2147483648 steps; ~pause was called", answers[0].message)
+        self.assertEqual(self.step(1).step, answers[0].step + 1)
+
     def refused(self, *needles, **parameters):
         """The node exits with 2, explains, and has advertised nothing."""
         if rospy.has_param("/t"):
@@ -225,6 +246,19 @@ class Services(NodeCase):
 
     def test_numbers_as_strings(self):
         self.start(guide_delay="1e-2")   # what rosparam makes of a number without a point
+
+    def test_scene_of_one_line(self):
+        self.start(scene="{name: short, rods: [{name: rope}]}")
+        self.assertEqual(self.step(1).step, 1)
+        self.refused("~scene:1: rods.0.radios", scene="rods: [{radios: 1}]")
+
+    def test_follow_without_a_clock_says_so(self):
+        rospy.set_param("/use_sim_time", True)
+        try:
+            self.start(wait=False, pace="follow")
+            wait_until(lambda: "waits for /clock" in self.output("rod.err"), what="a warning")
+        finally:
+            rospy.delete_param("/use_sim_time")
 
     def test_follows_the_clock(self):
         rospy.set_param("/use_sim_time", True)

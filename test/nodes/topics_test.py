@@ -10,7 +10,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, WrenchStamped
 from node_harness import SCENE, NodeCase, find_program, numbers, run, wait_until
-from slender_sim.msg import RodState
+from slender_sim.msg import BodyStates, GraspStates, RodState
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -21,6 +21,7 @@ TOPICS = {
     "/t/scene": "std_msgs/String",
     "/t/grasps/left/wrench": "geometry_msgs/WrenchStamped",
     "/t/grasps/right/wrench": "geometry_msgs/WrenchStamped",
+    "/t/grasp_states": "slender_sim/GraspStates",
     "/diagnostics": "diagnostic_msgs/DiagnosticArray",
 }
 
@@ -51,6 +52,7 @@ class Topics(NodeCase):
         self.assertNotIn("/t/grasps/left/pose", subscribed)   # fixed
         self.assertNotIn("/t/bodies", subscribed)             # no grasp follows one
         self.assertNotIn("/clock", published)
+        self.assertNotIn("/t/obstacle_states", published)     # the scene has none
         offered = {service for service, nodes in services if "/t/rod" in nodes}
         for name in ("pause", "reset", "step", "set_grasp", "save_state", "load_state"):
             self.assertIn("/t/rod/" + name, offered)
@@ -149,6 +151,17 @@ class Topics(NodeCase):
         sideways, across = self.wrench_sum(turned(SCENE), 0)
         self.assertAlmostEqual(sideways / upright, 1.0, delta=1e-5)
         self.assertLess(across, 1e-4 * weight)
+
+    def test_grasps_and_obstacles(self):
+        self.start(SCENE + "obstacles: [{name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0, 3, 0]}}]\n")
+        grasps, obstacles = self.listen("/t/grasp_states", GraspStates), self.listen("/t/obstacle_states", BodyStates)
+        stamp = self.step(3).stamp
+        for told in (grasps, obstacles):
+            wait_until(lambda: told.count() == 3 and told.last().header.stamp == stamp, what="three messages")
+        last = grasps.last()
+        self.assertEqual((last.name, last.object, list(last.active)), (["left", "right"], ["rope", "rope"], [True, True]))
+        self.assertAlmostEqual(last.pose[1].position.x, 1.0, delta=0.06)   # the middle of the last edge
+        self.assertEqual((obstacles.last().name, obstacles.last().pose[0].position.y), (["ball"], 3.0))
 
     def record(self, name):
         process = self.start(wait=False, pace="fast", stop_after=1.0, record_bag=self.path(name))

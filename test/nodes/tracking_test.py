@@ -11,7 +11,7 @@ import rospy
 from geometry_msgs.msg import Pose
 from sensor_msgs.msg import PointCloud2, PointField
 from slender_sim.msg import BodyStates, ClothState, MeshStamped
-from slender_sim.srv import FilePath
+from slender_sim.srv import FilePath, SetFunctions
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -142,6 +142,36 @@ class Tracking(NodeCase):
         self.assertGreater(int(told["most guide forces at their bounds"]), 2)
         self.assertGreater(float(told["greatest distance where forces are at their bounds [m]"]), 0.05)
 
+    def test_functions_are_switched(self):
+        self.begin("{topic: points}", more="    test_functions: [{name: loose, regions: {all: {guide: [0..8]}}}, {name: tight, basis: subdivision, blend: 0.4}]\n")
+        guide = self.publisher("/t/guide/points", PointCloud2)
+        self.send_wave(guide, 1.0)
+        before = self.after(30)
+        self.assertEqual((list(before.function_sets), len(before.guide_forces), before.blend_distances[0]), (["loose"], 1, 0.0))
+        call = lambda *request: self.call("set_functions", SetFunctions, *request)
+        self.assertIn('"firm"; cloth flap has: loose tight', call("", "firm", 0.1).message)
+        self.assertIn('no tracked cloth "flag"; the scene has: flap', call("flag", "tight", 0.1).message)
+        self.assertIn("0 or more", call("flap", "tight", float("nan")).message)
+        self.assertEqual(self.after(1).function_sets[0], "loose")
+        answer = call("", "tight", 0.2)
+        self.assertTrue(answer.success, answer.message)
+        states = [self.after(1) for _ in range(25)]
+        self.assertEqual({(s.function_sets[0], len(s.guide_forces)) for s in states}, {("tight", 9)})
+        self.assertGreater(states[2].blend_distances[0], 1e-3)
+        self.assertEqual([s.blend_distances[0] > 0 for s in states], [True] * 19 + [False] * 6)
+        self.assertLess(max(s.constraint_errors[0] for s in states), 1e-12)
+        steps = [distance(vertices(b.vertices), vertices(a.vertices)) for a, b in zip([before] + states, states)]
+        self.assertLess(max(steps[2:]), 0.03)
+        self.assertTrue(call("flap", "loose", -1).success)
+        state = self.after(1)
+        self.assertGreater(state.blend_distances[0], 0.0)   # 0.2 s as the scene has it by default
+        values = self.diagnostics("simulation")
+        self.assertEqual(values["test functions of flap"], "loose")
+        self.assertGreater(float(values["blend of flap goes on for [s]"]), 0.15)
+        self.assertEqual(self.after(20).blend_distances[0], 0.0)
+        self.assertTrue(self.call("reset", Trigger).success)
+        self.assertEqual(self.after(1).function_sets[0], "loose")
+
     def test_bodies(self):
         self.begin("{topic: bodies, groups: {left: [0, 3, 6, 1, 4, 7], right: [2, 5, 8, 1, 4, 7]}}")
         guide = self.publisher("/t/guide/bodies", BodyStates)
@@ -177,6 +207,19 @@ class Tracking(NodeCase):
         guide.publish(bodies([("left", ((0, 0, 0), (0, 0, 0, 1)))], 1.02))
         wait_until(lambda: self.diagnostics("inputs")["message"] == "no input yet for guide/bodies right", what="a warning")
         self.assertEqual(self.diagnostics("inputs")["input age guide/bodies right [s]"], "none yet")
+
+    def test_a_guide_that_never_speaks_is_named(self):
+        self.begin("{topic: points}", guide_timeout=0.3)
+        never = "no input yet for guide/points"
+        for message in ("ok", never, never):
+            self.assertEqual(self.diagnostics("inputs")["message"], message)
+            self.after(35)
+        self.assertTrue(self.call("reset", Trigger).success)
+        wait_until(lambda: self.diagnostics("inputs")["message"] == "ok", what="it to count anew after a reset")
+        self.after(35)
+        wait_until(lambda: self.diagnostics("inputs")["message"] == never, what="the warning")
+        self.publisher("/t/guide/points", PointCloud2).publish(cloud(REST, 2.42))
+        wait_until(lambda: self.diagnostics("inputs")["message"] == "ok", what="it to be heard")
 
     def test_a_stamp_far_ahead_does_not_deafen(self):
         self.begin("{topic: points}", guide_ahead=5.0)

@@ -16,8 +16,8 @@ namespace slender {
 class BagRecorder
 {
 public:
-  /// Opens PATH.active, which close() renames to PATH. `topic_namespace` precedes the topics, e.g. "/". Throws
-  /// std::runtime_error when the file cannot be written.
+  /// Opens PATH.active, which close() renames to PATH, in place of an older bag; where PATH is a symbolic link, beside the file that it leads to.
+  /// `topic_namespace` precedes the topics, e.g. "/". Throws std::runtime_error when the file cannot be written, and when PATH is no regular file.
   BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names,
               const std::vector<std::string>& thread_prefixes);
   ~BagRecorder();
@@ -27,14 +27,18 @@ public:
   /// The undeformed cloths, on `mesh`; likewise, in scenes that have any.
   void recordMesh(const slender_sim::MeshStamped& mesh);
   /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies, `nozzle/wrench` per
-  /// thread, `grasp_states` and `obstacle_states` if there are any; the rest can be derived from these.
+  /// thread, `grasp_states` and `obstacle_states` if there are any; the rest can be derived from these. These three throw WriteError.
   void record(const SceneMessages& messages);
-  /// Throws std::runtime_error when the file cannot be completed.
+  /// Throws WriteError when the file cannot be completed.
   void close();
 
   const std::string& path() const { return path_; }
 
 private:
+  template <class Message>
+  void write(const std::string& topic, const ros::Time& stamp, const Message& message);
+  std::string remains() const;
+
   std::string path_, state_topic_, scene_topic_, mesh_topic_, bodies_topic_, grasps_topic_, obstacles_topic_;
   std::vector<std::string> wrench_topics_, nozzle_topics_;
   std::unique_ptr<rosbag::Bag> bag_;

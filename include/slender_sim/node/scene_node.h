@@ -15,6 +15,7 @@
 #include <tf2_ros/transform_broadcaster.h>
 
 #include "slender_sim/FilePath.h"
+#include "slender_sim/SetFunctions.h"
 #include "slender_sim/SetGrasp.h"
 #include "slender_sim/Step.h"
 #include "slender_sim/node/bag_recorder.h"
@@ -49,6 +50,7 @@ public:
 
 private:
   enum class Mode { running, paused, failed };
+  static constexpr double kBurst = 0.02;   // [s] longest run of steps between two looks at the callbacks
 
   // scene_node.cpp
   void checkClock() const;
@@ -68,6 +70,7 @@ private:
   ros::WallDuration untilDue() const;
   void work();
   void tell();                           // markers and diagnostics, when they are due
+  void waitForCallbacks();
   void recordingFailed(const std::string& reason);
   void summary() const;
 
@@ -77,6 +80,7 @@ private:
   bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool onStep(slender_sim::Step::Request& request, slender_sim::Step::Response& response);
   bool onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response);
+  bool onSetFunctions(slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response);
   bool onSave(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
   bool onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
   std::string attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response);
@@ -86,7 +90,7 @@ private:
   diagnostic_msgs::DiagnosticStatus simulationStatus() const;
   diagnostic_msgs::DiagnosticStatus inputStatus();
 
-  ros::CallbackQueue queue_;
+  ros::CallbackQueue queue_, services_queue_;   // of messages, of service calls: a long ~step answers those, and leaves messages for later
   ros::NodeHandle nh_, nh_priv_;
   const NodeKind kind_;
   NodeOptions options_;
@@ -95,6 +99,7 @@ private:
   SimClock clock_;
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;
+  SceneInputs step_inputs_;              // of the last step, refilled
   std::unique_ptr<HandMarkers> hands_;   // only with ~interactive
   std::unique_ptr<BagRecorder> bag_;
   SceneMessages messages_;
@@ -103,19 +108,22 @@ private:
 
   Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
+  bool stepping_ = false;                // in ~step
+  std::string step_ended_;               // by what call; empty while it goes on
   std::atomic<bool> stop_{false};
   std::uint32_t epoch_ = 0;
   std::string failure_, bag_failure_;
   StepReport last_report_;
   RunStatistics total_, recent_;         // since the start, since the last diagnostics
   std::uint64_t reported_drops_ = 0;
+  double inputs_since_ = 0.0;            // [s] of clock_: earlier ones were forgotten
 
   ros::WallTime wall_start_;             // when the tick wall_start_ticks_ was due
   std::uint64_t wall_start_ticks_ = 0;
-  ros::WallTime next_diagnostics_, next_markers_;
+  ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_;
   std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture
 
-  ros::Publisher bodies_pub_;            // only when the scene has bodies, like the next
+  ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_;   // only when the scene has any, like the next
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
   ros::Publisher points_pub_, mesh_pub_;   // cloth only; poses_pub_ is for the others
   ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;

@@ -1,0 +1,47 @@
+"""Drags the handles of ~interactive as rviz does: what the tests of several nodes share."""
+import rospy
+from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
+
+from node_harness import NodeCase, fill, wait_until
+
+
+def dragged(name, p, q=(0, 0, 0, 1), frame="world", event=InteractiveMarkerFeedback.POSE_UPDATE):
+    message = InteractiveMarkerFeedback()
+    message.header.frame_id = frame
+    message.client_id = "test"
+    message.marker_name = name
+    message.event_type = event
+    fill(message.pose, p, q)
+    return message
+
+
+class HandCase(NodeCase):
+
+    def begin(self, scene, kind, **parameters):
+        self.start(scene, interactive=True, **parameters)
+        self.states = self.listen("/t/state", kind)
+        self.shown = self.listen("/t/interactive/update_full", InteractiveMarkerInit)
+        self.hand = self.publisher("/t/interactive/feedback", InteractiveMarkerFeedback)
+
+    def drag(self, *arguments, **keywords):
+        self.hand.publish(dragged(*arguments, **keywords))
+        rospy.sleep(0.2)
+
+    def drag_by(self, name, dx, dy, dz, **keywords):
+        """From where the handle is, without turning it."""
+        self.drag(name, *self.beside(name, dx, dy, dz), **keywords)
+
+    def beside(self, name, dx, dy, dz):
+        wait_until(lambda: self.shown.count() and name in self.handles(), what="the handle " + name)
+        at = self.handles()[name].pose
+        q = at.orientation
+        return (at.position.x + dx, at.position.y + dy, at.position.z + dz), (q.x, q.y, q.z, q.w)
+
+    def after(self, n):
+        """Steps one by one: what the hand does is looked at before each call."""
+        for _ in range(n - 1):
+            self.step(1)
+        return self.states_after(self.states, 1)
+
+    def handles(self):
+        return {marker.name: marker for marker in self.shown.last().markers}
