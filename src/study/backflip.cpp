@@ -31,7 +31,7 @@ const std::vector<Look>& looks()
   static const std::vector<Look> all{
     {"vinyl", {}},
     {"silk", {"tracked.0.damping.stiffness=0", "time.step=0.0025"}},
-    {"ribbed", {"tracked.0.undeformed={ridges: {axis: [0, 0, 1], count: 16, height: 0.02}, lengths: true}", "tracked.0.bending.modulus=3e-4"}},
+    {"ribbed", {"tracked.0.undeformed={ridges: {axis: [0, 0, 1], count: 5, height: 0.02}, lengths: true}", "tracked.0.bending.modulus=3e-4"}},
     {"cellophane", {"tracked.0.undeformed={crinkles: {height: 0.015}, lengths: true}", "tracked.0.bending.modulus=3e-4"}},
     {"wind", {"tracked.0.damping.stiffness=0", "tracked.0.aerodynamics={drag: 1.2, lift: 0.8}", "wind.velocity=[-25, 8, 0]"}},
   };

@@ -62,7 +62,7 @@ void runClothOnBranch(StudyContext& context)
     const Matrix3Xd& x = scene.state().cloths[cloth].cloth.x;
     return cloth == free ? Matrix3Xd(x(Eigen::all, order)) : x;
   };
-  const auto fromPreview = [&](int cloth) { return tracking.constraints->error(tracking.constraints->averages(vertices(preview)), vertices(cloth)); };
+  const auto fromPreview = [&](int cloth) { return tracking.sets[0].constraints->error(tracking.sets[0].constraints->averages(vertices(preview)), vertices(cloth)); };
 
   SurfacePicture& picture = context.picture("cloth_on_branch", "A cloth blown against a branch (thesis figure 6.1): preview, free and tracked in full resolution");
   picture.view = {-0.35, 1.0, -0.3};

@@ -8,6 +8,7 @@
 
 #include "cloth_cases.h"
 #include "stability.h"
+#include "state_bits.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {
@@ -36,7 +37,7 @@ StabilityCell run(ClothSetup& cloth, const ClothOptions& options, double h, int 
     const ClothState before = cloth.state;
     const StepReport report = stepper.step(cloth.state, cloth.inputs, h);
     const bool finite = isFinite(cloth.state) && (!report.ok || (stepper.pinForces().allFinite() && std::isfinite(report.max_strain)));
-    if (!cell.took(report, finite, cloth.state.x == before.x && cloth.state.v == before.v))
+    if (!cell.took(report, finite, sameBits(before, cloth.state)))
       break;
     if (!motion && keeps_energy && !cell.energyIs((stepper.energies(cloth.state, gravity).total() - start.total()) / scale, 1e-2))
       break;
@@ -206,7 +207,7 @@ cloths:
     material: {density: 1000, thickness: %g, youngs_modulus: %g, poissons_ratio: 0.3}
     grasps: {left: {corner: lower_left}, right: {corner: lower_right}}
 )", thickness, youngs_modulus);
-    return MapScene{text};
+    return MapScene{text, {}};
   };
   const std::vector<double> map_steps = context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
   const int map_length = context.quick() ? 5 : 15;

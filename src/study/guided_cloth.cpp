@@ -18,7 +18,7 @@ ClothModel modelOf(const GuidedCloth& c, Follow how, const WeakConstraints& cons
 {
   ClothModel model = c.model;
   if (how == Follow::averages)
-    model.averages = std::make_shared<const WeakConstraints::Matrix>(constraints.matrix());
+    model.averages = {{std::make_shared<const WeakConstraints::Matrix>(constraints.matrix()), {}}};
   return model;
 }
 
@@ -26,6 +26,7 @@ ClothOptions optionsOf(const GuidedCloth& c)
 {
   ClothOptions options;
   options.one_newton_step = c.one_newton_step;
+  options.linear_tolerance = c.linear_tolerance;
   return options;
 }
 

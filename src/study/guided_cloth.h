@@ -33,6 +33,7 @@ struct GuidedCloth
   Eigen::Vector3d gravity{0, 0, 0}, wind{0, 0, 0};
   double step = 0.01;                           ///< [s]
   bool one_newton_step = true;
+  double linear_tolerance = ClothOptions().linear_tolerance;
 
   /// Without grasps: what the fine mesh's averages shall be.
   WeakConstraints constraints() const;

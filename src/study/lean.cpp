@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <regex>
 #include <stdexcept>
@@ -171,17 +172,14 @@ public:
     return std::any_of(feature_.files.begin(), feature_.files.end(), [&](const char* start) { return file.rfind(start, 0) == 0; });
   }
 
-  bool hasLine(const SourceLine& at)
+  bool hasLine(const SourceLine& at) { return hasFile(at.file) || speaksOfIt(at, profiler_.text(at), lines_); }
+
+  /// The same of a line that takes memory. Settings among the fields of a record, in braces, are part of it: the list of what touches has a coefficient
+  /// of friction in each entry, and is there with or without friction.
+  bool takesMemory(const SourceLine& at)
   {
-    if (hasFile(at.file))
-      return true;
-    const std::string& text = profiler_.text(at);
-    if (text.empty() || *feature_.words == '\0')
-      return false;
-    const auto [found, added] = lines_.try_emplace(at.file + ":" + std::to_string(at.line), false);
-    if (added)
-      found->second = std::regex_search(text, words_);
-    return found->second;
+    static const std::regex fields("\\{[^{}]*\\}");
+    return hasFile(at.file) || speaksOfIt(at, std::regex_replace(profiler_.text(at), fields, ""), memory_lines_);
   }
 
   /// Per step: functions of the feature's files with all that libraries do for them, and its lines elsewhere.
@@ -212,7 +210,7 @@ public:
       bool innermost = true;   // lines further out merely call, maybe with a word of the feature among the arguments
       for (const SourceLine& at : a.stack)
       {
-        if (hasFile(at.file) || (innermost && hasLine(at)))
+        if (hasFile(at.file) || (innermost && takesMemory(at)))
         {
           places[at.file + ":" + std::to_string(at.line)] += static_cast<double>(a.bytes);
           break;
@@ -227,6 +225,16 @@ public:
   }
 
 private:
+  bool speaksOfIt(const SourceLine& at, const std::string& text, std::map<std::string, bool>& known) const
+  {
+    if (text.empty() || *feature_.words == '\0')
+      return false;
+    const auto [found, added] = known.try_emplace(at.file + ":" + std::to_string(at.line), false);
+    if (added)
+      found->second = std::regex_search(text, words_);
+    return found->second;
+  }
+
   static std::string most(const std::map<std::string, double>& places)
   {
     const auto least = [](const auto& a, const auto& b) { return a.second < b.second; };
@@ -236,26 +244,34 @@ private:
   const Profiler& profiler_;
   const Feature& feature_;
   const std::regex words_;
-  std::map<std::string, bool> lines_;
+  std::map<std::string, bool> lines_, memory_lines_;
 };
 
-/// Blocks that are taken from the heap in calls of a function, and where the most.
-double blocksIn(const std::vector<Allocation>& allocations, const char* function, std::string* where = nullptr)
+/// Calls per step that take memory from the heap, and the place of the package with the most.
+double heapCalls(const StepProfile& profile, std::string& where)
 {
-  double blocks = 0, most = 0;
-  for (const Allocation& a : allocations)
+  const auto isOneOf = [](const std::string& name, std::initializer_list<const char*> names) {
+    return std::any_of(names.begin(), names.end(), [&](const char* n) { return name == n; });
+  };
+  const auto isHeap = [&](const std::string& f) { return isOneOf(f, {"malloc", "calloc", "realloc", "memalign", "posix_memalign", "aligned_alloc"}); };
+  double calls = 0;
+  std::map<std::string, double> places;
+  for (const InstructionCost& cost : profile.costs)
   {
-    if (std::none_of(a.functions.begin(), a.functions.end(), [&](const std::string& f) { return f.find(function) != std::string::npos; }))
-      continue;
-    const auto innermost = std::find_if(a.stack.begin(), a.stack.end(), [](const SourceLine& at) { return isOfPackage(at.file); });
-    blocks += static_cast<double>(a.blocks);
-    if (static_cast<double>(a.blocks) > most && where && innermost != a.stack.end())
-    {
-      most = static_cast<double>(a.blocks);
-      *where = innermost->file + ":" + std::to_string(innermost->line);
-    }
+    const double each = static_cast<double>(cost.calls) / profile.steps;
+    if (isHeap(cost.callee) && !isHeap(cost.function))
+      calls += each;
+    if (isOfPackage(cost.at.file) && (isHeap(cost.callee) || cost.callee.rfind("operator new", 0) == 0))
+      places[cost.at.file + ":" + std::to_string(cost.at.line)] += each;
   }
-  return blocks;
+  double most = 0;
+  for (const auto& [place, count] : places)
+    if (count > most)
+    {
+      most = count;
+      where = place;
+    }
+  return calls;
 }
 
 /// One run of each scene, whatever it is needed for.
@@ -275,13 +291,15 @@ public:
     return found->second;
   }
 
-  const std::vector<Allocation>& allocations(const Scene& scene, int steps = 4)
+  bool has(const Scene& scene) const { return profiles_.count(key(scene)) > 0; }
+
+  const std::vector<Allocation>& allocations(const Scene& scene)
   {
-    auto [found, added] = allocations_.try_emplace(key(scene) + "\n" + std::to_string(steps));
+    auto [found, added] = allocations_.try_emplace(key(scene));
     if (added)
     {
       context_.progress(done_++, total_, std::string("memory of ") + scene.name);
-      found->second = profiler_.allocations(scene.text, scene.step, scene.options, steps);
+      found->second = profiler_.allocations(scene.text, scene.step, scene.options, 4);
     }
     return found->second;
   }
@@ -311,7 +329,7 @@ void runLean(StudyContext& context)
 {
   const std::filesystem::path program = thisProgram();
   const Profiler profiler((program.parent_path() / "simulate").string(), SLENDER_SOURCE_DIR);
-  Runs runs(context, profiler, 43);
+  Runs runs(context, profiler, context.quick() ? 16 : 34);
   Plot& plot = context.plot("lean", "Features per step: where the scene does not name them, and where it does", "feature, in the order of the table",
                             "instructions over those of the step");
   plot.log_x = false;
@@ -339,10 +357,10 @@ void runLean(StudyContext& context)
       plot.at("absent").x.push_back(number);
       plot.at("absent").y.push_back(std::max(overhead, 1e-7));   // zero has no place on a logarithmic axis
     }
-    if (context.quick() && feature.used.size() > 1 && number > 3)
-      continue;
     for (const Scene& scene : feature.used)
     {
+      if (context.quick() && !runs.has(scene))
+        continue;
       const StepProfile& profile = runs.profile(scene);
       Share share;
       attribution.count(profile, share);
@@ -355,27 +373,22 @@ void runLean(StudyContext& context)
       plot.at("used").y.push_back(std::max(share.instructions / perStep(profile), 1e-7));
     }
   }
-  // Of warm steps: what eight more of them take.
-  double most = 0, most_inputs = 0;
+  double most = 0;
   for (const Scene& scene : {kRod, kExplicitRod, kThread, kCloth, kTracked})
   {
-    const std::vector<Allocation>&few = runs.allocations(scene), &more = runs.allocations(scene, 12);
+    const StepProfile& profile = runs.profile(scene);
     std::string where;
-    const double in_step = (blocksIn(more, "slender::Simulation::step(", &where) - blocksIn(few, "slender::Simulation::step(")) / 8;
-    const double in_inputs = (blocksIn(more, "slender::Simulation::defaultInputs") - blocksIn(few, "slender::Simulation::defaultInputs")) / 8;
-    most = std::max(most, in_step);
-    most_inputs = std::max(most_inputs, in_inputs);
+    const double calls = heapCalls(profile, where);
+    most = std::max(most, calls);
     context.row().set("feature", "allocations per warm step").set("in_scene", "all").set("solver", scene.solver).set("scene", scene.name)
-        .set("instructions_per_step", perStep(runs.profile(scene))).set("allocations_per_step", in_step).set("allocations_of_inputs", in_inputs)
-        .set("where", in_step > 0 ? where : "");
+        .set("instructions_per_step", perStep(profile)).set("allocations_per_step", calls).set("where", where);
   }
   context.metric("max_instruction_overhead_absent", worst_instructions);
   context.metric("max_bytes_absent", worst_bytes);
   context.metric("allocations_per_step", most);
-  context.metric("allocations_per_step_of_inputs", most_inputs);
   context.note("of_feature: instructions of the functions in the feature's files, with what libraries do for them, and of lines elsewhere that speak of it; bytes: what the "
                "simulation takes from the heap there (a run of 4 steps, the reader apart); where: the place with the most. Instruction set: baseline, which valgrind knows. "
-               "allocations_of_inputs: of a program's call of Simulation::defaultInputs, before the step. used: by the same count; a part that is mostly other code (frames, "
+               "allocations_per_step: calls of the heap in warm steps, from the end of one to the end of the next, the scene's inputs included. used: by the same count; a part that is mostly other code (frames, "
                "contact) shows in instructions_per_step. Markers and diagnostics of the nodes are not counted here.");
 }
 

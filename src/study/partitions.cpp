@@ -6,6 +6,7 @@
 #include "region_cases.h"
 #include "sheet_cases.h"
 #include "slender_sim/tracking/clustering.h"
+#include "slender_sim/tracking/function_blend.h"
 #include "guided_cloth.h"
 
 namespace slender::study {
@@ -49,6 +50,14 @@ std::vector<int> patches(int cells, int left, int right)
   return region;
 }
 
+/// Off the plane, or it could not leave it.
+void disturb(Matrix3Xd& x)
+{
+  std::mt19937 random(3);
+  for (Eigen::Index i = 0; i < x.cols(); ++i)
+    x(2, i) += 1e-4 * (random() * 0x1p-32 - 0.5);
+}
+
 struct Folded
 {
   Matrix3Xd x;
@@ -58,10 +67,8 @@ struct Folded
 Folded fold(const GuidedCloth& c)
 {
   GuidedStepper run(c, Follow::averages);
-  std::mt19937 random(3);
   Matrix3Xd& x = run.cloth().state.x;
-  for (Eigen::Index i = 0; i < x.cols(); ++i)   // off the plane, or it could not leave it
-    x(2, i) += 1e-4 * (random() * 0x1p-32 - 0.5);
+  disturb(x);
   Folded folded;
   const int steps = static_cast<int>(std::lround(kDuration / c.step));
   for (int k = 0; k < steps; ++k)
@@ -95,6 +102,82 @@ double wavelength(const TriangleMesh& mesh, const Matrix3Xd& x, int cells, int f
   return wrinkles(part, {shape}).mean();
 }
 
+/// Few regions, and from a certain time on many: in one step and blended.
+void changeRegions(StudyContext& context, int cells, const TriangleMesh& sheet)
+{
+  constexpr double kFrom = 1.5, kEnd = 3.0;
+  constexpr int kFew = 16, kMany = 256;
+  SurfacePicture& picture = context.picture("partitions_changed", "16 regions, and 256 that take over while the sheet moves");
+  picture.view = {0.25, 0.8, -0.9};
+  picture.columns = 4;
+  Plot& away = context.plot("partitions_changed_distance", "256 regions take over from 16 at 1.5 s", "time [s]", "greatest distance of an average of the 256 from the guide's [m]");
+  Plot& speed = context.plot("partitions_changed_speed", "256 regions take over from 16 at 1.5 s", "time [s]", "greatest speed of a vertex [m/s]");
+  for (Plot* plot : {&away, &speed})
+  {
+    plot->log_x = plot->log_y = false;
+    plot->markers = false;
+  }
+  std::vector<Clustering> clusters;
+  for (const int count : {kFew, kMany})
+  {
+    ClusteringOptions options;
+    options.regions = count;
+    options.compactness = 1.0;
+    clusters.push_back(clusterFaces(sheet.triangles, {sheet.vertices}, options));
+  }
+  const WeakConstraints many = contracting(cells, clusters[1].region).constraints();
+  double greatest[2] = {0, 0}, error = 0;
+  for (const double duration : {0.4, 0.0})
+  {
+    GuidedCloth c = contracting(cells, clusters[0].region);
+    const WeakConstraints few = c.constraints();
+    for (const WeakConstraints* constraints : {&few, &many})
+      c.model.averages.push_back({std::make_shared<const WeakConstraints::Matrix>(constraints->matrix()), {}});
+    ClothSetup cloth(c.model);
+    ClothOptions options;
+    options.one_newton_step = true;
+    ClothStepper stepper(cloth.model, options);
+    Matrix3Xd& x = cloth.state.x;
+    disturb(x);
+    const std::string label = duration > 0 ? "blended within 0.4 s" : "in one step";
+    FunctionBlend blend;
+    const int change = static_cast<int>(std::lround(kFrom / c.step)), steps = static_cast<int>(std::lround(kEnd / c.step));
+    for (int k = 0; k < steps; ++k)
+    {
+      const double t = k * c.step;
+      if (k == change)
+      {
+        if (duration > 0)
+          picture.panels.push_back({"16 regions", {{{x, sheet.triangles}}}});
+        blend = FunctionBlend::between(many, c.at(t), c.velocity(t), x, cloth.state.v, t, duration);
+        cloth.state.average_set = 1;
+      }
+      const Matrix3Xd guide = c.at(t + c.step);
+      cloth.inputs.averages = (k < change ? few : many).averages(guide);
+      blend.apply(t + c.step, cloth.inputs.averages);
+      const StepReport report = stepper.step(cloth.state, cloth.inputs, c.step);
+      if (!report.ok)
+        throw std::runtime_error(report.message);
+      const double fastest = cloth.state.v.colwise().norm().maxCoeff(), distance = many.error(many.averages(guide), x);
+      if (k >= change)
+        greatest[duration > 0] = std::max(greatest[duration > 0], fastest);
+      if (t + c.step > kFrom + duration + 0.5 * c.step)
+        error = std::max(error, distance);
+      if (t > kFrom - 0.3)
+        for (Plot* plot : {&away, &speed})
+        {
+          plot->at(label).x.push_back(t + c.step);
+          plot->at(label).y.push_back(plot == &away ? distance : fastest);
+        }
+      if (duration > 0 && k == change + 20)
+        picture.panels.push_back({"half of the blend", {{{x, sheet.triangles}}}});
+    }
+    picture.panels.push_back({duration > 0 ? "256 regions, blended" : "256 regions, in one step", {{{x, sheet.triangles}}}});
+  }
+  context.metric("change_speed_over_blended", greatest[0] / greatest[1]);
+  context.metric("error_after_change_m", error);
+}
+
 }  // namespace
 
 void runPartitions(StudyContext& context)
@@ -116,7 +199,7 @@ void runPartitions(StudyContext& context)
   int disorder = 0;
   for (const int count : {16, 64, 256, 1024})
   {
-    context.progress(disorder, 6, std::to_string(count) + " regions");
+    context.progress(static_cast<int>(scales.panels.size()), 7, std::to_string(count) + " regions");
     ClusteringOptions options;
     options.regions = count;
     options.compactness = 1.0;
@@ -146,7 +229,7 @@ void runPartitions(StudyContext& context)
   below.clear();
   for (const bool even : {true, false})
   {
-    context.progress(even ? 4 : 5, 6, even ? "homogeneous" : "heterogeneous");
+    context.progress(even ? 4 : 5, 7, even ? "homogeneous" : "heterogeneous");
     const int left = even ? 3 * scale : 6 * scale, right = even ? 3 * scale : 3 * scale / 2;
     const std::vector<int> region = patches(cells, left, right);
     const Folded folded = fold(contracting(cells, region));
@@ -165,8 +248,11 @@ void runPartitions(StudyContext& context)
     below.push_back({"", {{{folded.x, sheet.triangles}}}});
   }
   spread.panels.insert(spread.panels.end(), below.begin(), below.end());
+  context.progress(6, 7, "regions that change");
+  changeRegions(context, cells, sheet);
   context.note("the guide contracts by 12 % in both directions of its plane; wavelength: geometric mean over the spectrum of mean curvature; "
-               "out_of_order: how often more regions did not mean finer folds and closer tracking");
+               "out_of_order: how often more regions did not mean finer folds and closer tracking; "
+               "change_speed_over_blended: greatest speed of a vertex after 256 regions take over from 16 in one step, over that with a blend of 0.4 s");
 }
 
 }  // namespace slender::study

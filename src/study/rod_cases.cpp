@@ -1,7 +1,6 @@
 #include "rod_cases.h"
 
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 
 namespace slender::study {
@@ -66,14 +65,6 @@ bool isFinite(const RodState& state)
   for (const GraspState& g : state.grasps)
     finite = finite && g.X_WG.position.allFinite() && g.X_WG.orientation.coeffs().allFinite();
   return finite;
-}
-
-bool sameBits(const RodState& a, const RodState& b)
-{
-  const auto same = [](const auto& p, const auto& q) {
-    return p.size() == q.size() && std::memcmp(p.data(), q.data(), sizeof(double) * static_cast<std::size_t>(p.size())) == 0;
-  };
-  return same(a.x, b.x) && same(a.v, b.v) && same(a.d1, b.d1) && same(a.twist, b.twist);
 }
 
 void require(const StepReport& report, const std::string& what)

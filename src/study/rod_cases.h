@@ -49,7 +49,6 @@ RodSetup shapedRod(const RodCase& rod_case, const Eigen::Matrix3Xd& nodes, doubl
 /// Largest |velocity| of a node [m/s].
 double fastestNode(const RodState& state);
 bool isFinite(const RodState& state);
-bool sameBits(const RodState& a, const RodState& b);
 
 /// Throws std::runtime_error with `what` and the report's message unless report.ok.
 void require(const StepReport& report, const std::string& what);

@@ -7,6 +7,7 @@
 
 #include "rod_cases.h"
 #include "stability.h"
+#include "state_bits.h"
 #include "slender_sim/study/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
@@ -16,22 +17,20 @@ namespace {
 struct Run
 {
   StabilityCell cell;
-  Eigen::Matrix3Xd end;
-  double moved = 0;   ///< the farthest that a node has been from its start [m]
+  Path path;
 };
 
 using Motion = std::function<void(int step, RodSetup& rod)>;
 
 /// Runs up to `steps` steps; `motion` sets the inputs of each. Energy may not grow once the inputs stand still
-/// (from step `quiet` on): beyond a thousandth for implicit Euler, tenfold for methods that keep it only on average.
+/// (from step `quiet` on).
 /// `turned` [rad], if not zero: how far a straight rod must be twisted at the end, told by its energy beta turned^2/(2 L).
 Run run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motion, int quiet, double turned = 0.0)
 {
-  Run r;
+  Run r{{}, Path(rod.state.x)};
   StabilityCell& cell = r.cell;
   cell.linear_steps = time.integrator == Integrator::symplectic_euler;
   RodStepper stepper(rod.model, time);
-  const Eigen::Matrix3Xd start = rod.state.x;
   double before = 0, scale = 0;
   const double begin = threadSeconds();
   for (int i = 0; i < steps; ++i)
@@ -48,14 +47,13 @@ Run run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motion, i
     const StepReport report = stepper.step(rod.state, rod.inputs, time.step);
     if (!cell.took(report, isFinite(rod.state), sameBits(saved, rod.state)))
       break;
-    r.moved = std::max(r.moved, (rod.state.x - start).colwise().norm().maxCoeff());
+    r.path.x.push_back(rod.state.x);
     if (i < quiet)
       continue;
     const double growth = (stepper.energies(rod.state, rod.inputs.gravity).total() - before) / scale;
-    if (!cell.energyIs(growth, time.integrator == Integrator::implicit_euler ? 1e-3 : 10.0))
+    if (!cell.energyIs(growth, energyGrowth(time.integrator)))
       break;
   }
-  r.end = rod.state.x;
   cell.cpu_seconds = threadSeconds() - begin;
   if (turned > 0 && !cell.refused && cell.complaint.empty())
   {
@@ -158,7 +156,7 @@ void runRodStability(StudyContext& context)
           {
             const Run fine = run(rod, timeConfig(integrator, step / 4), 120, still, 0);
             if (fine.cell.complaint.empty() && !fine.cell.refused)
-              r.cell.compare(r.end, fine.end, fine.moved, 1.0);
+              r.cell.compare(r.path, fine.path);
           }
           tally.record(row, r.cell);
           Series& s = plot.at(toString(r.cell.outcome()));

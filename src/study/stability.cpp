@@ -7,6 +7,7 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/study/cpu_clock.h"
+#include "state_bits.h"
 
 namespace slender::study {
 
@@ -64,11 +65,27 @@ bool StabilityCell::energyIs(double growth, double allowed)
   return complaint.empty();
 }
 
-void StabilityCell::compare(const Matrix3Xd& end, const Matrix3Xd& fine_end, double fine_moved, double size)
+Path::Path(const Matrix3Xd& start) : x{start}, size((start.rowwise().maxCoeff() - start.rowwise().minCoeff()).norm()) {}
+
+double Path::moved() const
 {
-  fine_distance = (end - fine_end).colwise().norm().maxCoeff() / (fine_moved + 1e-2 * size);
-  if (!(fine_distance <= 1))
-    complaint = "ends farther from a run with a quarter of the step than that has moved";
+  double farthest = 0;
+  for (const Matrix3Xd& now : x)
+    if (now.cols() == x[0].cols())
+      farthest = std::max(farthest, (now - x[0]).colwise().norm().maxCoeff());
+  return farthest;
+}
+
+void StabilityCell::compare(const Path& path, const Path& fine)
+{
+  constexpr double kFar = 0.5;   // 1 where nothing moves that should
+  const std::size_t often = (fine.x.size() - 1) / (path.x.size() - 1);
+  const double allowed = fine.moved() + 1e-2 * fine.size;
+  for (std::size_t k = 1; k < path.x.size(); ++k)
+    if (path.x[k].cols() == fine.x[often * k].cols())
+      fine_distance = std::max(fine_distance, (path.x[k] - fine.x[often * k]).colwise().norm().maxCoeff() / allowed);
+  if (!(fine_distance <= kFar))
+    complaint = "goes another way than a run with a quarter of the step";
 }
 
 void StabilityCell::refuseAtOnce(const std::string& why)
@@ -89,12 +106,13 @@ Outcome StabilityCell::outcome() const
 
 StabilityTally::StabilityTally(StudyContext& context) : context_(context)
 {
-  for (const char* metric : {"nan_count", "unexplained_failures", "silently_wrong", "done", "cut", "refused"})
+  for (const char* metric : {"nan_count", "unexplained_failures", "silently_wrong", "not_compared", "done", "cut", "refused"})
     context.metric(metric, 0);
   context.note("done: every step at once; cut: some in shorter steps; refused: the step said why and left the state alone. UNSOUND: a state that "
                "is not finite, a refusal without a reason or with a changed state (unexplained_failures); energy out of nothing, a step called done with forces unbalanced "
-               "by a tenth of the largest, or (silently_wrong; fine_distance > 1, maps) an end that is further from that of a run with a quarter of the step than that run has ever moved, "
-               "with a hundredth of the size allowed besides.");
+               "by a tenth of the largest, or (silently_wrong; fine_distance > 0.5, maps) another way than that of a run with a quarter of the step: farther from it after a step than half as "
+               "far as that run ever moves, with a hundredth of the size allowed besides. not_compared: cells done or cut without that comparison (those beside the maps, and where the "
+               "finer run is refused).");
 }
 
 void StabilityTally::record(Row& row, const StabilityCell& cell)
@@ -103,6 +121,7 @@ void StabilityTally::record(Row& row, const StabilityCell& cell)
   ++count_[static_cast<int>(outcome)];
   not_finite_ += cell.finite ? 0 : 1;
   unexplained_ += cell.explained ? 0 : 1;
+  not_compared_ += (outcome == Outcome::done || outcome == Outcome::cut) && cell.fine_distance < 0 ? 1 : 0;
   row.set("outcome", toString(outcome)).set("steps", cell.steps).set("cuts", cell.cuts).set("residual", cell.residual).set("energy_growth", cell.energy_growth)
       .set("max_strain", cell.max_strain);
   if (cell.fine_distance >= 0)
@@ -114,6 +133,7 @@ void StabilityTally::record(Row& row, const StabilityCell& cell)
   context_.metric("nan_count", not_finite_);
   context_.metric("unexplained_failures", unexplained_);
   context_.metric("silently_wrong", count_[static_cast<int>(Outcome::unsound)] - unexplained_);
+  context_.metric("not_compared", not_compared_);
   context_.metric("done", count_[static_cast<int>(Outcome::done)]);
   context_.metric("cut", count_[static_cast<int>(Outcome::cut)]);
   context_.metric("refused", count_[static_cast<int>(Outcome::refused)]);
@@ -121,30 +141,29 @@ void StabilityTally::record(Row& row, const StabilityCell& cell)
 
 namespace {
 
-/// Nodes or vertices of the scene's object, and their velocities.
-void gather(const SceneState& state, Matrix3Xd& x, Matrix3Xd& v)
+/// Nodes or vertices of the scene's object; whether they and their velocities are finite.
+Matrix3Xd positions(const SceneState& state)
 {
   if (!state.rods.empty())
-  {
-    x = state.rods[0].x;
-    v = state.rods[0].v;
-  }
-  else if (!state.cloths.empty())
-  {
-    x = state.cloths[0].cloth.x;
-    v = state.cloths[0].cloth.v;
-  }
-  else
-  {
-    const ThreadState& t = state.threads[0].threads[0];
-    x.resize(3, t.nodes());
-    v.resize(3, t.nodes());
-    for (int i = 0; i < t.nodes(); ++i)
-    {
-      x.col(i) = t.x[i];
-      v.col(i) = t.v[i];
-    }
-  }
+    return state.rods[0].x;
+  if (!state.cloths.empty())
+    return state.cloths[0].cloth.x;
+  const ThreadState& t = state.threads[0].threads[0];
+  return Eigen::Map<const Matrix3Xd>(t.x[0].data(), 3, t.nodes());
+}
+
+bool isFinite(const SceneState& state)
+{
+  bool finite = positions(state).allFinite();
+  for (const RodState& rod : state.rods)
+    finite = finite && rod.v.allFinite();
+  for (const SceneCloth& cloth : state.cloths)
+    finite = finite && cloth.cloth.v.allFinite();
+  for (const ThreadGroupState& group : state.threads)
+    for (const ThreadState& thread : group.threads)
+      for (const Vector3d& v : thread.v)
+        finite = finite && v.allFinite();
+  return finite;
 }
 
 struct Energy
@@ -177,8 +196,7 @@ Energy energyOf(const Simulation& simulation)
 struct Run
 {
   StabilityCell cell;
-  Matrix3Xd end;
-  double moved = 0, size = 0;   ///< the farthest that a node has been from its start; of the object [m]
+  std::optional<Path> path;   ///< none of what cannot be set up
 };
 
 Run run(const MapScene& scene, double step, int steps)
@@ -197,35 +215,41 @@ Run run(const MapScene& scene, double step, int steps)
   simulation->setThreads(1);
   const auto& cloths = simulation->config().cloths;
   r.cell.linear_steps = !cloths.empty() && cloths[0].one_newton_step;
-  Matrix3Xd start, x, v, x_before, v_before;
-  gather(simulation->state(), start, v);
-  r.size = (start.rowwise().maxCoeff() - start.rowwise().minCoeff()).norm();
-  const Energy at_start = energyOf(*simulation);
-  const Matrix3Xd guide = simulation->state().cloths.empty() ? Matrix3Xd() : simulation->state().cloths[0].guide;
-  // What there is to give: the fall through its own size, its motion and deformation, and what the guide puts in.
-  const double g = simulation->config().gravity.norm(), rise = scene.lift * step * steps;
-  const double scale = at_start.mass * g * (r.size + rise) + at_start.mass * scene.lift * scene.lift + 1e-12;
+  r.path.emplace(positions(simulation->state()));
+  const Energy start = energyOf(*simulation);
+  const TrackingConfig* tracking = scene.guide ? cloths[0].tracking.get() : nullptr;
+  Matrix3Xd guide, averages;
+  if (tracking)
+  {
+    guide = tracking->guide.mesh.vertices;
+    averages = simulation->functions(0).constraints->averages(guide);
+  }
+  // What there is to give: the fall through its own size, and what the guide puts in.
+  double work = 0, scale = start.mass * simulation->config().gravity.norm() * r.path->size + 1e-12;
   const double begin = threadSeconds();
-  x = start;
   for (int k = 0; k < steps; ++k)
   {
-    x_before = x;
-    v_before = v;
+    const SceneState before = simulation->state();
     SceneInputs inputs = simulation->defaultInputs();
-    if (scene.lift != 0)
-      inputs.guides.at(0) = guide.colwise() + Vector3d(0, 0, scene.lift * step * (k + 1));
+    if (tracking)
+      inputs.guides.at(0) = scene.guide(guide, step * (k + 1));
     const StepReport report = simulation->step(inputs);
-    gather(simulation->state(), x, v);
-    const bool same = x.cols() == x_before.cols() && x == x_before && v == v_before;
+    const SceneState& state = simulation->state();
     const Energy now = energyOf(*simulation);
-    if (!r.cell.took(report, x.allFinite() && v.allFinite() && std::isfinite(now.now), same))
+    if (!r.cell.took(report, isFinite(state) && std::isfinite(now.now), sameBits(before, state)))
       break;
-    if (x.cols() == start.cols())
-      r.moved = std::max(r.moved, (x - start).colwise().norm().maxCoeff());
-    if (!r.cell.energyIs((now.now - at_start.now) / scale, scene.lift != 0 ? 1.0 : 1e-2))
+    r.path->x.push_back(positions(state));
+    if (tracking)
+    {
+      const Matrix3Xd reached = simulation->functions(0).constraints->averages(state.cloths[0].guide);
+      const double given = (reached - averages).cwiseProduct(state.cloths[0].guide_forces).sum();
+      averages = reached;
+      work += given;
+      scale += std::abs(given);
+    }
+    if (!r.cell.energyIs((now.now - start.now - work) / scale, r.cell.linear_steps ? 1e-2 : energyGrowth(Integrator::implicit_euler)))
       break;
   }
-  r.end = x;
   r.cell.cpu_seconds = threadSeconds() - begin;
   return r;
 }
@@ -239,8 +263,8 @@ StabilityCell runScene(const MapScene& scene, double step, int steps)
     return coarse.cell;
   const Run fine = run(scene, step / 4, 4 * steps);
   const Outcome there = fine.cell.outcome();
-  if ((there == Outcome::done || there == Outcome::cut) && fine.end.cols() == coarse.end.cols())
-    coarse.cell.compare(coarse.end, fine.end, fine.moved, fine.size);
+  if (there == Outcome::done || there == Outcome::cut)
+    coarse.cell.compare(*coarse.path, *fine.path);
   return coarse.cell;
 }
 

@@ -10,12 +10,12 @@
 
 /// One definition of stable for all solvers. A run is sound when after every step
 ///  - the state is finite,
-///  - the energy has not grown beyond its bound,
+///  - the energy has not grown beyond its bound (kGrowth; threads and what is still being moved apart),
 ///  - a step reported as done has met its equations: the residual is below its bound (not asked of explicit steps and of cloth's single
 ///    Newton step, which solve linear equations),
 ///  - a refusal says why, and the state is as before the step, bit for bit.
-/// A cell that is done must also not be silently wrong: a run of the same time with a quarter of the step ends nearer to it than that run
-/// has ever moved (a hundredth of the object's size allowed besides).
+/// A cell that is done must also not be silently wrong: after each of its steps a run with a quarter of the step is nearer to it than half as
+/// far as that run ever moves (a hundredth of the object's size allowed besides). One that stands still where it should move fails that.
 namespace slender::study {
 
 enum class Outcome
@@ -32,6 +32,26 @@ const char* toString(Outcome outcome);
 /// up to a few per cent of the largest force where viscosity or stiffness over the step's length is great and all else at rest.
 constexpr double kResidualMet = 0.1;
 
+/// Energy that may appear, over what there is to give. Implicit Euler loses some in every step, but for what Newton's tolerance leaves; other methods
+/// that damp stiff motions (bdf2, tr_bdf2) keep it within their error; those that damp little or nothing only on average.
+inline double energyGrowth(Integrator integrator)
+{
+  return integrator == Integrator::implicit_euler                                           ? 1e-3
+         : integrator == Integrator::bdf2 || integrator == Integrator::tr_bdf2 ? 1e-2
+                                                                                            : 10.0;
+}
+
+/// Where an object has been after each step.
+struct Path
+{
+  std::vector<Eigen::Matrix3Xd> x;   ///< nodes, the start first [m]
+  double size = 0;                   ///< of the object [m]
+
+  explicit Path(const Eigen::Matrix3Xd& start);
+  /// The farthest that a node has been from its start.
+  double moved() const;
+};
+
 /// What became of one cell of a map.
 struct StabilityCell
 {
@@ -39,7 +59,7 @@ struct StabilityCell
   int steps = 0, cuts = 0, substeps = 0, iterations = 0;
   double residual = 0, energy_growth = 0, cpu_seconds = 0;
   double max_strain = 0, end_strain = 0;
-  double fine_distance = -1;   ///< to the run with a quarter of the step, over what is allowed; negative: not compared
+  double fine_distance = -1;   ///< largest from the run with a quarter of the step, over how far that moves; negative: not compared
   bool finite = true, refused = false;
   std::string reason;      ///< of the refusal
   std::string complaint;   ///< why the cell is unsound
@@ -49,9 +69,8 @@ struct StabilityCell
   bool took(const StepReport& report, bool state_finite, bool unchanged);
   /// `growth`: energy beyond that at the start, over what there was to give. True: the run goes on.
   bool energyIs(double growth, double allowed);
-  /// Compares with the run of a quarter of the step, which is sound: nodes at the end [m], the farthest that one of its nodes has been from its
-  /// start, and the size of the object [m].
-  void compare(const Eigen::Matrix3Xd& end, const Eigen::Matrix3Xd& fine_end, double fine_moved, double size);
+  /// Compares with the run of a quarter of the step, which is sound; steps after which the number of nodes differs apart.
+  void compare(const Path& path, const Path& fine);
   /// What could not even be set up.
   void refuseAtOnce(const std::string& why);
   Outcome outcome() const;
@@ -63,19 +82,20 @@ class StabilityTally
 public:
   explicit StabilityTally(StudyContext& context);
   /// Sets outcome, steps, cuts, residual, energy_growth, fine_distance, cpu_seconds, reason of the row; nan_count, unexplained_failures,
-  /// silently_wrong, done, cut, refused.
+  /// silently_wrong, not_compared, done, cut, refused.
   void record(Row& row, const StabilityCell& cell);
 
 private:
   StudyContext& context_;
-  int count_[4] = {0, 0, 0, 0}, not_finite_ = 0, unexplained_ = 0;
+  int count_[4] = {0, 0, 0, 0}, not_finite_ = 0, unexplained_ = 0, not_compared_ = 0;
 };
 
 /// A scene for a map: one object, implicit Euler.
 struct MapScene
 {
   std::string yaml;
-  double lift = 0.0;   ///< of a tracked cloth's guide: velocity upwards [m/s]
+  /// Of a tracked cloth: where the guide's vertices are at a time [s], from where they rest.
+  std::function<Eigen::Matrix3Xd(const Eigen::Matrix3Xd& rest, double time)> guide;
 };
 
 /// Runs a scene of `step` [s] and judges it, the run with a quarter of the step included.

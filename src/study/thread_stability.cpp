@@ -9,6 +9,7 @@
 #include "slender_sim/study/cpu_clock.h"
 #include "slender_sim/thread/thread_group.h"
 #include "stability.h"
+#include "state_bits.h"
 #include "thread_cases.h"
 
 namespace slender::study {
@@ -58,11 +59,10 @@ Verdict run(const ThreadSetup& setup, double h, int steps, const Motion& motion)
   for (int k = 0; k < steps; ++k)
   {
     motion((k + 1) * h, inputs);
-    const std::size_t before = nodesOf(state);
-    const Eigen::Vector3d tip = state.threads[0].x.front();
+    const ThreadGroupState before = state;
     const StepReport report = group.step(state, inputs, h);
     v.folds += report.mended_folds;
-    if (!v.cell.took(report, isFinite(state), before == nodesOf(state) && tip == state.threads[0].x.front()))
+    if (!v.cell.took(report, isFinite(state), sameBits(before, state)))
       break;
     fed += inputs.flow_rate * h;
     v.most_nodes = std::max(v.most_nodes, nodesOf(state));
@@ -150,7 +150,7 @@ threads:
     radius: %g
     ends: {oldest: held, newest: held}
 )", gravity, viscosity, radius);
-    return MapScene{text};
+    return MapScene{text, {}};
   };
   const std::vector<double> map_steps = context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 1e-1};
   stabilityMap(context, tally, "thread_stability_viscosity", "viscosity [Pa s]",

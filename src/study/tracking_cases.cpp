@@ -45,7 +45,7 @@ void finish(TrackedCase& c, const TestFunctions& functions, double area_density,
   c.model->bending = BendingModel::hinge;
   c.model->bending_modulus = bending;
   c.model->stiffness_damping = damping;
-  c.model->averages = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(c.constraints->matrix());
+  c.model->averages = {{std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(c.constraints->matrix()), {}}};
 }
 
 /// A flying cloth, led by four painted regions, the quarters of the sheet.

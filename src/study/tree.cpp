@@ -40,7 +40,7 @@ Wrench loadOn(const Simulation& scene)
   {
     const RodModel& m = scene.rodModel(static_cast<int>(r));
     for (int i = 0; i < m.nodes(); ++i)
-      add(scene.state().rods[r].x.col(i), m.mass[i] * config.gravity + m.drag[i] * config.wind);
+      add(scene.state().rods[r].x.col(i), m.mass[i] * config.gravity + (m.drag.size() > 0 ? m.drag[i] : 0.0) * config.wind);
   }
   for (std::size_t b = 0; b < config.bodies.size(); ++b)
     add(scene.state().bodies[b].X_WB.position, config.bodies[b].mass * config.gravity);

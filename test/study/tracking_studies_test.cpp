@@ -69,7 +69,9 @@ TEST(TrackingStudies, HuesTellRegionsApart)
     for (int g = 0; g < mesh.triangles.cols(); ++g)
       for (const int v : mesh.triangles.col(f))
         if ((mesh.triangles.col(g).array() == v).any())
+        {
           EXPECT_EQ(hues[f] == hues[g], region[f] == region[g]);
+        }
 }
 
 TEST(TrackingStudies, FineScaleLeavesOutWhatTheGuideHas)
