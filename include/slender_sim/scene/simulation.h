@@ -77,7 +77,7 @@ struct SceneInputs
   std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
   std::vector<ThreadDrive> threads;             ///< per thread of the scene
   std::vector<Eigen::Matrix3Xd> guides;         ///< per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]), ignored when it is a cloth;
-                                                  ///< of others empty
+                                                  ///< of others empty, and none where no cloth tracks anything
   Eigen::Vector3d wind{0, 0, 0};
 };
 
@@ -206,6 +206,8 @@ private:
   void gatherPins(SceneCloth& cloth) const;
 
   // simulation_guides.cpp: what tracked cloths follow
+  bool tracks() const;
+  TrackingError errorOf(int cloth, const Eigen::Matrix3Xd& targets) const;
   void startTracking(int cloth);
   bool functionsDue() const;
   void takeOver();
