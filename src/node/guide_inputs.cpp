@@ -28,7 +28,7 @@ std::set<std::string> solidNames(const SceneConfig& scene)
 
 GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
                          const std::vector<std::string>& grasp_names, const std::vector<std::string>& thread_prefixes)
-  : options_(options), simulation_(&simulation), clock_(clock)
+  : options_(options), simulation_(&simulation), clock_(clock), pending_(kMaxPending, options.tf_timeout)
 {
   GuideBuffer::Options buffer_options;
   buffer_options.delay = options.guide_delay;
@@ -246,25 +246,10 @@ void GuideInputs::take(int source, const std::string& what, const std_msgs::Head
                 "its stamp is " + std::to_string(std::abs(age)) + " s " + (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
     return;
   }
-  for (const Message& waiting : pending_)
-  {
-    if (waiting.source != source)
-      continue;
-    if (pending_.size() >= kMaxPending)
-      drops_.drop(Drop::queue_full, what);
-    else
-    {
-      message.deadline = std::chrono::steady_clock::now() +
-                         std::chrono::microseconds(static_cast<std::int64_t>(options_.tf_timeout * 1e6));
-      pending_.push_back(message);
-    }
+  if (!pending_.holds(source, message.frame) && deliver(message, nullptr))
     return;
-  }
-  if (deliver(message, nullptr))
-    return;
-  message.deadline = std::chrono::steady_clock::now() +
-                     std::chrono::microseconds(static_cast<std::int64_t>(options_.tf_timeout * 1e6));
-  pending_.push_back(message);
+  if (!pending_.add(source, message.frame, message))
+    drops_.drop(Drop::queue_full, what);
 }
 
 void GuideInputs::dropTransform(PoseFault fault, const std::string& what, const std::string& frame)
@@ -315,30 +300,9 @@ void GuideInputs::processPending()
 {
   tracking_->processPending();
   takeHand();
-  if (pending_.empty())
-    return;
-  const auto now = std::chrono::steady_clock::now();
-  std::set<int> blocked;   // sources whose earlier message still waits
-  for (std::size_t i = 0; i < pending_.size();)
-  {
-    const Message& message = pending_[i];
-    std::string why;
-    if (blocked.count(message.source))
-    {
-      ++i;
-      continue;
-    }
-    const bool done = deliver(message, &why);
-    if (!done && now < message.deadline)
-    {
-      blocked.insert(message.source);
-      ++i;
-      continue;
-    }
-    if (!done)
-      drops_.drop(Drop::no_transform, message.what, "from " + message.frame + " to " + options_.frame_id + ": " + why);
-    pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
-  }
+  pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); }, [this](const Message& message, const std::string& why) {
+    drops_.drop(Drop::no_transform, message.what, "from " + message.frame + " to " + options_.frame_id + ": " + why);
+  });
 }
 
 void GuideInputs::apply(double time, SceneInputs& inputs)

@@ -18,7 +18,7 @@ bool withinReach(const Eigen::Matrix3Xd& points) { return points.cols() == 0 || 
 
 TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers, const Simulation& simulation,
                                const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops)
-  : options_(options), buffers_(buffers), clock_(clock), tf_(tf), drops_(drops)
+  : options_(options), buffers_(buffers), clock_(clock), tf_(tf), drops_(drops), pending_(kMaxPending, options.tf_timeout)
 {
   const std::vector<ClothConfig>& cloths = simulation.config().cloths;
   const auto tracked = std::count_if(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking != nullptr; });
@@ -116,13 +116,10 @@ void TrackingInputs::take(Message message, const std_msgs::Header& header)
     return drops_.drop(age > 0.0 ? Drop::stale : Drop::from_future, what,
                        "its stamp is " + std::to_string(std::abs(age)) + " s " +
                          (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
-  const bool queued = std::any_of(pending_.begin(), pending_.end(), [&](const Message& m) { return m.guide == message.guide; });
-  if (!queued && deliver(message, nullptr))
+  if (!pending_.holds(message.guide, message.frame) && deliver(message, nullptr))
     return;
-  if (pending_.size() >= kMaxPending)
-    return drops_.drop(Drop::queue_full, what);
-  message.deadline = std::chrono::steady_clock::now() + std::chrono::microseconds(static_cast<std::int64_t>(options_.tf_timeout * 1e6));
-  pending_.push_back(std::move(message));
+  if (!pending_.add(message.guide, message.frame, message))
+    drops_.drop(Drop::queue_full, what);
 }
 
 /// False when the transform is not known yet.
@@ -174,23 +171,9 @@ bool TrackingInputs::deliver(const Message& message, std::string* why)
 
 void TrackingInputs::processPending()
 {
-  const auto now = std::chrono::steady_clock::now();
-  std::set<int> blocked;   // guides whose earlier message still waits
-  for (std::size_t i = 0; i < pending_.size();)
-  {
-    const Message& message = pending_[i];
-    std::string why;
-    const bool done = !blocked.count(message.guide) && deliver(message, &why);
-    if (!done && (blocked.count(message.guide) || now < message.deadline))
-    {
-      blocked.insert(message.guide);
-      ++i;
-      continue;
-    }
-    if (!done)
-      drops_.drop(Drop::no_transform, guides_[message.guide].topic, "from " + message.frame + " to " + options_.frame_id + ": " + why);
-    pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
-  }
+  pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); }, [this](const Message& message, const std::string& why) {
+    drops_.drop(Drop::no_transform, guides_[message.guide].topic, "from " + message.frame + " to " + options_.frame_id + ": " + why);
+  });
 }
 
 void TrackingInputs::apply(double time, SceneInputs& inputs)

@@ -141,6 +141,19 @@ class Inputs(NodeCase):
         self.assert_near(self.end(state, 200), (1, 0.05, 1))
         self.assertEqual(self.dropped("no_transform"), 0)
 
+    def test_unknown_frames_hold_back_nothing_else(self):
+        self.start(tf_timeout=100.0)
+        state = self.listen("/t/state", RodState)
+        guide = self.publisher(RIGHT, PoseStamped)
+        for k in range(300):
+            guide.publish(pose(1, 0, 1, 1.0 + 1e-4 * k, frame="nowhere"))
+        self.expect_drop("queue_full", 50)   # a quarter of 1,000 may wait
+        guide.publish(pose(1, 0, 1, 1.1))
+        guide.publish(pose(1, 0.1, 1, 1.2))
+        self.arrived()
+        self.assert_near(self.end(state, 200), (1, 0.1, 1))
+        self.assertEqual(int(self.diagnostics("inputs")["dropped"]), 50)
+
     def test_body_drives_a_grasp(self):
         self.start(BODY_SCENE)
         state = self.listen("/t/state", RodState)

@@ -133,7 +133,14 @@ class NodeCase(unittest.TestCase):
         values.update(parameters)
         process = self.launch(program, "rod", values)
         if wait:
-            rospy.wait_for_service("/t/rod/load_state", 60)
+            def up():
+                self.assertIsNone(process.poll(), self.output("rod.err"))
+                try:
+                    rospy.wait_for_service("/t/rod/load_state", 1)
+                except rospy.ROSException:
+                    return False
+                return True
+            wait_until(up, what="the node's services")
         return process
 
     def output(self, name):

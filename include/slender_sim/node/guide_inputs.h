@@ -1,7 +1,5 @@
 #pragma once
 
-#include <chrono>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -23,6 +21,7 @@
 #include "slender_sim/node/guide_buffer.h"
 #include "slender_sim/node/hand_markers.h"
 #include "slender_sim/node/node_options.h"
+#include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/node/tracking_inputs.h"
 #include "slender_sim/scene/simulation.h"
@@ -80,7 +79,6 @@ private:
     std::string what, frame;
     ros::Time stamp;
     std::vector<Entry> entries;
-    std::chrono::steady_clock::time_point deadline;
   };
 
   void onPose(int guided, const geometry_msgs::PoseStamped& message);
@@ -125,7 +123,7 @@ private:
   std::vector<std::string> prefixes_;                     // of their topics
   struct Dragged { Pose X_FH; std::string frame; };
   std::map<std::size_t, Dragged> hand_;                   // per guided, not taken yet
-  std::deque<Message> pending_;
+  PendingMessages<Message> pending_;
   DropCounter drops_;
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <chrono>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +13,7 @@
 #include "slender_sim/node/drop_counter.h"
 #include "slender_sim/node/guide_buffer.h"
 #include "slender_sim/node/node_options.h"
+#include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/point_guide_buffer.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/scene/simulation.h"
@@ -65,7 +64,6 @@ private:
     ros::Time stamp;
     Eigen::Matrix3Xd points;                                 // in the message's frame
     std::vector<std::pair<int, Pose>> bodies;
-    std::chrono::steady_clock::time_point deadline;
   };
 
   void onPoints(int guide, const sensor_msgs::PointCloud2& message);
@@ -81,7 +79,7 @@ private:
   const tf2_ros::Buffer& tf_;
   DropCounter& drops_;
   std::vector<Guide> guides_;
-  std::deque<Message> pending_;
+  PendingMessages<Message> pending_;
   std::vector<ros::Subscriber> subscribers_;
 };
 

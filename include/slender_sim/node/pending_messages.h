@@ -1,0 +1,78 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <deque>
+#include <set>
+#include <string>
+#include <utility>
+
+namespace slender {
+
+/// Messages that wait for their transforms. Those of one source and frame keep their order; others may overtake them, so that a frame that nobody knows
+/// holds back nothing else.
+template <class Message>
+class PendingMessages
+{
+public:
+  /// `most` may wait in all, a quarter of them of one source and frame, `patience` [s] each, of wall time.
+  PendingMessages(std::size_t most, double patience) : most_(most), patience_(std::chrono::microseconds(static_cast<std::int64_t>(1e6 * patience))) {}
+
+  bool empty() const { return waiting_.empty(); }
+  void clear() { waiting_.clear(); }
+
+  bool holds(int source, const std::string& frame) const { return count(source, frame) > 0; }
+
+  /// False when too many wait.
+  bool add(int source, const std::string& frame, Message message)
+  {
+    if (waiting_.size() >= most_ || 4 * count(source, frame) >= most_)
+      return false;
+    waiting_.push_back({source, frame, std::move(message), std::chrono::steady_clock::now() + patience_});
+    return true;
+  }
+
+  /// deliver(message, why) is false while the transform is not known; expired(message, why) takes those that have waited too long.
+  template <class Deliver, class Expired>
+  void process(const Deliver& deliver, const Expired& expired)
+  {
+    const auto now = std::chrono::steady_clock::now();
+    std::set<std::pair<int, std::string>> blocked;   // an earlier message of these still waits
+    for (std::size_t i = 0; i < waiting_.size();)
+    {
+      const Entry& entry = waiting_[i];
+      std::string why;
+      const bool done = !blocked.count({entry.source, entry.frame}) && deliver(entry.message, &why);
+      if (!done && (blocked.count({entry.source, entry.frame}) || now < entry.deadline))
+      {
+        blocked.insert({entry.source, entry.frame});
+        ++i;
+        continue;
+      }
+      if (!done)
+        expired(entry.message, why);
+      waiting_.erase(waiting_.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+  }
+
+private:
+  struct Entry
+  {
+    int source;
+    std::string frame;
+    Message message;
+    std::chrono::steady_clock::time_point deadline;
+  };
+
+  std::size_t count(int source, const std::string& frame) const
+  {
+    return static_cast<std::size_t>(std::count_if(waiting_.begin(), waiting_.end(), [&](const Entry& e) { return e.source == source && e.frame == frame; }));
+  }
+
+  std::size_t most_;
+  std::chrono::steady_clock::duration patience_;
+  std::deque<Entry> waiting_;
+};
+
+}  // namespace slender
