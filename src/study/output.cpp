@@ -79,21 +79,13 @@ std::string jsonString(const std::string& text)
 
 std::string jsonNumber(double value) { return std::isfinite(value) ? format(value, "%.15g") : "null"; }
 
-std::size_t longestLabel(const Plot& plot)
-{
-  std::size_t longest = 0;
-  for (const Series& s : plot.series)
-    longest = std::max(longest, s.label.size());
-  return longest;
-}
-
 void writeScript(std::ostream& out, const Plot& plot, const std::string& picture)
 {
-  out << "set terminal pngcairo size 1000,700 noenhanced font \"sans,12\"\n"
+  out << "set terminal pngcairo size 1200,640 noenhanced font \"sans,12\"\n"
       << "set output " << gnuplotString(picture) << "\n"
       << "set title " << gnuplotString(plot.title) << "\n"
       << "set xlabel " << gnuplotString(plot.x_label) << "\nset ylabel " << gnuplotString(plot.y_label) << "\n"
-      << "set key outside " << (longestLabel(plot) > 24 ? "bottom center horizontal maxcols 2" : "right") << "\nset grid\n";
+      << "set key outside right center vertical Left reverse font \",10\"\nset grid\n";
   if (plot.equal_axes)
     out << "set size ratio -1\n";
   if (plot.log_x)

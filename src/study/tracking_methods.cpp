@@ -14,6 +14,7 @@ using Eigen::Matrix3Xd;
 namespace {
 
 constexpr double kDuration = 1.0;   // [s]
+constexpr double kSmooth = 100;     // bending that leaves no fine wrinkles, over that of the sheet
 
 /// A sheet that is shaken and turned by its averages.
 GuidedCloth shakenSheet()
@@ -216,6 +217,26 @@ void runTrackingMethods(StudyContext& context)
         coarse_projection = error;
     }
   }
+
+  // where bending smooths out the wrinkles that steps do not resolve, errors of multipliers are of first order
+  GuidedCloth smooth = exact;
+  smooth.model.bending_modulus *= kSmooth;
+  const Run smooth_reference = follow(smooth, outside, Method::multipliers, 0.02 / std::exp2(halvings + 2), 0.0);
+  if (!smooth_reference.ok)
+    throw std::runtime_error("reference of the stiff sheet: " + smooth_reference.reason);
+  double coarse_smooth = 0, fine_smooth = 0;
+  for (int k = 0; k <= halvings; ++k)
+  {
+    const double h = 0.02 / std::exp2(k);
+    const Run run = follow(smooth, outside, Method::multipliers, h, 0.0);
+    if (!run.ok)
+      throw std::runtime_error("stiff sheet: " + run.reason);
+    const double error = distance(run.frames, smooth_reference.frames);
+    context.row().set("method", "multipliers, bending " + std::to_string(static_cast<int>(kSmooth)) + " times as stiff").set("step_ms", 1e3 * h).set("outcome", "done").set("cpu_seconds", run.seconds)
+        .set("rms_error_m", error).set("average_error_m", run.constraint_error);
+    (k == 0 ? coarse_smooth : fine_smooth) = error;
+  }
+  context.metric("order_of_multipliers_smooth", std::log2(coarse_smooth / fine_smooth) / halvings);
   context.metric("constraint_error_multipliers", worst_multipliers);
   context.metric("constraint_error_penalty_best", best_penalty);
   context.metric("projection_over_multipliers_20ms", coarse_projection / coarse_multipliers);
