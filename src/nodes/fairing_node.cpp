@@ -3,12 +3,14 @@
 
 #include <ros/ros.h>
 
+#include "slender_sim/node/arguments.h"
 #include "slender_sim/node/fairing_node.h"
 
 int main(int argc, char** argv)
 try
 {
   ros::init(argc, argv, "fairing_node");
+  slender::requireNoArguments(argc, argv);
   const slender::FairingNode node(ros::NodeHandle("~"));
   ros::spin();
   return 0;

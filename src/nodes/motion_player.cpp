@@ -3,12 +3,14 @@
 
 #include <ros/init.h>
 
+#include "slender_sim/node/arguments.h"
 #include "slender_sim/node/motion_player.h"
 
 int main(int argc, char** argv)
 try
 {
   ros::init(argc, argv, "motion_player");
+  slender::requireNoArguments(argc, argv);
   slender::MotionPlayer(ros::NodeHandle(), ros::NodeHandle("~")).spin();
   return 0;
 }

@@ -65,6 +65,10 @@ Options parseOptions(int argc, char** argv)
       }
       return argv[++k];
     };
+    if (argument != "--set" && argument.size() > 1 && argument[0] == '-' && std::find(argv + 1, argv + k, argument) != argv + k)
+    {
+      throw BadInput(argument + ": is given twice\n" + usage);
+    }
     if (argument == "--duration")
     {
       options.duration = slender::parsePositive(argument, value(), 1e7);

@@ -239,6 +239,12 @@ class Services(NodeCase):
         self.refused("use_sim_time", pace="follow")
         self.refused("use_sim_time", pace="fast", publish_clock=True)
 
+    def test_unknown_arguments_exit_2(self):
+        for program in ("rod_node", "fairing_node", "motion_player"):
+            process = self.launch(program, program, {}, ["rope.yaml"])
+            self.assertEqual(process.wait(60), 2)
+            self.assertIn('unknown argument "rope.yaml"', self.output(program + ".err"))
+
     def test_numbers_as_strings(self):
         self.start(guide_delay="1e-2")   # what rosparam makes of a number without a point
 
