@@ -7,6 +7,12 @@
 
 namespace slender {
 
+namespace {
+
+constexpr long kFlops = 600;   // of dense matrices, to a count of a WorkBudget
+
+}  // namespace
+
 /// Of the averages that are met; those at their bounds have forces of their own.
 void ClothSystem::takeOutAverages(PointVector& r)
 {
@@ -180,6 +186,7 @@ LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matri
   const Eigen::VectorXd& most = used_->prescribed->bounds;
   const PointKernels& kernels = pointKernels();
   const double tolerance = 1e-2 * linear_tolerance_;
+  const int m = averages_->count();
   applyMatrix(d, b.image);
   b.before = d;
   b.image_before = b.image;
@@ -208,6 +215,8 @@ LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matri
         averages_->solveBounded(right_.data(), gap_.data(), most.data(), l, tolerance, correction_.data(), b.pulls.data());
       step = norms.step;
       exact = norms.converged;
+      spend(1);
+      budget_->spend(static_cast<long>(norms.sweeps) * m * m * 3 / kFlops);
       reference = iteration == 0 ? std::max(reference, norms.load) : reference;
       applyMatrix(correction_, product_);
       const double curvature = kernels.dot(points(), correction_.data(), product_.data());
@@ -217,6 +226,8 @@ LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matri
         break;
     }
     ++linear_iterations;
+    if (budget_->spent())
+      return LinearOutcome::not_converged;
     averages_->addForces(b.pulls.data(), right_.data());
     double along = 0.0;
     for (std::size_t i = 0; i < d.size(); ++i)
@@ -287,6 +298,7 @@ LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3X
       clearHeld(right_);
       averages_->addForces(b.bounded.data(), right_.data());
       averages_->soften(b.weights);
+      budget_->spend(static_cast<long>(m) * m * m / kFlops);
       averages_->solveSoftened(right_.data(), move.data());
       const double left = std::sqrt(std::max(kernels.dot(points(), right_.data(), move.data()), 0.0)), allowed = 0.5 * linear_tolerance_ * reference;
       if (!std::isfinite(left))
@@ -294,8 +306,8 @@ LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3X
       balanced = left <= allowed;
       if (balanced)
         break;
-      const int most = kMostIterations - (linear_iterations - before);
-      if (most <= 0)
+      const int most = iterationsWithin(kMostIterations - (linear_iterations - before));
+      if (most <= 0 || budget_->spent())
         return LinearOutcome::not_converged;
       const LinearResult result = cg_.solve(
         right_, move, std::max(kForcing, 0.5 * allowed / left), most,
@@ -312,6 +324,7 @@ LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3X
         },
         [&](PointVector& r, PointVector& z) { averages_->solveSoftened(r.data(), z.data()); });
       linear_iterations += result.iterations;
+      spend(result.iterations + 1);
       if (!result.definite)
         return LinearOutcome::not_definite;
       // the quadratic part along the step, and the envelope

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kMeetTolerance = 1e-12;   // of the cloth's size
 constexpr int kLoadPasses = 2;
+constexpr long kParts = 4;   // of the budget, to one substep: what takes more is cut
 constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
 constexpr double kBalanced = 1e-6;   // of the work: what averages leave of pushes that they balance, rounding errors
 constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
@@ -49,12 +50,15 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
     throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " contact settings expected, one per cloth");
   if (!model_.options.empty() && model_.options.size() != model_.cloths.size())
     throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " options expected, one per cloth, or none");
+  budget_ = std::make_shared<WorkBudget>();
   first_.push_back(0);
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     const ClothModel& cloth = *model_.cloths[k];
     const ClothContact& contact = model_.contact[k];
     steppers_.emplace_back(model_.cloths[k], model_.options.empty() ? options : model_.options[k]);
+    if ((model_.options.empty() ? options : model_.options[k]).error_tolerance == 0)
+      steppers_.back().useBudget(budget_);
     surface_.rest.conservativeResize(3, first_.back() + cloth.vertices());
     surface_.rest.rightCols(cloth.vertices()) = cloth.rest.vertices;
     CollisionSheet sheet;
@@ -112,18 +116,24 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   double done = 0.0, share = 1.0;
   hopeless_ = false;
   const double shortest = std::ldexp(1.0 - 1e-9, -options_.newton.max_cuts);
+  const long most = WorkBudget::ofStep(first_.back());
+  budget_->start(most);
   while (done < 1.0)
   {
     const double end = done + share > 1.0 - 1e-9 ? 1.0 : done + share;
+    budget_->startPart(most / kParts);
     const StepReport sub = substep(inputs, done, end, duration);
     if (!sub.ok)
     {
       report.iterations += sub.iterations;
-      if (sub.failure == StepFailure::input_not_finite || hopeless_ || 0.5 * share < shortest)
+      if (sub.failure == StepFailure::input_not_finite || hopeless_ || budget_->exhausted() || 0.5 * share < shortest)
       {
         report.ok = false;
         report.failure = sub.failure;
         report.message = sub.message;
+        report.work = budget_->done();
+        if (!hopeless_ && sub.failure != StepFailure::input_not_finite && (budget_->exhausted() || sub.failure == StepFailure::work_exceeded))
+          blameWork((end - done) * duration, report);
         blameExplicit(duration, report);
         return report;
       }
@@ -143,6 +153,7 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   report.repulsions = collisions_.repulsions;
   report.impulses = collisions_.impulses;
   report.zones = collisions_.zones;
+  report.work = budget_->done();
   return report;
 }
 
@@ -195,7 +206,7 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
 /// Steps that blow up move pieces until no collision can be solved any more, or meet the end of all halving: what is said then is why.
 void ClothGroup::blameExplicit(double duration, StepReport& report) const
 {
-  if (hopeless_ || (report.failure != StepFailure::squeezed && report.failure != StepFailure::state_not_finite))
+  if (hopeless_ || (report.failure != StepFailure::squeezed && report.failure != StepFailure::state_not_finite && report.failure != StepFailure::work_exceeded))
     return;
   for (const ClothStepper& stepper : steppers_)
     if (const double stable = stepper.stableStep(); duration > stable)
@@ -273,7 +284,7 @@ CollisionReport ClothGroup::collide(double h)
     shared_pins_[k].setZero(3, static_cast<Eigen::Index>(work_.cloths[k].pins.size()));
     shared_averages_[k].setZero(3, averagesOf(k) ? averagesOf(k)->count() : 0);
   }
-  const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h};
+  const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h, budget_.get()};
   int pass = 0;
   while (pass < kLoadPasses && shareLoads(step, pass > 0))
     ++pass;
@@ -299,7 +310,7 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
   if (!found.ok)
   {
     report.ok = false;
-    report.failure = StepFailure::squeezed;
+    report.failure = found.spent ? StepFailure::work_exceeded : StepFailure::squeezed;
     report.message = "collisions: " + found.reason + whereIs(found) +
                      (found.at_start ? "; start from a state in which nothing intersects" : "; use a shorter step, or leave the cloth more room") +
                      blameAverages(found);

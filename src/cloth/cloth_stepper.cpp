@@ -56,6 +56,7 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
                          &guess_})
     v->assign(4 * model->vertices(), 0.0);
   plan_.stages.reserve(2);
+  useBudget(nullptr);
   if (o.integrator == Integrator::imex)
   {
     constant_ = std::make_unique<ShiftedMatrix>(system.bending().size() > 0 ? system.bending() : PointMatrix(model->vertices(), {}));
@@ -101,6 +102,7 @@ bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inpu
 StepReport ClothStepper::Impl::refuse(StepReport& report, StepFailure failure, const std::string& message) const
 {
   report.ok = false;
+  report.work = ownWork();
   report.failure = failure;
   report.message = "cloth '" + model->name + "': " + message;
   return report;
@@ -115,6 +117,9 @@ std::string ClothStepper::Impl::explain(StepFailure failure, double length)
     return "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the averages there";
   if (failure == StepFailure::singular_matrix)
     return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude";
+  if (failure == StepFailure::work_exceeded)
+    return "the step needs more work than it is given" + at + ": use a shorter step, move what " +
+           (model->averages.empty() ? "holds it by less at once" : "guides it by less at once and without crumpling it") + ", or take softer cloth (thickness, moduli)";
   if (failure == StepFailure::linear_unconverged)
     return "the linear equations did not converge" + at + ": use a shorter step, a larger solver.tolerance" +
            (system.bounded() ? ", a larger max_traction" : "") + ", or softer cloth (thickness, moduli)";
@@ -131,10 +136,19 @@ Eigen::Vector3d ClothStepper::Impl::pinAt(const ClothInputs& inputs, std::size_t
   return fraction >= 1.0 ? Eigen::Vector3d(inputs.pins.col(k)) : Eigen::Vector3d(pins_start_.col(k) + fraction * (inputs.pins.col(k) - pins_start_.col(k)));
 }
 
+void ClothStepper::Impl::useBudget(std::shared_ptr<WorkBudget> budget)
+{
+  own_budget_ = budget == nullptr;
+  budget_ = own_budget_ ? std::make_shared<WorkBudget>() : std::move(budget);
+  system.useBudget(*budget_);
+}
+
 StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs, double duration)
 {
   StepReport report;
   std::string what;
+  if (own_budget_)   // error control takes as many substeps as accuracy asks for
+    budget_->start(options.error_tolerance > 0 ? WorkBudget::kUnbounded : WorkBudget::ofStep(model->vertices()));
   if (!inputsFine(state, inputs, duration, what))
     return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   work_ = state;
@@ -154,6 +168,8 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   double t = 0.0, h = adaptive && state.next_step > 0 ? std::clamp(state.next_step, std::min(options.min_step, duration), duration) : duration;
   while (t < duration)
   {
+    if (budget_->spent())
+      return refuse(report, StepFailure::work_exceeded, explain(StepFailure::work_exceeded, h));
     const bool last = t + h > duration * (1 - 1e-9);
     const double to = last ? duration : t + h, length = to - t;
     StepReport sub;
@@ -169,6 +185,8 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
       report.iterations += sub.iterations;
       report.linear_iterations += sub.linear_iterations;
       report.factorizations += sub.factorizations;
+      if (budget_->spent())
+        continue;
       const bool shortest = 0.5 * length < (adaptive ? options.min_step : duration * std::ldexp(1 - 1e-9, -options.newton.max_cuts));
       if (!inaccurate && (isExplicit() || shortest || report.cut_steps >= most_cuts))
         return refuse(report, failure, explain(failure, length));
@@ -183,6 +201,7 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
     h = std::min(h, duration);
     t = to;
   }
+  report.work = ownWork();
   work_.next_step = adaptive ? h : 0.0;
   std::swap(state, work_);
   return report;
@@ -381,6 +400,8 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
 ClothStepper::ClothStepper(std::shared_ptr<const ClothModel> model, const ClothOptions& options) : impl_(std::make_unique<Impl>(std::move(model), options)) {}
 ClothStepper::~ClothStepper() = default;
 ClothStepper::ClothStepper(ClothStepper&&) noexcept = default;
+
+void ClothStepper::useBudget(std::shared_ptr<WorkBudget> budget) { impl_->useBudget(std::move(budget)); }
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
 StepReport ClothStepper::stepUndivided(ClothState& state, const ClothInputs& inputs, double duration)

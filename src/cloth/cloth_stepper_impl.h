@@ -14,6 +14,7 @@ class ClothStepper::Impl
 public:
   Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
 
+  void useBudget(std::shared_ptr<WorkBudget> budget);
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
   double stableStep();
   bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
@@ -49,6 +50,9 @@ private:
   ClothEvaluation addForces(const ClothInputs& inputs, bool with_bending);
   ClothEvaluation acceleration(const ClothInputs& inputs, double delta);
 
+  std::shared_ptr<WorkBudget> budget_;
+  bool own_budget_ = true;
+  long ownWork() const { return own_budget_ ? budget_->done() : 0; }   ///< others report their budgets themselves
   PlasticFlow plastic_;
   ClothState work_, next_;   ///< start of a substep, and its end
   Eigen::Matrix3Xd pins_start_, averages_start_, averages_, wind_v_;

@@ -21,6 +21,7 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
 
 /// Measured (study implicit_step): sweeps are faster below, the constant factor above.
 constexpr int kMostSwept = 3000;
+constexpr int kEnergyWork = 2, kHessianWork = 8, kFactorWork = 60;   // of a WorkBudget, per vertex; an iteration of conjugate gradients: 1
 constexpr double kBesideLoad = 1e-2;
 
 ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
@@ -309,6 +310,7 @@ double ClothSystem::addIsometric(const PointVector& x, PointVector& gradient)
 
 ClothEvaluation ClothSystem::energy(const PointVector& x)
 {
+  spend(kEnergyWork);
   ClothEvaluation result = addLoads(x, false);
   const MembraneSums sums = membrane_.energy(x.data());
   result.membrane = sums.energy;
@@ -327,6 +329,7 @@ ClothEvaluation ClothSystem::energy(const PointVector& x)
 
 ClothEvaluation ClothSystem::evaluate(const PointVector& x)
 {
+  spend(kEnergyWork);
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
   ClothEvaluation result = addInternal(x, gradient_);
   result.potential = addLoads(x, true).potential;
@@ -335,6 +338,7 @@ ClothEvaluation ClothSystem::evaluate(const PointVector& x)
 
 ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind kind)
 {
+  spend(kHessianWork);
   std::copy(base_.begin(), base_.end(), matrix_.values());
   matrix_tau_ = base_tau_;
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
@@ -425,6 +429,7 @@ LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& lin
       if (held_[i])
         point(right_, i) = point(d, i);
     ++factorizations;
+    spend(kFactorWork);
     if (!factor_.factor(matrix_, held_.data()))
       return LinearOutcome::not_definite;
     factor_.solvePoints(right_.data(), d.data());
@@ -437,14 +442,14 @@ LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& lin
   load_ = 0.0;
   const double allowed = tolerance > 0 ? tolerance : linear_tolerance_;
   if (solver_ == ClothSolver::gauss_seidel)
-    return correct(d, sweeps_.solve(1.0 + ratio_, held_, right_, correction_, allowed, kMostIterations), allowed, linear_iterations);
+    return correct(d, sweeps_.solve(1.0 + ratio_, held_, right_, correction_, allowed, iterationsWithin(kMostIterations)), allowed, linear_iterations);
   if (at && !averages_)   // averages are met with the constant matrix
     preconditioner_->align(*at, matrix_, held_);
   else
     preconditioner_->useConstant();
   const double reference = averages_ ? takeFirstStep(d, averages, allowed) : 0.0;
   const LinearResult result = cg_.solve(
-    right_, correction_, allowed, kMostIterations,
+    right_, correction_, allowed, iterationsWithin(kMostIterations),
     [&](const PointVector& p, PointVector& ap) {
       applyMatrix(p, ap);
       clearHeld(ap);
@@ -459,9 +464,10 @@ LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& lin
   return correct(d, result, allowed, linear_iterations);
 }
 
-LinearOutcome ClothSystem::correct(PointVector& d, const LinearResult& result, double tolerance, int& linear_iterations) const
+LinearOutcome ClothSystem::correct(PointVector& d, const LinearResult& result, double tolerance, int& linear_iterations)
 {
   linear_iterations += result.iterations;
+  spend(result.iterations + 1);
   for (std::size_t i = 0; i < d.size(); ++i)
     d[i] += correction_[i];
   if (!result.definite)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -52,6 +53,8 @@ public:
 
   int points() const { return model_.vertices(); }
   ClothSolver solver() const { return solver_; }
+  /// What solves and evaluations spend; must outlive this.
+  void useBudget(WorkBudget& budget) { budget_ = &budget; }
 
   /// What is held, and the hinges.
   void hold(const ClothState& state);
@@ -125,7 +128,7 @@ private:
   double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
   /// Adds correction_, the solution of conjugate gradients, to d.
-  LinearOutcome correct(PointVector& d, const LinearResult& result, double tolerance, int& linear_iterations) const;
+  LinearOutcome correct(PointVector& d, const LinearResult& result, double tolerance, int& linear_iterations);
   /// gap_: by how much the averages at x fall short.
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
   void preconditionWithin(PointVector& r, PointVector& z);
@@ -141,6 +144,8 @@ private:
   const ClothModel& model_;
   ClothSolver solver_;
   const double linear_tolerance_;
+  WorkBudget unbounded_;
+  WorkBudget* budget_ = &unbounded_;
   MembraneEnergy membrane_;
   WindLoad wind_;
   std::unique_ptr<HingeBending> hinges_;      ///< hinge bending only
@@ -186,6 +191,10 @@ private:
   std::unique_ptr<AverageBounds> bounds_;      ///< of models with bounds
 
   void respond(double ratio);
+  /// Of conjugate gradients: `most`, or what the budget has room for.
+  int iterationsWithin(int most) const { return static_cast<int>(std::min<long>(most, budget_->left() / points() + 1)); }
+  /// In counts per point.
+  void spend(int counts) { budget_->spend(static_cast<long>(counts) * points()); }
 
   double ratio_ = 0;
   double viscous_form_ = 0;                   ///< of isometric bending, at viscous_start_

@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kMeetRounds = 200;
 constexpr double kBoundSlack = 1e-3;   // of forces' bounds: the cloth's own step keeps them to its tolerance alone, 5e-3 of the load
+constexpr long kEntriesPerCount = 16;   // of sparse matrices, to a count of a WorkBudget
 constexpr int kStallRounds = 8;   // that must halve the averages' errors; slow convergence as it was seen makes a third of them
 
 }  // namespace
@@ -28,6 +29,20 @@ std::string ClothGroup::blameAverages(const CollisionReport& failure) const
              (cloth->averages[0].bounds.size() > 0 ? "take a lower max_traction" : "bound their forces (max_traction)");
   }
   return "";
+}
+
+/// What takes so much is seldom what the last substep failed at.
+void ClothGroup::blameWork(double h, StepReport& report) const
+{
+  const auto tracked = std::find_if(model_.cloths.begin(), model_.cloths.end(), [](const auto& cloth) { return !cloth->averages.empty(); });
+  const bool guided = tracked != model_.cloths.end();
+  const std::string last = report.failure == StepFailure::work_exceeded ? "" : "; at last " + report.message;
+  report.failure = StepFailure::work_exceeded;
+  report.message = "cloth '" + (guided ? *tracked : model_.cloths[0])->name + (model_.cloths.size() > 1 ? "' and others" : "'") +
+                   ": contact needs more work than a step is given, even at " + milliseconds(h) + ": use a shorter step, or " +
+                   (guided ? "a guide that moves by less at once, does not crumple, and is clear of obstacles" :
+                             "move what holds it and obstacles by less at once, and leave it more room") +
+                   last;
 }
 
 /// Collisions move averages that are prescribed. Going back and forth between both leads to where both are met, by a factor of about a thousand each time
@@ -129,7 +144,7 @@ double ClothGroup::boundAverages(std::size_t k, double h, double gap)
     return gap;
   to.multipliers.setZero();
   double needed = 0.0;
-  for (int sweep = 0; sweep < kSweeps; ++sweep)
+  for (int sweep = 0; sweep < kSweeps && budget_->spend(to.gram_rows.nonZeros() / kEntriesPerCount); ++sweep)
   {
     double largest = 0.0;
     for (Eigen::Index i = 0; i < bounds.size(); ++i)

@@ -10,6 +10,7 @@ namespace slender {
 namespace {
 
 constexpr double kMargin = 0.5;   // of shells
+constexpr long kPlaceWork = 2;    // of a WorkBudget: where a pair lies
 
 double leastAlong(const CollisionPair& pair, const Eigen::Matrix3Xd& x)
 {
@@ -54,16 +55,16 @@ CollisionPairs::CollisionPairs(const CollisionElements& elements) : elements_(el
   tree_.build(centers, groups, elements.touching, elements.objects.size());
 }
 
-const std::vector<CollisionPair>& CollisionPairs::find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
+const std::vector<CollisionPair>& CollisionPairs::find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, WorkBudget& budget)
 {
   pairs_.clear();
   std::fill(strayed_.begin(), strayed_.end(), 1);
   searched_ = to;
-  search(from);
+  search(from, budget);
   return pairs_;
 }
 
-const std::vector<CollisionPair>& CollisionPairs::update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
+const std::vector<CollisionPair>& CollisionPairs::update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, WorkBudget& budget)
 {
   bool any = false;
   for (std::size_t i = 0; i < points_.size(); ++i)
@@ -80,12 +81,12 @@ const std::vector<CollisionPair>& CollisionPairs::update(const Eigen::Matrix3Xd&
     return strayed_[p.point[0]] | strayed_[p.point[1]] | strayed_[p.point[2]] | strayed_[p.point[3]];
   };
   pairs_.erase(std::remove_if(pairs_.begin(), pairs_.end(), strayed), pairs_.end());
-  search(from);
+  search(from, budget);
   return pairs_;
 }
 
 /// Adds all pairs of points that strayed.
-void CollisionPairs::search(const Eigen::Matrix3Xd& from)
+void CollisionPairs::search(const Eigen::Matrix3Xd& from, WorkBudget& budget)
 {
   for (std::size_t i = 0; i < points_.size(); ++i)
     if (strayed_[i])
@@ -110,11 +111,16 @@ void CollisionPairs::search(const Eigen::Matrix3Xd& from)
   }
   found_.clear();
   tree_.refit(volumes_, active_);
-  tree_.selfPairs(found_);
+  tree_.selfPairs(found_, static_cast<std::size_t>(budget.left()));
+  budget.spend(static_cast<long>(volumes_.size() + found_.size()));
   for (const KdopTree::Pair& p : found_)
   {
+    if (budget.spent())
+      return;
+    const std::size_t before = pairs_.size();
     testElements(p.first, p.second, from);
     testElements(p.second, p.first, from);
+    budget.spend(kPlaceWork * static_cast<long>(pairs_.size() - before));
   }
 }
 

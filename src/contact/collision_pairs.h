@@ -5,6 +5,7 @@
 #include "collision_elements.h"
 #include "kdop_tree.h"
 #include "slender_sim/contact/ccd.h"
+#include "slender_sim/dynamics/work_budget.h"
 
 namespace slender {
 
@@ -35,10 +36,10 @@ class CollisionPairs
 public:
   explicit CollisionPairs(const CollisionElements& elements);
 
-  /// Finds all pairs of a step.
-  const std::vector<CollisionPair>& find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);
+  /// Finds all pairs of a step. Once the budget is spent some are missing.
+  const std::vector<CollisionPair>& find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, WorkBudget& budget);
   /// The same step with other ends: adds pairs where points have left the volumes searched, which are larger than the motion by a margin.
-  const std::vector<CollisionPair>& update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);
+  const std::vector<CollisionPair>& update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, WorkBudget& budget);
 
   /// Whether a plane is seen to keep the pieces apart.
   static bool separated(const CollisionPair& pair, const Eigen::Matrix3Xd& to);
@@ -53,7 +54,7 @@ public:
 private:
   template <class Position>
   PairPlace placeAt(const CollisionPair& pair, Position x) const;
-  void search(const Eigen::Matrix3Xd& from);
+  void search(const Eigen::Matrix3Xd& from, WorkBudget& budget);
   void testElements(int a, int b, const Eigen::Matrix3Xd& from);
   void add(int first, int second, bool edges, const int (&point)[4], const Eigen::Matrix3Xd& from);
 

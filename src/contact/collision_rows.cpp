@@ -44,7 +44,7 @@ void CollisionRows::restart(const Eigen::VectorXd& inverse_mass, double share, E
   }
 }
 
-void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y)
+void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y, WorkBudget& budget)
 {
   double* const values = y.data();
   const auto relative = [values](const CollisionRow& r) -> Eigen::Vector3d {
@@ -66,8 +66,10 @@ void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen
     if (r.mobility > 0.0)
       largest = std::max(largest, r.bound - r.normal.dot(relative(r)));
   }
-  for (int sweep = 0; sweep < sweeps; ++sweep)
+  const long looked_at = static_cast<long>(rows.size()) / 8;   // work of a sweep that does nothing
+  for (int sweep = 0; sweep < sweeps && !budget.spent(); ++sweep)
   {
+    long work = looked_at;
     const double relaxation = sweep == 0 ? 1.0 : kOverRelaxation;
     bool settled = true;
     for (CollisionRow& r : rows)
@@ -75,6 +77,7 @@ void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen
       const int moved = std::max(std::max(moved_[r.point[0]], moved_[r.point[1]]), std::max(moved_[r.point[2]], moved_[r.point[3]]));
       if (moved <= r.seen || r.mobility <= 0.0)
         continue;
+      ++work;
       const Eigen::Vector3d u = relative(r);
       const double stiffness = 1.0 / r.mobility, missed = r.bound - r.normal.dot(u);
       const double impulse = std::max(0.0, r.impulse + relaxation * missed * stiffness);
@@ -109,6 +112,7 @@ void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen
       r.seen = matters && relaxation != 1.0 ? clock_ - 1 : clock_;   // what goes too far comes back
       settled = settled && !matters;
     }
+    budget.spend(work);
     if (settled)
       return;
   }

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "slender_sim/dynamics/work_budget.h"
+
 namespace slender {
 
 /// A condition n . sum_i w_i y_i >= bound on vectors y of points (positions at the end of a step, or velocities), with friction against
@@ -38,9 +40,9 @@ public:
   void clear(int points);
   /// Begins on other vectors y, for which bounds and anchors may have been changed since: a share of all impulses but pushes is the start.
   void restart(const Eigen::VectorXd& inverse_mass, double share, Eigen::Matrix3Xd& y);
-  /// Adds impulses to y until no sweep changes a row by more than its tolerance or 1/200 of the largest miss at first, or for `sweeps` sweeps.
-  /// Rows may have been added since the last call.
-  void relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y);
+  /// Adds impulses to y until no sweep changes a row by more than its tolerance or 1/200 of the largest miss at first, or for `sweeps` sweeps,
+  /// or until the budget is spent. Rows may have been added since the last call.
+  void relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y, WorkBudget& budget);
 
 private:
   std::vector<int> moved_;

@@ -121,27 +121,27 @@ void KdopTree::refit(const std::vector<Kdop>& volumes, const std::vector<char>& 
   }
 }
 
-void KdopTree::selfPairs(std::vector<Pair>& pairs) const
+void KdopTree::selfPairs(std::vector<Pair>& pairs, std::size_t most) const
 {
   if (!second_.empty())
-    inside(0, pairs);
+    inside(0, pairs, most);
 }
 
-void KdopTree::inside(int node, std::vector<Pair>& pairs) const
+void KdopTree::inside(int node, std::vector<Pair>& pairs, std::size_t most) const
 {
   const int second = second_[node];
   if (second < 0 || !active_[node] || apart(node, node))
     return;
-  inside(node + 1, pairs);
-  inside(second, pairs);
+  inside(node + 1, pairs, most);
+  inside(second, pairs, most);
   if (volumes_[node + 1].overlaps(volumes_[second]))
-    between(node + 1, second, pairs);
+    between(node + 1, second, pairs, most);
 }
 
 /// Of two nodes that overlap.
-void KdopTree::between(int a, int b, std::vector<Pair>& pairs) const
+void KdopTree::between(int a, int b, std::vector<Pair>& pairs, std::size_t most) const
 {
-  if (!(active_[a] | active_[b]) || apart(a, b))
+  if (!(active_[a] | active_[b]) || apart(a, b) || pairs.size() > most)
     return;
   if (leaves_[a] == 1 && leaves_[b] == 1)
   {
@@ -152,7 +152,7 @@ void KdopTree::between(int a, int b, std::vector<Pair>& pairs) const
   const int divided = first ? a : b, other = first ? b : a;
   for (const int child : {divided + 1, second_[divided]})
     if (volumes_[child].overlaps(volumes_[other]))
-      first ? between(child, other, pairs) : between(other, child, pairs);
+      first ? between(child, other, pairs, most) : between(other, child, pairs, most);
 }
 
 }  // namespace slender

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -50,13 +51,13 @@ public:
   /// Takes over the elements' volumes. Pairs are looked for among those of which one is `active`.
   void refit(const std::vector<Kdop>& volumes, const std::vector<char>& active);
   /// Appends pairs of different elements whose volumes overlap, one of them active, in an order that depends on the arguments of the last
-  /// build() and refit() only.
-  void selfPairs(std::vector<Pair>& pairs) const;
+  /// build() and refit() only. Ends as soon as there are more than `most`.
+  void selfPairs(std::vector<Pair>& pairs, std::size_t most = std::numeric_limits<std::size_t>::max()) const;
 
 private:
   void divide(int from, int to, const Eigen::Matrix3Xd& centers, const std::vector<int>& groups);
-  void inside(int node, std::vector<Pair>& pairs) const;
-  void between(int a, int b, std::vector<Pair>& pairs) const;
+  void inside(int node, std::vector<Pair>& pairs, std::size_t most) const;
+  void between(int a, int b, std::vector<Pair>& pairs, std::size_t most) const;
   bool apart(int a, int b) const
   {
     return group_[a] >= 0 && group_[b] >= 0 && !touching_[static_cast<std::size_t>(group_[a]) * groups_ + static_cast<std::size_t>(group_[b])];

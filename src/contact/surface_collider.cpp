@@ -5,12 +5,7 @@
 #include <stdexcept>
 #include <tuple>
 
-#include <Eigen/Geometry>
-
-#include "collision_pairs.h"
-#include "collision_rows.h"
-#include "impact_zones.h"
-#include "slender_sim/geometry/rotation.h"
+#include "surface_collider_impl.h"
 
 namespace slender {
 
@@ -18,73 +13,12 @@ namespace {
 
 constexpr double kKept = 0.2;        // share of a gap that no collision may go below
 constexpr double kTarget = 0.5;      // share of the gap that impulses leave
-constexpr double kPush = 0.1;        // share of the overlap of shells that a step removes [Bridson et al. 2002]
 constexpr double kNear = 2.0;        // shells, up to where places of contact at the start tell those at the end
 constexpr int kSweeps = 25;
 constexpr int kImpulseRounds = 12;
+constexpr long kLimitWork = 8;       // of a WorkBudget: when a pair meets
 
 }  // namespace
-
-class SurfaceCollider::Impl
-{
-public:
-  explicit Impl(const CollisionSurface& surface) : elements_(surface), pairs_(elements_)
-  {
-    const Eigen::Index n = elements_.reference.cols();
-    for (Eigen::Matrix3Xd* m : {&from_, &to_, &tested_, &velocity_})
-      m->resize(3, n);
-    inverse_mass_.setZero(n);
-    changed_.resize(n);
-  }
-
-  CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again);
-  bool approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again);
-  const Eigen::Matrix3Xd& heldImpulses() const { return held_impulses_; }
-  bool touched(int first, int count) const { return rows_.touch(first, count); }
-  int solidOf(int point) const { return elements_.point_object.at(point) - elements_.sheet_count; }
-
-private:
-  struct PlaneHit { int point, plane; };
-
-  bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again);
-  bool examineStart();
-  void addHits();
-  bool examinePlanes();
-  void detect();
-  ApproachLimit limitOf(const CollisionPair& pair) const;
-  bool planeHit(int point, int plane) const;
-  double planeGap(int plane, const std::vector<Pose>& poses, const Eigen::Vector3d& x) const;
-  double reach(const CollisionPair& pair) const;
-  void repel(const CollisionPair& pair, const PairPlace& place, double range);
-  void stop(const CollisionPair& pair);
-  void addPlaneRow(int point, int plane, double gap, bool hit);
-  bool joinHits();
-  bool moveZones();
-  bool followPrescribed(const ImpactZones::Zone& zone);
-  void solveVelocities();
-  void takeHeldImpulses();
-  bool fail(const std::string& reason, int first = -1, int second = -1);
-  bool failAtStart(const std::string& reason, int first, int second = -1) { return !(report_.at_start = true) || fail(reason, first, second); }
-  int node(int point) const;
-
-  CollisionElements elements_;
-  CollisionPairs pairs_;
-  CollisionRows rows_;
-  ImpactZones zones_;
-  CollisionReport report_;
-
-  const CollisionStep* step_ = nullptr;
-  Eigen::Matrix3Xd from_, to_;      ///< all points, at both ends of the step
-  Eigen::Matrix3Xd tested_;         ///< ends at the last detection
-  Eigen::Matrix3Xd displacement_, velocity_;
-  Eigen::VectorXd inverse_mass_;
-  Eigen::Matrix3Xd held_impulses_;
-  std::vector<char> changed_;
-  double push_ = kPush;
-  bool known_ = false;              ///< pairs_ are those of the step's start
-  std::vector<CollisionPair> hits_;
-  std::vector<PlaneHit> plane_hits_;
-};
 
 bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int second)
 {
@@ -92,6 +26,14 @@ bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int secon
   report_.reason = reason;
   report_.points[0] = first, report_.points[1] = second;
   return false;
+}
+
+/// What was found so far is not all there is.
+bool SurfaceCollider::Impl::failSpent()
+{
+  known_ = false;
+  report_.spent = true;
+  return fail("more work than a step is given");
 }
 
 bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again)
@@ -106,6 +48,7 @@ bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3
     throw std::invalid_argument("collisions: the step must be positive, inverse masses not negative");
   known_ = known_ && again;
   step_ = &step;
+  budget_ = step.budget ? step.budget : &unbounded_;
   report_ = CollisionReport();
   from_.leftCols(n) = step.x_start;
   to_.leftCols(n) = x;
@@ -151,8 +94,10 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
 /// Finds all pairs that may come near each other; those within their shells, or near them and about to enter, get repulsions.
 bool SurfaceCollider::Impl::examineStart()
 {
-  const std::vector<CollisionPair>& pairs = known_ ? pairs_.update(from_, to_) : pairs_.find(from_, to_);
-  known_ = true;
+  const std::vector<CollisionPair>& pairs = known_ ? pairs_.update(from_, to_, *budget_) : pairs_.find(from_, to_, *budget_);
+  known_ = budget_->spend(static_cast<long>(pairs.size()));
+  if (!known_)
+    return failSpent();
   for (const CollisionPair& pair : pairs)
   {
     if (!(pair.gap > 0.0))
@@ -243,9 +188,16 @@ void SurfaceCollider::Impl::detect()
     return changed_[p.point[0]] | changed_[p.point[1]] | changed_[p.point[2]] | changed_[p.point[3]];
   };
   hits_.erase(std::remove_if(hits_.begin(), hits_.end(), changed), hits_.end());
-  for (const CollisionPair& pair : pairs_.update(from_, to_))
-    if (changed(pair) && !CollisionPairs::separated(pair, to_) && pairs_.limit(pair, from_, to_, limitOf(pair)) < 1.0)
-      hits_.push_back(pair);
+  const std::vector<CollisionPair>& pairs = pairs_.update(from_, to_, *budget_);
+  budget_->spend(static_cast<long>(pairs.size() / 8) + to_.cols());
+  for (const CollisionPair& pair : pairs)
+    if (changed(pair) && !CollisionPairs::separated(pair, to_))
+    {
+      if (!budget_->spend(kLimitWork))
+        break;
+      if (pairs_.limit(pair, from_, to_, limitOf(pair)) < 1.0)
+        hits_.push_back(pair);
+    }
   std::sort(hits_.begin(), hits_.end(), [](const CollisionPair& a, const CollisionPair& b) {
     return std::tie(a.edges, a.first, a.second) < std::tie(b.edges, b.first, b.second);
   });
@@ -289,93 +241,6 @@ void SurfaceCollider::Impl::stop(const CollisionPair& pair)
   ++report_.impulses;
 }
 
-/// Of a point in the zones: those of a solid are one.
-int SurfaceCollider::Impl::node(int point) const
-{
-  return point < elements_.sheet_points ? point
-                                        : static_cast<int>(from_.cols()) + elements_.point_object[point] - elements_.sheet_count;
-}
-
-/// Returns whether zones grew. Collisions within a zone are none: see ImpactZones.
-bool SurfaceCollider::Impl::joinHits()
-{
-  bool grown = false;
-  const auto join = [&](int a, int b) {
-    grown = grown || !zones_.together(a, b);
-    zones_.join(a, b);
-  };
-  for (const CollisionPair& pair : hits_)
-    for (int i = 1; i < 4; ++i)
-      join(node(pair.point[0]), node(pair.point[i]));
-  for (const PlaneHit& hit : plane_hits_)
-    join(hit.point, static_cast<int>(from_.cols()) + elements_.planes[hit.plane] - elements_.sheet_count);
-  return grown;
-}
-
-/// Moves a zone with what is prescribed in it, if that moves as one.
-bool SurfaceCollider::Impl::followPrescribed(const ImpactZones::Zone& zone)
-{
-  const int points = static_cast<int>(from_.cols());
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  const int last = zone.prescribed[zone.prescribed_count - 1];
-  if (last >= points)
-  {
-    const Pose moved = step_->solids_end[last - points] * step_->solids[last - points].inverse();
-    motion = Eigen::Translation3d(moved.position) * moved.orientation;
-  }
-  else
-    motion.translation() = to_.col(last) - from_.col(last);
-  const auto agrees = [&](const Eigen::Vector3d& start, const Eigen::Vector3d& end) {
-    return (motion * start - end).norm() <= 1e-9 * elements_.objects[0].shell;
-  };
-  const auto pointsAgree = [&] {
-    return std::all_of(zone.prescribed, zone.prescribed + zone.prescribed_count,
-                       [&](int i) { return i >= points || agrees(from_.col(i), to_.col(i)); });
-  };
-  if (last < points && !pointsAgree() && zone.prescribed_count > 2)   // a grasp that turns
-  {
-    Eigen::Matrix3Xd start(3, zone.prescribed_count), end(3, zone.prescribed_count);
-    for (int k = 0; k < zone.prescribed_count; ++k)
-    {
-      start.col(k) = from_.col(zone.prescribed[k]);
-      end.col(k) = to_.col(zone.prescribed[k]);
-    }
-    motion.matrix() = Eigen::umeyama(start, end, false);
-  }
-  bool one = pointsAgree();
-  for (int k = 0; k < zone.prescribed_count; ++k)
-    if (const int solid = zone.prescribed[k] - points; solid >= 0)
-      for (const Eigen::Vector3d& p : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)})
-        one = one && agrees(step_->solids[solid] * p, step_->solids_end[solid] * p);
-  if (!one)
-    return fail("prescribed motions squeeze or tear a piece", zone.count > 0 ? zone.members[0] : zone.prescribed[0] < points ? zone.prescribed[0] : -1);
-  if (motion.linear().trace() <= 1.0)   // 1 + 2 cos(angle)
-    return fail("a solid or grasp turns by more than a quarter in a step");
-  for (int k = 0; k < zone.count; ++k)
-    to_.col(zone.members[k]) = motion * from_.col(zone.members[k]);
-  return true;
-}
-
-bool SurfaceCollider::Impl::moveZones()
-{
-  for (const ImpactZones::Zone& zone : zones_.zones(inverse_mass_))
-  {
-    if (zone.prescribed_count > 0)
-    {
-      if (!followPrescribed(zone))
-        return false;
-      continue;
-    }
-    const RigidFit fit = rigidFit(zone.members, zone.count, inverse_mass_, from_, displacement_);
-    if (fit.angular.norm() > 0.5 * M_PI)
-      return fail("a piece would turn by more than a quarter in a step", zone.members[0]);
-    const Eigen::Matrix3d turn = fromRotationVector(fit.angular).toRotationMatrix();
-    for (int k = 0; k < zone.count; ++k)
-      to_.col(zone.members[k]) = fit.center + fit.linear + turn * (from_.col(zone.members[k]) - fit.center);
-  }
-  return true;
-}
-
 /// Velocities at the end do not approach where pieces touch then, with friction.
 void SurfaceCollider::Impl::solveVelocities()
 {
@@ -394,7 +259,7 @@ void SurfaceCollider::Impl::solveVelocities()
     row.tolerance /= h;
   }
   rows_.restart(inverse_mass_, 1.0 / h, velocity_);
-  rows_.relax(inverse_mass_, kSweeps, velocity_);
+  rows_.relax(inverse_mass_, kSweeps, velocity_, *budget_);
   takeHeldImpulses();
   if (zones_.empty())
     return;
@@ -445,15 +310,15 @@ bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd
   hits_.clear();
   if (!fine)
     return false;
-  rows_.relax(inverse_mass_, kSweeps, to_);
+  rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
   detect();
   if (!(hits_.empty() && plane_hits_.empty()))
   {
     addHits();
-    rows_.relax(inverse_mass_, kSweeps, to_);
+    rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
   }
   x = to_.leftCols(elements_.sheet_points);
-  return true;
+  return !budget_->spent() || failSpent();
 }
 
 CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again)
@@ -461,22 +326,28 @@ CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen:
   if (!load(step, x, v, again) || !examineStart() || !examinePlanes())
     return report_;
   hits_.clear();
-  rows_.relax(inverse_mass_, kSweeps, to_);
+  rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
   detect();
-  while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds)
+  while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds && !budget_->spent())
   {
     addHits();
-    rows_.relax(inverse_mass_, kSweeps, to_);
+    rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
     detect();
   }
   displacement_ = to_ - from_;
-  while (joinHits())
+  while (!budget_->spent() && joinHits())
   {
     if (!moveZones())
       return report_;
     detect();
   }
-  solveVelocities();
+  if (!budget_->spent())
+    solveVelocities();
+  if (budget_->spent())   // with something left out
+  {
+    failSpent();
+    return report_;
+  }
   x = to_.leftCols(elements_.sheet_points);
   v = velocity_.leftCols(elements_.sheet_points);
   return report_;

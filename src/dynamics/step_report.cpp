@@ -21,6 +21,7 @@ void StepReport::merge(const StepReport& other)
   repulsions += other.repulsions;
   impulses += other.impulses;
   zones += other.zones;
+  work += other.work;
   mended_folds += other.mended_folds;
   residual = std::max(residual, other.residual);
   max_strain = std::max(max_strain, other.max_strain);
@@ -46,6 +47,7 @@ const char* toString(StepFailure failure)
     case StepFailure::linear_unconverged: return "linear_unconverged";
     case StepFailure::energy_grew: return "energy_grew";
     case StepFailure::overstretched: return "overstretched";
+    case StepFailure::work_exceeded: return "work_exceeded";
     case StepFailure::turned_too_far: return "turned_too_far";
   }
   return "unknown";

@@ -189,6 +189,7 @@ ConstrainedCholesky::Norms ConstrainedCholesky::solveBounded(const double* r, co
         for (int c = 0; c < 3; ++c)
           t_[4 * k + c] -= s_(k, i) / l * change[c];
     }
+    ++norms.sweeps;
     norms.converged = largest <= tolerance;
     if (norms.converged)
       break;

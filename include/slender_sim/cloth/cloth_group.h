@@ -96,6 +96,7 @@ private:
   std::string whereIs(const CollisionReport& failure) const;
   std::string blameAverages(const CollisionReport& failure) const;
   std::string solidName(int solid) const;
+  void blameWork(double h, StepReport& report) const;
 
   ClothGroupModel model_;
   ClothOptions options_;
@@ -106,6 +107,7 @@ private:
   std::vector<Order> order_;               ///< of what was done of each cloth in the present substep; lowered: to be done again
   std::vector<int> first_;                 ///< point of each cloth; one more at the end
   CollisionReport collisions_;
+  std::shared_ptr<WorkBudget> budget_;     ///< of a step, of all that is done in it but by cloths with error control
   bool hopeless_ = false;                  ///< the failure of the last substep is one of its start
 
   ClothGroupState work_, next_;

@@ -5,6 +5,7 @@
 #include "slender_sim/cloth/cloth_model.h"
 #include "slender_sim/dynamics/step_report.h"
 #include "slender_sim/dynamics/time_config.h"
+#include "slender_sim/dynamics/work_budget.h"
 
 namespace slender {
 
@@ -63,6 +64,8 @@ public:
   ~ClothStepper();
   ClothStepper(ClothStepper&&) noexcept;
 
+  /// Steps spend this from now on, which others start; null: one of their own.
+  void useBudget(std::shared_ptr<WorkBudget> budget);
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
   /// The same by one step of implicit Euler, for tr_bdf2 and controlled steps; it is cut only where it cannot be solved.

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/dynamics/work_budget.h"
 
 namespace slender {
 
@@ -37,12 +38,14 @@ struct CollisionStep
   const Eigen::VectorXd& inverse_mass;          ///< [1/kg]; zero: the point's motion is prescribed
   const std::vector<Pose>&solids, &solids_end;
   double h;                                     ///< [s]
+  WorkBudget* budget = nullptr;                 ///< null: without bound
 };
 
 struct CollisionReport
 {
   bool ok = true;
   std::string reason;     ///< of a failure
+  bool spent = false;     ///< the failure: the budget is spent
   bool at_start = false;  ///< the failure is there before anything moves: no shorter step helps
   int points[2] = {-1, -1};   ///< that a failure concerns, if any: those of the sheets, then corners of the solids
   int repulsions = 0;     ///< pairs nearer than the thickness, or about to be
@@ -69,7 +72,7 @@ public:
   SurfaceCollider(SurfaceCollider&&) noexcept;
 
   /// Corrects the end of a step x [m] and the velocities v [m/s] there (3 x points). A failure changes nothing: surfaces meet at the start,
-  /// motions that are prescribed squeeze a piece, a piece would have to turn by more than a quarter; a shorter step may help.
+  /// motions that are prescribed squeeze a piece, a piece would have to turn by more than a quarter, the step's budget is spent; a shorter step may help.
   /// `again`: after approach() for the same step, from the same start.
   CollisionReport resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again = false);
 

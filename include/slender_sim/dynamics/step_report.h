@@ -18,6 +18,7 @@ enum class StepFailure
   energy_grew,          ///< energy out of nothing: implicit_midpoint, generalized_alpha; cloth with one Newton step
   overstretched,        ///< projection: the edges cannot all keep their lengths
   turned_too_far,       ///< isotropic formulation: the twist changed by about half a turn in one step, and could not be counted
+  work_exceeded,        ///< cloth: more work than a step is given; the guide, or what holds it, moves too far at once or presses it too hard
 };
 
 /// What one call of step() did. Sums and maxima run over all its substeps.
@@ -43,6 +44,7 @@ struct StepReport
   double tracking_error = 0.0;    ///< greatest distance of an average of a tracked cloth from that of its guide, over the guide's size [-]; of those that are met
   int forces_at_bound = 0;        ///< averages of tracked cloths whose forces are at their bounds, and which are therefore not met
   double error_estimate = 0.0;    ///< adaptive steps only: estimated local error [m]
+  long work = 0;                  ///< cloth: what the step did, in counts of a WorkBudget
 
   /// Takes the other report into this one (sums, maxima, first failure wins).
   void merge(const StepReport& other);

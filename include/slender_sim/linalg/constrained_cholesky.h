@@ -30,7 +30,8 @@ public:
   {
     double load = 0.0;   ///< sqrt(r . P^-1 r + g . S^-1 g): of r without constraints, and of the smallest z that has C z = g
     double step = 0.0;   ///< sqrt(z . P z)
-    bool converged = true;   ///< solveBounded()
+    bool converged = true;   ///< solveBounded(), and
+    int sweeps = 0;          ///< over all constraints
   };
   /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero, and no norms. r may be z. mu: 4 doubles per constraint. Fixed points: r
   /// must be zero there, and z is.
