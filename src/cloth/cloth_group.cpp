@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kMeetTolerance = 1e-12;   // of the cloth's size
 constexpr int kLoadPasses = 2;
-constexpr long kParts = 4;   // of the budget, to one substep: what takes more is cut
 constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
 constexpr double kBalanced = 1e-6;   // of the work: what averages leave of pushes that they balance, rounding errors
 constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
@@ -116,23 +115,21 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   double done = 0.0, share = 1.0;
   hopeless_ = false;
   const double shortest = std::ldexp(1.0 - 1e-9, -options_.newton.max_cuts);
-  const long most = WorkBudget::ofStep(first_.back());
-  budget_->start(most);
+  budget_->start(WorkBudget::ofStep(first_.back()));
   while (done < 1.0)
   {
     const double end = done + share > 1.0 - 1e-9 ? 1.0 : done + share;
-    budget_->startPart(most / kParts);
     const StepReport sub = substep(inputs, done, end, duration);
     if (!sub.ok)
     {
       report.iterations += sub.iterations;
-      if (sub.failure == StepFailure::input_not_finite || hopeless_ || budget_->exhausted() || 0.5 * share < shortest)
+      if (sub.failure == StepFailure::input_not_finite || hopeless_ || budget_->spent() || 0.5 * share < shortest)
       {
         report.ok = false;
         report.failure = sub.failure;
         report.message = sub.message;
         report.work = budget_->done();
-        if (!hopeless_ && sub.failure != StepFailure::input_not_finite && (budget_->exhausted() || sub.failure == StepFailure::work_exceeded))
+        if (!hopeless_ && sub.failure != StepFailure::input_not_finite && budget_->spent())
           blameWork((end - done) * duration, report);
         blameExplicit(duration, report);
         return report;

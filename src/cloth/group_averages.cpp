@@ -39,7 +39,7 @@ void ClothGroup::blameWork(double h, StepReport& report) const
   const std::string last = report.failure == StepFailure::work_exceeded ? "" : "; at last " + report.message;
   report.failure = StepFailure::work_exceeded;
   report.message = "cloth '" + (guided ? *tracked : model_.cloths[0])->name + (model_.cloths.size() > 1 ? "' and others" : "'") +
-                   ": contact needs more work than a step is given, even at " + milliseconds(h) + ": use a shorter step, or " +
+                   ": contact needs more work than a step is given, at " + milliseconds(h) + ": use a shorter step, or " +
                    (guided ? "a guide that moves by less at once, does not crumple, and is clear of obstacles" :
                              "move what holds it and obstacles by less at once, and leave it more room") +
                    last;

@@ -96,23 +96,18 @@ TEST_F(WildGuides, AreRefusedWithinTheBudgetAndTheRunGoesOn)
   EXPECT_TRUE(calm.state().cloths[0].cloth.x == cloth.x && calm.state().cloths[0].cloth.v == cloth.v);
 }
 
-TEST(WorkBudget, CountsWholeAndParts)
+TEST(WorkBudget, IsSpentByCounts)
 {
   WorkBudget budget;
   EXPECT_TRUE(budget.spend(1000000000000L));   // without bound until it is started
   budget.start(100);
   EXPECT_EQ(budget.done(), 0);
-  budget.startPart(30);
   EXPECT_TRUE(budget.spend(30));
-  EXPECT_EQ(budget.left(), 0);
+  EXPECT_EQ(budget.left(), 70);
+  EXPECT_TRUE(budget.spend(70));
   EXPECT_FALSE(budget.spend(1));
-  EXPECT_FALSE(budget.exhausted());
-  budget.startPart(1000);
-  EXPECT_EQ(budget.left(), 69);
-  EXPECT_FALSE(budget.spend(70));
-  EXPECT_TRUE(budget.exhausted());
-  budget.startPart(10);
-  EXPECT_TRUE(budget.spent());   // of nothing there is no part
+  EXPECT_TRUE(budget.spent());
+  EXPECT_EQ(budget.left(), 0);
   EXPECT_EQ(WorkBudget::ofStep(10), WorkBudget::ofStep(1500));
   EXPECT_EQ(WorkBudget::ofStep(3000), 2 * WorkBudget::ofStep(1500));
 }

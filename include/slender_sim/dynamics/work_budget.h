@@ -14,33 +14,29 @@ public:
   void start(long most)
   {
     done_ = 0;
-    most_ = limit_ = most;
+    most_ = most;
   }
-  /// From here on at most so much, within the whole.
-  void startPart(long most) { limit_ = std::min(most_, done_ + most); }
 
-  /// Returns false once the part is spent.
+  /// Returns false once all is spent.
   bool spend(long counts)
   {
     done_ += counts;
     return !spent();
   }
-  bool spent() const { return done_ > limit_; }
-  /// The whole, not only a part.
-  bool exhausted() const { return done_ > most_; }
+  bool spent() const { return done_ > most_; }
 
   /// Of a step of cloths of that many vertices in all; those of 1,500 vertices and less have the same.
   static long ofStep(long vertices) { return kPerVertex * std::max(vertices, 1500L); }
 
-  long left() const { return std::max(0L, limit_ - done_); }
+  long left() const { return std::max(0L, most_ - done_); }
   long done() const { return done_; }
 
   static constexpr long kUnbounded = std::numeric_limits<long>::max() / 4;
 
 private:
-  static constexpr long kPerVertex = 10000;
+  static constexpr long kPerVertex = 20000;
 
-  long done_ = 0, most_ = kUnbounded, limit_ = kUnbounded;
+  long done_ = 0, most_ = kUnbounded;
 };
 
 }  // namespace slender
