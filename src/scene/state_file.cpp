@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -267,8 +268,28 @@ void writeDurably(const std::string& wanted, const std::string& bytes)
   }
 }
 
-/// Empty, or what does not fit between a loaded rod and its model.
-std::string misfit(const RodState& rod, const RodModel& model, std::size_t grasps)
+/// Whether all numbers of a state are; visited as archives are.
+class FiniteCheck
+{
+public:
+  template <class T>
+  void operator()(const T& value)
+  {
+    if constexpr (std::is_floating_point_v<T>)
+      finite_ = finite_ && std::isfinite(value);
+    else if constexpr (!std::is_arithmetic_v<T>)
+      finite_ = finite_ && value.allFinite();
+  }
+  template <class T>
+  void list(const std::vector<T>&) {}
+  bool finite() const { return finite_; }
+
+private:
+  bool finite_ = true;
+};
+
+/// Empty, or what does not fit between a loaded rod, its model and the rod as it is now.
+std::string misfit(const RodState& rod, const RodModel& model, const RodState& now)
 {
   const Eigen::Index n = model.nodes();
   if (rod.x.cols() != n || rod.v.cols() != n || rod.twist.size() != n || rod.d1.cols() != model.edges())
@@ -282,16 +303,21 @@ std::string misfit(const RodState& rod, const RodModel& model, std::size_t grasp
       return "rod " + model.name + " has integrator memory of another size";
     }
   }
-  if (rod.grasps.size() != grasps)
+  if (rod.grasps.size() != now.grasps.size())
   {
     return "rod " + model.name + " has another number of grasps";
   }
-  for (const GraspState& grasp : rod.grasps)
+  for (std::size_t g = 0; g < rod.grasps.size(); ++g)
   {
-    const bool fits = grasp.first_node >= 0 && grasp.first_node <= grasp.last_node && grasp.last_node < n;
-    if (!fits)
+    const GraspState& grasp = rod.grasps[g];
+    if (grasp.first_node < 0 || grasp.first_node > grasp.last_node || grasp.last_node >= n)
     {
       return "a grasp of rod " + model.name + " holds nodes that do not exist";
+    }
+    const auto edges = static_cast<std::size_t>(grasp.last_node - grasp.first_node);
+    if (grasp.nodes_G.size() != edges + 1 || grasp.directors_G.size() != edges || (edges > 0 && !grasp.holds_frame) || grasp.body != now.grasps[g].body)
+    {
+      return "a grasp of rod " + model.name + " does not fit together";
     }
   }
   return "";
@@ -409,7 +435,9 @@ void Simulation::load(const std::string& path)
   {
     throw std::runtime_error(path + ": " + error.what());
   }
-  std::string problem = reader.left() != 0 ? "has bytes after its end" : "";
+  FiniteCheck numbers;
+  visitScene(numbers, loaded);
+  std::string problem = reader.left() != 0 ? "has bytes after its end" : numbers.finite() ? "" : "holds numbers that are not finite";
   if (loaded.rods.size() != models_.size() || loaded.threads.size() != thread_models_.size() || loaded.cloths.size() != cloth_models_.size() ||
       loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
       loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||
@@ -419,7 +447,7 @@ void Simulation::load(const std::string& path)
   }
   for (std::size_t r = 0; problem.empty() && r < models_.size(); ++r)
   {
-    problem = misfit(loaded.rods[r], *models_[r], state_.rods[r].grasps.size());
+    problem = misfit(loaded.rods[r], *models_[r], state_.rods[r]);
   }
   for (std::size_t k = 0; problem.empty() && k < thread_models_.size(); ++k)
   {
