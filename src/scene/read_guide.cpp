@@ -320,7 +320,10 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   {
     readBodyPoses(bodies, context, *carried);
   }
-  motion = std::move(*carried);
+  if (topic.present() || carried->poses.size() == carried->bodies.size())   // else reported
+  {
+    motion = std::move(*carried);
+  }
 }
 
 /// A cloth of the scene as the guide.

@@ -61,6 +61,19 @@ TEST_F(FileLimits, plyElementsWithoutPropertiesTakeNoTime)
   EXPECT_NE(refusalOfPly(text + "end_header\n").find("has no faces"), std::string::npos);
 }
 
+TEST_F(FileLimits, objFacesAndGroupsMayBeMany)   // compared each with each they would take half an hour
+{
+  constexpr int n = 1'000'000;
+  std::string text, face = "f";
+  for (int k = 0; k < n; ++k)
+  {
+    text += "v 0 0 0\ng g" + std::to_string(k) + "\n";
+    face += " " + std::to_string(k + 1);
+  }
+  std::ofstream(path_) << text << face << "\n";
+  EXPECT_EQ(readObj(path_).triangles.cols(), n - 2);
+}
+
 TEST_F(FileLimits, scenesHaveAsManyNodesAsFitIntoMemory)
 {
   for (const char* scene : {"generate: [{hair: {strands: 100000, edges: 10000}}]\n",
@@ -99,6 +112,16 @@ TEST_F(FileLimits, sweepPlansStopAtTooManyRuns)
   std::ofstream(path_) << "name: plan\nscene: scene.yaml\nmeasures: [rest]\naxes:\n" << axes;
   const std::string text = refusal([&] { readSweepPlan(path_); });
   EXPECT_NE(text.find("at most 1000000"), std::string::npos) << text.substr(0, 300);
+}
+
+TEST_F(FileLimits, guidesWhoseBodiesAreMissingAreNotEvaluated)
+{
+  std::ofstream(path_) << "0,here,0,0,0,0,0,0,1\n";
+  const std::string text = refusal([&] {
+    parseScene("tracked: [{guide: {grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {bodies: " + path_ +
+               ", groups: {here: [0..2], there: [3..8]}}}, test_functions: {basis: subdivision}}]\n");
+  });
+  EXPECT_NE(text.find("has no body there"), std::string::npos) << text;   // and the reader came to its end
 }
 
 TEST_F(FileLimits, statesOfOneSceneFitItWhateverTheirChecksumSays)
