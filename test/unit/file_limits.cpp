@@ -83,7 +83,7 @@ TEST_F(FileLimits, scenesHaveAsManyNodesAsFitIntoMemory)
                             "       {name: f, centerline: *c}]\n",
                             "generate: [{hair: {strands: 1000, edges: 9990}}]\n"
                             "cloths: [{grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: [100, 100]}}]\n"})
-    EXPECT_NE(refusal([&] { parseScene(scene); }).find("all its rods and cloths together may have 1e+07"), std::string::npos)
+    EXPECT_NE(refusal([&] { parseScene(scene); }).find("all its rods and cloths together may have 10000000"), std::string::npos)
       << scene << refusal([&] { parseScene(scene); });
 }
 
@@ -118,10 +118,10 @@ TEST_F(FileLimits, guidesWhoseBodiesAreMissingAreNotEvaluated)
 {
   std::ofstream(path_) << "0,here,0,0,0,0,0,0,1\n";
   const std::string text = refusal([&] {
-    parseScene("tracked: [{guide: {grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {bodies: " + path_ +
+    parseScene("tracked: [{guide: {grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2, pattern: one_diagonal}, motion: {bodies: " + path_ +
                ", groups: {here: [0..2], there: [3..8]}}}, test_functions: {basis: subdivision}}]\n");
   });
-  EXPECT_NE(text.find("has no body there"), std::string::npos) << text;   // and the reader came to its end
+  EXPECT_NE(text.find("has no body there"), std::string::npos) << text;   // and nothing is read past the poses that there are, which AddressSanitizer sees
 }
 
 TEST_F(FileLimits, statesOfOneSceneFitItWhateverTheirChecksumSays)
