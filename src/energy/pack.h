@@ -9,7 +9,8 @@ namespace SLENDER_ISA {
 namespace {
 
 using Pack = double __attribute__((vector_size(64)));
-using PackU = double __attribute__((vector_size(64), aligned(8), may_alias));
+using PackU __attribute__((aligned(8), may_alias)) = Pack;
+static_assert(alignof(PackU) == 8, "loads and stores may be anywhere");   // Clang overlooks aligned() beside vector_size()
 constexpr int W = 8;
 constexpr double kTwoPi = 6.283185307179586476925286766559;
 

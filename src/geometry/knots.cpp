@@ -2,6 +2,7 @@
 #include <numeric>
 #include <sstream>
 #include <stdexcept>
+#include <tuple>
 #include <string>
 #include <vector>
 
@@ -56,7 +57,8 @@ Eigen::Matrix3Xd trefoilCurve(const Vector3d& center, const Vector3d& axis, cons
   check(radius > 0, "radius", radius, "> 0 m");
   check(separation > 0 && separation <= 0.25 * radius, "separation", separation,
         "in (0, " + metres(0.25 * radius) + "], a quarter of the radius");
-  const auto [e1, e2] = plane(axis, "axis", up, "up");
+  Vector3d e1, e2;   // no structured binding: C++17 lets no lambda have those
+  std::tie(e1, e2) = plane(axis, "axis", up, "up");
   const Vector3d e3 = (left_handed ? -1.0 : 1.0) * e1.cross(e2);
 
   // The loop is a circle about the origin; the strands are wound about its upper part, -half to half, and tails leave it tangentially and
@@ -120,7 +122,8 @@ Eigen::Matrix3Xd torusKnotCurve(const Vector3d& center, const Vector3d& axis, do
         "at least 1 and without a common divisor with around = " + std::to_string(around));
   Eigen::Index least = 0;
   axis.cwiseAbs().minCoeff(&least);
-  const auto [e3, e1] = plane(axis, "axis", Vector3d::Unit(least), "axis");
+  Vector3d e3, e1;
+  std::tie(e3, e1) = plane(axis, "axis", Vector3d::Unit(least), "axis");
   const Vector3d e2 = e3.cross(e1);
   Eigen::Matrix3Xd nodes(3, edges + 1);
   for (int i = 0; i <= edges; ++i)
@@ -137,7 +140,8 @@ Eigen::Matrix3Xd veeCurve(const Vector3d& tip, const Vector3d& direction, const 
   check(edges >= 2 && edges % 2 == 0, "edges", edges, "even");
   check(arm > 0, "arm", arm, "> 0 m");
   check(angle > 0 && angle < M_PI, "angle", angle, "in (0, pi) rad");
-  const auto [e1, e3] = plane(direction, "direction", normal, "normal");
+  Vector3d e1, e3;
+  std::tie(e1, e3) = plane(direction, "direction", normal, "normal");
   const Vector3d across = e3.cross(e1);
   Eigen::Matrix3Xd nodes(3, edges + 1);
   const int half = edges / 2;

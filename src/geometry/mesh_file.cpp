@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -110,13 +111,12 @@ private:
 
   std::size_t group(const std::string& name)
   {
-    const auto known = std::find_if(groups_.begin(), groups_.end(), [&](const VertexGroup& g) { return g.name == name; });
-    if (known == groups_.end())
+    const auto [known, is_new] = group_places_.emplace(name, groups_.size());
+    if (is_new)
     {
       groups_.push_back({name, {}});
-      return groups_.size() - 1;
     }
-    return static_cast<std::size_t>(known - groups_.begin());
+    return known->second;
   }
 
   double coordinate(const std::string& word) const
@@ -138,15 +138,14 @@ private:
     std::vector<int> polygon;
     for (std::string word = words.next(); !word.empty(); word = words.next())
     {
-      const int vertex = index(word.substr(0, word.find('/')), word);
-      for (int other : polygon)
-      {
-        if (other == vertex)
-        {
-          fail(line_, "face with vertex " + std::to_string(vertex + 1) + " twice");
-        }
-      }
-      polygon.push_back(vertex);
+      polygon.push_back(index(word.substr(0, word.find('/')), word));
+    }
+    sorted_ = polygon;
+    std::sort(sorted_.begin(), sorted_.end());
+    const auto twice = std::adjacent_find(sorted_.begin(), sorted_.end());
+    if (twice != sorted_.end())
+    {
+      fail(line_, "face with vertex " + std::to_string(*twice + 1) + " twice");
     }
     if (polygon.size() < 3)
     {
@@ -207,7 +206,9 @@ private:
   int line_ = 0;
   std::vector<double> coordinates_;
   std::vector<Face> triangles_;
+  std::vector<int> sorted_;
   std::vector<VertexGroup> groups_;
+  std::unordered_map<std::string, std::size_t> group_places_;
   std::vector<std::size_t> current_;   ///< groups of the faces to come
 };
 

@@ -57,7 +57,7 @@ public:
     for (const PlyElement& element : elements_)
     {
       checkElement(element);
-      for (long i = 0; i < element.count; ++i)
+      for (long i = 0; i < element.count && !element.properties.empty(); ++i)   // else nothing of it is in the file, however many there are
         readItem(element, i);
     }
     return finish();
@@ -203,7 +203,7 @@ private:
         continue;
       }
       const double count = number(*property.count_type);
-      if (!(count >= 0) || count > 1e9)
+      if (!(count >= 0) || count > 1e9 || count != std::floor(count))
         fail(element.name + " " + std::to_string(i) + " (from 0): list of bad length");
       const bool wanted = face && (property.name == "vertex_indices" || property.name == "vertex_index");
       polygon_.clear();
@@ -225,12 +225,12 @@ private:
     const std::string name = "face " + std::to_string(i) + " (from 0)";
     if (polygon_.size() < 3)
       fail(name + " with " + std::to_string(polygon_.size()) + " vertices; must have at least 3");
+    if (!std::all_of(polygon_.begin(), polygon_.end(), [](double v) { return v >= 0 && v < 1e9 && v == std::floor(v); }))   // NaN has no order
+      fail(name + " names a vertex that the file does not have");
     std::vector<double> sorted = polygon_;
     std::sort(sorted.begin(), sorted.end());
     if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
       fail(name + " has a vertex twice");
-    if (!(sorted.front() >= 0) || !(sorted.back() < 1e9))
-      fail(name + " names a vertex that the file does not have");
     for (std::size_t k = 2; k < polygon_.size(); ++k)
       for (const double v : {polygon_[0], polygon_[k - 1], polygon_[k]})
         corners_.push_back(static_cast<int>(v));

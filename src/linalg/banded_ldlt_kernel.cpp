@@ -9,8 +9,9 @@ namespace {
 
 using V4 = double __attribute__((vector_size(32), aligned(32), may_alias));
 using V8 = double __attribute__((vector_size(64), aligned(64), may_alias));
-using V4u = double __attribute__((vector_size(32), aligned(8), may_alias));
-using V8u = double __attribute__((vector_size(64), aligned(8), may_alias));   // rows of right-hand sides, any alignment
+using V4u __attribute__((aligned(8), may_alias)) = V4;
+using V8u __attribute__((aligned(8), may_alias)) = V8;   // rows of right-hand sides, any alignment
+static_assert(alignof(V4u) == 8 && alignof(V8u) == 8, "loads and stores may be anywhere");   // Clang overlooks aligned() beside vector_size()
 
 inline __attribute__((always_inline)) V4 low(V8 v) { return V4{v[0], v[1], v[2], v[3]}; }
 inline __attribute__((always_inline)) V4 high(V8 v) { return V4{v[4], v[5], v[6], v[7]}; }

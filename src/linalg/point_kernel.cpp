@@ -6,7 +6,8 @@ namespace SLENDER_ISA {
 namespace {
 
 using Quad = double __attribute__((vector_size(32)));
-using QuadU = double __attribute__((vector_size(32), aligned(8), may_alias));
+using QuadU __attribute__((aligned(8), may_alias)) = Quad;
+static_assert(alignof(QuadU) == 8, "loads and stores may be anywhere");   // Clang overlooks aligned() beside vector_size()
 
 inline __attribute__((always_inline)) Quad load(const double* p) { return *reinterpret_cast<const Quad*>(p); }
 inline __attribute__((always_inline)) Quad loadAnywhere(const double* p) { return *reinterpret_cast<const QuadU*>(p); }

@@ -56,7 +56,17 @@ public:
   template <class T>
   void operator()(T& value)
   {
-    if constexpr (std::is_arithmetic_v<T>)
+    if constexpr (std::is_same_v<T, bool>)
+    {
+      unsigned char byte = 0;   // a bool of another value than 0 and 1 would be undefined
+      take(&byte, 1);
+      if (byte > 1)
+      {
+        throw std::runtime_error("holds neither yes nor no where it must");
+      }
+      value = byte == 1;
+    }
+    else if constexpr (std::is_arithmetic_v<T>)
     {
       take(&value, sizeof(T));
     }

@@ -48,7 +48,7 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
     at.problem("the wire is too thick: its radius " + shortNumber(thickness) + " m must be less than a fifth of the links' radius " +
                shortNumber(radius) + " m");
   }
-  if (at.problems().size() != before)
+  if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * links))
   {
     return;
   }

@@ -54,7 +54,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   }
   readTraits(map, rod);
   map.finish();
-  if (at.problems().size() != before)
+  if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * strands))
   {
     return;
   }

@@ -108,13 +108,21 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
     return;
   }
 
-  std::vector<Branch> branches = grow(shape, dice);
-  const int least = least_nodes * static_cast<int>(branches.size());
-  const YamlCursor& place = at_vertices.present() ? at_vertices : at;
-  if (shape.vertices < least)
+  long count = 0, of_level = 1;
+  for (int level = 0; level < shape.levels; ++level, of_level *= shape.children)
   {
-    return place.problem("is too few for " + std::to_string(branches.size()) + " branches; must be at least " + std::to_string(least));
+    count += of_level;
   }
+  const YamlCursor& place = at_vertices.present() ? at_vertices : at;
+  if (shape.vertices < least_nodes * count)   // before they grow: 6 levels of 30 children are 750 million
+  {
+    return place.problem("is too few for " + std::to_string(count) + " branches; must be at least " + std::to_string(least_nodes * count));
+  }
+  if (!context.claim(place, shape.vertices))
+  {
+    return;
+  }
+  std::vector<Branch> branches = grow(shape, dice);
   shareNodes(branches, shape.vertices);
 
   branches[0].root = root;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <unordered_map>
 
+#include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 #include "yaml_cursor.h"
 #include "yaml_number.h"
@@ -58,6 +59,14 @@ double number(const std::string& cell, const char* column)
 template <class Row>
 void readTable(const std::string& path, const std::vector<std::string>& columns, Row row)
 {
+  try
+  {
+    requireRegularFile(path);
+  }
+  catch (const std::runtime_error& error)
+  {
+    throw SceneError(error.what());
+  }
   std::ifstream file(path);
   if (!file)
   {

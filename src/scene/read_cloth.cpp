@@ -273,7 +273,7 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
   }
   else if (grid.present())
   {
-    cloth.grid = readClothGrid(grid, cloth.mesh);
+    cloth.grid = readClothGrid(grid, context, cloth.mesh);
     cloth.warp = cloth.grid ? Eigen::Vector3d(cloth.grid->sides[0].normalized()) : cloth.warp;
   }
   else if (!readClothMesh(mesh, context, cloth.mesh))

@@ -6,6 +6,7 @@
 #include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/geometry/mesh_shapes.h"
+#include "slender_sim/scene/file_paths.h"
 
 namespace slender {
 
@@ -41,6 +42,7 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
   read.path = *text;
   try
   {
+    requireRegularFile(context.resolve(read.path));
     read.mesh = slender::readMesh(context.resolve(read.path));
   }
   catch (const std::exception& error)
@@ -57,7 +59,7 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
   return read;
 }
 
-std::optional<ClothGrid> readClothGrid(const YamlCursor& at, TriangleMesh& mesh)
+std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh)
 {
   ClothGrid grid;
   YamlMap map(at);
@@ -118,7 +120,7 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, TriangleMesh& mesh)
     at_seed.problem("is for pattern: irregular");
   }
   map.finish();
-  if (!good)
+  if (!good || !context.claim(at_cells, (columns + 1.0) * (rows > 0 ? rows + 1.0 : height / width * columns + 1)))
   {
     return std::nullopt;
   }

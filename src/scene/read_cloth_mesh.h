@@ -18,7 +18,7 @@ struct MeshFile
 };
 /// Nothing when there is none to be used; reported.
 std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& context);
-std::optional<ClothGrid> readClothGrid(const YamlCursor& at, TriangleMesh& mesh);
+std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh);
 /// {file, scale, pose}. False when there is none to be used; reported, with the mesh's defects.
 bool readClothMesh(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh);
 /// Material, bending, damping, shapes, grasps ...: all of a cloth but its name and mesh. `start` stays when there is no such key.

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <type_traits>
+
 #include "read_parts.h"
 
 #include "slender_sim/scene/pose_file.h"
@@ -153,6 +156,20 @@ FileCurve readFile(YamlMap& map, const ReadContext& context)
   return curve;
 }
 
+/// That a rod along it gets at least.
+template <class CurveKind>
+double edgesOf(const CurveKind& curve)
+{
+  if constexpr (std::is_same_v<CurveKind, PolylineCurve> || std::is_same_v<CurveKind, FileCurve>)
+  {
+    return std::max(curve.edges.value_or(0), static_cast<int>(curve.points.size()));
+  }
+  else
+  {
+    return curve.edges;
+  }
+}
+
 }  // namespace
 
 std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
@@ -171,8 +188,10 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
     {
       ++given;
       YamlMap map(value);
-      curve = reader(map);
+      const auto read_curve = reader(map);
       map.finish();
+      context.claim(value, edgesOf(read_curve));
+      curve = read_curve;
     }
   };
   read("straight", readStraight);

@@ -84,7 +84,13 @@ std::vector<int> readIndexList(const YamlCursor& at, int count)
       item.problem("must be FIRST..LAST with whole numbers in [" + std::to_string(-limit) + ", " + std::to_string(limit - 1) + "]");
       return {};
     }
-    for (int index = resolve(static_cast<int>(*first)); index <= resolve(static_cast<int>(*last)); ++index)
+    const int begin = resolve(static_cast<int>(*first)), end = resolve(static_cast<int>(*last)) + 1;
+    if (indices.size() + static_cast<std::size_t>(end - begin) > static_cast<std::size_t>(limit))   // else a short list of ranges could fill the memory
+    {
+      item.problem("makes a list longer than the " + std::to_string(limit) + " places that there are; give each once");
+      return {};
+    }
+    for (int index = begin; index < end; ++index)
     {
       indices.push_back(index);
     }

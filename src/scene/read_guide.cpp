@@ -6,6 +6,7 @@
 
 #include "read_tracking.h"
 #include "slender_sim/geometry/mesh_defects.h"
+#include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/pose_file.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorded_guide.h"
@@ -104,6 +105,7 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
   {
     try
     {
+      requireRegularFile(files[k]);
       TriangleMesh frame = readMesh(files[k]);
       if (frame.vertices.cols() != mesh.vertices.cols() || frame.triangles != mesh.triangles)
       {
@@ -318,7 +320,10 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   {
     readBodyPoses(bodies, context, *carried);
   }
-  motion = std::move(*carried);
+  if (topic.present() || carried->poses.size() == carried->bodies.size())   // else reported
+  {
+    motion = std::move(*carried);
+  }
 }
 
 /// A cloth of the scene as the guide.
@@ -410,7 +415,7 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
   }
   else if (grid.present())
   {
-    source.grid = readClothGrid(grid, source.config.mesh);
+    source.grid = readClothGrid(grid, context, source.config.mesh);
   }
   else if ((source.file = readMeshFile(mesh, context)))
   {

@@ -9,16 +9,25 @@
 /// The parts of a scene's reader, one file each. All report into the cursor's Problems and return what could be read.
 namespace slender {
 
+#ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION   // scenes that are read in a millisecond
+constexpr int max_edges = 1000;
+constexpr double max_scene_nodes = 1000;
+#else
+constexpr int max_edges = 1'000'000;
+constexpr double max_scene_nodes = 1e7;
+#endif
+
 /// What the parts need to know of the scene around them.
 struct ReadContext
 {
   std::string directory;                   ///< files are relative to it
   Eigen::Vector3d gravity{0, 0, -9.81};
   double step = 0.01;                      ///< time.step [s]
+  mutable double nodes = 0;                ///< of rods and cloths so far
   std::string resolve(const std::string& path) const { return path[0] == '/' ? path : directory + "/" + path; }
+  /// Counts nodes that are about to be made; false, and reported, when the scene gets too many: a few words can ask for more than fits into memory.
+  bool claim(const YamlCursor& at, double more) const;
 };
-
-constexpr int max_edges = 1'000'000;
 
 /// Whole numbers of [0, count), sorted; an entry "3..7" stands for all between, negative ones count from the end. `count` 0: not known,
 /// not checked. Empty when reported.

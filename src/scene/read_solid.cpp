@@ -6,6 +6,7 @@
 #include "read_parts.h"
 #include "slender_sim/contact/solids.h"
 #include "slender_sim/geometry/mesh_file.h"
+#include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/pose_file.h"
 
 /// Poses, shapes, obstacles, and what touches.
@@ -76,6 +77,7 @@ std::optional<Shape> readMesh(YamlMap& map, const ReadContext& context)
   }
   try
   {
+    requireRegularFile(context.resolve(*path));
     auto mesh = std::make_shared<TriangleMesh>(readObj(context.resolve(*path)));
     mesh->vertices *= scale;
     return Shape(std::shared_ptr<const TriangleMesh>(std::move(mesh)));

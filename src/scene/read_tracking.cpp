@@ -66,6 +66,10 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
         map.get("subdivide").problem("makes more than " + std::to_string(static_cast<int>(max_fine_vertices)) + " vertices");
         return tracked;
       }
+      if (!context.claim(map.get("subdivide"), 0.5 * std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols())))
+      {
+        return tracked;
+      }
     }
   }
   if (tracked.kind != TrackedMesh::separate)

@@ -340,6 +340,19 @@ std::string fileText(const std::string& path)
   return text.str();
 }
 
+bool ReadContext::claim(const YamlCursor& at, double more) const
+{
+  nodes += more;
+  if (nodes <= max_scene_nodes)
+  {
+    return true;
+  }
+  at.problem("makes " + shortNumber(more) + " nodes, with which the scene has " + shortNumber(nodes) + "; all its rods and cloths together may have " +
+             shortNumber(max_scene_nodes));
+  nodes -= more;   // what comes after may still fit
+  return false;
+}
+
 TimeConfig readTime(const YamlCursor& at)
 {
   TimeConfig time;

@@ -1,6 +1,9 @@
 #include "slender_sim/scene/state_bytes.h"
 
+#include <cmath>
 #include <stdexcept>
+#include <type_traits>
+#include <vector>
 
 #include "byte_archive.h"
 
@@ -221,6 +224,26 @@ void visitScene(Archive& archive, State& scene)
   }
 }
 
+/// Whether all numbers of a state are; visited as archives are.
+class FiniteCheck
+{
+public:
+  template <class T>
+  void operator()(const T& value)
+  {
+    if constexpr (std::is_floating_point_v<T>)
+      finite_ = finite_ && std::isfinite(value);
+    else if constexpr (!std::is_arithmetic_v<T>)
+      finite_ = finite_ && value.allFinite();
+  }
+  template <class T>
+  void list(const std::vector<T>&) {}
+  bool finite() const { return finite_; }
+
+private:
+  bool finite_ = true;
+};
+
 }  // namespace
 
 std::string stateBytes(const SceneState& state)
@@ -259,6 +282,12 @@ SceneState stateOfBytes(const char* bytes, std::size_t size)
   if (reader.left() != 0)
   {
     throw std::runtime_error("has bytes after its end");
+  }
+  FiniteCheck numbers;
+  visitScene(numbers, state);
+  if (!numbers.finite())
+  {
+    throw std::runtime_error("holds numbers that are not finite");
   }
   return state;
 }

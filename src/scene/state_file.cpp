@@ -63,8 +63,8 @@ void writeDurably(const std::string& wanted, const std::string& bytes)
   }
 }
 
-/// Empty, or what does not fit between a loaded rod and its model.
-std::string misfit(const RodState& rod, const RodModel& model, std::size_t grasps)
+/// Empty, or what does not fit between a loaded rod, its model and the rod as it is now.
+std::string misfit(const RodState& rod, const RodModel& model, const RodState& now)
 {
   const Eigen::Index n = model.nodes();
   if (rod.x.cols() != n || rod.v.cols() != n || rod.twist.size() != n || rod.d1.cols() != model.edges())
@@ -78,16 +78,21 @@ std::string misfit(const RodState& rod, const RodModel& model, std::size_t grasp
       return "rod " + model.name + " has integrator memory of another size";
     }
   }
-  if (rod.grasps.size() != grasps)
+  if (rod.grasps.size() != now.grasps.size())
   {
     return "rod " + model.name + " has another number of grasps";
   }
-  for (const GraspState& grasp : rod.grasps)
+  for (std::size_t g = 0; g < rod.grasps.size(); ++g)
   {
-    const bool fits = grasp.first_node >= 0 && grasp.first_node <= grasp.last_node && grasp.last_node < n;
-    if (!fits)
+    const GraspState& grasp = rod.grasps[g];
+    if (grasp.first_node < 0 || grasp.first_node > grasp.last_node || grasp.last_node >= n)
     {
       return "a grasp of rod " + model.name + " holds nodes that do not exist";
+    }
+    const auto edges = static_cast<std::size_t>(grasp.last_node - grasp.first_node);
+    if (grasp.nodes_G.size() != edges + 1 || grasp.directors_G.size() != edges || (edges > 0 && !grasp.holds_frame) || grasp.body != now.grasps[g].body)
+    {
+      return "a grasp of rod " + model.name + " does not fit together";
     }
   }
   return "";
@@ -214,7 +219,7 @@ void Simulation::load(const std::string& path)
   }
   for (std::size_t r = 0; problem.empty() && r < models_.size(); ++r)
   {
-    problem = misfit(loaded.rods[r], *models_[r], state_.rods[r].grasps.size());
+    problem = misfit(loaded.rods[r], *models_[r], state_.rods[r]);
   }
   for (std::size_t k = 0; problem.empty() && k < thread_models_.size(); ++k)
   {

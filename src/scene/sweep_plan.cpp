@@ -12,7 +12,11 @@ namespace slender {
 
 namespace {
 
+#ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION   // each value is tried
+constexpr long max_points = 10;
+#else
 constexpr long max_points = 1'000'000;
+#endif
 
 std::vector<std::string> readSeries(const YamlCursor& at)
 {
@@ -161,11 +165,15 @@ SweepPlan readSweepPlan(const std::string& path)
   {
     plan.axes.push_back(readAxis(name, at));
     points *= static_cast<double>(plan.axes.back().values.size());
+    if (points > max_points)   // the values of more axes might not fit into memory
+    {
+      break;
+    }
   }
   if (axes.isMap() && plan.axes.empty())
     axes.problem("names no value to vary");
   if (points > max_points)
-    axes.problem("make " + shortNumber(points) + " runs; at most " + std::to_string(max_points));
+    axes.problem("make " + shortNumber(points) + " runs or more; at most " + std::to_string(max_points));
   for (const YamlCursor& measure : map.require("measures").items(1))
     if (const auto name = measure.name())
       plan.measures.push_back(*name);

@@ -85,5 +85,20 @@ TEST_F(FilePaths, savedStatesLeaveOthersAlone)
   simulation.load(path("link"));
 }
 
+TEST_F(FilePaths, whatScenesNameIsReadFromRegularFilesOnly)   // others wait for ever, or have no end
+{
+  ASSERT_EQ(::mkfifo(path("mesh.obj").c_str(), 0600), 0);
+  const auto says = [&](const std::string& scene) { return refusal([&] { parseScene(scene, "scene", {}, folder_.string()); }); };
+  for (const char* scene : {"rods: [{centerline: {file: {path: fifo}}}]\n", "rods: [{grasps: {left: {edges: [0], motion: {file: fifo, body: b}}}}]\n",
+                            "rods: [{name: r}]\nobstacles: [{shape: {mesh: {file: mesh.obj}}}]\n", "cloths: [{mesh: {file: mesh.obj}}]\n",
+                            "tracked: [{guide: {grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {frames: \"me*.obj\", rate: 30}}, "
+                            "test_functions: {basis: subdivision}}]\n"})
+  {
+    if (fs::exists(path("mesh.obj")) && std::string(scene).find("frames") != std::string::npos)
+      fs::rename(path("mesh.obj"), path("me1.obj"));
+    EXPECT_NE(says(scene).find("no regular file"), std::string::npos) << scene << says(scene);
+  }
+}
+
 }  // namespace
 }  // namespace slender
