@@ -158,6 +158,7 @@ bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::strin
 
 void GuideInputs::onPose(int guided, const geometry_msgs::PoseStamped& message)
 {
+  drops_.receive();
   Entry entry{guided, Pose()};
   if (checkPose(message.pose, guided_[guided].topic, guided_[guided].name, entry.X_FH))
     take(guided, guided_[guided].topic, message.header, {entry});
@@ -165,6 +166,7 @@ void GuideInputs::onPose(int guided, const geometry_msgs::PoseStamped& message)
 
 void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
 {
+  drops_.receive();
   if (message.poses.size() != grasps_)
   {
     drops_.drop(Drop::wrong_length, "guides",
@@ -185,6 +187,7 @@ void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
 
 void GuideInputs::onBodies(const slender_sim::BodyStates& message)
 {
+  drops_.receive();
   if (message.pose.size() != message.name.size() || (!message.twist.empty() && message.twist.size() != message.name.size()))
   {
     drops_.drop(Drop::wrong_length, "bodies", "name, pose and twist must be equally long (twist may be empty)");

@@ -18,6 +18,7 @@ std::string text(double value)
 
 void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
 {
+  drops_.receive();
   const std::string what = prefixes_[thread] + "nozzle/flow";
   if (!std::isfinite(message.data))
     drops_.drop(Drop::not_finite, what, "it must be finite [m^3/s]");
@@ -67,6 +68,7 @@ std::optional<Eigen::Vector3d> GuideInputs::velocityOf(const geometry_msgs::Vect
 /// Only its horizontal part can be a belt's.
 void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped& message)
 {
+  drops_.receive();
   const std::string what = prefixes_[thread] + "belt/velocity";
   const std::optional<Eigen::Vector3d> velocity = velocityOf(message, what);
   if (!velocity)
@@ -78,6 +80,7 @@ void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped
 
 void GuideInputs::onWind(const geometry_msgs::Vector3Stamped& message)
 {
+  drops_.receive();
   const std::optional<Eigen::Vector3d> velocity = velocityOf(message, "wind");
   if (!velocity)
     return;

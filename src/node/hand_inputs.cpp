@@ -87,6 +87,7 @@ std::vector<Handle> GuideInputs::handles(const Simulation& simulation) const
 
 void GuideInputs::onHand(const visualization_msgs::InteractiveMarkerFeedback& message)
 {
+  drops_.receive();
   using Feedback = visualization_msgs::InteractiveMarkerFeedback;
   if (message.event_type != Feedback::POSE_UPDATE && message.event_type != Feedback::MOUSE_DOWN && message.event_type != Feedback::MOUSE_UP)
     return;

@@ -199,6 +199,7 @@ DiagnosticStatus SceneNode::inputStatus()
   if (drops.total() > reported_drops_)
     raise(status, DiagnosticStatus::WARN, "messages were dropped");
   reported_drops_ = drops.total();
+  add(status, "received", drops.received());
   add(status, "dropped", drops.total());
   for (int r = 0; r < kDropReasons; ++r)
   {

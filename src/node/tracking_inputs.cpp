@@ -60,6 +60,7 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
 
 void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message)
 {
+  drops_.receive();
   const std::string& what = guides_[guide].topic;
   Message taken;
   taken.guide = guide;
@@ -76,6 +77,7 @@ void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message
 
 void TrackingInputs::onBodies(int guide, const slender_sim::BodyStates& message)
 {
+  drops_.receive();
   const std::string& what = guides_[guide].topic;
   if (message.pose.size() != message.name.size() || (!message.twist.empty() && message.twist.size() != message.name.size()))
     return drops_.drop(Drop::wrong_length, what, "name, pose and twist must be equally long (twist may be empty)");

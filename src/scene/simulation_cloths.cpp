@@ -302,7 +302,7 @@ void Simulation::stepCloths(bool ahead, const SceneInputs& inputs, StepReport& t
     }
     if (config_.cloths[k].tracking)
     {
-      cloth_inputs_[k].averages = functions(static_cast<int>(k)).constraints->averages(guideVertices(static_cast<int>(k), inputs));
+      functions(static_cast<int>(k)).constraints->averages(guideVertices(static_cast<int>(k), inputs), cloth_inputs_[k].averages);
       state_.cloths[k].blend.apply(static_cast<double>(state_.steps + 1) * config_.time.step, cloth_inputs_[k].averages);
     }
     if (cloth_steppers_[k])

@@ -123,8 +123,17 @@ const FunctionSet& Simulation::functions(int cloth) const
   return config_.cloths.at(static_cast<std::size_t>(cloth)).tracking->sets.at(static_cast<std::size_t>(state_.cloths[cloth].cloth.average_set));
 }
 
+bool Simulation::tracks() const
+{
+  return std::any_of(config_.cloths.begin(), config_.cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking != nullptr; });
+}
+
 void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
 {
+  if (!tracks())
+  {
+    return;
+  }
   inputs.guides.resize(config_.cloths.size());
   for (std::size_t k = 0; k < config_.cloths.size(); ++k)
   {
@@ -148,12 +157,13 @@ void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
 
 void Simulation::checkGuides(const SceneInputs& inputs) const
 {
-  if (inputs.guides.size() != config_.cloths.size())
+  const std::size_t needed = tracks() ? config_.cloths.size() : 0;
+  if (inputs.guides.size() != needed)
   {
-    throw std::invalid_argument("inputs.guides has " + std::to_string(inputs.guides.size()) + " entries; must have " +
-                                std::to_string(config_.cloths.size()) + ", one per cloth of the scene");
+    throw std::invalid_argument("inputs.guides has " + std::to_string(inputs.guides.size()) + " entries; must have " + std::to_string(needed) +
+                                ", one per cloth of a scene that tracks anything");
   }
-  for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+  for (std::size_t k = 0; k < needed; ++k)
   {
     const Eigen::Index expected = config_.cloths[k].tracking ? config_.cloths[k].tracking->guide.mesh.vertices.cols() : 0;
     if (inputs.guides[k].cols() != expected)
@@ -190,7 +200,7 @@ void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
         held.blend = FunctionBlend();
       }
       held.guide_forces = cloth_steppers_[k] ? cloth_steppers_[k]->averageForces() : touching_cloths_[cloth_places_[k].group].group.averageForces(cloth_places_[k].index);
-      report.tracking_error = std::max(report.tracking_error, trackingError(static_cast<int>(k)).met / tracking->size);
+      report.tracking_error = std::max(report.tracking_error, errorOf(static_cast<int>(k), cloth_inputs_[k].averages).met / tracking->size);
       report.forces_at_bound += static_cast<int>(held.cloth.at_bound.size());
     }
   }
@@ -198,16 +208,22 @@ void Simulation::takeGuides(const SceneInputs& inputs, StepReport& report)
 
 Simulation::TrackingError Simulation::trackingError(int cloth) const
 {
-  const auto& tracking = config_.cloths.at(static_cast<std::size_t>(cloth)).tracking;
-  TrackingError error;
-  if (!tracking)
+  if (!config_.cloths.at(static_cast<std::size_t>(cloth)).tracking)
   {
-    return error;
+    return TrackingError();
   }
   const SceneCloth& held = state_.cloths[static_cast<std::size_t>(cloth)];
-  const WeakConstraints& constraints = *functions(cloth).constraints;
-  Eigen::Matrix3Xd targets = constraints.averages(held.guide);
+  Eigen::Matrix3Xd targets = functions(cloth).constraints->averages(held.guide);
   held.blend.apply(state_.time, targets);
+  return errorOf(cloth, targets);
+}
+
+/// From what its averages shall be, 3 x count.
+Simulation::TrackingError Simulation::errorOf(int cloth, const Eigen::Matrix3Xd& targets) const
+{
+  const SceneCloth& held = state_.cloths[static_cast<std::size_t>(cloth)];
+  const WeakConstraints& constraints = *functions(cloth).constraints;
+  TrackingError error;
   error.blend = held.blend.left(state_.time);
   for (int i = 0; i < constraints.count(); ++i)
   {

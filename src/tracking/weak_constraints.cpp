@@ -75,6 +75,25 @@ WeakConstraints::WeakConstraints(const TestFunctions& functions, const MassMatri
     throw std::invalid_argument("test functions: one row per name expected on both meshes");
 }
 
+Eigen::Matrix3Xd WeakConstraints::averages(const Eigen::Matrix3Xd& guide) const
+{
+  Eigen::Matrix3Xd result;
+  averages(guide, result);
+  return result;
+}
+
+void WeakConstraints::averages(const Eigen::Matrix3Xd& guide, Eigen::Matrix3Xd& result) const
+{
+  result.setZero(3, guide_.rows());
+  for (Eigen::Index i = 0; i < guide_.rows(); ++i)
+  {
+    for (Matrix::InnerIterator it(guide_, i); it; ++it)
+    {
+      result.col(i) += it.value() * guide.col(it.col());
+    }
+  }
+}
+
 double WeakConstraints::distance(int i, const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& tracked) const
 {
   Eigen::Vector3d away = -targets.col(i);

@@ -51,8 +51,7 @@ class Bodies(NodeCase):
             p = [a + u * (b - a) for a, b in zip(start, end)]
             angle = turn * u
             publisher.publish(bodies(name, p, 1.0 + seconds * s, (0, 0, math.sin(angle / 2), math.cos(angle / 2))))
-        wait_until(lambda: self.diagnostics("inputs")["input age %s [s]" % name] != "none yet", what="a body")
-        rospy.sleep(0.3)
+        self.arrived()
         return publisher
 
     def test_body_drags_a_welded_rod_and_the_reaction_arrives(self):
@@ -162,7 +161,7 @@ class Bodies(NodeCase):
         self.assertAlmostEqual(drawn["bodies", 0].scale.x, 0.2)
         self.assertAlmostEqual(drawn["bodies", 1].scale.x, 0.1)
         node.terminate()
-        self.assertEqual(node.wait(20), 0)
+        self.assertEqual(node.wait(60), 0)
         with rosbag.Bag(bag) as file:
             told = [m for _, m, _ in file.read_messages("/t/body_states")]
         self.assertEqual(len(told), 4)

@@ -69,11 +69,10 @@ class ClothContact(NodeCase):
         wrench = self.listen("/t/grasps/top/wrench", WrenchStamped)
         markers = self.listen("/t/markers", MarkerArray)
         balls = self.publisher("/t/bodies", BodyStates)
-        corners = rospy.wait_for_message("/t/mesh", MeshStamped, 10).triangles
+        corners = rospy.wait_for_message("/t/mesh", MeshStamped, 60).triangles
         for k in range(2, 82):           # 0.35 m in 0.8 s, through where the cloth hangs
             self.send(balls, -0.2 + 0.35 * (k - 1) / 80.0, k)
-        wait_until(lambda: self.diagnostics("inputs")["input age ball [s]"] != "none yet", what="a message of the ball")
-        rospy.sleep(0.3)
+        self.arrived()
         ball, touched = {}, 0
         for _ in range(100):
             state = self.states_after(states, 1)
@@ -114,7 +113,7 @@ class ClothContact(NodeCase):
 
     def test_intersections_at_the_start_are_refused(self):
         process = self.start(SCENE.replace("[0, -0.2, 0.7]", "[0, -0.05, 0.7]"), wait=False, program="cloth_node")
-        self.assertEqual(process.wait(20), 2)
+        self.assertEqual(process.wait(60), 2)
         for word in ("cloth 'sheet' at vertex", "meets 'ball'", "move them apart"):
             self.assertIn(word, self.output("rod.err"))
 

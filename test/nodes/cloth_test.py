@@ -61,7 +61,7 @@ class Cloth(NodeCase):
             f = (k - 1) / 50.0
             left.publish(pose(7 + 0.05 * f, 0, 0.3 * f, stamp=1.0 + STEP * k, q=q))
             right.publish(pose(-7 - 0.05 * f, 3, 0.3 * f, stamp=1.0 + STEP * k, q=q))
-        rospy.sleep(0.3)
+        self.arrived()
         state = self.after(700)
         held = [i for i, v in enumerate(start.vertices) if abs(v.x) < 1e-9 and 0.05 < v.y < 0.25]
         self.assertGreater(len(held), 0)
@@ -91,7 +91,7 @@ class Cloth(NodeCase):
                 fill(p, (0, 0, 0), (math.sin(angle), 0, 0, math.cos(angle)))
             message.poses = turned
             guides.publish(message)
-        rospy.sleep(0.3)
+        self.arrived()
         state = self.after(110)
         held = [i for i, v in enumerate(start.vertices) if abs(v.x) < 1e-9 and abs(v.y - 0.15) < 0.06]
         self.assertEqual(len(held), 3)
@@ -110,7 +110,7 @@ class Cloth(NodeCase):
         calm = wrench.last().wrench.force
         self.assertAlmostEqual(calm.y, 0.0, delta=0.02 * WEIGHT)
         air.publish(wind(0, 6, 0))
-        rospy.sleep(0.3)
+        self.arrived()
         blown = self.after(200)
         self.assertGreater(sum(v.y for v in blown.vertices), sum(v.y for v in still.vertices) + 0.5)
         self.assertGreater(wrench.last().wrench.force.y, 0.05 * WEIGHT)
@@ -141,7 +141,7 @@ class Cloth(NodeCase):
         markers = self.listen("/t/markers", MarkerArray)
         points = self.listen("/t/points", PointCloud2)
         state = self.after(20)
-        mesh = rospy.wait_for_message("/t/mesh", MeshStamped, 10)          # latched: this subscriber is late
+        mesh = rospy.wait_for_message("/t/mesh", MeshStamped, 60)          # latched: this subscriber is late
         self.assertEqual(list(mesh.names), ["towel", "napkin"])
         self.assertEqual(list(state.names), ["towel", "napkin"])
         self.assertEqual(list(state.offsets), [0, 63])
@@ -186,7 +186,7 @@ class Cloth(NodeCase):
 
     def refused(self, scene, *words):
         process = self.start(scene, wait=False, program="cloth_node")
-        self.assertEqual(process.wait(20), 2)
+        self.assertEqual(process.wait(60), 2)
         text = self.output("rod.err")
         for word in words:
             self.assertIn(word, text)

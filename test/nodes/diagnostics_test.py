@@ -23,7 +23,7 @@ class Diagnostics(NodeCase):
         own = gathered_as("/Simulations/", ": simulation")[0]
         self.assertLess(names[own], DiagnosticStatus.ERROR)
         node.terminate()
-        node.wait(20)
+        node.wait(60)
         wait_until(lambda: levels()[own] == DiagnosticStatus.STALE, what="what a node that has gone said last to become stale")
 
 

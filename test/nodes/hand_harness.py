@@ -1,5 +1,4 @@
 """Drags the handles of ~interactive as rviz does: what the tests of several nodes share."""
-import rospy
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
 
 from node_harness import NodeCase, fill, wait_until
@@ -25,7 +24,7 @@ class HandCase(NodeCase):
 
     def drag(self, *arguments, **keywords):
         self.hand.publish(dragged(*arguments, **keywords))
-        rospy.sleep(0.2)
+        self.arrived()
 
     def drag_by(self, name, dx, dy, dz, **keywords):
         """From where the handle is, without turning it."""

@@ -66,7 +66,7 @@ class Hand(HandCase):
         p, q = self.beside("grasps/right", 0, 0, 0)
         for k in range(1, 21):
             self.hand.publish(dragged("grasps/right", (p[0], p[1] + 0.01 * k, p[2]), q))
-        rospy.sleep(0.3)
+        self.arrived()
         end = self.after(100).nodes[-1]
         self.assertAlmostEqual(end.y - start.y, 0.2, delta=1e-6)
         self.assertEqual(int(self.diagnostics("inputs")["dropped"]), 0)

@@ -37,8 +37,7 @@ class Inputs(NodeCase):
         # The gripper's frame is 2 m beside the rope: `attach: initial` keeps that.
         for k in range(21):
             guide.publish(pose(1, 2 + 0.005 * k, 1, 1.0 + 0.05 * k))
-        self.accepted()
-        rospy.sleep(0.3)
+        self.arrived()
         self.assert_near(self.end(state, 250), (1, 0.1, 1))
         self.assertEqual(self.dropped("out_of_order"), 0)
 
@@ -52,8 +51,7 @@ class Inputs(NodeCase):
             message.header.stamp = rospy.Time.from_sec(1.0 + 0.05 * k)
             message.poses = [fill(pose(0, 0, 0).pose, (0, 0, 9)), fill(pose(0, 0, 0).pose, (1 - 0.01 * k, 0, 1))]
             guides.publish(message)
-        self.accepted()
-        rospy.sleep(0.3)
+        self.arrived()
         last = self.states_after(state, 150)
         self.assert_near((last.nodes[-1].x, last.nodes[-1].y, last.nodes[-1].z), (0.9, 0, 1))
         self.assert_near((last.nodes[0].x, last.nodes[0].y, last.nodes[0].z), (0, 0, 1))   # fixed, whatever guides say
@@ -134,7 +132,7 @@ class Inputs(NodeCase):
         # The tool frame hangs at (1, 0.05, 1), turned by 90 degrees about z: its x axis is the world's y.
         half = math.sqrt(0.5)
         guide.publish(pose(-0.05, 0, 0, 1.2, frame="tool", q=(0, 0, -half, half)))   # comes before its transform
-        rospy.sleep(0.2)
+        self.arrived()
         self.assertEqual(self.diagnostics("inputs")["input age right [s]"], "none yet")
         tf.publish(TFMessage([self.transform("world", "tool", (1, 0.05, 1), (0, 0, half, half), 1.1)]))
         tf.publish(TFMessage([self.transform("world", "tool", (1, 0.15, 1), (0, 0, half, half), 1.3)]))
@@ -158,8 +156,7 @@ class Inputs(NodeCase):
             message.pose = [fill(pose(0, 0, 0).pose, (0.9, 0, 1), (0, 0, math.sin(angle / 2), math.cos(angle / 2)))]
             message.twist = [Twist()]
             bodies.publish(message)
-        self.accepted()
-        rospy.sleep(0.3)
+        self.arrived()
         self.assert_near(self.end(state, 150), (0.9, 0.1, 1))
         message.twist = [Twist(), Twist()]
         bodies.publish(message)
@@ -180,16 +177,16 @@ class Inputs(NodeCase):
             for k in range(21):
                 s = k / 20.0
                 file.write("%g,hand,3,2,%.6f,0,0,0,1\n" % (s, 0.1 * s * s * (3 - 2 * s)))
-        self.start(pace="wall", guide_delay=0.12)
+        self.start(pace="wall", guide_delay=1.0)   # a busy machine may keep messages for a while
         state = self.listen("/t/state", RodState)
         player = self.launch("motion_player", "player", {"file": table, "bodies": {"hand": "right"}})
-        self.assertEqual(player.wait(30), 0, self.output("player.err"))
+        self.assertEqual(player.wait(100), 0, self.output("player.err"))
         wait_until(lambda: abs(state.last().nodes[-1].z - 1.1) < 1e-6, what="the end to be lifted")
         # smooth on the way: no step moves it faster than the cubic does (0.15 m/s), nor back
-        heights = [m.nodes[-1].z for m in state.all()]
-        rises = [b - a for a, b in zip(heights, heights[1:])]
-        self.assertLess(max(rises), 0.2 * 0.005)
-        self.assertGreater(min(rises), -1e-5)
+        track = [(m.header.stamp.to_sec(), m.nodes[-1].z) for m in state.all()]
+        speeds = [(z - y) / (t - s) for (s, y), (t, z) in zip(track, track[1:])]
+        self.assertLess(max(speeds), 0.2)
+        self.assertGreater(min(speeds), -0.002)
         self.assertEqual(int(self.diagnostics("inputs")["dropped"]), 0)
 
     def test_player_refuses_a_bad_table(self):
@@ -197,7 +194,7 @@ class Inputs(NodeCase):
         with open(table, "w") as file:
             file.write("0,hand,0,0,zero,0,0,0,1\n")
         player = self.launch("motion_player", "player", {"file": table})
-        self.assertEqual(player.wait(20), 2)
+        self.assertEqual(player.wait(60), 2)
         self.assertIn("motion.csv:1", self.output("player.err"))
 
 

@@ -68,7 +68,20 @@ class Listener:
         return self.subscriber.get_num_connections() > 0
 
 
-def wait_until(condition, timeout=15.0, what="condition"):
+class Publisher(rospy.Publisher):
+    """Counts what it has sent."""
+
+    def __init__(self, topic, kind):
+        rospy.Publisher.__init__(self, topic, kind, queue_size=1000)
+        self.sent = 0
+
+    def publish(self, *arguments, **keywords):
+        rospy.Publisher.publish(self, *arguments, **keywords)
+        self.sent += 1
+
+
+def wait_until(condition, timeout=60.0, what="condition"):
+    """The time runs out on failures only: a busy machine may take its time."""
     end = time.time() + timeout
     while time.time() < end:
         if condition():
@@ -120,7 +133,7 @@ class NodeCase(unittest.TestCase):
         values.update(parameters)
         process = self.launch(program, "rod", values)
         if wait:
-            rospy.wait_for_service("/t/rod/load_state", 20)
+            rospy.wait_for_service("/t/rod/load_state", 60)
         return process
 
     def output(self, name):
@@ -136,10 +149,15 @@ class NodeCase(unittest.TestCase):
         return listener
 
     def publisher(self, topic, kind):
-        publisher = rospy.Publisher(topic, kind, queue_size=1000)
+        publisher = Publisher(topic, kind)
         self.ends.append(publisher)
         wait_until(lambda: publisher.get_num_connections() > 0, what="a subscriber of " + topic)
         return publisher
+
+    def arrived(self):
+        """Waits until the node has received all that was sent to it in its namespace."""
+        sent = sum(end.sent for end in self.ends if isinstance(end, Publisher) and end.resolved_name.startswith("/t/"))
+        wait_until(lambda: int(self.diagnostics("inputs")["received"]) >= sent, what="%d messages to arrive" % sent)
 
     def call(self, name, kind, *arguments):
         proxy = rospy.ServiceProxy("/t/rod/" + name, kind)
@@ -158,7 +176,7 @@ class NodeCase(unittest.TestCase):
 
     def diagnostics(self, kind):
         """Values of the node's latest status `simulation` or `inputs`, with `level` and `message`."""
-        message = rospy.wait_for_message("/diagnostics", DiagnosticArray, 10)
+        message = rospy.wait_for_message("/diagnostics", DiagnosticArray, 60)
         for status in message.status:
             if status.name == "/t/rod: " + kind:
                 values = {value.key: value.value for value in status.values}
@@ -197,7 +215,6 @@ def numbers(state):
     for q in state.frames:
         out += [q.x, q.y, q.z, q.w]
     return out + list(state.twists)
-
 
 
 def run(name, case):

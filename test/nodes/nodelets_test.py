@@ -15,21 +15,22 @@ class NodeletsLaunch(unittest.TestCase):
     def test_shell_follows_the_cloth(self):
         shell = Listener("/state", ClothState)
         cloth = Listener("/coarse/state", ClothState)
-        wait_until(lambda: shell.count() > 300 and cloth.count() > 300, timeout=60, what="states of both")
+        wait_until(lambda: shell.count() > 300 and cloth.count() > 300, what="states of both")
         self.assertEqual((shell.last().names, cloth.last().names), (["fine"], ["coarse"]))
-        guide = {m.header.stamp.to_nsec(): m for m in cloth.all()}
-        last = shell.last()
-        # the guide is the cloth of ~guide_delay ago, between two of its messages
-        stamps = sorted(guide)
-        self.assertLess(min(p.z for p in last.guide_vertices), 0.8)   # it lay at 1 m
-        delayed = last.header.stamp.to_nsec() - 30000000
-        near = min(stamps, key=lambda s: abs(s - delayed))
-        self.assertLess(abs(near - delayed), 20000000)
-        for a, b in zip(last.guide_vertices, guide[near].vertices):
-            self.assertLess(abs(a.x - b.x) + abs(a.y - b.y) + abs(a.z - b.z), 0.05)
-        self.assertLess(max(last.constraint_errors), 1e-9)
 
-        names = {status.name for k in range(4) for status in rospy.wait_for_message("/diagnostics", DiagnosticArray, 10).status}
+        def follows():
+            """The guide is the cloth of ~guide_delay ago, between two of its messages; a busy machine may be late for a while."""
+            guide = {m.header.stamp.to_nsec(): m for m in cloth.all()}
+            last = shell.last()
+            delayed = last.header.stamp.to_nsec() - 30000000
+            near = min(guide, key=lambda s: abs(s - delayed))
+            return (min(p.z for p in last.guide_vertices) < 0.8 and abs(near - delayed) < 20000000 and   # it lay at 1 m
+                    all(abs(a.x - b.x) + abs(a.y - b.y) + abs(a.z - b.z) < 0.05 for a, b in zip(last.guide_vertices, guide[near].vertices)))
+
+        wait_until(follows, what="the shell to be where the cloth was")
+        self.assertLess(max(max(m.constraint_errors) for m in shell.all()), 1e-9)
+
+        names = {status.name for k in range(4) for status in rospy.wait_for_message("/diagnostics", DiagnosticArray, 60).status}
         self.assertTrue(names & {"/coarse: simulation", "/fine: simulation"}, names)
 
     def test_unload_and_load(self):
@@ -37,7 +38,7 @@ class NodeletsLaunch(unittest.TestCase):
         load = rospy.ServiceProxy("/simulation/load_nodelet", NodeletLoad)
         unload = rospy.ServiceProxy("/simulation/unload_nodelet", NodeletUnload)
         loaded = rospy.ServiceProxy("/simulation/list", NodeletList)
-        wait_until(lambda: len(loaded().nodelets) == 2, timeout=30, what="two nodelets")
+        wait_until(lambda: len(loaded().nodelets) == 2, what="two nodelets")
         rospy.set_param("/visitor/scene", "rods: [{name: a, colour: red}]\n")
         with self.assertRaises(rospy.ServiceException):
             if not load("/visitor", "slender_sim/rod_node", [], [], [], "").success:

@@ -3,7 +3,6 @@
 import math
 import os
 import threading
-import time
 
 import rosgraph
 import rospy
@@ -24,7 +23,7 @@ class Services(NodeCase):
         answer = self.step(7)
         self.assertEqual(answer.step, 7)
         self.assertEqual(answer.stamp.to_nsec(), 1000000000 + 7 * 5000000)
-        wait_until(lambda: state.count() == 7, 2, "7 states")
+        wait_until(lambda: state.count() == 7, what="7 states")
         self.assertFalse(self.call("step", Step, 0).success)
 
     def test_step_is_refused_while_running(self):
@@ -151,8 +150,7 @@ class Services(NodeCase):
         guide = self.publisher("/t/grasps/right/pose", PoseStamped)
         guide.publish(pose(1, 0, 1, 1.0))
         guide.publish(pose(1e6, 0, 1, 1.01))
-        wait_until(lambda: self.diagnostics("inputs")["input age right [s]"] != "none yet", what="guides")
-        rospy.sleep(0.2)
+        self.arrived()
         answer = self.call("step", Step, 20)
         self.assertFalse(answer.success)
         self.assertTrue(answer.message)
@@ -173,12 +171,10 @@ class Services(NodeCase):
         self.step(1)
         guide.publish(pose(1, 0, 1, 1.0))
         guide.publish(pose(1e6, 0, 1, 1.01))
-        wait_until(lambda: self.diagnostics("inputs")["input age right [s]"] != "none yet", what="guides")
-        rospy.sleep(0.2)
+        self.arrived()
         self.assertFalse(self.call("step", Step, 20).success)
         self.assertTrue(self.call("reset", Trigger).success)
-        rospy.sleep(0.3)
-        self.assertEqual(self.diagnostics("simulation")["message"], "paused")
+        wait_until(lambda: self.diagnostics("simulation")["message"] == "paused", what="the pause")
         self.assertEqual(self.step(1).step, 1)
 
     def test_stop_after_ends_a_long_step_too(self):
@@ -186,14 +182,14 @@ class Services(NodeCase):
         answer = self.call("step", Step, 100)
         self.assertFalse(answer.success)
         self.assertEqual(answer.step, 10)
-        self.assertEqual(process.wait(20), 0)
+        self.assertEqual(process.wait(60), 0)
 
     def test_tells_of_itself_during_a_long_step(self):
         self.start()
         told = self.listen("/diagnostics", DiagnosticArray)
         before = told.count()
         self.step(30000)   # about a second
-        wait_until(lambda: told.count() > before, 1, "diagnostics")
+        wait_until(lambda: told.count() > before, what="diagnostics")
         steps = [int(value.value) for message in told.all()[before:] for status in message.status for value in status.values
                  if value.key == "step"]
         self.assertTrue([s for s in steps if 0 < s < 30000], steps)
@@ -204,12 +200,11 @@ class Services(NodeCase):
         stepping = threading.Thread(target=lambda: answers.append(self.call("step", Step, 2 ** 31)))
         stepping.start()
         wait_until(lambda: int(self.diagnostics("simulation")["step"]) > 0, what="steps")
-        begin = time.time()
         self.assertIn("under way", self.call("step", Step, 1).message)
         self.assertTrue(self.call("save_state", FilePath, self.path("meanwhile")).success)
         self.assertTrue(self.call("pause", SetBool, True).success)
-        stepping.join(10)
-        self.assertLess(time.time() - begin, 5)
+        stepping.join(60)   # all of the steps would take a day
+        self.assertFalse(stepping.is_alive())
         self.assertFalse(answers[0].success)
         self.assertIn("of 2147483648 steps; ~pause was called", answers[0].message)
         self.assertEqual(self.step(1).step, answers[0].step + 1)
@@ -219,7 +214,7 @@ class Services(NodeCase):
         if rospy.has_param("/t"):
             rospy.delete_param("/t")
         process = self.start(wait=False, **parameters)
-        self.assertEqual(process.wait(20), 2)
+        self.assertEqual(process.wait(60), 2)
         error = self.output("rod.err")
         for needle in needles:
             self.assertIn(needle, error)

@@ -48,7 +48,7 @@ class Thread(NodeCase):
         before = self.after(50)
         self.assertAlmostEqual(before.fed_volume, 50 * STEP * FLOW, delta=1e-9 * FLOW)
         flow.publish(3 * FLOW)
-        rospy.sleep(0.3)
+        self.arrived()
         more = self.after(50)
         self.assertAlmostEqual(more.fed_volume - before.fed_volume, 150 * STEP * FLOW, delta=1e-9 * FLOW)
         for bad in (float("nan"), -1.0, float("inf"), 1.0, 1e300):   # 1 m^3/s is a mistaken unit, and would take a step for ever
@@ -59,7 +59,7 @@ class Thread(NodeCase):
         kept = self.after(10)
         self.assertAlmostEqual(kept.fed_volume - more.fed_volume, 30 * STEP * FLOW, delta=1e-9 * FLOW)
         flow.publish(0.0)
-        rospy.sleep(0.3)
+        self.arrived()
         self.assertAlmostEqual(self.after(10).fed_volume, kept.fed_volume, delta=1e-9 * FLOW)
 
     def test_nozzle_by_message(self):
@@ -71,7 +71,7 @@ class Thread(NodeCase):
         self.assertAlmostEqual(start.nodes[-1].z, HEIGHT, places=9)
         for k in range(1, 51):
             nozzle.publish(pose(0.0004 * k, 0, HEIGHT, stamp=1.0 + STEP * (100 + k), q=down))
-        rospy.sleep(0.3)
+        self.arrived()
         moved = self.after(60)
         self.assertAlmostEqual(moved.nodes[-1].x, 0.02, delta=1e-6)
         self.assertLess(max(abs(p.y) for p in moved.nodes), 0.01)
@@ -88,7 +88,7 @@ class Thread(NodeCase):
         self.begin()
         velocity = self.publisher("/t/belt/velocity", Vector3Stamped)
         velocity.publish(belt(0.03, -0.01))
-        rospy.sleep(0.3)
+        self.arrived()
         state = self.after(700)
         lying = [v for v, d in zip(state.velocities, bytearray(state.deposited)) if d]
         self.assertGreater(len(lying), 5)
@@ -112,7 +112,7 @@ class Thread(NodeCase):
     def test_ids_stay_consistent(self):
         self.begin()
         self.publisher("/t/belt/velocity", Vector3Stamped).publish(belt(0.04, 0))
-        rospy.sleep(0.3)
+        self.arrived()
         for _ in range(10):
             self.after(200)                                            # topics drop what nobody takes in time
         self.assertGreater(self.states.count(), 1900)
@@ -165,7 +165,7 @@ class Thread(NodeCase):
         self.expect_drop("out_of_range")
         self.assertIn("threads/glue/nozzle/flow: dropped", self.output("rod.err") + self.output("rod.out"))
         flow.publish(2 * FLOW)
-        rospy.sleep(0.3)
+        self.arrived()
         stamp = self.step(50).stamp
         wait_until(lambda: sum(s.header.stamp == stamp for s in states.all()) == 2, what="both threads")
         fed = {s.name: s.fed_volume for s in states.all() if s.header.stamp == stamp}

@@ -195,9 +195,9 @@ class Topics(NodeCase):
 
     def test_bag_is_complete_when_terminated(self):
         process = self.start(pace="fast", record_bag=self.path("cut.bag"))
-        rospy.sleep(0.5)
+        wait_until(lambda: int(self.diagnostics("simulation")["step"]) > 100, what="steps")
         process.terminate()
-        process.wait(20)
+        process.wait(60)
         steps = [m.step for topic, m, stamp in rosbag.Bag(self.path("cut.bag")).read_messages(["/t/state"])]
         self.assertGreater(len(steps), 10)
         self.assertEqual(steps, list(range(len(steps))))

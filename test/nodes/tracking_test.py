@@ -8,7 +8,7 @@ import subprocess
 
 import rosbag
 import rospy
-from geometry_msgs.msg import Pose
+from geometry_msgs.msg import Pose, PoseStamped
 from sensor_msgs.msg import PointCloud2, PointField
 from slender_sim.msg import BodyStates, ClothState, MeshStamped
 from slender_sim.srv import FilePath, SetFunctions
@@ -31,6 +31,24 @@ tracked:
     material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 2.0e5}
     bending: {model: hinge}
     damping: {stiffness: 0.002}
+    solver: {one_newton_step: true}
+"""
+PREVIEW = """
+name: preview
+time: {step: 0.01, duration: 2}
+cloths:
+  - name: preview
+    grid: {corner: [0, 0, 0.5], sides: [[0.4, 0, 0], [0, 0.4, 0]], cells: [2, 2], pattern: alternating}
+    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 2.0e5}
+    damping: {mass: 2, stiffness: 0.002}
+    solver: {one_newton_step: true}
+    grasps: {hand: {corner: lower_left, motion: {topic: true}}}
+tracked:
+  - name: fine
+    guide: {cloth: preview}
+    mesh: {subdivide: 2}
+    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 2.0e5}
+    damping: {mass: 2, stiffness: 0.002}
     solver: {one_newton_step: true}
 """
 REST = [(0.2 * i, 0.2 * j, 0.5) for j in range(3) for i in range(3)]
@@ -91,7 +109,7 @@ class Tracking(NodeCase):
     def send_wave(self, guide, until):
         for k in range(int(until * RATE) + 1):
             guide.publish(cloud(wave(k / RATE), 1.0 + k / RATE))
-        rospy.sleep(0.3)
+        self.arrived()
 
     def test_points_live_equal_offline(self):
         self.begin("{topic: points}")
@@ -127,7 +145,7 @@ class Tracking(NodeCase):
         guide = self.publisher("/t/guide/points", PointCloud2)
         for k in range(6):
             guide.publish(cloud([(x * (1 + 0.4 * k), y, z) for x, y, z in REST], 1.0 + k / RATE))
-        rospy.sleep(0.3)
+        self.arrived()
         state = self.after(40)
         self.assertGreater(state.forces_at_bound[0], 2)
         self.assertGreater(state.bound_distances[0], 0.05)
@@ -181,7 +199,7 @@ class Tracking(NodeCase):
             lift = 0.1 * (3 * t ** 2 - 2 * t ** 3)
             q = (0, 0, 0, 1)
             guide.publish(bodies([("left", ((5, 5, 5), q)), ("right", ((7, 0, lift), q))], 1.0 + 0.01 + t))
-        rospy.sleep(0.3)
+        self.arrived()
         state = self.after(105)
         moved = [q[2] - p[2] for p, q in zip(REST, vertices(state.guide_vertices))]
         for i, up in enumerate(moved):   # the offset at the first message stays; the middle column is shared
@@ -230,7 +248,7 @@ class Tracking(NodeCase):
         self.assertIn("~guide_ahead", self.diagnostics("inputs")["last dropped from_future"])
         guide.publish(cloud([(x, y, z + 0.1) for x, y, z in REST], 1.02))
         guide.publish(cloud([(x, y, z + 0.1) for x, y, z in REST], 4.0))
-        rospy.sleep(0.3)
+        self.arrived()
         self.assertAlmostEqual(self.after(200).guide_vertices[0].z, 0.6, delta=1e-6)
 
     def cloths(self, scene, *arguments):
@@ -309,13 +327,13 @@ class Tracking(NodeCase):
         heights = []
         for k in range(11):
             guide.publish(cloud(up(k / RATE), 1.0 + k / RATE))
-        rospy.sleep(0.3)
+        self.arrived()
         for k in range(150):
             if k == 100:
                 self.assertEqual(self.diagnostics("inputs")["message"], "no input for guide/points")
                 for j in range(20):
                     guide.publish(cloud(up(1.0 + (j + 1) / RATE), 2.0 + (j + 1) / RATE))
-                rospy.sleep(0.3)
+                self.arrived()
             state = self.after(1)
             heights.append(state.guide_vertices[0].z - 0.5)
             self.assertLess(state.constraint_errors[0], 1e-12)
@@ -349,7 +367,7 @@ class Tracking(NodeCase):
         self.assertTrue(self.call("reset", Trigger).success)
         state = self.after(5)
         self.assertLess(distance(vertices(state.guide_vertices), REST), 1e-12)   # forgets what was sent
-        mesh = rospy.wait_for_message("/t/mesh", MeshStamped, 10)
+        mesh = rospy.wait_for_message("/t/mesh", MeshStamped, 60)
         self.assertEqual(len(mesh.vertices), 81)
         wait_until(lambda: markers.count() > 0, what="markers")
         drawn = {(m.ns, m.id): m for m in markers.last().markers}
@@ -360,11 +378,33 @@ class Tracking(NodeCase):
         self.assertLess(float(values["worst constraint residual over size"]), 1e-10)
         self.assertGreater(float(values["largest guide force [N]"]), 0.0)
 
+    def test_guide_that_is_a_cloth_of_the_scene(self):
+        """A gripper lifts a coarse preview by message; the shell goes with it, step by step."""
+        self.start(PREVIEW, program="tracking_node")
+        self.states = self.listen("/t/state", ClothState)
+        hand = self.publisher("/t/grasps/hand/pose", PoseStamped)
+        start = self.after(1)
+        self.assertEqual((start.names, list(start.offsets), list(start.guide_offsets)), (["preview", "fine"], [0, 9], [0, 0]))
+        for k in range(26):
+            lifted = PoseStamped()
+            lifted.header.stamp, lifted.header.frame_id = rospy.Time.from_sec(1.01 + k / RATE), "world"
+            fill(lifted.pose, (0, 0, 0.2 * (k / 25.0) ** 2))
+            hand.publish(lifted)
+        self.arrived()
+        self.after(100)
+        for state in self.states.all():
+            x = vertices(state.vertices)
+            self.assertEqual(vertices(state.guide_vertices), x[:9])
+            self.assertLess(max(state.constraint_errors), 1e-10)
+        self.assertAlmostEqual(x[0][2] - 0.5, 0.2, delta=0.01)      # held; the last pose is of the step before
+        fine = x[9:]
+        self.assertGreater(max(p[2] for p in fine) - min(p[2] for p in fine), 0.2)   # the rest of it hangs
+
     def test_other_nodes_say_who_tracks(self):
         with open(self.path("rest.obj"), "w") as file:
             file.write(obj(REST))
         process = self.start(SCENE % (self.path("rest.obj"), "fixed"), wait=False, program="cloth_node")
-        self.assertEqual(process.wait(20), 2)
+        self.assertEqual(process.wait(60), 2)
         self.assertIn("tracking_node", self.output("rod.err"))
 
 

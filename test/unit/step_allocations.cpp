@@ -10,6 +10,8 @@
 #include "slender_sim/fairing/willmore_flow.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/linalg/banded_ldlt.h"
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/simulation.h"
 #include "test/support/contact.h"
 #include "test/support/groups.h"
 #include "test/support/rods.h"
@@ -341,6 +343,38 @@ INSTANTIATE_TEST_SUITE_P(Cases, ClothAllocations, ::testing::ValuesIn(clothCases
   return std::string(toString(c.bending)) + "_" + toString(c.integrator) + (c.solver == ClothSolver::cholesky ? "_cholesky" : c.solver == ClothSolver::gauss_seidel ? "_sweeps" : "") +
          (c.one_newton_step ? "_one" : "_full") + (c.error_tolerance > 0 ? "_controlled" : "");
 });
+
+/// With what the scene does about guides: inputs, targets, errors.
+TEST(SceneAllocations, WarmTrackedScenesMakeNone)
+{
+  const std::string scene = R"(
+time: {step: 0.01, duration: 8}
+tracked:
+  - guide: {grid: {corner: [-0.2, -0.2, 1], sides: [[0.4, 0, 0], [0, 0.4, 0]], cells: 3}, motion: {topic: points}}
+    mesh: {subdivide: 2}
+    material: {area_density: 0.12, thickness: 0.0003, youngs_modulus: 2.0e4, poissons_ratio: 0.3}
+    solver: {one_newton_step: true}
+)";
+  for (const char* more : {"", "    test_functions: [{name: a, basis: subdivision}, {name: b, regions: {all: {guide: [0..15]}}}]\n", "    contact: {friction: 0.2}\n"})
+  {
+    Simulation simulation(parseScene(scene + more));
+    ASSERT_TRUE(simulation.config().cloths[0].tracking);
+    SceneInputs inputs;
+    bool ok = true;
+    const auto advance = [&] {
+      simulation.defaultInputs(inputs);
+      inputs.guides[0].row(0).array() += 1e-4;
+      ok = simulation.step(inputs).ok && ok;
+    };
+    for (int k = 0; k < 20; ++k)
+      advance();
+    const long before = allocations;
+    for (int k = 0; k < 5; ++k)
+      advance();
+    EXPECT_EQ(allocations - before, 0) << more;
+    EXPECT_TRUE(ok);
+  }
+}
 
 TEST(ContactAllocations, WarmContactMakesNone)
 {

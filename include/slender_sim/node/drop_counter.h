@@ -26,10 +26,14 @@ constexpr int kDropReasons = 11;
 
 const char* toString(Drop reason);
 
-/// Counts dropped messages by reason, and complains at most once a second about each.
+/// Counts messages, and those that are dropped by reason; complains at most once a second about each reason.
 class DropCounter
 {
 public:
+  /// Every message as it arrives, whatever becomes of it.
+  void receive() { ++received_; }
+  std::uint64_t received() const { return received_; }
+
   /// `what`: e.g. the topic; `detail` ends the sentence, e.g. the value.
   void drop(Drop reason, const std::string& what, const std::string& detail = "");
 
@@ -46,6 +50,7 @@ private:
     std::string last;
   };
   std::array<Reason, kDropReasons> reasons_;
+  std::uint64_t received_ = 0;
 };
 
 }  // namespace slender

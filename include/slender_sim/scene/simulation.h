@@ -86,7 +86,7 @@ struct SceneInputs
   std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
   std::vector<ThreadDrive> threads;             ///< per thread of the scene
   std::vector<Eigen::Matrix3Xd> guides;         ///< per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]), ignored when it is a cloth;
-                                                  ///< of others empty
+                                                  ///< of others empty, and none where no cloth tracks anything
   std::vector<Eigen::Matrix3Xd> rod_guides;     ///< per rod of the scene: its guide's nodes likewise; none where no rod tracks anything
   Eigen::Vector3d wind{0, 0, 0};
 };
@@ -197,7 +197,6 @@ private:
   StepReport stepAll();
 
   // simulation_tracked_rods.cpp
-  bool tracksRods() const { return !state_.rod_guides.empty(); }
   void placeOnGuide(int rod, const RodModel& model, Eigen::Matrix3Xd& nodes, Eigen::Matrix3Xd& velocities);
   void buildTrackedRod(int rod);
   void addRodGuides(SceneInputs& inputs, double time) const;
@@ -230,6 +229,8 @@ private:
   void gatherPins(SceneCloth& cloth) const;
 
   // simulation_guides.cpp: what tracked cloths follow
+  bool tracks() const;
+  TrackingError errorOf(int cloth, const Eigen::Matrix3Xd& targets) const;
   void startTracking(int cloth);
   bool functionsDue() const;
   void takeOver();

@@ -37,7 +37,9 @@ public:
   const Eigen::VectorXd& measures() const { return measures_; }
 
   /// What the averages shall be: 3 x count, of guide vertices 3 x nbar [m].
-  Eigen::Matrix3Xd averages(const Eigen::Matrix3Xd& guide) const { return guide * guide_.transpose(); }
+  Eigen::Matrix3Xd averages(const Eigen::Matrix3Xd& guide) const;
+  /// The same into `result`, which takes no memory when it has had that size before.
+  void averages(const Eigen::Matrix3Xd& guide, Eigen::Matrix3Xd& result) const;
   /// Distance of average i of the tracked vertices (3 x n) from its target [m].
   double distance(int i, const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& tracked) const;
   /// The greatest of all.
