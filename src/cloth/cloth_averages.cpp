@@ -63,7 +63,12 @@ void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces, bool response)
   averages_->multipliers(right_.data(), multipliers_.data());
   takeOutAverages(gradient_);
   for (Eigen::Index i = 0; i < forces.cols(); ++i)
+  {
     forces.col(i) = point(multipliers_, i);
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*used_->prescribed->weights, i); entry; ++entry)
+      if (held_[static_cast<std::size_t>(entry.col())])   // what holds it bears its share
+        point(gradient_, entry.col()) -= entry.value() * forces.col(i);
+  }
   if (bounds_ && !response)
     forces = bounds_->forces;
 }
@@ -144,7 +149,11 @@ LinearOutcome ClothSystem::solveBounded(PointVector& d, const Eigen::Matrix3Xd& 
   else if (!averagesIndependent() || !preconditioned_)
     return LinearOutcome::not_definite;
   std::fill(b.pulls.begin(), b.pulls.end(), 0.0);
+  constexpr double kSmall = 1e-6;   // of what the bounds could do: forces far below them, of a shell at rest, are rounding errors
   double reference = 0.0;
+  for (int i = 0; i < averages_->count(); ++i)
+    if (std::isfinite(most[i]))
+      reference = std::max(reference, kSmall * most[i] / std::sqrt(averages_->stiffness(i)));
   LinearOutcome outcome = stepTowardsBounded(d, averages, reference, linear_iterations);
   if (outcome == LinearOutcome::not_converged)
     outcome = minimizeBounded(d, averages, reference, linear_iterations);
@@ -199,7 +208,7 @@ LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matri
         averages_->solveBounded(right_.data(), gap_.data(), most.data(), l, tolerance, correction_.data(), b.pulls.data());
       step = norms.step;
       exact = norms.converged;
-      reference = iteration == 0 ? norms.load : reference;
+      reference = iteration == 0 ? std::max(reference, norms.load) : reference;
       applyMatrix(correction_, product_);
       const double curvature = kernels.dot(points(), correction_.data(), product_.data());
       if (!std::isfinite(curvature) || l > kSteepest)

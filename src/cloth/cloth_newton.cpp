@@ -55,17 +55,15 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
 /// Of a linearised step from work_ to next_: whether its end has more energy than the start and the work of loads, pins and averages can give. A step
 /// of implicit Euler that is solved loses some, but for what buckling releases. A linearised one that turns or swings stretched cloth too far for its tangent leaves
 /// forces unbalanced, whose work is the energy that appears.
-bool ClothStepper::Impl::createsEnergy(double energy_end, double average_work) const
+bool ClothStepper::Impl::createsEnergy(double energy_end, double average_work, double pin_work) const
 {
   constexpr double kCreated = 0.1;   // of what there was: sound steps lose energy, those that blow up create many times that
   const double strains = 1e-12 * (model->membrane.c11 + model->membrane.c22) * static_cast<double>(model->rest.triangles.cols()) * shortest_edge_ * shortest_edge_;
-  double gain = energy_end - energy_start_ - average_work, loads = 0.0, pins = 0.0;
+  double gain = energy_end - energy_start_ - average_work, loads = 0.0;
   double given = strains + elastic_start_ + std::abs(average_work);   // strains of a millionth: of a cloth at rest
   for (int i = 0; i < model->vertices(); ++i)
   {
-    if (system.held()[i])
-      pins += system.internalGradient(i, x_).dot(point(x_, i) - point(x_start_, i));
-    else
+    if (!system.held()[i])
     {
       const double before = 0.5 * model->mass[i] * work_.v.col(i).squaredNorm();
       loads += system.loadWork(i, x_start_, x_);
@@ -73,8 +71,8 @@ bool ClothStepper::Impl::createsEnergy(double energy_end, double average_work) c
       given += before;
     }
   }
-  gain -= loads + pins;
-  given += std::abs(loads) + std::abs(pins);
+  gain -= loads + pin_work;
+  given += std::abs(loads) + std::abs(pin_work);
   return gain > kCreated * given;
 }
 
@@ -126,7 +124,7 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
       }
       std::fill(d_.begin(), d_.end(), 0.0);
       outcome = system.solve(d_, &x_, report.linear_iterations, report.factorizations);
-      if (outcome != LinearOutcome::not_definite || kind == HessianKind::semidefinite)
+      if (outcome == LinearOutcome::solved || kind == HessianKind::semidefinite)   // near buckling conjugate gradients may not end either
         break;
       shift = std::max(0.2, 4.0 * shift);
       if (shift > kMostShift)

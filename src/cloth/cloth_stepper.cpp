@@ -270,7 +270,15 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
   const ClothEvaluation end = system.evaluate(x_);
   if (!std::isfinite(end.energy()))
     return StepFailure::state_not_finite;
-  double average_work = 0.0;
+  // before averages take from the gradient what they balance
+  double internal = 0.0, pin_work = 0.0, average_work = 0.0;
+  for (int i = 0; i < model->vertices(); ++i)
+  {
+    const Eigen::Vector3d g = system.internalGradient(i, x_);
+    internal = std::max(internal, g.norm());
+    if (system.held()[i])
+      pin_work += g.dot(point(x_, i) - point(x_start_, i));
+  }
   if (system.averageCount() > 0)
   {
     average_work = workOnFree(system.gradient());
@@ -282,14 +290,14 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
   const bool second_order = order(options.integrator) == 2;
   // Newton stops by its increment, which says little where stiffness has no bound: bends of faces without area
   const double resolved = options.newton.tolerance * (model->membrane.c11 + model->membrane.c22) * shortest_edge_;
-  double unbalanced = 0.0, force = resolved, jump = 0.0;
+  double unbalanced = 0.0, force = std::max(resolved, internal), jump = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
   {
     const bool held = system.held()[i];
     const double size = point(system.gradient(), i).norm();
     (held ? force : unbalanced) = std::max(held ? force : unbalanced, size);
     const Eigen::Vector3d q = point(x_, i), a = (q - point(q_hat_, i)) / (stage.tau_a * stage.tau_a);
-    force = std::max({force, model->mass[i] * a.norm(), model->mass[i] * inputs.gravity.norm(), system.internalGradient(i, x_).norm()});
+    force = std::max({force, model->mass[i] * a.norm(), model->mass[i] * inputs.gravity.norm()});
     if (!held)
       jump = std::max(jump, second_order ? (a - point(a_start_, i)).norm() : a.norm());
     next_.v.col(i) = held ? Eigen::Vector3d((q - point(x_start_, i)) / h) : Eigen::Vector3d((q - point(q_tilde_, i)) / stage.tau_v);
@@ -309,7 +317,7 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
     pin_forces.col(static_cast<Eigen::Index>(k)) = model->mass[p] * inertia - point(system.gradient(), p);
   }
   if (options.one_newton_step)
-    return createsEnergy(second_order && model->stiffness_damping > 0 ? system.elasticEnergy(x_) : end.membrane + end.bending, average_work) ? StepFailure::energy_grew : StepFailure::none;
+    return createsEnergy(second_order && model->stiffness_damping > 0 ? system.elasticEnergy(x_) : end.membrane + end.bending, average_work, pin_work) ? StepFailure::energy_grew : StepFailure::none;
   return unbalanced > std::max(kUnbalanced * force, resolved) ? StepFailure::newton_diverged : StepFailure::none;
 }
 

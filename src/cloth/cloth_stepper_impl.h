@@ -41,7 +41,7 @@ private:
   StepFailure minimize(StepReport& report);
   StepFailure linearized(StepReport& report);
   double largest(const PointVector& d) const;
-  bool createsEnergy(double energy_end, double average_work) const;
+  bool createsEnergy(double energy_end, double average_work, double pin_work) const;
 
   // cloth_explicit.cpp
   StepFailure explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);

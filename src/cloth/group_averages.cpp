@@ -10,7 +10,7 @@ namespace slender {
 namespace {
 
 constexpr int kMeetRounds = 200;
-constexpr double kBoundSlack = 1e-3;   // of forces' bounds
+constexpr double kBoundSlack = 1e-3;   // of forces' bounds: the cloth's own step keeps them to its tolerance alone, 5e-3 of the load
 constexpr int kStallRounds = 8;   // that must halve the averages' errors; slow convergence as it was seen makes a third of them
 
 }  // namespace

@@ -49,8 +49,13 @@ Eigen::Vector3d PointTrajectory::slope(std::size_t k, Eigen::Index i) const
 {
   if (k > 0 && k + 1 == times_.size() && coast_ > 0)
     return chord(k, i);
-  if (k == 0 && times_.size() > 1 && moving_start_)   // of the parabola through the first three frames, whose mean slope over the first two is the chord
-    return 2.0 / (times_[1] - times_[0]) * (frames_[1].col(i) - frames_[0].col(i)) - (times_.size() > 2 ? slope(1, i) : chord(1, i));
+  if (k == 0 && times_.size() == 2 && moving_start_)
+    return chord(1, i);
+  if (k == 0 && times_.size() > 2 && moving_start_)   // of the parabola through the first three frames, whose mean slope over the first two is the chord
+  {
+    const Eigen::Vector3d next = slope(1, i);
+    return (times_[1] - times_[0]) * burst_ratio < times_[2] - times_[1] ? next : Eigen::Vector3d(2.0 * chord(1, i) - next);
+  }
   if (k == 0 || k + 1 >= times_.size())
     return Eigen::Vector3d::Zero();   // held beyond the ends
   const Eigen::Vector3d here = frames_[k].col(i);

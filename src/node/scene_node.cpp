@@ -440,7 +440,10 @@ void SceneNode::waitForCallbacks()
   const bool running = mode_ == Mode::running && options_.pace != Pace::step;
   if (running)
     queue_.callAvailable(untilDue());
-  services_queue_.callAvailable(running ? ros::WallDuration(0.0) : untilDue());
+  // one by one: what callAvailable() has taken out of the queue is not seen by those calls that answer others meanwhile
+  ros::WallDuration patience = running ? ros::WallDuration(0.0) : untilDue();
+  while (!ended() && services_queue_.callOne(patience) == ros::CallbackQueue::Called)
+    patience = ros::WallDuration(0.0);
   queue_.callAvailable();
 }
 

@@ -78,7 +78,6 @@ bool SceneNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::R
       tell();
       if ((ros::WallTime::now() - looked).toSec() < kBurst)
         continue;
-      // one by one: callAvailable() within a callback counts those of the outer call twice
       while (!ended() && step_ended_.empty() && services_queue_.callOne() == ros::CallbackQueue::Called)
         continue;
       looked = ros::WallTime::now();
@@ -239,6 +238,7 @@ bool SceneNode::onSave(slender_sim::FilePath::Request& request, slender_sim::Fil
 bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response)
 {
   response.success = false;
+  queue_.callAvailable();   // older than the state that takes over
   try
   {
     simulation_->load(request.path);

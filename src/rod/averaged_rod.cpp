@@ -154,7 +154,28 @@ public:
     report.residual = std::max(report.residual, newton.residual);
     report.max_strain = std::max(report.max_strain, newton.max_strain);
     rod.finishStep(inputs, duration, t, h, report);
+    forces = -Eigen::Map<const Eigen::Matrix3Xd>(equations.multipliers().data(), 3, averages->rows());
+    bearShares();
     return StepFailure::none;
+  }
+
+  /// Averages pull at held nodes, too, which hand that on to what holds them.
+  void bearShares()
+  {
+    for (Eigen::Index i = 0; i < averages->rows(); ++i)
+      for (Averages::InnerIterator entry(*averages, i); entry; ++entry)
+      {
+        const int node = static_cast<int>(entry.col());
+        for (std::size_t k = 0; k < rod.wrenches.size() && !rod.system.isFree(node); ++k)
+        {
+          const GraspState& grasp = rod.work.grasps[k];
+          if (!grasp.active || node < grasp.first_node || node > grasp.last_node)
+            continue;
+          const Eigen::Vector3d force = entry.value() * forces.col(i);
+          rod.wrenches[k].force += force;
+          rod.wrenches[k].torque += (rod.system.position(node) - rod.stage_poses[k].position).cross(force);
+        }
+      }
   }
 
   RodStepper::Impl rod;
@@ -224,7 +245,6 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
     h = 2.0 * length;
   }
   state = rod.work;
-  impl_->forces = -Eigen::Map<const Eigen::Matrix3Xd>(impl_->equations.multipliers().data(), 3, targets.cols());
   return report;
 }
 

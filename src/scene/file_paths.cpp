@@ -32,7 +32,7 @@ std::string replaceablePath(const std::string& path)
   {
     if (link)
     {
-      throw std::runtime_error(path + ": is a symbolic link that leads nowhere; remove it, or name another file");
+      throw std::runtime_error(path + ": is a symbolic link that leads nowhere, or where this may not look; remove it, or name another file");
     }
     return path;
   }

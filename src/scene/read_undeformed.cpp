@@ -36,8 +36,8 @@ bool ridgesFit(const YamlCursor& at, const Eigen::Vector3d& axis, int count, con
   const double round = 2 * M_PI * meanRadius(cloth, axis), edge = meanFaceEdge(cloth);
   if (round < count * fewest_edges * edge)
   {
-    at.problem("makes ridges of less than " + shortNumber(fewest_edges) + " edges of the mesh (" + shortNumber(edge) + " m on average), which cannot show them; take " +
-               std::to_string(static_cast<int>(round / (fewest_edges * edge))) + " or fewer, or a finer mesh");
+    at.problem("makes ridges of less than " + shortNumber(fewest_edges) + " edges of the mesh (" + shortNumber(edge) + " m on average), which cannot show them; " +
+               (round < fewest_edges * edge ? "" : "take " + std::to_string(static_cast<int>(round / (fewest_edges * edge))) + " or fewer, or ") + "use a finer mesh");
     return false;
   }
   return true;

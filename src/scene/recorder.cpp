@@ -2,10 +2,12 @@
 
 #include <charconv>
 #include <cstdio>
+#include <filesystem>
 #include <numeric>
 
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/scene/csv_tables.h"
+#include "slender_sim/scene/file_paths.h"
 #include "text_file.h"
 
 namespace slender {
@@ -33,7 +35,7 @@ private:
     {
       write();
     }
-    catch (const WriteError& error)
+    catch (const std::runtime_error& error)
     {
       throw WriteError(std::string(error.what()) + "; the tables in " + folder_ + " are cut off");
     }
@@ -69,13 +71,16 @@ public:
       objects.push_back({cloth.name, {cloth.x, cloth.triangles}, {}});
     char name[32];
     std::snprintf(name, sizeof name, "/frame_%06ld.obj", frame_);
+    const std::string part = folder_ + name + ".part";   // so that there is never half a frame
     try
     {
-      writeObj(folder_ + name, objComment(simulation.config().name, instant.time), objects);
+      const std::string path = replaceablePath(folder_ + name);
+      writeObj(part, objComment(simulation.config().name, instant.time), objects);
+      std::filesystem::rename(part, path);
     }
     catch (const std::runtime_error& error)
     {
-      std::remove((folder_ + name).c_str());   // half of it
+      std::remove(part.c_str());
       throw WriteError(std::string(error.what()) + "; " + std::to_string(frame_) + " whole files are before it");
     }
     ++frame_;

@@ -11,6 +11,7 @@
 #include "byte_archive.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/simulation.h"
+#include "slender_sim/scene/state_bytes.h"
 
 /// Saving and loading of a simulation's state. The file: magic, version, fingerprint of the scene, size and checksum of the
 /// payload, payload; numbers as this machine keeps them (the magic number tells the byte order).
@@ -19,219 +20,8 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 11;
+constexpr std::uint64_t version = 12;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
-
-template <class Archive, class PoseType>
-void visitPose(Archive& archive, PoseType& pose)
-{
-  archive(pose.position);
-  archive(pose.orientation.coeffs());
-}
-
-template <class Archive, class State>
-void visitGrasp(Archive& archive, State& grasp)
-{
-  archive(grasp.active);
-  archive(grasp.first_node);
-  archive(grasp.last_node);
-  archive(grasp.holds_frame);
-  archive(grasp.body);
-  visitPose(archive, grasp.X_WG);
-  archive(grasp.velocity.linear);
-  archive(grasp.velocity.angular);
-  archive.list(grasp.nodes_G);
-  for (auto& node : grasp.nodes_G)
-  {
-    archive(node);
-  }
-  archive.list(grasp.directors_G);
-  for (auto& director : grasp.directors_G)
-  {
-    archive(director);
-  }
-  for (int side = 0; side < 2; ++side)
-  {
-    archive(grasp.section_G[side]);
-    archive(grasp.section_twist[side]);
-  }
-}
-
-template <class Archive, class State>
-void visitRod(Archive& archive, State& rod)
-{
-  archive(rod.x);
-  archive(rod.v);
-  archive(rod.d1);
-  archive(rod.twist);
-  archive.list(rod.grasps);
-  for (auto& grasp : rod.grasps)
-  {
-    visitGrasp(archive, grasp);
-  }
-  archive(rod.last_step);
-  archive(rod.next_step);
-  archive(rod.a);
-  archive(rod.x_previous);
-  archive(rod.v_previous);
-  archive(rod.strain_rate);
-  archive(rod.strain_rate_previous);
-  archive(rod.strain_previous);
-}
-
-template <class Archive, class State>
-void visitThread(Archive& archive, State& thread)
-{
-  const auto numbers = [&archive](auto& values) {
-    archive.list(values);
-    for (auto& value : values)
-    {
-      archive(value);
-    }
-  };
-  numbers(thread.x);
-  numbers(thread.v);
-  numbers(thread.d1);
-  numbers(thread.twist);
-  numbers(thread.spin);
-  numbers(thread.volume);
-  numbers(thread.id);
-  numbers(thread.deposited);
-  for (auto& end : thread.ends)
-  {
-    archive(end.held);
-    visitPose(archive, end.X_WE);
-  }
-  archive(thread.next_id);
-  archive(thread.thread_id);
-  archive(thread.fed_volume);
-  archive(thread.dropped_volume);
-}
-
-template <class Archive, class State>
-void visitCloth(Archive& archive, State& held)
-{
-  archive(held.cloth.x);
-  archive(held.cloth.v);
-  archive(held.cloth.rest_angles);
-  archive(held.cloth.next_step);
-  archive(held.cloth.stiffening);
-  const auto indices = [&archive](auto& values) {
-    archive.list(values);
-    for (auto& value : values)
-    {
-      archive(value);
-    }
-  };
-  indices(held.cloth.pins);
-  indices(held.cloth.at_bound);
-  archive.list(held.grasps);
-  for (auto& grasp : held.grasps)
-  {
-    archive(grasp.active);
-    indices(grasp.vertices);
-    archive(grasp.points_G);
-    visitPose(archive, grasp.X_WG);
-  }
-  archive(held.guide);
-  archive(held.guide_velocity);
-  archive(held.guide_forces);
-  archive(held.cloth.average_set);
-  archive(held.blend.gap);
-  archive(held.blend.rate);
-  archive(held.blend.start);
-  archive(held.blend.duration);
-}
-
-template <class Archive, class State>
-void visitTwist(Archive& archive, State& twist)
-{
-  archive(twist.linear);
-  archive(twist.angular);
-}
-
-template <class Archive, class State>
-void visitBody(Archive& archive, State& body)
-{
-  visitPose(archive, body.X_WB);
-  visitTwist(archive, body.velocity);
-  archive(body.has_history);
-  archive(body.linear_acceleration);
-  archive(body.angular_acceleration);
-  visitPose(archive, body.X_previous);
-  visitTwist(archive, body.velocity_previous);
-}
-
-template <class Archive, class State>
-void visitScene(Archive& archive, State& scene)
-{
-  archive(scene.time);
-  archive(scene.steps);
-  archive.list(scene.rods);
-  for (auto& rod : scene.rods)
-  {
-    visitRod(archive, rod);
-  }
-  archive.list(scene.rod_guides);
-  for (auto& guide : scene.rod_guides)
-  {
-    archive(guide.nodes);
-    archive(guide.forces);
-  }
-  archive.list(scene.threads);
-  for (auto& group : scene.threads)
-  {
-    archive.list(group.threads);
-    for (auto& thread : group.threads)
-    {
-      visitThread(archive, thread);
-    }
-    archive(group.next_thread_id);
-    archive(group.dropped_volume);
-  }
-  archive.list(scene.cloths);
-  for (auto& cloth : scene.cloths)
-  {
-    visitCloth(archive, cloth);
-  }
-  archive.list(scene.bodies);
-  for (auto& body : scene.bodies)
-  {
-    visitBody(archive, body);
-  }
-  archive.list(scene.obstacles);
-  for (auto& pose : scene.obstacles)
-  {
-    visitPose(archive, pose);
-  }
-  archive.list(scene.obstacle_velocities);
-  for (auto& velocity : scene.obstacle_velocities)
-  {
-    visitTwist(archive, velocity);
-  }
-  archive(scene.contact_stiffness);
-  archive(scene.thread_contact_stiffness);
-  archive.list(scene.grasp_offsets);
-  for (auto& offset : scene.grasp_offsets)
-  {
-    visitPose(archive, offset);
-  }
-  archive.list(scene.wrenches);
-  for (auto& wrench : scene.wrenches)
-  {
-    archive(wrench.force);
-    archive(wrench.torque);
-  }
-  archive.list(scene.end_loads);
-  for (auto& loads : scene.end_loads)
-  {
-    for (auto& load : loads)
-    {
-      archive(load.force);
-      archive(load.torque);
-    }
-  }
-}
 
 std::string errorText(const std::string& path, const std::string& what) { return path + ": " + what + ": " + std::strerror(errno); }
 
@@ -339,16 +129,15 @@ bool fits(const SceneCloth& held, const SceneCloth& now, const ClothModel& model
 
 void Simulation::save(const std::string& path) const
 {
-  ByteWriter payload;
-  visitScene(payload, state_);
+  const std::string payload = stateBytes(state_);
   Checksum checksum;
-  checksum.add(payload.bytes().data(), payload.bytes().size());
+  checksum.add(payload.data(), payload.size());
   ByteWriter file;
-  for (std::uint64_t word : {magic, version, fingerprint(), static_cast<std::uint64_t>(payload.bytes().size()), checksum.value()})
+  for (std::uint64_t word : {magic, version, fingerprint(), static_cast<std::uint64_t>(payload.size()), checksum.value()})
   {
     file(word);
   }
-  writeDurably(path, file.bytes() + payload.bytes());
+  writeDurably(path, file.bytes() + payload);
 }
 
 void Simulation::load(const std::string& path)
@@ -409,13 +198,13 @@ void Simulation::load(const std::string& path)
   SceneState loaded;
   try
   {
-    visitScene(reader, loaded);
+    loaded = stateOfBytes(bytes.data() + header_size, reader.left());
   }
   catch (const std::runtime_error& error)
   {
     throw std::runtime_error(path + ": " + error.what());
   }
-  std::string problem = reader.left() != 0 ? "has bytes after its end" : "";
+  std::string problem;
   if (loaded.rods.size() != models_.size() || loaded.rod_guides.size() != state_.rod_guides.size() || loaded.threads.size() != thread_models_.size() || loaded.cloths.size() != cloth_models_.size() ||
       loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
       loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||

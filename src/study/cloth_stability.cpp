@@ -8,7 +8,7 @@
 
 #include "cloth_cases.h"
 #include "stability.h"
-#include "state_bits.h"
+#include "slender_sim/scene/state_bytes.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {
@@ -37,7 +37,7 @@ StabilityCell run(ClothSetup& cloth, const ClothOptions& options, double h, int 
     const ClothState before = cloth.state;
     const StepReport report = stepper.step(cloth.state, cloth.inputs, h);
     const bool finite = isFinite(cloth.state) && (!report.ok || (stepper.pinForces().allFinite() && std::isfinite(report.max_strain)));
-    if (!cell.took(report, finite, sameBits(before, cloth.state)))
+    if (!cell.took(report, finite, stateBytes(before) == stateBytes(cloth.state)))
       break;
     if (!motion && keeps_energy && !cell.energyIs((stepper.energies(cloth.state, gravity).total() - start.total()) / scale, 1e-2))
       break;

@@ -275,7 +275,7 @@ constexpr double kLarge = 1e6;
 void runCostModel(StudyContext& context)
 {
   useOneBlasThread();
-  const std::vector<int> sizes = context.quick() ? std::vector<int>{100, 1000, 4000, 8000}
+  const std::vector<int> sizes = context.quick() ? std::vector<int>{100, 1000, 4000, 6000, 8000}
                                                  : std::vector<int>{100, 300, 1000, 4000, 10000, 30000, 100000, 300000, 1000000};
   const double enough = context.quick() ? 0.1 : 1.0;    // [s] of steps
   const double longest = context.quick() ? 10.0 : 240;   // [s] for a size
@@ -319,8 +319,8 @@ void runCostModel(StudyContext& context)
       }
       last_size = size, last_time = s.all_seconds, last_bytes = s.bytes;
     }
-    if (x.size() < 2)
-      throw std::runtime_error(label + ": fewer than two sizes could be measured");
+    if (x.size() < 3)
+      throw std::runtime_error(label + ": a power law of " + std::to_string(x.size()) + " sizes would fit whatever they are; three are needed from " + std::to_string(static_cast<int>(kFitFrom)) + " vertices on");
     time.at(label).points = true;
     const PowerLaw law(x, y);
     const Line space(x, bytes);   // what any process takes, and so much for each vertex

@@ -7,7 +7,7 @@
 
 #include "rod_cases.h"
 #include "stability.h"
-#include "state_bits.h"
+#include "slender_sim/scene/state_bytes.h"
 #include "slender_sim/study/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
@@ -45,7 +45,7 @@ Run run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motion, i
       scale = e.stretch + e.bend + e.twist + e.kinetic + rod.model->totalMass() * rod.inputs.gravity.norm() * rod.model->rest_length.sum();
     }
     const StepReport report = stepper.step(rod.state, rod.inputs, time.step);
-    if (!cell.took(report, isFinite(rod.state), sameBits(saved, rod.state)))
+    if (!cell.took(report, isFinite(rod.state), stateBytes(saved) == stateBytes(rod.state)))
       break;
     r.path.x.push_back(rod.state.x);
     if (i < quiet)

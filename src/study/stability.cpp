@@ -7,7 +7,7 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/study/cpu_clock.h"
-#include "state_bits.h"
+#include "slender_sim/scene/state_bytes.h"
 
 namespace slender::study {
 
@@ -236,7 +236,7 @@ Run run(const MapScene& scene, double step, int steps)
     const StepReport report = simulation->step(inputs);
     const SceneState& state = simulation->state();
     const Energy now = energyOf(*simulation);
-    if (!r.cell.took(report, isFinite(state) && std::isfinite(now.now), sameBits(before, state)))
+    if (!r.cell.took(report, isFinite(state) && std::isfinite(now.now), stateBytes(before) == stateBytes(state)))
       break;
     r.path->x.push_back(positions(state));
     if (tracking)

@@ -9,7 +9,7 @@
 #include "slender_sim/study/cpu_clock.h"
 #include "slender_sim/thread/thread_group.h"
 #include "stability.h"
-#include "state_bits.h"
+#include "slender_sim/scene/state_bytes.h"
 #include "thread_cases.h"
 
 namespace slender::study {
@@ -62,7 +62,7 @@ Verdict run(const ThreadSetup& setup, double h, int steps, const Motion& motion)
     const ThreadGroupState before = state;
     const StepReport report = group.step(state, inputs, h);
     v.folds += report.mended_folds;
-    if (!v.cell.took(report, isFinite(state), sameBits(before, state)))
+    if (!v.cell.took(report, isFinite(state), stateBytes(before) == stateBytes(state)))
       break;
     fed += inputs.flow_rate * h;
     v.most_nodes = std::max(v.most_nodes, nodesOf(state));

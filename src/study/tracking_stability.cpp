@@ -9,7 +9,7 @@
 #include "slender_sim/scene/simulation.h"
 #include "guided_cloth.h"
 #include "stability.h"
-#include "state_bits.h"
+#include "slender_sim/scene/state_bytes.h"
 
 namespace slender::study {
 
@@ -124,7 +124,7 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
     }
     SceneInputs inputs = simulation.defaultInputs();
     inputs.guides[0] = guide.motion(rest, k + 1, steps);
-    const SceneCloth before = simulation.state().cloths[0];
+    const SceneState before = simulation.state();
     StepReport report;
     try
     {
@@ -136,7 +136,7 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
       report.message = error.what();
     }
     const SceneCloth& now = simulation.state().cloths[0];
-    if (v.cell.took(report, isFinite(now), sameBits(before, now)))
+    if (v.cell.took(report, isFinite(now), stateBytes(before) == stateBytes(simulation.state())))
     {
       const Matrix3Xd& x = now.cloth.x;
       const double reach = x.cwiseAbs().maxCoeff(), size = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm();

@@ -1,4 +1,6 @@
 // Cloth whose averages are prescribed.
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "slender_sim/cloth/cloth_stepper.h"
@@ -90,6 +92,35 @@ TEST(ClothAverages, CarryTheClothWithTheForcesOfMechanics)
   EXPECT_LT((t.state.x - expected).cwiseAbs().maxCoeff(), 2e-5);   // hats' weights are not those of the mass: it bends a little
   const Vector3d total = stepper.averageForces().rowwise().sum(), law = t.model->totalMass() * (a - t.inputs.gravity);
   EXPECT_LT((total - law).norm(), 1e-4 * law.norm());
+}
+
+TEST(ClothAverages, HoldersBearTheirShare)
+{
+  // at rest, with vertices held that averages are taken over, guide and grippers bear the weight together; also where forces are at their bounds
+  for (const bool bounded : {false, true})
+  {
+    Tracked t;
+    t.model->mass_damping = 10;
+    const Vector3d weight = t.model->totalMass() * t.inputs.gravity;
+    if (bounded)
+    {
+      t.model->averages[0].bounds.setConstant(t.constraints->count(), std::numeric_limits<double>::infinity());
+      t.model->averages[0].bounds[7] = 0.3 * weight.norm() / 16;   // of what its hat weighs
+    }
+    pinVertices(t.state, {7, 40});
+    ClothOptions o = options(true);
+    o.linear_tolerance = 1e-4;
+    ClothStepper stepper(t.model, o);
+    for (int k = 0; k < 300; ++k)
+    {
+      const StepReport report = t.step(stepper, t.guide, 0.01);
+      ASSERT_TRUE(report.ok) << report.message;
+    }
+    EXPECT_EQ(bounded, !t.state.at_bound.empty());
+    EXPECT_LT(t.state.v.colwise().norm().maxCoeff(), 1e-3);
+    const Vector3d borne = stepper.pinForces().rowwise().sum() - stepper.averageForces().rowwise().sum();
+    EXPECT_LT((borne - weight).norm(), 1e-3 * weight.norm()) << bounded;   // without the share of the two held vertices 0.005
+  }
 }
 
 TEST(ClothAverages, AreStationaryUnderTheConstraints)

@@ -106,7 +106,10 @@ TEST(BoundedAverages, MoveAFreeBodyByTheBoundAlone)
   }
   // it comes back and forth, less each time, until the force needed to hold it is less than the bound
   for (; k < 400 && !(state.at_bound.empty() && k > 300); ++k)
-    ASSERT_TRUE(stepper.step(state, inputs, h).ok);
+  {
+    const StepReport report = stepper.step(state, inputs, h);
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+  }
   EXPECT_TRUE(state.at_bound.empty());
   EXPECT_LT(one.error(inputs.averages, state.x), 1e-14);
 }

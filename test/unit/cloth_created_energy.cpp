@@ -38,6 +38,7 @@ ClothOptions oneStep(Integrator integrator, int cuts)
 /// it was up to 1e7 times that: steps are cut, or refused.
 TEST(ClothCreatedEnergy, NoneAppears)
 {
+  int done = 0;
   for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
     for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
       for (const double membrane : {1e3, 1e5, 1e8})
@@ -54,10 +55,12 @@ TEST(ClothCreatedEnergy, NoneAppears)
               EXPECT_EQ(report.failure, StepFailure::energy_grew);
               break;
             }
+            done += k == 4;
             EXPECT_LT(stepper.energies(cloth.state, cloth.inputs.gravity).total() - start, (integrator == Integrator::implicit_euler ? 0.01 : 0.1) * fall)
               << toString(integrator) << " " << toString(bending) << " " << membrane << " N/m, " << h << " s";
           }
         }
+  EXPECT_GE(done, 12);   // of 24: those with soft membranes, or short steps
 }
 
 TEST(ClothCreatedEnergy, IsRefusedWithTheFixWhereNothingMayBeCut)

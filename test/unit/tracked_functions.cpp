@@ -322,7 +322,7 @@ TEST_F(TrackedFunctions, KeepTheirBoundsAndTouchThings)
     most = std::max(most, report.forces_at_bound);
     const FunctionSet& set = bounded.functions(0);
     const Eigen::VectorXd over = bounded.state().cloths[0].guide_forces.colwise().norm().transpose().array() / set.bounds.array();
-    EXPECT_LT(over.maxCoeff(), 1.02) << k;
+    EXPECT_LT(over.maxCoeff(), 1.0011) << k;   // contact may go over by a thousandth
   }
   EXPECT_GT(most, 0);
 }

@@ -1,5 +1,6 @@
 // A tracked cloth whose guide has stopped.
 #include <algorithm>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -12,9 +13,11 @@ namespace {
 using Eigen::Matrix3Xd;
 
 /// Errors of conjugate gradients, which count from a load that the guide holds for ever, must not keep a shell in motion.
-TEST(TrackedRest, ClothsComeToRestWithTheirGuides)
+class TrackedRest : public testing::TestWithParam<const char*> {};
+
+TEST_P(TrackedRest, ClothsComeToRestWithTheirGuides)
 {
-  Simulation simulation(parseScene(R"(
+  Simulation simulation(parseScene(std::string(GetParam()) + R"(
 time: {step: 0.01, duration: 8}
 tracked:
   - guide: {grid: {corner: [-0.2, -0.2, 1], sides: [[0.4, 0, 0], [0, 0.4, 0]], cells: 5}, motion: {topic: points}}
@@ -41,6 +44,8 @@ tracked:
   EXPECT_LT(residual, 1e-3);
   EXPECT_LT(simulation.state().cloths[0].cloth.v.colwise().norm().maxCoeff(), 1e-5);   // [m/s]; 2e-3 where the tolerance counts from the load alone
 }
+
+INSTANTIATE_TEST_SUITE_P(Loads, TrackedRest, testing::Values("", "gravity: [0, 0, 0]\n"), [](const auto& info) { return info.index == 0 ? "Weight" : "NoWeight"; });
 
 }  // namespace
 }  // namespace slender::test

@@ -15,7 +15,7 @@ enum class StepFailure
   input_not_finite,     ///< an input (pose, velocity, wind) was NaN or infinite
   state_not_finite,     ///< explicit step blew up
   squeezed,             ///< contact: prescribed motions leave no room for what lies between them
-  energy_grew,          ///< implicit_midpoint, generalized_alpha: energy out of nothing
+  energy_grew,          ///< energy out of nothing: implicit_midpoint, generalized_alpha; cloth with one Newton step
   overstretched,        ///< projection: the edges cannot all keep their lengths
   turned_too_far,       ///< isotropic formulation: the twist changed by about half a turn in one step, and could not be counted
 };
@@ -27,11 +27,11 @@ struct StepReport
   StepFailure failure = StepFailure::none;
   std::string message;            ///< empty when ok; otherwise the reason and what to change
   int substeps = 0;               ///< steps actually taken (1 unless the step was cut or adapted)
-  int cut_steps = 0;              ///< how often a step was halved because Newton failed
+  int cut_steps = 0;              ///< how often a step was halved because it could not be done
   int iterations = 0;             ///< Newton iterations
   int linear_iterations = 0;      ///< of conjugate gradients (cloth)
   int factorizations = 0;         ///< banded factorisations (more than iterations when a Hessian was shifted)
-  double residual = 0.0;          ///< largest unbalanced nodal force over the largest force in the rod [-]
+  double residual = 0.0;          ///< largest unbalanced nodal force over the largest force on any node [-]
   double max_strain = 0.0;        ///< largest |stretch strain| over all edges [-]
   long repulsions = 0;            ///< cloth: pairs of pieces nearer than the thickness, or about to be
   long impulses = 0;              ///< cloth: collisions found and stopped

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "slender_sim/scene/simulation.h"
+
+/// All that a later step reads, as bytes: what saved states consist of. Equal bytes are equal states, bit by bit.
+namespace slender {
+
+std::string stateBytes(const RodState& state);
+std::string stateBytes(const ThreadGroupState& state);
+std::string stateBytes(const ClothState& state);
+std::string stateBytes(const SceneState& state);
+
+/// Throws std::runtime_error when the bytes end too early or late, or hold a size that cannot be.
+SceneState stateOfBytes(const char* bytes, std::size_t size);
+
+}  // namespace slender
