@@ -15,6 +15,7 @@ namespace slender {
 
 namespace {
 
+constexpr int most_functions = 2000;   // their equations are dense
 const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
 
 /// The rod beside which a guide is read; without nodes when it could not be.
@@ -309,6 +310,11 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
   set.functions = readCurveFunctions(at_functions, rod, weights);
   map.finish();
   checkTraits(at, config);
+  if (set.functions.count() > most_functions || 12.0 * set.functions.count() * static_cast<double>(rod.rest.cols()) > max_guide_numbers)
+  {
+    (at_functions.present() ? at_functions : at).problem("makes " + std::to_string(set.functions.count()) + " test functions of " + std::to_string(rod.rest.cols()) +
+                                                         " nodes, too many for one rod; leave out some");
+  }
   if (!good || at.problems().size() != before)
   {
     return nullptr;

@@ -132,6 +132,7 @@ TEST_F(TrackedRods, SayWhatIsWrong)
     {{"rods.0.contact={self: true}"}, "leave out contact or track"},
     {{"rods.0.stretching=projected"}, "stretching must be stiff"},
     {{"bodies=[{name: ball, mass: 1, inertia: 1, welds: [{rod: rope, edges: [0]}]}]"}, "leave out the weld, or track"},
+    {{"rods.0.centerline.straight.edges=4000", g + "{nodes: 3000}"}, "makes 3000 test functions"},
     // test functions that depend on each other, on nothing, or on what is held
     {{g + "{points: [[0, 0, 1], [0.001, 0, 1], [0.002, 0, 1], [1.2, 0, 1]]}"}, "'node 1'"},
     {{"rods.0.grasps={all: {nodes: [0..60]}}"}, "'node 0' acts on held vertices only"},
