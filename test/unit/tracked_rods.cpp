@@ -235,7 +235,7 @@ TEST_F(TrackedRods, StandGuidesThatJump)
     if (k == 10)
       guide.row(1).array() += 3.0;
     if (k == 20)   // turned by 1 rad
-      guide = Eigen::AngleAxisd(1.0, Vector3d::UnitX()) * (Eigen::AngleAxisd(1.0, Vector3d::UnitZ()) * guide);
+      guide = (Eigen::AngleAxisd(1.0, Vector3d::UnitZ()).toRotationMatrix() * guide).eval();
     if (k == 30)
       guide = (guide.colwise() - Vector3d(0, 0, 5)).eval();
     const StepReport report = step(simulation, guide);
