@@ -216,7 +216,10 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
   if (!what.empty() || !rod.inputsFinite(state, inputs, what))
     return rod.refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   rod.begin(state);
-  impl_->start = state.x * impl_->averages->transpose();
+  impl_->start.setZero(3, targets.cols());   // entry by entry: Eigen's product takes memory
+  for (Eigen::Index i = 0; i < targets.cols(); ++i)
+    for (Averages::InnerIterator entry(*impl_->averages, i); entry; ++entry)
+      impl_->start.col(i) += entry.value() * state.x.col(entry.col());
   impl_->targets = &targets;
   double t = 0.0, h = duration;
   while (t < duration)
