@@ -353,6 +353,8 @@ void BagReader::Contents::add(const slender_sim::RodState& rod)
   requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.twist.allFinite() && read.radius_a.allFinite() &&
                   read.radius_b.allFinite(),
                 "rod " + rod.name);
+  require(!scene || rod.guide_nodes.empty() || appendFunctions(*scene, rod.name, "", columns(rod.guide_nodes), columns(rod.guide_forces), out->functions),
+          "state (what " + rod.name + " tracks)");
 }
 
 void BagReader::Contents::add(const slender_sim::ThreadState& thread)
@@ -400,22 +402,10 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
     out->cloths.push_back(std::move(cloth));
     const auto [guide, guide_end] = range(cloths.guide_offsets, k, cloths.guide_vertices.size());
     const auto [force, force_end] = range(cloths.function_offsets, k, cloths.guide_forces.size());
-    if (scene && guide < guide_end)
-    {
-      const ClothConfig* config = nullptr;
-      for (const ClothConfig& candidate : scene->cloths)
-        if (candidate.name == cloths.names[k])
-          config = &candidate;
-      const FunctionSet* set = nullptr;
-      if (config && config->tracking)
-        for (const FunctionSet& candidate : config->tracking->sets)
-          if (candidate.name == cloths.function_sets[k])
-            set = &candidate;
-      require(set && static_cast<std::size_t>(set->constraints->count()) == force_end - force &&
-                static_cast<std::size_t>(config->tracking->guide.mesh.vertices.cols()) == guide_end - guide,
-              "state (what " + cloths.names[k] + " tracks)");
-      appendFunctions(config->name, *set, columns(cloths.guide_vertices, guide, guide_end), columns(cloths.guide_forces, force, force_end), out->functions);
-    }
+    require(!scene || guide == guide_end ||
+              appendFunctions(*scene, cloths.names[k], cloths.function_sets[k], columns(cloths.guide_vertices, guide, guide_end),
+                              columns(cloths.guide_forces, force, force_end), out->functions),
+            "state (what " + cloths.names[k] + " tracks)");
   }
 }
 

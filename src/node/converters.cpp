@@ -155,6 +155,22 @@ void toMessage(const RodModel& model, const RodState& state, slender_sim::RodSta
     out.radii_b.clear();
   else
     out.radii_b.assign(model.radius_b.data(), model.radius_b.data() + model.radius_b.size());
+  out.constraint_errors.clear();
+  out.guide_nodes.clear();
+  out.guide_forces.clear();
+}
+
+void toTracking(const RodConfig& rod, const RodGuide& guide, const RodState& state, slender_sim::RodState& out)
+{
+  const WeakConstraints& constraints = *rod.tracking->sets.front().constraints;
+  const Eigen::Matrix3Xd targets = constraints.averages(guide.nodes);
+  for (int i = 0; i < constraints.count(); ++i)
+  {
+    out.constraint_errors.push_back(constraints.distance(i, targets, state.x));
+    out.guide_forces.push_back(toVector3(guide.forces.col(i)));
+  }
+  for (Eigen::Index k = 0; k < guide.nodes.cols(); ++k)
+    out.guide_nodes.push_back(toPoint(guide.nodes.col(k)));
 }
 
 void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out)

@@ -194,6 +194,16 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
     line.values = shares(shownValues(model, state, options.color), range);
     out.markers.push_back(curveMarker(header, "rods/" + model.name, 0, options.style, line, kMaxSections, base, true,
                                       2.0 * model.radius_a.mean()));
+    if (simulation.config().rods[r].tracking)
+    {
+      const Eigen::Matrix3Xd& nodes = simulation.state().rod_guides[r].nodes;
+      Marker guide = makeMarker(header, "guides/" + model.name, 0, Marker::LINE_STRIP);
+      guide.scale.x = 0.6 * model.radius_a.mean();
+      guide.color = color(0.15, 0.15, 0.18, 0.8);
+      for (Eigen::Index k = 0; k < nodes.cols() + (model.closed ? 1 : 0); ++k)
+        guide.points.push_back(toPoint(nodes.col(k % nodes.cols())));
+      out.markers.push_back(std::move(guide));
+    }
     if (options.frames)
     {
       Marker frames = makeMarker(header, "frames/" + model.name, 0, Marker::LINE_LIST);

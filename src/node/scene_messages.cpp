@@ -77,6 +77,8 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     const RodModel& model = simulation.rodModel(static_cast<int>(r));
     slender_sim::RodState& message = states[r].renew();
     toMessage(model, scene.rods[r], message);
+    if (const RodConfig& rod = simulation.config().rods[r]; rod.tracking)
+      toTracking(rod, scene.rod_guides[r], scene.rods[r], message);
     message.header = poses.header;
     message.epoch = epoch;
     message.step = scene.steps;

@@ -42,17 +42,26 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
   const auto refuse = [&](const std::string& has, const std::string& other) {
     throw SceneError(who + "it has " + has + ", which " + other + " simulates; they do not meet what " + toString(kind) + " simulates: put them in two scenes");
   };
-  if (kind != NodeKind::rods && !scene.rods.empty())
+  const auto tracks = [](const auto& objects) { return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; }); };
+  const bool tracked = tracks(scene.cloths), tracked_rods = tracks(scene.rods), follows = kind == NodeKind::tracking;
+  if (follows && tracked && !scene.rods.empty())
+    throw SceneError(who + "it has tracked cloths and rods, whose states are messages of two types; put them in two scenes");
+  if (follows && tracked_rods && !scene.cloths.empty())
+    throw SceneError(who + "it has rods that track a guide and cloths, whose states are messages of two types; put them in two scenes");
+  if (kind == NodeKind::rods && tracked_rods)
+    throw SceneError(who + "it has rods that track a guide; tracking_node simulates them, and rods beside them");
+  if (kind != NodeKind::rods && !tracked_rods && !scene.rods.empty())
     refuse("rods", toString(NodeKind::rods));
+  if (!follows && kind != NodeKind::rods && tracked_rods)
+    refuse("rods that track a guide", toString(NodeKind::tracking));
   if (kind != NodeKind::threads && !scene.threads.empty())
     refuse("threads", toString(NodeKind::threads));
-  const bool tracked = std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking != nullptr; });
-  if (!hasCloths(kind) && !scene.cloths.empty())
+  if ((kind == NodeKind::rods || kind == NodeKind::threads) && !scene.cloths.empty())
     refuse(tracked ? "tracked cloths" : "cloths", toString(tracked ? NodeKind::tracking : NodeKind::cloths));
   if (kind == NodeKind::cloths && tracked)
     throw SceneError(who + "it has tracked cloths; tracking_node simulates them, and cloths beside them");
-  if (kind == NodeKind::tracking && !tracked)
-    throw SceneError(who + "it has no tracked cloths; cloth_node simulates cloths that follow no guide");
+  if (follows && !tracked && !tracked_rods)
+    throw SceneError(who + "it has no tracked cloths and no rods that track a guide; cloth_node and rod_node simulate what follows none");
   if (kind == NodeKind::threads && scene.threads.empty())
     throw SceneError(who + "it has no threads; rod_node simulates rods");
   if (kind == NodeKind::threads && !scene.bodies.empty())
@@ -141,7 +150,7 @@ void SceneNode::startClock()
   scene_pub_.publish(scene);
   if (bag_)
     bag_->recordScene(scene.data, clock_.stamp());
-  if (hasCloths(kind_))
+  if (hasCloths())
     publishMesh();
   wall_start_ = ros::WallTime::now();
   total_ = recent_ = RunStatistics();
@@ -158,20 +167,19 @@ void SceneNode::publishMesh()
 
 void SceneNode::advertise()
 {
-  switch (kind_)
+  if (hasCloths())
   {
-    case NodeKind::rods: state_pub_ = nh_.advertise<slender_sim::RodState>("state", 1000); break;
-    case NodeKind::threads: state_pub_ = nh_.advertise<slender_sim::ThreadState>("state", 1000); break;
-    case NodeKind::cloths:
-    case NodeKind::tracking:
-      state_pub_ = nh_.advertise<slender_sim::ClothState>("state", 1000);
-      points_pub_ = nh_.advertise<sensor_msgs::PointCloud2>("points", 100);
-      mesh_pub_ = nh_.advertise<slender_sim::MeshStamped>("mesh", 1, true);
-      break;
+    state_pub_ = nh_.advertise<slender_sim::ClothState>("state", 1000);
+    points_pub_ = nh_.advertise<sensor_msgs::PointCloud2>("points", 100);
+    mesh_pub_ = nh_.advertise<slender_sim::MeshStamped>("mesh", 1, true);
   }
+  else if (kind_ == NodeKind::threads)
+    state_pub_ = nh_.advertise<slender_sim::ThreadState>("state", 1000);
+  else
+    state_pub_ = nh_.advertise<slender_sim::RodState>("state", 1000);
   for (const std::string& prefix : thread_prefixes_)
     nozzle_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>(prefix + "nozzle/wrench", 100));
-  if (!hasCloths(kind_))
+  if (!hasCloths())
     poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>("poses", 100);
   if (simulation_->config().rods.size() > 1)
     for (const RodConfig& rod : simulation_->config().rods)
@@ -291,7 +299,7 @@ void SceneNode::publishState()
     state_pub_.publish(state.pointer());
   for (const auto& state : messages_.threads)
     state_pub_.publish(state.pointer());
-  if (hasCloths(kind_))
+  if (hasCloths())
     state_pub_.publish(messages_.cloth_state.pointer());
   else
     poses_pub_.publish(messages_.edge_poses.pointer());

@@ -135,6 +135,12 @@ DiagnosticStatus SceneNode::simulationStatus() const
       const Eigen::Matrix3Xd& forces = simulation_->state().cloths[k].guide_forces;
       force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
     }
+    for (std::size_t r = 0; r < simulation_->state().rod_guides.size(); ++r)
+    {
+      error = std::max(error, simulation_->rodTrackingError(static_cast<int>(r)));
+      const Eigen::Matrix3Xd& forces = simulation_->state().rod_guides[r].forces;
+      force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
+    }
     add(status, "constraint residual [m]", error);
     add(status, "worst constraint residual over size", recent_.tracking_error);
     add(status, "largest guide force [N]", force);
@@ -147,7 +153,7 @@ DiagnosticStatus SceneNode::simulationStatus() const
       add(status, "greatest distance where forces are at their bounds [m]", refused);
     }
   }
-  if (hasCloths(kind_))
+  if (hasCloths())
   {
     std::uint64_t vertices = 0;
     for (const SceneCloth& held : simulation_->state().cloths)

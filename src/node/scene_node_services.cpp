@@ -15,7 +15,7 @@ void SceneNode::advertiseServices()
                nh_priv_.advertiseService("load_state", &SceneNode::onLoad, this)};
   if (kind_ != NodeKind::threads)
     services_.push_back(nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this));
-  if (kind_ == NodeKind::tracking)
+  if (kind_ == NodeKind::tracking && hasCloths())
     services_.push_back(nh_priv_.advertiseService("set_functions", &SceneNode::onSetFunctions, this));
 }
 
@@ -120,7 +120,7 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
     return true;
   }
   if (active)
-    response.message = request.name + " holds the " + (hasCloths(kind_) ? "cloth" : "rod") + " already; release it first";
+    response.message = request.name + " holds the " + (hasCloths() ? "cloth" : "rod") + " already; release it first";
   else
     response.message = attach(request, g, response);
   response.success = response.message.empty();

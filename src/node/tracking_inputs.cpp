@@ -14,6 +14,11 @@ constexpr std::size_t kMaxPending = 300;
 
 bool withinReach(const Eigen::Matrix3Xd& points) { return points.cols() == 0 || points.cwiseAbs().maxCoeff() <= max_coordinate; }
 
+const Eigen::Matrix3Xd& guideNow(const Simulation& simulation, int index, bool of_rod)
+{
+  return of_rod ? simulation.state().rod_guides[index].nodes : simulation.state().cloths[index].guide;
+}
+
 }  // namespace
 
 TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers, const Simulation& simulation,
@@ -21,26 +26,22 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
   : options_(options), buffers_(buffers), clock_(clock), tf_(tf), drops_(drops), pending_(kMaxPending, options.tf_timeout)
 {
   const std::vector<ClothConfig>& cloths = simulation.config().cloths;
-  const auto tracked = std::count_if(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking != nullptr; });
-  for (std::size_t k = 0; k < cloths.size(); ++k)
-  {
-    if (!cloths[k].tracking || !cloths[k].tracking->guide.byTopic())
-      continue;
-    const GuideConfig& config = cloths[k].tracking->guide;
-    Guide guide;
-    guide.cloth = static_cast<int>(k);
-    guide.carried = std::get_if<CarriedGuide>(&config.motion);
-    guide.topic = (tracked == 1 ? std::string() : "tracked/" + cloths[k].name + "/") + (guide.carried ? "guide/bodies" : "guide/points");
-    GuideBuffer::Options own = buffers_;
-    own.coast = config.coast;
-    if (guide.carried)
-      for (std::size_t b = 0; b < guide.carried->bodies.size(); ++b)
-        guide.bodies.emplace_back(own, guide.carried->keeps_offset ? Attach::initial : Attach::section, Pose());
-    else
-      guide.points = std::make_unique<PointGuideBuffer>(own, simulation.state().cloths[k].guide);
-    guide.held = simulation.state().cloths[k].guide;
-    guides_.push_back(std::move(guide));
-  }
+  const std::vector<RodConfig>& rods = simulation.config().rods;
+  const auto tracks = [](const auto& object) { return object.tracking != nullptr; };
+  const auto tracked = std::count_if(cloths.begin(), cloths.end(), tracks) + std::count_if(rods.begin(), rods.end(), tracks);
+  const auto add = [&](const auto& objects, bool of_rod) {
+    for (std::size_t k = 0; k < objects.size(); ++k)
+    {
+      Guide guide;
+      guide.index = static_cast<int>(k);
+      guide.of_rod = of_rod;
+      guide.topic = tracked == 1 ? std::string() : "tracked/" + objects[k].name + "/";
+      if (objects[k].tracking && objects[k].tracking->guide.byTopic())
+        addGuide(objects[k].tracking->guide, guideNow(simulation, guide.index, of_rod), std::move(guide));
+    }
+  };
+  add(cloths, false);
+  add(rods, true);
   for (std::size_t g = 0; g < guides_.size(); ++g)
   {
     const int index = static_cast<int>(g);
@@ -58,6 +59,22 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
   }
 }
 
+/// `guide`: with its topic's prefix.
+void TrackingInputs::addGuide(const GuideConfig& config, const Eigen::Matrix3Xd& now, Guide guide)
+{
+  guide.carried = std::get_if<CarriedGuide>(&config.motion);
+  guide.topic += guide.carried ? "guide/bodies" : "guide/points";
+  GuideBuffer::Options own = buffers_;
+  own.coast = config.coast;
+  if (guide.carried)
+    for (std::size_t b = 0; b < guide.carried->bodies.size(); ++b)
+      guide.bodies.emplace_back(own, guide.carried->keeps_offset ? Attach::initial : Attach::section, Pose());
+  else
+    guide.points = std::make_unique<PointGuideBuffer>(own, now);
+  guide.held = now;
+  guides_.push_back(std::move(guide));
+}
+
 void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message)
 {
   drops_.receive();
@@ -68,8 +85,8 @@ void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message
   if (!why.empty())
     return drops_.drop(Drop::wrong_length, what, why);
   if (taken.points.cols() != guides_[guide].held.cols())
-    return drops_.drop(Drop::wrong_length, what, std::to_string(taken.points.cols()) + " points, but the guide's mesh has " +
-                                                     std::to_string(guides_[guide].held.cols()) + " vertices");
+    return drops_.drop(Drop::wrong_length, what, std::to_string(taken.points.cols()) + " points, but the guide" + (guides_[guide].of_rod ? "" : "'s mesh") + " has " +
+                                                     std::to_string(guides_[guide].held.cols()) + (guides_[guide].of_rod ? " nodes" : " vertices"));
   if (!taken.points.allFinite())
     return drops_.drop(Drop::not_finite, what, "all points must be finite");
   take(std::move(taken), message.header);
@@ -180,7 +197,7 @@ void TrackingInputs::apply(double time, SceneInputs& inputs)
 {
   for (Guide& guide : guides_)
   {
-    Eigen::Matrix3Xd& vertices = inputs.guides[guide.cloth];
+    Eigen::Matrix3Xd& vertices = (guide.of_rod ? inputs.rod_guides : inputs.guides)[guide.index];
     if (guide.points)
       vertices = guide.points->target(time);
     else if (guide.heard())   // until then it stays
@@ -217,7 +234,7 @@ void TrackingInputs::attachAll(const Simulation& simulation)
 {
   for (Guide& guide : guides_)
   {
-    const Eigen::Matrix3Xd& now = simulation.state().cloths[guide.cloth].guide;
+    const Eigen::Matrix3Xd& now = guideNow(simulation, guide.index, guide.of_rod);
     start(guide, now);
     if (guide.points)
       guide.points->attachAt(now);
@@ -229,7 +246,7 @@ void TrackingInputs::restart(const Simulation& simulation)
   pending_.clear();
   for (Guide& guide : guides_)
   {
-    const Eigen::Matrix3Xd& now = simulation.state().cloths[guide.cloth].guide;
+    const Eigen::Matrix3Xd& now = guideNow(simulation, guide.index, guide.of_rod);
     start(guide, now);
     if (guide.points)
       guide.points->restart(now);

@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 
 #include "rod_stepper_impl.h"
+#include "slender_sim/rod/average_projection.h"
 
 namespace slender {
 
@@ -17,8 +18,7 @@ class ConstrainedRod
 {
 public:
   ConstrainedRod(RodSystem& rod, const AveragedRod::Averages& c)
-    : rod_(rod), c_(c), rows_(3 * c.rows()), columns_(4 * c.cols(), rows_), schur_(rows_, rows_), factor_(rows_), gap_(rows_), multipliers_(rows_), pull_(c.rows())
-    , weighted_(c.rows(), c.cols()), gram_(c.rows(), c.rows()), gram_factor_(c.rows())
+    : rod_(rod), c_(c), rows_(3 * c.rows()), columns_(4 * c.cols(), rows_), schur_(rows_, rows_), factor_(rows_), gap_(rows_), multipliers_(rows_), projection_(c)
   {
     multipliers_.setZero();
   }
@@ -27,28 +27,19 @@ public:
   bool meet(const Eigen::VectorXd& mass, const Eigen::Matrix3Xd& targets)
   {
     targets_ = &targets;
-    weighted_.setZero();
-    for (Eigen::Index i = 0; i < c_.rows(); ++i)
-      for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
-        if (rod_.isFree(static_cast<int>(entry.col())))
-          weighted_(i, entry.col()) = entry.value() / std::sqrt(mass[entry.col()]);
-    gram_.noalias() = weighted_ * weighted_.transpose();
-    const double scale = gram_.diagonal().maxCoeff();
-    gram_factor_.compute(gram_);
-    for (Eigen::Index i = 0; i < c_.rows(); ++i)   // what is left of a row beside the others
-      if (!(gram_factor_.vectorD()[i] > 1e-12 * scale))
-        return false;
+    if (!projection_.prepare(mass, [this](int node) { return rod_.isFree(node); }))
+      return false;
     for (int k = 0; k < 3; ++k)
     {
       for (Eigen::Index i = 0; i < c_.rows(); ++i)
-        pull_[i] = targets(k, i) - average(i, rod_.arrays().x[k]);
-      gram_factor_.solveInPlace(pull_);
-      for (Eigen::Index j = 0; j < c_.cols(); ++j)
-        if (rod_.isFree(static_cast<int>(j)))
+        gap_[i] = targets(k, i) - average(i, rod_.arrays().x[k]);
+      const Eigen::VectorXd& moved = projection_.displacements(gap_.head(c_.rows()));
+      for (int j = 0; j < static_cast<int>(c_.cols()); ++j)
+        if (rod_.isFree(j))
         {
-          Eigen::Vector3d x = rod_.position(static_cast<int>(j));
-          x[k] += weighted_.col(j).dot(pull_) / std::sqrt(mass[j]);
-          rod_.setPosition(static_cast<int>(j), x);
+          Eigen::Vector3d x = rod_.position(j);
+          x[k] += moved[j];
+          rod_.setPosition(j, x);
         }
     }
     return true;
@@ -131,9 +122,8 @@ private:
   Eigen::MatrixXd columns_;   ///< K^-1 C^T, 4 nodes x 3 averages
   Eigen::MatrixXd schur_;     ///< C K^-1 C^T
   Eigen::LDLT<Eigen::MatrixXd> factor_;
-  Eigen::VectorXd gap_, multipliers_, pull_;
-  Eigen::MatrixXd weighted_, gram_;
-  Eigen::LDLT<Eigen::MatrixXd> gram_factor_;
+  Eigen::VectorXd gap_, multipliers_;
+  AverageProjection projection_;
 };
 
 }  // namespace
@@ -164,7 +154,28 @@ public:
     report.residual = std::max(report.residual, newton.residual);
     report.max_strain = std::max(report.max_strain, newton.max_strain);
     rod.finishStep(inputs, duration, t, h, report);
+    forces = -Eigen::Map<const Eigen::Matrix3Xd>(equations.multipliers().data(), 3, averages->rows());
+    bearShares();
     return StepFailure::none;
+  }
+
+  /// Averages pull at held nodes, too, which hand that on to what holds them.
+  void bearShares()
+  {
+    for (Eigen::Index i = 0; i < averages->rows(); ++i)
+      for (Averages::InnerIterator entry(*averages, i); entry; ++entry)
+      {
+        const int node = static_cast<int>(entry.col());
+        for (std::size_t k = 0; k < rod.wrenches.size() && !rod.system.isFree(node); ++k)
+        {
+          const GraspState& grasp = rod.work.grasps[k];
+          if (!grasp.active || node < grasp.first_node || node > grasp.last_node)
+            continue;
+          const Eigen::Vector3d force = entry.value() * forces.col(i);
+          rod.wrenches[k].force += force;
+          rod.wrenches[k].torque += (rod.system.position(node) - rod.stage_poses[k].position).cross(force);
+        }
+      }
   }
 
   RodStepper::Impl rod;
@@ -205,7 +216,10 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
   if (!what.empty() || !rod.inputsFinite(state, inputs, what))
     return rod.refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   rod.begin(state);
-  impl_->start = state.x * impl_->averages->transpose();
+  impl_->start.setZero(3, targets.cols());   // entry by entry: Eigen's product takes memory
+  for (Eigen::Index i = 0; i < targets.cols(); ++i)
+    for (Averages::InnerIterator entry(*impl_->averages, i); entry; ++entry)
+      impl_->start.col(i) += entry.value() * state.x.col(entry.col());
   impl_->targets = &targets;
   double t = 0.0, h = duration;
   while (t < duration)
@@ -234,7 +248,6 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
     h = 2.0 * length;
   }
   state = rod.work;
-  impl_->forces = -Eigen::Map<const Eigen::Matrix3Xd>(impl_->equations.multipliers().data(), 3, targets.cols());
   return report;
 }
 

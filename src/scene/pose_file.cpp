@@ -179,4 +179,35 @@ std::vector<Eigen::Vector3d> readPointFile(const std::string& path)
   return points;
 }
 
+void appendPoints(PointTrajectory& points, const std::vector<double>& row)
+{
+  points.append(row[0], Eigen::Map<const Eigen::Matrix3Xd>(row.data() + 1, 3, static_cast<Eigen::Index>(row.size() / 3)));
+}
+
+PointTrajectory readPointMotion(const std::string& path, int count)
+{
+  std::vector<std::string> columns{"t"};
+  for (int i = 0; i < count; ++i)
+  {
+    for (const char* axis : {"x", "y", "z"})
+    {
+      columns.push_back(axis + std::to_string(i));
+    }
+  }
+  PointTrajectory points;
+  std::vector<double> row(columns.size());
+  readTable(path, columns, [&](const std::vector<std::string>& cells) {
+    for (std::size_t k = 0; k < row.size(); ++k)
+    {
+      row[k] = number(cells[k], columns[k].c_str());
+    }
+    appendPoints(points, row);
+  });
+  if (points.empty())
+  {
+    throw SceneError(path + ": has no points; must have at least one line " + joinWords(columns));
+  }
+  return points;
+}
+
 }  // namespace slender

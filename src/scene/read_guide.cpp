@@ -262,16 +262,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   only_for(groups, by_bodies, "bodies");
   only_for(attach, by_bodies, "bodies");
   only_for(late, topic.present(), "guides by topic");
-  if (late.isMap())
-  {
-    YamlMap extrapolated(late);
-    assign(source.config.coast, extrapolated.require("extrapolate").number(Range::above(0, 60, "s")));
-    extrapolated.finish();
-  }
-  else
-  {
-    assign(source.config.coast, late.choice<double>({{"hold", 0.0}, {"extrapolate", 0.2}}));
-  }
+  assign(source.config.coast, readLate(late));
   const double first = begin.number(Range::closed(-1e6, 1e6, "s")).value_or(0.0);
   if (frames.present())
   {
@@ -360,6 +351,18 @@ void readPreview(const YamlCursor& at, const std::vector<ClothConfig>& cloths, G
 }
 
 }  // namespace
+
+std::optional<double> readLate(const YamlCursor& at)
+{
+  if (!at.isMap())
+  {
+    return at.choice<double>({{"hold", 0.0}, {"extrapolate", 0.2}});
+  }
+  YamlMap map(at);
+  const auto coast = map.require("extrapolate").number(Range::above(0, 60, "s"));
+  map.finish();
+  return coast;
+}
 
 std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& context, const std::optional<MeshFile>& file)
 {

@@ -44,6 +44,8 @@ Damping readDamping(const YamlCursor& at);
 struct RodPart { RodConfig config; int edges = 0; };
 /// What rods of a scene and those of a generator have in common: curvature, formulation, material, damping, contact.
 void readTraits(YamlMap& map, RodConfig& rod);
+/// `track` of a rod with so many edges (0: not known), all else of which has been read; null without it, or when something was reported.
+std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context, const RodConfig& rod, int edges);
 RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
 
 /// What the generators of a scene make, each with the place that asked for it. Welds count rods from `first_rod`.

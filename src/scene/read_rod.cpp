@@ -257,6 +257,7 @@ RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::str
   rod.cross_section = readCrossSection(map.get("cross_section"), edges);
   readTraits(map, rod);
   readGrasps(map.get("grasps"), context, rod, edges);
+  rod.tracking = readTrackedCurve(map.get("track"), context, rod, edges);
   map.finish();
   return {std::move(rod), edges};
 }

@@ -25,6 +25,9 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
 /// Points of a bag, which must be those of the guide's mesh, as its motion.
 void readBagPoints(const YamlCursor& at, const ReadContext& context, double begin, const std::string& object, GuideSource& source);
 
+/// `late` of a guide by topic, as GuideConfig::coast.
+std::optional<double> readLate(const YamlCursor& at);
+
 /// The word obj: groups of vertices of a mesh's file; none when reported.
 std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& context, const std::optional<MeshFile>& file);
 

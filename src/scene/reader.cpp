@@ -245,6 +245,28 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   }
 }
 
+/// Rods that track a guide take implicit Euler steps of fixed length.
+void checkTrackedTime(YamlMap& map, SceneConfig& scene)
+{
+  YamlMap time(map.get("time"));
+  if (!time.has("integrator"))
+  {
+    scene.time.integrator = Integrator::implicit_euler;
+  }
+  else if (scene.time.integrator != Integrator::implicit_euler)
+  {
+    time.get("integrator").problem("is not for rods that track a guide; must be implicit_euler");
+  }
+  if (scene.time.error_tolerance > 0)
+  {
+    time.get("error_tolerance").problem("is not for rods that track a guide, whose steps are of fixed length; leave it out");
+  }
+  if (scene.start == Start::equilibrium)
+  {
+    map.get("start").problem("is not for rods that track a guide; must be as_given");
+  }
+}
+
 SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::string& directory, KeyLog* log = nullptr)
 {
   SceneConfig scene;
@@ -285,6 +307,10 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   {
     YamlMap(time).get("integrator").problem("takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
                                             "bdf2 or tr_bdf2, or no rod may have contact");
+  }
+  if (std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.tracking != nullptr; }))
+  {
+    checkTrackedTime(map, scene);
   }
   const bool only_threads = !scene.threads.empty() && scene.rods.empty() && scene.bodies.empty() && scene.cloths.empty();
   if (only_threads && YamlMap(time).has("integrator") && scene.time.integrator != Integrator::implicit_euler)

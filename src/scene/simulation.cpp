@@ -1,39 +1,13 @@
 #include "slender_sim/scene/simulation.h"
 
 #include <algorithm>
-#include <exception>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
 
-#include "slender_sim/scene/reader.h"
-#include "slender_sim/scene/shapes.h"
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 namespace slender {
 
 namespace {
-
-/// Which equations explicit steps use; implicit ones always use the general formulation with stretching.
-void chooseFormulation(const RodConfig& rod, Integrator integrator, RodModel& model)
-{
-  const bool explicit_steps = integrator == Integrator::symplectic_euler;
-  const std::string obstacle = explicit_steps ? whyNotIsotropic(model) : "it takes explicit steps (time.integrator: symplectic_euler)";
-  if (rod.formulation == Formulation::isotropic && !obstacle.empty())
-  {
-    throw std::invalid_argument("formulation: isotropic does not apply: " + obstacle + "; take formulation: auto");
-  }
-  if (rod.stretching == Stretching::projected && !explicit_steps)
-  {
-    throw std::invalid_argument("stretching: projected takes explicit steps (time.integrator: symplectic_euler); "
-                                "with implicit ones take stretching: stiff and material.inextensible: true");
-  }
-  model.isotropic = rod.formulation != Formulation::general && obstacle.empty();
-  model.inextensible = rod.stretching == Stretching::projected;
-}
 
 Pose sectionOffset(const Pose& X_WM, const Pose& X_WG) { return X_WM.inverse() * X_WG; }
 
@@ -65,57 +39,6 @@ Simulation::Simulation(SceneConfig config) : config_(std::move(config))
     findEquilibrium();
   }
   initial_ = state_;
-}
-
-void Simulation::buildRods()
-{
-  for (std::size_t r = 0; r < config_.rods.size(); ++r)
-  {
-    const RodConfig& rod = config_.rods[r];
-    try
-    {
-      const Eigen::Matrix3Xd rest = restNodes(rod, config_.gravity);
-      const Eigen::Matrix3Xd initial = initialNodes(rod, rest, config_.gravity);
-      const int edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
-      RodModel model = buildRod(rod.name, rest, rod.closed, rodSections(rod, edges), rod.director, rod.naturally_straight, rod.joints);
-      if (rod.material.inextensible)
-      {
-        model.stretch_modulus = model.stretch_modulus.cwiseMax(1e5 * model.totalMass() * config_.gravity.norm());
-      }
-      model.mass_damping = rod.damping.mass;
-      model.stiffness_damping = rod.damping.stiffness;
-      if (rod.damping.drag > 0)
-      {
-        model.drag.setZero(model.nodes());
-        for (int j = 0; j < model.edges(); ++j)
-        {
-          const double half = 0.5 * rod.damping.drag * model.rest_length[j];
-          model.drag[j] += half;
-          model.drag[(j + 1) % model.nodes()] += half;
-        }
-      }
-      chooseFormulation(rod, config_.time.integrator, model);
-      RodState state = makeRodState(model, initial, rod.director, rod.initial_twist);
-      for (std::size_t g = 0; g < rod.grasps.size(); ++g)
-      {
-        const GraspConfig& grasp = rod.grasps[g];
-        if (grasp.first_node < 0 || grasp.last_node >= model.nodes() || grasp.first_node > grasp.last_node)
-        {
-          throw std::invalid_argument("grasp " + grasp.name + " holds nodes " + std::to_string(grasp.first_node) + " to " +
-                                      std::to_string(grasp.last_node) + "; must be in [0, " + std::to_string(model.nodes() - 1) + "]");
-        }
-        state.grasps.push_back(makeGrasp(model, state, grasp.first_node, grasp.last_node, grasp.hold == Hold::frame));
-        grasps_.push_back({static_cast<int>(r), static_cast<int>(g), &grasp});
-      }
-      models_.push_back(std::make_shared<const RodModel>(std::move(model)));
-      state_.rods.push_back(std::move(state));
-    }
-    catch (const std::invalid_argument& error)
-    {
-      const std::string place = rod.place.empty() ? "scene " + config_.name + ": rods." + std::to_string(r) : rod.place;
-      throw SceneError(place + " (" + rod.name + "): " + error.what());
-    }
-  }
 }
 
 void Simulation::findEquilibrium()
@@ -165,6 +88,7 @@ void Simulation::inputsAt(double time, SceneInputs& inputs) const
   }
   addThreadInputs(inputs, time);
   addGuideInputs(inputs, time);
+  addRodGuides(inputs, time);
   inputs.grasps.clear();
   inputs.grasps.reserve(grasps_.size());
   for (std::size_t g = 0; g < grasps_.size(); ++g)
@@ -228,6 +152,7 @@ void Simulation::checkInputs(const SceneInputs& inputs) const
   check("threads", inputs.threads.size(), config_.threads.size(), "thread");
   check("obstacles", inputs.obstacles.size(), config_.obstacles.size(), "obstacle");
   checkGuides(inputs);
+  checkRodGuides(inputs);
 }
 
 void Simulation::fillRodInputs(const SceneInputs& inputs)
@@ -287,6 +212,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
     }
     if (total.ok)
     {
+      takeRodTargets(inputs);
       total.merge(stepAll());
     }
     if (total.ok && group_)
@@ -310,66 +236,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
   takeWrenches();
   takeClothWrenches();
   takeGuides(inputs, total);
-  return total;
-}
-
-/// Rods on their own, in parallel.
-StepReport Simulation::stepAll()
-{
-  StepReport total;
-  const int count = static_cast<int>(steppers_.size());
-  constexpr int kWorthThreads = 500;   // nodes; less is done before threads are awake
-  int nodes = 0, alone = 0;
-  for (int r = 0; r < count; ++r)
-  {
-    if (steppers_[r])
-    {
-      nodes += models_[r]->nodes();
-      ++alone;
-    }
-  }
-  if (alone == 0)
-  {
-    return total;
-  }
-  if (count == 1)
-  {
-    total.merge(steppers_[0]->step(state_.rods[0], rod_inputs_[0], config_.time.step));
-    return total;
-  }
-  std::vector<StepReport> reports(steppers_.size());
-  std::vector<std::exception_ptr> errors(steppers_.size());
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) if (threads_ != 1 && alone > 1 && nodes >= kWorthThreads) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
-#endif
-  for (int r = 0; r < count; ++r)
-  {
-    try
-    {
-      if (steppers_[r])
-      {
-        reports[r] = steppers_[r]->step(state_.rods[r], rod_inputs_[r], config_.time.step);
-      }
-    }
-    catch (...)
-    {
-      errors[r] = std::current_exception();   // must not leave the parallel region
-    }
-  }
-  for (const std::exception_ptr& error : errors)
-  {
-    if (error)
-    {
-      std::rethrow_exception(error);
-    }
-  }
-  for (int r = 0; r < count; ++r)
-  {
-    if (steppers_[r])
-    {
-      total.merge(reports[r]);
-    }
-  }
+  takeRodGuides(inputs, total);
   return total;
 }
 
@@ -393,7 +260,7 @@ void Simulation::takeWrenches()
     const int rod = grasps_[g].rod;
     if (rod >= 0)
     {
-      state_.wrenches[g] = (steppers_[rod] ? steppers_[rod]->wrenches() : group_->wrenches(group_index_[rod]))[grasps_[g].index];
+      state_.wrenches[g] = rodWrenches(rod)[grasps_[g].index];
     }
   }
   for (std::size_t k = 0; k < thread_steppers_.size(); ++k)
@@ -446,6 +313,7 @@ void Simulation::attach(int grasp, int first_node, int last_node, Hold hold)
                                   " to " + std::to_string(held.last_node));
     }
   }
+  checkHeld(ref.rod, ref.index, first_node, last_node);
   rod.forgetHistory();   // the integrator's past was that of another set of constraints
   rod.grasps[ref.index] = makeGrasp(model, rod, first_node, last_node, hold == Hold::frame);
   takeOffset(grasp, state_.time);
@@ -481,12 +349,6 @@ const Wrench& Simulation::wrench(int grasp) const
 {
   checkGrasp(grasp);
   return state_.wrenches[grasp];
-}
-
-RodEnergies Simulation::energies(int rod) const
-{
-  return steppers_.at(rod) ? steppers_[rod]->energies(state_.rods[rod], config_.gravity)
-                           : group_->energies(group_index_[rod], state_.rods[rod], config_.gravity);
 }
 
 }  // namespace slender

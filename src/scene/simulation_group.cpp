@@ -46,6 +46,7 @@ void Simulation::buildGroup()
   RodGroupModel model;
   group_index_.assign(rods, -1);
   steppers_.resize(rods);
+  tracked_rods_.resize(rods);
   for (int r = 0; r < rods; ++r)
   {
     if (joined[r])
@@ -54,7 +55,11 @@ void Simulation::buildGroup()
       group_rods_.push_back(r);
       model.rods.push_back(models_[r]);
     }
-    else
+    if (config_.rods[r].tracking)
+    {
+      buildTrackedRod(r);
+    }
+    else if (!joined[r])
     {
       steppers_[r].emplace(models_[r], config_.time);
     }

@@ -54,13 +54,35 @@ ThreadSnapshot snapshotOf(const std::string& name, const ThreadState& state)
   return out;
 }
 
-void appendFunctions(const std::string& cloth, const FunctionSet& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
+void appendFunctions(const std::string& object, const FunctionSet& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
                      std::vector<FunctionSnapshot>& out)
 {
   const std::string prefix = set.name.empty() ? "" : set.name + "/";
   const Eigen::Matrix3Xd averages = set.constraints->averages(guide);
   for (int i = 0; i < set.constraints->count(); ++i)
-    out.push_back({cloth, prefix + set.constraints->name(i), averages.col(i), forces.col(i)});
+    out.push_back({object, prefix + set.constraints->name(i), averages.col(i), forces.col(i)});
+}
+
+bool appendFunctions(const SceneConfig& scene, const std::string& object, const std::string& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
+                     std::vector<FunctionSnapshot>& out)
+{
+  const TrackingConfig* tracking = nullptr;
+  const auto look = [&](const auto& objects) {
+    for (const auto& candidate : objects)
+      if (candidate.tracking && candidate.name == object)
+        tracking = candidate.tracking.get();
+  };
+  look(scene.rods);
+  look(scene.cloths);
+  if (!tracking || tracking->guide.mesh.vertices.cols() != guide.cols())
+    return false;
+  for (const FunctionSet& functions : tracking->sets)
+    if (functions.name == set && functions.constraints->count() == forces.cols())
+    {
+      appendFunctions(object, functions, guide, forces, out);
+      return true;
+    }
+  return false;
 }
 
 SceneSnapshot snapshotOf(const Simulation& simulation)
@@ -70,7 +92,11 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
   SceneSnapshot out;
   out.time = state.time;
   for (std::size_t r = 0; r < state.rods.size(); ++r)
+  {
     out.rods.push_back(snapshotOf(simulation.rodModel(static_cast<int>(r)), state.rods[r]));
+    if (const auto& tracking = scene.rods[r].tracking)
+      appendFunctions(scene.rods[r].name, tracking->sets.front(), state.rod_guides[r].nodes, state.rod_guides[r].forces, out.functions);
+  }
   for (std::size_t k = 0; k < state.threads.size(); ++k)
     for (const ThreadState& thread : state.threads[k].threads)
       out.threads.push_back(snapshotOf(simulation.threadModel(static_cast<int>(k)).name, thread));

@@ -175,6 +175,12 @@ void visitScene(Archive& archive, State& scene)
   {
     visitRod(archive, rod);
   }
+  archive.list(scene.rod_guides);
+  for (auto& guide : scene.rod_guides)
+  {
+    archive(guide.nodes);
+    archive(guide.forces);
+  }
   archive.list(scene.threads);
   for (auto& group : scene.threads)
   {

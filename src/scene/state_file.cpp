@@ -20,7 +20,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 11;
+constexpr std::uint64_t version = 12;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 std::string errorText(const std::string& path, const std::string& what) { return path + ": " + what + ": " + std::strerror(errno); }
@@ -210,7 +210,7 @@ void Simulation::load(const std::string& path)
     throw std::runtime_error(path + ": " + error.what());
   }
   std::string problem;
-  if (loaded.rods.size() != models_.size() || loaded.threads.size() != thread_models_.size() || loaded.cloths.size() != cloth_models_.size() ||
+  if (loaded.rods.size() != models_.size() || loaded.rod_guides.size() != state_.rod_guides.size() || loaded.threads.size() != thread_models_.size() || loaded.cloths.size() != cloth_models_.size() ||
       loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
       loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||
       loaded.wrenches.size() != grasps_.size() || loaded.end_loads.size() != thread_models_.size())
@@ -220,6 +220,13 @@ void Simulation::load(const std::string& path)
   for (std::size_t r = 0; problem.empty() && r < models_.size(); ++r)
   {
     problem = misfit(loaded.rods[r], *models_[r], state_.rods[r]);
+  }
+  for (std::size_t r = 0; problem.empty() && r < state_.rod_guides.size(); ++r)
+  {
+    if (loaded.rod_guides[r].nodes.cols() != state_.rod_guides[r].nodes.cols() || loaded.rod_guides[r].forces.cols() != state_.rod_guides[r].forces.cols())
+    {
+      problem = "the guide of rod " + models_[r]->name + " has another size";
+    }
   }
   for (std::size_t k = 0; problem.empty() && k < thread_models_.size(); ++k)
   {

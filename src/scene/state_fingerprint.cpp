@@ -14,6 +14,30 @@ std::uint64_t Simulation::fingerprint() const
       out(c);
     }
   };
+  const auto tracked = [&](const TrackingConfig& tracking) {
+    out(tracking.guide.mesh.vertices);
+    out(static_cast<std::uint64_t>(tracking.sets.size()));
+    for (const FunctionSet& set : tracking.sets)
+    {
+      text(set.name);
+      out(set.from.value_or(0.0));
+      out(set.blend);
+      out(set.bounds);
+      for (const WeakConstraints::Matrix* weights : {&set.constraints->matrix(), &set.constraints->guideMatrix()})
+      {
+        out(static_cast<std::uint64_t>(weights->rows()));
+        for (Eigen::Index i = 0; i < weights->rows(); ++i)
+        {
+          for (WeakConstraints::Matrix::InnerIterator entry(*weights, i); entry; ++entry)
+          {
+            out(static_cast<int>(i));
+            out(static_cast<int>(entry.col()));
+            out(entry.value());
+          }
+        }
+      }
+    }
+  };
   out(config_.gravity);
   const TimeConfig& time = config_.time;
   out(time.step);
@@ -47,6 +71,10 @@ std::uint64_t Simulation::fingerprint() const
     {
       text(grasp.name);
       out(static_cast<int>(grasp.attach));
+    }
+    if (const auto& tracking = config_.rods[r].tracking)
+    {
+      tracked(*tracking);
     }
     const RodContact touch = config_.rods[r].contact.value_or(RodContact{});
     out(config_.rods[r].contact.has_value());
@@ -105,28 +133,7 @@ std::uint64_t Simulation::fingerprint() const
     out(config_.cloths[k].one_newton_step);
     if (const auto& tracking = config_.cloths[k].tracking)
     {
-      out(tracking->guide.mesh.vertices);
-      out(static_cast<std::uint64_t>(tracking->sets.size()));
-      for (const FunctionSet& set : tracking->sets)
-      {
-        text(set.name);
-        out(set.from.value_or(0.0));
-        out(set.blend);
-        out(set.bounds);
-        for (const WeakConstraints::Matrix* weights : {&set.constraints->matrix(), &set.constraints->guideMatrix()})
-        {
-          out(static_cast<std::uint64_t>(weights->rows()));
-          for (Eigen::Index i = 0; i < weights->rows(); ++i)
-          {
-            for (WeakConstraints::Matrix::InnerIterator entry(*weights, i); entry; ++entry)
-            {
-              out(static_cast<int>(i));
-              out(static_cast<int>(entry.col()));
-              out(entry.value());
-            }
-          }
-        }
-      }
+      tracked(*tracking);
     }
     const ClothContactConfig touch = config_.cloths[k].contact.value_or(ClothContactConfig{});
     out(config_.cloths[k].contact.has_value());

@@ -201,8 +201,8 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   {
     std::printf("mended folds      %d\n", total.mended_folds);
   }
-  const auto& cloths = simulation.config().cloths;
-  if (std::any_of(cloths.begin(), cloths.end(), [](const slender::ClothConfig& cloth) { return cloth.tracking != nullptr; }))
+  const auto tracks = [](const auto& objects) { return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; }); };
+  if (tracks(simulation.config().cloths) || tracks(simulation.config().rods))
   {
     std::printf("tracking          averages at most %.2g of the guide's size away\n", total.tracking_error);
     if (total.forces_at_bound > 0)

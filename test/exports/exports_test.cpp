@@ -50,7 +50,8 @@ INSTANTIATE_TEST_SUITE_P(
                   Recording{"handkerchief", "--duration 0.1", {"nodes.csv", "grasps.csv", "cloths.csv"}},
                   Recording{"obstacle_course", "--duration 0.1", {"nodes.csv", "grasps.csv", "bodies.csv"}},
                   Recording{"box", "--duration 0.1 --set 'tracked.0.test_functions=[{name: foot, regions: {foot: {guide: [0..3]}}}, {name: tight, basis: subdivision, from: 0.05}]'",
-                            {"nodes.csv", "grasps.csv", "cloths.csv", "tracking.csv"}}),
+                            {"nodes.csv", "grasps.csv", "cloths.csv", "tracking.csv"}},
+                  Recording{"tracked_rope", "--duration 0.1", {"nodes.csv", "grasps.csv", "tracking.csv"}}),
   [](const auto& info) { return std::string(info.param.scene); });
 
 TEST_F(Exports, withoutTheScenesFilesTablesLackOnlyTheirAverages)

@@ -141,6 +141,30 @@ TEST(Allocations, WarmProjectedStepsWithBodiesMakeNone)
   EXPECT_TRUE(ok);
 }
 
+/// A scene's rod that tracks a guide.
+TEST(TrackedRodAllocations, AWarmStepMakesNone)
+{
+  for (const char* functions : {"{basis: hats}", "{segments: 4}"})
+  {
+    Simulation simulation(parseScene(std::string("time: {step: 0.005}\nrods: [{centerline: {straight: {edges: 60}}, damping: {stiffness: 0.001}, grasps: {end: {edges: [0]}}, "
+                                                 "track: {guide: {nodes: 8, motion: {topic: points}}, test_functions: ") + functions + "}}]", "t"));
+    SceneInputs inputs;
+    bool ok = true;
+    const auto advance = [&] {
+      simulation.defaultInputs(inputs);
+      inputs.rod_guides[0].row(1).array() += 1e-3;
+      ok = simulation.step(inputs).ok && ok;
+    };
+    for (int k = 0; k < 20; ++k)
+      advance();
+    const long before = allocations;
+    for (int k = 0; k < 20; ++k)
+      advance();
+    EXPECT_EQ(allocations - before, 0) << functions;
+    EXPECT_TRUE(ok);
+  }
+}
+
 TEST(ThreadAllocations, AWarmStepMakesNone)
 {
   ThreadModel model = honey();

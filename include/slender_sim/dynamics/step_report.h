@@ -41,7 +41,7 @@ struct StepReport
   bool stable = true;             ///< statics: the equilibrium is a minimum of the energy (false: stationary only, a saddle)
   int projection_iterations = 0;  ///< of fast projection (explicit steps of inextensible rods), the most in a step
   double constraint_error = 0.0;  ///< largest | |e|^2/L^2 - 1 | that it left [-]
-  double tracking_error = 0.0;    ///< greatest distance of an average of a tracked cloth from that of its guide, over the guide's size [-]; of those that are met
+  double tracking_error = 0.0;    ///< greatest distance of an average of a tracked cloth or rod from that of its guide, over the guide's size [-]; of those that are met
   int forces_at_bound = 0;        ///< averages of tracked cloths whose forces are at their bounds, and which are therefore not met
   double error_estimate = 0.0;    ///< adaptive steps only: estimated local error [m]
   long work = 0;                  ///< cloth: what the step did, in counts of a WorkBudget

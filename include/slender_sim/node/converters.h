@@ -43,6 +43,8 @@ bool isFinite(const geometry_msgs::Twist& twist);
 
 /// Fills everything but header, epoch and step. `out` may hold an earlier message: its memory is reused.
 void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out);
+/// Then, what the rod tracks.
+void toTracking(const RodConfig& rod, const RodGuide& guide, const RodState& state, slender_sim::RodState& out);
 
 void toMessage(const ThreadState& state, slender_sim::ThreadState& out);
 

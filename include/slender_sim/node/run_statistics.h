@@ -21,7 +21,7 @@ struct RunStatistics
   std::uint64_t repulsions = 0, impulses = 0, zones = 0;   ///< of cloths with contact
   std::uint64_t mended_folds = 0;  ///< of threads
   int forces_at_bound = 0;         ///< most in a step
-  double tracking_error = 0.0;     ///< worst of tracked cloths [-]
+  double tracking_error = 0.0;     ///< worst of tracked cloths and rods [-]
   double constraint_error = 0.0;   ///< worst that it left [-]
   std::vector<double> max_force, max_torque;   ///< per grasp [N], [N m]
   std::chrono::steady_clock::time_point since = std::chrono::steady_clock::now();

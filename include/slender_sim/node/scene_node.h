@@ -31,9 +31,8 @@ namespace slender {
 /// What a node simulates, and its name in what it prints.
 enum class NodeKind { rods, threads, cloths, tracking };
 const char* toString(NodeKind kind);
-inline bool hasCloths(NodeKind kind) { return kind == NodeKind::cloths || kind == NodeKind::tracking; }
 
-/// Simulates a scene of rods and bodies, of viscous threads, of cloth, or of cloth that tracks guides: poses of what moves them come in as messages, their motion goes out.
+/// Simulates a scene of rods and bodies, of viscous threads, of cloth, or of cloth or rods that track guides: poses of what moves them come in as messages, their motion goes out.
 /// README lists topics, services and parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
 class SceneNode
 {
@@ -54,6 +53,7 @@ private:
 
   // scene_node.cpp
   void checkClock() const;
+  bool hasCloths() const { return !simulation_->config().cloths.empty(); }   // and then no rods
   void startClock();
   void advertise();
   void publishMesh();

@@ -20,8 +20,8 @@
 
 namespace slender {
 
-/// Guides of tracked cloths by message: `guide/points` (the guide's vertices in the order of its mesh) and `guide/bodies` (of the bodies that carry them),
-/// through tf2 into the node's frame; in scenes of several tracked cloths `tracked/NAME/guide/points`. A message is taken or dropped as a whole.
+/// Guides of tracked cloths and rods by message: `guide/points` (the guide's vertices or nodes in their order) and `guide/bodies` (of the bodies that carry them),
+/// through tf2 into the node's frame; in scenes of several tracked objects `tracked/NAME/guide/points`. A message is taken or dropped as a whole.
 class TrackingInputs
 {
 public:
@@ -46,7 +46,8 @@ public:
 private:
   struct Guide
   {
-    int cloth = 0;
+    int index = 0;                                           // of a cloth or rod of the scene
+    bool of_rod = false;
     std::string topic;
     std::unique_ptr<PointGuideBuffer> points;               // by points
     const CarriedGuide* carried = nullptr;                   // by bodies, one buffer each:
@@ -66,6 +67,7 @@ private:
     std::vector<std::pair<int, Pose>> bodies;
   };
 
+  void addGuide(const GuideConfig& config, const Eigen::Matrix3Xd& now, Guide guide);
   void onPoints(int guide, const sensor_msgs::PointCloud2& message);
   void onBodies(int guide, const slender_sim::BodyStates& message);
   void take(Message message, const std_msgs::Header& header);

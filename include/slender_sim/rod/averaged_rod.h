@@ -30,7 +30,7 @@ public:
 
   /// Force [N] with which each average acts on the rod (3 x count), spread over its nodes by their weights, at the end of the last successful step.
   const Eigen::Matrix3Xd& averageForces() const;
-  /// As RodStepper::wrenches().
+  /// As RodStepper::wrenches(); with what the averages do to held nodes.
   const std::vector<Wrench>& wrenches() const;
   RodEnergies energies(const RodState& state, const Eigen::Vector3d& gravity) const;
 

@@ -149,6 +149,7 @@ struct RodConfig
   Damping damping;
   std::vector<GraspConfig> grasps;
   std::optional<RodContact> contact;           ///< nothing: touches nothing
+  std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`track`), with one set of test functions; null: nothing
 };
 
 struct ContactConfig

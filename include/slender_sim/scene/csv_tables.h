@@ -17,7 +17,7 @@ namespace slender {
 ///   threads.csv  one row per instant and node of a thread, from the oldest on, if there are any: t, object, thread, id (never used again),
 ///                x y z, vx vy vz, radius of the edge after the node (the last edge at the newest end), deposited (1: lies on the floor)
 ///   cloths.csv   one row per instant and vertex of a cloth, if there are any: t, object, index, x y z, vx vy vz
-///   tracking.csv one row per instant and test function of a tracked cloth, if there are any: t, object, function, its average over the guide x y z,
+///   tracking.csv one row per instant and test function of a tracked cloth or rod, if there are any: t, object, function, its average over the guide x y z,
 ///                and the force with which the guide acts
 /// Numbers are the shortest that read back to the same double. All throw std::runtime_error when writing fails.
 class CsvTables

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "slender_sim/geometry/point_trajectory.h"
 #include "slender_sim/geometry/pose_trajectory.h"
 
 namespace slender {
@@ -24,6 +25,12 @@ std::vector<BodyTrajectory> readPoseFile(const std::string& path);
 
 /// Reads points `x,y,z` [m], one per line, '#' comments, an optional header line `x,y,z`. Throws SceneError in the same way.
 std::vector<Eigen::Vector3d> readPointFile(const std::string& path);
+
+/// Reads a motion of `count` points: `t,x0,y0,z0,x1,...` per line (s, m), '#' comments, an optional header line with these names. Throws SceneError in the same way.
+PointTrajectory readPointMotion(const std::string& path, int count);
+
+/// Appends a frame given as such a row; throws std::invalid_argument: times that do not increase, another number of points.
+void appendPoints(PointTrajectory& points, const std::vector<double>& row);
 
 /// Checks one pose given as seven numbers x y z qx qy qz qw and returns it; throws std::invalid_argument with the reason.
 Pose checkedPose(const double* numbers);

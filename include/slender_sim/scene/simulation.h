@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/rod/averaged_rod.h"
 #include "slender_sim/rod/rod_group.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
@@ -36,12 +37,20 @@ struct SceneCloth
   FunctionBlend blend;              ///< of the set in force, cloth.average_set
 };
 
+/// What a rod tracks.
+struct RodGuide
+{
+  Eigen::Matrix3Xd nodes;           ///< of its guide now [m]; of a rod that tracks nothing none
+  Eigen::Matrix3Xd forces;          ///< with which it acted in the last step, per test function [N] (AveragedRod::averageForces)
+};
+
 /// State of all objects of a scene at one instant.
 struct SceneState
 {
   double time = 0.0;          ///< simulated [s] = steps * step length
   std::uint64_t steps = 0;
   std::vector<RodState> rods;          ///< grasps of the scene first, then welds
+  std::vector<RodGuide> rod_guides;    ///< per rod; none where no rod tracks anything
   std::vector<ThreadGroupState> threads;   ///< per thread of the scene: it and what has broken off it
   std::vector<SceneCloth> cloths;
   std::vector<RigidBodyState> bodies;  ///< per body of the scene, driven ones included
@@ -78,6 +87,7 @@ struct SceneInputs
   std::vector<ThreadDrive> threads;             ///< per thread of the scene
   std::vector<Eigen::Matrix3Xd> guides;         ///< per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]), ignored when it is a cloth;
                                                   ///< of others empty, and none where no cloth tracks anything
+  std::vector<Eigen::Matrix3Xd> rod_guides;     ///< per rod of the scene: its guide's nodes likewise; none where no rod tracks anything
   Eigen::Vector3d wind{0, 0, 0};
 };
 
@@ -150,6 +160,8 @@ public:
     double blend = 0.0;      ///< that functions which took over leave for now: the others count from there
   };
   TrackingError trackingError(int cloth) const;
+  /// Greatest distance of an average of a tracked rod from that of its guide [m]; 0 for others.
+  double rodTrackingError(int rod) const;
   /// Test functions in force of a tracked cloth.
   const FunctionSet& functions(int cloth) const;
   /// Has another set of test functions act from the next step on. What its averages are away from the guide's goes within `blend` [s] (none: that of the
@@ -177,10 +189,21 @@ private:
   void buildRods();
   void takeOffset(int grasp, double time);
   void findEquilibrium();
+  StepReport stepAlone(int rod);
+  const std::vector<Wrench>& rodWrenches(int rod) const;
   void inputsAt(double time, SceneInputs& inputs) const;
   void fillRodInputs(const SceneInputs& inputs);
   void checkInputs(const SceneInputs& inputs) const;
   StepReport stepAll();
+
+  // simulation_tracked_rods.cpp
+  void placeOnGuide(int rod, const RodModel& model, Eigen::Matrix3Xd& nodes, Eigen::Matrix3Xd& velocities);
+  void buildTrackedRod(int rod);
+  void addRodGuides(SceneInputs& inputs, double time) const;
+  void checkRodGuides(const SceneInputs& inputs) const;
+  void takeRodTargets(const SceneInputs& inputs);
+  void takeRodGuides(const SceneInputs& inputs, StepReport& report);
+  void checkHeld(int rod, int grasp, int first_node, int last_node) const;
 
   // simulation_threads.cpp
   void buildThreads();
@@ -234,7 +257,13 @@ private:
   SceneConfig config_;
   SceneState state_, initial_;
   std::vector<std::shared_ptr<const RodModel>> models_;
-  std::vector<std::optional<RodStepper>> steppers_;   ///< per rod; none for those of the group
+  std::vector<std::optional<RodStepper>> steppers_;   ///< per rod; none for those of the group, and those that track a guide
+  struct TrackedRod
+  {
+    AveragedRod stepper;
+    Eigen::Matrix3Xd targets;                         ///< of its averages at the end of the step [m]
+  };
+  std::vector<std::unique_ptr<TrackedRod>> tracked_rods_;   ///< per rod; null for others
   std::vector<std::shared_ptr<const ThreadModel>> thread_models_;
   std::vector<std::optional<ThreadGroup>> thread_steppers_;   ///< per thread; none for those with contact
   std::optional<TouchingThreads> touching_;

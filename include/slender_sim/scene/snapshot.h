@@ -63,7 +63,7 @@ struct SolidSnapshot
   Twist velocity;
 };
 
-/// A test function of a tracked cloth.
+/// A test function of a tracked cloth or rod.
 struct FunctionSnapshot
 {
   std::string object, name;
@@ -89,9 +89,13 @@ RodSnapshot snapshotOf(const RodModel& model, const RodState& state);
 ThreadSnapshot snapshotOf(const std::string& name, const ThreadState& state);
 SceneSnapshot snapshotOf(const Simulation& simulation);
 
-/// The averages over the guide, vertices 3 x n [m], by the functions in force of a tracked cloth and the forces, 3 x functions [N], appended to `out`;
+/// The averages over the guide, vertices 3 x n [m], by the functions in force of a tracked cloth or rod and the forces, 3 x functions [N], appended to `out`;
 /// functions of a named set as SET/NAME.
-void appendFunctions(const std::string& cloth, const FunctionSet& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
+void appendFunctions(const std::string& object, const FunctionSet& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
+                     std::vector<FunctionSnapshot>& out);
+
+/// The same of a rod or cloth and a set by their names; false, and nothing, when the scene has none such that tracks a guide of this size.
+bool appendFunctions(const SceneConfig& scene, const std::string& object, const std::string& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
                      std::vector<FunctionSnapshot>& out);
 
 }  // namespace slender

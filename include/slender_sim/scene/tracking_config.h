@@ -12,7 +12,7 @@
 #include "slender_sim/tracking/guide_binding.h"
 #include "slender_sim/tracking/weak_constraints.h"
 
-/// Plain structs: what a tracked cloth follows, as checked by the reader.
+/// Plain structs: what a tracked cloth or rod follows, as checked by the reader.
 namespace slender {
 
 struct FixedGuide {};
@@ -38,7 +38,7 @@ using GuideMotion = std::variant<FixedGuide, FrameGuide, CarriedGuide, TopicGuid
 
 struct GuideConfig
 {
-  TriangleMesh mesh;                    ///< reference shape [m], over which averages are taken
+  TriangleMesh mesh;                    ///< reference shape [m], over which averages are taken; of a rod's guide: nodes of a polyline, no triangles
   GuideMotion motion;
   double coast = 0.0;                   ///< [s] within which the speed of a guide by topic dies out when no message comes; 0: it is held
 
@@ -63,7 +63,7 @@ struct TrackingConfig
 {
   GuideConfig guide;
   std::vector<FunctionSet> sets;        ///< the first acts where the scene starts
-  double size = 1.0;                    ///< diagonal of the box around the guide's mesh [m]: what errors are measured by
+  double size = 1.0;                    ///< diagonal of the box around the guide's mesh [m] (of a rod: its length): what errors are measured by
 };
 
 }  // namespace slender

@@ -1,0 +1,347 @@
+// Rods that track a guide curve.
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "read_parts.h"
+#include "read_tracking.h"
+#include "slender_sim/geometry/curves.h"
+#include "slender_sim/scene/pose_file.h"
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/shapes.h"
+#include "slender_sim/tracking/curve_functions.h"
+
+namespace slender {
+
+namespace {
+
+constexpr int most_functions = 2000;   // their equations are dense
+const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
+
+/// The rod beside which a guide is read; without nodes when it could not be.
+struct TrackedCurve
+{
+  Eigen::Matrix3Xd rest, start;   ///< nodes [m]
+  Eigen::VectorXd shares;         ///< of the length at rest at its nodes
+  bool closed = false;
+};
+
+struct GuideNodes
+{
+  Eigen::Matrix3Xd nodes;         ///< [m]; none when reported
+  Eigen::VectorXd shares;         ///< of the rod's length that belong to them
+};
+
+std::vector<Eigen::Vector3d> readPoints(const YamlCursor& points, const YamlCursor& file, const ReadContext& context)
+{
+  std::vector<Eigen::Vector3d> out;
+  if (const auto path = file.present() ? file.text() : std::nullopt)
+  {
+    try
+    {
+      out = readPointFile(context.resolve(*path));
+      for (const Eigen::Vector3d& point : out)
+      {
+        if (!(point.cwiseAbs().maxCoeff() <= max_coordinate))
+        {
+          file.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m");
+          return {};
+        }
+      }
+    }
+    catch (const SceneError& error)
+    {
+      file.problem(error.what());
+      return {};
+    }
+  }
+  for (const YamlCursor& item : points.present() ? points.items() : std::vector<YamlCursor>{})
+  {
+    if (const auto point = item.vector3(coordinate))
+    {
+      out.push_back(*point);
+    }
+  }
+  return out;
+}
+
+/// Evenly spaced nodes of the rod where it starts, or points, which lie along it by their shares of the polyline's length.
+GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurve& rod)
+{
+  const YamlCursor nodes = map.get("nodes"), points = map.get("points"), file = map.get("file");
+  GuideNodes guide;
+  const int fewest = rod.closed ? 3 : 2;
+  if (nodes.present() + points.present() + file.present() != 1)
+  {
+    if (map.at().isMap())
+    {
+      map.at().problem("must have one of nodes: N (of the rod), points: [[x, y, z], ...], file: PATH");
+    }
+    return guide;
+  }
+  if (nodes.present())
+  {
+    const int most = rod.rest.cols() > 0 ? static_cast<int>(rod.rest.cols()) : max_edges + 1;
+    const auto count = nodes.integer(fewest, most, rod.closed ? "nodes of the loop" : "nodes of the rod");
+    if (count && rod.rest.cols() > 0)
+    {
+      const double spacing = static_cast<double>(rod.shares.size() - 1) / (rod.closed ? *count : *count - 1);
+      guide.nodes.resize(3, *count);
+      guide.shares.resize(*count + (rod.closed ? 1 : 0));
+      for (int k = 0; k < *count; ++k)
+      {
+        const auto node = static_cast<Eigen::Index>(std::lround(k * spacing));
+        guide.nodes.col(k) = rod.start.col(node);
+        guide.shares[k] = rod.shares[node];
+      }
+      guide.shares[guide.shares.size() - 1] = 1.0;
+    }
+    return guide;
+  }
+  const std::size_t before = map.at().problems().size();
+  const std::vector<Eigen::Vector3d> given = readPoints(points, file, context);
+  const YamlCursor& from = points.present() ? points : file;
+  if (map.at().problems().size() != before)
+  {
+    return guide;
+  }
+  if (static_cast<int>(given.size()) < fewest)
+  {
+    from.problem("has " + std::to_string(given.size()) + " points; a guide" + (rod.closed ? " of a closed rod" : "") + " needs at least " + std::to_string(fewest));
+    return guide;
+  }
+  Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(given.size()));
+  for (std::size_t k = 0; k < given.size(); ++k)
+  {
+    matrix.col(static_cast<Eigen::Index>(k)) = given[k];
+  }
+  const Eigen::VectorXd lengths = edgeLengths(matrix, rod.closed);
+  Eigen::Index shortest = 0;
+  if (!(lengths.minCoeff(&shortest) > 1e-9 * lengths.sum()))
+  {
+    from.problem("points " + std::to_string(shortest) + " and " + std::to_string((shortest + 1) % lengths.size()) + " are at the same place; must differ");
+    return guide;
+  }
+  guide.nodes = std::move(matrix);
+  guide.shares = lengthFractions(lengths);
+  return guide;
+}
+
+std::optional<PointTrajectory> readTable(const YamlCursor& at, int nodes)
+{
+  PointTrajectory points;
+  for (const YamlCursor& item : at.items(1))
+  {
+    const auto row = item.numbers(coordinate);
+    if (!row)
+    {
+      return std::nullopt;
+    }
+    if (row->size() != 1 + 3 * static_cast<std::size_t>(nodes))
+    {
+      item.problem("has " + std::to_string(row->size()) + " numbers; must be [t, x0, y0, z0, x1, ...] of the guide's " + std::to_string(nodes) + " nodes");
+      return std::nullopt;
+    }
+    try
+    {
+      appendPoints(points, *row);
+    }
+    catch (const std::invalid_argument& error)
+    {
+      item.problem(error.what());
+      return std::nullopt;
+    }
+  }
+  return points.empty() ? std::nullopt : std::optional<PointTrajectory>(std::move(points));
+}
+
+std::optional<PointTrajectory> readMotionFile(const YamlCursor& at, const ReadContext& context, int nodes)
+{
+  const auto path = at.text();
+  if (!path)
+  {
+    return std::nullopt;
+  }
+  try
+  {
+    PointTrajectory points = readPointMotion(context.resolve(*path), nodes);
+    for (const Eigen::Matrix3Xd& frame : points.frames())
+    {
+      if (!(frame.cwiseAbs().maxCoeff() <= max_coordinate))
+      {
+        at.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m");
+        return std::nullopt;
+      }
+    }
+    return points;
+  }
+  catch (const SceneError& error)
+  {
+    at.problem(error.what());
+    return std::nullopt;
+  }
+}
+
+void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConfig& guide)
+{
+  if (!at.present())
+  {
+    return;
+  }
+  if (at.isScalar())
+  {
+    at.choice<bool>({{"fixed", true}});
+    return;
+  }
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  const YamlCursor table = map.get("table"), file = map.get("file"), topic = map.get("topic"), late = map.get("late");
+  map.finish();
+  if (table.present() + file.present() + topic.present() != 1)
+  {
+    if (at.problems().size() == before)
+    {
+      at.problem("must be fixed or one of {table: [[t, x0, y0, z0, x1, ...], ...]}, {file: FILE.csv}, {topic: points}");
+    }
+    return;
+  }
+  if (late.present() && !topic.present())
+  {
+    late.problem("is for guides by topic");
+  }
+  assign(guide.coast, readLate(late));
+  if (topic.present())
+  {
+    if (topic.choice<bool>({{"points", true}}))
+    {
+      guide.motion = TopicGuide{};
+    }
+    return;
+  }
+  const int nodes = static_cast<int>(guide.mesh.vertices.cols());
+  if (nodes == 0)
+  {
+    return;   // reported
+  }
+  auto points = table.present() ? readTable(table, nodes) : readMotionFile(file, context, nodes);
+  if (points)
+  {
+    if (points->times().front() <= 0)   // else the guide stands still until then
+    {
+      points->startInMotion();
+    }
+    guide.motion = FrameGuide{std::move(*points)};
+  }
+}
+
+TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, const MassMatrix& weights)
+{
+  if (!at.present())
+  {
+    return curveHats(weights);
+  }
+  YamlMap map(at);
+  const YamlCursor basis = map.get("basis"), segments = map.get("segments");
+  map.finish();
+  if (basis.present() == segments.present())
+  {
+    if (at.isMap())
+    {
+      at.problem("must be one of {basis: hats}, {segments: N}");
+    }
+    return {};
+  }
+  if (basis.present())
+  {
+    return basis.choice<bool>({{"hats", true}}) ? curveHats(weights) : TestFunctions{};
+  }
+  const auto count = segments.integer(1, rod.rest.cols() > 0 ? static_cast<long>(rod.rest.cols()) : max_edges + 1, "segments");
+  return count && rod.rest.cols() > 0 ? curveSegments(*count, rod.shares, rod.closed) : TestFunctions{};
+}
+
+/// Reports what the rod has that does not go with a guide.
+void checkTraits(const YamlCursor& at, const RodConfig& rod)
+{
+  if (rod.contact)
+  {
+    at.problem("is not for a rod that touches things; leave out contact or track");
+  }
+  if (rod.stretching == Stretching::projected)
+  {
+    at.problem("takes implicit steps; with it stretching must be stiff");
+  }
+}
+
+}  // namespace
+
+std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context, const RodConfig& config, int edges)
+{
+  if (!at.present())
+  {
+    return nullptr;
+  }
+  const std::size_t before = at.problems().size();
+  TrackedCurve rod;
+  rod.closed = config.closed;
+  rod.shares = Eigen::Vector2d(0, 1);
+  if (edges > 0)
+  {
+    try
+    {
+      rod.rest = restNodes(config, context.gravity);
+      rod.start = initialNodes(config, rod.rest, context.gravity);
+      rod.shares = lengthFractions(edgeLengths(rod.rest, rod.closed));
+    }
+    catch (const std::invalid_argument&)
+    {
+      rod = TrackedCurve();   // reported as `initial`
+    }
+  }
+  auto tracking = std::make_shared<TrackingConfig>();
+  YamlMap map(at), guide_map(map.require("guide"));
+  const GuideNodes guide = readNodes(guide_map, context, rod);
+  tracking->guide.mesh.vertices = guide.nodes;
+  readCurveMotion(guide_map.get("motion"), context, tracking->guide);
+  guide_map.finish();
+  const bool good = guide.nodes.cols() > 0 && rod.rest.cols() > 0;
+  const MassMatrix weights = good ? polylineWeights(guide.shares, rod.shares, rod.closed) : MassMatrix(0, 0);
+  FunctionSet set;
+  const YamlCursor at_functions = map.get("test_functions");
+  set.functions = readCurveFunctions(at_functions, rod, weights);
+  map.finish();
+  checkTraits(at, config);
+  if (set.functions.count() > most_functions || 12.0 * set.functions.count() * static_cast<double>(rod.rest.cols()) > max_guide_numbers)
+  {
+    (at_functions.present() ? at_functions : at).problem("makes " + std::to_string(set.functions.count()) + " test functions of " + std::to_string(rod.rest.cols()) +
+                                                         " nodes, too many for one rod; leave out some");
+  }
+  if (!good || at.problems().size() != before)
+  {
+    return nullptr;
+  }
+  try
+  {
+    auto constraints = std::make_shared<WeakConstraints>(curveConstraints(set.functions, weights, rod.rest, rod.closed));
+    std::vector<char> held;
+    for (const GraspConfig& grasp : config.grasps)
+    {
+      held.resize(static_cast<std::size_t>(rod.rest.cols()), 0);
+      for (int i = std::max(0, grasp.first_node); i <= grasp.last_node && i < rod.rest.cols(); ++i)   // others were reported
+      {
+        held[static_cast<std::size_t>(i)] = 1;
+      }
+    }
+    constraints->requireIndependent(held);
+    set.constraints = std::move(constraints);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    (at_functions.present() ? at_functions : at).problem(error.what());
+    return nullptr;
+  }
+  tracking->sets.push_back(std::move(set));
+  tracking->size = edgeLengths(rod.rest, rod.closed).sum();
+  return tracking;
+}
+
+}  // namespace slender

@@ -1,0 +1,177 @@
+// Rods of a scene: built, and stepped where they are on their own.
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/shapes.h"
+#include "slender_sim/scene/simulation.h"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+namespace slender {
+
+namespace {
+
+/// Which equations explicit steps use; implicit ones always use the general formulation with stretching.
+void chooseFormulation(const RodConfig& rod, Integrator integrator, RodModel& model)
+{
+  const bool explicit_steps = integrator == Integrator::symplectic_euler;
+  const std::string obstacle = explicit_steps ? whyNotIsotropic(model) : "it takes explicit steps (time.integrator: symplectic_euler)";
+  if (rod.formulation == Formulation::isotropic && !obstacle.empty())
+  {
+    throw std::invalid_argument("formulation: isotropic does not apply: " + obstacle + "; take formulation: auto");
+  }
+  if (rod.stretching == Stretching::projected && !explicit_steps)
+  {
+    throw std::invalid_argument("stretching: projected takes explicit steps (time.integrator: symplectic_euler); "
+                                "with implicit ones take stretching: stiff and material.inextensible: true");
+  }
+  model.isotropic = rod.formulation != Formulation::general && obstacle.empty();
+  model.inextensible = rod.stretching == Stretching::projected;
+}
+
+}  // namespace
+
+void Simulation::buildRods()
+{
+  for (std::size_t r = 0; r < config_.rods.size(); ++r)
+  {
+    const RodConfig& rod = config_.rods[r];
+    try
+    {
+      const Eigen::Matrix3Xd rest = restNodes(rod, config_.gravity);
+      Eigen::Matrix3Xd initial = initialNodes(rod, rest, config_.gravity);
+      const int edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
+      RodModel model = buildRod(rod.name, rest, rod.closed, rodSections(rod, edges), rod.director, rod.naturally_straight, rod.joints);
+      if (rod.material.inextensible)
+      {
+        model.stretch_modulus = model.stretch_modulus.cwiseMax(1e5 * model.totalMass() * config_.gravity.norm());
+      }
+      model.mass_damping = rod.damping.mass;
+      model.stiffness_damping = rod.damping.stiffness;
+      if (rod.damping.drag > 0)
+      {
+        model.drag.setZero(model.nodes());
+        for (int j = 0; j < model.edges(); ++j)
+        {
+          const double half = 0.5 * rod.damping.drag * model.rest_length[j];
+          model.drag[j] += half;
+          model.drag[(j + 1) % model.nodes()] += half;
+        }
+      }
+      chooseFormulation(rod, config_.time.integrator, model);
+      Eigen::Matrix3Xd velocities;
+      if (rod.tracking)
+      {
+        placeOnGuide(static_cast<int>(r), model, initial, velocities);
+      }
+      RodState state = makeRodState(model, initial, rod.director, rod.initial_twist);
+      if (velocities.cols() > 0)
+      {
+        state.v = velocities;
+      }
+      for (std::size_t g = 0; g < rod.grasps.size(); ++g)
+      {
+        const GraspConfig& grasp = rod.grasps[g];
+        if (grasp.first_node < 0 || grasp.last_node >= model.nodes() || grasp.first_node > grasp.last_node)
+        {
+          throw std::invalid_argument("grasp " + grasp.name + " holds nodes " + std::to_string(grasp.first_node) + " to " +
+                                      std::to_string(grasp.last_node) + "; must be in [0, " + std::to_string(model.nodes() - 1) + "]");
+        }
+        state.grasps.push_back(makeGrasp(model, state, grasp.first_node, grasp.last_node, grasp.hold == Hold::frame));
+        grasps_.push_back({static_cast<int>(r), static_cast<int>(g), &grasp});
+      }
+      models_.push_back(std::make_shared<const RodModel>(std::move(model)));
+      state_.rods.push_back(std::move(state));
+    }
+    catch (const std::invalid_argument& error)
+    {
+      const std::string place = rod.place.empty() ? "scene " + config_.name + ": rods." + std::to_string(r) : rod.place;
+      throw SceneError(place + " (" + rod.name + "): " + error.what());
+    }
+  }
+}
+
+/// Rods on their own, in parallel.
+StepReport Simulation::stepAll()
+{
+  StepReport total;
+  const int count = static_cast<int>(models_.size());
+  const auto isAlone = [this](int r) { return group_index_[r] < 0; };
+  constexpr int kWorthThreads = 500;   // nodes; less is done before threads are awake
+  int nodes = 0, alone = 0;
+  for (int r = 0; r < count; ++r)
+  {
+    if (isAlone(r))
+    {
+      nodes += models_[r]->nodes();
+      ++alone;
+    }
+  }
+  if (alone == 0)
+  {
+    return total;
+  }
+  if (count == 1)
+  {
+    total.merge(stepAlone(0));
+    return total;
+  }
+  std::vector<StepReport> reports(models_.size());
+  std::vector<std::exception_ptr> errors(models_.size());
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic) if (threads_ != 1 && alone > 1 && nodes >= kWorthThreads) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
+#endif
+  for (int r = 0; r < count; ++r)
+  {
+    try
+    {
+      if (isAlone(r))
+      {
+        reports[r] = stepAlone(r);
+      }
+    }
+    catch (...)
+    {
+      errors[r] = std::current_exception();   // must not leave the parallel region
+    }
+  }
+  for (const std::exception_ptr& error : errors)
+  {
+    if (error)
+    {
+      std::rethrow_exception(error);
+    }
+  }
+  for (int r = 0; r < count; ++r)
+  {
+    if (isAlone(r))
+    {
+      total.merge(reports[r]);
+    }
+  }
+  return total;
+}
+
+StepReport Simulation::stepAlone(int rod)
+{
+  return tracked_rods_[rod] ? tracked_rods_[rod]->stepper.step(state_.rods[rod], rod_inputs_[rod], tracked_rods_[rod]->targets, config_.time.step)
+                            : steppers_[rod]->step(state_.rods[rod], rod_inputs_[rod], config_.time.step);
+}
+
+const std::vector<Wrench>& Simulation::rodWrenches(int rod) const
+{
+  return tracked_rods_[rod] ? tracked_rods_[rod]->stepper.wrenches() : steppers_[rod] ? steppers_[rod]->wrenches() : group_->wrenches(group_index_[rod]);
+}
+
+RodEnergies Simulation::energies(int rod) const
+{
+  return tracked_rods_.at(rod) ? tracked_rods_[rod]->stepper.energies(state_.rods[rod], config_.gravity)
+         : steppers_[rod]      ? steppers_[rod]->energies(state_.rods[rod], config_.gravity)
+                               : group_->energies(group_index_[rod], state_.rods[rod], config_.gravity);
+}
+
+}  // namespace slender
