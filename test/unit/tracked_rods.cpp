@@ -10,6 +10,7 @@
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
 #include "slender_sim/scene/simulation.h"
+#include "slender_sim/scene/snapshot.h"
 #include "slender_sim/tracking/curve_functions.h"
 
 namespace slender {
