@@ -87,6 +87,26 @@ void ClothSystem::preconditionWithin(PointVector& r, PointVector& z)
   takeOutAverages(r);
 }
 
+/// By correction_, whose image is in product_.
+void ClothSystem::move(PointVector& d)
+{
+  for (std::size_t i = 0; i < d.size(); ++i)
+  {
+    d[i] += correction_[i];
+    right_[i] -= product_[i];
+  }
+}
+
+/// By what the preconditioner takes for the least motion that closes gap_.
+void ClothSystem::moveAverages(PointVector& d)
+{
+  std::fill(correction_.begin(), correction_.end(), 0.0);
+  averages_->solve(correction_.data(), gap_.data(), correction_.data(), multipliers_.data());
+  applyMatrix(correction_, product_);
+  clearHeld(product_);
+  move(d);
+}
+
 /// Before conjugate gradients with averages: takes out of right_ what these balance. With `averages` d is moved there, and on by a step of the
 /// preconditioned gradient, which comes for nothing; returns what the load on the cloth was without the forces of the averages, which the tolerance counts
 /// from as it does for a cloth without; less near equilibrium, where that load stays (the averages hold it) and errors of one step must not outlive the next. Where cloth is strained so much that the step leads uphill, it is far stiffer than the preconditioner: then
@@ -106,23 +126,58 @@ double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averag
   setGap(*averages, product_);
   const ConstrainedCholesky::Norms norms = averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
   load_ = norms.load;
+  first_step_ = norms.step;
   takeOutAverages(right_);
   applyMatrix(correction_, product_);
   clearHeld(product_);
   const bool downhill = pointKernels().dot(points(), correction_.data(), product_.data()) < 2.0 * norms.step * norms.step;
   if (!downhill)
-  {
-    std::fill(correction_.begin(), correction_.end(), 0.0);
-    averages_->solve(correction_.data(), gap_.data(), correction_.data(), multipliers_.data());
-    applyMatrix(correction_, product_);
-    clearHeld(product_);
-  }
-  for (std::size_t i = 0; i < d.size(); ++i)
-  {
-    d[i] += correction_[i];
-    right_[i] -= product_[i];
-  }
+    moveAverages(d);
+  else
+    move(d);
   return downhill ? std::max(std::min(norms.load, kLeft / tolerance * norms.step), kRounding * norms.load) : 0.0;
+}
+
+/// By conjugate gradients with symmetric sweeps, after takeFirstStep(). What keeps the averages met is a stiffness, which costs an iteration next to nothing, and
+/// after them the motion of the preconditioner that meets averages, which meetAverages() makes in the end: a method of multipliers. The tolerance is that of the
+/// equations with that stiffness; rounds go on until that motion is so small that positions are as good as those of the same cloth without averages.
+LinearOutcome ClothSystem::sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance, int& linear_iterations)
+{
+  constexpr int kMostRounds = 4;
+  constexpr double kStiff = 3.0, kMotion = 40.0;   // measured (study tracking_overhead): of the preconditioner; of the tolerance, in its norm
+  constexpr double kLeft = 0.1;                    // of what is not balanced at the start
+  sweeps_.set(1.0 + ratio_, held_);
+  const double reference = sweeps_.norm(right_);
+  if (!(takeFirstStep(d, &averages, tolerance) > 0))   // where cloth is so much stiffer than the preconditioner this leads away
+    return LinearOutcome::not_converged;
+  double gap = averages_->norm(gap_.data());   // may be any part of the load, where averages tear at the cloth
+  const double allowed = std::min(kMotion * tolerance * std::sqrt(std::max(load_ * load_ - gap * gap, 0.0)), kLeft * first_step_);
+  for (int round = 0; round < kMostRounds; ++round)
+  {
+    const LinearResult result = sweeps_.solve(*averages_, kStiff, right_, correction_, tolerance, iterationsWithin(kMostIterations), reference,
+                                              round == 0 ? kLeft : 1.0);
+    linear_iterations += result.iterations;
+    spend(result.iterations + 1);
+    for (std::size_t i = 0; i < d.size(); ++i)
+    {
+      d[i] += correction_[i];
+      product_[i] = start_[i] + d[i];
+    }
+    if (!result.definite || result.residual > tolerance)
+      break;
+    setGap(averages, product_);
+    const double left = averages_->norm(gap_.data());
+    if (result.iterations == 0 || left <= allowed)
+      return LinearOutcome::solved;
+    if (round > 0 && left > 0.5 * gap)
+      break;
+    gap = left;
+    setRight(d);
+    moveAverages(d);
+    averages_->multipliers(right_.data(), multipliers_.data());
+    takeOutAverages(right_);
+  }
+  return LinearOutcome::not_converged;
 }
 
 /// As solve() of a linearised step, but forces of averages are at most their bounds: what the step minimises gets bound times |target - average|

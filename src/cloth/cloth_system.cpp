@@ -21,6 +21,8 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
 
 /// Measured (study implicit_step): sweeps are faster below, the constant factor above.
 constexpr int kMostSwept = 3000;
+/// Measured (study tracking_overhead): for fewer averages sweeps are faster. The more there are, the less their stiffness is that of the rest preconditioner.
+constexpr int kPointsPerAverage = 50;
 constexpr int kEnergyWork = 2, kHessianWork = 8, kFactorWork = 60;   // of a WorkBudget, per vertex; an iteration of conjugate gradients: 1
 constexpr double kBesideLoad = 1e-2;
 
@@ -36,7 +38,7 @@ ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
-  : model_(model), solver_(chosen(model, options))
+  : model_(model), choose_(options.solver == ClothSolver::automatic), solver_(chosen(model, options))
   , linear_tolerance_(options.linear_tolerance), membrane_(model.rest, model.membrane, model.warp), wind_(model)
 {
   const int n = points();
@@ -79,7 +81,10 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     {
       average_sets_[s].prescribed = &model.averages[s];
       average_sets_[s].solver.setConstraints(*model.averages[s].weights, model.averages[s].bounds.size() > 0);
+      average_sets_[s].swept = sweepsSuit(model.averages[s]);
     }
+    if (std::any_of(average_sets_.begin(), average_sets_.end(), [](const AverageSet& set) { return set.swept; }))
+      sweeps_ = SymmetricSweeps(matrix_, constant_bending_ ? &bending_ : nullptr);
     if (!average_sets_.empty())
     {
       if (model.averages[0].bounds.size() > 0)
@@ -105,6 +110,11 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
       for (auto* a : {&angles_, &other_angles_, &start_angles_})
         a->assign(hinges_->paddedCount(), 0.0);
   }
+}
+
+bool ClothSystem::sweepsSuit(const PrescribedAverages& averages) const
+{
+  return choose_ && averages.bounds.size() == 0 && points() <= kMostSwept && points() >= kPointsPerAverage * averages.count();
 }
 
 void ClothSystem::setHinges(const ClothState& state)
@@ -402,27 +412,29 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
     bending_.addProduct(1.0 + ratio_, p.data(), ap.data());
 }
 
+void ClothSystem::setRight(const PointVector& d)
+{
+  for (std::size_t i = 0; i < right_.size(); ++i)
+    right_[i] = -gradient_[i];
+  if (std::any_of(d.begin(), d.end(), [](double x) { return x != 0.0; }))
+  {
+    applyMatrix(d, product_);
+    for (std::size_t i = 0; i < right_.size(); ++i)
+      right_[i] -= product_[i];
+  }
+  clearHeld(right_);
+}
+
 LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance,
                                  const Eigen::Matrix3Xd* averages)
 {
   if (!averagesIndependent())
     return LinearOutcome::not_definite;
   // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
-  bool moved = false;
-  for (int i = 0; i < points(); ++i)
-  {
-    if (solver_ == ClothSolver::cholesky && !held_[i])
+  for (int i = 0; i < points() && solver_ == ClothSolver::cholesky; ++i)
+    if (!held_[i])
       point(d, i).setZero();
-    moved = moved || point(d, i) != Eigen::Vector3d::Zero();
-  }
-  for (std::size_t i = 0; i < right_.size(); ++i)
-    right_[i] = -gradient_[i];
-  if (moved)
-  {
-    applyMatrix(d, product_);
-    for (std::size_t i = 0; i < right_.size(); ++i)
-      right_[i] -= product_[i];
-  }
+  setRight(d);
   if (solver_ == ClothSolver::cholesky)
   {
     for (int i = 0; i < points(); ++i)
@@ -437,12 +449,19 @@ LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& lin
   }
   if (!preconditioned_)
     return LinearOutcome::not_definite;
-  clearHeld(right_);
-  constexpr int kMostIterations = 2000;
   load_ = 0.0;
   const double allowed = tolerance > 0 ? tolerance : linear_tolerance_;
   if (solver_ == ClothSolver::gauss_seidel)
-    return correct(d, sweeps_.solve(1.0 + ratio_, held_, right_, correction_, allowed, iterationsWithin(kMostIterations)), allowed, linear_iterations);
+  {
+    sweeps_.set(1.0 + ratio_, held_);
+    return correct(d, sweeps_.solve(right_, correction_, allowed, iterationsWithin(kMostIterations)), allowed, linear_iterations);
+  }
+  if (averages && used_->swept)
+  {
+    if (sweepWithAverages(d, *averages, allowed, linear_iterations) == LinearOutcome::solved)
+      return LinearOutcome::solved;
+    setRight(d);
+  }
   if (at && !averages_)   // averages are met with the constant matrix
     preconditioner_->align(*at, matrix_, held_);
   else

@@ -133,6 +133,12 @@ private:
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
   void preconditionWithin(PointVector& r, PointVector& z);
   double takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages, double tolerance);
+  void move(PointVector& d);
+  void moveAverages(PointVector& d);
+  bool sweepsSuit(const PrescribedAverages& averages) const;
+  LinearOutcome sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance, int& linear_iterations);
+  /// right_: what d leaves of the equations, held points zero.
+  void setRight(const PointVector& d);
   LinearOutcome stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference, int& linear_iterations);
   LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference, int& linear_iterations);
   double boundedForces();
@@ -142,6 +148,7 @@ private:
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
 
   const ClothModel& model_;
+  const bool choose_;                         ///< the solver is ours to choose
   ClothSolver solver_;
   const double linear_tolerance_;
   WorkBudget unbounded_;
@@ -164,12 +171,13 @@ private:
   std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
   bool preconditioned_ = true;                ///< its constant part could be factored
   ConjugateGradients cg_;
-  SymmetricSweeps sweeps_;
+  SymmetricSweeps sweeps_;                    ///< of that solver, and where averages suit them (sweepsSuit())
 
   struct AverageSet
   {
     const PrescribedAverages* prescribed;
     ConstrainedCholesky solver;    ///< of the preconditioner
+    bool swept = false;            ///< sweepsSuit()
     bool ready = false;            ///< factored, with the present one
     bool independent = true;       ///< with what is held
   };
@@ -191,6 +199,7 @@ private:
   std::unique_ptr<AverageBounds> bounds_;      ///< of models with bounds
 
   void respond(double ratio);
+  static constexpr int kMostIterations = 2000;   ///< of conjugate gradients
   /// Of conjugate gradients: `most`, or what the budget has room for.
   int iterationsWithin(int most) const { return static_cast<int>(std::min<long>(most, budget_->left() / points() + 1)); }
   /// In counts per point.
@@ -198,7 +207,8 @@ private:
 
   double ratio_ = 0;
   double viscous_form_ = 0;                   ///< of isometric bending, at viscous_start_
-  double load_ = 0;   ///< with averages: on the cloth without them, as the tolerance counts it
+  double load_ = 0;         ///< with averages: on the cloth without them, as the tolerance counts it
+  double first_step_ = 0;   ///< of takeFirstStep(), in the preconditioner's norm
   PointVector start_, viscous_start_, shifted_, target_, force_, gradient_, product_, right_, correction_;
   std::vector<double> weight_;                ///< of inertia, per point
   std::vector<char> held_;

@@ -25,9 +25,9 @@ void factorInPlace(Eigen::Ref<Eigen::MatrixXd> a)
 
 }  // namespace
 
-void ConstrainedCholesky::Rows::multiply(double factor, const double* x, double* y) const
+double ConstrainedCholesky::Rows::multiply(double factor, const double* x, double* y) const
 {
-  pointKernels().multiply(static_cast<int>(starts.size()) - 1, starts.data(), offsets.data(), values.data(), factor, x, y);
+  return pointKernels().multiply(static_cast<int>(starts.size()) - 1, starts.data(), offsets.data(), values.data(), factor, x, y);
 }
 
 void ConstrainedCholesky::setConstraints(const Constraints& c, bool bounded)
@@ -82,6 +82,7 @@ bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
   Constraints free = c_.transpose();
   free.prune([fixed](Eigen::Index point, Eigen::Index, double) { return !fixed || !fixed[point]; });
   fill(free, c_transposed_);
+  fill(c_, c_rows_);
   const Eigen::MatrixXd s = Eigen::MatrixXd(Constraints(v * v.transpose()));
   if (s_.size() > 0)
     s_ = s;
@@ -234,6 +235,19 @@ void ConstrainedCholesky::addForces(const double* f, double* r) const
 {
   std::copy_n(f, 4 * count(), mu_.data());
   c_transposed_.multiply(1.0, mu_.data(), r);
+}
+
+double ConstrainedCholesky::norm(const double* g) const
+{
+  std::copy_n(g, 4 * count(), t_.data());
+  return std::sqrt(std::max(s_inverse_.multiply(0.0, t_.data(), mu_.data()), 0.0));
+}
+
+void ConstrainedCholesky::addStiffness(double factor, const double* x, double* y) const
+{
+  c_rows_.multiply(0.0, x, t_.data());
+  s_inverse_.multiply(0.0, t_.data(), mu_.data());
+  c_transposed_.multiply(factor, mu_.data(), y);
 }
 
 void ConstrainedCholesky::multipliers(const double* r, double* mu) const

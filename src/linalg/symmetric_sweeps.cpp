@@ -41,8 +41,10 @@ SymmetricSweeps::SymmetricSweeps(const BlockMatrix& a, const PointMatrix* b) : a
   }
 }
 
-void SymmetricSweeps::setDiagonal(double factor, const std::vector<char>& held)
+void SymmetricSweeps::set(double factor, const std::vector<char>& held)
 {
+  factor_ = factor;
+  held_ = &held;
   for (int i = 0; i < a_->points(); ++i)
   {
     Eigen::Matrix3d d = Eigen::Matrix3d::Zero(), inverse = d;
@@ -67,8 +69,9 @@ void SymmetricSweeps::setDiagonal(double factor, const std::vector<char>& held)
   }
 }
 
-void SymmetricSweeps::setWhole(double factor, const std::vector<char>& held)
+void SymmetricSweeps::setWhole()
 {
+  const std::vector<char>& held = *held_;
   Eigen::Matrix3d whole = Eigen::Matrix3d::Zero();
   for (int j = 0; j < a_->points(); ++j)
   {
@@ -84,25 +87,25 @@ void SymmetricSweeps::setWhole(double factor, const std::vector<char>& held)
     }
     for (int k = b_ ? b_->starts()[j] : 0; k < (b_ ? b_->starts()[j + 1] : 0); ++k)
       if (!held[b_->column(k)])
-        whole.diagonal().array() += factor * b_->values()[k];
+        whole.diagonal().array() += factor_ * b_->values()[k];
   }
   whole_.compute(whole);
 }
 
-void SymmetricSweeps::leave(double factor, const std::vector<char>& held, const PointVector& right_hand_side, const PointVector& x)
+void SymmetricSweeps::leave(const PointVector& right_hand_side, const PointVector& x)
 {
   std::fill(r_.begin(), r_.end(), 0.0);
   a_->addProduct(x.data(), r_.data());
   if (b_)
-    b_->addProduct(factor, x.data(), r_.data());
+    b_->addProduct(factor_, x.data(), r_.data());
   for (int j = 0; j < a_->points(); ++j)
-    if (held[j])
+    if ((*held_)[j])
       point(r_, j).setZero();
     else
       point(r_, j) = point(right_hand_side, j) - point(r_, j);
 }
 
-void SymmetricSweeps::translate(const std::vector<char>& held, const PointVector& forces, PointVector& x) const
+void SymmetricSweeps::translate(const PointVector& forces, PointVector& x) const
 {
   if (whole_.info() != Eigen::Success)   // nothing is free, or not definite
     return;
@@ -111,34 +114,73 @@ void SymmetricSweeps::translate(const std::vector<char>& held, const PointVector
     sum += point(forces, j);
   const Eigen::Vector3d motion = whole_.solve(sum);
   for (int j = 0; j < a_->points(); ++j)
-    if (!held[j])
+    if (!(*held_)[j])
       point(x, j) += motion;
 }
 
-LinearResult SymmetricSweeps::solve(double factor, const std::vector<char>& held, const PointVector& right_hand_side, PointVector& x, double tolerance,
-                                    int max_iterations)
+double SymmetricSweeps::sweepResidual()
+{
+  pointKernels().sweepDown(swept_, r_.data());
+  return pointKernels().multiplyDiagonal(a_->points(), diagonal_.data(), r_.data(), z_.data());
+}
+
+double SymmetricSweeps::norm(const PointVector& r)
+{
+  std::copy(r.begin(), r.end(), r_.begin());
+  return std::sqrt(std::max(sweepResidual(), 0.0));
+}
+
+LinearResult SymmetricSweeps::solve(const PointVector& right_hand_side, PointVector& x, double tolerance, int max_iterations)
+{
+  setWhole();
+  LinearResult result;
+  std::fill(x.begin(), x.end(), 0.0);
+  std::copy(right_hand_side.begin(), right_hand_side.end(), r_.begin());
+  const double square = sweepResidual();
+  if (!(square > 0))
+  {
+    result.definite = square == 0.0;
+    return result;
+  }
+  translate(right_hand_side, x);
+  leave(right_hand_side, x);
+  iterate(nullptr, 0.0, sweepResidual(), std::sqrt(square), x, tolerance, max_iterations, result);
+  if (result.definite)
+  {
+    leave(right_hand_side, x);
+    translate(r_, x);
+  }
+  return result;
+}
+
+LinearResult SymmetricSweeps::solve(const ConstrainedCholesky& constraints, double stiffness, const PointVector& right_hand_side, PointVector& x,
+                                    double tolerance, int max_iterations, double reference, double least)
+{
+  constexpr double kRounding = 1e-12;   // of the reference
+  LinearResult result;
+  std::fill(x.begin(), x.end(), 0.0);
+  std::copy(right_hand_side.begin(), right_hand_side.end(), r_.begin());
+  const double square = sweepResidual();
+  if (!(square > 0))
+  {
+    result.definite = square == 0.0;
+    return result;
+  }
+  const double scale = std::max(std::min(reference, least / tolerance * std::sqrt(square)), kRounding * reference);
+  iterate(&constraints, stiffness, square, scale, x, tolerance, max_iterations, result);
+  return result;
+}
+
+/// r_ = (D + L)^-1 times the residual; in the norm of D, where (D + L)^-1 A (D + L^T)^-1 p = t + (D + L)^-1 (p - D t) with t = (D + L^T)^-1 p
+void SymmetricSweeps::iterate(const ConstrainedCholesky* constraints, double stiffness, double square, double scale, PointVector& x, double tolerance,
+                              int max_iterations, LinearResult& result)
 {
   const PointKernels& k = pointKernels();
   const int n = a_->points();
-  setDiagonal(factor, held);
-  setWhole(factor, held);
-  // r = (D + L)^-1 times the residual; in the norm of D, where (D + L)^-1 A (D + L^T)^-1 p = t + (D + L)^-1 (p - D t) with t = (D + L^T)^-1 p
-  LinearResult result;
-  std::fill(x.begin(), x.end(), 0.0);
-  std::copy(right_hand_side.begin(), right_hand_side.end(), q_.begin());
-  k.sweepDown(swept_, q_.data());
-  const double scale = k.multiplyDiagonal(n, diagonal_.data(), q_.data(), z_.data());
-  if (!(scale > 0))
-  {
-    result.definite = scale == 0.0;
-    return result;
-  }
-  translate(held, right_hand_side, x);
-  leave(factor, held, right_hand_side, x);
-  k.sweepDown(swept_, r_.data());
-  double rz = k.multiplyDiagonal(n, diagonal_.data(), r_.data(), z_.data());
+  double rz = square;
   result.definite = rz >= 0.0;
-  result.residual = std::sqrt(std::max(rz, 0.0) / scale);
+  result.scale = scale;
+  result.residual = std::sqrt(std::max(rz, 0.0)) / scale;
   std::copy(z_.begin(), z_.end(), p_.begin());
   while (result.definite && result.residual > tolerance && result.iterations < max_iterations)
   {
@@ -146,6 +188,8 @@ LinearResult SymmetricSweeps::solve(double factor, const std::vector<char>& held
     k.multiplyDiagonal(n, diagonal_.data(), t_.data(), q_.data());
     for (std::size_t i = 0; i < q_.size(); ++i)
       q_[i] = p_[i] - q_[i];
+    if (constraints)
+      constraints->addStiffness(stiffness, t_.data(), q_.data());
     k.sweepDown(swept_, q_.data());
     for (std::size_t i = 0; i < q_.size(); ++i)
       q_[i] += t_[i];
@@ -163,18 +207,12 @@ LinearResult SymmetricSweeps::solve(double factor, const std::vector<char>& held
     }
     ++result.iterations;
     const double next = k.multiplyDiagonal(n, diagonal_.data(), r_.data(), z_.data());
-    result.residual = std::sqrt(std::abs(next) / scale);
+    result.residual = std::sqrt(std::abs(next)) / scale;
     const double beta = next / rz;
     rz = next;
     for (std::size_t i = 0; i < p_.size(); ++i)
       p_[i] = z_[i] + beta * p_[i];
   }
-  if (result.definite)
-  {
-    leave(factor, held, right_hand_side, x);
-    translate(held, r_, x);
-  }
-  return result;
 }
 
 }  // namespace slender

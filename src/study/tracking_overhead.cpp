@@ -34,7 +34,7 @@ class Solver
 public:
   Cost cost;
 
-  Solver(const std::shared_ptr<const ClothModel>& model, ClothOptions options, bool collides) : stepper_(model, options), exact_(model, [&options] {
+  Solver(const std::shared_ptr<const ClothModel>& model, ClothOptions options, bool collides) : stepper_(model, options), exact_(model, [options]() mutable {
       options.linear_tolerance = kExact;
       return options;
     }())

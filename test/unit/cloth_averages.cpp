@@ -197,6 +197,60 @@ TEST(ClothAverages, StayExactWhereTheyTearAtTheCloth)
   EXPECT_GT(report.max_strain, 100.0);
 }
 
+TEST(ClothAverages, SweepsSolveTheSameSteps)
+{
+  // few averages of many vertices, a gripper, air and bending of both kinds: sweeps, which are taken for them, and conjugate gradients among motions that
+  // leave the averages alone
+  for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
+  {
+    const TriangleMesh mesh = gridMesh(1.0, 1.0, 16, 16, GridPattern::alternating);
+    auto model = std::make_shared<ClothModel>(buildCloth("tracked", mesh, 0.2, orthotropicMembrane(500, 500, 0.3, 190)));
+    model->bending = bending;
+    model->bending_modulus = 1e-4;
+    model->stiffness_damping = 1e-3;
+    auto quarters = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(4, mesh.vertices.cols());
+    for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
+      quarters->coeffRef((mesh.vertices(0, i) > 0.5 ? 1 : 0) + (mesh.vertices(1, i) > 0.5 ? 2 : 0), i) = 1.0;
+    model->averages = {{quarters, {}}};
+    ClothState state = makeClothState(*model, mesh.vertices);
+    pinVertices(state, {0});
+    ClothInputs inputs;
+    inputs.pins = state.x.col(0);
+    const auto solverOf = [&](ClothSolver solver, double tolerance) {
+      ClothOptions o = options(true);
+      o.solver = solver;
+      o.linear_tolerance = tolerance;
+      return ClothStepper(model, o);
+    };
+    ClothStepper exact = solverOf(ClothSolver::conjugate_gradients, 1e-10), fine = solverOf(ClothSolver::automatic, 1e-10);
+    ClothStepper swept = solverOf(ClothSolver::automatic, 5e-3);
+    double error = 0.0, motion = 0.0;
+    int iterations = 0;
+    const Matrix3Xd rest = state.x * quarters->transpose();
+    for (int k = 1; k <= 20; ++k)
+    {
+      inputs.averages = rest;
+      for (int i = 0; i < 4; ++i)
+        inputs.averages.col(i) += 72.0 * Vector3d(0.002 * k, 0.0, 0.05 * std::sin(0.3 * k + i));   // times the vertices of an average
+      ClothState a = state, b = state, c = state;
+      ASSERT_TRUE(exact.step(a, inputs, 0.01).ok);
+      ASSERT_TRUE(fine.step(b, inputs, 0.01).ok);
+      const StepReport report = swept.step(c, inputs, 0.01);
+      ASSERT_TRUE(report.ok);
+      iterations += report.linear_iterations;
+      for (const ClothState* each : {&a, &b, &c})
+        EXPECT_LT((each->x * quarters->transpose() - inputs.averages).cwiseAbs().maxCoeff(), 1e-13 * inputs.averages.cwiseAbs().maxCoeff());
+      EXPECT_LT((b.x - a.x).norm(), 1e-7 * (a.x - state.x).norm()) << k;   // tolerances in norms that differ by the root of the condition number
+      EXPECT_LT((swept.averageForces() - exact.averageForces()).norm(), 0.2 * exact.averageForces().norm()) << k;
+      error += (c.x - a.x).squaredNorm();
+      motion += (a.x - state.x).squaredNorm();
+      state = a;
+    }
+    EXPECT_LT(std::sqrt(error), 0.02 * std::sqrt(motion));   // free cloth of this size, by sweeps: 0.03 of a step's fall
+    EXPECT_LT(iterations, 20 * 40);
+  }
+}
+
 TEST(ClothAverages, RefuseWhatCannotBe)
 {
   Tracked t;

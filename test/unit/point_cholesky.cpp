@@ -62,7 +62,8 @@ TEST(SymmetricSweeps, SolveWithAndWithoutAMatrixOfPoints)
       }
     SymmetricSweeps sweeps(s.blocks, with ? &s.bending : nullptr);
     const VectorXd expected = A.llt().solve(flattened(matrixOf(b)));
-    const LinearResult result = sweeps.solve(0.7, s.fixed, b, x, 1e-12, 500);
+    sweeps.set(0.7, s.fixed);
+    const LinearResult result = sweeps.solve(b, x, 1e-12, 500);
     EXPECT_TRUE(result.definite);
     EXPECT_LT(result.residual, 1e-12);
     ConjugateGradients plain;   // preconditioned by the diagonal blocks alone
@@ -85,7 +86,9 @@ TEST(SymmetricSweeps, SolveWithAndWithoutAMatrixOfPoints)
   }
   for (int k = 0; k < 3; ++k)
     s.blocks.values()[9 * s.blocks.starts()[40] + 4 * k] -= 100.0;
-  EXPECT_FALSE(SymmetricSweeps(s.blocks, nullptr).solve(1.0, s.fixed, b, x, 1e-12, 500).definite);
+  SymmetricSweeps sweeps(s.blocks, nullptr);
+  sweeps.set(1.0, s.fixed);
+  EXPECT_FALSE(sweeps.solve(b, x, 1e-12, 500).definite);
 }
 
 TEST(PointCholesky, SolvesBlocks)

@@ -153,6 +153,15 @@ TEST(ConstrainedCholesky, SolvesTheSaddlePointSystem)
     EXPECT_LT((solution - expected).norm(), 1e-10 * expected.norm()) << pinned;
     // what it is for: the constraints hold to rounding
     EXPECT_LT((dense.bottomLeftCorner(m, n) * solution.topRows(n) - right.bottomRows(m)).cwiseAbs().maxCoeff(), 1e-12);
+    // S^-1, as the constraints' stiffness and their norm
+    const MatrixXd c = dense.bottomLeftCorner(m, n), ct = dense.topRightCorner(n, m), s = c * dense.topLeftCorner(n, n).partialPivLu().solve(ct);
+    const MatrixXd along = s.llt().solve(c * matrixOf(z).transpose());
+    PointVector stiff = r;
+    saddle.addStiffness(0.7, z.data(), stiff.data());
+    const MatrixXd added = matrixOf(stiff).transpose() - right.topRows(n), stiffness = 0.7 * ct * along;
+    EXPECT_LT((added - stiffness).norm(), 1e-10 * stiffness.norm());
+    const double square = (right.bottomRows(m).transpose() * s.llt().solve(right.bottomRows(m))).trace();
+    EXPECT_NEAR(saddle.norm(g.data()), std::sqrt(square), 1e-10 * std::sqrt(square));
   }
   ConstrainedCholesky::Constraints twice(2, n);
   twice.insert(0, 4) = twice.insert(1, 4) = 1.0;

@@ -27,7 +27,9 @@ struct ClothEnergies
 
 enum class ClothSolver
 {
-  automatic,             ///< gauss_seidel up to 3,000 vertices without averages, else conjugate_gradients (measured: studies implicit_step, cloth_accuracy)
+  /// gauss_seidel up to 3,000 vertices without averages, else conjugate_gradients (measured: studies implicit_step, cloth_accuracy). With averages of 50
+  /// vertices each and more, and one_newton_step, up to 3,000 vertices by sweeps as well (tracking_overhead).
+  automatic,
   cholesky,              ///< factorisation of the whole matrix
   conjugate_gradients,   ///< preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the normals
   gauss_seidel           ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps; no prescribed averages
@@ -48,7 +50,8 @@ struct ClothOptions
   ClothSolver solver = ClothSolver::automatic;
   /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged velocity.
   /// With averages and one_newton_step it is that of the same cloth without them, and of what it takes to move them, unless strains are so large that
-  /// these say nothing about motions.
+  /// these say nothing about motions; by sweeps that of equations in which the averages are stiff, before they are met (positions are then as good as those of
+  /// the same cloth without averages).
   double linear_tolerance = 5e-3;
   double error_tolerance = 0.0;          ///< [m] local error per substep, implicit_euler and tr_bdf2 only; 0: fixed steps
   double min_step = 1e-7;                ///< [s] adaptive steps never get shorter

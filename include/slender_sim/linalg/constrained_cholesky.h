@@ -47,6 +47,10 @@ public:
   double stiffness(int i) const { return s_inverse_.values[static_cast<std::size_t>(i) * (count() + 1)]; }
   /// r += C^T f, but for fixed points.
   void addForces(const double* f, double* r) const;
+  /// sqrt(g . S^-1 g), in the norm of P: of the smallest z that has C z = g.
+  double norm(const double* g) const;
+  /// y += factor C^T S^-1 C x, but for fixed points, where x must be zero: `factor` times as stiff along the constraints as P is.
+  void addStiffness(double factor, const double* x, double* y) const;
   /// mu alone, g zero: half the work.
   void multipliers(const double* r, double* mu) const;
   /// r -= C^T mu, but for fixed points.
@@ -58,14 +62,14 @@ private:
     std::vector<int> starts{0};
     AlignedVector<unsigned> offsets;
     AlignedVector<double> values;
-    void multiply(double factor, const double* x, double* y) const;
+    double multiply(double factor, const double* x, double* y) const;
   };
 
   void inverse(const double* t, double* mu) const;
 
   Constraints c_;
   const SparseCholesky* p_ = nullptr;
-  Rows v_, v_transposed_, s_inverse_, c_transposed_;
+  Rows v_, v_transposed_, s_inverse_, c_rows_, c_transposed_;
   std::vector<int> left_out_;
   Eigen::MatrixXd s_, inner_, soft_; ///< S, with bounds; factor of the part of S^-1 that is left out; of S + diag(1 / weights)
   mutable Eigen::Matrix<double, Eigen::Dynamic, 3> give_;
