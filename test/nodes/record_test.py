@@ -6,6 +6,7 @@ import subprocess
 import unittest
 
 import rosbag
+import rosgraph
 import rospkg
 
 from node_harness import run, wait_until
@@ -20,7 +21,16 @@ class Record(unittest.TestCase):
             os.remove(path)
 
     def test_bag_holds_the_states(self):
-        wait_until(lambda: sum(map(os.path.getsize, glob.glob(BAGS + ".active"))) > 1000000, what="states in the bag")   # some 10 kB each
+        def recorded():
+            return sum(map(os.path.getsize, glob.glob(BAGS + ".active")))
+
+        def topics():   # the recorder looks for new ones once a second
+            subscribers = rosgraph.Master("/record_test").getSystemState()[1]
+            return [topic for topic, nodes in subscribers if "/bag_recorder" in nodes]
+
+        wait_until(lambda: {"/state", "/scene"} <= set(topics()), what="the recorder")
+        before = recorded()
+        wait_until(lambda: recorded() > before + 1000000, what="states in the bag")   # some 10 kB each
         subprocess.run(["rosnode", "kill", "/bag_recorder"], stdout=subprocess.DEVNULL, check=True)
         wait_until(lambda: glob.glob(BAGS), what="the bag")
         with rosbag.Bag(glob.glob(BAGS)[0]) as bag:
