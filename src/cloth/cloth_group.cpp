@@ -73,8 +73,8 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   }
   surface_.solids = model_.solids;
   collider_ = std::make_unique<SurfaceCollider>(surface_);
-  for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_, &push_, &answer_})
-    m->resize(3, first_.back());
+  for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_, &v_before_, &push_, &answer_, &contact_forces_, &contact_sums_, &contact_now_})
+    m->setZero(3, first_.back());
   inverse_mass_.resize(first_.back());
   order_.resize(model_.cloths.size());
   sub_.cloths.resize(model_.cloths.size());
@@ -98,6 +98,7 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
     throw std::invalid_argument("cloths: poses of " + std::to_string(model_.solids.size()) + " solids expected");
   StepReport report;
   collisions_ = CollisionReport();
+  contact_sums_.setZero();
   work_ = state;
   next_ = state;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
@@ -140,12 +141,13 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
     }
     report.merge(sub);
     std::swap(work_, next_);
-    addPinForces(end - done, (end - done) * duration);
+    addForces(end - done, (end - done) * duration);
     done = end;
     share *= 2.0;
   }
   std::swap(state, work_);
   std::swap(pin_forces_, pin_sums_);
+  std::swap(contact_forces_, contact_sums_);
   std::swap(average_forces_, average_sums_);
   report.repulsions = collisions_.repulsions;
   report.impulses = collisions_.impulses;
@@ -192,6 +194,7 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
   const double share = kLoadShare * work / answered;
   x_ += share * answer_;
   v_ += share / h * answer_;
+  contact_now_ += share * push_;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     shared_pins_[k] += share * pin_answers_[k];
@@ -216,8 +219,9 @@ void ClothGroup::blameExplicit(double duration, StepReport& report) const
 }
 
 /// Of a substep that was just done.
-void ClothGroup::addPinForces(double share, double h)
+void ClothGroup::addForces(double share, double h)
 {
+  contact_sums_ += share * contact_now_;
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     pin_sums_[k] += share * (steppers_[k].pinForces() + shared_pins_[k]);
@@ -266,6 +270,21 @@ bool ClothGroup::lowerOrder()
   return any;
 }
 
+/// Corrects x_ and v_, and counts the forces that this takes.
+CollisionReport ClothGroup::resolveContacts(const CollisionStep& step)
+{
+  v_before_ = v_;
+  CollisionReport report = collider_->resolve(step, x_, v_, true);
+  if (!report.ok)
+    return report;
+  held_impulses_ += collider_->heldImpulses();
+  contact_now_ += collider_->heldImpulses() / step.h;
+  for (int i = 0; i < first_.back(); ++i)
+    if (inverse_mass_[i] > 0.0)
+      contact_now_.col(i) += (v_.col(i) - v_before_.col(i)) / (inverse_mass_[i] * step.h);
+  return report;
+}
+
 /// What contacts make of the cloths' own steps, into x_ and v_.
 CollisionReport ClothGroup::collide(double h)
 {
@@ -281,6 +300,7 @@ CollisionReport ClothGroup::collide(double h)
     shared_pins_[k].setZero(3, static_cast<Eigen::Index>(work_.cloths[k].pins.size()));
     shared_averages_[k].setZero(3, averagesOf(k) ? averagesOf(k)->count() : 0);
   }
+  contact_now_.setZero();
   const CollisionStep step{x_start_, inverse_mass_, work_.solids, next_.solids, h, budget_.get()};
   int pass = 0;
   while (pass < kLoadPasses && shareLoads(step, pass > 0))

@@ -49,19 +49,17 @@ void ClothGroup::blameWork(double h, StepReport& report) const
 /// where what touches is little of what an average is taken over; where a cloth is pressed flat a hundred rounds were seen. Collisions have the last word.
 CollisionReport ClothGroup::resolve(const CollisionStep& step)
 {
-  CollisionReport report = collider_->resolve(step, x_, v_, true);
-  if (report.ok)
-    held_impulses_ = collider_->heldImpulses();
+  held_impulses_.setZero(3, first_.back());
+  CollisionReport report = resolveContacts(step);
   double earlier = std::numeric_limits<double>::infinity();
   for (int round = 1; report.ok && round <= kMeetRounds; ++round)
   {
     const double gap = meetAverages(step.h);
     if (gap <= 1)
       break;
-    const CollisionReport again = collider_->resolve(step, x_, v_, true);
+    const CollisionReport again = resolveContacts(step);
     if (!again.ok)
       return again;
-    held_impulses_ += collider_->heldImpulses();
     report.impulses += again.impulses;
     report.rounds += again.rounds;
     report.zones = again.zones;

@@ -49,13 +49,20 @@ void addForceMarkers(const Simulation& simulation, const std_msgs::Header& heade
   const std_msgs::ColorRGBA force = color(0.85, 0.20, 0.55), torque = color(0.35, 0.25, 0.80), touch = color(0.10, 0.60, 0.35);
   Marker contacts = makeMarker(header, "contacts", 0, Marker::LINE_LIST);
   double longest = 0.0;
-  for (const ContactTerm& contact : simulation.contacts())
-  {
-    const Vector3d along = scale * contact.force;
+  const auto add = [&](const Vector3d& at, const Vector3d& force) {
+    const Vector3d along = scale * force;
     if (!(along.norm() > 1e-6))
-      continue;
+      return;
     longest = std::max(longest, along.norm());
-    addArrow(contact.position, along, contacts);
+    addArrow(at, along, contacts);
+  };
+  for (const ContactTerm& contact : simulation.contacts())
+    add(contact.position, contact.force);
+  for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
+  {
+    const Eigen::Matrix3Xd forces = simulation.contactForces(static_cast<int>(k));
+    for (Eigen::Index i = 0; i < forces.cols(); ++i)
+      add(simulation.state().cloths[k].cloth.x.col(i), forces.col(i));
   }
   contacts.scale.x = 0.04 * longest;
   contacts.color = touch;

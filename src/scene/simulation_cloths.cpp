@@ -424,6 +424,13 @@ const Eigen::Matrix3Xd& Simulation::pinForces(int cloth) const
   return stepper ? stepper->pinForces() : touching_cloths_[cloth_places_[cloth].group].group.pinForces(cloth_places_[cloth].index);
 }
 
+Eigen::Matrix3Xd Simulation::contactForces(int cloth) const
+{
+  if (cloth_steppers_.at(static_cast<std::size_t>(cloth)))
+    return Eigen::Matrix3Xd(3, 0);
+  return touching_cloths_[cloth_places_[cloth].group].group.contactForces(cloth_places_[cloth].index);
+}
+
 const ClothStepper& Simulation::clothStepper(int cloth) const
 {
   const auto& own = cloth_steppers_.at(static_cast<std::size_t>(cloth));

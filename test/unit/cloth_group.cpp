@@ -38,6 +38,43 @@ struct Cloths
   }
 };
 
+TEST(ClothGroup, ContactForcesBalanceMomentum)
+{
+  // two cloths that fall onto a ball and onto each other, one of them held: the forces of every step are its change of momentum
+  Cloths c;
+  c.add("upper", 6, 0.3, {-0.15, -0.15, 0.112});
+  c.add("lower", 6, 0.3, {-0.14, -0.15, 0.106});
+  c.addSolid(Sphere{0.1});
+  pinVertices(c.state.cloths[0], {0});
+  c.inputs.cloths[0].pins = c.state.cloths[0].x.col(0);
+  ClothOptions options;
+  options.linear_tolerance = 1e-8;
+  ClothGroup group(c.model, options);
+  double most = 0.0, supported = 0.0;
+  for (int k = 0; k < 60; ++k)
+  {
+    const ClothGroupState before = c.state;
+    ASSERT_TRUE(group.step(c.state, c.inputs, 0.005).ok);
+    for (int i = 0; i < 2; ++i)
+    {
+      const ClothModel& model = *c.model.cloths[static_cast<std::size_t>(i)];
+      const auto& x = c.state.cloths[static_cast<std::size_t>(i)];
+      Vector3d forces = -group.pinForces(i).rowwise().sum(), change(0, 0, 0);
+      for (int v = 0; v < model.vertices(); ++v)
+      {
+        change += model.mass[v] / 0.005 * (x.v.col(v) - before.cloths[static_cast<std::size_t>(i)].v.col(v));
+        forces += model.mass[v] * c.inputs.cloths[static_cast<std::size_t>(i)].gravity + group.contactForces(i).col(v);
+        most = std::max(most, group.contactForces(i).col(v).norm());
+        supported += group.contactForces(i)(2, v) / 60;
+      }
+      EXPECT_LT((change - forces).norm(), 1e-3 * model.totalMass() * 9.81) << k << " " << i;   // answers to contacts are solved to that
+    }
+  }
+  EXPECT_GT(group.collisions().repulsions, 0);
+  EXPECT_GT(most, 0.01);
+  EXPECT_GT(supported, 0.3 * 2 * c.model.cloths[0]->totalMass() * 9.81);
+}
+
 TEST(ClothGroup, ComesToRestOnAFloor)
 {
   Cloths c;

@@ -70,6 +70,10 @@ public:
   /// Force [N] with which each prescribed average of a cloth acts on it, mean over the last successful step, as pinForces().
   const Eigen::Matrix3Xd& averageForces(int cloth) const { return average_forces_.at(cloth); }
 
+  /// What contacts exert on each vertex of a cloth [N], 3 x vertices, mean over the last successful step, friction included; on held ones as far as
+  /// SurfaceCollider::heldImpulses() knows it.
+  auto contactForces(int cloth) const { return contact_forces_.middleCols(first_.at(cloth), first_.at(cloth + 1) - first_.at(cloth)); }
+
   /// Sums and maxima over the last step.
   const CollisionReport& collisions() const { return collisions_; }
   std::size_t size() const { return model_.cloths.size(); }   ///< cloths
@@ -82,7 +86,8 @@ private:
   bool lowerOrder();
   bool shareLoads(const CollisionStep& step, bool again);
   void blameExplicit(double duration, StepReport& report) const;
-  void addPinForces(double share, double h);
+  void addForces(double share, double h);
+  CollisionReport resolveContacts(const CollisionStep& step);
   CollisionReport resolve(const CollisionStep& step);
   double meetAverages(double h);
   void prepareCorrection(std::size_t cloth);
@@ -131,7 +136,8 @@ private:
   };
   std::vector<AverageCorrection> corrections_;
   Eigen::Matrix3Xd held_impulses_;
-  Eigen::Matrix3Xd x_start_, x_, v_;
+  Eigen::Matrix3Xd contact_forces_, contact_sums_, contact_now_;   ///< 3 x points: of the last step, of the present one, of its substep
+  Eigen::Matrix3Xd x_start_, x_, v_, v_before_;
   Eigen::Matrix3Xd corrected_, push_, answer_, own_push_, own_answer_;
   Eigen::VectorXd inverse_mass_;
 };

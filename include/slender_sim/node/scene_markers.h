@@ -19,7 +19,7 @@ namespace slender {
 /// Very fine rods are thinned out to a few hundred sections: a picture has no more pixels.
 /// Colours (options.color) are blue for negative values, grey for none, red for positive ones: strain of rods and cloths (a cloth's principal
 /// one farthest from zero), curvature (of cloths the mean one, towards the normal), twist of rods and threads. What has no such value keeps its colour.
-/// With options.forces: `contacts` 0 what solids and rods do to rods where they touch, `wrenches` 2 i and 2 i + 1 what grasp i takes of force, and of torque
+/// With options.forces: `contacts` 0 what solids and rods do to rods where they touch, and contacts to vertices of cloth, `wrenches` 2 i and 2 i + 1 what grasp i takes of force, and of torque
 /// (as the force at a lever of 0.1 m), `nozzle_forces` i.
 visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options = {});
 

@@ -107,8 +107,10 @@ public:
   const RodModel& rodModel(int rod) const { return *models_[rod]; }
   /// True for bodies that move by the forces on them; others are driven.
   bool isSimulated(int body) const { return !config_.bodies[body].motion.has_value(); }
-  /// Contacts of the last step.
+  /// Contacts of rods and threads in the last step.
   const std::vector<ContactTerm>& contacts() const;
+  /// Of cloths, see ClothGroup; without columns for one that touches nothing.
+  Eigen::Matrix3Xd contactForces(int cloth) const;
   const std::vector<GraspRef>& grasps() const { return grasps_; }
   bool isActive(int grasp) const;
   /// Where the held section, or the frame of a cloth's grasp, is.
