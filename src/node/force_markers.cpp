@@ -48,12 +48,14 @@ void addForceMarkers(const Simulation& simulation, const std_msgs::Header& heade
 {
   const std_msgs::ColorRGBA force = color(0.85, 0.20, 0.55), torque = color(0.35, 0.25, 0.80), touch = color(0.10, 0.60, 0.35);
   Marker contacts = makeMarker(header, "contacts", 0, Marker::LINE_LIST);
-  double longest = 0.0;
+  double sum = 0.0;
+  std::size_t count = 0;
   const auto add = [&](const Vector3d& at, const Vector3d& force) {
     const Vector3d along = scale * force;
     if (!(along.norm() > 1e-6))
       return;
-    longest = std::max(longest, along.norm());
+    sum += along.norm();
+    ++count;
     addArrow(at, along, contacts);
   };
   for (const ContactTerm& contact : simulation.contacts())
@@ -64,7 +66,7 @@ void addForceMarkers(const Simulation& simulation, const std_msgs::Header& heade
     for (Eigen::Index i = 0; i < forces.cols(); ++i)
       add(simulation.state().cloths[k].cloth.x.col(i), forces.col(i));
   }
-  contacts.scale.x = 0.04 * longest;
+  contacts.scale.x = count > 0 ? 0.04 * sum / static_cast<double>(count) : 0.0;
   contacts.color = touch;
   if (contacts.points.empty())
     contacts.action = Marker::DELETE;

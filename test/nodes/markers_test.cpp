@@ -185,5 +185,30 @@ rods:
   EXPECT_EQ(find(markers, "contacts").action, Marker::DELETE);
 }
 
+TEST(Markers, arrowsShowWhatContactsDoToCloth)
+{
+  // a towel that has come to rest on a table: what carries it
+  Simulation simulation(parseScene(R"(
+time: {step: 0.01}
+cloths:
+  - name: towel
+    grid: {corner: [0, 0, 0.0011], sides: [[0.3, 0, 0], [0, 0.3, 0]], cells: 6}
+    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 1.0e6}
+    contact: {thickness: 0.002}
+obstacles: [{name: table, shape: {plane: {}}}]
+)", "scene"));
+  for (int k = 0; k < 50; ++k)
+    ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
+  MarkerOptions options;
+  options.forces = 2.0;
+  const auto markers = sceneMarkers(simulation, std_msgs::Header(), options);
+  const Marker& contacts = find(markers, "contacts");
+  ASSERT_EQ(contacts.points.size() % 10, 0u);   // a shaft and four barbs
+  double sum = 0.0;
+  for (std::size_t k = 0; k < contacts.points.size(); k += 10)
+    sum += contacts.points[k + 1].z - contacts.points[k].z;
+  EXPECT_NEAR(sum, 2.0 * 0.2 * 0.09 * 9.81, 0.01);
+}
+
 }  // namespace
 }  // namespace slender
