@@ -10,6 +10,9 @@ namespace slender {
 namespace {
 
 constexpr long kFlops = 600;   // of dense matrices, to a count of a WorkBudget
+/// Measured (study tracking_overhead): for fewer averages sweeps are faster. The more there are, the less their stiffness is that of the preconditioner.
+constexpr int kPointsPerAverage = 50;
+constexpr double kStiffestSwept = 300.0;   // measured likewise: of bending over inertia. Sweeps carry from edge to edge what bends a plate as a whole
 
 }  // namespace
 
@@ -47,14 +50,17 @@ void ClothSystem::setGap(const Eigen::Matrix3Xd& averages, const PointVector& x)
 
 void ClothSystem::meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x)
 {
-  constexpr double kRounding = 4e-15;   // of the coordinates: what is left after one solve, or conjugate gradients that began there
-  setGap(averages, x);
-  if ((averages - averages_now_).cwiseAbs().maxCoeff() <= kRounding * averages.cwiseAbs().maxCoeff())
-    return;
-  std::fill(right_.begin(), right_.end(), 0.0);
-  averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
-  for (std::size_t i = 0; i < x.size(); ++i)
-    x[i] += correction_[i];
+  constexpr double kRounding = 4e-15;   // of the coordinates: what is left after a solve, or conjugate gradients that began there
+  for (int pass = 0; pass < 2; ++pass)   // of averages that nearly depend on each other one leaves more
+  {
+    setGap(averages, x);
+    if ((averages - averages_now_).cwiseAbs().maxCoeff() <= kRounding * averages.cwiseAbs().maxCoeff())
+      return;
+    std::fill(right_.begin(), right_.end(), 0.0);
+    averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
+    for (std::size_t i = 0; i < x.size(); ++i)
+      x[i] += correction_[i];
+  }
 }
 
 void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces, bool response)
@@ -138,6 +144,20 @@ double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averag
   return downhill ? std::max(std::min(norms.load, kLeft / tolerance * norms.step), kRounding * norms.load) : 0.0;
 }
 
+bool ClothSystem::sweepsSuit(const PrescribedAverages& averages) const
+{
+  return choose_ && averages.bounds.size() == 0 && points() <= kMostSwept && points() >= kPointsPerAverage * averages.count();
+}
+
+bool ClothSystem::bendsLittle(double viscosity) const
+{
+  for (int i = 0; i < bending_.size(); ++i)
+    for (int k = bending_.starts()[i]; k < bending_.starts()[i + 1]; ++k)
+      if (bending_.column(k) == i && (1.0 + viscosity) * bending_.values()[k] > kStiffestSwept * weight_[i])
+        return false;
+  return true;
+}
+
 /// By conjugate gradients with symmetric sweeps, after takeFirstStep(). What keeps the averages met is a stiffness, which costs an iteration next to nothing, and
 /// after them the motion of the preconditioner that meets averages, which meetAverages() makes in the end: a method of multipliers. The tolerance is that of the
 /// equations with that stiffness; rounds go on until that motion is so small that positions are as good as those of the same cloth without averages.
@@ -146,12 +166,15 @@ LinearOutcome ClothSystem::sweepWithAverages(PointVector& d, const Eigen::Matrix
   constexpr int kMostRounds = 4;
   constexpr double kStiff = 3.0, kMotion = 40.0;   // measured (study tracking_overhead): of the preconditioner; of the tolerance, in its norm
   constexpr double kLeft = 0.1;                    // of what is not balanced at the start
+  constexpr double kMoving = 0.1;                  // of what it takes to move the averages, much of the load of cloth that they tear at
   sweeps_.set(1.0 + ratio_, held_);
-  const double reference = sweeps_.norm(right_);
+  double reference = sweeps_.norm(right_);
   if (!(takeFirstStep(d, &averages, tolerance) > 0))   // where cloth is so much stiffer than the preconditioner this leads away
     return LinearOutcome::not_converged;
-  double gap = averages_->norm(gap_.data());   // may be any part of the load, where averages tear at the cloth
-  const double allowed = std::min(kMotion * tolerance * std::sqrt(std::max(load_ * load_ - gap * gap, 0.0)), kLeft * first_step_);
+  double gap = averages_->norm(gap_.data());
+  const double moving = kMoving * gap, load = std::max(std::sqrt(std::max(load_ * load_ - gap * gap, 0.0)), moving);
+  const double allowed = std::min(kMotion * tolerance * load, kLeft * first_step_);
+  reference = std::max(reference, moving);
   for (int round = 0; round < kMostRounds; ++round)
   {
     const LinearResult result = sweeps_.solve(*averages_, kStiff, right_, correction_, tolerance, iterationsWithin(kMostIterations), reference,

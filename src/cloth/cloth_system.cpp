@@ -19,10 +19,6 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
   return Eigen::Map<const Eigen::MatrixXi>(pairs.data(), 2, static_cast<Eigen::Index>(pairs.size() / 2));
 }
 
-/// Measured (study implicit_step): sweeps are faster below, the constant factor above.
-constexpr int kMostSwept = 3000;
-/// Measured (study tracking_overhead): for fewer averages sweeps are faster. The more there are, the less their stiffness is that of the rest preconditioner.
-constexpr int kPointsPerAverage = 50;
 constexpr int kEnergyWork = 2, kHessianWork = 8, kFactorWork = 60;   // of a WorkBudget, per vertex; an iteration of conjugate gradients: 1
 constexpr double kBesideLoad = 1e-2;
 
@@ -30,7 +26,7 @@ ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
 {
   if (options.solver != ClothSolver::automatic)
     return options.solver;
-  return !model.averages.empty() || model.vertices() > kMostSwept ? ClothSolver::conjugate_gradients : ClothSolver::gauss_seidel;
+  return !model.averages.empty() || model.vertices() > ClothSystem::kMostSwept ? ClothSolver::conjugate_gradients : ClothSolver::gauss_seidel;
 }
 
 }  // namespace
@@ -38,7 +34,7 @@ ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
-  : model_(model), choose_(options.solver == ClothSolver::automatic), solver_(chosen(model, options))
+  : model_(model), choose_(options.solver == ClothSolver::automatic && options.one_newton_step), solver_(chosen(model, options))
   , linear_tolerance_(options.linear_tolerance), membrane_(model.rest, model.membrane, model.warp), wind_(model)
 {
   const int n = points();
@@ -110,11 +106,6 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
       for (auto* a : {&angles_, &other_angles_, &start_angles_})
         a->assign(hinges_->paddedCount(), 0.0);
   }
-}
-
-bool ClothSystem::sweepsSuit(const PrescribedAverages& averages) const
-{
-  return choose_ && averages.bounds.size() == 0 && points() <= kMostSwept && points() >= kPointsPerAverage * averages.count();
 }
 
 void ClothSystem::setHinges(const ClothState& state)
@@ -213,6 +204,7 @@ void ClothSystem::setWeights(double tau, double ratio)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += weight_[i];
   base_.assign(matrix_.values(), matrix_.values() + 9 * matrix_.blocks());
   preconditioned_ = !preconditioner_ || preconditioner_->setConstant(weight_, 1.0 + ratio, held_);
+  limp_ = !used_ || bendsLittle(ratio);
   for (AverageSet& set : average_sets_)
     set.ready = false;
   base_tau_ = tau;
@@ -456,7 +448,7 @@ LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& lin
     sweeps_.set(1.0 + ratio_, held_);
     return correct(d, sweeps_.solve(right_, correction_, allowed, iterationsWithin(kMostIterations)), allowed, linear_iterations);
   }
-  if (averages && used_->swept)
+  if (averages && used_->swept && limp_)
   {
     if (sweepWithAverages(d, *averages, allowed, linear_iterations) == LinearOutcome::solved)
       return LinearOutcome::solved;

@@ -49,6 +49,9 @@ enum class LinearOutcome
 class ClothSystem
 {
 public:
+  /// Measured (study implicit_step): sweeps are faster up to so many points, the constant factor above.
+  static constexpr int kMostSwept = 3000;
+
   ClothSystem(const ClothModel& model, const ClothOptions& options);
 
   int points() const { return model_.vertices(); }
@@ -136,6 +139,7 @@ private:
   void move(PointVector& d);
   void moveAverages(PointVector& d);
   bool sweepsSuit(const PrescribedAverages& averages) const;
+  bool bendsLittle(double viscosity) const;
   LinearOutcome sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance, int& linear_iterations);
   /// right_: what d leaves of the equations, held points zero.
   void setRight(const PointVector& d);
@@ -148,7 +152,7 @@ private:
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
 
   const ClothModel& model_;
-  const bool choose_;                         ///< the solver is ours to choose
+  const bool choose_;                         ///< the solver of steps with averages is ours to choose
   ClothSolver solver_;
   const double linear_tolerance_;
   WorkBudget unbounded_;
@@ -170,6 +174,7 @@ private:
   SparseCholesky factor_;                     ///< of matrix_
   std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
   bool preconditioned_ = true;                ///< its constant part could be factored
+  bool limp_ = true;                          ///< bendsLittle(): sweeps are not too slow
   ConjugateGradients cg_;
   SymmetricSweeps sweeps_;                    ///< of that solver, and where averages suit them (sweepsSuit())
 

@@ -33,6 +33,7 @@ double ConstrainedCholesky::Rows::multiply(double factor, const double* x, doubl
 void ConstrainedCholesky::setConstraints(const Constraints& c, bool bounded)
 {
   c_ = c;
+  c_rows_ = Rows();
   if (bounded)
   {
     s_.resize(c.rows(), c.rows());
@@ -82,7 +83,8 @@ bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
   Constraints free = c_.transpose();
   free.prune([fixed](Eigen::Index point, Eigen::Index, double) { return !fixed || !fixed[point]; });
   fill(free, c_transposed_);
-  fill(c_, c_rows_);
+  if (c_rows_.values.empty())
+    fill(c_, c_rows_);
   const Eigen::MatrixXd s = Eigen::MatrixXd(Constraints(v * v.transpose()));
   if (s_.size() > 0)
     s_ = s;

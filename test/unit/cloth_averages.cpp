@@ -197,22 +197,30 @@ TEST(ClothAverages, StayExactWhereTheyTearAtTheCloth)
   EXPECT_GT(report.max_strain, 100.0);
 }
 
+/// A sheet of 289 vertices whose quarters are averaged over: their steps are swept.
+std::shared_ptr<ClothModel> quarteredSheet(BendingModel bending)
+{
+  const TriangleMesh mesh = gridMesh(1.0, 1.0, 16, 16, GridPattern::alternating);
+  auto model = std::make_shared<ClothModel>(buildCloth("tracked", mesh, 0.2, orthotropicMembrane(500, 500, 0.3, 190)));
+  model->bending = bending;
+  model->bending_modulus = 1e-4;
+  model->stiffness_damping = 1e-3;
+  auto quarters = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(4, mesh.vertices.cols());
+  for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
+    quarters->coeffRef((mesh.vertices(0, i) > 0.5 ? 1 : 0) + (mesh.vertices(1, i) > 0.5 ? 2 : 0), i) = 1.0;
+  model->averages = {{quarters, {}}};
+  return model;
+}
+
 TEST(ClothAverages, SweepsSolveTheSameSteps)
 {
   // few averages of many vertices, a gripper, air and bending of both kinds: sweeps, which are taken for them, and conjugate gradients among motions that
   // leave the averages alone
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
   {
-    const TriangleMesh mesh = gridMesh(1.0, 1.0, 16, 16, GridPattern::alternating);
-    auto model = std::make_shared<ClothModel>(buildCloth("tracked", mesh, 0.2, orthotropicMembrane(500, 500, 0.3, 190)));
-    model->bending = bending;
-    model->bending_modulus = 1e-4;
-    model->stiffness_damping = 1e-3;
-    auto quarters = std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(4, mesh.vertices.cols());
-    for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
-      quarters->coeffRef((mesh.vertices(0, i) > 0.5 ? 1 : 0) + (mesh.vertices(1, i) > 0.5 ? 2 : 0), i) = 1.0;
-    model->averages = {{quarters, {}}};
-    ClothState state = makeClothState(*model, mesh.vertices);
+    const auto model = quarteredSheet(bending);
+    const auto quarters = model->averages[0].weights;
+    ClothState state = makeClothState(*model, model->rest.vertices);
     pinVertices(state, {0});
     ClothInputs inputs;
     inputs.pins = state.x.col(0);
@@ -249,6 +257,48 @@ TEST(ClothAverages, SweepsSolveTheSameSteps)
     EXPECT_LT(std::sqrt(error), 0.02 * std::sqrt(motion));   // free cloth of this size, by sweeps: 0.03 of a step's fall
     EXPECT_LT(iterations, 20 * 40);
   }
+}
+
+TEST(ClothAverages, AreExactWhereTheyNearlyDependOnEachOther)
+{
+  const auto model = quarteredSheet(BendingModel::hinge);
+  Eigen::SparseMatrix<double, Eigen::RowMajor> mix(4, 4);
+  mix.setIdentity();
+  mix.coeffRef(1, 1) = 1e-4;
+  mix.coeffRef(1, 0) = 1.0 - 1e-4;
+  model->averages = {{std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(mix * *model->averages[0].weights), {}}};
+  const auto& weights = *model->averages[0].weights;
+  ClothStepper stepper(model, options(true));
+  ClothState state = makeClothState(*model, model->rest.vertices);
+  ClothInputs inputs;
+  const Matrix3Xd rest = state.x * weights.transpose();
+  for (int k = 1; k <= 10; ++k)
+  {
+    inputs.averages = rest.colwise() + Vector3d(0.2 * k, 0.0, 3.0 * std::sin(0.3 * k));
+    inputs.averages.col(2) += Vector3d(0.0, 0.0, 1.0 * k);
+    const StepReport report = stepper.step(state, inputs, 0.01);
+    ASSERT_TRUE(report.ok) << report.message;
+    EXPECT_LT((state.x * weights.transpose() - inputs.averages).cwiseAbs().maxCoeff(), 1e-13 * inputs.averages.cwiseAbs().maxCoeff()) << k;
+  }
+}
+
+TEST(ClothAverages, NeedNoLoadToBeMoved)
+{
+  // the first motion of a sheet at rest, nothing else acts: the tolerance counts from that motion
+  ClothOptions exactly = options(true);
+  exactly.solver = ClothSolver::conjugate_gradients;
+  exactly.linear_tolerance = 1e-10;
+  const auto model = quarteredSheet(BendingModel::hinge);
+  ClothInputs inputs;
+  inputs.gravity.setZero();
+  inputs.averages = model->rest.vertices * model->averages[0].weights->transpose();
+  inputs.averages.row(2) += Eigen::RowVector4d(0.5, -0.3, 0.2, 0.1);
+  ClothState a = makeClothState(*model, model->rest.vertices), b = a;
+  ClothStepper swept(model, options(true)), exact(model, exactly);
+  const StepReport report = swept.step(a, inputs, 0.01);
+  ASSERT_TRUE(report.ok && exact.step(b, inputs, 0.01).ok);
+  EXPECT_LT(report.linear_iterations, 60);
+  EXPECT_LT((a.x - b.x).norm(), 0.05 * (b.x - model->rest.vertices).norm()) << report.linear_iterations;
 }
 
 TEST(ClothAverages, RefuseWhatCannotBe)

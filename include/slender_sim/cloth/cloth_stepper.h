@@ -27,8 +27,8 @@ struct ClothEnergies
 
 enum class ClothSolver
 {
-  /// gauss_seidel up to 3,000 vertices without averages, else conjugate_gradients (measured: studies implicit_step, cloth_accuracy). With averages of 50
-  /// vertices each and more, and one_newton_step, up to 3,000 vertices by sweeps as well (tracking_overhead).
+  /// gauss_seidel up to 3,000 vertices without averages, else conjugate_gradients (measured: studies implicit_step, cloth_accuracy). Steps with
+  /// one_newton_step and averages without bounds, up to 3,000 vertices and no more than one average per 50 of them, are swept as well, but for plates (tracking_overhead).
   automatic,
   cholesky,              ///< factorisation of the whole matrix
   conjugate_gradients,   ///< preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the normals
@@ -50,8 +50,9 @@ struct ClothOptions
   ClothSolver solver = ClothSolver::automatic;
   /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged velocity.
   /// With averages and one_newton_step it is that of the same cloth without them, and of what it takes to move them, unless strains are so large that
-  /// these say nothing about motions; by sweeps that of equations in which the averages are stiff, before they are met (positions are then as good as those of
-  /// the same cloth without averages).
+  /// these say nothing about motions. Where steps with averages are swept, it is that of the same cloth without them (or of a tenth of what it takes to move
+  /// them), in the sweeps' norm, before the averages are met: positions are as good as those of the same cloth without averages, averages exact, their forces
+  /// often less so than by conjugate_gradients.
   double linear_tolerance = 5e-3;
   double error_tolerance = 0.0;          ///< [m] local error per substep, implicit_euler and tr_bdf2 only; 0: fixed steps
   double min_step = 1e-7;                ///< [s] adaptive steps never get shorter
@@ -91,7 +92,7 @@ public:
   const Eigen::Matrix3Xd& averageForces() const;
 
   ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;
-  /// What `automatic` took.
+  /// What `automatic` took; steps with averages may be swept beside conjugate_gradients.
   ClothSolver solver() const;
   const ClothModel& model() const;
 
