@@ -197,9 +197,14 @@ struct Run
 {
   StabilityCell cell;
   std::optional<Path> path;   ///< none of what cannot be set up
+  std::vector<double> energy, scale;   ///< per step [J]; of what there is to give
 };
 
-Run run(const MapScene& scene, double step, int steps)
+constexpr int kAlong = 64;
+
+/// Of a guide that moves far in a step the force at the end says little about its work. Then `along`, the same motion in kAlong times as many steps, as far as that
+/// goes, has the energy that the guide has given; null: the end of the step counts.
+Run run(const MapScene& scene, double step, int steps, const Run* along = nullptr)
 {
   Run r;
   std::optional<Simulation> simulation;
@@ -229,6 +234,9 @@ Run run(const MapScene& scene, double step, int steps)
   const double begin = threadSeconds();
   for (int k = 0; k < steps; ++k)
   {
+    const std::size_t there = static_cast<std::size_t>(kAlong * (k + 1) - 1);
+    if (along && there >= along->energy.size())
+      break;
     const SceneState before = simulation->state();
     SceneInputs inputs = simulation->defaultInputs();
     if (tracking)
@@ -247,7 +255,10 @@ Run run(const MapScene& scene, double step, int steps)
       work += given;
       scale += std::abs(given);
     }
-    if (!r.cell.energyIs((now.now - start.now - work) / scale, r.cell.linear_steps ? 1e-2 : energyGrowth(Integrator::implicit_euler)))
+    r.energy.push_back(now.now);
+    r.scale.push_back(scale);
+    const double growth = along ? (now.now - along->energy[there]) / along->scale[there] : (now.now - start.now - work) / scale;
+    if (!r.cell.energyIs(growth, r.cell.linear_steps || along ? 1e-2 : energyGrowth(Integrator::implicit_euler)))
       break;
   }
   r.cell.cpu_seconds = threadSeconds() - begin;
@@ -259,6 +270,14 @@ Run run(const MapScene& scene, double step, int steps)
 StabilityCell runScene(const MapScene& scene, double step, int steps)
 {
   Run coarse = run(scene, step, steps);
+  if (scene.guide && coarse.cell.complaint.find("energy") != std::string::npos)
+  {
+    Run along = run(scene, step / kAlong, kAlong * steps);
+    if (!along.cell.complaint.empty() && !along.energy.empty())
+      along.energy.pop_back();
+    if (along.energy.size() >= kAlong * coarse.energy.size())
+      coarse = run(scene, step, steps, &along);
+  }
   if (coarse.cell.outcome() != Outcome::done && coarse.cell.outcome() != Outcome::cut)
     return coarse.cell;
   const Run fine = run(scene, step / 4, 4 * steps);
