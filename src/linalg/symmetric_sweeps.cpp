@@ -124,6 +124,15 @@ double SymmetricSweeps::sweepResidual()
   return pointKernels().multiplyDiagonal(a_->points(), diagonal_.data(), r_.data(), z_.data());
 }
 
+double SymmetricSweeps::begin(const PointVector& right_hand_side, PointVector& x, LinearResult& result)
+{
+  std::fill(x.begin(), x.end(), 0.0);
+  std::copy(right_hand_side.begin(), right_hand_side.end(), r_.begin());
+  const double square = sweepResidual();
+  result.definite = square >= 0.0;
+  return square;
+}
+
 double SymmetricSweeps::norm(const PointVector& r)
 {
   std::copy(r.begin(), r.end(), r_.begin());
@@ -134,14 +143,9 @@ LinearResult SymmetricSweeps::solve(const PointVector& right_hand_side, PointVec
 {
   setWhole();
   LinearResult result;
-  std::fill(x.begin(), x.end(), 0.0);
-  std::copy(right_hand_side.begin(), right_hand_side.end(), r_.begin());
-  const double square = sweepResidual();
+  const double square = begin(right_hand_side, x, result);
   if (!(square > 0))
-  {
-    result.definite = square == 0.0;
     return result;
-  }
   translate(right_hand_side, x);
   leave(right_hand_side, x);
   iterate(nullptr, 0.0, sweepResidual(), std::sqrt(square), x, tolerance, max_iterations, result);
@@ -158,14 +162,9 @@ LinearResult SymmetricSweeps::solve(const ConstrainedCholesky& constraints, doub
 {
   constexpr double kRounding = 1e-12;   // of the reference
   LinearResult result;
-  std::fill(x.begin(), x.end(), 0.0);
-  std::copy(right_hand_side.begin(), right_hand_side.end(), r_.begin());
-  const double square = sweepResidual();
+  const double square = begin(right_hand_side, x, result);
   if (!(square > 0))
-  {
-    result.definite = square == 0.0;
     return result;
-  }
   const double scale = std::max(std::min(reference, least / tolerance * std::sqrt(square)), kRounding * reference);
   iterate(&constraints, stiffness, square, scale, x, tolerance, max_iterations, result);
   return result;

@@ -39,6 +39,8 @@ private:
   void translate(const PointVector& forces, PointVector& x) const;
   /// r_ := (D + L)^-1 r_, z_ := D r_; returns r_ . z_, the square of the norm.
   double sweepResidual();
+  /// x = 0 and its residual, swept; returns the square of the norm, zero and below: there is nothing to solve, or not definite.
+  double begin(const PointVector& right_hand_side, PointVector& x, LinearResult& result);
   /// Onwards from x with the residual that sweepResidual() swept, in units of `scale`.
   void iterate(const ConstrainedCholesky* constraints, double stiffness, double square, double scale, PointVector& x, double tolerance, int max_iterations,
                LinearResult& result);
