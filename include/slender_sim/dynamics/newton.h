@@ -37,7 +37,6 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
 {
   constexpr int kPatience = 5;
   constexpr double kArmijo = 1e-4, kProgress = 0.1, kMaxShift = 1e12;
-  constexpr double kUnbalanced = 0.1;   // of the force scale: not a solution, however small the increment (inertia of very short steps)
   NewtonResult result;
   const auto fail = [&](StepFailure why) {
     result.failure = why;
@@ -89,10 +88,9 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     {
       system.moveAlong(1.0);
       trial = system.evaluate(false);
-      const double residual = system.residual();
-      result.residual = residual / system.forceScale();
+      result.residual = system.residual() / system.forceScale();
       result.max_strain = trial.max_strain;
-      if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi && (result.residual <= kUnbalanced || residual <= system.noiseLevel()))
+      if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
         return result;
     }
     if (result.iterations >= config.max_iterations)

@@ -92,6 +92,8 @@ public:
   double incrementSize() const;
   static constexpr bool anglesMayKeepShift() { return false; }
   double slope() const;
+  /// Residual over force scale beyond which a step is not solved, however small the increment: inertia of very short steps leaves nothing else to see.
+  static constexpr double kUnbalanced = 0.1;
   double residual() const;
   double forceScale() const;
   double noiseLevel() const;
