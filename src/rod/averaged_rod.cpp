@@ -86,6 +86,7 @@ public:
   double stepLimit() const { return rod_.stepLimit(); }
   double incrementSize() const { return rod_.incrementSize(); }
   static constexpr bool anglesMayKeepShift() { return RodSystem::anglesMayKeepShift(); }
+  static constexpr double mostUnbalanced() { return RodSystem::mostUnbalanced(); }
   double slope() const { return rod_.slope(); }
   double residual()
   {

@@ -46,6 +46,7 @@ public:
   double incrementSize() const;
   /// A stage may end at a saddle of kinked joints' angles, when positions have arrived.
   static constexpr bool anglesMayKeepShift() { return true; }
+  static constexpr double mostUnbalanced() { return RodSystem::mostUnbalanced(); }
   double slope() const;
   double residual() const;
   double forceScale() const;

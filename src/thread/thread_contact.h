@@ -45,6 +45,7 @@ public:
   double stepLimit();
   double incrementSize() const;
   static constexpr bool anglesMayKeepShift() { return false; }
+  static constexpr double mostUnbalanced() { return ThreadSystem::mostUnbalanced(); }
   double slope() const;
   double residual() const;
   double forceScale() const;

@@ -88,9 +88,11 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     {
       system.moveAlong(1.0);
       trial = system.evaluate(false);
-      result.residual = system.residual() / system.forceScale();
+      const double residual = system.residual();
+      result.residual = residual / system.forceScale();
       result.max_strain = trial.max_strain;
-      if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
+      const bool balanced = result.residual <= System::mostUnbalanced() || residual <= system.noiseLevel();
+      if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi && balanced)
         return result;
     }
     if (result.iterations >= config.max_iterations)

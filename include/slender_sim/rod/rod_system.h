@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "slender_sim/dynamics/hessian_shift.h"
@@ -105,6 +106,7 @@ public:
   double incrementSize() const;
   /// No: where nodes are held only frames move, and then no increment of positions tells whether they have arrived.
   static constexpr bool anglesMayKeepShift() { return false; }
+  static constexpr double mostUnbalanced() { return std::numeric_limits<double>::infinity(); }   ///< without forces there is no scale
   double slope() const;                 ///< gradient . direction [J]
   double residual() const;              ///< largest unbalanced nodal force or moment / edge [N]
   double forceScale() const;            ///< largest internal or external force [N]

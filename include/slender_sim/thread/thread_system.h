@@ -93,7 +93,7 @@ public:
   static constexpr bool anglesMayKeepShift() { return false; }
   double slope() const;
   /// Residual over force scale beyond which a step is not solved, however small the increment: inertia of very short steps leaves nothing else to see.
-  static constexpr double kUnbalanced = 0.1;
+  static constexpr double mostUnbalanced() { return 0.1; }
   double residual() const;
   double forceScale() const;
   double noiseLevel() const;
