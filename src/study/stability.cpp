@@ -258,6 +258,7 @@ Run run(const MapScene& scene, double step, int steps, const Run* along = nullpt
     r.energy.push_back(now.now);
     r.scale.push_back(scale);
     const double growth = along ? (now.now - along->energy[there]) / along->scale[there] : (now.now - start.now - work) / scale;
+    // one step and many may end in folds that differ by a little of what there is
     if (!r.cell.energyIs(growth, r.cell.linear_steps || along ? 1e-2 : energyGrowth(Integrator::implicit_euler)))
       break;
   }
