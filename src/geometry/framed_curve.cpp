@@ -11,44 +11,53 @@ namespace slender {
 namespace {
 // 1 + t.t' below this: the turn is within about 1e-3 rad of a fold, and 2 tan(phi/2) is meaningless
 constexpr double kFolded = 1e-6;
+
+Eigen::Vector3d tangentOf(const Eigen::Matrix3Xd& x, int edge)
+{
+  const int next = (edge + 1) % static_cast<int>(x.cols());
+  const Eigen::Vector3d e = x.col(next) - x.col(edge);
+  const double length = e.norm();
+  if (!(length > 0) || !std::isfinite(length))
+    throw std::invalid_argument("nodes " + std::to_string(edge) + " and " + std::to_string(next) + " coincide or are not finite");
+  return e / length;
+}
 }  // namespace
+
+Eigen::Vector3d firstDirector(const Eigen::Matrix3Xd& x, bool closed, const Eigen::Vector3d& director)
+{
+  const int n = static_cast<int>(x.cols()), edges = closed ? n : n - 1;
+  if (n < 2 || (closed && n < 3))
+    throw std::invalid_argument("a curve needs at least " + std::string(closed ? "3" : "2") + " nodes, got " + std::to_string(n));
+  if (!director.allFinite())
+    throw std::invalid_argument("director is not finite");
+  const Eigen::Vector3d t0 = tangentOf(x, 0), u = director - director.dot(t0) * t0;
+  if (director.norm() > 0 && u.norm() < 1e-6 * director.norm())
+    throw std::invalid_argument("director is parallel to the first edge; give a direction across it");
+  for (int j = closed ? 0 : 1; j < edges; ++j)
+    if (1.0 + tangentOf(x, (j + edges - 1) % edges).dot(tangentOf(x, j)) < kFolded)
+      throw std::invalid_argument("the curve folds back on itself at node " + std::to_string(j));
+  return director.norm() > 0 ? Eigen::Vector3d(u.normalized()) : anyNormal(t0);
+}
 
 FramedCurve::FramedCurve(const Eigen::Matrix3Xd& x, bool closed, const Eigen::Vector3d& director) : closed_(closed)
 {
+  const Eigen::Vector3d first = firstDirector(x, closed, director);
   const int n = static_cast<int>(x.cols());
-  if (n < 2 || (closed && n < 3))
-    throw std::invalid_argument("a curve needs at least " + std::string(closed ? "3" : "2") + " nodes, got " + std::to_string(n));
   t_.resize(3, closed ? n : n - 1);
   u_.resize(3, t_.cols());
-  if (!director.allFinite())
-    throw std::invalid_argument("director is not finite");
   theta = Eigen::VectorXd::Zero(t_.cols());
   reference_twist_ = Eigen::VectorXd::Zero(n);
   t_ = tangentsOf(x);
   x_ = x;
-  const Eigen::Vector3d t0 = t_.col(0);
-  Eigen::Vector3d u = director - director.dot(t0) * t0;
-  if (director.norm() > 0 && u.norm() < 1e-6 * director.norm())
-    throw std::invalid_argument("director is parallel to the first edge; give a direction across it");
-  u_.col(0) = director.norm() > 0 ? Eigen::Vector3d(u.normalized()) : anyNormal(t0);
-  for (int i = 0; i < n; ++i)
-    if (hasJoint(i) && 1.0 + t_.col(before(i)).dot(t_.col(i)) < kFolded)
-      throw std::invalid_argument("the curve folds back on itself at node " + std::to_string(i));
+  u_.col(0) = first;
   makeSpaceParallel();
 }
 
 Eigen::Matrix3Xd FramedCurve::tangentsOf(const Eigen::Matrix3Xd& x) const
 {
   Eigen::Matrix3Xd t(3, edges());
-  const int n = static_cast<int>(x.cols());
   for (int j = 0; j < edges(); ++j)
-  {
-    const Eigen::Vector3d e = x.col((j + 1) % n) - x.col(j);
-    const double length = e.norm();
-    if (!(length > 0) || !std::isfinite(length))
-      throw std::invalid_argument("nodes " + std::to_string(j) + " and " + std::to_string((j + 1) % n) + " coincide or are not finite");
-    t.col(j) = e / length;
-  }
+    t.col(j) = tangentOf(x, j);
   return t;
 }
 

@@ -145,11 +145,10 @@ void toMessage(const RodModel& model, const RodState& state, slender_sim::RodSta
   {
     out.nodes[i] = toPoint(state.x.col(i));
     out.velocities[i] = toVector3(state.v.col(i));
-    out.twists[i] = state.twist[i];
+    out.twists[i] = state.twistAt(i);
   }
   out.frames.resize(edges);
-  for (int j = 0; j < edges; ++j)
-    out.frames[j] = toQuaternion(edgeFrame(model, state, j));
+  forEachFrame(model, state, [&](int j, const Eigen::Matrix3d& axes) { out.frames[j] = toQuaternion(Eigen::Quaterniond(axes).normalized()); });
   out.radii.assign(model.radius_a.data(), model.radius_a.data() + model.radius_a.size());
   if (model.radius_b == model.radius_a)
     out.radii_b.clear();
@@ -175,18 +174,17 @@ void toTracking(const RodConfig& rod, const RodGuide& guide, const RodState& sta
 
 void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out)
 {
-  for (int j = 0; j < model.edges(); ++j)
-  {
+  forEachFrame(model, state, [&](int j, const Eigen::Matrix3d& axes) {
     geometry_msgs::Pose pose;
     pose.position = toPoint(0.5 * (state.x.col(j) + state.x.col((j + 1) % model.nodes())));
-    pose.orientation = toQuaternion(edgeFrame(model, state, j));
+    pose.orientation = toQuaternion(Eigen::Quaterniond(axes).normalized());
     out.push_back(pose);
-  }
+  });
 }
 
 bool isFinite(const RodState& state)
 {
-  return state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite();
+  return state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() && state.director.allFinite();
 }
 
 bool isFinite(const RigidBodyState& state)

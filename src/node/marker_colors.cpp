@@ -107,7 +107,7 @@ std::vector<double> shownValues(const RodModel& model, const RodState& state, Ma
     const double rest = 0.5 * (model.rest_length[before] + model.rest_length[after]);
     if (what == MarkerColor::twist)
     {
-      out.push_back(state.twist[i] / rest);
+      out.push_back(state.twistAt(i) / rest);
       continue;
     }
     const auto length = [&](int j) { return (state.x.col((j + 1) % nodes) - state.x.col(j)).norm(); };

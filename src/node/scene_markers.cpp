@@ -64,9 +64,9 @@ void addFrames(const RodModel& model, const RodState& s, Marker& marker)
   const int edges = model.edges(), stride = std::max(1, edges / 60);
   const double length = std::max(4.0 * model.radius_a.maxCoeff(), 0.4 * model.rest_length.mean() * stride);
   marker.scale.x = 0.08 * length;
-  for (int j = 0; j < edges; j += stride)
-  {
-    const Eigen::Matrix3d axes = edgeFrame(model, s, j).toRotationMatrix();
+  forEachFrame(model, s, [&](int j, const Eigen::Matrix3d& axes) {
+    if (j % stride != 0)
+      return;
     const Vector3d middle = 0.5 * (s.x.col(j) + s.x.col((j + 1) % model.nodes()));
     for (int k = 0; k < 3; ++k)
     {
@@ -74,7 +74,7 @@ void addFrames(const RodModel& model, const RodState& s, Marker& marker)
       marker.points.push_back(toPoint(middle + length * axes.col(k)));
       marker.colors.insert(marker.colors.end(), 2, color(k == 0 ? 0.85 : 0.1, k == 1 ? 0.7 : 0.1, k == 2 ? 0.85 : 0.1));
     }
-  }
+  });
 }
 
 Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& config, const GraspState& grasp, const RodModel& model)

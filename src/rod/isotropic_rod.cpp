@@ -136,7 +136,7 @@ void IsotropicRod::compose()
 double IsotropicRod::totalTwist(const Span& span, const RodState& state) const
 {
   double sum = 0.0;
-  forJoints(span, [&](int i) { sum += state.twist[i]; });
+  forJoints(span, [&](int i) { sum += state.twistAt(i); });
   for (int c : {span.before, span.after})
     if (c >= 0)
       sum += state.grasps[system_.clamps()[c].grasp].section_twist[system_.clamps()[c].side];
@@ -207,6 +207,7 @@ Eigen::Vector3d IsotropicRod::clampTorque(int grasp) const
 
 StepFailure IsotropicRod::settle(const RodState& from, const std::vector<Pose>& poses, RodState& to)
 {
+  const Eigen::Vector3d first_tangent = tangent(0);
   for (std::size_t s = 0; s < spans_.size(); ++s)
     for (int p = 0; p < spans_[s].pieces; ++p)
       old_tangents_[s][p] = tangent(spans_[s].piece_first[p]);
@@ -219,6 +220,14 @@ StepFailure IsotropicRod::settle(const RodState& from, const std::vector<Pose>& 
     return StepFailure::state_not_finite;
   if (!(sum.min_chi > kFoldedChi))
     return StepFailure::folded_back;
+  if (!from.framed())   // no frame is held: no twist, and nothing that frames could do
+  {
+    const Eigen::Vector3d t = tangent(0), d = parallelTransport(from.director, first_tangent, t);
+    to.director = (d - d.dot(t) * t).normalized();
+    if (!(1.0 + first_tangent.dot(t) > kFoldedChi))
+      return StepFailure::folded_back;
+    return to.director.allFinite() ? StepFailure::none : StepFailure::state_not_finite;
+  }
   to.d1.resize(3, a_.edges);
   to.twist = from.twist;
   for (const Span& span : spans_)

@@ -68,6 +68,19 @@ void matchToArcs(RodModel& model)
   }
 }
 
+/// d1 of an edge, whether the state has frames or not.
+Eigen::Vector3d directorOf(const RodModel& model, const RodState& state, int edge)
+{
+  if (state.framed())
+    return state.d1.col(edge);
+  Eigen::Vector3d director = state.director;
+  forEachFrame(model, state, [&](int j, const Eigen::Matrix3d& axes) {
+    if (j == edge)
+      director = axes.col(1);
+  });
+  return director;
+}
+
 }  // namespace
 
 RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed, const std::vector<RodSection>& sections,
@@ -169,14 +182,20 @@ RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, cons
   if (model.closed && std::abs(std::remainder(total_twist, 2 * M_PI)) > 1e-6)
     throw std::invalid_argument("rod '" + model.name + "': the frames of a closed rod meet again only after whole turns; its total twist must be a multiple of 2 pi, got " +
                                 std::to_string(total_twist) + " (a loop glued at another angle has that angle as rest twist of a node)");
-  FramedCurve curve(nodes, model.closed, director);
   const int n = model.nodes(), edges = model.edges();
-  const int joints = model.closed ? n : n - 2;
-  for (int j = 0; j < edges; ++j)
-    curve.theta[j] = total_twist * j / joints;
   RodState state;
   state.x = nodes;
   state.v = Eigen::Matrix3Xd::Zero(3, n);
+  const bool untwisted = total_twist == 0.0 && model.rest_twist.cwiseAbs().maxCoeff() < 1e-9;   // round-off of a straight line's frames
+  if (model.isotropic && !model.closed && untwisted)
+  {
+    state.director = firstDirector(nodes, model.closed, director);
+    return state;
+  }
+  FramedCurve curve(nodes, model.closed, director);
+  const int joints = model.closed ? n : n - 2;
+  for (int j = 0; j < edges; ++j)
+    curve.theta[j] = total_twist * j / joints;
   state.d1.resize(3, edges);
   state.twist = Eigen::VectorXd::Zero(n);
   for (int j = 0; j < edges; ++j)
@@ -197,6 +216,16 @@ double shareOfEdge(const RodModel& model, int node, int side)
   return (side ? after : before) / (before + after);
 }
 
+void addFrames(const RodModel& model, RodState& state)
+{
+  if (state.framed())
+    return;
+  Eigen::Matrix3Xd d1(3, model.edges());
+  forEachFrame(model, state, [&](int edge, const Eigen::Matrix3d& axes) { d1.col(edge) = axes.col(1); });
+  state.d1 = std::move(d1);
+  state.twist = Eigen::VectorXd::Zero(model.nodes());
+}
+
 Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int node)
 {
   const int n = model.nodes(), edges = model.edges();
@@ -206,7 +235,7 @@ Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int n
   {
     // Half the rest turn back from the end edge: curvature (kappa1, kappa2) turns t about kappa b = kappa1 d2 - kappa2 d1.
     const int edge = node == 0 ? 0 : edges - 1;
-    const Eigen::Vector3d te = tangent(edge), d1e = state.d1.col(edge), d2e = te.cross(d1e);
+    const Eigen::Vector3d te = tangent(edge), d1e = directorOf(model, state, edge), d2e = te.cross(d1e);
     const Eigen::Vector2d k = model.rest_curvature.col(node);
     const Eigen::Vector3d kb = k[0] * d2e - k[1] * d1e;
     const double angle = (model.curvature == Curvature::tangent ? 2.0 * std::atan(0.5 * kb.norm()) : kb.norm()) * (node == 0 ? -1.0 : 1.0);
@@ -222,7 +251,7 @@ Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int n
     const double share = shareOfEdge(model, node, 0);
     const Eigen::Vector3d kb = te.cross(tf);
     t = kb.norm() > 0 ? rotateAbout(te, kb.normalized(), share * std::atan2(kb.norm(), te.dot(tf))).normalized() : te;
-    d1 = rotateAbout(parallelTransport(state.d1.col(e), te, t), t, share * state.twist[node]);
+    d1 = rotateAbout(parallelTransport(directorOf(model, state, e), te, t), t, share * state.twistAt(node));
   }
   d1 = (d1 - d1.dot(t) * t).normalized();
   Eigen::Matrix3d frame;
@@ -255,14 +284,14 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
     g.X_WG.position = 0.5 * (state.x.col(edge) + state.x.col(edge + 1));
     Eigen::Matrix3d frame;
     const Eigen::Vector3d t = (state.x.col(edge + 1) - state.x.col(edge)).normalized();
-    frame << t, state.d1.col(edge), t.cross(Eigen::Vector3d(state.d1.col(edge)));
+    frame << t, directorOf(model, state, edge), t.cross(directorOf(model, state, edge));
     g.X_WG.orientation = Eigen::Quaterniond(frame).normalized();
   }
   const Pose X_GW = g.X_WG.inverse();
   for (int i = first_node; i <= last_node; ++i)
     g.nodes_G.push_back(X_GW * Eigen::Vector3d(state.x.col(i)));
   for (int j = first_node; j < last_node; ++j)
-    g.directors_G.push_back(X_GW.orientation * Eigen::Vector3d(state.d1.col(j)));
+    g.directors_G.push_back(X_GW.orientation * Eigen::Vector3d(directorOf(model, state, j)));
   for (int side = 0; side < 2; ++side)
   {
     const int node = side ? last_node : first_node;
@@ -273,8 +302,8 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
       continue;
     const int edge = side ? node : (node + model.edges() - 1) % model.edges();
     const Eigen::Vector3d te = (state.x.col((edge + 1) % n) - state.x.col(edge)).normalized();
-    const double angle = signedAngle(parallelTransport(section.col(1), section.col(0), te), state.d1.col(edge), te);
-    g.section_twist[side] = unwrapNear(side ? angle : -angle, shareOfEdge(model, node, side) * state.twist[node]);
+    const double angle = signedAngle(parallelTransport(section.col(1), section.col(0), te), directorOf(model, state, edge), te);
+    g.section_twist[side] = unwrapNear(side ? angle : -angle, shareOfEdge(model, node, side) * state.twistAt(node));
   }
   return g;
 }

@@ -17,7 +17,7 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
     return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   begin(state);
   const int n = model->nodes();
-  work = state;
+  addFrames(*model, work);
   work.forgetHistory();
   work.v.setZero();
   for (GraspState& g : work.grasps)

@@ -52,6 +52,9 @@ void RodStepper::Impl::begin(const RodState& state)
     stage_poses[k] = state.grasps[k].X_WG;
   origin = &state.grasps;
   work = state;
+  const bool holds_frame = std::any_of(work.grasps.begin(), work.grasps.end(), [](const GraspState& g) { return g.active && g.holds_frame; });
+  if (!isotropic || holds_frame)
+    addFrames(*model, work);
 }
 
 void RodStepper::Impl::moveGrasps(const RodInputs& inputs, double duration, double t)
@@ -85,7 +88,8 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
     return false;
   };
   bool good = check(inputs.gravity.allFinite(), "gravity") && check(inputs.wind.allFinite(), "wind") && check(inputs.forces.allFinite(), "a nodal force");
-  if (state.x.cols() != nodes || state.v.cols() != nodes || state.twist.size() != nodes || state.d1.cols() != edges)
+  const bool framed = state.framed();
+  if (state.x.cols() != nodes || state.v.cols() != nodes || state.twist.size() != (framed ? nodes : 0) || (framed && state.d1.cols() != edges))
     return refuse_count("nodes of the state", state.x.cols(), nodes);
   if (inputs.grasps.size() != state.grasps.size())
     return refuse_count("grasp targets", inputs.grasps.size(), state.grasps.size());
@@ -100,7 +104,7 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
     good = good && check(g.X_WG.position.allFinite() && std::isfinite(norm) && std::abs(norm - 1.0) < 1e-3, "pose of grasp ", k) &&
            check(!g.velocity || (g.velocity->linear.allFinite() && g.velocity->angular.allFinite()), "velocity of grasp ", k);
   }
-  bool sound = state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() && state.a.allFinite() &&
+  bool sound = state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() && (framed || std::abs(state.director.norm() - 1.0) < 1e-3) && state.a.allFinite() &&
                state.x_previous.allFinite() && state.v_previous.allFinite() && state.strain_rate.allFinite() &&
                state.strain_rate_previous.allFinite() && state.strain_previous.allFinite();
   for (const GraspState& g : state.grasps)
@@ -239,6 +243,12 @@ RodEnergies RodStepper::Impl::energies(const RodState& state, const Eigen::Vecto
     result.twist = isotropic->twistEnergy();
     result.bend = e.bend_twist - result.twist;
     return result;
+  }
+  if (!state.framed())
+  {
+    RodState framed = state;
+    addFrames(m, framed);
+    return energies(framed, gravity);
   }
   system.leaveOutStretching(false);
   system.load(state);

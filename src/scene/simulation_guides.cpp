@@ -9,6 +9,7 @@ namespace slender {
 
 void Simulation::startTracking(int cloth)
 {
+  tracks_ = true;
   const TrackingConfig& tracking = *config_.cloths[cloth].tracking;
   SceneCloth& held = state_.cloths[cloth];
   if (tracking.sets.size() > 1)
@@ -123,14 +124,9 @@ const FunctionSet& Simulation::functions(int cloth) const
   return config_.cloths.at(static_cast<std::size_t>(cloth)).tracking->sets.at(static_cast<std::size_t>(state_.cloths[cloth].cloth.average_set));
 }
 
-bool Simulation::tracks() const
-{
-  return std::any_of(config_.cloths.begin(), config_.cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking != nullptr; });
-}
-
 void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
 {
-  if (!tracks())
+  if (!tracks_)
   {
     return;
   }
@@ -157,7 +153,7 @@ void Simulation::addGuideInputs(SceneInputs& inputs, double time) const
 
 void Simulation::checkGuides(const SceneInputs& inputs) const
 {
-  const std::size_t needed = tracks() ? config_.cloths.size() : 0;
+  const std::size_t needed = tracks_ ? config_.cloths.size() : 0;
   if (inputs.guides.size() != needed)
   {
     throw std::invalid_argument("inputs.guides has " + std::to_string(inputs.guides.size()) + " entries; must have " + std::to_string(needed) +

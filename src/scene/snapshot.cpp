@@ -2,16 +2,6 @@
 
 namespace slender {
 
-Eigen::Quaterniond edgeFrame(const RodModel& model, const RodState& state, int edge)
-{
-  Eigen::Matrix3d axes;
-  axes.col(0) = (state.x.col((edge + 1) % model.nodes()) - state.x.col(edge)).normalized();
-  // the solver keeps d1 normal to the edge up to round-off; the quaternion needs an exact frame
-  axes.col(1) = (state.d1.col(edge) - axes.col(0) * axes.col(0).dot(state.d1.col(edge))).normalized();
-  axes.col(2) = axes.col(0).cross(axes.col(1));
-  return Eigen::Quaterniond(axes).normalized();
-}
-
 Eigen::Quaterniond edgeFrame(const ThreadState& state, int edge)
 {
   Eigen::Matrix3d axes;
@@ -25,9 +15,8 @@ RodSnapshot snapshotOf(const RodModel& model, const RodState& state)
 {
   RodSnapshot out{model.name, model.closed, state.x, state.v, {}, Eigen::VectorXd(model.nodes()), model.radius_a, model.radius_b};
   for (int i = 0; i < model.nodes(); ++i)
-    out.twist[i] = state.twist[i];
-  for (int j = 0; j < model.edges(); ++j)
-    out.frames.push_back(edgeFrame(model, state, j));
+    out.twist[i] = state.twistAt(i);
+  forEachFrame(model, state, [&](int, const Eigen::Matrix3d& axes) { out.frames.push_back(Eigen::Quaterniond(axes).normalized()); });
   return out;
 }
 

@@ -63,6 +63,7 @@ void visitRod(Archive& archive, State& rod)
   archive(rod.v);
   archive(rod.d1);
   archive(rod.twist);
+  archive(rod.director);
   archive.list(rod.grasps);
   for (auto& grasp : rod.grasps)
   {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -20,7 +21,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 12;
+constexpr std::uint64_t version = 13;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 std::string errorText(const std::string& path, const std::string& what) { return path + ": " + what + ": " + std::strerror(errno); }
@@ -67,9 +68,14 @@ void writeDurably(const std::string& wanted, const std::string& bytes)
 std::string misfit(const RodState& rod, const RodModel& model, const RodState& now)
 {
   const Eigen::Index n = model.nodes();
-  if (rod.x.cols() != n || rod.v.cols() != n || rod.twist.size() != n || rod.d1.cols() != model.edges())
+  const bool framed = rod.framed();
+  if (rod.x.cols() != n || rod.v.cols() != n || rod.twist.size() != (framed ? n : 0) || (framed && rod.d1.cols() != model.edges()))
   {
     return "rod " + model.name + " has another number of nodes";
+  }
+  if (!framed && !(std::abs(rod.director.norm() - 1.0) < 1e-6))
+  {
+    return "rod " + model.name + " has no material frames and no director to begin them with";
   }
   for (const auto* memory : {&rod.a, &rod.x_previous, &rod.v_previous})
   {

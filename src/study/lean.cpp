@@ -179,7 +179,13 @@ public:
   bool takesMemory(const SourceLine& at)
   {
     static const std::regex fields("\\{[^{}]*\\}");
-    return hasFile(at.file) || speaksOfIt(at, std::regex_replace(profiler_.text(at), fields, ""), memory_lines_);
+    std::string text = profiler_.text(at);
+    for (std::size_t length = 0; length != text.size();)   // records within records
+    {
+      length = text.size();
+      text = std::regex_replace(text, fields, "");
+    }
+    return hasFile(at.file) || speaksOfIt(at, text, memory_lines_);
   }
 
   /// Per step: functions of the feature's files with all that libraries do for them, and its lines elsewhere.
@@ -198,14 +204,17 @@ public:
     share.where = most(places);
   }
 
-  /// Of the simulation: what is taken while the scene file is read is given back.
+  /// Of the simulation: what is taken while the scene file is read is given back, and a rod's model is what the scene says of it, in
+  /// numbers: its moduli, of which twisting has one, are there whatever becomes of it.
   void count(const std::vector<Allocation>& allocations, Share& share)
   {
     std::map<std::string, double> places;
     for (const Allocation& a : allocations)
     {
-      const bool of_simulation = std::any_of(a.functions.begin(), a.functions.end(), [](const std::string& f) { return f.find("slender::Simulation::") != std::string::npos; });
-      if (!of_simulation)
+      const auto within = [&](const char* name) {
+        return std::any_of(a.functions.begin(), a.functions.end(), [&](const std::string& f) { return f.find(name) != std::string::npos; });
+      };
+      if (!within("slender::Simulation::") || within("slender::buildRod("))
         continue;
       bool innermost = true;   // lines further out merely call, maybe with a word of the feature among the arguments
       for (const SourceLine& at : a.stack)
@@ -387,7 +396,7 @@ void runLean(StudyContext& context)
   context.metric("max_bytes_absent", worst_bytes);
   context.metric("allocations_per_step", most);
   context.note("of_feature: instructions of the functions in the feature's files, with what libraries do for them, and of lines elsewhere that speak of it; bytes: what the "
-               "simulation takes from the heap there (a run of 4 steps, the reader apart); where: the place with the most. Instruction set: baseline, which valgrind knows. "
+               "simulation takes from the heap there (a run of 4 steps, the reader and the models of rods apart); where: the place with the most. Instruction set: baseline, which valgrind knows. "
                "allocations_per_step: calls of the heap in warm steps, from the end of one to the end of the next, the scene's inputs included. used: by the same count; a part that is mostly other code (frames, "
                "contact) shows in instructions_per_step. Markers and diagnostics of the nodes are not counted here.");
 }

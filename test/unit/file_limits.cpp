@@ -40,6 +40,25 @@ protected:
     return refusal([&] { readPly(path_); });
   }
 
+  /// Why a state is refused some of whose bytes are replaced, with a checksum that is right again.
+  template <class T>
+  std::string refusalWith(Simulation& simulation, std::string bytes, std::size_t at, const T& value) const
+  {
+    constexpr std::size_t header = 5 * 8;
+    bytes.replace(at, sizeof value, reinterpret_cast<const char*>(&value), sizeof value);
+    Checksum checksum;
+    checksum.add(bytes.data() + header, bytes.size() - header);
+    const std::uint64_t sum = checksum.value();
+    bytes.replace(4 * 8, 8, reinterpret_cast<const char*>(&sum), 8);
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
+    return refusal([&] { simulation.load(path_); });
+  }
+  std::string contents() const
+  {
+    std::ifstream in(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
   std::string path_ = testing::TempDir() + "/slender_sim_limits_" + std::to_string(getpid());
 };
 
@@ -126,29 +145,25 @@ TEST_F(FileLimits, guidesWhoseBodiesAreMissingAreNotEvaluated)
 
 TEST_F(FileLimits, statesOfOneSceneFitItWhateverTheirChecksumSays)
 {
-  Simulation simulation(parseScene("rods: [{centerline: {straight: {edges: 4}}, grasps: {left: {edges: [0]}}}]\n"));
-  simulation.save(path_);
-  std::ifstream in(path_, std::ios::binary);
-  const std::string good{std::istreambuf_iterator<char>(in), {}};
+  Simulation held(parseScene("rods: [{centerline: {straight: {edges: 4}}, grasps: {left: {edges: [0]}}}]\n"));
+  held.save(path_);
+  const std::string good = contents();
   constexpr std::size_t header = 5 * 8, nodes = 5, edges = 4;
   constexpr std::size_t x = header + 3 * 8 + 2 * 8;   // time, steps, number of rods; rows and columns
-  constexpr std::size_t grasp = header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + (2 * 8 + edges * 24) + (2 * 8 + nodes * 8) + 8;
-  const auto refusalWith = [&](std::size_t at, const auto& value) {
-    std::string bytes = good;
-    bytes.replace(at, sizeof value, reinterpret_cast<const char*>(&value), sizeof value);
-    Checksum checksum;
-    checksum.add(bytes.data() + header, bytes.size() - header);
-    const std::uint64_t sum = checksum.value();
-    bytes.replace(4 * 8, 8, reinterpret_cast<const char*>(&sum), 8);
-    std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
-    return refusal([&] { simulation.load(path_); });
-  };
-  EXPECT_EQ(refusalWith(x, 0.25), "");
-  EXPECT_NE(refusalWith(x, std::nan("")).find("not finite"), std::string::npos);
-  EXPECT_EQ(refusalWith(grasp, char{0}), "");   // released
-  EXPECT_NE(refusalWith(grasp, char{2}).find("neither yes nor no"), std::string::npos);
-  EXPECT_NE(refusalWith(grasp + 5, int{1}).find("does not fit together"), std::string::npos);    // last node: of one more than it holds
-  EXPECT_NE(refusalWith(grasp + 10, int{7}).find("does not fit together"), std::string::npos);   // carried by a body that is not there
+  constexpr std::size_t grasp = header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + (2 * 8 + edges * 24) + (2 * 8 + nodes * 8) + (2 * 8 + 24) + 8;
+  EXPECT_EQ(refusalWith(held, good, x, 0.25), "");
+  EXPECT_NE(refusalWith(held, good, x, std::nan("")).find("not finite"), std::string::npos);
+  EXPECT_EQ(refusalWith(held, good, grasp, char{0}), "");   // released
+  EXPECT_NE(refusalWith(held, good, grasp, char{2}).find("neither yes nor no"), std::string::npos);
+  EXPECT_NE(refusalWith(held, good, grasp + 5, int{1}).find("does not fit together"), std::string::npos);    // last node: of one more than it holds
+  EXPECT_NE(refusalWith(held, good, grasp + 10, int{7}).find("does not fit together"), std::string::npos);   // carried by a body that is not there
+
+  Simulation bare(parseScene("time: {step: 1e-4, integrator: symplectic_euler}\nrods: [{centerline: {straight: {edges: 4}}}]\n"));
+  bare.save(path_);
+  const std::string frameless = contents();
+  constexpr std::size_t director = header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + 3 * 2 * 8;   // after frames and twists, which are not there
+  EXPECT_EQ(refusalWith(bare, frameless, director + 8, 0.0), "");
+  EXPECT_NE(refusalWith(bare, frameless, director, 0.5).find("no director"), std::string::npos);
 }
 
 }  // namespace

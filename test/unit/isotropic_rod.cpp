@@ -164,5 +164,90 @@ const Case kCases[] = {
 };
 INSTANTIATE_TEST_SUITE_P(Rods, Isotropic, ::testing::ValuesIn(kCases), [](const auto& info) { return std::string(info.param.name); });
 
+/// A wiggly rod pinned at its first node, with and without material frames, in explicit steps.
+class FramelessRod : public ::testing::Test
+{
+protected:
+  FramelessRod()
+  {
+    Random random(3);
+    nodes_ = wigglyNodes(20, false, random);
+    RodModel model = openRod(nodes_, modulusSection(1.0, 0.7, 200.0, 1.0), true);
+    model.isotropic = true;
+    bare_ = std::make_unique<Rod>(model, nodes_);
+    bare_->hold(0, 0, false);
+    framed_ = std::make_unique<Rod>(*bare_);
+    addFrames(model, framed_->state);
+  }
+  void step(int steps)
+  {
+    for (Rod* rod : {bare_.get(), framed_.get()})
+    {
+      RodStepper stepper(rod->model, withIntegrator(Integrator::symplectic_euler));
+      for (int k = 0; k < steps; ++k)
+      {
+        const StepReport report = stepper.step(rod->state, rod->inputs, 1e-3);
+        ASSERT_TRUE(report.ok) << report.message;
+      }
+    }
+  }
+  /// Largest difference of the two rods' frames.
+  double frameError() const
+  {
+    std::vector<Eigen::Matrix3d> frames;
+    forEachFrame(*bare_->model, bare_->state, [&](int, const Eigen::Matrix3d& axes) { frames.push_back(axes); });
+    double worst = 0;
+    forEachFrame(*framed_->model, framed_->state, [&](int j, const Eigen::Matrix3d& axes) { worst = std::max(worst, (axes - frames[j]).norm()); });
+    return worst;
+  }
+  Matrix3Xd nodes_;
+  std::unique_ptr<Rod> bare_, framed_;
+};
+
+TEST_F(FramelessRod, MovesAsTheFramedOneAndShowsTheSameFrames)
+{
+  step(500);
+  EXPECT_FALSE(bare_->state.framed());
+  EXPECT_GT((bare_->state.x - nodes_).norm(), 0.1);
+  EXPECT_EQ(bare_->state.x, framed_->state.x);
+  EXPECT_EQ(framed_->state.twist.norm(), 0.0);
+  EXPECT_LT(frameError(), 1e-11);   // round-off of 500 steps and 19 edges
+}
+
+TEST_F(FramelessRod, GetsFramesWhenOneIsHeld)
+{
+  step(200);
+  for (Rod* rod : {bare_.get(), framed_.get()})
+  {
+    const int grasp = rod->hold(19, 19), first = rod->hold(5, 7);
+    Eigen::Quaterniond& orientation = rod->inputs.grasps[grasp].X_WG.orientation;
+    orientation = orientation * Eigen::AngleAxisd(0.3, Vector3d::UnitX());
+    EXPECT_EQ(first, 2);
+  }
+  EXPECT_FALSE(bare_->state.framed());
+  const RodStepper stepper(bare_->model, withIntegrator(Integrator::symplectic_euler));
+  EXPECT_NEAR(stepper.energies(bare_->state, Vector3d::Zero()).twist, 0.0, 1e-20);
+  step(50);
+  EXPECT_TRUE(bare_->state.framed());
+  EXPECT_GT(bare_->state.twist.cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_LT((bare_->state.x - framed_->state.x).norm(), 1e-11);   // frames taken up that differ by round-off
+  EXPECT_LT(frameError(), 1e-11);
+}
+
+TEST_F(FramelessRod, OthersHaveFrames)
+{
+  RodModel model = *bare_->model;
+  EXPECT_TRUE(makeRodState(model, nodes_, Vector3d::Zero(), 0.1).framed());
+  model.rest_twist[4] = 0.1;
+  EXPECT_TRUE(makeRodState(model, nodes_, Vector3d::Zero()).framed());
+  model = *bare_->model;
+  model.isotropic = false;
+  EXPECT_TRUE(makeRodState(model, nodes_, Vector3d::Zero()).framed());
+  // and where the equations are the general ones, as in implicit steps
+  RodStepper stepper(bare_->model, withIntegrator(Integrator::implicit_euler));
+  ASSERT_TRUE(stepper.step(bare_->state, bare_->inputs, 1e-3).ok);
+  EXPECT_TRUE(bare_->state.framed());
+}
+
 }  // namespace
 }  // namespace slender::test

@@ -314,6 +314,27 @@ TEST(SavedStateFile, belongsToTheFormulationToo)
   std::remove(path.c_str());
 }
 
+TEST(SavedStateFile, restartsRodsWithoutFramesBitEqual)
+{
+  const std::string path = testing::TempDir() + "/slender_sim_frameless";
+  const auto scene = [] {
+    return Simulation(parseScene("time: {step: 1e-4, integrator: symplectic_euler}\nrods: [{name: rope, grasps: {pin: {nodes: [0], hold: position}}}]\n"));
+  };
+  Simulation through = scene(), again = scene();
+  run(through, 25);
+  through.save(path);
+  EXPECT_FALSE(through.state().rods[0].framed());
+  again.load(path);
+  for (Simulation* s : {&through, &again})
+  {
+    s->attach(0, 0, 0, Hold::frame);
+    run(*s, 25);
+    EXPECT_TRUE(s->state().rods[0].framed());
+  }
+  expectSameBits(again.state(), through.state());
+  std::remove(path.c_str());
+}
+
 TEST(SavedStateFile, sayWhyItCannotBeWritten)
 {
   const Simulation simulation = make();

@@ -4,6 +4,10 @@
 
 namespace slender {
 
+/// First director of the first edge of a curve that framed curves can begin with: `director` across the edge, or any normal if it is zero.
+/// x: 3 x n node positions [m]. Throws std::invalid_argument on too few or repeated nodes, an edge folded back, a director along the edge.
+Eigen::Vector3d firstDirector(const Eigen::Matrix3Xd& x, bool closed, const Eigen::Vector3d& director);
+
 /// Discrete adapted framed curve in the curve-angle representation (thesis 3.2.2, 3.4): positions, one reference frame per
 /// edge, and one angle per edge that turns the reference frame into the material frame.
 ///

@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 
 #include "slender_sim/energy/rod_kernel.h"
+#include "slender_sim/geometry/rotation.h"
+#include "slender_sim/geometry/rotation.h"
 #include "slender_sim/rod/rod_state.h"
 
 namespace slender {
@@ -74,8 +76,32 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
 std::string whyNotIsotropic(const RodModel& model);
 
 /// A state at rest at the given nodes, twist-free frames plus `total_twist` [rad] spread evenly over the inner nodes
-/// (of a closed rod: over all nodes, and whole turns only). Throws std::invalid_argument naming the bad value.
+/// (of a closed rod: over all nodes, and whole turns only). `director`: d1 at the first edge (projected; zero: any normal).
+/// An open isotropic rod without twist gets no material frames. Throws std::invalid_argument naming the bad value.
 RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director, double total_twist = 0.0);
+
+/// Gives a state its material frames if it has none.
+void addFrames(const RodModel& model, RodState& state);
+
+/// Calls f(edge, axes) for each edge in order; `axes` 3 x 3: tangent, d1, d2 of its material frame, orthonormal to round-off.
+template <class F>
+void forEachFrame(const RodModel& model, const RodState& state, F&& f)
+{
+  Eigen::Vector3d d1 = state.director;
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  for (int j = 0; j < model.edges(); ++j)
+  {
+    const Eigen::Vector3d before = axes.col(0);
+    axes.col(0) = (state.x.col((j + 1) % model.nodes()) - state.x.col(j)).normalized();
+    if (state.framed())
+      d1 = state.d1.col(j);
+    else if (j > 0)
+      d1 = parallelTransport(d1, before, axes.col(0));
+    d1 = axes.col(1) = (d1 - axes.col(0) * axes.col(0).dot(d1)).normalized();
+    axes.col(2) = axes.col(0).cross(axes.col(1));
+    f(j, axes);
+  }
+}
 
 /// Takes hold of nodes first..last as they are now (thesis 4.3 clamps, second order in the edge length: see ClampJoint).
 GraspState makeGrasp(const RodModel& model, const RodState& state, int first_node, int last_node, bool holds_frame);

@@ -33,6 +33,9 @@ struct RodState
   Eigen::Matrix3Xd v;         ///< node velocities [m/s], 3 x n
   Eigen::Matrix3Xd d1;        ///< first material director of each edge, 3 x edges
   Eigen::VectorXd twist;      ///< integrated material twist m_i at each node [rad], unwrapped; zero at the ends of an open rod
+  /// An isotropic rod of which no frame is held (see makeRodState) has no twist, and d1 and twist are empty: this is d1 of its first
+  /// edge, and the others follow by parallel transport along it (see forEachFrame). Of other rods without meaning.
+  Eigen::Vector3d director{0, 0, 0};
   std::vector<GraspState> grasps;
 
   /// Integrator memory (empty when the integrator has none, or has not stepped yet).
@@ -43,6 +46,9 @@ struct RodState
   /// With Rayleigh stiffness damping only: per node, then two per grasp, (stretch of the edge after the node, kappa1, kappa2, twist).
   Eigen::Matrix4Xd strain_rate, strain_rate_previous;   ///< [1/s]
   Eigen::Matrix4Xd strain_previous;   ///< multistep methods: one step ago; a stage inside the step: its strain less the step's chord
+
+  bool framed() const { return d1.cols() > 0; }
+  double twistAt(int node) const { return framed() ? twist[node] : 0.0; }
 
   /// Forgets the integrator's memory: after a grasp was taken or released, or the state was edited.
   void forgetHistory()

@@ -231,7 +231,6 @@ private:
   void gatherPins(SceneCloth& cloth) const;
 
   // simulation_guides.cpp: what tracked cloths follow
-  bool tracks() const;
   TrackingError errorOf(int cloth, const Eigen::Matrix3Xd& targets) const;
   void startTracking(int cloth);
   bool functionsDue() const;
@@ -277,6 +276,7 @@ private:
   std::deque<TouchingCloths> touching_cloths_;
   struct ClothPlace { int group = -1, index = 0; };   // group -1: on its own
   std::vector<ClothPlace> cloth_places_;              ///< per cloth: in touching_cloths_; empty when all are on their own
+  bool tracks_ = false;                               ///< any cloth follows a guide
   std::vector<char> leads_;                           ///< per cloth: it is the guide of another
   std::vector<int> cloth_bodies_;                     ///< of the scene, that these meet, beside all obstacles
   std::vector<ClothInputs> cloth_inputs_;

@@ -82,7 +82,6 @@ struct SceneSnapshot
 };
 
 /// Material frame of an edge: x along the tangent, y along d1.
-Eigen::Quaterniond edgeFrame(const RodModel& model, const RodState& state, int edge);
 Eigen::Quaterniond edgeFrame(const ThreadState& state, int edge);
 
 RodSnapshot snapshotOf(const RodModel& model, const RodState& state);
