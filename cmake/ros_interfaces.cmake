@@ -13,3 +13,8 @@ catkin_package(
   LIBRARIES slender_sim slender_sim_node
   CATKIN_DEPENDS diagnostic_msgs geometry_msgs message_runtime roscpp sensor_msgs std_msgs std_srvs tf2_ros visualization_msgs
   DEPENDS EIGEN3)
+
+# rosrun passes over folders named build in a package; here it finds the programs of one (if the source folder can be written).
+if(CATKIN_DEVEL_PREFIX STREQUAL "${PROJECT_SOURCE_DIR}/build/devel")
+  file(CREATE_LINK build/devel/${CATKIN_PACKAGE_BIN_DESTINATION} ${PROJECT_SOURCE_DIR}/.rosrun RESULT unwritable SYMBOLIC)
+endif()
