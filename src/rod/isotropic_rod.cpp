@@ -226,7 +226,10 @@ StepFailure IsotropicRod::settle(const RodState& from, const std::vector<Pose>& 
     to.director = (d - d.dot(t) * t).normalized();
     if (!(1.0 + first_tangent.dot(t) > kFoldedChi))
       return StepFailure::folded_back;
-    return to.director.allFinite() ? StepFailure::none : StepFailure::state_not_finite;
+    double inverse_lengths = 0.0;   // infinite if nodes coincide: such an edge has no tangent
+    for (int j = 0; j < a_.edges; ++j)
+      inverse_lengths += a_.inverse_length[j];
+    return to.director.allFinite() && std::isfinite(inverse_lengths) ? StepFailure::none : StepFailure::state_not_finite;
   }
   to.d1.resize(3, a_.edges);
   to.twist = from.twist;

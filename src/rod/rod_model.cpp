@@ -186,8 +186,7 @@ RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, cons
   RodState state;
   state.x = nodes;
   state.v = Eigen::Matrix3Xd::Zero(3, n);
-  const bool untwisted = total_twist == 0.0 && model.rest_twist.cwiseAbs().maxCoeff() < 1e-9;   // round-off of a straight line's frames
-  if (model.isotropic && !model.closed && untwisted)
+  if (doesWithoutFrames(model) && total_twist == 0.0)
   {
     state.director = firstDirector(nodes, model.closed, director);
     return state;
@@ -214,6 +213,19 @@ double shareOfEdge(const RodModel& model, int node, int side)
     return 1.0;
   const double before = model.rest_length[(node + edges - 1) % edges], after = model.rest_length[node];
   return (side ? after : before) / (before + after);
+}
+
+bool doesWithoutFrames(const RodModel& model)
+{
+  return model.isotropic && !model.closed && model.rest_twist.cwiseAbs().maxCoeff() < 1e-9;   // round-off of a straight line's frames
+}
+
+bool framesFit(const RodModel& model, const RodState& state)
+{
+  if (state.framed())
+    return state.d1.cols() == model.edges() && state.twist.size() == model.nodes();
+  const Eigen::Vector3d t = (state.x.col(1) - state.x.col(0)).normalized();
+  return state.twist.size() == 0 && std::abs(t.cross(state.director).norm() - 1.0) < 1e-3;
 }
 
 void addFrames(const RodModel& model, RodState& state)
@@ -267,6 +279,12 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
                                 " must lie in 0.." + std::to_string(n - 1));
   if (!holds_frame && first_node != last_node)
     throw std::invalid_argument("rod '" + model.name + "': a point pin holds one node, not " + std::to_string(last_node - first_node + 1));
+  if (!state.framed() && last_node > first_node)   // all at once instead of edge by edge
+  {
+    RodState framed = state;
+    addFrames(model, framed);
+    return makeGrasp(model, framed, first_node, last_node, holds_frame);
+  }
   GraspState g;
   g.first_node = first_node;
   g.last_node = last_node;

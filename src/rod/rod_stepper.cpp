@@ -34,7 +34,7 @@ const RodModel& RodStepper::model() const
   return *impl_->model;
 }
 
-RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t) : model(std::move(m)), time(t), system(*model)
+RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t) : model(std::move(m)), time(t), without_frames(doesWithoutFrames(*model)), system(*model)
 {
   if (time.integrator == Integrator::imex)
     throw std::invalid_argument("rod '" + model->name + "': imex is for cloth only");
@@ -76,7 +76,7 @@ void RodStepper::Impl::moveGrasps(const RodInputs& inputs, double duration, doub
 
 bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const
 {
-  const int nodes = model->nodes(), edges = model->edges();
+  const int nodes = model->nodes();
   // names are built only when they are needed: a good step takes no memory
   const auto check = [&](bool good, const char* name, std::size_t number = std::string::npos) {
     if (!good && what.empty())
@@ -88,8 +88,7 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
     return false;
   };
   bool good = check(inputs.gravity.allFinite(), "gravity") && check(inputs.wind.allFinite(), "wind") && check(inputs.forces.allFinite(), "a nodal force");
-  const bool framed = state.framed();
-  if (state.x.cols() != nodes || state.v.cols() != nodes || state.twist.size() != (framed ? nodes : 0) || (framed && state.d1.cols() != edges))
+  if (state.x.cols() != nodes || state.v.cols() != nodes)
     return refuse_count("nodes of the state", state.x.cols(), nodes);
   if (inputs.grasps.size() != state.grasps.size())
     return refuse_count("grasp targets", inputs.grasps.size(), state.grasps.size());
@@ -104,13 +103,13 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
     good = good && check(g.X_WG.position.allFinite() && std::isfinite(norm) && std::abs(norm - 1.0) < 1e-3, "pose of grasp ", k) &&
            check(!g.velocity || (g.velocity->linear.allFinite() && g.velocity->angular.allFinite()), "velocity of grasp ", k);
   }
-  bool sound = state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() && (framed || std::abs(state.director.norm() - 1.0) < 1e-3) && state.a.allFinite() &&
+  bool sound = state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() && state.a.allFinite() &&
                state.x_previous.allFinite() && state.v_previous.allFinite() && state.strain_rate.allFinite() &&
                state.strain_rate_previous.allFinite() && state.strain_previous.allFinite();
   for (const GraspState& g : state.grasps)
     sound = sound && (!g.active || (g.X_WG.position.allFinite() && g.X_WG.orientation.coeffs().allFinite() && g.velocity.linear.allFinite() &&
                                     g.velocity.angular.allFinite() && std::isfinite(g.section_twist[0]) && std::isfinite(g.section_twist[1])));
-  return good && check(sound, "the state");
+  return good && check(sound, "the state") && check(framesFit(*model, state) && (state.framed() || without_frames), "the set of material frames");
 }
 
 /// Pose (and velocity) of a grasp at a fraction of the whole step: uniform motion, or a cubic through both ends' velocities.

@@ -27,6 +27,7 @@ public:
 
   std::shared_ptr<const RodModel> model;
   TimeConfig time;
+  bool without_frames;   ///< a state may come without them
   RodSystem system;
   std::vector<Wrench> wrenches;
   RodState work, next;              ///< start and end of a substep

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -68,14 +67,13 @@ void writeDurably(const std::string& wanted, const std::string& bytes)
 std::string misfit(const RodState& rod, const RodModel& model, const RodState& now)
 {
   const Eigen::Index n = model.nodes();
-  const bool framed = rod.framed();
-  if (rod.x.cols() != n || rod.v.cols() != n || rod.twist.size() != (framed ? n : 0) || (framed && rod.d1.cols() != model.edges()))
+  if (rod.x.cols() != n || rod.v.cols() != n)
   {
     return "rod " + model.name + " has another number of nodes";
   }
-  if (!framed && !(std::abs(rod.director.norm() - 1.0) < 1e-6))
+  if (!framesFit(model, rod) || !(rod.framed() || doesWithoutFrames(model)))
   {
-    return "rod " + model.name + " has no material frames and no director to begin them with";
+    return "rod " + model.name + " has material frames, or a director instead of them, that do not fit it";
   }
   for (const auto* memory : {&rod.a, &rod.x_previous, &rod.v_previous})
   {

@@ -234,6 +234,40 @@ TEST_F(FramelessRod, GetsFramesWhenOneIsHeld)
   EXPECT_LT(frameError(), 1e-11);
 }
 
+TEST_F(FramelessRod, NodesThatMeetAreRefusedAndTheStateKept)
+{
+  for (Rod* rod : {bare_.get(), framed_.get()})
+  {
+    const int a = rod->hold(9, 9, false), b = rod->hold(10, 10, false);
+    const GraspTarget back = rod->inputs.grasps[b];
+    rod->inputs.grasps[b].X_WG.position = rod->inputs.grasps[a].X_WG.position;   // one edge of no length, and so without a tangent
+    RodStepper stepper(rod->model, withIntegrator(Integrator::symplectic_euler));
+    const RodState before = rod->state;
+    EXPECT_FALSE(stepper.step(rod->state, rod->inputs, 1e-3).ok);
+    EXPECT_EQ(rod->state.x, before.x);
+    rod->inputs.grasps[b] = back;
+    EXPECT_TRUE(stepper.step(rod->state, rod->inputs, 1e-3).ok);
+  }
+}
+
+TEST_F(FramelessRod, StatesThatDoNotFitAreRefused)
+{
+  const RodState good = bare_->state;
+  const auto refusal = [&](const RodState& state) {
+    bare_->state = state;
+    return RodStepper(bare_->model, withIntegrator(Integrator::symplectic_euler)).step(bare_->state, bare_->inputs, 1e-3).message;
+  };
+  EXPECT_EQ(refusal(good), "");
+  RodState along = good, twisted = good;
+  along.director = (good.x.col(1) - good.x.col(0)).normalized();
+  twisted.twist.setZero(20);
+  for (const RodState& bad : {along, twisted})
+    EXPECT_NE(refusal(bad).find("material frames"), std::string::npos);
+  bare_->state = good;
+  bare_->model->rest_twist[4] = 0.1;
+  EXPECT_NE(refusal(good).find("material frames"), std::string::npos);
+}
+
 TEST_F(FramelessRod, OthersHaveFrames)
 {
   RodModel model = *bare_->model;

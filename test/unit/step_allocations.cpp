@@ -96,14 +96,17 @@ TEST_P(Allocations, AWarmStepMakesNone)
 
 TEST(Allocations, WarmProjectedStepsMakeNone)
 {
-  for (bool isotropic : {false, true})
+  for (int kind = 0; kind < 3; ++kind)
   {
+    const bool isotropic = kind > 0, framed = kind < 2;
     const int n = 40;
     Rod rod = straightRod(n, 1.0, roundSection(0.005, 1e6, 1000));
     rod.model->isotropic = isotropic;
     rod.model->inextensible = true;
     rod.inputs.gravity << 0, 0, -9.81;
-    rod.hold(0, 1);
+    if (!framed)
+      rod.state = makeRodState(*rod.model, straightNodes(n, 1.0), Vector3d::Zero());
+    rod.hold(0, framed ? 1 : 0, framed);
     RodStepper stepper(rod.model, withIntegrator(Integrator::symplectic_euler));
     const auto advance = [&] {
       rod.inputs.grasps[0].X_WG.position.x() += 1e-5;
@@ -115,8 +118,9 @@ TEST(Allocations, WarmProjectedStepsMakeNone)
     bool ok = true;
     for (int k = 0; k < 20; ++k)
       ok = advance() && ok;
-    EXPECT_EQ(allocations - before, 0) << isotropic;
+    EXPECT_EQ(allocations - before, 0) << kind;
     EXPECT_TRUE(ok);
+    EXPECT_EQ(rod.state.framed(), framed);
   }
 }
 

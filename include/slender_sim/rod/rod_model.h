@@ -6,7 +6,6 @@
 
 #include "slender_sim/energy/rod_kernel.h"
 #include "slender_sim/geometry/rotation.h"
-#include "slender_sim/geometry/rotation.h"
 #include "slender_sim/rod/rod_state.h"
 
 namespace slender {
@@ -77,8 +76,14 @@ std::string whyNotIsotropic(const RodModel& model);
 
 /// A state at rest at the given nodes, twist-free frames plus `total_twist` [rad] spread evenly over the inner nodes
 /// (of a closed rod: over all nodes, and whole turns only). `director`: d1 at the first edge (projected; zero: any normal).
-/// An open isotropic rod without twist gets no material frames. Throws std::invalid_argument naming the bad value.
+/// One that does without material frames gets none unless it is twisted. Throws std::invalid_argument naming the bad value.
 RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director, double total_twist = 0.0);
+
+/// Whether explicit steps need material frames only once one is held: open, isotropic and naturally untwisted. Such a rod has no twist until then.
+bool doesWithoutFrames(const RodModel& model);
+
+/// Whether there are as many material frames and twists as edges and nodes, or none of either but a director across the first edge.
+bool framesFit(const RodModel& model, const RodState& state);
 
 /// Gives a state its material frames if it has none.
 void addFrames(const RodModel& model, RodState& state);
