@@ -116,7 +116,7 @@ std::string ClothStepper::Impl::explain(StepFailure failure, double length)
   if (failure == StepFailure::singular_matrix && !system.averagesIndependent())
     return "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the averages there";
   if (failure == StepFailure::singular_matrix)
-    return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude";
+    return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude, or a grasp or force is too fast or too large by as many";
   if (failure == StepFailure::work_exceeded)
     return "the step needs more work than it is given" + at + ": use a shorter step, move what " +
            (model->averages.empty() ? "holds it by less at once" : "guides it by less at once and without crumpling it") + ", or take softer cloth (thickness, moduli)";

@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 #include <std_msgs/String.h>
@@ -28,6 +29,8 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
     nozzle_topics_.push_back(prefix + thread + "nozzle/wrench");
   try
   {
+    if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())
+      makeFolder(folder);
     path_ = replaceablePath(path);
     bag_ = std::make_unique<rosbag::Bag>(replaceablePath(path_ + ".active"), rosbag::bagmode::Write);
   }

@@ -3,6 +3,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "param_reader.h"
 #include "slender_sim/fairing/fair_mesh.h"
 #include "slender_sim/node/converters.h"
 
@@ -55,7 +56,11 @@ FairingOptions optionsOf(const slender_sim::FairMesh::Request& request)
 
 }  // namespace
 
-FairingNode::FairingNode(ros::NodeHandle nh_priv) : server_(nh_priv.advertiseService("fair_mesh", &FairingNode::fair)) {}
+FairingNode::FairingNode(ros::NodeHandle nh_priv)
+{
+  ParamReader(nh_priv).refuseUnknown();   // there are none
+  server_ = nh_priv.advertiseService("fair_mesh", &FairingNode::fair);
+}
 
 bool FairingNode::fair(slender_sim::FairMesh::Request& request, slender_sim::FairMesh::Response& response)
 try

@@ -2,54 +2,68 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
-#include <XmlRpcValue.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <slender_sim/BodyStates.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include "param_reader.h"
 #include "slender_sim/node/converters.h"
 
 namespace slender {
 
 MotionPlayer::MotionPlayer(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv) : nh_(nh)
 {
-  const std::string file = nh_priv.param<std::string>("file", "");
+  ParamReader params(nh_priv);
+  std::string file;
+  double rate = 0.0;
+  XmlRpc::XmlRpcValue offset, bodies;
+  params.read("file", file);
+  params.read("frame_id", frame_id_);
+  params.read("speed", speed_, 0.0, 1e6, true);
+  params.read("wait", wait_, 0.0, 1e9);
+  params.read("tf", tf_);
+  params.read("loop", loop_);
+  params.read("rate", rate, 0.0, 1e6);
+  params.readList("solids", solids_);
+  const bool moved = params.get("offset", offset), drives = params.get("bodies", bodies);
+  params.refuseUnknown();
   if (file.empty())
-    throw std::runtime_error("~file: missing; give a CSV table t,body,x,y,z,qx,qy,qz,qw");
-  frame_id_ = nh_priv.param<std::string>("frame_id", frame_id_);
-  speed_ = nh_priv.param<double>("speed", speed_);
-  wait_ = nh_priv.param<double>("wait", wait_);
-  tf_ = nh_priv.param<bool>("tf", tf_);
-  loop_ = nh_priv.param<bool>("loop", loop_);
-  const double rate = nh_priv.param<double>("rate", 0.0);
-  if (!(speed_ > 0.0) || !std::isfinite(speed_) || !(rate >= 0.0) || !std::isfinite(rate) || !std::isfinite(wait_))
-    throw std::runtime_error("~speed must be > 0, ~rate >= 0, ~wait finite");
-  const std::vector<double> offset = nh_priv.param("offset", std::vector<double>(3, 0.0));
-  if (offset.size() != 3)
-    throw std::runtime_error("~offset: must be three numbers [x, y, z]");
-  offset_ = {offset[0], offset[1], offset[2]};
+    throw OptionError("~file: missing; give a CSV table t,body,x,y,z,qx,qy,qz,qw");
+  if (moved)
+  {
+    const std::vector<double> three = nh_priv.param("offset", std::vector<double>());
+    if (three.size() != 3 || !std::all_of(three.begin(), three.end(), [](double v) { return std::isfinite(v); }))
+      params.refuse("offset", offset, "three numbers [x, y, z]");
+    offset_ = {three[0], three[1], three[2]};
+  }
 
   table_ = readPoseFile(file);
-  XmlRpc::XmlRpcValue bodies;
-  if (nh_priv.getParam("bodies", bodies))
+  const auto requireBody = [&](const std::string& param, const std::string& name) {
+    std::string names;
+    for (const BodyTrajectory& body : table_)
+    {
+      if (body.body == name)
+        return;
+      names += (names.empty() ? "" : ", ") + body.body;
+    }
+    throw OptionError("~" + param + ": " + name + " is not in " + file + ", whose bodies are: " + names);
+  };
+  if (drives)
   {
     if (bodies.getType() != XmlRpc::XmlRpcValue::TypeStruct)
-      throw std::runtime_error("~bodies: must be a map from bodies of the table to grasps, e.g. {left_wrist: left}");
+      params.refuse("bodies", bodies, "a map from bodies of the table to grasps, e.g. {left_wrist: left}");
     for (auto& entry : bodies)
     {
-      const auto named = [&entry](const BodyTrajectory& body) { return body.body == entry.first; };
-      if (std::none_of(table_.begin(), table_.end(), named) || entry.second.getType() != XmlRpc::XmlRpcValue::TypeString)
-        throw std::runtime_error("~bodies: " + entry.first + " is not in " + file + ", or its grasp is not a name");
+      requireBody("bodies", entry.first);
+      if (entry.second.getType() != XmlRpc::XmlRpcValue::TypeString)
+        params.refuse("bodies", bodies, "a map to names of grasps");
       pose_pubs_[entry.first] =
           nh_.advertise<geometry_msgs::PoseStamped>("grasps/" + static_cast<std::string>(entry.second) + "/pose", 1000);
     }
   }
-  nh_priv.getParam("solids", solids_);
   for (const std::string& solid : solids_)
-    if (std::none_of(table_.begin(), table_.end(), [&solid](const BodyTrajectory& body) { return body.body == solid; }))
-      throw std::runtime_error("~solids: " + solid + " is not in " + file);
+    requireBody("solids", solid);
   if (!solids_.empty())
     bodies_pub_ = nh_.advertise<slender_sim::BodyStates>("bodies", 1000);
   if (tf_)

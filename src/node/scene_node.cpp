@@ -24,7 +24,7 @@ namespace slender {
 namespace {
 
 constexpr double kIdle = 0.02;         // [s] longest sleep: how late diagnostics and markers may be
-constexpr double kClockPatience = 2.0, kClockReminder = 10.0;   // [s] until the first and between later complaints that there is no /clock
+constexpr double kClockPatience = 2.0;   // [s] until the first complaint that there is no /clock
 
 /// Text of a scene, not the path of one.
 bool isText(const std::string& scene)

@@ -75,8 +75,20 @@ void SceneNode::publishDiagnostics()
   message.header.stamp = clock_.stamp();
   message.status = {simulationStatus(), inputStatus()};
   diagnostics_pub_.publish(message);
+  if (const std::string waits = clockWentBack(); !waits.empty() && ros::WallTime::now() >= next_clock_reminder_)
+  {
+    next_clock_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
+    ROS_WARN("%s %s", nh_priv_.getNamespace().c_str(), waits.c_str());
+  }
   recent_ = RunStatistics();
   next_diagnostics_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.diagnostics_rate);
+}
+
+std::string SceneNode::clockWentBack() const
+{
+  const bool follows = mode_ == Mode::running && options_.pace == Pace::follow;
+  const double behind = follows ? clock_.seconds() - clock_.secondsAt(ros::Time::now()) : 0.0;
+  return behind > kBehind ? "waits for /clock, which is " + std::to_string(behind) + " s behind the simulated time; start the node anew if it went back" : "";
 }
 
 DiagnosticStatus SceneNode::simulationStatus() const
@@ -91,10 +103,8 @@ DiagnosticStatus SceneNode::simulationStatus() const
   const bool running = mode_ == Mode::running && options_.pace != Pace::step;
   if (running && options_.pace == Pace::wall && recent_.steps > 10 && recent_.realTimeFactor() < 1.0)
     raise(status, DiagnosticStatus::WARN, "slower than real time");
-  const double behind = options_.pace == Pace::follow ? clock_.seconds() - clock_.secondsAt(ros::Time::now()) : 0.0;
-  if (running && behind > kBehind)
-    raise(status, DiagnosticStatus::WARN, "waits for /clock, which is " + std::to_string(behind) +
-                                          " s behind the simulated time; start the node anew if it went back");
+  if (const std::string waits = clockWentBack(); !waits.empty())
+    raise(status, DiagnosticStatus::WARN, waits);
   if (recent_.cut_steps > 0)
     raise(status, DiagnosticStatus::WARN, "steps had to be cut");
   if (!bag_failure_.empty())

@@ -100,7 +100,7 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
   response.first_node = response.last_node = -1;
   if (found == grasp_names_.end())
   {
-    response.message = "no grasp \"" + request.name + "\"; the scene has:";
+    response.message = "no grasp \"" + request.name + "\"; the scene has" + (grasp_names_.empty() ? " none: give it grasps: {NAME: {...}}" : ":");
     for (const std::string& name : grasp_names_)
       response.message += " " + name;
     return true;

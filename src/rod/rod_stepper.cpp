@@ -180,7 +180,7 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length,
       return "two consecutive edges point (nearly) opposite ways" + at + ": use more edges, a stiffer rod or a slower motion" +
              (explicit_step ? "; if the motion is slow, the explicit step blew up: use a shorter step or an implicit integrator" : "");
     case StepFailure::singular_matrix:
-      return "the stiffness matrix could not be made definite" + at + ": moduli or masses differ by too many orders of magnitude";
+      return "the stiffness matrix could not be made definite" + at + ": moduli or masses differ by too many orders of magnitude, or a grasp or force is too fast or too large by as many";
     case StepFailure::state_not_finite:
       return explicit_step ? "the explicit step blew up" + at + ": use a shorter step or an implicit integrator"
                            : "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";

@@ -23,6 +23,16 @@ void requireRegular(const std::string& path, const fs::file_status& status)
 
 }  // namespace
 
+void makeFolder(const std::string& folder)
+{
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder))
+  {
+    throw std::runtime_error(folder + ": cannot be made a folder" + (error ? ": " + error.message() : ""));
+  }
+}
+
 std::string replaceablePath(const std::string& path)
 {
   std::error_code error;

@@ -343,6 +343,14 @@ std::string directoryOf(const std::string& path)
   return directory.empty() ? "." : directory;
 }
 
+/// Where a relative path is looked for: roslaunch starts nodes in a folder of its own.
+std::string lookedIn(const std::string& path)
+{
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::current_path(error);
+  return std::filesystem::path(path).is_absolute() || error ? "" : " in " + folder.string() + " (give a whole path if it is elsewhere)";
+}
+
 }  // namespace
 
 std::string fileText(const std::string& path)
@@ -350,7 +358,7 @@ std::string fileText(const std::string& path)
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
   {
-    throw SceneError(path + ": " + (std::filesystem::exists(path, error) ? "is not a regular file" : "no such file"));
+    throw SceneError(path + ": " + (std::filesystem::exists(path, error) ? "is not a regular file" : "no such file" + lookedIn(path)));
   }
   if (std::filesystem::file_size(path, error) > max_file_size)
   {

@@ -34,7 +34,7 @@ void writeDurably(const std::string& wanted, const std::string& bytes)
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (file < 0)
   {
-    throw std::runtime_error(errorText(temporary, "cannot be opened for writing"));
+    throw std::runtime_error(errorText(path, "cannot be written there"));
   }
   std::size_t written = 0;
   bool good = true;

@@ -14,17 +14,6 @@
 
 namespace slender {
 
-/// Throws std::runtime_error.
-inline void makeFolder(const std::string& folder)
-{
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (!std::filesystem::is_directory(folder))
-  {
-    throw std::runtime_error(folder + ": cannot be made a folder" + (error ? ": " + error.message() : ""));
-  }
-}
-
 /// A text file written through a buffer; every failure is an exception: WriteError once it is open.
 class TextFile
 {

@@ -89,7 +89,7 @@ std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double leng
       return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step" +
              (model->floor.present && work.ends[1].held ? ", and keep the nozzle above the floor" : "");
     case StepFailure::singular_matrix:
-      return "the matrix could not be made definite" + at + ": radii or edge lengths differ by too many orders of magnitude";
+      return "the matrix could not be made definite" + at + ": radii or edge lengths differ by too many orders of magnitude, or a nozzle or wind is too fast by as many";
     case StepFailure::state_not_finite:
       return "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
     case StepFailure::squeezed:

@@ -202,6 +202,21 @@ class Inputs(NodeCase):
         self.assertGreater(min(speeds), -0.002)
         self.assertEqual(int(self.diagnostics("inputs")["dropped"]), 0)
 
+    def test_player_refuses_bad_parameters(self):
+        table = self.path("motion.csv")
+        with open(table, "w") as file:
+            file.write("0,hand,0,0,0,0,0,0,1\n0,head,0,0,0,0,0,0,1\n")
+        for k, (expected, parameters) in enumerate((("~lop: no such parameter", {"lop": True}), ("~speed: is 0, must be", {"speed": 0}),
+                                                    ("foot is not in", {"bodies": {"foot": "right"}}), ("are: hand, head", {"solids": ["foot"]}),
+                                                    ("~offset", {"offset": [1, 2]}), ("~loop", {"loop": "perhaps"}))):
+            player = self.launch("motion_player", "player%d" % k, dict(parameters, file=table))
+            self.assertEqual(player.wait(60), 2)
+            self.assertIn(expected, self.output("player%d.err" % k))
+
+    def test_fairing_node_has_no_parameters(self):
+        self.assertEqual(self.launch("fairing_node", "fairing", {"x": 1}).wait(60), 2)
+        self.assertIn("~x: no such parameter", self.output("fairing.err"))
+
     def test_player_refuses_a_bad_table(self):
         table = self.path("motion.csv")
         with open(table, "w") as file:

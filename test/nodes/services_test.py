@@ -233,9 +233,12 @@ class Services(NodeCase):
         self.refused("~state_every", state_every=0)
         self.refused("~frame_id", "slash", frame_id="/world")
         self.refused("is a directory", record_bag=self.folder)
-        self.refused("~guide_dealy", "no such parameter", guide_dealy=0.1)
+        self.refused("~guide_dealy", "no such parameter", "rosparam delete", guide_dealy=0.1)
+        self.refused("~set", "rosparam set", set="[time.step=0.002, rods.0.damping.mass=1]")
+        self.refused("~frame_id", "one word", frame_id="a b")
+        self.refused("missing.yaml: no such file in", scene="missing.yaml")
         self.refused("~guide_delay", guide_delay="soon")
-        self.refused("cannot be written", record_bag="/nowhere/at/all.bag")
+        self.refused("cannot be made a folder", record_bag="/dev/null/at/all.bag")
         self.refused("use_sim_time", pace="follow")
         self.refused("use_sim_time", pace="fast", publish_clock=True)
 
@@ -281,6 +284,7 @@ class Services(NodeCase):
             self.assertEqual(self.diagnostics("simulation")["message"], "running")
             clock.publish(Clock(rospy.Time(2)))   # a bag that begins anew
             wait_until(lambda: "waits for /clock" in self.diagnostics("simulation")["message"], what="a warning")
+            wait_until(lambda: "behind the simulated time" in self.output("rod.err"), what="the same in the log")
         finally:
             rospy.delete_param("/use_sim_time")
 

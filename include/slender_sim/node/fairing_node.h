@@ -10,6 +10,7 @@ namespace slender {
 class FairingNode
 {
 public:
+  /// Throws OptionError: it has no parameters.
   explicit FairingNode(ros::NodeHandle nh_priv);
 
   /// Answers a request; a mesh or options that cannot be used are refused with the reason in the answer.

@@ -87,6 +87,8 @@ private:
 
   // scene_node_diagnostics.cpp
   void publishDiagnostics();
+  static constexpr double kClockReminder = 10.0;   ///< [s] between complaints about /clock
+  std::string clockWentBack() const;   ///< empty: it did not
   diagnostic_msgs::DiagnosticStatus simulationStatus() const;
   diagnostic_msgs::DiagnosticStatus inputStatus();
 

@@ -16,6 +16,9 @@ public:
 /// so that the link stays. Throws std::runtime_error for everything else: a directory, a device, a FIFO, a link that leads nowhere.
 std::string replaceablePath(const std::string& path);
 
+/// With all folders above it. Throws std::runtime_error.
+void makeFolder(const std::string& folder);
+
 /// Throws std::runtime_error when something is at `path` that is neither a regular file nor a link to one: reading a FIFO would wait for ever, and a
 /// device might have no end.
 void requireRegularFile(const std::string& path);
