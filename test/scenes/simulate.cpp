@@ -101,7 +101,7 @@ TEST_F(Simulate, badInputIsStatus2)
   }
   for (const char* options : {"--duration 0", "--duration x", "--duration nan", "--duration 1e8", "--threads 0", "--threads 1.5", "--set",
                               "--set time.step", "--set time.step=-1", "--set colour=red", "--csv /proc/nowhere", "--obj /proc/nowhere",
-                              "--duration 0.1 --bag /nonexistent/file.bag", "--csv a --csv b", "--quiet --quiet"})
+                              "--duration 0.1 --bag /proc/nowhere/file.bag", "--csv a --csv b", "--quiet --quiet"})
   {
     const Result result = simulate(cantilever + " " + options);
     EXPECT_EQ(result.status, 2) << options << "\n" << result.output;
