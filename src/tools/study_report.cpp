@@ -44,15 +44,28 @@ const std::vector<Plan>& plans()
        {"rod_tables", "thread_tables", "ibm_vs_hinge", "implicit_step"}, {"tracking_overhead", "willmore_smoothing", "hair", "tree"}},
       {"Cost against size", "", {"cost_model", "rod_scaling"}, {"rod_implicit_vs_explicit", "thread_implicit_vs_explicit"}},
       {"What a scene does not name", "Instructions counted by valgrind, told apart by the lines of the sources that they come from.", {"lean"}, {}},
-      {"Phase diagrams", "Where one behaviour ends and the next begins.", {"michell", "sagging"}, {"sewing_machine", "coiling", "bend_twist", "greenhill"}},
-      {"Rods against formulas", "", {"elastica", "torsion", "torsional_pendulum", "twist_asymmetry", "bend_twist"},
+      {"Phase diagrams", "Where one behaviour ends and the next begins.", {"michell", "bend_twist", "sagging"}, {"sewing_machine", "coiling", "greenhill"}},
+      {"Rods against formulas", "", {"elastica", "torsion", "torsional_pendulum", "twist_asymmetry"},
        {"beam_frequencies", "lateral_buckling", "perversion", "wilberforce", "helical_buckling", "stick_slip", "knot", "plectoneme", "chain"}},
       {"Threads against formulas", "", {"trouton", "thread_twist", "retraction"}, {"merging", "fiber_extrusion", "dragged_catenary"}},
       {"Cloth against formulas and measurements", "", {"willmore_sphere", "willmore_hole", "fabric_drape"}, {"plate", "stick_slip_strip", "flag", "drape", "stiffness_range"}},
       {"Tracking", "Shells that follow a guide exactly on average.", {"breathing_surface", "rubber_band", "clustering"},
-       {"tracking_exactness", "partitions", "character"}},
+       {"tracking_exactness", "partitions", "character", "cloth_on_branch", "backflip"}},
   };
   return all;
+}
+
+/// The full report has every study, once.
+void checkPlans()
+{
+  for (const study::Study& s : study::studies())
+  {
+    std::ptrdiff_t times = 0;
+    for (const Plan& plan : plans())
+      times += std::count(plan.quick.begin(), plan.quick.end(), s.name) + std::count(plan.more.begin(), plan.more.end(), s.name);
+    if (times != 1)
+      throw std::logic_error("report: " + s.name + " is in " + std::to_string(times) + " sections; must be in one");
+  }
 }
 
 std::string readFile(const std::string& path)
@@ -124,6 +137,7 @@ std::vector<std::pair<std::string, std::string>> facts(const ReportOptions& opti
 
 int makeReport(const ReportOptions& options)
 {
+  checkPlans();
   std::vector<ReportSection> sections;
   std::vector<ReportedStudy*> todo;
   for (const Plan& plan : plans())
