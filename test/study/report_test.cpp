@@ -120,9 +120,10 @@ TEST_F(Report, tellsWhichStudiesFailedAndWhy)
   EXPECT_EQ(made.status, 1) << made.output;
   EXPECT_NE(made.output.find("lean ended with exit status 1"), std::string::npos) << made.output;
   const std::string html = page();
-  EXPECT_NE(html.find("<a href=\"#lean\">lean</a></td><td colspan=3 class=bad>failed</td>"), std::string::npos);
+  EXPECT_NE(html.find("<a href=\"#lean\">lean</a></td><td colspan=4 class=bad>failed</td>"), std::string::npos);
   EXPECT_NE(html.find("<p class=bad>failed: valgrind is missing"), std::string::npos);
   EXPECT_EQ(countOf(html, "class=bad>failed"), 2u) << "the other one has not failed";
+  EXPECT_NE(html.find("<td class=n>at most 1</td><td class=good>met</td>"), std::string::npos) << "the bar of trouton's errors";
 }
 
 TEST_F(Report, mixesNothingAndKnowsItsStudies)
