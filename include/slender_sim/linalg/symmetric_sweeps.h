@@ -52,7 +52,7 @@ private:
   const std::vector<char>* held_ = nullptr;
   std::vector<int> order_;                            ///< SweptMatrix::order, so that points visited in turn seldom wait for each other
   SweptMatrix swept_;
-  Eigen::LLT<Eigen::Matrix3d> whole_;                 ///< the matrix among common motions of what is free
+  Eigen::LLT<Eigen::Matrix3d> whole_{Eigen::Matrix3d::Identity()};   ///< the matrix among common motions of what is free
   PointVector diagonal_, inverse_;                    ///< per point three columns of four
   PointVector r_, z_, p_, t_, q_;
 };
