@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 
 #include "slender_sim/fairing/willmore_flow.h"
@@ -13,6 +14,9 @@ namespace {
 
 /// Newton-like, of a step at most: enough for the implicit Euler method to the eye.
 constexpr int kIterations = 10;
+
+/// Of smoothing lengths in mean edges: the time step is the length's fourth power, and beyond this either it or the mass is lost in rounding.
+constexpr double kSmoothingRange = 1000.0;
 
 void checkOptions(const FairingOptions& o)
 {
@@ -71,7 +75,14 @@ bool smooth(TriangleMesh& mesh, const FairingOptions& options, const FairingProg
     selected.push_back(std::any_of(options.region.begin(), options.region.end(), [&](const FairingOptions::Ball& ball) {
       return (mesh.vertices.col(v) - ball.middle).norm() <= ball.radius;
     }));
-  const double length = options.smoothing > 0 ? options.smoothing : meanEdge(mesh, topology);
+  const double mean = meanEdge(mesh, topology), length = options.smoothing > 0 ? options.smoothing : mean;
+  if (!(length >= mean / kSmoothingRange && length <= mean * kSmoothingRange))
+  {
+    std::ostringstream why;
+    why << "the smoothing length is " << length << " m; must be from " << mean / kSmoothingRange << " m to " << mean * kSmoothingRange
+        << " m (a thousandth of the mean edge length to a thousand times it), or zero for the default";
+    throw std::invalid_argument(why.str());
+  }
   WillmoreFlow flow(mesh, topology, std::pow(length, 4), kIterations, selected);
   summary.energy_before = summary.energy = flow.energy(mesh.vertices);
   for (int k = 0; k < options.steps && !summary.stationary; ++k)

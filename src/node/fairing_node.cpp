@@ -1,6 +1,5 @@
 #include "slender_sim/node/fairing_node.h"
 
-#include <limits>
 #include <stdexcept>
 
 #include "param_reader.h"
@@ -30,19 +29,14 @@ TriangleMesh meshOf(const slender_sim::FairMesh::Request& request)
   return mesh;
 }
 
-int countOf(std::uint32_t value)
-{
-  return value > static_cast<std::uint32_t>(std::numeric_limits<int>::max()) ? std::numeric_limits<int>::max() : static_cast<int>(value);
-}
-
 FairingOptions optionsOf(const slender_sim::FairMesh::Request& request)
 {
   FairingOptions options;
   options.fill_holes = request.fill_holes;
   if (request.largest_hole > 0)
-    options.largest_hole = countOf(request.largest_hole);
+    options.largest_hole = request.largest_hole;
   options.edge_length = request.edge_length;
-  options.steps = countOf(request.steps);
+  options.steps = request.steps;
   options.smoothing = request.smoothing;
   if (!options.fill_holes && options.steps == 0)
     throw std::invalid_argument("nothing to do: set steps, fill_holes or both");

@@ -68,6 +68,8 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
     throw SceneError(who + "it has bodies beside its threads, which do not meet them; put them in two scenes");
   if (kind == NodeKind::cloths && scene.cloths.empty())
     throw SceneError(who + "it has no cloths; rod_node simulates rods and bodies");
+  if (options.markers.style == MarkerStyle::regions && !tracked)
+    throw OptionError("~marker_style: regions are those of tracked cloths, of which scene " + scene.name + " has none; choose tube or line");
   return scene;
 }
 

@@ -145,9 +145,11 @@ class Fairing(NodeCase):
     def test_bad_options_are_refused(self):
         vertices, triangles = icosphere(1)
         self.refused(["nothing to do"], vertices, triangles, steps=0)
-        self.refused(["largest hole"], vertices, triangles, fill_holes=True, largest_hole=4000000000)
-        self.refused(["steps"], vertices, triangles, steps=4000000000)
+        self.refused(["largest hole", "4000000000"], vertices, triangles, fill_holes=True, largest_hole=4000000000)
+        self.refused(["steps", "4000000000"], vertices, triangles, steps=4000000000)
         self.refused(["smoothing"], vertices, triangles, smoothing=-1)
+        for absurd in (1e-200, 1e-9, 1e9, 1e200):
+            self.refused(["smoothing length", "mean edge"], vertices, triangles, smoothing=absurd)
         self.refused(["edge length"], vertices, triangles, fill_holes=True, edge_length=float("inf"))
         open_box = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 2, 1), (0, 1, 3), (0, 3, 2)]
         self.refused(["1000000 faces", "longer than"], *open_box, steps=0, fill_holes=True, edge_length=1e-6)

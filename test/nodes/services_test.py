@@ -231,6 +231,7 @@ class Services(NodeCase):
     def test_bad_parameters_exit_2(self):
         self.refused("~pace", "wall | fast | follow | step", pace="slow")
         self.refused("~state_every", state_every=0)
+        self.refused("~marker_style", "tracked cloths", "choose tube or line", marker_style="regions")
         self.refused("~frame_id", "slash", frame_id="/world")
         self.refused("is a directory", record_bag=self.folder)
         self.refused("~guide_dealy", "no such parameter", "rosparam delete", guide_dealy=0.1)

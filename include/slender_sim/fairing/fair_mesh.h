@@ -18,10 +18,11 @@ struct FairingOptions
     double radius = 0.0;             ///< [m] > 0
   };
   bool fill_holes = false;
-  int largest_hole = kLongestHole;   ///< boundaries of more edges stay open
+  long largest_hole = kLongestHole;  ///< boundaries of more edges stay open
   double edge_length = 0.0;          ///< of patches [m]; 0: that around each hole
-  int steps = 0;                     ///< of the Willmore flow
-  double smoothing = 0.0;            ///< length [m]: a step halves bumps of wavelength 2 pi times it, longer ones less; 0: the mean edge length
+  long steps = 0;                    ///< of the Willmore flow
+  double smoothing = 0.0;            ///< length [m]: a step halves bumps of wavelength 2 pi times it, longer ones less. 0: the mean edge
+                                     ///< length, otherwise from a thousandth of that to a thousand times it
   std::vector<Ball> region;          ///< only vertices in one of them flow; empty: all
 };
 
