@@ -15,6 +15,7 @@ namespace slender {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLeastGap = 12.0;     // the gap over the smallest that barriers are to be resolved in
 constexpr double kTurnMargin = 0.02;   // [rad] a solid may turn before candidates are sought again
 
 void checkSurface(const ContactSurface& surface, const ContactOptions& options)
@@ -365,19 +366,37 @@ void ContactPotential::setStiffness(double force)
 {
   if (!(force > 0.0) || !std::isfinite(force))
     throw std::invalid_argument("contact: stiffness is " + std::to_string(force) + " N; must be positive and finite");
-  impl_->stiffness = std::max(force, impl_->options.least_stiffness);
+  impl_->stiffness = std::min(std::max(force, impl_->options.least_stiffness), impl_->most_stiffness);
+}
+
+void ContactPotential::setMostStiffness(double force)
+{
+  impl_->most_stiffness = std::max(force, impl_->options.least_stiffness);
 }
 
 void ContactPotential::adaptStiffness()
 {
   // force over stiffness() at a fifth, a twelfth and half of the gap
-  const double gap = impl_->options.gap, c = impl_->barrier.force(gap / 5), high = impl_->barrier.force(gap / 12), low = 1.0;
+  const double gap = impl_->options.gap, c = impl_->barrier.force(gap / 5), high = impl_->barrier.force(gap / kLeastGap), low = 1.0;
   double& stiffness = impl_->stiffness;
   const double share = impl_->largest_force / stiffness;
   if (share > high)
     stiffness = impl_->largest_force / c;
   else if (share > 0.0 && share < low)   // slowly: a load that comes and goes should not find a soft barrier
     stiffness = std::max({impl_->options.least_stiffness, 0.8 * stiffness, impl_->largest_force / c});
+  stiffness = std::min(stiffness, impl_->most_stiffness);
+}
+
+bool ContactPotential::stiffen(bool converged)
+{
+  if (smallestGap() > impl_->options.gap / kLeastGap)
+    return false;
+  const double before = impl_->stiffness;
+  if (converged)
+    adaptStiffness();
+  else
+    setStiffness(4.0 * before);
+  return impl_->stiffness > before;
 }
 
 }  // namespace slender

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "candidates.h"
@@ -45,7 +46,7 @@ public:
   ContactSurface surface;
   ContactOptions options;
   Barrier barrier;
-  double stiffness;
+  double stiffness, most_stiffness = std::numeric_limits<double>::infinity();
   std::vector<SolidPieces> solids;
 
   double h = 0.0;

@@ -11,8 +11,6 @@ namespace slender {
 
 namespace {
 
-constexpr double kLeastGap = 1.0 / 12;   // of the contact's gap: as ContactPotential::adaptStiffness()
-
 Eigen::Matrix3d cross(const Eigen::Vector3d& v)
 {
   Eigen::Matrix3d m;
@@ -268,12 +266,10 @@ NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, doub
     if (keys_ != before_keys)
       pattern_valid_ = false;
   }
-  return solveConfined((t + before * h) / duration_, (t + now * h) / duration_, newton);
+  return minimizeConfined(*this, (t + before * h) / duration_, (t + now * h) / duration_, newton, model_.contact.options.gap / least_edge_);
 }
 
-/// Moves from the base, where all that is prescribed stands at the fraction `from` of the step, towards the present trial, where it stands
-/// at `to`, as far as nothing touches; that becomes the base. False: there is no way at all.
-bool CoupledSystem::approach(double from, double to, double& reached)
+Approach CoupledSystem::approach(double from, double to, double& reached)
 {
   gather(points_end_, solids_end_);
   double alpha = contact_->stepLimit(points_base_, points_end_, solids_base_, solids_end_);
@@ -305,81 +301,20 @@ bool CoupledSystem::approach(double from, double to, double& reached)
     if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
     {
       accept();
-      return true;
+      return reached < to ? Approach::partly : Approach::arrived;
     }
     if (alpha == 1.0 && trial.min_chi <= kFoldedChi && std::isfinite(trial.potential))
-      return true;   // not a matter of contact: minimize() will say so
+      return Approach::arrived;   // not a matter of contact: minimize() will say so
   }
-  return false;
+  return Approach::squeezed;
 }
 
-/// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. True if it was made stiffer.
-bool CoupledSystem::stiffen(bool converged)
+void CoupledSystem::placeHeld(double to)
 {
-  if (contact_->smallestGap() > kLeastGap * model_.contact.options.gap)
-    return false;
-  const double before = contact_->stiffness();
-  if (converged)
-    contact_->adaptStiffness();
-  else   // forces mean nothing yet
-    contact_->setStiffness(4.0 * before);
-  return contact_->stiffness() > before;
-}
-
-NewtonResult CoupledSystem::solveConfined(double from, double to, const NewtonConfig& newton)
-{
-  constexpr int kMaxApproaches = 200, kMaxSolutions = 24, kMaxFailures = 8;
-  constexpr double kLagTolerance = 1e-2;
-  NewtonResult total;
-  const auto solve = [&](const NewtonConfig& config, double gap_tolerance) {
-    gap_tolerance_ = gap_tolerance;
-    tolerance_ = config.tolerance;
-    const NewtonResult r = minimize(*this, config);
-    const int iterations = total.iterations + r.iterations, factorizations = total.factorizations + r.factorizations;
-    total = r;
-    total.iterations = iterations;
-    total.factorizations = factorizations;
-    if (!r.ok())   // back to the last good configuration
-    {
-      moveAlong(0.0);
-      evaluate(false);
-    }
-    return r.ok();
-  };
-  // Friction that is about to slip and contacts that run along rods converge slowly at the end, far below what gaps resolve.
-  NewtonConfig fine = newton, loose = newton;
-  fine.tolerance = std::max(newton.tolerance, 1e-3 * model_.contact.options.gap / least_edge_);
-  loose.tolerance = std::max(newton.tolerance, 0.02 * model_.contact.options.gap / least_edge_);
-  loose.max_iterations = 12;
-  for (int k = 0;; ++k)
-  {
-    double reached = to;
-    if (k == kMaxApproaches || !approach(from, to, reached))
-    {
-      total.failure = StepFailure::squeezed;
-      return total;
-    }
-    if (reached >= to)
-      break;
-    // what is in the way gives way, then on from there
-    stiffen(solve(loose, 0.1));
-    accept();
-    from = reached;
-    placeDriven(to);
-    for (RodPart& part : parts_)
-      part.rod->placeAt(inputs_->rods[part.index], duration_, to);
-    placeWelds();
-  }
-  for (int k = 0, failures = 0;; ++k)
-  {
-    const bool good = solve(fine, 0.01);
-    const bool softer = stiffen(good);
-    if (!good && !(softer && ++failures <= kMaxFailures))
-      return total;
-    if (good && !softer && (contact_->lagFriction() < kLagTolerance || k >= kMaxSolutions))
-      return total;   // with the solution as the trial, which is what rods store
-    accept();
-  }
+  placeDriven(to);
+  for (RodPart& part : parts_)
+    part.rod->placeAt(inputs_->rods[part.index], duration_, to);
+  placeWelds();
 }
 
 void CoupledSystem::endStage(const StepPlan& plan, std::size_t s, bool last)

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "../contact/confined_newton.h"
 #include "body_system.h"
 #include "rod_stepper_impl.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
@@ -51,6 +52,12 @@ public:
   double residual() const;
   double forceScale() const;
   double noiseLevel() const;
+
+  // ---- and minimizeConfined()
+  Approach approach(double from, double to, double& reached);
+  void placeHeld(double to);
+  void resolve(double tolerance, double gap_tolerance) { tolerance_ = tolerance, gap_tolerance_ = gap_tolerance; }
+  ContactPotential& contact() { return *contact_; }
 
 private:
   /// One rod: how its unknowns (four per node) enter the matrix.
@@ -101,9 +108,6 @@ private:
   void placeWelds();
   void placeDriven(double fraction);
   void gather(Eigen::Matrix3Xd& x, std::vector<Pose>& solids) const;
-  NewtonResult solveConfined(double from, double to, const NewtonConfig& newton);
-  bool stiffen(bool converged);
-  bool approach(double from, double to, double& reached);
   void startAccelerations();
   void setCarriedInertia(const Stage& stage);
   const RodPart& partOf(int point) const { return parts_[point_part_[point]]; }

@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "../contact/confined_newton.h"
 #include "merging.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 #include "slender_sim/thread/touching_threads.h"
@@ -51,6 +52,12 @@ public:
   double forceScale() const;
   double noiseLevel() const;
 
+  // ---- and minimizeConfined()
+  Approach approach(double from, double to, double& reached);
+  void placeHeld(double to);
+  void resolve(double tolerance, double gap_tolerance) { tolerance_ = tolerance, gap_tolerance_ = gap_tolerance; }
+  ContactPotential& contact() { return contact_; }
+
 private:
   struct Part
   {
@@ -83,10 +90,6 @@ private:
   void buildPattern();
   void assemble(const HessianShift& shift, bool whole);
   bool factor(const HessianShift& shift);
-  NewtonResult solveConfined(double from, double to);
-  bool approach(double from, double to, double& reached);
-  void adaptStiffness();
-  bool stiffen(bool converged);
 
   const TouchingModel& model_;
   ContactPotential contact_;
@@ -94,8 +97,7 @@ private:
   bool merges_ = false;
   std::vector<Part> parts_;
   std::size_t part_count_ = 0;                  ///< of parts_ in use
-  double duration_ = 0, least_edge_ = 0, stiffness_now_ = 0, most_stiffness_ = 0;
-  bool still_driven_ = false;                   ///< after approach(): something held or driven has not arrived
+  double duration_ = 0, least_edge_ = 0, stiffness_now_ = 0;
   std::vector<Pose> solids_from_, solids_to_;   ///< over the step
   Eigen::Matrix3Xd points_, points_base_, points_end_, points_target_;
   std::vector<Pose> solids_, solids_base_, solids_end_;

@@ -10,8 +10,6 @@ namespace slender {
 
 namespace {
 
-constexpr double kLeastGap = 1.0 / 12;   // of the contact's gap: as ContactPotential::adaptStiffness()
-
 ContactSurface solidsOf(const TouchingModel& model)
 {
   ContactSurface surface;
@@ -141,7 +139,8 @@ bool ThreadContact::load(double from, double h)
     return false;
   // not what an attempt that failed left; no less than weights, what stops a node within the gap, and merging ask for
   double least = std::max(stiffness_now_, model_.options.least_stiffness);
-  most_stiffness_ = model_.options.least_stiffness;
+  // what would double the length of the thread in a step is force enough: where parts are jammed, gaps do not open however stiff the barrier is
+  double most = least;
   for (std::size_t p = 0; p < part_count_; ++p)
   {
     const double gravity = parts_[p].thread->inputs().gravity.norm();
@@ -149,14 +148,14 @@ bool ThreadContact::load(double from, double h)
     for (int i = 0; i < a.nodes; ++i)
       least = std::max(least, a.weight[i] * h * h * std::max(gravity, model_.options.gap / (duration_ * duration_)));
     const ThreadStepper::Impl& thread = *parts_[p].thread;
-    most_stiffness_ = std::max(most_stiffness_, 3.0 * thread.model->viscosityAt(0.0) * thread.work.totalVolume() / (objects_[p].curve_length * duration_));
+    most = std::max(most, 3.0 * thread.model->viscosityAt(0.0) * thread.work.totalVolume() / (objects_[p].curve_length * duration_));
   }
   if (merges_)
   {
     merging_.begin(points_base_, segments_, fluids_, contact_.nearPairs(), held_, model_.options.gap, h);
     least = std::max(least, merging_.largestAttraction());
   }
-  most_stiffness_ = std::max(most_stiffness_, least);
+  contact_.setMostStiffness(std::max(most, least));
   contact_.setStiffness(least);
   whole_ = {};
   contact_.begin(points_base_, solids_base_, duration_);   // friction sticks below a speed over the whole step, cut or not
@@ -178,7 +177,7 @@ StepFailure ThreadContact::solve(double from, double to, double h, StepReport& r
     return StepFailure::squeezed;
   for (;;)
   {
-    const NewtonResult result = solveConfined(from, to);
+    const NewtonResult result = minimizeConfined(*this, from, to, parts_[0].thread->newton, model_.options.gap / least_edge_);
     report.iterations += result.iterations;
     report.factorizations += result.factorizations;
     if (!result.ok())
@@ -198,14 +197,14 @@ StepFailure ThreadContact::solve(double from, double to, double h, StepReport& r
     points_target_ = points_;
     from = to;
   }
-  adaptStiffness();
+  contact_.adaptStiffness();
   stiffness_now_ = contact_.stiffness();
   return StepFailure::none;
 }
 
 /// Moves from the base towards the targets of what is held and the present guess of all else, as far as nothing touches; solids go from
-/// where they stand at the fraction `from` of the step to `to`. That becomes the base. No: there is no way at all.
-bool ThreadContact::approach(double from, double to, double& reached)
+/// where they stand at the fraction `from` of the step to `to`.
+Approach ThreadContact::approach(double from, double to, double& reached)
 {
   gather(points_target_);
   placeSolids(to, solids_end_);
@@ -234,94 +233,21 @@ bool ThreadContact::approach(double from, double to, double& reached)
     if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
     {
       reached = driven ? from + alpha * (to - from) : to;
-      still_driven_ = driven;
       accept();
-      return true;
+      return driven ? Approach::partly : Approach::arrived;
     }
     if (alpha == 1.0 && trial.min_chi <= kFoldedChi && std::isfinite(trial.potential))
-    {
-      still_driven_ = false;
-      return true;   // not a matter of contact: minimize() will say so
-    }
+      return Approach::arrived;   // not a matter of contact: minimize() will say so
   }
-  return false;
+  return Approach::squeezed;
 }
 
-/// What would double the length of the thread in a step is force enough: where parts are jammed, gaps do not open however stiff the barrier is.
-void ThreadContact::adaptStiffness()
+void ThreadContact::placeHeld(double /*to*/)
 {
-  contact_.adaptStiffness();
-  contact_.setStiffness(std::min(contact_.stiffness(), most_stiffness_));
-}
-
-/// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. True if it was made stiffer.
-bool ThreadContact::stiffen(bool converged)
-{
-  if (contact_.smallestGap() > kLeastGap * model_.options.gap)
-    return false;
-  const double before = contact_.stiffness();
-  if (converged)
-    adaptStiffness();
-  else   // forces mean nothing yet
-    contact_.setStiffness(std::min(4.0 * before, most_stiffness_));
-  return contact_.stiffness() > before;
-}
-
-NewtonResult ThreadContact::solveConfined(double from, double to)
-{
-  constexpr int kMaxApproaches = 200, kMaxSolutions = 24, kMaxFailures = 8;
-  constexpr double kLagTolerance = 1e-2;
-  const NewtonConfig& newton = parts_[0].thread->newton;
-  NewtonResult total;
-  const auto solveWith = [&](const NewtonConfig& config, double gap_tolerance) {
-    gap_tolerance_ = gap_tolerance;
-    tolerance_ = config.tolerance;
-    const NewtonResult r = minimize(*this, config);
-    const int iterations = total.iterations + r.iterations, factorizations = total.factorizations + r.factorizations;
-    total = r;
-    total.iterations = iterations;
-    total.factorizations = factorizations;
-    if (!r.ok())   // back to the last good configuration
-    {
-      moveAlong(0.0);
-      evaluate(false);
-    }
-    return r.ok();
-  };
-  // Friction that is about to slip and contacts that run along threads converge slowly at the end, far below what gaps resolve.
-  NewtonConfig fine = newton, loose = newton;
-  fine.tolerance = std::max(newton.tolerance, 1e-3 * model_.options.gap / least_edge_);
-  loose.tolerance = std::max(newton.tolerance, 0.02 * model_.options.gap / least_edge_);
-  loose.max_iterations = 12;
-  for (int k = 0;; ++k)
-  {
-    double reached = to;
-    if (k == kMaxApproaches || !approach(from, to, reached))
-    {
-      total.failure = StepFailure::squeezed;
-      return total;
-    }
-    if (!still_driven_)
-      break;
-    // what is in the way gives way, then on from there
-    stiffen(solveWith(loose, 0.1));
-    accept();
-    from = reached;
-    for (std::size_t p = 0; p < part_count_; ++p)
-      for (int i = 0; i < parts_[p].thread->work.nodes(); ++i)
-        if (const int n = parts_[p].thread->inSystem(i); n >= 0 && systemOf(parts_[p]).nodeHeld(n))
-          parts_[p].thread->placeNode(i, points_target_.col(parts_[p].point + i));
-  }
-  for (int k = 0, failures = 0;; ++k)
-  {
-    const bool good = solveWith(fine, 0.01);
-    const bool softer = stiffen(good);
-    if (!good && !(softer && ++failures <= kMaxFailures))
-      return total;
-    if (good && !softer && (contact_.lagFriction() < kLagTolerance || k >= kMaxSolutions))
-      return total;
-    accept();
-  }
+  for (std::size_t p = 0; p < part_count_; ++p)
+    for (int i = 0; i < parts_[p].thread->work.nodes(); ++i)
+      if (const int n = parts_[p].thread->inSystem(i); n >= 0 && systemOf(parts_[p]).nodeHeld(n))
+        parts_[p].thread->placeNode(i, points_target_.col(parts_[p].point + i));
 }
 
 double ThreadContact::clearance(const std::vector<const ThreadState*>& states, const std::vector<int>& kinds, const std::vector<Pose>& solids)

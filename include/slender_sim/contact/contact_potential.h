@@ -156,6 +156,11 @@ public:
   double stiffness() const;
   void setStiffness(double force);
   void adaptStiffness();
+  /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. Below a twelfth of the gap it is made
+  /// stiffer, as adaptStiffness() would where a solution has `converged`, fourfold where forces mean nothing yet. True: it was.
+  bool stiffen(bool converged);
+  /// From now on the stiffness stays below this [N]; no less than what it is to be set to. At first there is no such bound.
+  void setMostStiffness(double force);
 
 private:
   class Impl;

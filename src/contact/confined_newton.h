@@ -1,0 +1,82 @@
+#pragma once
+
+#include <algorithm>
+
+#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/dynamics/newton.h"
+
+namespace slender {
+
+/// What came of going towards a configuration that contact may be in the way of.
+enum class Approach
+{
+  arrived,
+  partly,     ///< as far as nothing touches
+  squeezed    ///< no way at all
+};
+
+/// Minimises the energy of a system with contact whose held parts and driven solids move from the fraction `from` of a time step to `to`:
+/// as far as nothing touches, again and again, while what is in the way gives way; then to the end, with friction's forces lagging one solution
+/// behind, until they have settled. `gap` is that of contact over the shortest edge. The solution is left as the trial.
+///
+/// System offers what minimize() needs, and:
+/// - approach(from, to, reached): from the base towards the present trial, as far as nothing touches; that becomes the base, where all that is
+///   prescribed stands at the fraction `reached`;
+/// - placeHeld(to): what is held or driven, in the trial, where it is at `to`;
+/// - resolve(tolerance, gap_tolerance): how incrementSize() measures, over the shortest edge and over the smallest gap;
+/// - contact(): the ContactPotential.
+template <class System>
+NewtonResult minimizeConfined(System& system, double from, double to, const NewtonConfig& newton, double gap)
+{
+  constexpr int kMaxApproaches = 200, kMaxSolutions = 24, kMaxFailures = 8;
+  constexpr double kLagTolerance = 1e-2;
+  NewtonResult total;
+  const auto solve = [&](const NewtonConfig& config, double gap_tolerance) {
+    system.resolve(config.tolerance, gap_tolerance);
+    const NewtonResult r = minimize(system, config);
+    const int iterations = total.iterations + r.iterations, factorizations = total.factorizations + r.factorizations;
+    total = r;
+    total.iterations = iterations;
+    total.factorizations = factorizations;
+    if (!r.ok())   // back to the last good configuration
+    {
+      system.moveAlong(0.0);
+      system.evaluate(false);
+    }
+    return r.ok();
+  };
+  // Friction that is about to slip and contacts that run along a curve converge slowly at the end, far below what gaps resolve.
+  NewtonConfig fine = newton, loose = newton;
+  fine.tolerance = std::max(newton.tolerance, 1e-3 * gap);
+  loose.tolerance = std::max(newton.tolerance, 0.02 * gap);
+  loose.max_iterations = 12;
+  for (int k = 0;; ++k)
+  {
+    double reached = to;
+    const Approach approach = k == kMaxApproaches ? Approach::squeezed : system.approach(from, to, reached);
+    if (approach == Approach::squeezed)
+    {
+      total.failure = StepFailure::squeezed;
+      return total;
+    }
+    if (approach == Approach::arrived)
+      break;
+    // what is in the way gives way, then on from there
+    system.contact().stiffen(solve(loose, 0.1));
+    system.accept();
+    from = reached;
+    system.placeHeld(to);
+  }
+  for (int k = 0, failures = 0;; ++k)
+  {
+    const bool good = solve(fine, 0.01);
+    const bool softer = system.contact().stiffen(good);
+    if (!good && !(softer && ++failures <= kMaxFailures))
+      return total;
+    if (good && !softer && (system.contact().lagFriction() < kLagTolerance || k >= kMaxSolutions))
+      return total;
+    system.accept();
+  }
+}
+
+}  // namespace slender
