@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
 
 namespace slender {
 
@@ -112,47 +112,45 @@ double WeakConstraints::error(const Eigen::Matrix3Xd& targets, const Eigen::Matr
 
 void WeakConstraints::requireIndependent(const std::vector<char>& held) const
 {
-  const int n = count();
   Matrix free = c_;
   if (!held.empty())
     free.prune([&](Eigen::Index, Eigen::Index column, double) { return !held[column]; });
-  // the Gram matrix of rows of unit length: what is left of a row after those before it is the square of its distance from their span
-  constexpr double kDependent = 1e-10;
-  Eigen::MatrixXd gram = Eigen::MatrixXd(Matrix(free * free.transpose()));
-  Eigen::VectorXd scale(n);
-  for (int i = 0; i < n; ++i)
+  for (int i = 0; i < count(); ++i)
   {
-    if (!(gram(i, i) > 0))
+    const double length = free.row(i).norm();
+    if (!(length > 0))
       throw std::invalid_argument("test function '" + names_[i] + "' acts on held vertices only: leave it out or release some");
-    scale[i] = 1.0 / std::sqrt(gram(i, i));
+    free.row(i) *= 1.0 / length;
   }
-  gram = scale.asDiagonal() * gram * scale.asDiagonal();
-  // those that are independent in their own order, then the first that is not, with its partners
-  Eigen::MatrixXd l = Eigen::MatrixXd::Zero(n, n);
-  for (int i = 0; i < n; ++i)
-  {
-    for (int j = 0; j < i; ++j)
-      l(i, j) = (gram(i, j) - l.row(i).head(j).dot(l.row(j).head(j))) / l(j, j);
-    const double rest = gram(i, i) - l.row(i).head(i).squaredNorm();
-    if (rest > kDependent)
-    {
-      l(i, i) = std::sqrt(rest);
-      continue;
-    }
-    const Eigen::VectorXd share = l.topLeftCorner(i, i).transpose().triangularView<Eigen::Upper>().solve(l.row(i).head(i).transpose());
-    std::string others;
-    int more = 0;
-    for (int j = 0; j < i; ++j)
-      if (std::abs(share[j]) > 1e-3)
-      {
-        if (++more <= 5)
-          others += (others.empty() ? "'" : ", '") + names_[j] + "'";
-      }
-    if (more > 5)
-      others += " and " + std::to_string(more - 5) + " more";
-    throw std::invalid_argument("test function '" + names_[i] + "' depends on " + others + (held.empty() ? "" : " (on the vertices that are not held)") +
-                                ": leave it out or change its region");
-  }
+  // Pivots of the rows' Gram matrix are squares of their distances from the span of those eliminated before.
+  constexpr double kDependent = 1e-10;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> gram;
+  gram.setShift(1e-3 * kDependent);   // it stops at pivots that are zero
+  gram.compute(Eigen::SparseMatrix<double>(free * free.transpose()));
+  const Eigen::VectorXd pivots = gram.vectorD();
+  const auto first = std::find_if(pivots.begin(), pivots.end(), [](double pivot) { return !(pivot > kDependent); });
+  if (first == pivots.end())
+    return;
+  // The row that is left with nothing is this sum of those before it: l^T share = its row of L.
+  const Eigen::Index rest = first - pivots.begin();
+  const Eigen::SparseMatrix<double> l = gram.matrixL();
+  Eigen::VectorXd share = -Eigen::VectorXd::Unit(count(), rest);
+  for (Eigen::Index j = rest - 1; j >= 0; --j)
+    for (Eigen::SparseMatrix<double>::InnerIterator at(l, j); at; ++at)
+      if (at.row() > j && at.row() <= rest)
+        share[j] -= at.value() * share[at.row()];
+  const Eigen::VectorXd shares = gram.permutationPinv() * share;
+  std::vector<int> parts;
+  for (int i = 0; i < count(); ++i)
+    if (std::abs(shares[i]) > 1e-3 * shares.lpNorm<Eigen::Infinity>())
+      parts.push_back(i);
+  std::string others;
+  for (std::size_t k = 0; k + 1 < parts.size() && k < 5; ++k)
+    others += (others.empty() ? "'" : ", '") + names_[parts[k]] + "'";
+  if (parts.size() > 6)
+    others += " and " + std::to_string(parts.size() - 6) + " more";
+  throw std::invalid_argument("test function '" + names_[parts.back()] + "' depends on " + others +
+                              (held.empty() ? "" : " (on the vertices that are not held)") + ": leave it out or change its region");
 }
 
 }  // namespace slender

@@ -88,6 +88,14 @@ TEST(WeakConstraints, NamesEmptyAndDependentFunctions)
   EXPECT_NE(dependent.find("'all' depends on 'left', 'right'"), std::string::npos) << dependent;
   EXPECT_NE(messageOf([&] { paint({{"left", left, {}}}); }).find("'left': has no vertices on the tracked mesh"), std::string::npos);
   EXPECT_NE(messageOf([&] { paint({{"left", {99}, left}}); }).find("vertex 99 is not on the guide mesh"), std::string::npos);
+  // among thousands, too: in time that grows with the overlaps, not with all pairs
+  const TriangleMesh large = gridMesh(1.0, 1.0, 60, 60, GridPattern::alternating);
+  TestFunctions hats = subdivisionBasis(subdivide(large, 0));
+  EXPECT_EQ(messageOf([&] { WeakConstraints(hats, hatMassMatrix(large), hatMassMatrix(large)).requireIndependent({}); }), "");
+  for (TestFunctions::Values* values : {&hats.guide, &hats.tracked})
+    values->row(7) = TestFunctions::Values(values->row(8));
+  const std::string among = messageOf([&] { WeakConstraints(hats, hatMassMatrix(large), hatMassMatrix(large)).requireIndependent({}); });
+  EXPECT_NE(among.find("'" + hats.names[8] + "' depends on '" + hats.names[7] + "':"), std::string::npos) << among;
   // held vertices leave nothing to act on
   std::vector<char> held(n, 0);
   for (const int v : all)
