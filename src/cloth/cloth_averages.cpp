@@ -130,7 +130,8 @@ double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averag
   for (std::size_t i = 0; i < d.size(); ++i)
     product_[i] = start_[i] + d[i];
   setGap(*averages, product_);
-  const ConstrainedCholesky::Norms norms = averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data());
+  ConstrainedCholesky::Norms norms;
+  averages_->solve(right_.data(), gap_.data(), correction_.data(), multipliers_.data(), &norms);
   load_ = norms.load;
   first_step_ = norms.step;
   takeOutAverages(right_);

@@ -20,6 +20,8 @@ public:
   /// y += (diag(w) + c A) x, held points as all others.
   void addProduct(const double* x, double* y) const;
   void solve(const PointVector& b, PointVector& x) const { factor_.solvePoints(b.data(), x.data()); }
+  const PointMatrix& pattern() const { return a_; }
+  const double* values() const { return values_.data(); }
   const SparseCholesky& factorization() const { return factor_; }
 
 private:
@@ -46,7 +48,7 @@ public:
   void align(const PointVector& x, const BlockMatrix& matrix, const std::vector<char>& held);
   void useConstant() { aligned_ = false; }
   void apply(const PointVector& r, PointVector& z);
-  const SparseCholesky& constantFactor() const { return constant_.factorization(); }
+  const ShiftedMatrix& constant() const { return constant_; }
 
 private:
   const ClothModel& model_;

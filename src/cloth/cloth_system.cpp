@@ -249,7 +249,8 @@ void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
   setWeights(stage.tau, ratio_);
   if (used_ && preconditioned_ && !used_->ready)
   {
-    used_->independent = averages_->factor(preconditioner_->constantFactor(), held_.data());
+    const ShiftedMatrix& p = preconditioner_->constant();
+    used_->independent = averages_->factor(p.pattern(), p.values(), p.factorization(), held_.data());
     used_->ready = true;
   }
   const bool extra = inputs.forces.cols() > 0;

@@ -1,8 +1,14 @@
 #include "slender_sim/dynamics/integrator.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace slender {
+
+long stepsUntil(double end, double step)
+{
+  return static_cast<long>(std::clamp(std::ceil(end / step * (1 - 1e-12) - 1e-9), 1.0, 1e15));
+}
 
 const char* toString(Integrator integrator)
 {

@@ -11,6 +11,18 @@ namespace slender {
 
 namespace {
 
+constexpr double kStiff = 1e5;   // W over what it takes at least to move a constraint's points alone: what a round leaves is one over it, rounding errors are it times as large
+constexpr int kRounds = 3;       // to rounding
+
+/// Measured: entries of C^T W C against those of S^-1, with their factors.
+bool roundsSuit(const ConstrainedCholesky::Constraints& c)
+{
+  double entries = 0.0;
+  for (Eigen::Index i = 0; i < c.rows(); ++i)
+    entries += std::pow(static_cast<double>(c.row(i).nonZeros()), 2);
+  return entries < 2.0 * static_cast<double>(c.rows()) * static_cast<double>(c.rows());
+}
+
 /// Lower triangle of a positive definite matrix: its factor.
 void factorInPlace(Eigen::Ref<Eigen::MatrixXd> a)
 {
@@ -45,12 +57,84 @@ void ConstrainedCholesky::setConstraints(const Constraints& c, bool bounded)
   const std::size_t size = 4 * static_cast<std::size_t>(std::max(c.rows(), c.cols()));
   for (PointVector* v : {&y_, &t_, &mu_})
     v->assign(size, 0.0);
+  many_ = !bounded && roundsSuit(c);
+  pattern_fixed_.clear();
+  if (many_)
+    for (PointVector* v : {&load_, &right_})
+      v->assign(size, 0.0);
 }
 
-bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
+void ConstrainedCholesky::fill(const Constraints& from, Rows& to)
+{
+  to.starts.assign(from.outerIndexPtr(), from.outerIndexPtr() + from.rows() + 1);
+  to.values.assign(from.valuePtr(), from.valuePtr() + from.nonZeros());
+  to.offsets.resize(from.nonZeros());
+  for (Eigen::Index k = 0; k < from.nonZeros(); ++k)
+    to.offsets[k] = 4u * static_cast<unsigned>(from.innerIndexPtr()[k]);
+}
+
+bool ConstrainedCholesky::factor(const PointMatrix& pattern, const double* values, const SparseCholesky& p, const char* fixed)
 {
   p_ = &p;
   left_out_.clear();
+  Constraints free = c_.transpose();
+  free.prune([fixed](Eigen::Index point, Eigen::Index, double) { return !fixed || !fixed[point]; });
+  fill(free, c_transposed_);
+  if (c_rows_.values.empty())
+    fill(c_, c_rows_);
+  in_rounds_ = many_ && factorRounds(pattern, values, fixed);
+  return in_rounds_ || factorSchur(p, fixed);
+}
+
+/// False: too stiff for a factor, or rounds do not converge as fast as those of constraints that are well apart.
+bool ConstrainedCholesky::factorRounds(const PointMatrix& pattern, const double* values, const char* fixed)
+{
+  const int m = count(), n = pattern.size();
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < n; ++i)
+    for (int k = pattern.starts()[i]; k < pattern.starts()[i + 1]; ++k)
+      entries.emplace_back(i, pattern.column(k), values[k]);
+  Eigen::SparseMatrix<double> p(n, n);
+  p.setFromTriplets(entries.begin(), entries.end());
+  Constraints c = c_;
+  c.prune([fixed](Eigen::Index, Eigen::Index point, double) { return !fixed || !fixed[point]; });
+  const Constraints cp = c * p;
+  weights_.resize(m);
+  for (int i = 0; i < m; ++i)
+  {
+    const double square = c.row(i).squaredNorm();
+    weights_[i] = kStiff * c.row(i).dot(cp.row(i)) / (square * square);   // at least 1 / S_ii, by the Cauchy-Schwarz inequality
+    if (!std::isfinite(weights_[i]))
+      return false;
+  }
+  const Constraints added = c.transpose() * Constraints(Eigen::Map<const Eigen::VectorXd>(weights_.data(), m).asDiagonal() * c);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Constraints::InnerIterator entry(added, i); entry; ++entry)
+      entries.emplace_back(i, entry.col(), entry.value());
+  const PointMatrix stiff(n, entries);
+  std::vector<char> now(static_cast<std::size_t>(n) + 1, 1);   // not empty
+  if (fixed)
+    std::copy_n(fixed, n, now.begin());
+  if (now != pattern_fixed_)
+    stiff_.setPattern(stiff);
+  pattern_fixed_ = std::move(now);
+  if (!stiff_.factor(stiff, fixed))
+    return false;
+  // a gap that is as rough as one can be
+  constexpr double kLeft = 1e-9;
+  PointVector gap(4 * static_cast<std::size_t>(m), 0.0), mu(gap.size()), z(4 * static_cast<std::size_t>(n), 0.0);
+  for (int i = 0; i < m; ++i)
+    point(gap, i) = Eigen::Vector3d(1.0, i % 2 == 0 ? 1.0 : -1.0, std::cos(static_cast<double>(i) * i));
+  solveInRounds(z.data(), gap.data(), z.data(), mu.data());
+  c_rows_.multiply(0.0, z.data(), t_.data());
+  double left = 0.0;
+  for (int i = 0; i < m; ++i)
+    left = std::max(left, (point(t_, i) - point(gap, i)).lpNorm<Eigen::Infinity>());
+  return left <= kLeft;
+}
+
+bool ConstrainedCholesky::factorSchur(const SparseCholesky& p, const char* fixed)
+{
   const int m = count(), n = static_cast<int>(c_.cols());
   // three rows of C at a time, as the coordinates of points
   std::vector<Eigen::Triplet<double>> entries;
@@ -71,20 +155,8 @@ bool ConstrainedCholesky::factor(const SparseCholesky& p, const char* fixed)
   }
   Constraints v(m, n);
   v.setFromTriplets(entries.begin(), entries.end());
-  const auto fill = [](const Constraints& from, Rows& to) {
-    to.starts.assign(from.outerIndexPtr(), from.outerIndexPtr() + from.rows() + 1);
-    to.values.assign(from.valuePtr(), from.valuePtr() + from.nonZeros());
-    to.offsets.resize(from.nonZeros());
-    for (Eigen::Index k = 0; k < from.nonZeros(); ++k)
-      to.offsets[k] = 4u * static_cast<unsigned>(from.innerIndexPtr()[k]);
-  };
   fill(v, v_);
   fill(Constraints(v.transpose()), v_transposed_);
-  Constraints free = c_.transpose();
-  free.prune([fixed](Eigen::Index point, Eigen::Index, double) { return !fixed || !fixed[point]; });
-  fill(free, c_transposed_);
-  if (c_rows_.values.empty())
-    fill(c_, c_rows_);
   const Eigen::MatrixXd s = Eigen::MatrixXd(Constraints(v * v.transpose()));
   if (s_.size() > 0)
     s_ = s;
@@ -113,9 +185,42 @@ void ConstrainedCholesky::leaveOut(const std::vector<int>& rows)
   factorInPlace(inner);
 }
 
+/// From mu = 0: z is that of the constraints' forces so far and of a stiffness W that closes what they leave open; its forces are the next. 4 doubles each.
+void ConstrainedCholesky::solveInRounds(const double* r, const double* g, double* z, double* mu) const
+{
+  const int m = count(), n = static_cast<int>(c_.cols());
+  if (r)
+    std::copy_n(r, 4 * n, load_.data());
+  else
+    std::fill(load_.begin(), load_.end(), 0.0);
+  std::fill_n(mu, 4 * m, 0.0);
+  for (int round = 0; round < kRounds; ++round)
+  {
+    for (int i = 0; i < m; ++i)
+      for (int k = 4 * i; k < 4 * i + 4; ++k)
+        right_[k] = (g ? weights_[i] * g[k] : 0.0) - mu[k];
+    std::copy_n(load_.data(), 4 * n, y_.data());
+    c_transposed_.multiply(1.0, right_.data(), y_.data());
+    stiff_.solvePoints(y_.data(), y_.data());
+    c_rows_.multiply(0.0, y_.data(), right_.data());
+    for (int i = 0; i < m; ++i)
+      for (int k = 4 * i; k < 4 * i + 4; ++k)
+        mu[k] += weights_[i] * (right_[k] - (g ? g[k] : 0.0));
+  }
+  if (z)
+    std::copy_n(y_.data(), 4 * n, z);
+}
+
 /// mu = S^-1 t of what is not left out (Woodbury's formula)
 void ConstrainedCholesky::inverse(const double* t, double* mu) const
 {
+  if (in_rounds_)
+  {
+    solveInRounds(nullptr, t, nullptr, mu);
+    for (int k = 0; k < 4 * count(); ++k)
+      mu[k] = -mu[k];
+    return;
+  }
   s_inverse_.multiply(0.0, t, mu);
   const auto k = static_cast<Eigen::Index>(left_out_.size());
   if (k == 0)
@@ -136,16 +241,32 @@ void ConstrainedCholesky::inverse(const double* t, double* mu) const
   }
 }
 
-ConstrainedCholesky::Norms ConstrainedCholesky::solve(const double* r, const double* g, double* z, double* mu) const
+void ConstrainedCholesky::solve(const double* r, const double* g, double* z, double* mu, Norms* norms) const
 {
   const int m = count(), n = static_cast<int>(c_.cols());
+  if (in_rounds_)
+  {
+    if (norms)
+    {
+      p_->forwardPoints(r, y_.data());
+      const double load = pointKernels().dot(n, y_.data(), y_.data());
+      inverse(g, mu_.data());
+      norms->load = std::sqrt(load + pointKernels().dot(m, g, mu_.data()));
+    }
+    solveInRounds(r, g, z, mu);
+    if (norms)   // load_ is r
+    {
+      takeOut(mu, load_.data());
+      norms->step = std::sqrt(std::max(pointKernels().dot(n, z, load_.data()), 0.0));
+    }
+    return;
+  }
   p_->forwardPoints(r, y_.data());
-  Norms norms;
-  if (g)
+  if (norms)
   {
     std::copy_n(g, 4 * m, t_.data());
     inverse(t_.data(), mu_.data());
-    norms.load = std::sqrt(pointKernels().dot(n, y_.data(), y_.data()) + pointKernels().dot(m, t_.data(), mu_.data()));
+    norms->load = std::sqrt(pointKernels().dot(n, y_.data(), y_.data()) + pointKernels().dot(m, t_.data(), mu_.data()));
   }
   v_.multiply(0.0, y_.data(), t_.data());
   for (int i = 0; g && i < 4 * m; ++i)
@@ -153,10 +274,9 @@ ConstrainedCholesky::Norms ConstrainedCholesky::solve(const double* r, const dou
   inverse(t_.data(), mu_.data());
   std::copy_n(mu_.data(), 4 * m, mu);
   v_transposed_.multiply(-1.0, mu_.data(), y_.data());
-  if (g)
-    norms.step = std::sqrt(pointKernels().dot(n, y_.data(), y_.data()));
+  if (norms)
+    norms->step = std::sqrt(pointKernels().dot(n, y_.data(), y_.data()));
   p_->backwardPoints(y_.data(), z);
-  return norms;
 }
 
 ConstrainedCholesky::Norms ConstrainedCholesky::solveBounded(const double* r, const double* gap, const double* bounds, double l, double tolerance, double* z,
@@ -242,18 +362,21 @@ void ConstrainedCholesky::addForces(const double* f, double* r) const
 double ConstrainedCholesky::norm(const double* g) const
 {
   std::copy_n(g, 4 * count(), t_.data());
-  return std::sqrt(std::max(s_inverse_.multiply(0.0, t_.data(), mu_.data()), 0.0));
+  inverse(t_.data(), mu_.data());
+  return std::sqrt(std::max(pointKernels().dot(count(), t_.data(), mu_.data()), 0.0));
 }
 
 void ConstrainedCholesky::addStiffness(double factor, const double* x, double* y) const
 {
   c_rows_.multiply(0.0, x, t_.data());
-  s_inverse_.multiply(0.0, t_.data(), mu_.data());
+  inverse(t_.data(), mu_.data());
   c_transposed_.multiply(factor, mu_.data(), y);
 }
 
 void ConstrainedCholesky::multipliers(const double* r, double* mu) const
 {
+  if (in_rounds_)
+    return solveInRounds(r, nullptr, nullptr, mu);
   p_->forwardPoints(r, y_.data());
   v_.multiply(0.0, y_.data(), t_.data());
   inverse(t_.data(), mu_.data());

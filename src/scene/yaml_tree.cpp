@@ -1,5 +1,6 @@
 #include "yaml_tree.h"
 
+#include <cmath>
 #include <map>
 #include <sstream>
 
@@ -323,7 +324,7 @@ void applyOverride(YamlTree& root, const std::string& assignment)
     {
       const long size = static_cast<long>(at->items.size());
       const auto index = parseNumber(part);
-      if (!index || *index != static_cast<long>(*index) || *index < -size || *index >= size)
+      if (!index || !(*index >= -size && *index < size) || *index != std::floor(*index))
       {
         throw SceneError(where + ": " + here + " is a list; '" + part + "' must be a whole number in [" + std::to_string(-size) +
                          ", " + std::to_string(size - 1) + "]");

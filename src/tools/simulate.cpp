@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "arguments.h"
+#include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
@@ -231,10 +231,9 @@ int run(const Options& options)
   {
     config.time.duration = *options.duration;
   }
-  const double duration = config.time.duration, step = config.time.step;
+  const double step = config.time.step;
   const int every = config.record.every;
-  // A duration that is a whole number of steps but for round-off takes no extra step.
-  const long steps = std::max(1L, static_cast<long>(std::ceil(duration / step * (1 - 1e-12) - 1e-9)));
+  const long steps = slender::stepsUntil(config.time.duration, step);
 
   const auto start = Clock::now();
   Simulation simulation(std::move(config));

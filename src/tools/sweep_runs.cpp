@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include <stdexcept>
 
 #include "arguments.h"
+#include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/study/measure.h"
 #include "slender_sim/study/output.h"
@@ -92,8 +92,7 @@ std::vector<study::Row> measure(const SweepPlan& plan, long point)
   for (const auto* kind : kindsOf(plan))
     measures.push_back(kind->make(scene));
   const double step = scene.time.step;
-  const long steps = std::max(1L, static_cast<long>(std::ceil(scene.time.duration / step * (1 - 1e-12) - 1e-9)));
-  const long first = std::min(steps, static_cast<long>(std::ceil(plan.after / step - 1e-9)));
+  const long steps = stepsUntil(scene.time.duration, step), first = plan.after > 0 ? std::min(steps, stepsUntil(plan.after, step)) : 0;
   Simulation simulation(std::move(scene));
   simulation.setThreads(1);
   for (long k = 0; k <= steps; ++k)

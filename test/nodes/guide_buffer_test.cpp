@@ -162,12 +162,16 @@ TEST(GuideBuffer, DoesNotRunTheOtherWayAfterAPause)
   {
     for (; 0.03 * sent <= time; ++sent)
       if (0.03 * sent <= 0.3 || 0.03 * sent >= 0.6)
+      {
         EXPECT_TRUE(buffer.push(0.03 * sent, {Eigen::Vector3d(0, 0, 0.03 * sent < 0.5 ? 0.0 : 10.0), Eigen::Quaterniond::Identity()}));
+      }
     const double z = buffer.target(time).X_WG.position.z();
     lowest = std::min(lowest, z);
     highest = std::max(highest, z);
     if (time > 1.0)   // what is left goes at catch_up_speed on average, 1.5 times that at most
+    {
       EXPECT_LT(std::abs(z - before) / 1e-3, 1.6) << time;
+    }
     before = z;
   }
   EXPECT_GT(lowest, -0.1);

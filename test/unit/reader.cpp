@@ -250,6 +250,8 @@ INSTANTIATE_TEST_SUITE_P(Grasp, BadValue, testing::Values(
 INSTANTIATE_TEST_SUITE_P(Path, BadValue, testing::Values(
   Case{"rods.1.name=x", "'rods' is a list; '1' must be a whole number in [-1, 0]"},
   Case{"rods.first.name=x", "'first' must be a whole number"},
+  Case{"rods.4e85.name=x", "'4e85' must be a whole number"},
+  Case{"rods.-4e85.name=x", "'-4e85' must be a whole number"},
   Case{"rods.0.5.name=x", "unknown key"},
   Case{"time.step.size=1", "'time.step' is the single value '0.005' and has no part 'size'"},
   Case{"time..step=1", "empty part"},

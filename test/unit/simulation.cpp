@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/scene/reader.h"
 
 namespace slender {
@@ -54,6 +55,16 @@ void expectSameBits(const SceneState& a, const SceneState& b)
     EXPECT_EQ(a.wrenches[g].force, b.wrenches[g].force);
     EXPECT_EQ(a.wrenches[g].torque, b.wrenches[g].torque);
   }
+}
+
+TEST(StepsUntil, CountsWholeStepsAndHasAnEnd)
+{
+  EXPECT_EQ(stepsUntil(1.0, 0.005), 200);
+  EXPECT_EQ(stepsUntil(0.3, 0.1), 3);        // 0.3 / 0.1 is less than 3, 0.7 / 0.1 less than 7
+  EXPECT_EQ(stepsUntil(0.7, 0.1), 7);
+  EXPECT_EQ(stepsUntil(0.7001, 0.1), 8);
+  EXPECT_EQ(stepsUntil(0.001, 0.1), 1);
+  EXPECT_EQ(stepsUntil(1e7, 1e-300), 1000000000000000);
 }
 
 TEST(Simulation, buildsWhatTheSceneSays)

@@ -3,6 +3,7 @@
 #include <set>
 
 #include <Eigen/LU>
+#include <Eigen/SparseLU>
 #include <gtest/gtest.h>
 
 #include "slender_sim/linalg/constrained_cholesky.h"
@@ -135,7 +136,8 @@ TEST(ConstrainedCholesky, SolvesTheSaddlePointSystem)
     std::vector<char> fixed(n, 0);
     fixed[2] = fixed[n - 1] = pinned;
     ASSERT_TRUE(factor.factor(P, fixed.data()));
-    ASSERT_TRUE(saddle.factor(factor, fixed.data()));
+    ASSERT_TRUE(saddle.factor(P, P.values().data(), factor, fixed.data()));
+    EXPECT_FALSE(saddle.inRounds());
     PointVector r(4 * n, 0.0), z(4 * n, 0.0), g(4 * m, 0.0), mu(4 * m, 0.0);
     for (int i = 0; i < n; ++i)
       if (!fixed[i])
@@ -175,7 +177,96 @@ TEST(ConstrainedCholesky, SolvesTheSaddlePointSystem)
   twice.insert(0, 4) = twice.insert(1, 4) = 1.0;
   ConstrainedCholesky dependent;
   dependent.setConstraints(twice);
-  EXPECT_FALSE(dependent.factor(factor, nullptr));
+  EXPECT_FALSE(dependent.factor(P, P.values().data(), factor, nullptr));
+}
+
+TEST(ConstrainedCholesky, MeetsManyConstraintsInRounds)
+{
+  const TriangleMesh coarse = gridMesh(1.0, 1.0, 30, 30, GridPattern::alternating);
+  const Subdivision fine = subdivide(coarse, 1);
+  const int n = static_cast<int>(fine.mesh.vertices.cols());
+  const WeakConstraints constraints(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
+  const int m = constraints.count();
+  std::vector<Eigen::Triplet<double>> entries;
+  const PointMatrix bending = isometricBending(fine.mesh, meshTopology(fine.mesh), IsometricElement::nonconforming, 1e-3);
+  for (int i = 0; i < n; ++i)
+    for (int k = bending.starts()[i]; k < bending.starts()[i + 1]; ++k)
+      entries.emplace_back(i, bending.column(k), bending.values()[k]);
+  for (int i = 0; i < n; ++i)
+    entries.emplace_back(i, i, 1e-2 + 1e-4 * (i % 100));
+  const PointMatrix P(n, entries);
+  SparseCholesky factor;
+  factor.setPattern(P);
+  ConstrainedCholesky saddle;
+  saddle.setConstraints(constraints.matrix());
+  Random random(6);
+  for (const bool pinned : {false, true, true})
+  {
+    std::vector<char> fixed(n, 0);
+    fixed[2] = fixed[n - 1] = pinned;
+    ASSERT_TRUE(factor.factor(P, fixed.data()));
+    ASSERT_TRUE(saddle.factor(P, P.values().data(), factor, fixed.data()));
+    ASSERT_TRUE(saddle.inRounds());
+    PointVector r(4 * n, 0.0), z(4 * n, 0.0), g(4 * m, 0.0), mu(4 * m, 0.0);
+    for (int i = 0; i < n; ++i)
+      if (!fixed[i])
+        point(r, i) = random.vector();
+    for (int i = 0; i < m; ++i)
+      point(g, i) = random.vector();
+    std::vector<Eigen::Triplet<double>> whole;
+    for (const auto& e : entries)
+      if (!fixed[e.row()] && !fixed[e.col()])
+        whole.push_back(e);
+    for (int i = 0; i < n; ++i)
+      if (fixed[i])
+        whole.emplace_back(i, i, 1.0);
+    for (int i = 0; i < m; ++i)
+      for (ConstrainedCholesky::Constraints::InnerIterator entry(constraints.matrix(), i); entry; ++entry)
+        if (!fixed[entry.col()])
+        {
+          whole.emplace_back(n + i, entry.col(), entry.value());
+          whole.emplace_back(entry.col(), n + i, entry.value());
+        }
+    Eigen::SparseMatrix<double> kkt(n + m, n + m);
+    kkt.setFromTriplets(whole.begin(), whole.end());
+    const Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(kkt);
+    const auto expect = [&](const PointVector& load, const PointVector& gap, const PointVector& point_answer, const PointVector& multipliers) {
+      MatrixXd right(n + m, 3), solution(n + m, 3);
+      right << matrixOf(load).transpose(), matrixOf(gap).transpose();
+      solution << matrixOf(point_answer).transpose(), matrixOf(multipliers).transpose();
+      const MatrixXd expected = lu.solve(right);
+      EXPECT_LT((solution - expected).topRows(n).norm(), 1e-10 * expected.topRows(n).norm()) << pinned;
+      EXPECT_LT((solution - expected).bottomRows(m).norm(), 1e-9 * expected.bottomRows(m).norm()) << pinned;
+      return expected;
+    };
+    const PointVector none(4 * m, 0.0), free(4 * n, 0.0);
+    ConstrainedCholesky::Norms norms;
+    saddle.solve(r.data(), g.data(), z.data(), mu.data(), &norms);
+    const MatrixXd expected = expect(r, g, z, mu);
+    const MatrixXd moved = expected.topRows(n);
+    EXPECT_NEAR(norms.step, std::sqrt((moved.transpose() * (P.toEigen() * moved)).trace()), 1e-8 * norms.step);
+    PointVector gap_alone(4 * m, 0.0), image(4 * n, 0.0);
+    saddle.solve(free.data(), g.data(), z.data(), gap_alone.data());
+    expect(free, g, z, gap_alone);
+    const double square = -(matrixOf(g).array() * matrixOf(gap_alone).array()).sum();
+    EXPECT_NEAR(saddle.norm(g.data()), std::sqrt(square), 1e-9 * std::sqrt(square));
+    factor.solvePoints(r.data(), image.data());
+    EXPECT_NEAR(norms.load, std::sqrt(square + (matrixOf(r).array() * matrixOf(image).array()).sum()), 1e-9 * norms.load);
+    z = r;   // in its own place, as conjugate gradients do
+    saddle.solve(z.data(), nullptr, z.data(), mu.data());
+    expect(r, none, z, mu);
+    saddle.multipliers(r.data(), gap_alone.data());
+    EXPECT_EQ(gap_alone, mu);
+  }
+  // two of them the same: nothing to be had in rounds, nor at all
+  std::vector<Eigen::Triplet<double>> same;
+  for (int i = 0; i < m; ++i)
+    for (ConstrainedCholesky::Constraints::InnerIterator entry(constraints.matrix(), i == 7 ? 8 : i); entry; ++entry)
+      same.emplace_back(i, entry.col(), entry.value());
+  ConstrainedCholesky::Constraints twice_eight(m, n);
+  twice_eight.setFromTriplets(same.begin(), same.end());
+  saddle.setConstraints(twice_eight);
+  EXPECT_FALSE(saddle.factor(P, P.values().data(), factor, nullptr));
 }
 
 /// Two stiff plates beside each other with a hinge between them at x = 0, of which only one frame shows the bend.

@@ -39,6 +39,9 @@ struct StepPlan
 ///  - generalized_alpha: second order, damping at infinite frequency by spectral_radius (1: midpoint-like, 0: most) [Chung & Hulbert 1993].
 void planStep(Integrator integrator, double spectral_radius, double h, double previous_step, StepPlan& plan);
 
+/// Steps from 0 s to `end` [s], at least 1: a time that is a whole number of steps but for round-off takes no more. At most 1e15, whose end nobody sees.
+long stepsUntil(double end, double step);
+
 /// Constant C in the local position error C h^2 |a1 - a0| (second order) or C h^2 |a1| (implicit Euler).
 double errorConstant(Integrator integrator);
 

@@ -11,18 +11,24 @@
 namespace slender {
 
 /// Solves [P C^T; C 0] [z; mu] = [r; g] for the three coordinates of points alike, given P = L L^T: with V = L^-1 C^T and S = V^T V, one solve costs one forward and one
-/// backward substitution, two products with V (sparse: constraints are local) and one with S^-1.
+/// backward substitution, two products with V (sparse: constraints are local) and one with S^-1, which is dense.
+///
+/// Many constraints that reach few points each are met by rounds of the method of multipliers instead: P + C^T W C is factored, with W so stiff that a round leaves
+/// about a hundred-thousandth of the gap and of the error of mu. S, whose factor takes the cube of their number, is then never formed.
 class ConstrainedCholesky
 {
 public:
   using Constraints = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-  /// Constraints x points. Takes the memory of solve(), with `bounded` that of solveBounded() and leaveOut().
+  /// Constraints x points. Takes the memory of solve(), with `bounded` that of solveBounded(), leaveOut(), soften() and stiffness().
   void setConstraints(const Constraints& c, bool bounded = false);
-  /// After P was factored with these fixed points (null: none), whose columns of C count as zero. False: constraints depend on each other.
-  bool factor(const SparseCholesky& p, const char* fixed);
+  /// After P (`values` in the pattern of a matrix) was factored with these fixed points (null: none), whose columns of C count as zero. False: constraints depend on
+  /// each other.
+  bool factor(const PointMatrix& pattern, const double* values, const SparseCholesky& p, const char* fixed);
+  /// In rounds, after factor().
+  bool inRounds() const { return in_rounds_; }
 
-  /// Leaves constraints `rows` (ascending) out of all solves: their mu are rounding errors. None, and factor(): all count.
+  /// Leaves constraints `rows` (ascending) out of all solves: their mu are rounding errors. None, and factor(): all count. With `bounded` only.
   void leaveOut(const std::vector<int>& rows);
 
   int count() const { return static_cast<int>(c_.rows()); }
@@ -33,9 +39,9 @@ public:
     bool converged = true;   ///< solveBounded(), and
     int sweeps = 0;          ///< over all constraints
   };
-  /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero, and no norms. r may be z. mu: 4 doubles per constraint. Fixed points: r
+  /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero, and no `norms`. r may be z. mu: 4 doubles per constraint. Fixed points: r
   /// must be zero there, and z is.
-  Norms solve(const double* r, const double* g, double* z, double* mu) const;
+  void solve(const double* r, const double* g, double* z, double* mu, Norms* norms = nullptr) const;
   /// z that minimises 1/2 l z . P z - r . z + sum_i bounds_i |gap_i - C_i z| (gap: 4 doubles per constraint): l P z = r + C^T f, where f_i is within its
   /// bound and C_i z = gap_i, or f_i is at it and points along gap_i - C_i z. By block Gauss-Seidel from the f given (4 doubles per constraint) until no
   /// f_i changes by more than `tolerance` of itself, or of its bound. load: sqrt(r . P^-1 r + f . S f), step: that of r + C^T f.
@@ -43,7 +49,7 @@ public:
   /// Makes solveSoftened() that of P + C^T diag(weights) C, weights positive. With `bounded` only.
   void soften(const Eigen::VectorXd& weights);
   void solveSoftened(const double* r, double* z) const;
-  /// Of one constraint when all others are met: entry of the diagonal of S^-1.
+  /// Of one constraint when all others are met: entry of the diagonal of S^-1. With `bounded` only.
   double stiffness(int i) const { return s_inverse_.values[static_cast<std::size_t>(i) * (count() + 1)]; }
   /// r += C^T f, but for fixed points.
   void addForces(const double* f, double* r) const;
@@ -64,8 +70,12 @@ private:
     AlignedVector<double> values;
     double multiply(double factor, const double* x, double* y) const;
   };
+  static void fill(const Constraints& from, Rows& to);
 
+  bool factorSchur(const SparseCholesky& p, const char* fixed);
+  bool factorRounds(const PointMatrix& pattern, const double* values, const char* fixed);
   void inverse(const double* t, double* mu) const;
+  void solveInRounds(const double* r, const double* g, double* z, double* mu) const;
 
   Constraints c_;
   const SparseCholesky* p_ = nullptr;
@@ -75,6 +85,12 @@ private:
   mutable Eigen::Matrix<double, Eigen::Dynamic, 3> give_;
   PointVector pull_;
   mutable PointVector y_, t_, mu_;   ///< of points each: the kernels read as many points of x as there are rows
+
+  bool many_ = false, in_rounds_ = false;
+  SparseCholesky stiff_;             ///< of P + C^T W C
+  std::vector<char> pattern_fixed_;  ///< points for which its pattern was analysed, and a 1; empty: not yet
+  std::vector<double> weights_;      ///< W
+  mutable PointVector load_, right_;
 };
 
 }  // namespace slender
