@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kStiff = 1e5;   // W over what it takes at least to move a constraint's points alone: what a round leaves is one over it, rounding errors are it times as large
 constexpr int kRounds = 3;       // to rounding
+constexpr int kFewRounds = 2;    // of a preconditioner: the gap that is left is closed when all motions of a step are known
 
 /// Measured: entries of C^T W C against those of S^-1, with their factors.
 bool roundsSuit(const ConstrainedCholesky::Constraints& c)
@@ -125,7 +126,7 @@ bool ConstrainedCholesky::factorRounds(const PointMatrix& pattern, const double*
   PointVector gap(4 * static_cast<std::size_t>(m), 0.0), mu(gap.size()), z(4 * static_cast<std::size_t>(n), 0.0);
   for (int i = 0; i < m; ++i)
     point(gap, i) = Eigen::Vector3d(1.0, i % 2 == 0 ? 1.0 : -1.0, std::cos(static_cast<double>(i) * i));
-  solveInRounds(z.data(), gap.data(), z.data(), mu.data());
+  solveInRounds(z.data(), gap.data(), kRounds, z.data(), mu.data());
   c_rows_.multiply(0.0, z.data(), t_.data());
   double left = 0.0;
   for (int i = 0; i < m; ++i)
@@ -186,7 +187,7 @@ void ConstrainedCholesky::leaveOut(const std::vector<int>& rows)
 }
 
 /// From mu = 0: z is that of the constraints' forces so far and of a stiffness W that closes what they leave open; its forces are the next. 4 doubles each.
-void ConstrainedCholesky::solveInRounds(const double* r, const double* g, double* z, double* mu) const
+void ConstrainedCholesky::solveInRounds(const double* r, const double* g, int rounds, double* z, double* mu) const
 {
   const int m = count(), n = static_cast<int>(c_.cols());
   if (r)
@@ -194,7 +195,7 @@ void ConstrainedCholesky::solveInRounds(const double* r, const double* g, double
   else
     std::fill(load_.begin(), load_.end(), 0.0);
   std::fill_n(mu, 4 * m, 0.0);
-  for (int round = 0; round < kRounds; ++round)
+  for (int round = 0; round < rounds; ++round)
   {
     for (int i = 0; i < m; ++i)
       for (int k = 4 * i; k < 4 * i + 4; ++k)
@@ -216,7 +217,7 @@ void ConstrainedCholesky::inverse(const double* t, double* mu) const
 {
   if (in_rounds_)
   {
-    solveInRounds(nullptr, t, nullptr, mu);
+    solveInRounds(nullptr, t, kRounds, nullptr, mu);
     for (int k = 0; k < 4 * count(); ++k)
       mu[k] = -mu[k];
     return;
@@ -253,7 +254,7 @@ void ConstrainedCholesky::solve(const double* r, const double* g, double* z, dou
       inverse(g, mu_.data());
       norms->load = std::sqrt(load + pointKernels().dot(m, g, mu_.data()));
     }
-    solveInRounds(r, g, z, mu);
+    solveInRounds(r, g, g ? kRounds : kFewRounds, z, mu);
     if (norms)   // load_ is r
     {
       takeOut(mu, load_.data());
@@ -376,7 +377,7 @@ void ConstrainedCholesky::addStiffness(double factor, const double* x, double* y
 void ConstrainedCholesky::multipliers(const double* r, double* mu) const
 {
   if (in_rounds_)
-    return solveInRounds(r, nullptr, nullptr, mu);
+    return solveInRounds(r, nullptr, kRounds, nullptr, mu);
   p_->forwardPoints(r, y_.data());
   v_.multiply(0.0, y_.data(), t_.data());
   inverse(t_.data(), mu_.data());

@@ -230,33 +230,34 @@ TEST(ConstrainedCholesky, MeetsManyConstraintsInRounds)
     Eigen::SparseMatrix<double> kkt(n + m, n + m);
     kkt.setFromTriplets(whole.begin(), whole.end());
     const Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(kkt);
-    const auto expect = [&](const PointVector& load, const PointVector& gap, const PointVector& point_answer, const PointVector& multipliers) {
+    const auto expect = [&](const PointVector& load, const PointVector& gap, const PointVector& point_answer, const PointVector& multipliers,
+                            double tolerance) {
       MatrixXd right(n + m, 3), solution(n + m, 3);
       right << matrixOf(load).transpose(), matrixOf(gap).transpose();
       solution << matrixOf(point_answer).transpose(), matrixOf(multipliers).transpose();
       const MatrixXd expected = lu.solve(right);
-      EXPECT_LT((solution - expected).topRows(n).norm(), 1e-10 * expected.topRows(n).norm()) << pinned;
-      EXPECT_LT((solution - expected).bottomRows(m).norm(), 1e-9 * expected.bottomRows(m).norm()) << pinned;
+      EXPECT_LT((solution - expected).topRows(n).norm(), tolerance * expected.topRows(n).norm()) << pinned;
+      EXPECT_LT((solution - expected).bottomRows(m).norm(), 10 * tolerance * expected.bottomRows(m).norm()) << pinned;
       return expected;
     };
     const PointVector none(4 * m, 0.0), free(4 * n, 0.0);
     ConstrainedCholesky::Norms norms;
     saddle.solve(r.data(), g.data(), z.data(), mu.data(), &norms);
-    const MatrixXd expected = expect(r, g, z, mu);
+    const MatrixXd expected = expect(r, g, z, mu, 1e-10);   // W is 1e5 times as stiff: rounding errors
     const MatrixXd moved = expected.topRows(n);
     EXPECT_NEAR(norms.step, std::sqrt((moved.transpose() * (P.toEigen() * moved)).trace()), 1e-8 * norms.step);
     PointVector gap_alone(4 * m, 0.0), image(4 * n, 0.0);
     saddle.solve(free.data(), g.data(), z.data(), gap_alone.data());
-    expect(free, g, z, gap_alone);
+    expect(free, g, z, gap_alone, 1e-10);
     const double square = -(matrixOf(g).array() * matrixOf(gap_alone).array()).sum();
     EXPECT_NEAR(saddle.norm(g.data()), std::sqrt(square), 1e-9 * std::sqrt(square));
     factor.solvePoints(r.data(), image.data());
     EXPECT_NEAR(norms.load, std::sqrt(square + (matrixOf(r).array() * matrixOf(image).array()).sum()), 1e-9 * norms.load);
-    z = r;   // in its own place, as conjugate gradients do
+    z = r;   // in its own place, in two rounds, as conjugate gradients do
     saddle.solve(z.data(), nullptr, z.data(), mu.data());
-    expect(r, none, z, mu);
-    saddle.multipliers(r.data(), gap_alone.data());
-    EXPECT_EQ(gap_alone, mu);
+    const MatrixXd within = expect(r, none, z, mu, 1e-8);
+    saddle.multipliers(r.data(), mu.data());
+    EXPECT_LT((matrixOf(mu).transpose() - within.bottomRows(m)).norm(), 1e-9 * within.bottomRows(m).norm());
   }
   // two of them the same: nothing to be had in rounds, nor at all
   std::vector<Eigen::Triplet<double>> same;

@@ -40,7 +40,8 @@ public:
     int sweeps = 0;          ///< over all constraints
   };
   /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero, and no `norms`. r may be z. mu: 4 doubles per constraint. Fixed points: r
-  /// must be zero there, and z is.
+  /// must be zero there, and z is. In rounds without g
+  /// there are fewer of them, for preconditioners: about a 1e-9 of z, and of mu, is missing.
   void solve(const double* r, const double* g, double* z, double* mu, Norms* norms = nullptr) const;
   /// z that minimises 1/2 l z . P z - r . z + sum_i bounds_i |gap_i - C_i z| (gap: 4 doubles per constraint): l P z = r + C^T f, where f_i is within its
   /// bound and C_i z = gap_i, or f_i is at it and points along gap_i - C_i z. By block Gauss-Seidel from the f given (4 doubles per constraint) until no
@@ -75,7 +76,7 @@ private:
   bool factorSchur(const SparseCholesky& p, const char* fixed);
   bool factorRounds(const PointMatrix& pattern, const double* values, const char* fixed);
   void inverse(const double* t, double* mu) const;
-  void solveInRounds(const double* r, const double* g, double* z, double* mu) const;
+  void solveInRounds(const double* r, const double* g, int rounds, double* z, double* mu) const;
 
   Constraints c_;
   const SparseCholesky* p_ = nullptr;
