@@ -147,13 +147,13 @@ TrackedCase walkingFigure()
 
 }  // namespace
 
-TrackedCase breathingSurface()
+TrackedCase breathingSurface(int cells, int subdivisions)
 {
   TrackedCase c;
   c.name = "breathing surface";
   c.section = "6.4";
-  c.guide = gridMesh(1.0, 1.0, 4, 4, GridPattern::alternating);
-  c.tracked = subdivide(c.guide, 3);
+  c.guide = gridMesh(1.0, 1.0, cells, cells, GridPattern::alternating);
+  c.tracked = subdivide(c.guide, subdivisions);
   finish(c, subdivisionBasis(c.tracked), 0.2, isotropicMembrane(3e4, 0.3, 1e-3), 3e4 * 1e-9 / (12 * 0.91), 1e-3);
   c.motion = [rest = c.guide.vertices](double t) {
     Eigen::Matrix3Xd x = rest;

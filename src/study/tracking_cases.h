@@ -29,7 +29,7 @@ struct TrackedCase
 /// The four rows of table 6.1: a sheet, a box, a bag, a figure with four limbs.
 std::vector<TrackedCase> thesisCases();
 
-/// A surface whose guide, 25 vertices, expands and contracts rapidly (6.4).
-TrackedCase breathingSurface();
+/// A surface whose guide, cells x cells, expands and contracts rapidly (6.4).
+TrackedCase breathingSurface(int cells = 4, int subdivisions = 3);
 
 }  // namespace slender::study

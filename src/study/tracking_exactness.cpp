@@ -33,6 +33,7 @@ std::vector<Scene> scenes(bool quick)
   all.push_back({"box", box});
   all.push_back({"box, full Newton", box, true});
   all.push_back({"breathing surface", breathingSurface()});
+  all.push_back({"breathing surface, a guide of a fourth of the vertices", breathingSurface(30, 1)});
   Scene wind{"sheet in wind of 15 m/s", sheet};
   wind.cloth.wind = Eigen::Vector3d(-15, 3, 2);
   auto blown = std::make_shared<ClothModel>(*sheet.model);
