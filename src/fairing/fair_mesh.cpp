@@ -40,6 +40,17 @@ double meanEdge(const TriangleMesh& mesh, const MeshTopology& topology)
   return sum / static_cast<double>(topology.edges.cols());
 }
 
+void checkSmoothing(double length, const TriangleMesh& mesh)
+{
+  const double mean = meanEdge(mesh, meshTopology(mesh));
+  if (length >= mean / kSmoothingRange && length <= mean * kSmoothingRange)
+    return;
+  std::ostringstream why;
+  why << "the smoothing length is " << length << " m; must be from " << mean / kSmoothingRange << " m to " << mean * kSmoothingRange
+      << " m (a thousandth of the mean edge length to a thousand times it), or zero for the default";
+  throw std::invalid_argument(why.str());
+}
+
 bool fillHoles(TriangleMesh& mesh, const FairingOptions& options, const FairingProgress& progress, FairingSummary& summary)
 {
   const auto loops = meshTopology(mesh).boundaries;   // later vertices are added behind: these stay valid
@@ -75,14 +86,7 @@ bool smooth(TriangleMesh& mesh, const FairingOptions& options, const FairingProg
     selected.push_back(std::any_of(options.region.begin(), options.region.end(), [&](const FairingOptions::Ball& ball) {
       return (mesh.vertices.col(v) - ball.middle).norm() <= ball.radius;
     }));
-  const double mean = meanEdge(mesh, topology), length = options.smoothing > 0 ? options.smoothing : mean;
-  if (!(length >= mean / kSmoothingRange && length <= mean * kSmoothingRange))
-  {
-    std::ostringstream why;
-    why << "the smoothing length is " << length << " m; must be from " << mean / kSmoothingRange << " m to " << mean * kSmoothingRange
-        << " m (a thousandth of the mean edge length to a thousand times it), or zero for the default";
-    throw std::invalid_argument(why.str());
-  }
+  const double length = options.smoothing > 0 ? options.smoothing : meanEdge(mesh, topology);
   WillmoreFlow flow(mesh, topology, std::pow(length, 4), kIterations, selected);
   summary.energy_before = summary.energy = flow.energy(mesh.vertices);
   for (int k = 0; k < options.steps && !summary.stationary; ++k)
@@ -109,6 +113,8 @@ FairingSummary fairMesh(TriangleMesh& mesh, const std::string& name, const Fairi
 {
   checkOptions(options);
   requireSoundMesh(mesh, name);
+  if (options.smoothing > 0)
+    checkSmoothing(options.smoothing, mesh);
   FairingSummary summary;
   TriangleMesh faired = mesh;
   summary.ok = (!options.fill_holes || fillHoles(faired, options, progress, summary)) && (options.steps == 0 || smooth(faired, options, progress, summary));

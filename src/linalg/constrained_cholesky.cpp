@@ -11,17 +11,21 @@ namespace slender {
 
 namespace {
 
-constexpr double kStiff = 1e5;   // W over what it takes at least to move a constraint's points alone: what a round leaves is one over it, rounding errors are it times as large
+constexpr double kStiff = 2e5;   // W over what it takes to move a constraint's points apart from all others: a round leaves one over it, rounding errors are it times as large
 constexpr int kRounds = 3;       // to rounding
 constexpr int kFewRounds = 2;    // of a preconditioner: the gap that is left is closed when all motions of a step are known
 
-/// Measured: entries of C^T W C against those of S^-1, with their factors.
+/// Measured: entries of C^T W C, and of a factor without it, against those of S^-1.
 bool roundsSuit(const ConstrainedCholesky::Constraints& c)
 {
+  constexpr Eigen::Index kLeast = 400;
+  const double m = static_cast<double>(c.rows()), n = static_cast<double>(c.cols());
+  if (c.rows() < kLeast || c.rows() > c.cols() || m * m < 25.0 * n)
+    return false;
   double entries = 0.0;
   for (Eigen::Index i = 0; i < c.rows(); ++i)
     entries += std::pow(static_cast<double>(c.row(i).nonZeros()), 2);
-  return entries < 2.0 * static_cast<double>(c.rows()) * static_cast<double>(c.rows());
+  return entries < 2.0 * m * m;
 }
 
 /// Lower triangle of a positive definite matrix: its factor.
@@ -95,16 +99,19 @@ bool ConstrainedCholesky::factorRounds(const PointMatrix& pattern, const double*
   for (int i = 0; i < n; ++i)
     for (int k = pattern.starts()[i]; k < pattern.starts()[i + 1]; ++k)
       entries.emplace_back(i, pattern.column(k), values[k]);
-  Eigen::SparseMatrix<double> p(n, n);
+  Constraints p(n, n);
   p.setFromTriplets(entries.begin(), entries.end());
+  fill(p, p_rows_);
+  const Eigen::VectorXd diagonal = p.diagonal();
   Constraints c = c_;
   c.prune([fixed](Eigen::Index, Eigen::Index point, double) { return !fixed || !fixed[point]; });
-  const Constraints cp = c * p;
   weights_.resize(m);
   for (int i = 0; i < m; ++i)
   {
-    const double square = c.row(i).squaredNorm();
-    weights_[i] = kStiff * c.row(i).dot(cp.row(i)) / (square * square);   // at least 1 / S_ii, by the Cauchy-Schwarz inequality
+    double give = 0.0;
+    for (Constraints::InnerIterator entry(c, i); entry; ++entry)
+      give += entry.value() * entry.value() / diagonal[entry.col()];
+    weights_[i] = kStiff / give;
     if (!std::isfinite(weights_[i]))
       return false;
   }
@@ -122,11 +129,11 @@ bool ConstrainedCholesky::factorRounds(const PointMatrix& pattern, const double*
   if (!stiff_.factor(stiff, fixed))
     return false;
   // a gap that is as rough as one can be
-  constexpr double kLeft = 1e-9;
+  constexpr double kLeft = 1e-8;
   PointVector gap(4 * static_cast<std::size_t>(m), 0.0), mu(gap.size()), z(4 * static_cast<std::size_t>(n), 0.0);
   for (int i = 0; i < m; ++i)
     point(gap, i) = Eigen::Vector3d(1.0, i % 2 == 0 ? 1.0 : -1.0, std::cos(static_cast<double>(i) * i));
-  solveInRounds(z.data(), gap.data(), kRounds, z.data(), mu.data());
+  solveInRounds(z.data(), gap.data(), kFewRounds, z.data(), mu.data());
   c_rows_.multiply(0.0, z.data(), t_.data());
   double left = 0.0;
   for (int i = 0; i < m; ++i)
@@ -215,13 +222,6 @@ void ConstrainedCholesky::solveInRounds(const double* r, const double* g, int ro
 /// mu = S^-1 t of what is not left out (Woodbury's formula)
 void ConstrainedCholesky::inverse(const double* t, double* mu) const
 {
-  if (in_rounds_)
-  {
-    solveInRounds(nullptr, t, kRounds, nullptr, mu);
-    for (int k = 0; k < 4 * count(); ++k)
-      mu[k] = -mu[k];
-    return;
-  }
   s_inverse_.multiply(0.0, t, mu);
   const auto k = static_cast<Eigen::Index>(left_out_.size());
   if (k == 0)
@@ -251,15 +251,11 @@ void ConstrainedCholesky::solve(const double* r, const double* g, double* z, dou
     {
       p_->forwardPoints(r, y_.data());
       const double load = pointKernels().dot(n, y_.data(), y_.data());
-      inverse(g, mu_.data());
-      norms->load = std::sqrt(load + pointKernels().dot(m, g, mu_.data()));
+      norms->load = std::hypot(std::sqrt(load), norm(g));
     }
     solveInRounds(r, g, g ? kRounds : kFewRounds, z, mu);
-    if (norms)   // load_ is r
-    {
-      takeOut(mu, load_.data());
-      norms->step = std::sqrt(std::max(pointKernels().dot(n, z, load_.data()), 0.0));
-    }
+    if (norms)   // y_ is z
+      norms->step = std::sqrt(std::max(p_rows_.multiply(0.0, y_.data(), load_.data()), 0.0));
     return;
   }
   p_->forwardPoints(r, y_.data());
@@ -362,6 +358,11 @@ void ConstrainedCholesky::addForces(const double* f, double* r) const
 
 double ConstrainedCholesky::norm(const double* g) const
 {
+  if (in_rounds_)   // of z, whose errors are small where those of mu, times W, are not
+  {
+    solveInRounds(nullptr, g, kRounds, nullptr, mu_.data());
+    return std::sqrt(std::max(p_rows_.multiply(0.0, y_.data(), load_.data()), 0.0));
+  }
   std::copy_n(g, 4 * count(), t_.data());
   inverse(t_.data(), mu_.data());
   return std::sqrt(std::max(pointKernels().dot(count(), t_.data(), mu_.data()), 0.0));

@@ -122,33 +122,36 @@ void WeakConstraints::requireIndependent(const std::vector<char>& held) const
       throw std::invalid_argument("test function '" + names_[i] + "' acts on held vertices only: leave it out or release some");
     free.row(i) *= 1.0 / length;
   }
-  // Pivots of the rows' Gram matrix are squares of their distances from the span of those eliminated before.
-  constexpr double kDependent = 1e-10;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> gram;
-  gram.setShift(1e-3 * kDependent);   // it stops at pivots that are zero
-  gram.compute(Eigen::SparseMatrix<double>(free * free.transpose()));
-  const Eigen::VectorXd pivots = gram.vectorD();
-  const auto first = std::find_if(pivots.begin(), pivots.end(), [](double pivot) { return !(pivot > kDependent); });
-  if (first == pivots.end())
+  // The smallest eigenvalue of the rows' Gram matrix, and what combination of them leaves so little, by inverse iteration.
+  constexpr double kDependent = 1e-11, kShift = 1e-13;
+  const Eigen::SparseMatrix<double> gram(free * free.transpose());
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor;
+  double shift = kShift;
+  do   // it stops at pivots that are zero
+  {
+    factor.setShift(shift);
+    factor.compute(gram);
+    shift *= 2.0;
+  }
+  while (factor.info() != Eigen::Success);
+  Eigen::VectorXd x(count());
+  for (int i = 0; i < count(); ++i)
+    x[i] = std::cos(static_cast<double>(i) * i);
+  for (int k = 0; k < 4; ++k)
+    x = Eigen::VectorXd(factor.solve(x)).normalized();
+  if (!(x.dot(gram * x) <= kDependent))
     return;
-  // The row that is left with nothing is this sum of those before it: l^T share = its row of L.
-  const Eigen::Index rest = first - pivots.begin();
-  const Eigen::SparseMatrix<double> l = gram.matrixL();
-  Eigen::VectorXd share = -Eigen::VectorXd::Unit(count(), rest);
-  for (Eigen::Index j = rest - 1; j >= 0; --j)
-    for (Eigen::SparseMatrix<double>::InnerIterator at(l, j); at; ++at)
-      if (at.row() > j && at.row() <= rest)
-        share[j] -= at.value() * share[at.row()];
-  const Eigen::VectorXd shares = gram.permutationPinv() * share;
   std::vector<int> parts;
   for (int i = 0; i < count(); ++i)
-    if (std::abs(shares[i]) > 1e-3 * shares.lpNorm<Eigen::Infinity>())
+    if (std::abs(x[i]) > 1e-3 * x.lpNorm<Eigen::Infinity>())
       parts.push_back(i);
   std::string others;
   for (std::size_t k = 0; k + 1 < parts.size() && k < 5; ++k)
     others += (others.empty() ? "'" : ", '") + names_[parts[k]] + "'";
   if (parts.size() > 6)
     others += " and " + std::to_string(parts.size() - 6) + " more";
+  if (others.empty())
+    others = "very many others";
   throw std::invalid_argument("test function '" + names_[parts.back()] + "' depends on " + others +
                               (held.empty() ? "" : " (on the vertices that are not held)") + ": leave it out or change its region");
 }

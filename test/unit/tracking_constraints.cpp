@@ -89,6 +89,11 @@ TEST(WeakConstraints, NamesEmptyAndDependentFunctions)
   EXPECT_NE(dependent.find("'all' depends on 'left', 'right'"), std::string::npos) << dependent;
   EXPECT_NE(messageOf([&] { paint({{"left", left, {}}}); }).find("'left': has no vertices on the tracked mesh"), std::string::npos);
   EXPECT_NE(messageOf([&] { paint({{"left", {99}, left}}); }).find("vertex 99 is not on the guide mesh"), std::string::npos);
+  // whatever order they come in: all but a corner, all, the corner
+  std::vector<int> most = all;
+  most.pop_back();
+  const std::string corner = messageOf([&] { paint({{"most", most, most}, {"all", all, all}, {"corner", {n - 1}, {n - 1}}}).requireIndependent({}); });
+  EXPECT_NE(corner.find("'corner' depends on 'most', 'all'"), std::string::npos) << corner;
   // among thousands, too: in time that grows with the overlaps, not with all pairs
   const TriangleMesh large = gridMesh(1.0, 1.0, 60, 60, GridPattern::alternating);
   TestFunctions hats = subdivisionBasis(subdivide(large, 0));
@@ -259,6 +264,20 @@ TEST(ConstrainedCholesky, MeetsManyConstraintsInRounds)
     saddle.multipliers(r.data(), mu.data());
     EXPECT_LT((matrixOf(mu).transpose() - within.bottomRows(m)).norm(), 1e-9 * within.bottomRows(m).norm());
   }
+  // more of them than points, or few: not in rounds, whatever they reach
+  ConstrainedCholesky::Constraints unit(500, 20);
+  for (int i = 0; i < 500; ++i)
+    unit.insert(i, i % 20) = 1.0;
+  std::vector<Eigen::Triplet<double>> ones;
+  for (int i = 0; i < 20; ++i)
+    ones.emplace_back(i, i, 1.0);
+  const PointMatrix identity(20, ones);
+  SparseCholesky small;
+  small.setPattern(identity);
+  ASSERT_TRUE(small.factor(identity, nullptr));
+  ConstrainedCholesky crowded;
+  crowded.setConstraints(unit);
+  EXPECT_FALSE(crowded.factor(identity, identity.values().data(), small, nullptr));
   // two of them the same: nothing to be had in rounds, nor at all
   std::vector<Eigen::Triplet<double>> same;
   for (int i = 0; i < m; ++i)

@@ -41,7 +41,7 @@ public:
   };
   /// z = P^-1 (r - C^T mu) with C z = g; g (4 doubles per constraint) null: zero, and no `norms`. r may be z. mu: 4 doubles per constraint. Fixed points: r
   /// must be zero there, and z is. In rounds without g
-  /// there are fewer of them, for preconditioners: about a 1e-9 of z, and of mu, is missing.
+  /// there are fewer of them, for preconditioners: a 1e-8 of z, and of mu, may be missing.
   void solve(const double* r, const double* g, double* z, double* mu, Norms* norms = nullptr) const;
   /// z that minimises 1/2 l z . P z - r . z + sum_i bounds_i |gap_i - C_i z| (gap: 4 doubles per constraint): l P z = r + C^T f, where f_i is within its
   /// bound and C_i z = gap_i, or f_i is at it and points along gap_i - C_i z. By block Gauss-Seidel from the f given (4 doubles per constraint) until no
@@ -56,7 +56,8 @@ public:
   void addForces(const double* f, double* r) const;
   /// sqrt(g . S^-1 g), in the norm of P: of the smallest z that has C z = g.
   double norm(const double* g) const;
-  /// y += factor C^T S^-1 C x, but for fixed points, where x must be zero: `factor` times as stiff along the constraints as P is.
+  /// y += factor C^T S^-1 C x, but for fixed points, where x must be zero: `factor` times as stiff along the constraints as P is. Not in rounds, which take hundreds of
+  /// constraints.
   void addStiffness(double factor, const double* x, double* y) const;
   /// mu alone, g zero: half the work.
   void multipliers(const double* r, double* mu) const;
@@ -91,6 +92,7 @@ private:
   SparseCholesky stiff_;             ///< of P + C^T W C
   std::vector<char> pattern_fixed_;  ///< points for which its pattern was analysed, and a 1; empty: not yet
   std::vector<double> weights_;      ///< W
+  Rows p_rows_;
   mutable PointVector load_, right_;
 };
 
