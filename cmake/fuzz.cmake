@@ -15,7 +15,7 @@ foreach(source ${fuzzers})
 endforeach()
 add_custom_target(fuzzers DEPENDS ${FUZZERS})
 if(TARGET fuzz_messages)   # what turns messages into the solver's types; nothing of it talks to a master
-  foreach(part converters guide_buffer point_guide_buffer)
+  foreach(part converters guide_buffer guide_timing point_guide_buffer)
     target_sources(fuzz_messages PRIVATE ${PROJECT_SOURCE_DIR}/src/node/${part}.cpp)
   endforeach()
   add_dependencies(fuzz_messages ${PROJECT_NAME}_generate_messages_cpp)

@@ -22,7 +22,8 @@ if(BUILD_TESTING)
   add_executable(node_unit_tests
     ${PROJECT_SOURCE_DIR}/test/nodes/guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/converters_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/bag_recorder_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/markers_test.cpp
-    ${PROJECT_SOURCE_DIR}/test/nodes/point_guide_buffer_test.cpp)
+    ${PROJECT_SOURCE_DIR}/test/nodes/point_guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/late_guides_test.cpp
+    ${PROJECT_SOURCE_DIR}/test/nodes/step_gaps_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/guide_gaps_test.cpp)
   target_compile_definitions(node_unit_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   find_package(GTest REQUIRED)
   target_link_libraries(node_unit_tests PRIVATE slender_sim_node GTest::gtest GTest::gtest_main)

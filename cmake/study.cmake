@@ -1,7 +1,7 @@
 # The study program: experiments behind the package's claims, without ROS.
 file(GLOB STUDY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/study/*.cpp)
 # Scenes that studies run, and what they refer to, are built in: `study` finds them wherever it is installed, and they are those of the package.
-foreach(path scenes/backflip.yaml scenes/chain.yaml scenes/cloth_on_branch.yaml scenes/hair.yaml scenes/knot_twist.yaml scenes/plectoneme.yaml scenes/tree.yaml
+foreach(path scenes/backflip.yaml scenes/chain.yaml scenes/cloth_on_branch.yaml scenes/hair.yaml scenes/helical_buckling.yaml scenes/knot_twist.yaml scenes/plectoneme.yaml scenes/tree.yaml
         meshes/bag.obj motion/backflip_keys.csv)
   set(package_file ${PROJECT_SOURCE_DIR}/config/${path})
   file(READ ${package_file} file_text)
@@ -12,12 +12,12 @@ configure_file(${CMAKE_CURRENT_LIST_DIR}/package_scenes.cpp.in ${PROJECT_BINARY_
 add_library(slender_sim_studies STATIC ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)
 target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include PRIVATE ${PROJECT_SOURCE_DIR})
 target_link_libraries(slender_sim_studies PUBLIC slender_sim)
-# Tells instructions apart by the lines that they come from.
-set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/lean.cpp PROPERTY COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+# lean tells instructions apart by the lines that they come from; repeatability runs the scenes of the package.
+set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/repeatability.cpp PROPERTY COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 
 # `study` is too common a name for a target in a shared catkin workspace.
 set(TOOLS ${PROJECT_SOURCE_DIR}/src/tools)
-add_executable(slender_sim_study_program ${TOOLS}/study.cpp ${TOOLS}/study_report.cpp ${TOOLS}/report_page.cpp)
+add_executable(slender_sim_study_program ${TOOLS}/study.cpp ${TOOLS}/study_check.cpp ${TOOLS}/study_report.cpp ${TOOLS}/report_page.cpp)
 set_target_properties(slender_sim_study_program PROPERTIES OUTPUT_NAME study)
 target_link_libraries(slender_sim_study_program PRIVATE slender_sim_studies)
 add_executable(slender_sim_sweep_program ${TOOLS}/sweep.cpp ${TOOLS}/sweep_runs.cpp ${TOOLS}/sweep_engines.cpp)
@@ -48,4 +48,6 @@ if(BUILD_TESTING)
   add_dependencies(study_tests slender_sim_sweep_program slender_sim_study_program)
   set_target_properties(study_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
   add_test(NAME study COMMAND study_tests)
+  # The quick form of every study, judged. Two at a time, as many as the smallest machine has cores.
+  add_test(NAME studies COMMAND slender_sim_study_program check --jobs 2 --xml ${PROJECT_BINARY_DIR}/test_results/studies.xml)
 endif()

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "cloth_system.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -305,7 +306,7 @@ LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matri
         break;
     }
     ++linear_iterations;
-    if (budget_->spent())
+    if (budget_->spent() || stepsInterrupted())
       return LinearOutcome::not_converged;
     averages_->addForces(b.pulls.data(), right_.data());
     double along = 0.0;

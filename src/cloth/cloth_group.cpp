@@ -9,6 +9,7 @@
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/contact/intersection.h"
 #include "slender_sim/dynamics/integrator.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -121,15 +122,21 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   {
     const double end = done + share > 1.0 - 1e-9 ? 1.0 : done + share;
     const StepReport sub = substep(inputs, done, end, duration);
-    if (!sub.ok)
+    if (!sub.ok || stepsInterrupted())   // then collision handling and linear solvers may have ended early
     {
       report.iterations += sub.iterations;
-      if (sub.failure == StepFailure::input_not_finite || hopeless_ || budget_->spent() || 0.5 * share < shortest)
+      if (sub.failure == StepFailure::input_not_finite || stepsInterrupted() || hopeless_ || budget_->spent() || 0.5 * share < shortest)
       {
         report.ok = false;
         report.failure = sub.failure;
         report.message = sub.message;
         report.work = budget_->done();
+        if (stepsInterrupted())
+        {
+          report.failure = StepFailure::work_exceeded;
+          report.message = std::string("cloths: ") + kStepInterrupted;
+          return report;
+        }
         if (!hopeless_ && sub.failure != StepFailure::input_not_finite && budget_->spent())
           blameWork((end - done) * duration, report);
         blameExplicit(duration, report);

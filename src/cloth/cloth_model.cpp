@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <stdexcept>
 
 #include "slender_sim/energy/isometric_bending.h"
@@ -40,6 +41,62 @@ ClothModel buildCloth(const std::string& name, const TriangleMesh& rest, double 
   return model;
 }
 
+namespace {
+
+/// Angles between the faces of the undeformed shape, one per hinge [rad].
+Eigen::VectorXd restAngles(const ClothModel& model)
+{
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(model.topology.hingeCount());
+  const HingeBending hinges(model.topology.hinges, none, none);
+  PointVector points;
+  toPoints(model.undeformed.cols() ? model.undeformed : model.rest.vertices, points);
+  Eigen::VectorXd angles(hinges.paddedCount());
+  if (hinges.count() > 0)
+    hinges.angles(points.data(), angles.data());
+  return angles.head(hinges.count());
+}
+
+void checkUndeformed(const ClothModel& model)
+{
+  if (model.undeformed.cols() != 0 && (model.undeformed.cols() != model.vertices() || !model.undeformed.allFinite()))
+    throw std::invalid_argument("cloth '" + model.name + "': the undeformed shape needs " + std::to_string(model.vertices()) + " finite vertices, got " +
+                                std::to_string(model.undeformed.cols()));
+}
+
+std::string degrees(double radians)
+{
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g degrees", radians * 180 / M_PI);
+  return text;
+}
+
+}  // namespace
+
+double largestRestAngle(const ClothModel& model)
+{
+  return model.topology.hingeCount() > 0 ? restAngles(model).cwiseAbs().maxCoeff() : 0.0;
+}
+
+double restAngleLimit(const ClothModel& model)
+{
+  return 1e-8 / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, model.rest.triangles.cols())));
+}
+
+void checkBending(const ClothModel& model)
+{
+  const std::string who = "cloth '" + model.name + "': ";
+  checkUndeformed(model);
+  const bool isometric = model.bending == BendingModel::isometric_nonconforming || model.bending == BendingModel::isometric_conforming;
+  if (model.bending_poissons_ratio && !(*model.bending_poissons_ratio > -1.0 && *model.bending_poissons_ratio < 1.0))
+    throw std::invalid_argument(who + "Poisson's ratio of bending must be in (-1, 1), got " + std::to_string(*model.bending_poissons_ratio));
+  if (isometric && model.bending_modulus > 0 && !restsFlat(model))
+    throw std::invalid_argument(who + "its shape at rest is curved (adjacent faces enclose up to " + degrees(largestRestAngle(model)) +
+                                "), and the constant matrix of isometric bending would flatten it; use bending: {model: hinge}");
+  if (model.bending_poissons_ratio && model.bending != BendingModel::isometric_nonconforming)
+    throw std::invalid_argument(who + "bending: {poissons_ratio} is for bending: {model: isometric} of flat shapes at rest. Hinges have the ratio of "
+                                "their mesh (-1/3 on equilateral triangles), conforming bending has 1: leave poissons_ratio out");
+}
+
 ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& vertices)
 {
   if (vertices.cols() != model.vertices() || !vertices.allFinite())
@@ -48,20 +105,12 @@ ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& verti
   ClothState state;
   state.x = vertices;
   state.v = Eigen::Matrix3Xd::Zero(3, vertices.cols());
-  if (model.undeformed.cols() != 0 && (model.undeformed.cols() != model.vertices() || !model.undeformed.allFinite()))
-    throw std::invalid_argument("cloth '" + model.name + "': the undeformed shape needs " + std::to_string(model.vertices()) + " finite vertices, got " +
-                                std::to_string(model.undeformed.cols()));
+  checkUndeformed(model);
   if (model.bending == BendingModel::hinge)
   {
-    const Eigen::VectorXd none = Eigen::VectorXd::Zero(model.topology.hingeCount());
-    const HingeBending hinges(model.topology.hinges, none, none);
-    PointVector points;
-    toPoints(model.undeformed.cols() ? model.undeformed : model.rest.vertices, points);
-    Eigen::VectorXd angles(hinges.paddedCount());
-    hinges.angles(points.data(), angles.data());
-    state.rest_angles = angles.head(hinges.count());
+    state.rest_angles = restAngles(model);
     if (std::isfinite(model.plasticity.yield_curvature))
-      state.stiffening = Eigen::VectorXd::Ones(hinges.count());
+      state.stiffening = Eigen::VectorXd::Ones(state.rest_angles.size());
   }
   return state;
 }

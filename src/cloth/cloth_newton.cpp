@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "cloth_stepper_impl.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -98,7 +99,7 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
     ClothEvaluation here = system.evaluateHessian(x_, kind);
     if (!std::isfinite(here.energy()))
       return StepFailure::state_not_finite;
-    if (budget_->spent())
+    if (budget_->spent() || stepsInterrupted())
       return StepFailure::work_exceeded;
     if (!strict && here.energy() > best + 1e-13 * here.magnitude())
     {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "cloth_stepper_impl.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -17,13 +18,15 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
   if (o.integrator != Integrator::implicit_euler && o.integrator != Integrator::tr_bdf2 && !isExplicit())
     throw std::invalid_argument(who + "integrator must be implicit_euler, tr_bdf2, imex or symplectic_euler");
   if (o.integrator == Integrator::imex && model->bending == BendingModel::hinge)
-    throw std::invalid_argument(who + "imex needs a constant matrix: bending must be isometric or none, or use another integrator");
+    throw std::invalid_argument(who + "imex needs a constant matrix, which only isometric bending of a flat rest shape has: use implicit_euler or tr_bdf2, "
+                                "or bending: {model: none}");
   if (!(o.error_tolerance >= 0) || !std::isfinite(o.error_tolerance) || !(o.min_step > 0))
     throw std::invalid_argument(who + "error_tolerance must be zero or more, min_step positive");
   if (o.error_tolerance > 0 && isExplicit())
     throw std::invalid_argument(who + "error_tolerance is for implicit_euler and tr_bdf2; leave it out, or use one of these");
   if (!(o.linear_tolerance > 0 && o.linear_tolerance < 1))
     throw std::invalid_argument(who + "linear_tolerance must be in (0, 1)");
+  checkBending(*model);
   for (const double value : {model->bending_modulus, model->mass_damping, model->stiffness_damping, model->wind_coefficient})
     if (!(value >= 0) || !std::isfinite(value))
       throw std::invalid_argument(who + "bending modulus, damping and wind coefficient must be zero or more");
@@ -178,6 +181,8 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
       failure = imexStep(inputs, t, to, duration, sub);
     else
       failure = isExplicit() ? explicitStep(inputs, t, to, duration, sub) : implicitStep(inputs, t, to, duration, sub);
+    if (stepsInterrupted())   // linear solvers may have ended early
+      return refuse(report, StepFailure::work_exceeded, kStepInterrupted);
     const double ratio = adaptive ? sub.error_estimate / options.error_tolerance : 0.0;
     const bool inaccurate = failure == StepFailure::none && ratio > 1 && 0.5 * length >= options.min_step;
     if (failure != StepFailure::none || inaccurate)

@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "slender_sim/energy/plate_bending.h"
+
 namespace slender {
 
 namespace {
@@ -50,7 +52,8 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     if (hinges_ && std::isfinite(model.plasticity.yield_curvature))
       hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient);
     if (constant_bending_ || solver_ == ClothSolver::conjugate_gradients)
-      bending_ = isometricBending(model.rest, t, element, coefficient);
+      bending_ = model.bending_poissons_ratio ? plateBending(model.rest, t, *model.bending_poissons_ratio, model.bending_modulus)
+                                              : isometricBending(model.rest, t, element, coefficient);
   }
   std::vector<Eigen::MatrixXi> elements{model.rest.triangles};
   if (hinges_)

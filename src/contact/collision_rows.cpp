@@ -1,4 +1,5 @@
 #include "collision_rows.h"
+#include "slender_sim/linalg/interruption.h"
 
 #include <algorithm>
 #include <cmath>
@@ -67,7 +68,7 @@ void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen
       largest = std::max(largest, r.bound - r.normal.dot(relative(r)));
   }
   const long looked_at = static_cast<long>(rows.size()) / 8;   // work of a sweep that does nothing
-  for (int sweep = 0; sweep < sweeps && !budget.spent(); ++sweep)
+  for (int sweep = 0; sweep < sweeps && !budget.spent() && !stepsInterrupted(); ++sweep)
   {
     long work = looked_at;
     const double relaxation = sweep == 0 ? 1.0 : kOverRelaxation;

@@ -4,6 +4,7 @@
 
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/dynamics/newton.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -53,7 +54,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   for (int k = 0;; ++k)
   {
     double reached = to;
-    const Approach approach = k == kMaxApproaches ? Approach::squeezed : system.approach(from, to, reached);
+    const Approach approach = k == kMaxApproaches || stepsInterrupted() ? Approach::squeezed : system.approach(from, to, reached);
     if (approach == Approach::squeezed)
     {
       total.failure = StepFailure::squeezed;
@@ -70,6 +71,11 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   for (int k = 0, failures = 0;; ++k)
   {
     const bool good = solve(fine, 0.01);
+    if (stepsInterrupted())
+    {
+      total.failure = StepFailure::work_exceeded;
+      return total;
+    }
     const bool softer = system.contact().stiffen(good);
     if (!good && !(softer && ++failures <= kMaxFailures))
       return total;

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "surface_collider_impl.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -328,14 +329,14 @@ CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen:
   hits_.clear();
   rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
   detect();
-  while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds && !budget_->spent())
+  while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds && !budget_->spent() && !stepsInterrupted())
   {
     addHits();
     rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
     detect();
   }
   displacement_ = to_ - from_;
-  while (!budget_->spent() && joinHits())
+  while (!budget_->spent() && !stepsInterrupted() && joinHits())
   {
     if (!moveZones())
       return report_;

@@ -26,6 +26,9 @@ void StepReport::merge(const StepReport& other)
   residual = std::max(residual, other.residual);
   max_strain = std::max(max_strain, other.max_strain);
   stable = stable && other.stable;
+  energy += other.energy;
+  lowest_eigenvalue = std::min(lowest_eigenvalue, other.lowest_eigenvalue);
+  escapes += other.escapes;
   projection_iterations = std::max(projection_iterations, other.projection_iterations);
   constraint_error = std::max(constraint_error, other.constraint_error);
   tracking_error = std::max(tracking_error, other.tracking_error);

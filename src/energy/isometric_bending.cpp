@@ -16,13 +16,7 @@ using Eigen::Vector3d;
 /// Cotangent of the angle between two vectors.
 double cotangent(const Vector3d& u, const Vector3d& v) { return u.dot(v) / u.cross(v).norm(); }
 
-/// The row L-tilde of a hinge (thesis 2.4.4) and the area of its two faces.
-struct HingeRow
-{
-  Eigen::Vector4i vertices;
-  Eigen::Vector4d weights;   ///< [-]
-  double area;               ///< [m^2]
-};
+}  // namespace
 
 HingeRow hingeRow(const TriangleMesh& mesh, const MeshTopology& t, Eigen::Index h)
 {
@@ -37,6 +31,8 @@ HingeRow hingeRow(const TriangleMesh& mesh, const MeshTopology& t, Eigen::Index 
   row.area = 0.5 * (e.cross(p(2) - p(0)).norm() + e.cross(p(3) - p(0)).norm());
   return row;
 }
+
+namespace {
 
 /// Rows of the cotangent Laplacian: weights of the neighbours; the vertex itself has minus their sum.
 std::vector<std::vector<std::pair<int, double>>> cotangentRows(const TriangleMesh& mesh, const MeshTopology& t)

@@ -7,6 +7,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "slender_sim/linalg/interruption.h"
+
 namespace slender {
 
 SymmetricSweeps::SymmetricSweeps(const BlockMatrix& a, const PointMatrix* b) : a_(&a), b_(b)
@@ -181,7 +183,7 @@ void SymmetricSweeps::iterate(const ConstrainedCholesky* constraints, double sti
   result.scale = scale;
   result.residual = std::sqrt(std::max(rz, 0.0)) / scale;
   std::copy(z_.begin(), z_.end(), p_.begin());
-  while (result.definite && result.residual > tolerance && result.iterations < max_iterations)
+  while (result.definite && result.residual > tolerance && result.iterations < max_iterations && !stepsInterrupted())
   {
     k.sweepUp(swept_, p_.data(), t_.data());
     k.multiplyDiagonal(n, diagonal_.data(), t_.data(), q_.data());

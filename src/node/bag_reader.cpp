@@ -18,6 +18,7 @@
 
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_messages.h"
+#include "slender_sim/node/step_gaps.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 
@@ -158,6 +159,8 @@ struct BagReader::Contents
   std::int64_t stamp = 0;
   std::uint64_t step = 0;
   bool step_known = false;    ///< of this instant
+  std::uint32_t epoch = 0;
+  StepGaps gaps;
 
   SceneSnapshot* out = nullptr;   ///< what the streams fill
 
@@ -346,6 +349,7 @@ void BagReader::Contents::add(const slender_sim::RodState& rod)
             rod.radii.size() == edges && (rod.radii_b.empty() || rod.radii_b.size() == edges),
           "rod " + rod.name);
   step = rod.step;
+  epoch = rod.epoch;
   step_known = true;
   out->rods.push_back({rod.name, rod.closed != 0, columns(rod.nodes), columns(rod.velocities), quaternions(rod.frames), numbers(rod.twists),
                        numbers(rod.radii), numbers(rod.radii_b.empty() ? rod.radii : rod.radii_b)});
@@ -364,6 +368,7 @@ void BagReader::Contents::add(const slender_sim::ThreadState& thread)
             thread.deposited.size() == nodes && thread.radii.size() == edges,
           "thread " + thread.name);
   step = thread.step;
+  epoch = thread.epoch;
   step_known = true;
   out->threads.push_back({thread.name, thread.thread_id, thread.ids, columns(thread.nodes), columns(thread.velocities), thread.deposited,
                           quaternions(thread.frames), numbers(thread.radii)});
@@ -378,6 +383,7 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
             cloths.function_offsets.size() == count && cloths.function_sets.size() == count,
           "state");
   step = cloths.step;
+  epoch = cloths.epoch;
   step_known = true;
   const auto range = [count](const std::vector<std::uint32_t>& offsets, std::size_t k, std::size_t size) {
     const std::size_t first = offsets[k], last = k + 1 < count ? offsets[k + 1] : size;
@@ -474,11 +480,14 @@ bool BagReader::next(SceneSnapshot& out)
     c.step = step_before + static_cast<std::uint64_t>(std::llround(1e-9 * static_cast<double>(c.stamp - before) / c.step_length));
   if (!c.first_stamp)
     c.first_stamp = c.stamp;
+  if (c.step_known)
+    c.gaps.add(c.epoch, c.step, 1e-9 * static_cast<double>(c.stamp - *c.first_stamp));
   out.time = static_cast<double>(c.step) * c.step_length;
   return true;
 }
 
 double BagReader::seconds() const { return 1e-9 * static_cast<double>(contents_->stamp - contents_->first_stamp.value_or(contents_->stamp)); }
+std::string BagReader::gaps() const { return contents_->gaps.text(contents_->step_length); }
 const SceneConfig* BagReader::scene() const { return contents_->scene ? &*contents_->scene : nullptr; }
 const std::string& BagReader::sceneProblem() const { return contents_->scene_problem; }
 std::size_t BagReader::messages() const { return contents_->messages; }

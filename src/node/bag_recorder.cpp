@@ -19,6 +19,7 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
   const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
   state_topic_ = prefix + "state";
   scene_topic_ = prefix + "scene";
+  inputs_topic_ = prefix + "inputs";
   mesh_topic_ = prefix + "mesh";
   bodies_topic_ = prefix + "body_states";
   grasps_topic_ = prefix + "grasp_states";
@@ -77,6 +78,8 @@ void BagRecorder::recordScene(const std::string& yaml, const ros::Time& stamp)
 }
 
 void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh) { write(mesh_topic_, mesh.header.stamp, mesh); }
+
+void BagRecorder::recordInput(const slender_sim::Input& input) { write(inputs_topic_, input.header.stamp, input); }
 
 void BagRecorder::record(const SceneMessages& messages)
 {

@@ -217,7 +217,7 @@ void toMessage(const ThreadState& state, slender_sim::ThreadState& out)
     out.radii[j] = state.radius(static_cast<int>(j));
   }
   out.fed_volume = state.fed_volume;
-  out.dropped_volume = state.dropped_volume;
+  out.dropped_volume = state.dropped_volume + state.left_volume;
 }
 
 void appendPoses(const ThreadState& state, std::vector<geometry_msgs::Pose>& out)

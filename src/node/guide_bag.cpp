@@ -13,6 +13,7 @@
 #include "slender_sim/BodyStates.h"
 #include "slender_sim/ClothState.h"
 #include "slender_sim/node/converters.h"
+#include "slender_sim/node/step_gaps.h"
 #include "slender_sim/scene/file_paths.h"
 
 namespace slender {
@@ -121,11 +122,15 @@ RecordedGuide read(const BagSource& source)
   RecordedGuide guide;
   std::map<std::string, PoseTrajectory> bodies;
   std::optional<std::uint32_t> epoch;
+  StepGaps steps;
+  IntervalGaps intervals;
   for (const rosbag::MessageInstance& message : rosbag::View(bag, rosbag::TopicQuery(topicOf(bag, source))))
   {
     if (const auto poses = message.instantiate<slender_sim::BodyStates>())
     {
-      addBodies(*poses, order.take(poses->header), bodies);
+      const double at = order.take(poses->header);
+      intervals.add(at);
+      addBodies(*poses, at, bodies);
       continue;
     }
     Eigen::Matrix3Xd points;
@@ -136,11 +141,13 @@ RecordedGuide read(const BagSource& source)
         throw std::runtime_error("its run was reset or loaded (epoch " + std::to_string(state->epoch) + "): a guide is one motion");
       epoch = state->epoch;
       time = order.take(state->header);
+      steps.add(state->epoch, state->step, time);
       points = pointsOf(*state, source.object);
     }
     else if (const auto cloud = message.instantiate<sensor_msgs::PointCloud2>())
     {
       time = order.take(cloud->header);
+      intervals.add(time);
       const std::string why = fromPoints(*cloud, points);
       if (!why.empty())
         throw std::runtime_error("at " + std::to_string(time) + " s: " + why);
@@ -155,6 +162,7 @@ RecordedGuide read(const BagSource& source)
   }
   if (guide.points.empty() && bodies.empty())
     throw std::runtime_error("has no message that says where the guide is");
+  guide.gaps = steps.text(0.0) + intervals.text();
   for (auto& [name, poses] : bodies)
     guide.bodies.push_back({name, std::move(poses)});
   return guide;

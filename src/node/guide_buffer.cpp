@@ -12,57 +12,92 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kInstant = 1e-7;       // [s] for limits from the right; shorter than any step
+constexpr double kOpenCoast = 0.5;      // [s] in which an extrapolated motion would die out, if the rate did not fall before
+constexpr double kGentle = 0.3;         // [s] shortest blending time where a stream ran dry: its errors are small
 constexpr double kSame = 1e-10;         // [m], [rad], [m/s], [rad/s] round-off of evaluating the same motion twice
 
 }  // namespace
 
-GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG) : options_(options), attach_(attach)
+GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG) : options_(options), attach_(attach), timing_(options.timing())
 {
-  if (!(options.delay >= 0.0) || !(options.catch_up_time > 0.0) || !(options.catch_up_speed > 0.0) || !(options.catch_up_turning > 0.0))
-    throw std::invalid_argument("GuideBuffer: delay must be >= 0, catch-up time and speeds > 0");
+  if (!(options.catch_up_time > 0.0) || !(options.catch_up_speed > 0.0) || !(options.catch_up_turning > 0.0))
+    throw std::invalid_argument("GuideBuffer: catch-up time and speeds must be > 0");
   last_.X = X_WG;
 }
 
 bool GuideBuffer::push(double time, const Pose& X_WH)
 {
-  if (trajectory_.empty())
-  {
-    trajectory_ = PoseTrajectory({time}, {X_WH});
-    trajectory_.coast(options_.coast);
-  }
-  else if (time > trajectory_.lastTime())
-    trajectory_.append(time, X_WH);
-  else
+  if (last_stamp_ && !(time > *last_stamp_))
     return false;
+  const bool fresh = timing_.sample(time);
+  if (fresh && !trajectory_.empty())
+    next_ = PoseTrajectory();
+  (next_ ? *next_ : trajectory_).append(time, X_WH);
+  last_stamp_ = time;
   changed_ = true;
   return true;
 }
 
-GraspTarget GuideBuffer::target(double time)
+/// The stream takes effect: the first one, or one after a pause.
+void GuideBuffer::begin(double time, const GuideTiming::Instant& now)
 {
-  const double query = time - options_.delay;
-  if (!following_ && !trajectory_.empty() && query >= trajectory_.firstTime())
-  {
-    const double begin = trajectory_.firstTime();
-    following_ = true;
-    X_HG_ = attach_ == Attach::initial ? trajectory_.evaluate(begin).inverse() * last_.X : Pose();
-    last_query_ = std::max(begin, last_query_.value_or(begin));
-    last_.V = Twist();
-    changed_ = true;
-  }
+  if (next_)
+    trajectory_ = std::move(*next_);
+  next_.reset();
+  trajectory_.coast(options_.coast);
+  open_ = false;
+  const double start = trajectory_.firstTime();
   if (!following_)
   {
-    last_query_ = query;
-    return {last_.X, last_.V};
+    X_HG_ = attach_ == Attach::initial ? trajectory_.evaluate(start).inverse() * last_.X : Pose();
+    last_.V = Twist();
   }
+  following_ = changed_ = true;
+  plain_.X.position.setConstant(std::nan(""));   // nothing is known there
+  last_time_ = now.rate > 0.0 ? time - (now.time - start) : time;
+  query_ = start;
+  rate_ = now.rate;
+}
 
-  const double previous = *last_query_;
-  if (changed_)   // does the trajectory still pass where the grasp was led to?
-    blendFrom(previous, last_, followed(previous + kInstant));
-  changed_ = false;
-  last_ = blended(query, followed(query));
-  last_query_ = query;
-  trajectory_.forgetBefore(query);
+bool GuideBuffer::passesHere() const
+{
+  const Motion now = followed(query_, rate_);
+  return now.X.position == plain_.X.position && now.X.orientation.coeffs() == plain_.X.orientation.coeffs() && now.V.linear == plain_.V.linear &&
+         now.V.angular == plain_.V.angular;
+}
+
+GraspTarget GuideBuffer::target(double time)
+{
+  GuideTiming::Instant now = timing_.advance(time);
+  if (now.began)
+    begin(time, now);
+  else if (!now.following && following_)   // the stream before goes on until the next one takes effect
+    now.time = query_ + rate_ * (time - *last_time_);
+  if (now.jumped)
+  {
+    query_ = now.time;
+    rate_ = now.rate;
+    plain_.X.position.setConstant(std::nan(""));
+    changed_ = true;
+  }
+  if (following_)
+  {
+    if (now.following && now.open != open_ && options_.coast == 0.0)
+    {
+      open_ = now.open;
+      trajectory_.coast(open_ ? kOpenCoast : 0.0);
+      changed_ = true;
+    }
+    if (changed_ && !passesHere())   // does the trajectory still pass where the grasp was led to?
+      blendFrom(*last_time_, last_, followed(query_ + kInstant, rate_));
+    changed_ = false;
+    query_ = now.time;
+    rate_ = now.rate;
+    plain_ = followed(query_, rate_);
+    last_ = blended(time, plain_);
+    trajectory_.forgetBefore(query_);
+  }
+  last_time_ = time;
   return {last_.X, last_.V};
 }
 
@@ -72,35 +107,42 @@ void GuideBuffer::attachAt(const Pose& X_WG)
   offset_.reset();
   if (!following_)
     return;
-  const double now = *last_query_;
   if (attach_ == Attach::initial)
-    X_HG_ = trajectory_.evaluate(now).inverse() * X_WG;
-  blendFrom(now, last_, followed(now + kInstant));
+    X_HG_ = trajectory_.evaluate(query_).inverse() * X_WG;
+  blendFrom(*last_time_, last_, followed(query_ + kInstant, rate_));
 }
 
 void GuideBuffer::restart(const Pose& X_WG)
 {
+  timing_.restart();
   trajectory_ = PoseTrajectory();
-  following_ = changed_ = false;
+  next_.reset();
+  last_stamp_.reset();
+  following_ = changed_ = open_ = false;
   offset_.reset();
   last_ = {X_WG, Twist()};
 }
 
-std::optional<double> GuideBuffer::lastTime() const
+void GuideBuffer::skip(double seconds)
 {
-  if (trajectory_.empty())
-    return std::nullopt;
-  return trajectory_.lastTime();
+  timing_.skip(seconds);
+  query_ += seconds;
+  plain_.X.position.setConstant(std::nan(""));
+  if (last_time_)
+    *last_time_ += seconds;
+  if (offset_)
+    offset_->start += seconds;
+  changed_ = true;
 }
 
-GuideBuffer::Motion GuideBuffer::followed(double query) const
+GuideBuffer::Motion GuideBuffer::followed(double query, double rate) const
 {
   Motion m;
   Twist V_WH;
   const Pose X_WH = trajectory_.evaluate(query, &V_WH);
   m.X = X_WH * X_HG_;
-  m.V.angular = V_WH.angular;
-  m.V.linear = V_WH.linear + V_WH.angular.cross(m.X.position - X_WH.position);
+  m.V.angular = rate * V_WH.angular;
+  m.V.linear = rate * (V_WH.linear + V_WH.angular.cross(m.X.position - X_WH.position));
   return m;
 }
 
@@ -111,7 +153,7 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
   const Offset& o = *offset_;
   // cubic Hermite from (value, rate) at the start to (0, 0) at the end of d; the rate, however long d is, within the shortest blending time:
   // over a long one it would lead far away
-  const double d = o.duration, t = options_.catch_up_time, s = std::clamp((time - o.start) / d, 0.0, 1.0), u = std::clamp((time - o.start) / t, 0.0, 1.0);
+  const double d = o.duration, t = o.rate_duration, s = std::clamp((time - o.start) / d, 0.0, 1.0), u = std::clamp((time - o.start) / t, 0.0, 1.0);
   const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = t * u * (1 - u) * (1 - u);
   const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - u) * (1 - 3 * u);
   const Vector3d r = h0 * o.r + h1 * o.r_rate, r_rate = dh0 * o.r + dh1 * o.r_rate;
@@ -140,7 +182,8 @@ void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
   o.p_rate = from.V.linear - to.V.linear;
   o.r = rotated(from, to);
   o.r_rate = rotationRate(o.r).inverse() * (from.V.angular - fromRotationVector(o.r) * to.V.angular);
-  o.duration = std::max({options_.catch_up_time, o.p.norm() / options_.catch_up_speed, o.r.norm() / options_.catch_up_turning});
+  o.rate_duration = timing_.overran() ? std::max(options_.catch_up_time, kGentle) : options_.catch_up_time;
+  o.duration = std::max({o.rate_duration, o.p.norm() / options_.catch_up_speed, o.r.norm() / options_.catch_up_turning});
   offset_ = o;
 }
 

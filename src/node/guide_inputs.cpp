@@ -32,6 +32,8 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
 {
   GuideBuffer::Options buffer_options;
   buffer_options.delay = options.guide_delay;
+  buffer_options.automatic = options.guide_delay_auto;
+  buffer_options.live = options.live_guides;
   buffer_options.catch_up_time = options.catch_up_time;
   buffer_options.catch_up_speed = options.catch_up_speed;
   buffer_options.catch_up_turning = 3.0 * options.catch_up_speed;   // [rad/s]: as if a hand's radius of 1/3 m turned
@@ -290,7 +292,15 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
   const double time = clock_.secondsAt(message.stamp);
   bool late = false;
   for (const Entry& entry : message.entries)
-    late |= !guided_[entry.guided].buffer->push(time, X_WF * entry.X_FH);
+  {
+    const Pose X_WH = X_WF * entry.X_FH;
+    if (!guided_[entry.guided].buffer->push(time, X_WH))
+    {
+      late = true;
+      continue;
+    }
+    takenPose(static_cast<std::size_t>(entry.guided), time, X_WH);
+  }
   if (late)
     drops_.drop(Drop::out_of_order, message.what, "its stamp is not after that of an earlier message");
   return true;
@@ -371,6 +381,14 @@ void GuideInputs::restart(const Simulation& simulation)
   tracking_->restart(simulation);
 }
 
+void GuideInputs::skip(double seconds)
+{
+  for (Guided& guided : guided_)
+    if (guided.buffer)
+      guided.buffer->skip(seconds);
+  tracking_->skip(seconds);
+}
+
 std::vector<GuideInputs::Age> GuideInputs::ages() const
 {
   std::vector<Age> ages;
@@ -381,10 +399,10 @@ std::vector<GuideInputs::Age> GuideInputs::ages() const
     std::optional<double> age = guided.buffer->lastTime();
     if (age)
       age = clock_.seconds() - *age;
-    ages.push_back({guided.name, age, false});
+    ages.push_back({guided.name, age, false, guided.buffer->timing().lag(), guided.buffer->timing().excess()});
   }
-  for (const TrackingInputs::Age& age : tracking_->ages())
-    ages.push_back({age.name, age.seconds, age.missing});
+  for (const Age& age : tracking_->ages())
+    ages.push_back(age);
   return ages;
 }
 

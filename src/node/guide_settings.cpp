@@ -26,7 +26,14 @@ void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
     drops_.drop(Drop::out_of_range, what, text(message.data) + "; it must be from 0 to " + text(threads_[thread].greatest_flow) +
                                               " m^3/s, with which a thousand edges leave the nozzle per step");
   else
+  {
     threads_[thread].flow = message.data;
+    slender_sim::Input input;
+    input.kind = slender_sim::Input::FLOW;
+    input.index = static_cast<std::int32_t>(thread);
+    input.values = {message.data};
+    taken(std::move(input));
+  }
 }
 
 /// In whatever frame the message names, as that stands now. Nothing when dropped.
@@ -76,6 +83,7 @@ void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped
   if (!(velocity->head<2>().cwiseAbs().maxCoeff() <= max_belt_speed))
     return drops_.drop(Drop::out_of_range, what, "components must be within " + text(max_belt_speed) + " m/s");
   threads_[thread].belt = Eigen::Vector3d(velocity->x(), velocity->y(), 0.0);
+  takenVector(slender_sim::Input::BELT, thread, *threads_[thread].belt);
 }
 
 void GuideInputs::onWind(const geometry_msgs::Vector3Stamped& message)
@@ -87,6 +95,7 @@ void GuideInputs::onWind(const geometry_msgs::Vector3Stamped& message)
   if (!(velocity->cwiseAbs().maxCoeff() <= max_wind_speed))
     return drops_.drop(Drop::out_of_range, "wind", "components must be within " + text(max_wind_speed) + " m/s");
   wind_ = velocity;
+  takenVector(slender_sim::Input::WIND, 0, *wind_);
 }
 
 std::vector<GuideInputs::Setting> GuideInputs::settings() const

@@ -21,7 +21,14 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
   params.read("paused", o.paused);
   params.read("state_every", o.state_every, 1, 1000000);
   params.read("record_bag", o.record_bag);
-  params.read("guide_delay", o.guide_delay, 0.0, 100.0);
+  params.read("record_inputs", o.record_inputs);
+  params.read("replay", o.replay);
+  params.read("speed", o.speed, 0.0, 1000.0, true);
+  params.read("max_lag", o.max_lag, 0.0, 1e6);
+  o.guide_delay_auto = params.is("guide_delay", "auto");
+  if (!o.guide_delay_auto)
+    params.read("guide_delay", o.guide_delay, 0.0, 100.0, false, " or auto");
+  o.live_guides = o.pace == Pace::wall;
   params.read("guide_timeout", o.guide_timeout, 0.0, 1e6, true);
   params.read("guide_ahead", o.guide_ahead, 0.0, 1e6, true);
   params.read("catch_up_time", o.catch_up_time, 0.0, 100.0, true);
@@ -37,7 +44,14 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
   params.read("marker_range", o.markers.range, 0.0, 1e9);
   params.read("marker_forces", o.markers.forces, 0.0, 1e9);
   params.refuseUnknown();
-  if (o.scene.empty())
+  if (o.guide_delay_auto && o.pace != Pace::wall)
+    throw OptionError(std::string("~guide_delay: auto depends on when guides arrive, so that runs with ~pace: ") + toString(o.pace) +
+                      " would differ; give a number, two message intervals and the transport [s]");
+  if (o.speed != 1.0 && o.pace != Pace::wall)
+    throw OptionError(std::string("~speed: is for ~pace: wall; ~pace: ") + toString(o.pace) + " has a speed of its own");
+  if (!o.replay.empty() && (o.pace == Pace::follow || o.start_time))
+    throw OptionError("~replay: keeps the recorded stamps, and needs neither ~pace: follow nor ~start_time");
+  if (o.scene.empty() && o.replay.empty())
     throw OptionError("~scene: missing; give the path of a scene file (or its YAML text)");
   if (o.frame_id.empty())
     throw OptionError("~frame_id: is empty, must be the name of a frame, e.g. world");

@@ -27,7 +27,15 @@ public:
     return nh_.getParam(name, value);
   }
 
-  void read(const std::string& name, double& value, double low, double high, bool open_low = false)
+  /// True when the parameter is this very word.
+  bool is(const std::string& name, const std::string& word)
+  {
+    XmlRpc::XmlRpcValue v;
+    return get(name, v) && v.getType() == XmlRpc::XmlRpcValue::TypeString && static_cast<std::string>(v) == word;
+  }
+
+  /// `or_else`: what the message adds to the range of numbers.
+  void read(const std::string& name, double& value, double low, double high, bool open_low = false, const std::string& or_else = "")
   {
     XmlRpc::XmlRpcValue v;
     if (!get(name, v))
@@ -47,7 +55,7 @@ public:
     if (!std::isfinite(number) || number < low || number > high || (open_low && number == low))
     {
       std::ostringstream range;
-      range << "a number in " << (open_low ? "(" : "[") << low << ", " << high << "]";
+      range << "a number in " << (open_low ? "(" : "[") << low << ", " << high << "]" << or_else;
       refuse(name, v, range.str());
     }
     value = number;

@@ -15,6 +15,7 @@
 #include "slender_sim/MeshStamped.h"
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
+#include "slender_sim/linalg/interruption.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/guide_bag.h"
 #include "slender_sim/node/scene_markers.h"
@@ -22,9 +23,6 @@
 
 namespace slender {
 namespace {
-
-constexpr double kIdle = 0.02;         // [s] longest sleep: how late diagnostics and markers may be
-constexpr double kClockPatience = 2.0;   // [s] until the first complaint that there is no /clock
 
 /// Text of a scene, not the path of one.
 bool isText(const std::string& scene)
@@ -85,15 +83,20 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
 {
   nh_.setCallbackQueue(&queue_);
   nh_priv_.setCallbackQueue(&services_queue_);
+  openReplay();
   checkClock();
   simulation_ = std::make_unique<Simulation>(loadScene(options_, kind_));
+  for (const std::string& warning : simulation_->config().warnings)
+    ROS_WARN("%s", warning.c_str());
+  if (replay_ && options_.scene != replay_->scene() && simulation_->config().source != replay_->scene())
+    throw OptionError("~replay: " + options_.replay + ": was recorded with another scene (or other values of ~set) than ~scene; leave ~scene away");
   grasp_names_ = graspTopicNames(*simulation_);
   thread_prefixes_ = threadTopicPrefixes(*simulation_);
   if (!options_.record_bag.empty())
     bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), grasp_names_, thread_prefixes_);
   if (options_.paused)
     mode_ = Mode::paused;
-  startClock();
+  start();
 }
 
 SceneNode::~SceneNode()
@@ -102,43 +105,18 @@ SceneNode::~SceneNode()
     service.shutdown();
 }
 
-void SceneNode::checkClock() const
+/// Everything that needs the time of the first stamp.
+void SceneNode::start()
 {
-  bool use_sim_time = false;
-  nh_.getParam("/use_sim_time", use_sim_time);
-  if (options_.pace == Pace::follow && options_.publish_clock)
-    throw OptionError("~pace: follow waits for /clock, which ~publish_clock: true would publish; choose one");
-  if (options_.pace == Pace::follow && !use_sim_time)
-    throw OptionError("~pace: follow needs the parameter /use_sim_time set to true (and somebody who publishes /clock)");
-  if (options_.publish_clock && !use_sim_time)
-    throw OptionError("~publish_clock: true needs the parameter /use_sim_time set to true, or no other node will listen to /clock");
-  if (use_sim_time && !options_.publish_clock && options_.pace != Pace::follow)
-    throw OptionError(std::string("/use_sim_time is true, but ~pace: ") + toString(options_.pace) +
-                      " without ~publish_clock keeps its own time; use ~pace: follow, or ~publish_clock: true, or unset it");
-}
-
-/// Everything that needs the time of the first stamp. With `follow` that may be the first /clock.
-void SceneNode::startClock()
-{
-  ros::Time start(1.0);
-  if (options_.start_time)
-    start = ros::Time(*options_.start_time);
-  else if (options_.pace == Pace::follow)
-  {
-    start = ros::Time::now();
-    if (start.isZero())
-    {
-      if (next_clock_reminder_.isZero())
-        next_clock_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockPatience);
-      return;   // no /clock yet; asked again in work()
-    }
-  }
-  else if (options_.pace == Pace::wall && !options_.publish_clock)
-    start = ros::Time::now();
-  clock_ = SimClock(start, simulation_->config().time.step);
-  clock_started_ = true;
+  const std::optional<ros::Time> stamp = firstStamp();
+  if (!stamp)
+    return;
+  clock_ = SimClock(*stamp, simulation_->config().time.step);
   inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, grasp_names_, thread_prefixes_);
-  if (options_.interactive)
+  if (replay_)
+    inputs_->stopListening();
+  inputs_->onTaken([this](slender_sim::Input input) { note(std::move(input), clock_.ticks()); });
+  if (options_.interactive && !replay_)
   {
     const std::string topic = nh_.resolveName("interactive");
     hands_ = std::make_unique<HandMarkers>(topic, options_.frame_id);
@@ -147,6 +125,10 @@ void SceneNode::startClock()
   }
   advertise();
   advertiseServices();
+  if (stampsAreOfTheWall())   // advertising takes its time: the stamps would lag by that for ever
+    clock_ = SimClock(ros::Time::now(), clock_.step());
+  clock_started_ = true;
+  anchor();
   std_msgs::String scene;
   scene.data = simulation_->config().source;
   scene_pub_.publish(scene);
@@ -154,7 +136,6 @@ void SceneNode::startClock()
     bag_->recordScene(scene.data, clock_.stamp());
   if (hasCloths())
     publishMesh();
-  wall_start_ = ros::WallTime::now();
   total_ = recent_ = RunStatistics();
   publishState();
 }
@@ -217,6 +198,8 @@ bool SceneNode::isStateFinite() const
 
 bool SceneNode::advance()
 {
+  if (replay_ && !replayInputs())
+    return false;
   const ros::WallTime begin = ros::WallTime::now();
   simulation_->defaultInputs(step_inputs_);
   inputs_->apply(clock_.seconds() + clock_.step(), step_inputs_);
@@ -224,6 +207,8 @@ bool SceneNode::advance()
   last_report_ = report;
   if (!report.ok)
   {
+    if (stepsInterrupted())   // by a signal, which shuts the node down: the state is that at the start of the step
+      return false;
     fail(std::string(toString(report.failure)) + ": " + report.message);
     return false;
   }
@@ -242,6 +227,8 @@ bool SceneNode::advance()
     clock_pub_.publish(message);
   }
   const double busy = (ros::WallTime::now() - begin).toSec();
+  total_.stamp_lag = stampLag();
+  recent_.worst_stamp_lag = std::max(recent_.worst_stamp_lag, total_.stamp_lag);
   total_.add(report, *simulation_, clock_.step(), busy);
   recent_.add(report, *simulation_, clock_.step(), busy);
   if (options_.stop_after > 0.0 && clock_.seconds() >= options_.stop_after - 0.5 * clock_.step())
@@ -367,48 +354,11 @@ void SceneNode::publishMarkers()
       sceneMarkers(*simulation_, header, options_.markers)));
 }
 
-void SceneNode::jumped()
-{
-  ++epoch_;
-  clock_.tick();   // stamps grow even so
-  showHandles();
-  realign();
-  publishState();
-  step_ended_ = "the state was replaced by ~reset or ~load_state";
-}
-
-void SceneNode::realign()
-{
-  // Where others keep the time, skip to their present: guides then act when they come, not late by the length of the pause.
-  const bool others = options_.pace == Pace::follow || (options_.pace == Pace::wall && !options_.publish_clock && !options_.start_time);
-  if (others)
-  {
-    const double behind = clock_.secondsAt(ros::Time::now()) - clock_.seconds();
-    if (behind > clock_.step())
-      clock_.skip(static_cast<std::uint64_t>(behind / clock_.step()));
-  }
-  wall_start_ = ros::WallTime::now();
-  wall_start_ticks_ = clock_.ticks();
-}
-
-ros::WallDuration SceneNode::untilDue() const
-{
-  if (!clock_started_ || mode_ != Mode::running || options_.pace == Pace::step)
-    return ros::WallDuration(kIdle);
-  if (options_.pace == Pace::fast)
-    return ros::WallDuration(0.0);
-  if (options_.pace == Pace::follow)
-    return ros::WallDuration(clock_.nextStamp() <= ros::Time::now() ? 0.0 : 0.001);
-  const double due = static_cast<double>(clock_.ticks() + 1 - wall_start_ticks_) * clock_.step();
-  const double remaining = due - (ros::WallTime::now() - wall_start_).toSec();
-  return ros::WallDuration(std::clamp(remaining, 0.0, kIdle));
-}
-
 void SceneNode::work()
 {
   if (!clock_started_)
   {
-    startClock();
+    start();
     if (!clock_started_ && ros::WallTime::now() >= next_clock_reminder_)
     {
       next_clock_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
@@ -423,6 +373,7 @@ void SceneNode::work()
   {
     if (!advance())
       break;
+    keepUp();
     if (!queue_.isEmpty() || !services_queue_.isEmpty())
       break;
   }
@@ -483,6 +434,8 @@ void SceneNode::summary() const
             << " s computing, real-time factor " << s.realTimeFactor() << ", worst residual " << s.residual << ", largest strain "
             << s.max_strain << ", Newton iterations per step " << (s.steps ? static_cast<double>(s.iterations) / s.steps : 0.0)
             << ", cut steps " << s.cut_steps << "\n";
+  if (s.skipped > 0.0)
+    std::cout << name << ": slower than real time, the clock skipped " << s.skipped << " s (~max_lag)\n";
   for (std::size_t g = 0; g < s.max_force.size(); ++g)
     std::cout << name << ": grasp " << grasp_names_[g] << ": largest force " << s.max_force[g] << " N, torque " << s.max_torque[g]
               << " N m\n";

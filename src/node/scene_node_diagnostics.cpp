@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
@@ -20,12 +21,14 @@ void add(DiagnosticStatus& status, const std::string& key, const std::string& va
   status.values.push_back(entry);
 }
 
-void add(DiagnosticStatus& status, const std::string& key, double value)
+std::string text(const char* format, double value)
 {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6g", value);
-  add(status, key, std::string(text));
+  char out[128];
+  std::snprintf(out, sizeof(out), format, value);
+  return out;
 }
+
+void add(DiagnosticStatus& status, const std::string& key, double value) { add(status, key, text("%.6g", value)); }
 
 void add(DiagnosticStatus& status, const std::string& key, std::uint64_t value) { add(status, key, std::to_string(value)); }
 
@@ -40,17 +43,24 @@ void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& mess
 void addThreads(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
 {
   std::uint64_t nodes = 0, pieces = 0;
-  double fed = 0.0;
+  ThreadVolumes volumes;
   for (const ThreadGroupState& group : simulation.state().threads)
+  {
+    volumes.add(group);
     for (const ThreadState& thread : group.threads)
     {
       nodes += static_cast<std::uint64_t>(thread.nodes());
-      fed += thread.fed_volume;
       ++pieces;
     }
+  }
   add(status, "nodes", nodes);
   add(status, "threads and pieces", pieces);
-  add(status, "fed volume [m^3]", fed);
+  add(status, "fed volume [m^3]", volumes.fed);
+  add(status, "volume in the scene [m^3]", volumes.present);
+  add(status, "volume that left the region [m^3]", volumes.left);
+  add(status, "volume dropped by edges.deposited [m^3]", volumes.dropped);
+  if (std::abs(volumes.missing()) > ThreadVolumes::kMostMissing)
+    raise(status, DiagnosticStatus::ERROR, "fluid is missing: a defect of the program");
   add(status, "mended folds", recent.mended_folds);
 }
 
@@ -101,8 +111,10 @@ DiagnosticStatus SceneNode::simulationStatus() const
   const double wall = recent_.wallSeconds();
   const double achieved = wall > 0.0 ? recent_.simulated / wall : 0.0;
   const bool running = mode_ == Mode::running && options_.pace != Pace::step;
-  if (running && options_.pace == Pace::wall && recent_.steps > 10 && recent_.realTimeFactor() < 1.0)
-    raise(status, DiagnosticStatus::WARN, "slower than real time");
+  if (running && options_.pace == Pace::wall && recent_.steps > 10 && recent_.realTimeFactor() < options_.speed)
+    raise(status, DiagnosticStatus::WARN, options_.speed == 1.0 ? "slower than real time" : "slower than ~speed");
+  if (recent_.skipped > 0.0)
+    raise(status, DiagnosticStatus::WARN, text("the clock skipped %.3g s to the present (~max_lag)", recent_.skipped));
   if (const std::string waits = clockWentBack(); !waits.empty())
     raise(status, DiagnosticStatus::WARN, waits);
   if (recent_.cut_steps > 0)
@@ -121,8 +133,13 @@ DiagnosticStatus SceneNode::simulationStatus() const
   add(status, "longest step time [ms]", 1e3 * recent_.worst_step);
   add(status, "real-time factor", recent_.realTimeFactor());
   add(status, "simulated per wall second", achieved);
-  if (options_.pace == Pace::wall && mode_ == Mode::running)
-    add(status, "behind real time [s]", std::max(0.0, (ros::WallTime::now() - wall_start_).toSec() - static_cast<double>(clock_.ticks() - wall_start_ticks_) * clock_.step()));
+  if (options_.pace == Pace::wall || options_.pace == Pace::follow)
+  {
+    add(status, "lag of stamps [s]", total_.stamp_lag);
+    add(status, "largest lag of stamps [s]", recent_.worst_stamp_lag);
+  }
+  if (options_.pace == Pace::wall)
+    add(status, "clock skipped [s]", total_.skipped);
   add(status, "iterations per step", recent_.steps ? static_cast<double>(recent_.iterations) / static_cast<double>(recent_.steps) : 0.0);
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);
@@ -204,6 +221,12 @@ DiagnosticStatus SceneNode::inputStatus()
       add(status, "input age " + age.name + " [s]", std::string("none yet"));
     if (age.seconds && *age.seconds > options_.guide_timeout && mode_ == Mode::running)
       raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
+    if (age.seconds)
+      add(status, "input lag " + age.name + " [s]", age.lag);
+    if (age.seconds && age.excess > 0.0 && *age.seconds <= options_.guide_timeout)
+      raise(status, DiagnosticStatus::WARN,
+            "guides arrive " + text("%.0f ms later than ~guide_delay", 1e3 * age.excess) + " allows: " + age.name +
+              text(" lags by %.3g s; raise ~guide_delay", age.lag) + (options_.pace == Pace::wall ? ", or set it to auto" : ""));
     const bool late = mode_ == Mode::running && clock_.seconds() - inputs_since_ > options_.guide_timeout;
     if (age.missing || (!age.seconds && late))
       raise(status, DiagnosticStatus::WARN, "no input yet for " + age.name);

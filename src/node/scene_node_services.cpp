@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_node.h"
@@ -28,7 +30,14 @@ bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::
     return true;
   }
   if (!request.data && mode_ == Mode::paused)
-    realign();
+  {
+    const std::uint64_t tick = clock_.ticks(), skipped = realign();
+    slender_sim::Input input;
+    input.kind = slender_sim::Input::SKIP;
+    input.values = {static_cast<double>(skipped)};
+    if (skipped > 0)
+      note(std::move(input), tick);
+  }
   mode_ = request.data ? Mode::paused : Mode::running;
   step_ended_ = "~pause was called";
   response.success = true;
@@ -38,14 +47,23 @@ bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::
 
 bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response)
 {
+  response.success = false;
+  response.message = refusesInput();
+  if (!response.message.empty())
+    return true;
   queue_.callAvailable();   // older than the reset
   simulation_->reset();
   inputs_->restart(*simulation_);
-  if (mode_ == Mode::failed)
+  const bool failed = mode_ == Mode::failed;
+  if (failed)
     mode_ = mode_before_failure_;
   failure_.clear();
   last_report_ = StepReport();
-  jumped();
+  slender_sim::Input input;
+  input.kind = slender_sim::Input::RESET;
+  const std::uint64_t tick = clock_.ticks(), skipped = jumped();
+  noteJump(std::move(input), tick, skipped, failed);
+  publishState();
   inputs_since_ = clock_.seconds();
   publishDiagnostics();
   response.success = true;
@@ -95,6 +113,17 @@ bool SceneNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::R
 
 bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response)
 {
+  response.first_node = response.last_node = -1;
+  response.message = refusesInput();
+  if (response.message.empty())
+    setGrasp(request, response);
+  if (response.success)
+    noteGrasp(request);
+  return true;
+}
+
+void SceneNode::setGrasp(const slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response)
+{
   const auto found = std::find(grasp_names_.begin(), grasp_names_.end(), request.name);
   response.success = false;
   response.first_node = response.last_node = -1;
@@ -103,7 +132,7 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
     response.message = "no grasp \"" + request.name + "\"; the scene has" + (grasp_names_.empty() ? " none: give it grasps: {NAME: {...}}" : ":");
     for (const std::string& name : grasp_names_)
       response.message += " " + name;
-    return true;
+    return;
   }
   const int g = static_cast<int>(found - grasp_names_.begin());
   const bool active = simulation_->isActive(g);
@@ -117,17 +146,32 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
       showHandles();
     }
     response.success = active;
-    return true;
+    return;
   }
   if (active)
     response.message = request.name + " holds the " + (hasCloths() ? "cloth" : "rod") + " already; release it first";
   else
     response.message = attach(request, g, response);
   response.success = response.message.empty();
-  return true;
 }
 
 bool SceneNode::onSetFunctions(slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response)
+{
+  response.message = refusesInput();
+  if (response.message.empty())
+    setFunctions(request, response);
+  if (!response.success)
+    return true;
+  slender_sim::Input input;
+  input.kind = slender_sim::Input::SET_FUNCTIONS;
+  input.name = request.name;
+  input.text = request.set;
+  input.values = {request.blend};
+  note(std::move(input), clock_.ticks());
+  return true;
+}
+
+void SceneNode::setFunctions(const slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response)
 {
   const auto& cloths = simulation_->config().cloths;
   std::string names;
@@ -155,7 +199,6 @@ bool SceneNode::onSetFunctions(slender_sim::SetFunctions::Request& request, slen
     {
       response.message = e.what();
     }
-  return true;
 }
 
 /// Returns why not; empty when done.
@@ -238,10 +281,18 @@ bool SceneNode::onSave(slender_sim::FilePath::Request& request, slender_sim::Fil
 bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response)
 {
   response.success = false;
+  response.message = refusesInput();
+  if (!response.message.empty())
+    return true;
   queue_.callAvailable();   // older than the state that takes over
+  slender_sim::Input input;
+  input.kind = slender_sim::Input::LOAD;
   try
   {
     simulation_->load(request.path);
+    std::ifstream file(request.path, std::ios::binary);
+    if (bag_ && options_.record_inputs)
+      input.data.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   }
   catch (const std::exception& e)
   {
@@ -249,10 +300,13 @@ bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::Fil
     return true;
   }
   inputs_->attachAll(*simulation_);
-  if (mode_ == Mode::failed)
+  const bool failed = mode_ == Mode::failed;
+  if (failed)
     mode_ = Mode::paused;   // what was loaded may be just before the failure
   failure_.clear();
-  jumped();
+  const std::uint64_t tick = clock_.ticks(), skipped = jumped();
+  noteJump(std::move(input), tick, skipped, failed);
+  publishState();
   response.success = true;
   return true;
 }

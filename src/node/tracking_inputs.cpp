@@ -178,9 +178,19 @@ bool TrackingInputs::deliver(const Message& message, std::string* why)
   }
   bool late = false;
   if (guide.points)
+  {
     late = !guide.points->push(time, points);
+    if (!late)
+      takenPoints(message.guide, time, points);
+  }
   for (const auto& [body, pose] : message.bodies)
-    late |= !guide.bodies[body].push(time, X_WF * pose);
+  {
+    const Pose X_WH = X_WF * pose;
+    const bool good = guide.bodies[body].push(time, X_WH);
+    late |= !good;
+    if (good)
+      takenBody(message.guide, body, time, X_WH);
+  }
   if (late)
     drops_.drop(Drop::out_of_order, guide.topic, "its stamp is not after that of an earlier message");
   return true;
@@ -267,11 +277,11 @@ std::vector<TrackingInputs::Age> TrackingInputs::ages() const
   for (const Guide& guide : guides_)
   {
     if (guide.points)
-      ages.push_back({guide.topic, age(guide.points->lastTime()), false});
+      ages.push_back({guide.topic, age(guide.points->lastTime()), false, guide.points->timing().lag(), guide.points->timing().excess()});
     for (std::size_t b = 0; b < guide.bodies.size(); ++b)   // one may fall silent while others speak
     {
       const std::optional<double> own = age(guide.bodies[b].lastTime());
-      ages.push_back({guide.topic + " " + guide.carried->bodies[b], own, !own && guide.heard()});
+      ages.push_back({guide.topic + " " + guide.carried->bodies[b], own, !own && guide.heard(), guide.bodies[b].timing().lag(), guide.bodies[b].timing().excess()});
     }
   }
   return ages;

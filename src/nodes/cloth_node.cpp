@@ -1,4 +1,3 @@
-#include <csignal>
 #include <exception>
 #include <iostream>
 
@@ -6,13 +5,14 @@
 
 #include "slender_sim/node/arguments.h"
 #include "slender_sim/node/scene_node.h"
+#include "slender_sim/node/signals.h"
 
 int main(int argc, char** argv)
 try
 {
-  ros::init(argc, argv, "cloth_node");
+  ros::init(argc, argv, "cloth_node", ros::init_options::NoSigintHandler);
   slender::requireNoArguments(argc, argv);
-  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });   // like SIGINT, or the bag stays unfinished
+  slender::stopOnSignals();   // or the bag stays unfinished, and a long step goes on
   return slender::SceneNode(ros::NodeHandle(), ros::NodeHandle("~"), slender::NodeKind::cloths).spin();
 }
 catch (const std::exception& e)

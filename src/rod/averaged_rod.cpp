@@ -8,6 +8,7 @@
 
 #include "rod_stepper_impl.h"
 #include "slender_sim/rod/average_projection.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -233,6 +234,8 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
     {
       report.iterations += sub.iterations;
       report.factorizations += sub.factorizations;
+      if (stepsInterrupted())
+        return rod.refuse(report, StepFailure::work_exceeded, kStepInterrupted);
       if (0.5 * length < duration * std::ldexp(1.0 - 1e-9, -rod.time.newton.max_cuts))
         return rod.refuse(report, failure, failure == StepFailure::singular_matrix
                                              ? "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes"

@@ -113,6 +113,15 @@ void BodySystem::beginStage(const StepPlan& plan, std::size_t index, double h, c
   force_ = model_.force + (model_.gravity ? Eigen::Vector3d(model_.mass * gravity) : Eigen::Vector3d::Zero());
 }
 
+void BodySystem::hold(double weight, const Eigen::Vector3d& gravity)
+{
+  weight_ = weight * model_.mass;
+  rotation_weight_ = weight;
+  target_ = pose.position;
+  rotation_target_ = pose.orientation.toRotationMatrix();
+  force_ = model_.force + (model_.gravity ? Eigen::Vector3d(model_.mass * gravity) : Eigen::Vector3d::Zero());
+}
+
 void BodySystem::evaluate(bool with_hessian)
 {
   const Eigen::Matrix3d r = pose.orientation.toRotationMatrix();
@@ -140,6 +149,11 @@ void BodySystem::addShift(const HessianShift& shift)
 
 void BodySystem::moveAlong(const Vector6& direction, double alpha)
 {
+  if (alpha == 0.0)   // whatever the direction is, which may be that of an attempt that overflowed
+  {
+    pose = base_;
+    return;
+  }
   pose.position = base_.position + alpha * direction.head<3>();
   pose.orientation = (fromRotationVector(alpha * direction.tail<3>()) * base_.orientation).normalized();
 }

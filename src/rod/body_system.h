@@ -30,6 +30,8 @@ public:
   /// Targets x^ (of inertia) and x~ (of damping) of a point that goes with the body; r in body axes.
   Eigen::Vector3d inertiaTarget(const Eigen::Vector3d& r) const { return inertia_target_ + inertia_rotation_ * r; }
   Eigen::Vector3d dampingTarget(const Eigen::Vector3d& r) const { return damping_target_ + damping_rotation_ * r; }
+  /// In place of a stage, for statics: inertia of `weight` [1/s^2] times the mass holds the body where it is now.
+  void hold(double weight, const Eigen::Vector3d& gravity);
   /// Takes over the stage's solution.
   void endStage(const Stage& stage, bool last);
   void finishStep(const StepPlan& plan, RigidBodyState& next);

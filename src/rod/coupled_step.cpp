@@ -84,7 +84,7 @@ CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodSt
     if (body.simulated)
       bodies_.emplace_back(body);
   }
-  body_direction_.resize(bodies_.size());
+  body_direction_.resize(bodies_.size(), BodySystem::Vector6::Zero());
   driven_.resize(model.bodies.size());
   obstacles_.resize(model.contact.obstacles.size());
   if (model.contact.rods.empty())
@@ -97,6 +97,7 @@ CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodSt
   ContactOptions options = model.contact.options;
   options.least_stiffness = std::max(options.least_stiffness, leastStiffness(model, rods[0]->time.step));
   contact_ = std::make_unique<ContactPotential>(contactSurface(model), options);
+  first_stiffness_ = contact_->stiffness();
   points_.resize(3, point_part_.size());
   points_base_ = points_end_ = points_;
   solids_.resize(obstacles_.size() + model.contact.bodies.size());
@@ -110,7 +111,7 @@ void CoupledSystem::begin(const RodGroupState& state, const RodGroupInputs& inpu
   duration_ = duration;
   bodies_now_ = bodies_next_ = state.bodies;
   if (contact_)
-    stiffness_now_ = state.contact_stiffness > 0 ? state.contact_stiffness : contact_->stiffness();
+    stiffness_now_ = state.contact_stiffness > 0 ? state.contact_stiffness : first_stiffness_;
 }
 
 void CoupledSystem::placeDriven(double fraction)
@@ -148,6 +149,7 @@ void CoupledSystem::gather(Eigen::Matrix3Xd& x, std::vector<Pose>& solids) const
 
 void CoupledSystem::beginStep(const StepPlan& plan, double t)
 {
+  exact_ = false;
   for (RodPart& part : parts_)
     mapUnknowns(part);
   bool fresh = false;
@@ -181,6 +183,7 @@ void CoupledSystem::startAccelerations()
   for (RodPart& part : parts_)
     if (part.welded)
     {
+      part.rod->system.setResponse(0.0, nullptr);   // an attempt that failed leaves its viscous response
       for (int i = 0; i < part.rod->model->nodes(); ++i)
         part.rod->system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), part.rod->load(inputs_->rods[part.index], i));
       part.rod->system.evaluateWhole(false);

@@ -71,6 +71,11 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
 
 bool CoupledSystem::factor(const HessianShift& shift)
 {
+  if (exact_)
+  {
+    assemble(shift, true);
+    return matrix_.factor();
+  }
   if (contact_ && !contact_->terms().empty() && whole_.due())
   {
     assemble(shift, true);
@@ -149,12 +154,18 @@ void CoupledSystem::solve()
       body_direction_[b] = Eigen::Map<BodySystem::Vector6>(rhs_.data() + body_offset_ + 6 * b);
   }
   forRods([&](RodPart& part) {
+    if (!part.coupled)
+      part.rod->system.solve();
+  });
+  spread();
+}
+
+void CoupledSystem::spread()
+{
+  forRods([&](RodPart& part) {
     RodSystem& system = part.rod->system;
     if (!part.coupled)
-    {
-      system.solve();
       return;
-    }
     Columns row;
     for (std::size_t d = 0; d < part.dof.size(); ++d)
     {

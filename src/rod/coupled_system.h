@@ -33,6 +33,19 @@ public:
   double bodyEnergy(bool next) const;   ///< kinetic and of loads [J]
   double clearance(const RodGroupState& state);
   const std::vector<ContactTerm>& contacts() const;
+
+  // ---- stability of an equilibrium (coupled_stability.cpp)
+  /// Loads an equilibrium, at which everything stands still. The calls below are about it.
+  void beginStability(const RodGroupState& state, const RodGroupInputs& inputs);
+  /// Factors K + s M, with the exact second derivative of contact and without friction; returns whether it is positive definite.
+  bool definite(double s);
+  RodEvaluation energyAt(double s);
+  /// Half width of the band of eigenvalues that count as zero.
+  double neutralBand() const;
+  /// The direction becomes the mode of the lowest eigenvalue, by inverse iteration with the matrix last factored; nothing turns by more than 1 rad.
+  void findLowestMode();
+  /// Writes into the state what is `alpha` times the mode away from the equilibrium. Returns false when something is in the way.
+  bool displaceAlongMode(double alpha, RodGroupState& state);
   bool hasContact() const { return contact_ != nullptr; }
   int threads = 0;
 
@@ -103,6 +116,7 @@ private:
   void contactColumns(const ContactRow& contact, bool whole, Columns& row) const;
   bool takeKeys();
 
+  void spread();   ///< solution of the matrix to the rods' directions
   void mapUnknowns(RodPart& part);
   void reduceGradient();
   void placeWelds();
@@ -128,6 +142,7 @@ private:
   double duration_ = 0, least_edge_ = std::numeric_limits<double>::infinity();
 
   std::unique_ptr<ContactPotential> contact_;
+  double first_stiffness_ = 0;                  ///< of the barrier in a state that has none yet
   double stiffness_now_ = 0;                    ///< of the barrier as the substep begins
   double tolerance_ = 0, gap_tolerance_ = 0;    ///< of increments: over the shortest edge, and at contacts over the smallest gap
   Eigen::Matrix3Xd points_, points_base_, points_end_;
@@ -136,6 +151,7 @@ private:
   // matrix
   SparseCholesky matrix_;
   bool pattern_valid_ = false;
+  bool exact_ = false;                          ///< stability: the matrix must not be replaced by a positive definite one
   WholeStiffness whole_;
   int unknowns_ = 0, body_offset_ = 0;
   std::vector<std::array<int, 5>> keys_;        ///< contacts (four points, a solid) the pattern has room for, sorted

@@ -4,35 +4,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "slender_sim/geometry/rotation.h"
-#include "step_loop.h"
+#include "rod_group_impl.h"
 
 namespace slender {
-
-class RodGroup::Impl
-{
-public:
-  Impl(RodGroupModel m, const TimeConfig& t) : model(std::move(m)), time(t)
-  {
-    std::vector<RodStepper::Impl*> parts;
-    for (const auto& rod : model.rods)
-    {
-      rods.push_back(std::make_unique<RodStepper::Impl>(rod, time));
-      parts.push_back(rods.back().get());
-    }
-    loop = std::make_unique<StepLoop>(time, parts, &model);
-  }
-
-  StepReport step(RodGroupState& state, const RodGroupInputs& inputs, double duration);
-  StepReport solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs);
-
-  RodGroupModel model;
-  TimeConfig time;
-  std::vector<std::unique_ptr<RodStepper::Impl>> rods;
-  std::unique_ptr<StepLoop> loop;
-  int threads = 0;
-  RodGroupInputs inputs;   ///< with the targets of grasps that driven bodies carry
-};
 
 namespace {
 
@@ -77,102 +51,6 @@ RodGroup::~RodGroup() = default;
 RodGroup::RodGroup(RodGroup&&) noexcept = default;
 
 StepReport RodGroup::step(RodGroupState& state, const RodGroupInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
-
-StepReport RodGroup::solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs)
-{
-  TimeConfig time = impl_->time;
-  time.integrator = Integrator::implicit_euler;
-  time.error_tolerance = 0;
-  time.newton.max_iterations = std::max(60, time.newton.max_iterations);
-  time.newton.tolerance = std::min(1e-7, time.newton.tolerance);
-  Impl settling(impl_->model, time);
-  settling.loop->coupled()->threads = impl_->threads;
-  const StepReport report = settling.solveEquilibrium(state, inputs);
-  for (std::size_t r = 0; r < impl_->rods.size(); ++r)
-    impl_->rods[r]->wrenches = settling.rods[r]->wrenches;
-  return report;
-}
-
-/// What is left of the forces is what accelerates the rods in the last step.
-StepReport RodGroup::Impl::solveEquilibrium(RodGroupState& state, const RodGroupInputs& targets)
-{
-  constexpr int kMaxRounds = 400;
-  constexpr double kUnbalanced = 1e-8;   // of the largest force
-  StepReport total;
-  RodGroupState work = state, before;
-  double h = time.step, force_scale = 0.0, lever = std::numeric_limits<double>::max();   // for moments beside forces: the shortest edge
-  for (const auto& rod : model.rods)
-    lever = std::min(lever, rod->rest_length.minCoeff());
-  for (int round = 0, failures = 0; round < kMaxRounds; ++round)
-  {
-    for (RodState& rod : work.rods)
-    {
-      rod.forgetHistory();
-      rod.v.setZero();
-      for (GraspState& g : rod.grasps)
-        g.velocity = {};
-    }
-    for (RigidBodyState& body : work.bodies)
-    {
-      body.velocity = {};
-      body.has_history = false;
-    }
-    for (Twist& v : work.obstacle_velocities)
-      v = {};
-    before = work;
-    StepReport report = step(work, targets, h);
-    total.iterations += report.iterations;
-    total.factorizations += report.factorizations;
-    if (!report.ok)
-    {
-      h *= 0.1;
-      if (++failures > 12)
-      {
-        report.message = "no equilibrium was found: " + report.message;
-        report.iterations = total.iterations;
-        return report;
-      }
-      continue;
-    }
-    ++total.substeps;
-    double unbalanced = 0.0;
-    for (std::size_t r = 0; r < work.rods.size(); ++r)
-      for (int i = 0; i < model.rods[r]->nodes(); ++i)
-        if (rods[r]->system.isMoving(i))
-          unbalanced = std::max(unbalanced, model.rods[r]->mass[i] * (work.rods[r].x.col(i) - before.rods[r].x.col(i)).norm() / (h * h));
-    for (std::size_t b = 0; b < work.bodies.size(); ++b)
-      if (model.bodies[b].simulated)
-      {
-        const RigidBodyModel& m = model.bodies[b];
-        const Pose &from = before.bodies[b].X_WB, &to = work.bodies[b].X_WB;
-        const Eigen::Vector3d turn = rotationVector(from.orientation.conjugate() * to.orientation);
-        unbalanced = std::max({unbalanced, m.mass * (to.position - from.position).norm() / (h * h), (m.inertia * turn).norm() / (lever * h * h)});
-      }
-    force_scale = std::max(force_scale, loop->coupled()->forceScale());
-    total.residual = unbalanced / force_scale;
-    total.max_strain = report.max_strain;
-    if (round > 0 && total.residual < kUnbalanced)
-    {
-      for (RodState& rod : work.rods)
-      {
-        rod.forgetHistory();
-        rod.v.setZero();
-      }
-      for (RigidBodyState& body : work.bodies)
-      {
-        body.velocity = {};
-        body.has_history = false;
-      }
-      state = work;
-      return total;
-    }
-    h = std::min(h * (report.iterations < 10 ? 4.0 : 1.5), 1e6);
-  }
-  total.ok = false;
-  total.failure = StepFailure::newton_diverged;
-  total.message = "the equilibrium did not settle: something may be free to drift; hold it, or let it settle by time stepping with damping";
-  return total;
-}
 
 StepReport RodGroup::Impl::step(RodGroupState& state, const RodGroupInputs& step_inputs, double duration)
 {

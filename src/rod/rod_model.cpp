@@ -169,7 +169,7 @@ std::string whyNotIsotropic(const RodModel& model)
   if (model.stiffness_damping > 0)
     return "it has damping.stiffness";
   if (model.curvature != Curvature::tangent)
-    return "it has curvature: compensated";
+    return "it has curvature: compensated (leave curvature out)";
   return "";
 }
 
@@ -181,7 +181,7 @@ RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, cons
     throw std::invalid_argument("rod '" + model.name + "': a node or the total twist is not finite");
   if (model.closed && std::abs(std::remainder(total_twist, 2 * M_PI)) > 1e-6)
     throw std::invalid_argument("rod '" + model.name + "': the frames of a closed rod meet again only after whole turns; its total twist must be a multiple of 2 pi, got " +
-                                std::to_string(total_twist) + " (a loop glued at another angle has that angle as rest twist of a node)");
+                                std::to_string(total_twist) + " (a loop glued at another angle has that angle as natural twist: see addNaturalTwist)");
   const int n = model.nodes(), edges = model.edges();
   RodState state;
   state.x = nodes;
@@ -245,15 +245,19 @@ Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int n
   Eigen::Vector3d t, d1;
   if (!model.closed && (node == 0 || node == n - 1))
   {
-    // Half the rest turn back from the end edge: curvature (kappa1, kappa2) turns t about kappa b = kappa1 d2 - kappa2 d1.
+    // Half the rest turn and twist back from the end edge: curvature (kappa1, kappa2) turns t about kappa b = kappa1 d2 - kappa2 d1, with
+    // the directors half way of the twist.
     const int edge = node == 0 ? 0 : edges - 1;
-    const Eigen::Vector3d te = tangent(edge), d1e = directorOf(model, state, edge), d2e = te.cross(d1e);
-    const Eigen::Vector2d k = model.rest_curvature.col(node);
-    const Eigen::Vector3d kb = k[0] * d2e - k[1] * d1e;
-    const double angle = (model.curvature == Curvature::tangent ? 2.0 * std::atan(0.5 * kb.norm()) : kb.norm()) * (node == 0 ? -1.0 : 1.0);
-    const Eigen::Vector3d axis = kb.norm() > 0 ? Eigen::Vector3d(kb.normalized()) : d1e;
+    const double side = node == 0 ? -1.0 : 1.0, m = model.rest_twist[node];
+    const Eigen::Vector3d te = tangent(edge), d1e = directorOf(model, state, edge);
+    const Eigen::Vector3d d1h = m == 0.0 ? d1e : rotateAbout(d1e, te, 0.5 * side * m), d2h = te.cross(d1h);
+    const bool tangents = model.curvature == Curvature::tangent;
+    const Eigen::Vector2d k = model.rest_curvature.col(node) / (tangents ? std::cos(0.5 * m) : 1.0);
+    const Eigen::Vector3d kb = k[0] * d2h - k[1] * d1h;
+    const double angle = (tangents ? 2.0 * std::atan(0.5 * kb.norm()) : kb.norm()) * side;
+    const Eigen::Vector3d axis = kb.norm() > 0 ? Eigen::Vector3d(kb.normalized()) : d1h;
     t = rotateAbout(te, axis, angle);
-    d1 = rotateAbout(d1e, axis, angle);
+    d1 = rotateAbout(rotateAbout(d1e, axis, angle), t, side * m);
   }
   else
   {
@@ -321,7 +325,9 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
     const int edge = side ? node : (node + model.edges() - 1) % model.edges();
     const Eigen::Vector3d te = (state.x.col((edge + 1) % n) - state.x.col(edge)).normalized();
     const double angle = signedAngle(parallelTransport(section.col(1), section.col(0), te), directorOf(model, state, edge), te);
-    g.section_twist[side] = unwrapNear(side ? angle : -angle, shareOfEdge(model, node, side) * state.twistAt(node));
+    const bool end = !model.closed && (node == 0 || node == n - 1);   // whose half joint has its rest twist
+    const double expected = end ? model.rest_twist[node] : shareOfEdge(model, node, side) * state.twistAt(node);
+    g.section_twist[side] = unwrapNear(side ? angle : -angle, expected);
   }
   return g;
 }

@@ -30,6 +30,9 @@ StepFailure RodStepper::Impl::beginStep(const StepPlan& step_plan, const RodInpu
 {
   (void)h;
   plan = &step_plan;
+  for (std::size_t k = 0; k < work.grasps.size(); ++k)
+    if (work.grasps[k].active && work.grasps[k].body >= 0)
+      stage_poses[k] = work.grasps[k].X_WG;   // an attempt that failed leaves its trial poses
   system.load(work);
   if ((plan->needs_acceleration || time.error_tolerance > 0) && work.a.cols() == 0)
   {

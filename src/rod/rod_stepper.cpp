@@ -21,9 +21,18 @@ StepReport RodStepper::step(RodState& state, const RodInputs& inputs, double dur
 {
   return loop_->step(&state, &inputs, duration);
 }
-StepReport RodStepper::solveEquilibrium(RodState& state, const RodInputs& inputs)
+StepReport RodStepper::solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles)
 {
-  return impl_->solveEquilibrium(state, inputs);
+  return impl_->solveEquilibrium(state, inputs, leave_saddles);
+}
+StepReport RodStepper::assessEquilibrium(const RodState& state, const RodInputs& inputs)
+{
+  return impl_->assessEquilibrium(state, inputs);
+}
+Eigen::Map<const Eigen::Matrix4Xd> RodStepper::lowestMode() const
+{
+  const Eigen::VectorXd& mode = impl_->lowest_mode;
+  return Eigen::Map<const Eigen::Matrix4Xd>(mode.data(), 4, mode.size() / 4);
 }
 const std::vector<Wrench>& RodStepper::wrenches() const
 {

@@ -23,7 +23,8 @@ class RodStepper::Impl
 public:
   Impl(std::shared_ptr<const RodModel> model, const TimeConfig& time);
 
-  StepReport solveEquilibrium(RodState& state, const RodInputs& inputs);
+  StepReport solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles);
+  StepReport assessEquilibrium(const RodState& state, const RodInputs& inputs);
 
   std::shared_ptr<const RodModel> model;
   TimeConfig time;
@@ -31,6 +32,7 @@ public:
   RodSystem system;
   std::vector<Wrench> wrenches;
   RodState work, next;              ///< start and end of a substep
+  Eigen::VectorXd lowest_mode;      ///< of the last equilibrium, see RodStepper::lowestMode()
   /// Of all grasps at the instant being solved for. Those of grasps carried by bodies are set from outside.
   std::vector<Pose> stage_poses;
   std::vector<Twist> carried_velocity;   ///< of the frames of grasps carried by bodies
@@ -75,8 +77,9 @@ private:
   void holdNodes(const RodInputs& inputs, double duration, double at);
 
   // rod_statics.cpp
+  class EquilibriumSearch;
   void carryFreeNodes(const RodInputs& inputs, double weight);
-  StepReport finishEquilibrium(RodState& state, const RodInputs& inputs, StepReport& report);
+  void evaluateEquilibrium(const RodInputs& inputs, StepReport& report);
 
   // rod_viscous.cpp: strain history of Rayleigh stiffness damping
   void startStrainHistory(const RodInputs& inputs, double duration, double t);

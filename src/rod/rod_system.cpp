@@ -305,6 +305,13 @@ void RodSystem::addShift(int from, int to, const HessianShift& shift)
 
 void RodSystem::moveAlong(double alpha)
 {
+  if (alpha == 0.0)   // whatever the direction is, which may be that of an attempt that overflowed
+  {
+    for (int k = 0; k < 3; ++k)
+      std::copy_n(x_base_[k].data(), a_.nodes, a_.x[k]);
+    std::fill(a_.turn - kHalo, a_.turn + a_.nodes + kHalo, 0.0);
+    return;
+  }
   for (int i = 0; i < a_.nodes; ++i)
   {
     for (int k = 0; k < 3; ++k)

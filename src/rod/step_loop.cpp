@@ -1,4 +1,5 @@
 #include "step_loop.h"
+#include "slender_sim/linalg/interruption.h"
 
 #include <algorithm>
 #include <cmath>
@@ -93,6 +94,7 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
     const double length = last ? duration - t : h;
     const bool can_shorten = !explicit_step && 0.5 * length >= time_.min_step;
     StepReport sub;
+    failed_ = 0;
     StepFailure failure = explicit_step ? explicit_->step(inputs_, duration_, t, length, sub, failed_) : implicitStep(t, length, sub);
     if (conserving && failure == StepFailure::none && energy(false, nullptr) > start_energy + allowance)
       failure = StepFailure::energy_grew;
@@ -102,6 +104,8 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
     {
       report.iterations += sub.iterations;
       report.factorizations += sub.factorizations;
+      if (stepsInterrupted() && !rods_.empty())
+        return rods_[failed_]->refuse(report, StepFailure::work_exceeded, kStepInterrupted);
       const bool shortest = !adaptive && 0.5 * length < duration * std::ldexp(1.0 - 1e-9, -time_.newton.max_cuts);
       if (!inaccurate && (!can_shorten || shortest || ++cuts > time_.newton.max_cuts))
       {

@@ -1,19 +1,41 @@
 #include "slender_sim/scene/csv_tables.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <optional>
+#include <set>
 
+#include "earlier_run.h"
 #include "text_file.h"
 
 namespace slender {
+
+namespace {
+
+/// Makes the folder, or removes the tables of an earlier run from it: of two runs with other objects the tables would be mixed.
+const std::string& clearedFolder(const std::string& folder)
+{
+  const auto ours = [](const std::string& name) {
+    static const std::set<std::string> names = {"nodes.csv",  "grasps.csv",   "bodies.csv",     "threads.csv",     "cloths.csv",
+                                                "tracking.csv", "rod_fields.csv", "cloth_fields.csv", "energies.csv"};
+    return names.count(name) > 0;
+  };
+  makeFolder(folder);
+  clearEarlierRun(folder, ours, "t [s],");
+  return folder;
+}
+
+}  // namespace
 
 struct CsvTables::Files
 {
   std::string folder;
   TextFile nodes, grasps;
   std::optional<TextFile> bodies, threads, cloths, tracking;   // only scenes that have any
+  std::map<std::string, TextFile> fields;                      // by name of the table
 
-  explicit Files(const std::string& to) : folder(to), nodes((makeFolder(to), to + "/nodes.csv")), grasps(to + "/grasps.csv") {}
+  explicit Files(const std::string& to) : folder(clearedFolder(to)), nodes(to + "/nodes.csv"), grasps(to + "/grasps.csv") {}
 
   TextFile& opened(std::optional<TextFile>& file, const char* name, const char* header)
   {
@@ -105,6 +127,35 @@ void writeSolid(TextFile& file, double time, const SolidSnapshot& solid)
   file.endLine();
 }
 
+void writeFields(TextFile& file, double time, const FieldTable& table)
+{
+  const bool indexed = table.values.rows() > 1;
+  for (Eigen::Index i = 0; i < table.values.rows(); ++i)
+  {
+    file.number(time) << ',' << table.object;
+    if (indexed)
+    {
+      file << ',';
+      file.number(i);
+    }
+    for (Eigen::Index k = 0; k < table.values.cols(); ++k)
+    {
+      file << ',';
+      if (!std::isnan(table.values(i, k)))
+        file.number(table.values(i, k));
+    }
+    file.endLine();
+  }
+}
+
+std::string headerOf(const FieldTable& table)
+{
+  std::string header = table.values.rows() > 1 ? "t [s],object,index" : "t [s],object";
+  for (const std::string& column : table.columns)
+    header += "," + column;
+  return header;
+}
+
 }  // namespace
 
 CsvTables::CsvTables(const std::string& folder) : files_(std::make_unique<Files>(folder))
@@ -143,6 +194,17 @@ void CsvTables::write(const SceneSnapshot& instant)
       writeSolid(files_->opened(files_->bodies, "/bodies.csv",
                                 "t [s],object,x [m],y [m],z [m],qx,qy,qz,qw,vx [m/s],vy [m/s],vz [m/s],wx [rad/s],wy [rad/s],wz [rad/s]"),
                  time, solid);
+  for (const FieldTable& table : instant.fields)
+  {
+    auto place = files_->fields.find(table.table);
+    if (place == files_->fields.end())
+    {
+      place = files_->fields.emplace(table.table, TextFile(files_->folder + "/" + table.table + ".csv")).first;
+      place->second << headerOf(table);
+      place->second.endLine();
+    }
+    writeFields(place->second, time, table);
+  }
 }
 
 void CsvTables::finish()
@@ -152,6 +214,8 @@ void CsvTables::finish()
   for (auto* file : {&files_->bodies, &files_->threads, &files_->cloths, &files_->tracking})
     if (*file)
       (*file)->close();
+  for (auto& [name, file] : files_->fields)
+    file.close();
 }
 
 }  // namespace slender

@@ -24,8 +24,11 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
   const Eigen::Vector3d along = readDirection(map.get("direction"), Eigen::Vector3d::UnitX());
   const Eigen::Vector3d up = readDirection(at_up, Eigen::Vector3d::UnitZ());
   RodConfig rod;
-  rod.cross_section = readCrossSection(map.get("cross_section"), edges);
+  rod.name = name;
+  const YamlCursor at_section = map.get("cross_section");
+  rod.cross_section = readCrossSection(at_section, edges);
   readTraits(map, rod);
+  warnOfRoundContact(at_section, rod);
   const Motion motions[2] = {readMotion(map.get("start_motion"), context, false), readMotion(map.get("end_motion"), context, false)};
   double thickness = 0.0;
   for (const auto* radii : {&rod.cross_section.a, &rod.cross_section.b})

@@ -52,7 +52,9 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   {
     rod.cross_section = {{4e-5}, {4e-5}};
   }
+  rod.name = name;
   readTraits(map, rod);
+  warnOfRoundContact(at_section, rod);
   map.finish();
   if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * strands))
   {

@@ -67,8 +67,14 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
                                                                    {"conforming", BendingModel::isometric_conforming},
                                                                    {"hinge", BendingModel::hinge},
                                                                    {"none", BendingModel::none}}));
-  const YamlCursor bending_modulus = bending.get("modulus");
+  const YamlCursor bending_modulus = bending.get("modulus"), bending_ratio = bending.get("poissons_ratio");
+  cloth.bending_poissons_ratio = bending_ratio.number(Range::between(-1, 1));
   bending.finish();
+  if (bending_ratio.present() && cloth.bending != BendingModel::isometric_nonconforming)
+  {
+    bending_ratio.problem("is for bending: {model: isometric}. Hinges have the ratio of their mesh (-1/3 on equilateral triangles), conforming bending "
+                          "has 1; leave it out");
+  }
   readPlasticity(map.get("plasticity"), cloth);
   if (at_membrane.present())
   {
@@ -106,7 +112,8 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
     cloth.membrane = isotropicMembrane(youngs_modulus, poissons_ratio, thickness);
     if (cloth.bending != BendingModel::none)
     {
-      cloth.bending_modulus = youngs_modulus * thickness * thickness * thickness / (12 * (1 - poissons_ratio * poissons_ratio));
+      const double nu = cloth.bending_poissons_ratio.value_or(poissons_ratio);
+      cloth.bending_modulus = youngs_modulus * thickness * thickness * thickness / (12 * (1 - nu * nu));
     }
   }
   assign(cloth.bending_modulus, bending_modulus.number(Range::closed(0, 1e9, "N m")));
@@ -294,9 +301,10 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
   const Eigen::Matrix3Xd start = readClothShape(map.get("start"), context, cloth.mesh);
   cloth.start = start.cols() ? start : cloth.start;
   readUndeformed(undeformed, context, cloth);
-  if (undeformed.present() && cloth.bending != BendingModel::hinge)
+  if (undeformed.present() && (cloth.bending == BendingModel::isometric_conforming || cloth.bending == BendingModel::none))
   {
-    undeformed.problem("gives angles at rest, which only bending: {model: hinge} has; the isometric models are for flat rest shapes");
+    undeformed.problem("gives angles at rest, which this bending model does not have; use bending: {model: hinge}, or isometric, which takes hinges "
+                       "for curved shapes at rest");
   }
   cloth.aerodynamics = readAerodynamics(map.get("aerodynamics"));
   YamlMap damping(map.get("damping"));

@@ -48,7 +48,12 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
   }
   try
   {
-    return bagReader()(source);
+    RecordedGuide recorded = bagReader()(source);
+    if (!recorded.gaps.empty())
+    {
+      at.warning(recorded.gaps);
+    }
+    return recorded;
   }
   catch (const std::runtime_error& error)
   {

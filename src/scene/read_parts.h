@@ -38,6 +38,8 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
 std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges);
 GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges);
 CrossSection readCrossSection(const YamlCursor& at, int edges);
+/// Warns that contact treats elliptical sections of a rod as circles. Call this after its cross-section and its contact have been read.
+void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod);
 Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
 /// A rod, and how many edges it has: 0 when its centreline could not be read.
@@ -66,6 +68,9 @@ std::optional<Pose> readPose(const YamlCursor& at);
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
 std::optional<RodContact> readRodContact(const YamlCursor& at);
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context);
+/// Chooses the edges and the break-up radius of threads whose entries `at` do not give them, and says what is not resolved. All other
+/// objects of the scene, its gravity and its time have been read.
+void completeThreads(SceneConfig& scene, const std::vector<YamlCursor>& at);
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context);
 /// The list `tracked`: appends to the cloths.
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
@@ -74,5 +79,8 @@ std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodPart>& rods);
 TimeConfig readTime(const YamlCursor& at);
+RecordConfig readRecord(const YamlCursor& at);
+/// Reports fields that nothing in the scene has; called when all objects have been read.
+void checkRecord(const YamlCursor& at, const SceneConfig& scene);
 
 }  // namespace slender

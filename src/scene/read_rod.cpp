@@ -154,6 +154,78 @@ void checkInitial(YamlMap& map, const ReadContext& context, const RodConfig& rod
   }
 }
 
+/// `rest_twist` and `natural_curvature` of a rod with so many edges (0: not known).
+void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
+{
+  const YamlCursor at_twist = map.get("rest_twist"), at_curvature = map.get("natural_curvature");
+  const std::size_t joints = edges == 0 ? 0 : rod.closed ? edges : edges - 1;
+  const auto checkJoints = [joints, &rod](const YamlCursor& at, std::size_t count) {
+    if (joints > 0 && count != 1 && count != joints)
+    {
+      at.problem("has " + std::to_string(count) + " entries; must have 1 or " + std::to_string(joints) + (rod.closed ? " (one per node)" : " (one per inner node)"));
+    }
+  };
+  if (const auto twist = at_twist.numbers(Range::closed(-1e5, 1e5, "rad")))
+  {
+    checkJoints(at_twist, twist->size());
+    rod.rest_twist = *twist;
+  }
+  if (!at_curvature.present())
+  {
+    return;
+  }
+  const Range curvature = Range::closed(-1e6, 1e6, "1/m");
+  const auto pair = [&curvature](const YamlCursor& at) {
+    const auto values = at.numbers(curvature);
+    if (values && values->size() != 2)
+    {
+      at.problem("must be [kappa1, kappa2]");
+    }
+    return values && values->size() == 2 ? Eigen::Vector2d((*values)[0], (*values)[1]) : Eigen::Vector2d(0, 0);
+  };
+  const auto entries = at_curvature.items(1);
+  if (!entries.empty() && !entries[0].isList())
+  {
+    rod.natural_curvature = {pair(at_curvature)};
+  }
+  else
+  {
+    for (const YamlCursor& entry : entries)
+    {
+      rod.natural_curvature.push_back(pair(entry));
+    }
+    checkJoints(at_curvature, entries.size());
+  }
+  if (rod.naturally_straight)
+  {
+    at_curvature.problem("contradicts naturally_straight: true; leave one of them out");
+  }
+  if (rod.joints.matched_to_arcs)
+  {
+    at_curvature.problem("contradicts matched_to_arcs: true, whose arcs are those of the centreline; leave one of them out");
+  }
+}
+
+/// Moduli that the scene leaves out may only follow from a Young's modulus that it states: the default one has nothing to do with the
+/// moduli that are given. A Young's modulus that nothing follows from is worth a warning.
+void checkModuli(const YamlMap& material, const YamlCursor& at_youngs)
+{
+  std::vector<std::string> given, missing;
+  for (const char* key : {"stretch_modulus", "bend_modulus", "twist_modulus"})
+  {
+    (material.has(key) ? given : missing).push_back(key);
+  }
+  if (!given.empty() && !missing.empty() && !at_youngs.present())
+  {
+    material.at().problem("gives " + joinWords(given) + " but not " + joinWords(missing) + "; give " + (missing.size() == 1 ? "this too" : "these too") +
+                          ", or youngs_modulus (and poissons_ratio), from which the rest follows with the cross-section");
+  }
+  if (missing.empty() && at_youngs.present())
+  {
+    at_youngs.warning("has no effect, since stretch_modulus, bend_modulus and twist_modulus are given; leave it out");
+  }
+}
+
 }  // namespace
 
 CrossSection readCrossSection(const YamlCursor& at, int edges)
@@ -193,12 +265,44 @@ CrossSection readCrossSection(const YamlCursor& at, int edges)
   return section;
 }
 
+void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod)
+{
+  if (!rod.contact)
+  {
+    return;
+  }
+  // an entry list is one number, the two ends of a taper, or one number per edge; the most eccentric section is the one to name
+  const CrossSection& section = rod.cross_section;
+  const std::size_t count = std::max(section.a.size(), section.b.size());
+  const auto entry = [count](const std::vector<double>& list, std::size_t k) {
+    return list.size() == count ? list[k] : list.size() == 1 ? list[0] : list[k < count / 2 ? 0 : 1];
+  };
+  double worst = 1.0, a = 0.0, b = 0.0;
+  for (std::size_t k = 0; k < count; ++k)
+  {
+    const double here_a = entry(section.a, k), here_b = entry(section.b, k), ratio = std::max(here_a / here_b, here_b / here_a);
+    if (ratio > worst)
+    {
+      worst = ratio;
+      a = here_a;
+      b = here_b;
+    }
+  }
+  if (worst > 1.0 + 1e-9)   // round-off of half-axes that are meant to be equal
+  {
+    at_section.warning("rod " + rod.name + " has elliptical sections (half-axes " + shortNumber(a) + " m and " + shortNumber(b) +
+                       " m), but contact treats each section as a circle of the larger half-axis, " + shortNumber(std::max(a, b)) +
+                       " m; bending and twisting use the ellipse. Give the rod a round section or leave out its contact");
+  }
+}
+
 Material readMaterial(const YamlCursor& at)
 {
   Material material;
   YamlMap map(at);
   assign(material.density, map.get("density").number(Range::above(0, 1e6, "kg/m^3")));
-  assign(material.youngs_modulus, map.get("youngs_modulus").number(Range::above(0, 1e15, "Pa")));
+  const YamlCursor at_youngs = map.get("youngs_modulus");
+  assign(material.youngs_modulus, at_youngs.number(Range::above(0, 1e15, "Pa")));
   assign(material.poissons_ratio, map.get("poissons_ratio").number(Range::above(-1, 0.5)));
   assign(material.torsion, map.get("torsion").choice<Torsion>({{"polar", Torsion::polar}, {"saint_venant", Torsion::saint_venant}}));
   material.linear_density = map.get("linear_density").number(Range::above(0, 1e6, "kg/m"));
@@ -207,6 +311,7 @@ Material readMaterial(const YamlCursor& at)
   material.bend_modulus = readBendModulus(map.get("bend_modulus"));
   material.twist_modulus = map.get("twist_modulus").number(stiffness);
   map.finish();
+  checkModuli(map, at_youngs);
   return material;
 }
 
@@ -223,8 +328,13 @@ Damping readDamping(const YamlCursor& at)
 
 void readTraits(YamlMap& map, RodConfig& rod)
 {
-  assign(rod.joints.curvature,
-         map.get("curvature").choice<Curvature>({{"tangent", Curvature::tangent}, {"compensated", Curvature::compensated}}));
+  const auto curvature = map.get("curvature").choice<std::optional<Curvature>>(
+      {{"auto", std::nullopt}, {"tangent", Curvature::tangent}, {"compensated", Curvature::compensated}});
+  if (curvature && *curvature)
+  {
+    rod.automatic_curvature = false;
+    rod.joints.curvature = **curvature;
+  }
   assign(rod.formulation,
          map.get("formulation").choice<Formulation>(
              {{"auto", Formulation::automatic}, {"isotropic", Formulation::isotropic}, {"general", Formulation::general}}));
@@ -250,12 +360,15 @@ RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::str
   }
   assign(rod.initial_twist, map.get("initial_twist").number(Range::closed(-1e5, 1e5, "rad")));
   const int edges = readCenterline(map, context, rod);
+  readNaturalFrames(map, rod, edges);
   if (edges > 0 && rod.initial)
   {
     checkInitial(map, context, rod);
   }
-  rod.cross_section = readCrossSection(map.get("cross_section"), edges);
+  const YamlCursor at_section = map.get("cross_section");
+  rod.cross_section = readCrossSection(at_section, edges);
   readTraits(map, rod);
+  warnOfRoundContact(at_section, rod);
   readGrasps(map.get("grasps"), context, rod, edges);
   rod.tracking = readTrackedCurve(map.get("track"), context, rod, edges);
   map.finish();

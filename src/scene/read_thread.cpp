@@ -64,7 +64,7 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
   return timed;
 }
 
-NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context)
+NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double& swirl)
 {
   NozzleConfig nozzle;
   YamlMap map(at);
@@ -73,8 +73,18 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context)
   assign(nozzle.pose.position, position.vector3(Range::closed(-max_coordinate, max_coordinate, "m")));
   const Eigen::Vector3d along = readDirection(direction, -Eigen::Vector3d::UnitZ());
   nozzle.pose.orientation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), along);
-  nozzle.flow = readTimed(map.get("flow"), Range::closed(0, 1e3, "m^3/s"));
+  const YamlCursor flow = map.get("flow");
+  if (flow.present())
+  {
+    nozzle.flow = readTimed(flow, Range::closed(0, 1e3, "m^3/s"));
+  }
   assign(nozzle.motion, readSolidMotion(map.get("motion"), context, false));
+  const YamlCursor at_swirl = map.get("swirl");
+  assign(swirl, at_swirl.number(Range::closed(0, 1, "of the coil's radius")));
+  if (swirl > 0 && !std::holds_alternative<FixedMotion>(nozzle.motion))
+  {
+    at_swirl.problem("is for nozzles that stand; this one has a motion of its own");
+  }
   if (const auto* table = std::get_if<TableMotion>(&nozzle.motion))
   {
     if (position.present() || direction.present())
@@ -203,7 +213,7 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
   }
   else if (nozzle.present())
   {
-    thread.nozzle = readNozzle(nozzle, context);
+    thread.nozzle = readNozzle(nozzle, context, thread.swirl);
     for (const YamlCursor& other : {radius, ends})
     {
       if (other.present())
@@ -252,20 +262,7 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
                                            "friction out, then it sticks");
   }
   readEdges(map.get("edges"), thread);
-  const double most = greatestFlow(thread, context.step);
-  if (thread.nozzle && thread.nozzle->flow.table.greatest() > most)
-  {
-    YamlMap(nozzle).get("flow").problem("is too much: over a thousand edges would leave the nozzle in one step; must be at most " + shortNumber(most) +
-                                        " m^3/s, or with longer edges.feed or a shorter time.step more");
-  }
-  const YamlCursor breakup = map.get("breakup_radius");
-  // a thread whose flow stops drains without end
-  thread.breakup_radius = thread.nozzle ? 0.002 * thread.nozzle->diameter : 0.0;
-  assign(thread.breakup_radius, breakup.number(Range::closed(0, max_coordinate, "m")));
-  if (thread.nozzle && thread.breakup_radius >= 0.5 * thread.nozzle->diameter)
-  {
-    breakup.problem("must be less than the nozzle's radius " + shortNumber(0.5 * thread.nozzle->diameter) + " m, or the thread would break wherever it is");
-  }
+  assign(thread.breakup_radius, map.get("breakup_radius").number(Range::closed(0, max_coordinate, "m")));
   const YamlCursor region = map.get("region");
   if (region.present())
   {

@@ -133,6 +133,14 @@ TestFunctions readClusters(const YamlCursor& at, const GuideConfig& guide)
   options.seed = static_cast<unsigned>(seed);
   assign(options.sampled_frames, map.get("frames").integer(1, 10'000));
   map.finish();
+  const auto* carried = std::get_if<CarriedGuide>(&guide.motion);
+  const bool live = std::holds_alternative<TopicGuide>(guide.motion) || (carried && carried->poses.empty());
+  const bool simulated = std::holds_alternative<ClothGuide>(guide.motion);
+  if (live || simulated)
+  {
+    at.warning(std::string("the guide's motion is not known before it runs, as it is that of ") + (live ? "messages" : "a cloth") +
+               ": regions are clustered by its first shape alone; give regions, or cluster a recorded motion of the guide");
+  }
   return regionBasis(guide.mesh, clusterFaces(guide.mesh.triangles, framesOf(guide, options.sampled_frames), options).region);
 }
 

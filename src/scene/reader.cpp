@@ -96,24 +96,38 @@ private:
   std::map<std::string, std::string> paths_;
 };
 
-/// A grasp cannot follow what it may hold back.
+/// A grasp cannot follow what it may hold back. Bodies that the scene does not have may be known to a node.
 void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods, const std::vector<YamlCursor>& cloths)
 {
   std::set<std::string> simulated;
+  std::vector<std::string> names;
   for (const BodyConfig& body : scene.bodies)
   {
+    names.push_back(body.name);
     if (!body.motion)
     {
       simulated.insert(body.name);
     }
   }
-  const auto check = [&simulated](const std::vector<GraspConfig>& grasps, const YamlCursor& entry, const char* instead) {
+  for (const ObstacleConfig& obstacle : scene.obstacles)
+  {
+    names.push_back(obstacle.name);
+  }
+  const auto check = [&](const std::vector<GraspConfig>& grasps, const YamlCursor& entry, const char* instead) {
     for (const GraspConfig& grasp : grasps)
     {
       const auto* motion = std::get_if<BodyMotion>(&grasp.motion);
+      const bool known = !motion || std::find(names.begin(), names.end(), motion->body) != names.end();
+      const auto at = [&] { return YamlMap(YamlMap(YamlMap(entry).get("grasps")).get(grasp.name)).get("motion"); };
       if (motion && simulated.count(motion->body))
       {
-        YamlMap(YamlMap(YamlMap(entry).get("grasps")).get(grasp.name)).get("motion").problem("body " + motion->body + " is simulated; " + instead);
+        at().problem("body " + motion->body + " is simulated; " + instead);
+      }
+      else if (!known)
+      {
+        const std::string nearest = nearestWord(motion->body, names);
+        at().warning("the scene has no body or obstacle of this name" + (nearest.empty() ? std::string() : " (did you mean " + nearest + "?)") +
+                   ": the grasp stays where it is, unless a node hears of the body in its bodies topic");
       }
     }
   };
@@ -218,6 +232,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   {
     cloths.push_back(entry);
   }
+  completeThreads(scene, entriesOf(at_threads));
   checkFollowed(scene, entriesOf(at_rods), cloths);
   checkGraspNames(scene, cloths);
   checkUnderCloth(scene, cloths);
@@ -228,6 +243,11 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   const YamlCursor time = map.get("time");
   if (!YamlMap(time).has("integrator"))
   {
+    if (scene.time.integrator != Integrator::implicit_euler && !(scene.rods.empty() && scene.bodies.empty()))
+    {
+      map.get(map.has("cloths") ? "cloths" : "tracked").warning("makes implicit_euler the default integrator of the rods and bodies as well, which is of first order; without cloth it is " +
+                                std::string(toString(scene.time.integrator)) + ": give time.integrator to choose (cloth takes implicit_euler or tr_bdf2)");
+    }
     scene.time.integrator = Integrator::implicit_euler;
   }
   else if (scene.time.integrator != Integrator::implicit_euler && scene.time.integrator != Integrator::tr_bdf2 &&
@@ -242,6 +262,35 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   if (scene.start == Start::equilibrium)
   {
     map.get("start").problem("is not for cloth; must be as_given");
+  }
+}
+
+/// Threads take implicit Euler steps of fixed length, and nothing blows on them. Alone they refuse what they do not have; beside other objects,
+/// which may have it, that is a warning.
+void checkThreadTime(YamlMap& map, const SceneConfig& scene)
+{
+  YamlMap time(map.get("time"));
+  const bool alone = scene.rods.empty() && scene.bodies.empty() && scene.cloths.empty();
+  const auto refuse = [&](const YamlCursor& at, const std::string& problem, const std::string& warning) {
+    alone ? at.problem(problem) : at.warning(warning);
+  };
+  if (time.has("integrator") && scene.time.integrator != Integrator::implicit_euler)
+  {
+    refuse(time.get("integrator"), "is not for threads; must be implicit_euler", "does not hold for the scene's threads, which take implicit Euler steps.");
+  }
+  if (scene.start == Start::equilibrium)
+  {
+    refuse(map.get("start"), "is not for threads, which flow; must be as_given",
+           "does not hold for the scene's threads, which flow: they start as given.");
+  }
+  if (scene.time.error_tolerance > 0)
+  {
+    refuse(time.get("error_tolerance"), "is not for threads, whose steps are of fixed length; leave it out",
+           "does not hold for the scene's threads, whose steps are of fixed length.");
+  }
+  if (scene.wind != Eigen::Vector3d::Zero() || scene.wind_topic)
+  {
+    map.get("wind").warning("does not act on threads.");
   }
 }
 
@@ -290,14 +339,14 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   assign(scene.start, map.get("start").choice<Start>({{"as_given", Start::as_given}, {"equilibrium", Start::equilibrium}}));
   const YamlCursor time = map.get("time");
   scene.time = readTime(time);
-  YamlMap record(map.get("record"));
-  assign(scene.record.every, record.get("every").integer(1, 1'000'000'000, "steps"));
-  record.finish();
+  const YamlCursor record = map.get("record");
+  scene.record = readRecord(record);
   ReadContext context;
   context.directory = directory;
   context.gravity = scene.gravity;
   context.step = scene.time.step;
   readObjects(map, context, scene);
+  checkRecord(record, scene);
   const bool touches = std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
   if (touches && !YamlMap(time).has("integrator"))
   {
@@ -312,14 +361,9 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   {
     checkTrackedTime(map, scene);
   }
-  const bool only_threads = !scene.threads.empty() && scene.rods.empty() && scene.bodies.empty() && scene.cloths.empty();
-  if (only_threads && YamlMap(time).has("integrator") && scene.time.integrator != Integrator::implicit_euler)
+  if (!scene.threads.empty())
   {
-    YamlMap(time).get("integrator").problem("is not for threads; must be implicit_euler");
-  }
-  if (only_threads && scene.start == Start::equilibrium)
-  {
-    map.get("start").problem("is not for threads, which flow; must be as_given");
+    checkThreadTime(map, scene);
   }
   if (!scene.cloths.empty())
   {
@@ -334,6 +378,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   {
     throw SceneError(problems.text());
   }
+  scene.warnings = problems.warnings();
   return scene;
 }
 

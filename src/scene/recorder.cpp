@@ -1,5 +1,6 @@
 #include "slender_sim/scene/recorder.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/scene/csv_tables.h"
 #include "slender_sim/scene/file_paths.h"
+#include "earlier_run.h"
 #include "text_file.h"
 
 namespace slender {
@@ -54,10 +56,23 @@ std::vector<int> polyline(Eigen::Index nodes, bool closed)
   return line;
 }
 
+/// frame_000000.obj and so on.
+bool isFrameName(const std::string& name)
+{
+  const std::string start = "frame_", end = ".obj";
+  const std::size_t digits = name.size() - std::min(name.size(), start.size() + end.size());
+  return digits >= 6 && name.compare(0, start.size(), start) == 0 && name.compare(name.size() - end.size(), end.size(), end) == 0 &&
+         name.find_first_not_of("0123456789", start.size()) == name.size() - end.size();
+}
+
 class ObjRecorder final : public Recorder
 {
 public:
-  explicit ObjRecorder(std::string folder) : folder_(std::move(folder)) { makeFolder(folder_); }
+  explicit ObjRecorder(std::string folder) : folder_(std::move(folder))
+  {
+    makeFolder(folder_);
+    clearEarlierRun(folder_, isFrameName, "# scene ");
+  }
 
   void record(const Simulation& simulation, const StepReport&) override
   {

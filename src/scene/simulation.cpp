@@ -1,6 +1,7 @@
 #include "slender_sim/scene/simulation.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -51,16 +52,24 @@ void Simulation::findEquilibrium()
   {
     if (steppers_[r])
     {
-      report = steppers_[r]->solveEquilibrium(state_.rods[r], rod_inputs_[r]);
+      report.merge(steppers_[r]->solveEquilibrium(state_.rods[r], rod_inputs_[r]));
     }
   }
   if (report.ok && group_)
   {
-    report = stepGroup(inputs, true);
+    report.merge(stepGroup(inputs, true));
   }
   if (!report.ok)
   {
-    throw SimulationError("no equilibrium to start from: " + report.message + " (start: as_given starts from the shape in the scene)");
+    throw SimulationError("start: equilibrium: " + report.message + " (start: as_given starts from the shape in the scene)");
+  }
+  if (!report.stable)
+  {
+    char lowest[40];
+    std::snprintf(lowest, sizeof lowest, "%.3g", report.lowest_eigenvalue);
+    throw SimulationError("start: equilibrium: the equilibrium is unstable (lowest eigenvalue " + std::string(lowest) +
+                          " 1/s^2), and no stable one was reached from it: start from a shape that is nearer to the stable equilibrium (initial), or hold "
+                          "what drifts by a grasp (start: as_given starts from the shape in the scene)");
   }
   takeWrenches();
 }

@@ -1,7 +1,10 @@
 // Cloths of a scene and what holds them.
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <stdexcept>
 
+#include "slender_sim/energy/plate_bending.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
 
@@ -9,17 +12,52 @@ namespace slender {
 
 namespace {
 
-ClothModel modelOf(const ClothConfig& config)
+/// Isometric bending, the default, is for flat shapes at rest. Curved ones bend by hinges, which have the same small-angle limit.
+void chooseBending(ClothModel& model, std::vector<std::string>& warnings)
+{
+  if (model.bending != BendingModel::isometric_nonconforming || !(model.bending_modulus > 0) || model.bending_poissons_ratio || restsFlat(model))
+  {
+    return;
+  }
+  model.bending = BendingModel::hinge;
+  char angle[32];
+  std::snprintf(angle, sizeof angle, "%.3g", largestRestAngle(model) * 180 / M_PI);
+  warnings.push_back("cloth " + model.name + ": its shape at rest is curved (adjacent faces enclose up to " + angle + " degrees), so it bends by hinges; "
+                     "the isometric model is for flat shapes at rest. Give bending: {model: hinge} to choose that yourself.");
+}
+
+/// Bending with a Poisson's ratio of its own is exact on meshes of parallelograms only.
+void checkPlate(const ClothModel& model, std::vector<std::string>& warnings)
+{
+  constexpr double kNoticeable = 0.02;   // the bound of the study plate
+  if (!model.bending_poissons_ratio || model.bending != BendingModel::isometric_nonconforming || !(model.bending_modulus > 0) || !restsFlat(model))
+  {
+    return;
+  }
+  const double excess = plateStiffening(model.rest, model.topology, *model.bending_poissons_ratio) - 1.0;
+  if (excess > kNoticeable)
+  {
+    char percent[32];
+    std::snprintf(percent, sizeof percent, "%.0f", 100 * excess);
+    warnings.push_back("cloth " + model.name + ": with bending: {poissons_ratio} this mesh resists some curvatures by up to " + percent +
+                       " % more than the modulus says. Use a grid with pattern: equilateral or one_diagonal, or leave poissons_ratio out.");
+  }
+}
+
+ClothModel modelOf(const ClothConfig& config, std::vector<std::string>& warnings)
 {
   ClothModel model = buildCloth(config.name, config.mesh, config.area_density, config.membrane, config.warp);
   model.bending = config.bending;
   model.bending_modulus = config.bending_modulus;
+  model.bending_poissons_ratio = config.bending_poissons_ratio;
   model.mass_damping = config.mass_damping;
   model.stiffness_damping = config.stiffness_damping;
   model.wind_coefficient = config.drag;
   model.aerodynamics = config.aerodynamics;
   model.plasticity = config.plasticity;
   model.undeformed = config.undeformed;
+  chooseBending(model, warnings);
+  checkPlate(model, warnings);
   for (std::size_t s = 0; config.tracking && s < config.tracking->sets.size(); ++s)
   {
     const FunctionSet& set = config.tracking->sets[s];
@@ -95,7 +133,7 @@ void Simulation::buildCloths()
     const ClothConfig& config = config_.cloths[k];
     try
     {
-      cloth_models_.push_back(std::make_shared<const ClothModel>(modelOf(config)));
+      cloth_models_.push_back(std::make_shared<const ClothModel>(modelOf(config, config_.warnings)));
       cloth_steppers_.emplace_back();
       if (!config.contact)
       {
@@ -151,6 +189,21 @@ void Simulation::buildTouchingCloths()
     {
       cloth_bodies_.push_back(static_cast<int>(b));
     }
+  }
+  const auto meetsOthers = [this](bool leads) {
+    for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+    {
+      if (config_.cloths[k].contact && config_.cloths[k].contact->cloths && static_cast<bool>(leads_[k]) == leads)
+      {
+        return static_cast<int>(k);
+      }
+    }
+    return -1;
+  };
+  if (const int guide = meetsOthers(true), other = meetsOthers(false); guide >= 0 && other >= 0)
+  {
+    config_.warnings.push_back("cloth " + config_.cloths[guide].name + " is the guide of another cloth and is stepped ahead of it: it passes through cloth " +
+                               config_.cloths[other].name + " and all others that are no guides. Give both contact: {cloths: false} if that is meant");
   }
   try
   {

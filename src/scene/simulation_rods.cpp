@@ -3,6 +3,7 @@
 #include <exception>
 #include <stdexcept>
 
+#include "scene_rod.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/shapes.h"
 #include "slender_sim/scene/simulation.h"
@@ -13,28 +14,6 @@
 
 namespace slender {
 
-namespace {
-
-/// Which equations explicit steps use; implicit ones always use the general formulation with stretching.
-void chooseFormulation(const RodConfig& rod, Integrator integrator, RodModel& model)
-{
-  const bool explicit_steps = integrator == Integrator::symplectic_euler;
-  const std::string obstacle = explicit_steps ? whyNotIsotropic(model) : "it takes explicit steps (time.integrator: symplectic_euler)";
-  if (rod.formulation == Formulation::isotropic && !obstacle.empty())
-  {
-    throw std::invalid_argument("formulation: isotropic does not apply: " + obstacle + "; take formulation: auto");
-  }
-  if (rod.stretching == Stretching::projected && !explicit_steps)
-  {
-    throw std::invalid_argument("stretching: projected takes explicit steps (time.integrator: symplectic_euler); "
-                                "with implicit ones take stretching: stiff and material.inextensible: true");
-  }
-  model.isotropic = rod.formulation != Formulation::general && obstacle.empty();
-  model.inextensible = rod.stretching == Stretching::projected;
-}
-
-}  // namespace
-
 void Simulation::buildRods()
 {
   for (std::size_t r = 0; r < config_.rods.size(); ++r)
@@ -44,31 +23,14 @@ void Simulation::buildRods()
     {
       const Eigen::Matrix3Xd rest = restNodes(rod, config_.gravity);
       Eigen::Matrix3Xd initial = initialNodes(rod, rest, config_.gravity);
-      const int edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
-      RodModel model = buildRod(rod.name, rest, rod.closed, rodSections(rod, edges), rod.director, rod.naturally_straight, rod.joints);
-      if (rod.material.inextensible)
-      {
-        model.stretch_modulus = model.stretch_modulus.cwiseMax(1e5 * model.totalMass() * config_.gravity.norm());
-      }
-      model.mass_damping = rod.damping.mass;
-      model.stiffness_damping = rod.damping.stiffness;
-      if (rod.damping.drag > 0)
-      {
-        model.drag.setZero(model.nodes());
-        for (int j = 0; j < model.edges(); ++j)
-        {
-          const double half = 0.5 * rod.damping.drag * model.rest_length[j];
-          model.drag[j] += half;
-          model.drag[(j + 1) % model.nodes()] += half;
-        }
-      }
-      chooseFormulation(rod, config_.time.integrator, model);
+      SceneRod built = buildSceneRod(rod, rest, config_.gravity, config_.time.integrator);
+      RodModel& model = built.model;
       Eigen::Matrix3Xd velocities;
       if (rod.tracking)
       {
         placeOnGuide(static_cast<int>(r), model, initial, velocities);
       }
-      RodState state = makeRodState(model, initial, rod.director, rod.initial_twist);
+      RodState state = startSceneRod(rod, built, initial);
       if (velocities.cols() > 0)
       {
         state.v = velocities;

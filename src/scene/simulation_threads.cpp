@@ -11,6 +11,9 @@ namespace slender {
 
 namespace {
 
+/// Edges grow by this share of their height above the floor. It is small enough for an edge to be divided several times on its way down.
+constexpr double kEdgeGrading = 0.1;
+
 ThreadModel modelOf(const ThreadConfig& config)
 {
   ThreadModel model;
@@ -34,6 +37,15 @@ ThreadModel modelOf(const ThreadConfig& config)
   {
     model.limits.max_edge_length = config.longest_edge;
   }
+  if (config.highest_edge > 0)
+  {
+    model.limits.edge_grading = kEdgeGrading;
+    model.limits.highest_edge_length = config.highest_edge;
+  }
+  if (config.longest_step > 0)
+  {
+    model.limits.max_step = config.longest_step;
+  }
   model.limits.min_edge_length = config.shortest_edge;
   model.limits.min_radius = config.breakup_radius;
   if (config.most_deposited > 0)
@@ -51,7 +63,14 @@ ThreadState stateOf(const ThreadConfig& config, const ThreadModel& model, const 
 {
   if (config.nozzle)
   {
-    return makeNozzleThread(model, config.nozzle->pose, config.nozzle->flow.table.at(0.0) / model.nozzleArea());
+    ThreadState state = makeNozzleThread(model, config.nozzle->pose, config.nozzle->flow.table.at(0.0) / model.nozzleArea());
+    // A thread without a fault would stand on its floor as a column. A displacement and a velocity at right angles to it leave no plane of
+    // symmetry either, in which the thread might fold for ever.
+    constexpr double kAside = 0.05;
+    const Eigen::Matrix3d section = config.nozzle->pose.orientation.toRotationMatrix();
+    state.x[0] += kAside * std::min(0.5 * model.nozzle_diameter, 0.5 * model.feed_length) * section.col(1);
+    state.v[0] += kAside * state.v[0].norm() * section.col(2);
+    return state;
   }
   const Eigen::Matrix3Xd nodes = curveNodes(*config.centerline, gravity);
   const int edges = static_cast<int>(nodes.cols()) - 1;
@@ -89,6 +108,7 @@ void Simulation::buildThreads()
       state_.threads.emplace_back();
       state_.end_loads.emplace_back();
       state_.threads.back().threads.push_back(stateOf(config_.threads[k], *thread_models_.back(), config_.gravity));
+      state_.threads.back().start_volume = state_.threads.back().volumeBalance();
     }
     catch (const std::invalid_argument& error)
     {
@@ -117,7 +137,7 @@ void Simulation::buildTouchingThreads()
   }
   for (const ObstacleConfig& obstacle : config_.obstacles)
   {
-    model.obstacles.push_back({obstacle.shape, obstacle.friction.value_or(-1.0)});
+    model.obstacles.push_back({obstacle.shape, obstacle.friction.value_or(-1.0), obstacle.name});
   }
   model.options.gap = config_.contact.gap;
   model.options.slip_speed = config_.contact.slip_speed;

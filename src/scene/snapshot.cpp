@@ -109,6 +109,7 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
     out.bodies.push_back({scene.bodies[b].name, state.bodies[b].X_WB, state.bodies[b].velocity});
   for (std::size_t k = 0; k < state.obstacles.size(); ++k)
     out.obstacles.push_back({scene.obstacles[k].name, state.obstacles[k], state.obstacle_velocities[k]});
+  out.fields = fieldTablesOf(simulation);
   return out;
 }
 

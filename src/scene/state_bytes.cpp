@@ -99,6 +99,7 @@ void visitThread(Archive& archive, State& thread)
   archive(thread.thread_id);
   archive(thread.fed_volume);
   archive(thread.dropped_volume);
+  archive(thread.left_volume);
 }
 
 template <class Archive, class State>
@@ -111,6 +112,8 @@ void visitThreads(Archive& archive, State& group)
   }
   archive(group.next_thread_id);
   archive(group.dropped_volume);
+  archive(group.left_volume);
+  archive(group.start_volume);
 }
 
 template <class Archive, class State>

@@ -87,7 +87,8 @@ std::uint64_t Simulation::fingerprint() const
   {
     text(model->name);
     for (const double value : {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
-                               model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length, model->limits.min_radius})
+                               model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length, model->limits.min_radius,
+                               model->limits.edge_grading, model->limits.highest_edge_length, model->limits.max_step})
     {
       out(value);
     }
@@ -129,6 +130,10 @@ std::uint64_t Simulation::fingerprint() const
       out(value);
     }
     out(static_cast<int>(model.bending));
+    if (model.bending_poissons_ratio)
+    {
+      out(*model.bending_poissons_ratio);
+    }
     out(static_cast<int>(config_.cloths[k].solver));
     out(config_.cloths[k].one_newton_step);
     if (const auto& tracking = config_.cloths[k].tracking)

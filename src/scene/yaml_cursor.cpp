@@ -123,7 +123,7 @@ std::string Problems::placeOf(const YamlTree* tree, const YamlTree* parent, cons
   return line + ": " + (path.empty() ? "scene" : path);
 }
 
-void Problems::add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason)
+std::string Problems::lineOf(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason) const
 {
   std::string line = placeOf(tree, parent, path);
   const std::string value = tree ? quote(*tree) : "";
@@ -131,7 +131,21 @@ void Problems::add(const YamlTree* tree, const YamlTree* parent, const std::stri
   {
     line += " = " + value;
   }
-  lines_.push_back(line + ": " + reason);
+  return line + ": " + reason;
+}
+
+void Problems::add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason)
+{
+  lines_.push_back(lineOf(tree, parent, path, reason));
+}
+
+void Problems::warn(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& text)
+{
+  const std::string line = lineOf(tree, parent, path, text);
+  if (warnings_.size() < max_reported && std::find(warnings_.begin(), warnings_.end(), line) == warnings_.end())
+  {
+    warnings_.push_back(line);
+  }
 }
 
 std::string Problems::text() const

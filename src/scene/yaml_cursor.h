@@ -43,6 +43,9 @@ public:
   /// "FILE:LINE: PATH".
   std::string placeOf(const YamlTree* tree, const YamlTree* parent, const std::string& path) const;
   void addText(const std::string& line) { lines_.push_back(line); }
+  /// Adds the warning "FILE:LINE: PATH = VALUE: text", once. Warnings do not make the scene unusable: empty() does not count them.
+  void warn(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& text);
+  const std::vector<std::string>& warnings() const { return warnings_; }
 
   bool empty() const { return lines_.empty(); }
   std::size_t size() const { return lines_.size(); }
@@ -63,7 +66,9 @@ public:
 private:
   std::string file_;
   KeyLog* log_;
-  std::vector<std::string> lines_;
+  std::string lineOf(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason) const;
+
+  std::vector<std::string> lines_, warnings_;
 };
 
 /// One value of a scene with its path: typed, checked access. Every getter returns nothing when the value is absent or wrong, and
@@ -86,6 +91,8 @@ public:
   std::string place() const { return problems_->placeOf(tree_, parent_, path_); }
   /// Reports what is wrong with this value.
   void problem(const std::string& reason) const { problems_->add(tree_, parent_, path_, reason); }
+  /// Warns of this value: the scene runs, but not as its writer may expect. The text says what happens instead and what to do.
+  void warning(const std::string& text) const { problems_->warn(tree_, parent_, path_, text); }
 
   std::optional<double> number(const Range& range) const;
   std::optional<int> integer(long low, long high, const char* unit = "") const;

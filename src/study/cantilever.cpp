@@ -15,13 +15,42 @@ namespace {
 /// more than 1e-5.
 double stretchModulus(double gamma) { return std::max(1e7, 1e5 * gamma); }
 
-RodSetup heavyRod(double gamma, int edges, double mass_damping)
+/// The rod bends in a boundary layer at the clamp whose length is L / sqrt(Gamma). With fewer edges in it than this a mesh does not show
+/// its shape: at a fifth of an edge H/W is off by 15 %, at a sixteenth by 230 %.
+constexpr double kLayerEdges = 5;
+
+double layerEdges(double gamma, int edges) { return edges / std::sqrt(std::max(gamma, 1.0)); }
+
+/// Nodes along x in [0, 1] whose first edge is at most a fifth of the boundary layer; the others grow in a constant ratio.
+Eigen::Matrix3Xd gradedNodes(double gamma, int edges)
+{
+  const double first = 1 / (kLayerEdges * std::sqrt(std::max(gamma, 1.0)));
+  double low = 1, high = 10;   // the ratio of successive edges
+  for (int k = 0; k < 100; ++k)
+  {
+    const double ratio = 0.5 * (low + high);
+    (first * (std::pow(ratio, edges) - 1) / (ratio - 1) < 1 ? low : high) = ratio;
+  }
+  Eigen::Matrix3Xd nodes = Eigen::Matrix3Xd::Zero(3, edges + 1);
+  for (int i = 0; i <= edges; ++i)
+    nodes(0, i) = (std::pow(low, i) - 1) / (std::pow(low, edges) - 1);
+  return nodes;
+}
+
+Eigen::Matrix3Xd evenNodes(int edges)
+{
+  Eigen::Matrix3Xd nodes = Eigen::Matrix3Xd::Zero(3, edges + 1);
+  nodes.row(0).setLinSpaced(edges + 1, 0.0, 1.0);
+  return nodes;
+}
+
+RodSetup heavyRod(double gamma, const Eigen::Matrix3Xd& nodes, double mass_damping)
 {
   RodCase c;
-  c.edges = edges;
+  c.edges = static_cast<int>(nodes.cols()) - 1;
   c.stretch = stretchModulus(gamma);
   c.mass_damping = mass_damping;
-  RodSetup rod = straightRod(c);
+  RodSetup rod = shapedRod(c, nodes);
   rod.inputs.gravity = {0, 0, -gamma};
   rod.hold(0, 0, true);
   return rod;
@@ -38,9 +67,9 @@ struct Outcome
   std::string refused;
 };
 
-Outcome runStatic(double gamma, int edges)
+Outcome runStatic(double gamma, const Eigen::Matrix3Xd& nodes)
 {
-  RodSetup rod = heavyRod(gamma, edges, 0.0);
+  RodSetup rod = heavyRod(gamma, nodes, 0.0);
   RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
   const double start = threadSeconds();
   const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
@@ -51,11 +80,19 @@ Outcome runStatic(double gamma, int edges)
 Outcome runSettled(double gamma, int edges)
 {
   const double rate = slowestRate(gamma);
-  RodSetup rod = heavyRod(gamma, edges, 2 * rate);
+  RodSetup rod = heavyRod(gamma, evenNodes(edges), 2 * rate);
   RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 0.2 / rate, 1e-9));
   const double start = threadSeconds();
   const std::string problem = settle(stepper, rod, 0.2 / rate, 1e-9 * rate, 2000);
   return {problem.empty() ? aspectRatio(rod) : std::numeric_limits<double>::quiet_NaN(), threadSeconds() - start, problem};
+}
+
+enum class How { uniform, graded, settled };
+
+/// Relative. Five edges in the boundary layer or more make the second term at most 1 %.
+double boundOf(double gamma, int edges, bool graded)
+{
+  return graded ? 0.01 : 0.003 + 0.25 * std::pow(1 / layerEdges(gamma, edges), 2);
 }
 
 }  // namespace
@@ -70,8 +107,8 @@ void runCantilever(StudyContext& context)
 
   Plot& errors = context.plot("cantilever_error", "Heavy cantilever, static: error of H/W against resolution", "free edges n", "relative error of H/W");
   Plot& cost = context.plot("cantilever_cost", "Heavy cantilever, static: error against run time", "CPU time [s]", "relative error of H/W");
-  double order = std::numeric_limits<double>::infinity();
-  int done = 0;
+  double order = std::numeric_limits<double>::infinity(), worst = 0;
+  int done = 0, unresolved = 0, refused = 0;
   for (const double gamma : gammas)
   {
     const CantileverTip exact = heavyCantilever(gamma);
@@ -83,26 +120,39 @@ void runCantilever(StudyContext& context)
     for (const int n : edges)
     {
       context.progress(done++, total, label);
-      for (const bool dynamic : {false, true})
+      for (const How how : {How::uniform, How::graded, How::settled})
       {
-        if (dynamic && (n > 80 || !whole_decade))   // settling repeats the static result at more cost
+        // settling repeats the static result at more cost
+        if (how != How::uniform && (!whole_decade || (how == How::settled && n > 80)))
           continue;
-        const Outcome o = dynamic ? runSettled(gamma, n) : runStatic(gamma, n);
+        if (how == How::graded && layerEdges(gamma, n) >= kLayerEdges)
+          continue;   // equal edges are as short
+        const Outcome o = how == How::settled ? runSettled(gamma, n) : runStatic(gamma, how == How::graded ? gradedNodes(gamma, n) : evenNodes(n));
+        const double relative = o.ratio / expected - 1;
+        const bool resolved = how == How::graded || layerEdges(gamma, n) >= kLayerEdges;
         Row& row = context.row();
-        row.set("how", dynamic ? "settled" : "static").set("Gamma", gamma).set("edges", n);
-        row.check(o.ratio, expected, expected * (0.003 + 0.25 * gamma / (n * n)), "inextensible elastica, bound 0.3 % + 0.25 Gamma/n^2");
-        row.set("relative_error", o.ratio / expected - 1).set("cpu_seconds", o.seconds);
+        row.set("how", how == How::settled ? "settled" : how == How::graded ? "static, graded" : "static").set("Gamma", gamma).set("edges", n);
+        if (resolved)
+          row.check(o.ratio, expected, expected * boundOf(gamma, n, how == How::graded), "inextensible elastica");
+        else
+        {
+          // such a mesh is not passed, but it must still give an answer
+          row.set("resolved", "no: fewer than 5 edges in the boundary layer").set("measured", o.ratio);
+          ++unresolved;
+          refused += std::isnan(o.ratio);
+        }
+        row.set("relative_error", relative).set("cpu_seconds", o.seconds);
         if (!o.refused.empty())
           row.set("refused", o.refused);
-        if (dynamic)
+        if (resolved)
+          worst = std::max(worst, std::abs(relative));
+        if (how == How::settled || !whole_decade)
           continue;
-        if (whole_decade)
-        {
-          errors.at(label).x.push_back(n);
-          errors.at(label).y.push_back(std::abs(o.ratio / expected - 1));
-          cost.at(label).x.push_back(o.seconds);
-          cost.at(label).y.push_back(std::abs(o.ratio / expected - 1));
-        }
+        const std::string series = how == How::graded ? label + std::string(", graded") : label;
+        errors.at(series).x.push_back(n);
+        errors.at(series).y.push_back(std::abs(relative));
+        cost.at(series).x.push_back(o.seconds);
+        cost.at(series).y.push_back(std::abs(relative));
       }
     }
     if (!whole_decade || gamma > (context.quick() ? 2 : 2000))
@@ -114,7 +164,7 @@ void runCantilever(StudyContext& context)
     int used = 0;
     for (int n = 40; n <= 1280 || n < 60 * std::sqrt(gamma); n *= 2)
     {
-      const double e = runStatic(gamma, n).ratio / (stretched.drop / stretched.extent) - 1;
+      const double e = runStatic(gamma, evenNodes(n)).ratio / (stretched.drop / stretched.extent) - 1;
       if (std::abs(e) < 1e-8)
         break;
       coarse = fine;
@@ -126,6 +176,11 @@ void runCantilever(StudyContext& context)
     order = seen >= order ? order : seen;   // keeps NaN
   }
   context.metric("observed_order", order);
+  context.metric("worst_resolved_error", worst);
+  context.metric("unresolved", unresolved);
+  context.row().set("how", "unresolved meshes").check(refused, 0, 0.5, "each gives an answer, though no accurate one");
+  context.note("Rows that are not resolved have fewer than five edges in the boundary layer at the clamp, L / sqrt(Gamma) long. They are named and not passed.");
+  context.note("graded: the first edge is a fifth of the boundary layer and the others grow in a constant ratio.");
   context.note("EA is set so that the rod's weight strains it by at most 1e-5: the reference is inextensible.");
   context.note("observed_order: smallest over Gamma = 0.01 to 1000, from two meshes that put 30 and 60 edges or more into the boundary layer.");
 }

@@ -103,7 +103,7 @@ Sparse plateStiffness(const TriangleMesh& mesh, BendingModel model)
   return normalPart(matrix);
 }
 
-double squarePlateDeflection(GridPattern pattern, BendingModel model, int cells, bool clamped)
+double squarePlateDeflection(GridPattern pattern, const PlateModel& model, int cells, bool clamped)
 {
   const TriangleMesh mesh = plateMesh(pattern, 1.0, 1.0, cells, clamped, clamped);
   const double eps = 0.3 / cells;   // irregular vertices of the margin's inner side are not on a line
@@ -117,7 +117,7 @@ double squarePlateDeflection(GridPattern pattern, BendingModel model, int cells,
   for (std::size_t i = 0; i < free.number.size(); ++i)
     if (free.number[i] >= 0)
       load[free.number[i]] = areas[static_cast<Eigen::Index>(i)];
-  const Eigen::VectorXd w = Eigen::SimplicialLDLT<Sparse>(free.of(plateStiffness(mesh, model))).solve(load);
+  const Eigen::VectorXd w = Eigen::SimplicialLDLT<Sparse>(free.of(model(mesh))).solve(load);
   // a parabola fitted about the centre: no vertex need be there
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -133,7 +133,7 @@ double squarePlateDeflection(GridPattern pattern, BendingModel model, int cells,
   return normal.ldlt().solve(right)[0];
 }
 
-double lateralBucklingLoad(GridPattern pattern, BendingModel model, double width, int cells)
+double lateralBucklingLoad(GridPattern pattern, const PlateModel& model, double width, int cells)
 {
   const TriangleMesh mesh = plateMesh(pattern, 1.0, width, cells, true, false);
   const int n = static_cast<int>(mesh.vertices.cols());
@@ -169,7 +169,7 @@ double lateralBucklingLoad(GridPattern pattern, BendingModel model, double width
   matrix.setZero();
   membrane.addHessian(HessianKind::exact, x.data(), slots, gradient.data(), matrix.values());
   const Free free(n, held);
-  const Sparse geometric = free.of(normalPart(matrix)) / kSmall, stiffness = free.of(plateStiffness(mesh, model));
+  const Sparse geometric = free.of(normalPart(matrix)) / kSmall, stiffness = free.of(model(mesh));
   const Eigen::SimplicialLDLT<Sparse> solver(stiffness);
   if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 1e-12 * solver.vectorD().maxCoeff()))
     return std::numeric_limits<double>::quiet_NaN();
@@ -187,6 +187,16 @@ double lateralBucklingLoad(GridPattern pattern, BendingModel model, double width
     load = 1.0 / ritz.eigenvalues()[kVectors - 1];
   }
   return load;
+}
+
+double squarePlateDeflection(GridPattern pattern, BendingModel model, int cells, bool clamped)
+{
+  return squarePlateDeflection(pattern, [model](const TriangleMesh& mesh) { return plateStiffness(mesh, model); }, cells, clamped);
+}
+
+double lateralBucklingLoad(GridPattern pattern, BendingModel model, double width, int cells)
+{
+  return lateralBucklingLoad(pattern, [model](const TriangleMesh& mesh) { return plateStiffness(mesh, model); }, width, cells);
 }
 
 }  // namespace slender::study

@@ -14,12 +14,14 @@ void runImplicitVsExplicit(StudyContext&);
 void runRodStability(StudyContext&);
 void runBendTwist(StudyContext&);
 void runLateralBuckling(StudyContext&);
+void runStaticsStability(StudyContext&);
 void runPerversion(StudyContext&);
 void runTwistAsymmetry(StudyContext&);
 void runTorsionalPendulum(StudyContext&);
 void runWilberforce(StudyContext&);
 void runRodContactSafety(StudyContext&);
 void runHelicalBuckling(StudyContext&);
+void runHelicalScene(StudyContext&);
 void runMichell(StudyContext&);
 void runKnot(StudyContext&);
 void runStickSlip(StudyContext&);
@@ -49,6 +51,8 @@ void runWillmoreSphere(StudyContext&);
 void runWillmoreHole(StudyContext&);
 void runWillmoreSmoothing(StudyContext&);
 void runPlate(StudyContext&);
+void runPlatePoisson(StudyContext&);
+void runCurvedShells(StudyContext&);
 void runIbmVsHinge(StudyContext&);
 void runImplicitStep(StudyContext&);
 void runClothStability(StudyContext&);
@@ -71,6 +75,7 @@ void runTrackingOverhead(StudyContext&);
 void runTrackingExactness(StudyContext&);
 void runLean(StudyContext&);
 void runCostModel(StudyContext&);
+void runRepeatability(StudyContext&);
 
 const std::vector<Study>& studies()
 {
@@ -86,12 +91,14 @@ const std::vector<Study>& studies()
       {"rod_stability", "extreme stiffness, thickness, steps, twist and grasps: done, cut or refused with reason", runRodStability},
       {"bend_twist", "heavy naturally curved rod: planar or three-dimensional on both sides of the boundary", runBendTwist},
       {"lateral_buckling", "heavy cantilevers of elliptical section that topple sideways: critical load", runLateralBuckling},
+      {"statics_stability", "statics from exactly symmetric states around thresholds: never an unstable equilibrium called stable", runStaticsStability},
       {"perversion", "a curled ribbon drawn flat and released: two helices of opposite handedness", runPerversion},
       {"twist_asymmetry", "a V and a semicircle turned at one end: where the twist goes", runTwistAsymmetry},
       {"torsional_pendulum", "a disc that turns on a wire: period, all integrators and steps", runTorsionalPendulum},
       {"wilberforce", "a body on a helical spring: frequencies, beat, exchange of energy", runWilberforce},
       {"rod_contact_safety", "1,000 random knots, heaps and whips: an independent check finds no penetration after any step", runRodContactSafety},
       {"helical_buckling", "localised helix of a twisted rod: peak, moment and envelope against discrete and smooth solutions", runHelicalBuckling},
+      {"helical_scene", "the shipped scene of the localised helix and three more, as simulate runs them, against the smooth solutions", runHelicalScene},
       {"michell", "twist at which a ring leaves its plane, by the energy's Hessian and by the growth of a push", runMichell},
       {"greenhill", "torque that buckles a clamped straight rod under tension or compression", runGreenhill},
       {"stick_slip", "compression at which the foot of a strip pressed on a floor slips, against the coefficient of friction", runStickSlip},
@@ -121,6 +128,8 @@ const std::vector<Study>& studies()
       {"willmore_hole", "caps of spheres and pieces of a torus cut out and closed again by Willmore flow", runWillmoreHole},
       {"willmore_smoothing", "rough meshes of 24,192 and 44,928 triangles: times of 16 steps and of the factorisation", runWillmoreSmoothing},
       {"plate", "plates of every bending model on every mesh against plate theory: what D means", runPlate},
+      {"plate_poisson", "clamped, supported and laterally loaded plates with Poisson's ratios of bending from -0.3 to 0.5", runPlatePoisson},
+      {"curved_shells", "shells that are curved at rest: they keep their shape without load", runCurvedShells},
       {"ibm_vs_hinge", "isometric bending beside hinges, as thesis table 2.1: gradient, Hessian, explicit and implicit steps", runIbmVsHinge},
       {"implicit_step", "a sheet pinned at two corners: a step and its parts beside one factorisation of its matrix", runImplicitStep},
       {"cloth_stability", "extreme stiffness, steps, random and crushed starts, needles, a yanked corner: done, recovered or refused with reason", runClothStability},
@@ -143,6 +152,7 @@ const std::vector<Study>& studies()
       {"tracking_exactness", "averages of tracked cloths against their guides' after every step, with wind, jumps, contact", runTrackingExactness},
       {"lean", "instructions per step and memory of every feature in scenes that do not name it (needs valgrind)", runLean},
       {"cost_model", "time per step and memory against size, all solvers with contact and without: measured and fitted", runCostModel},
+      {"repeatability", "every scene of the package and random ones, each twice in fresh processes: equal bit by bit", runRepeatability},
   };
   return all;
 }

@@ -116,7 +116,7 @@ void runImplicitVsExplicit(StudyContext& context)
   for (const bool soft : {true, false})
   {
     const char* material = soft ? "soft stretch" : "own EA";
-    const int frames = context.quick() ? (soft ? 15 : 3) : (soft ? 300 : 30);   // at its own EA the explicit code takes 30,000 steps per frame
+    const int frames = context.quick() ? (soft ? 10 : 1) : (soft ? 300 : 30);   // at its own EA the explicit code takes 30,000 steps per frame
     context.progress(soft ? 0 : 10, 20, std::string(material) + ", largest explicit step");
     const double explicit_step = largestExplicitStep(soft);
     context.progress(soft ? 1 : 11, 20, std::string(material) + ", explicit run");

@@ -115,7 +115,7 @@ void runRodScaling(StudyContext& context)
                                                  : std::vector<int>{50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000};
   Plot& plot = context.plot("rod_scaling", "Newton iteration of a rod: time against size", "nodes", "time per iteration [s]");
   std::vector<double> x, y, whole;
-  double at_1000 = 0, largest = 0;
+  double at_1000 = 0, largest = 0, iterations = 0;
   int done = 0;
   for (const int nodes : sizes)
   {
@@ -139,6 +139,7 @@ void runRodScaling(StudyContext& context)
       plot.at(part.first).x.push_back(nodes);
       plot.at(part.first).y.push_back(part.second);
     }
+    iterations = std::max(iterations, cost.iterations_per_step);
     if (nodes >= 1000)
     {
       x.push_back(nodes);
@@ -150,6 +151,7 @@ void runRodScaling(StudyContext& context)
       at_1000 = total * per_node;
   }
   context.metric("scaling_exponent", logSlope(x, y));
+  context.metric("iterations_per_step_worst", iterations);
   context.metric("microseconds_per_node_iteration", at_1000);
   context.metric("microseconds_per_node_iteration_worst", largest);
   context.metric("scaling_exponent_whole_step", logSlope(x, whole));

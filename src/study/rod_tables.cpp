@@ -201,6 +201,7 @@ void runRodTables(StudyContext& context)
   int done = 0;
   const int count = static_cast<int>(std::size(kExamples)), batch = context.quick() ? 20 : 200;
   double least = std::numeric_limits<double>::infinity();
+  int most_iterations = 0, most_apart = 0;
   for (const Example& e : kExamples)
   {
     context.progress(done++, count, e.what);
@@ -240,9 +241,13 @@ void runRodTables(StudyContext& context)
     if (e.total / (1e3 * total) < 10)
       row.set("why_not_10x", contact ? "contact takes implicit steps: barriers that nothing passes, friction and all stiffness in one sparse system, solved by Newton's method"
                                      : "so few vertices that copying the state and setting up body and projection weigh as much as the rod");
+    most_iterations = std::max(most_iterations, report.projection_iterations);
+    most_apart = std::max(most_apart, static_cast<int>(std::abs(vertices - e.vertices)));
     least = std::min(least, e.total / (1e3 * total));
   }
   context.metric("speedup_min", least);
+  context.metric("projection_iterations_max", most_iterations);
+  context.metric("vertices_from_thesis_max", most_apart);
 }
 
 }  // namespace slender::study

@@ -157,6 +157,9 @@ void runSwing(StudyContext& context)
       at8 = run.cpu_seconds, best8 = setting;
     if (counts && error <= 0.6 && run.cpu_seconds < at06)
       at06 = run.cpu_seconds, best06 = setting;
+    if (candidate.time.integrator == Integrator::tr_bdf2 && candidate.time.step == 2e-3 && candidate.time.newton.tolerance == 1e-6 &&
+        candidate.how == "fixed step")
+      context.metric("tip_error_mm_tr_bdf2_2ms", error);
     front.add(row, candidate.how == "fixed step" ? name : std::string(name) + " adaptive", setting + std::strlen(name) + 2, error, run.cpu_seconds, counts);
   }
   front.conclude();

@@ -162,7 +162,7 @@ void runTrackingMethods(StudyContext& context)
                              "RMS distance from the converged motion [m]");
   Plot& drift = context.plot("tracking_methods_constraints", "Ways of tracking: how well averages are kept", "CPU time per simulated second [s]",
                              "greatest distance of an average [m]");
-  const int halvings = context.quick() ? 3 : 5;   // of 20 ms
+  const int halvings = context.quick() ? 2 : 5;   // of 20 ms
   GuidedCloth exact = c;
   exact.one_newton_step = false;
   exact.linear_tolerance = 1e-6;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "../contact/confined_newton.h"
@@ -11,6 +12,9 @@
 #include "thread_loop.h"
 
 namespace slender {
+
+/// Distance [m] of a segment from a shape, by places along the segment: enough to tell which of several shapes is nearest.
+double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// Equations of threads with contact and merging, for minimize(). Threads that nothing touches keep their own band matrices; the others
 /// share one sparse matrix.
@@ -33,6 +37,8 @@ public:
   StepFailure solve(double from, double to, double h, StepReport& report);
   double stiffness() const { return stiffness_now_; }
   double clearance(const std::vector<const ThreadState*>& states, const std::vector<int>& kinds, const std::vector<Pose>& obstacles);
+  /// After clearance() of the same: the two that are nearest to each other, "thread 'honey' and obstacle 'plate'".
+  std::string nearest(const std::vector<const ThreadState*>& states, const std::vector<Pose>& obstacles) const;
   const std::vector<ContactTerm>& terms() const { return contact_.terms(); }
   bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const override;
 
@@ -93,6 +99,7 @@ private:
 
   const TouchingModel& model_;
   ContactPotential contact_;
+  double first_stiffness_;                      ///< of the barrier in a state that has none yet
   MergingPotential merging_;
   bool merges_ = false;
   std::vector<Part> parts_;

@@ -4,6 +4,7 @@
 
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/contact/distance.h"
+#include "slender_sim/contact/solids.h"
 #include "thread_contact.h"
 
 namespace slender {
@@ -26,7 +27,29 @@ ContactSurface solidsOf(const TouchingModel& model)
 
 }  // namespace
 
-ThreadContact::ThreadContact(const TouchingModel& model) : model_(model), contact_(solidsOf(model), model.options)
+double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& from, const Eigen::Vector3d& to)
+{
+  constexpr int kPlaces = 16;
+  const Eigen::Vector3d a = pose.inverse() * from, e = pose.inverse() * to - a;
+  double least = std::numeric_limits<double>::infinity();
+  const auto look = [&](const ConvexPiece& piece) {
+    for (int k = 0; k <= kPlaces; ++k)
+      least = std::min(least, pieceDistance(piece, a + e * k / kPlaces, e).distance);
+  };
+  std::visit(
+    [&](const auto& s) {
+      using T = std::decay_t<decltype(s)>;
+      if constexpr (std::is_same_v<T, std::shared_ptr<const TriangleMesh>>)
+        for (Eigen::Index i = 0; i < s->triangles.cols(); ++i)
+          look(Triangle{s->vertices.col(s->triangles(0, i)), s->vertices.col(s->triangles(1, i)), s->vertices.col(s->triangles(2, i))});
+      else
+        look(s);
+    },
+    shape);
+  return least;
+}
+
+ThreadContact::ThreadContact(const TouchingModel& model) : model_(model), contact_(solidsOf(model), model.options), first_stiffness_(contact_.stiffness())
 {
   for (const ThreadTouch& touch : model.touches)
     merges_ = merges_ || touch.merging > 0.0;
@@ -81,7 +104,7 @@ void ThreadContact::beginStep(const std::vector<Thread>& threads, const std::vec
       solids_from_.push_back({start, Eigen::Quaterniond::Identity()});
       solids_to_.push_back({start + duration * belts[k], Eigen::Quaterniond::Identity()});
     }
-  stiffness_now_ = stiffness > 0.0 ? stiffness : contact_.stiffness();
+  stiffness_now_ = stiffness > 0.0 ? stiffness : first_stiffness_;
 }
 
 void ThreadContact::placeSolids(double fraction, std::vector<Pose>& solids) const
@@ -148,15 +171,16 @@ bool ThreadContact::load(double from, double h)
     for (int i = 0; i < a.nodes; ++i)
       least = std::max(least, a.weight[i] * h * h * std::max(gravity, model_.options.gap / (duration_ * duration_)));
     const ThreadStepper::Impl& thread = *parts_[p].thread;
-    most = std::max(most, 3.0 * thread.model->viscosityAt(0.0) * thread.work.totalVolume() / (objects_[p].curve_length * duration_));
+    most = std::max(most, 3.0 * thread.model->viscosity * thread.work.totalVolume() / (objects_[p].curve_length * duration_));
   }
   if (merges_)
   {
     merging_.begin(points_base_, segments_, fluids_, contact_.nearPairs(), held_, model_.options.gap, h);
     least = std::max(least, merging_.largestAttraction());
   }
-  contact_.setMostStiffness(std::max(most, least));
-  contact_.setStiffness(least);
+  constexpr double kLargest = std::numeric_limits<double>::max();   // of loads that overflow: what they do to the threads says why
+  contact_.setMostStiffness(std::min(std::max(most, least), kLargest));
+  contact_.setStiffness(std::min(least, kLargest));
   whole_ = {};
   contact_.begin(points_base_, solids_base_, duration_);   // friction sticks below a speed over the whole step, cut or not
 
@@ -269,6 +293,48 @@ double ThreadContact::clearance(const std::vector<const ThreadState*>& states, c
     if (thread->floor.slips())
       solids_.push_back({Eigen::Vector3d(0, 0, thread->floor.height), Eigen::Quaterniond::Identity()});
   return contact_.clearance(x, solids_);
+}
+
+std::string ThreadContact::nearest(const std::vector<const ThreadState*>& states, const std::vector<Pose>& obstacles) const
+{
+  std::vector<Eigen::Vector3d> x;
+  for (const ThreadState* state : states)
+    x.insert(x.end(), state->x.begin(), state->x.end());
+  const auto nameOf = [&](const ContactSegment& s) { return "thread '" + model_.threads[objects_[s.object].owner]->name + "'"; };
+  double least = std::numeric_limits<double>::infinity();
+  std::string names;
+  for (std::size_t p = 0; p < segments_.size(); ++p)
+  {
+    const ContactSegment& a = segments_[p];
+    const ContactObject& object = objects_[a.object];
+    for (std::size_t q = p + 1; q < segments_.size(); ++q)
+    {
+      const ContactSegment& b = segments_[q];
+      const bool same = a.object == b.object;
+      if ((a.driven && b.driven) || (same ? !object.self || contactNeighbours(a, b, object, model_.options.gap)
+                                          : !object.others || !objects_[b.object].others))
+        continue;
+      const double room = segmentDistance(x[a.a], x[a.b], x[b.a], x[b.b]) - a.coreRadius() - b.coreRadius();
+      if (room < least)
+      {
+        least = room;
+        names = nameOf(a) + " and " + (same ? "itself" : nameOf(b));
+      }
+    }
+    for (std::size_t k = 0; object.solids && !a.driven && k < model_.obstacles.size(); ++k)
+      if (const double room = distanceToShape(model_.obstacles[k].shape, obstacles[k], x[a.a], x[a.b]) - a.radius; room < least)
+      {
+        least = room;
+        names = nameOf(a) + " and obstacle '" + model_.obstacles[k].name + "'";
+      }
+    if (const ThreadFloor& floor = model_.threads[object.owner]->floor; floor.slips())
+      if (const double room = std::min(x[a.a].z(), x[a.b].z()) - floor.height - a.radius; room < least)
+      {
+        least = room;
+        names = nameOf(a) + " and its floor";
+      }
+  }
+  return names;
 }
 
 bool ThreadContact::allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "thread_contact.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -25,8 +26,12 @@ StepFailure substep(const ThreadPart* parts, const ThreadPart* end, double from,
   for (const ThreadPart* p = parts; p != end; ++p)
     p->thread->takeOver(h);
   for (failed = parts; failed != end; ++failed)
+  {
     if (!failed->thread->remesh(contact))
       return StepFailure::overstretched;
+    if (failed->thread->overgrownEdge() >= 0)
+      return StepFailure::squeezed;
+  }
   return StepFailure::none;
 }
 
@@ -66,8 +71,10 @@ StepReport advanceThreads(const ThreadPart* parts, int count, double duration, T
     if (failure != StepFailure::none)
     {
       const ThreadStepper::Impl& thread = *failed->thread;
-      // a shorter step now would only hide that all of them are too long, or draw the thread out bit by bit
-      if (thread.explicit_step || failure == StepFailure::overstretched)
+      if (stepsInterrupted())
+        return thread.refuse(report, StepFailure::work_exceeded, kStepInterrupted);
+      // a shorter step now would only hide that all of them are too long, or draw the thread out or thicken it bit by bit
+      if (thread.explicit_step || failure == StepFailure::overstretched || thread.overgrownEdge() >= 0)
         return thread.refuse(report, failure, thread.explainFailure(failure, length));
       if (0.5 * length < shortest * (1 - 1e-9))
       {

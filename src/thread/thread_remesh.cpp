@@ -227,17 +227,17 @@ bool breakThread(ThreadState& state, double min_radius, ThreadState& older)
   perEdge(state, keepRest);
   older.ends[1].held = state.ends[0].held = false;
   older.twist.back() = state.twist.front() = 0.0;
-  older.fed_volume = older.dropped_volume = 0.0;
+  older.fed_volume = older.dropped_volume = older.left_volume = 0.0;
   return true;
 }
 
-void dropOldest(ThreadState& state, int count)
+void dropOldest(ThreadState& state, int count, double& account)
 {
   count = std::min(count, state.nodes() - 2);
   if (count <= 0)
     return;
   for (int j = 0; j < count; ++j)
-    state.dropped_volume += state.volume[j];
+    account += state.volume[j];
   const auto drop = [&](auto& v) { v.erase(v.begin(), v.begin() + count); };
   drop(state.x);
   drop(state.v);

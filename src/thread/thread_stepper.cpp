@@ -2,11 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "thread_loop.h"
 
 namespace slender {
+
+namespace {
+
+/// "2.5 mm".
+std::string millimetres(double length)
+{
+  char text[40];
+  std::snprintf(text, sizeof text, "%.3g mm", 1e3 * length);
+  return text;
+}
+
+/// The smallest and the largest.
+std::pair<double, double> rangeOfRadii(const ThreadState& state)
+{
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
+  for (int j = 0; j < state.edges(); ++j)
+  {
+    least = std::min(least, state.radius(j));
+    most = std::max(most, state.radius(j));
+  }
+  return {least, most};
+}
+
+}  // namespace
 
 ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton, Integrator integrator)
 {
@@ -81,15 +108,30 @@ std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double leng
   if (failure == StepFailure::overstretched)
     return "it is drawn out so far that more than 10000 edges would have to be divided" + at +
            ": check the motion of nozzle and belt, or use a longer max_edge_length";
+  if (const int j = overgrownEdge(); j >= 0)
+  {
+    const bool at_nozzle = j + 1 == work.edges() && work.ends[1].held;
+    return "edge " + std::to_string(j) + " of " + std::to_string(work.edges()) + " has grown " + millimetres(work.radius(j)) +
+           " wide in radius over a length of " + millimetres(work.edge(j).norm()) +
+           (at_nozzle && !work.deposited[j] && model->surface_tension > 0
+              ? ": surface tension draws it up into the nozzle faster than it flows out. Use more flow or a finer nozzle"
+              : at_nozzle ? ", because the nozzle is too near to what the fluid lands on: raise the nozzle"
+                          : ", which is a puddle and no thread: use a more viscous fluid, or less flow or height") +
+           (j + 1 == work.edges() ? ", or use shorter edges.feed" : ", or shorter edges.longest");
+  }
   if (explicit_step)
     return "the explicit step blew up" + at + ": use a shorter step or implicit_euler";
+  const auto radii = rangeOfRadii(work);
   switch (failure)
   {
     case StepFailure::folded_back:
       return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step" +
              (model->floor.present && work.ends[1].held ? ", and keep the nozzle above the floor" : "");
     case StepFailure::singular_matrix:
-      return "the matrix could not be made definite" + at + ": radii or edge lengths differ by too many orders of magnitude, or a nozzle or wind is too fast by as many";
+      return "the matrix could not be made definite" + at + ": radii (" + millimetres(radii.first) + " to " + millimetres(radii.second) +
+             ") or edge lengths differ by too many orders of magnitude, or a nozzle is too fast by as many. Use a larger breakup_radius" +
+             (model->limits.min_radius > 0 ? " than " + millimetres(model->limits.min_radius) : ", which is not set here") +
+             ", so that the thread parts before it is so thin";
     case StepFailure::state_not_finite:
       return "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
     case StepFailure::squeezed:
@@ -112,6 +154,13 @@ bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& in
   start_ends = state.ends;
   loads = {};
   flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
+  if (model->floor.sticks() && state.ends[1].held && model->nozzle_diameter > 0 && !(inputs.ends[1].position.z() > model->floor.height))
+  {
+    refuse(report, StepFailure::input_not_finite,
+           "the nozzle is at a height of " + millimetres(inputs.ends[1].position.z()) + ", not above its floor at " + millimetres(model->floor.height) +
+             "; keep it above");
+    return false;
+  }
   constexpr double kMostFed = 1e4;   // edges in one step
   if (!(flow_speed_ * duration <= kMostFed * model->feed_length))
   {

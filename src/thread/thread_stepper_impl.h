@@ -21,8 +21,12 @@ public:
   // ---- a step in substeps, see advanceThreads()
   /// No: an input or the state is not sound, and the report says so.
   bool begin(const ThreadState& state, const ThreadInputs& inputs, double duration, StepReport& report);
-  /// Of a substep: no more than an edge leaves the nozzle at a time.
-  double longestSubstep(double duration) const { return flow_speed_ > 0 ? std::min(duration, model->feed_length / flow_speed_) : duration; }
+  /// Of a substep: no more than an edge leaves the nozzle at a time, and ThreadLimits::max_step.
+  double longestSubstep(double duration) const
+  {
+    const double longest = std::min(duration, model->limits.max_step);
+    return flow_speed_ > 0 ? std::min(longest, model->feed_length / flow_speed_) : longest;
+  }
   /// The equations of a substep and a first guess.
   StepFailure prepare(double from, double to, double duration);
   /// Solves them for this thread on its own.
@@ -33,6 +37,8 @@ public:
   /// would take more edges than a motion can mean.
   bool remesh(const RemeshGuard* guard);
   int foldedNode() const;
+  /// The edge whose section has grown beyond what a thread can be; -1: there is none. See explainFailure().
+  int overgrownEdge() const;
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
   std::string explainFailure(StepFailure failure, double length) const;
 
@@ -79,6 +85,7 @@ private:
   Pose endPose(int end, const ThreadInputs& inputs, double fraction) const;
   double restingHeight(int node) const;
   double deformingShare(int j) const;
+  double longestEdge(int j) const;
 
   const ThreadInputs* inputs_ = nullptr;
   std::array<ThreadEnd, 2> start_ends;   ///< at the start of the step

@@ -72,7 +72,7 @@ double ThreadStepper::Impl::deformingShare(int j) const
 void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
 {
   const int n = work.nodes();
-  const double mu = model->viscosityAt(0.0);
+  const double mu = model->viscosity;
   system.setSurfaceTension(model->surface_tension, model->surface_shape);
   // of the edge before the node: solid parts end a joint in a clamped section, whose half of the joint has no length
   double length_before = 0.0, radius_before = 0.0, volume_before = 0.0;
@@ -321,6 +321,35 @@ void ThreadStepper::Impl::split(int j, double fraction, const RemeshGuard* guard
   splitEdge(work, j, fraction, x);
 }
 
+/// Beyond this length edge j is divided.
+double ThreadStepper::Impl::longestEdge(int j) const
+{
+  const ThreadLimits& limits = model->limits;
+  if (!model->floor.present || limits.edge_grading == 0.0)
+    return limits.max_edge_length;
+  const double above = 0.5 * (work.x[j].z() + work.x[j + 1].z()) - model->floor.height;
+  return std::max(limits.max_edge_length, std::min(limits.highest_edge_length, limits.max_edge_length + limits.edge_grading * above));
+}
+
+/// A drop that hangs from a fine nozzle is some capillary lengths wide, whatever the nozzle; all else is not much wider than the nozzle. An
+/// edge of a thread that is wider, and wider than it is long, is fluid that piles up between two nodes which cannot move.
+int ThreadStepper::Impl::overgrownEdge() const
+{
+  constexpr double kWider = 5.0;
+  if (model->nozzle_diameter == 0.0)
+    return -1;
+  const double gravity = inputs_->gravity.norm();
+  if (model->surface_tension > 0.0 && gravity == 0.0)
+    return -1;
+  const double capillary = model->surface_tension > 0.0 ? std::sqrt(model->surface_tension / (model->density * gravity)) : 0.0;
+  const double allowed = kWider * std::max(0.5 * model->nozzle_diameter, capillary);
+  for (int j = first_; j < work.edges(); ++j)
+    if (!isSolid(j))
+      if (const double radius = work.radius(j); radius > allowed && radius > work.edge(j).norm())
+        return j;
+  return -1;
+}
+
 bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
 {
   constexpr double kMostNew = 1e4;
@@ -330,7 +359,7 @@ bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
   double more = at_nozzle ? work.edge(work.edges() - 1).norm() / feed : 0.0;
   for (int j = first_; j < work.edges(); ++j)
     if (!isSolid(j))
-      more += std::floor(work.edge(j).norm() / limits.max_edge_length);
+      more += std::floor(work.edge(j).norm() / longestEdge(j));
   if (!(more < kMostNew))
     return false;
   if (at_nozzle)
@@ -347,7 +376,7 @@ bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
     if (isSolid(j))
       continue;
     const double length = work.edge(j).norm();
-    if (length > limits.max_edge_length)
+    if (length > longestEdge(j))
       split(j--, 0.5, guard);
   }
   for (int i = first_ + 1; i + 1 < work.nodes(); ++i)
@@ -357,15 +386,15 @@ bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
 
   if (work.ends[0].held)
     return true;
-  int drop = 0;
-  while (drop + 2 < work.nodes() && !limits.scene.contains(work.x[drop]))
-    ++drop;
+  int outside = 0;
+  while (outside + 2 < work.nodes() && !limits.scene.contains(work.x[outside]))
+    ++outside;
+  dropOldest(work, outside, work.left_volume);
   int youngest = work.nodes() - 1;
   while (youngest >= 0 && !work.deposited[youngest])
     --youngest;
   if (youngest > limits.max_deposited)
-    drop = std::max(drop, youngest - limits.max_deposited);
-  dropOldest(work, drop);
+    dropOldest(work, youngest - limits.max_deposited, work.dropped_volume);
   return true;
 }
 

@@ -224,6 +224,13 @@ void ThreadSystem::solve()
 
 void ThreadSystem::moveAlong(double alpha)
 {
+  if (alpha == 0.0)   // whatever the direction is, which may be that of an attempt that overflowed
+  {
+    for (int k = 0; k < 3; ++k)
+      std::copy_n(x_base_[k].data(), a_.nodes, a_.x[k]);
+    std::fill_n(a_.turn, a_.nodes, 0.0);
+    return;
+  }
   for (int i = 0; i < a_.nodes; ++i)
   {
     for (int k = 0; k < 3; ++k)

@@ -39,7 +39,40 @@ public:
         states.push_back(&thread);
         kinds.push_back(static_cast<int>(k));
       }
-    return contact.clearance(states, kinds, state.obstacles);
+    const double room = contact.clearance(states, kinds, state.obstacles);
+    if (!(room > 0))
+      meeting = contact.nearest(states, state.obstacles);
+    return room;
+  }
+  std::string meeting;   ///< what touches, by the last clearance()
+
+  /// An end that is held cannot give way. Returns false, and fills the report, when an obstacle comes nearer to one than the thread is thick: no
+  /// shorter step helps then.
+  bool endsHaveRoom(const TouchingState& state, const TouchingInputs& inputs, StepReport& report) const
+  {
+    for (std::size_t k = 0; k < state.threads.size(); ++k)
+      for (const ThreadState& thread : state.threads[k].threads)
+        for (int end = 0; end < 2 && model.touches[k].solids; ++end)
+        {
+          const Eigen::Vector3d from = end ? thread.x.back() : thread.x.front(), to = inputs.threads[k].ends[end].position;
+          const double radius = thread.radius(end ? thread.edges() - 1 : 0);
+          for (std::size_t o = 0; thread.ends[end].held && o < state.obstacles.size(); ++o)
+          {
+            const TouchingModel::Obstacle& obstacle = model.obstacles[o];
+            if ((to - inputs.obstacles[o].position).norm() > boundingRadius(obstacle.shape) + radius)
+              continue;
+            const double room = distanceToShape(obstacle.shape, inputs.obstacles[o], to, to);
+            if (room >= std::min(radius, distanceToShape(obstacle.shape, state.obstacles[o], from, from)))
+              continue;
+            report.ok = false;
+            report.failure = StepFailure::squeezed;
+            report.message = "obstacle '" + obstacle.name + "' comes within " + std::to_string(1e3 * room) + " mm of the " +
+                             (end && model.threads[k]->nozzle_diameter > 0 ? "nozzle" : "held end") + " of thread '" + model.threads[k]->name +
+                             "', which is " + std::to_string(1e3 * radius) + " mm in radius there: keep them further apart";
+            return false;
+          }
+        }
+    return true;
   }
 };
 
@@ -106,6 +139,8 @@ StepReport TouchingThreads::step(TouchingState& state, const TouchingInputs& inp
                           : "the number of threads or obstacles is not that of the model; correct this input";
     return report;
   }
+  if (!m.endsHaveRoom(state, inputs, report))
+    return report;
   m.work = state;
   m.threads.clear();
   m.parts.clear();
@@ -159,7 +194,7 @@ void TouchingThreads::checkClearance(const TouchingState& state)
 {
   const double room = clearance(state);
   if (!(room > 0))
-    throw std::invalid_argument("threads or obstacles with contact touch or cross by " + std::to_string(-1e3 * room) +
+    throw std::invalid_argument(impl_->meeting + " touch or cross by " + std::to_string(-1e3 * room) +
                                 " mm as the scene starts: move them apart, or take thinner threads");
 }
 

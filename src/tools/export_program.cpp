@@ -98,6 +98,9 @@ void eachInstant(const std::string& program, const ExportOptions& options, BagRe
     if (progress)
       progress->show(bag.done());
   }
+  const std::string gaps = bag.gaps();
+  if (!gaps.empty() && !options.quiet)
+    std::fprintf(stderr, "%s: warning: %s: %s\n", program.c_str(), options.bag.c_str(), gaps.c_str());
 }
 
 bool FrameChoice::takes(double seconds)

@@ -26,7 +26,7 @@ int exportProgram(const std::string& name, const std::string& usage, int argc, c
 /// Opens the bag, and says on stderr when its scene cannot be read, and that `loses` then.
 BagReader openBag(const std::string& program, const ExportOptions& options, const std::string& loses);
 
-/// Goes through the bag with progress on stderr.
+/// Goes through the bag with progress on stderr, and warns there when steps are missing.
 void eachInstant(const std::string& program, const ExportOptions& options, BagReader& bag, const std::function<void(const SceneSnapshot&)>& use);
 
 /// Which instants become frames: all (fps 0), or the first at or after each 1/fps seconds.

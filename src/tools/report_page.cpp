@@ -12,6 +12,7 @@
 
 #include "../scene/yaml_tree.h"
 #include "slender_sim/scene/reader.h"
+#include "slender_sim/study/bars.h"
 #include "slender_sim/study/output.h"
 
 namespace slender {
@@ -78,67 +79,16 @@ std::string cell(const std::string& text)
   return std::string("<td class=n>") + number + "</td>";
 }
 
-/// What a figure has to meet.
-struct Bar
-{
-  const char* study;    ///< empty: of any
-  const char* metric;
-  double limit;
-  bool at_least;        ///< else at most
-};
-
-const Bar kBars[] = {
-    {"", "worst_error_over_bound", 1, false},
-    {"", "nan_count", 0, false},
-    {"", "unexplained_failures", 0, false},
-    {"", "silently_wrong", 0, false},
-    {"", "not_recovered", 0, false},
-    {"", "missed", 0, false},
-    {"", "intersections", 0, false},
-    {"", "penetrations", 0, false},
-    {"", "volume_drift", 1e-10, false},
-    {"", "misclassified_fraction", 0.1, false},
-    {"cantilever", "observed_order", 1.9, true},
-    {"rods_at_rest", "max_tip_error_mm", 0.3, false},
-    {"swing", "cpu_per_second_at_8mm", 0.25, false},
-    {"swing", "cpu_per_second_at_0.6mm", 1.05, false},
-    {"helical_buckling", "order", 1.9, true},
-    {"projection", "length_error_max", 1e-8, false},
-    {"projection", "iterations_max_to_1ms", 5, false},
-    {"rod_tables", "speedup_min", 10, true},
-    {"rod_implicit_vs_explicit", "step_ratio", 70, true},
-    {"rod_implicit_vs_explicit", "speedup", 8.6, true},
-    {"thread_implicit_vs_explicit", "step_ratio", 1e4, true},
-    {"thread_implicit_vs_explicit", "speedup", 1e3, true},
-    {"coiling", "median_relative_error_frequency", 0.05, false},
-    {"ibm_vs_hinge", "gradient_speedup_min", 7, true},
-    {"ibm_vs_hinge", "hessian_cost_ratio_max", 0.02, false},
-    {"ibm_vs_hinge", "product_over_bandwidth_bound", 1.5, false},
-    {"ibm_vs_hinge", "implicit_step_speedup_min", 2, true},
-    {"implicit_step", "step_over_factorisation_25600", 0.25, false},
-    {"willmore_sphere", "energy_relative_error", 0.01, false},
-    {"willmore_hole", "max_radius_error", 0.005, false},
-    {"willmore_hole", "max_radius_error_hemisphere", 0.02, false},
-    {"breathing_surface", "tugging_ratio", 3, true},
-    {"rubber_band", "tugging_ratio", 3, true},
-    {"tracking_overhead", "max_overhead", 0.05, false},
-    {"tracking_overhead", "max_overhead_colliding", 0.05, false},
-    {"lean", "max_instruction_overhead_absent", 0.005, false},
-    {"lean", "max_bytes_absent", 0, false},
-    {"lean", "allocations_per_step", 0, false},
-};
-
-/// The bar of a figure and whether it is met, as cells of a table; empty: it has none.
+/// Returns two table cells with the bar of a metric and whether the value meets it, or nothing if the metric has no bar.
 std::string rating(const std::string& study, const std::string& metric, double value)
 {
-  for (const Bar& bar : kBars)
-    if (metric == bar.metric && (*bar.study == '\0' || study == bar.study))
-    {
-      char text[48];
-      std::snprintf(text, sizeof text, "<td class=n>%s %g</td>", bar.at_least ? "at least" : bar.limit == 0 ? "" : "at most", bar.limit);
-      return text + std::string((bar.at_least ? value >= bar.limit : value <= bar.limit) ? "<td class=good>met</td>" : "<td class=bad>missed</td>");
-    }
-  return "";
+  const study::Bar* bar = study::findBar(study, metric);
+  if (!bar)
+    return "";
+  const char* sense = bar->sense == study::Bar::Sense::at_least ? "at least" : bar->limit == 0 ? "" : "at most";
+  char text[48];
+  std::snprintf(text, sizeof text, "<td class=n>%s %g</td>", sense, bar->limit);
+  return text + std::string(bar->metBy(value) ? "<td class=good>met</td>" : "<td class=bad>missed</td>");
 }
 
 struct Loaded

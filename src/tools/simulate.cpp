@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -11,6 +13,7 @@
 
 #include "arguments.h"
 #include "slender_sim/dynamics/integrator.h"
+#include "slender_sim/linalg/interruption.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
@@ -20,7 +23,8 @@
 #include "slender_sim/node/guide_bag.h"
 #endif
 
-/// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed, or its results could not be written.
+/// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed, or its results could not be written,
+/// 128 + N stopped by signal N.
 namespace {
 
 using slender::BadInput;
@@ -37,15 +41,17 @@ const char* const usage =
   "  --bag FILE          record a ROS bag (only in a build with ROS)\n"
   "  --csv DIR           record tables: DIR/nodes.csv, DIR/grasps.csv\n"
   "  --obj DIR           record one OBJ file per instant\n"
+  "  --state FILE        save the state that was reached, as the nodes' save_state does; after a failure as well\n"
   "  --set PATH=VALUE    override a value of the scene, e.g. rods.0.material.youngs_modulus=1e7; may be repeated\n"
   "  --threads N         threads for scenes of several rods; results do not depend on it\n"
-  "  --quiet             print nothing but errors\n"
+  "  --quiet             print nothing but warnings and errors\n"
   "record.every of the scene says which steps are recorded. Exit status: 0 done, 2 bad input, 3 the simulation failed,\n"
-  "or its results could not be written (disk full): the message names what is left of them.\n";
+  "or its results could not be written (disk full): the message names what is left of them; 130 stopped by SIGINT (Ctrl-C),\n"
+  "143 by SIGTERM: within the step, whose start is then the end of what is recorded. A second signal ends it at once.\n";
 
 struct Options
 {
-  std::string scene, bag, csv, obj;
+  std::string scene, bag, csv, obj, state;
   std::vector<std::string> overrides;
   std::optional<double> duration;
   std::optional<int> threads;
@@ -88,6 +94,10 @@ Options parseOptions(int argc, char** argv)
     else if (argument == "--obj")
     {
       options.obj = value();
+    }
+    else if (argument == "--state")
+    {
+      options.state = value();
     }
     else if (argument == "--set")
     {
@@ -142,6 +152,23 @@ std::vector<std::unique_ptr<Recorder>> makeRecorders(const Options& options)
   return recorders;
 }
 
+volatile std::sig_atomic_t stopped_by = 0;
+
+/// The next of these signals ends the step that is being solved, and the run; the one after it the process.
+void stopOnSignals()
+{
+  struct sigaction action = {};
+  action.sa_handler = [](int signal) {
+    stopped_by = signal;
+    slender::interruptSteps();
+  };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  for (const int signal : {SIGINT, SIGTERM})
+  {
+    ::sigaction(signal, &action, nullptr);
+  }
+}
+
 /// A bar on a terminal; nothing when the output goes elsewhere.
 class Progress
 {
@@ -180,6 +207,71 @@ private:
   Clock::time_point start_, last_;
 };
 
+slender::ThreadVolumes volumesOf(const Simulation& simulation)
+{
+  slender::ThreadVolumes volumes;
+  for (const slender::ThreadGroupState& thread : simulation.state().threads)
+  {
+    volumes.add(thread);
+  }
+  return volumes;
+}
+
+/// Says so and returns false when fluid was lost or came out of nothing.
+bool checkVolumes(const Simulation& simulation)
+{
+  const double missing = volumesOf(simulation).missing();
+  if (std::abs(missing) <= slender::ThreadVolumes::kMostMissing)
+  {
+    return true;
+  }
+  std::fprintf(stderr, "simulate: %.3g of the threads' fluid is not accounted for, more than %.0e: this is a defect of the program, please report it\n",
+               missing, slender::ThreadVolumes::kMostMissing);
+  return false;
+}
+
+std::string rangeOf(double low, double high)
+{
+  char text[64];
+  std::snprintf(text, sizeof text, high - low > 1e-9 * high ? "%.6g to %.6g" : "%.6g", low, high);
+  return text;
+}
+
+/// The moduli in use, whether the scene gives them or they follow from Young's modulus: one line for each rod that differs from those before.
+void printModuli(const Simulation& simulation)
+{
+  constexpr int kMostLines = 10;
+  std::vector<std::pair<std::string, int>> lines;   // and the number of further rods that have the same moduli
+  const int rods = static_cast<int>(simulation.config().rods.size());
+  for (int r = 0; r < rods; ++r)
+  {
+    const slender::RodModel& m = simulation.rodModel(r);
+    const auto bend = [&m](int row) { return rangeOf(m.bend_modulus.row(row).minCoeff(), m.bend_modulus.row(row).maxCoeff()); };
+    const std::string bends = bend(0) == bend(2) ? bend(0) : "[" + bend(0) + ", " + bend(2) + "]";
+    const std::string text = "stretch " + rangeOf(m.stretch_modulus.minCoeff(), m.stretch_modulus.maxCoeff()) + " N, bend " + bends + " N m^2, twist " +
+                             rangeOf(m.twist_modulus.minCoeff(), m.twist_modulus.maxCoeff()) + " N m^2";
+    const auto ends = [&text](const std::string& line) { return line.size() > text.size() && line.compare(line.size() - text.size(), text.size(), text) == 0; };
+    const auto same = std::find_if(lines.begin(), lines.end(), [&ends](const auto& line) { return ends(line.first); });
+    if (same != lines.end())
+    {
+      ++same->second;
+    }
+    else if (static_cast<int>(lines.size()) <= kMostLines)
+    {
+      lines.emplace_back("rod " + m.name + ": " + text, 0);
+    }
+  }
+  for (std::size_t k = 0; k < lines.size() && k < kMostLines; ++k)
+  {
+    std::printf("moduli            %s", lines[k].first.c_str());
+    lines[k].second > 0 ? std::printf(" (and %d more rods)\n", lines[k].second) : std::printf("\n");
+  }
+  if (static_cast<int>(lines.size()) > kMostLines)
+  {
+    std::printf("moduli            other rods have other moduli\n");
+  }
+}
+
 void printSummary(const Simulation& simulation, const StepReport& total, double wall)
 {
   const double simulated = simulation.state().time;
@@ -192,6 +284,7 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   std::printf("iterations        %d (%.2f per step)\n", total.iterations,
               total.iterations / std::max(1.0, static_cast<double>(simulation.state().steps)));
   std::printf("cut steps         %d\n", total.cut_steps);
+  printModuli(simulation);
   if (total.repulsions > 0 || total.impulses > 0)
   {
     std::printf("cloth contacts    %.1f per step, %ld collisions stopped, %ld rigid pieces\n",
@@ -210,9 +303,28 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
       std::printf("bounded forces    at most %d at their bounds, whose averages were not met\n", total.forces_at_bound);
     }
   }
+  if (!simulation.config().threads.empty())
+  {
+    const slender::ThreadVolumes volumes = volumesOf(simulation);
+    std::printf("fluid             %.9g m^3 at the start, %.9g m^3 fed: %.9g m^3 in the scene, %.9g m^3 left the region, %.9g m^3 dropped "
+                "(edges.deposited); missing %.2g\n",
+                volumes.start, volumes.fed, volumes.present, volumes.left, volumes.dropped, volumes.missing());
+  }
   if (total.projection_iterations > 0)
   {
     std::printf("projection        at most %d iterations a step, edge lengths squared to %.2g\n", total.projection_iterations, total.constraint_error);
+  }
+}
+
+void saveState(const Simulation& simulation, const std::string& path)
+{
+  try
+  {
+    simulation.save(path);
+  }
+  catch (const std::runtime_error& error)
+  {
+    throw slender::WriteError(std::string("--state ") + error.what());
   }
 }
 
@@ -237,10 +349,15 @@ int run(const Options& options)
 
   const auto start = Clock::now();
   Simulation simulation(std::move(config));
+  for (const std::string& warning : simulation.config().warnings)
+  {
+    std::fprintf(stderr, "simulate: warning: %s\n", warning.c_str());
+  }
   if (options.threads)
   {
     simulation.setThreads(*options.threads);
   }
+  stopOnSignals();   // before there is anything to finish: until here a signal ends the process at once
   std::vector<std::unique_ptr<Recorder>> recorders = makeRecorders(options);
   StepReport total;
   for (auto& recorder : recorders)
@@ -254,7 +371,14 @@ int run(const Options& options)
   {
     simulation.defaultInputs(inputs);
     const StepReport report = simulation.step(inputs);
-    ok = report.ok;
+    ok = report.ok && stopped_by == 0;   // explicit steps, for one, are too short to be interrupted
+    if (stopped_by != 0)
+    {
+      progress.clear();
+      std::fprintf(stderr, "simulate: stopped by %s in step %ld of %ld: what was reached by t = %.9g s is kept\n",
+                   stopped_by == SIGINT ? "SIGINT" : "SIGTERM", k, steps, simulation.state().time);
+      break;
+    }
     if (!ok)
     {
       progress.clear();
@@ -276,12 +400,17 @@ int run(const Options& options)
   {
     recorder->finish();   // after a failure as well: what was reached is worth looking at
   }
+  if (!options.state.empty())
+  {
+    saveState(simulation, options.state);
+  }
   progress.clear();
   if (!options.quiet)
   {
     printSummary(simulation, total, std::chrono::duration<double>(Clock::now() - start).count());
   }
-  return ok ? exit_done : exit_failed;
+  const bool balanced = checkVolumes(simulation);
+  return stopped_by != 0 && !ok ? 128 + stopped_by : balanced && ok ? exit_done : exit_failed;
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// study list | run NAME... | report: the experiments behind the package's claims.
+// study list | run NAME... | check | report: the experiments behind the package's claims.
 
 #include <chrono>
 #include <cstring>
@@ -11,8 +11,10 @@
 #include <vector>
 
 #include "arguments.h"
+#include "slender_sim/study/bars.h"
 #include "slender_sim/study/output.h"
 #include "slender_sim/study/study.h"
+#include "study_check.h"
 #include "study_report.h"
 
 namespace {
@@ -25,10 +27,13 @@ constexpr int kDone = 0, kStudyFailed = 1, kBadUsage = 2;
 
 const char kUsage[] =
     "usage: study list\n"
-    "       study run NAME... [--quick] [--json FILE] [--out DIR]\n"
+    "       study run NAME... [--quick] [--judge] [--json FILE] [--out DIR]\n"
+    "       study check [NAME...] [--jobs N] [--xml FILE]\n"
     "       study report [NAME...] --out DIR [--quick] [--jobs N]\n"
     "  NAME     a study of `study list`, or all\n"
-    "  --quick  fewer cases and coarser ones: well under a minute each\n"
+    "  --quick  fewer cases and coarser ones: at most a minute or two each\n"
+    "  --judge  fails a study that exceeds a bound or misses a bar (timings are not judged)\n"
+    "  check    runs the quick form of every study, or of those named, and judges it; --xml writes the results in JUnit's format\n"
     "  --json   metrics and rows of all studies run\n"
     "  --out    a CSV table and PNG plots of each study (the directory is made); report: DIR/report.html, one page with all of them.\n"
     "           Stopped, it goes on where it was;\n"
@@ -55,7 +60,7 @@ int list()
 struct Options
 {
   std::vector<const Study*> chosen;
-  bool quick = false;
+  bool quick = false, judge = false;
   std::string json, out;
 };
 
@@ -67,6 +72,8 @@ bool parse(const std::vector<std::string>& words, Options& options, int& status)
     const std::string& word = words[i];
     if (word == "--quick")
       options.quick = true;
+    else if (word == "--judge")
+      options.judge = true;
     else if (word == "--json" || word == "--out")
     {
       if (i + 1 == words.size() || words[i + 1].rfind("--", 0) == 0)
@@ -164,6 +171,12 @@ int run(const Options& options)
       std::cerr << "study: " << study->name << " failed: " << result.error << "\n";
       status = kStudyFailed;
     }
+    if (options.judge && result.error.empty())
+      for (const std::string& failure : slender::study::judge(context))
+      {
+        std::cerr << "study: " << study->name << ": " << failure << "\n";
+        status = kStudyFailed;
+      }
     if (!options.out.empty() && !writeFiles(options, context))
       status = kStudyFailed;
     results.push_back(result);
@@ -205,6 +218,21 @@ int report(const std::vector<std::string>& words)
   return slender::makeReport(options) == 0 ? kDone : kStudyFailed;
 }
 
+int check(const std::vector<std::string>& words)
+{
+  slender::StudyCheckOptions options;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    if (words[i] == "--jobs" && i + 1 < words.size())
+      options.jobs = slender::parseCount("--jobs", words[++i], 1, 1000);
+    else if (words[i] == "--xml" && i + 1 < words.size())
+      options.xml = words[++i];
+    else if (words[i].rfind("-", 0) == 0)
+      return badUsage("check: " + words[i] + " is not an option, or its value is missing");
+    else
+      options.only.push_back(words[i]);
+  return slender::checkStudies(options) == 0 ? kDone : kStudyFailed;
+}
+
 }  // namespace
 
 int main(int argc, char** argv)
@@ -223,6 +251,8 @@ int main(int argc, char** argv)
   {
     if (words[0] == "report")
       return report({words.begin() + 1, words.end()});
+    if (words[0] == "check")
+      return check({words.begin() + 1, words.end()});
   }
   catch (const std::exception& error)   // BadInput, a process that cannot be started
   {

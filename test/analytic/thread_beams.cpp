@@ -18,6 +18,7 @@ double sagSpeed(int edges, bool second_end, int node)
   Thread t{honey(), makeThread(x, Eigen::VectorXd::Constant(edges, kRadius), Eigen::Vector3d::UnitY()), {}};
   t.model.density = 1.0;
   t.model.viscosity = kMu;
+  t.model.nozzle_diameter = 0.0;   // No nozzle: its radius would limit that of the edges.
   t.inputs.gravity = {0, 0, -kGravity};
   t.inputs.ends[0] = Pose{};
   t.inputs.ends[1] = {{1, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY()))};   // x into the thread, y along d1
@@ -48,6 +49,7 @@ TEST(ThreadBeams, HoldersBearTheWeight)
   Thread t{honey(), makeThread(x, Eigen::VectorXd::Constant(edges, kRadius), Eigen::Vector3d::UnitY()), {}};
   t.model.density = 1.0;
   t.model.viscosity = kMu;
+  t.model.nozzle_diameter = 0.0;   // No nozzle: its radius would limit that of the edges.
   t.inputs.gravity = {0, 0, -kGravity};
   t.state.ends[0].held = true;
   ThreadStepper stepper = t.stepper();

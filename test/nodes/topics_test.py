@@ -57,6 +57,11 @@ class Topics(NodeCase):
         for name in ("pause", "reset", "step", "set_grasp", "save_state", "load_state"):
             self.assertIn("/t/rod/" + name, offered)
 
+    def test_warnings_of_the_scene_are_logged(self):
+        scene = SCENE.replace("cross_section: {radius: 0.004}", "cross_section: {ellipse: [0.004, 0.002]}\n    contact: {}")
+        self.start(scene)
+        wait_until(lambda: "half-axes 0.004 m and 0.002 m" in self.output("rod.out") + self.output("rod.err"), what="the warning")
+
     def test_messages(self):
         self.start(frame_id="map", start_time=10.0)
         state = self.listen("/t/state", RodState)

@@ -84,11 +84,20 @@ TEST_F(Simulate, printsASummary)
   const Result result = simulate(cantilever + " --duration 0.1");
   EXPECT_EQ(result.status, 0);
   for (const char* word : {"steps             20\n", "simulated         0.1 s", "wall", "real-time factor", "worst residual", "iterations",
-                           "cut steps"})
+                           "cut steps", "moduli            rod beam: stretch "})
   {
     EXPECT_NE(result.output.find(word), std::string::npos) << word << " not in\n" << result.output;
   }
   EXPECT_EQ(simulate(cantilever + " --duration 0.1 --quiet").output, "");
+}
+
+TEST_F(Simulate, warnsEvenWhenItIsQuiet)
+{
+  const Result result = simulate(cantilever + " --duration 0.01 --quiet --set 'rods.0.cross_section={ellipse: [0.02, 0.01]}' --set 'rods.0.contact={}'");
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_EQ(result.output.rfind("simulate: warning: ", 0), 0u) << result.output;
+  EXPECT_NE(result.output.find("half-axes 0.02 m and 0.01 m"), std::string::npos) << result.output;
+  EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;   // once
 }
 
 TEST_F(Simulate, badInputIsStatus2)
@@ -234,6 +243,27 @@ TEST_F(Simulate, writesObjFiles)
   EXPECT_NE(text.str().find("o blade2\nv "), std::string::npos);
   EXPECT_NE(text.str().find("l 63 64 65"), std::string::npos);   // 31 nodes per blade
   EXPECT_FALSE(fs::exists(folder_ + "/frame_000003.obj"));
+}
+
+TEST_F(Simulate, runsIntoOneFolderAreNotMixed)
+{
+  const std::string csv = " --csv " + folder_ + "/csv", obj = " --obj " + folder_ + "/obj";
+  ASSERT_EQ(simulate(scenes + "torsional_pendulum.yaml --duration 0.1 --set record.fields=[energy]" + csv + obj).status, 0);
+  EXPECT_TRUE(fs::exists(folder_ + "/csv/bodies.csv"));
+  EXPECT_TRUE(fs::exists(folder_ + "/csv/energies.csv"));
+  EXPECT_TRUE(fs::exists(folder_ + "/obj/frame_000010.obj"));
+  std::ofstream(folder_ + "/obj/notes.txt") << "mine";
+  ASSERT_EQ(simulate(cantilever + " --duration 0.02" + csv + obj).status, 0);
+  EXPECT_FALSE(fs::exists(folder_ + "/csv/bodies.csv"));
+  EXPECT_FALSE(fs::exists(folder_ + "/csv/energies.csv"));
+  EXPECT_FALSE(fs::exists(folder_ + "/obj/frame_000010.obj"));
+  EXPECT_TRUE(fs::exists(folder_ + "/obj/notes.txt"));
+  // what another program wrote under such a name is neither removed nor mixed with ours
+  std::ofstream(folder_ + "/obj/frame_000099.obj") << "v 0 0 0\n";
+  const Result result = simulate(cantilever + " --duration 0.02" + obj);
+  EXPECT_EQ(result.status, 2) << result.output;
+  EXPECT_NE(result.output.find("frame_000099.obj: was not written by slender_sim"), std::string::npos) << result.output;
+  EXPECT_TRUE(fs::exists(folder_ + "/obj/frame_000000.obj"));
 }
 
 TEST_F(Simulate, threadsDoNotChangeTheTables)

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "slender_sim/study/bars.h"
 #include "slender_sim/study/output.h"
 #include "slender_sim/study/reference.h"
 #include "slender_sim/study/study.h"
@@ -48,6 +49,55 @@ TEST(StudyFrame, noChecksNoMetric)
   context.row().set("n", 1);
   context.finish();
   EXPECT_TRUE(context.metrics().empty());
+}
+
+TEST(StudyFrame, judgingFindsEveryFailure)
+{
+  StudyContext good("projection", true, false);
+  good.row().check(1.0, 1.0, 0.1, "formula");
+  good.metric("length_error_max", 1e-9);
+  good.metric("iterations_max_to_1ms", 3);
+  EXPECT_TRUE(judge(good).empty());
+
+  StudyContext bad("projection", true, false);
+  bad.row().check(1.2, 1.0, 0.1, "formula of the test");
+  bad.row().check(kNan, 1.0, 0.1, "formula");
+  bad.metric("length_error_max", kNan);
+  const std::vector<std::string> failures = judge(bad);
+  ASSERT_EQ(failures.size(), 4u) << "two rows, a metric that is not a number, a metric that is missing";
+  EXPECT_NE(failures[0].find("formula of the test"), std::string::npos) << failures[0];
+  EXPECT_NE(failures[2].find("length_error_max"), std::string::npos) << failures[2];
+  EXPECT_NE(failures[3].find("iterations_max_to_1ms has a bar but is missing"), std::string::npos) << failures[3];
+}
+
+TEST(StudyFrame, judgingLeavesTimingsOutAndRefusesStudiesThatCannotFail)
+{
+  StudyContext timed("rod_scaling", true, false);
+  timed.metric("iterations_per_step_worst", 2.0);
+  timed.metric("microseconds_per_node_iteration", 1e3);   // far beyond its bar
+  EXPECT_TRUE(judge(timed).empty());
+  StudyContext empty("a study of the test", true, false);
+  empty.metric("seconds", 1.0);
+  ASSERT_EQ(judge(empty).size(), 1u);
+  EXPECT_NE(judge(empty)[0].find("nothing in it can fail"), std::string::npos);
+}
+
+TEST(StudyFrame, barsOfTheFullFormAreNotAskedOfTheQuickForm)
+{
+  for (const bool quick : {true, false})
+  {
+    StudyContext context("helical_buckling", quick, false);
+    context.row().check(1.0, 1.0, 0.1, "formula");
+    EXPECT_EQ(judge(context).size(), quick ? 0u : 1u);
+  }
+}
+
+TEST(StudyFrame, everyBarOfAStudyNamesAStudy)
+{
+  for (const Bar& bar : bars())
+    EXPECT_TRUE(bar.study.empty() || findStudy(bar.study)) << bar.study;
+  EXPECT_TRUE(findBar("cloth_accuracy", "observed_order_tr_bdf2_flag"));
+  EXPECT_FALSE(findBar("cloth_accuracy", "observed_order_flag"));
 }
 
 TEST(StudyFrame, boundMustBePositive)

@@ -210,7 +210,7 @@ INSTANTIATE_TEST_SUITE_P(Material, BadValue, testing::Values(
   Case{"rods.0.material.bend_modulus=[[1, 0.1], [0, 1]]", "symmetric"},
   Case{"rods.0.damping.mass=-1", "in [0, 1000000] 1/s"},
   Case{"rods.0.damping.stiffness=-1", "in [0, 1000] s"},
-  Case{"rods.0.curvature=angle", "must be one of: tangent, compensated"},
+  Case{"rods.0.curvature=angle", "must be one of: auto, tangent, compensated"},
   Case{"rods.0.matched_to_arcs=1", "matched_to_arcs = 1"},
   Case{"rods.0={naturally_straight: true, matched_to_arcs: true}", "has no arcs to match its joints to"},
   Case{"rods.0.damping.drag=-1", "N s/m^2"}));
@@ -367,11 +367,60 @@ TEST(Reader, resolvesGraspedNodes)
 TEST(Reader, readsHowJointsAreMade)
 {
   const RodConfig plain = parseScene("rods:\n  - {}\n").rods[0];
-  EXPECT_EQ(plain.joints.curvature, Curvature::tangent);
+  EXPECT_TRUE(plain.automatic_curvature);
   EXPECT_FALSE(plain.joints.matched_to_arcs);
   const RodConfig rod = parseScene("rods:\n  - {curvature: compensated, matched_to_arcs: true, centerline: {arc: {}}}\n").rods[0];
   EXPECT_EQ(rod.joints.curvature, Curvature::compensated);
+  EXPECT_FALSE(rod.automatic_curvature);
+  EXPECT_TRUE(parseScene("rods:\n  - {curvature: auto}\n").rods[0].automatic_curvature);
+  const RodConfig natural = parseScene("rods:\n  - {rest_twist: [1, 2, 3], natural_curvature: [4, 5], centerline: {straight: {edges: 4}}}\n").rods[0];
+  EXPECT_EQ(natural.rest_twist, (std::vector<double>{1, 2, 3}));
+  ASSERT_EQ(natural.natural_curvature.size(), 1u);
+  EXPECT_EQ(natural.natural_curvature[0], Eigen::Vector2d(4, 5));
   EXPECT_TRUE(rod.joints.matched_to_arcs);
+}
+
+TEST(Reader, warnsWhereContactReplacesAShape)
+{
+  const auto warnings = [](const std::string& section, const std::string& contact) {
+    return parseScene("rods:\n  - {name: strap, cross_section: " + section + ", contact: " + contact + "}\n", "test.yaml").warnings;
+  };
+  const auto flat = warnings("{ellipse: [0.02, 0.005]}", "{}");
+  ASSERT_EQ(flat.size(), 1u);
+  for (const char* part : {"test.yaml:2: rods.0.cross_section: ", "rod strap", "half-axes 0.02 m and 0.005 m", "circle of the larger half-axis, 0.02 m"})
+  {
+    EXPECT_NE(flat[0].find(part), std::string::npos) << part << " is not in: " << flat[0];
+  }
+  const auto tapered = warnings("{ellipse: [[0.02, 0.01], [0.01]]}", "{}");   // a taper towards a circle
+  ASSERT_EQ(tapered.size(), 1u);
+  EXPECT_NE(tapered[0].find("half-axes 0.02 m and 0.01 m"), std::string::npos) << tapered[0];
+  EXPECT_TRUE(warnings("{ellipse: [0.01, 0.01]}", "{}").empty());
+  EXPECT_TRUE(warnings("{radius: 0.01}", "{}").empty());
+  EXPECT_TRUE(parseScene("rods:\n  - {cross_section: {ellipse: [0.02, 0.005]}}\n").warnings.empty());   // touches nothing
+}
+
+TEST(Reader, warnsOnceOfTheRodsOfAGenerator)
+{
+  const auto warnings = parseScene("generate:\n  - hair: {strands: 20, edges: 5, cross_section: {ellipse: [4e-5, 8e-5]}, contact: {}}\n").warnings;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("rod hair has elliptical sections"), std::string::npos) << warnings[0];
+}
+
+TEST(Reader, moduliThatAreLeftOutFollowOnlyFromAStatedYoungsModulus)
+{
+  const auto read = [](const std::string& material) { return parseScene("rods:\n  - {material: " + material + "}\n", "test.yaml"); };
+  const auto problem = [](const std::string& material) { return problemsOf("rods:\n  - {material: " + material + "}\n"); };
+  EXPECT_EQ(problem("{bend_modulus: 1}"),
+            "test.yaml:2: rods.0.material: gives bend_modulus but not stretch_modulus, twist_modulus; give these too, or youngs_modulus (and "
+            "poissons_ratio), from which the rest follows with the cross-section");
+  EXPECT_NE(problem("{stretch_modulus: 1, bend_modulus: 1, poissons_ratio: 0.3}").find("but not twist_modulus; give this too, or youngs_modulus"), std::string::npos);
+  EXPECT_NE(problem("{twist_modulus: 1}").find("but not stretch_modulus, bend_modulus;"), std::string::npos);
+  EXPECT_TRUE(read("{bend_modulus: 1, youngs_modulus: 1e5}").warnings.empty());
+  EXPECT_TRUE(read("{bend_modulus: 1, twist_modulus: 1, stretch_modulus: 1}").warnings.empty());
+  EXPECT_TRUE(read("{density: 1}").warnings.empty());
+  const auto unused = read("{bend_modulus: 1, twist_modulus: 1, stretch_modulus: 1, youngs_modulus: 1e5}").warnings;
+  ASSERT_EQ(unused.size(), 1u);
+  EXPECT_NE(unused[0].find("rods.0.material.youngs_modulus = 1e5: has no effect"), std::string::npos) << unused[0];
 }
 
 TEST(Reader, readsModuliInEveryForm)

@@ -166,11 +166,14 @@ TEST(ThreadRemesh, DroppingCountsTheVolume)
   Random random(5);
   ThreadState s = wigglyThread(9, random);
   const double volume = s.totalVolume();
-  dropOldest(s, 3);
+  dropOldest(s, 3, s.dropped_volume);
   EXPECT_EQ(s.nodes(), 6);
   EXPECT_EQ(s.firstId(), 3u);
   EXPECT_NEAR(s.totalVolume() + s.dropped_volume, volume, 1e-15);
-  dropOldest(s, 100);
+  EXPECT_EQ(s.left_volume, 0.0);
+  dropOldest(s, 100, s.left_volume);
+  EXPECT_GT(s.left_volume, 0.0);
+  EXPECT_NEAR(s.totalVolume() + s.dropped_volume + s.left_volume, volume, 1e-15);
   EXPECT_EQ(s.nodes(), 2);
 }
 

@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,8 @@ enum class BendingModel
 {
   none,
   hinge,                     ///< nonlinear, Discrete Shells; bends about the rest angles
-  isometric_nonconforming,   ///< quadratic (thesis 2.4), for flat rest shapes
-  isometric_conforming
+  isometric_nonconforming,   ///< quadratic (thesis 2.4), for flat rest shapes only (see restAngleLimit())
+  isometric_conforming       ///< likewise
 };
 
 const char* toString(BendingModel model);
@@ -65,7 +66,10 @@ struct ClothModel
   Eigen::Vector3d warp = Eigen::Vector3d::UnitX();   ///< direction in the rest shape
   BendingModel bending = BendingModel::isometric_nonconforming;
   double bending_modulus = 0.0;      ///< D [N m], as in plate theory (see bendingCalibration)
-  Eigen::Matrix3Xd undeformed;       ///< 3 x n: its bend angles are those at rest (hinge bending); empty: those of `rest`
+  /// Of bending, in (-1, 1): the plate energy D/2 [(k1 + k2)^2 - 2 (1 - nu) k1 k2] with the principal curvatures k1 and k2 (see plateBending()).
+  /// Empty: the bending model has the ratio of its discretisation, about -1/3 (nonconforming, hinges) or 1 (conforming).
+  std::optional<double> bending_poissons_ratio;
+  Eigen::Matrix3Xd undeformed;       ///< 3 x n: its bend angles are those at rest; empty: those of `rest`
   Plasticity plasticity;
   double mass_damping = 0.0;         ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;    ///< Rayleigh [s]
@@ -92,6 +96,21 @@ ClothModel buildCloth(const std::string& name, const TriangleMesh& rest, double 
 /// A state at rest at the given vertices (3 x n [m]). Rest angles (hinge bending only) are those of the undeformed shape. Throws
 /// std::invalid_argument for vertices or an undeformed shape that do not fit.
 ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& vertices);
+
+/// Largest angle [rad] between two adjacent faces of the undeformed shape, or of the rest shape where that is empty.
+double largestRestAngle(const ClothModel& model);
+
+/// The largest such angle [rad] of a rest shape that counts as flat: 1e-8 over the square root of the number of faces. A sheet bent
+/// by that much everywhere in one direction leaves its plane by about 1e-9 of its size. Files with six digits are beyond it unless the sheet is parallel to
+/// a plane of coordinates.
+double restAngleLimit(const ClothModel& model);
+
+/// Whether isometric bending keeps the rest shape: its constant matrix acts on positions and flattens all that is curved.
+inline bool restsFlat(const ClothModel& model) { return largestRestAngle(model) <= restAngleLimit(model); }
+
+/// Throws std::invalid_argument with the fix where the bending model does not suit the cloth: isometric bending of a curved rest shape,
+/// a Poisson's ratio of bending that the model does not have or that is out of range, an undeformed shape of the wrong size.
+void checkBending(const ClothModel& model);
 
 /// Pins vertices where they are, in addition to those that already are. Throws std::invalid_argument for one that is not there.
 void pinVertices(ClothState& state, const std::vector<int>& vertices);

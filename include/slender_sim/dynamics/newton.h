@@ -7,6 +7,7 @@
 #include "slender_sim/dynamics/step_report.h"
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/linalg/banded_ldlt.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -57,6 +58,8 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
 
   for (;;)
   {
+    if (stepsInterrupted())
+      return fail(StepFailure::work_exceeded);
     // round-off of the energy's sum; differences below it mean nothing
     const double noise = 1e-13 * (std::abs(trial.stretch) + std::abs(trial.bend_twist) + std::abs(trial.potential));
     while (!trial.inertia.positiveDefinite())

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 
 namespace slender {
@@ -38,7 +39,12 @@ struct StepReport
   long impulses = 0;              ///< cloth: collisions found and stopped
   long zones = 0;                 ///< cloth: pieces that could only be kept apart by moving them rigidly
   int mended_folds = 0;           ///< threads: sharp folds that were taken out because the step could not be done with them
-  bool stable = true;             ///< statics: the equilibrium is a minimum of the energy (false: stationary only, a saddle)
+  bool stable = true;             ///< statics: no small motion lowers the energy (false: stationary only, a saddle)
+  double energy = 0.0;            ///< statics: elastic energy and that of the loads [J]
+  /// Statics: the lowest eigenvalue of the energy's second derivative against the masses [1/s^2]; negative: unstable. It is the square of the
+  /// lowest angular frequency. 0: a motion that costs nothing. Infinite: not computed.
+  double lowest_eigenvalue = std::numeric_limits<double>::infinity();
+  int escapes = 0;                ///< statics: unstable equilibria that were left on the way
   int projection_iterations = 0;  ///< of fast projection (explicit steps of inextensible rods), the most in a step
   double constraint_error = 0.0;  ///< largest | |e|^2/L^2 - 1 | that it left [-]
   double tracking_error = 0.0;    ///< greatest distance of an average of a tracked cloth or rod from that of its guide, over the guide's size [-]; of those that are met

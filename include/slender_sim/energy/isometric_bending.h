@@ -14,6 +14,17 @@ enum class IsometricElement
 
 const char* toString(IsometricElement element);
 
+/// The row L-tilde of a hinge (thesis 2.4.4). For isometric motions of a flat mesh |sum_k weights[k] x_k| is the length of the edge times the
+/// angle between the faces, if that is small.
+struct HingeRow
+{
+  Eigen::Vector4i vertices;
+  Eigen::Vector4d weights;   ///< [-]
+  double area;               ///< of both faces [m^2]
+};
+
+HingeRow hingeRow(const TriangleMesh& mesh, const MeshTopology& topology, Eigen::Index hinge);
+
 /// `coefficient` times K = L^T M^-1 L of the thesis on the rest mesh: E = 1/2 x^T K x for each coordinate of the points. Boundary edges
 /// (nonconforming) and boundary vertices (conforming) have no row in L, so a free boundary is free. It is positive semidefinite, and constants are in its
 /// kernel, and linear functions if the mesh is flat.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "slender_sim/linalg/interruption.h"
 #include "slender_sim/linalg/point_kernel.h"
 #include "slender_sim/linalg/point_matrix.h"
 
@@ -48,7 +49,7 @@ public:
     result.scale = std::sqrt(scale);
     result.residual = std::sqrt(rz / scale);
     std::copy(z_.begin(), z_.end(), p_.begin());
-    while (result.residual > tolerance && result.iterations < max_iterations)
+    while (result.residual > tolerance && result.iterations < max_iterations && !stepsInterrupted())
     {
       apply(p_, ap_);
       const double curvature = k.dot(points_, p_.data(), ap_.data());

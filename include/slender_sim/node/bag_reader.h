@@ -33,6 +33,9 @@ public:
   const SceneConfig* scene() const;
   const std::string& sceneProblem() const;
 
+  /// What is missing between the instants that next() gave so far, in one or two sentences; empty when nothing is.
+  std::string gaps() const;
+
   /// For progress: messages in the bag, and how many were gone through.
   std::size_t messages() const;
   std::size_t done() const;

@@ -6,6 +6,7 @@
 
 #include <rosbag/bag.h>
 
+#include "slender_sim/Input.h"
 #include "slender_sim/node/scene_messages.h"
 #include "slender_sim/scene/recorder.h"
 
@@ -26,8 +27,10 @@ public:
   void recordScene(const std::string& yaml, const ros::Time& stamp);
   /// The undeformed cloths, on `mesh`; likewise, in scenes that have any.
   void recordMesh(const slender_sim::MeshStamped& mesh);
+  /// What changed the run, on `inputs`.
+  void recordInput(const slender_sim::Input& input);
   /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies, `nozzle/wrench` per
-  /// thread, `grasp_states` and `obstacle_states` if there are any; the rest can be derived from these. These three throw WriteError.
+  /// thread, `grasp_states` and `obstacle_states` if there are any; the rest can be derived from these. These four throw WriteError.
   void record(const SceneMessages& messages);
   /// Throws WriteError when the file cannot be completed.
   void close();
@@ -39,7 +42,7 @@ private:
   void write(const std::string& topic, const ros::Time& stamp, const Message& message);
   std::string remains() const;
 
-  std::string path_, state_topic_, scene_topic_, mesh_topic_, bodies_topic_, grasps_topic_, obstacles_topic_;
+  std::string path_, state_topic_, scene_topic_, inputs_topic_, mesh_topic_, bodies_topic_, grasps_topic_, obstacles_topic_;
   std::vector<std::string> wrench_topics_, nozzle_topics_;
   std::unique_ptr<rosbag::Bag> bag_;
   bool open_ = false;

@@ -20,6 +20,7 @@
 #include "slender_sim/node/drop_counter.h"
 #include "slender_sim/node/guide_buffer.h"
 #include "slender_sim/node/hand_markers.h"
+#include "slender_sim/node/input_replay.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/sim_clock.h"
@@ -42,6 +43,13 @@ public:
   /// Takes in messages whose transforms have arrived meanwhile; drops those that waited too long.
   void processPending();
 
+  /// Hands every input that takes effect to `sink`, too.
+  void onTaken(InputSink sink);
+  /// From now on inputs come from repeat() alone.
+  void stopListening();
+  /// A recorded input takes effect. Throws std::runtime_error when the scene has nothing that it could move.
+  void repeat(const slender_sim::Input& input);
+
   /// Replaces the targets of everything driven from outside by where it shall be at `time` [s since the clock's start].
   void apply(double time, SceneInputs& inputs);
 
@@ -51,6 +59,8 @@ public:
   void attachAll(const Simulation& simulation);
   /// The scene was reset: forgets all input.
   void restart(const Simulation& simulation);
+  /// The clock skipped so many seconds, during which everything stood still.
+  void skip(double seconds);
 
   /// What is driven by messages of its own may also be dragged by hand: TOPIC/feedback counts as poses of the present. Whoever drags should be
   /// the only one who moves it.
@@ -61,8 +71,8 @@ public:
   const DropCounter& drops() const { return drops_; }
   bool waiting() const { return !pending_.empty() || !hand_.empty() || tracking_->waiting(); }
 
-  /// Per grasp, body, obstacle and guide driven from outside. `missing`: see TrackingInputs::Age.
-  struct Age { std::string name; std::optional<double> seconds; bool missing; };
+  /// Per grasp, body, obstacle and guide driven from outside. `missing`, `lag`, `excess`: see TrackingInputs::Age.
+  using Age = TrackingInputs::Age;
   /// Age of the last pose at the clock's present; nothing while none came.
   std::vector<Age> ages() const;
 
@@ -71,6 +81,11 @@ public:
   std::vector<Setting> settings() const;
 
 private:
+  // recorded_inputs.cpp
+  void taken(slender_sim::Input input) const;
+  void takenPose(std::size_t guided, double time, const Pose& X_WH) const;
+  void takenVector(std::uint8_t kind, std::size_t thread, const Eigen::Vector3d& v) const;
+
   struct Guided { std::string name, body, topic; std::unique_ptr<GuideBuffer> buffer; };   // buffer: null when not driven from outside
   struct Entry { int guided; Pose X_FH; };                // a gripper, body or obstacle in the frame of the message
   struct Message
@@ -129,6 +144,7 @@ private:
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::unique_ptr<TrackingInputs> tracking_;
   std::vector<ros::Subscriber> subscribers_;
+  InputSink sink_;
 };
 
 }  // namespace slender

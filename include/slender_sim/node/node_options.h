@@ -18,7 +18,7 @@ public:
 
 enum class Pace
 {
-  wall,     ///< keeps real time as well as it can; never skips physics
+  wall,     ///< keeps real time as well as it can; never skips physics, but where it falls behind by ~max_lag its clock
   fast,     ///< as fast as it can
   follow,   ///< steps up to the incoming /clock
   step,     ///< only when the step service is called
@@ -37,7 +37,7 @@ struct MarkerOptions
   double forces = 0.0;                     ///< ~marker_forces [m/N]: arrows of contacts' and holders' forces so long; 0: none
 };
 
-/// Private parameters of rod_node, with their defaults.
+/// Private parameters of rod_node, thread_node, cloth_node and tracking_node, with their defaults.
 struct NodeOptions
 {
   std::string scene;                            ///< ~scene: path of the scene file, or its YAML text
@@ -46,11 +46,17 @@ struct NodeOptions
   Pace pace = Pace::wall;                       ///< ~pace
   std::optional<double> start_time;             ///< ~start_time [s] > 0; default: ROS time now (wall), first /clock (follow), else 1
   double stop_after = 0.0;                      ///< ~stop_after [s] simulated, then the node ends; 0: never
+  double speed = 1.0;                           ///< ~speed > 0: simulated over wall time, with ~pace: wall
+  double max_lag = 1.0;                         ///< ~max_lag [s]: behind the wall clock by more than that, the clock skips to the present; 0: never
   bool publish_clock = false;                   ///< ~publish_clock: /clock comes from here; needs /use_sim_time
   bool paused = false;                          ///< ~paused: start paused
   int state_every = 1;                          ///< ~state_every: steps between state, poses and wrench messages
   std::string record_bag;                       ///< ~record_bag: path; empty: no bag
+  bool record_inputs = true;                    ///< ~record_inputs: into the same bag, for ~replay
+  std::string replay;                           ///< ~replay: path of a bag whose run is repeated; empty: none
   double guide_delay = 0.05;                    ///< ~guide_delay [s] behind which grasps follow their guides
+  bool guide_delay_auto = false;                ///< ~guide_delay: auto
+  bool live_guides = true;                      ///< guides come in real time: with ~pace: wall (of a replay: of the run that it repeats)
   double guide_timeout = 1.0;                   ///< ~guide_timeout [s]: older guides are stale; no guide for so long: WARN
   double guide_ahead = 10.0;                    ///< ~guide_ahead [s]: guides stamped later than that after the simulated time are refused
   double catch_up_time = 0.1;                   ///< ~catch_up_time [s] shortest time for closing a gap

@@ -14,7 +14,7 @@ namespace slender {
 class PointGuideBuffer
 {
 public:
-  /// `points`: where the guide is now (3 x n [m]). Takes delay, catch_up_time and catch_up_speed of the options, and coast.
+  /// `points`: where the guide is now (3 x n [m]). Takes all options but catch_up_turning.
   PointGuideBuffer(const GuideBuffer::Options& options, const Eigen::Matrix3Xd& points);
 
   /// Adds the points at `time` [s]; false when it is not later than the last one (nothing changes). Throws std::invalid_argument for another number of
@@ -28,22 +28,32 @@ public:
   void attachAt(const Eigen::Matrix3Xd& points);
   /// Forgets all input and stays there.
   void restart(const Eigen::Matrix3Xd& points);
+  /// The simulated clock skipped so many seconds while the guide stood still; it catches up.
+  void skip(double seconds);
 
   /// Stamp of the last message [s], if there is any.
-  std::optional<double> lastTime() const;
+  std::optional<double> lastTime() const { return last_stamp_; }
+  const GuideTiming& timing() const { return timing_; }
 
 private:
-  void follow(double query, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const;
+  void begin(double time, const GuideTiming::Instant& now);
+  void follow(double query, double rate, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const;
   void addOffset(double time, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const;
   void blendFrom(double time);
 
   GuideBuffer::Options options_;
+  GuideTiming timing_;
   PointTrajectory trajectory_;
+  std::optional<PointTrajectory> next_;      // of a new stream that has not taken effect yet
+  std::optional<double> last_stamp_;         // [s] of the last message
   bool following_ = false;                   // samples have taken effect
-  bool changed_ = false;                     // samples came since the last query
-  std::optional<double> last_query_;
+  bool changed_ = false;                     // the trajectory changed since the last query
+  bool open_ = false;                        // its end is extrapolated
+  std::optional<double> last_time_;          // [s] simulated, of the last query
+  double query_ = 0.0, rate_ = 1.0;          // instant of the trajectory at last_time_, and how fast it passed
+  Eigen::Matrix3Xd plain_x_, plain_v_;       // of the trajectory alone, then; empty: not known
   Eigen::Matrix3Xd x_, v_;                   // what was given to the solver last
-  double offset_start_ = 0.0, offset_duration_ = 0.0;   // duration 0: none
+  double offset_start_ = 0.0, offset_duration_ = 0.0, offset_rate_duration_ = 0.0;   // [s] simulated; duration 0: none
   Eigen::Matrix3Xd offset_, offset_rate_;    // [m], [m/s] at the start
 };
 

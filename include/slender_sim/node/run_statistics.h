@@ -15,6 +15,9 @@ struct RunStatistics
   double simulated = 0.0;          ///< [s]
   double busy = 0.0;               ///< wall time spent stepping and publishing [s]
   double worst_step = 0.0;         ///< wall time of the longest step [s]
+  double stamp_lag = 0.0;          ///< of the last state when it had been published: how far its stamp was behind the clock that it shall keep [s]
+  double worst_stamp_lag = 0.0;    ///< the largest [s]
+  double skipped = 0.0;            ///< of the clock, because steps took too long [s]
   double residual = 0.0;           ///< worst [-]
   double max_strain = 0.0;         ///< worst [-]
   int projection_iterations = 0;   ///< of fast projection, the most in a step

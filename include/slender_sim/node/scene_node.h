@@ -21,6 +21,7 @@
 #include "slender_sim/node/bag_recorder.h"
 #include "slender_sim/node/guide_inputs.h"
 #include "slender_sim/node/hand_markers.h"
+#include "slender_sim/node/input_replay.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/run_statistics.h"
 #include "slender_sim/node/scene_messages.h"
@@ -52,9 +53,8 @@ private:
   static constexpr double kBurst = 0.02;   // [s] longest run of steps between two looks at the callbacks
 
   // scene_node.cpp
-  void checkClock() const;
   bool hasCloths() const { return !simulation_->config().cloths.empty(); }   // and then no rods
-  void startClock();
+  void start();
   void advertise();
   void publishMesh();
   bool isStateFinite() const;
@@ -65,14 +65,34 @@ private:
   void broadcastBodies();
   void showHandles();
   void publishMarkers();
-  void jumped();                         // the state was replaced: a new epoch begins, one tick later
-  void realign();                        // time went on while the rod stood still
-  ros::WallDuration untilDue() const;
   void work();
   void tell();                           // markers and diagnostics, when they are due
   void waitForCallbacks();
   void recordingFailed(const std::string& reason);
   void summary() const;
+
+  // scene_node_clock.cpp
+  void checkClock() const;
+  std::optional<ros::Time> firstStamp();   // nothing while there is no /clock to follow
+  bool stampsAreOfTheWall() const;       // and so jump to the present after a pause
+  void anchor();                         // the present tick is due now
+  std::uint64_t jumped();                // the state was replaced: a new epoch begins, one tick later; returns the ticks skipped
+  std::uint64_t realign();               // time went on while the scene stood still; returns the ticks skipped
+  void skip(std::uint64_t ticks);
+  double stampLag() const;               // [s]
+  void keepUp();                         // ~max_lag
+  ros::WallDuration untilDue() const;
+
+  // scene_node_replay.cpp
+  void openReplay();
+  void note(slender_sim::Input input, std::uint64_t tick);
+  void noteJump(slender_sim::Input input, std::uint64_t tick, std::uint64_t skipped, bool failed);
+  void noteGrasp(const slender_sim::SetGrasp::Request& request);
+  bool replayInputs();                   // those of the present tick; false when the run is over
+  void repeat(const slender_sim::Input& input);
+  void repeatJump(const slender_sim::Input& input);
+  void repeatGrasp(const slender_sim::Input& input);
+  std::string refusesInput() const;      // why service calls must not change a run; empty: they may
 
   // scene_node_services.cpp
   void advertiseServices();
@@ -83,6 +103,8 @@ private:
   bool onSetFunctions(slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response);
   bool onSave(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
   bool onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
+  void setGrasp(const slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response);
+  void setFunctions(const slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response);
   std::string attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response);
 
   // scene_node_diagnostics.cpp
@@ -102,6 +124,8 @@ private:
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;
   SceneInputs step_inputs_;              // of the last step, refilled
+  std::unique_ptr<InputReplay> replay_;  // only with ~replay
+  std::uint64_t inputs_noted_ = 0;       // in the bag
   std::unique_ptr<HandMarkers> hands_;   // only with ~interactive
   std::unique_ptr<BagRecorder> bag_;
   SceneMessages messages_;
@@ -121,6 +145,7 @@ private:
   double inputs_since_ = 0.0;            // [s] of clock_: earlier ones were forgotten
 
   ros::WallTime wall_start_;             // when the tick wall_start_ticks_ was due
+  ros::WallTime next_skip_warning_;
   std::uint64_t wall_start_ticks_ = 0;
   ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_;
   std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture

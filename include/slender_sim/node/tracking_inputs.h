@@ -12,6 +12,7 @@
 #include "slender_sim/BodyStates.h"
 #include "slender_sim/node/drop_counter.h"
 #include "slender_sim/node/guide_buffer.h"
+#include "slender_sim/node/input_replay.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/point_guide_buffer.h"
@@ -39,8 +40,17 @@ public:
   /// The scene was reset: forgets all input.
   void restart(const Simulation& simulation);
 
-  /// Of each guide by points, and of each body. `missing`: it has not spoken yet, though other bodies of its guide have.
-  struct Age { std::string name; std::optional<double> seconds; bool missing; };
+  /// The clock skipped so many seconds, during which everything stood still.
+  void skip(double seconds);
+
+  // As those of GuideInputs.
+  void onTaken(InputSink sink) { sink_ = std::move(sink); }
+  void stopListening() { subscribers_.clear(); }
+  void repeat(const slender_sim::Input& input);
+
+  /// Of each guide by points, and of each body. `missing`: it has not spoken yet, though other bodies of its guide have. `lag`: behind which it is
+  /// followed [s]. `excess`: by how much that had to be more than ~guide_delay lately [s].
+  struct Age { std::string name; std::optional<double> seconds; bool missing; double lag, excess; };
   std::vector<Age> ages() const;
 
 private:
@@ -67,6 +77,8 @@ private:
     std::vector<std::pair<int, Pose>> bodies;
   };
 
+  void takenPoints(int guide, double time, const Eigen::Matrix3Xd& points) const;
+  void takenBody(int guide, int body, double time, const Pose& pose) const;
   void addGuide(const GuideConfig& config, const Eigen::Matrix3Xd& now, Guide guide);
   void onPoints(int guide, const sensor_msgs::PointCloud2& message);
   void onBodies(int guide, const slender_sim::BodyStates& message);
@@ -83,6 +95,7 @@ private:
   std::vector<Guide> guides_;
   PendingMessages<Message> pending_;
   std::vector<ros::Subscriber> subscribers_;
+  InputSink sink_;
 };
 
 }  // namespace slender

@@ -63,8 +63,10 @@ public:
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(RodGroupState& state, const RodGroupInputs& inputs, double duration);
 
-  /// Equilibrium under the inputs, without friction: implicit Euler steps that grow, from rest each time. Velocities become zero.
-  StepReport solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs);
+  /// Equilibrium under the inputs, without friction: implicit Euler steps that grow, from rest each time. Velocities become zero. An unstable
+  /// equilibrium is left along its mode of negative curvature, until a stable one is found or every way was tried; then report.stable is false.
+  /// `leave_saddles` false: it is kept.
+  StepReport solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs, bool leave_saddles = true);
 
   /// Throws std::invalid_argument when something touches or crosses in this state, naming what.
   void checkClearance(const RodGroupState& state);
@@ -77,8 +79,9 @@ public:
   const std::vector<ContactTerm>& contacts() const;   ///< of the last step; empty without contact
   void setThreads(int threads);
 
-private:
   class Impl;
+
+private:
   std::unique_ptr<Impl> impl_;
 };
 

@@ -51,8 +51,14 @@ public:
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(RodState& state, const RodInputs& inputs, double duration);
 
-  /// Static equilibrium under the inputs, reached by continuation; velocities become zero.
-  StepReport solveEquilibrium(RodState& state, const RodInputs& inputs);
+  /// Static equilibrium under the inputs, reached by continuation; velocities become zero. An unstable equilibrium is left along its mode of
+  /// negative curvature, until a stable one is found or every way was tried; then report.stable is false. `leave_saddles` false: it is kept.
+  StepReport solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles = true);
+  /// Residual, energy, lowest eigenvalue and stability of a state that is an equilibrium under the inputs already.
+  StepReport assessEquilibrium(const RodState& state, const RodInputs& inputs);
+  /// Mode of the lowest eigenvalue of the last equilibrium: displacement of each node and turn of the edge after it (4 x n, [m] and [rad]), scaled
+  /// so that the edge that turns most turns by 1 rad.
+  Eigen::Map<const Eigen::Matrix4Xd> lowestMode() const;
 
   /// Of the last successful step() or solveEquilibrium(); one per grasp, zero for inactive ones. They belong to the instant at which
   /// the step balances forces: its end, but its middle for implicit_midpoint and 1 / (1 + spectral_radius) of it for generalized_alpha.

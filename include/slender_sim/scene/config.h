@@ -17,6 +17,7 @@
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
 #include "slender_sim/rod/rod_model.h"
+#include "slender_sim/scene/record_fields.h"
 #include "slender_sim/scene/tracking_config.h"
 
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
@@ -118,7 +119,8 @@ struct GraspConfig
   Attach attach = Attach::section;
 };
 
-/// Which equations a rod uses. `automatic` chooses the cheapest that applies; so far that is always the general one.
+/// Selects the equations of a rod. `automatic` takes the isotropic form for explicit steps of naturally straight rods that bend
+/// alike in all directions, and the general form otherwise.
 enum class Formulation { automatic, isotropic, general };
 enum class Stretching { stiff, projected };
 
@@ -140,6 +142,9 @@ struct RodConfig
   bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
   bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
   JointOptions joints;                         ///< `curvature`, `matched_to_arcs`
+  bool automatic_curvature = true;             ///< joints.curvature is chosen when the rod is built: see `curvature` in the README
+  std::vector<double> rest_twist;              ///< natural twist [rad]: of the whole rod, or of each joint; empty: none
+  std::vector<Eigen::Vector2d> natural_curvature;   ///< about d2, -d1 [1/m]: of all joints, or of each; empty: that of the centreline
   Formulation formulation = Formulation::automatic;
   Stretching stretching = Stretching::stiff;
   double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
@@ -237,7 +242,10 @@ struct ThreadConfig
   std::optional<FloorConfig> floor;
   double feed_length = 0.0;                ///< of the edges that leave the nozzle [m]
   double longest_edge = 0.0, shortest_edge = 0.0;   ///< [m] 0: edges are neither divided nor joined
-  double breakup_radius = 0.0;             ///< the thread parts where it is thinner [m]; 0: never; the reader's default: 0.002 nozzle diameters
+  double highest_edge = 0.0;               ///< [m] edges grow up to it with their height above the floor; 0: longest_edge holds everywhere
+  double longest_step = 0.0;               ///< [s] longer steps are taken in several; 0: they are not
+  double swirl = 0.0;                      ///< radius of the circle in which the nozzle starts, over that of the coil; 0: it stands
+  double breakup_radius = 0.0;             ///< the thread parts where it is thinner [m]; 0: never; the reader chooses it from the flow unless the scene gives it
   int most_deposited = 0;                  ///< nodes on the floor; 0: all are kept
   std::optional<std::array<Eigen::Vector3d, 2>> region;   ///< corners; what lies outside is dropped, oldest first
   std::optional<ThreadContactConfig> contact;  ///< nothing: touches nothing but the floor
@@ -278,13 +286,14 @@ struct ClothConfig
   TriangleMesh mesh;                           ///< undeformed [m]
   Eigen::Matrix3Xd start;                      ///< vertices where the scene starts [m]; empty: those of the mesh
   Eigen::Matrix3Xd start_velocity;             ///< of the vertices [m/s]; empty: at rest
-  Eigen::Matrix3Xd undeformed;                 ///< vertices of the shape whose bend angles are those at rest (hinge bending); empty: those of the mesh
+  Eigen::Matrix3Xd undeformed;                 ///< vertices of the shape whose bend angles are those at rest; empty: those of the mesh
   std::optional<ClothGrid> grid;               ///< that the mesh was made from
   double area_density = 0.15;                  ///< [kg/m^2]
   MembraneModuli membrane;
   Eigen::Vector3d warp{1, 0, 0};               ///< direction in the undeformed shape; of a grid the first side
   BendingModel bending = BendingModel::isometric_nonconforming;
   double bending_modulus = 0.0;                ///< D [N m]
+  std::optional<double> bending_poissons_ratio;   ///< of bending, in (-1, 1); empty: that of the discretisation
   Plasticity plasticity;
   double mass_damping = 0.0;                   ///< [1/s]
   double stiffness_damping = 0.0;              ///< [s]
@@ -300,13 +309,20 @@ struct ClothConfig
 
 enum class Start { as_given, equilibrium };    ///< equilibrium: the static solver runs first
 
-struct RecordConfig { int every = 1; };        ///< record every n-th step (`simulate`)
+struct RecordConfig
+{
+  int every = 1;                               ///< record every n-th step (`simulate`)
+  std::vector<RecordField> fields;             ///< what is computed and recorded besides, each once (see field_tables.h)
+};
 
 struct SceneConfig
 {
   std::string name = "scene";
   std::string file;                            ///< that it was read from, for messages; may be empty
   std::string source;                          ///< the YAML text after --set overrides (what `scene` publishes)
+  /// What the user should know although the scene runs, one sentence or two each. The reader adds to them (YamlCursor::warning), then
+  /// the constructor of Simulation. simulate prints them to stderr, nodes log them as ROS warnings.
+  std::vector<std::string> warnings;
   Eigen::Vector3d gravity{0, 0, -9.81};        ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};               ///< [m/s]
   bool wind_topic = false;                     ///< `wind` messages set it; until the first one it is as above

@@ -19,6 +19,8 @@ namespace slender {
 ///   cloths.csv   one row per instant and vertex of a cloth, if there are any: t, object, index, x y z, vx vy vz
 ///   tracking.csv one row per instant and test function of a tracked cloth or rod, if there are any: t, object, function, its average over the guide x y z,
 ///                and the force with which the guide acts
+///   rod_fields.csv, cloth_fields.csv, energies.csv: what `record.fields` of the scene asks for (FieldTable), one row per instant and node
+///                or vertex (energies: and object); docs/quantities.md defines every column; empty cells: not determined
 /// Numbers are the shortest that read back to the same double. All throw std::runtime_error when writing fails.
 class CsvTables
 {

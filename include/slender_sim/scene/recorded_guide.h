@@ -27,6 +27,7 @@ struct RecordedGuide
 {
   PointTrajectory points;
   std::vector<BodyTrajectory> bodies;
+  std::string gaps;   ///< what is missing in the recording, in a sentence; empty: nothing
 };
 
 /// Throws std::runtime_error "FILE: reason".

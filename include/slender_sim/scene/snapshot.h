@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "slender_sim/scene/field_tables.h"
 #include "slender_sim/scene/simulation.h"
 
 /// What is kept of one instant, whether it comes from a running simulation or from a bag. SI units, world axes.
@@ -79,6 +80,7 @@ struct SceneSnapshot
   std::vector<GraspSnapshot> grasps;
   std::vector<SolidSnapshot> bodies, obstacles;
   std::vector<FunctionSnapshot> functions;
+  std::vector<FieldTable> fields;   ///< what `record.fields` of the scene asks for
 };
 
 /// Material frame of an edge: x along the tangent, y along d1.

@@ -27,6 +27,10 @@ struct ThreadFloor
 struct ThreadLimits
 {
   double max_edge_length = std::numeric_limits<double>::infinity();   ///< [m] longer edges are divided
+  /// Above the floor edges may be longer, by this share of their height above it [-], up to `highest_edge_length` [m].
+  double edge_grading = 0.0;
+  double highest_edge_length = 0.0;                                   ///< [m] without effect below max_edge_length
+  double max_step = std::numeric_limits<double>::infinity();          ///< [s] longer steps are taken in several
   double min_edge_length = 0.0;                                       ///< [m] shorter edges are joined to a neighbour
   double min_radius = 0.0;                                            ///< [m] a thinner edge breaks: ThreadGroup then has one thread more
   int max_deposited = std::numeric_limits<int>::max();   ///< nodes older than the youngest one on the floor; more are dropped
@@ -48,12 +52,6 @@ struct ThreadModel
   ThreadFloor floor;
   ThreadLimits limits;
 
-  /// Dynamic viscosity [Pa s] that the fluid shows at a rate of stretching [1/s]. Newtonian: it does not depend on it.
-  double viscosityAt(double stretch_rate) const
-  {
-    (void)stretch_rate;
-    return viscosity;
-  }
   double nozzleArea() const { return 0.25 * M_PI * nozzle_diameter * nozzle_diameter; }
 };
 

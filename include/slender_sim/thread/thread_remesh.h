@@ -35,7 +35,8 @@ bool mayRemove(const ThreadState& state, int i, const RemeshGuard* guard);
 /// break. No: nothing is so thin.
 bool breakThread(ThreadState& state, double min_radius, ThreadState& older);
 
-/// Takes the `count` oldest nodes and the edges after them away; their volume goes to dropped_volume. At least two nodes stay.
-void dropOldest(ThreadState& state, int count);
+/// Takes the `count` oldest nodes and the edges after them away. Their volume is added to `account`, state.dropped_volume or
+/// state.left_volume. At least two nodes stay.
+void dropOldest(ThreadState& state, int count, double& account);
 
 }  // namespace slender

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "slender_sim/contact/contact_potential.h"
@@ -21,7 +22,7 @@ struct ThreadTouch
 /// Threads that may touch each other, themselves or obstacles, and so are stepped together.
 struct TouchingModel
 {
-  struct Obstacle { Shape shape; double friction = -1.0; };   ///< negative: that of the thread
+  struct Obstacle { Shape shape; double friction = -1.0; std::string name = {}; };   ///< friction negative: that of the thread
   std::vector<std::shared_ptr<const ThreadModel>> threads;    ///< floors may slip here
   std::vector<ThreadTouch> touches;                           ///< per thread
   std::vector<Obstacle> obstacles;

@@ -1,0 +1,155 @@
+// Inputs as they took effect, for the bag, and from it.
+#include <stdexcept>
+
+#include "slender_sim/node/guide_inputs.h"
+
+namespace slender {
+namespace {
+
+using slender_sim::Input;
+
+Input inputOf(std::uint8_t kind, std::size_t index, const std::string& name)
+{
+  Input input;
+  input.kind = kind;
+  input.index = static_cast<std::int32_t>(index);
+  input.name = name;
+  return input;
+}
+
+/// Not normalised: exactly what was handed to the buffer before.
+Pose recordedPose(const geometry_msgs::Pose& from)
+{
+  const geometry_msgs::Quaternion& q = from.orientation;
+  return {fromMessage(from.position), Eigen::Quaterniond(q.w, q.x, q.y, q.z)};
+}
+
+template <class Things>
+auto& checked(Things& things, std::int32_t index, const std::string& what)
+{
+  if (index < 0 || static_cast<std::size_t>(index) >= things.size())
+    throw std::runtime_error("the scene has no " + what + " " + std::to_string(index) + " that its inputs move; it is not the recorded one");
+  return things[static_cast<std::size_t>(index)];
+}
+
+Eigen::Vector3d vectorOf(const Input& input)
+{
+  if (input.values.size() != 3)
+    throw std::runtime_error("its input " + std::to_string(input.number) + " is not a vector; the bag is damaged");
+  return {input.values[0], input.values[1], input.values[2]};
+}
+
+}  // namespace
+
+void GuideInputs::onTaken(InputSink sink)
+{
+  sink_ = std::move(sink);
+  tracking_->onTaken([this](Input input) { taken(std::move(input)); });
+}
+
+void GuideInputs::taken(Input input) const
+{
+  if (sink_)
+    sink_(std::move(input));
+}
+
+void GuideInputs::takenPose(std::size_t guided, double time, const Pose& X_WH) const
+{
+  if (!sink_)
+    return;
+  Input input = inputOf(Input::POSE, guided, guided_[guided].name);
+  input.time = time;
+  input.pose = toMessage(X_WH);
+  sink_(std::move(input));
+}
+
+void GuideInputs::takenVector(std::uint8_t kind, std::size_t thread, const Eigen::Vector3d& v) const
+{
+  Input input = inputOf(kind, thread, "");
+  input.values = {v.x(), v.y(), v.z()};
+  taken(std::move(input));
+}
+
+void GuideInputs::stopListening()
+{
+  subscribers_.clear();
+  tf_listener_.reset();
+  tracking_->stopListening();
+}
+
+void GuideInputs::repeat(const Input& input)
+{
+  switch (input.kind)
+  {
+    case Input::POSE:
+    {
+      Guided& guided = checked(guided_, input.index, "grasp, body, obstacle or nozzle");
+      if (!guided.buffer || !guided.buffer->push(input.time, recordedPose(input.pose)))
+        throw std::runtime_error("its pose of " + input.name + " cannot be taken; the scene is not the recorded one");
+      return;
+    }
+    case Input::FLOW:
+      if (input.values.size() != 1)
+        throw std::runtime_error("its input " + std::to_string(input.number) + " is no flow; the bag is damaged");
+      checked(threads_, input.index, "thread").flow = input.values[0];
+      return;
+    case Input::BELT: checked(threads_, input.index, "thread").belt = vectorOf(input); return;
+    case Input::WIND: wind_ = vectorOf(input); return;
+    case Input::GUIDE_POINTS:
+    case Input::GUIDE_BODY: tracking_->repeat(input); return;
+    default: throw std::runtime_error("its input " + std::to_string(input.number) + " is of an unknown kind; replay it with the version that recorded it");
+  }
+}
+
+void TrackingInputs::takenPoints(int guide, double time, const Eigen::Matrix3Xd& points) const
+{
+  if (!sink_)
+    return;
+  Input input = inputOf(Input::GUIDE_POINTS, static_cast<std::size_t>(guide), guides_[guide].topic);
+  input.time = time;
+  for (Eigen::Index i = 0; i < points.cols(); ++i)
+    input.points.push_back(toPoint(points.col(i)));
+  sink_(std::move(input));
+}
+
+void TrackingInputs::takenBody(int guide, int body, double time, const Pose& pose) const
+{
+  if (!sink_)
+    return;
+  Input input = inputOf(Input::GUIDE_BODY, static_cast<std::size_t>(guide), guides_[guide].carried->bodies[body]);
+  input.part = body;
+  input.time = time;
+  input.pose = toMessage(pose);
+  sink_(std::move(input));
+}
+
+void TrackingInputs::repeat(const Input& input)
+{
+  Guide& guide = checked(guides_, input.index, "guide");
+  bool good = false;
+  if (input.kind == Input::GUIDE_BODY)
+    good = checked(guide.bodies, input.part, "body that carries a guide").push(input.time, recordedPose(input.pose));
+  else if (guide.points)
+  {
+    Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(input.points.size()));
+    for (std::size_t i = 0; i < input.points.size(); ++i)
+      points.col(static_cast<Eigen::Index>(i)) = fromMessage(input.points[i]);
+    good = guide.points->push(input.time, points);
+  }
+  if (!good)
+    throw std::runtime_error("its guide " + input.name + " cannot be taken; the scene is not the recorded one");
+}
+
+void TrackingInputs::skip(double seconds)
+{
+  for (Guide& guide : guides_)
+  {
+    guide.gap_start += seconds;
+    if (guide.points)
+      guide.points->skip(seconds);
+    for (GuideBuffer& body : guide.bodies)
+      body.skip(seconds);
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,196 @@
+// What changes a run from outside: recorded beside its states, and repeated from such a record.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <unistd.h>
+
+#include "slender_sim/node/converters.h"
+#include "slender_sim/node/scene_node.h"
+
+namespace slender {
+namespace {
+
+using slender_sim::Input;
+using slender_sim::SetGrasp;
+
+/// The values that inputs of its kind have.
+const std::vector<double>& values(const Input& input, std::size_t count)
+{
+  if (input.values.size() != count)
+    throw std::runtime_error("its input " + std::to_string(input.number) + " has " + std::to_string(input.values.size()) + " values, not " +
+                             std::to_string(count) + "; the bag is damaged");
+  return input.values;
+}
+
+}  // namespace
+
+/// Before the options are used: the recorded ones take their place.
+void SceneNode::openReplay()
+{
+  if (options_.replay.empty())
+    return;
+  replay_ = std::make_unique<InputReplay>(options_.replay);
+  if (options_.scene.empty())
+    options_.scene = replay_->scene();
+  const Input* settings = replay_->settings();
+  if (!settings)
+    return;
+  options_.frame_id = settings->header.frame_id;
+  options_.guide_delay = settings->values[0];
+  options_.guide_delay_auto = settings->values[1] != 0.0;
+  options_.live_guides = settings->values[2] != 0.0;
+  options_.catch_up_time = settings->values[3];
+  options_.catch_up_speed = settings->values[4];
+}
+
+std::string SceneNode::refusesInput() const
+{
+  return replay_ ? "the node repeats the run in " + replay_->path() + " (~replay) and takes no other input" : std::string();
+}
+
+/// `tick`: when it took effect. The first one is preceded by what replaying needs to know of the parameters.
+void SceneNode::note(Input input, std::uint64_t tick)
+{
+  if (!bag_ || !options_.record_inputs || replay_)
+    return;
+  if (inputs_noted_ == 0 && input.kind != Input::SETTINGS)
+  {
+    Input settings;
+    settings.kind = Input::SETTINGS;
+    settings.values = {options_.guide_delay, options_.guide_delay_auto ? 1.0 : 0.0, options_.live_guides ? 1.0 : 0.0, options_.catch_up_time,
+                       options_.catch_up_speed};
+    note(std::move(settings), tick);
+  }
+  input.header.stamp = clock_.stamp();
+  input.header.frame_id = options_.frame_id;
+  input.number = inputs_noted_++;
+  input.tick = tick;
+  try
+  {
+    if (bag_)
+      bag_->recordInput(input);
+  }
+  catch (const std::runtime_error& e)
+  {
+    recordingFailed(e.what());
+  }
+}
+
+void SceneNode::noteJump(Input input, std::uint64_t tick, std::uint64_t skipped, bool failed)
+{
+  input.values = {static_cast<double>(skipped), failed ? 1.0 : 0.0};
+  note(std::move(input), tick);
+}
+
+void SceneNode::noteGrasp(const SetGrasp::Request& request)
+{
+  Input input;
+  input.kind = Input::SET_GRASP;
+  input.name = request.name;
+  input.values = {static_cast<double>(request.action), static_cast<double>(request.first_node), static_cast<double>(request.last_node), request.point.x,
+                  request.point.y, request.point.z, request.max_distance, request.position_only ? 1.0 : 0.0};
+  note(std::move(input), clock_.ticks());
+}
+
+bool SceneNode::replayInputs()
+{
+  try
+  {
+    while (const Input* input = replay_->next(clock_.ticks()))
+    {
+      if (bag_ && options_.record_inputs)   // the same bag again
+        bag_->recordInput(*input);
+      repeat(*input);
+    }
+  }
+  catch (const std::exception& e)
+  {
+    fail("~replay: " + replay_->path() + ": " + e.what());
+    return false;
+  }
+  finished_ = finished_ || clock_.seconds() > clock_.secondsAt(replay_->end()) - 0.5 * clock_.step();
+  return !finished_;
+}
+
+void SceneNode::repeat(const Input& input)
+{
+  switch (input.kind)
+  {
+    case Input::SETTINGS: return;
+    case Input::RESET:
+    case Input::LOAD: return repeatJump(input);
+    case Input::SET_GRASP: return repeatGrasp(input);
+    case Input::SET_FUNCTIONS:
+    {
+      slender_sim::SetFunctions::Request request;
+      slender_sim::SetFunctions::Response response;
+      request.name = input.name;
+      request.set = input.text;
+      request.blend = values(input, 1)[0];
+      setFunctions(request, response);
+      if (!response.success)
+        throw std::runtime_error(response.message);
+      return;
+    }
+    case Input::SKIP: skip(static_cast<std::uint64_t>(values(input, 1)[0])); return anchor();
+    default: inputs_->repeat(input);
+  }
+}
+
+void SceneNode::repeatJump(const Input& input)
+{
+  if (values(input, 2)[1] != 0.0)   // the step that failed had led the guides on
+  {
+    simulation_->defaultInputs(step_inputs_);
+    inputs_->apply(clock_.seconds() + clock_.step(), step_inputs_);
+  }
+  if (input.kind == Input::RESET)
+  {
+    simulation_->reset();
+    inputs_->restart(*simulation_);
+  }
+  else
+  {
+    const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / ("slender_sim_replay_" + std::to_string(::getpid()) + "_" + std::to_string(input.number));
+    std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(input.data.data()), static_cast<std::streamsize>(input.data.size()));
+    try
+    {
+      simulation_->load(file.string());
+    }
+    catch (...)
+    {
+      std::filesystem::remove(file);
+      throw;
+    }
+    std::filesystem::remove(file);
+    inputs_->attachAll(*simulation_);
+  }
+  jumped();
+  skip(static_cast<std::uint64_t>(input.values[0]));
+  anchor();
+  publishState();
+}
+
+void SceneNode::repeatGrasp(const Input& input)
+{
+  const std::vector<double>& v = values(input, 8);
+  SetGrasp::Request request;
+  SetGrasp::Response response;
+  request.name = input.name;
+  request.action = static_cast<std::uint8_t>(v[0]);
+  request.first_node = static_cast<std::int32_t>(v[1]);
+  request.last_node = static_cast<std::int32_t>(v[2]);
+  request.point.x = v[3];
+  request.point.y = v[4];
+  request.point.z = v[5];
+  request.max_distance = v[6];
+  request.position_only = v[7] != 0.0;
+  setGrasp(request, response);
+  if (!response.success)
+    throw std::runtime_error(response.message);
+}
+
+}  // namespace slender

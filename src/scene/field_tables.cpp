@@ -1,0 +1,170 @@
+#include "slender_sim/scene/field_tables.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "slender_sim/rod/rod_sections.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+const std::vector<std::pair<std::string, RecordField>>& recordFieldNames()
+{
+  static const std::vector<std::pair<std::string, RecordField>> names = {
+    {"curvature", RecordField::curvature}, {"twist", RecordField::twist},   {"strain", RecordField::strain},
+    {"force", RecordField::force},         {"moment", RecordField::moment}, {"energy", RecordField::energy},
+    {"contact_force", RecordField::contact_force}};
+  return names;
+}
+
+namespace {
+
+constexpr double empty_cell = std::numeric_limits<double>::quiet_NaN();
+
+/// Puts columns side by side.
+class Columns
+{
+public:
+  Columns(std::string table, const std::string& object, Eigen::Index rows) : table_{std::move(table), object, {}, Eigen::MatrixXd(rows, 0)} {}
+
+  /// `values`: one row per name. With a column less than the table has rows (edges of an open rod) the last one counts twice.
+  void add(const std::vector<std::string>& names, const Eigen::MatrixXd& values)
+  {
+    const Eigen::Index before = table_.values.cols(), rows = table_.values.rows();
+    table_.values.conservativeResize(Eigen::NoChange, before + values.rows());
+    for (Eigen::Index i = 0; i < rows; ++i)
+      table_.values.row(i).tail(values.rows()) = values.col(std::min(i, values.cols() - 1)).transpose();
+    table_.columns.insert(table_.columns.end(), names.begin(), names.end());
+  }
+  void moveTo(std::vector<FieldTable>& out)
+  {
+    if (!table_.columns.empty() && table_.values.rows() > 0)
+      out.push_back(std::move(table_));
+  }
+
+private:
+  FieldTable table_;
+};
+
+bool asks(const std::vector<RecordField>& fields, RecordField field) { return std::find(fields.begin(), fields.end(), field) != fields.end(); }
+
+/// Forces of contact on the nodes of each rod [N]; zero without contact.
+std::vector<Eigen::Matrix3Xd> rodContactForces(const Simulation& simulation)
+{
+  const std::vector<RodConfig>& rods = simulation.config().rods;
+  std::vector<Eigen::Matrix3Xd> forces;
+  std::vector<std::pair<std::size_t, int>> places;   // rod and node of each point of contact: those of all rods with contact, in order
+  for (std::size_t r = 0; r < rods.size(); ++r)
+  {
+    const int nodes = simulation.rodModel(static_cast<int>(r)).nodes();
+    forces.push_back(Eigen::Matrix3Xd::Zero(3, nodes));
+    for (int i = 0; rods[r].contact && i < nodes; ++i)
+      places.emplace_back(r, i);
+  }
+  if (places.empty())
+    return forces;
+  for (const ContactTerm& term : simulation.contacts())
+    for (int k = 0; k < 4; ++k)
+      if (term.point[k] >= 0)
+      {
+        const auto [rod, node] = places.at(static_cast<std::size_t>(term.point[k]));
+        forces[rod].col(node) += term.weight[k] * term.force;
+      }
+  return forces;
+}
+
+const std::vector<std::string> contact_columns = {"contact_fx [N]", "contact_fy [N]", "contact_fz [N]"};
+
+/// `contact`: forces on the nodes, of no columns when they are not asked for.
+void addRod(const Simulation& simulation, int rod, const std::vector<RecordField>& fields, const Eigen::Matrix3Xd& contact, std::vector<FieldTable>& out)
+{
+  const RodModel& model = simulation.rodModel(rod);
+  Columns columns("rod_fields", model.name, model.nodes());
+  const bool of_sections = std::any_of(fields.begin(), fields.end(), [](RecordField f) { return f < RecordField::energy; });
+  const RodSections sections = of_sections ? sectionsOf(model, simulation.state().rods[static_cast<std::size_t>(rod)]) : RodSections();
+  if (asks(fields, RecordField::curvature))
+    columns.add({"kappa1 [1/m]", "kappa2 [1/m]"}, sections.curvature);
+  if (asks(fields, RecordField::twist))
+    columns.add({"twist_rate [rad/m]"}, sections.twist.transpose());
+  if (asks(fields, RecordField::strain))
+    columns.add({"strain"}, sections.strain.transpose());
+  if (asks(fields, RecordField::force))
+  {
+    columns.add({"tension [N]"}, sections.tension.transpose());
+    columns.add({"fx [N]", "fy [N]", "fz [N]"}, sections.force);
+  }
+  if (asks(fields, RecordField::moment))
+  {
+    columns.add({"moment_t [N m]", "moment_d1 [N m]", "moment_d2 [N m]"}, sections.material_moment);
+    columns.add({"mx [N m]", "my [N m]", "mz [N m]"}, sections.moment);
+  }
+  if (contact.cols() > 0)
+    columns.add(contact_columns, contact);
+  columns.moveTo(out);
+}
+
+void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordField>& fields, std::vector<FieldTable>& out)
+{
+  if (!asks(fields, RecordField::contact_force))
+    return;
+  const Eigen::Index vertices = simulation.state().cloths[static_cast<std::size_t>(cloth)].cloth.x.cols();
+  Columns columns("cloth_fields", simulation.clothModel(cloth).name, vertices);
+  Eigen::Matrix3Xd forces = simulation.contactForces(cloth);
+  if (forces.cols() != vertices)
+    forces.setZero(3, vertices);   // it touches nothing, or has not been stepped yet
+  columns.add(contact_columns, forces);
+  columns.moveTo(out);
+}
+
+void addEnergies(const Simulation& simulation, std::vector<FieldTable>& out)
+{
+  const auto add = [&out](const std::string& object, double stretch, double bend, double twist, double kinetic, double gravity) {
+    Columns columns("energies", object, 1);
+    columns.add({"stretch [J]", "bend [J]", "twist [J]", "kinetic [J]", "gravity [J]"},
+                (Eigen::MatrixXd(5, 1) << stretch, bend, twist, kinetic, gravity).finished());
+    columns.moveTo(out);
+  };
+  const SceneState& state = simulation.state();
+  const SceneConfig& scene = simulation.config();
+  for (std::size_t r = 0; r < state.rods.size(); ++r)
+  {
+    const RodEnergies e = simulation.energies(static_cast<int>(r));
+    add(scene.rods[r].name, e.stretch, e.bend, e.twist, e.kinetic, e.gravity);
+  }
+  for (std::size_t k = 0; k < state.cloths.size(); ++k)
+  {
+    const ClothEnergies e = simulation.clothEnergies(static_cast<int>(k));
+    add(scene.cloths[k].name, e.membrane, e.bending, empty_cell, e.kinetic, e.gravity);
+  }
+  for (std::size_t b = 0; b < state.bodies.size(); ++b)
+    if (simulation.isSimulated(static_cast<int>(b)))
+    {
+      const BodyConfig& body = scene.bodies[b];
+      const RigidBodyState& s = state.bodies[b];
+      const Eigen::Vector3d spin = s.X_WB.orientation.conjugate() * s.velocity.angular;
+      const double kinetic = 0.5 * body.mass * s.velocity.linear.squaredNorm() + 0.5 * spin.dot(body.inertia * spin);
+      add(body.name, empty_cell, empty_cell, empty_cell, kinetic, body.gravity ? -body.mass * scene.gravity.dot(s.X_WB.position) : 0.0);
+    }
+}
+
+}  // namespace
+
+std::vector<FieldTable> fieldTablesOf(const Simulation& simulation)
+{
+  std::vector<FieldTable> out;
+  const std::vector<RecordField>& fields = simulation.config().record.fields;
+  if (fields.empty())
+    return out;
+  std::vector<Eigen::Matrix3Xd> contact(simulation.state().rods.size());
+  if (asks(fields, RecordField::contact_force))
+    contact = rodContactForces(simulation);
+  for (std::size_t r = 0; r < contact.size(); ++r)
+    addRod(simulation, static_cast<int>(r), fields, contact[r], out);
+  for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
+    addCloth(simulation, static_cast<int>(k), fields, out);
+  if (asks(fields, RecordField::energy))
+    addEnergies(simulation, out);
+  return out;
+}
+
+}  // namespace slender

@@ -1,0 +1,51 @@
+// The section `record`: which steps are recorded, and which fields besides the motion.
+#include <algorithm>
+
+#include "read_parts.h"
+#include "slender_sim/scene/record_fields.h"
+
+namespace slender {
+
+RecordConfig readRecord(const YamlCursor& at)
+{
+  RecordConfig record;
+  YamlMap map(at);
+  assign(record.every, map.get("every").integer(1, 1'000'000'000, "steps"));
+  if (const YamlCursor fields = map.get("fields"); fields.present())
+    for (const YamlCursor& item : fields.items())
+      if (const auto field = item.choice(recordFieldNames()))
+      {
+        if (std::find(record.fields.begin(), record.fields.end(), *field) != record.fields.end())
+          item.problem("is named twice; leave one out");
+        record.fields.push_back(*field);
+      }
+  map.finish();
+  return record;
+}
+
+void checkRecord(const YamlCursor& at, const SceneConfig& scene)
+{
+  if (scene.record.fields.empty() || !at.problems().empty())
+    return;
+  const YamlCursor fields = YamlMap(at).get("fields");
+  const bool bodies = std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyConfig& body) { return !body.motion; });
+  for (const YamlCursor& item : fields.items())
+  {
+    const auto field = item.choice(recordFieldNames());
+    if (!field)
+      continue;
+    if (*field == RecordField::energy && scene.rods.empty() && scene.cloths.empty() && !bodies)
+      item.problem("is recorded of rods, cloths and simulated bodies, and the scene has none; leave it out");
+    if (*field == RecordField::contact_force && scene.rods.empty() && scene.cloths.empty())
+      item.problem("is recorded of rods and cloths, and the scene has none; leave it out");
+    if (*field < RecordField::energy && scene.rods.empty())
+      item.problem("is recorded of rods, and the scene has none; leave it out");
+    const auto projected = std::find_if(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.stretching == Stretching::projected; });
+    if (*field == RecordField::force && projected != scene.rods.end())
+      item.problem("is not known of rod " + projected->name +
+                   ", whose edges keep their lengths by projection (stretching: projected): its tension is no function of the state; "
+                   "leave it out, or take stretching: stiff");
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,449 @@
+// A substep that fails leaves nothing behind: what follows is what a fresh stepper makes of the same state, bit by bit.
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/geometry/mesh_shapes.h"
+#include "slender_sim/rod/averaged_rod.h"
+#include "slender_sim/scene/state_bytes.h"
+#include "slender_sim/thread/touching_threads.h"
+#include "test/support/groups.h"
+#include "test/support/threads.h"
+
+namespace slender::test {
+namespace {
+
+constexpr double kPart = 1.0 / 64;   // [s] and parts of it: sums of these are exact
+
+std::string bytesOf(const RodState& s) { return stateBytes(s); }
+std::string bytesOf(const ClothState& s) { return stateBytes(s); }
+std::string bytesOf(const ThreadState& s)
+{
+  ThreadGroupState group;
+  group.threads.push_back(s);
+  return stateBytes(group);
+}
+std::string bytesOf(const TouchingState& s)
+{
+  std::string bytes;
+  for (const ThreadGroupState& thread : s.threads)
+    bytes += stateBytes(thread);
+  return bytes + std::to_string(s.contact_stiffness);
+}
+std::string bytesOf(const ClothGroupState& s)
+{
+  std::string bytes;
+  for (const ClothState& cloth : s.cloths)
+    bytes += stateBytes(cloth);
+  return bytes;
+}
+std::string bytesOf(const RodGroupState& s)
+{
+  SceneState scene;   // whose bytes are those of saved states
+  scene.rods = s.rods;
+  scene.bodies = s.bodies;
+  scene.obstacles = s.obstacles;
+  scene.obstacle_velocities = s.obstacle_velocities;
+  scene.contact_stiffness = s.contact_stiffness;
+  return stateBytes(scene);
+}
+
+/// The first substep of a step fails, and two halves of it succeed: they must be what a fresh stepper makes of two steps of half the length. The
+/// length and Newton's most iterations are varied until that happens. `make(newton)` makes a stepper, `step(stepper, state, h)` steps it.
+template <class State, class Make, class Step>
+void expectHalvesLikeFresh(const std::string& what, const State& start, double longest, const Make& make, const Step& step)
+{
+  constexpr int kMost = 24;   // iterations
+  int found = 0;
+  for (int k = 0; k < 4 * kMost && found < 2; ++k)
+  {
+    const double h = std::ldexp(longest, -(k / kMost));
+    NewtonConfig newton;
+    newton.max_iterations = 1 + k % kMost;
+    auto halved = make(newton);
+    State state = start;
+    const StepReport report = step(halved, state, h);
+    if (!report.ok || report.cut_steps != 1 || report.substeps != 2)
+      continue;
+    ++found;
+    auto fresh = make(newton);
+    State expected = start;
+    for (int half = 0; half < 2; ++half)
+    {
+      const StepReport own = step(fresh, expected, 0.5 * h);
+      EXPECT_TRUE(own.ok && own.cut_steps == 0) << what << ", at most " << newton.max_iterations << " iterations: " << own.message;
+    }
+    EXPECT_TRUE(bytesOf(state) == bytesOf(expected)) << what << ", at most " << newton.max_iterations << " iterations";
+  }
+  EXPECT_GT(found, 0) << what << ": no first substep failed whose halves succeeded";
+}
+
+/// A step that is refused changes nothing, and the next one is that of a fresh stepper. `spoil` makes a step of the inputs that cannot be done.
+template <class State, class Inputs, class Stepper>
+void expectRefusalLeavesNothing(const std::string& what, const State& start, const Inputs& inputs, const Inputs& spoilt, double h,
+                                const std::function<Stepper()>& make)
+{
+  Stepper refused = make(), fresh = make();
+  State state = start, expected = start;
+  const StepReport report = refused.step(state, spoilt, h);
+  EXPECT_FALSE(report.ok) << what << ": the spoilt step was done";
+  EXPECT_FALSE(report.message.empty()) << what;
+  EXPECT_TRUE(bytesOf(state) == bytesOf(start)) << what << ": " << report.message;
+  for (int k = 0; k < 3; ++k)
+  {
+    const StepReport a = refused.step(state, inputs, h), b = fresh.step(expected, inputs, h);
+    EXPECT_TRUE(a.ok && b.ok) << what << ", step " << k << ": " << a.message << b.message;
+    EXPECT_EQ(a.iterations, b.iterations) << what << ", step " << k;
+    EXPECT_TRUE(bytesOf(state) == bytesOf(expected)) << what << ", step " << k << " after: " << report.message;
+  }
+}
+
+std::string named(const char* what, Integrator integrator) { return std::string(what) + ", " + toString(integrator); }
+
+/// Held at one end, the other end whips.
+Rod whip(bool damped)
+{
+  const Matrix3Xd nodes = straightNodes(20, 0.5);
+  RodModel model = openRod(nodes, roundSection(0.003, 5e6, 1100));
+  model.mass_damping = damped ? 0.3 : 0.0;
+  model.stiffness_damping = damped ? 1e-3 : 0.0;
+  Rod rod(model, nodes, 0.5);
+  rod.hold(0, 0);
+  for (int i = 0; i < 20; ++i)
+    rod.state.v.col(i) = Vector3d(0, 2, 6) * std::pow(i / 19.0, 2);
+  return rod;
+}
+
+/// Three rods on a body that tumbles fast; damped, or not.
+Group tumbling(bool damped)
+{
+  Group g = tee();
+  for (auto& rod : g.model.rods)
+  {
+    RodModel model = *rod;
+    model.stiffness_damping = damped ? 2e-3 : 0.0;
+    rod = std::make_shared<RodModel>(model);
+  }
+  g.state.bodies[0].velocity.angular *= 8.0;
+  g.setGravity({0, 0, -9.81});
+  return g;
+}
+
+/// A rod with a weight at its end that falls onto a ball, without friction.
+Group landing(double speed)
+{
+  Group g;
+  const Matrix3Xd nodes = straightNodes(15, 0.3, Vector3d(-0.15, 0, 0.0));
+  RodModel model = openRod(nodes, roundSection(0.004, 2e6, 1100));
+  model.stiffness_damping = 2e-3;
+  g.addRod(Rod(model, nodes));
+  const int body = g.addBody(bodyOf(0.01, {2e-6, 3e-6, 4e-6}), {Vector3d(0.16, 0, 0), Eigen::Quaterniond::Identity()});
+  g.weld(0, 14, 14, body);
+  g.addObstacle(Sphere{0.05}, {Vector3d(0, 0.004, -0.0565), Eigen::Quaterniond::Identity()});
+  GroupContact::Rod touching;
+  touching.rod = 0;
+  touching.friction = 0.0;
+  g.model.contact.rods.push_back(touching);
+  g.model.contact.options.gap = 2e-3;
+  g.state.rods[0].v.colwise() = Vector3d(0, 0, -speed);
+  g.state.bodies[0].velocity.linear = {0, 0, -speed};
+  g.setGravity({0, 0, -9.81});
+  return g;
+}
+
+TEST(FailedSteps, HalvesOfARodAreThoseOfAFreshOne)
+{
+  for (const bool damped : {false, true})
+    for (const Integrator integrator : implicitIntegrators())
+    {
+      const Rod rod = whip(damped);
+      const auto make = [&](const NewtonConfig& newton) {
+        TimeConfig time = withIntegrator(integrator);
+        time.newton = newton;
+        return RodStepper(rod.model, time);
+      };
+      expectHalvesLikeFresh(named(damped ? "damped rod" : "rod", integrator), rod.state, 2 * kPart, make,
+                            [&](RodStepper& stepper, RodState& state, double h) { return stepper.step(state, rod.inputs, h); });
+    }
+}
+
+void expectGroupHalves(const std::string& what, const Group& g, Integrator integrator, double h)
+{
+  const auto make = [&](const NewtonConfig& newton) {
+    TimeConfig time = withIntegrator(integrator);
+    time.step = h;
+    time.newton = newton;
+    return RodGroup(g.model, time);
+  };
+  expectHalvesLikeFresh(what, g.state, h, make,
+                        [&](RodGroup& group, RodGroupState& state, double length) { return group.step(state, g.inputs, length); });
+}
+
+TEST(FailedSteps, HalvesOfRodsWithBodiesAreThoseOfFreshOnes)
+{
+  for (const bool damped : {false, true})
+    for (const Integrator integrator : implicitIntegrators())
+      expectGroupHalves(named(damped ? "damped, tumbling" : "tumbling", integrator), tumbling(damped), integrator, kPart);
+}
+
+TEST(FailedSteps, HalvesOfRodsInContactAreThoseOfFreshOnes)
+{
+  expectGroupHalves("landing", landing(1.5), Integrator::tr_bdf2, kPart);
+}
+
+// A step of 10 ms was refused after ten halvings, while one of 1 ms passed at once.
+TEST(FailedSteps, AFirstStepWithADampedRodAndABodyCanBeHalved)
+{
+  for (const Integrator integrator : {Integrator::tr_bdf2, Integrator::generalized_alpha, Integrator::implicit_midpoint})
+  {
+    Group g = tumbling(true);
+    TimeConfig time = withIntegrator(integrator);
+    time.newton.max_iterations = 6;   // too few for the whole step, enough for a part of it
+    RodGroup group(g.model, time);
+    const StepReport report = group.step(g.state, g.inputs, 0.02);
+    EXPECT_TRUE(report.ok) << named("", integrator) << ": " << report.message;
+    EXPECT_GT(report.cut_steps, 0) << named("", integrator);
+  }
+}
+
+TEST(FailedSteps, HalvesOfAClothAreThoseOfAFreshOne)
+{
+  for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
+    for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
+    {
+      ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.4, 8, 0, GridPattern::alternating), 0.2, isotropicMembrane(1e5, 0.3, 1e-3));
+      model.bending = bending;
+      model.bending_modulus = 1e-4;
+      model.stiffness_damping = 1e-3;
+      const auto shared = std::make_shared<ClothModel>(model);
+      ClothState start = makeClothState(model, model.rest.vertices);
+      Random random(11);
+      for (Eigen::Index i = 0; i < start.x.cols(); ++i)
+        start.v.col(i) = random.vector(3.0);
+      pinVertices(start, {0, 8});
+      ClothInputs inputs;
+      inputs.pins.resize(3, 2);
+      inputs.pins << start.x.col(0), start.x.col(8);
+      const auto make = [&](const NewtonConfig& newton) {
+        ClothOptions options;
+        options.integrator = integrator;
+        options.newton = newton;
+        options.linear_tolerance = 1e-6;
+        return ClothStepper(shared, options);
+      };
+      expectHalvesLikeFresh(named(bending == BendingModel::hinge ? "cloth with hinges" : "isometric cloth", integrator), start, kPart, make,
+                            [&](ClothStepper& stepper, ClothState& state, double h) { return stepper.step(state, inputs, h); });
+    }
+}
+
+TEST(FailedSteps, HalvesOfAThreadAreThoseOfAFreshOne)
+{
+  Random random(3);
+  ThreadModel model = honey();
+  model.nozzle_diameter = 0;
+  model.viscosity = 2000;
+  model.limits.min_edge_length = 1e-3;
+  model.limits.max_edge_length = 10;
+  const ThreadState start = wigglyThread(14, random);
+  const auto shared = std::make_shared<ThreadModel>(model);
+  const ThreadInputs inputs;
+  expectHalvesLikeFresh("thread", start, 16 * kPart, [&](const NewtonConfig& newton) { return ThreadStepper(shared, newton); },
+                        [&](ThreadStepper& stepper, ThreadState& state, double h) { return stepper.step(state, inputs, h); });
+}
+
+TEST(FailedSteps, RefusalsOfRodsLeaveNothing)
+{
+  for (const bool damped : {false, true})
+    for (const Integrator integrator : allIntegrators())
+    {
+      const Rod rod = whip(damped);
+      RodInputs spoilt = rod.inputs;
+      spoilt.forces.setZero(3, 20);
+      spoilt.forces.col(10) << 0, 1e300, -1e300;   // finite, and what follows from it is not
+      TimeConfig time = withIntegrator(integrator);
+      const double h = integrator == Integrator::symplectic_euler ? 1e-5 : 2e-3;
+      expectRefusalLeavesNothing<RodState, RodInputs, RodStepper>(named(damped ? "damped rod" : "rod", integrator), rod.state, rod.inputs, spoilt, h,
+                                                                  [&] { return RodStepper(rod.model, time); });
+    }
+}
+
+TEST(FailedSteps, RefusalsOfRodsWithBodiesLeaveNothing)
+{
+  for (const bool damped : {false, true})
+    for (const Integrator integrator : allIntegrators())
+    {
+      const Group g = tumbling(damped);
+      RodGroupInputs spoilt = g.inputs;
+      spoilt.rods[1].forces.setZero(3, 9);
+      spoilt.rods[1].forces.col(5) << 0, 1e300, -1e300;
+      TimeConfig time = withIntegrator(integrator);
+      const double h = integrator == Integrator::symplectic_euler ? 1e-5 : 2e-3;
+      expectRefusalLeavesNothing<RodGroupState, RodGroupInputs, RodGroup>(named(damped ? "damped, tumbling" : "tumbling", integrator), g.state, g.inputs,
+                                                                          spoilt, h, [&] { return RodGroup(g.model, time); });
+    }
+}
+
+TEST(FailedSteps, RefusalsOfRodsInContactLeaveNothing)
+{
+  for (const Integrator integrator : {Integrator::implicit_euler, Integrator::bdf2, Integrator::tr_bdf2})
+  {
+    Group g = landing(1.5);
+    TimeConfig time = withIntegrator(integrator);
+    time.step = 2e-3;
+    RodGroupInputs spoilt = g.inputs;
+    spoilt.rods[0].forces.setZero(3, 15);
+    RodGroup first(g.model, time);
+    for (int k = 0; k < 4; ++k)   // from the first step on, until it touches
+    {
+      for (const double force : {1e9, 1e300})
+      {
+        spoilt.rods[0].forces.col(7) << 0, force, -force;
+        expectRefusalLeavesNothing<RodGroupState, RodGroupInputs, RodGroup>(named("landing", integrator), g.state, g.inputs, spoilt, time.step,
+                                                                            [&] { return RodGroup(g.model, time); });
+      }
+      ASSERT_TRUE(first.step(g.state, g.inputs, time.step).ok);
+    }
+  }
+}
+
+TEST(FailedSteps, RefusalsOfThreadsLeaveNothing)
+{
+  ThreadModel model = honey();
+  model.floor.present = true;
+  Thread t = Thread::fromNozzle(model, {0, 0, 0.1}, 0.1);
+  for (const Integrator integrator : {Integrator::implicit_euler, Integrator::symplectic_euler})
+  {
+    ThreadInputs spoilt = t.inputs;
+    spoilt.ends[1].position.x() += 1e160;   // finite, and its square is not
+    const double h = integrator == Integrator::symplectic_euler ? 1e-6 : 0.01;
+    const auto shared = std::make_shared<ThreadModel>(t.model);
+    expectRefusalLeavesNothing<ThreadState, ThreadInputs, ThreadStepper>(named("thread", integrator), t.state, t.inputs, spoilt, h,
+                                                                         [&] { return ThreadStepper(shared, NewtonConfig{}, integrator); });
+  }
+}
+
+TEST(FailedSteps, RefusalsOfThreadsInContactLeaveNothing)
+{
+  TouchingModel model;
+  model.options.gap = 5e-5;
+  model.options.least_stiffness = 1e-8;
+  TouchingState state;
+  TouchingInputs inputs;
+  ThreadModel syrup = honey();
+  syrup.nozzle_diameter = 0;
+  syrup.surface_tension = 0.05;
+  for (int k = 0; k < 2; ++k)
+  {
+    Eigen::Matrix3Xd x(3, 13);
+    for (int i = 0; i < 13; ++i)
+      x.col(i) = Eigen::Vector3d(k == 0 ? 1e-3 * (i - 6) : 0, k == 1 ? 1e-3 * (i - 6) : 0, 2.02e-3 * k);
+    model.threads.push_back(std::make_shared<ThreadModel>(syrup));
+    model.touches.emplace_back();
+    state.threads.emplace_back();
+    state.threads.back().threads.push_back(makeThread(x, Eigen::VectorXd::Constant(12, 1e-3)));
+    for (Eigen::Vector3d& v : state.threads.back().threads[0].v)
+      v.z() = k == 1 ? -0.02 : 0.0;
+    inputs.threads.emplace_back();
+  }
+  TouchingInputs spoilt = inputs;
+  spoilt.threads[1].gravity = {1e200, 0, -1e300};
+  expectRefusalLeavesNothing<TouchingState, TouchingInputs, TouchingThreads>("threads in contact", state, inputs, spoilt, 2e-3,
+                                                                             [&] { return TouchingThreads(model, NewtonConfig{}); });
+}
+
+TEST(FailedSteps, RefusalsOfClothsLeaveNothing)
+{
+  for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
+    for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2, Integrator::imex, Integrator::symplectic_euler})
+      for (const ClothSolver solver : {ClothSolver::cholesky, ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
+        for (const bool one_newton_step : {false, true})
+          for (const bool touching : {false, true})
+          {
+            if (integrator == Integrator::imex && bending == BendingModel::hinge)
+              continue;
+            ClothModel model = buildCloth("sheet", gridMesh(0.3, 0.3, 6, 0, GridPattern::alternating), 0.2, isotropicMembrane(1e4, 0.3, 1e-3));
+            model.bending = bending;
+            model.bending_modulus = 1e-5;
+            model.stiffness_damping = 1e-4;
+            const auto shared = std::make_shared<ClothModel>(model);
+            ClothState state = makeClothState(model, model.rest.vertices);
+            pinVertices(state, {0, 6});
+            ClothInputs inputs;
+            inputs.pins.resize(3, 2);
+            inputs.pins << state.x.col(0), state.x.col(6);
+            ClothInputs spoilt = inputs;
+            spoilt.pins.col(1) += Vector3d(1e155, -1e155, 1e155);   // finite, and its square is not
+            ClothOptions options;
+            options.integrator = integrator;
+            options.one_newton_step = one_newton_step;
+            options.solver = solver;
+            const bool is_explicit = integrator == Integrator::imex || integrator == Integrator::symplectic_euler;
+            const double h = is_explicit ? 1e-4 : 5e-3;
+            const std::string what = named(bending == BendingModel::hinge ? "cloth with hinges" : "isometric cloth", integrator) + ", solver " +
+                                     std::to_string(static_cast<int>(solver)) + (one_newton_step ? ", one Newton step" : "") +
+                                     (touching ? ", with contact" : "");
+            if (!touching)
+            {
+              expectRefusalLeavesNothing<ClothState, ClothInputs, ClothStepper>(what, state, inputs, spoilt, h,
+                                                                                [&] { return ClothStepper(shared, options); });
+              continue;
+            }
+            ClothGroupModel group;
+            group.cloths.push_back(shared);
+            group.contact.emplace_back();
+            group.contact.back().thickness = 4e-3;
+            group.solids.push_back({Sphere{0.1}, -1.0, {}});
+            ClothGroupState group_state;
+            group_state.cloths.push_back(state);
+            group_state.solids.push_back({Vector3d(0.15, 0.15, -0.1045), Eigen::Quaterniond::Identity()});
+            ClothGroupInputs group_inputs, group_spoilt;
+            group_inputs.cloths.push_back(inputs);
+            group_inputs.solids = group_state.solids;
+            group_spoilt = group_inputs;
+            group_spoilt.cloths[0] = spoilt;
+            expectRefusalLeavesNothing<ClothGroupState, ClothGroupInputs, ClothGroup>(what, group_state, group_inputs, group_spoilt, h,
+                                                                                      [&] { return ClothGroup(group, options); });
+          }
+}
+
+TEST(FailedSteps, RefusalsOfRodsWithAveragesLeaveNothing)
+{
+  const int n = 25;
+  const Matrix3Xd nodes = straightNodes(n, 1.0);
+  RodModel model = openRod(nodes, modulusSection(1e-3, 1e-3, 200.0, 0.1), true);
+  model.stiffness_damping = 1e-3;
+  const auto shared = std::make_shared<const RodModel>(model);
+  AveragedRod::Averages averages(2, n);
+  for (int i = 0; i < 12; ++i)
+  {
+    averages.insert(0, i) = 1.0 / 12;
+    averages.insert(1, 13 + i) = 1.0 / 12;
+  }
+  averages.makeCompressed();
+  const auto weights = std::make_shared<const AveragedRod::Averages>(averages);
+  RodState start = makeRodState(model, nodes, Vector3d::UnitZ());
+  for (int i = 0; i < n; ++i)
+    start.v.col(i) = Vector3d(0, 2 * std::sin(9.0 * i), 6 * std::sin(0.5 * i));
+  const RodInputs inputs;
+  Matrix3Xd targets = start.x * averages.transpose();
+  TimeConfig time = withIntegrator(Integrator::implicit_euler);
+  AveragedRod refused(shared, weights, time), fresh(shared, weights, time);
+  RodInputs spoilt = inputs;
+  spoilt.forces.setZero(3, n);
+  spoilt.forces.col(7) << 0, 1e300, -1e300;
+  RodState a = start, b = start;
+  EXPECT_FALSE(refused.step(a, spoilt, targets, 5e-3).ok);
+  EXPECT_TRUE(bytesOf(a) == bytesOf(start));
+  for (int k = 0; k < 3; ++k)
+  {
+    EXPECT_TRUE(refused.step(a, inputs, targets, 5e-3).ok);
+    EXPECT_TRUE(fresh.step(b, inputs, targets, 5e-3).ok);
+    EXPECT_TRUE(bytesOf(a) == bytesOf(b)) << k;
+  }
+}
+
+}  // namespace
+}  // namespace slender::test
