@@ -5,16 +5,12 @@
 #include <stdexcept>
 
 #include "slender_sim/geometry/rotation.h"
+#include "slender_sim/node/catch_up.h"
 
 namespace slender {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kInstant = 1e-7;       // [s] for limits from the right; shorter than any step
-constexpr double kOpenCoast = 0.5;      // [s] in which an extrapolated motion would die out, if the rate did not fall before
-constexpr double kGentle = 0.3;         // [s] shortest blending time where a stream ran dry: its errors are small
-constexpr double kSame = 1e-10;         // [m], [rad], [m/s], [rad/s] round-off of evaluating the same motion twice
 
 }  // namespace
 
@@ -38,7 +34,7 @@ bool GuideBuffer::push(double time, const Pose& X_WH)
   return true;
 }
 
-/// The stream takes effect: the first one, or one after a pause.
+/// Lets the newest stream take effect, which is the first one or one after a pause.
 void GuideBuffer::begin(double time, const GuideTiming::Instant& now)
 {
   if (next_)
@@ -53,7 +49,7 @@ void GuideBuffer::begin(double time, const GuideTiming::Instant& now)
     last_.V = Twist();
   }
   following_ = changed_ = true;
-  plain_.X.position.setConstant(std::nan(""));   // nothing is known there
+  plain_.X.position.setConstant(std::nan(""));   // no earlier query was made of this trajectory
   last_time_ = now.rate > 0.0 ? time - (now.time - start) : time;
   query_ = start;
   rate_ = now.rate;
@@ -71,7 +67,7 @@ GraspTarget GuideBuffer::target(double time)
   GuideTiming::Instant now = timing_.advance(time);
   if (now.began)
     begin(time, now);
-  else if (!now.following && following_)   // the stream before goes on until the next one takes effect
+  else if (!now.following && following_)   // the earlier stream goes on until the next one takes effect
     now.time = query_ + rate_ * (time - *last_time_);
   if (now.jumped)
   {
@@ -88,8 +84,8 @@ GraspTarget GuideBuffer::target(double time)
       trajectory_.coast(open_ ? kOpenCoast : 0.0);
       changed_ = true;
     }
-    if (changed_ && !passesHere())   // does the trajectory still pass where the grasp was led to?
-      blendFrom(*last_time_, last_, followed(query_ + kInstant, rate_));
+    if (changed_ && !passesHere())   // the trajectory no longer passes through what the solver was given
+      blendFrom(*last_time_, last_, followed(query_ + kLimitOffset, rate_));
     changed_ = false;
     query_ = now.time;
     rate_ = now.rate;
@@ -109,7 +105,7 @@ void GuideBuffer::attachAt(const Pose& X_WG)
     return;
   if (attach_ == Attach::initial)
     X_HG_ = trajectory_.evaluate(query_).inverse() * X_WG;
-  blendFrom(*last_time_, last_, followed(query_ + kInstant, rate_));
+  blendFrom(*last_time_, last_, followed(query_ + kLimitOffset, rate_));
 }
 
 void GuideBuffer::restart(const Pose& X_WG)
@@ -151,16 +147,12 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
   if (!offset_ || time >= offset_->start + offset_->duration)
     return followed;
   const Offset& o = *offset_;
-  // cubic Hermite from (value, rate) at the start to (0, 0) at the end of d; the rate, however long d is, within the shortest blending time:
-  // over a long one it would lead far away
-  const double d = o.duration, t = o.rate_duration, s = std::clamp((time - o.start) / d, 0.0, 1.0), u = std::clamp((time - o.start) / t, 0.0, 1.0);
-  const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = t * u * (1 - u) * (1 - u);
-  const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - u) * (1 - 3 * u);
-  const Vector3d r = h0 * o.r + h1 * o.r_rate, r_rate = dh0 * o.r + dh1 * o.r_rate;
+  const FadeWeights w = fadeOut(time - o.start, o.duration, o.rate_duration);
+  const Vector3d r = w.value * o.r + w.slope * o.r_rate, r_rate = w.value_rate * o.r + w.slope_rate * o.r_rate;
   const Eigen::Quaterniond turn = fromRotationVector(r);
   Motion m;
-  m.X.position = followed.X.position + h0 * o.p + h1 * o.p_rate;
-  m.V.linear = followed.V.linear + dh0 * o.p + dh1 * o.p_rate;
+  m.X.position = followed.X.position + w.value * o.p + w.slope * o.p_rate;
+  m.V.linear = followed.V.linear + w.value_rate * o.p + w.slope_rate * o.p_rate;
   m.X.orientation = (turn * followed.X.orientation).normalized();
   m.V.angular = rotationRate(r) * r_rate + turn * followed.V.angular;
   return m;
@@ -168,10 +160,11 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
 
 void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
 {
-  const auto differ = [](const Vector3d& a, const Vector3d& b, double scale) { return (a - b).norm() > kSame * (1.0 + scale); };
+  const auto differ = [](const Vector3d& a, const Vector3d& b, double scale) { return (a - b).norm() > kSameMotion * (1.0 + scale); };
   const auto rotated = [](const Motion& a, const Motion& b) { return rotationVector(a.X.orientation * b.X.orientation.conjugate()); };
-  const Motion expected = blended(time, to);   // `to` was evaluated an instant away: allow for that
-  const double speed = (to.V.linear.norm() + to.V.angular.norm()) * kInstant / kSame;
+  const Motion expected = blended(time, to);
+  // `to` was evaluated kLimitOffset later than `from`, so the two may differ by what passes in that time.
+  const double speed = (to.V.linear.norm() + to.V.angular.norm()) * kLimitOffset / kSameMotion;
   if (!differ(from.X.position, expected.X.position, speed) && !differ(rotated(from, expected), Vector3d::Zero(), speed) &&
       (from.V.linear - expected.V.linear).norm() < 1e-4 * (1e-2 + to.V.linear.norm()) &&
       (from.V.angular - expected.V.angular).norm() < 1e-4 * (1e-2 + to.V.angular.norm()))
@@ -182,7 +175,7 @@ void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
   o.p_rate = from.V.linear - to.V.linear;
   o.r = rotated(from, to);
   o.r_rate = rotationRate(o.r).inverse() * (from.V.angular - fromRotationVector(o.r) * to.V.angular);
-  o.rate_duration = timing_.overran() ? std::max(options_.catch_up_time, kGentle) : options_.catch_up_time;
+  o.rate_duration = timing_.overran() ? std::max(options_.catch_up_time, kDryBlend) : options_.catch_up_time;
   o.duration = std::max({o.rate_duration, o.p.norm() / options_.catch_up_speed, o.r.norm() / options_.catch_up_turning});
   offset_ = o;
 }

@@ -7,17 +7,19 @@
 namespace slender {
 namespace {
 
-constexpr double kPause = 0.25;      // [s] a longer interval is no interval of a stream, where the last sample was reached meanwhile
-constexpr double kSilence = 0.4;     // [s] without a sample after which a stream has ended
-constexpr double kFewSilence = 0.1;  // [s] the same while there are only one or two
-constexpr double kAhead = 0.05;      // [s] a sample stamped so far ahead belongs to a planned motion, whose end is known
-constexpr double kMemory = 2.5;      // [s] lateness is remembered for once to twice as long
-constexpr double kMargin = 1.1;      // lag over what the stream needs, so that the next sample may be a little later than all before
-constexpr double kMostLag = 1.0;     // [s] a stream that needs more is shown in pieces
-constexpr double kRamp = 0.2;        // [s] in which the rate changes by 1: with a motion of 1 Hz that adds at most 0.8 of its acceleration, in quadrature
-constexpr double kBrake = 0.15;      // [s] the same where the stream runs dry
-constexpr double kSettle = 0.5;      // [s] in which the lag approaches what is wanted
-constexpr double kCatchUp = 0.1;     // greatest rate above 1
+constexpr double kPause = 0.25;      // [s] a longer interval begins a new stream if the last sample was reached meanwhile
+constexpr double kSilence = 0.4;     // [s] a stream has ended when no sample came for this time
+constexpr double kFewSilence = 0.1;  // [s] the same for a stream of one or two samples
+constexpr double kAhead = 0.05;      // [s] a sample stamped this far ahead belongs to a planned motion, whose end is known
+constexpr double kMemory = 2.5;      // [s] the greatest needed lag is remembered for one to two times this long
+constexpr double kMargin = 1.1;      // ratio of lag to needed lag, so that the next sample may be a little later than the earlier ones
+constexpr double kMostLag = 1.0;     // [s] greatest lag; a stream that needs more stops and goes
+// [s] time in which the rate changes by 1. For a sine of 1 Hz this adds at most 0.8 of its acceleration, a quarter of a
+// period out of phase with it.
+constexpr double kRamp = 0.2;
+constexpr double kBrake = 0.15;      // [s] the same for a stream that runs dry
+constexpr double kSettle = 0.5;      // [s] time constant with which the lag approaches the wanted one
+constexpr double kCatchUp = 0.1;     // greatest rate minus 1
 
 }  // namespace
 
@@ -32,7 +34,8 @@ bool GuideTiming::sample(double stamp)
 {
   const double interval = stamp - last_, ahead = now_ ? stamp - *now_ : 0.0;
   arrival_ = now_.value_or(kNever);
-  // a planned motion through sparse points is sent ahead, or read far behind: at least half of the way is still to come
+  // A planned motion through sparse points is sent ahead of time or evaluated far behind. It is recognised by this: at
+  // least half of the interval has not passed yet.
   const bool sparse = std::max(ahead, wanted()) >= 0.5 * interval;
   const bool fresh = count_ == 0 || (following_ && !fixed() && interval > kPause && query_ >= last_ && !sparse);
   if (fresh)
@@ -42,7 +45,8 @@ bool GuideTiming::sample(double stamp)
     following_ = overran_ = false;
     return true;
   }
-  if (now_)   // until then instants were shown without this sample: up to which of them was that right?
+  // Instants up to known() were final without this sample. Everything that was shown beyond needed a greater lag.
+  if (now_)
     peak_ = std::max(peak_, *now_ - known());
   previous_ = last_;
   last_ = stamp;
@@ -64,7 +68,8 @@ bool GuideTiming::ended(double time) const
 {
   if (fixed() || time - arrival_ > (count_ < 3 ? kFewSilence : kSilence) || last_ > arrival_ + kAhead)
     return true;
-  // While nothing was late, what is missing will not come: so the motion is the same whenever the samples arrived in time.
+  // While no sample was late, a missing sample is taken as the stream's end. The motion then does not depend on the times
+  // at which samples arrived.
   return count_ > 2 && !options_.live && !options_.automatic && required() <= options_.delay;
 }
 
@@ -96,7 +101,7 @@ GuideTiming::Instant GuideTiming::advance(double time)
   return instant;
 }
 
-/// Where samples came in time the stream is under way at once; else it starts from its first sample and from rest.
+/// A stream whose samples came in time runs at its full rate at once. Another one starts at its first sample, at rest.
 void GuideTiming::begin(double time, double lag)
 {
   following_ = true;
@@ -113,7 +118,7 @@ void GuideTiming::follow(double time, double step, double lag, bool over)
     query_ = time - lag;
     return;
   }
-  if (count_ < 3 && !over)   // at the first sample the motion is at rest, whatever the rate
+  if (count_ < 3 && !over)   // the slope at the first sample is not known yet, so the motion waits there
   {
     query_ = first_;
     rate_ = 0.0;
@@ -147,7 +152,7 @@ void GuideTiming::follow(double time, double step, double lag, bool over)
   }
 }
 
-/// While no samples come nothing new is known about them.
+/// Forgets needed lags that are older than the memory. Nothing is forgotten while no samples come.
 void GuideTiming::forgetPeaks(double time)
 {
   if (peak_ == kNever || time - peaks_since_ <= kMemory)

@@ -3,13 +3,10 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "slender_sim/node/catch_up.h"
+
 namespace slender {
 namespace {
-
-constexpr double kInstant = 1e-7;   // [s] for limits from the right; shorter than any step
-constexpr double kOpenCoast = 0.5;  // [s], and the next: see guide_buffer.cpp
-constexpr double kGentle = 0.3;
-constexpr double kSame = 1e-10;     // [m] round-off of evaluating the same motion twice
 
 double largest(const Eigen::Matrix3Xd& m) { return m.cols() > 0 ? m.colwise().norm().maxCoeff() : 0.0; }
 
@@ -41,7 +38,7 @@ bool PointGuideBuffer::push(double time, const Eigen::Matrix3Xd& points)
     throw std::invalid_argument("guide: " + std::to_string(points.cols()) + " points, but the guide has " + std::to_string(x_.cols()));
   if (last_stamp_ && !(time > *last_stamp_))
     return false;
-  if (!points.allFinite())   // before the timing hears of it
+  if (!points.allFinite())   // refused samples must not reach the timing
     throw std::invalid_argument("guide: a position is not finite");
   const bool fresh = timing_.sample(time);
   if (fresh && !trajectory_.empty())
@@ -52,7 +49,7 @@ bool PointGuideBuffer::push(double time, const Eigen::Matrix3Xd& points)
   return true;
 }
 
-/// The stream takes effect: the first one, or one after a pause.
+/// Lets the newest stream take effect, which is the first one or one after a pause.
 void PointGuideBuffer::begin(double time, const GuideTiming::Instant& now)
 {
   if (next_)
@@ -74,7 +71,7 @@ const Eigen::Matrix3Xd& PointGuideBuffer::target(double time)
   GuideTiming::Instant now = timing_.advance(time);
   if (now.began)
     begin(time, now);
-  else if (!now.following && following_)   // the stream before goes on until the next one takes effect
+  else if (!now.following && following_)   // the earlier stream goes on until the next one takes effect
     now.time = query_ + rate_ * (time - *last_time_);
   if (now.jumped)
   {
@@ -91,7 +88,7 @@ const Eigen::Matrix3Xd& PointGuideBuffer::target(double time)
       trajectory_.coast(open_ ? kOpenCoast : 0.0);
       changed_ = true;
     }
-    if (changed_)   // do the points still pass where the guide was led to?
+    if (changed_)   // the trajectory may no longer pass through what the solver was given
       blendFrom(*last_time_);
     changed_ = false;
     query_ = now.time;
@@ -138,32 +135,29 @@ void PointGuideBuffer::addOffset(double time, Eigen::Matrix3Xd& x, Eigen::Matrix
   const double d = offset_duration_;
   if (!(d > 0.0) || time >= offset_start_ + d)
     return;
-  // cubic Hermite from (value, rate) at the start to (0, 0) at the end of d; the rate, however long d is, within the shortest blending time:
-  // over a long one it would lead far away
-  const double t = offset_rate_duration_, s = std::clamp((time - offset_start_) / d, 0.0, 1.0), u = std::clamp((time - offset_start_) / t, 0.0, 1.0);
-  const double h0 = (1 + 2 * s) * (1 - s) * (1 - s), h1 = t * u * (1 - u) * (1 - u);
-  const double dh0 = 6 * s * (s - 1) / d, dh1 = (1 - u) * (1 - 3 * u);
-  x += h0 * offset_ + h1 * offset_rate_;
-  v += dh0 * offset_ + dh1 * offset_rate_;
+  const FadeWeights w = fadeOut(time - offset_start_, d, offset_rate_duration_);
+  x += w.value * offset_ + w.slope * offset_rate_;
+  v += w.value_rate * offset_ + w.slope_rate * offset_rate_;
 }
 
-/// From x_, v_ at `time` to what the trajectory now says.
+/// Starts an offset at `time` that leads from x_, v_ to the trajectory, unless the trajectory passes through them.
 void PointGuideBuffer::blendFrom(double time)
 {
   Eigen::Matrix3Xd to, to_rate;
   follow(query_, rate_, to, to_rate);
   if (plain_x_.cols() == to.cols() && to == plain_x_ && to_rate == plain_v_)
-    return;   // to the last bit what it was
-  follow(query_ + kInstant, rate_, to, to_rate);
-  Eigen::Matrix3Xd expected = to, expected_rate = to_rate;   // an instant away: allow for that
+    return;   // the trajectory has not changed here
+  follow(query_ + kLimitOffset, rate_, to, to_rate);
+  // `to` was evaluated kLimitOffset later than x_, so the two may differ by what passes in that time.
+  Eigen::Matrix3Xd expected = to, expected_rate = to_rate;
   addOffset(time, expected, expected_rate);
   const double speed = largest(to_rate);
-  if (largest(x_ - expected) <= kSame + 2.0 * speed * kInstant && largest(v_ - expected_rate) < 1e-4 * (1e-2 + speed))
+  if (largest(x_ - expected) <= kSameMotion + 2.0 * speed * kLimitOffset && largest(v_ - expected_rate) < 1e-4 * (1e-2 + speed))
     return;
   offset_ = x_ - to;
   offset_rate_ = v_ - to_rate;
   offset_start_ = time;
-  offset_rate_duration_ = timing_.overran() ? std::max(options_.catch_up_time, kGentle) : options_.catch_up_time;
+  offset_rate_duration_ = timing_.overran() ? std::max(options_.catch_up_time, kDryBlend) : options_.catch_up_time;
   offset_duration_ = std::max(offset_rate_duration_, largest(offset_) / options_.catch_up_speed);
 }
 

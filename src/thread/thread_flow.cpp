@@ -8,9 +8,9 @@ namespace slender {
 
 namespace {
 
-constexpr double kPerTurn = 20.0;      // edges: the coiling study's quick form stays within 2 % with as many
-constexpr double kOverFall = 25.0;     // edges at least
-constexpr double kStepAngle = 0.06;    // [rad] of the coil per step: implicit Euler then errs by about 1 % in frequency
+constexpr double kPerTurn = 20.0;      // edges per turn of the coil, which keep the quick form of study `coiling` within 2 %
+constexpr double kOverFall = 25.0;     // smallest number of edges over the fall
+constexpr double kStepAngle = 0.06;    // [rad] turn of the coil per step, with which implicit Euler errs by about 1 % in frequency
 
 double areaOf(double diameter) { return 0.25 * M_PI * diameter * diameter; }
 

@@ -1,4 +1,5 @@
-// A substep that fails leaves nothing behind: what follows is what a fresh stepper makes of the same state, bit by bit.
+// A step or substep that fails leaves nothing behind in its stepper. After the failure the stepper computes the same states,
+// bit by bit, as a new stepper that starts from the same state.
 #include <cmath>
 #include <functional>
 #include <string>
@@ -16,7 +17,7 @@
 namespace slender::test {
 namespace {
 
-constexpr double kPart = 1.0 / 64;   // [s] and parts of it: sums of these are exact
+constexpr double kPart = 1.0 / 64;   // [s] a power of two, so that sums of halves of steps are exact
 
 std::string bytesOf(const RodState& s) { return stateBytes(s); }
 std::string bytesOf(const ClothState& s) { return stateBytes(s); }
@@ -42,7 +43,7 @@ std::string bytesOf(const ClothGroupState& s)
 }
 std::string bytesOf(const RodGroupState& s)
 {
-  SceneState scene;   // whose bytes are those of saved states
+  SceneState scene;   // stateBytes() takes the state of a scene
   scene.rods = s.rods;
   scene.bodies = s.bodies;
   scene.obstacles = s.obstacles;
@@ -51,8 +52,9 @@ std::string bytesOf(const RodGroupState& s)
   return stateBytes(scene);
 }
 
-/// The first substep of a step fails, and two halves of it succeed: they must be what a fresh stepper makes of two steps of half the length. The
-/// length and Newton's most iterations are varied until that happens. `make(newton)` makes a stepper, `step(stepper, state, h)` steps it.
+/// Expects that a step whose first substep fails, and whose two halves succeed, ends like two steps of half its length of a
+/// new stepper. The step length (at most `longest` [s]) and the limit of Newton iterations are varied until such a step is
+/// found. `make(newton)` returns a stepper, and `step(stepper, state, h)` takes one step with it.
 template <class State, class Make, class Step>
 void expectHalvesLikeFresh(const std::string& what, const State& start, double longest, const Make& make, const Step& step)
 {
@@ -81,7 +83,8 @@ void expectHalvesLikeFresh(const std::string& what, const State& start, double l
   EXPECT_GT(found, 0) << what << ": no first substep failed whose halves succeeded";
 }
 
-/// A step that is refused changes nothing, and the next one is that of a fresh stepper. `spoil` makes a step of the inputs that cannot be done.
+/// Expects that the step with the inputs `spoilt` is refused and does not change the state, and that the next three steps
+/// equal those of a new stepper.
 template <class State, class Inputs, class Stepper>
 void expectRefusalLeavesNothing(const std::string& what, const State& start, const Inputs& inputs, const Inputs& spoilt, double h,
                                 const std::function<Stepper()>& make)
@@ -103,7 +106,7 @@ void expectRefusalLeavesNothing(const std::string& what, const State& start, con
 
 std::string named(const char* what, Integrator integrator) { return std::string(what) + ", " + toString(integrator); }
 
-/// Held at one end, the other end whips.
+/// Returns a rod that is held at one end while its other end moves fast.
 Rod whip(bool damped)
 {
   const Matrix3Xd nodes = straightNodes(20, 0.5);
@@ -117,7 +120,7 @@ Rod whip(bool damped)
   return rod;
 }
 
-/// Three rods on a body that tumbles fast; damped, or not.
+/// Returns three rods, with or without damping, that are welded to a fast tumbling body.
 Group tumbling(bool damped)
 {
   Group g = tee();
@@ -132,7 +135,7 @@ Group tumbling(bool damped)
   return g;
 }
 
-/// A rod with a weight at its end that falls onto a ball, without friction.
+/// Returns a rod with a weight at its end that falls onto a ball without friction.
 Group landing(double speed)
 {
   Group g;
@@ -201,7 +204,7 @@ TEST(FailedSteps, AFirstStepWithADampedRodAndABodyCanBeHalved)
   {
     Group g = tumbling(true);
     TimeConfig time = withIntegrator(integrator);
-    time.newton.max_iterations = 6;   // too few for the whole step, enough for a part of it
+    time.newton.max_iterations = 6;   // the whole step needs more, a part of it does not
     RodGroup group(g.model, time);
     const StepReport report = group.step(g.state, g.inputs, 0.02);
     EXPECT_TRUE(report.ok) << named("", integrator) << ": " << report.message;
@@ -262,7 +265,7 @@ TEST(FailedSteps, RefusalsOfRodsLeaveNothing)
       const Rod rod = whip(damped);
       RodInputs spoilt = rod.inputs;
       spoilt.forces.setZero(3, 20);
-      spoilt.forces.col(10) << 0, 1e300, -1e300;   // finite, and what follows from it is not
+      spoilt.forces.col(10) << 0, 1e300, -1e300;   // this is finite, but the accelerations overflow
       TimeConfig time = withIntegrator(integrator);
       const double h = integrator == Integrator::symplectic_euler ? 1e-5 : 2e-3;
       expectRefusalLeavesNothing<RodState, RodInputs, RodStepper>(named(damped ? "damped rod" : "rod", integrator), rod.state, rod.inputs, spoilt, h,
@@ -296,7 +299,7 @@ TEST(FailedSteps, RefusalsOfRodsInContactLeaveNothing)
     RodGroupInputs spoilt = g.inputs;
     spoilt.rods[0].forces.setZero(3, 15);
     RodGroup first(g.model, time);
-    for (int k = 0; k < 4; ++k)   // from the first step on, until it touches
+    for (int k = 0; k < 4; ++k)   // the first steps end before contact begins
     {
       for (const double force : {1e9, 1e300})
       {
@@ -317,7 +320,7 @@ TEST(FailedSteps, RefusalsOfThreadsLeaveNothing)
   for (const Integrator integrator : {Integrator::implicit_euler, Integrator::symplectic_euler})
   {
     ThreadInputs spoilt = t.inputs;
-    spoilt.ends[1].position.x() += 1e160;   // finite, and its square is not
+    spoilt.ends[1].position.x() += 1e160;   // this is finite, but its square overflows
     const double h = integrator == Integrator::symplectic_euler ? 1e-6 : 0.01;
     const auto shared = std::make_shared<ThreadModel>(t.model);
     expectRefusalLeavesNothing<ThreadState, ThreadInputs, ThreadStepper>(named("thread", integrator), t.state, t.inputs, spoilt, h,
@@ -375,7 +378,7 @@ TEST(FailedSteps, RefusalsOfClothsLeaveNothing)
             inputs.pins.resize(3, 2);
             inputs.pins << state.x.col(0), state.x.col(6);
             ClothInputs spoilt = inputs;
-            spoilt.pins.col(1) += Vector3d(1e155, -1e155, 1e155);   // finite, and its square is not
+            spoilt.pins.col(1) += Vector3d(1e155, -1e155, 1e155);   // this is finite, but its square overflows
             ClothOptions options;
             options.integrator = integrator;
             options.one_newton_step = one_newton_step;

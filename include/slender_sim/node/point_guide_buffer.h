@@ -9,26 +9,27 @@
 
 namespace slender {
 
-/// Turns a stream of stamped guide vertices into a motion of the guide that never jumps in position or velocity: as GuideBuffer does for
-/// poses, with PointTrajectory in between. All points catch up within the same time, at no more than about catch_up_speed on average.
+/// Turns a stream of stamped guide vertices into a motion of the guide that never jumps in position or velocity. The method
+/// is that of GuideBuffer, with PointTrajectory between the samples. All points catch up within the same time, and the mean
+/// speed of catching up is about `catch_up_speed` at most.
 class PointGuideBuffer
 {
 public:
-  /// `points`: where the guide is now (3 x n [m]). Takes all options but catch_up_turning.
+  /// `points` are the present positions of the guide's vertices, 3 x n [m]. The option `catch_up_turning` has no effect.
   PointGuideBuffer(const GuideBuffer::Options& options, const Eigen::Matrix3Xd& points);
 
-  /// Adds the points at `time` [s]; false when it is not later than the last one (nothing changes). Throws std::invalid_argument for another number of
-  /// points, or what is not finite.
+  /// Adds the points at `time` [s]. Returns false and changes nothing when `time` is not later than the last one. Throws
+  /// std::invalid_argument when the number of points differs or a coordinate is not finite.
   bool push(double time, const Eigen::Matrix3Xd& points);
 
   /// Where the guide is at simulated `time` [s]; times of successive calls do not decrease.
   const Eigen::Matrix3Xd& target(double time);
 
-  /// The guide was moved: it catches up from there.
+  /// The guide has been moved to `points`. It then catches up with the stream from there.
   void attachAt(const Eigen::Matrix3Xd& points);
-  /// Forgets all input and stays there.
+  /// Forgets all samples and stays at `points`.
   void restart(const Eigen::Matrix3Xd& points);
-  /// The simulated clock skipped so many seconds while the guide stood still; it catches up.
+  /// The simulated clock skipped `seconds` while the guide stood still. The guide then catches up.
   void skip(double seconds);
 
   /// Stamp of the last message [s], if there is any.
@@ -48,12 +49,12 @@ private:
   std::optional<double> last_stamp_;         // [s] of the last message
   bool following_ = false;                   // samples have taken effect
   bool changed_ = false;                     // the trajectory changed since the last query
-  bool open_ = false;                        // its end is extrapolated
-  std::optional<double> last_time_;          // [s] simulated, of the last query
-  double query_ = 0.0, rate_ = 1.0;          // instant of the trajectory at last_time_, and how fast it passed
-  Eigen::Matrix3Xd plain_x_, plain_v_;       // of the trajectory alone, then; empty: not known
-  Eigen::Matrix3Xd x_, v_;                   // what was given to the solver last
-  double offset_start_ = 0.0, offset_duration_ = 0.0, offset_rate_duration_ = 0.0;   // [s] simulated; duration 0: none
+  bool open_ = false;                        // the end of the trajectory is extrapolated
+  std::optional<double> last_time_;          // [s] simulated time of the last query
+  double query_ = 0.0, rate_ = 1.0;          // [s] instant of the trajectory at last_time_, and its rate
+  Eigen::Matrix3Xd plain_x_, plain_v_;       // motion without an offset at last_time_; empty when it is not known
+  Eigen::Matrix3Xd x_, v_;                   // last output
+  double offset_start_ = 0.0, offset_duration_ = 0.0, offset_rate_duration_ = 0.0;   // [s]; no offset while the duration is 0
   Eigen::Matrix3Xd offset_, offset_rate_;    // [m], [m/s] at the start
 };
 
