@@ -86,6 +86,8 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   openReplay();
   checkClock();
   simulation_ = std::make_unique<Simulation>(loadScene(options_, kind_));
+  if (simulation_->config().statics)
+    ROS_WARN("%s: the key statics of the scene is for simulate --statics; the node does not use it", nh_priv_.getNamespace().c_str());
   for (const std::string& warning : simulation_->config().warnings)
     ROS_WARN("%s", warning.c_str());
   if (replay_ && options_.scene != replay_->scene() && simulation_->config().source != replay_->scene())

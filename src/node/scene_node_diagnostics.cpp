@@ -144,6 +144,16 @@ DiagnosticStatus SceneNode::simulationStatus() const
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);
   add(status, "largest strain", recent_.max_strain);
+  if (const auto& start = simulation_->startReport())
+  {
+    add(status, "start: residual", start->residual);
+    add(status, "start: energy [J]", start->energy);
+    add(status, "start: lowest eigenvalue [1/s^2]", start->lowest_eigenvalue);
+    add(status, "start: stable", std::string(start->stable ? "yes" : "no"));
+    add(status, "start: unstable equilibria left", static_cast<std::uint64_t>(start->escapes));
+    if (!start->stable)
+      raise(status, DiagnosticStatus::WARN, "the run started from an unstable equilibrium");
+  }
   if (kind_ == NodeKind::threads)
     addThreads(*simulation_, recent_, status);
   if (recent_.projection_iterations > 0)

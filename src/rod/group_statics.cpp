@@ -176,6 +176,15 @@ bool GroupEquilibriumSearch::settleStably(bool leave_saddles)
 
 StepReport RodGroup::solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs, bool leave_saddles)
 {
+  if (std::any_of(inputs.rods.begin(), inputs.rods.end(), [](const RodInputs& rod) { return rod.torques.size() > 0; }))
+  {
+    StepReport refused;
+    refused.ok = false;
+    refused.failure = StepFailure::input_not_finite;
+    refused.message = "statics of rods with contact or bodies does not know torques about the tangent: weld a body with this torque, or let the scene "
+                      "settle by time stepping with damping (start: as_given)";
+    return refused;
+  }
   TimeConfig time = impl_->time;
   time.integrator = Integrator::implicit_euler;
   time.error_tolerance = 0;

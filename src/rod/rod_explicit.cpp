@@ -43,6 +43,7 @@ RodEvaluation RodStepper::Impl::evaluateStart(const RodInputs& inputs, double du
     return isotropic->evaluate(work);
   system.leaveOutStretching(model->inextensible);
   system.load(work);
+  system.setTwistLoads(inputs.torques);
   if (model->stiffness_damping > 0)
   {
     startStrainHistory(inputs, duration, t);

@@ -21,10 +21,20 @@ public:
       Eigen::Matrix3Xd f(3, n);
       for (int i = 0; i < n; ++i)
         f.col(i) = model->mass[i] * inputs.gravity;
+      if (model->drag.size() > 0)
+        f += inputs.wind * model->drag.transpose();
       if (inputs.forces.cols() > 0)
         f += inputs.forces;
       return f;
     };
+    const auto torques = [&](const RodInputs& inputs) {
+      return inputs.torques.size() > 0 ? inputs.torques : Eigen::VectorXd(Eigen::VectorXd::Zero(model->edges()));
+    };
+    if (constant.torques.size() + scaled.torques.size() > 0)
+    {
+      fixed_torques = torques(constant);
+      unit_torques = torques(scaled);
+    }
     fixed = loads(constant);
     unit = loads(scaled);
     for (const GraspState& g : state.grasps)
@@ -45,6 +55,7 @@ public:
   {
     for (int i = 0; i < model->nodes(); ++i)
       system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), fixed.col(i) + at * unit.col(i));
+    system.setTwistLoads(fixed_torques + at * unit_torques);
   }
 
   /// The displacement per unit of the factor, with the matrix last factored.
@@ -54,6 +65,9 @@ public:
     for (int i = 0; i < model->nodes(); ++i)
       if (system.isFree(i))
         v.segment<3>(4 * i) = unit.col(i);
+    for (int j = 0; j < static_cast<int>(unit_torques.size()); ++j)
+      if (system.mayTurn(j))
+        v[4 * j + 3] = unit_torques[j];
     system.solveFor(v.data());
     return v;
   }
@@ -83,6 +97,7 @@ public:
   RodSystem system;
   std::vector<Pose> poses;
   Eigen::Matrix3Xd fixed, unit;
+  Eigen::VectorXd fixed_torques, unit_torques;   ///< about the tangents; empty without torques
   Eigen::VectorXd tangent;
   double tangent_factor = 0.0;   ///< 0: no step yet
   double factor = 0.0, last_factor, length = 1.0, share_now = 0.0;

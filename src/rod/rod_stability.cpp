@@ -135,6 +135,7 @@ RodStability assessStability(RodStepper::Impl& rod, const RodInputs& inputs, boo
   for (GraspTarget& g : targets.grasps)
     g.velocity.reset();
   rod.system.load(rod.work);
+  rod.system.setTwistLoads(inputs.torques);
   rod.placeAt(targets, 1.0, 1.0);
   RodPencil pencil(rod, inputs);
   const RodEvaluation at = pencil.evaluate(0.0, false);

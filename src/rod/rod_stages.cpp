@@ -10,6 +10,7 @@ StepFailure RodStepper::Impl::computeAcceleration(const RodInputs& inputs, doubl
 {
   // at the start of a run: frames to equilibrium, then a = M^-1 F
   system.setResponse(0.0, nullptr);
+  system.setTwistLoads(inputs.torques);
   for (int i = 0; i < model->nodes(); ++i)
     system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), load(inputs, i));
   placeAt(inputs, duration, t / duration);
@@ -55,6 +56,7 @@ void RodStepper::Impl::beginStage(std::size_t s, const RodInputs& inputs, double
   const Stage& stage = plan->stages[s];
   const double inertia = 1.0 / (stage.tau_a * stage.tau_a), damping = 1.0 / stage.tau_v;
   const double ahead = stage.time * h;
+  system.setTwistLoads(inputs.torques);
   for (int i = 0; i < model->nodes(); ++i)
   {
     const Eigen::Vector3d q_hat = combine(stage.q_hat, i), q_tilde = combine(stage.q_tilde, i);

@@ -37,6 +37,7 @@ private:
   NewtonConfig newton_;
   StepFailure failure_ = StepFailure::none;
   double length_, base_weight_, move_ = 0.0;
+  double twist_work_ = 0.0;   ///< of torques about tangents since the search began [J]
   double relative_ = 1.0;   ///< proximal weight over base_weight_
 };
 
@@ -58,6 +59,7 @@ RodStepper::Impl::EquilibriumSearch::EquilibriumSearch(Impl& rod, const RodInput
   for (int i = 0; i < model.nodes(); ++i)
     load_total += rod_.load(inputs, i).norm();
   base_weight_ = std::max(bend / std::pow(length_, 3), load_total / length_) * 100.0 / model.nodes();
+  rod_.system.setTwistLoads(inputs.torques);
   newton_.tolerance = std::min(newton_.tolerance, 1e-8);
   newton_.max_iterations = std::max(60, newton_.max_iterations);
 }
@@ -75,6 +77,7 @@ NewtonResult RodStepper::Impl::EquilibriumSearch::round(double fraction, double 
   if (!result.ok())
     return result;
   ++report_.substeps;
+  twist_work_ += rod_.system.twistWork();
   rod_.next = rod_.work;
   rod_.system.store(rod_.next);
   for (std::size_t k = 0; k < rod_.next.grasps.size(); ++k)
@@ -111,6 +114,7 @@ void RodStepper::Impl::EquilibriumSearch::furtherDown()
 {
   rod_.system.moveAlong(0.0);
   rod_.system.evaluate(false);
+  twist_work_ += rod_.system.twistWork();
   rod_.system.store(rod_.work);
 }
 
@@ -149,24 +153,28 @@ bool RodStepper::Impl::EquilibriumSearch::escape(const RodStability& at)
 {
   const RodState saddle = rod_.work;
   const Eigen::VectorXd mode = at.mode;
+  const double work_before = twist_work_;
   for (const double turn : {0.1, -0.1, 0.01, -0.01, 1e-3, -1e-3})
   {
     rod_.work = saddle;
+    twist_work_ = work_before;
     rod_.system.load(rod_.work);
     rod_.placeAt(targets_, 1.0, 1.0);
     Eigen::Map<Eigen::VectorXd>(rod_.system.direction(), mode.size()) = mode;
     rod_.system.moveAlong(turn);
     if (rod_.system.evaluate(false).min_chi <= kFoldedChi)
       continue;
+    twist_work_ += rod_.system.twistWork();
     rod_.system.store(rod_.work);
     // A weight above the negative eigenvalue makes the first rounds convex, so that they slide down instead of jumping.
     relative_ = std::max(1e-6, 2.0 * std::abs(at.lowest) * rod_.model->mass.maxCoeff() / base_weight_);
     if (!std::isfinite(relative_))
       relative_ = 1e-2;
-    if (settle() && assessStability(rod_, inputs_, false).energy < at.energy - at.energy_noise)
+    if (settle() && assessStability(rod_, inputs_, false).energy - (twist_work_ - work_before) < at.energy - at.energy_noise)
       return true;
   }
   rod_.work = saddle;
+  twist_work_ = work_before;
   return false;
 }
 

@@ -96,13 +96,21 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
     what = std::string("number of ") + name + " (" + std::to_string(count) + " for " + std::to_string(expected) + ")";
     return false;
   };
-  bool good = check(inputs.gravity.allFinite(), "gravity") && check(inputs.wind.allFinite(), "wind") && check(inputs.forces.allFinite(), "a nodal force");
+  bool good = check(inputs.gravity.allFinite(), "gravity") && check(inputs.wind.allFinite(), "wind") && check(inputs.forces.allFinite(), "a nodal force") && check(inputs.torques.allFinite(), "a torque");
   if (state.x.cols() != nodes || state.v.cols() != nodes)
     return refuse_count("nodes of the state", state.x.cols(), nodes);
   if (inputs.grasps.size() != state.grasps.size())
     return refuse_count("grasp targets", inputs.grasps.size(), state.grasps.size());
   if (inputs.forces.cols() != 0 && inputs.forces.cols() != state.x.cols())
     return refuse_count("nodal forces", inputs.forces.cols(), state.x.cols());
+  if (inputs.torques.size() != 0 && inputs.torques.size() != model->edges())
+    return refuse_count("torques", inputs.torques.size(), model->edges());
+  if (inputs.torques.size() != 0 && (isotropic || time.integrator == Integrator::implicit_midpoint || time.integrator == Integrator::generalized_alpha))
+  {
+    what = isotropic ? "a torque about the tangent, which the isotropic formulation does not have (formulation: general has it),"
+                     : "a torque about the tangent, whose work the energy check of this integrator does not know (tr_bdf2 has none),";
+    return false;
+  }
   for (std::size_t k = 0; k < inputs.grasps.size(); ++k)
   {
     const GraspTarget& g = inputs.grasps[k];
@@ -261,6 +269,7 @@ RodEnergies RodStepper::Impl::energies(const RodState& state, const Eigen::Vecto
   system.leaveOutStretching(false);
   system.load(state);
   system.setResponse(0.0, nullptr);
+  system.setTwistLoads({});
   for (int i = 0; i < m.nodes(); ++i)
     system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   const RodEvaluation e = system.evaluate(false);

@@ -97,6 +97,7 @@ void RodSystem::load(const RodState& state)
     a_.base_twist[i] = state.twist[i];
   wrapHalo(a_.base_twist, n);
   std::fill(a_.turn - kHalo, a_.turn + n + kHalo, 0.0);
+  std::fill(turned_.begin(), turned_.end(), 0.0);
   for (ClampJoint& c : clamps_)
   {
     const GraspState& g = state.grasps[c.grasp];
@@ -131,6 +132,33 @@ void RodSystem::setInertia(int node, double weight, const Eigen::Vector3d& targe
     a_.target[k][node] = target[k];
     a_.force[k][node] = force[k];
   }
+}
+
+void RodSystem::setTwistLoads(const Eigen::VectorXd& torques)
+{
+  twist_load_.assign(torques.data(), torques.data() + torques.size());
+  if (turned_.size() != twist_load_.size())
+    turned_.assign(twist_load_.size(), 0.0);
+}
+
+double RodSystem::twistWork() const
+{
+  double work = 0.0;
+  for (std::size_t j = 0; j < twist_load_.size(); ++j)
+    work += twist_load_[j] * (turned_[j] + a_.turn[j]);
+  return work;
+}
+
+void RodSystem::addTwistLoads(int from, int to)
+{
+  const int end = std::min(to, static_cast<int>(twist_load_.size()));
+  for (int j = from; j < end; ++j)
+    gradient_[4 * j + 3] -= twist_load_[j];
+}
+
+bool RodSystem::mayTurn(int edge) const
+{
+  return std::find(held_angles_.begin(), held_angles_.end(), edge) == held_angles_.end();
 }
 
 void RodSystem::strains(Eigen::Matrix4Xd& out) const
@@ -169,6 +197,7 @@ RodEvaluation RodSystem::evaluate(bool with_hessian, const HessianShift& shift)
     }
     // the newest node may still receive from a clamp on the edge after it
     const int complete = done < n ? done - 1 : n;
+    addTwistLoads(eliminated, complete);
     takeReactions(eliminated, complete);
     if (with_hessian)
     {
@@ -191,6 +220,7 @@ RodEvaluation RodSystem::evaluate(bool with_hessian, const HessianShift& shift)
   }
   RodEvaluation result = kernels.end(sweep);
   result.bend_twist += clamped.bend_twist;
+  result.potential -= twistWork();
   result.min_chi = std::min(result.min_chi, clamped.min_chi);
   if (by_pieces)
     result.inertia = {4 * n - carry.negative - carry.zero, carry.negative, carry.zero};
@@ -210,8 +240,10 @@ RodEvaluation RodSystem::evaluateWhole(bool with_hessian)
   RodEvaluation clamped;
   for (ClampJoint& c : clamps_)
     evaluateClamp(c, with_hessian, clamped);
+  addTwistLoads(0, a_.nodes);
   RodEvaluation result = kernels.end(sweep);
   result.bend_twist += clamped.bend_twist;
+  result.potential -= twistWork();
   result.min_chi = std::min(result.min_chi, clamped.min_chi);
   return result;
 }
@@ -330,6 +362,8 @@ void RodSystem::accept()
     std::copy_n(a_.x[k], a_.nodes, x_base_[k].data());
   }
   std::swap(a_.base_twist, a_.twist);
+  for (std::size_t j = 0; j < turned_.size(); ++j)
+    turned_[j] += a_.turn[j];
   std::fill(a_.turn - kHalo, a_.turn + a_.nodes + kHalo, 0.0);
   for (ClampJoint& c : clamps_)
   {
@@ -351,6 +385,7 @@ void RodSystem::saveBase()
   }
   std::copy_n(a_.base_twist - kHalo, count, saved_[9].data());
   saved_clamps_ = clamps_;
+  saved_turned_ = turned_;
 }
 
 void RodSystem::restoreBase()
@@ -364,6 +399,7 @@ void RodSystem::restoreBase()
   }
   std::copy_n(saved_[9].data(), count, a_.base_twist - kHalo);
   clamps_ = saved_clamps_;
+  turned_ = saved_turned_;
 }
 
 double RodSystem::stepLimit() const
@@ -421,6 +457,8 @@ double RodSystem::forceScale() const
     const double moment = std::hypot(a_.b11[i] * (a_.kappa1[i] - a_.rest_kappa1[i]), a_.b22[i] * (a_.kappa2[i] - a_.rest_kappa2[i]));
     largest = std::max(largest, moment * a_.inverse_rest_length[i]);
   }
+  for (std::size_t j = 0; j < twist_load_.size(); ++j)
+    largest = std::max(largest, std::abs(twist_load_[j]) * a_.inverse_rest_length[j]);
   return largest;
 }
 

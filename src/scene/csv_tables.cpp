@@ -7,6 +7,7 @@
 #include <set>
 
 #include "earlier_run.h"
+#include "slender_sim/scene/statics_run.h"
 #include "text_file.h"
 
 namespace slender {
@@ -23,6 +24,7 @@ const std::string& clearedFolder(const std::string& folder)
   };
   makeFolder(folder);
   clearEarlierRun(folder, ours, "t [s],");
+  clearStatics(folder);
   return folder;
 }
 

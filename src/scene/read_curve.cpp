@@ -57,12 +57,18 @@ ArcCurve readArc(YamlMap& map)
   assign(curve.start, map.get("start").vector3(coordinate));
   assign(curve.axis, map.get("axis").vector3(coordinate));
   const YamlCursor angle = map.get("angle");
-  assign(curve.angle, angle.number(Range::closed(-2 * M_PI - 1e-6, 2 * M_PI + 1e-6, "rad")));
+  assign(curve.angle, angle.number(Range::closed(-2e5 * M_PI, 2e5 * M_PI, "rad")));
   if (curve.angle == 0)
   {
-    angle.problem("must not be zero; must be in [-2 pi, 2 pi] rad");
+    angle.problem("must not be zero");
   }
   assign(curve.edges, readEdges(map));
+  // Edges that turn by half a turn or more each lie the wrong way round the circle, or fold back.
+  if (std::abs(curve.angle) >= 0.999 * M_PI * curve.edges)
+  {
+    angle.problem("is too much for " + std::to_string(curve.edges) + " edges, each of which may turn by less than pi; give edges of at least " +
+                  std::to_string(static_cast<long>(std::abs(curve.angle) / (0.999 * M_PI)) + 1));
+  }
   return curve;
 }
 

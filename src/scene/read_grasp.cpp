@@ -56,6 +56,69 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
   std::tie(grasp.first_node, grasp.last_node) = nodesOfEdges(edge_list, held->first, held->second, closed, edges);
 }
 
+/// `direction` and `director` of a clamped section. They stand in for the orientation of poses that have none.
+void readFrame(YamlMap& map, GraspConfig& grasp)
+{
+  const Range any = Range::closed(-1e6, 1e6);
+  for (const auto& [key, vector] : {std::make_pair("direction", &grasp.direction), std::make_pair("director", &grasp.director)})
+  {
+    const YamlCursor at = map.get(key);
+    const auto value = at.vector3(any);
+    if (!value)
+    {
+      continue;
+    }
+    if (!(value->norm() > 0))
+    {
+      at.problem("must not be zero");
+    }
+    else if (grasp.hold == Hold::position)
+    {
+      at.problem("needs hold: frame; hold: position leaves the direction free");
+    }
+    else if (grasp.attach == Attach::initial)
+    {
+      at.problem("needs attach: section; attach: initial keeps the orientation that the section has at the start");
+    }
+    else
+    {
+      *vector = value->normalized();
+    }
+  }
+  if (grasp.direction.cross(grasp.director).norm() < 1e-6 && grasp.direction.norm() * grasp.director.norm() > 0)
+  {
+    map.get("director").problem("is along direction; must point away from it");
+  }
+}
+
+/// Poses with an orientation of their own leave nothing for `direction` and `director` to say.
+void checkFrame(YamlMap& map, const GraspConfig& grasp)
+{
+  if (grasp.direction.isZero(0) && grasp.director.isZero(0))
+  {
+    return;
+  }
+  const YamlCursor at = map.get(grasp.direction.isZero(0) ? "director" : "direction"), motion = map.get("motion");
+  const YamlCursor table = motion.isMap() ? YamlMap(motion).get("table") : motion;
+  if (!std::holds_alternative<FixedMotion>(grasp.motion) && !(motion.isMap() && table.present()))
+  {
+    at.problem("and this motion both say how the section is turned; must be left out, or the motion fixed or a table of [t, x, y, z]");
+    return;
+  }
+  if (!table.isList())
+  {
+    return;
+  }
+  for (const YamlCursor& row : table.items())
+  {
+    if (row.isList() && row.items().size() == 8)
+    {
+      row.problem("has an orientation, and so has " + std::string(grasp.direction.isZero(0) ? "director" : "direction") +
+                  "; must be [t, x, y, z], or leave direction and director out");
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<int> readIndexList(const YamlCursor& at, int count)
@@ -122,7 +185,10 @@ GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadC
   const YamlCursor hold = map.get("hold");
   assign(grasp.hold, hold.choice<Hold>({{"frame", Hold::frame}, {"position", Hold::position}}));
   assign(grasp.attach, map.get("attach").choice<Attach>({{"section", Attach::section}, {"initial", Attach::initial}}));
-  grasp.motion = readMotion(map.get("motion"), context, grasp.hold == Hold::frame && grasp.attach == Attach::section);
+  readFrame(map, grasp);
+  const bool oriented = grasp.direction.norm() + grasp.director.norm() > 0;
+  grasp.motion = readMotion(map.get("motion"), context, grasp.hold == Hold::frame && grasp.attach == Attach::section && !oriented);
+  checkFrame(map, grasp);
   if (grasp.hold == Hold::position && grasp.first_node != grasp.last_node)
   {
     hold.problem("holds " + std::to_string(grasp.last_node - grasp.first_node + 1) +

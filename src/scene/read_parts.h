@@ -37,6 +37,8 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
 /// Nodes held when edges first..last of the rod are (see GraspConfig); reports the joining edge of a closed rod.
 std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges);
 GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges);
+/// Point loads of a rod with so many edges (0: not known).
+std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, bool closed, int edges);
 CrossSection readCrossSection(const YamlCursor& at, int edges);
 /// Warns that contact treats elliptical sections of a rod as circles. Call this after its cross-section and its contact have been read.
 void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod);
@@ -80,6 +82,11 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodPart>& rods);
 TimeConfig readTime(const YamlCursor& at);
 RecordConfig readRecord(const YamlCursor& at);
+StartConfig readStart(const YamlCursor& at);
+/// Nothing without the key.
+std::optional<StaticsConfig> readStatics(const YamlCursor& at);
+/// Reports what statics cannot do with this scene; called when all objects have been read.
+void checkStatics(const YamlCursor& at, const SceneConfig& scene);
 /// Reports fields that nothing in the scene has; called when all objects have been read.
 void checkRecord(const YamlCursor& at, const SceneConfig& scene);
 

@@ -370,6 +370,7 @@ RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::str
   readTraits(map, rod);
   warnOfRoundContact(at_section, rod);
   readGrasps(map.get("grasps"), context, rod, edges);
+  rod.loads = readRodLoads(map.get("loads"), rod.closed, edges);
   rod.tracking = readTrackedCurve(map.get("track"), context, rod, edges);
   map.finish();
   return {std::move(rod), edges};

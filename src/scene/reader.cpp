@@ -259,7 +259,7 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   {
     YamlMap(time).get("spectral_radius").problem("is for generalized_alpha, which cloth does not have; leave it out");
   }
-  if (scene.start == Start::equilibrium)
+  if (scene.start.equilibrium)
   {
     map.get("start").problem("is not for cloth; must be as_given");
   }
@@ -278,7 +278,7 @@ void checkThreadTime(YamlMap& map, const SceneConfig& scene)
   {
     refuse(time.get("integrator"), "is not for threads; must be implicit_euler", "does not hold for the scene's threads, which take implicit Euler steps.");
   }
-  if (scene.start == Start::equilibrium)
+  if (scene.start.equilibrium)
   {
     refuse(map.get("start"), "is not for threads, which flow; must be as_given",
            "does not hold for the scene's threads, which flow: they start as given.");
@@ -310,7 +310,7 @@ void checkTrackedTime(YamlMap& map, SceneConfig& scene)
   {
     time.get("error_tolerance").problem("is not for rods that track a guide, whose steps are of fixed length; leave it out");
   }
-  if (scene.start == Start::equilibrium)
+  if (scene.start.equilibrium)
   {
     map.get("start").problem("is not for rods that track a guide; must be as_given");
   }
@@ -327,7 +327,8 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
                      "; must be a map, at least with rods: [{...}], threads: [{...}] or cloths: [{...}]");
   }
   YamlMap map(root);
-  const Range acceleration = Range::closed(-1e4, 1e4, "m/s^2"), speed = Range::closed(-max_wind_speed, max_wind_speed, "m/s");
+  // The largest acceleration serves scaled problems, whose lengths, masses and moduli are of order one.
+  const Range acceleration = Range::closed(-1e9, 1e9, "m/s^2"), speed = Range::closed(-max_wind_speed, max_wind_speed, "m/s");
   assign(scene.name, map.get("name").text());
   assign(scene.gravity, map.get("gravity").vector3(acceleration));
   const YamlCursor wind = map.get("wind");
@@ -336,7 +337,9 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   const YamlCursor wind_topic = wind_map.get("topic");
   assign(scene.wind_topic, wind_topic.boolean());
   wind_map.finish();
-  assign(scene.start, map.get("start").choice<Start>({{"as_given", Start::as_given}, {"equilibrium", Start::equilibrium}}));
+  scene.start = readStart(map.get("start"));
+  const YamlCursor statics = map.get("statics");
+  scene.statics = readStatics(statics);
   const YamlCursor time = map.get("time");
   scene.time = readTime(time);
   const YamlCursor record = map.get("record");
@@ -347,6 +350,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   context.step = scene.time.step;
   readObjects(map, context, scene);
   checkRecord(record, scene);
+  checkStatics(statics, scene);
   const bool touches = std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
   if (touches && !YamlMap(time).has("integrator"))
   {

@@ -1,7 +1,6 @@
 #include "slender_sim/scene/simulation.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -16,7 +15,7 @@ bool isIdentity(const Pose& X) { return X.position == Eigen::Vector3d::Zero() &&
 
 }  // namespace
 
-Simulation::Simulation(SceneConfig config) : config_(std::move(config))
+Simulation::Simulation(SceneConfig config, bool solve_start) : config_(std::move(config)), gravity_(config_.gravity)
 {
   buildRods();
   buildThreads();
@@ -35,43 +34,11 @@ Simulation::Simulation(SceneConfig config) : config_(std::move(config))
       takeOffset(static_cast<int>(g), table ? table->poses.firstTime() : 0.0);
     }
   }
-  if (config_.start == Start::equilibrium)
+  if (config_.start.equilibrium && solve_start)
   {
     findEquilibrium();
   }
   initial_ = state_;
-}
-
-void Simulation::findEquilibrium()
-{
-  SceneInputs inputs;
-  inputsAt(0.0, inputs);
-  fillRodInputs(inputs);
-  StepReport report;
-  for (std::size_t r = 0; r < steppers_.size() && report.ok; ++r)
-  {
-    if (steppers_[r])
-    {
-      report.merge(steppers_[r]->solveEquilibrium(state_.rods[r], rod_inputs_[r]));
-    }
-  }
-  if (report.ok && group_)
-  {
-    report.merge(stepGroup(inputs, true));
-  }
-  if (!report.ok)
-  {
-    throw SimulationError("start: equilibrium: " + report.message + " (start: as_given starts from the shape in the scene)");
-  }
-  if (!report.stable)
-  {
-    char lowest[40];
-    std::snprintf(lowest, sizeof lowest, "%.3g", report.lowest_eigenvalue);
-    throw SimulationError("start: equilibrium: the equilibrium is unstable (lowest eigenvalue " + std::string(lowest) +
-                          " 1/s^2), and no stable one was reached from it: start from a shape that is nearer to the stable equilibrium (initial), or hold "
-                          "what drifts by a grasp (start: as_given starts from the shape in the scene)");
-  }
-  takeWrenches();
 }
 
 void Simulation::inputsAt(double time, SceneInputs& inputs) const
@@ -170,7 +137,9 @@ void Simulation::fillRodInputs(const SceneInputs& inputs)
   rod_inputs_.resize(models_.size());
   for (std::size_t r = 0; r < models_.size(); ++r)
   {
-    rod_inputs_[r].gravity = config_.gravity;
+    rod_inputs_[r].gravity = gravity_;
+    rod_inputs_[r].forces = rod_loads_[r].forces;
+    rod_inputs_[r].torques = rod_loads_[r].torques;
     rod_inputs_[r].wind = inputs.wind;
     rod_inputs_[r].grasps.resize(state_.rods[r].grasps.size());   // welds last: the group fills them
   }

@@ -149,7 +149,7 @@ void Simulation::exchangeGroup()
 
 StepReport Simulation::stepGroup(const SceneInputs& inputs, bool to_equilibrium)
 {
-  group_inputs_.gravity = config_.gravity;
+  group_inputs_.gravity = gravity_;
   group_inputs_.rods.resize(group_rods_.size());
   group_inputs_.bodies.resize(group_bodies_.size());
   for (std::size_t k = 0; k < group_rods_.size(); ++k)

@@ -72,6 +72,13 @@ std::uint64_t Simulation::fingerprint() const
       text(grasp.name);
       out(static_cast<int>(grasp.attach));
     }
+    for (const RodLoadConfig& load : config_.rods[r].loads)
+    {
+      out(load.node);
+      out(load.arc_length);
+      out(load.force);
+      out(load.torque);
+    }
     if (const auto& tracking = config_.rods[r].tracking)
     {
       tracked(*tracking);

@@ -44,6 +44,8 @@ const char* const usage =
   "  --state FILE        save the state that was reached, as the nodes' save_state does; after a failure as well\n"
   "  --set PATH=VALUE    override a value of the scene, e.g. rods.0.material.youngs_modulus=1e7; may be repeated\n"
   "  --threads N         threads for scenes of several rods; results do not depend on it\n"
+  "  --statics           only find equilibria: those that `statics` of the scene asks for, or one. Prints residual, energy, lowest\n"
+  "                      eigenvalue and stability of each; tables of them with --csv. Exit status 3 without a stable one\n"
   "  --quiet             print nothing but warnings and errors\n"
   "record.every of the scene says which steps are recorded. Exit status: 0 done, 2 bad input, 3 the simulation failed,\n"
   "or its results could not be written (disk full): the message names what is left of them; 130 stopped by SIGINT (Ctrl-C),\n"
@@ -55,7 +57,7 @@ struct Options
   std::vector<std::string> overrides;
   std::optional<double> duration;
   std::optional<int> threads;
-  bool quiet = false, help = false;
+  bool quiet = false, help = false, statics = false;
 };
 
 Options parseOptions(int argc, char** argv)
@@ -107,6 +109,10 @@ Options parseOptions(int argc, char** argv)
     {
       options.quiet = true;
     }
+    else if (argument == "--statics")
+    {
+      options.statics = true;
+    }
     else if (argument == "--help" || argument == "-h")
     {
       options.help = true;
@@ -127,6 +133,10 @@ Options parseOptions(int argc, char** argv)
   if (options.scene.empty() && !options.help)
   {
     throw BadInput(std::string("a scene file is missing\n") + usage);
+  }
+  if (options.statics && options.duration)
+  {
+    throw BadInput(std::string("--duration: statics has no time; leave out --duration or --statics\n") + usage);
   }
   return options;
 }
@@ -328,6 +338,108 @@ void saveState(const Simulation& simulation, const std::string& path)
   }
 }
 
+void printRow(const slender::StaticsRow& row)
+{
+  const StepReport& r = row.report;
+  std::printf("load factor       %.9g\n", row.factor);
+  std::printf("  residual        %.3g of the largest force\n", r.residual);
+  std::printf("  energy          %.9g J\n", r.energy);
+  std::printf("  lowest eigenvalue %.6g 1/s^2%s\n", r.lowest_eigenvalue, r.lowest_eigenvalue == 0 ? " (a motion that costs nothing)" : "");
+  std::printf("  stable          %s, %d unstable equilibria left on the way\n", r.stable ? "yes" : "no", r.escapes);
+  std::printf("  largest move    %.6g m\n", row.displacement);
+}
+
+/// Lines of a path are short: there may be thousands.
+void printPath(const std::vector<slender::StaticsRow>& rows)
+{
+  std::printf("%14s %12s %16s %18s %8s %14s\n", "load factor", "residual", "energy [J]", "eigenvalue [1/s^2]", "stable", "move [m]");
+  for (const slender::StaticsRow& row : rows)
+  {
+    std::printf("%14.8g %12.3g %16.9g %18.6g %8s %14.6g\n", row.factor, row.report.residual, row.report.energy, row.report.lowest_eigenvalue,
+                row.report.stable ? "yes" : "no", row.displacement);
+  }
+}
+
+void printStatics(const Simulation& simulation, const slender::StaticsRun& found, double wall)
+{
+  std::printf("scene             %s\n", simulation.config().name.c_str());
+  std::printf("wall              %.6g s\n", wall);
+  printModuli(simulation);
+  if (found.critical)
+  {
+    std::printf("critical factor   %.9g (%s)\n", found.critical->factor,
+                found.critical->fold ? "a limit load: no equilibrium is near beyond it" : "paths branch: beyond it the equilibrium is unstable");
+  }
+  if (simulation.config().statics && simulation.config().statics->path)
+  {
+    printPath(found.rows);
+    return;
+  }
+  for (const slender::StaticsRow& row : found.rows)
+  {
+    printRow(row);
+  }
+}
+
+/// `simulate --statics`. Returns the exit status.
+int runStatics(const Options& options, Simulation& simulation, Clock::time_point start)
+{
+  std::vector<std::unique_ptr<Recorder>> recorders = makeRecorders(options);
+  const slender::StaticsRun found = simulation.runStatics();
+  if (!simulation.config().threads.empty())
+  {
+    std::fprintf(stderr, "simulate: warning: --statics leaves the scene's threads, which flow, as they are given\n");
+  }
+  for (auto& recorder : recorders)
+  {
+    recorder->record(simulation, found.rows.empty() ? found.end : found.rows.back().report);
+    recorder->finish();
+  }
+  if (!options.csv.empty())
+  {
+    std::vector<std::string> rods;
+    for (const slender::RodConfig& rod : simulation.config().rods)
+    {
+      rods.push_back(rod.name);
+    }
+    slender::writeStatics(options.csv, found, rods);
+  }
+  if (!options.state.empty())
+  {
+    saveState(simulation, options.state);
+  }
+  if (!options.quiet)
+  {
+    printStatics(simulation, found, std::chrono::duration<double>(Clock::now() - start).count());
+  }
+  if (!found.end.ok)
+  {
+    std::fprintf(stderr, "simulate: statics failed: %s\n", found.end.message.c_str());
+    return exit_failed;
+  }
+  if (simulation.config().statics && simulation.config().statics->path)
+  {
+    return exit_done;   // a path is asked for whether it is stable or not
+  }
+  for (const slender::StaticsRow& row : found.rows)
+  {
+    if (row.report.stable)
+    {
+      continue;
+    }
+    const bool accept = simulation.config().start.accept_unstable;
+    std::fprintf(stderr, "simulate: %sload factor %.9g: the equilibrium is unstable (lowest eigenvalue %.3g 1/s^2), and no stable one was reached from it%s\n",
+                 accept ? "warning: " : "", row.factor, row.report.lowest_eigenvalue,
+                 accept ? "" : ": start from a shape that is nearer to the stable equilibrium (initial), hold what drifts by a grasp, or accept it "
+                               "(start: {equilibrium: true, accept_unstable: true})");
+    if (!accept)
+    {
+      return exit_failed;
+    }
+  }
+  return exit_done;
+}
+
 int run(const Options& options)
 {
 #ifdef SLENDER_WITH_BAG
@@ -347,8 +459,9 @@ int run(const Options& options)
   const int every = config.record.every;
   const long steps = slender::stepsUntil(config.time.duration, step);
 
+  config.start.equilibrium = config.start.equilibrium || options.statics;
   const auto start = Clock::now();
-  Simulation simulation(std::move(config));
+  Simulation simulation(std::move(config), !options.statics);
   for (const std::string& warning : simulation.config().warnings)
   {
     std::fprintf(stderr, "simulate: warning: %s\n", warning.c_str());
@@ -357,7 +470,15 @@ int run(const Options& options)
   {
     simulation.setThreads(*options.threads);
   }
+  if (simulation.config().statics && !options.statics)
+  {
+    std::fprintf(stderr, "simulate: warning: the key statics of the scene is for --statics, without which it is not used\n");
+  }
   stopOnSignals();   // before there is anything to finish: until here a signal ends the process at once
+  if (options.statics)
+  {
+    return runStatics(options, simulation, start);
+  }
   std::vector<std::unique_ptr<Recorder>> recorders = makeRecorders(options);
   StepReport total;
   for (auto& recorder : recorders)

@@ -40,6 +40,10 @@ struct LoadedRod
     }
     for (int i = 0; i < n; ++i)
       system.setInertia(i, system.isFree(i) ? random.uniform(4.0, 6.0) : 0.0, rod.state.x.col(i) + random.vector(0.2), random.vector());
+    Eigen::VectorXd torques(rod.model->edges());
+    for (int j = 0; j < torques.size(); ++j)
+      torques[j] = 0.5 * std::sin(1.0 + 2.0 * j);
+    system.setTwistLoads(torques);
   }
 
   static Rod make(const Case& c, int n, Random& random)

@@ -40,7 +40,7 @@ struct StepReport
   long zones = 0;                 ///< cloth: pieces that could only be kept apart by moving them rigidly
   int mended_folds = 0;           ///< threads: sharp folds that were taken out because the step could not be done with them
   bool stable = true;             ///< statics: no small motion lowers the energy (false: stationary only, a saddle)
-  double energy = 0.0;            ///< statics: elastic energy and that of the loads [J]
+  double energy = 0.0;            ///< statics: elastic energy and that of gravity and forces [J]; torques about tangents have none
   /// Statics: the lowest eigenvalue of the energy's second derivative against the masses [1/s^2]; negative: unstable. It is the square of the
   /// lowest angular frequency. 0: a motion that costs nothing. Infinite: not computed.
   double lowest_eigenvalue = std::numeric_limits<double>::infinity();

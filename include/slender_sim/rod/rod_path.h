@@ -12,7 +12,8 @@ namespace slender {
 class RodPath
 {
 public:
-  /// `start` is an equilibrium at factor 0. Loads at a factor: those of `constant` plus factor times `scaled` (gravity and forces of both).
+  /// `start` is an equilibrium at factor 0. Loads at a factor: those of `constant` plus factor times `scaled` (gravity, wind, forces and torques of both; the wind
+  /// acts through the drag).
   /// Grasps stay where they are. `last_factor` (not zero) sets the scale and the sign of the factor.
   RodPath(std::shared_ptr<const RodModel> model, const RodState& start, const RodInputs& constant, const RodInputs& scaled, double last_factor);
   ~RodPath();

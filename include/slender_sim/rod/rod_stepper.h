@@ -25,6 +25,9 @@ struct RodInputs
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
   Eigen::Matrix3Xd forces;                ///< extra nodal forces, 3 x n [N], or empty
+  /// Torques about the tangents of the edges [N m], one per edge, or empty. They turn the material frames and go along where a tangent turns. Implicit
+  /// midpoint and generalised alpha refuse them, since their check of the energy does not know the work of such a torque.
+  Eigen::VectorXd torques;
 };
 
 /// Force and torque that the rod exerts on the gripper, about the grasp origin, in world axes.

@@ -67,6 +67,12 @@ public:
 
   /// Inertia and loads of node i: 1/2 weight |x - target|^2 - force . x.
   void setInertia(int node, double weight, const Eigen::Vector3d& target, const Eigen::Vector3d& force);
+  /// Torques about the tangents of the edges [N m], one per edge, or empty: none. They stay until they are set again, beyond load().
+  /// The potential is -sum M_j theta_j, where theta_j is the turn of edge j since load(). At fixed tangents that is exact. Where a tangent turns as
+  /// well, such a torque has no potential: its force field is M_j on theta_j and nothing on positions, and the matrix leaves out its skew part.
+  void setTwistLoads(const Eigen::VectorXd& torques);
+  /// Work of these torques on the way from the state of load() to the trial [J].
+  double twistWork() const;
 
   /// Elastic response; with viscous_ratio > 0 every stiffness acts as k (1 + ratio) about the mean of its rest strain and
   /// `viscous_strain` with weights 1 : ratio, which is the elastic force plus k ratio (strain - viscous_strain).
@@ -112,6 +118,7 @@ public:
   double forceScale() const;            ///< largest internal or external force [N]
   double noiseLevel() const;            ///< unbalanced force that round-off alone can cause [N]
   bool isFree(int node) const { return !held_[node]; }
+  bool mayTurn(int edge) const;         ///< its angle is not prescribed
   /// Has inertia here: free, or carried by a simulated body.
   bool isMoving(int node) const { return !held_[node] || carried_[node]; }
 
@@ -143,6 +150,7 @@ private:
   void respond(ClampJoint& clamp) const;
   void evaluateClamp(ClampJoint& clamp, bool with_hessian, RodEvaluation& sum);
   void takeReactions(int from, int to);
+  void addTwistLoads(int from, int to);
   RodPanel& panel(int node) { return panels_[node - first_panel_]; }
   void fixPanels(int from, int to);
   void fixUnknown(int node, int component, int from, int to);
@@ -164,6 +172,7 @@ private:
   std::vector<ClampJoint> saved_clamps_;
   AlignedVector<double> stretch_, b11_, b12_, b22_, beta_, rest_k1_, rest_k2_, rest_m_, coupling_;   ///< elastic response as composed
 
+  std::vector<double> twist_load_, turned_, saved_turned_;   ///< per edge, see setTwistLoads; turned_: from load() to the base [rad]; empty: no torques
   std::vector<GraspState> grasps_;
   std::vector<ClampJoint> clamps_;
   std::vector<char> carried_;                      ///< per node: held by a simulated body

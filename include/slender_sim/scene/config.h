@@ -18,6 +18,7 @@
 #include "slender_sim/geometry/pose_trajectory.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/scene/record_fields.h"
+#include "slender_sim/scene/statics_config.h"
 #include "slender_sim/scene/tracking_config.h"
 
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
@@ -117,6 +118,9 @@ struct GraspConfig
   Hold hold = Hold::frame;
   Motion motion = FixedMotion{};
   Attach attach = Attach::section;
+  /// Of a rod: unit tangent and unit first material axis of the held section, in world axes, for motions whose poses have no orientation. Zero: not
+  /// given. The director need not be normal to the tangent; its normal part counts.
+  Eigen::Vector3d direction{0, 0, 0}, director{0, 0, 0};
 };
 
 /// Selects the equations of a rod. `automatic` takes the isotropic form for explicit steps of naturally straight rods that bend
@@ -153,6 +157,7 @@ struct RodConfig
   Material material;
   Damping damping;
   std::vector<GraspConfig> grasps;
+  std::vector<RodLoadConfig> loads;            ///< dead point loads, in statics and in dynamics
   std::optional<RodContact> contact;           ///< nothing: touches nothing
   std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`track`), with one set of test functions; null: nothing
 };
@@ -307,7 +312,13 @@ struct ClothConfig
   std::optional<ClothContactConfig> contact;   ///< nothing: touches nothing
 };
 
-enum class Start { as_given, equilibrium };    ///< equilibrium: the static solver runs first
+/// How a scene starts.
+struct StartConfig
+{
+  bool equilibrium = false;                    ///< the static solver runs first
+  bool keep_velocities = false;                ///< simulated bodies have their given velocities at the equilibrium; otherwise they are at rest
+  bool accept_unstable = false;                ///< an unstable equilibrium is a warning; otherwise the scene is refused
+};
 
 struct RecordConfig
 {
@@ -326,7 +337,8 @@ struct SceneConfig
   Eigen::Vector3d gravity{0, 0, -9.81};        ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};               ///< [m/s]
   bool wind_topic = false;                     ///< `wind` messages set it; until the first one it is as above
-  Start start = Start::as_given;
+  StartConfig start;
+  std::optional<StaticsConfig> statics;        ///< what `simulate --statics` does besides one equilibrium
   TimeConfig time;
   RecordConfig record;
   ContactConfig contact;

@@ -13,6 +13,7 @@
 #include "slender_sim/rod/rod_group.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
+#include "slender_sim/scene/statics_run.h"
 #include "slender_sim/thread/touching_threads.h"
 #include "slender_sim/tracking/function_blend.h"
 
@@ -99,8 +100,9 @@ class Simulation
 {
 public:
   /// Throws SceneError (scene/reader.h) when the configuration cannot be built. With `start: equilibrium` it solves for it, and
-  /// throws SimulationError when there is none to be found.
-  explicit Simulation(SceneConfig config);
+  /// throws SimulationError when there is none to be found, or only an unstable one (unless `accept_unstable` makes a warning of it). With `solve_start`
+  /// false it starts as given all the same, and leaves the search for equilibria to runStatics().
+  explicit Simulation(SceneConfig config, bool solve_start = true);
 
   const SceneConfig& config() const { return config_; }
   const SceneState& state() const { return state_; }
@@ -132,6 +134,13 @@ public:
   /// One step of config().time.step. On failure the state is untouched. Throws std::invalid_argument unless there is one grasp
   /// target per grasp of the scene.
   StepReport step(const SceneInputs& inputs);
+
+  /// Of the equilibrium from which the scene starts; nothing when it starts as given.
+  const std::optional<StepReport>& startReport() const { return start_report_; }
+  /// What `statics` of the scene asks for, from the present state on; without the key one equilibrium. The state becomes the last equilibrium, at rest
+  /// (with start.keep_velocities bodies keep their velocities). Throws SceneError for objects that have no statics: cloth, rods that track a guide, or
+  /// nothing but threads. Equilibria that were not found are told by StaticsRun::end.
+  StaticsRun runStatics();
 
   /// Threads for scenes of several rods (at least 1; default: what OpenMP offers). Results do not depend on it.
   void setThreads(int threads);
@@ -189,8 +198,8 @@ private:
   };
 
   void buildRods();
+  void takeLoads(int rod, const RodModel& model);
   void takeOffset(int grasp, double time);
-  void findEquilibrium();
   StepReport stepAlone(int rod);
   const std::vector<Wrench>& rodWrenches(int rod) const;
   void inputsAt(double time, SceneInputs& inputs) const;
@@ -206,6 +215,20 @@ private:
   void takeRodTargets(const SceneInputs& inputs);
   void takeRodGuides(const SceneInputs& inputs, StepReport& report);
   void checkHeld(int rod, int grasp, int first_node, int last_node) const;
+
+  // simulation_statics.cpp
+  void findEquilibrium();
+  void checkHasStatics() const;
+  void takeStaticInputs();
+  Eigen::Vector3d gravityAt(double factor) const;
+  RodInputs loadsAt(int rod, double factor) const;
+  RodInputs loadsPerFactor(int rod, double factor) const;
+  StepReport solveStatics(double factor);
+  void perturb(double first_factor, StaticsRun& run);
+  void runFactors(const std::vector<double>& factors, StaticsRun& run);
+  void runPath(const PathConfig& path, StaticsRun& run);
+  void findCritical(double up_to, StaticsRun& run);
+  StaticsRow rowAt(double factor, const StepReport& report) const;
 
   // simulation_threads.cpp
   void buildThreads();
@@ -287,6 +310,11 @@ private:
   RodGroupState group_state_;
   RodGroupInputs group_inputs_;
   std::vector<RodInputs> rod_inputs_;
+  SceneInputs static_inputs_;                         ///< of statics, at time 0
+  std::vector<RodInputs> rod_loads_;                  ///< per rod: gravity, forces and torques of the scene; no grasps
+  Eigen::Vector3d gravity_{0, 0, 0};                  ///< that acts now: that of the scene, while runStatics() times the factor
+  Eigen::Matrix3Xd imperfection_;                     ///< forces on the nodes of the only rod [N], while runStatics() uses them
+  std::optional<StepReport> start_report_;
   std::vector<GraspRef> grasps_;
   int threads_ = 0;   // 0: as OpenMP says
 };
