@@ -130,10 +130,11 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
         report.ok = false;
         report.failure = sub.failure;
         report.message = sub.message;
+        report.place = sub.place;
         report.work = budget_->done();
         if (stepsInterrupted())
         {
-          report.failure = StepFailure::work_exceeded;
+          report.failure = StepFailure::interrupted;
           report.message = std::string("cloths: ") + kStepInterrupted;
           return report;
         }
@@ -339,6 +340,12 @@ StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, doub
                      (found.at_start ? "; start from a state in which nothing intersects" : "; use a shorter step, or leave the cloth more room") +
                      blameAverages(found);
     hopeless_ = found.at_start;
+    for (const int point : found.points)
+      if (point >= 0 && point < first_.back() && report.place.kind == FailurePlace::Kind::none)
+      {
+        const int cloth = clothOf(point);
+        report.place = {FailurePlace::Kind::cloth, model_.cloths[cloth]->name, point - first_[cloth], x_start_.col(point)};
+      }
     return report;
   }
   collisions_.repulsions += found.repulsions;

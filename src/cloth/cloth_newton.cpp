@@ -99,7 +99,9 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
     ClothEvaluation here = system.evaluateHessian(x_, kind);
     if (!std::isfinite(here.energy()))
       return StepFailure::state_not_finite;
-    if (budget_->spent() || stepsInterrupted())
+    if (stepsInterrupted())
+      return StepFailure::interrupted;
+    if (budget_->spent())
       return StepFailure::work_exceeded;
     if (!strict && here.energy() > best + 1e-13 * here.magnitude())
     {

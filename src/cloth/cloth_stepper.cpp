@@ -133,6 +133,35 @@ std::string ClothStepper::Impl::explain(StepFailure failure, double length)
   return "Newton's method did not converge" + at + ": use a shorter step, more time.newton.max_iterations or max_cuts, move the pins slowly, or start from a shape whose faces have area";
 }
 
+StepReport ClothStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length)
+{
+  // explicit steps end in a state that says nothing, and a spent budget may have left none; then the state at the start of the step is looked at
+  const bool trial = !isExplicit() && failure != StepFailure::work_exceeded;
+  const auto place = [&](int i) { return trial ? Eigen::Vector3d(point(x_, i)) : Eigen::Vector3d(work_.x.col(i)); };
+  Largest strain, node;
+  const auto& edges = model->topology.edges;
+  for (int e = 0; e < static_cast<int>(edges.cols()); ++e)
+  {
+    const double rest = (model->rest.vertices.col(edges(0, e)) - model->rest.vertices.col(edges(1, e))).norm();
+    strain.add(e, std::abs((place(edges(0, e)) - place(edges(1, e))).norm() / rest - 1.0));
+  }
+  for (int i = 0; i < model->vertices(); ++i)
+    if (trial && system.averageCount() == 0 && !system.held()[i])   // averages bear forces that the gradient does not know
+      node.add(i, point(system.gradient(), i).norm());
+    else if (!trial)
+      node.add(i, work_.v.col(i).norm());
+  const int a = edges(0, strain.index()), b = edges(1, strain.index());
+  const int at = node.any() ? node.index() : a;
+  report.place = {FailurePlace::Kind::cloth, model->name, at, work_.x.col(at)};
+  std::string text = ". The largest stretch strain is " + strain.text("") + ", between vertices " + std::to_string(a) + " and " + std::to_string(b);
+  if (node.any())
+    text += trial ? "; the largest unbalanced force is " + node.text("N") + ", on vertex " + std::to_string(at) + ", which"
+                  : "; vertex " + std::to_string(at) + " is the fastest, with " + node.text("m/s") + "; it";
+  else
+    text += ", of which the first";
+  return refuse(report, failure, explain(failure, length) + text + " was at " + metres(report.place.position) + " as the step began");
+}
+
 Eigen::Vector3d ClothStepper::Impl::pinAt(const ClothInputs& inputs, std::size_t pin, double fraction) const
 {
   const auto k = static_cast<Eigen::Index>(pin);
@@ -172,7 +201,7 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   while (t < duration)
   {
     if (budget_->spent())
-      return refuse(report, StepFailure::work_exceeded, explain(StepFailure::work_exceeded, h));
+      return refuseUnsolved(report, StepFailure::work_exceeded, h);
     const bool last = t + h > duration * (1 - 1e-9);
     const double to = last ? duration : t + h, length = to - t;
     StepReport sub;
@@ -182,7 +211,7 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
     else
       failure = isExplicit() ? explicitStep(inputs, t, to, duration, sub) : implicitStep(inputs, t, to, duration, sub);
     if (stepsInterrupted())   // linear solvers may have ended early
-      return refuse(report, StepFailure::work_exceeded, kStepInterrupted);
+      return refuse(report, StepFailure::interrupted, kStepInterrupted);
     const double ratio = adaptive ? sub.error_estimate / options.error_tolerance : 0.0;
     const bool inaccurate = failure == StepFailure::none && ratio > 1 && 0.5 * length >= options.min_step;
     if (failure != StepFailure::none || inaccurate)
@@ -194,7 +223,7 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
         continue;
       const bool shortest = 0.5 * length < (adaptive ? options.min_step : duration * std::ldexp(1 - 1e-9, -options.newton.max_cuts));
       if (!inaccurate && (isExplicit() || shortest || report.cut_steps >= most_cuts))
-        return refuse(report, failure, explain(failure, length));
+        return refuseUnsolved(report, failure, length);
       report.cut_steps += !inaccurate;
       h = length * (inaccurate ? std::clamp(stepFactor(ratio), 0.2, 0.8) : 0.5);
       continue;

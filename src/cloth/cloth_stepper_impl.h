@@ -30,6 +30,8 @@ private:
   bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
   std::string explain(StepFailure failure, double length);
+  /// Refuses a step of `length` seconds that could not be solved. The message says why and where the cloth was farthest from a solution.
+  StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length);
   double stepFactor(double ratio) const;
   StepFailure implicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
   void combine(const Combination& c, PointVector& result) const;

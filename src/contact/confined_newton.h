@@ -73,7 +73,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     const bool good = solve(fine, 0.01);
     if (stepsInterrupted())
     {
-      total.failure = StepFailure::work_exceeded;
+      total.failure = StepFailure::interrupted;
       return total;
     }
     const bool softer = system.contact().stiffen(good);

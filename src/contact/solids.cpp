@@ -150,4 +150,26 @@ double boundingRadius(const Shape& shape)
   return std::numeric_limits<double>::infinity();
 }
 
+double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& from, const Eigen::Vector3d& to)
+{
+  constexpr int kPlaces = 16;
+  const Eigen::Vector3d a = pose.inverse() * from, e = pose.inverse() * to - a;
+  double least = std::numeric_limits<double>::infinity();
+  const auto look = [&](const ConvexPiece& piece) {
+    for (int k = 0; k <= kPlaces; ++k)
+      least = std::min(least, pieceDistance(piece, a + e * k / kPlaces, e).distance);
+  };
+  std::visit(
+    [&](const auto& s) {
+      using T = std::decay_t<decltype(s)>;
+      if constexpr (std::is_same_v<T, std::shared_ptr<const TriangleMesh>>)
+        for (Eigen::Index i = 0; i < s->triangles.cols(); ++i)
+          look(Triangle{s->vertices.col(s->triangles(0, i)), s->vertices.col(s->triangles(1, i)), s->vertices.col(s->triangles(2, i))});
+      else
+        look(s);
+    },
+    shape);
+  return least;
+}
+
 }  // namespace slender

@@ -12,6 +12,7 @@ void StepReport::merge(const StepReport& other)
     ok = false;
     failure = other.failure;
     message = other.message;
+    place = other.place;
   }
   substeps += other.substeps;
   cut_steps += other.cut_steps;
@@ -51,6 +52,7 @@ const char* toString(StepFailure failure)
     case StepFailure::energy_grew: return "energy_grew";
     case StepFailure::overstretched: return "overstretched";
     case StepFailure::work_exceeded: return "work_exceeded";
+    case StepFailure::interrupted: return "interrupted";
     case StepFailure::turned_too_far: return "turned_too_far";
   }
   return "unknown";

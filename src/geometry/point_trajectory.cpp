@@ -33,9 +33,9 @@ void PointTrajectory::append(double time, const Eigen::Matrix3Xd& points)
 
 void PointTrajectory::forgetBefore(double time)
 {
-  // the segment of `time` starts at the last frame not after it, and the slope there needs one frame more
+  // The segment of `time` starts at the last frame not after it. The slope there needs one frame more, and up to three where it may be in a pause.
   const auto after = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin();
-  const auto drop = std::max<std::ptrdiff_t>(0, after - 2);
+  const auto drop = std::max<std::ptrdiff_t>(0, after - 4);
   times_.erase(times_.begin(), times_.begin() + drop);
   frames_.erase(frames_.begin(), frames_.begin() + drop);
 }
@@ -58,8 +58,11 @@ Eigen::Vector3d PointTrajectory::slope(std::size_t k, Eigen::Index i) const
   }
   if (k == 0 || k + 1 >= times_.size())
     return Eigen::Vector3d::Zero();   // held beyond the ends
+  const auto shift = [this, i](std::size_t j) { return Eigen::Vector3d(frames_[j].col(i) - frames_[j - 1].col(i)); };
+  if (pausesAt(times_, k, growing_, 0.0, shift))
+    return Eigen::Vector3d::Zero();
   const Eigen::Vector3d here = frames_[k].col(i);
-  return threePointSlope(times_[k] - times_[k - 1], frames_[k - 1].col(i) - here, times_[k + 1] - times_[k], frames_[k + 1].col(i) - here, 0.0);
+  return threePointSlope(times_[k] - times_[k - 1], frames_[k - 1].col(i) - here, times_[k + 1] - times_[k], frames_[k + 1].col(i) - here);
 }
 
 void PointTrajectory::evaluate(double time, Eigen::Matrix3Xd& points, Eigen::Matrix3Xd* velocities) const

@@ -60,9 +60,9 @@ void PoseTrajectory::append(double time, const Pose& pose)
 
 void PoseTrajectory::forgetBefore(double time)
 {
-  // The segment of `time` starts at the last sample not after it, and the slope there needs one sample more.
+  // The segment of `time` starts at the last sample not after it. The slope there needs one sample more, and up to three where it may be in a pause.
   const auto after = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin();
-  const auto drop = std::max<std::ptrdiff_t>(0, after - 2);
+  const auto drop = std::max<std::ptrdiff_t>(0, after - 4);
   times_.erase(times_.begin(), times_.begin() + drop);
   poses_.erase(poses_.begin(), poses_.begin() + drop);
 }
@@ -81,11 +81,17 @@ Twist PoseTrajectory::slope(std::size_t k) const
   }
   const double h0 = times_[k] - times_[k - 1], h1 = times_[k + 1] - times_[k];
   const Eigen::Quaterniond back = poses_[k].orientation.conjugate();
+  const auto shift = [this](std::size_t j) { return Eigen::Vector3d(poses_[j].position - poses_[j - 1].position); };
+  const auto turn = [this](std::size_t j) { return rotationVector(poses_[j - 1].orientation.conjugate() * poses_[j].orientation); };
   Twist slope;
-  slope.linear = threePointSlope(h0, poses_[k - 1].position - poses_[k].position, h1, poses_[k + 1].position - poses_[k].position,
-                                 same_position);
-  slope.angular = threePointSlope(h0, rotationVector(back * poses_[k - 1].orientation), h1, rotationVector(back * poses_[k + 1].orientation),
-                                  same_orientation);
+  if (!pausesAt(times_, k, growing_, same_position, shift))
+  {
+    slope.linear = threePointSlope(h0, poses_[k - 1].position - poses_[k].position, h1, poses_[k + 1].position - poses_[k].position);
+  }
+  if (!pausesAt(times_, k, growing_, same_orientation, turn))
+  {
+    slope.angular = threePointSlope(h0, rotationVector(back * poses_[k - 1].orientation), h1, rotationVector(back * poses_[k + 1].orientation));
+  }
   return slope;
 }
 

@@ -41,6 +41,7 @@ void GuideBuffer::begin(double time, const GuideTiming::Instant& now)
     trajectory_ = std::move(*next_);
   next_.reset();
   trajectory_.coast(options_.coast);
+  trajectory_.expectMore();
   open_ = false;
   const double start = trajectory_.firstTime();
   if (!following_)

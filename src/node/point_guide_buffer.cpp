@@ -56,6 +56,7 @@ void PointGuideBuffer::begin(double time, const GuideTiming::Instant& now)
     trajectory_ = std::move(*next_);
   next_.reset();
   trajectory_.coast(options_.coast);
+  trajectory_.expectMore();
   open_ = false;
   if (!following_)
     v_.setZero();

@@ -235,11 +235,13 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
       report.iterations += sub.iterations;
       report.factorizations += sub.factorizations;
       if (stepsInterrupted())
-        return rod.refuse(report, StepFailure::work_exceeded, kStepInterrupted);
+        return rod.refuse(report, StepFailure::interrupted, kStepInterrupted);
       if (0.5 * length < duration * std::ldexp(1.0 - 1e-9, -rod.time.newton.max_cuts))
-        return rod.refuse(report, failure, failure == StepFailure::singular_matrix
-                                             ? "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes"
-                                             : rod.explainFailure(failure, length, false));
+        return rod.refuseUnsolved(report, failure, length, false,
+                                  failure == StepFailure::singular_matrix
+                                    ? "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes"
+                                    : "",
+                                  true);
       ++report.cut_steps;
       h = 0.5 * length;
       continue;

@@ -219,6 +219,41 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length,
   }
 }
 
+Largest RodStepper::Impl::unbalancedForce() const
+{
+  Largest force;
+  for (int i = 0; i < system.arrays().nodes; ++i)   // none before the first load()
+    if (system.isFree(i))
+      force.add(i, system.nodeGradient(i).norm());
+  return force;
+}
+
+StepReport RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step, const std::string& why,
+                                            bool multipliers)
+{
+  // explicit steps end in a state that says nothing; that at their start shows what is about to blow up
+  Largest strain, node;
+  const bool implicit = !explicit_step && system.arrays().nodes == model->nodes();
+  for (int j = 0; j < model->edges(); ++j)
+    strain.add(j, implicit ? std::abs(system.arrays().strain[j])
+                           : std::abs((work.x.col((j + 1) % model->nodes()) - work.x.col(j)).norm() / model->rest_length[j] - 1.0));
+  if (implicit && !multipliers)
+    node = unbalancedForce();
+  else
+    for (int i = 0; i < model->nodes() && explicit_step; ++i)
+      node.add(i, work.v.col(i).norm());
+  const int at = node.any() ? node.index() : strain.index();
+  report.place = {FailurePlace::Kind::rod, model->name, at, work.x.col(at)};
+  std::string text = ". The largest stretch strain is " + strain.text("") + ", in edge " + std::to_string(strain.index());
+  if (node.any())
+    text += explicit_step ? "; node " + std::to_string(at) + " is the fastest, with " + node.text("m/s") + "; it"
+                          : "; the largest unbalanced force is " + node.text("N") + ", on node " + std::to_string(at) + ", which";
+  else
+    text += ", whose first node";
+  text += " was at " + metres(report.place.position) + " as the step began";
+  return refuse(report, failure, (why.empty() ? explainFailure(failure, length, explicit_step) : why) + text);
+}
+
 void RodStepper::Impl::placeAt(const RodInputs& inputs, double duration, double fraction)
 {
   for (std::size_t k = 0; k < stage_poses.size(); ++k)

@@ -104,18 +104,19 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
     {
       report.iterations += sub.iterations;
       report.factorizations += sub.factorizations;
-      if (stepsInterrupted() && !rods_.empty())
-        return rods_[failed_]->refuse(report, StepFailure::work_exceeded, kStepInterrupted);
+      const auto refuse_bodies = [&report](StepFailure why, const std::string& message) {
+        report.ok = false;
+        report.failure = why;
+        report.message = message;
+        return report;
+      };
+      if (stepsInterrupted())
+        return rods_.empty() ? refuse_bodies(StepFailure::interrupted, kStepInterrupted)
+                             : rods_[failed_]->refuse(report, StepFailure::interrupted, kStepInterrupted);
       const bool shortest = !adaptive && 0.5 * length < duration * std::ldexp(1.0 - 1e-9, -time_.newton.max_cuts);
       if (!inaccurate && (!can_shorten || shortest || ++cuts > time_.newton.max_cuts))
-      {
-        if (!rods_.empty())
-          return rods_[failed_]->refuse(report, failure, rods_[failed_]->explainFailure(failure, length, explicit_step));
-        report.ok = false;
-        report.failure = failure;
-        report.message = "the bodies' motion was not found: use a shorter step";
-        return report;
-      }
+        return rods_.empty() ? refuse_bodies(failure, "the bodies' motion was not found: use a shorter step")
+                             : rods_[failed_]->refuseUnsolved(report, failure, length, explicit_step);
       report.cut_steps += !inaccurate;
       h = length * (inaccurate ? std::clamp(stepFactor(ratio), 0.2, 0.8) : 0.5);
       continue;
@@ -171,7 +172,7 @@ StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
     report.iterations += newton.iterations;
     report.factorizations += newton.factorizations;
     if (!newton.ok())
-      return failing(0, newton.failure);
+      return failing(farthestFromBalance(), newton.failure);
     report.residual = std::max(report.residual, newton.residual);
     report.max_strain = std::max(report.max_strain, newton.max_strain);
     const bool last = s + 1 == plan_.stages.size();
@@ -181,6 +182,16 @@ StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
       last ? rods_[r]->finishStep(inputs_[r], duration_, t, h, report) : rods_[r]->endStage(s, inputs_[r], duration_, t, h);
   }
   return StepFailure::none;
+}
+
+/// The rod on which the largest unbalanced force acts.
+std::size_t StepLoop::farthestFromBalance() const
+{
+  Largest force;
+  for (std::size_t r = 0; r < rods_.size(); ++r)
+    if (const Largest own = rods_[r]->unbalancedForce(); own.any())
+      force.add(static_cast<int>(r), own.value());
+  return force.any() ? static_cast<std::size_t>(force.index()) : 0;
 }
 
 /// Next step length over this one for a local error that is `ratio` times the tolerance, with a margin.

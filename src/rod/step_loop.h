@@ -27,6 +27,7 @@ private:
   bool conserves(const RodState* states) const;
   double energy(bool at_start, double* allowance);
   StepFailure implicitStep(double t, double h, StepReport& report);
+  std::size_t farthestFromBalance() const;
   double stepFactor(double ratio) const;
 
   const TimeConfig time_;

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "slender_sim/scene/failure_surroundings.h"
+
 namespace slender {
 
 namespace {
@@ -206,6 +208,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
   if (!total.ok)
   {
     restore();
+    total.message += surroundingsOf(*this, total.place);
     return total;
   }
   moveGiven(inputs);

@@ -13,9 +13,6 @@
 
 namespace slender {
 
-/// Distance [m] of a segment from a shape, by places along the segment: enough to tell which of several shapes is nearest.
-double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
-
 /// Equations of threads with contact and merging, for minimize(). Threads that nothing touches keep their own band matrices; the others
 /// share one sparse matrix.
 class ThreadContact : public RemeshGuard

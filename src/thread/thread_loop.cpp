@@ -10,6 +10,16 @@ namespace slender {
 
 namespace {
 
+/// The part on which the largest unbalanced force acts.
+const ThreadPart* farthestFromBalance(const ThreadPart* parts, const ThreadPart* end)
+{
+  Largest force;
+  for (const ThreadPart* p = parts; p != end; ++p)
+    if (const Largest own = p->thread->unbalancedForce(); own.any())
+      force.add(static_cast<int>(p - parts), own.value());
+  return parts + std::max(force.index(), 0);
+}
+
 /// Of the parts from `parts` to `end`; on failure `failed` is the part it is about.
 StepFailure substep(const ThreadPart* parts, const ThreadPart* end, double from, double to, double duration, ThreadContact* contact,
                     StepReport& report, const ThreadPart*& failed)
@@ -22,7 +32,10 @@ StepFailure substep(const ThreadPart* parts, const ThreadPart* end, double from,
   const StepFailure failure =
     contact ? contact->solve(from / duration, to / duration, h, report) : parts->thread->solveAlone(h, report);
   if (failure != StepFailure::none)
+  {
+    failed = farthestFromBalance(parts, end);
     return failure;
+  }
   for (const ThreadPart* p = parts; p != end; ++p)
     p->thread->takeOver(h);
   for (failed = parts; failed != end; ++failed)
@@ -72,14 +85,14 @@ StepReport advanceThreads(const ThreadPart* parts, int count, double duration, T
     {
       const ThreadStepper::Impl& thread = *failed->thread;
       if (stepsInterrupted())
-        return thread.refuse(report, StepFailure::work_exceeded, kStepInterrupted);
+        return thread.refuse(report, StepFailure::interrupted, kStepInterrupted);
       // a shorter step now would only hide that all of them are too long, or draw the thread out or thicken it bit by bit
       if (thread.explicit_step || failure == StepFailure::overstretched || thread.overgrownEdge() >= 0)
-        return thread.refuse(report, failure, thread.explainFailure(failure, length));
+        return thread.refuseUnsolved(report, failure, length);
       if (0.5 * length < shortest * (1 - 1e-9))
       {
         if (report.mended_folds >= kMostFolds || !mend(parts, end, contact))
-          return thread.refuse(report, failure, thread.explainFailure(failure, length));
+          return thread.refuseUnsolved(report, failure, length);
         ++report.mended_folds;
         h = first;
         continue;

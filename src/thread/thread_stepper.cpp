@@ -141,6 +141,31 @@ std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double leng
   }
 }
 
+Largest ThreadStepper::Impl::unbalancedForce() const
+{
+  Largest force;
+  for (int i = std::max(first_, 0); i < work.nodes(); ++i)
+    if (const int k = inSystem(i); k >= 0 && k < system.nodes() && !isHeld(i))
+      force.add(i, system.reaction(k).head<3>().norm());
+  return force;
+}
+
+StepReport ThreadStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length) const
+{
+  std::string text = explainFailure(failure, length);
+  const int grown = overgrownEdge();
+  const Largest force = grown < 0 ? unbalancedForce() : Largest();
+  if (grown >= 0 || force.any())
+  {
+    const int node = grown >= 0 ? grown : force.index();
+    report.place = {FailurePlace::Kind::thread, model->name, node, work.x[node]};
+    text += grown >= 0 ? ". The edge begins" : ". The largest unbalanced force is " + force.text("N") + ", on node " + std::to_string(node) + " of " +
+                                                 std::to_string(work.nodes()) + ", which was";
+    text += " at " + metres(report.place.position) + (grown >= 0 ? "" : " as the step began");
+  }
+  return refuse(report, failure, text);
+}
+
 bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& inputs, double duration, StepReport& report)
 {
   std::string what;

@@ -41,6 +41,10 @@ public:
   int overgrownEdge() const;
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
   std::string explainFailure(StepFailure failure, double length) const;
+  /// Largest unbalanced force [N] on a free node in the last evaluation, by the thread's numbers of nodes.
+  Largest unbalancedForce() const;
+  /// Refuses a step of `length` seconds that could not be solved. The message says why and where the thread was farthest from a solution.
+  StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length) const;
 
   /// When the first node goes through the floor, as a fraction of the substep; above 1: none does.
   double firstLanding() const;

@@ -93,11 +93,11 @@ GuideBuffer::Options options(bool live, bool automatic = false)
   return o;
 }
 
-// Poses that all come equally late. The bound on acceleration is the bar of the issue; what is measured is at most 1.06. No swing of 2 Hz: its extremes
-// lie in the middle between two samples, which PoseTrajectory takes for a pause, with or without lateness.
+// Poses that all come equally late. The bound on acceleration is the bar of the issue; what is measured is at most 1.06. The
+// extremes of the swing of 2 Hz lie in the middle between two samples, which are therefore equal without being a pause.
 TEST(LateGuides, ConstantlyLate)
 {
-  for (const double frequency : {0.5, 1.0, 1.9})
+  for (const double frequency : {0.5, 1.0, 2.0})
     for (const bool live : {false, true})
       for (int ms = 0; ms <= 300; ms += 10)
       {
@@ -134,7 +134,7 @@ TEST(LateGuides, InTimeIsExact)
 // Every pose late by another time, in the order of their stamps, as a stream over a network.
 TEST(LateGuides, Jitter)
 {
-  for (const double frequency : {0.5, 1.0, 1.9})
+  for (const double frequency : {0.5, 1.0, 2.0})
     for (const bool live : {false, true})
       for (const double most_late : {0.05, 0.1, 0.3})
       {

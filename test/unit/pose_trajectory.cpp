@@ -151,6 +151,78 @@ TEST(PoseTrajectory, aPauseStaysAPause)
   }
 }
 
+/// Greatest acceleration [m/s^2] along x, or about z [rad/s^2], by differences of the velocity over steps of a millisecond.
+double greatestAcceleration(const PoseTrajectory& trajectory, bool angular)
+{
+  constexpr double step = 1e-3;
+  double greatest = 0.0;
+  for (double t = trajectory.firstTime() + 0.5; t + step < trajectory.lastTime() - 0.5; t += step)
+  {
+    Twist a, b;
+    trajectory.evaluate(t, &a);
+    trajectory.evaluate(t + step, &b);
+    greatest = std::max(greatest, (angular ? b.angular - a.angular : b.linear - a.linear).norm() / step);
+  }
+  return greatest;
+}
+
+TEST(PoseTrajectory, aSwingDoesNotPauseAtItsPeaks)
+{
+  // 100 samples a second. Where the peak lies in the middle between two samples, these are equal: at 2 Hz without a phase every peak does. Each sample
+  // is the nearest float, as messages from elsewhere often are, so that equal samples are equal to the last bit.
+  double worst = 0.0;
+  int equal = 0;
+  for (const double frequency : {0.5, 1.0, 1.5, 2.0, 2.5, 3.0})
+  {
+    const double omega = 2.0 * M_PI * frequency;
+    for (const double shift : {0.0, 0.0025, 0.005})   // [s]
+    {
+      std::vector<double> times;
+      std::vector<Pose> poses;
+      for (int k = 0; k < 400; ++k)
+      {
+        times.push_back(0.01 * k);
+        const double x = static_cast<float>(0.2 * std::sin(omega * (0.01 * k + shift)));
+        equal += !poses.empty() && poses.back().position.x() == x;
+        poses.push_back({Eigen::Vector3d(x, 0, 0), Eigen::Quaterniond(Eigen::AngleAxisd(3.0 * x, Eigen::Vector3d::UnitZ()))});
+      }
+      const PoseTrajectory trajectory(times, poses);
+      const double commanded = 0.2 * omega * omega;
+      worst = std::max({worst, greatestAcceleration(trajectory, false) / commanded, greatestAcceleration(trajectory, true) / (3.0 * commanded)});
+    }
+  }
+  EXPECT_GT(equal, 20);
+  EXPECT_LT(worst, 1.5);   // the bar; cubics with three-point slopes have a few per cent more than the sine
+}
+
+TEST(PoseTrajectory, pausesDoNotOvershoot)
+{
+  // Waypoints with a hold of two samples or more, ways into it at constant speed, braking steadily until a sample and in between, and smoothly.
+  const std::vector<std::vector<double>> ways{
+    {0, 1, 1, 0},           {0, 1, 2, 2, 1, 0},           {0, 1, 2, 3, 3, 4, 5},          {-4.5, -2, -0.5, 0, 0, 0, -1}, {-4, -2.5, -1, -0.25, 0, 0, -0.5, -3},
+    {-8, -1, 0, 0, -1, -8}, {-5, -3, -1, 0, 0, 0, -1, -3}, {-6, -3, -1, 0, 0, 0.5, 0.5, 3}, {-6, -3, -1, 0, 0}};
+  for (const std::vector<double>& way : ways)
+  {
+    std::vector<double> times;
+    std::vector<Pose> poses;
+    for (std::size_t k = 0; k < way.size(); ++k)
+    {
+      times.push_back(0.1 * static_cast<double>(k));
+      poses.push_back({Eigen::Vector3d(way[k], 0, 0), Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * way[k], Eigen::Vector3d::UnitZ()))});
+    }
+    const PoseTrajectory trajectory(times, poses);
+    for (std::size_t k = 0; k + 1 < way.size(); ++k)
+    {
+      for (double s = 0; s <= 1 && way[k] == way[k + 1]; s += 0.05)
+      {
+        const Pose pose = trajectory.evaluate(times[k] + 0.1 * s);
+        EXPECT_EQ(pose.position.x(), way[k]) << "waypoint " << k << " of " << way.size();
+        EXPECT_LT(angleBetween(pose, poses[k]), 1e-7);
+      }
+    }
+  }
+}
+
 TEST(PoseTrajectory, aBurstOfSamplesDoesNotThrowThePoseAway)
 {
   // Two samples 0.1 ms apart with 1 mm of noise between them would give a three-point slope of 10 m/s, and so an overshoot of

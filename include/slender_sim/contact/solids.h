@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "slender_sim/contact/shape.h"
+#include "slender_sim/geometry/pose.h"
 
 namespace slender {
 
@@ -33,5 +34,8 @@ void checkShape(const Shape& shape);
 
 /// Radius [m] of a ball about the frame's origin that holds the shape; infinite for a plane.
 double boundingRadius(const Shape& shape);
+
+/// Distance [m] of a segment from a shape, by places along the segment: enough to tell which of several shapes is nearest.
+double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 }  // namespace slender

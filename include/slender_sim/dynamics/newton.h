@@ -59,7 +59,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
   for (;;)
   {
     if (stepsInterrupted())
-      return fail(StepFailure::work_exceeded);
+      return fail(StepFailure::interrupted);
     // round-off of the energy's sum; differences below it mean nothing
     const double noise = 1e-13 * (std::abs(trial.stretch) + std::abs(trial.bend_twist) + std::abs(trial.potential));
     while (!trial.inertia.positiveDefinite())

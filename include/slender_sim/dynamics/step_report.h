@@ -3,6 +3,8 @@
 #include <limits>
 #include <string>
 
+#include "slender_sim/dynamics/failure_place.h"
+
 namespace slender {
 
 /// Why a step was refused. The state is then what it was before the step.
@@ -20,6 +22,7 @@ enum class StepFailure
   overstretched,        ///< projection: the edges cannot all keep their lengths
   turned_too_far,       ///< isotropic formulation: the twist changed by about half a turn in one step, and could not be counted
   work_exceeded,        ///< cloth: more work than a step is given; the guide, or what holds it, moves too far at once or presses it too hard
+  interrupted,          ///< the process was asked to end (interruptSteps()); nothing is wrong with the step
 };
 
 /// What one call of step() did. Sums and maxima run over all its substeps.
@@ -28,6 +31,7 @@ struct StepReport
   bool ok = true;
   StepFailure failure = StepFailure::none;
   std::string message;            ///< empty when ok; otherwise the reason and what to change
+  FailurePlace place;             ///< of a failure: the node that it is about, where that is known
   int substeps = 0;               ///< steps actually taken (1 unless the step was cut or adapted)
   int cut_steps = 0;              ///< how often a step was halved because it could not be done
   int iterations = 0;             ///< Newton iterations

@@ -23,6 +23,8 @@ public:
   /// The slope at the first frame is that of the parabola through the first three (of two frames: their chord), and not zero: of a motion that was
   /// under way when it was sampled. Before that frame points are held all the same, so that a query there sees a jump in velocity.
   void startInMotion() { moving_start_ = true; }
+  /// From now on more frames may come: two equal ones at the end may be the turning point of a swing, and are no pause yet.
+  void expectMore() { growing_ = true; }
   /// Forgets frames that no query at or after `time` needs.
   void forgetBefore(double time);
 
@@ -42,6 +44,7 @@ private:
   std::vector<Eigen::Matrix3Xd> frames_;
   double coast_ = 0.0;
   bool moving_start_ = false;
+  bool growing_ = false;   ///< see expectMore()
 };
 
 }  // namespace slender

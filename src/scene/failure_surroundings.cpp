@@ -1,0 +1,285 @@
+#include "slender_sim/scene/failure_surroundings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "slender_sim/contact/distance.h"
+#include "slender_sim/contact/solids.h"
+
+namespace slender {
+
+namespace {
+
+using Kind = FailurePlace::Kind;
+
+struct Nearest
+{
+  double distance = std::numeric_limits<double>::infinity();   ///< [m]
+  std::string name;
+
+  void add(double other, const std::string& other_name)
+  {
+    if (other < distance)
+    {
+      distance = other;
+      name = other_name;
+    }
+  }
+  std::string text(const std::string& what) const
+  {
+    if (name.empty())
+    {
+      return "";
+    }
+    char away[40];
+    std::snprintf(away, sizeof away, "%.3g", distance);
+    return "; the nearest " + what + " is " + name + ", " + away + " m away";
+  }
+};
+
+template <class Configs>
+int indexOf(const Configs& configs, const std::string& name)
+{
+  const auto found = std::find_if(configs.begin(), configs.end(), [&name](const auto& config) { return config.name == name; });
+  return found == configs.end() ? -1 : static_cast<int>(found - configs.begin());
+}
+
+std::string quoted(const char* kind, const std::string& name) { return std::string(kind) + " '" + name + "'"; }
+
+/// Looks at one object of a simulation from one of its nodes.
+class Surroundings
+{
+public:
+  Surroundings(const Simulation& simulation, const FailurePlace& place) : simulation_(simulation), config_(simulation.config()), place_(place)
+  {
+    object_ = place.kind == Kind::rod      ? indexOf(config_.rods, place.name)
+              : place.kind == Kind::thread ? indexOf(config_.threads, place.name)
+                                           : indexOf(config_.cloths, place.name);
+  }
+
+  std::string text()
+  {
+    if (place_.kind == Kind::none || object_ < 0 || !place_.position.allFinite())
+    {
+      return "";
+    }
+    findHolder();
+    place_.kind == Kind::rod ? findPartnersOfRod() : place_.kind == Kind::thread ? findPartnersOfThread() : findPartnersOfCloth();
+    return holder_.text("grasp") + partner_.text("contact partner");
+  }
+
+private:
+  void findHolder()
+  {
+    const SceneState& state = simulation_.state();
+    for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
+    {
+      const GraspRef& ref = simulation_.grasps()[g];
+      if (!simulation_.isActive(static_cast<int>(g)) || (place_.kind == Kind::rod ? ref.rod : place_.kind == Kind::cloth ? ref.cloth : -1) != object_)
+      {
+        continue;
+      }
+      const std::string name = "'" + ref.config->name + "'";
+      if (place_.kind == Kind::rod)
+      {
+        const GraspState& held = state.rods[object_].grasps[ref.index];
+        holder_.add(toNodes(object_, held.first_node, held.last_node), name);
+      }
+      else
+      {
+        for (const int vertex : state.cloths[object_].grasps[ref.index].vertices)
+        {
+          holder_.add((state.cloths[object_].cloth.x.col(vertex) - place_.position).norm(), name);
+        }
+      }
+    }
+    for (const BodyConfig& body : config_.bodies)
+    {
+      for (const WeldConfig& weld : body.welds)
+      {
+        if (place_.kind == Kind::rod && weld.rod == object_)
+        {
+          holder_.add(toNodes(object_, weld.first_node, weld.last_node), "the weld to " + quoted("body", body.name));
+        }
+      }
+    }
+    if (place_.kind == Kind::thread)
+    {
+      for (const ThreadState& thread : state.threads[object_].threads)
+      {
+        for (int end = 0; end < 2; ++end)
+        {
+          if (thread.ends[end].held)
+          {
+            holder_.add(((end ? thread.x.back() : thread.x.front()) - place_.position).norm(), config_.threads[object_].nozzle ? "the nozzle" : "a held end");
+          }
+        }
+      }
+    }
+  }
+
+  double toNodes(int rod, int first, int last) const
+  {
+    const Eigen::Matrix3Xd& x = simulation_.state().rods[rod].x;
+    return (x.middleCols(first, last - first + 1).colwise() - place_.position).colwise().norm().minCoeff();
+  }
+
+  /// Obstacles, and the bodies that `touches` accepts; `radius`: of the object at the place [m].
+  template <class Touches>
+  void addSolids(double radius, Touches&& touches)
+  {
+    const SceneState& state = simulation_.state();
+    for (std::size_t k = 0; k < config_.obstacles.size(); ++k)
+    {
+      addSolid(config_.obstacles[k].shape, state.obstacles[k], radius, quoted("obstacle", config_.obstacles[k].name));
+    }
+    for (std::size_t b = 0; b < config_.bodies.size(); ++b)
+    {
+      const BodyConfig& body = config_.bodies[b];
+      if (body.shape && body.contact && touches(body))
+      {
+        addSolid(*body.shape, state.bodies[b].X_WB * body.X_BS, radius, quoted("body", body.name));
+      }
+    }
+  }
+
+  void addSolid(const Shape& shape, const Pose& pose, double radius, const std::string& name)
+  {
+    partner_.add(distanceToShape(shape, pose, place_.position, place_.position) - radius, name);
+  }
+
+  void addSegment(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radii, const std::string& name)
+  {
+    partner_.add(pointSegmentDistance(place_.position, a, b) - radii, name);
+  }
+
+  void findPartnersOfRod()
+  {
+    const auto& contact = config_.rods[object_].contact;
+    if (!contact)
+    {
+      return;
+    }
+    const RodModel& model = simulation_.rodModel(object_);
+    const double radius = largestRadius(model, std::min(place_.node, model.edges() - 1));
+    if (contact->obstacles)
+    {
+      addSolids(radius, [this](const BodyConfig& body) {
+        return std::none_of(body.welds.begin(), body.welds.end(), [this](const WeldConfig& weld) { return weld.rod == object_; });
+      });
+    }
+    for (int r = 0; r < static_cast<int>(config_.rods.size()); ++r)
+    {
+      const bool own = r == object_;
+      if (own ? !contact->self : !(contact->rods && config_.rods[r].contact && config_.rods[r].contact->rods))
+      {
+        continue;
+      }
+      const RodModel& other = simulation_.rodModel(r);
+      const Eigen::Matrix3Xd& x = simulation_.state().rods[r].x;
+      for (int j = 0; j < other.edges(); ++j)
+      {
+        const double radii = radius + largestRadius(other, j);
+        if (!own || !isNeighbour(other, j, radii))
+        {
+          addSegment(x.col(j), x.col((j + 1) % other.nodes()), radii, own ? "the rod itself at edge " + std::to_string(j) : quoted("rod", config_.rods[r].name));
+        }
+      }
+    }
+  }
+
+  static double largestRadius(const RodModel& model, int edge) { return std::max(model.radius_a[edge], model.radius_b[edge]); }
+
+  /// Whether an edge of the same rod is so near along it that the two never count as a contact (see contactNeighbours).
+  bool isNeighbour(const RodModel& model, int edge, double radii) const
+  {
+    const auto between = [&model](int from, int to) { return from < to ? model.rest_length.segment(from, to - from).sum() : 0.0; };
+    double along = edge >= place_.node ? between(place_.node, edge) : between(edge + 1, place_.node);
+    if (model.closed)
+    {
+      along = std::min(along, model.rest_length.sum() - along - model.rest_length[edge]);
+    }
+    return along < 0.5 * M_PI * radii + config_.contact.gap;
+  }
+
+  void findPartnersOfThread()
+  {
+    const ThreadConfig& config = config_.threads[object_];
+    const SceneState& state = simulation_.state();
+    double radius = 0.0;   // where the place is
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const ThreadState& thread : state.threads[object_].threads)
+    {
+      for (int j = 0; j < thread.edges(); ++j)
+      {
+        if (const double distance = (thread.x[j] - place_.position).norm(); distance < nearest)
+        {
+          nearest = distance;
+          radius = thread.radius(j);
+        }
+      }
+    }
+    if (config.floor)
+    {
+      partner_.add(place_.position.z() - config.floor->height - radius, "the floor");
+    }
+    if (config.contact && config.contact->obstacles)
+    {
+      addSolids(radius, [](const BodyConfig&) { return false; });   // threads do not meet bodies
+    }
+    for (int k = 0; config.contact && config.contact->threads && k < static_cast<int>(config_.threads.size()); ++k)
+    {
+      if (k == object_ || !config_.threads[k].contact || !config_.threads[k].contact->threads)
+      {
+        continue;
+      }
+      for (const ThreadState& thread : state.threads[k].threads)
+      {
+        for (int j = 0; j < thread.edges(); ++j)
+        {
+          addSegment(thread.x[j], thread.x[j + 1], radius + thread.radius(j), quoted("thread", config_.threads[k].name));
+        }
+      }
+    }
+  }
+
+  void findPartnersOfCloth()
+  {
+    const auto& contact = config_.cloths[object_].contact;
+    if (!contact)
+    {
+      return;
+    }
+    if (contact->obstacles)
+    {
+      addSolids(0.0, [](const BodyConfig& body) { return body.motion.has_value(); });   // cloth meets driven bodies only
+    }
+    for (int k = 0; k < static_cast<int>(config_.cloths.size()); ++k)
+    {
+      if (k == object_ || !contact->cloths || !config_.cloths[k].contact || !config_.cloths[k].contact->cloths)
+      {
+        continue;
+      }
+      const Eigen::Matrix3Xi& faces = config_.cloths[k].mesh.triangles;
+      const Eigen::Matrix3Xd& x = simulation_.state().cloths[k].cloth.x;
+      for (Eigen::Index f = 0; f < faces.cols(); ++f)
+      {
+        partner_.add(pointTriangleDistance(place_.position, x.col(faces(0, f)), x.col(faces(1, f)), x.col(faces(2, f))), quoted("cloth", config_.cloths[k].name));
+      }
+    }
+  }
+
+  const Simulation& simulation_;
+  const SceneConfig& config_;
+  const FailurePlace& place_;
+  int object_ = -1;
+  Nearest holder_, partner_;
+};
+
+}  // namespace
+
+std::string surroundingsOf(const Simulation& simulation, const FailurePlace& place) { return Surroundings(simulation, place).text(); }
+
+}  // namespace slender
