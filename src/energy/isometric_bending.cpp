@@ -32,6 +32,35 @@ HingeRow hingeRow(const TriangleMesh& mesh, const MeshTopology& t, Eigen::Index 
   return row;
 }
 
+std::vector<char> facesWithin(const TriangleMesh& mesh, const std::vector<int>& vertices)
+{
+  std::vector<char> chosen(static_cast<std::size_t>(mesh.vertices.cols()), 0), faces;
+  for (const int v : vertices)
+    chosen.at(static_cast<std::size_t>(v)) = 1;
+  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+  {
+    bool all = true;
+    for (int k = 0; k < 3; ++k)
+      all = all && chosen[static_cast<std::size_t>(mesh.triangles(k, f))] != 0;
+    faces.push_back(all);
+  }
+  return faces;
+}
+
+double hingeArea(const TriangleMesh& mesh, const MeshTopology& t, Eigen::Index h, const std::vector<char>& clamped)
+{
+  const auto faces = t.edge_faces.col(t.hinge_edges[static_cast<std::size_t>(h)]);
+  bool held[2] = {false, false};
+  double area[2];
+  for (int side = 0; side < 2; ++side)
+  {
+    const auto p = [&](int k) -> Vector3d { return mesh.vertices.col(mesh.triangles(k, faces[side])); };
+    area[side] = 0.5 * (p(1) - p(0)).cross(p(2) - p(0)).norm();
+    held[side] = !clamped.empty() && clamped[static_cast<std::size_t>(faces[side])];
+  }
+  return held[0] == held[1] ? area[0] + area[1] : area[held[0] ? 1 : 0];
+}
+
 namespace {
 
 /// Rows of the cotangent Laplacian: weights of the neighbours; the vertex itself has minus their sum.
@@ -133,16 +162,17 @@ Sample sampleVertices(const TriangleMesh& mesh, const MeshTopology& t, const Vec
 
 const char* toString(IsometricElement element) { return element == IsometricElement::conforming ? "conforming" : "nonconforming"; }
 
-PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& t, IsometricElement element, double coefficient)
+PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& t, IsometricElement element, double coefficient, const std::vector<char>& clamped)
 {
   std::vector<Eigen::Triplet<double>> entries;
   if (element == IsometricElement::nonconforming)
     for (Eigen::Index h = 0; h < t.hinges.cols(); ++h)
     {
       const HingeRow row = hingeRow(mesh, t, h);
+      const double factor = coefficient * 3.0 / hingeArea(mesh, t, h, clamped);
       for (int a = 0; a < 4; ++a)
         for (int b = 0; b < 4; ++b)
-          entries.emplace_back(row.vertices[a], row.vertices[b], coefficient * 3.0 / row.area * row.weights[a] * row.weights[b]);
+          entries.emplace_back(row.vertices[a], row.vertices[b], factor * row.weights[a] * row.weights[b]);
     }
   else
   {
@@ -173,13 +203,13 @@ double bendingCalibration(const TriangleMesh& mesh, const MeshTopology& t, Isome
   return 0.5 * sample.area / sample.energy;
 }
 
-Eigen::VectorXd hingeStiffness(const TriangleMesh& mesh, const MeshTopology& t, double coefficient)
+Eigen::VectorXd hingeStiffness(const TriangleMesh& mesh, const MeshTopology& t, double coefficient, const std::vector<char>& clamped)
 {
   Eigen::VectorXd stiffness(t.hinges.cols());
   for (Eigen::Index h = 0; h < t.hinges.cols(); ++h)
   {
-    const HingeRow row = hingeRow(mesh, t, h);
-    stiffness[h] = coefficient * 3.0 * (mesh.vertices.col(row.vertices[1]) - mesh.vertices.col(row.vertices[0])).squaredNorm() / row.area;
+    const double length2 = (mesh.vertices.col(t.hinges(1, h)) - mesh.vertices.col(t.hinges(0, h))).squaredNorm();
+    stiffness[h] = coefficient * 3.0 * length2 / hingeArea(mesh, t, h, clamped);
   }
   return stiffness;
 }

@@ -37,7 +37,7 @@ Matrix3d formOfCurvatures(const TriangleMesh& mesh, Eigen::Index f, double nu)
 
 }  // namespace
 
-std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTopology& t, double nu, double modulus)
+std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTopology& t, double nu, double modulus, const std::vector<char>& clamped)
 {
   if (!(nu > -1.0 && nu < 1.0))
     throw std::invalid_argument("Poisson's ratio of bending must be in (-1, 1), got " + std::to_string(nu));
@@ -47,6 +47,8 @@ std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTo
   std::vector<PlateTriangle> result;
   for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
   {
+    if (!clamped.empty() && clamped[static_cast<std::size_t>(f)])
+      continue;
     PlateTriangle triangle;
     int inner[3], free[3], free_count = 0;
     Vector3d per_angle;   // q / theta
@@ -59,7 +61,7 @@ std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTo
         continue;
       }
       const double length = (mesh.vertices.col(t.edges(1, edge)) - mesh.vertices.col(t.edges(0, edge))).norm();
-      per_angle[triangle.count] = length / (faceArea(mesh, t.edge_faces(0, edge)) + faceArea(mesh, t.edge_faces(1, edge)));
+      per_angle[triangle.count] = length / hingeArea(mesh, t, h, clamped);
       triangle.hinges[triangle.count] = h;
       inner[triangle.count++] = k;
     }
@@ -82,7 +84,7 @@ std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTo
   return result;
 }
 
-PointMatrix plateBending(const TriangleMesh& mesh, const MeshTopology& t, double poissons_ratio, double modulus)
+PointMatrix plateBending(const TriangleMesh& mesh, const MeshTopology& t, double poissons_ratio, double modulus, const std::vector<char>& clamped)
 {
   std::vector<HingeRow> rows;
   std::vector<double> per_length;
@@ -92,7 +94,7 @@ PointMatrix plateBending(const TriangleMesh& mesh, const MeshTopology& t, double
     per_length.push_back(1.0 / (mesh.vertices.col(t.hinges(1, h)) - mesh.vertices.col(t.hinges(0, h))).norm());
   }
   std::vector<Eigen::Triplet<double>> entries;
-  for (const PlateTriangle& triangle : plateTriangles(mesh, t, poissons_ratio, modulus))
+  for (const PlateTriangle& triangle : plateTriangles(mesh, t, poissons_ratio, modulus, clamped))
     for (int i = 0; i < triangle.count; ++i)
       for (int j = 0; j < triangle.count; ++j)
       {

@@ -26,13 +26,16 @@ struct PlateTriangle
 /// adjacent faces form a parallelogram: equilateral grids, and right-angled grids with parallel diagonals. An edge on the boundary has no angle. Its q_e
 /// is the one that makes the energy least, so that there is no moment across a free boundary.
 ///
-/// `modulus`: D [N m]. Throws std::invalid_argument for a ratio that is not in (-1, 1).
-std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTopology& topology, double poissons_ratio, double modulus);
+/// `modulus`: D [N m]. `clamped`: one per face, not 0 for a face that is held as a whole, or empty. Clamped faces have no energy, and A0 + A1 is without their area
+/// (see hingeArea()). Throws std::invalid_argument for a ratio that is not in (-1, 1).
+std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTopology& topology, double poissons_ratio, double modulus,
+                                          const std::vector<char>& clamped = {});
 
 /// The constant matrix K of this energy for isometric motions of a flat rest shape: E = 1/2 x^T K x for each coordinate of the points. An
 /// angle enters as the row of nonconforming isometric bending over the edge's length (see isometricBending()). For nu = -1/3 on equilateral triangles K is that model's,
 /// apart from the boundary.
-PointMatrix plateBending(const TriangleMesh& mesh, const MeshTopology& topology, double poissons_ratio, double modulus);
+PointMatrix plateBending(const TriangleMesh& mesh, const MeshTopology& topology, double poissons_ratio, double modulus,
+                         const std::vector<char>& clamped = {});
 
 /// Largest ratio of the energy that a quadratic surface gets from plateTriangles(), in triangles without a vertex on the boundary, to D/2 int [(1 - nu) S : S + nu tr(S)^2] dA.
 /// It is 1 on meshes of parallelograms and more on others, about 1.1 on irregular meshes. For flat meshes; 1 if all triangles have such a vertex.
