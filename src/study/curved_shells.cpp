@@ -1,4 +1,4 @@
-// Shells that are curved at rest: under no load they stay as they are.
+// Shells that are curved at rest: under no load they stay as they are, and about that shape they vibrate like the shells they stand for.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +11,7 @@
 
 #include "cloth_cases.h"
 #include "mesh_cases.h"
+#include "shell_modes.h"
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/scene/reader.h"
@@ -253,12 +254,107 @@ void creeps(StudyContext& context)
   context.metric("accepted_wrongly", acceptedWrongly(context, shapes));
 }
 
+/// A shell of the study of frequencies: mesh, what of it is held, and the frequencies of the continuous shell.
+struct VibratingShell
+{
+  std::string name;
+  TriangleMesh mesh;
+  std::vector<int> held;
+  Eigen::VectorXd expected;   ///< angular frequencies [rad/s]
+  double unsure = 0.0;        ///< change of these, relative, when the reference gets more terms
+};
+
+constexpr int kModes = 4;
+/// Bending has the ratio of hinges on equilateral triangles (see docs/cloth_node.md). The membrane has its own.
+const ShellMaterial kShell{1.0, 1e6, 0.3, 1e6 * 2e-3 * 2e-3 / 12, -1.0 / 3};
+
+/// Largest relative difference of two lists of frequencies.
+double difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b) { return (a.array() / b.array() - 1).abs().maxCoeff(); }
+
+/// A strip bent to an arc of 120 degrees, clamped at both ends. One more row of faces is held at each end, so that the
+/// edge between that row and the strip is clamped.
+VibratingShell arch(int columns)
+{
+  constexpr double kRadius = 0.2, kAngle = 2 * M_PI / 3;
+  const int rows = 5 * columns;
+  const double length = kRadius * kAngle, row = length / rows, width = columns * row / std::sqrt(0.75);
+  VibratingShell shell{"arch", gridMesh(width, length + 2 * row, columns, rows + 2, GridPattern::equilateral), {}, {}, 0.0};
+  for (Eigen::Index i = 0; i < shell.mesh.vertices.cols(); ++i)
+  {
+    const double s = shell.mesh.vertices(1, i) - row, a = s / kRadius - 0.5 * kAngle;
+    if (s < 0.5 * row || s > length - 0.5 * row)
+      shell.held.push_back(static_cast<int>(i));
+    shell.mesh.vertices.col(i) = Vector3d(shell.mesh.vertices(0, i), kRadius * std::sin(a), kRadius * std::cos(a));
+  }
+  shell.expected = archFrequencies(kShell, kRadius, kAngle, width, 18, kModes);
+  shell.unsure = difference(archFrequencies(kShell, kRadius, kAngle, width, 14, kModes), shell.expected);
+  return shell;
+}
+
+/// A cap of a sphere, up to 40 degrees from its axis, clamped along its rim.
+VibratingShell cap(int rings)
+{
+  constexpr double kRadius = 0.2, kAngle = 2 * M_PI / 9;
+  VibratingShell shell{"spherical cap", discMesh(kAngle * (rings + 1) / rings, rings + 1), {}, {}, 0.0};
+  for (Eigen::Index i = 0; i < shell.mesh.vertices.cols(); ++i)
+  {
+    const Vector3d at = shell.mesh.vertices.col(i);
+    const double a = at.norm(), share = a > 0 ? std::sin(a) / a : 1.0;
+    if (a > kAngle * (1 - 0.5 / rings))
+      shell.held.push_back(static_cast<int>(i));
+    shell.mesh.vertices.col(i) = kRadius * Vector3d(share * at.x(), share * at.y(), std::cos(a));
+  }
+  shell.expected = capFrequencies(kShell, kRadius, kAngle, 14, kModes);
+  shell.unsure = difference(capFrequencies(kShell, kRadius, kAngle, 10, kModes), shell.expected);
+  return shell;
+}
+
+/// Largest relative error of the frequencies of a mesh.
+double frequencyError(StudyContext& context, const VibratingShell& shell, double bound)
+{
+  ClothModel model = buildCloth(shell.name, shell.mesh, kShell.area_density,
+                                isotropicMembrane(kShell.stretching * (1 - kShell.membrane_ratio * kShell.membrane_ratio), kShell.membrane_ratio, 1.0));
+  model.bending = BendingModel::hinge;
+  model.bending_modulus = kShell.bending;
+  const Eigen::VectorXd found = meshFrequencies(model, shell.held, kModes);
+  double worst = 0.0;
+  for (int k = 0; k < kModes; ++k)
+  {
+    worst = std::max(worst, std::abs(found[k] / shell.expected[k] - 1));
+    Row& row = context.row();
+    row.set("case", "frequency " + std::to_string(k + 1)).set("shape", shell.name).set("model", "hinge").set("vertices", model.vertices());
+    row.set("relative_error", found[k] / shell.expected[k] - 1).set("reference_unsure_by", shell.unsure);
+    row.check(found[k], shell.expected[k], bound * shell.expected[k], "Ritz");
+  }
+  return worst;
+}
+
+/// The meshes converge with the width of their cells: the strip's free sides are of first order.
+void frequencies(StudyContext& context)
+{
+  constexpr double kBound = 0.01;   // of every row, coarse ones included
+  double worst = 0.0;
+  for (const bool spherical : {false, true})
+  {
+    const std::vector<int> sizes = context.quick() ? std::vector<int>{16} : std::vector<int>{16, 32};
+    for (const int n : sizes)
+    {
+      context.progress(n, sizes.back(), spherical ? "frequencies of a cap" : "frequencies of an arch");
+      worst = std::max(worst, frequencyError(context, spherical ? cap(n) : arch(n), kBound));
+    }
+  }
+  context.metric("worst_frequency_error", worst);
+}
+
 }  // namespace
 
 void runCurvedShells(StudyContext& context)
 {
   useOneBlasThread();
   creeps(context);
+  frequencies(context);
+  context.note("frequencies: of small motions about the rest shape, of a mesh with hinge bending against the method of Ritz for the continuous shell, both with the same "
+               "Poisson's ratios of bending (-1/3) and of the membrane (0.3).");
   context.note("at rest: nothing acts on the shells, so that all motion is the model's own. Models: as the scene asks for them; for curved shapes scenes "
                "take hinges instead of isometric bending.");
 }

@@ -129,7 +129,7 @@ const std::vector<Study>& studies()
       {"willmore_smoothing", "rough meshes of 24,192 and 44,928 triangles: times of 16 steps and of the factorisation", runWillmoreSmoothing},
       {"plate", "plates of every bending model on every mesh against plate theory: what D means", runPlate},
       {"plate_poisson", "clamped, supported and laterally loaded plates with Poisson's ratios of bending from -0.3 to 0.5", runPlatePoisson},
-      {"curved_shells", "shells that are curved at rest: they keep their shape without load", runCurvedShells},
+      {"curved_shells", "shells that are curved at rest: they keep their shape without load, and vibrate as the method of Ritz says", runCurvedShells},
       {"ibm_vs_hinge", "isometric bending beside hinges, as thesis table 2.1: gradient, Hessian, explicit and implicit steps", runIbmVsHinge},
       {"implicit_step", "a sheet pinned at two corners: a step and its parts beside one factorisation of its matrix", runImplicitStep},
       {"cloth_stability", "extreme stiffness, steps, random and crushed starts, needles, a yanked corner: done, recovered or refused with reason", runClothStability},
