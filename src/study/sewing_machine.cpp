@@ -13,11 +13,19 @@ namespace slender::study {
 namespace {
 
 /// Silicone oil of Morris et al. (2008), CGS units, at a height where inertia is small: H (g/nu^2)^(1/3) = 0.59, Omega^2 H / g = 0.16.
-constexpr double kHeight = 2.5, kSpeed = 0.0537, kPerTurn = 30, kStepAngle = 0.03;
+constexpr double kHeight = 2.5, kSpeed = 0.0537;
 
-ThreadSetup fallingThread(double radius)
+/// What the full and the quick form differ in. The quick one finds the same thresholds at a third of the cost.
+struct Resolution
 {
-  const double edge = 2 * M_PI * radius / kPerTurn;
+  double per_turn, step_angle;      ///< edges, and of the coil per step [rad]
+  double still, settle, watch;      ///< turns: on the still belt, at a new speed of the belt, and then recorded
+};
+constexpr Resolution kFull{30, 0.03, 80, 15, 15}, kQuick{20, 0.045, 60, 12, 12};
+
+ThreadSetup fallingThread(double radius, const Resolution& resolution)
+{
+  const double edge = 2 * M_PI * radius / resolution.per_turn;
   ThreadModel m;
   m.name = "sewing";
   m.density = 0.996;
@@ -26,7 +34,7 @@ ThreadSetup fallingThread(double radius)
   m.feed_length = edge;
   m.limits.max_edge_length = 1.5 * edge;
   m.limits.min_edge_length = 0.1 * edge;
-  m.limits.max_deposited = static_cast<int>(3 * kPerTurn);
+  m.limits.max_deposited = static_cast<int>(3 * resolution.per_turn);
   m.floor = {true, 0.0, false};
   ThreadSetup t = nozzleThread(m, {0, 0, kHeight}, kSpeed);
   t.inputs.gravity = {0, 0, -981};
@@ -36,10 +44,10 @@ ThreadSetup fallingThread(double radius)
 }
 
 /// Runs on for some turns of the coil while the belt comes to its new speed and the nozzle gives the thread a nudge, then records.
-std::vector<Landings::Point> observe(ThreadSetup& t, double belt, double coil_radius, double coil_frequency, double settle, double turns)
+std::vector<Landings::Point> observe(ThreadSetup& t, double belt, double coil_radius, double coil_frequency, double step_angle, double settle, double turns)
 {
   ThreadStepper stepper = makeStepper(t);
-  const double h = kStepAngle / coil_frequency, start = t.time, period = 2 * M_PI / coil_frequency;
+  const double h = step_angle / coil_frequency, start = t.time, period = 2 * M_PI / coil_frequency;
   const double before = t.inputs.belt_velocity.x();
   while (t.time < start + settle * period)
   {
@@ -62,9 +70,10 @@ std::vector<Landings::Point> observe(ThreadSetup& t, double belt, double coil_ra
 void runSewingMachine(StudyContext& context)
 {
   // the coil on a still belt sets the scales
+  const Resolution& resolution = context.quick() ? kQuick : kFull;
   double frequency = 7.8, radius = 0.185;
-  ThreadSetup still = fallingThread(radius);
-  std::vector<Landings::Point> coil = observe(still, 0.0, radius, frequency, 80, 6);
+  ThreadSetup still = fallingThread(radius, resolution);
+  std::vector<Landings::Point> coil = observe(still, 0.0, radius, frequency, resolution.step_angle, resolution.still, 6);
   double x = 0, y = 0, r = 0, angle = 0;
   for (const Landings::Point& p : coil)
   {
@@ -107,7 +116,7 @@ void runSewingMachine(StudyContext& context)
   for (const bool rising : {true, false})
   {
     if (context.quick() && !rising)
-      continue;   // a minute
+      continue;   // as long again
     const std::string way = rising ? "rising" : "falling";
     ThreadSetup t = still;
     if (!rising)
@@ -116,7 +125,9 @@ void runSewingMachine(StudyContext& context)
     std::vector<std::string> patterns;
     const auto look = [&](double ratio) {
       const bool fresh = patterns.empty() && !rising;
-      return classifyBeltTrace(observe(t, ratio * speed, radius, frequency, fresh ? 30 : 15, 15), ratio * speed, 0.05 * radius);
+      const double settle = (fresh ? 2 : 1) * resolution.settle;
+      return classifyBeltTrace(observe(t, ratio * speed, radius, frequency, resolution.step_angle, settle, resolution.watch), ratio * speed,
+                               0.05 * radius);
     };
     const auto record = [&](double ratio, const BeltTrace& trace) {
       seen_at.push_back(ratio);

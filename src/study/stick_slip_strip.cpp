@@ -120,9 +120,10 @@ void runStickSlipStrip(StudyContext& context)
     double crossed;
   };
   constexpr double kChecked = 0.25;   // of longer steps some are shown: from half a cell on, friction may fail to hold a strip that is still nearly straight
+  constexpr int kQuickCells = 12;     // the cost goes with the square
   const std::vector<Case> cases =
-    context.quick() ? std::vector<Case>{{20, kChecked}, {20, 5.0}}
-                                             : std::vector<Case>{{20, kChecked}, {40, kChecked}, {20, 0.5}, {20, 1.0}, {20, 2.0}, {20, 5.0}};
+    context.quick() ? std::vector<Case>{{kQuickCells, kChecked}, {kQuickCells, 5.0}}
+                    : std::vector<Case>{{20, kChecked}, {40, kChecked}, {20, 0.5}, {20, 1.0}, {20, 2.0}, {20, 5.0}};
   for (const Case& c : cases)
     for (std::size_t k = 0; k < std::size(kSlips); ++k)
     {
