@@ -92,6 +92,11 @@ void checkBending(const ClothModel& model)
   if (isometric && model.bending_modulus > 0 && !restsFlat(model))
     throw std::invalid_argument(who + "its shape at rest is curved (adjacent faces enclose up to " + degrees(largestRestAngle(model)) +
                                 "), and the constant matrix of isometric bending would flatten it; use bending: {model: hinge}");
+  if (!model.clamped_faces.empty() && model.clamped_faces.size() != static_cast<std::size_t>(model.rest.triangles.cols()))
+    throw std::invalid_argument(who + "clamped_faces needs one entry per face, or none");
+  const auto clamped = [](char face) { return face != 0; };
+  if (model.bending == BendingModel::isometric_conforming && std::any_of(model.clamped_faces.begin(), model.clamped_faces.end(), clamped))
+    throw std::invalid_argument(who + "conforming bending has no clamped edges; use bending: {model: isometric} or {model: hinge}, or leave out clamp");
   if (model.bending_poissons_ratio && model.bending != BendingModel::isometric_nonconforming)
     throw std::invalid_argument(who + "bending: {poissons_ratio} is for bending: {model: isometric} of flat shapes at rest. Hinges have the ratio of "
                                 "their mesh (-1/3 on equilateral triangles), conforming bending has 1: leave poissons_ratio out");
@@ -113,6 +118,16 @@ ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& verti
       state.stiffening = Eigen::VectorXd::Ones(state.rest_angles.size());
   }
   return state;
+}
+
+void clampFaces(ClothModel& model, const std::vector<int>& held)
+{
+  const std::vector<char> faces = facesWithin(model.rest, held);
+  if (std::find(faces.begin(), faces.end(), 1) == faces.end())
+    throw std::invalid_argument("cloth '" + model.name + "': a clamp holds no whole face, so that nothing holds the slope; let it hold the vertices of at least one face");
+  model.clamped_faces.resize(faces.size(), 0);
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    model.clamped_faces[f] = static_cast<char>(model.clamped_faces[f] | faces[f]);
 }
 
 void pinVertices(ClothState& state, const std::vector<int>& vertices)

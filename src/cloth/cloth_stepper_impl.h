@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "cloth_statics.h"
 #include "cloth_system.h"
 #include "slender_sim/cloth/plastic_flow.h"
 #include "slender_sim/dynamics/integrator.h"
@@ -17,13 +18,14 @@ public:
   void useBudget(std::shared_ptr<WorkBudget> budget);
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
   double stableStep();
+  StepReport statics(ClothState& state, const ClothInputs& inputs, bool search, bool leave_saddles);
   bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
                Eigen::Matrix3Xd& average_forces_change);
 
   std::shared_ptr<const ClothModel> model;
   ClothOptions options;
   ClothSystem system;
-  Eigen::Matrix3Xd pin_forces, average_forces;
+  Eigen::Matrix3Xd pin_forces, average_forces, lowest_mode;
 
 private:
   // cloth_stepper.cpp
@@ -52,6 +54,7 @@ private:
   ClothEvaluation addForces(const ClothInputs& inputs, bool with_bending);
   ClothEvaluation acceleration(const ClothInputs& inputs, double delta);
 
+  std::unique_ptr<ClothStatics> statics_;   ///< from the first equilibrium on
   std::shared_ptr<WorkBudget> budget_;
   bool own_budget_ = true;
   long ownWork() const { return own_budget_ ? budget_->done() : 0; }   ///< others report their budgets themselves

@@ -48,12 +48,12 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
     const double coefficient = model.bending_modulus * bendingCalibration(model.rest, t, element, model.warp);
     constant_bending_ = model.bending != BendingModel::hinge;
     if (!constant_bending_)
-      hinges_ = std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()));
+      hinges_ = std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces), Eigen::VectorXd::Zero(t.hingeCount()));
     if (hinges_ && std::isfinite(model.plasticity.yield_curvature))
-      hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient);
+      hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient, model.clamped_faces);
     if (constant_bending_ || solver_ == ClothSolver::conjugate_gradients)
-      bending_ = model.bending_poissons_ratio ? plateBending(model.rest, t, *model.bending_poissons_ratio, model.bending_modulus)
-                                              : isometricBending(model.rest, t, element, coefficient);
+      bending_ = model.bending_poissons_ratio ? plateBending(model.rest, t, *model.bending_poissons_ratio, model.bending_modulus, model.clamped_faces)
+                                              : isometricBending(model.rest, t, element, coefficient, model.clamped_faces);
   }
   std::vector<Eigen::MatrixXi> elements{model.rest.triangles};
   if (hinges_)
@@ -385,6 +385,19 @@ void ClothSystem::shiftMatrix(double factor)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += factor * weight_[i];
 }
 
+void ClothSystem::addInertia(double rate)
+{
+  for (int i = 0; i < points(); ++i)
+    for (int k = 0; k < 3; ++k)
+      matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += rate * model_.mass[i];
+}
+
+bool ClothSystem::factor()
+{
+  spend(kFactorWork);
+  return factor_.factor(matrix_, held_.data());
+}
+
 void ClothSystem::setInertia(double tau)
 {
   if (tau == matrix_tau_)
@@ -437,8 +450,7 @@ LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& lin
       if (held_[i])
         point(right_, i) = point(d, i);
     ++factorizations;
-    spend(kFactorWork);
-    if (!factor_.factor(matrix_, held_.data()))
+    if (!factor())
       return LinearOutcome::not_definite;
     factor_.solvePoints(right_.data(), d.data());
     return LinearOutcome::solved;

@@ -84,11 +84,18 @@ public:
   ClothEvaluation evaluateHessian(const PointVector& x, HessianKind kind);
   /// Adds a multiple of the weights of inertia to the matrix.
   void shiftMatrix(double factor);
+  /// Adds the masses times `rate` [1/s^2] to the matrix; the rate may be negative.
+  void addInertia(double rate);
+  /// Factors the matrix (Cholesky only). Returns false where it is not positive definite on what is not held.
+  bool factor();
+  /// v := matrix^-1 v after a factor() that returned true. Held points of v must be zero and stay so.
+  void solveFactored(PointVector& v) const { factor_.solvePoints(v.data(), v.data()); }
   /// Makes the inertia in the matrix, and mass damping, that of a stage with this tau [s].
   void setInertia(double tau);
   /// Elastic and viscous parts only, added.
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient, bool with_bending = true);
   PointVector& gradient() { return gradient_; }
+  const PointVector& gradient() const { return gradient_; }
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
   /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `tolerance`: theirs, 0: that of the options.
   /// The numbers grow by what was needed.

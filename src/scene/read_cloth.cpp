@@ -219,6 +219,45 @@ std::vector<int> readHeldVertices(YamlMap& map, const ClothConfig& cloth)
   return {static_cast<int>(nearest)};
 }
 
+/// Vertices, ascending, of all faces that have one of these.
+std::vector<int> withFaces(const TriangleMesh& mesh, std::vector<int> vertices)
+{
+  std::sort(vertices.begin(), vertices.end());
+  std::vector<int> found = vertices;
+  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+  {
+    const Eigen::Vector3i corners = mesh.triangles.col(f);
+    const auto held = [&](int vertex) { return std::binary_search(vertices.begin(), vertices.end(), vertex); };
+    if (std::any_of(corners.begin(), corners.end(), held))
+    {
+      found.insert(found.end(), corners.begin(), corners.end());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
+
+/// Dead loads: a force on each of some vertices, which are named as for grasps.
+std::vector<ClothLoadConfig> readClothLoads(const YamlCursor& at, const ClothConfig& cloth)
+{
+  std::vector<ClothLoadConfig> loads;
+  if (!at.present())
+  {
+    return loads;
+  }
+  for (const YamlCursor& item : at.items(1, 10'000))
+  {
+    ClothLoadConfig load;
+    YamlMap map(item);
+    load.vertices = readHeldVertices(map, cloth);
+    assign(load.force, map.require("force").vector3(Range::closed(-1e15, 1e15, "N")));
+    map.finish();
+    loads.push_back(std::move(load));
+  }
+  return loads;
+}
+
 void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& cloth)
 {
   if (!at.present())
@@ -232,6 +271,11 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
     grasp.name = name;
     YamlMap map(entry);
     grasp.vertices = readHeldVertices(map, cloth);
+    assign(grasp.clamp, map.get("clamp").boolean());
+    if (grasp.clamp)
+    {
+      grasp.vertices = withFaces(cloth.mesh, grasp.vertices);
+    }
     grasp.attach = Attach::initial;
     assign(grasp.attach, map.get("attach").choice<Attach>({{"frame", Attach::section}, {"initial", Attach::initial}}));
     grasp.motion = readMotion(map.get("motion"), context, grasp.attach == Attach::section);
@@ -288,6 +332,7 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
     cloth.mesh = TriangleMesh{};
   }
   readClothTraits(map, context, cloth);
+  cloth.loads = readClothLoads(map.get("loads"), cloth);
   map.finish();
   return cloth;
 }

@@ -116,6 +116,10 @@ std::string whyNotAlone(const SceneConfig& scene)
   {
     return "rod " + scene.rods[0].name + " has contact";
   }
+  if (!scene.cloths.empty())
+  {
+    return "there is the cloth " + scene.cloths[0].name;
+  }
   for (const BodyConfig& body : scene.bodies)
   {
     if (!body.motion || !body.welds.empty())
@@ -199,9 +203,9 @@ void checkStatics(const YamlCursor& at, const SceneConfig& scene)
     return;
   }
   const StaticsConfig& statics = *scene.statics;
-  if (!scene.cloths.empty() || !scene.threads.empty())
+  if (!scene.threads.empty())
   {
-    at.problem(std::string("is for rods and bodies; the scene has ") + (scene.cloths.empty() ? "threads, which flow" : "cloth, whose loads are not scaled"));
+    at.problem("is for rods, cloths and bodies; the scene has threads, which flow");
   }
   YamlMap map(at);
   const std::string joined = whyNotAlone(scene);
@@ -213,12 +217,13 @@ void checkStatics(const YamlCursor& at, const SceneConfig& scene)
       map.get(key).problem("is for scenes of one rod that touches nothing and carries no body, but " + joined + "; factors can be given for all scenes");
     }
   }
-  const bool loaded = std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return !rod.loads.empty(); });
+  const auto bears = [](const auto& object) { return !object.loads.empty(); };
+  const bool loaded = std::any_of(scene.rods.begin(), scene.rods.end(), bears) || std::any_of(scene.cloths.begin(), scene.cloths.end(), bears);
   const bool weighs = scene.gravity.norm() > 0 && statics.scales != FactorScales::loads;
   const bool pulls = loaded && statics.scales != FactorScales::gravity;
   if (!weighs && !pulls)
   {
-    at.problem("has nothing to scale: a load factor multiplies gravity and the loads of rods (scales); give one of them");
+    at.problem("has nothing to scale: a load factor multiplies gravity and the loads of rods and cloths (scales); give one of them");
   }
 }
 

@@ -261,7 +261,15 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   }
   if (scene.start.equilibrium)
   {
-    map.get("start").problem("is not for cloth; must be as_given");
+    for (const ClothConfig& cloth : scene.cloths)
+    {
+      if (cloth.tracking || cloth.contact)
+      {
+        map.get("start").problem("is not for cloth that " + std::string(cloth.tracking ? "tracks a guide" : "has contact") + ", as cloth " + cloth.name +
+                                 " does; must be as_given");
+        return;
+      }
+    }
   }
 }
 

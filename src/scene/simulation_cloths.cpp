@@ -58,6 +58,13 @@ ClothModel modelOf(const ClothConfig& config, std::vector<std::string>& warnings
   model.undeformed = config.undeformed;
   chooseBending(model, warnings);
   checkPlate(model, warnings);
+  for (const GraspConfig& grasp : config.grasps)
+  {
+    if (grasp.clamp)
+    {
+      clampFaces(model, grasp.vertices);
+    }
+  }
   for (std::size_t s = 0; config.tracking && s < config.tracking->sets.size(); ++s)
   {
     const FunctionSet& set = config.tracking->sets[s];
@@ -164,6 +171,20 @@ void Simulation::buildCloths()
     }
   }
   cloth_inputs_.resize(config_.cloths.size());
+  for (std::size_t k = 0; k < config_.cloths.size(); ++k)
+  {
+    if (!config_.cloths[k].loads.empty())
+    {
+      cloth_inputs_[k].forces.setZero(3, config_.cloths[k].mesh.vertices.cols());
+    }
+    for (const ClothLoadConfig& load : config_.cloths[k].loads)
+    {
+      for (const int vertex : load.vertices)
+      {
+        cloth_inputs_[k].forces.col(vertex) += load.force;
+      }
+    }
+  }
   cloth_targets_.resize(grasps_.size());
   leads_.assign(config_.cloths.size(), 0);
   for (const ClothConfig& config : config_.cloths)
@@ -312,9 +333,9 @@ void Simulation::gatherPins(SceneCloth& cloth) const
   }
 }
 
-StepReport Simulation::stepCloths(const SceneInputs& inputs)
+/// What acts on the cloths by the end of a step, and where their grasps are then.
+void Simulation::fillClothInputs(const SceneInputs& inputs)
 {
-  StepReport total;
   for (std::size_t k = 0; k < cloth_inputs_.size(); ++k)
   {
     cloth_inputs_[k].gravity = config_.gravity;
@@ -339,6 +360,27 @@ StepReport Simulation::stepCloths(const SceneInputs& inputs)
       cloth_inputs_[ref.cloth].pins.col(pin) = X_WG * grasp.points_G.col(static_cast<Eigen::Index>(p));
     }
   }
+}
+
+/// The stable equilibria of all cloths under loads of this factor; the state is where the search begins. fillClothInputs() comes before.
+StepReport Simulation::solveCloths(double factor)
+{
+  StepReport total;
+  const bool scaled = !config_.statics || config_.statics->scales != FactorScales::gravity;
+  for (std::size_t k = 0; k < cloth_steppers_.size() && total.ok; ++k)
+  {
+    ClothInputs loads = cloth_inputs_[k];
+    loads.gravity = gravityAt(factor);
+    loads.forces *= scaled ? factor : 1.0;
+    total.merge(cloth_steppers_[k]->solveEquilibrium(state_.cloths[k].cloth, loads));
+  }
+  return total;
+}
+
+StepReport Simulation::stepCloths(const SceneInputs& inputs)
+{
+  StepReport total;
+  fillClothInputs(inputs);
   stepCloths(true, inputs, total);
   stepCloths(false, inputs, total);
   return total;

@@ -73,10 +73,13 @@ void Simulation::findEquilibrium()
 void Simulation::checkHasStatics() const
 {
   const std::string where = config_.file.empty() ? "scene " + config_.name : config_.file;
-  if (!config_.cloths.empty())
+  for (const ClothConfig& cloth : config_.cloths)
   {
-    throw SceneError(where + ": statics is not for cloth, and the scene has the cloth " + config_.cloths.front().name +
-                     "; let it settle by time stepping with damping");
+    if (cloth.tracking || cloth.contact)
+    {
+      throw SceneError(where + ": statics is not for cloth that " + (cloth.tracking ? "tracks a guide" : "has contact") + ", as cloth " + cloth.name +
+                       " does; let it settle by time stepping with damping");
+    }
   }
   for (const RodConfig& rod : config_.rods)
   {
@@ -85,9 +88,9 @@ void Simulation::checkHasStatics() const
       throw SceneError(where + ": statics is not for rods that track a guide, as rod " + rod.name + " does");
     }
   }
-  if (config_.rods.empty() && !group_)
+  if (config_.rods.empty() && config_.cloths.empty() && !group_)
   {
-    throw SceneError(where + ": statics needs a rod or a simulated body; threads flow, and have no equilibrium");
+    throw SceneError(where + ": statics needs a rod, a cloth or a simulated body; threads flow, and have no equilibrium");
   }
 }
 
@@ -96,6 +99,7 @@ void Simulation::takeStaticInputs()
 {
   inputsAt(0.0, static_inputs_);
   fillRodInputs(static_inputs_);
+  fillClothInputs(static_inputs_);
 }
 
 Eigen::Vector3d Simulation::gravityAt(double factor) const
@@ -159,6 +163,10 @@ StepReport Simulation::solveStatics(double factor)
   {
     report.merge(stepGroup(static_inputs_, true));
   }
+  if (report.ok)
+  {
+    report.merge(solveCloths(factor));
+  }
   gravity_ = config_.gravity;
   if (config_.start.keep_velocities)
   {
@@ -181,6 +189,10 @@ StaticsRow Simulation::rowAt(double factor, const StepReport& report) const
     row.nodes.push_back(state_.rods[r].x);
     row.modes.push_back(steppers_[r] ? Eigen::Matrix4Xd(steppers_[r]->lowestMode()) : Eigen::Matrix4Xd(4, 0));
     row.displacement = std::max(row.displacement, largestDistance(state_.rods[r].x, initial_.rods[r].x));
+  }
+  for (std::size_t k = 0; k < state_.cloths.size(); ++k)
+  {
+    row.displacement = std::max(row.displacement, largestDistance(state_.cloths[k].cloth.x, initial_.cloths[k].cloth.x));
   }
   return row;
 }

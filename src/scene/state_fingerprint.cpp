@@ -159,6 +159,18 @@ std::uint64_t Simulation::fingerprint() const
       text(grasp.name);
       out(static_cast<int>(grasp.attach));
     }
+    for (const char face : model.clamped_faces)
+    {
+      out(static_cast<int>(face));
+    }
+    for (const ClothLoadConfig& load : config_.cloths[k].loads)
+    {
+      for (const int vertex : load.vertices)
+      {
+        out(vertex);
+      }
+      out(load.force);
+    }
   }
   for (const BodyConfig& body : config_.bodies)
   {

@@ -316,6 +316,7 @@ double frequencyError(StudyContext& context, const VibratingShell& shell, double
                                 isotropicMembrane(kShell.stretching * (1 - kShell.membrane_ratio * kShell.membrane_ratio), kShell.membrane_ratio, 1.0));
   model.bending = BendingModel::hinge;
   model.bending_modulus = kShell.bending;
+  clampFaces(model, shell.held);
   const Eigen::VectorXd found = meshFrequencies(model, shell.held, kModes);
   double worst = 0.0;
   for (int k = 0; k < kModes; ++k)

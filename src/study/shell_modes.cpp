@@ -119,7 +119,7 @@ VectorXd capHarmonic(const ShellMaterial& material, double radius, double angle,
 
 }  // namespace
 
-BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state, const std::vector<char>& clamped)
+BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state)
 {
   const MeshTopology& t = model.topology;
   const MembraneEnergy membrane(model.rest, model.membrane, model.warp);
@@ -131,13 +131,13 @@ BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state, con
   membrane.addHessian(HessianKind::exact, x.data(), membrane.slotsIn(matrix), gradient.data(), matrix.values());
   if (model.bending == BendingModel::hinge)
   {
-    const HingeBending hinges(t.hinges, hingeStiffness(model.rest, t, coefficient, clamped), state.rest_angles);
+    const HingeBending hinges(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces), state.rest_angles);
     hinges.addHessian(HessianKind::exact, x.data(), hinges.slotsIn(matrix), gradient.data(), matrix.values());
     return matrix;
   }
   if (model.bending != BendingModel::isometric_nonconforming || model.bending_poissons_ratio)
     throw std::runtime_error("elasticHessian: only hinges and isometric bending without a ratio of its own");
-  const PointMatrix bending = isometricBending(model.rest, t, IsometricElement::nonconforming, coefficient, clamped);
+  const PointMatrix bending = isometricBending(model.rest, t, IsometricElement::nonconforming, coefficient, model.clamped_faces);
   matrix.add(1.0, bending, matrix.mapOf(bending));
   return matrix;
 }
@@ -145,7 +145,7 @@ BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state, con
 VectorXd meshFrequencies(const ClothModel& model, const std::vector<int>& held, int count)
 {
   const int n = model.vertices(), vectors = 2 * count + 4, rounds = 20;
-  const BlockMatrix stiffness = elasticHessian(model, makeClothState(model, model.rest.vertices), facesWithin(model.rest, held));
+  const BlockMatrix stiffness = elasticHessian(model, makeClothState(model, model.rest.vertices));
   std::vector<char> fixed(static_cast<std::size_t>(n), 0);
   for (const int v : held)
     fixed[static_cast<std::size_t>(v)] = 1;

@@ -21,11 +21,9 @@ struct ShellMaterial
 };
 
 /// Hessian of the elastic energy of a cloth that bends by hinges or by isometric bending without a ratio of its own, put together from the energies alone.
-/// `clamped`: as in hingeArea().
-BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state, const std::vector<char>& clamped);
+BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state);
 
-/// The `count` lowest angular frequencies [rad/s], ascending, of a cloth with hinge bending about its shape at rest. The vertices `held` do not move, and the faces
-/// between them are clamped.
+/// The `count` lowest angular frequencies [rad/s], ascending, of a cloth with hinge bending about its shape at rest. The vertices `held` do not move.
 /// Inverse iteration of a subspace, with the Hessian that time steps take. Throws std::runtime_error where the Hessian is not positive definite.
 Eigen::VectorXd meshFrequencies(const ClothModel& model, const std::vector<int>& held, int count);
 

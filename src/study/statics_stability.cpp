@@ -11,6 +11,7 @@
 
 #include "bend_twist_table.h"
 #include "shape_cases.h"
+#include "statics_plates.h"
 #include "slender_sim/geometry/curves.h"
 #include "slender_sim/rod/rod_system.h"
 #include "slender_sim/study/study.h"
@@ -55,16 +56,9 @@ int negativeModes(const RodSetup& rod, double ground)
   return inertia.negative + inertia.zero;
 }
 
-/// What all cases came to.
-struct Tally
-{
-  int cases = 0, wrong = 0, called_stable = 0, refused = 0, unstable_ends = 0;
-  double worst_residual = 0;
-};
-
 constexpr double kAway = 1e-5;   ///< of the length: a state that left its branch is farther, one that stayed is at 1e-9
 
-void judge(StudyContext& context, const StaticsCase& c, Tally& tally)
+void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally)
 {
   const int before = negativeModes(c.rod, c.ground);
   const bool near = std::abs(c.factor - 1) <= c.trusted;
@@ -101,7 +95,7 @@ void relaxPlanar(RodSetup& rod, int keep)
 double acrossPlane(const RodState& s) { return s.x.row(1).cwiseAbs().maxCoeff(); }
 
 /// Heavy cantilevers of elliptical section (lateral_rod_ellipse.csv); A1 = L = rho A = 1.
-void addLateral(StudyContext& context, Tally& tally, const std::vector<int>& meshes)
+void addLateral(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
   struct Section { double nu, a_over_b, gamma; };
   constexpr Section kSections[] = {{0.3, 3, 53.415613}, {0.5, 2.5, 0}, {0.3, 5, 65.114802}, {0.3, 10, 118.00056}, {0.5, 20, 201.10635}};
@@ -209,7 +203,7 @@ private:
   RodSetup rod_;
 };
 
-void addBendTwist(StudyContext& context, Tally& tally, const std::vector<int>& meshes)
+void addBendTwist(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
   for (const BendTwistPoint& p : kBendTwistBoundary)
   {
@@ -240,7 +234,7 @@ void addBendTwist(StudyContext& context, Tally& tally, const std::vector<int>& m
 double acrossAxis(const RodState& s) { return s.x.bottomRows(2).colwise().norm().maxCoeff(); }
 
 /// Straight clamped rods under torque and tension, which become helices (greenhill.csv); B = L = rho A = 1.
-void addHelices(StudyContext& context, Tally& tally, const std::vector<int>& meshes)
+void addHelices(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
   struct Load { double tension, torque; };
   constexpr Load kLoads[] = {{-20, 5.771135703}, {0, 8.986818916}, {20, 11.80032954}, {100, 20.98350083}};
@@ -278,7 +272,7 @@ void addHelices(StudyContext& context, Tally& tally, const std::vector<int>& mes
 }
 
 /// Twisted rings (Michell, Zajac) of radius 1 and bending modulus 1, free in space: the twist is a rest twist of the opposite sign.
-void addRings(StudyContext& context, Tally& tally, const std::vector<int>& meshes)
+void addRings(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
   for (const double beta : {0.6, 0.77, 1.5})
     for (const int edges : meshes)
@@ -311,7 +305,7 @@ void addRings(StudyContext& context, Tally& tally, const std::vector<int>& meshe
 }
 
 /// Columns: pushed together between clamps (Euler), under a dead load at the tip (Euler), under their own weight (Greenhill: 7.8373 B/L^3).
-void addColumns(StudyContext& context, Tally& tally, const std::vector<int>& meshes)
+void addColumns(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
   constexpr double kStretch = 1e5;
   for (const int kind : {0, 1, 2})
@@ -363,12 +357,13 @@ void addColumns(StudyContext& context, Tally& tally, const std::vector<int>& mes
 void runStaticsStability(StudyContext& context)
 {
   const std::vector<int> meshes = context.quick() ? std::vector<int>{20, 80} : std::vector<int>{20, 40, 80, 160, 320, 640, 1280};
-  Tally tally;
+  StaticsTally tally;
   addLateral(context, tally, meshes);
   addBendTwist(context, tally, meshes);
   addHelices(context, tally, meshes);
   addRings(context, tally, meshes);
   addColumns(context, tally, meshes);
+  addPlates(context, tally);
   context.metric("cases", tally.cases);
   context.metric("wrong_equilibria", tally.wrong);
   context.metric("unstable_reported_as_stable", tally.called_stable);
@@ -377,7 +372,8 @@ void runStaticsStability(StudyContext& context)
   context.metric("worst_residual", tally.worst_residual);
   context.note("Each case starts exactly on the branch (planar, straight or circular). Within `trusted` of the continuous threshold the inertia of the "
                "mesh's own Hessian decides which answer is right, beyond it the reference does.");
-  context.note("Cloths have no static solver, so that thin plates appear as strips: elliptical rods up to a/b = 20.");
+  context.note("Plates: `edges` are cells along the plate, `factor` is over the threshold of plate theory. The loads are 0.97, 1.03 and 1.2 times the threshold of the "
+               "same mesh, which the inertia of its Hessian gives.");
 }
 
 }  // namespace slender::study

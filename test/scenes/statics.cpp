@@ -486,10 +486,10 @@ TEST_F(SimulateStatics, exitStatusAndMessages)
   const Result unused = run(loadedColumn(10, "{factors: [1]}"), "--duration 0.01 --quiet");
   EXPECT_EQ(unused.status, 0) << unused.output;
   EXPECT_NE(unused.output.find("statics of the scene is for --statics"), std::string::npos) << unused.output;
-  const std::string cloth = "cloths: [{mesh: {grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}}}]";
+  const std::string cloth = "cloths: [{grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, contact: {}}]";
   const Result sheet = run(cloth, "--statics");
   EXPECT_EQ(sheet.status, 2) << sheet.output;
-  EXPECT_NE(sheet.output.find("statics is not for cloth"), std::string::npos) << sheet.output;
+  EXPECT_NE(sheet.output.find("statics is not for cloth that has contact"), std::string::npos) << sheet.output;
 }
 
 }  // namespace

@@ -133,7 +133,6 @@ TEST(ClothReader, NamesWhatIsWrong)
     {"cloths.0.stiff=1", "unknown key"},
     {"time.integrator=bdf2", "is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler"},
     {"time.spectral_radius=0.5", "is for generalized_alpha, which cloth does not have"},
-    {"start=equilibrium", "is not for cloth"},
     {"wind={velocity: [2000, 0, 0]}", "wind.velocity"},
   };
   for (const auto& [assignment, expected] : cases)

@@ -69,6 +69,9 @@ struct ClothModel
   /// Of bending, in (-1, 1): the plate energy D/2 [(k1 + k2)^2 - 2 (1 - nu) k1 k2] with the principal curvatures k1 and k2 (see plateBending()).
   /// Empty: the bending model has the ratio of its discretisation, about -1/3 (nonconforming, hinges) or 1 (conforming).
   std::optional<double> bending_poissons_ratio;
+  /// One per face, not 0 for faces that are held as a whole; empty: none. They do not bend, so that their edges to other faces are clamped edges (see hingeArea()). See clampFaces(). Their vertices
+  /// should be pins of the state; once these are released, the clamped edges stay twice as stiff. Not for conforming bending.
+  std::vector<char> clamped_faces;
   Eigen::Matrix3Xd undeformed;       ///< 3 x n: its bend angles are those at rest; empty: those of `rest`
   Plasticity plasticity;
   double mass_damping = 0.0;         ///< Rayleigh [1/s]
@@ -111,6 +114,9 @@ inline bool restsFlat(const ClothModel& model) { return largestRestAngle(model) 
 /// Throws std::invalid_argument with the fix where the bending model does not suit the cloth: isometric bending of a curved rest shape,
 /// a Poisson's ratio of bending that the model does not have or that is out of range, an undeformed shape of the wrong size.
 void checkBending(const ClothModel& model);
+
+/// Clamps all faces whose three vertices are among `held`. Throws std::invalid_argument where there is none, so that nothing holds a slope.
+void clampFaces(ClothModel& model, const std::vector<int>& held);
 
 /// Pins vertices where they are, in addition to those that already are. Throws std::invalid_argument for one that is not there.
 void pinVertices(ClothState& state, const std::vector<int>& vertices);

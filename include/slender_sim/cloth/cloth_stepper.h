@@ -75,6 +75,15 @@ public:
   /// The same by one step of implicit Euler, for tr_bdf2 and controlled steps; it is cut only where it cannot be solved.
   StepReport stepUndivided(ClothState& state, const ClothInputs& inputs, double duration);
 
+  /// Static equilibrium under gravity, forces and pins (velocities become zero), with elastic forces alone: damping does not act, and neither does air at rest.
+  /// An unstable equilibrium is left along its mode of negative curvature, until a stable one is found or every way was tried; then
+  /// report.stable is false. `leave_saddles` false: it is kept. Refuses wind, plasticity and prescribed averages.
+  StepReport solveEquilibrium(ClothState& state, const ClothInputs& inputs, bool leave_saddles = true);
+  /// Residual, energy, lowest eigenvalue and stability of a state that is an equilibrium under the inputs already.
+  StepReport assessEquilibrium(const ClothState& state, const ClothInputs& inputs);
+  /// Mode of the lowest eigenvalue of the last equilibrium: displacement of each vertex (3 x n [m]), scaled so that the edge that turns most turns by 1 rad.
+  const Eigen::Matrix3Xd& lowestMode() const;
+
   /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step, and by how much the pins' forces
   /// and those of the averages, which stay, change [N]: linear, with the stiffness of its last Newton iteration and the inertia of a step of implicit
   /// Euler of `duration` [s], whatever the stages and substeps were, so that responses of several cloths go together; after explicit steps that of the
@@ -84,7 +93,7 @@ public:
   /// Of explicit integrators: the longest step for which the cloth at rest is stable [s], by the largest eigenvalue of M^-1 K (power iteration);
   /// damping by stiffness makes it shorter. Infinite for implicit ones. Not cheap: for messages.
   double stableStep() const;
-  /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step.
+  /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step or in the last equilibrium.
   const Eigen::Matrix3Xd& pinForces() const;
 
   /// Force [N] with which each prescribed average acts on the cloth (3 x count), spread over its vertices by their weights: the Lagrange multipliers at the end

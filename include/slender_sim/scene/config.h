@@ -115,6 +115,7 @@ struct GraspConfig
   /// `edges: [0]` (or [-1]) of an open rod is the end section: first == last == the end node. More edges hold all their nodes.
   int first_node = 0, last_node = 0;
   std::vector<int> vertices;   ///< of a cloth, instead of nodes: ascending
+  bool clamp = false;          ///< of a cloth: the faces within the vertices are clamped (see ClothModel::clamped_faces)
   Hold hold = Hold::frame;
   Motion motion = FixedMotion{};
   Attach attach = Attach::section;
@@ -308,6 +309,7 @@ struct ClothConfig
   bool one_newton_step = false;
   double linear_tolerance = 5e-3;
   std::vector<GraspConfig> grasps;
+  std::vector<ClothLoadConfig> loads;          ///< dead loads on vertices, in statics and in dynamics
   std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`tracked`); null: nothing
   std::optional<ClothContactConfig> contact;   ///< nothing: touches nothing
 };

@@ -247,6 +247,8 @@ private:
   const Eigen::Matrix3Xd& pinForces(int cloth) const;
   const ClothStepper& clothStepper(int cloth) const;
   StepReport stepCloths(const SceneInputs& inputs);
+  void fillClothInputs(const SceneInputs& inputs);
+  StepReport solveCloths(double factor);
   void stepCloths(bool ahead, const SceneInputs& inputs, StepReport& total);
   /// What drives a grasp: its target, or the body or obstacle that it follows.
   GraspTarget drivenTarget(int grasp, const SceneInputs& inputs) const;

@@ -19,12 +19,19 @@ struct RodLoadConfig
   double torque = 0.0;
 };
 
+/// A dead load on a cloth: each of these vertices bears the force, which keeps its size and its direction in the world.
+struct ClothLoadConfig
+{
+  std::vector<int> vertices;             ///< ascending
+  Eigen::Vector3d force{0, 0, 0};        ///< on each [N]
+};
+
 /// What a load factor multiplies.
 enum class FactorScales
 {
-  all,       ///< gravity and the loads of the rods
+  all,       ///< gravity and the loads of rods and cloths
   gravity,   ///< gravity alone
-  loads,     ///< the loads of the rods alone
+  loads,     ///< the loads of rods and cloths alone
 };
 
 /// The path of equilibria that is followed while the load factor grows from `from` towards `to`. Steps are equally long along the path, 1/steps of

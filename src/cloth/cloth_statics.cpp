@@ -1,0 +1,455 @@
+// Static equilibrium of one cloth by continuation: the pins are carried to their targets in small moves, and at each the energy is minimised with a
+// proximal term. See rod_statics.cpp, which does the same for rods.
+#include "cloth_statics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "slender_sim/dynamics/lowest_eigenvalue.h"
+
+namespace slender {
+
+namespace {
+
+/// Without inertia: the square of this is still a finite number.
+constexpr double kNoInertia = 1e150;
+
+/// Share of the lowest bending stiffness (D over mass and size squared) below which an eigenvalue counts as zero, as in statics of rods.
+constexpr double kNeutralShare = 1e-6;
+
+ClothModel elasticPart(const ClothModel& model)
+{
+  ClothModel elastic = model;
+  elastic.mass_damping = elastic.stiffness_damping = elastic.wind_coefficient = 0.0;
+  elastic.aerodynamics = Aerodynamics{};
+  return elastic;
+}
+
+ClothOptions directOptions()
+{
+  ClothOptions options;
+  options.solver = ClothSolver::cholesky;
+  return options;
+}
+
+}  // namespace
+
+bool ClothTrial::Definiteness::positiveDefinite()
+{
+  ClothStatics& s = *statics;
+  if (!s.factored_)
+  {
+    s.definite_ = s.system_.factor();
+    s.factored_ = true;
+    ++s.factorizations_;
+  }
+  return s.definite_;
+}
+
+ClothStatics::ClothStatics(const ClothModel& model, const NewtonConfig& newton)
+  : model_(elasticPart(model)), system_(model_, directOptions()), newton_(newton)
+{
+  shortest_edge_ = std::numeric_limits<double>::infinity();
+  for (Eigen::Index e = 0; e < model_.topology.edges.cols(); ++e)
+    shortest_edge_ = std::min(shortest_edge_, (model_.rest.vertices.col(model_.topology.edges(0, e)) - model_.rest.vertices.col(model_.topology.edges(1, e))).norm());
+  size_ = (model_.rest.vertices.rowwise().maxCoeff() - model_.rest.vertices.rowwise().minCoeff()).norm();
+  for (PointVector* v : {&x_, &trial_, &base_, &saved_, &d_, &force_})
+    v->assign(4 * static_cast<std::size_t>(model_.vertices()), 0.0);
+  newton_.tolerance = std::min(newton_.tolerance, 1e-8);
+  newton_.max_iterations = std::max(60, newton_.max_iterations);
+}
+
+void ClothStatics::begin(const ClothState& state, const ClothInputs& inputs)
+{
+  state_ = state;
+  inputs_ = inputs;
+  inputs_.wind.setZero();
+  toPoints(state.x, x_);
+  system_.hold(state_);
+  double load = 0.0;
+  for (int i = 0; i < model_.vertices(); ++i)
+  {
+    point(force_, i) = model_.mass[i] * inputs.gravity;
+    if (inputs.forces.cols() > 0)
+      point(force_, i) += inputs.forces.col(i);
+    load += point(force_, i).norm();
+  }
+  pins_from_.resize(3, static_cast<Eigen::Index>(state.pins.size()));
+  for (std::size_t k = 0; k < state.pins.size(); ++k)
+    pins_from_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
+  // The stiffness of the whole cloth against bending, or against its loads where that is larger, over its mass. A cloth without either is held by its membrane.
+  const double stiffness = std::max(model_.bending_modulus / (size_ * size_), load / size_);
+  base_weight_ = 100.0 * (stiffness > 0 ? stiffness : 1e-6 * (model_.membrane.c11 + model_.membrane.c22)) / model_.totalMass();
+  relative_ = 1.0;
+  factorizations_ = 0;
+}
+
+/// Energy with a proximal term of this weight [1/s^2] about x_.
+void ClothStatics::setRound(double weight)
+{
+  const ClothStage stage{weight > 0 ? 1.0 / std::sqrt(weight) : kNoInertia, &x_, &x_, &x_, &x_, &state_.v};
+  system_.beginStage(stage, inputs_);
+}
+
+ClothTrial ClothStatics::evaluate(bool with_hessian, const HessianShift& shift)
+{
+  const ClothEvaluation e = with_hessian ? system_.evaluateHessian(trial_, HessianKind::exact) : system_.evaluate(trial_);
+  // Cloth has no massless unknowns: the shifts that minimize() tries on them first are small ones of all vertices here.
+  constexpr double kFirstShift = 1e-3;
+  if (with_hessian && !shift.none())
+    system_.addInertia((shift.position + kFirstShift * shift.angle) * base_weight_);
+  if (with_hessian)
+    factored_ = false;
+  ClothTrial trial;
+  trial.stretch = e.membrane;
+  trial.bend_twist = e.bending;
+  trial.potential = e.potential;
+  trial.max_strain = e.max_strain;
+  trial.inertia.statics = this;
+  return trial;
+}
+
+void ClothStatics::solve()
+{
+  for (int i = 0; i < model_.vertices(); ++i)
+    point(d_, i) = system_.held()[i] ? Eigen::Vector3d::Zero() : Eigen::Vector3d(-point(system_.gradient(), i));
+  system_.solveFactored(d_);
+}
+
+void ClothStatics::moveAlong(double alpha)
+{
+  for (std::size_t i = 0; i < trial_.size(); ++i)
+    trial_[i] = base_[i] + alpha * d_[i];
+}
+
+double ClothStatics::incrementSize() const
+{
+  double square = 0.0;
+  for (int i = 0; i < model_.vertices(); ++i)
+    square = std::max(square, point(d_, i).squaredNorm());
+  return std::sqrt(square) / shortest_edge_;
+}
+
+double ClothStatics::slope() const
+{
+  const PointVector& gradient = system_.gradient();
+  double sum = 0.0;
+  for (int i = 0; i < model_.vertices(); ++i)
+    sum += point(gradient, i).dot(point(d_, i));
+  return sum;
+}
+
+/// Largest turn or stretch of an edge by a displacement, over its length at rest.
+double ClothStatics::turnOf(const PointVector& d) const
+{
+  double worst = 0.0;
+  for (Eigen::Index e = 0; e < model_.topology.edges.cols(); ++e)
+  {
+    const int a = model_.topology.edges(0, e), b = model_.topology.edges(1, e);
+    worst = std::max(worst, (point(d, b) - point(d, a)).norm() / (model_.rest.vertices.col(b) - model_.rest.vertices.col(a)).norm());
+  }
+  return worst;
+}
+
+double ClothStatics::stepLimit() const
+{
+  constexpr double kMostTurn = 0.7;   // [rad] as for edges of rods
+  const double turn = turnOf(d_);
+  return turn > kMostTurn ? kMostTurn / turn : 1.0;
+}
+
+double ClothStatics::residual() const
+{
+  const PointVector& gradient = system_.gradient();
+  double square = 0.0;
+  for (int i = 0; i < model_.vertices(); ++i)
+    if (!system_.held()[i])
+      square = std::max(square, point(gradient, i).squaredNorm());
+  return std::sqrt(square);
+}
+
+/// Largest load or reaction. A cloth at rest has neither to compare with, only their round-off.
+double ClothStatics::forceScale() const
+{
+  const PointVector& gradient = system_.gradient();
+  double largest = 1e-9 * (model_.membrane.c11 + model_.membrane.c22) * shortest_edge_;
+  for (int i = 0; i < model_.vertices(); ++i)
+    largest = std::max({largest, point(force_, i).norm(), system_.held()[i] ? point(gradient, i).norm() : 0.0});
+  return largest;
+}
+
+/// Strains of eps extent / edge times the modulus and the edge.
+double ClothStatics::noiseLevel() const
+{
+  double extent = 0.0;
+  for (const double x : trial_)
+    extent = std::max(extent, std::abs(x));
+  return 4.0 * std::numeric_limits<double>::epsilon() * (model_.membrane.c11 + model_.membrane.c22) * extent;
+}
+
+/// Minimises with the pins at a fraction of their way. The result becomes x_.
+StepFailure ClothStatics::round(double fraction, double weight, StepReport& report)
+{
+  setRound(weight);
+  trial_ = x_;
+  for (std::size_t k = 0; k < state_.pins.size(); ++k)
+  {
+    const Eigen::Index pin = static_cast<Eigen::Index>(k);
+    point(trial_, state_.pins[k]) = pins_from_.col(pin) + fraction * (inputs_.pins.col(pin) - pins_from_.col(pin));
+  }
+  const NewtonResult result = minimize(*this, newton_);
+  report.iterations += result.iterations;
+  if (!result.ok())
+    return result.failure;
+  ++report.substeps;
+  std::swap(x_, trial_);   // trial_ is where the round began
+  return StepFailure::none;
+}
+
+StepFailure ClothStatics::carryPins(StepReport& report)
+{
+  const double move = state_.pins.empty() ? 0.0 : (inputs_.pins - pins_from_).colwise().norm().maxCoeff() / (0.2 * shortest_edge_);
+  double done = move > 0 ? 0.0 : 1.0, advance = move > 1 ? 1.0 / move : 1.0;
+  for (int failures = 0; done < 1.0;)
+  {
+    const double fraction = std::min(1.0, done + advance);
+    const StepFailure failure = round(fraction, relative_ * base_weight_, report);
+    if (failure == StepFailure::none)
+    {
+      done = fraction;
+      failures = 0;
+      relative_ = std::max(0.2 * relative_, 1.0);
+      advance = std::min(1.5 * advance, move > 1 ? 1.0 / move : 1.0);
+      continue;
+    }
+    relative_ = std::min(10.0 * relative_, 1e8);
+    advance *= 0.5;
+    if (++failures > 40 || advance < 1e-6 || failure == StepFailure::work_exceeded)
+      return failure;
+  }
+  return StepFailure::none;
+}
+
+StepFailure ClothStatics::settle(StepReport& report)
+{
+  constexpr int kMostRounds = 1000, kMostFailures = 40;
+  double ease = 0.01;   // smallest factor by which the weight falls from round to round
+  for (int k = 0, failures = 0; k < kMostRounds; ++k)
+  {
+    const double weight = relative_ < 1e-9 ? 0.0 : relative_ * base_weight_;
+    const StepFailure failure = round(1.0, weight, report);
+    if (failure != StepFailure::none)
+    {
+      if (failure == StepFailure::newton_diverged && weight > 0)
+        x_ = base_;   // Newton did not arrive but came further down: the next round begins there
+      relative_ = std::max(10.0 * relative_, 1e-6);
+      ease = std::sqrt(ease);   // let go more slowly, so as not to come back here at once
+      if (++failures > kMostFailures || failure == StepFailure::work_exceeded)
+        return failure;
+      continue;
+    }
+    if (weight == 0.0)
+      return StepFailure::none;
+    failures = 0;
+    double square = 0.0;
+    for (int i = 0; i < model_.vertices(); ++i)
+      square = std::max(square, (point(x_, i) - point(trial_, i)).squaredNorm());
+    const double shift = std::sqrt(square) / size_;
+    relative_ *= std::max(ease, shift < 1e-3 ? 0.01 : shift < 0.05 ? 0.2 : 0.7);
+    ease = std::max(0.01, 0.7 * ease);
+  }
+  return StepFailure::newton_diverged;
+}
+
+bool ClothStatics::definite(double rate)
+{
+  system_.evaluateHessian(trial_, HessianKind::exact);
+  system_.addInertia(rate);
+  ++factorizations_;
+  return system_.factor();
+}
+
+/// Half width of the band of eigenvalues that count as zero [1/s^2].
+double ClothStatics::neutralBand() const
+{
+  const double mass = model_.totalMass();
+  // Rounding errors of the n entries of the largest eigenvalue, which is that of one vertex on its edges, add up like a random walk.
+  const double largest = 8.0 * (model_.membrane.c11 + model_.membrane.c22) / model_.mass.minCoeff();
+  const double rounding = std::numeric_limits<double>::epsilon() * largest / std::sqrt(static_cast<double>(model_.vertices()));
+  return kNeutralShare * model_.bending_modulus / (mass * size_ * size_) + 4.0 * rounding;
+}
+
+/// By inverse iteration with the matrix last factored.
+void ClothStatics::findMode()
+{
+  const int n = model_.vertices();
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k)
+      point(d_, i)[k] = std::sin(1.0 + 1.7 * (3 * i + k)) + 0.5 * std::cos(0.3 * (3 * i + k));   // no symmetry that a mode could be orthogonal to
+  for (int round = 0; round < 12; ++round)
+  {
+    double square = 0.0;
+    for (int i = 0; i < n; ++i)
+    {
+      point(d_, i) *= system_.held()[i] ? 0.0 : model_.mass[i];
+      square += point(d_, i).squaredNorm();
+    }
+    for (double& value : d_)
+      value /= std::max(std::sqrt(square), 1e-300);
+    system_.solveFactored(d_);
+  }
+  for (int i = 0; i < n; ++i)
+    if (system_.held()[i])
+      point(d_, i).setZero();
+  // A mode that moves the cloth as a whole turns nothing.
+  double largest = 0.0, at = 0.0;
+  for (const double value : d_)
+    if (std::abs(value) > largest)
+    {
+      largest = std::abs(value);
+      at = value;
+    }
+  const double scale = (at < 0 ? -1.0 : 1.0) / std::max({turnOf(d_), largest / size_, 1e-300});
+  for (double& value : d_)
+    value *= std::isfinite(scale * value) ? scale : 0.0;
+  fromPoints(d_, mode_);
+}
+
+/// Of x_, with the pins there.
+ClothStatics::Stability ClothStatics::assessHere(bool spectrum)
+{
+  Stability result;
+  setRound(0.0);
+  trial_ = x_;
+  const ClothEvaluation e = system_.evaluate(trial_);
+  // Loads count from x_ within a round: here from the origin, so that states can be compared.
+  double potential = 0.0, size = 0.0;
+  for (int i = 0; i < model_.vertices(); ++i)
+  {
+    potential -= point(force_, i).dot(point(x_, i));
+    size += std::abs(point(force_, i).dot(point(x_, i)));
+  }
+  result.energy = e.membrane + e.bending + potential;
+  result.energy_noise = 1e-13 * (e.membrane + e.bending + size);
+  if (!spectrum)
+    return result;
+  const double neutral = neutralBand();
+  const LowestEigenvalue lowest = lowestEigenvalue([this](double rate) { return definite(rate); }, neutral);
+  result.lowest = std::abs(lowest.value) <= neutral ? 0.0 : lowest.value;
+  result.stable = result.lowest >= 0;
+  if (std::isfinite(lowest.value))
+    findMode();
+  else
+    mode_.setZero(3, model_.vertices());
+  return result;
+}
+
+/// Leaves a saddle, at which the cloth is, along its mode of negative curvature: to both sides, and less and less far, until the minimisation ends
+/// at a stationary point of lower energy. The side that the mode's sign gives comes first; by symmetry both are usually equal.
+bool ClothStatics::escape(const Stability& at, StepReport& report)
+{
+  const PointVector saddle = x_;
+  PointVector mode;
+  toPoints(mode_, mode);
+  for (const double turn : {0.1, -0.1, 0.01, -0.01, 1e-3, -1e-3})
+  {
+    for (std::size_t i = 0; i < x_.size(); ++i)
+      x_[i] = saddle[i] + turn * mode[i];
+    // A weight above the negative eigenvalue makes the first rounds convex, so that they slide down instead of jumping.
+    relative_ = std::max(1e-6, 2.0 * std::abs(at.lowest) / base_weight_);
+    if (!std::isfinite(relative_))
+      relative_ = 1e-2;
+    if (settle(report) == StepFailure::none && assessHere(false).energy < at.energy - at.energy_noise)
+      return true;
+  }
+  x_ = saddle;
+  return false;
+}
+
+StepFailure ClothStatics::settleStably(bool leave_saddles, StepReport& report)
+{
+  constexpr int kMostEscapes = 50;
+  if (const StepFailure failure = settle(report); failure != StepFailure::none)
+    return failure;
+  for (int k = 0;; ++k)
+  {
+    const Stability at = assessHere(true);
+    report.stable = at.stable;
+    report.lowest_eigenvalue = at.lowest;
+    report.energy = at.energy;
+    const Eigen::Matrix3Xd mode = mode_;
+    if (at.stable || !leave_saddles || k == kMostEscapes || !escape(at, report))
+    {
+      mode_ = mode;
+      return StepFailure::none;
+    }
+    ++report.escapes;
+  }
+}
+
+/// Residual, strain and forces on the pins of x_.
+void ClothStatics::finish(StepReport& report)
+{
+  setRound(0.0);
+  trial_ = x_;
+  const ClothEvaluation e = system_.evaluate(trial_);
+  report.residual = residual() / forceScale();
+  report.max_strain = std::max(report.max_strain, e.max_strain);
+  report.factorizations += factorizations_;
+  pin_forces_.resize(3, static_cast<Eigen::Index>(state_.pins.size()));
+  for (std::size_t k = 0; k < state_.pins.size(); ++k)
+    pin_forces_.col(static_cast<Eigen::Index>(k)) = -point(system_.gradient(), state_.pins[k]);
+}
+
+StepFailure ClothStatics::solve(ClothState& state, const ClothInputs& inputs, bool leave_saddles, StepReport& report)
+{
+  begin(state, inputs);
+  StepFailure failure = carryPins(report);
+  if (failure == StepFailure::none)
+    failure = settleStably(leave_saddles, report);
+  if (failure != StepFailure::none)
+    return failure;
+  finish(report);
+  // Newton's increments of 1e-8 of an edge leave 1e-7 of the largest force. Where nothing balances a load, as much as the load is left.
+  constexpr double kUnbalanced = 1e-4;
+  if (!(report.residual < kUnbalanced))
+    return StepFailure::newton_diverged;
+  fromPoints(x_, state.x);
+  state.v.setZero();
+  state.next_step = 0.0;
+  for (std::size_t k = 0; k < state.pins.size(); ++k)
+    state.x.col(state.pins[k]) = inputs.pins.col(static_cast<Eigen::Index>(k));
+  return StepFailure::none;
+}
+
+StepFailure ClothStatics::assess(const ClothState& state, const ClothInputs& inputs, StepReport& report)
+{
+  begin(state, inputs);
+  const Stability at = assessHere(true);
+  report.stable = at.stable;
+  report.lowest_eigenvalue = at.lowest;
+  report.energy = at.energy;
+  finish(report);
+  return StepFailure::none;
+}
+
+std::string ClothStatics::explain(StepFailure failure) const
+{
+  const std::string what = "no equilibrium was found: ";
+  switch (failure)
+  {
+    case StepFailure::singular_matrix:
+      return what + "the stiffness matrix could not be made definite: moduli or masses differ by too many orders of magnitude, or something is free to "
+                    "drift: hold it by a grasp";
+    case StepFailure::state_not_finite:
+      return what + "the configuration overflowed: the loads are too large for the cloth, or something is free to drift: hold it by a grasp";
+    case StepFailure::work_exceeded:
+      return what + "the search was interrupted";
+    default:
+      return what + "Newton's method did not converge: hold what drifts by a grasp, start from a shape that is nearer to the equilibrium (start of the cloth), "
+                    "or let the cloth settle by time stepping with damping (start: as_given)";
+  }
+}
+
+}  // namespace slender

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cloth_system.h"
+#include "slender_sim/dynamics/hessian_shift.h"
+#include "slender_sim/dynamics/newton.h"
+
+namespace slender {
+
+/// Elastic energy and that of the loads at a trial configuration, in the terms of minimize() (see newton.h).
+struct ClothTrial
+{
+  /// Factors the Hessian when it is asked for, once.
+  struct Definiteness
+  {
+    class ClothStatics* statics = nullptr;
+    bool positiveDefinite();
+  };
+  double stretch = 0, bend_twist = 0, potential = 0;   ///< [J]; bend_twist: bending
+  double max_strain = 0;
+  double min_chi = 2;   ///< cloth has no parallel transport that could fail
+  Definiteness inertia;
+  double energy() const { return stretch + bend_twist + potential; }
+};
+
+/// Static equilibria of one cloth. Newton's method with the exact Hessian minimises the energy with a proximal term 1/2 w m |x - x_k|^2, whose
+/// weight falls to zero as the iteration settles. What it settles at is stationary. The inertia of the Hessian says whether it is a minimum; from a
+/// saddle the search goes on along the direction of negative curvature.
+class ClothStatics
+{
+public:
+  /// Keeps its own copy of the model, without damping and air.
+  ClothStatics(const ClothModel& model, const NewtonConfig& newton);
+
+  /// Inputs and state must have been checked. Takes the equilibrium into `state` on success.
+  StepFailure solve(ClothState& state, const ClothInputs& inputs, bool leave_saddles, StepReport& report);
+  StepFailure assess(const ClothState& state, const ClothInputs& inputs, StepReport& report);
+  const Eigen::Matrix3Xd& pinForces() const { return pin_forces_; }
+  const Eigen::Matrix3Xd& mode() const { return mode_; }
+  /// Why there is no equilibrium, and what to change.
+  std::string explain(StepFailure failure) const;
+
+  // ---- what minimize() needs
+  ClothTrial evaluate(bool with_hessian, const HessianShift& shift = {});
+  void solve();
+  void moveAlong(double alpha);
+  void accept() { base_ = trial_; }
+  void saveBase() { saved_ = base_; }
+  void restoreBase() { base_ = saved_; }
+  double incrementSize() const;
+  double slope() const;
+  double stepLimit() const;
+  double residual() const;
+  double noiseLevel() const;
+  double forceScale() const;
+  static constexpr bool anglesMayKeepShift() { return false; }
+  static constexpr double mostUnbalanced() { return std::numeric_limits<double>::infinity(); }   ///< without forces there is no scale
+
+private:
+  friend struct ClothTrial::Definiteness;
+  struct Stability
+  {
+    bool stable = true;
+    double lowest = 0, energy = 0, energy_noise = 0;
+  };
+
+  void begin(const ClothState& state, const ClothInputs& inputs);
+  void setRound(double weight);
+  StepFailure round(double fraction, double weight, StepReport& report);
+  StepFailure carryPins(StepReport& report);
+  StepFailure settle(StepReport& report);
+  StepFailure settleStably(bool leave_saddles, StepReport& report);
+  bool escape(const Stability& at, StepReport& report);
+  Stability assessHere(bool spectrum);
+  bool definite(double rate);
+  void findMode();
+  double neutralBand() const;
+  double turnOf(const PointVector& d) const;
+  void finish(StepReport& report);
+
+  ClothModel model_;
+  ClothSystem system_;
+  NewtonConfig newton_;
+  double shortest_edge_ = 0, size_ = 0;   ///< [m]
+  double base_weight_ = 0;                ///< scale of the proximal term [1/s^2]
+  double relative_ = 1.0;                 ///< proximal weight over base_weight_
+  double shift_rate_ = 0;                 ///< of the matrix as evaluated [1/s^2]
+  bool factored_ = false, definite_ = false;
+  int factorizations_ = 0;
+  ClothInputs inputs_;
+  ClothState state_;                      ///< for pins and hinges
+  Eigen::Matrix3Xd pins_from_;
+  PointVector x_, trial_, base_, saved_, d_, force_;
+  Eigen::Matrix3Xd pin_forces_, mode_;
+};
+
+}  // namespace slender
