@@ -7,6 +7,8 @@ foreach(kind unit analytic scenes)
     target_include_directories(${kind}_tests PRIVATE ${PROJECT_SOURCE_DIR})
     target_compile_definitions(${kind}_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     target_link_libraries(${kind}_tests PRIVATE slender_sim GTest::gtest GTest::gtest_main)
+    target_precompile_headers(${kind}_tests PRIVATE
+      <gtest/gtest.h> <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h>)
     # Not among the programs that rosrun offers.
     set_target_properties(${kind}_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
     add_test(NAME ${kind} COMMAND ${kind}_tests)
