@@ -9,6 +9,7 @@ foreach(kind unit analytic scenes)
     target_link_libraries(${kind}_tests PRIVATE slender_sim GTest::gtest GTest::gtest_main)
     target_precompile_headers(${kind}_tests PRIVATE
       <gtest/gtest.h> <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h>)
+    target_compile_options(${kind}_tests PRIVATE $<$<CONFIG:Release>:-O1>)   # tests spend their time in the library
     # Not among the programs that rosrun offers.
     set_target_properties(${kind}_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
     add_test(NAME ${kind} COMMAND ${kind}_tests)
