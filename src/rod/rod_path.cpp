@@ -81,6 +81,15 @@ public:
     return sum / (model->nodes() * length * length) + fa * fb / (last_factor * last_factor);
   }
 
+  /// From the last point of the path to the trial at the factor `at`, as inner() measures.
+  double distanceTo(double at) const
+  {
+    double sum = 0.0;
+    for (int i = 0; i < model->nodes(); ++i)
+      sum += (system.position(i) - state.x.col(i)).squaredNorm();
+    return std::sqrt(sum / (model->nodes() * length * length) + std::pow((at - factor) / last_factor, 2));
+  }
+
   void move(const Eigen::VectorXd& by)
   {
     Eigen::Map<Eigen::VectorXd>(system.direction(), by.size()) = by;
@@ -144,6 +153,7 @@ bool RodPath::Impl::correct(double& at, const Eigen::VectorXd* along, double alo
 
 bool RodPath::Impl::tryStep(double share, int& iterations)
 {
+  constexpr double kFurthest = 1.5;   // times the step: what is further away may be another branch, or leave out a fold
   iterations = 0;
   setLoads(factor);
   if (!sound(system.evaluate(true)))
@@ -165,7 +175,7 @@ bool RodPath::Impl::tryStep(double share, int& iterations)
     return false;
   move(by);
   double at = factor + share * next_factor;
-  if (!correct(at, &next, next_factor, iterations))
+  if (!correct(at, &next, next_factor, iterations) || distanceTo(at) > kFurthest * share)
     return false;
   tangent = next;
   tangent_factor = next_factor;
