@@ -194,6 +194,20 @@ class Services(NodeCase):
                  if value.key == "step"]
         self.assertTrue([s for s in steps if 0 < s < 30000], steps)
 
+    def test_tells_of_the_equilibrium_from_which_it_starts(self):
+        node = self.start()
+        self.assertNotIn("start: stable", self.diagnostics("simulation"))
+        node.terminate()
+        node.wait(60)
+        self.start(scene=SCENE.replace("rods:", "start: equilibrium\nrods:", 1))
+        told = self.diagnostics("simulation")
+        self.assertEqual(told["start: stable"], "yes")
+        self.assertEqual(told["start: unstable equilibria left"], "0")
+        self.assertLess(float(told["start: residual"]), 1e-6)   # of the largest force; Newton's method leaves 1e-8 of an edge
+        self.assertGreater(float(told["start: lowest eigenvalue [1/s^2]"]), 1.0)   # a rope of 1 m swings at several rad/s
+        # as simulate --statics prints it: a weight of 0.54 N at 1 m, that sags by up to 8 cm
+        self.assertAlmostEqual(float(told["start: energy [J]"]), 0.521577, delta=1e-5)
+
     def test_a_long_step_lets_others_in(self):
         self.start()
         answers = []
