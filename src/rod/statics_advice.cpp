@@ -18,8 +18,8 @@ std::string explainStatics(StepFailure failure)
       return what + "contact leaves the rods no room on the way to it: start from a shape that is nearer to the equilibrium (initial), or move "
                     "grasps, bodies and obstacles apart";
     default:
-      return what + "Newton's method did not converge: start from a shape that is nearer to the equilibrium (initial), or let the scene settle by "
-                    "time stepping with damping (start: as_given)";
+      return what + "Newton's method did not converge: hold what is free to drift by a grasp, start from a shape that is nearer to the equilibrium "
+                    "(initial), or let the scene settle by time stepping with damping (start: as_given)";
   }
 }
 
