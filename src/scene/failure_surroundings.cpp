@@ -182,9 +182,10 @@ private:
       for (int j = 0; j < other.edges(); ++j)
       {
         const double radii = radius + largestRadius(other, j);
-        if (!own || !isNeighbour(other, j, radii))
+        const Eigen::Vector3d a = x.col(j), b = x.col((j + 1) % other.nodes());
+        if (!own || comesBack(other, j, radii, pointSegmentDistance(place_.position, a, b)))
         {
-          addSegment(x.col(j), x.col((j + 1) % other.nodes()), radii, own ? "the rod itself at edge " + std::to_string(j) : quoted("rod", config_.rods[r].name));
+          addSegment(a, b, radii, own ? "the rod itself at edge " + std::to_string(j) : quoted("rod", config_.rods[r].name));
         }
       }
     }
@@ -192,8 +193,9 @@ private:
 
   static double largestRadius(const RodModel& model, int edge) { return std::max(model.radius_a[edge], model.radius_b[edge]); }
 
-  /// Whether an edge of the same rod is so near along it that the two never count as a contact (see contactNeighbours).
-  bool isNeighbour(const RodModel& model, int edge, double radii) const
+  /// Whether an edge of the same rod lies there because the rod comes back: it is no neighbour along the rod (see contactNeighbours), and the way along the
+  /// rod is at least twice as long as the distance.
+  bool comesBack(const RodModel& model, int edge, double radii, double distance) const
   {
     const auto between = [&model](int from, int to) { return from < to ? model.rest_length.segment(from, to - from).sum() : 0.0; };
     double along = edge >= place_.node ? between(place_.node, edge) : between(edge + 1, place_.node);
@@ -201,7 +203,7 @@ private:
     {
       along = std::min(along, model.rest_length.sum() - along - model.rest_length[edge]);
     }
-    return along < 0.5 * M_PI * radii + config_.contact.gap;
+    return along > 0.5 * M_PI * radii + config_.contact.gap && along > 2.0 * distance;
   }
 
   void findPartnersOfThread()

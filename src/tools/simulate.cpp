@@ -289,8 +289,8 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   std::printf("steps             %llu\n", static_cast<unsigned long long>(simulation.state().steps));
   std::printf("simulated         %.6g s\n", simulated);
   std::printf("wall              %.6g s\n", wall);
-  std::printf("real-time factor  %.4g\n", simulated / std::max(wall, 1e-9));
-  std::printf("worst residual    %.3g\n", total.residual);
+  std::printf("real-time factor  %.4g (simulated over wall time)\n", simulated / std::max(wall, 1e-9));
+  std::printf("worst residual    %.3g of the largest force\n", total.residual);
   std::printf("iterations        %d (%.2f per step)\n", total.iterations,
               total.iterations / std::max(1.0, static_cast<double>(simulation.state().steps)));
   std::printf("cut steps         %d\n", total.cut_steps);
@@ -322,7 +322,7 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   }
   if (total.projection_iterations > 0)
   {
-    std::printf("projection        at most %d iterations a step, edge lengths squared to %.2g\n", total.projection_iterations, total.constraint_error);
+    std::printf("projection        at most %d iterations a step, squared edge lengths to %.2g of their own\n", total.projection_iterations, total.constraint_error);
   }
 }
 
