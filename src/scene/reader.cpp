@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include "ignored_keys.h"
 #include "read_parts.h"
 #include "reader_log.h"
 
@@ -390,6 +391,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   {
     throw SceneError(problems.text());
   }
+  warnOfIgnoredKeys(map, scene);
   scene.warnings = problems.warnings();
   return scene;
 }

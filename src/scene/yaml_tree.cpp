@@ -8,6 +8,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "slender_sim/scene/reader.h"
+#include "yaml_cursor.h"
 #include "yaml_number.h"
 
 namespace slender {
@@ -229,6 +230,40 @@ std::vector<std::string> split(const std::string& path)
   return parts;
 }
 
+/// " (0 is rope, 1 is cable)", for a list whose entries have names; of long lists the first ones.
+std::string placesByName(const YamlTree& list)
+{
+  constexpr std::size_t most = 10;
+  std::string text;
+  for (std::size_t k = 0; k < list.items.size() && k < most; ++k)
+  {
+    const YamlTree* name = list.items[k].kind == YamlTree::Kind::map ? list.items[k].find("name") : nullptr;
+    if (name && name->kind == YamlTree::Kind::scalar)
+    {
+      text += (text.empty() ? " (" : ", ") + std::to_string(k) + " is " + name->scalar;
+    }
+  }
+  return text.empty() ? text : text + ")";
+}
+
+/// A new grasp can be set as a whole. A key of a grasp that is not there is a mistaken name: the reader would only see a grasp that holds nothing.
+void requireKnownGrasp(const YamlTree& map, const std::string& path, const std::string& name, std::size_t parts, const std::string& where)
+{
+  const std::vector<std::string> passed = split(path);
+  if (passed.back() != "grasps" || parts == passed.size() + 1)
+  {
+    return;
+  }
+  std::vector<std::string> names;
+  for (const auto& member : map.members)
+  {
+    names.push_back(member.first);
+  }
+  const std::string nearest = nearestWord(name, names);
+  throw SceneError(where + ": " + path + " has no grasp '" + name + "'" + (names.empty() ? "" : "; it has: " + joinWords(names)) +
+                   (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
+}
+
 }  // namespace
 
 const char* toString(YamlTree::Kind kind)
@@ -304,7 +339,8 @@ void applyOverride(YamlTree& root, const std::string& assignment)
 
   YamlTree* at = &root;
   std::string passed;
-  for (const std::string& part : split(assignment.substr(0, equals)))
+  const std::vector<std::string> parts = split(assignment.substr(0, equals));
+  for (const std::string& part : parts)
   {
     const std::string here = passed.empty() ? "the scene" : "'" + passed + "'";
     if (part.empty())
@@ -327,7 +363,7 @@ void applyOverride(YamlTree& root, const std::string& assignment)
       if (!index || !(*index >= -size && *index < size) || *index != std::floor(*index))
       {
         throw SceneError(where + ": " + here + " is a list; '" + part + "' must be a whole number in [" + std::to_string(-size) +
-                         ", " + std::to_string(size - 1) + "]");
+                         ", " + std::to_string(size - 1) + "]" + placesByName(*at));
       }
       at = &at->items[static_cast<long>(*index) + (*index < 0 ? size : 0)];
     }
@@ -335,6 +371,7 @@ void applyOverride(YamlTree& root, const std::string& assignment)
     {
       if (!at->find(part))
       {
+        requireKnownGrasp(*at, passed, part, parts.size(), where);
         at->members.emplace_back(part, YamlTree{});
       }
       at = at->find(part);

@@ -76,5 +76,79 @@ TEST(IgnoredInputs, aPreviewThatPassesThroughOtherClothsIsWarnedOf)
   EXPECT_EQ(count(built("    contact: {thickness: 0.002, self: false, cloths: false}\n"), {"is the guide of another"}), 0);
 }
 
+/// The scene with `more` in the material of its rod.
+std::string withMaterial(const std::string& more) { return std::string(rod).insert(rod.find("density:"), more + ", "); }
+
+TEST(IgnoredInputs, materialThatNothingFollowsFromIsWarnedOf)
+{
+  const std::string twist = "twist_modulus: 1.0e-3, bend_modulus: 1.0e-3";
+  EXPECT_EQ(count(warningsOf(withMaterial("poissons_ratio: 0.4, " + twist)), {"material.poissons_ratio", "has no effect", "twist_modulus"}), 1);
+  EXPECT_EQ(count(warningsOf(withMaterial("torsion: saint_venant, " + twist)), {"material.torsion", "has no effect", "twist_modulus"}), 1);
+  EXPECT_EQ(count(warningsOf(withMaterial("poissons_ratio: 0.4, torsion: saint_venant")), {"has no effect"}), 0);
+  EXPECT_EQ(count(warningsOf(withMaterial("linear_density: 0.1")), {"material.density", "linear_density is given"}), 1);
+  EXPECT_EQ(count(warningsOf("gravity: [0, 0, 0]\n" + withMaterial("inextensible: true")), {"material.inextensible", "no gravity"}), 1);
+  EXPECT_EQ(count(warningsOf(withMaterial("inextensible: true")), {"has no effect"}), 0);
+}
+
+TEST(IgnoredInputs, timeKeysOfOtherIntegratorsAreWarnedOf)
+{
+  EXPECT_EQ(count(warningsOf("time: {integrator: bdf2, spectral_radius: 0.5}\n" + rod), {"time.spectral_radius", "generalized_alpha", "bdf2"}), 1);
+  EXPECT_EQ(count(warningsOf("time: {integrator: generalized_alpha, spectral_radius: 0.5}\n" + rod), {"spectral_radius"}), 0);
+  EXPECT_EQ(count(warningsOf("time: {integrator: symplectic_euler, newton: {max_iterations: 5}}\n" + rod), {"time.newton", "has no effect"}), 1);
+}
+
+TEST(IgnoredInputs, windThatNothingFeelsIsWarnedOf)
+{
+  const std::string wind = "wind: {velocity: [1, 0, 0]}\n";
+  EXPECT_EQ(count(warningsOf(wind + rod), {"wind", "has no effect", "drag"}), 1);
+  EXPECT_EQ(count(warningsOf(wind + sheet), {"wind", "has no effect"}), 1);
+  EXPECT_EQ(count(warningsOf(wind + rod + "    damping: {drag: 0.1}\n"), {"wind"}), 0);
+  EXPECT_EQ(count(warningsOf(wind + sheet + "    aerodynamics: {drag: 1.2}\n"), {"wind"}), 0);
+}
+
+TEST(IgnoredInputs, obstaclesThatNothingTouchesAreWarnedOf)
+{
+  const std::string post = "obstacles:\n  - {name: post, shape: {sphere: {radius: 0.1}}}\n";
+  EXPECT_EQ(count(warningsOf(rod + post), {"obstacles", "touched by nothing", "post"}), 1);
+  EXPECT_EQ(count(warningsOf(rod + "    contact: {friction: 0.3}\n" + post), {"touched by nothing"}), 0);
+  EXPECT_EQ(count(warningsOf(rod + "    contact: {obstacles: false}\n" + post), {"touched by nothing"}), 1);
+  EXPECT_EQ(count(warningsOf(rod + "    grasps: {end: {edges: [0], motion: {body: post}}}\n" + post), {"touched by nothing"}), 0);   // a frame to follow
+}
+
+TEST(IgnoredInputs, otherKeysWithoutEffectAreWarnedOf)
+{
+  EXPECT_EQ(count(warningsOf(rod + "bodies:\n  - {name: hand, motion: fixed, force: [1, 0, 0]}\n"), {"bodies.0.force", "motion is given"}), 1);
+  EXPECT_EQ(count(warningsOf(sheet + "    bending: {model: none, modulus: 1.0e-4}\n"), {"bending.modulus", "model: none"}), 1);
+  EXPECT_EQ(count(warningsOf(sheet + "    solver: {linear: cholesky, tolerance: 0.01}\n"), {"solver.tolerance", "cholesky"}), 1);
+  EXPECT_EQ(count(warningsOf("time: {integrator: symplectic_euler, step: 1.0e-5}\n" + sheet + "    solver: {tolerance: 0.01}\n"), {"solver", "has no effect"}), 1);
+  const std::string thread = "threads:\n  - {name: honey, fluid: {viscosity: 10}, nozzle: {position: [0, 0, 1], diameter: 0.004, flow: 1.0e-7}, edges: {deposited: 100}}\n";
+  EXPECT_EQ(count(warningsOf(thread), {"edges.deposited", "no"}), 1);
+}
+
+TEST(IgnoredInputs, overridesThatMatchNothingAreRefusedWithNearNames)
+{
+  const auto refusal = [](const std::string& assignment) {
+    try
+    {
+      parseScene(rod + "    grasps: {left: {edges: [0]}, right: {edges: [-1]}}\n", "test.yaml", {assignment});
+      return std::string();
+    }
+    catch (const SceneError& error)
+    {
+      return std::string(error.what());
+    }
+  };
+  const auto has = [](const std::string& text, const std::vector<std::string>& words) { return count({text}, words) == 1; };
+  EXPECT_TRUE(has(refusal("rods.0.material.youngs_modulis=1e7"), {"--set", "youngs_modulis", "did you mean youngs_modulus?"})) << refusal("rods.0.material.youngs_modulis=1e7");
+  EXPECT_TRUE(has(refusal("rods.rope.closed=true"), {"--set", "is a list", "0 is rope"})) << refusal("rods.rope.closed=true");
+  EXPECT_TRUE(has(refusal("rods.1.closed=true"), {"--set", "[-1, 0]"}));
+  EXPECT_TRUE(has(refusal("rods.0.grasps.lefft.motion=topic"), {"--set", "no grasp 'lefft'", "it has: left, right", "did you mean left?"}))
+    << refusal("rods.0.grasps.lefft.motion=topic");
+  EXPECT_TRUE(has(refusal("rod.0.closed=true"), {"--set", "did you mean rods?"})) << refusal("rod.0.closed=true");
+  EXPECT_TRUE(has(refusal("rods.0.name.first=a"), {"--set", "single value"}));
+  EXPECT_EQ(refusal("rods.0.material.youngs_modulus=1e8"), "");
+  EXPECT_EQ(refusal("rods.0.grasps.middle={edges: [4]}"), "");   // a new one, as a whole
+}
+
 }  // namespace
 }  // namespace slender
