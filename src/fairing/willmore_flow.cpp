@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "slender_sim/energy/isometric_bending.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -168,6 +169,8 @@ FairingReport WillmoreFlow::step(Eigen::Matrix3Xd& vertices)
   double first = 0.0;
   for (int iteration = 0; iteration < iterations_; ++iteration)
   {
+    if (stepsInterrupted())
+      return refuse(kStepInterrupted);
     std::fill(gradient_.begin(), gradient_.end(), 0.0);
     if (!std::isfinite(willmore_.addGradient(x_.data(), gradient_.data())))
       return refuse("a face has no area, or a vertex is not finite; mend the mesh first");

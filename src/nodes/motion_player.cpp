@@ -5,12 +5,14 @@
 
 #include "slender_sim/node/arguments.h"
 #include "slender_sim/node/motion_player.h"
+#include "slender_sim/node/signals.h"
 
 int main(int argc, char** argv)
 try
 {
-  ros::init(argc, argv, "motion_player");
+  ros::init(argc, argv, "motion_player", ros::init_options::NoSigintHandler);
   slender::requireNoArguments(argc, argv);
+  slender::stopOnSignals();
   slender::MotionPlayer(ros::NodeHandle(), ros::NodeHandle("~")).spin();
   return 0;
 }
