@@ -16,6 +16,7 @@
 #include <rosbag/view.h>
 #include <std_msgs/String.h>
 
+#include "slender_sim/Fields.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_messages.h"
 #include "slender_sim/node/step_gaps.h"
@@ -179,6 +180,7 @@ struct BagReader::Contents
   void add(const slender_sim::ThreadState& thread);
   void add(const slender_sim::ClothState& cloths);
   void add(const slender_sim::BodyStates& states, std::vector<SolidSnapshot>& solids);
+  void add(const slender_sim::Fields& fields);
 };
 
 void BagReader::Contents::open()
@@ -284,6 +286,8 @@ void BagReader::Contents::openStreams()
       stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { add(m, out->bodies); });
     else if (name == "obstacle_states" && type == "BodyStates")
       stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { add(m, out->obstacles); });
+    else if (name == "fields" && type == "Fields")
+      stream<slender_sim::Fields>(topic, "Fields", [this](const auto& m) { add(m); });
     else if (name == "grasp_states" && type == "GraspStates")
       stream<slender_sim::GraspStates>(topic, "GraspStates", [this](const auto& m) {
         require(m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(), "grasp_states");
@@ -420,6 +424,21 @@ void BagReader::Contents::add(const slender_sim::BodyStates& states, std::vector
   require(states.pose.size() == states.name.size() && states.twist.size() == states.name.size(), "body_states");
   for (std::size_t b = 0; b < states.name.size(); ++b)
     solids.push_back({states.name[b], poseOf(states.pose[b]), {vectorOf(states.twist[b].linear), vectorOf(states.twist[b].angular)}});
+}
+
+void BagReader::Contents::add(const slender_sim::Fields& fields)
+{
+  // names of tables become names of files
+  static const std::set<std::string> known{"rod_fields", "thread_fields", "cloth_fields", "energies"};
+  for (const slender_sim::FieldTable& from : fields.tables)
+  {
+    const std::size_t columns = from.columns.size(), rows = columns > 0 ? from.values.size() / columns : 0;
+    require(known.count(from.table) > 0 && columns > 0 && from.values.size() == rows * columns, "fields (of " + from.object + ")");
+    FieldTable table{from.table, from.object, from.columns, Eigen::MatrixXd(rows, columns)};
+    for (std::size_t i = 0; i < from.values.size(); ++i)
+      table.values(static_cast<Eigen::Index>(i / columns), static_cast<Eigen::Index>(i % columns)) = from.values[i];
+    out->fields.push_back(std::move(table));
+  }
 }
 
 BagReader::BagReader(const std::string& path, const std::string& topic_namespace, const std::string& scene_folder)

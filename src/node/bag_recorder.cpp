@@ -24,6 +24,7 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
   bodies_topic_ = prefix + "body_states";
   grasps_topic_ = prefix + "grasp_states";
   obstacles_topic_ = prefix + "obstacle_states";
+  fields_topic_ = prefix + "fields";
   for (const std::string& name : grasp_names)
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
   for (const std::string& thread : thread_prefixes)
@@ -99,6 +100,8 @@ void BagRecorder::record(const SceneMessages& messages)
     write(grasps_topic_, messages.grasps.header.stamp, messages.grasps);
   if (!messages.obstacles.name.empty())
     write(obstacles_topic_, messages.obstacles.header.stamp, messages.obstacles);
+  if (!messages.fields.tables.empty())
+    write(fields_topic_, messages.fields.header.stamp, messages.fields);
 }
 
 void BagRecorder::close()
@@ -138,6 +141,7 @@ public:
         bag_->recordMesh(clothMesh(simulation, clock.stamp(), "world"));
     }
     messages_.fill(simulation, clock.stamp(), "world", 0);
+    messages_.fillFields(simulation);
     bag_->record(messages_);
   }
 

@@ -389,6 +389,15 @@ void GuideInputs::skip(double seconds)
   tracking_->skip(seconds);
 }
 
+std::vector<std::string> GuideInputs::unheardBodies() const
+{
+  std::vector<std::string> bodies;
+  for (std::size_t g = 0; g < guided_.size(); ++g)
+    if (guided_[g].buffer && !guided_[g].body.empty() && !guided_[g].buffer->lastTime())
+      bodies.push_back(guided_[g].body + (g < grasps_ ? " for grasp " + guided_[g].name : ""));
+  return bodies;
+}
+
 std::vector<GuideInputs::Age> GuideInputs::ages() const
 {
   std::vector<Age> ages;

@@ -6,6 +6,7 @@
 #include <ros/names.h>
 
 #include "slender_sim/node/converters.h"
+#include "slender_sim/scene/field_tables.h"
 
 namespace slender {
 namespace {
@@ -167,6 +168,24 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     obstacles.name[k] = simulation.config().obstacles[k].name;
     obstacles.pose[k] = toMessage(scene.obstacles[k]);
     obstacles.twist[k] = toMessage(scene.obstacle_velocities[k]);
+  }
+}
+
+void SceneMessages::fillFields(const Simulation& simulation)
+{
+  fields.header = edge_poses->header;
+  fields.epoch = cloth_state->epoch;
+  fields.step = simulation.state().steps;
+  fields.tables.clear();
+  for (const FieldTable& table : fieldTablesOf(simulation))
+  {
+    slender_sim::FieldTable& message = fields.tables.emplace_back();
+    message.table = table.table;
+    message.object = table.object;
+    message.columns = table.columns;
+    for (Eigen::Index i = 0; i < table.values.rows(); ++i)
+      for (Eigen::Index k = 0; k < table.values.cols(); ++k)
+        message.values.push_back(table.values(i, k));
   }
 }
 

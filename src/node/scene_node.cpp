@@ -1,6 +1,7 @@
 #include "slender_sim/node/scene_node.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
@@ -179,6 +180,8 @@ void SceneNode::advertise()
     grasps_pub_ = nh_.advertise<slender_sim::GraspStates>("grasp_states", 1000);
   if (!simulation_->config().obstacles.empty())
     obstacles_pub_ = nh_.advertise<slender_sim::BodyStates>("obstacle_states", 1000);
+  if (!simulation_->config().record.fields.empty())
+    fields_pub_ = nh_.advertise<slender_sim::Fields>("fields", 1000);
   if (std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.broadcast_tf; }))
     tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   markers_pub_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
@@ -242,7 +245,9 @@ void SceneNode::fail(const std::string& reason)
 {
   mode_before_failure_ = mode_;
   mode_ = Mode::failed;
-  failure_ = "step " + std::to_string(simulation_->state().steps + 1) + ": " + reason;
+  char time[40];
+  std::snprintf(time, sizeof time, "%.9g", simulation_->state().time);
+  failure_ = "step " + std::to_string(simulation_->state().steps + 1) + " (from t = " + time + " s on): " + reason;
   ROS_ERROR("%s stopped at %s; call ~reset to start again", nh_priv_.getNamespace().c_str(), failure_.c_str());
   publishDiagnostics();
 }
@@ -257,10 +262,12 @@ void SceneNode::publishState()
   }
   broadcastBodies();
   const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
-  if (!bag_ && !heard(state_pub_) && !heard(points_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) && !heard(grasps_pub_) && !heard(obstacles_pub_) &&
+  if (!bag_ && !heard(state_pub_) && !heard(points_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) && !heard(grasps_pub_) && !heard(obstacles_pub_) && !heard(fields_pub_) &&
       std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) && std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard) && std::none_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard))
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
+  if (fields_pub_ && (bag_ || heard(fields_pub_)))
+    messages_.fillFields(*simulation_);
   if (bag_)   // first: what is published belongs to others
     try
     {
@@ -304,6 +311,8 @@ void SceneNode::publishState()
     grasps_pub_.publish(messages_.grasps);
   if (!messages_.obstacles.name.empty())
     obstacles_pub_.publish(messages_.obstacles);
+  if (heard(fields_pub_))
+    fields_pub_.publish(messages_.fields);
 }
 
 void SceneNode::broadcastBodies()
@@ -433,7 +442,7 @@ void SceneNode::summary() const
   const RunStatistics& s = total_;
   const char* name = toString(kind_);
   std::cout << std::setprecision(4) << name << ": " << s.steps << " steps, " << s.simulated << " s simulated, " << s.busy
-            << " s computing, real-time factor " << s.realTimeFactor() << ", worst residual " << s.residual << ", largest strain "
+            << " s computing, real-time factor " << s.realTimeFactor() << ", worst residual " << s.residual << " of the largest force, largest strain "
             << s.max_strain << ", Newton iterations per step " << (s.steps ? static_cast<double>(s.iterations) / s.steps : 0.0)
             << ", cut steps " << s.cut_steps << "\n";
   if (s.skipped > 0.0)

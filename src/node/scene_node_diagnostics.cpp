@@ -90,8 +90,24 @@ void SceneNode::publishDiagnostics()
     next_clock_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
     ROS_WARN("%s %s", nh_priv_.getNamespace().c_str(), waits.c_str());
   }
+  remindOfBodies();
   recent_ = RunStatistics();
   next_diagnostics_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.diagnostics_rate);
+}
+
+void SceneNode::remindOfBodies()
+{
+  if (mode_ != Mode::running || replay_ || ros::WallTime::now() < next_body_reminder_)
+    return;
+  std::string waits;
+  for (const std::string& body : inputs_->unheardBodies())
+    waits += (waits.empty() ? "" : ", ") + body;
+  if (waits.empty())
+    return;
+  next_body_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
+  const std::string& stranger = inputs_->drops().last(Drop::unknown_name);
+  ROS_WARN("%s: nobody has published a pose yet of %s; what follows it stays where it is (topic %s)%s%s", nh_priv_.getNamespace().c_str(), waits.c_str(),
+           nh_.resolveName("bodies").c_str(), stranger.empty() ? "" : ". Messages there name others: ", stranger.c_str());
 }
 
 std::string SceneNode::clockWentBack() const

@@ -1,6 +1,7 @@
 #include "slender_sim/scene/field_tables.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "slender_sim/rod/rod_sections.h"
@@ -116,6 +117,58 @@ void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordF
   columns.moveTo(out);
 }
 
+/// Curvature at an inner node [1/m]: 2 tan(turn / 2) over the mean length of its two edges, as for rods.
+double threadCurvature(const ThreadState& thread, int node)
+{
+  const Eigen::Vector3d a = thread.edge(node - 1), b = thread.edge(node);
+  const double turn = 2.0 * a.cross(b).norm() / (a.norm() * b.norm() + a.dot(b));
+  return turn / (0.5 * (a.norm() + b.norm()));
+}
+
+/// One table per piece. All follows from the state: positions, velocities and volumes.
+void addThread(const Simulation& simulation, int thread, const std::vector<RecordField>& fields, std::vector<FieldTable>& out)
+{
+  const bool curvature = asks(fields, RecordField::curvature), strain = asks(fields, RecordField::strain), force = asks(fields, RecordField::force);
+  if (!curvature && !strain && !force)
+    return;
+  const ThreadModel& model = simulation.threadModel(thread);
+  for (const ThreadState& piece : simulation.state().threads[static_cast<std::size_t>(thread)].threads)
+  {
+    const int nodes = piece.nodes(), edges = piece.edges();
+    Columns columns("thread_fields", model.name, nodes);
+    Eigen::MatrixXd names(2, nodes);
+    Eigen::RowVectorXd kappa = Eigen::RowVectorXd::Zero(nodes), flux(nodes);
+    Eigen::MatrixXd of_edges(3, edges);   // radius, stretch rate, tension
+    for (int j = 0; j < edges; ++j)
+    {
+      const double length = piece.edge(j).norm(), radius = piece.radius(j);
+      const double rate = (piece.v[j + 1] - piece.v[j]).dot(piece.edge(j)) / (length * length);
+      of_edges.col(j) << radius, rate, 3.0 * model.viscosity * M_PI * radius * radius * rate + M_PI * model.surface_tension * radius;
+    }
+    for (int i = 0; i < nodes; ++i)
+    {
+      names.col(i) << static_cast<double>(piece.thread_id), static_cast<double>(piece.id[i]);
+      if (i > 0 && i + 1 < nodes)
+        kappa[i] = threadCurvature(piece, i);
+      const int before = std::max(i - 1, 0), after = std::min(i, edges - 1);
+      const Eigen::Vector3d along = (piece.edge(before).normalized() + piece.edge(after).normalized()).normalized();   // against the flow
+      const double section = 0.5 * M_PI * (of_edges(0, before) * of_edges(0, before) + of_edges(0, after) * of_edges(0, after));
+      flux[i] = -section * piece.v[i].dot(along);
+    }
+    columns.add({"thread", "id"}, names);
+    if (curvature)
+      columns.add({"curvature [1/m]"}, kappa);
+    if (strain)
+    {
+      columns.add({"radius [m]", "stretch_rate [1/s]"}, of_edges.topRows(2));
+      columns.add({"flux [m^3/s]"}, flux);
+    }
+    if (force)
+      columns.add({"tension [N]"}, of_edges.row(2));
+    columns.moveTo(out);
+  }
+}
+
 void addEnergies(const Simulation& simulation, std::vector<FieldTable>& out)
 {
   const auto add = [&out](const std::string& object, double stretch, double bend, double twist, double kinetic, double gravity) {
@@ -160,6 +213,8 @@ std::vector<FieldTable> fieldTablesOf(const Simulation& simulation)
     contact = rodContactForces(simulation);
   for (std::size_t r = 0; r < contact.size(); ++r)
     addRod(simulation, static_cast<int>(r), fields, contact[r], out);
+  for (std::size_t k = 0; k < simulation.state().threads.size(); ++k)
+    addThread(simulation, static_cast<int>(k), fields, out);
   for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
     addCloth(simulation, static_cast<int>(k), fields, out);
   if (asks(fields, RecordField::energy))

@@ -38,8 +38,10 @@ void checkRecord(const YamlCursor& at, const SceneConfig& scene)
       item.problem("is recorded of rods, cloths and simulated bodies, and the scene has none; leave it out");
     if (*field == RecordField::contact_force && scene.rods.empty() && scene.cloths.empty())
       item.problem("is recorded of rods and cloths, and the scene has none; leave it out");
-    if (*field < RecordField::energy && scene.rods.empty())
-      item.problem("is recorded of rods, and the scene has none; leave it out");
+    const bool of_threads = *field == RecordField::curvature || *field == RecordField::strain || *field == RecordField::force;
+    if (*field < RecordField::energy && scene.rods.empty() && !(of_threads && !scene.threads.empty()))
+      item.problem(of_threads ? "is recorded of rods and threads, and the scene has none; leave it out"
+                              : "is recorded of rods, and the scene has none; leave it out");
     const auto projected = std::find_if(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.stretching == Stretching::projected; });
     if (*field == RecordField::force && projected != scene.rods.end())
       item.problem("is not known of rod " + projected->name +

@@ -7,7 +7,7 @@ namespace {
 const char* const name = "bag_to_csv";
 const char* const usage =
   "usage: bag_to_csv BAG --out DIR [options]\n"
-  "  --out DIR        new or empty folder for nodes.csv, grasps.csv, and of scenes that have them threads.csv, cloths.csv, bodies.csv, tracking.csv:\n"
+  "  --out DIR        new or empty folder for nodes.csv, grasps.csv, and of scenes that have them threads.csv, cloths.csv, bodies.csv, tracking.csv, and tables of fields:\n"
   "                   the tables of simulate --csv\n"
   "  --namespace NS   of the recorded topics, e.g. /rod_node; needed for a bag of several nodes\n"
   "  --scene-dir DIR  where the files lie that the recorded scene names (default: here); needed for tracking.csv\n"

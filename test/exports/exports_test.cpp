@@ -46,9 +46,10 @@ TEST_P(Tables, areThoseOfTheRunItself)
 INSTANTIATE_TEST_SUITE_P(
   All, Tables,
   testing::Values(Recording{"demo_rope", "--duration 0.1", {"nodes.csv", "grasps.csv"}},
-                  Recording{"honey_coil", "--duration 1.2", {"nodes.csv", "grasps.csv", "threads.csv"}},
+                  Recording{"honey_coil", "--duration 1.2 --set 'record.fields=[curvature, strain, force]'", {"nodes.csv", "grasps.csv", "threads.csv", "thread_fields.csv"}},
                   Recording{"handkerchief", "--duration 0.1", {"nodes.csv", "grasps.csv", "cloths.csv"}},
-                  Recording{"obstacle_course", "--duration 0.1", {"nodes.csv", "grasps.csv", "bodies.csv"}},
+                  Recording{"obstacle_course", "--duration 0.1 --set 'record.fields=[force, moment, energy, contact_force]'",
+                            {"nodes.csv", "grasps.csv", "bodies.csv", "rod_fields.csv", "energies.csv"}},
                   Recording{"box", "--duration 0.1 --set 'tracked.0.test_functions=[{name: foot, regions: {foot: {guide: [0..3]}}}, {name: tight, basis: subdivision, from: 0.05}]'",
                             {"nodes.csv", "grasps.csv", "cloths.csv", "tracking.csv"}},
                   Recording{"tracked_rope", "--duration 0.1", {"nodes.csv", "grasps.csv", "tracking.csv"}}),

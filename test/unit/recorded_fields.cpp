@@ -360,5 +360,80 @@ cloths:
   EXPECT_NE(complaint({"record={fields: [moment]}"}, cloth).find("recorded of rods"), std::string::npos);
 }
 
+// A thread that hangs from a nozzle without flow, so viscous that inertia is nothing against weight and viscosity.
+TEST(RecordedFields, TensionOfAHangingThreadIsTheWeightBelow)
+{
+  Simulation simulation = make(R"(
+time: {step: 0.01}
+record: {fields: [force, strain, curvature]}
+threads:
+  - name: pitch
+    fluid: {density: 1000, viscosity: 1.0e5, surface_tension: 0.05}
+    centerline: {straight: {from: [0, 0, 0], to: [0, 0, 0.4], edges: 20}}
+    radius: 0.005
+    ends: {newest: held}
+)");
+  run(simulation, 5);
+  const std::vector<FieldTable> tables = fieldTablesOf(simulation);
+  ASSERT_EQ(tables.size(), 1u);
+  EXPECT_EQ(tables[0].table, "thread_fields");
+  EXPECT_EQ(tables[0].object, "pitch");
+  const ThreadState& thread = simulation.state().threads[0].threads[0];
+  const Eigen::VectorXd tension = column(tables[0], "tension [N]"), rate = column(tables[0], "stretch_rate [1/s]"), radius = column(tables[0], "radius [m]");
+  const Eigen::VectorXd flux = column(tables[0], "flux [m^3/s]"), kappa = column(tables[0], "curvature [1/m]"), id = column(tables[0], "id");
+  ASSERT_EQ(tension.size(), thread.nodes());
+  double below = 0.0;
+  for (int j = 0; j < thread.edges(); ++j)
+  {
+    // the balance of node j: what hangs below it is whole edges and half of its own on either side; surface tension of the free end pulls up
+    below += 9.81 * 1000 * 0.5 * (thread.volume[j] + (j > 0 ? thread.volume[j - 1] : 0.0));
+    EXPECT_NEAR(tension[j], below, 2e-3 * 9.81 * 1000 * thread.totalVolume()) << j;   // the rates are those of a step that ends here: first order in time
+    EXPECT_NEAR(radius[j], thread.radius(j), 1e-15);
+    EXPECT_NEAR(tension[j], 3 * 1e5 * M_PI * radius[j] * radius[j] * rate[j] + M_PI * 0.05 * radius[j], 1e-12);
+    EXPECT_NEAR(id[j], static_cast<double>(thread.id[j]), 0.0);
+  }
+  EXPECT_LT(kappa.lpNorm<Eigen::Infinity>(), 1e-9);
+  // it falls towards its oldest node: that is downstream, and positive
+  EXPECT_GT(flux[0], 0.0);
+  EXPECT_NEAR(flux[0], -thread.v[0].z() * M_PI * radius[0] * radius[0], 1e-9 * flux[0]);
+  EXPECT_EQ(flux[thread.nodes() - 1], 0.0);   // held
+}
+
+TEST(RecordedFields, FluxOfAThreadIsThatOfTheNozzle)
+{
+  // fed slowly and in free air: near the nozzle the section has not changed yet, so that the flux is the flow
+  Simulation simulation = make(R"(
+time: {step: 0.002}
+record: {fields: [strain]}
+threads:
+  - name: honey
+    fluid: {density: 1400, viscosity: 100}
+    nozzle: {position: [0, 0, 1], diameter: 0.01, flow: 2.0e-6}
+)");
+  run(simulation, 100);
+  const std::vector<FieldTable> tables = fieldTablesOf(simulation);
+  ASSERT_EQ(tables.size(), 1u);
+  const Eigen::VectorXd flux = column(tables[0], "flux [m^3/s]");
+  EXPECT_NEAR(flux[flux.size() - 1], 2e-6, 0.1 * 2e-6);   // the last edge is still filling
+}
+
+TEST(RecordedFields, CurvatureOfAThreadIsThatOfItsArc)
+{
+  const Simulation simulation = make(R"(
+record: {fields: [curvature]}
+threads:
+  - name: bow
+    fluid: {viscosity: 10}
+    centerline: {arc: {center: [0, 0, 0], start: [0.2, 0, 0], axis: [0, 0, 1], angle: 1.5, edges: 30}}
+    radius: 0.005
+)");
+  const Eigen::VectorXd kappa = column(fieldTablesOf(simulation).at(0), "curvature [1/m]");
+  EXPECT_EQ(kappa[0], 0.0);   // free ends carry none
+  for (Eigen::Index i = 1; i + 1 < kappa.size(); ++i)
+  {
+    EXPECT_NEAR(kappa[i], 5.0, 5.0 * 1e-3);   // chords of 1/20 rad: 2 tan(turn/2) / chord is 1 + 3/24 turn^2 times 1/R
+  }
+}
+
 }  // namespace
 }  // namespace slender

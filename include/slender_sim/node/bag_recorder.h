@@ -30,7 +30,7 @@ public:
   /// What changed the run, on `inputs`.
   void recordInput(const slender_sim::Input& input);
   /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies, `nozzle/wrench` per
-  /// thread, `grasp_states` and `obstacle_states` if there are any; the rest can be derived from these. These four throw WriteError.
+  /// thread, `grasp_states` and `obstacle_states` if there are any, and `fields` if the scene asks for them; the rest can be derived from these. These four throw WriteError.
   void record(const SceneMessages& messages);
   /// Throws WriteError when the file cannot be completed.
   void close();
@@ -42,7 +42,7 @@ private:
   void write(const std::string& topic, const ros::Time& stamp, const Message& message);
   std::string remains() const;
 
-  std::string path_, state_topic_, scene_topic_, inputs_topic_, mesh_topic_, bodies_topic_, grasps_topic_, obstacles_topic_;
+  std::string path_, state_topic_, scene_topic_, inputs_topic_, mesh_topic_, bodies_topic_, grasps_topic_, obstacles_topic_, fields_topic_;
   std::vector<std::string> wrench_topics_, nozzle_topics_;
   std::unique_ptr<rosbag::Bag> bag_;
   bool open_ = false;

@@ -74,6 +74,8 @@ public:
   /// Per grasp, body, obstacle and guide driven from outside. `missing`, `lag`, `excess`: see TrackingInputs::Age.
   using Age = TrackingInputs::Age;
   /// Age of the last pose at the clock's present; nothing while none came.
+  /// "NAME for grasp G" of each body that something follows by the topic `bodies` and that no message has named yet.
+  std::vector<std::string> unheardBodies() const;
   std::vector<Age> ages() const;
 
   /// Per flow, belt and wind driven from outside: the value by message.

@@ -8,6 +8,7 @@
 
 #include "slender_sim/BodyStates.h"
 #include "slender_sim/ClothState.h"
+#include "slender_sim/Fields.h"
 #include "slender_sim/GraspStates.h"
 #include "slender_sim/MeshStamped.h"
 #include "slender_sim/RodState.h"
@@ -41,7 +42,11 @@ struct SceneMessages
   slender_sim::GraspStates grasps;                      ///< recorded only; none: not recorded
   slender_sim::BodyStates obstacles;                    ///< likewise
 
+  slender_sim::Fields fields;                           ///< see fillFields(); no tables: neither published nor recorded
+
   void fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch);
+  /// What `record.fields` of the scene asks for, of the instant of the last fill(). It is computed here, so call it only if somebody takes it.
+  void fillFields(const Simulation& simulation);
 };
 
 }  // namespace slender

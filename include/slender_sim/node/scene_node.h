@@ -111,6 +111,7 @@ private:
   void publishDiagnostics();
   static constexpr double kClockReminder = 10.0;   ///< [s] between complaints about /clock
   std::string clockWentBack() const;   ///< empty: it did not
+  void remindOfBodies();               ///< that are followed, and that nobody has published yet
   diagnostic_msgs::DiagnosticStatus simulationStatus() const;
   diagnostic_msgs::DiagnosticStatus inputStatus();
 
@@ -147,10 +148,10 @@ private:
   ros::WallTime wall_start_;             // when the tick wall_start_ticks_ was due
   ros::WallTime next_skip_warning_;
   std::uint64_t wall_start_ticks_ = 0;
-  ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_;
+  ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_, next_body_reminder_;
   std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture
 
-  ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_;   // only when the scene has any, like the next
+  ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_, fields_pub_;   // only when the scene has any, like the next
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
   ros::Publisher points_pub_, mesh_pub_;   // cloth only; poses_pub_ is for the others
   ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
