@@ -1,0 +1,243 @@
+#!/usr/bin/python3
+"""The ROS commands of docs/tutorials.md, word by word from the text, and what the text says will be seen. Only rviz, which needs a display, is left out.
+
+The scenes and the commands of `simulate` are run by test/scenes/tutorials.cpp.
+"""
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import unittest
+
+import rosbag
+import rospkg
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Point, PoseStamped, WrenchStamped
+from sensor_msgs import point_cloud2
+from sensor_msgs.msg import PointCloud2
+from slender_sim.msg import ClothState, RodState, ThreadState
+from slender_sim.srv import SetGrasp
+from std_msgs.msg import Float64, Header, String
+
+from node_harness import Listener, run, wait_until
+
+with open(os.path.join(rospkg.RosPack().get_path("slender_sim"), "docs", "tutorials.md")) as file:
+    TEXT = file.read()
+
+
+def only(pattern, text=TEXT):
+    """The one place of the text that matches: a tutorial that says it otherwise needs another test."""
+    found = re.findall(pattern, text, re.DOTALL)
+    if len(found) != 1:
+        raise AssertionError("%d places match %s" % (len(found), pattern))
+    return found[0]
+
+
+def scene(name):
+    return only(r"`%s\.yaml`[^\n]*:\n\n```yaml\n([^`]*)```" % name)
+
+
+def launch_command(name):
+    """`roslaunch ... scene:=$PWD/NAME.yaml ...` without rviz."""
+    return only(r"`(roslaunch slender_sim \w+\.launch scene:=\$PWD/%s\.yaml[^`]*)`" % name).replace(" rviz:=true", "")
+
+
+class Tutorials(unittest.TestCase):
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix="slender_sim_tutorials_")
+        self.processes, self.ends = [], []
+
+    def tearDown(self):
+        for end in self.ends:
+            end.unregister()
+        for process in self.processes:
+            self.stop(process)
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def write(self, name, text):
+        with open(self.path(name), "w") as file:
+            file.write(text)
+
+    def shell(self, command):
+        """Runs a command line of the text in its own process group, in the folder of the tutorial."""
+        process = subprocess.Popen(["bash", "-c", command], cwd=self.folder, preexec_fn=os.setsid, stdout=open(self.path("out.txt"), "w"),
+                                   stderr=subprocess.STDOUT)
+        self.processes.append(process)
+        return process
+
+    def stop(self, process):
+        """As Ctrl-C does, of the whole group."""
+        for which in (signal.SIGINT, signal.SIGKILL):
+            if process.poll() is None:
+                os.killpg(process.pid, which)
+            try:
+                process.wait(60)
+                return
+            except subprocess.TimeoutExpired:
+                pass
+
+    def done(self, command):
+        result = subprocess.run(["bash", "-c", command], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+        self.assertEqual(result.returncode, 0, command + "\n" + result.stdout)
+        return result.stdout
+
+    def output(self):
+        with open(self.path("out.txt")) as file:
+            return file.read()
+
+    def listen(self, topic, kind):
+        listener = Listener(topic, kind)
+        self.ends.append(listener.subscriber)
+        return listener
+
+    def see(self, listener, condition, what):
+        wait_until(lambda: listener.count() > 0 and condition(listener.last()), what=what)
+        return listener.last()
+
+    def bag_lists(self, command, topics):
+        """`rosbag info NAME.bag` of the text, or the same of another bag."""
+        text = self.done(command)
+        for topic in topics:
+            self.assertRegex(text, r"%s\s+\d+ msgs?" % topic)
+
+    def test_rope(self):
+        self.write("rope.yaml", scene("rope"))
+        record = only(r"`(record_bag:=\$PWD/rope\.bag)`")
+        node = self.shell(launch_command("rope") + " " + record)
+        state = self.listen("/state", RodState)
+        first = self.see(state, lambda m: True, "/state").nodes[0]
+        self.assertAlmostEqual(first.y, 0.0, 9)   # nobody moves it yet
+        command = only(r"\n( +rostopic pub -r 20 -s /grasps/gripper/pose .*?)\n\n")
+        mover = self.shell(command)
+        moved = self.see(state, lambda m: abs(m.nodes[0].y - 0.2) < 1e-6, "the gripper to be at y = 0.2 m")
+        self.assertAlmostEqual(moved.nodes[0].z, 1.0, 6)
+        # every message has its own stamp: none is dropped as stale, and the input stays young
+        diagnostics = self.listen("/diagnostics", DiagnosticArray)
+        values = {}
+
+        def young():
+            for status in diagnostics.last().status if diagnostics.count() else []:
+                values.update({value.key: value.value for value in status.values})
+            return float(values.get("input age gripper [s]", "9").replace("none yet", "9")) < 0.5 and "real-time factor" in values
+
+        rospy.sleep(2.0)
+        wait_until(young, what="diagnostics of a young input")
+        self.assertEqual(values["dropped stale"], "0")
+        wrench = self.listen("/grasps/gripper/wrench", WrenchStamped)
+        self.see(wrench, lambda m: abs(m.wrench.force.z) > 0.01, "the rope's weight on the gripper")
+        self.stop(mover)
+        self.stop(node)
+        self.bag_lists(only(r"`(rosbag info rope\.bag)`"), ["/state", "/scene", "/grasps/gripper/wrench"])
+
+    def test_stiffer_rope(self):
+        self.write("rope.yaml", scene("rope"))
+        self.shell(launch_command("rope") + " " + only(r'`(set:="\[rods\.0\.material\.youngs_modulus=1e8\]")`'))
+        text = self.listen("/scene", String)
+        self.see(text, lambda m: "youngs_modulus: 1e8" in m.data, "the overridden scene")
+        self.see(self.listen("/state", RodState), lambda m: m.step > 10, "steps of the stiffer rope")
+
+    def test_honey(self):
+        self.write("honey.yaml", scene("honey"))
+        node = self.shell(launch_command("honey"))
+        state = self.listen("/state", ThreadState)
+        self.see(state, lambda m: min(p.z for p in m.nodes) < 0.03, "honey that falls")
+        self.stop(node)
+        self.bag_lists("rosbag info honey.bag", ["/state", "/scene"])
+
+    def test_driven_nozzle(self):
+        flow, motion, replaced = only(r"With `(flow: \{topic: true[^`]*)` and\s+`(motion: \{topic: true\})` in place of `(swirl: 0\.3)` in `nozzle`")
+        text = scene("honey")
+        self.assertIn("flow: 4.0e-7, " + replaced, text)
+        self.write("honey.yaml", text.replace("flow: 4.0e-7, " + replaced, flow + ", " + motion))
+        node = self.shell(launch_command("honey"))
+        state = self.listen("/state", ThreadState)
+        self.see(state, lambda m: m.step > 2, "the thread")
+        rate = rospy.Publisher("/nozzle/flow", Float64, queue_size=1)
+        where = rospy.Publisher("/nozzle/pose", PoseStamped, queue_size=10)
+        self.ends += [rate, where]
+        wait_until(lambda: rate.get_num_connections() > 0 and where.get_num_connections() > 0, what="nozzle/flow and nozzle/pose to be heard")
+        rate.publish(0.0)
+        pose = PoseStamped()
+        pose.header.frame_id = "world"
+        pose.pose.position = Point(0.01, 0, 0.06)
+        pose.pose.orientation.y = pose.pose.orientation.w = math.sqrt(0.5)   # x along the flow: down
+
+        def moved():
+            pose.header.stamp = rospy.Time.now()
+            where.publish(pose)
+            return abs(state.last().nodes[-1].x - 0.01) < 1e-6
+
+        wait_until(moved, what="the nozzle to be at x = 0.01 m")
+        self.stop(node)
+
+    def test_sweep(self):
+        """The first run of the map ends; the whole map takes long."""
+        command = only(r"`(rosrun slender_sim sweep [^`]*)`")
+        self.assertIn("--out out/map", command)
+        sweep = self.shell(command)
+
+        def begun():
+            self.assertIsNone(sweep.poll(), self.output())
+            return os.path.isdir(self.path("out/map")) and any(files for _, _, files in os.walk(self.path("out/map")))
+
+        wait_until(begun, timeout=300.0, what="results of the sweep")
+        self.stop(sweep)
+
+    def test_cloth(self):
+        grasps = only(r"`(grasps: \{hand: \{corner: lower_left, motion: \{topic: true\}\}\})`")
+        self.write("cloth.yaml", scene("cloth").rstrip() + "\n    " + grasps + "\n")
+        node = self.shell(launch_command("cloth"))
+        state = self.listen("/state", ClothState)
+        self.see(state, lambda m: m.step > 2, "the handkerchief")
+        held = state.all()[0].vertices[0]
+        # "drive grasps/hand/pose as above": the command for the gripper, with the hand's topic and pose. Poses of cloths count relative to the first one.
+        command = only(r"\n( +rostopic pub -r 20 -s /grasps/gripper/pose .*?)\n\n").replace("gripper", "hand")
+        self.shell(command)
+        rospy.sleep(2.0)
+        mover = self.processes.pop()
+        self.stop(mover)
+        self.shell(command.replace("y: 0.2", "y: 0.3"))
+        self.see(state, lambda m: abs(m.vertices[0].y - held.y - 0.1) < 1e-6, "the corner 0.1 m further")
+        release = only(r"`(rosservice call /cloth_node/set_grasp [^`]*)`")
+        self.assertIn("success: True", self.done(release))
+        self.see(state, lambda m: m.vertices[0].z < held.z - 0.05, "the corner that was let go")
+        self.stop(node)
+        self.bag_lists("rosbag info cloth.bag", ["/state", "/scene", "/mesh"])
+
+    def test_tracked(self):
+        self.write("tracked.yaml", scene("tracked"))
+        node = self.shell(launch_command("tracked"))
+        state = self.listen("/state", ClothState)
+        self.see(state, lambda m: m.step > 2, "the sheet")
+        points = rospy.Publisher("/guide/points", PointCloud2, queue_size=10)
+        self.ends.append(points)
+        wait_until(lambda: points.get_num_connections() > 0, what="guide/points to be heard")
+
+        def follows():
+            header = Header(stamp=rospy.Time.now(), frame_id="world")
+            points.publish(point_cloud2.create_cloud_xyz32(header, [(x, y, 0.3) for y in (-0.25, 0.25) for x in (-0.25, 0.25)]))
+            message = state.last()
+            return len(message.guide_vertices) == 4 and all(abs(p.z - 0.3) < 1e-6 for p in message.guide_vertices)
+
+        wait_until(follows, what="the guide at z = 0.3 m")
+        message = state.last()
+        self.assertLess(max(message.constraint_errors), 1e-12)   # round-off
+        mean = sum(p.z for p in message.vertices) / len(message.vertices)
+        self.assertAlmostEqual(mean, 0.3, 1)   # the sheet is where the guide is; folds and sway are its own
+        self.assertGreater(sum(f.z for f in message.guide_forces), 0.0)   # its weight is among the forces
+        self.stop(node)
+        self.bag_lists("rosbag info tracked.bag", ["/state", "/scene", "/mesh"])
+        self.done(only(r"`(rosrun slender_sim regions tracked\.yaml out\.ply)`"))
+        self.assertGreater(os.path.getsize(self.path("out.ply")), 1000)
+
+
+if __name__ == "__main__":
+    run("tutorials_test", Tutorials)
