@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -23,6 +24,39 @@ Eigen::Matrix3Xd vertexNormals(const TriangleMesh& mesh)
   for (Eigen::Index i = 0; i < normals.cols(); ++i)
   {
     normals.col(i).normalize();   // one by one: this leaves zeros alone
+  }
+  return normals;
+}
+
+Eigen::Matrix3Xd cornerNormals(const TriangleMesh& mesh, double crease)
+{
+  const Eigen::Index corners = mesh.triangles.size();
+  Eigen::Matrix3Xd areas(3, mesh.triangles.cols());   // normals of the faces, twice their areas long
+  std::vector<Eigen::Index> first(static_cast<std::size_t>(mesh.vertices.cols()) + 1, 0), around(static_cast<std::size_t>(corners));
+  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+  {
+    const Eigen::Vector3d a = mesh.vertices.col(mesh.triangles(0, f));
+    areas.col(f) = (mesh.vertices.col(mesh.triangles(1, f)) - a).cross(mesh.vertices.col(mesh.triangles(2, f)) - a);
+    for (int k = 0; k < 3; ++k)
+      ++first[static_cast<std::size_t>(mesh.triangles(k, f)) + 1];
+  }
+  for (std::size_t i = 1; i < first.size(); ++i)
+    first[i] += first[i - 1];
+  std::vector<Eigen::Index> next(first.begin(), first.end() - 1);   // faces of vertex i: around[first[i] .. first[i + 1])
+  for (Eigen::Index c = 0; c < corners; ++c)
+    around[static_cast<std::size_t>(next[static_cast<std::size_t>(mesh.triangles.data()[c])]++)] = c / 3;
+  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, corners);
+  for (Eigen::Index c = 0; c < corners; ++c)
+  {
+    const std::size_t vertex = static_cast<std::size_t>(mesh.triangles.data()[c]);
+    const Eigen::Vector3d own = areas.col(c / 3);
+    for (Eigen::Index k = first[vertex]; k < first[vertex + 1]; ++k)
+    {
+      const Eigen::Vector3d other = areas.col(around[static_cast<std::size_t>(k)]);
+      if (other.dot(own) >= crease * other.norm() * own.norm())
+        normals.col(c) += other;
+    }
+    normals.col(c).normalize();
   }
   return normals;
 }

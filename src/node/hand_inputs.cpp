@@ -2,24 +2,31 @@
 #include <algorithm>
 #include <cmath>
 
+#include "marker_tools.h"
 #include "slender_sim/node/guide_inputs.h"
 
 namespace slender {
 namespace {
 
-/// [m] Diagonal of the box around all rods, threads and cloths.
-double sceneSize(const SceneState& state)
+/// Of the box around an object [m].
+double diagonal(const Eigen::AlignedBox3d& box) { return box.isEmpty() ? 1.0 : std::max(box.diagonal().norm(), 1e-3); }
+
+/// The ball is little wider than the gripper of a rod, so that the rod is seen beside it, but wide enough to be caught with a mouse where all of the object is in view.
+void sizeGraspHandle(const Simulation& simulation, const GraspRef& ref, Handle& handle)
 {
-  Eigen::AlignedBox3d box;
-  for (const RodState& rod : state.rods)
-    box.extend(rod.x.rowwise().minCoeff()).extend(rod.x.rowwise().maxCoeff());
-  for (const ThreadGroupState& group : state.threads)
-    for (const ThreadState& thread : group.threads)
-      for (const Eigen::Vector3d& x : thread.x)
-        box.extend(x);
-  for (const SceneCloth& held : state.cloths)
-    box.extend(held.cloth.x.rowwise().minCoeff()).extend(held.cloth.x.rowwise().maxCoeff());
-  return box.isEmpty() ? 1.0 : std::max(box.diagonal().norm(), 1e-3);
+  if (ref.cloth >= 0)
+  {
+    const Eigen::Matrix3Xd& x = simulation.state().cloths[ref.cloth].cloth.x;
+    const double size = diagonal(Eigen::AlignedBox3d(x.rowwise().minCoeff(), x.rowwise().maxCoeff()));
+    handle.size = 0.12 * size;
+    handle.ball = 0.03 * size;
+    return;
+  }
+  const RodModel& model = simulation.rodModel(ref.rod);
+  const double radius = std::max(model.radius_a.maxCoeff(), model.radius_b.maxCoeff()), length = model.rest_length.sum();
+  handle.size = std::max(12.0 * radius, 0.08 * length);
+  handle.ball = std::max(5.0 * radius, 0.02 * length);
+  handle.turns = simulation.state().rods[ref.rod].grasps[ref.index].holds_frame;
 }
 
 struct Reach   // [m] how far a shape reaches from its origin
@@ -60,26 +67,26 @@ std::vector<Handle> GuideInputs::handles(const Simulation& simulation) const
 {
   std::vector<Handle> out;
   const SceneConfig& scene = simulation.config();
-  const double size = sceneSize(simulation.state());
   for (std::size_t g = 0; g < guided_.size(); ++g)
   {
     if (!isDraggable(g) || (g < grasps_ && !simulation.isActive(static_cast<int>(g))))
       continue;
-    Handle handle{handleName(g), poseOf(simulation, g), 0.15 * size, true};
+    Handle handle{handleName(g), poseOf(simulation, g)};
     if (g < grasps_)
-    {
-      const GraspRef& ref = simulation.grasps()[g];
-      handle.turns = ref.cloth >= 0 || simulation.state().rods[ref.rod].grasps[ref.index].holds_frame;
-    }
+      sizeGraspHandle(simulation, simulation.grasps()[g], handle);
     else if (g < grasps_ + bodies_ + obstacles_)
     {
       const std::size_t solid = g - grasps_;
       const Shape* shape = solid >= bodies_ ? &scene.obstacles[solid - bodies_].shape : scene.bodies[solid].shape ? &*scene.bodies[solid].shape : nullptr;
-      if (shape)
-        handle.size = 2.4 * std::visit(Reach(), *shape);
+      handle.size = shape ? 2.4 * std::visit(Reach(), *shape) : 0.15 * diagonal(sceneBox(simulation.state()));
+      handle.ball = 0.35 * handle.size;
     }
     else
-      handle.size = 8.0 * scene.threads[g - grasps_ - bodies_ - obstacles_].nozzle->diameter;
+    {
+      const double diameter = scene.threads[g - grasps_ - bodies_ - obstacles_].nozzle->diameter;
+      handle.size = 8.0 * diameter;
+      handle.ball = 1.8 * diameter;
+    }
     out.push_back(handle);
   }
   return out;

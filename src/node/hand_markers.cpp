@@ -38,7 +38,7 @@ InteractiveMarker makeHandle(const Handle& handle, const std::string& frame_id)
   visualization_msgs::Marker picture;
   picture.type = visualization_msgs::Marker::SPHERE;
   picture.pose.orientation.w = 1.0;
-  picture.scale = toVector3(Eigen::Vector3d::Constant(0.35 * handle.size));
+  picture.scale = toVector3(Eigen::Vector3d::Constant(handle.ball));
   picture.color = color(0.95, 0.75, 0.20, 0.6);
   ball.markers.push_back(picture);
   out.controls.push_back(ball);

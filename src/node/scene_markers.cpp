@@ -79,7 +79,7 @@ void addFrames(const RodModel& model, const RodState& s, Marker& marker)
 
 Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& config, const GraspState& grasp, const RodModel& model)
 {
-  Marker marker = makeMarker(header, "grasps", id, grasp.holds_frame ? Marker::CUBE : Marker::SPHERE);
+  Marker marker = makeMarker(header, "grasps", id, Marker::SPHERE);
   if (!grasp.active)
   {
     marker.action = Marker::DELETE;
@@ -91,9 +91,10 @@ Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& co
     length += model.rest_length[j % model.edges()];
   const double width = 3.6 * std::max(model.radius_a[edge], model.radius_b[edge]);
   marker.pose = toMessage(grasp.X_WG);
-  marker.scale.x = (grasp.holds_frame ? 1.0 : 0.0) * length + width;
-  marker.scale.y = marker.scale.z = width;
+  marker.scale = toVector3(Vector3d::Constant(width));
   marker.color = std::holds_alternative<FixedMotion>(config.motion) ? color(0.35, 0.37, 0.40) : color(0.22, 0.27, 0.33);
+  if (grasp.holds_frame)
+    paintMesh(shapeMesh(Box{{length + width, width, width}}), marker);
   return marker;
 }
 
@@ -142,14 +143,13 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
     }
     if (config.nozzle)
     {
-      Marker nozzle = makeMarker(header, "nozzles", static_cast<int>(k), Marker::CYLINDER);
+      Marker nozzle = makeMarker(header, "nozzles", static_cast<int>(k), Marker::TRIANGLE_LIST);
       const Pose& X = simulation.state().threads[k].threads.front().ends[1].X_WE;
       const double length = 4.0 * config.nozzle->diameter;
       nozzle.pose = toMessage(Pose{X.position - X.orientation * Vector3d(0.5 * length, 0, 0),
                                    X.orientation * Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d::UnitX())});
-      nozzle.scale.x = nozzle.scale.y = 1.4 * config.nozzle->diameter;
-      nozzle.scale.z = length;
       nozzle.color = metal;
+      paintMesh(shapeMesh(Cylinder{0.7 * config.nozzle->diameter, length}), nozzle);
       out.markers.push_back(nozzle);
     }
     if (config.floor)
@@ -224,6 +224,7 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
   addSolidMarkers(simulation, header, out);
   if (options.forces > 0.0)
     addForceMarkers(simulation, header, options.forces, out);
+  addLegend(simulation, header, options, range, out);
   return out;
 }
 

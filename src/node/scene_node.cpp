@@ -184,6 +184,7 @@ void SceneNode::advertise()
     fields_pub_ = nh_.advertise<slender_sim::Fields>("fields", 1000);
   if (std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.broadcast_tf; }))
     tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
+  broadcastFrame();
   markers_pub_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
   scene_pub_ = nh_.advertise<std_msgs::String>("scene", 1, true);
   diagnostics_pub_ = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
@@ -313,6 +314,18 @@ void SceneNode::publishState()
     obstacles_pub_.publish(messages_.obstacles);
   if (heard(fields_pub_))
     fields_pub_.publish(messages_.fields);
+}
+
+/// tf knows a frame only by a transform. Without any rviz warns that its fixed frame does not exist.
+void SceneNode::broadcastFrame()
+{
+  frame_broadcaster_ = std::make_unique<tf2_ros::StaticTransformBroadcaster>();
+  geometry_msgs::TransformStamped transform;
+  transform.header.stamp = clock_.stamp();
+  transform.header.frame_id = options_.frame_id;
+  transform.child_frame_id = nh_priv_.getNamespace().substr(1) + "/origin";
+  transform.transform.rotation.w = 1.0;
+  frame_broadcaster_->sendTransform(transform);
 }
 
 void SceneNode::broadcastBodies()

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "marker_tools.h"
+#include "slender_sim/geometry/mesh_offsets.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/scene/snapshot_meshes.h"
 
@@ -45,55 +46,52 @@ std_msgs::ColorRGBA lit(const std_msgs::ColorRGBA& paint, const Vector3d& normal
   return color(shade(paint.r), shade(paint.g), shade(paint.b), paint.a);
 }
 
+void paintMesh(const TriangleMesh& mesh, Marker& marker)
+{
+  marker.type = Marker::TRIANGLE_LIST;
+  marker.scale = toVector3(Vector3d::Ones());
+  const geometry_msgs::Quaternion& q = marker.pose.orientation;
+  const Eigen::Matrix3d R = Eigen::Quaterniond(q.w, q.x, q.y, q.z).toRotationMatrix();
+  const Eigen::Matrix3Xd normals = R * cornerNormals(mesh);
+  marker.points.reserve(static_cast<std::size_t>(normals.cols()));
+  marker.colors.reserve(static_cast<std::size_t>(normals.cols()));
+  for (Eigen::Index c = 0; c < normals.cols(); ++c)
+  {
+    marker.points.push_back(toPoint(mesh.vertices.col(mesh.triangles.data()[c])));
+    marker.colors.push_back(lit(marker.color, normals.col(c)));
+  }
+}
+
 namespace {
 
 constexpr double kPlaneSize = 10.0;      // [m] a piece of it is drawn
 
-/// Fills type, scale and points of a marker whose pose is `X` and whose colour is set.
+/// Fills type, scale and points of a marker whose pose and colour are set.
 struct Drawing
 {
-  const Pose& X;
   Marker& marker;
 
-  void simple(int type, const Vector3d& size, const Vector3d& center = Vector3d::Zero())
+  void operator()(const Plane&)
   {
-    marker.type = type;
-    marker.pose.position = toPoint(X * center);
-    marker.scale = toVector3(size);
-  }
-
-  void triangle(const Vector3d& a, const Vector3d& b, const Vector3d& c)
-  {
-    const std_msgs::ColorRGBA paint = lit(marker.color, (X.orientation * (b - a).cross(c - a)).normalized());
-    for (const Vector3d* p : {&a, &b, &c})
-    {
-      marker.points.push_back(toPoint(*p));
-      marker.colors.push_back(paint);
-    }
-  }
-
-  void operator()(const Plane&)   // rviz would light a cube from the camera: seen at a glance it is black
-  {
-    marker.type = Marker::TRIANGLE_LIST;
     const double h = 0.5 * kPlaneSize;
-    triangle({-h, -h, 0}, {h, -h, 0}, {h, h, 0});
-    triangle({-h, -h, 0}, {h, h, 0}, {-h, h, 0});
+    TriangleMesh square{Eigen::Matrix3Xd(3, 4), Eigen::Matrix3Xi(3, 2)};
+    square.vertices << -h, h, h, -h, -h, -h, h, h, 0, 0, 0, 0;
+    square.triangles << 0, 0, 1, 2, 2, 3;
+    paintMesh(square, marker);
   }
 
-  void operator()(const Sphere& s) { simple(Marker::SPHERE, Vector3d::Constant(2 * s.radius)); }
-  void operator()(const Box& b) { simple(Marker::CUBE, b.size); }
-  void operator()(const Cylinder& c) { simple(Marker::CYLINDER, {2 * c.radius, 2 * c.radius, c.length}); }
-
-  void operator()(const Capsule& c) { (*this)(std::make_shared<const TriangleMesh>(shapeMesh(c))); }
-
-  void operator()(const std::shared_ptr<const TriangleMesh>& mesh)
+  void operator()(const Sphere& s)   // lit from the camera it looks as it should
   {
-    marker.type = Marker::TRIANGLE_LIST;
-    for (Eigen::Index i = 0; i < mesh->triangles.cols(); ++i)
-    {
-      const auto corner = [&](int k) -> Vector3d { return mesh->vertices.col(mesh->triangles(k, i)); };
-      triangle(corner(0), corner(1), corner(2));
-    }
+    marker.type = Marker::SPHERE;
+    marker.scale = toVector3(Vector3d::Constant(2 * s.radius));
+  }
+
+  void operator()(const std::shared_ptr<const TriangleMesh>& mesh) { paintMesh(*mesh, marker); }
+
+  template <class Solid>
+  void operator()(const Solid& solid)
+  {
+    paintMesh(shapeMesh(solid), marker);
   }
 };
 
@@ -105,8 +103,7 @@ void addSolidMarkers(const Simulation& simulation, const std_msgs::Header& heade
     Marker marker = makeMarker(header, ns, static_cast<int>(id), Marker::CUBE);
     marker.color = paint;
     marker.pose = toMessage(X_WS);
-    Drawing drawing{X_WS, marker};
-    std::visit(drawing, shape);
+    std::visit(Drawing{marker}, shape);
     out.markers.push_back(std::move(marker));
   };
   const SceneConfig& scene = simulation.config();

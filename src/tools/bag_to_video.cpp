@@ -3,12 +3,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <tuple>
 
 #include "arguments.h"
 #include "export_program.h"
+#include "holder_meshes.h"
 #include "picture.h"
 #include "../study/processes.h"
 
@@ -26,7 +28,7 @@ const char* const usage =
   "  --size WxH       of the picture in pixels, even numbers (default: mp4 1280x720, gif 640x360)\n"
   "  --from X,Y,Z     direction from what is seen to the eye (default 0.55,-1,0.45); the distance is such that all recorded motion is seen\n"
   "  --namespace NS   of the recorded topics, e.g. /rod_node; needed for a bag of several nodes\n"
-  "  --scene-dir DIR  where the files lie that the recorded scene names (default: here); needed for bodies, obstacles and floors\n"
+  "  --scene-dir DIR  where the files lie that the recorded scene names (default: here); needed for bodies, obstacles, nozzles and floors\n"
   "  --quiet          print nothing but errors\n"
   "Exit status: 0 done, 2 bad input, 3 failed.\n";
 
@@ -55,7 +57,7 @@ public:
     char input[200];
     std::snprintf(input, sizeof input, "ffmpeg -y -loglevel error -f rawvideo -pixel_format rgb24 -video_size %dx%d -framerate %.9g -i - ", width, height, fps);
     const std::string output = gif ? "-filter_complex 'split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4' -f gif "
-                                   : "-c:v libx264 -preset medium -crf 18 -pix_fmt yuv420p -movflags +faststart -f mp4 ";
+                                   : "-c:v libx264 -preset veryfast -crf 18 -pix_fmt yuv420p -movflags +faststart -f mp4 ";
     pipe_ = popen((input + output + slender::shellWord(file)).c_str(), "w");
     if (!pipe_)
       throw std::runtime_error(std::string("ffmpeg cannot be started: ") + std::strerror(errno));
@@ -103,47 +105,46 @@ private:
   long pictures_ = 0;
 };
 
-/// What the motion reaches; obstacles are not counted, they may be large.
+void extend(Eigen::AlignedBox3d& box, const Eigen::Matrix3Xd& x, double margin = 0.0)
+{
+  box.extend(Eigen::Vector3d(x.rowwise().minCoeff().array() - margin));
+  box.extend(Eigen::Vector3d(x.rowwise().maxCoeff().array() + margin));
+}
+
+/// What the motion reaches, with the obstacles that are no larger.
 Eigen::AlignedBox3d reach(const slender::ExportOptions& options)
 {
   slender::BagReader bag(options.bag, options.topic_namespace, options.scene_folder);
   Eigen::AlignedBox3d box;
-  const auto extend = [&box](const Eigen::Matrix3Xd& x, double margin) {
-    for (Eigen::Index i = 0; i < x.cols(); ++i)
-    {
-      box.extend(Eigen::Vector3d(x.col(i).array() - margin));
-      box.extend(Eigen::Vector3d(x.col(i).array() + margin));
-    }
+  std::vector<Eigen::AlignedBox3d> obstacles(bag.scene() ? bag.scene()->obstacles.size() : 0);
+  const auto addSolid = [](const slender::Shape& shape, const Eigen::Vector3d& at, Eigen::AlignedBox3d& to) {
+    if (!std::holds_alternative<slender::Plane>(shape))
+      extend(to, at, slender::shapeMesh(shape).vertices.colwise().norm().maxCoeff());
   };
   slender::SceneSnapshot instant;
   while (bag.next(instant))
   {
     for (const slender::RodSnapshot& rod : instant.rods)
-      extend(rod.x, std::max(rod.radius_a.maxCoeff(), rod.radius_b.maxCoeff()));
+      extend(box, rod.x, std::max(rod.radius_a.maxCoeff(), rod.radius_b.maxCoeff()));
     for (const slender::ThreadSnapshot& thread : instant.threads)
-      extend(thread.x, thread.radius.maxCoeff());
+      extend(box, thread.x, thread.radius.maxCoeff());
     for (const slender::ClothSnapshot& cloth : instant.cloths)
-      extend(cloth.x, 0.0);
+      extend(box, cloth.x);
     for (std::size_t b = 0; bag.scene() && b < std::min(instant.bodies.size(), bag.scene()->bodies.size()); ++b)
-      if (const auto& shape = bag.scene()->bodies[b].shape; shape && !std::holds_alternative<slender::Plane>(*shape))
-        extend(instant.bodies[b].pose.position, slender::shapeMesh(*shape).vertices.colwise().norm().maxCoeff());
+      if (const auto& shape = bag.scene()->bodies[b].shape)
+        addSolid(*shape, instant.bodies[b].pose.position, box);
+    for (std::size_t k = 0; k < std::min(instant.obstacles.size(), obstacles.size()); ++k)
+      addSolid(bag.scene()->obstacles[k].shape, instant.obstacles[k].pose.position, obstacles[k]);
+    for (const slender::ObjectMesh& holder : slender::holderMeshes(instant, bag.scene()))
+      extend(box, holder.mesh.vertices);
   }
   if (box.isEmpty())
     throw BadInput(options.bag + ": holds nothing that can be seen");
+  const double size = box.diagonal().norm();
+  for (const Eigen::AlignedBox3d& obstacle : obstacles)
+    if (!obstacle.isEmpty() && obstacle.diagonal().norm() <= size)
+      box.extend(obstacle);
   return box;
-}
-
-std::optional<double> groundOf(const slender::SceneConfig* scene)
-{
-  if (!scene)
-    return std::nullopt;
-  for (const slender::ThreadConfig& thread : scene->threads)
-    if (thread.floor)
-      return thread.floor->height;
-  for (const slender::ObstacleConfig& obstacle : scene->obstacles)
-    if (std::holds_alternative<slender::Plane>(obstacle.shape) && (obstacle.pose.orientation * Eigen::Vector3d::UnitZ()).z() > 0.9999)
-      return obstacle.pose.position.z();
-  return std::nullopt;
 }
 
 void run(const slender::ExportOptions& options, const VideoOptions& video)
@@ -151,12 +152,12 @@ void run(const slender::ExportOptions& options, const VideoOptions& video)
   const bool gif = endsWith(options.out, ".gif");
   if (!gif && !endsWith(options.out, ".mp4"))
     throw BadInput("--out " + options.out + ": must end in .mp4 or .gif");
-  slender::BagReader bag = slender::openBag(name, options, "bodies, obstacles and floors are left out,");
+  slender::BagReader bag = slender::openBag(name, options, "bodies, obstacles, nozzles and floors are left out,");
   slender::PictureView view;
   std::tie(view.width, view.height) = video.size.value_or(gif ? std::pair(640, 360) : std::pair(1280, 720));
   view.from = video.from;
   view.box = reach(options);
-  view.ground = groundOf(bag.scene());
+  view.ground = slender::groundOf(bag.scene());
   slender::TubeResolution resolution;
   view.tube_sides = resolution.sides;
   slender::PicturePainter painter(view);
@@ -167,12 +168,20 @@ void run(const slender::ExportOptions& options, const VideoOptions& video)
   Ffmpeg ffmpeg(file.part(), gif, fps, view.width, view.height);
 
   slender::SceneSnapshot last;
-  std::optional<std::vector<std::uint8_t>> picture;   // of `last`
+  const std::vector<std::uint8_t>* picture = nullptr;   // of `last`
+  const auto seen = [&](const slender::SceneSnapshot& instant) {
+    std::vector<slender::ObjectMesh> objects = slender::objectMeshes(instant, bag.scene(), resolution);
+    const auto add = [&objects](std::vector<slender::ObjectMesh> more) { std::move(more.begin(), more.end(), std::back_inserter(objects)); };
+    add(slender::holderMeshes(instant, bag.scene()));
+    if (bag.scene())
+      add(slender::planeMeshes(instant, *bag.scene(), view.box, view.ground));
+    return objects;
+  };
   long frame = 0;
   const auto due = [&] { return static_cast<double>(frame) * video.speed / fps; };
   const auto show = [&] {   // what was recorded last, until there is something newer
     if (!picture)
-      picture = painter.paint(slender::objectMeshes(last, bag.scene(), resolution));
+      picture = &painter.paint(seen(last));
     ffmpeg.add(*picture);
     ++frame;
   };
@@ -181,7 +190,7 @@ void run(const slender::ExportOptions& options, const VideoOptions& video)
     while (due() < bag.seconds() - rounding)
       show();
     last = instant;
-    picture.reset();
+    picture = nullptr;
   });
   while (frame == 0 || due() <= bag.seconds() + rounding)
     show();

@@ -18,6 +18,8 @@ inline Eigen::Vector3d objectColor(ObjectKind kind, int index)
     case ObjectKind::thread: return {0.90, 0.60, 0.12};
     case ObjectKind::cloth: return cloths[index % cloths.size()];
     case ObjectKind::body: return {0.70, 0.28, 0.24};
+    case ObjectKind::gripper: return {0.22, 0.27, 0.33};
+    case ObjectKind::nozzle: return {0.55, 0.57, 0.60};
     case ObjectKind::obstacle: break;
   }
   return {0.62, 0.64, 0.66};

@@ -10,74 +10,123 @@
 namespace slender {
 
 using Eigen::Vector3d;
+using Eigen::Vector3f;
 
 namespace {
 
 constexpr int kSuper = 2;            // samples per pixel and direction
 constexpr int kShadowCells = 1536;
 constexpr double kTanHalfHeight = 0.3;
-
-/// Calls put(column, row, b, c) for the cells whose middles lie in a triangle of the plane.
-template <class Put>
-void fill(const Eigen::Vector2d& p0, const Eigen::Vector2d& p1, const Eigen::Vector2d& p2, int width, int height, const Put& put)
-{
-  const double area = (p1 - p0).x() * (p2 - p0).y() - (p1 - p0).y() * (p2 - p0).x();
-  if (!(std::abs(area) > 1e-12))
-    return;
-  const auto bound = [](double v, int high) { return static_cast<int>(std::clamp(v, 0.0, static_cast<double>(high))); };
-  const int left = bound(std::floor(std::min({p0.x(), p1.x(), p2.x()})), width), right = bound(std::ceil(std::max({p0.x(), p1.x(), p2.x()})), width);
-  const int top = bound(std::floor(std::min({p0.y(), p1.y(), p2.y()})), height), bottom = bound(std::ceil(std::max({p0.y(), p1.y(), p2.y()})), height);
-  for (int row = top; row < bottom; ++row)
-    for (int column = left; column < right; ++column)
-    {
-      const Eigen::Vector2d d(column + 0.5 - p0.x(), row + 0.5 - p0.y());
-      const double b = (d.x() * (p2 - p0).y() - d.y() * (p2 - p0).x()) / area, c = ((p1 - p0).x() * d.y() - (p1 - p0).y() * d.x()) / area;
-      if (b >= 0 && c >= 0 && b + c <= 1)
-        put(column, row, b, c);
-    }
-}
+constexpr float kNeverLit = -std::numeric_limits<float>::infinity();
 
 /// Grey: videos keep hues coarsely, and show stripes in a faint gradient of them.
 Vector3d skyColor(double height) { return Vector3d::Constant(0.95 - 0.20 * std::clamp(height, 0.0, 1.0)); }
 
+bool isTube(ObjectKind kind) { return kind == ObjectKind::rod || kind == ObjectKind::thread; }
+
+std::uint8_t toByte(float share) { return static_cast<std::uint8_t>(255.0f * std::clamp(share, 0.0f, 1.0f) + 0.5f); }
+
 }  // namespace
 
-PicturePainter::PicturePainter(const PictureView& view) : view_(view), width_(kSuper * view.width), height_(kSuper * view.height)
+PicturePainter::PicturePainter(const PictureView& view)
+  : view_(view), width_(kSuper * view.width), height_(kSuper * view.height), samples_(width_, height_, 0.0f),
+    shadow_(kShadowCells, kShadowCells, kNeverLit), triangles_(static_cast<std::size_t>(width_) * height_)
 {
-  forward_ = -view.from.normalized();
-  right_ = std::abs(forward_.z()) > 0.999 ? Vector3d(1, 0, 0) : Vector3d(forward_.cross(Vector3d::UnitZ()).normalized());
-  up_ = right_.cross(forward_);
-  scale_ = 0.5 * height_ / kTanHalfHeight;
-  const double tan_width = kTanHalfHeight * width_ / height_, margin = 0.9;
-  const Vector3d middle = view.box.center();
-  double distance = 0.0;
-  for (int k = 0; k < 8; ++k)
-  {
-    const Vector3d corner = view.box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k)) - middle;
-    distance = std::max({distance, std::abs(right_.dot(corner)) / (margin * tan_width) - forward_.dot(corner),
-                         std::abs(up_.dot(corner)) / (margin * kTanHalfHeight) - forward_.dot(corner)});
-  }
-  eye_ = middle - std::max(distance, 1e-6) * forward_;
+  placeCamera();
   sun_ = (0.55 * right_ - 0.75 * forward_ + 1.3 * Vector3d::UnitZ()).normalized();
   const Vector3d across = sun_.cross(std::abs(sun_.z()) > 0.9 ? Vector3d(Vector3d::UnitX()) : Vector3d(Vector3d::UnitZ())).normalized();
   sun_axes_.row(0) = across;
   sun_axes_.row(1) = sun_.cross(across);
   sun_axes_.row(2) = sun_;
-  samples_.resize(static_cast<std::size_t>(width_) * height_);
-  shadow_.resize(static_cast<std::size_t>(kShadowCells) * kShadowCells);
   const double reach = 1.05 * view.box.diagonal().norm() + 1e-9;
   sun_scale_ = kShadowCells / reach;
-  sun_corner_ = sun_axes_ * middle - Vector3d(0.5 * reach, 0.5 * reach, 0);
+  sun_corner_ = sun_axes_ * view.box.center() - Vector3d(0.5 * reach, 0.5 * reach, 0);
+  paintBackground();
+}
+
+/// Far enough away that all of the box is in the picture.
+void PicturePainter::placeCamera()
+{
+  forward_ = -view_.from.normalized();
+  right_ = std::abs(forward_.z()) > 0.999 ? Vector3d(1, 0, 0) : Vector3d(forward_.cross(Vector3d::UnitZ()).normalized());
+  up_ = right_.cross(forward_);
+  scale_ = 0.5 * height_ / kTanHalfHeight;
+  const double tan_width = kTanHalfHeight * width_ / height_, margin = 0.9;
+  const Vector3d middle = view_.box.center();
+  double distance = 0.0;
+  for (int k = 0; k < 8; ++k)
+  {
+    const Vector3d corner = view_.box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k)) - middle;
+    distance = std::max({distance, std::abs(right_.dot(corner)) / (margin * tan_width) - forward_.dot(corner),
+                         std::abs(up_.dot(corner)) / (margin * kTanHalfHeight) - forward_.dot(corner)});
+  }
+  eye_ = middle - std::max(distance, 1e-6) * forward_;
+}
+
+/// From the eye through a sample to the plane at distance 1 along the view.
+Vector3d PicturePainter::ray(int column, int row) const
+{
+  return forward_ + (column + 0.5 - 0.5 * width_) / scale_ * right_ + (0.5 * height_ - row - 0.5) / scale_ * up_;
+}
+
+/// The sky, and the floor in the sun.
+void PicturePainter::paintBackground()
+{
+  const bool floor = view_.ground && eye_.z() > *view_.ground;
+  const double size = view_.box.diagonal().norm(), cell = std::pow(10.0, std::floor(std::log10(size))) * 0.5;
+  for (int y = 0; y < view_.height; ++y)
+    for (int x = 0; x < view_.width; ++x)
+    {
+      Vector3d sum = Vector3d::Zero(), drop = Vector3d::Zero(), where = Vector3d::Zero();
+      int on_floor = 0;
+      for (int row = kSuper * y; row < kSuper * (y + 1); ++row)
+        for (int column = kSuper * x; column < kSuper * (x + 1); ++column)
+        {
+          const Vector3d along = ray(column, row);
+          const Vector3d sky = skyColor(1.0 - static_cast<double>(row) / height_);
+          if (!floor || along.z() >= -1e-6)
+          {
+            sum += sky;
+            continue;
+          }
+          const Vector3d at = eye_ + (*view_.ground - eye_.z()) / along.z() * along;
+          const double fade = std::clamp(1.6 - 0.5 * (at - view_.box.center()).norm() / size, 0.0, 1.0);
+          const bool odd = (static_cast<long>(std::floor(at.x() / cell)) + static_cast<long>(std::floor(at.y() / cell))) & 1;
+          const Vector3d paint = Vector3d(0.80, 0.80, 0.79) * (odd ? 0.96 : 1.0);
+          sum += fade * paint + (1 - fade) * sky;
+          drop += 0.38 * fade * paint;
+          where += at;
+          ++on_floor;
+        }
+      const std::uint32_t pixel = static_cast<std::uint32_t>(background_.size() / 3);
+      for (int c = 0; c < 3; ++c)
+        background_.push_back(toByte(static_cast<float>(sum[c]) / (kSuper * kSuper)));
+      if (on_floor == 0)
+        continue;
+      const Vector3d at = sun_axes_ * (where / on_floor) - sun_corner_;
+      const double column = std::floor(at.x() * sun_scale_), row = std::floor(at.y() * sun_scale_);
+      if (column < -1 || row < -1 || column > kShadowCells || row > kShadowCells)
+        continue;   // no shadow reaches there
+      const Vector3f share = drop.cast<float>() * 255.0f / (kSuper * kSuper);
+      ground_.push_back({pixel, static_cast<std::int16_t>(column), static_cast<std::int16_t>(row),
+                         static_cast<float>(at.z() + 2.0 / sun_scale_), {share[0], share[1], share[2]}});
+    }
 }
 
 void PicturePainter::draw(const std::vector<ObjectMesh>& objects)
 {
-  std::fill(samples_.begin(), samples_.end(), Sample{0, -1, -1, 0, 0});
+  samples_.clear();
+  parts_.clear();
+  faces_.clear();
   const double nearest = 1e-3 * view_.box.diagonal().norm();
-  for (std::size_t k = 0; k < objects.size(); ++k)
+  // a floor hides what is below it, but for what sinks in a little
+  const bool floor = view_.ground && eye_.z() > *view_.ground;
+  const double below = floor ? *view_.ground - 0.004 * view_.box.diagonal().norm() : -std::numeric_limits<double>::infinity();
+  std::uint32_t count = 0;
+  for (const ObjectMesh& object : objects)
   {
-    const TriangleMesh& mesh = objects[k].mesh;
-    Eigen::Matrix3Xd seen(3, mesh.vertices.cols());   // column, row, 1 / distance (negative: behind the eye)
+    const TriangleMesh& mesh = object.mesh;
+    Eigen::Matrix3Xd seen(3, mesh.vertices.cols());
     for (Eigen::Index i = 0; i < seen.cols(); ++i)
     {
       const Vector3d d = mesh.vertices.col(i) - eye_;
@@ -86,23 +135,34 @@ void PicturePainter::draw(const std::vector<ObjectMesh>& objects)
     }
     for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
     {
-      const Vector3d a = seen.col(mesh.triangles(0, f)), b = seen.col(mesh.triangles(1, f)), c = seen.col(mesh.triangles(2, f));
+      const Eigen::Vector3i t = mesh.triangles.col(f);
+      const Vector3d a = seen.col(t[0]), b = seen.col(t[1]), c = seen.col(t[2]);
       if (!(a.z() > 0 && b.z() > 0 && c.z() > 0))
         continue;
-      fill(a.head<2>(), b.head<2>(), c.head<2>(), width_, height_, [&](int column, int row, double share_b, double share_c) {
-        const double inverse = (1 - share_b - share_c) * a.z() + share_b * b.z() + share_c * c.z();
-        Sample& sample = samples_[static_cast<std::size_t>(row) * width_ + column];
-        if (inverse > sample.depth)   // shares as on the surface, not on the picture
-          sample = {static_cast<float>(inverse), static_cast<std::int32_t>(k), static_cast<std::int32_t>(f),
-                    static_cast<float>(share_b * b.z() / inverse), static_cast<float>(share_c * c.z() / inverse)};
+      if (isTube(object.kind) && (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x() > 0)
+        continue;   // the far side of a tube
+      const std::uint32_t triangle = count + static_cast<std::uint32_t>(f);
+      const bool sinks = std::min({mesh.vertices(2, t[0]), mesh.vertices(2, t[1]), mesh.vertices(2, t[2])}) < below;
+      samples_.fill(a, b, c, [&](int row, int first, int end, float inverse, float slope) {
+        float* const depths = &samples_.at(0, row);
+        std::uint32_t* const triangles = &triangles_[static_cast<std::size_t>(row) * width_];
+        for (int column = first; column < end; ++column, inverse += slope)
+          if (inverse > depths[column] && !(sinks && eye_.z() + ray(column, row).z() / inverse < below))
+          {
+            depths[column] = inverse;
+            triangles[column] = triangle;
+          }
       });
     }
+    parts_.push_back({count, std::move(seen), vertexNormals(mesh)});
+    count += static_cast<std::uint32_t>(mesh.triangles.cols());
   }
+  face_of_.assign(count, -1);
 }
 
 void PicturePainter::drawShadows(const std::vector<ObjectMesh>& objects)
 {
-  std::fill(shadow_.begin(), shadow_.end(), -std::numeric_limits<float>::infinity());
+  shadow_.clear();
   for (const ObjectMesh& object : objects)
   {
     Eigen::Matrix3Xd seen = (sun_axes_ * object.mesh.vertices).colwise() - sun_corner_;
@@ -110,101 +170,164 @@ void PicturePainter::drawShadows(const std::vector<ObjectMesh>& objects)
     for (Eigen::Index f = 0; f < object.mesh.triangles.cols(); ++f)
     {
       const Vector3d a = seen.col(object.mesh.triangles(0, f)), b = seen.col(object.mesh.triangles(1, f)), c = seen.col(object.mesh.triangles(2, f));
-      fill(a.head<2>(), b.head<2>(), c.head<2>(), kShadowCells, kShadowCells, [&](int column, int row, double share_b, double share_c) {
-        float& height = shadow_[static_cast<std::size_t>(row) * kShadowCells + column];
-        height = std::max(height, static_cast<float>((1 - share_b - share_c) * a.z() + share_b * b.z() + share_c * c.z()));
+      if (isTube(object.kind) && (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x() < 0)
+        continue;   // the dark side of a tube
+      shadow_.fill(a, b, c, [&](int row, int first, int end, float height, float slope) {
+        float* const heights = &shadow_.at(0, row);
+        for (int column = first; column < end; ++column)
+          heights[column] = std::max(heights[column], height + slope * static_cast<float>(column - first));
       });
     }
   }
 }
 
-/// Share of the sun that reaches a point.
-double PicturePainter::lit(const Vector3d& x, double bias) const
+/// Share of the sun that reaches a height above the cells around (column, row).
+float PicturePainter::lit(int column, int row, float height) const
 {
-  const Vector3d at = sun_axes_ * x - sun_corner_;
-  const int column = static_cast<int>(std::floor(at.x() * sun_scale_)), row = static_cast<int>(std::floor(at.y() * sun_scale_));
-  int free = 0, all = 0;
-  for (int r = row - 1; r <= row + 1; ++r)
-    for (int c = column - 1; c <= column + 1; ++c, ++all)
-      free += r < 0 || c < 0 || r >= kShadowCells || c >= kShadowCells ||
-              shadow_[static_cast<std::size_t>(r) * kShadowCells + c] <= at.z() + bias;
-  return static_cast<double>(free) / all;
+  if (!shadow_.isDrawn(column - 1, row - 1) && !shadow_.isDrawn(column + 1, row - 1) && !shadow_.isDrawn(column - 1, row + 1) &&
+      !shadow_.isDrawn(column + 1, row + 1))
+    return 1.0f;
+  int free = 0;
+  if (column > 0 && row > 0 && column + 1 < kShadowCells && row + 1 < kShadowCells)
+    for (int r = row - 1; r <= row + 1; ++r)
+      for (int c = column - 1; c <= column + 1; ++c)
+        free += shadow_.at(c, r) <= height;
+  else
+    for (int r = row - 1; r <= row + 1; ++r)
+      for (int c = column - 1; c <= column + 1; ++c)
+        free += r < 0 || c < 0 || r >= kShadowCells || c >= kShadowCells || shadow_.at(c, r) <= height;
+  return static_cast<float>(free) / 9.0f;
 }
 
-Vector3d PicturePainter::shade(const ObjectMesh& object, const Eigen::Matrix3Xd& normals, const Sample& sample) const
+void PicturePainter::paintShadowsOnGround()
 {
-  const Eigen::Vector3i t = object.mesh.triangles.col(sample.triangle);
-  const Vector3d a = object.mesh.vertices.col(t[0]), b = object.mesh.vertices.col(t[1]), c = object.mesh.vertices.col(t[2]);
-  const Vector3d face = (b - a).cross(c - a).normalized(), x = a + sample.b * (b - a) + sample.c * (c - a);
-  const auto normalAt = [&](int vertex) -> Vector3d {   // edges of solids and ends of tubes stay sharp
-    const Vector3d normal = normals.col(vertex);
-    return object.kind == ObjectKind::cloth || normal.dot(face) > 0.75 ? normal : face;
-  };
-  Vector3d normal = ((1 - sample.b - sample.c) * normalAt(t[0]) + sample.b * normalAt(t[1]) + sample.c * normalAt(t[2])).normalized();
-  const Vector3d to_eye = (eye_ - x).normalized();
-  if (normal.dot(to_eye) < 0 && face.dot(to_eye) < 0)   // the back of a cloth
-    normal = -normal;
+  for (const GroundPixel& ground : ground_)
+  {
+    const float dark = 1.0f - lit(ground.column, ground.row, ground.height);
+    if (dark > 0)
+      for (std::size_t c = 0; c < 3; ++c)
+      {
+        std::uint8_t& byte = out_[3 * ground.pixel + c];
+        byte = static_cast<std::uint8_t>(std::max(0.0f, static_cast<float>(byte) - dark * ground.drop[c] + 0.5f));
+      }
+  }
+}
+
+PicturePainter::Face PicturePainter::faceOf(std::uint32_t triangle, const std::vector<ObjectMesh>& objects) const
+{
+  const auto after = std::upper_bound(parts_.begin(), parts_.end(), triangle, [](std::uint32_t t, const Part& part) { return t < part.first; });
+  const Part& part = *(after - 1);
+  const ObjectMesh& object = objects[static_cast<std::size_t>(&part - parts_.data())];
+  const Eigen::Index index = triangle - part.first;
+  const Eigen::Vector3i t = object.mesh.triangles.col(index);
+  std::array<Vector3d, 3> x, seen;
+  for (std::size_t k = 0; k < 3; ++k)
+  {
+    x[k] = object.mesh.vertices.col(t[static_cast<int>(k)]);
+    seen[k] = part.seen.col(t[static_cast<int>(k)]);
+  }
+  Face face;
+  face.p0 = seen[0].head<2>().cast<float>();
+  face.u = (seen[1] - seen[0]).head<2>().cast<float>();
+  face.v = (seen[2] - seen[0]).head<2>().cast<float>();
+  face.inverse_area = 1.0f / (face.u.x() * face.v.y() - face.u.y() * face.v.x());
+  const Vector3d flat = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
+  const double towards_sun = flat.dot(sun_);
+  const double slope = std::sqrt(1 / std::max(0.01, towards_sun * towards_sun) - 1);   // how much higher the next cell is
+  face.bias = static_cast<float>((1 + 2.2 * slope) / sun_scale_);
+  const bool cloth = object.kind == ObjectKind::cloth, back = flat.dot(eye_ - x[0]) < 0;
+  for (std::size_t k = 0; k < 3; ++k)
+  {
+    Vector3d normal = part.normals.col(t[static_cast<int>(k)]);
+    if (!cloth && normal.dot(flat) <= 0.75)   // edges of solids and ends of tubes stay sharp
+      normal = flat;
+    const Vector3d to_eye = (eye_ - x[k]).normalized();
+    if (back)   // of a cloth
+      normal = -normal;
+    const double direct = std::max(0.0, normal.dot(sun_)), mirrored = cloth ? 0.0 : std::max(0.0, normal.dot((sun_ + to_eye).normalized()));
+    Vector3d at = sun_axes_ * x[k] - sun_corner_;
+    at.head<2>() *= sun_scale_;
+    face.inverse_depth[static_cast<int>(k)] = static_cast<float>(seen[k].z());
+    face.corners[k] = {at.cast<float>(), static_cast<float>(0.465 + 0.085 * normal.z()), static_cast<float>(0.55 * direct),
+                       static_cast<float>(direct > 0 ? 0.3 * std::pow(mirrored, 40.0) : 0.0)};
+  }
   Vector3d paint = objectColor(object.kind, object.index);
   const Eigen::Index walls = object.mesh.triangles.cols() - 2 * view_.tube_sides;
-  if (object.kind == ObjectKind::rod && (sample.triangle < walls || object.mesh.vertices.cols() % view_.tube_sides == 0) &&
-      (sample.triangle / 2) % view_.tube_sides % (view_.tube_sides / 2) <= 1)
+  if (object.kind == ObjectKind::rod && (index < walls || object.mesh.vertices.cols() % view_.tube_sides == 0) &&
+      (index / 2) % view_.tube_sides % (view_.tube_sides / 2) <= 1)
     paint = {0.20, 0.24, 0.30};
-  const double slope = std::sqrt(1 / std::max(0.01, face.dot(sun_) * face.dot(sun_)) - 1);   // how much higher the next cell is
-  const double bias = (1 + 2.2 * slope) / sun_scale_;
-  const double direct = std::max(0.0, normal.dot(sun_)) * lit(x, bias), sky = 0.5 + 0.5 * normal.z();
-  const Vector3d half = (sun_ + to_eye).normalized();
-  const double gloss = object.kind == ObjectKind::cloth ? 0.0 : 0.3 * std::pow(std::max(0.0, normal.dot(half)), 40.0) * (direct > 0);
-  return paint * (0.38 + 0.17 * sky + 0.55 * direct) + Vector3d::Constant(gloss);
+  face.paint = paint.cast<float>();
+  return face;
 }
 
-Vector3d PicturePainter::background(int row, int column) const
+/// Colour of a triangle at a sample, which lies in it.
+Vector3f PicturePainter::shade(std::uint32_t triangle, float column, float row, const std::vector<ObjectMesh>& objects)
 {
-  const Vector3d ray = forward_ + (column + 0.5 - 0.5 * width_) / scale_ * right_ + (0.5 * height_ - row - 0.5) / scale_ * up_;
-  const Vector3d sky = skyColor(1.0 - static_cast<double>(row) / height_);
-  if (!view_.ground || ray.z() >= -1e-6 || eye_.z() <= *view_.ground)
-    return sky;
-  const double along = (*view_.ground - eye_.z()) / ray.z(), size = view_.box.diagonal().norm();
-  const Vector3d x = eye_ + along * ray;
-  const double fade = std::clamp(1.6 - 0.5 * (x - view_.box.center()).norm() / size, 0.0, 1.0);
-  const double cell = std::pow(10.0, std::floor(std::log10(size))) * 0.5;
-  const bool odd = (static_cast<long>(std::floor(x.x() / cell)) + static_cast<long>(std::floor(x.y() / cell))) & 1;
-  const Vector3d floor = Vector3d(0.80, 0.80, 0.79) * (odd ? 0.96 : 1.0) * (0.62 + 0.38 * lit(x, 2.0 / sun_scale_));
-  return fade * floor + (1 - fade) * sky;
+  std::int32_t& index = face_of_[triangle];
+  if (index < 0)
+  {
+    index = static_cast<std::int32_t>(faces_.size());
+    faces_.push_back(faceOf(triangle, objects));
+  }
+  const Face& face = faces_[static_cast<std::size_t>(index)];
+  const float x = column - face.p0.x(), y = row - face.p0.y();
+  float b = (x * face.v.y() - y * face.v.x()) * face.inverse_area * face.inverse_depth[1];
+  float c = (face.u.x() * y - face.u.y() * x) * face.inverse_area * face.inverse_depth[2];
+  float a = (1.0f - (x * (face.v.y() - face.u.y()) + y * (face.u.x() - face.v.x())) * face.inverse_area) * face.inverse_depth[0];
+  const float sum = 1.0f / (a + b + c);   // shares as on the surface, not on the picture
+  a *= sum;
+  b *= sum;
+  c *= sum;
+  const auto& [A, B, C] = face.corners;
+  const Vector3f sun = a * A.sun + b * B.sun + c * C.sun;
+  const float direct = a * A.direct + b * B.direct + c * C.direct;
+  const float light = direct > 0 ? lit(static_cast<int>(std::floor(sun.x())), static_cast<int>(std::floor(sun.y())), sun.z() + face.bias) : 0.0f;
+  const float gloss = light * (a * A.gloss + b * B.gloss + c * C.gloss);
+  return (face.paint * (a * A.ambient + b * B.ambient + c * C.ambient + light * direct) + Vector3f::Constant(gloss)).cwiseMin(1.0f);
 }
 
-std::vector<std::uint8_t> PicturePainter::paint(const std::vector<ObjectMesh>& objects)
+void PicturePainter::paintTile(int tile, const std::vector<ObjectMesh>& objects)
+{
+  const auto [left, top] = samples_.corner(tile);
+  const int right = std::min(left + DepthTiles::kTile, width_), bottom = std::min(top + DepthTiles::kTile, height_);
+  for (int row = top; row < bottom; row += kSuper)
+    for (int column = left; column < right; column += kSuper)
+    {
+      std::array<std::uint32_t, kSuper * kSuper> seen;
+      std::array<Vector3f, kSuper * kSuper> colors;
+      std::size_t count = 0;
+      Vector3f sum = Vector3f::Zero();
+      for (int r = row; r < row + kSuper; ++r)
+        for (int c = column; c < column + kSuper; ++c)
+        {
+          if (!(samples_.at(c, r) > 0))
+            continue;
+          const std::uint32_t triangle = triangles_[static_cast<std::size_t>(r) * width_ + c];
+          std::size_t same = 0;   // samples of one triangle in a pixel have one colour
+          while (same < count && seen[same] != triangle)
+            ++same;
+          seen[count] = triangle;
+          colors[count] = same < count ? colors[same] : shade(triangle, c + 0.5f, r + 0.5f, objects);
+          sum += colors[count++];
+        }
+      if (count == 0)
+        continue;
+      std::uint8_t* pixel = &out_[3 * (static_cast<std::size_t>(row / kSuper) * view_.width + column / kSuper)];
+      const float share = 1.0f / (kSuper * kSuper);
+      for (int k = 0; k < 3; ++k)
+        pixel[k] = static_cast<std::uint8_t>(255.0f * share * sum[k] + share * static_cast<float>(kSuper * kSuper - count) * pixel[k] + 0.5f);
+    }
+}
+
+const std::vector<std::uint8_t>& PicturePainter::paint(const std::vector<ObjectMesh>& objects)
 {
   draw(objects);
   drawShadows(objects);
-  std::vector<Eigen::Matrix3Xd> normals;
-  for (const ObjectMesh& object : objects)
-    normals.push_back(vertexNormals(object.mesh));
-  // a floor hides what is below it, but for what sinks in a little
-  const bool floor = view_.ground && eye_.z() > *view_.ground;
-  const double below = floor ? *view_.ground - 0.004 * view_.box.diagonal().norm() : -std::numeric_limits<double>::infinity();
-  std::vector<std::uint8_t> out;
-  out.reserve(3u * view_.width * view_.height);
-  for (int y = 0; y < view_.height; ++y)
-    for (int x = 0; x < view_.width; ++x)
-    {
-      Vector3d sum = Vector3d::Zero();
-      for (int row = kSuper * y; row < kSuper * (y + 1); ++row)
-        for (int column = kSuper * x; column < kSuper * (x + 1); ++column)
-        {
-          const Sample& sample = samples_[static_cast<std::size_t>(row) * width_ + column];
-          bool hidden = sample.object < 0;
-          if (!hidden)
-          {
-            const TriangleMesh& mesh = objects[sample.object].mesh;
-            const auto height = [&](int corner) { return mesh.vertices(2, mesh.triangles(corner, sample.triangle)); };
-            hidden = (1 - sample.b - sample.c) * height(0) + sample.b * height(1) + sample.c * height(2) < below;
-          }
-          sum += (hidden ? background(row, column) : shade(objects[sample.object], normals[sample.object], sample)).cwiseMin(1.0);
-        }
-      for (int c = 0; c < 3; ++c)
-        out.push_back(static_cast<std::uint8_t>(255.0 * sum[c] / (kSuper * kSuper) + 0.5));
-    }
-  return out;
+  out_ = background_;
+  paintShadowsOnGround();
+  for (const int tile : samples_.drawn())
+    paintTile(tile, objects);
+  return out_;
 }
 
 }  // namespace slender

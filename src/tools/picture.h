@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -7,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "depth_tiles.h"
 #include "slender_sim/scene/snapshot_meshes.h"
 
 /// Shaded pictures of surfaces, drawn in memory: no display, no graphics card.
@@ -21,29 +23,59 @@ struct PictureView
   int tube_sides = 16;                        ///< of rods, which get stripes along their material frames
 };
 
-/// One picture after the other from the same place. Perspective, one sun with shadows, light from the sky; each pixel is the mean of four.
+/// One picture after the other from the same place. Perspective, one sun with shadows, light from the sky; each pixel is the mean of four samples.
+/// The background is computed once. Of each picture only the parts are computed that objects, or their shadows on the floor, cover.
 class PicturePainter
 {
 public:
   explicit PicturePainter(const PictureView& view);
 
-  /// Rows from the top, red, green, blue per pixel.
-  std::vector<std::uint8_t> paint(const std::vector<ObjectMesh>& objects);
+  /// Rows from the top, red, green, blue per pixel. Valid until the next call.
+  const std::vector<std::uint8_t>& paint(const std::vector<ObjectMesh>& objects);
 
 private:
-  /// The nearest surface at a point of the picture.
-  struct Sample
+  /// A pixel of the floor: where its shadow is looked up, and by how much its colour falls in full shadow [0..255].
+  struct GroundPixel
   {
-    float depth;   ///< 1 / distance along the view; 0: nothing
-    std::int32_t object, triangle;
-    float b, c;    ///< shares of the second and third corner
+    std::uint32_t pixel;
+    std::int16_t column, row;
+    float height;
+    std::array<float, 3> drop;
+  };
+  /// What is interpolated over a triangle: the place in the shadow map, and light.
+  struct Corner
+  {
+    Eigen::Vector3f sun;               ///< column, row, height in the shadow map
+    float ambient, direct, gloss;
+  };
+  /// A triangle that is seen, with what shading needs of it.
+  struct Face
+  {
+    Eigen::Vector2f p0, u, v;          ///< first corner and edges in the picture [samples]
+    float inverse_area;
+    Eigen::Vector3f inverse_depth;     ///< of the corners
+    std::array<Corner, 3> corners;
+    float bias;                        ///< [m] by which shadows are let in, so that a surface does not shade itself
+    Eigen::Vector3f paint;
+  };
+  /// Where in all_ an object's triangles begin.
+  struct Part
+  {
+    std::uint32_t first;
+    Eigen::Matrix3Xd seen;             ///< per vertex: column, row, 1 / distance along the view (negative: behind the eye)
+    Eigen::Matrix3Xd normals;
   };
 
+  void placeCamera();
+  Eigen::Vector3d ray(int column, int row) const;
+  void paintBackground();
   void draw(const std::vector<ObjectMesh>& objects);
   void drawShadows(const std::vector<ObjectMesh>& objects);
-  double lit(const Eigen::Vector3d& x, double bias) const;
-  Eigen::Vector3d shade(const ObjectMesh& object, const Eigen::Matrix3Xd& normals, const Sample& sample) const;
-  Eigen::Vector3d background(int row, int column) const;
+  void paintShadowsOnGround();
+  void paintTile(int tile, const std::vector<ObjectMesh>& objects);
+  Eigen::Vector3f shade(std::uint32_t triangle, float column, float row, const std::vector<ObjectMesh>& objects);
+  Face faceOf(std::uint32_t triangle, const std::vector<ObjectMesh>& objects) const;
+  float lit(int column, int row, float height) const;
 
   PictureView view_;
   int width_, height_;   ///< of the samples
@@ -52,8 +84,14 @@ private:
   Eigen::Matrix3d sun_axes_;   ///< rows: across, up, towards the sun
   double sun_scale_ = 1.0;     ///< shadow cells per metre
   Eigen::Vector3d sun_corner_;
-  std::vector<Sample> samples_;
-  std::vector<float> shadow_;   ///< height towards the sun of what is lit
+  DepthTiles samples_;                        ///< 1 / distance along the view; 0: nothing
+  DepthTiles shadow_;                         ///< height towards the sun of what is lit
+  std::vector<std::uint32_t> triangles_;      ///< of the samples: the nearest one, counted over all objects
+  std::vector<Part> parts_;
+  std::vector<std::int32_t> face_of_;         ///< of the triangles: index into faces_, -1: not made yet
+  std::vector<Face> faces_;
+  std::vector<std::uint8_t> background_, out_;
+  std::vector<GroundPixel> ground_;
 };
 
 }  // namespace slender

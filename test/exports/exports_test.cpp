@@ -8,9 +8,11 @@
 
 #include "export_program.h"
 #include "harness.h"
+#include "holder_meshes.h"
 #include "picture.h"
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/node/bag_reader.h"
+#include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/snapshot_meshes.h"
 #ifdef SLENDER_WITH_GLTF
 #include <tiny_gltf.h>
@@ -261,6 +263,65 @@ TEST(FrameChoice, thinsToTheRateFromTheFirstOn)
   }
   EXPECT_EQ(of_all, 101);
   EXPECT_EQ(of_thin, 11);
+}
+
+/// Where a holder is, and how far it extends.
+Eigen::AlignedBox3d boxOf(const ObjectMesh& object)
+{
+  return {object.mesh.vertices.rowwise().minCoeff(), object.mesh.vertices.rowwise().maxCoeff()};
+}
+
+TEST(Holders, areShownInVideos)
+{
+  const Simulation rods(parseScene(R"(
+rods: [{name: r, centerline: {straight: {to: [1, 0, 0], edges: 10}}, cross_section: {radius: 0.01}, grasps: {left: {edges: [0]}, pin: {nodes: [5], hold: position}}}]
+)", "scene"));
+  SceneSnapshot instant = snapshotOf(rods);
+  std::vector<ObjectMesh> holders = holderMeshes(instant, &rods.config());
+  ASSERT_EQ(holders.size(), 2u);
+  EXPECT_NEAR((boxOf(holders[0]).sizes() - Eigen::Vector3d::Constant(0.036)).norm(), 0.0, 1e-9);
+  EXPECT_EQ(holders[0].mesh.vertices.cols(), 8);            // a box at the clamped end
+  EXPECT_LT(boxOf(holders[0]).center().norm(), 1e-9);
+  EXPECT_GT(holders[1].mesh.vertices.cols(), 100);          // a ball at the pinned node
+  EXPECT_LT((boxOf(holders[1]).center() - Eigen::Vector3d(0.5, 0, 0)).norm(), 1e-9);
+  instant.grasps[0].held->active = false;
+  EXPECT_EQ(holderMeshes(instant, &rods.config()).size(), 1u);
+
+  const Simulation cloth(parseScene(R"(
+cloths: [{name: c, grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 4}, grasps: {edge: {near: {point: [0, 0, 0], radius: 0.3}}}}]
+)", "scene"));
+  instant = snapshotOf(cloth);
+  const std::size_t held = cloth.config().cloths[0].grasps[0].vertices.size();
+  ASSERT_GT(held, 1u);
+  EXPECT_EQ(holderMeshes(instant, &cloth.config()).size(), held);
+  EXPECT_EQ(holderMeshes(instant, nullptr).size(), 1u);
+  instant.grasps[0].held->X_WG.position.x() += 0.5;         // it holds other vertices by now
+  holders = holderMeshes(instant, &cloth.config());
+  ASSERT_EQ(holders.size(), 1u);
+  EXPECT_LT((boxOf(holders[0]).center() - instant.grasps[0].held->X_WG.position).norm(), 1e-9);
+
+  const Simulation thread(parseScene("threads: [{name: t, nozzle: {position: [0, 0, 0.1], diameter: 0.01, flow: 1.0e-6}, floor: {height: 0}}]", "scene"));
+  holders = holderMeshes(snapshotOf(thread), &thread.config());
+  ASSERT_EQ(holders.size(), 1u);
+  EXPECT_NEAR(boxOf(holders[0]).min().z(), 0.1, 1e-6);      // above the spout
+  EXPECT_NEAR(boxOf(holders[0]).max().z(), 0.14, 1e-6);
+}
+
+TEST(Holders, tiltedPlanesAreShownBesideTheGround)
+{
+  const Simulation scene(parseScene(R"(
+rods: [{}]
+obstacles: [{name: floor, shape: {plane: {}}}, {name: plate, shape: {plane: {point: [0, 0, 1], normal: [-1, 0, 1]}}}]
+)", "scene"));
+  const std::optional<double> ground = groundOf(&scene.config());
+  ASSERT_TRUE(ground);
+  EXPECT_EQ(*ground, 0.0);
+  const Eigen::AlignedBox3d box(Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1));
+  const auto planes = planeMeshes(snapshotOf(scene), scene.config(), box, ground);
+  ASSERT_EQ(planes.size(), 1u);
+  EXPECT_EQ(planes[0].name, "plate");
+  for (Eigen::Index i = 0; i < planes[0].mesh.vertices.cols(); ++i)
+    EXPECT_NEAR(planes[0].mesh.vertices(2, i) - planes[0].mesh.vertices(0, i), 1.0, 1e-12);   // z = 1 + x
 }
 
 }  // namespace

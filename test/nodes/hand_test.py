@@ -36,6 +36,9 @@ class Hand(HandCase):
         self.assertTrue(handles["bodies/ball"].header.stamp.is_zero())
         self.assertAlmostEqual(handles["bodies/ball"].pose.position.y, 3.0)
         self.assertEqual(len(handles["grasps/right"].controls), 7)
+        self.assertAlmostEqual(handles["grasps/right"].scale, 0.08, places=6)   # of a rope of 1 m and a radius of 4 mm
+        ball = handles["grasps/right"].controls[-1].markers[0].scale.x
+        self.assertAlmostEqual(ball, 0.02)                                      # it does not hide the rope
 
     def test_without_it_nothing_is_advertised(self):
         self.start()

@@ -52,9 +52,14 @@ bodies:
   EXPECT_EQ((markers[{"obstacles", 1}].type), Marker::SPHERE);
   EXPECT_EQ((markers[{"obstacles", 1}].scale.x), 0.2);
   EXPECT_EQ((markers[{"obstacles", 1}].pose.position.y), 2);
-  EXPECT_EQ((markers[{"obstacles", 2}].scale.y), 2);
-  EXPECT_EQ((markers[{"obstacles", 3}].type), Marker::CYLINDER);
-  EXPECT_EQ((markers[{"obstacles", 3}].scale.z), 0.5);
+  const Marker& crate = markers[{"obstacles", 2}];
+  EXPECT_NEAR(volumeOf(crate), 6.0, 1e-12);
+  for (std::size_t k = 0; k < crate.points.size(); k += 3)
+    if (const bool top = crate.points[k].z > 1 && crate.points[k + 1].z > 1 && crate.points[k + 2].z > 1; top)
+      EXPECT_GT(crate.colors[k].r, 0.6f);   // in the light, from wherever it is seen
+  const Marker& drum = markers[{"obstacles", 3}];
+  EXPECT_NEAR(volumeOf(drum), M_PI * 0.04 * 0.5, 0.03 * M_PI * 0.04 * 0.5);
+  EXPECT_EQ(drum.scale.z, 1);
   const Marker& log = markers[{"obstacles", 4}];
   EXPECT_EQ(log.pose.position.z, 1);
   const double exact = M_PI * 0.04 * 0.5 + 4.0 / 3.0 * M_PI * 0.008;
@@ -208,6 +213,36 @@ obstacles: [{name: table, shape: {plane: {}}}]
   for (std::size_t k = 0; k < contacts.points.size(); k += 10)
     sum += contacts.points[k + 1].z - contacts.points[k].z;
   EXPECT_NEAR(sum, 2.0 * 0.2 * 0.09 * 9.81, 0.01);
+}
+
+TEST(Markers, gripperIsALitBoxAboutTheSection)
+{
+  const Simulation simulation(parseScene(R"(
+rods: [{name: r, centerline: {straight: {to: [1, 0, 0], edges: 10}}, cross_section: {radius: 0.01}, grasps: {left: {edges: [0]}, pin: {nodes: [5], hold: position}}}]
+)", "scene"));
+  const auto markers = sceneMarkers(simulation, std_msgs::Header());
+  const Marker& left = find(markers, "grasps", 0);
+  EXPECT_EQ(left.type, Marker::TRIANGLE_LIST);
+  EXPECT_NEAR(volumeOf(left), std::pow(0.036, 3), 1e-12);
+  EXPECT_EQ(left.colors.size(), left.points.size());
+  EXPECT_EQ(find(markers, "grasps", 1).type, Marker::SPHERE);
+}
+
+TEST(Markers, legendSaysWhatColoursAndArrowsMean)
+{
+  const Simulation simulation(parseScene("rods: [{centerline: {straight: {to: [1, 0, 0], edges: 4}}}]", "scene"));
+  for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header()).markers)
+    EXPECT_NE(marker.ns, "legend");
+  MarkerOptions options = colored(MarkerColor::curvature, 2.5);
+  options.frames = true;
+  options.forces = 0.02;
+  const auto markers = sceneMarkers(simulation, std_msgs::Header(), options);
+  const Marker& legend = find(markers, "legend");
+  EXPECT_EQ(legend.type, Marker::TEXT_VIEW_FACING);
+  EXPECT_NE(legend.text.find("curvature: blue -2.5 1/m, grey 0, red 2.5 1/m\n"), std::string::npos);
+  EXPECT_NE(legend.text.find("d1 green"), std::string::npos);
+  EXPECT_NE(legend.text.find("0.02 m per N"), std::string::npos);
+  EXPECT_GT(legend.pose.position.z, 0.0);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@ from geometry_msgs.msg import PoseArray, WrenchStamped
 from node_harness import SCENE, NodeCase, find_program, numbers, run, wait_until
 from slender_sim.msg import BodyStates, GraspStates, RodState
 from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 TOPICS = {
@@ -98,6 +99,15 @@ class Topics(NodeCase):
         kinds = {m.ns: m.type for m in markers.last().markers}
         self.assertEqual(kinds["rods/rope"], Marker.LINE_STRIP)
         self.assertEqual(kinds["frames/rope"], Marker.LINE_LIST)
+
+    def test_frame_is_known_to_tf(self):
+        """A viewer whose fixed frame it is finds it in tf without anybody else's transforms."""
+        self.start(frame_id="map")
+        frames = self.listen("/tf_static", TFMessage)
+        wait_until(lambda: frames.count() > 0, what="a static transform")
+        transform = frames.last().transforms[0]
+        self.assertEqual((transform.header.frame_id, transform.child_frame_id), ("map", "t/rod/origin"))
+        self.assertEqual(transform.transform.rotation.w, 1.0)
 
     def test_scene_is_latched(self):
         self.start()

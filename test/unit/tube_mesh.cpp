@@ -1,7 +1,9 @@
+#include <cmath>
 #include <map>
 
 #include <gtest/gtest.h>
 
+#include "slender_sim/geometry/mesh_offsets.h"
 #include "slender_sim/geometry/tube_mesh.h"
 #include "slender_sim/scene/snapshot_meshes.h"
 
@@ -129,6 +131,28 @@ TEST(ShapeMesh, closedAndOfTheRightVolume)
   check(Capsule{0.2, 0.5}, M_PI * 0.04 * 0.5 + 4.0 / 3.0 * M_PI * 0.008, 0.03);
   EXPECT_NEAR(shapeMesh(Capsule{0.2, 0.5}).vertices.row(2).maxCoeff(), 0.45, 1e-15);
   EXPECT_EQ(shapeMesh(Plane{}).vertices.cols(), 0);
+}
+
+TEST(CornerNormals, creasesStaySharpAndRoundSidesAreSmooth)
+{
+  const TriangleMesh box = shapeMesh(Box{{1, 2, 3}});
+  const Eigen::Matrix3Xd flat = cornerNormals(box);
+  ASSERT_EQ(flat.cols(), box.triangles.size());
+  for (Eigen::Index c = 0; c < flat.cols(); ++c)
+  {
+    EXPECT_NEAR(flat.col(c).cwiseAbs().maxCoeff(), 1.0, 1e-12);   // along an axis
+    EXPECT_GT(flat.col(c).dot(box.vertices.col(box.triangles.data()[c])), 0.0);   // outwards
+  }
+  const TriangleMesh drum = shapeMesh(Cylinder{0.5, 1.0});
+  const Eigen::Matrix3Xd round = cornerNormals(drum);
+  for (Eigen::Index c = 0; c < round.cols(); ++c)
+  {
+    const Eigen::Vector3d x = drum.vertices.col(drum.triangles.data()[c]);
+    if (std::abs(round(2, c)) > 0.5)
+      EXPECT_NEAR(round.col(c).dot(Eigen::Vector3d(0, 0, x.z() > 0 ? 1 : -1)), 1.0, 1e-12);
+    else   // radial but for the two triangles per side, which weigh unequally at a corner: at most a third of the 15 degrees of a side
+      EXPECT_GT(round.col(c).dot(Eigen::Vector3d(x.x(), x.y(), 0).normalized()), std::cos(5.1 * M_PI / 180));
+  }
 }
 
 }  // namespace

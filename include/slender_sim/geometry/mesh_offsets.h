@@ -8,6 +8,10 @@ namespace slender {
 /// Unit normals of the vertices (3 x n), of the faces around them weighted by their areas; zero where there is no face.
 Eigen::Matrix3Xd vertexNormals(const TriangleMesh& mesh);
 
+/// Unit normals of the faces' corners (3 x 3 m; column 3 f + k is corner k of face f), for shading. Faces around a vertex whose normals differ by
+/// less than acos(`crease`) share a normal, weighted by their areas; other edges stay sharp. Zero where a face has no area.
+Eigen::Matrix3Xd cornerNormals(const TriangleMesh& mesh, double crease = 0.75);
+
 /// Mean length of the edges of all faces [m]; 0 without.
 double meanFaceEdge(const TriangleMesh& mesh);
 /// How far the mesh extends along a direction [m].

@@ -14,7 +14,8 @@ struct Handle
 {
   std::string name;          ///< of its marker: `grasps/NAME`, `bodies/NAME`, `nozzle`
   Pose X_WH;                 ///< where it is
-  double size = 0.1;         ///< [m] of its rings
+  double size = 0.1;         ///< [m] diameter of its rings
+  double ball = 0.03;        ///< [m] diameter of the ball in their middle
   bool turns = true;         ///< false: only its position matters
 };
 

@@ -21,6 +21,7 @@ namespace slender {
 /// one farthest from zero), curvature (of cloths the mean one, towards the normal), twist of rods and threads. What has no such value keeps its colour.
 /// With options.forces: `contacts` 0 what solids and rods do to rods where they touch, and contacts to vertices of cloth, `wrenches` 2 i and 2 i + 1 what grasp i takes of force, and of torque
 /// (as the force at a lever of 0.1 m), `nozzle_forces` i.
+/// `legend` 0 is a text above the scene. It says what colours, material frames and arrows mean, when the options show any of them.
 visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options = {});
 
 }  // namespace slender

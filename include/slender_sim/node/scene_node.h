@@ -12,6 +12,7 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
+#include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
 
 #include "slender_sim/FilePath.h"
@@ -62,6 +63,7 @@ private:
   bool advance();                        // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
   void publishState();
+  void broadcastFrame();
   void broadcastBodies();
   void showHandles();
   void publishMarkers();
@@ -153,6 +155,7 @@ private:
 
   ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_, fields_pub_;   // only when the scene has any, like the next
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
+  std::unique_ptr<tf2_ros::StaticTransformBroadcaster> frame_broadcaster_;   // tells rviz that ~frame_id is there
   ros::Publisher points_pub_, mesh_pub_;   // cloth only; poses_pub_ is for the others
   ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
   std::vector<ros::Publisher> rod_poses_pubs_, wrench_pubs_, nozzle_pubs_;

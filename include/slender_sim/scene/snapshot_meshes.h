@@ -18,7 +18,7 @@ FramedLine lineOf(const ThreadSnapshot& thread, const std::vector<double>& value
 /// Surface of a solid about the origin; round ones have their vertices on the true surface. A plane has none.
 TriangleMesh shapeMesh(const Shape& shape);
 
-enum class ObjectKind { rod, thread, cloth, body, obstacle };
+enum class ObjectKind { rod, thread, cloth, body, obstacle, gripper, nozzle };
 
 struct ObjectMesh
 {

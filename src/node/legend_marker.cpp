@@ -1,0 +1,67 @@
+#include <cstdio>
+
+#include "marker_tools.h"
+#include "slender_sim/node/converters.h"
+
+namespace slender {
+namespace {
+
+using visualization_msgs::Marker;
+
+std::string colorLine(MarkerColor what, double range)
+{
+  const char* const name = what == MarkerColor::strain ? "strain" : what == MarkerColor::curvature ? "curvature" : "twist";
+  const char* const unit = what == MarkerColor::strain ? "" : what == MarkerColor::curvature ? " 1/m" : " rad/m";
+  char text[120];
+  std::snprintf(text, sizeof text, "%s: blue -%.3g%s, grey 0, red %.3g%s\n", name, range, unit, range, unit);
+  return text;
+}
+
+}  // namespace
+
+Eigen::AlignedBox3d sceneBox(const SceneState& state)
+{
+  Eigen::AlignedBox3d box;
+  const auto extend = [&box](const Eigen::Matrix3Xd& x) { box.extend(x.rowwise().minCoeff()).extend(x.rowwise().maxCoeff()); };
+  for (const RodState& rod : state.rods)
+    extend(rod.x);
+  for (const ThreadGroupState& group : state.threads)
+    for (const ThreadState& thread : group.threads)
+      for (const Eigen::Vector3d& x : thread.x)
+        box.extend(x);
+  for (const SceneCloth& held : state.cloths)
+    extend(held.cloth.x);
+  return box;
+}
+
+void addLegend(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
+               visualization_msgs::MarkerArray& out)
+{
+  std::string text;
+  if (options.color != MarkerColor::none)
+    text += colorLine(options.color, range);
+  if (options.style == MarkerStyle::regions)
+    text += "one colour per test function\n";
+  if (options.frames && !simulation.state().rods.empty())
+    text += "frames: tangent red, d1 green, d2 blue\n";
+  if (options.forces > 0.0)
+  {
+    char line[160];
+    std::snprintf(line, sizeof line, "arrows, %.3g m per N: contact green, holder red, its torque over 0.1 m violet\n", options.forces);
+    text += line;
+  }
+  const Eigen::AlignedBox3d box = sceneBox(simulation.state());
+  if (text.empty() || box.isEmpty())
+    return;
+  const double size = box.diagonal().norm();
+  Marker marker = makeMarker(header, "legend", 0, Marker::TEXT_VIEW_FACING);
+  Eigen::Vector3d place = box.center();
+  place.z() = box.max().z() + 0.1 * size;
+  marker.pose.position = toPoint(place);
+  marker.scale.z = 0.04 * size;   // height of a letter
+  marker.color = color(0.15, 0.15, 0.18);
+  marker.text = text.substr(0, text.size() - 1);
+  out.markers.push_back(std::move(marker));
+}
+
+}  // namespace slender
