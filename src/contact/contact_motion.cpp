@@ -85,9 +85,11 @@ bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vec
 {
   check(x, poses);
   near_.build(surface, solids, {x, x, poses, poses}, options.gap, margin_, 0.0);
-  const double least = options.gap / 20, fifth = options.gap / 5;
+  // Less than the twelfth at which the barrier is made stiffer: a step under load then ends with more room than it began with, and parts that
+  // something else than motion brought together come apart again.
+  const double least = options.gap / 20, opened = options.gap / 16;
   // never thinner than what leaves half of the distance between centrelines
-  const auto room = [&](double distance) { return distance - std::min(fifth, 0.5 * distance); };
+  const auto room = [&](double distance) { return distance - std::min(opened, 0.5 * distance); };
   for (const GridPairs::Pair& pair : near_.pairs())
   {
     ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];

@@ -169,6 +169,24 @@ void checkHeight(const Falls& falls, const ThreadConfig& thread, const YamlCurso
   }
 }
 
+/// Thin fluid that comes out slowly does not form a thread: it hangs as a drop until its weight tears it off. Slender theory has no end cap that
+/// would keep such a drop round.
+void checkDripping(const ThreadConfig& thread, const YamlCursor& at, double gravity)
+{
+  const NozzleConfig& nozzle = *thread.nozzle;
+  const double flow = nozzle.flow.table.greatest(), area = 0.25 * M_PI * nozzle.diameter * nozzle.diameter;
+  if (!(thread.surface_tension > 0) || !(flow > 0))
+    return;
+  const ThreadFall fall{thread.density, thread.viscosity, gravity, nozzle.diameter, flow, 0.0};
+  const double least = leastJettingSpeed(fall, thread.surface_tension);
+  if (flow < least * area)
+  {
+    YamlMap(YamlMap(at).get("nozzle")).get("flow").problem("is " + about(flow / area) + " m/s in the nozzle, at which so thin a fluid drips: surface tension draws "
+                                                           "it up, and no thread forms. Must be at least " + about(least * area) +
+                                                           " m^3/s, or the fluid more viscous, or fluid.surface_tension: 0 for the falling part alone");
+  }
+}
+
 /// What was given, against what forms.
 void checkGiven(const Needs& needs, const Falls& falls, const ThreadConfig& thread, const YamlCursor& at, double step)
 {
@@ -249,6 +267,8 @@ void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& 
   const Falls falls = fallsOf(scene, thread);
   YamlMap map(at);
   const bool parts_given = map.has("breakup_radius");
+  if (falls.flow_known)
+    checkDripping(thread, at, scene.gravity.norm());
   if (!std::isfinite(falls.least))   // it falls for ever
   {
     if (!(thread.feed_length > 0))

@@ -76,6 +76,12 @@ const std::vector<Bar>& bars()
       {"thread_implicit_vs_explicit", "step_ratio", at_least, 1e4},
       {"thread_implicit_vs_explicit", "speedup", at_least, 1e3, timing},
       {"coiling", "median_relative_error_frequency", at_most, 0.05},
+      {"thread_defaults", "lost_volume", at_most, 1e-9},
+      {"thread_defaults", "unresolved_unwarned", at_most, 0},
+      {"thread_defaults", "absurd_states", at_most, 0},
+      {"thread_defaults", "scenes", at_least, 100, result, full},
+      {"thread_defaults", "worst_frequency_error", at_most, 0.05},
+      {"thread_defaults", "worst_radius_error", at_most, 0.05},
       // Isometric bending is the small-angle limit of hinges. Its forces stay vertical, those of hinges turn with the sheet, whose slope
       // is at most 3.6e-4 here.
       {"ibm_vs_hinge", "small_bend_gradient_difference", at_most, 3.6e-4},

@@ -42,6 +42,7 @@ void runDraggedCatenary(StudyContext&);
 void runCoiling(StudyContext&);
 void runThreadAccuracy(StudyContext&);
 void runThreadStability(StudyContext&);
+void runThreadDefaults(StudyContext&);
 void runSewingMachine(StudyContext&);
 void runThreadTables(StudyContext&);
 void runSagging(StudyContext&);
@@ -124,6 +125,7 @@ const std::vector<Study>& studies()
       {"thread_accuracy", "error against run time of a viscous thread that sags between two plates", runThreadAccuracy},
       {"thread_stability", "viscous threads in all ranges of viscosity, surface tension, step and motion; an hour of pouring", runThreadStability},
       {"cloth_collision_safety", "continuous tests of a million pairs, none missed; scenes in which cloth never passes through anything", runClothCollisionSafety},
+      {"thread_defaults", "poured fluids from water to pitch, and coils, whose scenes give no edges: resolved, warned of or refused", runThreadDefaults},
       {"willmore_sphere", "an icosahedron and rough spheres that Willmore flow makes round: int H^2 against 16 pi", runWillmoreSphere},
       {"willmore_hole", "caps of spheres and pieces of a torus cut out and closed again by Willmore flow", runWillmoreHole},
       {"willmore_smoothing", "rough meshes of 24,192 and 44,928 triangles: times of 16 steps and of the factorisation", runWillmoreSmoothing},

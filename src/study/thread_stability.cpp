@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/state_bytes.h"
 #include "slender_sim/study/cpu_clock.h"
 #include "slender_sim/thread/thread_group.h"
 #include "stability.h"
-#include "slender_sim/scene/state_bytes.h"
 #include "thread_cases.h"
 
 namespace slender::study {
@@ -96,6 +97,32 @@ ThreadSetup pour(double viscosity, double surface_tension, double speed = 0.05)
   return t;
 }
 
+/// The same by a scene that says nothing of edges, deposits and break-up. A scene that is refused is a cell that is.
+Verdict pourByDefaults(double viscosity, double surface_tension, double h, int steps)
+{
+  char text[500];
+  std::snprintf(text, sizeof text,
+                "time: {step: %g, duration: 1}\nthreads:\n  - fluid: {density: 1000, viscosity: %g, surface_tension: %g}\n"
+                "    nozzle: {position: [0, 0, 0.1], diameter: 5e-3, flow: 1e-6}\n    floor: {height: 0}\n",
+                h, viscosity, surface_tension);
+  Verdict v;
+  try
+  {
+    const Simulation scene(parseScene(text, "poured"));
+    ThreadSetup t;
+    t.model = scene.threadModel(0);
+    t.state = scene.state().threads[0].threads[0];
+    t.inputs.ends[1] = t.state.ends[1].X_WE;
+    t.inputs.flow_rate = 1e-6;
+    v = run(t, h, steps, [](double, ThreadInputs&) {});
+  }
+  catch (const SceneError& error)
+  {
+    v.cell.refuseAtOnce(error.what());
+  }
+  return v;
+}
+
 void record(StudyContext& context, StabilityTally& tally, double& volume_drift, const std::string& test, double h, const Verdict& v)
 {
   Row& row = context.row();
@@ -139,6 +166,14 @@ void runThreadStability(StudyContext& context)
         context.progress(done++, static_cast<int>(9 * viscosities.size()), test);
         record(context, tally, drift, test, h, run(pour(mu, gamma), h, h < 1e-4 ? 300 : h < 1e-2 ? 600 : 40, steady));
       }
+  for (const double mu : viscosities)
+    for (const double gamma : tensions)
+    {
+      const std::string test = "by defaults, " + name("viscosity", mu) + name(", surface tension", gamma);
+      context.progress(done, done + 1, test);
+      ++done;
+      record(context, tally, drift, test, 2e-3, pourByDefaults(mu, gamma, 2e-3, context.quick() ? 250 : 1000));
+    }
   // Held at both ends and let go: thin and thick, thin and thick fluids.
   const auto held = [](double viscosity, double radius, double gravity) {
     char text[700];

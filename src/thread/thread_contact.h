@@ -38,6 +38,7 @@ public:
   std::string nearest(const std::vector<const ThreadState*>& states, const std::vector<Pose>& obstacles) const;
   const std::vector<ContactTerm>& terms() const { return contact_.terms(); }
   bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const override;
+  bool mayJoin(const ThreadState& state, int i) const override;
 
   // ---- the system of a substep, as minimize() needs it (thread_contact.cpp)
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
@@ -84,6 +85,9 @@ private:
   /// Of a contact point: its unknowns' first number in its part, -1: held.
   int dofOf(int point) const;
 
+  /// Calls f(other, j, core) for every edge that the edges first to last of `state` may touch; stops and returns false when f does.
+  template <class F>
+  bool forOthers(const ThreadState& state, int first, int last, F&& f) const;
   void addCurve(const ThreadState& state, int kind);
   bool load(double from, double h);
   void gather(Eigen::Matrix3Xd& x) const;

@@ -328,12 +328,33 @@ bool ThreadContact::allows(const ThreadState& state, int first, int last, const 
     const MovingPoint s{p, p}, t{q, q};
     const auto side = [&](const MovingPoint& end) {
       ApproachLimit limit;
-      limit.thickness = std::min(thickness, 0.9 * segmentDistance(end.from, node.from, p, q));
+      limit.thickness = std::min(thickness, 0.99 * segmentDistance(end.from, node.from, p, q));
       limit.reach = gap;
       return segmentsLimit(end, node, s, t, limit) >= 1.0;
     };
     return side(a) && side(b);
   };
+  return forOthers(state, first, last, isFree);
+}
+
+bool ThreadContact::mayJoin(const ThreadState& state, int i) const
+{
+  const Eigen::Vector3d &a = state.x[i - 1], &b = state.x[i], &c = state.x[i + 1];
+  const double radius = std::sqrt((state.volume[i - 1] + state.volume[i]) / (M_PI * (c - a).norm()));
+  return forOthers(state, i - 1, i, [&](const ThreadState& other, int j, double core) {
+    const Eigen::Vector3d &p = other.x[j], &q = other.x[j + 1];
+    const double r = other.radius(j);
+    const auto apart = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to, double own) {
+      return segmentDistance(from, to, p, q) / (core * (own + r));
+    };
+    return apart(a, c, radius) >= std::min({1.0, apart(a, b, state.radius(i - 1)), apart(b, c, state.radius(i))});
+  });
+}
+
+template <class F>
+bool ThreadContact::forOthers(const ThreadState& state, int first, int last, F&& f) const
+{
+  const double radius = std::max(state.radius(first), state.radius(last)), gap = model_.options.gap;
   for (std::size_t p = 0; p < part_count_; ++p)
     if (&parts_[p].thread->work == &state)
     {
@@ -344,7 +365,7 @@ bool ThreadContact::allows(const ThreadState& state, int first, int last, const 
         const ThreadState& other = parts_[q].thread->work;
         if (q != p && own.others && model_.touches[parts_[q].kind].others)
           for (int j = 0; j < other.edges(); ++j)
-            if (!isFree(other, j, core))
+            if (!f(other, j, core))
               return false;
       }
       if (!own.self)
@@ -352,11 +373,11 @@ bool ThreadContact::allows(const ThreadState& state, int first, int last, const 
       const auto neighbours = [&](double apart, int j) { return apart < 0.5 * M_PI * (radius + state.radius(j)) + gap; };
       double apart = 0.0;
       for (int j = first - 1; j >= 0; apart += state.edge(j--).norm())
-        if (!neighbours(apart, j) && !isFree(state, j, core))
+        if (!neighbours(apart, j) && !f(state, j, core))
           return false;
       apart = 0.0;
       for (int j = last + 1; j < state.edges(); apart += state.edge(j++).norm())
-        if (!neighbours(apart, j) && !isFree(state, j, core))
+        if (!neighbours(apart, j) && !f(state, j, core))
           return false;
     }
   return true;

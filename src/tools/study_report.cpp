@@ -48,7 +48,7 @@ const std::vector<Plan>& plans()
       {"Phase diagrams", "Where one behaviour ends and the next begins.", {"michell", "bend_twist", "sagging"}, {"sewing_machine", "coiling", "greenhill"}},
       {"Rods against formulas", "", {"elastica", "torsion", "torsional_pendulum", "twist_asymmetry"},
        {"beam_frequencies", "lateral_buckling", "perversion", "wilberforce", "helical_buckling", "helical_scene", "stick_slip", "knot", "plectoneme", "chain"}},
-      {"Threads against formulas", "", {"trouton", "thread_twist", "retraction"}, {"merging", "fiber_extrusion", "dragged_catenary"}},
+      {"Threads against formulas", "", {"trouton", "thread_twist", "retraction"}, {"thread_defaults", "merging", "fiber_extrusion", "dragged_catenary"}},
       {"Cloth against formulas and measurements", "", {"willmore_sphere", "willmore_hole", "fabric_drape", "plate_poisson", "curved_shells"},
        {"plate", "stick_slip_strip", "flag", "drape", "stiffness_range"}},
       {"Tracking", "Shells that follow a guide exactly on average.", {"breathing_surface", "rubber_band", "clustering"},

@@ -252,7 +252,8 @@ TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
   }
 }
 
-/// Smallest distance of centrelines over the sum of radii, of all parts that are no neighbours and do not both lie on the floor.
+/// Smallest distance of centrelines over the sum of radii, of all parts that are no neighbours, and of which no end lies on the floor if the other
+/// part lies there: the floor, to which they stick, lets them pass through each other.
 double closest(const TouchingState& state)
 {
   struct Piece { Vector3d a, b; double r, start, length; int thread; bool lies; };

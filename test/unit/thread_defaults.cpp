@@ -143,6 +143,23 @@ TEST(ThreadFlow, AThinFluidFallsFreely)
   EXPECT_FALSE(landing.slender());
 }
 
+TEST(ThreadFlow, ThinFluidsDripFromSlowNozzles)
+{
+  // water from 3 mm: B = 0.613, We = 1.065
+  EXPECT_NEAR(leastJettingSpeed({1000, 1e-3, 9.81, 0.003, 1e-6, 0.1}, 0.072), 0.1599, 1e-4);
+  EXPECT_NEAR(leastJettingSpeed({1000, 1e-3, 0.0, 0.003, 1e-6, 0.1}, 0.072), std::sqrt(4 * 0.072 / (1000 * 0.003)), 1e-12);   // We = 4
+  EXPECT_EQ(leastJettingSpeed({1400, 10, 9.81, 0.003, 1e-6, 0.1}, 0.05), 0.0);
+}
+
+TEST(ThreadDefaults, WhatDripsIsRefused)
+{
+  const std::string slow = problemsOf(plain, {"threads.0.fluid={density: 1000, viscosity: 0.001, surface_tension: 0.072}"});
+  EXPECT_TRUE(contains(slow, "threads.0.nozzle.flow")) << slow;
+  EXPECT_TRUE(contains(slow, "drips")) << slow;
+  EXPECT_TRUE(contains(slow, "Must be at least 1.62")) << slow;
+  EXPECT_EQ(problemsOf(plain, {"threads.0.fluid={density: 1000, viscosity: 0.001, surface_tension: 0.072}", "threads.0.nozzle.flow=3e-6"}), "");
+}
+
 TEST(ThreadDefaults, EdgesResolveTheCoilThatForms)
 {
   for (const double height : {0.02, 0.07, 0.122, 0.3})
@@ -170,7 +187,7 @@ TEST(ThreadDefaults, WhatIsTooCoarseForTheCoilIsSaid)
 
 TEST(ThreadDefaults, WhatIsNoThreadIsSaid)
 {
-  EXPECT_TRUE(contains(warningsOf(plain, {"threads.0.fluid.viscosity=0.001"}), "which is no thread"));
+  EXPECT_TRUE(contains(warningsOf(plain, {"threads.0.fluid.viscosity=0.001", "threads.0.fluid.surface_tension=0"}), "which is no thread"));
   EXPECT_TRUE(contains(warningsOf(plain, {"threads.0.nozzle.position=[0, 0, 0.008]"}), "less than two of its diameters"));
   for (const char* height : {"0.002", "0", "-0.01"})
     EXPECT_TRUE(contains(problemsOf(plain, {std::string("threads.0.nozzle.position=[0, 0, ") + height + "]"}), "must be more than its radius 2.5 mm")) << height;

@@ -186,6 +186,7 @@ struct Shelf : RemeshGuard
   {
     return std::min(from.z(), to.z()) > height;
   }
+  bool mayJoin(const ThreadState&, int) const override { return true; }
 };
 
 TEST(ThreadRemesh, AGuardKeepsNodes)

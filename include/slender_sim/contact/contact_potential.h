@@ -117,7 +117,7 @@ public:
 
   /// Other points, segments and objects (sound ones) from now on; the solids stay. For curves that are fed and divided while they move.
   void setCurves(int points, const std::vector<ContactSegment>& segments, const std::vector<ContactObject>& objects);
-  /// Thins segments where others, or solids, are nearer than a twentieth of the gap, or overlap: to a fifth of it. What was brought together by
+  /// Thins segments where others, or solids, are nearer than a twentieth of the gap, or overlap: to a sixteenth of it. What was brought together by
   /// something else than motion (a division, growing radii) can so begin a step. False: two centrelines, or one and a solid, meet.
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const std::vector<ContactSegment>& segments() const;

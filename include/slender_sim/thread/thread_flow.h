@@ -32,6 +32,11 @@ struct Landing
 /// [Ribe 2004], with factors fitted to the reference solutions of coiling; the tightest law counts most.
 Landing estimateLanding(const ThreadFall& fall);
 
+/// Speed out of the nozzle [m/s] below which a fluid of this surface tension [N/m] > 0 drips instead of flowing as a jet; height and flow do not
+/// matter. We = rho U^2 D / gamma = 4 (1 + 0.37 B - sqrt((1 + 0.37 B)^2 - 1))^2 with B = rho g D^2 / (2 gamma) [Clanet and Lasheras 1999, of a
+/// nozzle with thin walls]. Zero where viscosity holds what hangs from the nozzle together: mu > sqrt(rho gamma D / 2) (Ohnesorge number 1).
+double leastJettingSpeed(const ThreadFall& fall, double surface_tension);
+
 /// Edges that resolve what forms.
 struct EdgeChoice
 {

@@ -11,6 +11,9 @@ class RemeshGuard
 public:
   virtual ~RemeshGuard() = default;
   virtual bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const = 0;
+  /// Whether the edges at inner node i may become one for the sake of their length: the joined edge, whose radius is that of both volumes, does
+  /// not come nearer to others than it may while the two edges are farther from them.
+  virtual bool mayJoin(const ThreadState& state, int i) const = 0;
 };
 
 /// Divides edge j where `fraction` of its length lies on the older side (thesis 5.4.4): the new node by a cubic through the four nodes
