@@ -241,13 +241,13 @@ void coil(StudyContext& context, const Scaled& fluid, double height, double& wor
   };
   constexpr double kSteady = 2e-3;   // change of the frequency, and of the radius, from one window to the next
   constexpr int kMostWindows = 60;
-  const double guess = 2.0 * M_PI / landing.frequency;
   double before = 0.0, radius_before = 0.0;
   CoilTrace trace = watch(2.0 * outlet.height / (outlet.speed + landing.speed));
   int windows = 0, steady = 0;
   for (; windows < kMostWindows && steady < 2; ++windows)
   {
-    trace = watch(3.0 * (before > 0 ? 2.0 * M_PI / before : guess));
+    // the estimate is up to three times too fast; while the thread folds to and fro it hardly turns
+    trace = watch(6.0 * M_PI / (before > 0 ? std::max(before, landing.frequency / 4) : landing.frequency));
     const double now = trace.turns() > 1.0 ? trace.frequency() : 0.0;
     steady = now > 0 && std::abs(now - before) < kSteady * now && std::abs(trace.radius() - radius_before) < kSteady * trace.radius() ? steady + 1 : 0;
     before = now;
