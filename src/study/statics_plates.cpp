@@ -170,11 +170,14 @@ PlateCase compressedPlate(int cells, BendingModel bending)
 void addPlates(StudyContext& context, StaticsTally& tally)
 {
   useOneBlasThread();
-  const std::vector<int> meshes = context.quick() ? std::vector<int>{12} : std::vector<int>{12, 24, 48};
+  // So many cells make the triangles of these plates equilateral within half a percent. Triangles that are one percent too long change the thresholds by two.
+  const std::vector<int> meshes = context.quick() ? std::vector<int>{20} : std::vector<int>{20, 32, 52};
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
     for (const int cells : meshes)
       for (const double width : {0.25, 0.5, 0.0})
       {
+        if (context.quick() && bending != BendingModel::hinge)
+          continue;
         const PlateCase c = width > 0 ? lateralPlate(width, cells, bending) : compressedPlate(cells, bending);
         context.progress(tally.cases, 0, c.family + " " + c.label);
         const double threshold = meshThreshold(c);
