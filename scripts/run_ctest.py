@@ -7,7 +7,6 @@ only if nothing failed and something passed.
 """
 
 import argparse
-import concurrent.futures
 import json
 import os
 import pathlib
@@ -15,11 +14,6 @@ import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-
-
-def is_rostest(name):
-    """Whether CTest's test of this name is a rostest, whose results rostest itself writes to a folder of its own."""
-    return "_rostest_" in name
 
 
 def results_in(folder):
@@ -43,15 +37,15 @@ def count(path):
 
 
 def run(build, name, timeout):
-    """Runs one test; returns (passed, names of failed cases, what the test printed)."""
+    """Runs one test; returns (passed, names of failed cases)."""
     gtest_folder = build / "test_results" / "gtest"
-    folder = build / "test_results" / "slender_sim" if is_rostest(name) else gtest_folder
-    before = results_in(folder)
+    gtest_folder.mkdir(parents=True, exist_ok=True)
+    before = results_in(build / "test_results")
     environment = dict(os.environ, GTEST_OUTPUT="xml:{}/{}.xml".format(gtest_folder.resolve(), name.replace("/", "_")))
     command = ["ctest", "--test-dir", str(build), "-R", "^{}$".format(name), "--output-on-failure", "--timeout", str(timeout)]
-    ended = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    good = ended.returncode == 0
-    files = sorted(results_in(folder) - before)
+    print("== {}".format(name), flush=True)
+    good = subprocess.run(command, env=environment).returncode == 0
+    files = sorted(results_in(build / "test_results") - before)
     # rostest writes a summary (rostest-*.xml) beside the results of each test node (rosunit-*.xml): the single cases are in the
     # latter; the former tells of nodes that died.
     detailed = [path for path in files if path.name.startswith("rosunit-")]
@@ -71,17 +65,6 @@ def run(build, name, timeout):
         failed.append("{}: the program failed without naming a case (crash, timeout, or not built)".format(name))
     if good and not files:
         passed += 1   # a plain program whose exit status is all it says
-    return passed, failed, ended.stdout.decode(errors="replace")
-
-
-def run_in_turn(build, names, timeout):
-    """Runs tests one after another; returns (number of passed cases, names of failed cases)."""
-    passed, failed = 0, []
-    for name in names:
-        more_passed, more_failed, output = run(build, name, timeout)
-        print("== {}\n{}".format(name, output), end="", flush=True)
-        passed += more_passed
-        failed += more_failed
     return passed, failed
 
 
@@ -96,14 +79,11 @@ def main():
     shutil.rmtree(arguments.build / "test_results", ignore_errors=True)
     listing = subprocess.run(["ctest", "--test-dir", str(arguments.build), "--show-only=json-v1"], stdout=subprocess.PIPE, check=True)
     names = [test["name"] for test in json.loads(listing.stdout)["tests"]]
-    (arguments.build / "test_results" / "gtest").mkdir(parents=True)
-    # Rostests mostly wait for the wall clock, so one core computes for the other tests meanwhile.
-    lanes = [[name for name in names if is_rostest(name)], [name for name in names if not is_rostest(name)]]
     passed, failed = len(arguments.passed), list(arguments.failed)
-    with concurrent.futures.ThreadPoolExecutor(len(lanes)) as pool:
-        for more_passed, more_failed in pool.map(lambda lane: run_in_turn(arguments.build, lane, arguments.timeout), lanes):
-            passed += more_passed
-            failed += more_failed
+    for name in names:
+        more_passed, more_failed = run(arguments.build, name, arguments.timeout)
+        passed += more_passed
+        failed += more_failed
     if not names:
         failed.append("CTest knows no tests in {}".format(arguments.build))
     for line in failed:
