@@ -29,6 +29,11 @@ with open(os.path.join(rospkg.RosPack().get_path("slender_sim"), "docs", "tutori
     TEXT = file.read()
 
 
+def wait_for(condition, what):
+    """roslaunch looks through the whole package for what it starts, and a busy machine may take minutes for that."""
+    wait_until(condition, timeout=300.0, what=what)
+
+
 def only(pattern, text=TEXT):
     """The one place of the text that matches: a tutorial that says it otherwise needs another test."""
     found = re.findall(pattern, text, re.DOTALL)
@@ -99,7 +104,7 @@ class Tutorials(unittest.TestCase):
         return listener
 
     def see(self, listener, condition, what):
-        wait_until(lambda: listener.count() > 0 and condition(listener.last()), what=what)
+        wait_for(lambda: listener.count() > 0 and condition(listener.last()), what)
         return listener.last()
 
     def bag_lists(self, command, topics):
@@ -129,7 +134,7 @@ class Tutorials(unittest.TestCase):
             return float(values.get("input age gripper [s]", "9").replace("none yet", "9")) < 0.5 and "real-time factor" in values
 
         rospy.sleep(2.0)
-        wait_until(young, what="diagnostics of a young input")
+        wait_for(young, "diagnostics of a young input")
         self.assertEqual(values["dropped stale"], "0")
         wrench = self.listen("/grasps/gripper/wrench", WrenchStamped)
         self.see(wrench, lambda m: abs(m.wrench.force.z) > 0.01, "the rope's weight on the gripper")
@@ -163,7 +168,7 @@ class Tutorials(unittest.TestCase):
         rate = rospy.Publisher("/nozzle/flow", Float64, queue_size=1)
         where = rospy.Publisher("/nozzle/pose", PoseStamped, queue_size=10)
         self.ends += [rate, where]
-        wait_until(lambda: rate.get_num_connections() > 0 and where.get_num_connections() > 0, what="nozzle/flow and nozzle/pose to be heard")
+        wait_for(lambda: rate.get_num_connections() > 0 and where.get_num_connections() > 0, "nozzle/flow and nozzle/pose to be heard")
         rate.publish(0.0)
         pose = PoseStamped()
         pose.header.frame_id = "world"
@@ -175,7 +180,7 @@ class Tutorials(unittest.TestCase):
             where.publish(pose)
             return abs(state.last().nodes[-1].x - 0.01) < 1e-6
 
-        wait_until(moved, what="the nozzle to be at x = 0.01 m")
+        wait_for(moved, "the nozzle to be at x = 0.01 m")
         self.stop(node)
 
     def test_sweep(self):
@@ -188,7 +193,7 @@ class Tutorials(unittest.TestCase):
             self.assertIsNone(sweep.poll(), self.output())
             return os.path.isdir(self.path("out/map")) and any(files for _, _, files in os.walk(self.path("out/map")))
 
-        wait_until(begun, timeout=300.0, what="results of the sweep")
+        wait_for(begun, "results of the sweep")
         self.stop(sweep)
 
     def test_cloth(self):
@@ -200,9 +205,9 @@ class Tutorials(unittest.TestCase):
         held = state.all()[0].vertices[0]
         # "drive grasps/hand/pose as above": the command for the gripper, with the hand's topic and pose. Poses of cloths count relative to the first one.
         command = only(r"\n( +rostopic pub -r 20 -s /grasps/gripper/pose .*?)\n\n").replace("gripper", "hand")
-        self.shell(command)
-        rospy.sleep(2.0)
-        mover = self.processes.pop()
+        mover = self.shell(command)
+        sent = self.listen("/grasps/hand/pose", PoseStamped)
+        wait_for(lambda: sent.count() > 40, "two seconds of poses")   # the first of them is what later ones count from
         self.stop(mover)
         self.shell(command.replace("y: 0.2", "y: 0.3"))
         self.see(state, lambda m: abs(m.vertices[0].y - held.y - 0.1) < 1e-6, "the corner 0.1 m further")
@@ -219,7 +224,7 @@ class Tutorials(unittest.TestCase):
         self.see(state, lambda m: m.step > 2, "the sheet")
         points = rospy.Publisher("/guide/points", PointCloud2, queue_size=10)
         self.ends.append(points)
-        wait_until(lambda: points.get_num_connections() > 0, what="guide/points to be heard")
+        wait_for(lambda: points.get_num_connections() > 0, "guide/points to be heard")
 
         def follows():
             header = Header(stamp=rospy.Time.now(), frame_id="world")
@@ -227,7 +232,7 @@ class Tutorials(unittest.TestCase):
             message = state.last()
             return len(message.guide_vertices) == 4 and all(abs(p.z - 0.3) < 1e-6 for p in message.guide_vertices)
 
-        wait_until(follows, what="the guide at z = 0.3 m")
+        wait_for(follows, "the guide at z = 0.3 m")
         message = state.last()
         self.assertLess(max(message.constraint_errors), 1e-12)   # round-off
         mean = sum(p.z for p in message.vertices) / len(message.vertices)
