@@ -137,7 +137,7 @@ class Signals(NodeCase):
 
     def test_fairing_node(self):
         """A million steps of a small mesh, which is not stationary for long."""
-        n = 60
+        n = 40
         request = FairMeshRequest(steps=1000000, smoothing=1e-3)
         request.vertices = [Point(x / n, y / n, 0.03 * ((7 * x + 13 * y) % 5)) for y in range(n) for x in range(n)]
         for y in range(n - 1):
