@@ -108,7 +108,9 @@ TEST(PointTrajectory, MovesEachPointAsThePositionsOfPoses)
   trajectory.forgetBefore(0.5);
   trajectory.evaluate(0.5, after);
   EXPECT_EQ(before, after);
-  EXPECT_EQ(trajectory.times().size(), 3u);
+  EXPECT_EQ(trajectory.times().size(), 5u);   // three samples before that of the segment, which tell a pause from a turning point
+  trajectory.forgetBefore(0.8);
+  EXPECT_EQ(trajectory.times().size(), 4u);
   EXPECT_THROW(trajectory.append(0.7, frames[0]), std::invalid_argument);
   EXPECT_THROW(trajectory.append(0.8, Matrix3Xd::Zero(3, 2)), std::invalid_argument);
   EXPECT_THROW(trajectory.append(0.8, Matrix3Xd::Constant(3, 3, NAN)), std::invalid_argument);
