@@ -362,21 +362,6 @@ void Simulation::fillClothInputs(const SceneInputs& inputs)
   }
 }
 
-/// The stable equilibria of all cloths under loads of this factor; the state is where the search begins. fillClothInputs() comes before.
-StepReport Simulation::solveCloths(double factor)
-{
-  StepReport total;
-  const bool scaled = !config_.statics || config_.statics->scales != FactorScales::gravity;
-  for (std::size_t k = 0; k < cloth_steppers_.size() && total.ok; ++k)
-  {
-    ClothInputs loads = cloth_inputs_[k];
-    loads.gravity = gravityAt(factor);
-    loads.forces *= scaled ? factor : 1.0;
-    total.merge(cloth_steppers_[k]->solveEquilibrium(state_.cloths[k].cloth, loads));
-  }
-  return total;
-}
-
 StepReport Simulation::stepCloths(const SceneInputs& inputs)
 {
   StepReport total;
@@ -490,51 +475,6 @@ void Simulation::release(int grasp)
     state_.rods[ref.rod].forgetHistory();
   }
   state_.wrenches[grasp] = {};
-}
-
-bool Simulation::isActive(int grasp) const
-{
-  checkGrasp(grasp);
-  const GraspRef& ref = grasps_[grasp];
-  return ref.cloth >= 0 ? state_.cloths[ref.cloth].grasps[ref.index].active : graspState(grasp).active;
-}
-
-const Pose& Simulation::graspPose(int grasp) const
-{
-  checkGrasp(grasp);
-  const GraspRef& ref = grasps_[grasp];
-  return ref.cloth >= 0 ? state_.cloths[ref.cloth].grasps[ref.index].X_WG : graspState(grasp).X_WG;
-}
-
-const std::string& Simulation::heldObject(int grasp) const
-{
-  checkGrasp(grasp);
-  const GraspRef& ref = grasps_[grasp];
-  return ref.cloth >= 0 ? config_.cloths[ref.cloth].name : config_.rods[ref.rod].name;
-}
-
-const Eigen::Matrix3Xd& Simulation::pinForces(int cloth) const
-{
-  const auto& stepper = cloth_steppers_.at(static_cast<std::size_t>(cloth));
-  return stepper ? stepper->pinForces() : touching_cloths_[cloth_places_[cloth].group].group.pinForces(cloth_places_[cloth].index);
-}
-
-Eigen::Matrix3Xd Simulation::contactForces(int cloth) const
-{
-  if (cloth_steppers_.at(static_cast<std::size_t>(cloth)))
-    return Eigen::Matrix3Xd(3, 0);
-  return touching_cloths_[cloth_places_[cloth].group].group.contactForces(cloth_places_[cloth].index);
-}
-
-const ClothStepper& Simulation::clothStepper(int cloth) const
-{
-  const auto& own = cloth_steppers_.at(static_cast<std::size_t>(cloth));
-  return own ? *own : touching_cloths_[cloth_places_[cloth].group].group.stepper(cloth_places_[cloth].index);
-}
-
-ClothEnergies Simulation::clothEnergies(int cloth) const
-{
-  return clothStepper(cloth).energies(state_.cloths[static_cast<std::size_t>(cloth)].cloth, config_.gravity);
 }
 
 }  // namespace slender

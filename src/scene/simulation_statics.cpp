@@ -68,6 +68,7 @@ void Simulation::findEquilibrium()
   }
   start_report_ = report;
   takeWrenches();
+  takeClothWrenches();
 }
 
 void Simulation::checkHasStatics() const
@@ -178,6 +179,21 @@ StepReport Simulation::solveStatics(double factor)
   return report;
 }
 
+/// The stable equilibria of all cloths under loads of this factor; the state is where the search begins. fillClothInputs() comes before.
+StepReport Simulation::solveCloths(double factor)
+{
+  StepReport total;
+  const bool scaled = !config_.statics || config_.statics->scales != FactorScales::gravity;
+  for (std::size_t k = 0; k < cloth_steppers_.size() && total.ok; ++k)
+  {
+    ClothInputs loads = cloth_inputs_[k];
+    loads.gravity = gravityAt(factor);
+    loads.forces *= scaled ? factor : 1.0;
+    total.merge(cloth_steppers_[k]->solveEquilibrium(state_.cloths[k].cloth, loads));
+  }
+  return total;
+}
+
 /// The present state as a row.
 StaticsRow Simulation::rowAt(double factor, const StepReport& report) const
 {
@@ -225,6 +241,7 @@ StaticsRun Simulation::runStatics()
   if (run.end.ok)
   {
     takeWrenches();
+    takeClothWrenches();
   }
   return run;
 }

@@ -12,12 +12,14 @@
 #include <vector>
 
 #include "arguments.h"
+#include "moduli.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/linalg/interruption.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
 #include "slender_sim/scene/simulation.h"
+#include "statics_report.h"
 #ifdef SLENDER_WITH_BAG
 #include "slender_sim/node/bag_recorder.h"
 #include "slender_sim/node/guide_bag.h"
@@ -240,48 +242,6 @@ bool checkVolumes(const Simulation& simulation)
   return false;
 }
 
-std::string rangeOf(double low, double high)
-{
-  char text[64];
-  std::snprintf(text, sizeof text, high - low > 1e-9 * high ? "%.6g to %.6g" : "%.6g", low, high);
-  return text;
-}
-
-/// The moduli in use, whether the scene gives them or they follow from Young's modulus: one line for each rod that differs from those before.
-void printModuli(const Simulation& simulation)
-{
-  constexpr int kMostLines = 10;
-  std::vector<std::pair<std::string, int>> lines;   // and the number of further rods that have the same moduli
-  const int rods = static_cast<int>(simulation.config().rods.size());
-  for (int r = 0; r < rods; ++r)
-  {
-    const slender::RodModel& m = simulation.rodModel(r);
-    const auto bend = [&m](int row) { return rangeOf(m.bend_modulus.row(row).minCoeff(), m.bend_modulus.row(row).maxCoeff()); };
-    const std::string bends = bend(0) == bend(2) ? bend(0) : "[" + bend(0) + ", " + bend(2) + "]";
-    const std::string text = "stretch " + rangeOf(m.stretch_modulus.minCoeff(), m.stretch_modulus.maxCoeff()) + " N, bend " + bends + " N m^2, twist " +
-                             rangeOf(m.twist_modulus.minCoeff(), m.twist_modulus.maxCoeff()) + " N m^2";
-    const auto ends = [&text](const std::string& line) { return line.size() > text.size() && line.compare(line.size() - text.size(), text.size(), text) == 0; };
-    const auto same = std::find_if(lines.begin(), lines.end(), [&ends](const auto& line) { return ends(line.first); });
-    if (same != lines.end())
-    {
-      ++same->second;
-    }
-    else if (static_cast<int>(lines.size()) <= kMostLines)
-    {
-      lines.emplace_back("rod " + m.name + ": " + text, 0);
-    }
-  }
-  for (std::size_t k = 0; k < lines.size() && k < kMostLines; ++k)
-  {
-    std::printf("moduli            %s", lines[k].first.c_str());
-    lines[k].second > 0 ? std::printf(" (and %d more rods)\n", lines[k].second) : std::printf("\n");
-  }
-  if (static_cast<int>(lines.size()) > kMostLines)
-  {
-    std::printf("moduli            other rods have other moduli\n");
-  }
-}
-
 void printSummary(const Simulation& simulation, const StepReport& total, double wall)
 {
   const double simulated = simulation.state().time;
@@ -294,7 +254,7 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   std::printf("iterations        %d (%.2f per step)\n", total.iterations,
               total.iterations / std::max(1.0, static_cast<double>(simulation.state().steps)));
   std::printf("cut steps         %d\n", total.cut_steps);
-  printModuli(simulation);
+  slender::printModuli(simulation);
   if (total.repulsions > 0 || total.impulses > 0)
   {
     std::printf("cloth contacts    %.1f per step, %ld collisions stopped, %ld rigid pieces\n",
@@ -338,47 +298,12 @@ void saveState(const Simulation& simulation, const std::string& path)
   }
 }
 
-void printRow(const slender::StaticsRow& row)
-{
-  const StepReport& r = row.report;
-  std::printf("load factor       %.9g\n", row.factor);
-  std::printf("  residual        %.3g of the largest force\n", r.residual);
-  std::printf("  energy          %.9g J\n", r.energy);
-  std::printf("  lowest eigenvalue %.6g 1/s^2%s\n", r.lowest_eigenvalue, r.lowest_eigenvalue == 0 ? " (a motion that costs nothing)" : "");
-  std::printf("  stable          %s, %d unstable equilibria left on the way\n", r.stable ? "yes" : "no", r.escapes);
-  std::printf("  largest move    %.6g m\n", row.displacement);
-}
-
-/// Lines of a path are short: there may be thousands.
-void printPath(const std::vector<slender::StaticsRow>& rows)
-{
-  std::printf("%14s %12s %16s %18s %8s %14s\n", "load factor", "residual", "energy [J]", "eigenvalue [1/s^2]", "stable", "move [m]");
-  for (const slender::StaticsRow& row : rows)
-  {
-    std::printf("%14.8g %12.3g %16.9g %18.6g %8s %14.6g\n", row.factor, row.report.residual, row.report.energy, row.report.lowest_eigenvalue,
-                row.report.stable ? "yes" : "no", row.displacement);
-  }
-}
-
 void printStatics(const Simulation& simulation, const slender::StaticsRun& found, double wall)
 {
   std::printf("scene             %s\n", simulation.config().name.c_str());
   std::printf("wall              %.6g s\n", wall);
-  printModuli(simulation);
-  if (found.critical)
-  {
-    std::printf("critical factor   %.9g (%s)\n", found.critical->factor,
-                found.critical->fold ? "a limit load: no equilibrium is near beyond it" : "paths branch: beyond it the equilibrium is unstable");
-  }
-  if (simulation.config().statics && simulation.config().statics->path)
-  {
-    printPath(found.rows);
-    return;
-  }
-  for (const slender::StaticsRow& row : found.rows)
-  {
-    printRow(row);
-  }
+  slender::printModuli(simulation);
+  slender::printEquilibria(simulation.config(), found);
 }
 
 /// `simulate --statics`. Returns the exit status.
@@ -412,32 +337,7 @@ int runStatics(const Options& options, Simulation& simulation, Clock::time_point
   {
     printStatics(simulation, found, std::chrono::duration<double>(Clock::now() - start).count());
   }
-  if (!found.end.ok)
-  {
-    std::fprintf(stderr, "simulate: statics failed: %s\n", found.end.message.c_str());
-    return exit_failed;
-  }
-  if (simulation.config().statics && simulation.config().statics->path)
-  {
-    return exit_done;   // a path is asked for whether it is stable or not
-  }
-  for (const slender::StaticsRow& row : found.rows)
-  {
-    if (row.report.stable)
-    {
-      continue;
-    }
-    const bool accept = simulation.config().start.accept_unstable;
-    std::fprintf(stderr, "simulate: %sload factor %.9g: the equilibrium is unstable (lowest eigenvalue %.3g 1/s^2), and no stable one was reached from it%s\n",
-                 accept ? "warning: " : "", row.factor, row.report.lowest_eigenvalue,
-                 accept ? "" : ": start from a shape that is nearer to the stable equilibrium (initial), hold what drifts by a grasp, or accept it "
-                               "(start: {equilibrium: true, accept_unstable: true})");
-    if (!accept)
-    {
-      return exit_failed;
-    }
-  }
-  return exit_done;
+  return slender::reportStatics(simulation.config(), found) ? exit_done : exit_failed;
 }
 
 int run(const Options& options)

@@ -445,11 +445,7 @@ using test::Result;
 class SimulateStatics : public testing::Test
 {
 protected:
-  void SetUp() override
-  {
-    folder_ = testing::TempDir() + "/slender_sim_statics_" + std::to_string(getpid());
-    fs::create_directories(folder_);
-  }
+  void SetUp() override { fs::create_directories(folder_); }
   void TearDown() override { fs::remove_all(folder_); }
   Result run(const std::string& scene, const std::string& arguments)
   {
@@ -464,7 +460,7 @@ protected:
       all.push_back(line);
     return all;
   }
-  std::string folder_;
+  const std::string folder_ = testing::TempDir() + "/slender_sim_statics_" + std::to_string(getpid());
 };
 
 TEST_F(SimulateStatics, printsTheEquilibriumAndWritesTables)
@@ -472,9 +468,7 @@ TEST_F(SimulateStatics, printsTheEquilibriumAndWritesTables)
   const Result result = run(loadedColumn(20, "{factors: [1, 3], buckling: true}"), "--statics --csv " + folder_ + "/out");
   EXPECT_EQ(result.status, 0) << result.output;
   for (const char* word : {"critical factor   2.46", "load factor       1\n", "load factor       3\n", "residual", " J\n", "lowest eigenvalue", "1/s^2", "stable          yes, 1"})
-  {
     EXPECT_NE(result.output.find(word), std::string::npos) << word << " not in\n" << result.output;
-  }
   const std::vector<std::string> rows = lines("statics.csv"), modes = lines("statics_modes.csv");
   ASSERT_EQ(rows.size(), 4u);
   EXPECT_EQ(rows[0], "step,factor,residual,energy [J],lowest eigenvalue [1/s^2],stable,escapes,displacement [m]");
