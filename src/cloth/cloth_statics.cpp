@@ -405,6 +405,16 @@ void ClothStatics::finish(StepReport& report)
 StepFailure ClothStatics::solve(ClothState& state, const ClothInputs& inputs, bool leave_saddles, StepReport& report)
 {
   begin(state, inputs);
+  Eigen::Vector3d total(0, 0, 0);
+  double sizes = 0.0;
+  for (int i = 0; i < model_.vertices(); ++i)
+  {
+    total += point(force_, i);
+    sizes += point(force_, i).norm();
+  }
+  // Nothing but pins can balance a resultant load. Below 1e-9 of the loads it is round-off of their sum.
+  if (state.pins.empty() && total.norm() > 1e-9 * sizes)
+    return StepFailure::newton_diverged;
   StepFailure failure = carryPins(report);
   if (failure == StepFailure::none)
     failure = settleStably(leave_saddles, report);

@@ -68,7 +68,6 @@ void Simulation::findEquilibrium()
   }
   start_report_ = report;
   takeWrenches();
-  takeClothWrenches();
 }
 
 void Simulation::checkHasStatics() const
@@ -191,6 +190,10 @@ StepReport Simulation::solveCloths(double factor)
     loads.forces *= scaled ? factor : 1.0;
     total.merge(cloth_steppers_[k]->solveEquilibrium(state_.cloths[k].cloth, loads));
   }
+  if (total.ok)
+  {
+    takeClothWrenches();
+  }
   return total;
 }
 
@@ -241,7 +244,6 @@ StaticsRun Simulation::runStatics()
   if (run.end.ok)
   {
     takeWrenches();
-    takeClothWrenches();
   }
   return run;
 }
