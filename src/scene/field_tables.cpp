@@ -28,7 +28,8 @@ class Columns
 public:
   Columns(std::string table, const std::string& object, Eigen::Index rows) : table_{std::move(table), object, {}, Eigen::MatrixXd(rows, 0)} {}
 
-  /// `values`: one row per name. With a column less than the table has rows (edges of an open rod) the last one counts twice.
+  /// `values` has one row per name and one column per row of the table. Edges of an open rod are one fewer than its nodes: then
+  /// the last column is written twice.
   void add(const std::vector<std::string>& names, const Eigen::MatrixXd& values)
   {
     const Eigen::Index before = table_.values.cols(), rows = table_.values.rows();

@@ -238,7 +238,7 @@ std::vector<int> withFaces(const TriangleMesh& mesh, std::vector<int> vertices)
   return found;
 }
 
-/// Dead loads: a force on each of some vertices, which are named as for grasps.
+/// Reads the dead loads of a cloth. Each entry gives one force for all vertices that it names, as grasps name theirs.
 std::vector<ClothLoadConfig> readClothLoads(const YamlCursor& at, const ClothConfig& cloth)
 {
   std::vector<ClothLoadConfig> loads;

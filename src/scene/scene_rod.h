@@ -24,7 +24,7 @@ struct RodLoads
   Eigen::VectorXd torques;    ///< about the tangent of each edge [N m]
 };
 
-/// Spreads the point loads of a rod over its nodes and edges. A torque at an inner node is borne by both edges there, half each.
+/// Spreads the point loads of a rod over its nodes and edges. Each of the two edges at an inner node bears half of a torque there.
 RodLoads rodLoads(const RodConfig& rod, const RodModel& model, Integrator integrator);
 
 /// Gives a clamped section the orientation of `direction` and `director` in place of that of its motion's poses. What is left out of the two stays

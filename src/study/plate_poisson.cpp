@@ -92,7 +92,7 @@ void lateralBuckling(StudyContext& context)
         }
 }
 
-/// Meshes on which the model is too stiff, which scenes warn of.
+/// Measures how much too stiff the model is on irregular and alternating meshes. Scenes warn of such meshes.
 void otherMeshes(StudyContext& context)
 {
   for (const GridPattern pattern : {GridPattern::irregular, GridPattern::alternating})

@@ -118,7 +118,7 @@ void judge(StudyContext& context, const PlateCase& c, double threshold, double f
   row.check(wrong + called_stable, 0, 0.5, leaves ? "must leave its plane for a stable state" : "must stay in its plane");
 }
 
-/// A plate 1 x width that is clamped along x = 0 and stands upright: gravity acts along -y. The load is rho g h L^3 / D.
+/// Returns a plate of length 1 that stands upright and is clamped along x = 0. Gravity acts along -y. The load is rho g h L^3 / D.
 PlateCase lateralPlate(double width, int cells, BendingModel bending)
 {
   const double h = 1.0 / cells, row = std::sqrt(0.75);

@@ -56,7 +56,7 @@ int negativeModes(const RodSetup& rod, double ground)
   return inertia.negative + inertia.zero;
 }
 
-constexpr double kAway = 1e-5;   ///< of the length: a state that left its branch is farther, one that stayed is at 1e-9
+constexpr double kAway = 1e-5;   ///< ratio of distance to length; a state that left its branch is farther away, and one that stayed is within 1e-9
 
 void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally)
 {

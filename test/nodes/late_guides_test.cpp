@@ -106,7 +106,7 @@ TEST(LateGuides, ConstantlyLate)
         const Result result = follow(command, options(live), 6.0, [&](int) { return late; });
         EXPECT_LE(result.acceleration, 1.5 * most) << ms << " ms, " << frequency << " Hz" << (live ? ", live" : "");
         EXPECT_LE(result.turning, 1.5 * 3.0 * most) << ms << " ms, " << frequency << " Hz" << (live ? ", live" : "");
-        EXPECT_LE(result.error, 1e-4) << ms;   // on the command's own way, later: cubics through 100 poses a second
+        EXPECT_LE(result.error, 1e-4) << ms;   // the motion is late but follows the command's path, up to the error of cubics through 100 poses a second
         // two intervals and the transport, which is found out with the resolution of a step; and 10 % more; the delay where that is enough
         EXPECT_LE(result.lag, std::max(0.05, 1.1 * (late + 2.0 * kInterval + kStep)) + 1e-6) << ms;
         EXPECT_GE(result.lag, std::max(0.05, late + 2.0 * kInterval - kStep) - 1e-9) << ms;

@@ -94,7 +94,7 @@ TEST(RecordedFields, MomentOfACantileverIsThatOfTheWeightBeyond)
       for (int k = i + 1; k < model.nodes(); ++k)
         expected += (state.x.col(k) - state.x.col(i)).cross(Vector3d(0, 0, -9.81 * model.mass[k]));
       largest = std::max(largest, expected.norm());
-      // equilibrium of the discrete rod: exact up to the solver's residual
+      // the discrete rod is in equilibrium, so the only error is the solver's residual
       EXPECT_LT((s.moment.col(i) - expected).norm(), 1e-7 * largest) << i;
       // d1 points up, so that the moment of the weight turns about +y, which is -d2 at a rod along x
       EXPECT_NEAR(s.material_moment(2, i), -expected.y(), 1e-7 * largest + 1e-14);
@@ -431,7 +431,7 @@ threads:
   EXPECT_EQ(kappa[0], 0.0);   // free ends carry none
   for (Eigen::Index i = 1; i + 1 < kappa.size(); ++i)
   {
-    EXPECT_NEAR(kappa[i], 5.0, 5.0 * 1e-3);   // chords of 1/20 rad: 2 tan(turn/2) / chord is 1 + 3/24 turn^2 times 1/R
+    EXPECT_NEAR(kappa[i], 5.0, 5.0 * 1e-3);   // on chords that turn by 1/20 rad, 2 tan(turn/2) / chord exceeds 1/R by the factor 1 + turn^2/8
   }
 }
 
