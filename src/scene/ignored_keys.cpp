@@ -2,11 +2,14 @@
 #include "ignored_keys.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "slender_sim/dynamics/integrator.h"
+#include "slender_sim/geometry/mesh_topology.h"
 
 namespace slender {
 
@@ -79,6 +82,54 @@ void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
   }
 }
 
+/// Returns true for a key that is given as false.
+bool isOff(const YamlCursor& key) { return key.present() && !key.boolean().value_or(true); }
+
+/// Warns of a contact that finds no partner. `others`: the key for contact with objects of the same kind, of which the scene has any if `has_others`.
+void warnOfContact(YamlMap contact, const char* others, bool has_others, bool has_solids)
+{
+  const bool meets_others = has_others && !isOff(contact.get(others)), meets_solids = has_solids && !isOff(contact.get("obstacles"));
+  if (contact.at().present() && isOff(contact.get("self")) && !meets_others && !meets_solids)
+  {
+    contact.at().warning(std::string("has no effect: self is false, and ") + others +
+                         " and obstacles are false or the scene has none, so that there is nothing to touch; leave contact out, or change these keys");
+  }
+}
+
+/// Returns why the friction of a solid has no effect, or an empty text.
+std::string whyNoFriction(const SceneConfig& scene)
+{
+  const auto touches = [](const auto& object) { return object.contact && object.contact->obstacles; };
+  const auto slips = [&touches](const auto& object) { return touches(object) && object.contact->friction > 0; };
+  if (!any(scene.rods, touches) && !any(scene.threads, touches) && !any(scene.cloths, touches))
+  {
+    return "nothing touches it; give the rods, threads or cloths a contact with obstacles, or leave friction out";
+  }
+  if (!any(scene.rods, slips) && !any(scene.threads, slips) && !any(scene.cloths, slips))
+  {
+    return "the friction between two objects is the geometric mean of both, and that of everything that touches solids is 0; give them a friction as well";
+  }
+  return "";
+}
+
+void warnOfFriction(const YamlCursor& friction, const std::string& why)
+{
+  if (friction.present() && friction.number(Range{}).value_or(0.0) > 0 && !why.empty())
+  {
+    friction.warning("has no effect: " + why);
+  }
+}
+
+/// The section `contact` of the scene. Rods and threads have a slip speed, cloths do not.
+void warnOfSlipSpeed(const YamlCursor& slip_speed, const SceneConfig& scene)
+{
+  const auto slips = [](const auto& object) { return object.contact && object.contact->friction > 0; };
+  if (slip_speed.present() && !any(scene.rods, slips) && !any(scene.threads, slips))
+  {
+    slip_speed.warning("has no effect: friction is 0 for all rods and threads that touch anything; give them a friction, or leave it out");
+  }
+}
+
 void warnOfMaterial(YamlMap material, const Eigen::Vector3d& gravity)
 {
   const YamlCursor ratio = material.get("poissons_ratio"), torsion = material.get("torsion"), density = material.get("density");
@@ -100,8 +151,16 @@ void warnOfMaterial(YamlMap material, const Eigen::Vector3d& gravity)
   }
 }
 
-void warnOfBody(YamlMap body, const BodyConfig& config)
+void warnOfBody(YamlMap body, const BodyConfig& config, const std::string& why_no_friction)
 {
+  const YamlCursor contact = body.get("contact"), friction = body.get("friction");
+  if (contact.present() && config.contact && !config.shape)
+  {
+    contact.warning("has no effect: the body has no shape that could touch anything; give it a shape, or leave contact out");
+  }
+  warnOfFriction(friction, !config.shape     ? "the body has no shape; give it one, or leave friction out"
+                           : !config.contact ? "contact is false; leave one of them out"
+                                             : why_no_friction);
   for (const char* key : {"gravity", "force", "torque", "damping"})
   {
     if (config.motion && body.has(key))
@@ -111,8 +170,91 @@ void warnOfBody(YamlMap body, const BodyConfig& config)
   }
 }
 
-void warnOfCloth(YamlMap cloth, const SceneConfig& scene)
+/// Hinges flow beyond the yield curvature times their width, and no hinge can be bent by more than half a turn.
+void warnOfPlasticity(YamlMap plasticity, const ClothConfig& config)
 {
+  if (!plasticity.at().present() || config.mesh.triangles.cols() == 0)
+  {
+    return;
+  }
+  if (!(config.bending_modulus > 0))
+  {
+    plasticity.at().warning("has no effect: bending.modulus is 0, so that creases have no stiffness; give a modulus, or leave plasticity out");
+    return;
+  }
+  const MeshTopology topology = meshTopology(config.mesh);
+  const Eigen::VectorXd areas = faceAreas(config.mesh);
+  double narrowest = std::numeric_limits<double>::infinity();   // [m] width of a hinge: twice the area of both faces over the length of their edge
+  for (int h = 0; h < topology.hingeCount(); ++h)
+  {
+    const auto faces = topology.edge_faces.col(topology.hinge_edges[static_cast<std::size_t>(h)]);
+    const double length = (config.mesh.vertices.col(topology.hinges(1, h)) - config.mesh.vertices.col(topology.hinges(0, h))).norm();
+    narrowest = std::min(narrowest, 2.0 * (areas[faces[0]] + areas[faces[1]]) / length);
+  }
+  if (config.plasticity.yield_curvature * narrowest >= M_PI)
+  {
+    plasticity.get("yield_curvature").warning("is never reached, so that plasticity has no effect: no hinge of this mesh can be bent by more than half a turn, "
+                                              "which is a curvature of at most " + shortNumber(M_PI / narrowest) +
+                                              " 1/m; lower the yield curvature, or refine the mesh");
+  }
+}
+
+/// Keys of one set of test functions. `shapes`: how many shapes of the guide are known beforehand.
+void warnOfClusters(YamlMap clusters, std::size_t shapes)
+{
+  const YamlCursor frames = clusters.get("frames");
+  const bool one_region = clusters.get("count").integer(1, 1'000'000).value_or(2) == 1;
+  for (const char* key : {"compactness", "seed", "frames"})
+  {
+    if (one_region && clusters.has(key))
+    {
+      clusters.get(key).warning("has no effect with count: 1, since all faces are in one region; leave it out");
+    }
+  }
+  if (!one_region && frames.present() && shapes < 2)
+  {
+    frames.warning("has no effect: only one shape of the guide is known when regions are clustered; leave it out");
+  }
+}
+
+void warnOfTracking(YamlMap tracked, const ClothConfig& config)
+{
+  if (!config.tracking)
+  {
+    return;
+  }
+  const GuideMotion& motion = config.tracking->guide.motion;
+  const auto* frames = std::get_if<FrameGuide>(&motion);
+  const auto* carried = std::get_if<CarriedGuide>(&motion);
+  const std::size_t shapes = frames ? frames->points.frames().size() : carried && !carried->poses.empty() ? 2 : 1;
+  const YamlCursor functions = tracked.get("test_functions");
+  for (const YamlCursor& set : functions.isList() ? functions.items() : std::vector<YamlCursor>{functions})
+  {
+    YamlMap map(set);
+    for (const char* key : {"from", "blend"})
+    {
+      if (functions.isList() && config.tracking->sets.size() == 1 && map.has(key))
+      {
+        map.get(key).warning("has no effect: there is only one set of test functions, which acts from the start; leave it out, or add another set");
+      }
+    }
+    warnOfClusters(YamlMap(map.get("clusters")), shapes);
+  }
+}
+
+void warnOfCloth(YamlMap cloth, const SceneConfig& scene, const ClothConfig& config)
+{
+  warnOfPlasticity(YamlMap(cloth.get("plasticity")), config);
+  warnOfContact(YamlMap(cloth.get("contact")), "cloths", scene.cloths.size() > 1, !scene.obstacles.empty() || !scene.bodies.empty());
+  const YamlCursor air_density = YamlMap(cloth.get("aerodynamics")).get("air_density"), thickness = YamlMap(cloth.get("material")).get("thickness");
+  if (air_density.present() && !(config.aerodynamics.drag > 0) && !(config.aerodynamics.lift > 0))
+  {
+    air_density.warning("has no effect: aerodynamics.drag and lift are 0; give one of them");
+  }
+  if (thickness.present() && cloth.has("membrane") && !YamlMap(cloth.get("material")).has("density"))
+  {
+    thickness.warning("has no effect beside membrane and an area density, since nothing else follows from it; leave it out (contact has a thickness of its own)");
+  }
   YamlMap bending(cloth.get("bending")), solver(cloth.get("solver"));
   const YamlCursor model = bending.get("model"), modulus = bending.get("modulus");
   if (model.isScalar() && model.tree()->scalar == "none" && modulus.present())
@@ -131,41 +273,93 @@ void warnOfCloth(YamlMap cloth, const SceneConfig& scene)
   }
 }
 
-void warnOfThread(YamlMap thread, const ThreadConfig& config)
+void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig& scene)
 {
-  const YamlCursor deposited = YamlMap(thread.get("edges")).get("deposited");
+  const YamlCursor deposited = YamlMap(thread.get("edges")).get("deposited"), merging = thread.get("merging");
+  YamlMap contact(thread.get("contact"));
   if (deposited.present() && !config.floor)
   {
     deposited.warning("has no effect: it counts nodes that lie on the thread's floor, and there is none; give a floor, or a region in which fluid is kept");
   }
+  const bool has_others = scene.threads.size() > 1;
+  if (config.merging > 0 && isOff(contact.get("self")) && (!has_others || isOff(contact.get("threads"))))
+  {
+    merging.warning("has no effect: neither parts of the thread nor other threads are in touch with it; take contact: {self: true}");
+  }
+  warnOfContact(contact, "threads", has_others, !scene.obstacles.empty() || (config.floor && config.floor->friction));
+  if (config.nozzle && thread.has("nozzle"))
+  {
+    const YamlCursor flow = YamlMap(thread.get("nozzle")).get("flow");
+    if (flow.present() && !config.nozzle->flow.topic && !(config.nozzle->flow.table.greatest() > 0))
+    {
+      flow.warning("is 0, so nothing flows out of the nozzle; give it in m^3/s, or flow: {topic: true}");
+    }
+  }
+}
+
+/// Keys of a generator that do nothing beside its others.
+void warnOfGenerator(YamlMap generator, const SceneConfig& scene, const std::string& why_no_friction)
+{
+  YamlMap chain(generator.get("chain")), tree(generator.get("tree")), hair(generator.get("hair"));
+  for (YamlMap* rods : {&chain, &tree, &hair})
+  {
+    warnOfMaterial(YamlMap(rods->get("material")), scene.gravity);
+    warnOfContact(YamlMap(rods->get("contact")), "rods", scene.rods.size() > 1, !scene.obstacles.empty() || !scene.bodies.empty());
+  }
+  if (chain.has("spacing") && chain.get("links").integer(1, 10'000).value_or(2) == 1)
+  {
+    chain.get("spacing").warning("has no effect with links: 1; leave it out");
+  }
+  for (const char* key : {"seed", "children", "length_ratio", "radius_ratio", "angle", "joint_density"})
+  {
+    if (tree.has(key) && tree.get("levels").integer(1, 6).value_or(2) == 1)
+    {
+      tree.get(key).warning("has no effect with levels: 1, a trunk without branches; leave it out");
+    }
+  }
+  warnOfFriction(YamlMap(hair.get("head")).get("friction"), why_no_friction);
 }
 
 }  // namespace
 
 void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
 {
+  const std::string why_no_friction = whyNoFriction(scene);
   warnOfTime(YamlMap(map.get("time")), scene);
   warnOfWind(map.get("wind"), scene);
   warnOfObstacles(map.get("obstacles"), scene);
-  for (const YamlCursor& rod : entriesOf(map.get("rods")))
+  warnOfSlipSpeed(YamlMap(map.get("contact")).get("slip_speed"), scene);
+  for (const YamlCursor& obstacle : entriesOf(map.get("obstacles")))
   {
-    warnOfMaterial(YamlMap(YamlMap(rod).get("material")), scene.gravity);
+    warnOfFriction(YamlMap(obstacle).get("friction"), why_no_friction);
   }
+  for (const YamlCursor& entry : entriesOf(map.get("rods")))
+  {
+    YamlMap rod(entry);
+    warnOfMaterial(YamlMap(rod.get("material")), scene.gravity);
+    warnOfContact(YamlMap(rod.get("contact")), "rods", scene.rods.size() > 1, !scene.obstacles.empty() || !scene.bodies.empty());
+  }
+  for (const YamlCursor& generator : entriesOf(map.get("generate")))
+  {
+    warnOfGenerator(YamlMap(generator), scene, why_no_friction);
+  }
+  std::size_t k = 0;   // tracked cloths come after the others
   for (const char* key : {"cloths", "tracked"})
   {
     for (const YamlCursor& cloth : entriesOf(map.get(key)))
     {
-      warnOfCloth(YamlMap(cloth), scene);
+      warnOfCloth(YamlMap(cloth), scene, scene.cloths[k]);
+      warnOfTracking(YamlMap(cloth), scene.cloths[k++]);
     }
   }
   const std::vector<YamlCursor> bodies = entriesOf(map.get("bodies")), threads = entriesOf(map.get("threads"));
   for (std::size_t b = 0; b < bodies.size(); ++b)
   {
-    warnOfBody(YamlMap(bodies[b]), scene.bodies[b]);
+    warnOfBody(YamlMap(bodies[b]), scene.bodies[b], why_no_friction);
   }
-  for (std::size_t k = 0; k < threads.size(); ++k)
+  for (std::size_t t = 0; t < threads.size(); ++t)
   {
-    warnOfThread(YamlMap(threads[k]), scene.threads[k]);
+    warnOfThread(YamlMap(threads[t]), scene.threads[t], scene);
   }
 }
 

@@ -30,6 +30,10 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
   {
     at.problem("must be a number, {table: [[t, value], ...]} or {topic: true, initial: value}");
   }
+  else if (table.present() && initial.present())
+  {
+    initial.problem("is for values by messages; a table begins with its own first value");
+  }
   else if (topic.present())
   {
     timed.topic = topic.boolean().value_or(true);

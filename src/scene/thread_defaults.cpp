@@ -262,6 +262,22 @@ GivenMotion swirlOf(const Landing& landing, const NozzleConfig& nozzle, double s
   return motion;
 }
 
+/// Sets the motion of a nozzle that swirls, or warns that it stands.
+void swirl(const Falls& falls, const Needs& needs, ThreadConfig& thread, const YamlCursor& at)
+{
+  if (!(thread.swirl > 0))
+    return;
+  const YamlCursor key = YamlMap(YamlMap(at).get("nozzle")).get("swirl");
+  if (falls.heights.empty())
+    key.warning("has no effect: there is nothing below the nozzle on which a coil could form; give a floor, or leave it out");
+  else if (!falls.flow_known)
+    key.warning("has no effect: no flow is known beforehand, and the radius of the coil follows from it; give nozzle.flow, or leave it out");
+  else if (!needs.tightest.slender())
+    key.warning("has no effect: a coil would be no wider than the thread; leave it out");
+  else
+    thread.nozzle->motion = swirlOf(needs.tightest, *thread.nozzle, thread.swirl, falls.heights.front());
+}
+
 void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& at)
 {
   const Falls falls = fallsOf(scene, thread);
@@ -275,11 +291,12 @@ void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& 
       thread.feed_length = thread.longest_edge > 0 ? std::min(thread.longest_edge, thread.nozzle->diameter) : thread.nozzle->diameter;
     if (!parts_given)
       thread.breakup_radius = 0.01 * thread.nozzle->diameter;
+    swirl(falls, Needs(), thread, at);
     return;
   }
   checkHeight(falls, thread, at);
   if (falls.heights.empty())
-    return;
+    return swirl(falls, Needs(), thread, at);
   const Needs needs = needsOf(falls, thread, scene.gravity.norm());
   if (!parts_given)
     thread.breakup_radius = 0.05 * std::min(0.5 * thread.nozzle->diameter, needs.thinnest);
@@ -291,8 +308,7 @@ void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& 
   if (falls.flow_known)
     checkGiven(needs, falls, thread, at, scene.time.step);
   takeLengths(needs, thread);
-  if (thread.swirl > 0 && needs.tightest.slender() && falls.flow_known)
-    thread.nozzle->motion = swirlOf(needs.tightest, *thread.nozzle, thread.swirl, falls.heights.front());
+  swirl(falls, needs, thread, at);
 }
 
 }  // namespace

@@ -61,6 +61,16 @@ void addClothGrasp(const GraspSnapshot& grasp, const ClothSnapshot& cloth, const
       out.push_back(ball(grasp.name, cloth.x.col(vertex), diameter));
 }
 
+/// Returns the unit vector from the outlet into the nozzle at `time` [s] of the scene. It is opposite to the direction that the scene gives. The poses of
+/// a nozzle that is moved by messages are not among what is recorded of each instant: its newest edge, which runs into it, takes their place.
+Vector3d upstream(const NozzleConfig& nozzle, const ThreadSnapshot& thread, double time)
+{
+  if (std::holds_alternative<TopicMotion>(nozzle.motion))
+    return thread.frames.back() * Vector3d::UnitX();
+  const auto* table = std::get_if<TableMotion>(&nozzle.motion);
+  return -((table ? table->poses.evaluate(time) : nozzle.pose).orientation * Vector3d::UnitX());
+}
+
 }  // namespace
 
 std::vector<ObjectMesh> holderMeshes(const SceneSnapshot& instant, const SceneConfig* scene)
@@ -87,8 +97,7 @@ std::vector<ObjectMesh> holderMeshes(const SceneSnapshot& instant, const SceneCo
     if (!config || !config->nozzle)
       continue;
     const double diameter = config->nozzle->diameter, length = 4.0 * diameter;
-    const Vector3d along = thread.frames.back() * Vector3d::UnitX();
-    // the newest edge runs into the nozzle
+    const Vector3d along = upstream(*config->nozzle, thread, instant.time);
     out.push_back(placed(ObjectKind::nozzle, thread.name + "_nozzle", 0, shapeMesh(Cylinder{0.7 * diameter, length}),
                          Pose{thread.x.col(thread.x.cols() - 1) + 0.5 * length * along, Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along)}));
   }

@@ -24,6 +24,8 @@ cloths:
     material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 1.0e5}
 )";
 
+const std::string post = "obstacles:\n  - {name: post, shape: {sphere: {radius: 0.1}}}\n";
+
 /// The warnings that have all of these words.
 int count(const std::vector<std::string>& warnings, const std::vector<std::string>& words)
 {
@@ -108,7 +110,6 @@ TEST(IgnoredInputs, windThatNothingFeelsIsWarnedOf)
 
 TEST(IgnoredInputs, obstaclesThatNothingTouchesAreWarnedOf)
 {
-  const std::string post = "obstacles:\n  - {name: post, shape: {sphere: {radius: 0.1}}}\n";
   EXPECT_EQ(count(warningsOf(rod + post), {"obstacles", "touched by nothing", "post"}), 1);
   EXPECT_EQ(count(warningsOf(rod + "    contact: {friction: 0.3}\n" + post), {"touched by nothing"}), 0);
   EXPECT_EQ(count(warningsOf(rod + "    contact: {obstacles: false}\n" + post), {"touched by nothing"}), 1);
@@ -123,6 +124,104 @@ TEST(IgnoredInputs, otherKeysWithoutEffectAreWarnedOf)
   EXPECT_EQ(count(warningsOf("time: {integrator: symplectic_euler, step: 1.0e-5}\n" + sheet + "    solver: {tolerance: 0.01}\n"), {"solver", "has no effect"}), 1);
   const std::string thread = "threads:\n  - {name: honey, fluid: {viscosity: 10}, nozzle: {position: [0, 0, 1], diameter: 0.004, flow: 1.0e-7}, edges: {deposited: 100}}\n";
   EXPECT_EQ(count(warningsOf(thread), {"edges.deposited", "no"}), 1);
+}
+
+TEST(IgnoredInputs, contactThatFindsNothingToTouchIsWarnedOf)
+{
+  const std::string deaf = "    contact: {self: false}\n";
+  EXPECT_EQ(count(warningsOf(rod + deaf), {"rods.0.contact", "has no effect", "nothing to touch"}), 1);
+  EXPECT_EQ(count(warningsOf(rod + deaf + post), {"nothing to touch"}), 0);
+  EXPECT_EQ(count(warningsOf(rod + "    contact: {self: false, obstacles: false}\n" + post), {"rods.0.contact", "nothing to touch"}), 1);
+  EXPECT_EQ(count(warningsOf(rod + "    contact: {}\n"), {"nothing to touch"}), 0);
+  EXPECT_EQ(count(warningsOf(sheet + "    contact: {self: false, thickness: 0.001}\n"), {"cloths.0.contact", "nothing to touch"}), 1);
+  const std::string thread = "threads:\n  - {name: honey, fluid: {viscosity: 10}, centerline: {straight: {from: [0, 0, 1], to: [0.1, 0, 1], edges: 4}}, radius: 0.002, ";
+  EXPECT_EQ(count(warningsOf(thread + "contact: {self: false}}\n"), {"threads.0.contact", "nothing to touch"}), 1);
+  EXPECT_EQ(count(warningsOf(thread + "contact: {self: false}, merging: true}\n" + post), {"threads.0.merging", "has no effect"}), 1);
+  EXPECT_EQ(count(warningsOf(thread + "contact: {self: true}, merging: true}\n"), {"has no effect"}), 0);
+}
+
+TEST(IgnoredInputs, frictionThatNothingFeelsIsWarnedOf)
+{
+  const std::string rough = "obstacles:\n  - {name: post, shape: {sphere: {radius: 0.1}}, friction: 0.5}\n";
+  EXPECT_EQ(count(warningsOf(rod + rough), {"obstacles.0.friction", "has no effect", "nothing touches it"}), 1);
+  EXPECT_EQ(count(warningsOf(rod + "    contact: {friction: 0}\n" + rough), {"obstacles.0.friction", "geometric mean"}), 1);
+  EXPECT_EQ(count(warningsOf(rod + "    contact: {friction: 0.1}\n" + rough), {"has no effect"}), 0);
+  const std::string touching = rod + "    contact: {friction: 0.1}\nbodies:\n  - {name: hand, motion: fixed, ";
+  EXPECT_EQ(count(warningsOf(touching + "friction: 0.4}\n"), {"bodies.0.friction", "no shape"}), 1);
+  EXPECT_EQ(count(warningsOf(touching + "contact: true}\n"), {"bodies.0.contact", "no shape"}), 1);
+  EXPECT_EQ(count(warningsOf(touching + "pose: {position: [0, 0, 3]}, shape: {sphere: {radius: 0.1}}, contact: false, friction: 0.4}\n"), {"bodies.0.friction", "contact is false"}), 1);
+  EXPECT_EQ(count(warningsOf(touching + "pose: {position: [0, 0, 3]}, shape: {sphere: {radius: 0.1}}, friction: 0.4}\n"), {"has no effect"}), 0);
+  EXPECT_EQ(count(warningsOf("contact: {slip_speed: 0.001}\n" + rod + "    contact: {friction: 0}\n"), {"contact.slip_speed", "has no effect"}), 1);
+  EXPECT_EQ(count(warningsOf("contact: {slip_speed: 0.001}\n" + rod + "    contact: {friction: 0.1}\n"), {"slip_speed"}), 0);
+}
+
+TEST(IgnoredInputs, plasticityThatNeverFlowsIsWarnedOf)
+{
+  const std::string hinges = sheet + "    bending: {model: hinge, modulus: ";
+  EXPECT_EQ(count(warningsOf(hinges + "0}\n    plasticity: {yield_curvature: 5}\n"), {"plasticity", "has no effect", "bending.modulus is 0"}), 1);
+  EXPECT_EQ(count(warningsOf(hinges + "1.0e-5}\n    plasticity: {yield_curvature: 1000}\n"), {"plasticity.yield_curvature", "never reached"}), 1);
+  EXPECT_EQ(count(warningsOf(hinges + "1.0e-5}\n    plasticity: {yield_curvature: 5, hardening: 0.1, creep_time: 1}\n"), {"plasticity"}), 0);
+}
+
+TEST(IgnoredInputs, keysOfGeneratorsThatDoNothingAreWarnedOf)
+{
+  const auto generated = [](const std::string& entry) { return warningsOf("generate:\n  - " + entry + "\n"); };
+  EXPECT_EQ(count(generated("{chain: {links: 3, cross_section: {radius: 0.002}, material: {density: 1000, linear_density: 0.1}}}"), {"generate.0.chain.material.density", "has no effect"}), 1);
+  EXPECT_EQ(count(generated("{chain: {links: 1, spacing: 0.08, cross_section: {radius: 0.002}}}"), {"generate.0.chain.spacing", "links: 1"}), 1);
+  EXPECT_EQ(count(generated("{chain: {links: 2, spacing: 0.08, cross_section: {radius: 0.002}}}"), {"has no effect"}), 0);
+  EXPECT_EQ(count(generated("{chain: {links: 1, cross_section: {radius: 0.002}, contact: {self: false}}}"), {"generate.0.chain.contact", "nothing to touch"}), 1);
+  const std::string trunk = "seed: 2, children: 3, length_ratio: 0.4, radius_ratio: 0.4, angle: 0.5, joint_density: 800";
+  for (const char* key : {"seed", "children", "length_ratio", "radius_ratio", "angle", "joint_density"})
+  {
+    EXPECT_EQ(count(generated("{tree: {levels: 1, vertices: 20, " + trunk + "}}"), {"generate.0.tree." + std::string(key) + " ", "levels: 1"}), 1) << key;
+  }
+  EXPECT_EQ(count(generated("{tree: {levels: 2, vertices: 100, " + trunk + "}}"), {"has no effect"}), 0);
+  EXPECT_EQ(count(generated("{hair: {strands: 2, head: {friction: 0.4}}}"), {"generate.0.hair.head.friction", "nothing touches it"}), 1);
+  EXPECT_EQ(count(generated("{hair: {strands: 2, head: {friction: 0.4}, contact: {friction: 0.2}}}"), {"has no effect"}), 0);
+}
+
+TEST(IgnoredInputs, keysOfTrackedShellsThatDoNothingAreWarnedOf)
+{
+  const auto shell = [](const std::string& functions) { return warningsOf(tracked("", functions)); };
+  EXPECT_EQ(count(shell("[{name: all, basis: subdivision, from: 0.5, blend: 0.1}]"), {"only one set"}), 2);
+  EXPECT_EQ(count(shell("[{name: all, basis: subdivision}, {name: one, vertices: [0], from: 0.5, blend: 0.1}]"), {"only one set"}), 0);
+  EXPECT_EQ(count(shell("{clusters: {count: 1, seed: 3, compactness: 0.2, frames: 5}}"), {"with count: 1"}), 3);
+  EXPECT_EQ(count(shell("{clusters: {count: 2, frames: 5}}"), {"clusters.frames", "only one shape"}), 1);
+  EXPECT_EQ(count(shell("{clusters: {count: 2, seed: 3}}"), {"has no effect"}), 0);
+}
+
+TEST(IgnoredInputs, keysOfClothThatNothingFollowsFromAreWarnedOf)
+{
+  EXPECT_EQ(count(warningsOf(sheet + "    aerodynamics: {air_density: 1.1}\n"), {"aerodynamics.air_density", "has no effect"}), 1);
+  EXPECT_EQ(count(warningsOf(sheet + "    aerodynamics: {air_density: 1.1, lift: 0.5}\n"), {"has no effect"}), 0);
+  const auto woven = [](const std::string& material) {
+    return warningsOf("cloths:\n  - {name: s, grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, membrane: {warp: 300, weft: 200, shear: 50}, "
+                      "bending: {modulus: 1.0e-5}, material: {" + material + "}}\n");
+  };
+  EXPECT_EQ(count(woven("area_density: 0.2, thickness: 0.0005"), {"material.thickness", "has no effect"}), 1);
+  EXPECT_EQ(count(woven("density: 300, thickness: 0.0005"), {"has no effect"}), 0);
+}
+
+TEST(IgnoredInputs, keysOfNozzlesThatDoNothingAreWarnedOfOrRefused)
+{
+  const auto poured = [](const std::string& nozzle, const std::string& more) {
+    return warningsOf("threads:\n  - {name: honey, fluid: {viscosity: 10}, nozzle: {position: [0, 0, 0.1], diameter: 0.004, " + nozzle + "}" + more + "}\n");
+  };
+  const std::string floor = ", floor: {height: 0}", flow = "flow: 1.0e-7";
+  EXPECT_EQ(count(poured(flow + ", swirl: 0.5", ""), {"nozzle.swirl", "has no effect", "nothing below"}), 1);
+  EXPECT_EQ(count(poured("flow: {topic: true}, swirl: 0.5", floor), {"nozzle.swirl", "has no effect", "no flow is known"}), 1);
+  EXPECT_EQ(count(poured(flow + ", swirl: 0.5", floor), {"swirl"}), 0);
+  EXPECT_EQ(count(poured("flow: 0", floor), {"nozzle.flow", "nothing flows"}), 1);
+  EXPECT_EQ(count(poured("flow: {topic: true, initial: 0}", floor), {"nothing flows"}), 0);
+  try
+  {
+    poured("flow: {table: [[0, 1.0e-7], [1, 2.0e-7]], initial: 1.0e-8}", floor);
+    FAIL() << "initial beside a table was taken";
+  }
+  catch (const SceneError& error)
+  {
+    EXPECT_EQ(count({error.what()}, {"nozzle.flow.initial", "by messages"}), 1) << error.what();
+  }
 }
 
 TEST(IgnoredInputs, overridesThatMatchNothingAreRefusedWithNearNames)
