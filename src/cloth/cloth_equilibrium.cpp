@@ -19,8 +19,9 @@ StepReport ClothStepper::Impl::statics(ClothState& state, const ClothInputs& inp
                                                            ", or let the cloth settle by time stepping with damping");
   if (!statics_)
     statics_ = std::make_unique<ClothStatics>(*model, options.newton);
-  const StepFailure failure = search ? statics_->solve(state, inputs, leave_saddles, report) : statics_->assess(state, inputs, report);
-  if (failure != StepFailure::none)
+  if (!search)
+    statics_->assess(state, inputs, report);
+  else if (const StepFailure failure = statics_->solve(state, inputs, leave_saddles, report); failure != StepFailure::none)
     return refuse(report, failure, statics_->explain(failure));
   pin_forces = statics_->pinForces();
   lowest_mode = statics_->mode();

@@ -1,5 +1,4 @@
-// Static equilibrium of one cloth by continuation: the pins are carried to their targets in small moves, and at each the energy is minimised with a
-// proximal term. See rod_statics.cpp, which does the same for rods.
+// Static equilibria of one cloth (see EquilibriumSearch): the energy that its rounds minimise, and its eigenvalues.
 #include "cloth_statics.h"
 
 #include <algorithm>
@@ -80,8 +79,7 @@ void ClothStatics::begin(const ClothState& state, const ClothInputs& inputs)
     pins_from_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
   // The stiffness of the whole cloth against bending, or against its loads where that is larger, over its mass. A cloth without either is held by its membrane.
   const double stiffness = std::max(model_.bending_modulus / (size_ * size_), load / size_);
-  base_weight_ = 100.0 * (stiffness > 0 ? stiffness : 1e-6 * (model_.membrane.c11 + model_.membrane.c22)) / model_.totalMass();
-  relative_ = 1.0;
+  unit_rate_ = 100.0 * (stiffness > 0 ? stiffness : 1e-6 * (model_.membrane.c11 + model_.membrane.c22)) / model_.totalMass();
   factorizations_ = 0;
 }
 
@@ -98,7 +96,7 @@ ClothTrial ClothStatics::evaluate(bool with_hessian, const HessianShift& shift)
   // Cloth has no massless unknowns: the shifts that minimize() tries on them first are small ones of all vertices here.
   constexpr double kFirstShift = 1e-3;
   if (with_hessian && !shift.none())
-    system_.addInertia((shift.position + kFirstShift * shift.angle) * base_weight_);
+    system_.addInertia((shift.position + kFirstShift * shift.angle) * unit_rate_);
   if (with_hessian)
     factored_ = false;
   ClothTrial trial;
@@ -188,10 +186,9 @@ double ClothStatics::noiseLevel() const
   return 4.0 * std::numeric_limits<double>::epsilon() * (model_.membrane.c11 + model_.membrane.c22) * extent;
 }
 
-/// Minimises with the pins at a fraction of their way. The result becomes x_.
-StepFailure ClothStatics::round(double fraction, double weight, StepReport& report)
+NewtonResult ClothStatics::round(double fraction, double weight)
 {
-  setRound(weight);
+  setRound(weight * unit_rate_);
   trial_ = x_;
   for (std::size_t k = 0; k < state_.pins.size(); ++k)
   {
@@ -199,67 +196,23 @@ StepFailure ClothStatics::round(double fraction, double weight, StepReport& repo
     point(trial_, state_.pins[k]) = pins_from_.col(pin) + fraction * (inputs_.pins.col(pin) - pins_from_.col(pin));
   }
   const NewtonResult result = minimize(*this, newton_);
-  report.iterations += result.iterations;
-  if (!result.ok())
-    return result.failure;
-  ++report.substeps;
-  std::swap(x_, trial_);   // trial_ is where the round began
-  return StepFailure::none;
+  if (result.ok())
+    std::swap(x_, trial_);   // trial_ is where the round began
+  return result;
 }
 
-StepFailure ClothStatics::carryPins(StepReport& report)
+double ClothStatics::shift() const
 {
-  const double move = state_.pins.empty() ? 0.0 : (inputs_.pins - pins_from_).colwise().norm().maxCoeff() / (0.2 * shortest_edge_);
-  double done = move > 0 ? 0.0 : 1.0, advance = move > 1 ? 1.0 / move : 1.0;
-  for (int failures = 0; done < 1.0;)
-  {
-    const double fraction = std::min(1.0, done + advance);
-    const StepFailure failure = round(fraction, relative_ * base_weight_, report);
-    if (failure == StepFailure::none)
-    {
-      done = fraction;
-      failures = 0;
-      relative_ = std::max(0.2 * relative_, 1.0);
-      advance = std::min(1.5 * advance, move > 1 ? 1.0 / move : 1.0);
-      continue;
-    }
-    relative_ = std::min(10.0 * relative_, 1e8);
-    advance *= 0.5;
-    if (++failures > 40 || advance < 1e-6 || failure == StepFailure::work_exceeded)
-      return failure;
-  }
-  return StepFailure::none;
+  double square = 0.0;
+  for (int i = 0; i < model_.vertices(); ++i)
+    square = std::max(square, (point(x_, i) - point(trial_, i)).squaredNorm());
+  return std::sqrt(square) / size_;
 }
 
-StepFailure ClothStatics::settle(StepReport& report)
+/// Returns the number of moves in which the pins can be carried to their targets: each at most a fifth of an edge. 0: all are there.
+double ClothStatics::pinMoves() const
 {
-  constexpr int kMostRounds = 1000, kMostFailures = 40;
-  double ease = 0.01;   // smallest factor by which the weight falls from round to round
-  for (int k = 0, failures = 0; k < kMostRounds; ++k)
-  {
-    const double weight = relative_ < 1e-9 ? 0.0 : relative_ * base_weight_;
-    const StepFailure failure = round(1.0, weight, report);
-    if (failure != StepFailure::none)
-    {
-      if (failure == StepFailure::newton_diverged && weight > 0)
-        x_ = base_;   // Newton did not arrive but came further down: the next round begins there
-      relative_ = std::max(10.0 * relative_, 1e-6);
-      ease = std::sqrt(ease);   // let go more slowly, so as not to come back here at once
-      if (++failures > kMostFailures || failure == StepFailure::work_exceeded)
-        return failure;
-      continue;
-    }
-    if (weight == 0.0)
-      return StepFailure::none;
-    failures = 0;
-    double square = 0.0;
-    for (int i = 0; i < model_.vertices(); ++i)
-      square = std::max(square, (point(x_, i) - point(trial_, i)).squaredNorm());
-    const double shift = std::sqrt(square) / size_;
-    relative_ *= std::max(ease, shift < 1e-3 ? 0.01 : shift < 0.05 ? 0.2 : 0.7);
-    ease = std::max(0.01, 0.7 * ease);
-  }
-  return StepFailure::newton_diverged;
+  return state_.pins.empty() ? 0.0 : (inputs_.pins - pins_from_).colwise().norm().maxCoeff() / (0.2 * shortest_edge_);
 }
 
 bool ClothStatics::definite(double rate)
@@ -316,14 +269,14 @@ void ClothStatics::findMode()
   fromPoints(d_, mode_);
 }
 
-/// Of x_, with the pins there.
-ClothStatics::Stability ClothStatics::assessHere(bool spectrum)
+/// Judges x_ with the pins where it has them.
+EquilibriumStability ClothStatics::assess(bool spectrum)
 {
-  Stability result;
+  EquilibriumStability result;
   setRound(0.0);
   trial_ = x_;
   const ClothEvaluation e = system_.evaluate(trial_);
-  // Loads count from x_ within a round: here from the origin, so that states can be compared.
+  // Within a round the loads' energy counts from x_. Here it counts from the origin, so that states can be compared.
   double potential = 0.0, size = 0.0;
   for (int i = 0; i < model_.vertices(); ++i)
   {
@@ -345,47 +298,12 @@ ClothStatics::Stability ClothStatics::assessHere(bool spectrum)
   return result;
 }
 
-/// Leaves a saddle, at which the cloth is, along its mode of negative curvature: to both sides, and less and less far, until the minimisation ends
-/// at a stationary point of lower energy. The side that the mode's sign gives comes first; by symmetry both are usually equal.
-bool ClothStatics::escape(const Stability& at, StepReport& report)
+bool ClothStatics::displace(double turn)
 {
-  const PointVector saddle = x_;
-  PointVector mode;
-  toPoints(mode_, mode);
-  for (const double turn : {0.1, -0.1, 0.01, -0.01, 1e-3, -1e-3})
-  {
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      x_[i] = saddle[i] + turn * mode[i];
-    // A weight above the negative eigenvalue makes the first rounds convex, so that they slide down instead of jumping.
-    relative_ = std::max(1e-6, 2.0 * std::abs(at.lowest) / base_weight_);
-    if (!std::isfinite(relative_))
-      relative_ = 1e-2;
-    if (settle(report) == StepFailure::none && assessHere(false).energy < at.energy - at.energy_noise)
-      return true;
-  }
-  x_ = saddle;
-  return false;
-}
-
-StepFailure ClothStatics::settleStably(bool leave_saddles, StepReport& report)
-{
-  constexpr int kMostEscapes = 50;
-  if (const StepFailure failure = settle(report); failure != StepFailure::none)
-    return failure;
-  for (int k = 0;; ++k)
-  {
-    const Stability at = assessHere(true);
-    report.stable = at.stable;
-    report.lowest_eigenvalue = at.lowest;
-    report.energy = at.energy;
-    const Eigen::Matrix3Xd mode = mode_;
-    if (at.stable || !leave_saddles || k == kMostEscapes || !escape(at, report))
-    {
-      mode_ = mode;
-      return StepFailure::none;
-    }
-    ++report.escapes;
-  }
+  toPoints(mode_, d_);
+  for (std::size_t i = 0; i < x_.size(); ++i)
+    x_[i] += turn * d_[i];
+  return true;
 }
 
 /// Residual, strain and forces on the pins of x_.
@@ -415,15 +333,11 @@ StepFailure ClothStatics::solve(ClothState& state, const ClothInputs& inputs, bo
   // Nothing but pins can balance a resultant load. Below 1e-9 of the loads it is round-off of their sum.
   if (state.pins.empty() && total.norm() > 1e-9 * sizes)
     return StepFailure::newton_diverged;
-  StepFailure failure = carryPins(report);
-  if (failure == StepFailure::none)
-    failure = settleStably(leave_saddles, report);
-  if (failure != StepFailure::none)
-    return failure;
+  EquilibriumSearch<ClothStatics> search(*this, report);
+  if (!search.carry(pinMoves()) || !search.settleStably(leave_saddles))
+    return search.failure();
   finish(report);
-  // Newton's increments of 1e-8 of an edge leave 1e-7 of the largest force. Where nothing balances a load, as much as the load is left.
-  constexpr double kUnbalanced = 1e-4;
-  if (!(report.residual < kUnbalanced))
+  if (!(report.residual < kMostUnbalanced))
     return StepFailure::newton_diverged;
   fromPoints(x_, state.x);
   state.v.setZero();
@@ -433,15 +347,14 @@ StepFailure ClothStatics::solve(ClothState& state, const ClothInputs& inputs, bo
   return StepFailure::none;
 }
 
-StepFailure ClothStatics::assess(const ClothState& state, const ClothInputs& inputs, StepReport& report)
+void ClothStatics::assess(const ClothState& state, const ClothInputs& inputs, StepReport& report)
 {
   begin(state, inputs);
-  const Stability at = assessHere(true);
+  const EquilibriumStability at = assess(true);
   report.stable = at.stable;
   report.lowest_eigenvalue = at.lowest;
   report.energy = at.energy;
   finish(report);
-  return StepFailure::none;
 }
 
 std::string ClothStatics::explain(StepFailure failure) const
@@ -454,8 +367,8 @@ std::string ClothStatics::explain(StepFailure failure) const
                     "drift: hold it by a grasp";
     case StepFailure::state_not_finite:
       return what + "the configuration overflowed: the loads are too large for the cloth, or something is free to drift: hold it by a grasp";
-    case StepFailure::work_exceeded:
-      return what + "the search was interrupted";
+    case StepFailure::interrupted:
+      return what + "the search was interrupted on request";
     default:
       return what + "Newton's method did not converge: hold what drifts by a grasp, start from a shape that is nearer to the equilibrium (start of the cloth), "
                     "or let the cloth settle by time stepping with damping (start: as_given)";

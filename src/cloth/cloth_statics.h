@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cloth_system.h"
+#include "slender_sim/dynamics/equilibrium_search.h"
 #include "slender_sim/dynamics/hessian_shift.h"
 #include "slender_sim/dynamics/newton.h"
 
@@ -25,22 +26,32 @@ struct ClothTrial
   double energy() const { return stretch + bend_twist + potential; }
 };
 
-/// Static equilibria of one cloth. Newton's method with the exact Hessian minimises the energy with a proximal term 1/2 w m |x - x_k|^2, whose
-/// weight falls to zero as the iteration settles. What it settles at is stationary. The inertia of the Hessian says whether it is a minimum; from a
-/// saddle the search goes on along the direction of negative curvature.
+/// Static equilibria of one cloth, in the terms of EquilibriumSearch. The proximal term is 1/2 w m |x - x_k|^2, and each round minimises with the
+/// exact Hessian. The pins are what is prescribed.
 class ClothStatics
 {
 public:
   /// Keeps its own copy of the model, without damping and air.
   ClothStatics(const ClothModel& model, const NewtonConfig& newton);
 
-  /// Inputs and state must have been checked. Takes the equilibrium into `state` on success.
+  /// Writes the equilibrium into `state` on success. Inputs and state must have been checked.
   StepFailure solve(ClothState& state, const ClothInputs& inputs, bool leave_saddles, StepReport& report);
-  StepFailure assess(const ClothState& state, const ClothInputs& inputs, StepReport& report);
+  /// Judges `state`, which must be stationary.
+  void assess(const ClothState& state, const ClothInputs& inputs, StepReport& report);
   const Eigen::Matrix3Xd& pinForces() const { return pin_forces_; }
   const Eigen::Matrix3Xd& mode() const { return mode_; }
-  /// Why there is no equilibrium, and what to change.
+  /// Says why there is no equilibrium, and what to change.
   std::string explain(StepFailure failure) const;
+
+  // ---- what EquilibriumSearch needs; the present configuration is x_, and a proximal weight of 1 is unit_rate_
+  NewtonResult round(double fraction, double weight);
+  double shift() const;
+  void takeBase() { x_ = base_; }
+  double weightOf(double rate) const { return rate / unit_rate_; }
+  EquilibriumStability assess(bool spectrum);
+  const PointVector& configuration() const { return x_; }
+  void restore(const PointVector& x) { x_ = x; }
+  bool displace(double turn);
 
   // ---- what minimize() needs
   ClothTrial evaluate(bool with_hessian, const HessianShift& shift = {});
@@ -60,20 +71,10 @@ public:
 
 private:
   friend struct ClothTrial::Definiteness;
-  struct Stability
-  {
-    bool stable = true;
-    double lowest = 0, energy = 0, energy_noise = 0;
-  };
 
   void begin(const ClothState& state, const ClothInputs& inputs);
   void setRound(double weight);
-  StepFailure round(double fraction, double weight, StepReport& report);
-  StepFailure carryPins(StepReport& report);
-  StepFailure settle(StepReport& report);
-  StepFailure settleStably(bool leave_saddles, StepReport& report);
-  bool escape(const Stability& at, StepReport& report);
-  Stability assessHere(bool spectrum);
+  double pinMoves() const;
   bool definite(double rate);
   void findMode();
   double neutralBand() const;
@@ -84,9 +85,7 @@ private:
   ClothSystem system_;
   NewtonConfig newton_;
   double shortest_edge_ = 0, size_ = 0;   ///< [m]
-  double base_weight_ = 0;                ///< scale of the proximal term [1/s^2]
-  double relative_ = 1.0;                 ///< proximal weight over base_weight_
-  double shift_rate_ = 0;                 ///< of the matrix as evaluated [1/s^2]
+  double unit_rate_ = 0;                  ///< scale of the proximal term [1/s^2]
   bool factored_ = false, definite_ = false;
   int factorizations_ = 0;
   ClothInputs inputs_;

@@ -1,11 +1,12 @@
 // Static equilibrium of rods with bodies and contact: implicit Euler steps that grow, from rest each time. Each minimises the energy with a
-// proximal term whose weight is the mass over the step squared. The inertia of the Hessian says whether the end is a minimum; from a saddle the
-// search goes on along the direction of negative curvature.
+// proximal term whose weight is the mass over the step squared. The weight never becomes zero, because contact needs a step. What the steps end at
+// is judged, and saddles are left, by settleStably().
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "rod_group_impl.h"
+#include "slender_sim/dynamics/equilibrium_search.h"
 #include "slender_sim/dynamics/lowest_eigenvalue.h"
 #include "slender_sim/geometry/rotation.h"
 #include "statics_advice.h"
@@ -32,65 +33,73 @@ void standStill(RodGroupState& state)
     v = {};
 }
 
-class GroupEquilibriumSearch
+/// The rods and bodies in the terms of settleStably().
+class GroupEquilibrium
 {
 public:
-  GroupEquilibriumSearch(RodGroup::Impl& group, const RodGroupInputs& targets, RodGroupState state, StepReport& total)
-    : group_(group), targets_(targets), work(std::move(state)), total_(total), force_scale_(0.0), lever_(std::numeric_limits<double>::max())
+  GroupEquilibrium(RodGroup::Impl& group, const RodGroupInputs& targets, RodGroupState state, StepReport& total)
+    : group_(group), targets_(targets), work_(std::move(state)), total_(total), force_scale_(0.0), lever_(std::numeric_limits<double>::max())
   {
     for (const auto& rod : group_.model.rods)
       lever_ = std::min(lever_, rod->rest_length.minCoeff());
   }
 
-  bool settle(double first_step);
-  bool settleStably(bool leave_saddles);
+  /// Steps from rest, the first of `h` seconds, until nothing is accelerated. Returns false when that does not end; failure() says why.
+  bool settle(double h);
+  const RodGroupState& state() const { return work_; }
   StepFailure failure() const { return failure_; }
+
+  // ---- what settleStably() needs
+  EquilibriumStability assess(bool spectrum);
+  struct Configuration
+  {
+    RodGroupState state;
+    double residual, max_strain;
+  };
+  Configuration configuration() const { return {work_, total_.residual, total_.max_strain}; }
+  void restore(const Configuration& c);
+  bool displace(double turn);
+  bool settleFrom(double lowest);
 
 private:
   double unbalanced(double h) const;
-  bool escape(double lowest, double energy, double noise);
 
   RodGroup::Impl& group_;
   const RodGroupInputs& targets_;
-
-public:
-  RodGroupState work;
-
-private:
-  RodGroupState before_;
+  RodGroupState work_, before_;
   StepReport& total_;
   StepFailure failure_ = StepFailure::none;
-  double force_scale_, lever_;   ///< lever: for moments beside forces, the shortest edge
+  double force_scale_, lever_;   ///< lever: turns moments into forces; the shortest edge [m]
 };
 
-/// What is left of the forces is what accelerates rods and bodies in a step of h from rest.
-double GroupEquilibriumSearch::unbalanced(double h) const
+/// Returns the largest unbalanced force [N]: the one that accelerates rods and bodies in a step of h from rest.
+double GroupEquilibrium::unbalanced(double h) const
 {
   double sum = 0.0;
-  for (std::size_t r = 0; r < work.rods.size(); ++r)
+  for (std::size_t r = 0; r < work_.rods.size(); ++r)
     for (int i = 0; i < group_.model.rods[r]->nodes(); ++i)
       if (group_.rods[r]->system.isMoving(i))
-        sum = std::max(sum, group_.model.rods[r]->mass[i] * (work.rods[r].x.col(i) - before_.rods[r].x.col(i)).norm() / (h * h));
-  for (std::size_t b = 0; b < work.bodies.size(); ++b)
+        sum = std::max(sum, group_.model.rods[r]->mass[i] * (work_.rods[r].x.col(i) - before_.rods[r].x.col(i)).norm() / (h * h));
+  for (std::size_t b = 0; b < work_.bodies.size(); ++b)
     if (group_.model.bodies[b].simulated)
     {
       const RigidBodyModel& m = group_.model.bodies[b];
-      const Pose &from = before_.bodies[b].X_WB, &to = work.bodies[b].X_WB;
+      const Pose &from = before_.bodies[b].X_WB, &to = work_.bodies[b].X_WB;
       const Eigen::Vector3d turn = rotationVector(from.orientation.conjugate() * to.orientation);
       sum = std::max({sum, m.mass * (to.position - from.position).norm() / (h * h), (m.inertia * turn).norm() / (lever_ * h * h)});
     }
   return sum;
 }
 
-bool GroupEquilibriumSearch::settle(double h)
+bool GroupEquilibrium::settle(double h)
 {
   constexpr int kMaxRounds = 400;
   constexpr double kUnbalanced = 1e-8;   // of the largest force
   for (int round = 0, failures = 0; round < kMaxRounds; ++round)
   {
-    standStill(work);
-    before_ = work;
-    const StepReport report = group_.step(work, targets_, h);
+    standStill(work_);
+    before_ = work_;
+    const StepReport report = group_.step(work_, targets_, h);
     total_.iterations += report.iterations;
     total_.factorizations += report.factorizations;
     if (!report.ok)
@@ -98,7 +107,7 @@ bool GroupEquilibriumSearch::settle(double h)
       failure_ = report.failure;
       total_.message = report.failure == StepFailure::input_not_finite ? report.message : "";
       h *= 0.1;
-      if (++failures > 12)
+      if (++failures > 12 || failure_ == StepFailure::interrupted)
         return false;
       continue;
     }
@@ -108,7 +117,7 @@ bool GroupEquilibriumSearch::settle(double h)
     total_.max_strain = report.max_strain;
     if (round > 0 && total_.residual < kUnbalanced)
     {
-      standStill(work);
+      standStill(work_);
       return true;
     }
     h = std::min(h * (report.iterations < 10 ? 4.0 : 1.5), 1e6);
@@ -119,57 +128,43 @@ bool GroupEquilibriumSearch::settle(double h)
   return false;
 }
 
-/// Leaves the saddle `work` along its mode: to both sides, and less and less far, until the steps end at a state of lower energy.
-bool GroupEquilibriumSearch::escape(double lowest, double energy, double noise)
+EquilibriumStability GroupEquilibrium::assess(bool spectrum)
 {
-  const RodGroupState saddle = work;
-  // Inertia above the negative eigenvalue makes the first steps convex, so that they slide down instead of jumping.
-  const double h = std::isfinite(lowest) ? 0.7 / std::sqrt(-lowest) : 1e-3 * group_.time.step;
   CoupledSystem& system = *group_.loop->coupled();
-  for (const double turn : {0.1, -0.1, 0.01, -0.01, 1e-3, -1e-3})
-  {
-    work = saddle;
-    system.beginStability(saddle, group_.inputs);
-    const auto definite = [&](double s) { return system.definite(s); };
-    lowestEigenvalue(definite, system.neutralBand());
-    system.findLowestMode();
-    if (!system.displaceAlongMode(turn, work) || !settle(h))
-      continue;
-    system.beginStability(work, group_.inputs);
-    if (system.energyAt(0.0).energy() < energy - noise)
-      return true;
-  }
-  work = saddle;
-  return false;
+  system.beginStability(work_, group_.inputs);
+  const RodEvaluation at = system.energyAt(0.0);
+  EquilibriumStability result;
+  result.energy = at.energy();
+  result.energy_noise = 1e-13 * (std::abs(at.stretch) + std::abs(at.bend_twist) + std::abs(at.potential));
+  if (!spectrum)
+    return result;
+  result.lowest = lowestEigenvalue([&](double s) { return system.definite(s); }, system.neutralBand()).value;
+  result.stable = result.lowest >= 0;
+  return result;
 }
 
-bool GroupEquilibriumSearch::settleStably(bool leave_saddles)
+void GroupEquilibrium::restore(const Configuration& c)
 {
-  constexpr int kMostEscapes = 50;
-  if (!settle(group_.time.step))
-    return false;
+  work_ = c.state;
+  total_.residual = c.residual;
+  total_.max_strain = c.max_strain;
+  total_.message.clear();
+}
+
+bool GroupEquilibrium::displace(double turn)
+{
+  // The factor of the matrix near its lowest eigenvalue, which inverse iteration needs, belongs to the saddle: other steps came in between.
   CoupledSystem& system = *group_.loop->coupled();
-  for (int k = 0;; ++k)
-  {
-    system.beginStability(work, group_.inputs);
-    const RodEvaluation at = system.energyAt(0.0);
-    const LowestEigenvalue lowest = lowestEigenvalue([&](double s) { return system.definite(s); }, system.neutralBand());
-    total_.energy = at.energy();
-    total_.lowest_eigenvalue = lowest.value;
-    total_.stable = lowest.value >= 0;
-    const StepReport here = total_;
-    const double noise = 1e-13 * (std::abs(at.stretch) + std::abs(at.bend_twist) + std::abs(at.potential));
-    if (total_.stable || !leave_saddles || k == kMostEscapes)
-      return true;
-    if (!escape(lowest.value, at.energy(), noise))
-    {
-      total_.residual = here.residual;
-      total_.max_strain = here.max_strain;
-      total_.message.clear();
-      return true;
-    }
-    ++total_.escapes;
-  }
+  system.beginStability(work_, group_.inputs);
+  lowestEigenvalue([&](double s) { return system.definite(s); }, system.neutralBand());
+  system.findLowestMode();
+  return system.displaceAlongMode(turn, work_);
+}
+
+bool GroupEquilibrium::settleFrom(double lowest)
+{
+  // Inertia above the negative eigenvalue makes the first steps convex, so that they slide down instead of jumping.
+  return settle(std::isfinite(lowest) ? 0.7 / std::sqrt(-lowest) : 1e-3 * group_.time.step);
 }
 
 }  // namespace
@@ -201,15 +196,16 @@ StepReport RodGroup::solveEquilibrium(RodGroupState& state, const RodGroupInputs
 StepReport RodGroup::Impl::solveEquilibrium(RodGroupState& state, const RodGroupInputs& targets, bool leave_saddles)
 {
   StepReport total;
-  GroupEquilibriumSearch search(*this, targets, state, total);
-  if (search.settleStably(leave_saddles))
+  GroupEquilibrium equilibrium(*this, targets, state, total);
+  if (equilibrium.settle(time.step))
   {
+    settleStably(equilibrium, leave_saddles, total);
     total.message.clear();
-    state = search.work;
+    state = equilibrium.state();
     return total;
   }
   total.ok = false;
-  total.failure = search.failure();
+  total.failure = equilibrium.failure();
   if (total.message.empty())
     total.message = explainStatics(total.failure);
   return total;

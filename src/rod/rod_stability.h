@@ -3,19 +3,16 @@
 #include <Eigen/Core>
 
 #include "rod_stepper_impl.h"
+#include "slender_sim/dynamics/equilibrium_search.h"
 
 namespace slender {
 
 /// What the second derivative of the energy says of an equilibrium of one rod. Held nodes and edges are fixed; material frames are unknowns like
 /// the positions, with the sections' own (small) inertia about the tangent.
-struct RodStability
+struct RodStability : EquilibriumStability
 {
-  bool stable = true;         ///< no eigenvalue below minus the neutral band
-  double lowest = 0.0;        ///< [1/s^2], see StepReport::lowest_eigenvalue
-  double neutral = 0.0;       ///< half width of the band around zero in which round-off decides [1/s^2]
-  double energy = 0.0;        ///< elastic and of loads [J]
-  double energy_noise = 0.0;  ///< differences below it are round-off [J]
-  Eigen::VectorXd mode;       ///< of the lowest eigenvalue: four per node as RodSystem::direction(); no edge turns by more than 1 rad
+  double neutral = 0.0;   ///< half width of the band around zero in which round-off decides [1/s^2]
+  Eigen::VectorXd mode;   ///< of the lowest eigenvalue: four per node as RodSystem::direction(); no edge turns by more than 1 rad
 };
 
 /// Of the configuration rod.work under these inputs. `spectrum` false: only the energy.

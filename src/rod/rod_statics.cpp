@@ -1,82 +1,88 @@
-// Static equilibrium by continuation: the grasps are carried to their targets in small moves, and at each the energy is
-// minimised with a proximal term 1/2 w |x - x_k|^2 whose weight falls to zero as the iteration settles. What it settles at is stationary. The
-// inertia of the Hessian says whether it is a minimum; from a saddle the search goes on along the direction of negative curvature.
+// Static equilibria of one rod: the grasps are what is prescribed (see EquilibriumSearch).
 #include <algorithm>
 #include <cmath>
 
 #include "rod_stability.h"
 #include "rod_stepper_impl.h"
+#include "slender_sim/dynamics/equilibrium_search.h"
 #include "slender_sim/geometry/rotation.h"
 #include "statics_advice.h"
 
 namespace slender {
 
-/// The search for one equilibrium.
-class RodStepper::Impl::EquilibriumSearch
+/// The rod in the terms of EquilibriumSearch. The present configuration is rod.work. A proximal weight of 1 is 100 times the stiffness of the whole
+/// rod, shared among its nodes.
+class RodStepper::Impl::RodEquilibrium
 {
 public:
-  EquilibriumSearch(Impl& rod, const RodInputs& inputs, StepReport& report);
-  /// Carries the grasps to their targets. Returns false when the rod cannot follow; failure() says why.
-  bool carryGrasps();
-  /// Minimises the energy from rod.work on. Returns false when that does not settle.
-  bool settle();
-  /// Settles again and again until the equilibrium is stable or every way down from a saddle was tried (with leave_saddles). Returns false if
-  /// nothing settled at all.
-  bool settleStably(bool leave_saddles);
-  StepFailure failure() const { return failure_; }
+  RodEquilibrium(Impl& rod, const RodInputs& inputs, StepReport& report);
+  /// Number of moves in which the grasps can be carried to their targets: each at most 2 % of the length and 0.2 rad. 0: all are there.
+  double moves() const;
+
+  // ---- what EquilibriumSearch needs
+  NewtonResult round(double fraction, double weight);
+  double shift() const { return (rod_.next.x - rod_.work.x).colwise().norm().maxCoeff() / length_; }   // `next` is what the round began with
+  void takeBase();
+  double weightOf(double rate) const { return rate * rod_.model->mass.maxCoeff() / unit_weight_; }
+  EquilibriumStability assess(bool spectrum);
+  struct Configuration
+  {
+    RodState state;
+    double twist_work;
+  };
+  Configuration configuration() const { return {rod_.work, twist_work_}; }
+  void restore(const Configuration& c);
+  bool displace(double turn);
 
 private:
-  NewtonResult round(double fraction, double weight);
-  void furtherDown();
-  bool escape(const RodStability& at);
-
   Impl& rod_;
   const RodInputs& inputs_;
   StepReport& report_;
   RodInputs targets_;
   NewtonConfig newton_;
-  StepFailure failure_ = StepFailure::none;
-  double length_, base_weight_, move_ = 0.0;
-  double twist_work_ = 0.0;   ///< of torques about tangents since the search began [J]
-  double relative_ = 1.0;   ///< proximal weight over base_weight_
+  double length_, unit_weight_;   ///< unit_weight_ [N/m]
+  double twist_work_ = 0.0;       ///< of torques about tangents since the search began [J]
 };
 
-RodStepper::Impl::EquilibriumSearch::EquilibriumSearch(Impl& rod, const RodInputs& inputs, StepReport& report)
+RodStepper::Impl::RodEquilibrium::RodEquilibrium(Impl& rod, const RodInputs& inputs, StepReport& report)
   : rod_(rod), inputs_(inputs), report_(report), targets_(inputs), newton_(rod.time.newton), length_(rod.model->rest_length.sum())
 {
-  for (std::size_t k = 0; k < rod_.work.grasps.size(); ++k)
-    if (rod_.work.grasps[k].active)
-    {
-      const Pose &a = rod_.work.grasps[k].X_WG, &b = inputs.grasps[k].X_WG;
-      move_ = std::max({move_, (b.position - a.position).norm() / (0.02 * length_), rotationVector(a.orientation.conjugate() * b.orientation).norm() / 0.2});
-    }
   for (GraspTarget& g : targets_.grasps)
     g.velocity.reset();
-  // scale of the proximal weight: the stiffness of the whole rod against bending, or against its weight if that is larger
+  // Scale of the proximal weight: the stiffness of the whole rod against bending, or against its loads if that is larger.
   const RodModel& model = *rod_.model;
   const double bend = std::max(model.bend_modulus.row(0).maxCoeff(), model.bend_modulus.row(2).maxCoeff());
   double load_total = 0.0;
   for (int i = 0; i < model.nodes(); ++i)
     load_total += rod_.load(inputs, i).norm();
-  base_weight_ = std::max(bend / std::pow(length_, 3), load_total / length_) * 100.0 / model.nodes();
+  unit_weight_ = std::max(bend / std::pow(length_, 3), load_total / length_) * 100.0 / model.nodes();
   rod_.system.setTwistLoads(inputs.torques);
   newton_.tolerance = std::min(newton_.tolerance, 1e-8);
   newton_.max_iterations = std::max(60, newton_.max_iterations);
 }
 
-/// Minimises with the grasps at a fraction of their way and this proximal weight. The trial is the result.
-NewtonResult RodStepper::Impl::EquilibriumSearch::round(double fraction, double weight)
+double RodStepper::Impl::RodEquilibrium::moves() const
+{
+  double result = 0.0;
+  for (std::size_t k = 0; k < rod_.work.grasps.size(); ++k)
+    if (rod_.work.grasps[k].active)
+    {
+      const Pose &a = rod_.work.grasps[k].X_WG, &b = inputs_.grasps[k].X_WG;
+      const double turn = rotationVector(a.orientation.conjugate() * b.orientation).norm();
+      result = std::max({result, (b.position - a.position).norm() / (0.02 * length_), turn / 0.2});
+    }
+  return result;
+}
+
+NewtonResult RodStepper::Impl::RodEquilibrium::round(double fraction, double weight)
 {
   rod_.system.load(rod_.work);
   rod_.placeAt(targets_, 1.0, fraction);
-  rod_.carryFreeNodes(inputs_, weight);
+  rod_.carryFreeNodes(inputs_, weight * unit_weight_);
   const NewtonResult result = minimize(rod_.system, newton_);
-  report_.iterations += result.iterations;
   report_.factorizations += result.factorizations;
-  failure_ = result.failure;
   if (!result.ok())
     return result;
-  ++report_.substeps;
   twist_work_ += rod_.system.twistWork();
   rod_.next = rod_.work;
   rod_.system.store(rod_.next);
@@ -87,30 +93,7 @@ NewtonResult RodStepper::Impl::EquilibriumSearch::round(double fraction, double 
   return result;
 }
 
-bool RodStepper::Impl::EquilibriumSearch::carryGrasps()
-{
-  double done = move_ > 0 ? 0.0 : 1.0, advance = move_ > 1 ? 1.0 / move_ : 1.0;
-  for (int failures = 0; done < 1.0;)
-  {
-    const double fraction = std::min(1.0, done + advance);
-    if (round(fraction, relative_ * base_weight_).ok())
-    {
-      done = fraction;
-      failures = 0;
-      relative_ = std::max(0.2 * relative_, 1.0);
-      advance = std::min(1.5 * advance, move_ > 1 ? 1.0 / move_ : 1.0);
-      continue;
-    }
-    relative_ = std::min(10.0 * relative_, 1e8);
-    advance *= 0.5;
-    if (++failures > 40 || advance < 1e-6)
-      return false;
-  }
-  return true;
-}
-
-/// Newton did not arrive but came further down: the next round begins there.
-void RodStepper::Impl::EquilibriumSearch::furtherDown()
+void RodStepper::Impl::RodEquilibrium::takeBase()
 {
   rod_.system.moveAlong(0.0);
   rod_.system.evaluate(false);
@@ -118,111 +101,69 @@ void RodStepper::Impl::EquilibriumSearch::furtherDown()
   rod_.system.store(rod_.work);
 }
 
-bool RodStepper::Impl::EquilibriumSearch::settle()
+EquilibriumStability RodStepper::Impl::RodEquilibrium::assess(bool spectrum)
 {
-  constexpr int kMaxRounds = 1000;
-  double ease = 0.01;   // smallest factor by which the weight falls from round to round
-  for (int k = 0, failures = 0; k < kMaxRounds; ++k)
-  {
-    const double weight = relative_ < 1e-9 ? 0.0 : relative_ * base_weight_;
-    const NewtonResult result = round(1.0, weight);
-    if (!result.ok())
-    {
-      if (result.failure == StepFailure::newton_diverged && weight > 0)
-        furtherDown();
-      relative_ = std::max(10.0 * relative_, 1e-6);
-      ease = std::sqrt(ease);   // let go more slowly, so as not to come back here at once
-      if (++failures > 40)
-        return false;
-      continue;
-    }
-    if (weight == 0.0)
-      return true;
-    failures = 0;
-    const double shift = (rod_.next.x - rod_.work.x).colwise().norm().maxCoeff() / length_;   // next is what the round began with
-    relative_ *= std::max(ease, shift < 1e-3 ? 0.01 : shift < 0.05 ? 0.2 : 0.7);
-    ease = std::max(0.01, 0.7 * ease);
-  }
-  failure_ = StepFailure::newton_diverged;
-  return false;
+  RodStability at = assessStability(rod_, inputs_, spectrum);
+  if (spectrum)
+    rod_.lowest_mode = std::move(at.mode);
+  at.work = twist_work_;
+  return at;
 }
 
-/// Leaves a saddle, at which the rod is, along its mode of negative curvature: to both sides, and less and less far, until the minimisation ends
-/// at a stationary point of lower energy. The side that the mode's sign gives comes first; by symmetry both are usually equal.
-bool RodStepper::Impl::EquilibriumSearch::escape(const RodStability& at)
+void RodStepper::Impl::RodEquilibrium::restore(const Configuration& c)
 {
-  const RodState saddle = rod_.work;
-  const Eigen::VectorXd mode = at.mode;
-  const double work_before = twist_work_;
-  for (const double turn : {0.1, -0.1, 0.01, -0.01, 1e-3, -1e-3})
-  {
-    rod_.work = saddle;
-    twist_work_ = work_before;
-    rod_.system.load(rod_.work);
-    rod_.placeAt(targets_, 1.0, 1.0);
-    Eigen::Map<Eigen::VectorXd>(rod_.system.direction(), mode.size()) = mode;
-    rod_.system.moveAlong(turn);
-    if (rod_.system.evaluate(false).min_chi <= kFoldedChi)
-      continue;
-    twist_work_ += rod_.system.twistWork();
-    rod_.system.store(rod_.work);
-    // A weight above the negative eigenvalue makes the first rounds convex, so that they slide down instead of jumping.
-    relative_ = std::max(1e-6, 2.0 * std::abs(at.lowest) * rod_.model->mass.maxCoeff() / base_weight_);
-    if (!std::isfinite(relative_))
-      relative_ = 1e-2;
-    if (settle() && assessStability(rod_, inputs_, false).energy - (twist_work_ - work_before) < at.energy - at.energy_noise)
-      return true;
-  }
-  rod_.work = saddle;
-  twist_work_ = work_before;
-  return false;
+  rod_.work = c.state;
+  twist_work_ = c.twist_work;
 }
 
-bool RodStepper::Impl::EquilibriumSearch::settleStably(bool leave_saddles)
+bool RodStepper::Impl::RodEquilibrium::displace(double turn)
 {
-  constexpr int kMostEscapes = 50;
-  if (!settle())
+  rod_.system.load(rod_.work);
+  rod_.placeAt(targets_, 1.0, 1.0);
+  Eigen::Map<Eigen::VectorXd>(rod_.system.direction(), rod_.lowest_mode.size()) = rod_.lowest_mode;
+  rod_.system.moveAlong(turn);
+  if (rod_.system.evaluate(false).min_chi <= kFoldedChi)
     return false;
-  for (int k = 0;; ++k)
+  twist_work_ += rod_.system.twistWork();
+  rod_.system.store(rod_.work);
+  return true;
+}
+
+/// Loads `state` for statics. Returns false, with the report refused, when an input is not valid.
+bool RodStepper::Impl::beginStatics(const RodState& state, const RodInputs& inputs, StepReport& report)
+{
+  std::string what;
+  if (!inputsFinite(state, inputs, what))
   {
-    RodStability at = assessStability(rod_, inputs_, true);
-    report_.stable = at.stable;
-    report_.lowest_eigenvalue = at.lowest;
-    report_.energy = at.energy;
-    if (at.stable || !leave_saddles || k == kMostEscapes || !escape(at))
-    {
-      rod_.lowest_mode = std::move(at.mode);
-      return true;
-    }
-    ++report_.escapes;
+    refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
+    return false;
   }
+  begin(state);
+  addFrames(*model, work);
+  system.leaveOutStretching(false);
+  system.load(work);
+  system.setResponse(0.0, nullptr);
+  return true;
 }
 
 StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles)
 {
   StepReport report;
-  std::string what;
-  if (!inputsFinite(state, inputs, what))
-    return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
-  begin(state);
-  addFrames(*model, work);
+  if (!beginStatics(state, inputs, report))
+    return report;
   work.forgetHistory();
   work.v.setZero();
   for (GraspState& g : work.grasps)
     g.velocity = Twist{};
   const std::vector<GraspState> start = work.grasps;
   origin = &start;
-  system.leaveOutStretching(false);
-  system.load(work);
-  system.setResponse(0.0, nullptr);
 
-  EquilibriumSearch search(*this, inputs, report);
-  if (!search.carryGrasps() || !search.settleStably(leave_saddles))
+  RodEquilibrium equilibrium(*this, inputs, report);
+  EquilibriumSearch<RodEquilibrium> search(equilibrium, report);
+  if (!search.carry(equilibrium.moves()) || !search.settleStably(leave_saddles))
     return refuse(report, search.failure(), explainStatics(search.failure()));
   evaluateEquilibrium(inputs, report);
-  // Newton's increments of 1e-8 of an edge leave 1e-7 of the largest force. Where nothing balances a load, as much as the load is left.
-  constexpr double kUnbalanced = 1e-4;
-  if (!(report.residual < kUnbalanced))
+  if (!(report.residual < kMostUnbalanced))
     return refuse(report, StepFailure::newton_diverged, "no equilibrium was found: nothing balances the loads, so that the rod drifts: hold it by a "
                                                         "grasp, or let it move by time stepping (start: as_given)");
   for (std::size_t k = 0; k < work.grasps.size(); ++k)
@@ -235,14 +176,8 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
 StepReport RodStepper::Impl::assessEquilibrium(const RodState& state, const RodInputs& inputs)
 {
   StepReport report;
-  std::string what;
-  if (!inputsFinite(state, inputs, what))
-    return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
-  begin(state);
-  addFrames(*model, work);
-  system.leaveOutStretching(false);
-  system.load(work);
-  system.setResponse(0.0, nullptr);
+  if (!beginStatics(state, inputs, report))
+    return report;
   RodStability at = assessStability(*this, inputs, true);
   report.energy = at.energy;
   report.lowest_eigenvalue = at.lowest;

@@ -83,7 +83,8 @@ private:
   void holdNodes(const RodInputs& inputs, double duration, double at);
 
   // rod_statics.cpp
-  class EquilibriumSearch;
+  class RodEquilibrium;
+  bool beginStatics(const RodState& state, const RodInputs& inputs, StepReport& report);
   void carryFreeNodes(const RodInputs& inputs, double weight);
   void evaluateEquilibrium(const RodInputs& inputs, StepReport& report);
 

@@ -17,6 +17,8 @@ std::string explainStatics(StepFailure failure)
     case StepFailure::squeezed:
       return what + "contact leaves the rods no room on the way to it: start from a shape that is nearer to the equilibrium (initial), or move "
                     "grasps, bodies and obstacles apart";
+    case StepFailure::interrupted:
+      return what + "the search was interrupted on request";
     default:
       return what + "Newton's method did not converge: hold what is free to drift by a grasp, start from a shape that is nearer to the equilibrium "
                     "(initial), or let the scene settle by time stepping with damping (start: as_given)";
