@@ -58,7 +58,8 @@ int negativeModes(const RodSetup& rod, double ground)
 
 constexpr double kAway = 1e-5;   ///< ratio of distance to length; a state that left its branch is farther away, and one that stayed is within 1e-9
 
-void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally)
+/// `shape`: a number for the column `localisation`, of the end where the rod left its branch.
+void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally, const std::function<double(const RodState&)>& shape = nullptr)
 {
   const int before = negativeModes(c.rod, c.ground);
   const bool near = std::abs(c.factor - 1) <= c.trusted;
@@ -82,6 +83,8 @@ void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally)
   row.set("stable", report.stable ? "yes" : "no").set("saddles_left", report.escapes).set("energy", report.energy);
   if (refused)
     row.set("refused", report.message);
+  if (shape && away > kAway)
+    row.set("localisation", shape(rod.state));
   row.check(wrong + called_stable, 0, 0.5, leaves ? "must leave the branch for a stable state" : "must stay on the branch");
 }
 
@@ -233,41 +236,97 @@ void addBendTwist(StudyContext& context, StaticsTally& tally, const std::vector<
 
 double acrossAxis(const RodState& s) { return s.x.bottomRows(2).colwise().norm().maxCoeff(); }
 
-/// Straight clamped rods under torque and tension, which become helices (greenhill.csv); B = L = rho A = 1.
+/// Tension T of a straight rod of stiffness EA = `stretch` whose threshold is that of an inextensible rod under the tension `effective`. An edge of
+/// length 1 + T/EA that turns by the angle t adds T (1 + T/EA) t^2 / 2 to the second derivative, in place of T t^2 / 2.
+double tensionOf(double effective, double stretch) { return 0.5 * stretch * (std::sqrt(1.0 + 4.0 * effective / stretch) - 1.0); }
+
+/// A clamped rod under torque and tension (greenhill.csv, column clamped: w'''' - i M w''' - T w'' = 0 with w = w' = 0 at both ends). B = L = rho A = 1.
+struct TwistedRod
+{
+  const char* family;
+  double tension, torque;   ///< at the threshold
+  double stretch;           ///< E A
+  double error;             ///< largest relative error of a mesh's threshold, times the square of its number of edges
+};
+
+/// The straight rod with `factor` times the torque of the threshold.
+StaticsCase twistedRod(const TwistedRod& rod, int edges, double factor)
+{
+  RodCase rod_case;
+  rod_case.edges = edges;
+  rod_case.stretch = rod.stretch;
+  rod_case.twist = 2.0;   // joints that twist far soften their bending, see study greenhill
+  StaticsCase c;
+  c.family = rod.family;
+  c.label = "T L^2/B " + std::to_string(static_cast<int>(rod.tension));
+  c.edges = edges;
+  c.factor = factor;
+  c.trusted = 0.01 + rod.error / (edges * edges);
+  c.rod = straightRod(rod_case, factor * rod.torque / rod_case.twist);
+  c.rod.state.x *= 1.0 + tensionOf(rod.tension, rod.stretch) / rod.stretch;
+  c.rod.hold(0, 0, true);
+  c.rod.hold(edges, edges, true);
+  // A straight rod stays straight: only its frames look for their equilibrium.
+  RodSystem system(*c.rod.model);
+  system.load(c.rod.state);
+  system.setResponse(0.0, nullptr);
+  for (int i = 0; i <= edges; ++i)
+    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  system.relaxFrames();
+  system.store(c.rod.state);
+  c.ground = groundOf(rod.stretch, 1.0, edges);   // what has buckled can turn about the axis
+  c.away = acrossAxis;
+  return c;
+}
+
+/// Straight clamped rods, which become helices.
 void addHelices(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
-  struct Load { double tension, torque; };
-  constexpr Load kLoads[] = {{-20, 5.771135703}, {0, 8.986818916}, {20, 11.80032954}, {100, 20.98350083}};
-  for (const Load& load : kLoads)
+  constexpr TwistedRod kRods[] = {{"helix", -20, 5.771135703, 1e6, 40},
+                                  {"helix", 0, 8.986818916, 1e6, 40},
+                                  {"helix", 20, 11.80032954, 1e6, 40},
+                                  {"helix", 100, 20.98350083, 1e6, 40}};
+  for (const TwistedRod& rod : kRods)
     for (const int edges : meshes)
       for (const double factor : {0.95, 1.05, 1.2})
       {
-        RodCase rod_case;
-        rod_case.edges = edges;
-        rod_case.stretch = 1e6;
-        rod_case.twist = 2.0;   // joints that twist far soften their bending, see study greenhill
-        StaticsCase c;
-        c.family = "helix";
-        c.label = "T L^2/B " + std::to_string(static_cast<int>(load.tension));
-        c.edges = edges;
-        c.factor = factor;
-        c.trusted = 0.01 + 40.0 / (edges * edges);
-        c.rod = straightRod(rod_case, factor * load.torque / rod_case.twist);
-        c.rod.state.x *= 1.0 + load.tension / rod_case.stretch;
-        c.rod.hold(0, 0, true);
-        c.rod.hold(edges, edges, true);
-        // a straight rod stays straight: only its frames look for their equilibrium
-        RodSystem system(*c.rod.model);
-        system.load(c.rod.state);
-        system.setResponse(0.0, nullptr);
-        for (int i = 0; i <= edges; ++i)
-          system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-        system.relaxFrames();
-        system.store(c.rod.state);
-        c.ground = groundOf(rod_case.stretch, 1.0, edges);   // what has buckled can turn about the axis
-        c.away = acrossAxis;
+        const StaticsCase c = twistedRod(rod, edges, factor);
         context.progress(tally.cases, 0, c.family + " " + c.label);
         judge(context, c, tally);
+      }
+}
+
+/// Largest angle between the rod and its axis over the root of its mean square: 1.4 for a helix along the whole rod, whose envelope is a sine.
+double localisation(const RodState& s)
+{
+  double largest = 0.0, sum = 0.0;
+  const Eigen::Index edges = s.x.cols() - 1;
+  for (Eigen::Index j = 0; j < edges; ++j)
+  {
+    const double angle = std::acos(std::clamp((s.x.col(j + 1) - s.x.col(j)).normalized().x(), -1.0, 1.0));
+    largest = std::max(largest, angle);
+    sum += angle * angle / static_cast<double>(edges);
+  }
+  return largest / std::sqrt(std::max(sum, 1e-300));
+}
+
+/// Long rods, whose thresholds are within 1.1 % of M^2 = 4 B T of the infinite rod. They are so extensible that buckling takes much length out of
+/// them, and then the helix is localised (Coyne 1990, van der Heijden and Thompson 2000).
+void addLocalisedHelices(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
+{
+  constexpr TwistedRod kRods[] = {{"localised_helix", 500, 45.16117543, 2e3, 600}, {"localised_helix", 1000, 63.55930846, 5e3, 600}};
+  for (const TwistedRod& rod : kRods)
+    for (const int edges : meshes)
+      for (const double factor : {0.97, 1.03, 1.1, 1.15})
+      {
+        if (edges < 80)   // a turn of the helix needs at least eight edges
+          continue;
+        StaticsCase c = twistedRod(rod, edges, factor);
+        // Well beyond the threshold a rod without contact may pass through itself and become straight again, with less twist.
+        const double twist = c.rod.state.twist.sum();
+        c.away = [twist](const RodState& s) { return std::max(acrossAxis(s), std::abs(s.twist.sum() - twist)); };
+        context.progress(tally.cases, 0, c.family + " " + c.label);
+        judge(context, c, tally, localisation);
       }
 }
 
@@ -361,6 +420,7 @@ void runStaticsStability(StudyContext& context)
   addLateral(context, tally, meshes);
   addBendTwist(context, tally, meshes);
   addHelices(context, tally, meshes);
+  addLocalisedHelices(context, tally, meshes);
   addRings(context, tally, meshes);
   addColumns(context, tally, meshes);
   addPlates(context, tally);
@@ -372,6 +432,8 @@ void runStaticsStability(StudyContext& context)
   context.metric("worst_residual", tally.worst_residual);
   context.note("Each case starts exactly on the branch (planar, straight or circular). Within `trusted` of the continuous threshold the inertia of the "
                "mesh's own Hessian decides which answer is right, beyond it the reference does.");
+  context.note("Localised helices: long rods under tension. `localisation` is the largest angle to the axis over the root of its mean square: 1.4 for a sine "
+               "along the whole rod, more for a helix that is localised, 0 for a rod that passed through itself and is straight again.");
   context.note("Plates: `edges` are cells along the plate, `factor` is over the threshold of plate theory. The loads are 0.97, 1.03 and 1.2 times the threshold of the "
                "same mesh, which the inertia of its Hessian gives.");
 }
