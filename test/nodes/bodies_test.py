@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Rigid bodies and obstacles: driven by messages, and told about."""
 import math
+import time
 
 import rosbag
 import rospy
@@ -115,6 +116,18 @@ class Bodies(NodeCase):
         self.drive("crane", (1, 0, 2), (0.9, 0, 2.1), 0.5)
         last = self.states_after(state, 150).nodes[-1]
         self.assertLess(math.dist((last.x, last.y, last.z), (0.9, 0, 1.1)), 1e-9)
+
+    def test_a_body_that_is_unheard_is_warned_of_until_it_is_heard(self):
+        self.start(FOLLOWED)
+        said = lambda: (self.output("rod.out") + self.output("rod.err")).count("nobody has published a pose yet of crane")
+        wait_until(lambda: said() == 1, what="the warning")
+        wait_until(lambda: said() == 2, what="the warning once more")   # after ten seconds
+        self.drive("crane", (1, 0, 2), (0.9, 0, 2.1), 0.5)
+        self.step(1)
+        heard = said()
+        begin = time.time()
+        wait_until(lambda: time.time() > begin + 12.0, what="a while in which the warning would come again")
+        self.assertEqual(said(), heard)
 
     def test_a_grasp_attached_elsewhere_stays_there(self):
         """Also where its body says `attach: section`."""

@@ -10,7 +10,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, WrenchStamped
 from node_harness import SCENE, NodeCase, find_program, numbers, run, wait_until
-from slender_sim.msg import BodyStates, GraspStates, RodState
+from slender_sim.msg import BodyStates, Fields, GraspStates, RodState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -54,6 +54,7 @@ class Topics(NodeCase):
         self.assertNotIn("/t/bodies", subscribed)             # no grasp follows one
         self.assertNotIn("/clock", published)
         self.assertNotIn("/t/obstacle_states", published)     # the scene has none
+        self.assertNotIn("/t/fields", published)              # it records none
         offered = {service for service, nodes in services if "/t/rod" in nodes}
         for name in ("pause", "reset", "step", "set_grasp", "save_state", "load_state"):
             self.assertIn("/t/rod/" + name, offered)
@@ -91,6 +92,39 @@ class Topics(NodeCase):
         tube = markers.last().markers[0]
         self.assertEqual(len(tube.points), len(tube.colors))
         self.assertEqual(len(tube.points) % 3, 0)
+
+    def test_fields(self):
+        """The fields of a step follow from the state of that step, and are those in the bag."""
+        bag, n = self.path("fields.bag"), 40
+        node = self.start(SCENE + "record: {fields: [strain, force, energy]}\n", frame_id="map", start_time=10.0, record_bag=bag)
+        state = self.listen("/t/state", RodState)
+        fields = self.listen("/t/fields", Fields)
+        self.step(n)
+        wait_until(lambda: state.count() >= n and fields.count() >= n, what="%d messages" % n)
+        states, told = state.all(), fields.all()
+        self.assertEqual([m.step for m in told], list(range(1, n + 1)))
+        for of_state, message in zip(states, told):
+            self.assertEqual((message.step, message.epoch, message.header.stamp), (of_state.step, of_state.epoch, of_state.header.stamp))
+            self.assertEqual(message.header.frame_id, "map")
+            self.assertEqual([(table.table, table.object) for table in message.tables], [("rod_fields", "rope"), ("energies", "rope")])
+            of_rod, energies = message.tables
+            self.assertEqual(of_rod.columns, ["strain", "tension [N]", "fx [N]", "fy [N]", "fz [N]"])
+            width = len(of_rod.columns)
+            rows = [of_rod.values[k:k + width] for k in range(0, len(of_rod.values), width)]
+            self.assertEqual(len(rows), 21)      # one per node
+            self.assertEqual(rows[20], rows[19])   # of the edge; the last node repeats it
+            for a, b, row in zip(of_state.nodes, of_state.nodes[1:], rows):
+                length = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
+                self.assertAlmostEqual(row[0], length / 0.05 - 1.0, delta=1e-12)   # round-off; edges are 0.05 m long at rest
+                along = sum(f * (q - p) / length for f, p, q in zip(row[2:], (a.x, a.y, a.z), (b.x, b.y, b.z)))
+                self.assertAlmostEqual(row[1], along, delta=1e-12 * max(1.0, abs(along)))
+            self.assertEqual(len(energies.values), len(energies.columns))
+        node.terminate()
+        self.assertEqual(node.wait(60), 0)
+        with rosbag.Bag(bag) as file:
+            recorded = [m for _, m, _ in file.read_messages("/t/fields")]
+        plain = lambda messages: [[(t.table, t.object, list(t.columns), list(t.values)) for t in m.tables] for m in messages]
+        self.assertEqual(plain(recorded[1:]), plain(told))   # the first one is that of the start
 
     def test_marker_style(self):
         self.start(marker_style="line", marker_frames=True)
