@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The demo, headless and in real time: every step arrives, no message is lost, and the rope ends in a loop that still holds its
-twist."""
+"""The demo, headless and in real time: no message is lost, and the rope ends in a loop that still holds its twist. However busy the machine is, the
+test waits for the motion of the grippers to end."""
 import math
 import unittest
 
@@ -9,8 +9,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from node_harness import Listener, run, wait_until
 from slender_sim.msg import RodState
 
-STEP = 0.004
-END = 12.5     # [s] the grippers rest from 11 s after the player's start
+STEP, EVERY = 0.004, 25   # [s], steps between states (demo.test)
+END, REST = 0.67, 1.5     # [m] distance of the grippers at the end of their motion, [s] for which they rest there
 
 
 def seen_from_camera(p, yaw=0.62, pitch=0.24):
@@ -29,18 +29,21 @@ def crossings(points):
                for i, (a, b) in enumerate(segments) for c, d in segments[i + 2:])
 
 
+def at_end(message):
+    return abs(message.nodes[-1].x - message.nodes[0].x - END) < 1e-6
+
+
 class Demo(unittest.TestCase):
 
     def test_the_rope_loops(self):
         states = Listener("state", RodState)
         diagnostics = Listener("/diagnostics", DiagnosticArray)
-        wait_until(lambda: states.count() > 0 and states.last().step * STEP > END, 200, "the end of the motion")
+        resting = round(REST / (STEP * EVERY))
+        wait_until(lambda: states.count() > resting and all(map(at_end, states.all()[-resting:])), 400, "the end of the motion")
         messages = states.all()
         steps = [m.step for m in messages]
-        self.assertEqual(steps, list(range(steps[0], steps[0] + len(steps))))
+        self.assertEqual(steps, list(range(steps[0], steps[0] + EVERY * len(steps), EVERY)))
         last = messages[-1]
-        ends = last.nodes[0], last.nodes[-1]
-        self.assertAlmostEqual(ends[1].x - ends[0].x, 0.67, delta=1e-6)
         twist = sum(last.twists) / (2 * math.pi)
         self.assertGreater(twist, 2.0)   # 3 turns less what the loop takes; one pull-through would cost 2
         self.assertLess(twist, 3.0)
