@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "slender_sim/geometry/rotation.h"
-#include "slender_sim/node/catch_up.h"
 
 namespace slender {
 namespace {
@@ -14,7 +13,7 @@ using Eigen::Vector3d;
 
 }  // namespace
 
-GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG) : options_(options), attach_(attach), timing_(options.timing())
+GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG) : GuideStream(options.timing(), options.coast), options_(options), attach_(attach)
 {
   if (!(options.catch_up_time > 0.0) || !(options.catch_up_speed > 0.0) || !(options.catch_up_turning > 0.0))
     throw std::invalid_argument("GuideBuffer: catch-up time and speeds must be > 0");
@@ -23,38 +22,19 @@ GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG
 
 bool GuideBuffer::push(double time, const Pose& X_WH)
 {
-  if (last_stamp_ && !(time > *last_stamp_))
+  if (!isNew(time))
     return false;
-  const bool fresh = timing_.sample(time);
-  if (fresh && !trajectory_.empty())
-    next_ = PoseTrajectory();
-  (next_ ? *next_ : trajectory_).append(time, X_WH);
-  last_stamp_ = time;
-  changed_ = true;
+  append(time, X_WH);
   return true;
 }
 
-/// Lets the newest stream take effect, which is the first one or one after a pause.
-void GuideBuffer::begin(double time, const GuideTiming::Instant& now)
+void GuideBuffer::join(double start)
 {
-  if (next_)
-    trajectory_ = std::move(*next_);
-  next_.reset();
-  trajectory_.coast(options_.coast);
-  trajectory_.expectMore();
-  open_ = false;
-  const double start = trajectory_.firstTime();
-  if (!following_)
-  {
-    X_HG_ = attach_ == Attach::initial ? trajectory_.evaluate(start).inverse() * last_.X : Pose();
-    last_.V = Twist();
-  }
-  following_ = changed_ = true;
-  plain_.X.position.setConstant(std::nan(""));   // no earlier query was made of this trajectory
-  last_time_ = now.rate > 0.0 ? time - (now.time - start) : time;
-  query_ = start;
-  rate_ = now.rate;
+  X_HG_ = attach_ == Attach::initial ? trajectory_.evaluate(start).inverse() * last_.X : Pose();
+  last_.V = Twist();
 }
+
+void GuideBuffer::forgetPlain() { plain_.X.position.setConstant(std::nan("")); }
 
 bool GuideBuffer::passesHere() const
 {
@@ -63,38 +43,21 @@ bool GuideBuffer::passesHere() const
          now.V.angular == plain_.V.angular;
 }
 
+void GuideBuffer::rejoin(double time)
+{
+  if (!passesHere())
+    blendFrom(time, last_, followed(query_ + kLimitOffset, rate_));
+}
+
+void GuideBuffer::output(double time)
+{
+  plain_ = followed(query_, rate_);
+  last_ = blended(time, plain_);
+}
+
 GraspTarget GuideBuffer::target(double time)
 {
-  GuideTiming::Instant now = timing_.advance(time);
-  if (now.began)
-    begin(time, now);
-  else if (!now.following && following_)   // the earlier stream goes on until the next one takes effect
-    now.time = query_ + rate_ * (time - *last_time_);
-  if (now.jumped)
-  {
-    query_ = now.time;
-    rate_ = now.rate;
-    plain_.X.position.setConstant(std::nan(""));
-    changed_ = true;
-  }
-  if (following_)
-  {
-    if (now.following && now.open != open_ && options_.coast == 0.0)
-    {
-      open_ = now.open;
-      trajectory_.coast(open_ ? kOpenCoast : 0.0);
-      changed_ = true;
-    }
-    if (changed_ && !passesHere())   // the trajectory no longer passes through what the solver was given
-      blendFrom(*last_time_, last_, followed(query_ + kLimitOffset, rate_));
-    changed_ = false;
-    query_ = now.time;
-    rate_ = now.rate;
-    plain_ = followed(query_, rate_);
-    last_ = blended(time, plain_);
-    trajectory_.forgetBefore(query_);
-  }
-  last_time_ = time;
+  advance(time);
   return {last_.X, last_.V};
 }
 
@@ -111,25 +74,16 @@ void GuideBuffer::attachAt(const Pose& X_WG)
 
 void GuideBuffer::restart(const Pose& X_WG)
 {
-  timing_.restart();
-  trajectory_ = PoseTrajectory();
-  next_.reset();
-  last_stamp_.reset();
-  following_ = changed_ = open_ = false;
+  restartStream();
   offset_.reset();
   last_ = {X_WG, Twist()};
 }
 
 void GuideBuffer::skip(double seconds)
 {
-  timing_.skip(seconds);
-  query_ += seconds;
-  plain_.X.position.setConstant(std::nan(""));
-  if (last_time_)
-    *last_time_ += seconds;
+  skipStream(seconds);
   if (offset_)
     offset_->start += seconds;
-  changed_ = true;
 }
 
 GuideBuffer::Motion GuideBuffer::followed(double query, double rate) const

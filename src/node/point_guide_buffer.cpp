@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "slender_sim/node/catch_up.h"
 
 namespace slender {
 namespace {
@@ -12,7 +11,8 @@ double largest(const Eigen::Matrix3Xd& m) { return m.cols() > 0 ? m.colwise().no
 
 }  // namespace
 
-PointGuideBuffer::PointGuideBuffer(const GuideBuffer::Options& options, const Eigen::Matrix3Xd& points) : options_(options), timing_(options.timing())
+PointGuideBuffer::PointGuideBuffer(const GuideBuffer::Options& options, const Eigen::Matrix3Xd& points)
+  : GuideStream(options.timing(), options.coast), options_(options)
 {
   if (!(options.catch_up_time > 0.0) || !(options.catch_up_speed > 0.0))
     throw std::invalid_argument("PointGuideBuffer: catch-up time and speed must be > 0");
@@ -21,12 +21,7 @@ PointGuideBuffer::PointGuideBuffer(const GuideBuffer::Options& options, const Ei
 
 void PointGuideBuffer::restart(const Eigen::Matrix3Xd& points)
 {
-  timing_.restart();
-  trajectory_ = PointTrajectory();
-  trajectory_.coast(options_.coast);
-  next_.reset();
-  last_stamp_.reset();
-  following_ = changed_ = open_ = false;
+  restartStream();
   offset_duration_ = 0.0;
   x_ = points;
   v_.setZero(3, points.cols());
@@ -36,71 +31,29 @@ bool PointGuideBuffer::push(double time, const Eigen::Matrix3Xd& points)
 {
   if (points.cols() != x_.cols())
     throw std::invalid_argument("guide: " + std::to_string(points.cols()) + " points, but the guide has " + std::to_string(x_.cols()));
-  if (last_stamp_ && !(time > *last_stamp_))
+  if (!isNew(time))
     return false;
   if (!points.allFinite())   // refused samples must not reach the timing
     throw std::invalid_argument("guide: a position is not finite");
-  const bool fresh = timing_.sample(time);
-  if (fresh && !trajectory_.empty())
-    next_ = PointTrajectory();
-  (next_ ? *next_ : trajectory_).append(time, points);
-  last_stamp_ = time;
-  changed_ = true;
+  append(time, points);
   return true;
 }
 
-/// Lets the newest stream take effect, which is the first one or one after a pause.
-void PointGuideBuffer::begin(double time, const GuideTiming::Instant& now)
+void PointGuideBuffer::join(double) { v_.setZero(); }
+
+void PointGuideBuffer::forgetPlain() { plain_x_.resize(3, 0); }
+
+void PointGuideBuffer::output(double time)
 {
-  if (next_)
-    trajectory_ = std::move(*next_);
-  next_.reset();
-  trajectory_.coast(options_.coast);
-  trajectory_.expectMore();
-  open_ = false;
-  if (!following_)
-    v_.setZero();
-  following_ = changed_ = true;
-  query_ = trajectory_.times().front();
-  plain_x_.resize(3, 0);
-  last_time_ = now.rate > 0.0 ? time - (now.time - query_) : time;
-  rate_ = now.rate;
+  follow(query_, rate_, x_, v_);
+  plain_x_ = x_;
+  plain_v_ = v_;
+  addOffset(time, x_, v_);
 }
 
 const Eigen::Matrix3Xd& PointGuideBuffer::target(double time)
 {
-  GuideTiming::Instant now = timing_.advance(time);
-  if (now.began)
-    begin(time, now);
-  else if (!now.following && following_)   // the earlier stream goes on until the next one takes effect
-    now.time = query_ + rate_ * (time - *last_time_);
-  if (now.jumped)
-  {
-    query_ = now.time;
-    rate_ = now.rate;
-    plain_x_.resize(3, 0);
-    changed_ = true;
-  }
-  if (following_)
-  {
-    if (now.following && now.open != open_ && options_.coast == 0.0)
-    {
-      open_ = now.open;
-      trajectory_.coast(open_ ? kOpenCoast : 0.0);
-      changed_ = true;
-    }
-    if (changed_)   // the trajectory may no longer pass through what the solver was given
-      blendFrom(*last_time_);
-    changed_ = false;
-    query_ = now.time;
-    rate_ = now.rate;
-    follow(query_, rate_, x_, v_);
-    plain_x_ = x_;
-    plain_v_ = v_;
-    addOffset(time, x_, v_);
-    trajectory_.forgetBefore(query_);
-  }
-  last_time_ = time;
+  advance(time);
   return x_;
 }
 
@@ -109,20 +62,15 @@ void PointGuideBuffer::attachAt(const Eigen::Matrix3Xd& points)
   x_ = points;
   v_.setZero(3, points.cols());
   offset_duration_ = 0.0;
-  plain_x_.resize(3, 0);
+  forgetPlain();
   if (following_)
-    blendFrom(*last_time_);
+    rejoin(*last_time_);
 }
 
 void PointGuideBuffer::skip(double seconds)
 {
-  timing_.skip(seconds);
-  query_ += seconds;
-  plain_x_.resize(3, 0);
+  skipStream(seconds);
   offset_start_ += seconds;
-  if (last_time_)
-    *last_time_ += seconds;
-  changed_ = true;
 }
 
 void PointGuideBuffer::follow(double query, double rate, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const
@@ -142,7 +90,7 @@ void PointGuideBuffer::addOffset(double time, Eigen::Matrix3Xd& x, Eigen::Matrix
 }
 
 /// Starts an offset at `time` that leads from x_, v_ to the trajectory, unless the trajectory passes through them.
-void PointGuideBuffer::blendFrom(double time)
+void PointGuideBuffer::rejoin(double time)
 {
   Eigen::Matrix3Xd to, to_rate;
   follow(query_, rate_, to, to_rate);

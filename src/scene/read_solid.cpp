@@ -189,37 +189,31 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
   return shape;
 }
 
-std::optional<RodContact> readRodContact(const YamlCursor& at)
+namespace {
+
+/// Reads the contact of rods or threads. `others`: the key for contact with objects of the same kind, and the member that it sets.
+template <class Contact>
+std::optional<Contact> readTouch(const YamlCursor& at, const char* others, bool Contact::*touches_others)
 {
   if (!at.present())
   {
     return std::nullopt;
   }
-  RodContact contact;
+  Contact contact;
   YamlMap map(at);
   assign(contact.self, map.get("self").boolean());
-  assign(contact.rods, map.get("rods").boolean());
+  assign(contact.*touches_others, map.get(others).boolean());
   assign(contact.obstacles, map.get("obstacles").boolean());
   assign(contact.friction, map.get("friction").number(friction));
   map.finish();
   return contact;
 }
 
-std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at)
-{
-  if (!at.present())
-  {
-    return std::nullopt;
-  }
-  ThreadContactConfig contact;
-  YamlMap map(at);
-  assign(contact.self, map.get("self").boolean());
-  assign(contact.threads, map.get("threads").boolean());
-  assign(contact.obstacles, map.get("obstacles").boolean());
-  assign(contact.friction, map.get("friction").number(friction));
-  map.finish();
-  return contact;
-}
+}  // namespace
+
+std::optional<RodContact> readRodContact(const YamlCursor& at) { return readTouch(at, "rods", &RodContact::rods); }
+
+std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at) { return readTouch(at, "threads", &ThreadContactConfig::threads); }
 
 ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods, const std::vector<ThreadConfig>& threads)
 {

@@ -8,11 +8,11 @@
 #include <fstream>
 #include <istream>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 
 #include "../scene/yaml_tree.h"
 #include "processes.h"
+#include "whole_file.h"
 #include "slender_sim/scene/reader.h"
 
 namespace slender::study {
@@ -20,14 +20,6 @@ namespace slender::study {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string readAll(const std::string& path)
-{
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// "0x4A: function (file:line)", "0x4A: function (in library)" or "[root]".
 void splitFrame(const std::string& frame, const std::string& sources, SourceLine& at, std::string& function)
@@ -209,7 +201,7 @@ std::string Profiler::run(const std::string& tool, const std::string& scene, dou
     command += " " + shellWord(word);
   }
   if (std::system((command + " > " + shellWord(log) + " 2>&1").c_str()) != 0)
-    throw std::runtime_error("failed: " + command + "\n" + readAll(log));
+    throw std::runtime_error("failed: " + command + "\n" + wholeFile(log));
   return folder_ + "/out";
 }
 
@@ -232,7 +224,7 @@ StepProfile Profiler::instructions(const std::string& scene, double step, const 
 
 std::vector<Allocation> Profiler::allocations(const std::string& scene, double step, const std::vector<std::string>& options, int steps) const
 {
-  return readDhat(readAll(run("--tool=dhat --fullpath-after=/ --num-callers=60 --dhat-out-file=" + shellWord(folder_ + "/out"), scene, step, options, steps)), sources_);
+  return readDhat(wholeFile(run("--tool=dhat --fullpath-after=/ --num-callers=60 --dhat-out-file=" + shellWord(folder_ + "/out"), scene, step, options, steps)), sources_);
 }
 
 }  // namespace slender::study

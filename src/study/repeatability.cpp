@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "processes.h"
+#include "whole_file.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/study/study.h"
 
@@ -20,14 +21,6 @@ namespace slender::study {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string contents(const std::string& path)
-{
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// What `simulate` printed, but for lines that tell wall time.
 std::string withoutTimes(const std::string& text)
@@ -83,7 +76,7 @@ public:
     const std::string command = environment + shellWord(simulate_) + " " + shellWord(scene) + " " + options + " --threads " + (second ? "3" : "1") + " --state " +
                                 shellWord(state) + " > " + shellWord(printed) + " 2>&1";
     const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, withoutTimes(contents(printed)), contents(state)};
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, withoutTimes(wholeFile(printed)), wholeFile(state)};
   }
 
 private:

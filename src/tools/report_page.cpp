@@ -6,11 +6,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <sstream>
 
 #include "../scene/yaml_tree.h"
+#include "../study/whole_file.h"
+#include "markup.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/study/bars.h"
 #include "slender_sim/study/output.h"
@@ -28,22 +29,6 @@ const char kStyle[] =
     "th{background:#eef2f6;position:sticky;top:0}td.n{text-align:right;font-variant-numeric:tabular-nums}"
     "img{max-width:100%;border:1px solid #ddd;margin:.5em 0}.wide{overflow:auto;max-height:32em}.bad{color:#b00020;font-weight:bold}"
     ".good{color:#166534}.words{color:#444}summary{cursor:pointer;color:#246}nav a{margin-right:1.2em}";
-
-std::string readFile(const std::string& path)
-{
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-std::string escaped(const std::string& text)
-{
-  std::string out;
-  for (const char c : text)
-    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '"' ? "&quot;" : std::string(1, c);
-  return out;
-}
 
 std::string base64(const std::string& bytes)
 {
@@ -108,7 +93,7 @@ Loaded load(const ReportedStudy& study)
     return loaded;
   try
   {
-    const YamlTree tree = parseYaml(readFile(file), file);   // JSON is YAML
+    const YamlTree tree = parseYaml(wholeFile(file), file);   // JSON is YAML
     const YamlTree& result = tree.find("studies")->items.at(0);
     for (const auto& [name, value] : result.find("metrics")->members)
       loaded.metrics.emplace_back(name, value.kind == YamlTree::Kind::null ? "not a number" : value.scalar);
@@ -128,7 +113,7 @@ Loaded load(const ReportedStudy& study)
 
 void writeRows(std::ostream& page, const std::string& csv)
 {
-  std::istringstream lines(readFile(csv));
+  std::istringstream lines(wholeFile(csv));
   std::string line;
   std::size_t rows = 0;
   std::ostringstream table;
@@ -157,7 +142,7 @@ void writeStudy(std::ostream& page, const ReportedStudy& study, const Loaded& lo
       pictures.push_back(entry.path().string());
   std::sort(pictures.begin(), pictures.end());
   for (const std::string& picture : pictures)
-    page << "<img alt=\"" << escaped(fs::path(picture).stem().string()) << "\" src=\"data:image/png;base64," << base64(readFile(picture)) << "\">\n";
+    page << "<img alt=\"" << escaped(fs::path(picture).stem().string()) << "\" src=\"data:image/png;base64," << base64(wholeFile(picture)) << "\">\n";
   if (!loaded.metrics.empty())
   {
     page << "<table>";

@@ -7,10 +7,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <sstream>
 
 #include "../study/processes.h"
+#include "../study/whole_file.h"
 #include "arguments.h"
+#include "markup.h"
 #include "slender_sim/study/study.h"
 
 namespace slender {
@@ -27,22 +28,6 @@ struct CheckedStudy
   Clock::time_point start{};
   double seconds = 0.0;
 };
-
-std::string readFile(const std::string& path)
-{
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-std::string escaped(const std::string& text)
-{
-  std::string out;
-  for (const char c : text)
-    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '"' ? "&quot;" : std::string(1, c);
-  return out;
-}
 
 std::vector<CheckedStudy> chosenStudies(const std::vector<std::string>& only)
 {
@@ -101,7 +86,7 @@ int checkStudies(const StudyCheckOptions& options)
     if (!why.empty())
     {
       ++failed;
-      std::cout << readFile(log(k));
+      std::cout << wholeFile(log(k));
     }
     std::fflush(stdout);
   });

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <sstream>
 #include <stdexcept>
 #include <vector>
 
@@ -17,6 +16,7 @@
 
 #include "arguments.h"
 #include "../study/processes.h"
+#include "../study/whole_file.h"
 #include "report_page.h"
 #include "slender_sim/study/study.h"
 
@@ -70,14 +70,6 @@ void checkPlans()
   }
 }
 
-std::string readFile(const std::string& path)
-{
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 /// Of /proc, the value behind `key`.
 std::string systemValue(const char* file, const std::string& key)
 {
@@ -115,7 +107,7 @@ void prepare(const ReportOptions& options)
   const std::string file = options.out + "/data/extent.txt", wanted = extent(options.quick);
   if (!fs::exists(file))
     std::ofstream(file) << wanted;
-  else if (readFile(file) != wanted)
+  else if (wholeFile(file) != wanted)
     throw BadInput(options.out + " holds the results of another program or extent (" + file + "); give another --out or delete it");
 }
 

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "slender_sim/geometry/pose_trajectory.h"
-#include "slender_sim/node/guide_timing.h"
+#include "slender_sim/node/guide_stream.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
 
@@ -20,7 +20,7 @@ namespace slender {
 /// and velocity between the last output and the changed trajectory then becomes an offset. A cubic Hermite polynomial
 /// takes the offset to zero within a blending time, so the grasp catches up with continuous velocity and a mean speed of
 /// about `catch_up_speed` at most. While samples come in time the offset is exactly zero.
-class GuideBuffer
+class GuideBuffer : public GuideStream<PoseTrajectory>
 {
 public:
   struct Options
@@ -56,10 +56,6 @@ public:
   /// The simulated clock skipped `seconds` while the grasp stood still. The grasp then catches up.
   void skip(double seconds);
 
-  /// Stamp of the last sample [s], if there is any.
-  std::optional<double> lastTime() const { return last_stamp_; }
-  const GuideTiming& timing() const { return timing_; }
-
   /// The grasp in the gripper's frame, once it follows; before, and with attach section, identity.
   const Pose& graspInGripper() const { return X_HG_; }
 
@@ -75,7 +71,10 @@ private:
     Eigen::Vector3d p, p_rate, r, r_rate;   // position [m], rotation vector [rad], and rates, at `start`
   };
 
-  void begin(double time, const GuideTiming::Instant& now);
+  void join(double start) override;
+  void forgetPlain() override;
+  void rejoin(double time) override;
+  void output(double time) override;
   bool passesHere() const;                   // the trajectory has not changed at query_, to the last bit
   Motion followed(double query, double rate) const;      // motion of the grasp without an offset
   Motion blended(double time, const Motion& followed) const;
@@ -83,16 +82,7 @@ private:
 
   Options options_;
   Attach attach_;
-  GuideTiming timing_;
-  PoseTrajectory trajectory_;                // of the gripper X_WH
-  std::optional<PoseTrajectory> next_;       // of a new stream that has not taken effect yet
-  std::optional<double> last_stamp_;         // [s] of the last sample
-  Pose X_HG_;                                // grasp in the gripper
-  bool following_ = false;                   // samples have taken effect, X_HG_ is known
-  bool changed_ = false;                     // the trajectory changed since the last query
-  bool open_ = false;                        // the end of the trajectory is extrapolated
-  std::optional<double> last_time_;          // [s] simulated time of the last query
-  double query_ = 0.0, rate_ = 1.0;          // [s] instant of the trajectory at last_time_, and its rate
+  Pose X_HG_;                                // grasp in the gripper, known once samples have taken effect
   Motion plain_;                             // motion without an offset at last_time_
   Motion last_;                              // last output
   std::optional<Offset> offset_;

@@ -1,0 +1,138 @@
+#pragma once
+
+#include <optional>
+
+#include "slender_sim/node/catch_up.h"
+#include "slender_sim/node/guide_timing.h"
+
+namespace slender {
+
+/// Follows a stream of stamped samples in simulated time: what GuideBuffer and PointGuideBuffer have in common. `Trajectory` joins the samples
+/// (PoseTrajectory, PointTrajectory). It is evaluated at instants that GuideTiming chooses. The derived class evaluates it and blends from the last
+/// output to a trajectory that has changed.
+template <class Trajectory>
+class GuideStream
+{
+public:
+  /// Stamp of the last sample [s], if there is any.
+  std::optional<double> lastTime() const { return last_stamp_; }
+  const GuideTiming& timing() const { return timing_; }
+
+protected:
+  /// `coast` [s] >= 0: within this time the motion comes to rest when no sample comes. With 0 the last sample is held.
+  GuideStream(const GuideTiming::Options& timing, double coast) : timing_(timing), coast_(coast) {}
+  virtual ~GuideStream() = default;
+
+  /// The first stream takes effect. trajectory_ begins at `start` [s].
+  virtual void join(double start) = 0;
+  /// What was evaluated last is not that of the trajectory at query_.
+  virtual void forgetPlain() = 0;
+  /// The trajectory may have changed at query_. Starts a blend from the last output, given at simulated `time` [s], unless they agree.
+  virtual void rejoin(double time) = 0;
+  /// Sets the output at simulated `time` [s] from the trajectory at query_, which passes at rate_.
+  virtual void output(double time) = 0;
+
+  /// Whether `time` [s] is later than the last sample.
+  bool isNew(double time) const { return !last_stamp_ || time > *last_stamp_; }
+
+  /// Adds a sample that is new.
+  template <class Sample>
+  void append(double time, const Sample& sample)
+  {
+    const bool fresh = timing_.sample(time);
+    if (fresh && !trajectory_.empty())
+      next_ = Trajectory();
+    (next_ ? *next_ : trajectory_).append(time, sample);
+    last_stamp_ = time;
+    changed_ = true;
+  }
+
+  /// Goes on to simulated `time` [s], which does not decrease from call to call. Calls output() once a stream has taken effect.
+  void advance(double time)
+  {
+    GuideTiming::Instant now = timing_.advance(time);
+    if (now.began)
+      begin(time, now);
+    else if (!now.following && following_)   // the earlier stream goes on until the next one takes effect
+      now.time = query_ + rate_ * (time - *last_time_);
+    if (now.jumped)
+    {
+      query_ = now.time;
+      rate_ = now.rate;
+      forgetPlain();
+      changed_ = true;
+    }
+    if (following_)
+    {
+      if (now.following && now.open != open_ && coast_ == 0.0)
+      {
+        open_ = now.open;
+        trajectory_.coast(open_ ? kOpenCoast : 0.0);
+        changed_ = true;
+      }
+      if (changed_)
+        rejoin(*last_time_);
+      changed_ = false;
+      query_ = now.time;
+      rate_ = now.rate;
+      output(time);
+      trajectory_.forgetBefore(query_);
+    }
+    last_time_ = time;
+  }
+
+  /// Forgets all samples.
+  void restartStream()
+  {
+    timing_.restart();
+    trajectory_ = Trajectory();
+    next_.reset();
+    last_stamp_.reset();
+    following_ = changed_ = open_ = false;
+  }
+
+  /// The simulated clock skipped `seconds` while the output stood still.
+  void skipStream(double seconds)
+  {
+    timing_.skip(seconds);
+    query_ += seconds;
+    forgetPlain();
+    if (last_time_)
+      *last_time_ += seconds;
+    changed_ = true;
+  }
+
+  GuideTiming timing_;
+  Trajectory trajectory_;
+  bool following_ = false;                   // samples have taken effect
+  std::optional<double> last_time_;          // [s] simulated time of the last query
+  double query_ = 0.0, rate_ = 1.0;          // [s] instant of the trajectory at last_time_, and its rate
+
+private:
+  /// Lets the newest stream take effect, which is the first one or one after a pause.
+  void begin(double time, const GuideTiming::Instant& now)
+  {
+    if (next_)
+      trajectory_ = std::move(*next_);
+    next_.reset();
+    trajectory_.coast(coast_);
+    trajectory_.expectMore();
+    open_ = false;
+    const double start = trajectory_.times().front();
+    if (!following_)
+      join(start);
+    following_ = changed_ = true;
+    forgetPlain();   // no earlier query was made of this trajectory
+    last_time_ = now.rate > 0.0 ? time - (now.time - start) : time;
+    query_ = start;
+    rate_ = now.rate;
+  }
+
+  double coast_;
+  std::optional<Trajectory> next_;           // of a new stream that has not taken effect yet
+  std::optional<double> last_stamp_;         // [s] of the last sample
+  bool changed_ = false;                     // the trajectory changed since the last query
+  bool open_ = false;                        // the end of the trajectory is extrapolated
+};
+
+}  // namespace slender
