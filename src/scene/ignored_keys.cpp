@@ -114,7 +114,7 @@ std::string whyNoFriction(const SceneConfig& scene)
 
 void warnOfFriction(const YamlCursor& friction, const std::string& why)
 {
-  if (friction.present() && friction.number(Range{}).value_or(0.0) > 0 && !why.empty())
+  if (friction.present() && friction.number(Range::closed(0, 100)).value_or(0.0) > 0 && !why.empty())
   {
     friction.warning("has no effect: " + why);
   }
@@ -202,8 +202,12 @@ void warnOfPlasticity(YamlMap plasticity, const ClothConfig& config)
 /// Keys of one set of test functions. `shapes`: how many shapes of the guide are known beforehand.
 void warnOfClusters(YamlMap clusters, std::size_t shapes)
 {
+  if (!clusters.at().present())
+  {
+    return;
+  }
   const YamlCursor frames = clusters.get("frames");
-  const bool one_region = clusters.get("count").integer(1, 1'000'000).value_or(2) == 1;
+  const bool one_region = clusters.get("count").integer(1, 1'000'000, "regions").value_or(2) == 1;
   for (const char* key : {"compactness", "seed", "frames"})
   {
     if (one_region && clusters.has(key))
@@ -303,6 +307,10 @@ void warnOfGenerator(YamlMap generator, const SceneConfig& scene, const std::str
   YamlMap chain(generator.get("chain")), tree(generator.get("tree")), hair(generator.get("hair"));
   for (YamlMap* rods : {&chain, &tree, &hair})
   {
+    if (!rods->at().present())
+    {
+      continue;
+    }
     warnOfMaterial(YamlMap(rods->get("material")), scene.gravity);
     warnOfContact(YamlMap(rods->get("contact")), "rods", scene.rods.size() > 1, !scene.obstacles.empty() || !scene.bodies.empty());
   }
@@ -317,7 +325,10 @@ void warnOfGenerator(YamlMap generator, const SceneConfig& scene, const std::str
       tree.get(key).warning("has no effect with levels: 1, a trunk without branches; leave it out");
     }
   }
-  warnOfFriction(YamlMap(hair.get("head")).get("friction"), why_no_friction);
+  if (hair.at().present())
+  {
+    warnOfFriction(YamlMap(hair.get("head")).get("friction"), why_no_friction);
+  }
 }
 
 }  // namespace
