@@ -65,7 +65,7 @@ double leastJettingSpeed(const ThreadFall& fall, double surface_tension)
 {
   if (fall.viscosity > std::sqrt(0.5 * fall.density * surface_tension * fall.diameter))
     return 0.0;
-  constexpr double kWater = 0.37;   // fitted by the authors
+  constexpr double kWater = 0.37;   // for water in air, by the authors
   const double bond = 0.5 * fall.density * fall.gravity * fall.diameter * fall.diameter / surface_tension, x = 1.0 + kWater * bond;
   const double y = x - std::sqrt(x * x - 1.0);
   return 2.0 * y * std::sqrt(surface_tension / (fall.density * fall.diameter));

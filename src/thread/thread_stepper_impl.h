@@ -78,6 +78,7 @@ private:
   bool land(double h);
   bool meetsFloor(int node, double& when) const;
   void finish(const ThreadInputs& inputs, double h);
+  void restBetweenLying(const Eigen::Vector3d& belt_velocity);
   void split(int j, double fraction, const RemeshGuard* guard);
   EndLoad endLoad(int end) const;
   double fedVolume(double h) const { return flow_speed_ * model->nozzleArea() * h; }

@@ -255,6 +255,22 @@ void ThreadStepper::Impl::placeNode(int node, const Eigen::Vector3d& x)
   system.setNode(k, x);
 }
 
+/// Two neighbours that lie on the floor hold a node between them up: it would creep down for ever, and until it has landed every younger node
+/// has to stay in the system. Such a node is deposited where it is, as soon as it is nearer to the floor than a small share of the radius.
+void ThreadStepper::Impl::restBetweenLying(const Eigen::Vector3d& belt_velocity)
+{
+  constexpr double kNear = 0.05;   // of the radius: the height is then far below what the section leaves open
+  if (!model->floor.sticks())
+    return;
+  for (int i = std::max(1, first_); i + 1 < work.nodes(); ++i)
+    if (!work.deposited[i] && work.deposited[i - 1] && work.deposited[i + 1] &&
+        work.x[i].z() - restingHeight(i) < kNear * std::min(work.radius(i - 1), work.radius(i)))
+    {
+      work.deposited[i] = 1;
+      work.v[i] = belt_velocity;
+    }
+}
+
 /// Takes the solution over.
 void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
 {
@@ -276,6 +292,7 @@ void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
     work.x[i] = x;
     work.deposited[i] = landed[i];
   }
+  restBetweenLying(inputs.belt_velocity);
   for (int j = first_; j + 1 < n; ++j)
   {
     const int k = inSystem(j);

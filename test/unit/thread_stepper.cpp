@@ -259,6 +259,31 @@ TEST(ThreadStepper, TheFlowMayStopAndTheNozzleMove)
   EXPECT_LT(std::abs(volumeDrift(t, start)), 1e-13);
 }
 
+/// Lying neighbours hold the node between them up. It is deposited when it is nearer to the floor than a small share of the radius, and not before.
+TEST(ThreadStepper, ANodeBetweenTwoThatLieIsDeposited)
+{
+  const double radius = 0.002;
+  for (const double above : {0.02 * radius, 0.5 * radius})
+  {
+    ThreadModel m = honey();
+    m.floor.present = true;
+    Eigen::Matrix3Xd x(3, 4);
+    x << 0, 0.01, 0.02, 0.03, 0, 0, 0, 0, radius, radius + above, radius, 0.01;
+    Thread t{m, makeThread(x, Eigen::Vector3d::Constant(radius)), {}};
+    t.state.deposited = {1, 0, 1, 0};
+    t.inputs.gravity.setZero();
+    t.inputs.belt_velocity = {0.1, 0, 0};
+    ThreadStepper stepper(std::make_shared<ThreadModel>(m), NewtonConfig{});
+    ASSERT_TRUE(stepper.step(t.state, t.inputs, 1e-4).ok);
+    EXPECT_EQ(static_cast<bool>(t.state.deposited[1]), above < 0.05 * radius) << above;
+    EXPECT_NEAR(t.state.x[1].z(), radius + above, 0.05 * above) << above;
+    if (t.state.deposited[1])
+    {
+      EXPECT_EQ(t.state.v[1], t.inputs.belt_velocity);
+    }
+  }
+}
+
 TEST(ThreadStepper, WhatTouchesTheFloorStaysThere)
 {
   Thread t = pouring(0.1);
