@@ -1,9 +1,8 @@
-// Threads whose scenes give neither edges nor break-up: fluids from water to pitch, of which each works, is warned of or is refused; and coils at
-// the heights of coiling_grid.csv, resolved by the defaults alone.
+// Threads whose scenes give neither edges nor break-up: a hundred pours (thread_pours.cpp), and coils at the heights of
+// coiling_grid.csv.
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -11,289 +10,218 @@
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/study/cpu_clock.h"
-#include "slender_sim/thread/thread_flow.h"
-#include "slender_sim/thread/thread_group.h"
+#include "thread_pours.h"
 
 namespace slender::study {
 namespace {
 
-constexpr double kGravity = 9.81;
-constexpr double kFewPerTurn = 10.0;   // edges: the readers' warning begins there
-constexpr double kCoilBound = 0.05;    // of frequency and radius
+constexpr double kCoilBound = 0.05;   // of frequency and radius
 
-struct Fluid
-{
-  const char* name;
-  double density, viscosity, surface_tension;   ///< [kg/m^3], [Pa s], [N/m]: round values of handbooks, which differ by the kind and the temperature
-};
-
-const std::vector<Fluid> kFluids = {
-    {"water", 1000, 1e-3, 0.072},      {"milk", 1030, 2e-3, 0.047},       {"blood", 1060, 4e-3, 0.056},         {"olive oil", 912, 0.08, 0.032},
-    {"motor oil", 880, 0.25, 0.031},   {"castor oil", 960, 0.99, 0.039},  {"glycerin", 1260, 1.4, 0.063},       {"warm honey", 1400, 2, 0.05},
-    {"shampoo", 1020, 4, 0.03},        {"chocolate", 1300, 3, 0.04},      {"corn syrup", 1380, 5, 0.08},        {"honey", 1400, 10, 0.05},
-    {"glue", 1100, 20, 0.04},          {"molasses", 1420, 50, 0.07},      {"caramel", 1400, 100, 0.05},         {"silicone oil", 970, 1e3, 0.021},
-    {"glass melt", 2500, 1e3, 0.3},    {"stiff glass", 2500, 1e5, 0.3},   {"tar", 1200, 3e4, 0.03},             {"pitch", 1100, 2e8, 0.03}};
-
-struct Outlet
-{
-  double diameter, height, speed;   ///< [m], of the nozzle above the floor [m], of the fluid in the nozzle [m/s]
-};
-
-const std::vector<Outlet> kOutlets = {{0.001, 0.03, 0.2}, {0.003, 0.1, 0.05}, {0.005, 0.2, 0.02}, {0.01, 0.1, 0.1}, {0.02, 0.5, 0.3}};
-
-std::string text(const char* format, ...)
-{
-  char buffer[1000];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
-
-/// No key says how it is resolved.
-std::string sceneText(const Fluid& fluid, const Outlet& outlet, double step, const std::string& more_nozzle, const std::string& more_floor)
-{
-  const double flow = 0.25 * M_PI * outlet.diameter * outlet.diameter * outlet.speed;
-  return text("time: {step: %.9g, duration: 1}\ngravity: [0, 0, %g]\nthreads:\n  - name: poured\n    fluid: {density: %.9g, viscosity: %.9g, surface_tension: %.9g}\n"
-              "    nozzle: {position: [0, 0, %.9g], diameter: %.9g, flow: %.9g%s}\n    floor: {height: 0%s}\n",
-              step, -kGravity, fluid.density, fluid.viscosity, fluid.surface_tension, outlet.height, outlet.diameter, flow, more_nozzle.c_str(), more_floor.c_str());
-}
-
-Landing landingOf(const Fluid& fluid, const Outlet& outlet)
-{
-  const double flow = 0.25 * M_PI * outlet.diameter * outlet.diameter * outlet.speed;
-  return estimateLanding({fluid.density, fluid.viscosity, kGravity, outlet.diameter, flow, outlet.height});
-}
-
-/// What is no state of a thread that falls onto a floor, in the words of the report; empty: it is one. That is: numbers that are not finite; an edge
-/// wider in radius than five times the nozzle's radius or a puddle's depth 2 sqrt(gamma / (rho g)), whichever is larger, and wider than it is
-/// long; an edge longer than half the fall; a node more than two puddle depths and nozzle diameters below the floor or above the nozzle, or
-/// farther from the nozzle's axis than the fall is high; one that is faster than twice free fall and than a film that breaks retracts.
-std::string absurdityOf(const ThreadGroupState& group, const Fluid& fluid, const Outlet& outlet, double thinnest)
-{
-  const double puddle = 2.0 * std::sqrt(fluid.surface_tension / (fluid.density * kGravity)), nozzle = 0.5 * outlet.diameter;
-  const double widest = 5.0 * std::max(nozzle, puddle), around = 2.0 * (puddle + outlet.diameter);
-  const double fastest = 2.0 * std::sqrt(outlet.speed * outlet.speed + 2.0 * kGravity * outlet.height) +
-                         2.0 * std::sqrt(2.0 * fluid.surface_tension / (fluid.density * std::max(thinnest, 1e-9)));
-  for (const ThreadState& t : group.threads)
-  {
-    for (int i = 0; i < t.nodes(); ++i)
-    {
-      if (!t.x[i].allFinite() || !t.v[i].allFinite())
-        return "a number that is not finite";
-      if (t.x[i].z() > outlet.height + around || t.x[i].z() < -around || t.x[i].head<2>().norm() > outlet.height + around)
-        return text("a node %g m aside and %g m above the floor", t.x[i].head<2>().norm(), t.x[i].z());
-      if (t.v[i].norm() > fastest)
-        return text("a node of %g m/s, where %g is fast", t.v[i].norm(), fastest);
-    }
-    for (int j = 0; j < t.edges(); ++j)
-    {
-      const double length = t.edge(j).norm(), radius = t.radius(j);
-      if (!(t.volume[j] > 0) || !std::isfinite(radius))
-        return "an edge without a radius";
-      if (radius > widest && radius > length)
-        return text("an edge of %g m in radius and %g m long", radius, length);
-      if (length > 0.5 * outlet.height)
-        return text("an edge of %g m", length);
-    }
-  }
-  return "";
-}
-
-struct Poured
-{
-  std::string outcome;           ///< works, warned, refused, stopped
-  std::string says;              ///< the first warning, or why it was refused
-  std::string absurd;
-  double lost = 0.0;             ///< of the fluid
-  double turns = 0.0, per_turn = 0.0;
-  double simulated = 0.0, seconds = 0.0;
-  long substeps = 0;
-};
-
-/// Until the thread has landed and should have turned some times; or `most` substeps.
-Poured pour(const Fluid& fluid, const Outlet& outlet, double turns, long most)
-{
-  Poured p;
-  const double begin = threadSeconds();
-  SceneConfig config;
-  try
-  {
-    config = parseScene(sceneText(fluid, outlet, 0.002, "", ""), "poured");
-  }
-  catch (const SceneError& error)
-  {
-    p.outcome = "refused";
-    p.says = error.what();
-    return p;
-  }
-  p.outcome = config.warnings.empty() ? "works" : "warned";
-  p.says = config.warnings.empty() ? "" : config.warnings.front();
-  const Landing landing = landingOf(fluid, outlet);
-  const double duration = 1.5 * 2.0 * outlet.height / (outlet.speed + landing.speed) + (landing.slender() ? turns * 2.0 * M_PI / landing.frequency : 1.0);
-  const double thinnest = config.threads[0].breakup_radius;
-  Simulation simulation(config);
-  Landings landings(simulation.state().threads[0].threads[0]);
-  while (simulation.state().time < duration && p.substeps < most)
-  {
-    const StepReport report = simulation.step(simulation.defaultInputs());
-    p.substeps += report.substeps;
-    if (!report.ok)
-    {
-      p.outcome = "stopped";
-      p.says = report.message;
-      break;
-    }
-    const ThreadGroupState& group = simulation.state().threads[0];
-    p.absurd = absurdityOf(group, fluid, outlet, thinnest);
-    if (!p.absurd.empty())
-      break;
-    landings.look(group.threads[0], simulation.state().time);
-    ThreadVolumes volumes;
-    volumes.add(group);
-    p.lost = std::max(p.lost, std::abs(volumes.missing()));
-  }
-  const CoilTrace trace(landings);
-  p.turns = trace.turns();
-  p.per_turn = p.turns > 0 ? trace.perTurn() : 0.0;
-  p.simulated = simulation.state().time;
-  p.seconds = threadSeconds() - begin;
-  return p;
-}
-
-/// What 100 scenes add up to.
-struct Tally
-{
-  int scenes = 0, works = 0, warned = 0, refused = 0, stopped = 0, absurd = 0, unwarned = 0;
-  double lost = 0.0;
-
-  void add(StudyContext& context, const Fluid& fluid, const Outlet& outlet, const Poured& p)
-  {
-    // few edges in what turns: a coil of which nothing was said
-    const bool unresolved = p.outcome == "works" && p.turns > 2.0 && p.per_turn < kFewPerTurn;
-    ++scenes;
-    works += p.outcome == "works";
-    warned += p.outcome == "warned";
-    refused += p.outcome == "refused";
-    stopped += p.outcome == "stopped";
-    absurd += !p.absurd.empty();
-    unwarned += unresolved;
-    lost = std::max(lost, p.lost);
-    Row& row = context.row();
-    row.set("fluid", fluid.name).set("viscosity", fluid.viscosity).set("nozzle_mm", 1e3 * outlet.diameter).set("height_m", outlet.height);
-    row.set("speed_m_s", outlet.speed).set("outcome", p.absurd.empty() ? p.outcome : "ABSURD: " + p.absurd);
-    row.set("turns", p.turns).set("edges_per_turn", p.per_turn).set("simulated_s", p.simulated).set("substeps", static_cast<double>(p.substeps));
-    row.set("seconds", p.seconds).set("lost", p.lost).set("says", p.says.substr(0, 200));
-  }
-};
-
-void pourAll(StudyContext& context)
-{
-  Tally tally;
-  int done = 0;
-  for (std::size_t f = 0; f < kFluids.size(); ++f)
-    for (std::size_t o = 0; o < kOutlets.size(); ++o)
-    {
-      ++done;
-      if (context.quick() && (f % 4 != 0 || o == 2))
-        continue;
-      context.progress(done, static_cast<int>(kFluids.size() * kOutlets.size()), kFluids[f].name);
-      tally.add(context, kFluids[f], kOutlets[o], context.quick() ? pour(kFluids[f], kOutlets[o], 2, 600) : pour(kFluids[f], kOutlets[o], 6, 60000));
-    }
-  context.metric("scenes", tally.scenes);
-  context.metric("works", tally.works);
-  context.metric("warned", tally.warned);
-  context.metric("refused", tally.refused);
-  context.metric("stopped", tally.stopped);
-  context.metric("lost_volume", tally.lost);
-  context.metric("unresolved_unwarned", tally.unwarned);
-  context.metric("absurd_states", tally.absurd);
-}
-
-/// The coils of the reference in the units of some fluid: lengths and times of coils without surface tension scale with its kinematic viscosity.
+/// The coils of the reference in the units of some fluid: lengths and times of coils without surface tension scale with
+/// its kinematic viscosity.
 struct Scaled
 {
   const char* name;
   double density, viscosity;
   double time() const { return std::cbrt(viscosity / density / (CoilFluid::viscosity / CoilFluid::density)); }
   double length() const { return time() * time(); }
+  Fluid fluid() const { return {name, density, viscosity, 0.0}; }
+  Outlet outlet(double height) const
+  {
+    return {length() * CoilFluid::diameter, length() * height, CoilFluid::speed * length() / time()};
+  }
+};
+
+/// How a coil is started, in the units of the reference. Several motions are stable at some heights, and the start
+/// decides which one is reached: a steady coil, a coil on another branch, or folding to and fro.
+struct Start
+{
+  double at = 0.0;   ///< height in the table for which this start is; 0: all others, by `swirl: 0.3`
+  double frequency = 0.0, radius = 0.0;        ///< of a circle of the nozzle
+  double stands_at = 0.0;                      ///< time at which the nozzle stands in the middle
+  double from_height = 0.0;                    ///< the nozzle stays there at first
+  double rise_begins = 0.0, rise_ends = 0.0;   ///< times; between them the nozzle rises to its height
+  double finer_edges = 1.0,
+         finer_steps = 1.0;   ///< factors of the lengths and of the longest step that the defaults choose
+};
+
+/// At 15.2 the default swirl turns faster than the coil and ends in folding to and fro; a circle as slow as the coil
+/// reaches it. At 15.7 the steady coil of the default resolution is not stable: its branch ends at 15.9, and with
+/// default steps it ends earlier. At 50.7 circles of the nozzle end in folding; a rise from a height at which the
+/// thread coils reaches the coil.
+const std::vector<Start> kStarts = {{},
+                                    {15.216, 2.05, 0.118, 35, 15.216, 0, 0},
+                                    {15.7232, 2.05, 0.118, 35, 15.7232, 0, 0, 0.5, 0.25},
+                                    {50.7201, 16, 0.07, 17, 38.0401, 40, 80}};
+
+const Start& startOf(double height)
+{
+  for (const Start& start : kStarts)
+    if (std::abs(start.at / height - 1) < 1e-4)
+      return start;
+  return kStarts.front();
+}
+
+/// The motion as a table of the nozzle's poses.
+TableMotion motionOf(const Start& start, double height, const Scaled& fluid, const Pose& nozzle)
+{
+  constexpr double kInterval = 0.1;
+  TableMotion motion;
+  const double end = std::max(start.stands_at, start.rise_ends) + 2 * kInterval;
+  for (double t = 0; t < end; t += kInterval)
+  {
+    const double turn = 2 * M_PI / start.frequency,
+                 radius = start.radius * std::clamp((start.stands_at - t) / turn, 0.0, std::min(1.0, t / turn));
+    const double risen = start.rise_ends > 0
+                             ? std::clamp((t - start.rise_begins) / (start.rise_ends - start.rise_begins), 0.0, 1.0)
+                             : 1.0;
+    Pose pose = nozzle;
+    pose.position =
+        fluid.length() * Eigen::Vector3d(radius * std::cos(start.frequency * t), radius * std::sin(start.frequency * t),
+                                         start.from_height + risen * (height - start.from_height));
+    motion.poses.append(t * fluid.time(), pose);
+  }
+  return motion;
+}
+
+SceneConfig coilScene(const Scaled& fluid, double height)
+{
+  const Start& start = startOf(height);
+  SceneConfig scene =
+      parseScene(pouredScene(fluid.fluid(), fluid.outlet(height), 0.05 * start.finer_steps * fluid.time(),
+                             start.at > 0 ? "" : ", swirl: 0.3", ", centreline_on_surface: true"),
+                 "coil");
+  ThreadConfig& thread = scene.threads[0];
+  if (start.at > 0)
+  {
+    thread.nozzle->motion = motionOf(start, height, fluid, thread.nozzle->pose);
+    thread.nozzle->pose = std::get<TableMotion>(thread.nozzle->motion).poses.evaluate(0.0);
+  }
+  for (double* length : {&thread.feed_length, &thread.longest_edge, &thread.shortest_edge, &thread.highest_edge})
+    *length *= start.finer_edges;
+  thread.longest_step *= start.finer_steps;
+  return scene;
+}
+
+/// Steps for `duration` seconds and returns what landed.
+CoilTrace watch(Simulation& simulation, double duration, const char* what)
+{
+  const ThreadGroupState& group = simulation.state().threads[0];
+  Landings landings(group.threads[0]);
+  for (const double end = simulation.state().time + duration; simulation.state().time < end;)
+  {
+    const StepReport report = simulation.step(simulation.defaultInputs());
+    if (!report.ok)
+      throw std::runtime_error(std::string("coil of ") + what + ": " + report.message);
+    landings.look(group.threads[0], simulation.state().time);
+  }
+  return CoilTrace(landings);
+}
+
+/// Largest errors of the coils that the defaults resolve, and of those that were resolved more finely.
+struct CoilErrors
+{
+  double frequency = 0.0, radius = 0.0, finer = 0.0;
+  int steady = 0, unsteady = 0, refined = 0;
 };
 
 /// Waits for a steady coil and measures it.
-void coil(StudyContext& context, const Scaled& fluid, double height, double& worst_frequency, double& worst_radius)
+void coil(StudyContext& context, const Scaled& fluid, double height, CoilErrors& errors)
 {
   const double begin = threadSeconds();
-  const Fluid thin{fluid.name, fluid.density, fluid.viscosity, 0.0};
-  const Outlet outlet{fluid.length() * CoilFluid::diameter, fluid.length() * height, CoilFluid::speed * fluid.length() / fluid.time()};
-  const Landing landing = landingOf(thin, outlet);
-  Simulation simulation(parseScene(sceneText(thin, outlet, 0.05 * fluid.time(), ", swirl: 0.3", ", centreline_on_surface: true"), "coil"));
-  const auto watch = [&](double duration) {
-    Landings landings(simulation.state().threads[0].threads[0]);
-    for (const double end = simulation.state().time + duration; simulation.state().time < end;)
-    {
-      const StepReport report = simulation.step(simulation.defaultInputs());
-      if (!report.ok)
-        throw std::runtime_error(std::string("coil of ") + fluid.name + ": " + report.message);
-      landings.look(simulation.state().threads[0].threads[0], simulation.state().time);
-    }
-    return CoilTrace(landings);
-  };
-  constexpr double kSteady = 2e-3;   // change of the frequency, and of the radius, from one window to the next
-  constexpr int kMostWindows = 60;
+  const Outlet outlet = fluid.outlet(height);
+  const Landing landing = landingOf(fluid.fluid(), outlet);
+  const Start& start = startOf(height);
+  Simulation simulation(coilScene(fluid, height));
+  // From one window of three turns to the next the coil's frequency and radius change by less than kSteady, twice, and
+  // its radius varies by less than kRound within a window. A window ends between two landings, which makes about 3e-3
+  // of its frequency.
+  constexpr double kSteady = 5e-3, kRound = 0.02;
+  constexpr int kMostWindows = 120;   // of which up to 20 pass before the fluid has landed
+  const double started = fluid.time() * std::max(start.stands_at, start.rise_ends);
+  CoilTrace trace =
+      watch(simulation, std::max(started, 2.0 * outlet.height / (outlet.speed + landing.speed)), fluid.name);
   double before = 0.0, radius_before = 0.0;
-  CoilTrace trace = watch(2.0 * outlet.height / (outlet.speed + landing.speed));
   int windows = 0, steady = 0;
   for (; windows < kMostWindows && steady < 2; ++windows)
   {
-    // the estimate is up to three times too fast; while the thread folds to and fro it hardly turns
-    trace = watch(6.0 * M_PI / (before > 0 ? std::max(before, landing.frequency / 4) : landing.frequency));
+    // The estimate is up to three times too fast. A thread that folds to and fro hardly turns.
+    trace = watch(simulation, 6.0 * M_PI / (before > 0 ? std::max(before, landing.frequency / 4) : landing.frequency),
+                  fluid.name);
     const double now = trace.turns() > 1.0 ? trace.frequency() : 0.0;
-    steady = now > 0 && std::abs(now - before) < kSteady * now && std::abs(trace.radius() - radius_before) < kSteady * trace.radius() ? steady + 1 : 0;
+    const bool same = now > 0 && std::abs(now - before) < kSteady * now &&
+                      std::abs(trace.radius() - radius_before) < kSteady * trace.radius();
+    steady = same && trace.unsteadiness() < kRound ? steady + 1 : 0;
     before = now;
     radius_before = trace.radius();
   }
+  const ThreadState& thread = simulation.state().threads[0].threads[0];
   const double frequency = trace.frequency() * fluid.time(), radius = trace.radius() / fluid.length();
+  const bool refined = start.finer_edges < 1 || start.finer_steps < 1;
   Row& row = context.row();
-  row.set("fluid", fluid.name).set("H", height).set("Omega", frequency).set("R", radius).set("unsteadiness", trace.unsteadiness());
-  row.set("edges_per_turn", trace.turns() > 0 ? trace.perTurn() : 0.0).set("windows", windows).set("simulated_s", simulation.state().time);
-  row.set("nodes", simulation.state().threads[0].threads[0].nodes()).set("seconds", threadSeconds() - begin);
+  row.set("fluid", fluid.name)
+      .set("H", height)
+      .set("start", start.at > 0 ? "motion of the nozzle" : "swirl")
+      .set("edges", refined ? "finer" : "default");
+  row.set("Omega", frequency)
+      .set("R", radius)
+      .set("unsteadiness", trace.unsteadiness())
+      .set("steady", steady >= 2 ? "yes" : "no");
+  row.set("edges_per_turn", edgesPerTurn(thread, trace.radius()))
+      .set("windows", windows)
+      .set("simulated_s", simulation.state().time);
+  row.set("nodes", thread.nodes()).set("seconds", threadSeconds() - begin);
+  errors.steady += steady >= 2;
+  errors.unsteady += steady < 2;
+  errors.refined += refined;
   const SteadyCoil* reference = nearestStableCoil(height, frequency);
   if (!reference)
     return;
-  row.set("branch", reference->branch).set("R_error", radius / reference->radius - 1);
+  const double frequency_error = frequency / reference->frequency - 1, radius_error = radius / reference->radius - 1;
+  row.set("branch", reference->branch).set("Omega_error", frequency_error).set("R_error", radius_error);
   row.check(frequency, reference->frequency, kCoilBound * reference->frequency, "steady coils, coiling_grid.csv");
-  worst_frequency = std::max(worst_frequency, std::abs(frequency / reference->frequency - 1));
-  worst_radius = std::max(worst_radius, std::abs(radius / reference->radius - 1));
+  if (refined)
+    errors.finer = std::max({errors.finer, std::abs(frequency_error), std::abs(radius_error)});
+  else
+  {
+    errors.frequency = std::max(errors.frequency, std::abs(frequency_error));
+    errors.radius = std::max(errors.radius, std::abs(radius_error));
+  }
 }
 
 void coilAll(StudyContext& context)
 {
-  const std::vector<Scaled> fluids = {{"thesis 5.5", CoilFluid::density, CoilFluid::viscosity}, {"honey", 1400, 10}, {"glass melt", 2500, 1e3}, {"tar", 1200, 3e4}};
-  double frequency = 0.0, radius = 0.0, last = 0.0;
+  const Scaled thesis = {"thesis 5.5", CoilFluid::density, CoilFluid::viscosity};
+  const std::vector<Scaled> others = {{"honey", 1400, 10}, {"glass melt", 2500, 1e3}, {"tar", 1200, 3e4}};
+  CoilErrors errors;
+  double last = 0.0;
   int done = 0;
   if (context.quick())
-    for (std::size_t k = 1; k < fluids.size(); ++k)
-      coil(context, fluids[k], steadyCoils()[4 * k].height, frequency, radius);
+    for (std::size_t k = 0; k < others.size(); ++k)
+      coil(context, others[k], steadyCoils()[4 * k + 4].height, errors);
   else
     for (const SteadyCoil& c : steadyCoils())
       if (c.stable && c.height > 1.0001 * last)
       {
         last = c.height;
-        context.progress(done++, 32, "coil at H = " + std::to_string(c.height));
-        coil(context, fluids[0], c.height, frequency, radius);
+        context.progress(done++, 30, "coil at H = " + std::to_string(c.height));
+        coil(context, thesis, c.height, errors);
       }
-  context.metric("worst_frequency_error", frequency);
-  context.metric("worst_radius_error", radius);
+  context.metric("steady_coils", errors.steady);
+  context.metric("coils_not_steady", errors.unsteady);
+  context.metric("coils_with_finer_edges", errors.refined);
+  context.metric("worst_frequency_error", errors.frequency);
+  context.metric("worst_radius_error", errors.radius);
+  if (errors.refined > 0)
+    context.metric("worst_error_with_finer_edges", errors.finer);
 }
 
-}  // namespace
+}   // namespace
 
 void runThreadDefaults(StudyContext& context)
 {
   coilAll(context);
   pourAll(context);
-  context.note("works: without a warning. refused: when the scene was read. stopped: in a step, whose message says why.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study
