@@ -12,6 +12,7 @@
 #include "export_program.h"
 #include "holder_meshes.h"
 #include "picture.h"
+#include "video_file.h"
 #include "../study/processes.h"
 
 /// bag_to_video BAG --out FILE.mp4|FILE.gif: pictures of what was recorded, joined by ffmpeg.
@@ -51,13 +52,13 @@ class Ffmpeg
 public:
   Ffmpeg(const std::string& file, bool gif, double fps, int width, int height) : file_(file), gif_(gif)
   {
-    if (std::system("command -v ffmpeg >/dev/null && command -v ffprobe >/dev/null") != 0)
+    if (std::system("command -v ffmpeg >/dev/null") != 0)
       throw BadInput("ffmpeg is not installed; it joins the pictures: apt install ffmpeg");
     std::signal(SIGPIPE, SIG_IGN);   // told by fwrite
     char input[200];
     std::snprintf(input, sizeof input, "ffmpeg -y -loglevel error -f rawvideo -pixel_format rgb24 -video_size %dx%d -framerate %.9g -i - ", width, height, fps);
     const std::string output = gif ? "-filter_complex 'split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4' -f gif "
-                                   : "-c:v libx264 -preset veryfast -crf 18 -pix_fmt yuv420p -movflags +faststart -f mp4 ";
+                                   : "-sws_flags fast_bilinear -c:v libx264 -preset veryfast -crf 18 -pix_fmt yuv420p -movflags +faststart -f mp4 ";
     pipe_ = popen((input + output + slender::shellWord(file)).c_str(), "w");
     if (!pipe_)
       throw std::runtime_error(std::string("ffmpeg cannot be started: ") + std::strerror(errno));
@@ -77,23 +78,11 @@ public:
   {
     const int status = pclose(pipe_);
     pipe_ = nullptr;
-    if (status != 0 || inFile() != pictures_)
+    if (status != 0 || slender::picturesIn(file_) != pictures_)   // the status does not tell when the end of the file could not be written
       fail();
   }
 
 private:
-  /// Pictures that a player finds: ffmpeg's exit status does not tell when the end of the file could not be written.
-  long inFile() const
-  {
-    const std::string probe = "ffprobe -v error -count_packets -select_streams v -show_entries stream=nb_read_packets -of csv=p=0 ";
-    FILE* pipe = popen((probe + slender::shellWord(file_)).c_str(), "r");
-    long count = 0;
-    if (pipe && std::fscanf(pipe, "%ld", &count) != 1)
-      count = 0;
-    if (pipe)
-      pclose(pipe);
-    return count;
-  }
   [[noreturn]] void fail() const
   {
     throw std::runtime_error(std::string("ffmpeg failed to write the ") + (gif_ ? "gif" : "mp4") + "; its message is above (is there room on the disk?)");

@@ -10,6 +10,7 @@
 #include "harness.h"
 #include "holder_meshes.h"
 #include "picture.h"
+#include "video_file.h"
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/node/bag_reader.h"
 #include "slender_sim/scene/reader.h"
@@ -219,6 +220,16 @@ TEST_F(Exports, videosHaveTheirFramesAndSize)
   const std::string probe = "ffprobe -v error -count_frames -show_entries stream=codec_name,width,height,nb_read_frames -of csv=p=0 ";
   EXPECT_EQ(shell(probe + path("x.mp4")).output, "h264,160,96,6\n");   // 0, 0.04 ... 0.2 s
   EXPECT_EQ(shell(probe + path("x.gif")).output, "gif,160,96,6\n");
+  for (const char* name : {"x.mp4", "x.gif"})
+  {
+    EXPECT_EQ(picturesIn(path(name)), 6) << name;
+    const std::string whole = contentsOf(path(name));
+    for (const std::size_t left : {whole.size() - 1, whole.size() / 2, whole.size() / 5, std::size_t{10}, std::size_t{0}})
+    {
+      std::ofstream(path("cut"), std::ios::binary | std::ios::trunc) << whole.substr(0, left);
+      EXPECT_EQ(picturesIn(path("cut")), 0) << name << " cut to " << left << " bytes";
+    }
+  }
 }
 
 TEST(Picture, showsTheNearerSurfaceLitFromAboveAndItsShadow)
