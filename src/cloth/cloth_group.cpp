@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/contact/intersection.h"
@@ -114,45 +115,17 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
     if (averages)
       averages_start_[k].noalias() = state.cloths[k].x * averages->weights->transpose();
   }
-  double done = 0.0, share = 1.0;
+  inputs_ = &inputs;
+  duration_ = duration;
   hopeless_ = false;
-  const double shortest = std::ldexp(1.0 - 1e-9, -options_.newton.max_cuts);
   budget_->start(WorkBudget::ofStep(first_.back()));
-  while (done < 1.0)
-  {
-    const double end = done + share > 1.0 - 1e-9 ? 1.0 : done + share;
-    const StepReport sub = substep(inputs, done, end, duration);
-    if (!sub.ok || stepsInterrupted())   // then collision handling and linear solvers may have ended early
-    {
-      report.iterations += sub.iterations;
-      if (sub.failure == StepFailure::input_not_finite || stepsInterrupted() || hopeless_ || budget_->spent() || 0.5 * share < shortest)
-      {
-        report.ok = false;
-        report.failure = sub.failure;
-        report.message = sub.message;
-        report.place = sub.place;
-        report.work = budget_->done();
-        if (stepsInterrupted())
-        {
-          report.failure = StepFailure::interrupted;
-          report.message = std::string("cloths: ") + kStepInterrupted;
-          return report;
-        }
-        if (!hopeless_ && sub.failure != StepFailure::input_not_finite && budget_->spent())
-          blameWork((end - done) * duration, report);
-        blameExplicit(duration, report);
-        return report;
-      }
-      ++report.cut_steps;
-      share *= 0.5;
-      continue;
-    }
-    report.merge(sub);
-    std::swap(work_, next_);
-    addForces(end - done, (end - done) * duration);
-    done = end;
-    share *= 2.0;
-  }
+  SubstepRule rule;
+  rule.longest = duration;
+  rule.max_cuts = options_.newton.max_cuts;
+  SubstepController(rule).run(*this, duration, report);
+  report.work = budget_->done();
+  if (!report.ok)
+    return report;
   std::swap(state, work_);
   std::swap(pin_forces_, pin_sums_);
   std::swap(contact_forces_, contact_sums_);
@@ -160,8 +133,45 @@ StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inpu
   report.repulsions = collisions_.repulsions;
   report.impulses = collisions_.impulses;
   report.zones = collisions_.zones;
-  report.work = budget_->done();
   return report;
+}
+
+StepFailure ClothGroup::attempt(const Substep& substep, StepReport& report)
+{
+  sub_report_ = tryStep(*inputs_, substep.from / duration_, substep.to / duration_, substep.length);
+  report = sub_report_;
+  report.ok = true;   // a failure is told by refuse() when no shorter substep succeeds
+  report.message.clear();
+  // The controller counts the substep. What remains is how often cloths divided it further.
+  report.substeps = std::max(0, report.substeps - static_cast<int>(model_.cloths.size()));
+  return std::exchange(report.failure, StepFailure::none);
+}
+
+void ClothGroup::accept(const Substep& substep)
+{
+  std::swap(work_, next_);
+  addForces(substep.length / duration_, substep.length);
+}
+
+bool ClothGroup::shorterMayHelp(StepFailure failure) const
+{
+  return failure != StepFailure::input_not_finite && !hopeless_ && !budget_->spent();
+}
+
+void ClothGroup::refuse(const Substep& substep, StepFailure failure, StepReport& report)
+{
+  report.ok = false;
+  report.failure = failure;
+  report.place = sub_report_.place;
+  if (failure == StepFailure::interrupted)
+  {
+    report.message = std::string("cloths: ") + kStepInterrupted;
+    return;
+  }
+  report.message = sub_report_.message;
+  if (!hopeless_ && failure != StepFailure::input_not_finite && budget_->spent())
+    blameWork(substep.length, report);
+  blameExplicit(duration_, report);
 }
 
 /// Collisions change the velocities of what touches only. Where that is little mass, as under the point of a needle, it would carry little of the load,
@@ -317,10 +327,9 @@ CollisionReport ClothGroup::collide(double h)
 }
 
 /// From work_ to next_; times as shares of the step.
-StepReport ClothGroup::substep(const ClothGroupInputs& inputs, double from, double to, double duration)
+StepReport ClothGroup::tryStep(const ClothGroupInputs& inputs, double from, double to, double h)
 {
   StepReport report;
-  const double h = (to - from) * duration;
   for (std::size_t s = 0; s < model_.solids.size(); ++s)   // uniformly from here to the end of the step
     next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
   if (!stepCloths(inputs, to, h, true, report))

@@ -194,57 +194,38 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
     toPoints(state.x, x_);
     system.averagesOf(x_, averages_start_);
   }
-  const bool adaptive = options.error_tolerance > 0;
-  // cuts that come again and again do not help: what fails everywhere should fail soon
-  const int most_cuts = 3 * options.newton.max_cuts;
-  double t = 0.0, h = adaptive && state.next_step > 0 ? std::clamp(state.next_step, std::min(options.min_step, duration), duration) : duration;
-  while (t < duration)
-  {
-    if (budget_->spent())
-      return refuseUnsolved(report, StepFailure::work_exceeded, h);
-    const bool last = t + h > duration * (1 - 1e-9);
-    const double to = last ? duration : t + h, length = to - t;
-    StepReport sub;
-    StepFailure failure;
-    if (options.integrator == Integrator::imex)
-      failure = imexStep(inputs, t, to, duration, sub);
-    else
-      failure = isExplicit() ? explicitStep(inputs, t, to, duration, sub) : implicitStep(inputs, t, to, duration, sub);
-    if (stepsInterrupted())   // linear solvers may have ended early
-      return refuse(report, StepFailure::interrupted, kStepInterrupted);
-    const double ratio = adaptive ? sub.error_estimate / options.error_tolerance : 0.0;
-    const bool inaccurate = failure == StepFailure::none && ratio > 1 && 0.5 * length >= options.min_step;
-    if (failure != StepFailure::none || inaccurate)
-    {
-      report.iterations += sub.iterations;
-      report.linear_iterations += sub.linear_iterations;
-      report.factorizations += sub.factorizations;
-      if (budget_->spent())
-        continue;
-      const bool shortest = 0.5 * length < (adaptive ? options.min_step : duration * std::ldexp(1 - 1e-9, -options.newton.max_cuts));
-      if (!inaccurate && (isExplicit() || shortest || report.cut_steps >= most_cuts))
-        return refuseUnsolved(report, failure, length);
-      report.cut_steps += !inaccurate;
-      h = length * (inaccurate ? std::clamp(stepFactor(ratio), 0.2, 0.8) : 0.5);
-      continue;
-    }
-    std::swap(work_, next_);
-    ++sub.substeps;
-    report.merge(sub);
-    h = std::max(last && adaptive ? h : 0.0, length * (adaptive ? std::clamp(stepFactor(ratio), 0.5, 2.0) : 2.0));
-    h = std::min(h, duration);
-    t = to;
-  }
+  inputs_ = &inputs;
+  duration_ = duration;
+  SubstepController controller({duration, state.next_step, options.error_tolerance, options.min_step, order(options.integrator), options.newton.max_cuts});
+  controller.run(*this, duration, report);
+  if (!report.ok)
+    return report;
   report.work = ownWork();
-  work_.next_step = adaptive ? h : 0.0;
+  work_.next_step = controller.nextLength();
   std::swap(state, work_);
   return report;
 }
 
-/// Next step length over this one for a local error that is `ratio` times the tolerance, with a margin.
-double ClothStepper::Impl::stepFactor(double ratio) const
+StepFailure ClothStepper::Impl::attempt(const Substep& substep, StepReport& report)
 {
-  return 0.9 * std::pow(std::max(ratio, 1e-12), -1.0 / (order(options.integrator) + 1));
+  if (budget_->spent())
+    return StepFailure::work_exceeded;
+  if (options.integrator == Integrator::imex)
+    return imexStep(*inputs_, substep.from, substep.to, duration_, report);
+  return isExplicit() ? explicitStep(*inputs_, substep.from, substep.to, duration_, report)
+                      : implicitStep(*inputs_, substep.from, substep.to, duration_, report);
+}
+
+void ClothStepper::Impl::accept(const Substep&) { std::swap(work_, next_); }
+
+bool ClothStepper::Impl::shorterMayHelp(StepFailure) const { return !isExplicit() && !budget_->spent(); }
+
+void ClothStepper::Impl::refuse(const Substep& substep, StepFailure failure, StepReport& report)
+{
+  if (failure == StepFailure::interrupted)
+    refuse(report, failure, kStepInterrupted);
+  else
+    refuseUnsolved(report, budget_->spent() ? StepFailure::work_exceeded : failure, substep.length);
 }
 
 void ClothStepper::Impl::combine(const Combination& c, PointVector& result) const

@@ -7,10 +7,11 @@
 #include "cloth_system.h"
 #include "slender_sim/cloth/plastic_flow.h"
 #include "slender_sim/dynamics/integrator.h"
+#include "slender_sim/dynamics/substep_controller.h"
 
 namespace slender {
 
-class ClothStepper::Impl
+class ClothStepper::Impl : SubstepEquations
 {
 public:
   Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
@@ -34,7 +35,10 @@ private:
   std::string explain(StepFailure failure, double length);
   /// Refuses a step of `length` seconds that could not be solved. The message says why and where the cloth was farthest from a solution.
   StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length);
-  double stepFactor(double ratio) const;
+  StepFailure attempt(const Substep& substep, StepReport& report) override;
+  void accept(const Substep& substep) override;
+  bool shorterMayHelp(StepFailure failure) const override;
+  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override;
   StepFailure implicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
   void combine(const Combination& c, PointVector& result) const;
   StepFailure finish(const Stage& stage, const ClothInputs& inputs, double h, double fraction, StepReport& report);
@@ -59,6 +63,8 @@ private:
   bool own_budget_ = true;
   long ownWork() const { return own_budget_ ? budget_->done() : 0; }   ///< others report their budgets themselves
   PlasticFlow plastic_;
+  const ClothInputs* inputs_ = nullptr;   ///< of the present step
+  double duration_ = 0;                   ///< of the present step [s]
   ClothState work_, next_;   ///< start of a substep, and its end
   Eigen::Matrix3Xd pins_start_, averages_start_, averages_, wind_v_;
   std::vector<int> at_bound_;

@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 
 #include "rod_stepper_impl.h"
+#include "slender_sim/dynamics/substep_controller.h"
 #include "slender_sim/rod/average_projection.h"
 #include "slender_sim/linalg/interruption.h"
 
@@ -130,7 +131,7 @@ private:
 
 }  // namespace
 
-class AveragedRod::Impl
+class AveragedRod::Impl : public SubstepEquations
 {
 public:
   Impl(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> a, const TimeConfig& time)
@@ -139,12 +140,13 @@ public:
     plan.stages.reserve(2);
   }
 
-  StepFailure substep(const RodInputs& inputs, double duration, double t, double h, StepReport& report)
+  StepFailure attempt(const Substep& substep, StepReport& report) override
   {
+    const double t = substep.from, h = substep.length;
     planStep(Integrator::implicit_euler, rod.time.spectral_radius, h, rod.work.last_step, plan);
-    if (const StepFailure failure = rod.beginStep(plan, inputs, duration, t, h); failure != StepFailure::none)
+    if (const StepFailure failure = rod.beginStep(plan, *inputs, duration, t, h); failure != StepFailure::none)
       return failure;
-    rod.beginStage(0, inputs, duration, t, h);
+    rod.beginStage(0, *inputs, duration, t, h);
     at = start + (t + h) / duration * (*targets - start);
     if (!equations.meet(rod.model->mass, at))
       return StepFailure::singular_matrix;
@@ -155,10 +157,27 @@ public:
       return newton.failure;
     report.residual = std::max(report.residual, newton.residual);
     report.max_strain = std::max(report.max_strain, newton.max_strain);
-    rod.finishStep(inputs, duration, t, h, report);
+    rod.finishStep(*inputs, duration, t, h, report);
     forces = -Eigen::Map<const Eigen::Matrix3Xd>(equations.multipliers().data(), 3, averages->rows());
     bearShares();
     return StepFailure::none;
+  }
+
+  void accept(const Substep& substep) override
+  {
+    rod.moveGrasps(*inputs, duration, substep.to);
+    std::swap(rod.work, rod.next);
+  }
+
+  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override
+  {
+    if (failure == StepFailure::interrupted)
+    {
+      rod.refuse(report, failure, kStepInterrupted);
+      return;
+    }
+    const char* dependent = "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
+    rod.refuseUnsolved(report, failure, substep.length, false, failure == StepFailure::singular_matrix ? dependent : "", true);
   }
 
   /// Averages pull at held nodes, too, which hand that on to what holds them.
@@ -186,6 +205,8 @@ public:
   StepPlan plan;
   Eigen::Matrix3Xd start, at, forces;
   const Eigen::Matrix3Xd* targets = nullptr;
+  const RodInputs* inputs = nullptr;   ///< of the present step
+  double duration = 0.0;               ///< of the present step [s]
 };
 
 AveragedRod::AveragedRod(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> averages, const TimeConfig& time)
@@ -223,36 +244,12 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
     for (Averages::InnerIterator entry(*impl_->averages, i); entry; ++entry)
       impl_->start.col(i) += entry.value() * state.x.col(entry.col());
   impl_->targets = &targets;
-  double t = 0.0, h = duration;
-  while (t < duration)
-  {
-    const bool last = t + h > duration * (1 - 1e-9);
-    const double length = last ? duration - t : h;
-    StepReport sub;
-    const StepFailure failure = impl_->substep(inputs, duration, t, length, sub);
-    if (failure != StepFailure::none)
-    {
-      report.iterations += sub.iterations;
-      report.factorizations += sub.factorizations;
-      if (stepsInterrupted())
-        return rod.refuse(report, StepFailure::interrupted, kStepInterrupted);
-      if (0.5 * length < duration * std::ldexp(1.0 - 1e-9, -rod.time.newton.max_cuts))
-        return rod.refuseUnsolved(report, failure, length, false,
-                                  failure == StepFailure::singular_matrix
-                                    ? "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes"
-                                    : "",
-                                  true);
-      ++report.cut_steps;
-      h = 0.5 * length;
-      continue;
-    }
-    t = last ? duration : t + length;
-    rod.moveGrasps(inputs, duration, t);
-    std::swap(rod.work, rod.next);
-    ++sub.substeps;
-    report.merge(sub);
-    h = 2.0 * length;
-  }
+  impl_->inputs = &inputs;
+  impl_->duration = duration;
+  const SubstepRule rule{duration, 0.0, 0.0, rod.time.min_step, 1, rod.time.newton.max_cuts};
+  SubstepController(rule).run(*impl_, duration, report);
+  if (!report.ok)
+    return report;
   state = rod.work;
   return report;
 }

@@ -80,65 +80,20 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
   if (explicit_ && group)
     explicit_->begin(*group, *group_inputs, duration);
 
-  const bool explicit_step = explicit_ != nullptr;
-  const bool adaptive = time_.error_tolerance > 0 && !explicit_step;
-  const bool conserving = conserves(states);
+  conserving_ = conserves(states);
   double allowance = 0.0;
-  const double start_energy = conserving ? energy(true, &allowance) : 0.0;
-  double t = 0.0, h = adaptive && !rods_.empty() && states[0].next_step > 0 ? states[0].next_step : duration;
-  int cuts = 0;   // since the last good substep
-  while (t < duration)
-  {
-    // the last substep ends exactly with the step; a sliver would be worse than a slightly longer one
-    const bool last = t + h > duration * (1 - 1e-9);
-    const double length = last ? duration - t : h;
-    const bool can_shorten = !explicit_step && 0.5 * length >= time_.min_step;
-    StepReport sub;
-    failed_ = 0;
-    StepFailure failure = explicit_step ? explicit_->step(inputs_, duration_, t, length, sub, failed_) : implicitStep(t, length, sub);
-    if (conserving && failure == StepFailure::none && energy(false, nullptr) > start_energy + allowance)
-      failure = StepFailure::energy_grew;
-    const double ratio = sub.error_estimate / time_.error_tolerance;
-    const bool inaccurate = adaptive && failure == StepFailure::none && ratio > 1 && can_shorten;
-    if (failure != StepFailure::none || inaccurate)
-    {
-      report.iterations += sub.iterations;
-      report.factorizations += sub.factorizations;
-      const auto refuse_bodies = [&report](StepFailure why, const std::string& message) {
-        report.ok = false;
-        report.failure = why;
-        report.message = message;
-        return report;
-      };
-      if (stepsInterrupted())
-        return rods_.empty() ? refuse_bodies(StepFailure::interrupted, kStepInterrupted)
-                             : rods_[failed_]->refuse(report, StepFailure::interrupted, kStepInterrupted);
-      const bool shortest = !adaptive && 0.5 * length < duration * std::ldexp(1.0 - 1e-9, -time_.newton.max_cuts);
-      if (!inaccurate && (!can_shorten || shortest || ++cuts > time_.newton.max_cuts))
-        return rods_.empty() ? refuse_bodies(failure, "the bodies' motion was not found: use a shorter step")
-                             : rods_[failed_]->refuseUnsolved(report, failure, length, explicit_step);
-      report.cut_steps += !inaccurate;
-      h = length * (inaccurate ? std::clamp(stepFactor(ratio), 0.2, 0.8) : 0.5);
-      continue;
-    }
-    t = last ? duration : t + length;
-    for (std::size_t r = 0; r < rods_.size(); ++r)
-    {
-      rods_[r]->moveGrasps(inputs_[r], duration, t);
-      std::swap(rods_[r]->work, rods_[r]->next);
-    }
-    if (coupled_)
-      coupled_->commitStep();
-    if (explicit_)
-      explicit_->commitStep();
-    cuts = 0;
-    ++sub.substeps;
-    report.merge(sub);
-    h = std::max(last && adaptive ? h : 0.0, length * (adaptive ? std::clamp(stepFactor(ratio), 0.5, 2.0) : 2.0));
-  }
+  const double start_energy = conserving_ ? energy(true, &allowance) : 0.0;
+  most_energy_ = start_energy + allowance;
+  SubstepRule rule{duration, 0.0, explicit_ ? 0.0 : time_.error_tolerance, time_.min_step, order(time_.integrator), time_.newton.max_cuts};
+  if (rule.error_tolerance > 0 && !rods_.empty())
+    rule.first = states[0].next_step;
+  SubstepController controller(rule);
+  controller.run(*this, duration, report);
+  if (!report.ok)
+    return report;
   for (std::size_t r = 0; r < rods_.size(); ++r)
   {
-    rods_[r]->work.next_step = adaptive ? std::min(h, duration) : 0.0;
+    rods_[r]->work.next_step = controller.nextLength();
     states[r] = rods_[r]->work;
   }
   if (coupled_)
@@ -146,6 +101,45 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
   if (explicit_ && group)
     explicit_->end(*group);
   return report;
+}
+
+StepFailure StepLoop::attempt(const Substep& substep, StepReport& report)
+{
+  failed_ = 0;
+  const StepFailure failure = explicit_ ? explicit_->step(inputs_, duration_, substep.from, substep.length, report, failed_)
+                                        : implicitStep(substep.from, substep.length, report);
+  if (conserving_ && failure == StepFailure::none && energy(false, nullptr) > most_energy_)
+    return StepFailure::energy_grew;
+  return failure;
+}
+
+void StepLoop::accept(const Substep& substep)
+{
+  for (std::size_t r = 0; r < rods_.size(); ++r)
+  {
+    rods_[r]->moveGrasps(inputs_[r], duration_, substep.to);
+    std::swap(rods_[r]->work, rods_[r]->next);
+  }
+  if (coupled_)
+    coupled_->commitStep();
+  if (explicit_)
+    explicit_->commitStep();
+}
+
+/// Explicit steps have one length, on which their stability depends.
+bool StepLoop::shorterMayHelp(StepFailure) const { return explicit_ == nullptr; }
+
+void StepLoop::refuse(const Substep& substep, StepFailure failure, StepReport& report)
+{
+  if (!rods_.empty())
+  {
+    failure == StepFailure::interrupted ? rods_[failed_]->refuse(report, failure, kStepInterrupted)
+                                        : rods_[failed_]->refuseUnsolved(report, failure, substep.length, explicit_ != nullptr);
+    return;
+  }
+  report.ok = false;
+  report.failure = failure;
+  report.message = failure == StepFailure::interrupted ? kStepInterrupted : "the bodies' motion was not found: use a shorter step";
 }
 
 StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
@@ -192,12 +186,6 @@ std::size_t StepLoop::farthestFromBalance() const
     if (const Largest own = rods_[r]->unbalancedForce(); own.any())
       force.add(static_cast<int>(r), own.value());
   return force.any() ? static_cast<std::size_t>(force.index()) : 0;
-}
-
-/// Next step length over this one for a local error that is `ratio` times the tolerance, with a margin.
-double StepLoop::stepFactor(double ratio) const
-{
-  return 0.9 * std::pow(std::max(ratio, 1e-12), -1.0 / (order(time_.integrator) + 1));
 }
 
 }  // namespace slender

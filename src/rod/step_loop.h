@@ -6,17 +6,17 @@
 #include "coupled_system.h"
 #include "explicit_system.h"
 #include "rod_stepper_impl.h"
+#include "slender_sim/dynamics/substep_controller.h"
 
 namespace slender {
 
-/// Advances one rod, or rods with bodies and contact together, by a step: cuts it where a substep fails, shortens it where it is
-/// inaccurate, and changes the states only when all of it is done.
-class StepLoop
+/// Advances one rod, or rods with bodies and contact together, by a step, and changes the states only when all of it is done.
+class StepLoop : SubstepEquations
 {
 public:
   /// `group` null: a single rod on its own.
   StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, const RodGroupModel* group = nullptr);
-  ~StepLoop();
+  ~StepLoop() override;
 
   /// One state and one input per rod. `group`, its bodies and obstacles, for coupled rods only.
   StepReport step(RodState* states, const RodInputs* inputs, double duration, RodGroupState* group = nullptr, const RodGroupInputs* group_inputs = nullptr);
@@ -28,7 +28,10 @@ private:
   double energy(bool at_start, double* allowance);
   StepFailure implicitStep(double t, double h, StepReport& report);
   std::size_t farthestFromBalance() const;
-  double stepFactor(double ratio) const;
+  StepFailure attempt(const Substep& substep, StepReport& report) override;
+  void accept(const Substep& substep) override;
+  bool shorterMayHelp(StepFailure failure) const override;
+  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override;
 
   const TimeConfig time_;
   std::vector<RodStepper::Impl*> rods_;
@@ -36,6 +39,8 @@ private:
   std::unique_ptr<ExplicitSystem> explicit_;   ///< null: implicit steps
   const RodInputs* inputs_ = nullptr;
   double duration_ = 0;
+  bool conserving_ = false;         ///< the present step may not add to the energy
+  double most_energy_ = 0;          ///< of a step that conserves: that at its start and the allowance [J]
   std::size_t failed_ = 0;   ///< rod that the last failure is about
   StepPlan plan_;
 };

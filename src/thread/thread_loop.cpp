@@ -4,67 +4,109 @@
 #include <cmath>
 
 #include "thread_contact.h"
+#include "slender_sim/dynamics/substep_controller.h"
 #include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
 namespace {
 
+/// Threads that a step advances together, and what the last substep of them came to.
+class ThreadSubsteps : public SubstepEquations
+{
+public:
+  ThreadSubsteps(const ThreadPart* parts, int count, double duration, ThreadContact* contact)
+    : parts_(parts), end_(parts + count), duration_(duration), contact_(contact), failed_(parts)
+  {
+  }
+
+  StepFailure attempt(const Substep& substep, StepReport& report) override;
+  void accept(const Substep&) override {}   // the attempt changes the parts' work states only when it succeeds
+  bool shorterMayHelp(StepFailure failure) const override;
+  bool mend(StepReport& report) override;
+  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override;
+
+private:
+  const ThreadPart* farthestFromBalance() const;
+
+  const ThreadPart *parts_, *end_;
+  double duration_;
+  ThreadContact* contact_;
+  const ThreadPart* failed_;   ///< part that the last failure is about
+};
+
 /// The part on which the largest unbalanced force acts.
-const ThreadPart* farthestFromBalance(const ThreadPart* parts, const ThreadPart* end)
+const ThreadPart* ThreadSubsteps::farthestFromBalance() const
 {
   Largest force;
-  for (const ThreadPart* p = parts; p != end; ++p)
+  for (const ThreadPart* p = parts_; p != end_; ++p)
     if (const Largest own = p->thread->unbalancedForce(); own.any())
-      force.add(static_cast<int>(p - parts), own.value());
-  return parts + std::max(force.index(), 0);
+      force.add(static_cast<int>(p - parts_), own.value());
+  return parts_ + std::max(force.index(), 0);
 }
 
-/// Of the parts from `parts` to `end`; on failure `failed` is the part it is about.
-StepFailure substep(const ThreadPart* parts, const ThreadPart* end, double from, double to, double duration, ThreadContact* contact,
-                    StepReport& report, const ThreadPart*& failed)
+StepFailure ThreadSubsteps::attempt(const Substep& substep, StepReport& report)
 {
-  const double h = to - from;
-  for (failed = parts; failed != end; ++failed)
-    if (const StepFailure failure = failed->thread->prepare(from, to, duration); failure != StepFailure::none)
+  const double from = substep.from, to = substep.to, h = to - from;
+  for (failed_ = parts_; failed_ != end_; ++failed_)
+    if (const StepFailure failure = failed_->thread->prepare(from, to, duration_); failure != StepFailure::none)
       return failure;
-  failed = parts;
+  failed_ = parts_;
   const StepFailure failure =
-    contact ? contact->solve(from / duration, to / duration, h, report) : parts->thread->solveAlone(h, report);
+    contact_ ? contact_->solve(from / duration_, to / duration_, h, report) : parts_->thread->solveAlone(h, report);
   if (failure != StepFailure::none)
   {
-    failed = farthestFromBalance(parts, end);
+    failed_ = farthestFromBalance();
     return failure;
   }
-  for (const ThreadPart* p = parts; p != end; ++p)
+  for (const ThreadPart* p = parts_; p != end_; ++p)
     p->thread->takeOver(h);
-  for (failed = parts; failed != end; ++failed)
+  for (failed_ = parts_; failed_ != end_; ++failed_)
   {
-    if (!failed->thread->remesh(contact))
+    if (!failed_->thread->remesh(contact_))
       return StepFailure::overstretched;
-    if (failed->thread->overgrownEdge() >= 0)
+    if (failed_->thread->overgrownEdge() >= 0)
       return StepFailure::squeezed;
   }
   return StepFailure::none;
 }
 
-/// Takes out the sharpest fold of a part, if there is one.
-bool mend(const ThreadPart* parts, const ThreadPart* end, const RemeshGuard* guard)
+/// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by bit.
+bool ThreadSubsteps::shorterMayHelp(StepFailure failure) const
 {
-  for (const ThreadPart* p = parts; p != end; ++p)
-    if (const int fold = p->thread->foldedNode(); fold >= 0 && mendFold(p->thread->work, fold, guard))
+  return !failed_->thread->explicit_step && failure != StepFailure::overstretched && failed_->thread->overgrownEdge() < 0;
+}
+
+/// Takes out the sharpest fold of a part, if there is one.
+bool ThreadSubsteps::mend(StepReport& report)
+{
+  constexpr int kMostFolds = 20;   // in one step
+  if (report.mended_folds >= kMostFolds)
+    return false;
+  for (const ThreadPart* p = parts_; p != end_; ++p)
+    if (const int fold = p->thread->foldedNode(); fold >= 0 && mendFold(p->thread->work, fold, contact_))
+    {
+      ++report.mended_folds;
       return true;
+    }
   return false;
+}
+
+void ThreadSubsteps::refuse(const Substep& substep, StepFailure failure, StepReport& report)
+{
+  const ThreadStepper::Impl& thread = *(failed_ == end_ ? parts_ : failed_)->thread;
+  if (failure == StepFailure::interrupted)
+    thread.refuse(report, failure, kStepInterrupted);
+  else
+    thread.refuseUnsolved(report, failure, substep.length);
 }
 
 }  // namespace
 
 StepReport advanceThreads(const ThreadPart* parts, int count, double duration, ThreadContact* contact)
 {
-  constexpr int kMostFolds = 20;   // in one step
   StepReport report;
   const ThreadPart* const end = parts + count;
-  const ThreadPart* failed = parts;
   double longest = duration;
   for (const ThreadPart* p = parts; p != end; ++p)
   {
@@ -72,39 +114,13 @@ StepReport advanceThreads(const ThreadPart* parts, int count, double duration, T
       return report;
     longest = std::min(longest, p->thread->longestSubstep(duration));
   }
-  const double first = duration / std::ceil(duration / longest * (1 - 1e-9)), shortest = std::ldexp(first, -parts->thread->newton.max_cuts);
-  double t = 0.0, h = first;
-  while (t < duration)
-  {
-    const bool last = t + h > duration * (1 - 1e-9);
-    const double length = last ? duration - t : h;
-    StepReport sub;
-    const StepFailure failure = substep(parts, end, t, last ? duration : t + length, duration, contact, sub, failed);
-    report.merge(sub);
-    if (failure != StepFailure::none)
-    {
-      const ThreadStepper::Impl& thread = *failed->thread;
-      if (stepsInterrupted())
-        return thread.refuse(report, StepFailure::interrupted, kStepInterrupted);
-      // a shorter step now would only hide that all of them are too long, or draw the thread out or thicken it bit by bit
-      if (thread.explicit_step || failure == StepFailure::overstretched || thread.overgrownEdge() >= 0)
-        return thread.refuseUnsolved(report, failure, length);
-      if (0.5 * length < shortest * (1 - 1e-9))
-      {
-        if (report.mended_folds >= kMostFolds || !mend(parts, end, contact))
-          return thread.refuseUnsolved(report, failure, length);
-        ++report.mended_folds;
-        h = first;
-        continue;
-      }
-      ++report.cut_steps;
-      h = 0.5 * length;
-      continue;
-    }
-    ++report.substeps;
-    t = last ? duration : t + length;
-    h = std::min(2.0 * length, first);
-  }
+  SubstepRule rule;
+  rule.longest = duration / std::ceil(duration / longest * (1 - 1e-9));   // all but shortened substeps are equally long
+  rule.max_cuts = parts->thread->newton.max_cuts;
+  ThreadSubsteps substeps(parts, count, duration, contact);
+  SubstepController(rule).run(substeps, duration, report);
+  if (!report.ok)
+    return report;
   for (const ThreadPart* p = parts; p != end; ++p)
     std::swap(*p->state, p->thread->work);
   return report;

@@ -9,6 +9,7 @@
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/contact/surface_collider.h"
+#include "slender_sim/dynamics/substep_controller.h"
 
 namespace slender {
 
@@ -48,7 +49,7 @@ struct ClothGroupInputs
 /// cloth away from its balance by some d, and the next solve, which does not know it, lets go: implicit Euler with a velocity -d / h, which contact takes back
 /// exactly, tr_bdf2 with 4.8 d / h (its stability function goes as that over z), a step in m parts with up to m d / h, so that contacts would pump energy into
 /// the cloth.
-class ClothGroup
+class ClothGroup : SubstepEquations
 {
 public:
   /// Throws std::invalid_argument for models or options that are not valid.
@@ -82,7 +83,11 @@ public:
 private:
   bool stepCloths(const ClothGroupInputs& inputs, double to, double h, bool all, StepReport& report);
   CollisionReport collide(double h);
-  StepReport substep(const ClothGroupInputs& inputs, double from, double to, double duration);
+  StepReport tryStep(const ClothGroupInputs& inputs, double from, double to, double h);
+  StepFailure attempt(const Substep& substep, StepReport& report) override;
+  void accept(const Substep& substep) override;
+  bool shorterMayHelp(StepFailure failure) const override;
+  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override;
   bool lowerOrder();
   bool shareLoads(const CollisionStep& step, bool again);
   void blameExplicit(double duration, StepReport& report) const;
@@ -113,6 +118,9 @@ private:
   std::vector<int> first_;                 ///< point of each cloth; one more at the end
   CollisionReport collisions_;
   std::shared_ptr<WorkBudget> budget_;     ///< of a step, of all that is done in it but by cloths with error control
+  const ClothGroupInputs* inputs_ = nullptr;   ///< of the present step
+  double duration_ = 0;                    ///< of the present step [s]
+  StepReport sub_report_;                  ///< of the last substep
   bool hopeless_ = false;                  ///< the failure of the last substep is one of its start
 
   ClothGroupState work_, next_;
