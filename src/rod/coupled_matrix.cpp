@@ -129,12 +129,14 @@ void CoupledSystem::contactColumns(const ContactRow& contact, bool whole, Column
   }
 }
 
-/// Makes room for the present contacts; true when there was none for some of them.
+/// Makes room for the present contacts that couple unknowns; true when there was none for some of them.
 bool CoupledSystem::takeKeys()
 {
   bool grown = false;
   for (const ContactTerm& term : contact_->terms())
   {
+    if (isOwn(term))
+      continue;
     const std::array<int, 5> key{term.point[0], term.point[1], term.point[2], term.point[3], term.solid};
     const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
     if (at == keys_.end() || *at != key)
@@ -387,6 +389,8 @@ void CoupledSystem::assemble(const HessianShift& shift, bool whole)
   std::array<Columns, 3> rows;
   for (const ContactTerm& term : contact_->terms())
   {
+    if (isOwn(term) && !partOf(term.point[0]).coupled)
+      continue;
     contactColumns(term, rows);
     const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
     for (int c = 0; c < 3; ++c)

@@ -32,12 +32,16 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
       return sum;
     if (takeKeys())
       pattern_valid_ = false;
+    findOwnTerms();
   }
   if (!pattern_valid_)
     buildPattern();
   forRods([&](RodPart& part) {
     RodSystem& system = part.rod->system;
-    part.evaluation = part.coupled ? system.evaluateWhole(with_hessian) : system.evaluate(with_hessian, shift);
+    if (part.coupled)
+      part.evaluation = system.evaluateWhole(with_hessian);
+    else
+      part.evaluation = part.own_terms.empty() ? system.evaluate(with_hessian, shift) : evaluateWithOwn(part, with_hessian, shift);
   });
   for (const RodPart& part : parts_)
   {
@@ -69,6 +73,84 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
   return sum;
 }
 
+/// Whether a contact couples no more than two neighbouring nodes of a rod: a segment touches what moves as prescribed.
+bool CoupledSystem::isOwn(const ContactTerm& term) const
+{
+  if (exact_ || term.solid < 0 || term.point[2] >= 0 || term.point[3] >= 0)
+    return false;
+  const int obstacles = static_cast<int>(obstacles_.size());
+  return term.solid < obstacles || simulated_[model_.contact.bodies[term.solid - obstacles].body] < 0;
+}
+
+void CoupledSystem::findOwnTerms()
+{
+  for (RodPart& part : parts_)
+    part.own_terms.clear();
+  const std::vector<ContactTerm>& terms = contact_->terms();
+  for (std::size_t k = 0; k < terms.size(); ++k)
+    if (isOwn(terms[k]))
+      parts_[point_part_[terms[k].point[0]]].own_terms.push_back(static_cast<int>(k));
+}
+
+/// Force and stiffness of a contact to the rod's own gradient and band matrix.
+void CoupledSystem::addOwn(RodPart& part, const ContactTerm& term, bool with_hessian, bool whole)
+{
+  RodSystem& system = part.rod->system;
+  const int n = part.rod->model->nodes();
+  int count = 0, node[2];
+  double weight[2];
+  for (int p = 0; p < 2; ++p)
+    if (term.point[p] >= 0)
+    {
+      node[count] = term.point[p] - part.point;
+      weight[count++] = term.weight[p];
+    }
+  if (count == 2 && node[1] != (node[0] + 1) % n)   // the node that comes first has the panel with both
+  {
+    std::swap(node[0], node[1]);
+    std::swap(weight[0], weight[1]);
+  }
+  for (int p = 0; p < count; ++p)
+    for (int c = 0; c < 3; ++c)
+      system.gradient()[4 * node[p] + c] -= weight[p] * term.force[c];
+  if (!with_hessian)
+    return;
+  const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
+  for (int p = 0; p < count; ++p)
+    for (int c = 0; c < 3; ++c)
+      for (int r = c; r < 3; ++r)
+        system.panels()[node[p]].diag[c][r] += weight[p] * weight[p] * stiffness(r, c);
+  for (int c = 0; c < 3 && count == 2; ++c)
+    for (int r = 0; r < 3; ++r)
+      system.panels()[node[0]].below[c][r] += weight[0] * weight[1] * stiffness(r, c);
+}
+
+/// Of a rod with its own band matrix and contacts that couple nothing.
+RodEvaluation CoupledSystem::evaluateWithOwn(RodPart& part, bool with_hessian, const HessianShift& shift)
+{
+  RodSystem& system = part.rod->system;
+  const std::vector<ContactTerm>& terms = contact_->terms();
+  const auto attempt = [&](bool whole) {
+    RodEvaluation e = system.evaluateWhole(with_hessian);
+    for (const int k : part.own_terms)
+      addOwn(part, terms[k], with_hessian, whole);
+    if (with_hessian)
+      e.inertia = system.factorWhole(shift);
+    else
+      system.closeGradient();
+    return e;
+  };
+  const auto turns = [&](int k) { return !terms[k].geometric.isZero(0.0); };
+  if (with_hessian && std::any_of(part.own_terms.begin(), part.own_terms.end(), turns) && part.whole.due())
+  {
+    const RodEvaluation e = attempt(true);
+    part.whole.tried(e.inertia.positiveDefinite());
+    if (e.inertia.positiveDefinite())
+      return e;
+  }
+  return attempt(false);
+}
+
 bool CoupledSystem::factor(const HessianShift& shift)
 {
   if (exact_)
@@ -94,6 +176,8 @@ void CoupledSystem::reduceGradient()
   if (contact_)
     for (const ContactTerm& term : contact_->terms())
     {
+      if (isOwn(term) && !partOf(term.point[0]).coupled)
+        continue;
       for (int p = 0; p < 4; ++p)
         if (term.point[p] >= 0)
         {

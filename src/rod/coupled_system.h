@@ -15,7 +15,8 @@ namespace slender {
 
 /// Equations of rods, the simulated bodies they are welded to, and contact, for minimize(). Rods that nothing touches and no body carries
 /// keep their own band matrices; the others share one sparse matrix, in which the unknowns of welded sections are replaced by those of
-/// their bodies.
+/// their bodies. Contact with what moves as prescribed couples only neighbouring nodes, so that a rod that touches nothing else keeps its band
+/// matrix, too.
 class CoupledSystem
 {
 public:
@@ -81,6 +82,8 @@ private:
     int point = -1;                ///< its first contact point, -1: it touches nothing
     bool welded = false, touched = false;
     bool coupled = false;          ///< has its unknowns in the matrix
+    std::vector<int> own_terms;    ///< of the present contacts: those that couple nothing, see isOwn()
+    WholeStiffness whole;          ///< of the rod's own matrix with own_terms
     int offset = 0, unknowns = 0;
     std::vector<int> dof;          ///< own number, kPrescribed, or carried by grasp k: -2 - k
     std::vector<int> slots;        ///< where the entries of its panels go: index of a matrix value, -1: nowhere or not simply
@@ -116,6 +119,10 @@ private:
   void contactColumns(const ContactRow& contact, bool whole, Columns& row) const;
   bool takeKeys();
 
+  bool isOwn(const ContactTerm& term) const;
+  void findOwnTerms();
+  RodEvaluation evaluateWithOwn(RodPart& part, bool with_hessian, const HessianShift& shift);
+  void addOwn(RodPart& part, const ContactTerm& term, bool with_hessian, bool whole);
   void spread();   ///< solution of the matrix to the rods' directions
   void mapUnknowns(RodPart& part);
   void reduceGradient();

@@ -248,6 +248,21 @@ RodEvaluation RodSystem::evaluateWhole(bool with_hessian)
   return result;
 }
 
+Inertia RodSystem::factorWhole(const HessianShift& shift)
+{
+  const int n = a_.nodes;
+  takeReactions(0, n);
+  fixPanels(0, n);
+  addShift(0, n, shift);
+  if (model_.closed)
+    return matrix_.factor();
+  for (int i = 0; i < 4 * n; ++i)
+    reduced_[i] = -gradient_[i];
+  BandCarry carry;
+  matrix_.band().eliminate(matrix_.panels(), 0, n, reduced_.data(), carry);
+  return {4 * n - carry.negative - carry.zero, carry.negative, carry.zero};
+}
+
 void RodSystem::solve()
 {
   if (model_.closed)

@@ -90,6 +90,9 @@ public:
   /// factoring. closeGradient() then keeps the prescribed ones' entries as reactions and clears them.
   RodEvaluation evaluateWhole(bool with_hessian);
   void closeGradient() { takeReactions(0, a_.nodes); }
+  /// After evaluateWhole(true), for a rod on which only forces act that couple neighbouring nodes, and which were added to gradient() and panels():
+  /// closes the gradient, factors the matrix plus the shift, and begins the solution of solve(). Returns the matrix's inertia.
+  Inertia factorWhole(const HessianShift& shift);
   RodPanel* panels() { return matrix_.panels(); }
   double* gradient() { return gradient_.data(); }       ///< 4 per node
   double* direction() { return direction_.data(); }     ///< 4 per node
