@@ -119,7 +119,8 @@ class Bodies(NodeCase):
 
     def test_a_body_that_is_unheard_is_warned_of_until_it_is_heard(self):
         self.start(FOLLOWED)
-        said = lambda: (self.output("rod.out") + self.output("rod.err")).count("nobody has published a pose yet of crane")
+        warning = "nobody has published a pose yet of crane"
+        said = lambda: (self.output("rod.out") + self.output("rod.err")).count(warning)
         wait_until(lambda: said() == 1, what="the warning")
         wait_until(lambda: said() == 2, what="the warning once more")   # after ten seconds
         self.drive("crane", (1, 0, 2), (0.9, 0, 2.1), 0.5)

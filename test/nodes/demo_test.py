@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The demo, headless and in real time: no message is lost, and the rope ends in a loop that still holds its twist. However busy the machine is, the
-test waits for the motion of the grippers to end."""
+"""The demo, headless and in real time: no message is lost, and the rope ends in a loop that still holds its twist.
+However busy the machine is, the test waits for the motion of the grippers to end."""
 import math
 import unittest
 
@@ -39,7 +39,8 @@ class Demo(unittest.TestCase):
         states = Listener("state", RodState)
         diagnostics = Listener("/diagnostics", DiagnosticArray)
         resting = round(REST / (STEP * EVERY))
-        wait_until(lambda: states.count() > resting and all(map(at_end, states.all()[-resting:])), 400, "the end of the motion")
+        wait_until(lambda: states.count() > resting and all(map(at_end, states.all()[-resting:])), 400,
+                   "the end of the motion")
         messages = states.all()
         steps = [m.step for m in messages]
         self.assertEqual(steps, list(range(steps[0], steps[0] + EVERY * len(steps), EVERY)))

@@ -44,7 +44,8 @@ class Follow(NodeCase):
                 message = pose(1.0, 0.0, 1.0 + height(t - BEGIN), stamp=t)
                 out.write("/t/grasps/right/pose", message, rospy.Time.from_sec(t))
         # the queue holds all messages of the bag: none is lost however late they are sent
-        player = subprocess.Popen(["rosbag", "play", "--clock", "--hz=50", "--queue=1000", "--wait-for-subscribers", "-q"] + list(options) + [bag],
+        command = ["rosbag", "play", "--clock", "--hz=50", "--queue=1000", "--wait-for-subscribers", "-q"]
+        player = subprocess.Popen(command + list(options) + [bag],
                                   stdin=subprocess.DEVNULL, stdout=open(self.path("play.out"), "w"), stderr=subprocess.STDOUT)
         self.processes.append(player)
         return player
@@ -53,7 +54,8 @@ class Follow(NodeCase):
         rospy.set_param("/use_sim_time", True)
         self.start(wait=False, pace="follow", guide_delay=DELAY, record_bag=self.path("run.bag"))
         clock = self.publisher("/clock", Clock)   # the node subscribes and advertises when it has heard the clock
-        # States are taken from the node's own bag, which misses none. What is heard live are its reports, twenty a second.
+        # States are taken from the node's own bag, which misses none. What is heard live are its reports, twenty a
+        # second.
         reports = rospy.Subscriber("/diagnostics", DiagnosticArray, self.take)
         self.ends.append(reports)
 

@@ -96,7 +96,8 @@ class Topics(NodeCase):
     def test_fields(self):
         """The fields of a step follow from the state of that step, and are those in the bag."""
         bag, n = self.path("fields.bag"), 40
-        node = self.start(SCENE + "record: {fields: [strain, force, energy]}\n", frame_id="map", start_time=10.0, record_bag=bag)
+        scene = SCENE + "record: {fields: [strain, force, energy]}\n"
+        node = self.start(scene, frame_id="map", start_time=10.0, record_bag=bag)
         state = self.listen("/t/state", RodState)
         fields = self.listen("/t/fields", Fields)
         self.step(n)
@@ -104,9 +105,11 @@ class Topics(NodeCase):
         states, told = state.all(), fields.all()
         self.assertEqual([m.step for m in told], list(range(1, n + 1)))
         for of_state, message in zip(states, told):
-            self.assertEqual((message.step, message.epoch, message.header.stamp), (of_state.step, of_state.epoch, of_state.header.stamp))
+            self.assertEqual((message.step, message.epoch, message.header.stamp),
+                             (of_state.step, of_state.epoch, of_state.header.stamp))
             self.assertEqual(message.header.frame_id, "map")
-            self.assertEqual([(table.table, table.object) for table in message.tables], [("rod_fields", "rope"), ("energies", "rope")])
+            self.assertEqual([(table.table, table.object) for table in message.tables],
+                             [("rod_fields", "rope"), ("energies", "rope")])
             of_rod, energies = message.tables
             self.assertEqual(of_rod.columns, ["strain", "tension [N]", "fx [N]", "fy [N]", "fz [N]"])
             width = len(of_rod.columns)
@@ -115,7 +118,8 @@ class Topics(NodeCase):
             self.assertEqual(rows[20], rows[19])   # of the edge; the last node repeats it
             for a, b, row in zip(of_state.nodes, of_state.nodes[1:], rows):
                 length = math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
-                self.assertAlmostEqual(row[0], length / 0.05 - 1.0, delta=1e-12)   # round-off; edges are 0.05 m long at rest
+                # edges are 0.05 m long at rest; the tolerances are round-off
+                self.assertAlmostEqual(row[0], length / 0.05 - 1.0, delta=1e-12)
                 along = sum(f * (q - p) / length for f, p, q in zip(row[2:], (a.x, a.y, a.z), (b.x, b.y, b.z)))
                 self.assertAlmostEqual(row[1], along, delta=1e-12 * max(1.0, abs(along)))
             self.assertEqual(len(energies.values), len(energies.columns))
@@ -123,7 +127,8 @@ class Topics(NodeCase):
         self.assertEqual(node.wait(60), 0)
         with rosbag.Bag(bag) as file:
             recorded = [m for _, m, _ in file.read_messages("/t/fields")]
-        plain = lambda messages: [[(t.table, t.object, list(t.columns), list(t.values)) for t in m.tables] for m in messages]
+        def plain(messages):
+            return [[(t.table, t.object, list(t.columns), list(t.values)) for t in m.tables] for m in messages]
         self.assertEqual(plain(recorded[1:]), plain(told))   # the first one is that of the start
 
     def test_marker_style(self):
