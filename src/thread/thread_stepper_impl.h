@@ -11,15 +11,15 @@ namespace slender {
 
 /// A thread's part in a step and its work space, which is reused from step to step.
 ///
-/// Deposited nodes move with the floor and need no equations: the system holds only the active part of the thread, from three nodes
-/// before its oldest free node on. A held end adds the inside of its holder as one more edge, so that its section is an ordinary joint.
+/// Deposited nodes move with the floor and need no equations. The system holds only the active part of the thread, from
+/// three nodes before its oldest free node on. A held end adds the inside of its holder as one more edge, so that its section is an ordinary joint.
 class ThreadStepper::Impl
 {
 public:
   Impl(std::shared_ptr<const ThreadModel> m, const NewtonConfig& n, bool is_explicit) : model(std::move(m)), newton(n), explicit_step(is_explicit) {}
 
   // ---- a step in substeps, see advanceThreads()
-  /// No: an input or the state is not sound, and the report says so.
+  /// Returns false if an input or the state is not sound. The report then says so.
   bool begin(const ThreadState& state, const ThreadInputs& inputs, double duration, StepReport& report);
   /// Of a substep: no more than an edge leaves the nozzle at a time, and ThreadLimits::max_step.
   double longestSubstep(double duration) const
@@ -33,8 +33,8 @@ public:
   StepFailure solveAlone(double h, StepReport& report);
   /// Takes the solution over.
   void takeOver(double h);
-  /// Divides, joins and takes away edges, as far as the guard (may be null) allows; nothing of it when the step needs none. No: it
-  /// would take more edges than a motion can mean.
+  /// Divides, joins and takes away edges, as far as the guard (may be null) allows; nothing of it when the step needs none.
+  /// Returns false if it would take more edges than a motion can mean.
   bool remesh(const RemeshGuard* guard);
   int foldedNode() const;
   /// The edge whose section has grown beyond what a thread can be; -1: there is none. See explainFailure().

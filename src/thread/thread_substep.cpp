@@ -8,9 +8,9 @@
 
 namespace slender {
 
-/// The configuration from which the step's strains are measured. It is the present one, except at the nozzle: there the fluid moves
-/// on like a solid plug while the nozzle stands, so the last edge is longer by what flows out, and less turned against the nozzle.
-/// No: the thread is folded.
+/// Sets the configuration from which the step's strains are measured. It is the present one, except at the nozzle. There
+/// the fluid moves on like a solid plug while the nozzle stands, so the last edge is longer by what flows out, and it is
+/// less turned against the nozzle. Returns false if the thread is folded.
 bool ThreadStepper::Impl::loadSystem(double h)
 {
   const int n = work.nodes();
@@ -233,8 +233,9 @@ void ThreadStepper::Impl::stopLanding(double h, double earliest)
     }
 }
 
-/// Stops the nodes that go through the floor where they meet it; from there they move with the belt. Those that get there first hold
-/// back the others, so these are looked at again after the next solution. No: there were none.
+/// Stops the nodes that go through the floor where they meet it. From there they move with the belt. Nodes that arrive
+/// first hold back the others, so the others are looked at again after the next solution. Returns false if no node
+/// goes through the floor.
 bool ThreadStepper::Impl::land(double h)
 {
   const double earliest = firstLanding();
@@ -255,11 +256,12 @@ void ThreadStepper::Impl::placeNode(int node, const Eigen::Vector3d& x)
   system.setNode(k, x);
 }
 
-/// Two neighbours that lie on the floor hold a node between them up: it would creep down for ever, and until it has landed every younger node
-/// has to stay in the system. Such a node is deposited where it is, as soon as it is nearer to the floor than a small share of the radius.
+/// Two neighbours that lie on the floor hold up a node between them. It would creep down for ever, and until it has
+/// landed every younger node has to stay in the system. Such a node is deposited where it is, as soon as it is nearer
+/// to the floor than a small share of the radius.
 void ThreadStepper::Impl::restBetweenLying(const Eigen::Vector3d& belt_velocity)
 {
-  constexpr double kNear = 0.05;   // of the radius: the height is then far below what the section leaves open
+  constexpr double kNear = 0.05;   // share of the radius, far below what matters for the place of a section
   if (!model->floor.sticks())
     return;
   for (int i = std::max(1, first_); i + 1 < work.nodes(); ++i)

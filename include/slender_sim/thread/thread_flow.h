@@ -32,15 +32,16 @@ struct Landing
 /// [Ribe 2004], with factors fitted to the reference solutions of coiling; the tightest law counts most.
 Landing estimateLanding(const ThreadFall& fall);
 
-/// Speed out of the nozzle [m/s] below which a fluid of this surface tension [N/m] > 0 drips instead of flowing as a jet. Height and flow of
-/// `fall` do not matter.
+/// Returns the speed out of the nozzle [m/s] below which a fluid of this surface tension [N/m] > 0 drips instead of
+/// flowing as a jet. Height and flow of `fall` do not matter.
 ///
-/// The criterion is that of Clanet and Lasheras (J. Fluid Mech. 383, 1999) for fluids without viscosity: the Weber number rho U^2 D / gamma is
+/// The criterion is that of Clanet and Lasheras (J. Fluid Mech. 383, 1999) for fluids without viscosity. The Weber number
+/// rho U^2 D / gamma is
 ///   4 (Bo_o / Bo) (1 + K Bo_o Bo - sqrt((1 + K Bo_o Bo)^2 - 1))^2,   Bo = sqrt(rho g D^2 / (2 gamma)),
-/// with the Bond numbers Bo of the inner and Bo_o of the outer diameter, and K = 0.37, which they give for water in air. Three choices are not
-/// theirs. A nozzle has one diameter here, so Bo_o = Bo. K = 0.37 serves all fluids. And the result is zero for mu > sqrt(rho gamma D / 2), which
-/// is an Ohnesorge number of 1 with the nozzle's radius: viscosity then slows the recoil of what hangs from the nozzle. More viscous fluids can
-/// drip as well, below limits that are not known here.
+/// with the Bond numbers Bo of the inner and Bo_o of the outer diameter, and K = 0.37, which they give for water in air.
+/// Three choices are not theirs. A nozzle has one diameter here, so Bo_o = Bo. K = 0.37 serves all fluids. The result is
+/// zero for mu > sqrt(rho gamma D / 2), which is an Ohnesorge number of 1 with the nozzle's radius: viscosity then slows
+/// the recoil of what hangs from the nozzle. More viscous fluids can drip as well, below limits that are not known here.
 double leastJettingSpeed(const ThreadFall& fall, double surface_tension);
 
 /// Edges that resolve what forms.

@@ -27,15 +27,16 @@ void splitEdge(ThreadState& state, int j, double fraction, const Eigen::Vector3d
 /// Joins edges i-1 and i by taking node i away (0 < i < nodes - 1). Volume, mass and momentum are conserved.
 void removeNode(ThreadState& state, int i);
 
-/// Takes out the fold at an inner node: removes it (the fluid on both sides has flowed together), or where a free edge folds back on one
-/// that lies on the floor, holds it there as it is. No: nothing can be done, or the guard (may be null) forbids it.
+/// Takes out the fold at an inner node. The node is removed, because the fluid on both sides has flowed together. Where a
+/// free edge folds back on one that lies on the floor, the node is held there as it is. Returns false if nothing can be
+/// done, or if the guard (may be null) forbids it.
 bool mendFold(ThreadState& state, int node, const RemeshGuard* guard = nullptr);
 /// Where a node lies after its removal: on the joined edge, which its two edges become. Whether a guard (may be null) allows it.
 bool mayRemove(const ThreadState& state, int i, const RemeshGuard* guard);
 
 /// Breaks the thread at its thinnest free edge if that is thinner than `min_radius` [m] (thesis 5.4.4): `state` keeps the newer part, `older`
 /// becomes the other. The fluid of the edge goes to its neighbours, half to either side, with its momentum. The edges at the ends do not
-/// break. No: nothing is so thin.
+/// break. Returns false if no edge is so thin.
 bool breakThread(ThreadState& state, double min_radius, ThreadState& older);
 
 /// Takes the `count` oldest nodes and the edges after them away. Their volume is added to `account`, state.dropped_volume or
