@@ -11,10 +11,10 @@ namespace slender {
 ClothEvaluation ClothStepper::Impl::addForces(const ClothInputs& inputs, bool with_bending)
 {
   std::fill(d_.begin(), d_.end(), 0.0);
-  const ClothEvaluation here = system.addInternal(x_, d_, with_bending);
+  const ClothEvaluation here = system->addInternal(x_, d_, with_bending);
   std::fill(force_.begin(), force_.end(), 0.0);
-  if (system.wind().active())
-    system.wind().addForces(x_, v_, inputs.wind, force_);
+  if (system->wind().active())
+    system->wind().addForces(x_, v_, inputs.wind, force_);
   for (int i = 0; i < model->vertices(); ++i)
   {
     point(force_, i) += model->mass[i] * inputs.gravity - point(d_, i);
@@ -33,11 +33,11 @@ ClothEvaluation ClothStepper::Impl::acceleration(const ClothInputs& inputs, doub
   {
     for (std::size_t i = 0; i < trial_.size(); ++i)
       trial_[i] = -delta * v_[i];
-    system.setViscosity(model->stiffness_damping / delta, x_, &trial_, 0.0, nullptr);
+    system->setViscosity(model->stiffness_damping / delta, x_, &trial_, 0.0, nullptr);
   }
   const ClothEvaluation here = addForces(inputs, true);
   for (int i = 0; i < model->vertices(); ++i)
-    point(a_start_, i) = system.held()[i] ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(point(force_, i) / model->mass[i] - model->mass_damping * point(v_, i));
+    point(a_start_, i) = system->held()[i] ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(point(force_, i) / model->mass[i] - model->mass_damping * point(v_, i));
   return here;
 }
 
@@ -52,8 +52,8 @@ double ClothStepper::Impl::stableStep()
   PointVector rest, away(4 * n), up(4 * n), down(4 * n);
   toPoints(model->rest.vertices, rest);
   ClothState at_rest = makeClothState(*model, model->rest.vertices);
-  system.setHinges(at_rest);
-  system.setViscosity(0.0, rest);
+  system->setHinges(at_rest);
+  system->setViscosity(0.0, rest);
   const double small = 1e-4 * shortest_edge_;
   PointVector mode(4 * n, 0.0);
   for (int i = 0; i < n; ++i)   // anything that is not orthogonal to the stiffest
@@ -68,11 +68,11 @@ double ClothStepper::Impl::stableStep()
       away[i] = rest[i] + mode[i];
     }
     std::fill(up.begin(), up.end(), 0.0);
-    system.addInternal(away, up, with_bending);
+    system->addInternal(away, up, with_bending);
     for (std::size_t i = 0; i < mode.size(); ++i)
       away[i] = rest[i] - mode[i];
     std::fill(down.begin(), down.end(), 0.0);
-    system.addInternal(away, down, with_bending);
+    system->addInternal(away, down, with_bending);
     double work = 0.0, inertia = 0.0;   // Rayleigh's quotient
     for (int i = 0; i < n; ++i)
     {
@@ -95,12 +95,12 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
   toPoints(work_.x, x_);
   toPoints(work_.v, v_);
   next_ = work_;
-  system.setHinges(work_);
+  system->setHinges(work_);
   if (model->stiffness_damping > 0)
   {
     for (std::size_t i = 0; i < x_.size(); ++i)
       trial_[i] = x_[i] - h * v_[i];
-    system.setViscosity(model->stiffness_damping / h, trial_);
+    system->setViscosity(model->stiffness_damping / h, trial_);
   }
   const ClothEvaluation here = addForces(inputs, true);
   for (int i = 0; i < n; ++i)
@@ -136,28 +136,28 @@ StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from,
   toPoints(work_.x, x_);
   toPoints(work_.v, v_);
   next_ = work_;
-  system.hold(work_);
-  if (h != constant_h_ || system.held() != constant_held_)
+  system->hold(work_);
+  if (h != constant_h_ || system->held() != constant_held_)
   {
     for (int i = 0; i < n; ++i)
       constant_weight_[i] = model->mass[i] * (1.0 / (h * h) + model->mass_damping / h);
     constant_h_ = 0.0;
     ++report.factorizations;
-    if (!constant_->factor(constant_weight_, viscous, system.held()))
+    if (!constant_->factor(constant_weight_, viscous, system->held()))
       return StepFailure::singular_matrix;
     constant_h_ = h;
-    constant_held_ = system.held();
+    constant_held_ = system->held();
   }
   if (model->stiffness_damping > 0)
   {
     for (std::size_t i = 0; i < x_.size(); ++i)
       trial_[i] = x_[i] - h * v_[i];
-    system.setViscosity(model->stiffness_damping / h, trial_);
+    system->setViscosity(model->stiffness_damping / h, trial_);
   }
   const ClothEvaluation here = addForces(inputs, false);
   std::fill(trial_.begin(), trial_.end(), 0.0);
-  if (system.bending().size() > 0)
-    system.bending().addProduct(-1.0, x_.data(), trial_.data());
+  if (system->bending().size() > 0)
+    system->bending().addProduct(-1.0, x_.data(), trial_.data());
   std::fill(d_.begin(), d_.end(), 0.0);
   for (int i = 0; i < n; ++i)
     point(force_, i) += point(trial_, i) + model->mass[i] / h * point(v_, i);
@@ -167,7 +167,7 @@ StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from,
   std::fill(trial_.begin(), trial_.end(), 0.0);
   constant_->addProduct(d_.data(), trial_.data());
   for (int i = 0; i < n; ++i)
-    point(trial_, i) = system.held()[i] ? Eigen::Vector3d(point(d_, i)) : Eigen::Vector3d(point(force_, i) - point(trial_, i));
+    point(trial_, i) = system->held()[i] ? Eigen::Vector3d(point(d_, i)) : Eigen::Vector3d(point(force_, i) - point(trial_, i));
   constant_->solve(trial_, d_);
   std::fill(trial_.begin(), trial_.end(), 0.0);
   constant_->addProduct(d_.data(), trial_.data());

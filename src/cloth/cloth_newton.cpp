@@ -32,19 +32,19 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
   const bool ahead = order(options.integrator) == 2;
   for (int i = 0; i < model->vertices(); ++i)
   {
-    const Eigen::Vector3d end = system.held()[i] ? Eigen::Vector3d(point(system.start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
-    point(trial_, i) = ahead ? end : Eigen::Vector3d(point(system.start(), i));
+    const Eigen::Vector3d end = system->held()[i] ? Eigen::Vector3d(point(system->start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
+    point(trial_, i) = ahead ? end : Eigen::Vector3d(point(system->start(), i));
     point(d_, i) = end - point(trial_, i);
   }
-  const ClothEvaluation here = system.evaluateHessian(trial_, HessianKind::semidefinite);
+  const ClothEvaluation here = system->evaluateHessian(trial_, HessianKind::semidefinite);
   if (!ahead)
   {
     energy_start_ = here.membrane + here.bending;
-    elastic_start_ = (1.0 + system.viscosity()) * energy_start_;   // strains are those that viscosity counts from
+    elastic_start_ = (1.0 + system->viscosity()) * energy_start_;   // strains are those that viscosity counts from
   }
   const LinearOutcome outcome =
-    system.bounded() ? system.solveBounded(d_, averages_, at_bound_, report.linear_iterations)
-                     : system.solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, system.averageCount() > 0 ? &averages_ : nullptr);
+    system->bounded() ? system->solveBounded(d_, averages_, at_bound_, report.linear_iterations)
+                     : system->solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, system->averageCount() > 0 ? &averages_ : nullptr);
   if (outcome != LinearOutcome::solved)
     return failureOf(outcome);
   ++report.iterations;
@@ -64,10 +64,10 @@ bool ClothStepper::Impl::createsEnergy(double energy_end, double average_work, d
   double given = strains + elastic_start_ + std::abs(average_work);   // strains of a millionth: of a cloth at rest
   for (int i = 0; i < model->vertices(); ++i)
   {
-    if (!system.held()[i])
+    if (!system->held()[i])
     {
       const double before = 0.5 * model->mass[i] * work_.v.col(i).squaredNorm();
-      loads += system.loadWork(i, x_start_, x_);
+      loads += system->loadWork(i, x_start_, x_);
       gain += 0.5 * model->mass[i] * next_.v.col(i).squaredNorm() - before;
       given += before;
     }
@@ -86,9 +86,9 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
   constexpr double kMostShift = 10.0;   // of the weight of inertia
   constexpr int kPatience = 5;
   for (int i = 0; i < model->vertices(); ++i)
-    point(x_, i) = system.held()[i] ? Eigen::Vector3d(point(system.start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
-  if (system.averageCount() > 0)
-    system.meetAverages(averages_, x_);
+    point(x_, i) = system->held()[i] ? Eigen::Vector3d(point(system->start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
+  if (system->averageCount() > 0)
+    system->meetAverages(averages_, x_);
   bool near = false, strict = false;
   double best = std::numeric_limits<double>::infinity(), shift = 0.0;
   int misses = 0;
@@ -96,7 +96,7 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
   {
     // far away the matrix that is never indefinite; near by the exact one, shifted where wrinkles are about to grow
     HessianKind kind = near ? HessianKind::exact : HessianKind::semidefinite;
-    ClothEvaluation here = system.evaluateHessian(x_, kind);
+    ClothEvaluation here = system->evaluateHessian(x_, kind);
     if (!std::isfinite(here.energy()))
       return StepFailure::state_not_finite;
     if (stepsInterrupted())
@@ -110,7 +110,7 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
       {
         std::copy(best_.begin(), best_.end(), x_.begin());
         kind = HessianKind::semidefinite;
-        here = system.evaluateHessian(x_, kind);
+        here = system->evaluateHessian(x_, kind);
       }
     }
     else if (!strict)
@@ -124,11 +124,11 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
     {
       if (kind == HessianKind::exact && shift > added)
       {
-        system.shiftMatrix(shift - added);
+        system->shiftMatrix(shift - added);
         added = shift;
       }
       std::fill(d_.begin(), d_.end(), 0.0);
-      outcome = system.solve(d_, &x_, report.linear_iterations, report.factorizations);
+      outcome = system->solve(d_, &x_, report.linear_iterations, report.factorizations);
       if (outcome == LinearOutcome::solved || kind == HessianKind::semidefinite)   // near buckling conjugate gradients may not end either
         break;
       shift = std::max(0.2, 4.0 * shift);
@@ -136,7 +136,7 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
       {
         shift = 0.0;
         kind = HessianKind::semidefinite;
-        system.evaluateHessian(x_, kind);
+        system->evaluateHessian(x_, kind);
       }
     }
     if (outcome != LinearOutcome::solved)
@@ -145,14 +145,14 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
     const double increment = largest(d_) / shortest_edge_;
     if (!std::isfinite(increment))
       return StepFailure::state_not_finite;
-    const double slope = pointKernels().dot(model->vertices(), system.gradient().data(), d_.data());
+    const double slope = pointKernels().dot(model->vertices(), system->gradient().data(), d_.data());
     const double noise = 1e-13 * here.magnitude();
     double alpha = 1.0;
     for (;; alpha *= 0.5)
     {
       for (std::size_t i = 0; i < x_.size(); ++i)
         trial_[i] = x_[i] + alpha * d_[i];
-      if (!strict || increment <= options.newton.tolerance || system.energy(trial_).energy() <= here.energy() + kArmijo * alpha * slope + noise)
+      if (!strict || increment <= options.newton.tolerance || system->energy(trial_).energy() <= here.energy() + kArmijo * alpha * slope + noise)
         break;
       if (alpha < 1e-8)
         return StepFailure::newton_diverged;

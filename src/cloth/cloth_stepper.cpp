@@ -12,7 +12,7 @@
 namespace slender {
 
 ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
-  : model(std::move(m)), options(o), system(*model, o), plastic_(*model)
+  : model(std::move(m)), options(o), system(std::make_unique<ClothSystem>(*model, o)), plastic_(*model)
 {
   const std::string who = "cloth '" + model->name + "': ";
   if (o.integrator != Integrator::implicit_euler && o.integrator != Integrator::tr_bdf2 && !isExplicit())
@@ -60,11 +60,7 @@ ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions
     v->assign(4 * model->vertices(), 0.0);
   plan_.stages.reserve(2);
   useBudget(nullptr);
-  if (o.integrator == Integrator::imex)
-  {
-    constant_ = std::make_unique<ShiftedMatrix>(system.bending().size() > 0 ? system.bending() : PointMatrix(model->vertices(), {}));
-    constant_weight_.assign(model->vertices(), 0.0);
-  }
+  useConstantMatrix();
 }
 
 bool ClothStepper::Impl::inputsFine(const ClothState& s, const ClothInputs& inputs, double duration, std::string& what) const
@@ -116,7 +112,7 @@ std::string ClothStepper::Impl::explain(StepFailure failure, double length)
   const std::string at = " at a step of " + milliseconds(length);
   if (isExplicit())
     return "the explicit step blew up" + at + ": use a shorter step (stable below " + milliseconds(stableStep()) + " at rest) or implicit_euler";
-  if (failure == StepFailure::singular_matrix && !system.averagesIndependent())
+  if (failure == StepFailure::singular_matrix && !system->averagesIndependent())
     return "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the averages there";
   if (failure == StepFailure::singular_matrix)
     return "the matrix is not positive definite" + at + ": sizes or moduli differ by too many orders of magnitude, or a grasp or force is too fast or too large by as many";
@@ -125,7 +121,7 @@ std::string ClothStepper::Impl::explain(StepFailure failure, double length)
            (model->averages.empty() ? "holds it by less at once" : "guides it by less at once and without crumpling it") + ", or take softer cloth (thickness, moduli)";
   if (failure == StepFailure::linear_unconverged)
     return "the linear equations did not converge" + at + ": use a shorter step, a larger solver.tolerance" +
-           (system.bounded() ? ", a larger max_traction" : "") + ", or softer cloth (thickness, moduli)";
+           (system->bounded() ? ", a larger max_traction" : "") + ", or softer cloth (thickness, moduli)";
   if (failure == StepFailure::energy_grew)
     return "one Newton step brings energy out of nothing" + at + ": use a shorter step, more time.newton.max_cuts, or one_newton_step: false";
   if (failure == StepFailure::state_not_finite)
@@ -146,8 +142,8 @@ StepReport ClothStepper::Impl::refuseUnsolved(StepReport& report, StepFailure fa
     strain.add(e, std::abs((place(edges(0, e)) - place(edges(1, e))).norm() / rest - 1.0));
   }
   for (int i = 0; i < model->vertices(); ++i)
-    if (trial && system.averageCount() == 0 && !system.held()[i])   // averages bear forces that the gradient does not know
-      node.add(i, point(system.gradient(), i).norm());
+    if (trial && system->averageCount() == 0 && !system->held()[i])   // averages bear forces that the gradient does not know
+      node.add(i, point(system->gradient(), i).norm());
     else if (!trial)
       node.add(i, work_.v.col(i).norm());
   const int a = edges(0, strain.index()), b = edges(1, strain.index());
@@ -172,7 +168,7 @@ void ClothStepper::Impl::useBudget(std::shared_ptr<WorkBudget> budget)
 {
   own_budget_ = budget == nullptr;
   budget_ = own_budget_ ? std::make_shared<WorkBudget>() : std::move(budget);
-  system.useBudget(*budget_);
+  system->useBudget(*budget_);
 }
 
 StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs, double duration)
@@ -183,16 +179,17 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
     budget_->start(options.error_tolerance > 0 ? WorkBudget::kUnbounded : WorkBudget::ofStep(model->vertices()));
   if (!inputsFine(state, inputs, duration, what))
     return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
+  followClamps(state);
   work_ = state;
   plastic_.flow(work_, duration);   // at the start, which sees what collisions made of the last step (thesis 6.4.4)
   pins_start_.resize(3, static_cast<Eigen::Index>(state.pins.size()));
   for (std::size_t k = 0; k < state.pins.size(); ++k)
     pins_start_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
-  system.useAverages(state);
-  if (system.averageCount() > 0)
+  system->useAverages(state);
+  if (system->averageCount() > 0)
   {
     toPoints(state.x, x_);
-    system.averagesOf(x_, averages_start_);
+    system->averagesOf(x_, averages_start_);
   }
   inputs_ = &inputs;
   duration_ = duration;
@@ -242,15 +239,15 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
   planStep(options.integrator, 1.0, h, 0.0, plan_);
   toPoints(work_.x, x_start_);
   toPoints(work_.v, v_start_);
-  system.hold(work_);
+  system->hold(work_);
   at_bound_ = work_.at_bound;
-  if (system.averageCount() > 0)
+  if (system->averageCount() > 0)
     averages_ = averages_start_ + to / duration * (inputs.averages - averages_start_);
   const bool second_order = order(options.integrator) == 2, damped = model->stiffness_damping > 0;
   if (second_order)
   {
     const ClothEvaluation here = acceleration(inputs, plan_.stages[0].tau_v);
-    energy_start_ = elastic_start_ = damped ? system.elasticEnergy(x_start_) : here.membrane + here.bending;
+    energy_start_ = elastic_start_ = damped ? system->elasticEnergy(x_start_) : here.membrane + here.bending;
   }
   double reached = 0.0;
   for (std::size_t s = 0; s < plan_.stages.size(); ++s)
@@ -269,15 +266,15 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
     {
       for (std::size_t i = 0; i < trial_.size(); ++i)
         trial_[i] = stage.q_tilde[kV] * v_start_[i];
-      system.setViscosity(model->stiffness_damping / stage.tau_v, x_start_, stage.q_tilde[kV] != 0 ? &trial_ : nullptr, stage.q_tilde[kQStage], &x_stage_);
+      system->setViscosity(model->stiffness_damping / stage.tau_v, x_start_, stage.q_tilde[kV] != 0 ? &trial_ : nullptr, stage.q_tilde[kQStage], &x_stage_);
     }
-    if (system.wind().active())
+    if (system->wind().active())
     {
       wind_v_ = work_.v;
       for (int i = 0; i < n && second_order; ++i)
         wind_v_.col(i) += stage.time * h * point(a_start_, i);
     }
-    system.beginStage({stage.tau_v, &q_hat_, &q_tilde_, &start, second_order ? &guess_ : &start, &wind_v_}, inputs);
+    system->beginStage({stage.tau_v, &q_hat_, &q_tilde_, &start, second_order ? &guess_ : &start, &wind_v_}, inputs);
     const StepFailure failure = options.one_newton_step ? linearized(report) : minimize(report);
     if (failure != StepFailure::none)
       return failure;
@@ -287,7 +284,7 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
     for (int i = 0; i < n; ++i)
     {
       const Eigen::Vector3d q = point(x_, i);
-      point(v_stage_, i) = system.held()[i] ? Eigen::Vector3d((q - point(x_start_, i)) / (stage.time * h))
+      point(v_stage_, i) = system->held()[i] ? Eigen::Vector3d((q - point(x_start_, i)) / (stage.time * h))
                                             : Eigen::Vector3d((q - point(q_tilde_, i)) / stage.tau_v);
     }
     x_stage_ = x_;
@@ -299,25 +296,25 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
 StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& inputs, double h, double fraction, StepReport& report)
 {
   constexpr double kUnbalanced = 0.1;   // of the largest force: not a solution
-  if (system.averageCount() > 0)   // to rounding
-    system.meetAverages(averages_, x_);
-  const ClothEvaluation end = system.evaluate(x_);
+  if (system->averageCount() > 0)   // to rounding
+    system->meetAverages(averages_, x_);
+  const ClothEvaluation end = system->evaluate(x_);
   if (!std::isfinite(end.energy()))
     return StepFailure::state_not_finite;
   // before averages take from the gradient what they balance
   double internal = 0.0, pin_work = 0.0, average_work = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
   {
-    const Eigen::Vector3d g = system.internalGradient(i, x_);
+    const Eigen::Vector3d g = system->internalGradient(i, x_);
     internal = std::max(internal, g.norm());
-    if (system.held()[i])
+    if (system->held()[i])
       pin_work += g.dot(point(x_, i) - point(x_start_, i));
   }
-  if (system.averageCount() > 0)
+  if (system->averageCount() > 0)
   {
-    average_work = workOnFree(system.gradient());
-    system.balanceAverages(average_forces);
-    average_work -= workOnFree(system.gradient());
+    average_work = workOnFree(system->gradient());
+    system->balanceAverages(average_forces);
+    average_work -= workOnFree(system->gradient());
   }
   next_ = work_;
   next_.at_bound = at_bound_;
@@ -327,8 +324,8 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
   double unbalanced = 0.0, force = std::max(resolved, internal), jump = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
   {
-    const bool held = system.held()[i];
-    const double size = point(system.gradient(), i).norm();
+    const bool held = system->held()[i];
+    const double size = point(system->gradient(), i).norm();
     (held ? force : unbalanced) = std::max(held ? force : unbalanced, size);
     const Eigen::Vector3d q = point(x_, i), a = (q - point(q_hat_, i)) / (stage.tau_a * stage.tau_a);
     force = std::max({force, model->mass[i] * a.norm(), model->mass[i] * inputs.gravity.norm()});
@@ -348,10 +345,10 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
     // a pin's speed changes at the start of the step: its inertia over the whole step counts, not that at the end, which the last stage guesses from both
     const int p = work_.pins[k];
     const Eigen::Vector3d inertia = (point(x_, p) - point(q_hat_, p)) / (stage.tau_a * stage.tau_a) - (next_.v.col(p) - work_.v.col(p)) / h;
-    pin_forces.col(static_cast<Eigen::Index>(k)) = model->mass[p] * inertia - point(system.gradient(), p);
+    pin_forces.col(static_cast<Eigen::Index>(k)) = model->mass[p] * inertia - point(system->gradient(), p);
   }
   if (options.one_newton_step)
-    return createsEnergy(second_order && model->stiffness_damping > 0 ? system.elasticEnergy(x_) : end.membrane + end.bending, average_work, pin_work) ? StepFailure::energy_grew : StepFailure::none;
+    return createsEnergy(second_order && model->stiffness_damping > 0 ? system->elasticEnergy(x_) : end.membrane + end.bending, average_work, pin_work) ? StepFailure::energy_grew : StepFailure::none;
   return unbalanced > std::max(kUnbalanced * force, resolved) ? StepFailure::newton_diverged : StepFailure::none;
 }
 
@@ -360,7 +357,7 @@ double ClothStepper::Impl::workOnFree(const PointVector& forces) const
 {
   double work = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
-    if (!system.held()[i])
+    if (!system->held()[i])
       work += point(forces, i).dot(point(x_, i) - point(x_start_, i));
   return work;
 }
@@ -382,33 +379,33 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
   int iterations = 0, factorizations = 0;
   constexpr double kTolerance = 5e-4;   // what it leaves unbalanced the grasps' wrenches lack: below a thousandth of the load
   const auto solve = [&] {
-    system.setInertia(duration);
+    system->setInertia(duration);
     for (int i = 0; i < model->vertices(); ++i)
-      point(system.gradient(), i) = -forces.col(i);
+      point(system->gradient(), i) = -forces.col(i);
     std::fill(d_.begin(), d_.end(), 0.0);
-    return system.solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance) == LinearOutcome::solved;
+    return system->solve(d_, options.one_newton_step ? nullptr : &x_, iterations, factorizations, kTolerance) == LinearOutcome::solved;
   };
   if (!solve())   // the inertia of a longer step does not hold up what a short stage's does
   {
-    system.evaluateHessian(x_, HessianKind::semidefinite);
+    system->evaluateHessian(x_, HessianKind::semidefinite);
     if (!solve())
       return false;
   }
   for (int i = 0; i < model->vertices(); ++i)
     displacement.col(i) = point(d_, i);
   pin_forces_change.resize(3, pin_forces.cols());
-  average_forces_change.resize(3, system.averageCount());
-  if (pin_forces.cols() == 0 && system.averageCount() == 0)
+  average_forces_change.resize(3, system->averageCount());
+  if (pin_forces.cols() == 0 && system->averageCount() == 0)
     return true;
-  system.applyMatrix(d_, trial_);
+  system->applyMatrix(d_, trial_);
   for (std::size_t i = 0; i < trial_.size(); ++i)
-    system.gradient()[i] += trial_[i];
-  if (system.averageCount() > 0)
-    system.balanceAverages(average_forces_change, true);
+    system->gradient()[i] += trial_[i];
+  if (system->averageCount() > 0)
+    system->balanceAverages(average_forces_change, true);
   Eigen::Index pin = 0;
   for (int i = 0; i < model->vertices(); ++i)
-    if (system.held()[i])
-      pin_forces_change.col(pin++) = -point(system.gradient(), i);
+    if (system->held()[i])
+      pin_forces_change.col(pin++) = -point(system->gradient(), i);
   return true;
 }
 
@@ -441,13 +438,14 @@ bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, double duration, Eige
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 double ClothStepper::stableStep() const { return impl_->stableStep(); }
 const Eigen::Matrix3Xd& ClothStepper::averageForces() const { return impl_->average_forces; }
-ClothSolver ClothStepper::solver() const { return impl_->system.solver(); }
+ClothSolver ClothStepper::solver() const { return impl_->system->solver(); }
 const ClothModel& ClothStepper::model() const { return *impl_->model; }
 
 ClothEnergies ClothStepper::energies(const ClothState& state, const Eigen::Vector3d& gravity) const
 {
   ClothEnergies result;
-  ClothSystem& system = impl_->system;
+  impl_->followClamps(state);
+  ClothSystem& system = *impl_->system;
   PointVector x;
   toPoints(state.x, x);
   PointVector unused(x.size(), 0.0);

@@ -20,12 +20,14 @@ public:
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
   double stableStep();
   StepReport statics(ClothState& state, const ClothInputs& inputs, bool search, bool leave_saddles);
+  /// Lets the clamped faces act that `state` holds, and no others. Comes before each use of the system with another state.
+  void followClamps(const ClothState& state);
   bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
                Eigen::Matrix3Xd& average_forces_change);
 
   std::shared_ptr<const ClothModel> model;
   ClothOptions options;
-  ClothSystem system;
+  std::unique_ptr<ClothSystem> system;
   Eigen::Matrix3Xd pin_forces, average_forces, lowest_mode;
 
 private:
@@ -44,6 +46,7 @@ private:
   StepFailure finish(const Stage& stage, const ClothInputs& inputs, double h, double fraction, StepReport& report);
   double workOnFree(const PointVector& forces) const;
   Eigen::Vector3d pinAt(const ClothInputs& inputs, std::size_t pin, double fraction) const;
+  void useConstantMatrix();
   bool isExplicit() const { return options.integrator == Integrator::symplectic_euler || options.integrator == Integrator::imex; }
 
   // cloth_newton.cpp: a stage's equation
@@ -59,6 +62,9 @@ private:
   ClothEvaluation acceleration(const ClothInputs& inputs, double delta);
 
   std::unique_ptr<ClothStatics> statics_;   ///< from the first equilibrium on
+  std::shared_ptr<const ClothModel> clamped_model_;   ///< what the system is of, where not all clamped faces of the model act; otherwise null
+  std::vector<int> clamp_pins_;             ///< of the state whose clamped faces act; with clamped faces only
+  bool clamps_known_ = false;
   std::shared_ptr<WorkBudget> budget_;
   bool own_budget_ = true;
   long ownWork() const { return own_budget_ ? budget_->done() : 0; }   ///< others report their budgets themselves

@@ -1,9 +1,11 @@
 // Edges of cloth that are clamped between faces that are held and faces that are free.
 #include <cmath>
+#include <memory>
 
 #include <Eigen/SparseCholesky>
 #include <gtest/gtest.h>
 
+#include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/energy/plate_bending.h"
 #include "test/support/cloths.h"
 
@@ -103,6 +105,105 @@ TEST(ClampedEdges, onlyHingesBesideClampedFacesAreStiffer)
   const double hinges = HingeBending(t.hinges, held, VectorXd::Zero(t.hingeCount())).energy(points.data());
   EXPECT_GT(hinges, 0.0);
   EXPECT_NEAR(isometric / hinges, 1.0, 1e-6);
+}
+
+/// A strip whose margin is clamped, or the same strip without a clamp.
+std::shared_ptr<ClothModel> stripModel(BendingModel bending, bool with_ratio, bool clamped)
+{
+  constexpr int kRows = 6;
+  const TriangleMesh mesh = stripWithMargin(GridPattern::one_diagonal, kRows);
+  auto model = std::make_shared<ClothModel>(buildCloth("strip", mesh, 1.0, isotropicMembrane(1e4, 0.0, 1.0)));
+  model->bending = bending;
+  model->bending_modulus = 1.0;
+  if (with_ratio)
+    model->bending_poissons_ratio = 0.0;
+  if (clamped)
+    clampFaces(*model, marginOf(mesh, kRows));
+  return model;
+}
+
+/// Ten steps under gravity with these pins, from `state` on.
+void step(ClothStepper& stepper, ClothState& state, const std::vector<int>& pins)
+{
+  ClothInputs inputs;
+  inputs.gravity = Vector3d(0, 0, -1);
+  state.pins.clear();
+  pinVertices(state, pins);
+  inputs.pins.resize(3, static_cast<Eigen::Index>(pins.size()));
+  for (std::size_t k = 0; k < pins.size(); ++k)
+    inputs.pins.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
+  for (int k = 0; k < 10; ++k)
+  {
+    const StepReport report = stepper.step(state, inputs, 1e-4);
+    ASSERT_TRUE(report.ok) << report.message;
+  }
+}
+
+TEST(ClampedEdges, aReleasedClampIsGoneAndComesBack)
+{
+  struct Kind
+  {
+    BendingModel bending;
+    bool with_ratio;
+    Integrator integrator;
+  };
+  for (const Kind& kind : {Kind{BendingModel::hinge, false, Integrator::implicit_euler}, Kind{BendingModel::hinge, false, Integrator::symplectic_euler},
+                           Kind{BendingModel::isometric_nonconforming, false, Integrator::tr_bdf2},
+                           Kind{BendingModel::isometric_nonconforming, true, Integrator::implicit_euler},
+                           Kind{BendingModel::isometric_nonconforming, true, Integrator::imex}})
+  {
+    SCOPED_TRACE(std::string(toString(kind.bending)) + ", " + toString(kind.integrator));
+    const auto clamped_model = stripModel(kind.bending, kind.with_ratio, true), plain_model = stripModel(kind.bending, kind.with_ratio, false);
+    ClothOptions options;
+    options.integrator = kind.integrator;
+    ClothStepper stepper(clamped_model, options), plain(plain_model, options), again(clamped_model, options);
+    ClothState state = makeClothState(*clamped_model, clamped_model->rest.vertices);
+    const std::vector<int> margin = marginOf(clamped_model->rest, 6), corner{margin.front()};
+    step(stepper, state, margin);
+    ClothState without = state;
+    step(plain, without, margin);
+    step(stepper, state, margin);
+    EXPECT_GT((state.x - without.x).cwiseAbs().maxCoeff(), 1e-12);   // the clamp matters
+    // Once the margin is released the cloth moves as one that was never clamped, bit by bit.
+    without = state;
+    step(stepper, state, corner);
+    step(plain, without, corner);
+    EXPECT_EQ((state.x - without.x).cwiseAbs().maxCoeff(), 0.0);
+    EXPECT_EQ(stepper.energies(state, Vector3d::Zero()).bending, plain.energies(state, Vector3d::Zero()).bending);
+    // Once it is held again it is clamped, as for a stepper that begins here.
+    ClothState begun = state;
+    step(stepper, state, margin);
+    step(again, begun, margin);
+    EXPECT_EQ((state.x - begun.x).cwiseAbs().maxCoeff(), 0.0);
+  }
+}
+
+TEST(ClampedEdges, staticsFollowsTheClampsThatAreHeld)
+{
+  const auto clamped_model = stripModel(BendingModel::isometric_nonconforming, true, true), plain_model = stripModel(BendingModel::isometric_nonconforming, true, false);
+  ClothStepper stepper(clamped_model, ClothOptions{}), plain(plain_model, ClothOptions{});
+  // The margin's lower line and the strip's upper end are held: the margin is free to bend.
+  const TriangleMesh& mesh = clamped_model->rest;
+  std::vector<int> ends;
+  for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
+    if (mesh.vertices(1, i) < -0.1 || mesh.vertices(1, i) > 1 - 1e-9)
+      ends.push_back(static_cast<int>(i));
+  const auto settle = [&](ClothStepper& of, const std::vector<int>& pins) {
+    ClothState state = makeClothState(*clamped_model, mesh.vertices);
+    pinVertices(state, pins);
+    ClothInputs inputs;
+    inputs.gravity = Vector3d(0, 0, -1e-2);
+    inputs.pins.resize(3, static_cast<Eigen::Index>(pins.size()));
+    for (std::size_t k = 0; k < pins.size(); ++k)
+      inputs.pins.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
+    const StepReport report = of.solveEquilibrium(state, inputs);
+    EXPECT_TRUE(report.ok) << report.message;
+    return state.x;
+  };
+  const Matrix3Xd held = settle(stepper, marginOf(mesh, 6));
+  EXPECT_GT((held - settle(plain, marginOf(mesh, 6))).cwiseAbs().maxCoeff(), 1e-5);   // of 1e-3
+  EXPECT_EQ((settle(stepper, ends) - settle(plain, ends)).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_EQ((settle(stepper, marginOf(mesh, 6)) - held).cwiseAbs().maxCoeff(), 0.0);
 }
 
 }  // namespace

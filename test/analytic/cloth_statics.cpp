@@ -150,6 +150,54 @@ TEST(ClothStatics, aPlateCompressedBeyondItsBucklingLoadLeavesItsPlane)
   EXPECT_EQ((above.state.x - again.state.x).cwiseAbs().maxCoeff(), 0.0);   // the side is chosen by the mode, not by chance
 }
 
+TEST(ClothStatics, aFlatSheetWhoseEdgesComeTogetherHangsInACatenary)
+{
+  // An inextensible, limp strip of length 1 between two lines at a distance of 0.6: 2 a sinh(0.3 / a) = 1, sag a (cosh(0.3 / a) - 1) = 0.36.
+  constexpr double kSpan = 0.6, kWidth = 0.25;
+  double a = 0.2;
+  for (int k = 0; k < 50; ++k)   // Newton's method
+    a -= (2 * a * std::sinh(kSpan / (2 * a)) - 1) / (2 * std::sinh(kSpan / (2 * a)) - kSpan / a * std::cosh(kSpan / (2 * a)));
+  const double sag = a * (std::cosh(kSpan / (2 * a)) - 1);
+  EXPECT_GT(sag, 0.36);
+  for (const int rows : {16, 32})
+  {
+    constexpr double kLoad = 1e6, kThickness = 1e-4;   // q L^3 / D: bending reaches no farther than sqrt(D / H) = 0.002 of the length
+    const TriangleMesh mesh = gridMesh(kWidth, 1.0, rows / 4, rows, GridPattern::alternating);
+    std::vector<int> held;
+    for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
+      if (mesh.vertices(1, i) < 1e-9 || mesh.vertices(1, i) > 1 - 1e-9)
+        held.push_back(static_cast<int>(i));
+    Plate sheet(mesh, kThickness, held, false);
+    sheet.inputs.gravity = Vector3d(0, 0, -kLoad);
+    sheet.inputs.pins.row(1).array() = 0.5 + kSpan * (sheet.inputs.pins.row(1).array() - 0.5);   // the search starts from the flat sheet
+    ClothStepper stepper(sheet.model, ClothOptions{});
+    const StepReport report = stepper.solveEquilibrium(sheet.state, sheet.inputs);
+    ASSERT_TRUE(report.ok) << report.message;
+    EXPECT_TRUE(report.stable);
+    // A strain of e makes the sheet longer by at most e, and a sheet that is longer by 1 % sags by 1.2 % more. A chain of n straight links sags by
+    // 1.0 / n^2 more than the catenary (measured: 0.9). Bending that pinned edges do not feel changes less than D / (H a^2) = 1e-4.
+    const double bound = 1.2 * report.max_strain + 1.0 / (rows * rows) + 1e-4;
+    EXPECT_NEAR(sheet.deflection() / sag, 1.0, bound) << rows;
+    // The edges bear the weight, and pull inwards by q a per width.
+    const Eigen::Matrix3Xd& forces = stepper.pinForces();
+    EXPECT_NEAR(forces.row(2).sum(), -kLoad * kWidth, 1e-6 * kLoad * kWidth);
+    EXPECT_NEAR(0.5 * forces.row(1).cwiseAbs().sum(), kLoad * a * kWidth, 3 * bound * kLoad * a * kWidth) << rows;
+  }
+}
+
+TEST(ClothStatics, aFlatSheetOnTwoCornersFallsAndHangsBelowThem)
+{
+  constexpr int kCells = 12;
+  const TriangleMesh mesh = gridMesh(1.0, 1.0, kCells, kCells, GridPattern::alternating);
+  Plate sheet(mesh, 1e-3, {kCells * (kCells + 1), (kCells + 1) * (kCells + 1) - 1}, false);
+  sheet.inputs.gravity = Vector3d(0, 0, -1e4);
+  const StepReport report = solve(sheet);
+  ASSERT_TRUE(report.ok) << report.message;
+  EXPECT_TRUE(report.stable);
+  // It hangs from the corners of one side, and its lower side is one side's length below, but for strain.
+  EXPECT_NEAR(sheet.deflection(), 1.0, report.max_strain);
+}
+
 TEST(ClothStatics, whatHasNoEquilibriumIsRefused)
 {
   Plate plate = cantilever(10);
