@@ -483,7 +483,11 @@ double RodSystem::noiseLevel() const
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < a_.nodes; ++i)
       extent = std::max(extent, std::abs(a_.x[k][i]));
-  return 4.0 * std::numeric_limits<double>::epsilon() * max_stretch_modulus_ * (a_.stretch[0] / std::max(stretch_[0], 1e-300)) * extent / min_rest_length_;
+  // Positions round to eps of the extent, so that forces round to this times the stiffness of an edge against stretching, and of a joint against
+  // bending, which is the larger one where edges are shorter than the rod is thick.
+  const double bend = std::max(model_.bend_modulus.row(0).maxCoeff(), model_.bend_modulus.row(2).maxCoeff());
+  const double stiffness = max_stretch_modulus_ / min_rest_length_ + bend / (min_rest_length_ * min_rest_length_ * min_rest_length_);
+  return 4.0 * std::numeric_limits<double>::epsilon() * stiffness * (a_.stretch[0] / std::max(stretch_[0], 1e-300)) * extent;
 }
 
 Eigen::Vector3d RodSystem::nodeGradient(int node) const

@@ -69,8 +69,8 @@ struct ClothModel
   /// Of bending, in (-1, 1): the plate energy D/2 [(k1 + k2)^2 - 2 (1 - nu) k1 k2] with the principal curvatures k1 and k2 (see plateBending()).
   /// Empty: the bending model has the ratio of its discretisation, about -1/3 (nonconforming, hinges) or 1 (conforming).
   std::optional<double> bending_poissons_ratio;
-  /// One per face, not 0 for faces that are held as a whole; empty: none. They do not bend, so that their edges to other faces are clamped edges (see hingeArea()). See clampFaces(). Their vertices
-  /// should be pins of the state; once these are released, the clamped edges stay twice as stiff. Not for conforming bending.
+  /// One per face, not 0 for faces that do not bend while all their vertices are pins of the state; empty: none. Their edges to other faces are
+  /// then clamped edges (see hingeArea()). Once a pin of theirs is released they bend like the rest. See clampFaces(). Not for conforming bending.
   std::vector<char> clamped_faces;
   Eigen::Matrix3Xd undeformed;       ///< 3 x n: its bend angles are those at rest; empty: those of `rest`
   Plasticity plasticity;
