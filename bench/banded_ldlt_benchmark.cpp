@@ -13,11 +13,12 @@
 
 extern "C" {
 void dpbtrf_(const char* uplo, const int* n, const int* kd, double* ab, const int* ldab, int* info, std::size_t);
-void dpbtrs_(const char* uplo, const int* n, const int* kd, const int* nrhs, const double* ab, const int* ldab, double* b, const int* ldb, int* info,
-             std::size_t);
-void dgbtrf_(const int* m, const int* n, const int* kl, const int* ku, double* ab, const int* ldab, int* pivots, int* info);
-void dgbtrs_(const char* trans, const int* n, const int* kl, const int* ku, const int* nrhs, const double* ab, const int* ldab, const int* pivots,
+void dpbtrs_(const char* uplo, const int* n, const int* kd, const int* nrhs, const double* ab, const int* ldab,
              double* b, const int* ldb, int* info, std::size_t);
+void dgbtrf_(const int* m, const int* n, const int* kl, const int* ku, double* ab, const int* ldab, int* pivots,
+             int* info);
+void dgbtrs_(const char* trans, const int* n, const int* kl, const int* ku, const int* nrhs, const double* ab,
+             const int* ldab, const int* pivots, double* b, const int* ldb, int* info, std::size_t);
 }
 
 namespace {
@@ -27,7 +28,8 @@ using slender::RodPanel;
 
 constexpr int kHalf = 10, kBlock = 4;
 
-/// Random symmetric positive definite band with a rod's sparsity: a column reaches down to ten rows below the first of its node.
+/// Random symmetric positive definite band with a rod's sparsity: a column reaches down to ten rows below the first of
+/// its node.
 struct Band
 {
   explicit Band(int nodes) : n(kBlock * nodes), lower(static_cast<std::size_t>(n) * (kHalf + 1), 0.0)
@@ -38,12 +40,17 @@ struct Band
       for (int d = 0; c + d < n && c % kBlock + d <= kHalf; ++d)
         at(c + d, c) = d == 0 ? 15.0 + entry(random) : entry(random);
   }
-  double& at(int row, int column) { return lower[static_cast<std::size_t>(column) * (kHalf + 1) + static_cast<std::size_t>(row - column)]; }
+  double& at(int row, int column)
+  {
+    return lower[static_cast<std::size_t>(column) * (kHalf + 1) + static_cast<std::size_t>(row - column)];
+  }
   double get(int row, int column) const
   {
     if (row < column)
       std::swap(row, column);
-    return row - column > kHalf ? 0.0 : lower[static_cast<std::size_t>(column) * (kHalf + 1) + static_cast<std::size_t>(row - column)];
+    return row - column > kHalf
+               ? 0.0
+               : lower[static_cast<std::size_t>(column) * (kHalf + 1) + static_cast<std::size_t>(row - column)];
   }
   int n;
   std::vector<double> lower;   ///< LAPACK's lower band storage, leading dimension kHalf + 1
@@ -87,8 +94,9 @@ void finish(benchmark::State& state, const Band& band, const std::vector<double>
 {
   if (!(residual(band, x) < 1e-9))
     state.SkipWithError("wrong solution");
-  state.counters["per_node"] = benchmark::Counter(static_cast<double>(band.n / kBlock),
-                                                  benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+  state.counters["per_node"] =
+      benchmark::Counter(static_cast<double>(band.n / kBlock),
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
 // Every loop copies the matrix in, since all of them factor in place; BM_copy is that part alone.
@@ -143,7 +151,8 @@ void BM_lapack_dgbtrf(benchmark::State& state)
 {
   const Band band(static_cast<int>(state.range(0)));
   const int half = kHalf, leading = 3 * kHalf + 1, one = 1;
-  std::vector<double> general(static_cast<std::size_t>(band.n) * leading, 0.0), work(general.size()), x(static_cast<std::size_t>(band.n));
+  std::vector<double> general(static_cast<std::size_t>(band.n) * leading, 0.0), work(general.size()),
+      x(static_cast<std::size_t>(band.n));
   for (int c = 0; c < band.n; ++c)
     for (int r = std::max(0, c - kHalf); r <= std::min(band.n - 1, c + kHalf); ++r)
       general[static_cast<std::size_t>(c) * leading + static_cast<std::size_t>(2 * kHalf + r - c)] = band.get(r, c);
@@ -160,7 +169,7 @@ void BM_lapack_dgbtrf(benchmark::State& state)
   finish(state, band, x);
 }
 
-}  // namespace
+}   // namespace
 
 BENCHMARK(BM_copy)->RangeMultiplier(10)->Range(100, 100000);
 BENCHMARK(BM_banded_ldlt)->RangeMultiplier(10)->Range(100, 100000);

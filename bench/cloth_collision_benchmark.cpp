@@ -141,7 +141,12 @@ void fclTree(benchmark::State& state)
   }
   state.counters["pairs"] = static_cast<double>(pairs);
 }
-BENCHMARK_TEMPLATE(fclTree, fcl::KDOP<double, 16>)->Args({22, 1})->Args({71, 0})->Args({71, 1})->Args({158, 1})->Unit(benchmark::kMicrosecond);
+BENCHMARK_TEMPLATE(fclTree, fcl::KDOP<double, 16>)
+    ->Args({22, 1})
+    ->Args({71, 0})
+    ->Args({71, 1})
+    ->Args({158, 1})
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK_TEMPLATE(fclTree, fcl::KDOP<double, 24>)->Args({71, 1})->Unit(benchmark::kMicrosecond);
 BENCHMARK_TEMPLATE(fclTree, fcl::AABB<double>)->Args({71, 1})->Unit(benchmark::kMicrosecond);
 
@@ -171,10 +176,12 @@ void grid(benchmark::State& state)
 }
 BENCHMARK(grid)->Arg(22)->Arg(71)->Arg(158)->Unit(benchmark::kMicrosecond);
 
-/// A whole step: sheets of 1 m of 2 n^2 triangles each at rest on a floor and on each other, or one that hangs free (layers 0), under gravity.
+/// A whole step: sheets of 1 m of 2 n^2 triangles each at rest on a floor and on each other, or one that hangs free
+/// (layers 0), under gravity.
 void resolve(benchmark::State& state)
 {
-  const int n = static_cast<int>(state.range(0)), layers = static_cast<int>(state.range(1)), sheets = std::max(1, layers);
+  const int n = static_cast<int>(state.range(0)), layers = static_cast<int>(state.range(1)),
+            sheets = std::max(1, layers);
   CollisionSurface surface;
   const Sheet flat = folded(n);
   const int points = (n + 1) * (n + 1);
@@ -185,13 +192,15 @@ void resolve(benchmark::State& state)
     sheet.triangles = flat.triangles.array() + s * points;
     surface.sheets.push_back(sheet);
     for (int i = 0; i < points; ++i)
-      surface.rest.col(s * points + i) << (i / (n + 1)) / double(n) + 0.003 * s, (i % (n + 1)) / double(n) + 0.002 * s, 0.0;
+      surface.rest.col(s * points + i) << (i / (n + 1)) / double(n) + 0.003 * s, (i % (n + 1)) / double(n) + 0.002 * s,
+          0.0;
   }
   surface.solids.push_back({Plane{}, -1.0, {}});
   const Eigen::VectorXd inverse_mass = Eigen::VectorXd::Constant(surface.rest.cols(), points / 0.2);
   Eigen::Matrix3Xd x = surface.rest;
   for (Eigen::Index i = 0; i < x.cols(); ++i)
-    x(2, i) = layers == 0 ? 0.5 + 0.05 * std::sin(9 * x(0, i)) * std::cos(7 * x(1, i)) : 0.9 * kThickness * (i / points + 0.5) + 1e-5 * std::sin(i);
+    x(2, i) = layers == 0 ? 0.5 + 0.05 * std::sin(9 * x(0, i)) * std::cos(7 * x(1, i))
+                          : 0.9 * kThickness * (i / points + 0.5) + 1e-5 * std::sin(i);
   SurfaceCollider collider(surface);
   const double h = 0.005;
   Eigen::Matrix3Xd end, v;
@@ -208,8 +217,9 @@ void resolve(benchmark::State& state)
   state.counters["impulses"] = report.impulses;
   state.counters["rounds"] = report.rounds;
 }
-BENCHMARK(resolve)->Args({71, 0})->Args({71, 1})->Args({50, 2})->Args({41, 3})->Args({160, 0})->Unit(benchmark::kMicrosecond);
+BENCHMARK(resolve)->Args({71, 0})->Args({71, 1})->Args({50, 2})->Args({41, 3})->Args({160, 0})->Unit(
+    benchmark::kMicrosecond);
 
-}  // namespace
+}   // namespace
 
 BENCHMARK_MAIN();

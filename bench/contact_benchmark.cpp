@@ -84,7 +84,9 @@ std::vector<BoundingBox> hair(int segments)
     Eigen::Vector3d p = 0.1 * n;
     for (int i = 0; i < 20; ++i)
     {
-      const Eigen::Vector3d q = p + 0.005 * (n + 0.5 * Eigen::Vector3d(u(random), u(random), u(random)) - 0.05 * i * Eigen::Vector3d::UnitZ()).normalized();
+      const Eigen::Vector3d q =
+          p + 0.005 * (n + 0.5 * Eigen::Vector3d(u(random), u(random), u(random)) - 0.05 * i * Eigen::Vector3d::UnitZ())
+                          .normalized();
       boxes.push_back({p.cwiseMin(q).array() - 5e-4, p.cwiseMax(q).array() + 5e-4});
       p = q;
     }
@@ -121,7 +123,8 @@ void sweepPairs(benchmark::State& state)
   state.counters["pairs"] = static_cast<double>(pairs);
 }
 
-/// FCL's dynamic AABB tree, updated after a motion of a millimetre and collided with itself; building it is not counted.
+/// FCL's dynamic AABB tree, updated after a motion of a millimetre and collided with itself; building it is not
+/// counted.
 void fclTreePairs(benchmark::State& state)
 {
   const auto boxes = hair(static_cast<int>(state.range(0)));
@@ -130,7 +133,8 @@ void fclTreePairs(benchmark::State& state)
   for (const BoundingBox& b : boxes)
   {
     const Eigen::Vector3d size = b.high - b.low;
-    objects.push_back(std::make_unique<fcl::CollisionObjectd>(std::make_shared<fcl::Boxd>(size), Eigen::Matrix3d::Identity(), 0.5 * (b.low + b.high)));
+    objects.push_back(std::make_unique<fcl::CollisionObjectd>(std::make_shared<fcl::Boxd>(size),
+                                                              Eigen::Matrix3d::Identity(), 0.5 * (b.low + b.high)));
     objects.back()->computeAABB();
     pointers.push_back(objects.back().get());
   }
@@ -160,7 +164,8 @@ BENCHMARK(gridPairs)->Arg(200)->Arg(2000)->Arg(50000)->Unit(benchmark::kMicrosec
 BENCHMARK(sweepPairs)->Arg(200)->Arg(2000)->Arg(50000)->Unit(benchmark::kMicrosecond);
 BENCHMARK(fclTreePairs)->Arg(200)->Arg(2000)->Arg(50000)->Unit(benchmark::kMicrosecond);
 
-/// FCL's distance of a capsule from a shape, as a rod's segment would need it, against the minimum of the closed formula along the axis.
+/// FCL's distance of a capsule from a shape, as a rod's segment would need it, against the minimum of the closed
+/// formula along the axis.
 template <class FclShape>
 void fclDistance(benchmark::State& state, const FclShape& shape, const ConvexPiece& piece)
 {
@@ -175,7 +180,9 @@ void fclDistance(benchmark::State& state, const FclShape& shape, const ConvexPie
     pose.translation() = 0.4 * Eigen::Vector3d(u(random), u(random), u(random));
     pose.linear() = Eigen::Quaterniond(u(random), u(random), u(random), u(random)).normalized().toRotationMatrix();
     double a = -0.5 * kLength, b = 0.5 * kLength;
-    const auto distance = [&](double t) { return pieceDistance(piece, pose * Eigen::Vector3d(0, 0, t), Eigen::Vector3d::Zero()).distance - kRadius; };
+    const auto distance = [&](double t) {
+      return pieceDistance(piece, pose * Eigen::Vector3d(0, 0, t), Eigen::Vector3d::Zero()).distance - kRadius;
+    };
     for (int k = 0; k < 90; ++k)
     {
       const double p = a + (b - a) / 3, q = b - (b - a) / 3;
@@ -233,6 +240,6 @@ void softenedCylinder(benchmark::State& state)
 }
 BENCHMARK(softenedCylinder);
 
-}  // namespace
+}   // namespace
 
 BENCHMARK_MAIN();

@@ -11,11 +11,13 @@ namespace slender {
 namespace {
 
 constexpr long kFlops = 600;   // of dense matrices, to a count of a WorkBudget
-/// Measured (study tracking_overhead): for fewer averages sweeps are faster. The more there are, the less their stiffness is that of the preconditioner.
+/// Measured (study tracking_overhead): for fewer averages sweeps are faster. The more there are, the less their
+/// stiffness is that of the preconditioner.
 constexpr int kPointsPerAverage = 50;
-constexpr double kStiffestSwept = 300.0;   // measured likewise: of bending over inertia. Sweeps carry from edge to edge what bends a plate as a whole
+// measured likewise: of bending over inertia. Sweeps carry from edge to edge what bends a plate as a whole
+constexpr double kStiffestSwept = 300.0;
 
-}  // namespace
+}   // namespace
 
 /// Of the averages that are met; those at their bounds have forces of their own.
 void ClothSystem::takeOutAverages(PointVector& r)
@@ -51,7 +53,8 @@ void ClothSystem::setGap(const Eigen::Matrix3Xd& averages, const PointVector& x)
 
 void ClothSystem::meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x)
 {
-  constexpr double kRounding = 4e-15;   // of the coordinates: what is left after a solve, or conjugate gradients that began there
+  // of the coordinates: what is left after a solve, or conjugate gradients that began there
+  constexpr double kRounding = 4e-15;
   for (int pass = 0; pass < 2; ++pass)   // of averages that nearly depend on each other one leaves more
   {
     setGap(averages, x);
@@ -69,7 +72,8 @@ void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces, bool response)
   forces.resize(3, averageCount());
   if (bounds_ && !response)
     for (const int i : bounds_->at)
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*used_->prescribed->weights, i); entry; ++entry)
+      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*used_->prescribed->weights, i); entry;
+           ++entry)
         point(gradient_, entry.col()) -= entry.value() * bounds_->forces.col(i);
   std::copy(gradient_.begin(), gradient_.end(), right_.begin());
   clearHeld(right_);
@@ -78,7 +82,8 @@ void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces, bool response)
   for (Eigen::Index i = 0; i < forces.cols(); ++i)
   {
     forces.col(i) = point(multipliers_, i);
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*used_->prescribed->weights, i); entry; ++entry)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*used_->prescribed->weights, i); entry;
+         ++entry)
       if (held_[static_cast<std::size_t>(entry.col())])   // what holds it bears its share
         point(gradient_, entry.col()) -= entry.value() * forces.col(i);
   }
@@ -86,8 +91,8 @@ void ClothSystem::balanceAverages(Eigen::Matrix3Xd& forces, bool response)
     forces = bounds_->forces;
 }
 
-/// z = P r, among directions that leave the averages alone. What the averages balance is taken out of r, where it would drown the rest in rounding errors
-/// [Gould, Hribar, Nocedal, SIAM J. Sci. Comput. 23 (2001), 5].
+/// z = P r, among directions that leave the averages alone. What the averages balance is taken out of r, where it would
+/// drown the rest in rounding errors [Gould, Hribar, Nocedal, SIAM J. Sci. Comput. 23 (2001), 5].
 void ClothSystem::preconditionWithin(PointVector& r, PointVector& z)
 {
   averages_->solve(r.data(), nullptr, z.data(), multipliers_.data());
@@ -114,10 +119,12 @@ void ClothSystem::moveAverages(PointVector& d)
   move(d);
 }
 
-/// Before conjugate gradients with averages: takes out of right_ what these balance. With `averages` d is moved there, and on by a step of the
-/// preconditioned gradient, which comes for nothing; returns what the load on the cloth was without the forces of the averages, which the tolerance counts
-/// from as it does for a cloth without; less near equilibrium, where that load stays (the averages hold it) and errors of one step must not outlive the next. Where cloth is strained so much that the step leads uphill, it is far stiffer than the preconditioner: then
-/// that load says nothing about motions. d is moved by the least, and the tolerance counts from what is left: 0.
+/// Before conjugate gradients with averages: takes out of right_ what these balance. With `averages` d is moved there,
+/// and on by a step of the preconditioned gradient, which comes for nothing; returns what the load on the cloth was
+/// without the forces of the averages, which the tolerance counts from as it does for a cloth without; less near
+/// equilibrium, where that load stays (the averages hold it) and errors of one step must not outlive the next. Where
+/// cloth is strained so much that the step leads uphill, it is far stiffer than the preconditioner: then that load says
+/// nothing about motions. d is moved by the least, and the tolerance counts from what is left: 0.
 double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages, double tolerance)
 {
   constexpr double kLeft = 0.1;         // of what is not balanced at the start
@@ -138,7 +145,8 @@ double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averag
   takeOutAverages(right_);
   applyMatrix(correction_, product_);
   clearHeld(product_);
-  const bool downhill = pointKernels().dot(points(), correction_.data(), product_.data()) < 2.0 * norms.step * norms.step;
+  const bool downhill =
+      pointKernels().dot(points(), correction_.data(), product_.data()) < 2.0 * norms.step * norms.step;
   if (!downhill)
     moveAverages(d);
   else
@@ -148,7 +156,8 @@ double ClothSystem::takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averag
 
 bool ClothSystem::sweepsSuit(const PrescribedAverages& averages) const
 {
-  return choose_ && averages.bounds.size() == 0 && points() <= kMostSwept && points() >= kPointsPerAverage * averages.count();
+  return choose_ && averages.bounds.size() == 0 && points() <= kMostSwept &&
+         points() >= kPointsPerAverage * averages.count();
 }
 
 bool ClothSystem::bendsLittle(double viscosity) const
@@ -160,18 +169,24 @@ bool ClothSystem::bendsLittle(double viscosity) const
   return true;
 }
 
-/// By conjugate gradients with symmetric sweeps, after takeFirstStep(). What keeps the averages met is a stiffness, which costs an iteration next to nothing, and
-/// after them the motion of the preconditioner that meets averages, which meetAverages() makes in the end: a method of multipliers. The tolerance is that of the
-/// equations with that stiffness; rounds go on until that motion is so small that positions are as good as those of the same cloth without averages.
-LinearOutcome ClothSystem::sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance, int& linear_iterations)
+/// By conjugate gradients with symmetric sweeps, after takeFirstStep(). What keeps the averages met is a stiffness,
+/// which costs an iteration next to nothing, and after them the motion of the preconditioner that meets averages, which
+/// meetAverages() makes in the end: a method of multipliers. The tolerance is that of the equations with that
+/// stiffness; rounds go on until that motion is so small that positions are as good as those of the same cloth without
+/// averages.
+LinearOutcome ClothSystem::sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance,
+                                             int& linear_iterations)
 {
   constexpr int kMostRounds = 4;
-  constexpr double kStiff = 3.0, kMotion = 40.0;   // measured (study tracking_overhead): of the preconditioner; of the tolerance, in its norm
-  constexpr double kLeft = 0.1;                    // of what is not balanced at the start
-  constexpr double kMoving = 0.1;                  // of what it takes to move the averages, much of the load of cloth that they tear at
+  // measured (study tracking_overhead): of the preconditioner; of the tolerance, in its norm
+  constexpr double kStiff = 3.0, kMotion = 40.0;
+  constexpr double kLeft = 0.1;   // of what is not balanced at the start
+  // of what it takes to move the averages, much of the load of cloth that they tear at
+  constexpr double kMoving = 0.1;
   sweeps_.set(1.0 + ratio_, held_);
   double reference = sweeps_.norm(right_);
-  if (!(takeFirstStep(d, &averages, tolerance) > 0))   // where cloth is so much stiffer than the preconditioner this leads away
+  if (!(takeFirstStep(d, &averages, tolerance) >
+        0))   // where cloth is so much stiffer than the preconditioner this leads away
     return LinearOutcome::not_converged;
   double gap = averages_->norm(gap_.data());
   const double moving = kMoving * gap, load = std::max(std::sqrt(std::max(load_ * load_ - gap * gap, 0.0)), moving);
@@ -179,8 +194,8 @@ LinearOutcome ClothSystem::sweepWithAverages(PointVector& d, const Eigen::Matrix
   reference = std::max(reference, moving);
   for (int round = 0; round < kMostRounds; ++round)
   {
-    const LinearResult result = sweeps_.solve(*averages_, kStiff, right_, correction_, tolerance, iterationsWithin(kMostIterations), reference,
-                                              round == 0 ? kLeft : 1.0);
+    const LinearResult result = sweeps_.solve(*averages_, kStiff, right_, correction_, tolerance,
+                                              iterationsWithin(kMostIterations), reference, round == 0 ? kLeft : 1.0);
     linear_iterations += result.iterations;
     spend(result.iterations + 1);
     for (std::size_t i = 0; i < d.size(); ++i)
@@ -205,10 +220,11 @@ LinearOutcome ClothSystem::sweepWithAverages(PointVector& d, const Eigen::Matrix
   return LinearOutcome::not_converged;
 }
 
-/// As solve() of a linearised step, but forces of averages are at most their bounds: what the step minimises gets bound times |target - average|
-/// for each instead of the condition that both are the same. An average is either met, or its force is at the bound and points from it to its target.
-/// Where no bound is reached that is solve().
-LinearOutcome ClothSystem::solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound, int& linear_iterations)
+/// As solve() of a linearised step, but forces of averages are at most their bounds: what the step minimises gets bound
+/// times |target - average| for each instead of the condition that both are the same. An average is either met, or its
+/// force is at the bound and points from it to its target. Where no bound is reached that is solve().
+LinearOutcome ClothSystem::solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound,
+                                        int& linear_iterations)
 {
   AverageBounds& b = *bounds_;
   const Eigen::VectorXd& most = used_->prescribed->bounds;
@@ -235,7 +251,8 @@ LinearOutcome ClothSystem::solveBounded(PointVector& d, const Eigen::Matrix3Xd& 
   else if (!averagesIndependent() || !preconditioned_)
     return LinearOutcome::not_definite;
   std::fill(b.pulls.begin(), b.pulls.end(), 0.0);
-  constexpr double kSmall = 1e-6;   // of what the bounds could do: forces far below them, of a shell at rest, are rounding errors
+  // of what the bounds could do: forces far below them, of a shell at rest, are rounding errors
+  constexpr double kSmall = 1e-6;
   double reference = 0.0;
   for (int i = 0; i < averages_->count(); ++i)
     if (std::isfinite(most[i]))
@@ -255,10 +272,12 @@ LinearOutcome ClothSystem::solveBounded(PointVector& d, const Eigen::Matrix3Xd& 
   return outcome;
 }
 
-/// By steps of the preconditioned gradient, with the averages and their bounds solved exactly for the preconditioner (proximal gradient method, accelerated
-/// [Beck & Teboulle, SIAM J. Imaging Sci. 2 (2009), 183] and restarted [O'Donoghue & Candes, Found. Comput. Math. 15 (2015), 715]). Forces keep their bounds
-/// whatever is left to converge. Gives up early where cloth is stiff: there Gauss-Seidel sweeps over the averages take thousands, and steps hundreds.
-LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference, int& linear_iterations)
+/// By steps of the preconditioned gradient, with the averages and their bounds solved exactly for the preconditioner
+/// (proximal gradient method, accelerated [Beck & Teboulle, SIAM J. Imaging Sci. 2 (2009), 183] and restarted
+/// [O'Donoghue & Candes, Found. Comput. Math. 15 (2015), 715]). Forces keep their bounds whatever is left to converge.
+/// Gives up early where cloth is stiff: there Gauss-Seidel sweeps over the averages take thousands, and steps hundreds.
+LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference,
+                                              int& linear_iterations)
 {
   constexpr int kMostIterations = 25;
   constexpr double kSteepest = 1e6;   // of the preconditioner
@@ -277,7 +296,8 @@ LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matri
     t = next;
     for (std::size_t i = 0; i < d.size(); ++i)   // the point to step from, and its image
     {
-      const double x = d[i] + carry * (d[i] - b.before[i]), image = b.image[i] + carry * (b.image[i] - b.image_before[i]);
+      const double x = d[i] + carry * (d[i] - b.before[i]),
+                   image = b.image[i] + carry * (b.image[i] - b.image_before[i]);
       b.before[i] = d[i];
       b.image_before[i] = b.image[i];
       d[i] = x;
@@ -291,8 +311,8 @@ LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matri
     bool exact = false;
     for (;; l *= 2.0)
     {
-      const ConstrainedCholesky::Norms norms =
-        averages_->solveBounded(right_.data(), gap_.data(), most.data(), l, tolerance, correction_.data(), b.pulls.data());
+      const ConstrainedCholesky::Norms norms = averages_->solveBounded(right_.data(), gap_.data(), most.data(), l,
+                                                                       tolerance, correction_.data(), b.pulls.data());
       step = norms.step;
       exact = norms.converged;
       spend(1);
@@ -326,8 +346,9 @@ LinearOutcome ClothSystem::stepTowardsBounded(PointVector& d, const Eigen::Matri
   return LinearOutcome::not_converged;
 }
 
-/// Of the bounded averages' forces `b.pulls` and the gap they leave: u = f + stiffness gap, the forces that are u within their bounds, and how stiff these
-/// are along the gap, for the preconditioner in all directions alike. Returns the work that is left in the gap: the Moreau envelope of bound |gap|.
+/// Of the bounded averages' forces `b.pulls` and the gap they leave: u = f + stiffness gap, the forces that are u
+/// within their bounds, and how stiff these are along the gap, for the preconditioner in all directions alike. Returns
+/// the work that is left in the gap: the Moreau envelope of bound |gap|.
 double ClothSystem::boundedForces()
 {
   AverageBounds& b = *bounds_;
@@ -346,11 +367,14 @@ double ClothSystem::boundedForces()
   return envelope;
 }
 
-/// The same problem by the method of multipliers [Rockafellar, Math. Oper. Res. 1 (1976), 97], whose smooth problems take a few steps of semismooth Newton
-/// with a line search [Li, Sun & Toh, SIAM J. Optim. 28 (2018), 433], and these conjugate gradients.
-LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference, int& linear_iterations)
+/// The same problem by the method of multipliers [Rockafellar, Math. Oper. Res. 1 (1976), 97], whose smooth problems
+/// take a few steps of semismooth Newton with a line search [Li, Sun & Toh, SIAM J. Optim. 28 (2018), 433], and these
+/// conjugate gradients.
+LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference,
+                                           int& linear_iterations)
 {
-  constexpr int kMostRounds = 60, kMostSteps = 60, kMostIterations = 4000;   // rounds of multipliers, Newton steps in each, and all of conjugate gradients
+  // rounds of multipliers, Newton steps in each, and all of conjugate gradients
+  constexpr int kMostRounds = 60, kMostSteps = 60, kMostIterations = 4000;
   constexpr double kStiff = 10.0;     // of the averages
   constexpr double kForcing = 0.05;   // of a Newton step's residual
   constexpr double kArmijo = 1e-4;
@@ -380,7 +404,8 @@ LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3X
       averages_->soften(b.weights);
       budget_->spend(static_cast<long>(m) * m * m / kFlops);
       averages_->solveSoftened(right_.data(), move.data());
-      const double left = std::sqrt(std::max(kernels.dot(points(), right_.data(), move.data()), 0.0)), allowed = 0.5 * linear_tolerance_ * reference;
+      const double left = std::sqrt(std::max(kernels.dot(points(), right_.data(), move.data()), 0.0)),
+                   allowed = 0.5 * linear_tolerance_ * reference;
       if (!std::isfinite(left))
         return LinearOutcome::not_definite;
       balanced = left <= allowed;
@@ -390,26 +415,27 @@ LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3X
       if (most <= 0 || budget_->spent())
         return LinearOutcome::not_converged;
       const LinearResult result = cg_.solve(
-        right_, move, std::max(kForcing, 0.5 * allowed / left), most,
-        [&](const PointVector& p, PointVector& ap) {
-          applyMatrix(p, ap);
-          clearHeld(ap);
-          averagesOf(p, averages_now_);
-          for (int i = 0; i < m; ++i)   // a force at its bound only turns
-          {
-            const Eigen::Vector3d n = point(b.wanted, i);
-            point(b.response, i) = b.weights[i] * (averages_now_.col(i) - n.dot(averages_now_.col(i)) * n);
-          }
-          averages_->addForces(b.response.data(), ap.data());
-        },
-        [&](PointVector& r, PointVector& z) { averages_->solveSoftened(r.data(), z.data()); });
+          right_, move, std::max(kForcing, 0.5 * allowed / left), most,
+          [&](const PointVector& p, PointVector& ap) {
+            applyMatrix(p, ap);
+            clearHeld(ap);
+            averagesOf(p, averages_now_);
+            for (int i = 0; i < m; ++i)   // a force at its bound only turns
+            {
+              const Eigen::Vector3d n = point(b.wanted, i);
+              point(b.response, i) = b.weights[i] * (averages_now_.col(i) - n.dot(averages_now_.col(i)) * n);
+            }
+            averages_->addForces(b.response.data(), ap.data());
+          },
+          [&](PointVector& r, PointVector& z) { averages_->solveSoftened(r.data(), z.data()); });
       linear_iterations += result.iterations;
       spend(result.iterations + 1);
       if (!result.definite)
         return LinearOutcome::not_definite;
       // the quadratic part along the step, and the envelope
       applyMatrix(move, image);
-      const double slope = -kernels.dot(points(), right_.data(), move.data()), curvature = kernels.dot(points(), move.data(), image.data());
+      const double slope = -kernels.dot(points(), right_.data(), move.data()),
+                   curvature = kernels.dot(points(), move.data(), image.data());
       const double start = envelope;
       double linear = 0.0, alpha = 1.0;
       for (std::size_t i = 0; i < d.size(); ++i)
@@ -420,7 +446,9 @@ LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3X
           d[i] += change * move[i];
         setBoundedGap();
         envelope = boundedForces();
-        if (alpha * linear + 0.5 * alpha * alpha * curvature + envelope - start <= kArmijo * alpha * slope + 1e-12 * std::abs(start) || alpha < 1e-6)
+        if (alpha * linear + 0.5 * alpha * alpha * curvature + envelope - start <=
+                kArmijo * alpha * slope + 1e-12 * std::abs(start) ||
+            alpha < 1e-6)
           break;
       }
       for (std::size_t i = 0; i < d.size(); ++i)
@@ -438,4 +466,4 @@ LinearOutcome ClothSystem::minimizeBounded(PointVector& d, const Eigen::Matrix3X
   return LinearOutcome::not_converged;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -15,7 +15,7 @@ std::vector<char> heldClamps(const ClothModel& model, const ClothState& state)
   return faces;
 }
 
-}  // namespace
+}   // namespace
 
 void ClothStepper::Impl::followClamps(const ClothState& state)
 {
@@ -31,7 +31,8 @@ void ClothStepper::Impl::followClamps(const ClothState& state)
       changed.clamped_faces = std::move(acting);
       next = std::make_shared<const ClothModel>(std::move(changed));
     }
-    // The bending stiffness of clamped edges is part of constant matrices and of their factors, so that the system is built anew.
+    // The bending stiffness of clamped edges is part of constant matrices and of their factors, so that the system is
+    // built anew.
     system = std::make_unique<ClothSystem>(next ? *next : *model, options);
     clamped_model_ = std::move(next);
     system->useBudget(*budget_);
@@ -47,9 +48,10 @@ void ClothStepper::Impl::useConstantMatrix()
 {
   if (options.integrator != Integrator::imex)
     return;
-  constant_ = std::make_unique<ShiftedMatrix>(system->bending().size() > 0 ? system->bending() : PointMatrix(model->vertices(), {}));
+  constant_ = std::make_unique<ShiftedMatrix>(system->bending().size() > 0 ? system->bending()
+                                                                           : PointMatrix(model->vertices(), {}));
   constant_weight_.assign(model->vertices(), 0.0);
   constant_h_ = 0.0;   // The matrix is not factored yet.
 }
 
-}  // namespace slender
+}   // namespace slender

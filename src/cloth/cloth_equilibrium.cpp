@@ -14,15 +14,19 @@ StepReport ClothStepper::Impl::statics(ClothState& state, const ClothInputs& inp
     return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   const bool blown = system->wind().active() && inputs.wind != Eigen::Vector3d::Zero();
   if (!model->averages.empty() || plastic_.active() || blown)
-    return refuse(report, StepFailure::input_not_finite, "statics is for elastic cloth under gravity, loads and grasps: leave out " +
-                                                           std::string(plastic_.active() ? "plasticity" : blown ? "wind" : "what it tracks") +
-                                                           ", or let the cloth settle by time stepping with damping");
+    return refuse(report, StepFailure::input_not_finite,
+                  "statics is for elastic cloth under gravity, loads and grasps: leave out " +
+                      std::string(plastic_.active() ? "plasticity"
+                                  : blown           ? "wind"
+                                                    : "what it tracks") +
+                      ", or let the cloth settle by time stepping with damping");
   followClamps(state);
   if (!statics_)
     statics_ = std::make_unique<ClothStatics>(clamped_model_ ? *clamped_model_ : *model, options.newton);
   if (!search)
     statics_->assess(state, inputs, report);
-  else if (const StepFailure failure = statics_->solve(state, inputs, leave_saddles, report); failure != StepFailure::none)
+  else if (const StepFailure failure = statics_->solve(state, inputs, leave_saddles, report);
+           failure != StepFailure::none)
     return refuse(report, failure, statics_->explain(failure));
   pin_forces = statics_->pinForces();
   lowest_mode = statics_->mode();
@@ -40,4 +44,4 @@ StepReport ClothStepper::assessEquilibrium(const ClothState& state, const ClothI
 }
 const Eigen::Matrix3Xd& ClothStepper::lowestMode() const { return impl_->lowest_mode; }
 
-}  // namespace slender
+}   // namespace slender

@@ -24,7 +24,8 @@ ClothEvaluation ClothStepper::Impl::addForces(const ClothInputs& inputs, bool wi
   return here;
 }
 
-/// a_start_ = F(x, v) / m at the start of a step; `delta`: a time over which strain rates are found to second order [s].
+/// a_start_ = F(x, v) / m at the start of a step; `delta`: a time over which strain rates are found to second order
+/// [s].
 ClothEvaluation ClothStepper::Impl::acceleration(const ClothInputs& inputs, double delta)
 {
   x_ = x_start_;
@@ -37,7 +38,9 @@ ClothEvaluation ClothStepper::Impl::acceleration(const ClothInputs& inputs, doub
   }
   const ClothEvaluation here = addForces(inputs, true);
   for (int i = 0; i < model->vertices(); ++i)
-    point(a_start_, i) = system->held()[i] ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(point(force_, i) / model->mass[i] - model->mass_damping * point(v_, i));
+    point(a_start_, i) = system->held()[i]
+                             ? Eigen::Vector3d(0, 0, 0)
+                             : Eigen::Vector3d(point(force_, i) / model->mass[i] - model->mass_damping * point(v_, i));
   return here;
 }
 
@@ -87,8 +90,10 @@ double ClothStepper::Impl::stableStep()
   return 4.0 / square / (b + std::sqrt(b * b + 4.0 / square));
 }
 
-/// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step ago.
-StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report)
+/// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step
+/// ago.
+StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double from, double to, double duration,
+                                             StepReport& report)
 {
   const double h = to - from;
   const int n = model->vertices();
@@ -124,12 +129,14 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
     fastest = std::max(fastest, next_.v.col(i).cwiseAbs().maxCoeff());
   }
   report.max_strain = std::max(report.max_strain, here.max_strain);
-  return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none : StepFailure::state_not_finite;
+  return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none
+                                                                              : StepFailure::state_not_finite;
 }
 
-/// (M (1/h^2 + a/h) + (1 + b/h) K) d = M v/h + f - K x for the motion d of the step, with a and b of the damping, K of the bending, and f the
-/// membrane's forces (elastic and viscous) and the wind at the start, and the loads.
-StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report)
+/// (M (1/h^2 + a/h) + (1 + b/h) K) d = M v/h + f - K x for the motion d of the step, with a and b of the damping, K of
+/// the bending, and f the membrane's forces (elastic and viscous) and the wind at the start, and the loads.
+StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from, double to, double duration,
+                                         StepReport& report)
 {
   const double h = to - from, viscous = 1.0 + model->stiffness_damping / h;
   const int n = model->vertices();
@@ -167,7 +174,8 @@ StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from,
   std::fill(trial_.begin(), trial_.end(), 0.0);
   constant_->addProduct(d_.data(), trial_.data());
   for (int i = 0; i < n; ++i)
-    point(trial_, i) = system->held()[i] ? Eigen::Vector3d(point(d_, i)) : Eigen::Vector3d(point(force_, i) - point(trial_, i));
+    point(trial_, i) =
+        system->held()[i] ? Eigen::Vector3d(point(d_, i)) : Eigen::Vector3d(point(force_, i) - point(trial_, i));
   constant_->solve(trial_, d_);
   std::fill(trial_.begin(), trial_.end(), 0.0);
   constant_->addProduct(d_.data(), trial_.data());
@@ -184,7 +192,8 @@ StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from,
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
     next_.x.col(work_.pins[k]) = pinAt(inputs, k, to / duration);
   report.max_strain = std::max(report.max_strain, here.max_strain);
-  return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none : StepFailure::state_not_finite;
+  return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none
+                                                                              : StepFailure::state_not_finite;
 }
 
-}  // namespace slender
+}   // namespace slender

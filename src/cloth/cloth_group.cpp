@@ -18,11 +18,15 @@ namespace {
 
 constexpr double kMeetTolerance = 1e-12;   // of the cloth's size
 constexpr int kLoadPasses = 2;
-constexpr double kLocalAnswer = 0.4;   // answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's waves
+// answers that are so large a part of those of the masses alone need no sharing: steps that resolve the membrane's
+// waves
+constexpr double kLocalAnswer = 0.4;
 constexpr double kBalanced = 1e-6;   // of the work: what averages leave of pushes that they balance, rounding errors
-constexpr double kLoadShare = 0.7;   // of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
+// of the step of steepest descent, which goes too far where cloth lies loosely: it would hop
+constexpr double kLoadShare = 0.7;
 
-/// Layers much thicker than edges are long: everything touches what is some edges away, at the price of the square of that, and folds cannot form.
+/// Layers much thicker than edges are long: everything touches what is some edges away, at the price of the square of
+/// that, and folds cannot form.
 void checkThickness(const ClothModel& cloth, double thickness)
 {
   constexpr double kMost = 4.0;   // shortest edges
@@ -30,7 +34,8 @@ void checkThickness(const ClothModel& cloth, double thickness)
   double shortest = std::numeric_limits<double>::infinity();
   Eigen::Index at = 0;
   for (Eigen::Index e = 0; e < edges.cols(); ++e)
-    if (const double length = (cloth.rest.vertices.col(edges(0, e)) - cloth.rest.vertices.col(edges(1, e))).norm(); length < shortest)
+    if (const double length = (cloth.rest.vertices.col(edges(0, e)) - cloth.rest.vertices.col(edges(1, e))).norm();
+        length < shortest)
     {
       shortest = length;
       at = e;
@@ -38,19 +43,22 @@ void checkThickness(const ClothModel& cloth, double thickness)
   if (thickness <= kMost * shortest)
     return;
   std::ostringstream text;
-  text << "cloth '" << cloth.name << "': contact: thickness " << thickness << " m is more than " << kMost << " times its shortest edge (" << shortest
-       << " m, vertices " << edges(0, at) << " and " << edges(1, at) << "): use at most " << kMost * shortest << " m, or a mesh with longer edges";
+  text << "cloth '" << cloth.name << "': contact: thickness " << thickness << " m is more than " << kMost
+       << " times its shortest edge (" << shortest << " m, vertices " << edges(0, at) << " and " << edges(1, at)
+       << "): use at most " << kMost * shortest << " m, or a mesh with longer edges";
   throw std::invalid_argument(text.str());
 }
 
-}  // namespace
+}   // namespace
 
 ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : model_(std::move(model)), options_(options)
 {
   if (model_.contact.size() != model_.cloths.size())
-    throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " contact settings expected, one per cloth");
+    throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) +
+                                " contact settings expected, one per cloth");
   if (!model_.options.empty() && model_.options.size() != model_.cloths.size())
-    throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) + " options expected, one per cloth, or none");
+    throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) +
+                                " options expected, one per cloth, or none");
   budget_ = std::make_shared<WorkBudget>();
   first_.push_back(0);
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
@@ -75,14 +83,15 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   }
   surface_.solids = model_.solids;
   collider_ = std::make_unique<SurfaceCollider>(surface_);
-  for (Eigen::Matrix3Xd* m : {&x_start_, &x_, &v_, &v_before_, &push_, &answer_, &contact_forces_, &contact_sums_, &contact_now_})
+  for (Eigen::Matrix3Xd* m :
+       {&x_start_, &x_, &v_, &v_before_, &push_, &answer_, &contact_forces_, &contact_sums_, &contact_now_})
     m->setZero(3, first_.back());
   inverse_mass_.resize(first_.back());
   order_.resize(model_.cloths.size());
   sub_.cloths.resize(model_.cloths.size());
   sub_.solids.resize(model_.solids.size());
-  for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_, &shared_pins_, &pin_answers_, &averages_start_, &average_forces_, &average_sums_, &shared_averages_,
-                     &average_answers_})
+  for (auto* pins : {&pins_start_, &pin_forces_, &pin_sums_, &shared_pins_, &pin_answers_, &averages_start_,
+                     &average_forces_, &average_sums_, &shared_averages_, &average_answers_})
     pins->resize(model_.cloths.size());
   corrections_.resize(model_.cloths.size());
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
@@ -95,7 +104,8 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
 StepReport ClothGroup::step(ClothGroupState& state, const ClothGroupInputs& inputs, double duration)
 {
   if (state.cloths.size() != model_.cloths.size() || inputs.cloths.size() != model_.cloths.size())
-    throw std::invalid_argument("cloths: states and inputs of " + std::to_string(model_.cloths.size()) + " cloths expected");
+    throw std::invalid_argument("cloths: states and inputs of " + std::to_string(model_.cloths.size()) +
+                                " cloths expected");
   if (state.solids.size() != model_.solids.size() || inputs.solids.size() != model_.solids.size())
     throw std::invalid_argument("cloths: poses of " + std::to_string(model_.solids.size()) + " solids expected");
   StepReport report;
@@ -174,10 +184,11 @@ void ClothGroup::refuse(const Substep& substep, StepFailure failure, StepReport&
   blameExplicit(duration_, report);
 }
 
-/// Collisions change the velocities of what touches only. Where that is little mass, as under the point of a needle, it would carry little of the load,
-/// while the next solve, which knows nothing of contact, relaxes it at the cost of the few that touch. So the forces that stand for the correction act on
-/// the whole cloth as well: along its response to them, as far as the energy of the step says (a step of steepest descent on the dual problem of contact).
-/// Returns false when there is nothing left to do.
+/// Collisions change the velocities of what touches only. Where that is little mass, as under the point of a needle, it
+/// would carry little of the load, while the next solve, which knows nothing of contact, relaxes it at the cost of the
+/// few that touch. So the forces that stand for the correction act on the whole cloth as well: along its response to
+/// them, as far as the energy of the step says (a step of steepest descent on the dual problem of contact). Returns
+/// false when there is nothing left to do.
 bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
 {
   const double h = step.h;
@@ -188,7 +199,8 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
   for (int i = 0; i < first_.back(); ++i)
   {
     const bool free = inverse_mass_[i] > 0.0;
-    push_.col(i) = free ? Eigen::Vector3d((corrected_.col(i) - x_.col(i)) / (inverse_mass_[i] * h * h)) : Eigen::Vector3d(0, 0, 0);
+    push_.col(i) =
+        free ? Eigen::Vector3d((corrected_.col(i) - x_.col(i)) / (inverse_mass_[i] * h * h)) : Eigen::Vector3d(0, 0, 0);
     work += push_.col(i).dot(corrected_.col(i) - x_.col(i));
   }
   const double all = work;
@@ -221,17 +233,20 @@ bool ClothGroup::shareLoads(const CollisionStep& step, bool again)
   return true;
 }
 
-/// Steps that blow up move pieces until no collision can be solved any more, or meet the end of all halving: what is said then is why.
+/// Steps that blow up move pieces until no collision can be solved any more, or meet the end of all halving: what is
+/// said then is why.
 void ClothGroup::blameExplicit(double duration, StepReport& report) const
 {
-  if (hopeless_ || (report.failure != StepFailure::squeezed && report.failure != StepFailure::state_not_finite && report.failure != StepFailure::work_exceeded))
+  if (hopeless_ || (report.failure != StepFailure::squeezed && report.failure != StepFailure::state_not_finite &&
+                    report.failure != StepFailure::work_exceeded))
     return;
   for (const ClothStepper& stepper : steppers_)
     if (const double stable = stepper.stableStep(); duration > stable)
     {
       report.failure = StepFailure::state_not_finite;
-      report.message = "cloth '" + stepper.model().name + "': explicit steps of " + milliseconds(duration) + " are too long for its membrane (stable below " +
-                       milliseconds(stable) + " at rest): use a shorter time.step or implicit_euler; at last " + report.message;
+      report.message = "cloth '" + stepper.model().name + "': explicit steps of " + milliseconds(duration) +
+                       " are too long for its membrane (stable below " + milliseconds(stable) +
+                       " at rest): use a shorter time.step or implicit_euler; at last " + report.message;
       return;
     }
 }
@@ -246,7 +261,8 @@ void ClothGroup::addForces(double share, double h)
     if (averagesOf(k))
       average_sums_[k] += share * (steppers_[k].averageForces() + shared_averages_[k]);
     for (std::size_t p = 0; p < work_.cloths[k].pins.size(); ++p)
-      pin_sums_[k].col(static_cast<Eigen::Index>(p)) += share / h * held_impulses_.col(first_[k] + work_.cloths[k].pins[p]);
+      pin_sums_[k].col(static_cast<Eigen::Index>(p)) +=
+          share / h * held_impulses_.col(first_[k] + work_.cloths[k].pins[p]);
   }
 }
 
@@ -263,7 +279,8 @@ bool ClothGroup::stepCloths(const ClothGroupInputs& inputs, double to, double h,
       sub_.cloths[k].pins = pins_start_[k] + to * (inputs.cloths[k].pins - pins_start_[k]);
     if (to < 1.0 && inputs.cloths[k].averages.cols() == averages_start_[k].cols())
       sub_.cloths[k].averages = averages_start_[k] + to * (inputs.cloths[k].averages - averages_start_[k]);
-    StepReport own = all ? steppers_[k].step(next_.cloths[k], sub_.cloths[k], h) : steppers_[k].stepUndivided(next_.cloths[k], sub_.cloths[k], h);
+    StepReport own = all ? steppers_[k].step(next_.cloths[k], sub_.cloths[k], h)
+                         : steppers_[k].stepUndivided(next_.cloths[k], sub_.cloths[k], h);
     if (!all)   // counted already
       own.substeps = 0;
     report.merge(own);
@@ -331,7 +348,8 @@ StepReport ClothGroup::tryStep(const ClothGroupInputs& inputs, double from, doub
 {
   StepReport report;
   for (std::size_t s = 0; s < model_.solids.size(); ++s)   // uniformly from here to the end of the step
-    next_.solids[s] = to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
+    next_.solids[s] =
+        to < 1.0 ? RigidMotion(work_.solids[s], inputs.solids[s]).at((to - from) / (1.0 - from)) : inputs.solids[s];
   if (!stepCloths(inputs, to, h, true, report))
     return report;
   CollisionReport found = collide(h);
@@ -346,14 +364,16 @@ StepReport ClothGroup::tryStep(const ClothGroupInputs& inputs, double from, doub
     report.ok = false;
     report.failure = found.spent ? StepFailure::work_exceeded : StepFailure::squeezed;
     report.message = "collisions: " + found.reason + whereIs(found) +
-                     (found.at_start ? "; start from a state in which nothing intersects" : "; use a shorter step, or leave the cloth more room") +
+                     (found.at_start ? "; start from a state in which nothing intersects"
+                                     : "; use a shorter step, or leave the cloth more room") +
                      blameAverages(found);
     hopeless_ = found.at_start;
     for (const int point : found.points)
       if (point >= 0 && point < first_.back() && report.place.kind == FailurePlace::Kind::none)
       {
         const int cloth = clothOf(point);
-        report.place = {FailurePlace::Kind::cloth, model_.cloths[cloth]->name, point - first_[cloth], x_start_.col(point)};
+        report.place = {FailurePlace::Kind::cloth, model_.cloths[cloth]->name, point - first_[cloth],
+                        x_start_.col(point)};
       }
     return report;
   }
@@ -432,14 +452,16 @@ void ClothGroup::checkIntersections(const ClothGroupState& state) const
     int end = first_.back();
     for (;; ++solid)
     {
-      const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&(prism ? taken : surface_).solids[solid].shape);
+      const auto* mesh =
+          std::get_if<std::shared_ptr<const TriangleMesh>>(&(prism ? taken : surface_).solids[solid].shape);
       end += mesh ? static_cast<int>((*mesh)->vertices.cols()) : 0;
       if (point < end)
         return static_cast<int>(solid);
     }
   };
   const bool edge = first.edge[0] < first_.back();
-  const int vertex = edge ? first.edge[0] : first.triangle[0], other = edge ? first.triangle[0] : first.edge[0], cloth = clothOf(vertex);
+  const int vertex = edge ? first.edge[0] : first.triangle[0], other = edge ? first.triangle[0] : first.edge[0],
+            cloth = clothOf(vertex);
   std::string meets;
   if (other < 0)
     meets = solidName(first.triangle[2]);
@@ -449,8 +471,8 @@ void ClothGroup::checkIntersections(const ClothGroupState& state) const
     meets = "itself at vertex " + std::to_string(other - first_[cloth]);
   else
     meets = "cloth '" + model_.cloths[clothOf(other)]->name + "'";
-  throw std::invalid_argument(placeOf(vertex) + " meets " + meets + (prism ? " or the prism that stands for it" : "") + " (" +
-                              std::to_string(found.size()) + " places in all): move them apart");
+  throw std::invalid_argument(placeOf(vertex) + " meets " + meets + (prism ? " or the prism that stands for it" : "") +
+                              " (" + std::to_string(found.size()) + " places in all): move them apart");
 }
 
-}  // namespace slender
+}   // namespace slender

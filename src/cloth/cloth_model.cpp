@@ -22,8 +22,8 @@ const char* toString(BendingModel model)
   return "unknown";
 }
 
-ClothModel buildCloth(const std::string& name, const TriangleMesh& rest, double area_density, const MembraneModuli& membrane,
-                      const Eigen::Vector3d& warp)
+ClothModel buildCloth(const std::string& name, const TriangleMesh& rest, double area_density,
+                      const MembraneModuli& membrane, const Eigen::Vector3d& warp)
 {
   const std::string who = "cloth '" + name + "'";
   requireSoundMesh(rest, who);
@@ -59,7 +59,8 @@ Eigen::VectorXd restAngles(const ClothModel& model)
 void checkUndeformed(const ClothModel& model)
 {
   if (model.undeformed.cols() != 0 && (model.undeformed.cols() != model.vertices() || !model.undeformed.allFinite()))
-    throw std::invalid_argument("cloth '" + model.name + "': the undeformed shape needs " + std::to_string(model.vertices()) + " finite vertices, got " +
+    throw std::invalid_argument("cloth '" + model.name + "': the undeformed shape needs " +
+                                std::to_string(model.vertices()) + " finite vertices, got " +
                                 std::to_string(model.undeformed.cols()));
 }
 
@@ -70,7 +71,7 @@ std::string degrees(double radians)
   return text;
 }
 
-}  // namespace
+}   // namespace
 
 double largestRestAngle(const ClothModel& model)
 {
@@ -86,27 +87,36 @@ void checkBending(const ClothModel& model)
 {
   const std::string who = "cloth '" + model.name + "': ";
   checkUndeformed(model);
-  const bool isometric = model.bending == BendingModel::isometric_nonconforming || model.bending == BendingModel::isometric_conforming;
+  const bool isometric =
+      model.bending == BendingModel::isometric_nonconforming || model.bending == BendingModel::isometric_conforming;
   if (model.bending_poissons_ratio && !(*model.bending_poissons_ratio > -1.0 && *model.bending_poissons_ratio < 1.0))
-    throw std::invalid_argument(who + "Poisson's ratio of bending must be in (-1, 1), got " + std::to_string(*model.bending_poissons_ratio));
+    throw std::invalid_argument(who + "Poisson's ratio of bending must be in (-1, 1), got " +
+                                std::to_string(*model.bending_poissons_ratio));
   if (isometric && model.bending_modulus > 0 && !restsFlat(model))
-    throw std::invalid_argument(who + "its shape at rest is curved (adjacent faces enclose up to " + degrees(largestRestAngle(model)) +
-                                "), and the constant matrix of isometric bending would flatten it; use bending: {model: hinge}");
-  if (!model.clamped_faces.empty() && model.clamped_faces.size() != static_cast<std::size_t>(model.rest.triangles.cols()))
+    throw std::invalid_argument(
+        who + "its shape at rest is curved (adjacent faces enclose up to " + degrees(largestRestAngle(model)) +
+        "), and the constant matrix of isometric bending would flatten it; use bending: {model: hinge}");
+  if (!model.clamped_faces.empty() &&
+      model.clamped_faces.size() != static_cast<std::size_t>(model.rest.triangles.cols()))
     throw std::invalid_argument(who + "clamped_faces needs one entry per face, or none");
   const auto clamped = [](char face) { return face != 0; };
-  if (model.bending == BendingModel::isometric_conforming && std::any_of(model.clamped_faces.begin(), model.clamped_faces.end(), clamped))
-    throw std::invalid_argument(who + "conforming bending has no clamped edges; use bending: {model: isometric} or {model: hinge}, or leave out clamp");
+  if (model.bending == BendingModel::isometric_conforming &&
+      std::any_of(model.clamped_faces.begin(), model.clamped_faces.end(), clamped))
+    throw std::invalid_argument(who +
+                                "conforming bending has no clamped edges; use bending: {model: isometric} or {model: "
+                                "hinge}, or leave out clamp");
   if (model.bending_poissons_ratio && model.bending != BendingModel::isometric_nonconforming)
-    throw std::invalid_argument(who + "bending: {poissons_ratio} is for bending: {model: isometric} of flat shapes at rest. Hinges have the ratio of "
-                                "their mesh (-1/3 on equilateral triangles), conforming bending has 1: leave poissons_ratio out");
+    throw std::invalid_argument(
+        who +
+        "bending: {poissons_ratio} is for bending: {model: isometric} of flat shapes at rest. Hinges have the ratio of "
+        "their mesh (-1/3 on equilateral triangles), conforming bending has 1: leave poissons_ratio out");
 }
 
 ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& vertices)
 {
   if (vertices.cols() != model.vertices() || !vertices.allFinite())
-    throw std::invalid_argument("cloth '" + model.name + "': needs " + std::to_string(model.vertices()) + " finite vertices, got " +
-                                std::to_string(vertices.cols()));
+    throw std::invalid_argument("cloth '" + model.name + "': needs " + std::to_string(model.vertices()) +
+                                " finite vertices, got " + std::to_string(vertices.cols()));
   ClothState state;
   state.x = vertices;
   state.v = Eigen::Matrix3Xd::Zero(3, vertices.cols());
@@ -124,7 +134,9 @@ void clampFaces(ClothModel& model, const std::vector<int>& held)
 {
   const std::vector<char> faces = facesWithin(model.rest, held);
   if (std::find(faces.begin(), faces.end(), 1) == faces.end())
-    throw std::invalid_argument("cloth '" + model.name + "': a clamp holds no whole face, so that nothing holds the slope; let it hold the vertices of at least one face");
+    throw std::invalid_argument("cloth '" + model.name +
+                                "': a clamp holds no whole face, so that nothing holds the slope; let it hold the "
+                                "vertices of at least one face");
   model.clamped_faces.resize(faces.size(), 0);
   for (std::size_t f = 0; f < faces.size(); ++f)
     model.clamped_faces[f] = static_cast<char>(model.clamped_faces[f] | faces[f]);
@@ -134,10 +146,11 @@ void pinVertices(ClothState& state, const std::vector<int>& vertices)
 {
   for (const int v : vertices)
     if (v < 0 || v >= state.x.cols())
-      throw std::invalid_argument("pin: vertex " + std::to_string(v) + " is not there; must be from 0 to " + std::to_string(state.x.cols() - 1));
+      throw std::invalid_argument("pin: vertex " + std::to_string(v) + " is not there; must be from 0 to " +
+                                  std::to_string(state.x.cols() - 1));
   state.pins.insert(state.pins.end(), vertices.begin(), vertices.end());
   std::sort(state.pins.begin(), state.pins.end());
   state.pins.erase(std::unique(state.pins.begin(), state.pins.end()), state.pins.end());
 }
 
-}  // namespace slender
+}   // namespace slender

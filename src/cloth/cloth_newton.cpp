@@ -15,7 +15,7 @@ StepFailure failureOf(LinearOutcome outcome)
   return outcome == LinearOutcome::not_converged ? StepFailure::linear_unconverged : StepFailure::singular_matrix;
 }
 
-}  // namespace
+}   // namespace
 
 double ClothStepper::Impl::largest(const PointVector& d) const
 {
@@ -25,14 +25,16 @@ double ClothStepper::Impl::largest(const PointVector& d) const
   return std::sqrt(square);
 }
 
-/// One Newton step, what is held moving as prescribed: from the start of the stage, where the cloth is balanced, or for methods of second order
-/// from the motion carried on, which is near enough to the end that the semidefinite matrix costs no order.
+/// One Newton step, what is held moving as prescribed: from the start of the stage, where the cloth is balanced, or for
+/// methods of second order from the motion carried on, which is near enough to the end that the semidefinite matrix
+/// costs no order.
 StepFailure ClothStepper::Impl::linearized(StepReport& report)
 {
   const bool ahead = order(options.integrator) == 2;
   for (int i = 0; i < model->vertices(); ++i)
   {
-    const Eigen::Vector3d end = system->held()[i] ? Eigen::Vector3d(point(system->start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
+    const Eigen::Vector3d end = system->held()[i] ? Eigen::Vector3d(point(system->start(), i) + point(pin_motion_, i))
+                                                  : Eigen::Vector3d(point(guess_, i));
     point(trial_, i) = ahead ? end : Eigen::Vector3d(point(system->start(), i));
     point(d_, i) = end - point(trial_, i);
   }
@@ -42,9 +44,10 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
     energy_start_ = here.membrane + here.bending;
     elastic_start_ = (1.0 + system->viscosity()) * energy_start_;   // strains are those that viscosity counts from
   }
-  const LinearOutcome outcome =
-    system->bounded() ? system->solveBounded(d_, averages_, at_bound_, report.linear_iterations)
-                     : system->solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0, system->averageCount() > 0 ? &averages_ : nullptr);
+  const LinearOutcome outcome = system->bounded()
+                                    ? system->solveBounded(d_, averages_, at_bound_, report.linear_iterations)
+                                    : system->solve(d_, nullptr, report.linear_iterations, report.factorizations, 0.0,
+                                                    system->averageCount() > 0 ? &averages_ : nullptr);
   if (outcome != LinearOutcome::solved)
     return failureOf(outcome);
   ++report.iterations;
@@ -53,13 +56,16 @@ StepFailure ClothStepper::Impl::linearized(StepReport& report)
   return StepFailure::none;
 }
 
-/// Of a linearised step from work_ to next_: whether its end has more energy than the start and the work of loads, pins and averages can give. A step
-/// of implicit Euler that is solved loses some, but for what buckling releases. A linearised one that turns or swings stretched cloth too far for its tangent leaves
-/// forces unbalanced, whose work is the energy that appears.
+/// Of a linearised step from work_ to next_: whether its end has more energy than the start and the work of loads, pins
+/// and averages can give. A step of implicit Euler that is solved loses some, but for what buckling releases. A
+/// linearised one that turns or swings stretched cloth too far for its tangent leaves forces unbalanced, whose work is
+/// the energy that appears.
 bool ClothStepper::Impl::createsEnergy(double energy_end, double average_work, double pin_work) const
 {
-  constexpr double kCreated = 0.1;   // of what there was: sound steps lose energy, those that blow up create many times that
-  const double strains = 1e-12 * (model->membrane.c11 + model->membrane.c22) * static_cast<double>(model->rest.triangles.cols()) * shortest_edge_ * shortest_edge_;
+  // of what there was: sound steps lose energy, those that blow up create many times that
+  constexpr double kCreated = 0.1;
+  const double strains = 1e-12 * (model->membrane.c11 + model->membrane.c22) *
+                         static_cast<double>(model->rest.triangles.cols()) * shortest_edge_ * shortest_edge_;
   double gain = energy_end - energy_start_ - average_work, loads = 0.0;
   double given = strains + elastic_start_ + std::abs(average_work);   // strains of a millionth: of a cloth at rest
   for (int i = 0; i < model->vertices(); ++i)
@@ -77,16 +83,17 @@ bool ClothStepper::Impl::createsEnergy(double energy_end, double average_work, d
   return gain > kCreated * given;
 }
 
-/// Newton's method on the energy of the step, with a watchdog as in minimize() of rods: nearly inextensible cloth gains a little membrane
-/// energy in every full step that turns it, and a strict line search would creep. Where full steps do not get below the best energy
-/// for a while, it returns there and becomes strict.
+/// Newton's method on the energy of the step, with a watchdog as in minimize() of rods: nearly inextensible cloth gains
+/// a little membrane energy in every full step that turns it, and a strict line search would creep. Where full steps do
+/// not get below the best energy for a while, it returns there and becomes strict.
 StepFailure ClothStepper::Impl::minimize(StepReport& report)
 {
   constexpr double kArmijo = 1e-4;
   constexpr double kMostShift = 10.0;   // of the weight of inertia
   constexpr int kPatience = 5;
   for (int i = 0; i < model->vertices(); ++i)
-    point(x_, i) = system->held()[i] ? Eigen::Vector3d(point(system->start(), i) + point(pin_motion_, i)) : Eigen::Vector3d(point(guess_, i));
+    point(x_, i) = system->held()[i] ? Eigen::Vector3d(point(system->start(), i) + point(pin_motion_, i))
+                                     : Eigen::Vector3d(point(guess_, i));
   if (system->averageCount() > 0)
     system->meetAverages(averages_, x_);
   bool near = false, strict = false;
@@ -129,7 +136,8 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
       }
       std::fill(d_.begin(), d_.end(), 0.0);
       outcome = system->solve(d_, &x_, report.linear_iterations, report.factorizations);
-      if (outcome == LinearOutcome::solved || kind == HessianKind::semidefinite)   // near buckling conjugate gradients may not end either
+      if (outcome == LinearOutcome::solved ||
+          kind == HessianKind::semidefinite)   // near buckling conjugate gradients may not end either
         break;
       shift = std::max(0.2, 4.0 * shift);
       if (shift > kMostShift)
@@ -152,7 +160,8 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
     {
       for (std::size_t i = 0; i < x_.size(); ++i)
         trial_[i] = x_[i] + alpha * d_[i];
-      if (!strict || increment <= options.newton.tolerance || system->energy(trial_).energy() <= here.energy() + kArmijo * alpha * slope + noise)
+      if (!strict || increment <= options.newton.tolerance ||
+          system->energy(trial_).energy() <= here.energy() + kArmijo * alpha * slope + noise)
         break;
       if (alpha < 1e-8)
         return StepFailure::newton_diverged;
@@ -166,4 +175,4 @@ StepFailure ClothStepper::Impl::minimize(StepReport& report)
   return StepFailure::newton_diverged;
 }
 
-}  // namespace slender
+}   // namespace slender

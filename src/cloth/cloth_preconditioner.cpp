@@ -60,7 +60,7 @@ PointMatrix constantPart(const ClothModel& model, const PointMatrix& bending)
   return PointMatrix(model.vertices(), entries);
 }
 
-}  // namespace
+}   // namespace
 
 ShiftedMatrix::ShiftedMatrix(const PointMatrix& a)
 {
@@ -98,8 +98,10 @@ void ShiftedMatrix::addProduct(const double* x, double* y) const
       y[4 * i + k] += weight_[i] * x[4 * i + k];
 }
 
-ClothPreconditioner::ClothPreconditioner(const ClothModel& model, const PointMatrix& bending, const BlockMatrix& pattern, bool in_blocks)
-  : model_(model), constant_(constantPart(model, bending))
+ClothPreconditioner::ClothPreconditioner(const ClothModel& model, const PointMatrix& bending,
+                                         const BlockMatrix& pattern, bool in_blocks)
+  : model_(model),
+    constant_(constantPart(model, bending))
 {
   const int n = model.vertices();
   const bool separate = bending.size() > 0 && !in_blocks;
@@ -162,7 +164,8 @@ void ClothPreconditioner::align(const PointVector& x, const BlockMatrix& matrix,
       const Eigen::Vector3d a = point(normals_, i), b = point(normals_, j);
       normal_values_[k] = factor_ * normal_bending_[k] * a.dot(b);
       if (block >= 0)
-        normal_values_[k] += a.dot(Eigen::Map<const Eigen::Matrix3d>(matrix.values() + 9 * static_cast<std::size_t>(block)) * b);
+        normal_values_[k] +=
+            a.dot(Eigen::Map<const Eigen::Matrix3d>(matrix.values() + 9 * static_cast<std::size_t>(block)) * b);
     }
   aligned_ = normal_factor_.factor(normal_pattern_, normal_values_.data(), held.data());
 }
@@ -186,4 +189,4 @@ void ClothPreconditioner::apply(const PointVector& r, PointVector& z)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -25,7 +25,7 @@ public:
   const SparseCholesky& factorization() const { return factor_; }
 
 private:
-  PointMatrix a_;                 ///< with a whole diagonal
+  PointMatrix a_;   ///< with a whole diagonal
   std::vector<int> diagonal_;
   AlignedVector<double> values_;
   std::vector<double> weight_;
@@ -33,9 +33,10 @@ private:
   SparseCholesky factor_;
 };
 
-/// What preconditions conjugate gradients: mass and rest membrane, as if it acted on each coordinate alike (and bending, where it is not small
-/// beside them), factored once. Cloth is far softer along its normals; with align() that part of forces and motions
-/// goes by the matrix's own part along the normals, an n x n matrix that is factored each time.
+/// What preconditions conjugate gradients: mass and rest membrane, as if it acted on each coordinate alike (and
+/// bending, where it is not small beside them), factored once. Cloth is far softer along its normals; with align() that
+/// part of forces and motions goes by the matrix's own part along the normals, an n x n matrix that is factored each
+/// time.
 class ClothPreconditioner
 {
 public:
@@ -56,10 +57,10 @@ private:
   double factor_ = 1.0;
   bool aligned_ = false;
   PointMatrix normal_pattern_;
-  std::vector<int> normal_block_;           ///< per entry: block of the matrix, -1: none or above the diagonal
+  std::vector<int> normal_block_;   ///< per entry: block of the matrix, -1: none or above the diagonal
   AlignedVector<double> normal_bending_, normal_values_;
   SparseCholesky normal_factor_;
   PointVector normals_, along_, within_;
 };
 
-}  // namespace slender
+}   // namespace slender

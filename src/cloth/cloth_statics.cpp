@@ -14,7 +14,8 @@ namespace {
 /// Without inertia: the square of this is still a finite number.
 constexpr double kNoInertia = 1e150;
 
-/// Share of the lowest bending stiffness (D over mass and size squared) below which an eigenvalue counts as zero, as in statics of rods.
+/// Share of the lowest bending stiffness (D over mass and size squared) below which an eigenvalue counts as zero, as in
+/// statics of rods.
 constexpr double kNeutralShare = 1e-6;
 
 ClothModel elasticPart(const ClothModel& model)
@@ -32,7 +33,7 @@ ClothOptions directOptions()
   return options;
 }
 
-}  // namespace
+}   // namespace
 
 bool ClothTrial::Definiteness::positiveDefinite()
 {
@@ -47,11 +48,15 @@ bool ClothTrial::Definiteness::positiveDefinite()
 }
 
 ClothStatics::ClothStatics(const ClothModel& model, const NewtonConfig& newton)
-  : model_(elasticPart(model)), system_(model_, directOptions()), newton_(newton)
+  : model_(elasticPart(model)),
+    system_(model_, directOptions()),
+    newton_(newton)
 {
   shortest_edge_ = std::numeric_limits<double>::infinity();
   for (Eigen::Index e = 0; e < model_.topology.edges.cols(); ++e)
-    shortest_edge_ = std::min(shortest_edge_, (model_.rest.vertices.col(model_.topology.edges(0, e)) - model_.rest.vertices.col(model_.topology.edges(1, e))).norm());
+    shortest_edge_ = std::min(shortest_edge_, (model_.rest.vertices.col(model_.topology.edges(0, e)) -
+                                               model_.rest.vertices.col(model_.topology.edges(1, e)))
+                                                  .norm());
   size_ = (model_.rest.vertices.rowwise().maxCoeff() - model_.rest.vertices.rowwise().minCoeff()).norm();
   for (PointVector* v : {&x_, &trial_, &base_, &saved_, &d_, &force_})
     v->assign(4 * static_cast<std::size_t>(model_.vertices()), 0.0);
@@ -77,9 +82,11 @@ void ClothStatics::begin(const ClothState& state, const ClothInputs& inputs)
   pins_from_.resize(3, static_cast<Eigen::Index>(state.pins.size()));
   for (std::size_t k = 0; k < state.pins.size(); ++k)
     pins_from_.col(static_cast<Eigen::Index>(k)) = state.x.col(state.pins[k]);
-  // The stiffness of the whole cloth against bending, or against its loads where that is larger, over its mass. A cloth without either is held by its membrane.
+  // The stiffness of the whole cloth against bending, or against its loads where that is larger, over its mass. A cloth
+  // without either is held by its membrane.
   const double stiffness = std::max(model_.bending_modulus / (size_ * size_), load / size_);
-  unit_rate_ = 100.0 * (stiffness > 0 ? stiffness : 1e-6 * (model_.membrane.c11 + model_.membrane.c22)) / model_.totalMass();
+  unit_rate_ =
+      100.0 * (stiffness > 0 ? stiffness : 1e-6 * (model_.membrane.c11 + model_.membrane.c22)) / model_.totalMass();
   factorizations_ = 0;
 }
 
@@ -92,7 +99,8 @@ void ClothStatics::setRound(double weight)
 
 ClothTrial ClothStatics::evaluate(bool with_hessian, const HessianShift& shift)
 {
-  const ClothEvaluation e = with_hessian ? system_.evaluateHessian(trial_, HessianKind::exact) : system_.evaluate(trial_);
+  const ClothEvaluation e =
+      with_hessian ? system_.evaluateHessian(trial_, HessianKind::exact) : system_.evaluate(trial_);
   // Cloth has no massless unknowns: the shifts that minimize() tries on them first are small ones of all vertices here.
   constexpr double kFirstShift = 1e-3;
   if (with_hessian && !shift.none())
@@ -145,7 +153,8 @@ double ClothStatics::turnOf(const PointVector& d) const
   for (Eigen::Index e = 0; e < model_.topology.edges.cols(); ++e)
   {
     const int a = model_.topology.edges(0, e), b = model_.topology.edges(1, e);
-    worst = std::max(worst, (point(d, b) - point(d, a)).norm() / (model_.rest.vertices.col(b) - model_.rest.vertices.col(a)).norm());
+    worst = std::max(
+        worst, (point(d, b) - point(d, a)).norm() / (model_.rest.vertices.col(b) - model_.rest.vertices.col(a)).norm());
   }
   return worst;
 }
@@ -209,7 +218,8 @@ double ClothStatics::shift() const
   return std::sqrt(square) / size_;
 }
 
-/// Returns the number of moves in which the pins can be carried to their targets: each at most a fifth of an edge. 0: all are there.
+/// Returns the number of moves in which the pins can be carried to their targets: each at most a fifth of an edge. 0:
+/// all are there.
 double ClothStatics::pinMoves() const
 {
   return state_.pins.empty() ? 0.0 : (inputs_.pins - pins_from_).colwise().norm().maxCoeff() / (0.2 * shortest_edge_);
@@ -227,9 +237,11 @@ bool ClothStatics::definite(double rate)
 double ClothStatics::neutralBand() const
 {
   const double mass = model_.totalMass();
-  // Rounding errors of the n entries of the largest eigenvalue, which is that of one vertex on its edges, add up like a random walk.
+  // Rounding errors of the n entries of the largest eigenvalue, which is that of one vertex on its edges, add up like a
+  // random walk.
   const double largest = 8.0 * (model_.membrane.c11 + model_.membrane.c22) / model_.mass.minCoeff();
-  const double rounding = std::numeric_limits<double>::epsilon() * largest / std::sqrt(static_cast<double>(model_.vertices()));
+  const double rounding =
+      std::numeric_limits<double>::epsilon() * largest / std::sqrt(static_cast<double>(model_.vertices()));
   return kNeutralShare * model_.bending_modulus / (mass * size_ * size_) + 4.0 * rounding;
 }
 
@@ -239,7 +251,8 @@ void ClothStatics::findMode()
   const int n = model_.vertices();
   for (int i = 0; i < n; ++i)
     for (int k = 0; k < 3; ++k)
-      point(d_, i)[k] = std::sin(1.0 + 1.7 * (3 * i + k)) + 0.5 * std::cos(0.3 * (3 * i + k));   // no symmetry that a mode could be orthogonal to
+      // no symmetry that a mode could be orthogonal to
+      point(d_, i)[k] = std::sin(1.0 + 1.7 * (3 * i + k)) + 0.5 * std::cos(0.3 * (3 * i + k));
   for (int round = 0; round < 12; ++round)
   {
     double square = 0.0;
@@ -363,16 +376,21 @@ std::string ClothStatics::explain(StepFailure failure) const
   switch (failure)
   {
     case StepFailure::singular_matrix:
-      return what + "the stiffness matrix could not be made definite: moduli or masses differ by too many orders of magnitude, or something is free to "
-                    "drift: hold it by a grasp";
+      return what +
+             "the stiffness matrix could not be made definite: moduli or masses differ by too many orders of "
+             "magnitude, or something is free to "
+             "drift: hold it by a grasp";
     case StepFailure::state_not_finite:
-      return what + "the configuration overflowed: the loads are too large for the cloth, or something is free to drift: hold it by a grasp";
-    case StepFailure::interrupted:
-      return what + "the search was interrupted on request";
+      return what +
+             "the configuration overflowed: the loads are too large for the cloth, or something is free to drift: hold "
+             "it by a grasp";
+    case StepFailure::interrupted: return what + "the search was interrupted on request";
     default:
-      return what + "Newton's method did not converge: hold what drifts by a grasp, start from a shape that is nearer to the equilibrium (start of the cloth), "
-                    "or let the cloth settle by time stepping with damping (start: as_given)";
+      return what +
+             "Newton's method did not converge: hold what drifts by a grasp, start from a shape that is nearer to the "
+             "equilibrium (start of the cloth), "
+             "or let the cloth settle by time stepping with damping (start: as_given)";
   }
 }
 
-}  // namespace slender
+}   // namespace slender

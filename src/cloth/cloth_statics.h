@@ -26,8 +26,8 @@ struct ClothTrial
   double energy() const { return stretch + bend_twist + potential; }
 };
 
-/// Static equilibria of one cloth, in the terms of EquilibriumSearch. The proximal term is 1/2 w m |x - x_k|^2, and each round minimises with the
-/// exact Hessian. The pins are what is prescribed.
+/// Static equilibria of one cloth, in the terms of EquilibriumSearch. The proximal term is 1/2 w m |x - x_k|^2, and
+/// each round minimises with the exact Hessian. The pins are what is prescribed.
 class ClothStatics
 {
 public:
@@ -67,7 +67,8 @@ public:
   double noiseLevel() const;
   double forceScale() const;
   static constexpr bool anglesMayKeepShift() { return false; }
-  static constexpr double mostUnbalanced() { return std::numeric_limits<double>::infinity(); }   ///< without forces there is no scale
+  /// without forces there is no scale
+  static constexpr double mostUnbalanced() { return std::numeric_limits<double>::infinity(); }
 
 private:
   friend struct ClothTrial::Definiteness;
@@ -89,10 +90,10 @@ private:
   bool factored_ = false, definite_ = false;
   int factorizations_ = 0;
   ClothInputs inputs_;
-  ClothState state_;                      ///< for pins and hinges
+  ClothState state_;   ///< for pins and hinges
   Eigen::Matrix3Xd pins_from_;
   PointVector x_, trial_, base_, saved_, d_, force_;
   Eigen::Matrix3Xd pin_forces_, mode_;
 };
 
-}  // namespace slender
+}   // namespace slender

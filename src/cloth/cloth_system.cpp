@@ -21,39 +21,50 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
   return Eigen::Map<const Eigen::MatrixXi>(pairs.data(), 2, static_cast<Eigen::Index>(pairs.size() / 2));
 }
 
-constexpr int kEnergyWork = 2, kHessianWork = 8, kFactorWork = 60;   // of a WorkBudget, per vertex; an iteration of conjugate gradients: 1
+// of a WorkBudget, per vertex; an iteration of conjugate gradients: 1
+constexpr int kEnergyWork = 2, kHessianWork = 8, kFactorWork = 60;
 constexpr double kBesideLoad = 1e-2;
 
 ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
 {
   if (options.solver != ClothSolver::automatic)
     return options.solver;
-  return !model.averages.empty() || model.vertices() > ClothSystem::kMostSwept ? ClothSolver::conjugate_gradients : ClothSolver::gauss_seidel;
+  return !model.averages.empty() || model.vertices() > ClothSystem::kMostSwept ? ClothSolver::conjugate_gradients
+                                                                               : ClothSolver::gauss_seidel;
 }
 
-}  // namespace
+}   // namespace
 
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
-  : model_(model), choose_(options.solver == ClothSolver::automatic && options.one_newton_step), solver_(chosen(model, options))
-  , linear_tolerance_(options.linear_tolerance), membrane_(model.rest, model.membrane, model.warp), wind_(model)
+  : model_(model),
+    choose_(options.solver == ClothSolver::automatic && options.one_newton_step),
+    solver_(chosen(model, options)),
+    linear_tolerance_(options.linear_tolerance),
+    membrane_(model.rest, model.membrane, model.warp),
+    wind_(model)
 {
   const int n = points();
   const bool direct = solver_ == ClothSolver::cholesky;
   const MeshTopology& t = model.topology;
   if (model.bending != BendingModel::none && model.bending_modulus > 0 && t.hingeCount() > 0)
   {
-    const auto element = model.bending == BendingModel::isometric_conforming ? IsometricElement::conforming : IsometricElement::nonconforming;
+    const auto element = model.bending == BendingModel::isometric_conforming ? IsometricElement::conforming
+                                                                             : IsometricElement::nonconforming;
     const double coefficient = model.bending_modulus * bendingCalibration(model.rest, t, element, model.warp);
     constant_bending_ = model.bending != BendingModel::hinge;
     if (!constant_bending_)
-      hinges_ = std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces), Eigen::VectorXd::Zero(t.hingeCount()));
+      hinges_ =
+          std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces),
+                                         Eigen::VectorXd::Zero(t.hingeCount()));
     if (hinges_ && std::isfinite(model.plasticity.yield_curvature))
       hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient, model.clamped_faces);
     if (constant_bending_ || solver_ == ClothSolver::conjugate_gradients)
-      bending_ = model.bending_poissons_ratio ? plateBending(model.rest, t, *model.bending_poissons_ratio, model.bending_modulus, model.clamped_faces)
-                                              : isometricBending(model.rest, t, element, coefficient, model.clamped_faces);
+      bending_ =
+          model.bending_poissons_ratio
+              ? plateBending(model.rest, t, *model.bending_poissons_ratio, model.bending_modulus, model.clamped_faces)
+              : isometricBending(model.rest, t, element, coefficient, model.clamped_faces);
   }
   std::vector<Eigen::MatrixXi> elements{model.rest.triangles};
   if (hinges_)
@@ -122,7 +133,8 @@ void ClothSystem::setHinges(const ClothState& state)
 
 void ClothSystem::setViscosity(double ratio, const PointVector& x) { setViscosity(ratio, x, nullptr, 0.0, nullptr); }
 
-void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVector* move, double share, const PointVector* other)
+void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVector* move, double share,
+                               const PointVector* other)
 {
   if (ratio == 0.0 && ratio_ == 0.0)
     return;
@@ -307,7 +319,8 @@ double ClothSystem::addIsometric(const PointVector& x, PointVector& gradient)
   if (ratio_ > 0)
   {
     bending_.multiply(viscous_start_.data(), product_.data());
-    energy += ratio_ * (0.5 * ratio_ / (1.0 + ratio_) * viscous_form_ - pointKernels().dot(points(), x.data(), product_.data()));
+    energy += ratio_ *
+              (0.5 * ratio_ / (1.0 + ratio_) * viscous_form_ - pointKernels().dot(points(), x.data(), product_.data()));
     for (std::size_t i = 0; i < gradient.size(); ++i)
       gradient[i] -= ratio_ * product_[i];
   }
@@ -328,7 +341,8 @@ ClothEvaluation ClothSystem::energy(const PointVector& x)
     const double form = bending_.multiply(x.data(), product_.data());
     result.bending = 0.5 * (1.0 + ratio_) * form;
     if (ratio_ > 0)
-      result.bending += ratio_ * (0.5 * ratio_ / (1.0 + ratio_) * viscous_form_ - pointKernels().dot(points(), viscous_start_.data(), product_.data()));
+      result.bending += ratio_ * (0.5 * ratio_ / (1.0 + ratio_) * viscous_form_ -
+                                  pointKernels().dot(points(), viscous_start_.data(), product_.data()));
   }
   return result;
 }
@@ -403,8 +417,8 @@ void ClothSystem::setRight(const PointVector& d)
   clearHeld(right_);
 }
 
-LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance,
-                                 const Eigen::Matrix3Xd* averages)
+LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations,
+                                 double tolerance, const Eigen::Matrix3Xd* averages)
 {
   if (!averagesIndependent())
     return LinearOutcome::not_definite;
@@ -431,7 +445,8 @@ LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& lin
   if (solver_ == ClothSolver::gauss_seidel)
   {
     sweeps_.set(1.0 + ratio_, held_);
-    return correct(d, sweeps_.solve(right_, correction_, allowed, iterationsWithin(kMostIterations)), allowed, linear_iterations);
+    return correct(d, sweeps_.solve(right_, correction_, allowed, iterationsWithin(kMostIterations)), allowed,
+                   linear_iterations);
   }
   if (averages && used_->swept && limp_)
   {
@@ -445,18 +460,18 @@ LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& lin
     preconditioner_->useConstant();
   const double reference = averages_ ? takeFirstStep(d, averages, allowed) : 0.0;
   const LinearResult result = cg_.solve(
-    right_, correction_, allowed, iterationsWithin(kMostIterations),
-    [&](const PointVector& p, PointVector& ap) {
-      applyMatrix(p, ap);
-      clearHeld(ap);
-    },
-    [&](PointVector& r, PointVector& z) {
-      if (averages_)
-        preconditionWithin(r, z);
-      else
-        preconditioner_->apply(r, z);
-    },
-    reference);
+      right_, correction_, allowed, iterationsWithin(kMostIterations),
+      [&](const PointVector& p, PointVector& ap) {
+        applyMatrix(p, ap);
+        clearHeld(ap);
+      },
+      [&](PointVector& r, PointVector& z) {
+        if (averages_)
+          preconditionWithin(r, z);
+        else
+          preconditioner_->apply(r, z);
+      },
+      reference);
   return correct(d, result, allowed, linear_iterations);
 }
 
@@ -473,4 +488,4 @@ LinearOutcome ClothSystem::correct(PointVector& d, const LinearResult& result, d
   return result.residual <= tolerance || beside_load ? LinearOutcome::solved : LinearOutcome::not_converged;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -19,8 +19,9 @@ namespace slender {
 /// What the energy of a step is made of at a configuration.
 struct ClothEvaluation
 {
-  double membrane = 0, bending = 0, potential = 0;   ///< [J]; viscous response is part of the first two, inertia and loads of the last
-  double max_strain = 0;                             ///< largest |principal stretch - 1|
+  /// [J]; viscous response is part of the first two, inertia and loads of the last
+  double membrane = 0, bending = 0, potential = 0;
+  double max_strain = 0;   ///< largest |principal stretch - 1|
   double energy() const { return membrane + bending + potential; }
   double magnitude() const;
 };
@@ -28,24 +29,25 @@ struct ClothEvaluation
 /// One implicit stage M (x - q_hat) / tau^2 = F(x, (x - q_tilde) / tau) of a step (see Stage).
 struct ClothStage
 {
-  double tau = 0;                                ///< [s]
+  double tau = 0;   ///< [s]
   const PointVector *q_hat = nullptr, *q_tilde = nullptr;
-  const PointVector* start = nullptr;            ///< where the stage starts: potentials count from there
-  const PointVector* wind_at = nullptr;          ///< where the wind sees the cloth
-  const Eigen::Matrix3Xd* velocity = nullptr;    ///< at which it does, as far as its force is not linear in the end's
+  const PointVector* start = nullptr;           ///< where the stage starts: potentials count from there
+  const PointVector* wind_at = nullptr;         ///< where the wind sees the cloth
+  const Eigen::Matrix3Xd* velocity = nullptr;   ///< at which it does, as far as its force is not linear in the end's
 };
 
 /// What became of linear equations.
 enum class LinearOutcome
 {
   solved,
-  not_definite,    ///< the matrix is not positive definite, or prescribed averages depend on each other
-  not_converged    ///< the most iterations that are taken did not reach the tolerance
+  not_definite,   ///< the matrix is not positive definite, or prescribed averages depend on each other
+  not_converged   ///< the most iterations that are taken did not reach the tolerance
 };
 
 /// Energy of one implicit stage of a cloth, with gradient and Hessian, and the solution of its Newton equations:
 ///   E(x) + sum 1/2 w |x - target|^2 + 1/2 (x - y)^T D (x - y) - f . x,
-/// w from mass and mass damping, D and y from the wind; stiffness damping makes E viscous (see HingeBending::setResponse).
+/// w from mass and mass damping, D and y from the wind; stiffness damping makes E viscous (see
+/// HingeBending::setResponse).
 class ClothSystem
 {
 public:
@@ -70,8 +72,10 @@ public:
   void setHinges(const ClothState& state);
   /// Strains at x as those that viscous response of the given ratio starts from; 0: none.
   void setViscosity(double ratio, const PointVector& x);
-  /// The same for strains that are combined like the points x + move + share (other - x), to second order in `move`; `move` and `other` may be null.
-  void setViscosity(double ratio, const PointVector& x, const PointVector* move, double share, const PointVector* other);
+  /// The same for strains that are combined like the points x + move + share (other - x), to second order in `move`;
+  /// `move` and `other` may be null.
+  void setViscosity(double ratio, const PointVector& x, const PointVector* move, double share,
+                    const PointVector* other);
 
   double viscosity() const { return ratio_; }
   /// Without what viscosity adds [J].
@@ -96,30 +100,35 @@ public:
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient, bool with_bending = true);
   PointVector& gradient() { return gradient_; }
   const PointVector& gradient() const { return gradient_; }
-  /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
-  /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant matrix. `tolerance`: theirs, 0: that of the options.
-  /// The numbers grow by what was needed.
-  /// Averages stay what the first guess makes them; with `averages` (3 x count) the points x + d, x the start of the stage, get these.
-  LinearOutcome solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations, double tolerance = 0.0,
-                      const Eigen::Matrix3Xd* averages = nullptr);
+  /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the
+  /// others. `at`: where the matrix is from, for conjugate gradients that are preconditioned along the normals there;
+  /// null: by the constant matrix. `tolerance`: theirs, 0: that of the options. The numbers grow by what was needed.
+  /// Averages stay what the first guess makes them; with `averages` (3 x count) the points x + d, x the start of the
+  /// stage, get these.
+  LinearOutcome solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations,
+                      double tolerance = 0.0, const Eigen::Matrix3Xd* averages = nullptr);
   /// The blocks of solve()'s matrix as last evaluated; those of isometric bending are among them only for Cholesky.
   const BlockMatrix& matrix() const { return matrix_; }
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
 
-  /// The same for a linearised step of a model with bounds of its averages' forces. `at_bound`: which were, and are, at their bounds.
-  LinearOutcome solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound, int& linear_iterations);
-  /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x count).
+  /// The same for a linearised step of a model with bounds of its averages' forces. `at_bound`: which were, and are, at
+  /// their bounds.
+  LinearOutcome solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound,
+                             int& linear_iterations);
+  /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x
+  /// count).
   void meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x);
-  /// Takes the part out of the gradient that the averages balance: their forces (3 x count). With bounds these are those of solveBounded(),
-  /// and of the `response` to other forces those of averages that are not at their bounds.
+  /// Takes the part out of the gradient that the averages balance: their forces (3 x count). With bounds these are
+  /// those of solveBounded(), and of the `response` to other forces those of averages that are not at their bounds.
   void balanceAverages(Eigen::Matrix3Xd& forces, bool response = false);
   /// False when averages depend on each other on what is not held: then nothing can be solved.
   bool averagesIndependent() const { return !averages_ || used_->independent; }
   /// What they are at x.
   void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
 
-  /// Work of gravity, extra forces and air on a point that moved between two places, the air as at the end of the stage [J].
+  /// Work of gravity, extra forces and air on a point that moved between two places, the air as at the end of the stage
+  /// [J].
   double loadWork(int i, const PointVector& from, const PointVector& to) const;
   /// Of the gradient at x, as last evaluated, what is elastic and viscous [N].
   Eigen::Vector3d internalGradient(int i, const PointVector& x) const;
@@ -147,11 +156,14 @@ private:
   void moveAverages(PointVector& d);
   bool sweepsSuit(const PrescribedAverages& averages) const;
   bool bendsLittle(double viscosity) const;
-  LinearOutcome sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance, int& linear_iterations);
+  LinearOutcome sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance,
+                                  int& linear_iterations);
   /// right_: what d leaves of the equations, held points zero.
   void setRight(const PointVector& d);
-  LinearOutcome stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference, int& linear_iterations);
-  LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference, int& linear_iterations);
+  LinearOutcome stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference,
+                                   int& linear_iterations);
+  LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference,
+                                int& linear_iterations);
   double boundedForces();
   void takeOutAverages(PointVector& r);
   struct AverageSet;
@@ -159,72 +171,76 @@ private:
   ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
 
   const ClothModel& model_;
-  const bool choose_;                         ///< the solver of steps with averages is ours to choose
+  const bool choose_;   ///< the solver of steps with averages is ours to choose
   ClothSolver solver_;
   const double linear_tolerance_;
   WorkBudget unbounded_;
   WorkBudget* budget_ = &unbounded_;
   MembraneEnergy membrane_;
   WindLoad wind_;
-  std::unique_ptr<HingeBending> hinges_;      ///< hinge bending only
-  Eigen::VectorXd hinge_stiffness_;           ///< without stiffening; with plasticity only
-  PointMatrix bending_;                       ///< isometric model, or for hinges what preconditions
-  bool constant_bending_ = false;             ///< bending_ is the model, not a stand-in
+  std::unique_ptr<HingeBending> hinges_;   ///< hinge bending only
+  Eigen::VectorXd hinge_stiffness_;        ///< without stiffening; with plasticity only
+  PointMatrix bending_;                    ///< isometric model, or for hinges what preconditions
+  bool constant_bending_ = false;          ///< bending_ is the model, not a stand-in
   bool bending_in_blocks_ = false;
 
   BlockMatrix matrix_;
   std::vector<int> membrane_slots_, hinge_slots_, bending_map_;
-  std::vector<double> base_;                  ///< constant part of matrix_
+  std::vector<double> base_;   ///< constant part of matrix_
   double base_tau_ = 0, base_ratio_ = -1;
   double matrix_tau_ = 0;
   std::vector<char> base_held_;
-  SparseCholesky factor_;                     ///< of matrix_
+  SparseCholesky factor_;                                 ///< of matrix_
   std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
-  bool preconditioned_ = true;                ///< its constant part could be factored
-  bool limp_ = true;                          ///< bendsLittle(): sweeps are not too slow
+  bool preconditioned_ = true;                            ///< its constant part could be factored
+  bool limp_ = true;                                      ///< bendsLittle(): sweeps are not too slow
   ConjugateGradients cg_;
-  SymmetricSweeps sweeps_;                    ///< of that solver, and where averages suit them (sweepsSuit())
+  SymmetricSweeps sweeps_;   ///< of that solver, and where averages suit them (sweepsSuit())
 
   struct AverageSet
   {
     const PrescribedAverages* prescribed;
-    ConstrainedCholesky solver;    ///< of the preconditioner
-    bool swept = false;            ///< sweepsSuit()
-    bool ready = false;            ///< factored, with the present one
-    bool independent = true;       ///< with what is held
+    ConstrainedCholesky solver;   ///< of the preconditioner
+    bool swept = false;           ///< sweepsSuit()
+    bool ready = false;           ///< factored, with the present one
+    bool independent = true;      ///< with what is held
   };
   std::vector<AverageSet> average_sets_;
-  AverageSet* used_ = nullptr;                      ///< of these, where averages are prescribed, and
-  ConstrainedCholesky* averages_ = nullptr;         ///< its solver
-  PointVector gap_, multipliers_;                   ///< one point per average
+  AverageSet* used_ = nullptr;                ///< of these, where averages are prescribed, and
+  ConstrainedCholesky* averages_ = nullptr;   ///< its solver
+  PointVector gap_, multipliers_;             ///< one point per average
   Eigen::Matrix3Xd averages_now_;
 
   struct AverageBounds
   {
-    std::vector<int> at;           ///< averages that are not met because their forces are at their bounds, ascending
-    Eigen::Matrix3Xd forces;       ///< of all [N]
-    PointVector taken, pulls;      ///< multipliers of the averages that are met, so far; forces of all
+    std::vector<int> at;        ///< averages that are not met because their forces are at their bounds, ascending
+    Eigen::Matrix3Xd forces;    ///< of all [N]
+    PointVector taken, pulls;   ///< multipliers of the averages that are met, so far; forces of all
     PointVector first_guess, before, image, image_before;
-    PointVector wanted, bounded, response;   ///< of minimizeBounded(): directions of forces at their bounds, else zero; forces; what they are to a motion
-    Eigen::VectorXd stiffness, weights;      ///< [N/m]
+    /// of minimizeBounded(): directions of forces at their bounds, else zero; forces; what they are to a motion
+    PointVector wanted, bounded, response;
+    Eigen::VectorXd stiffness, weights;   ///< [N/m]
   };
-  std::unique_ptr<AverageBounds> bounds_;      ///< of models with bounds
+  std::unique_ptr<AverageBounds> bounds_;   ///< of models with bounds
 
   void respond(double ratio);
   static constexpr int kMostIterations = 2000;   ///< of conjugate gradients
   /// Of conjugate gradients: `most`, or what the budget has room for.
-  int iterationsWithin(int most) const { return static_cast<int>(std::min<long>(most, budget_->left() / points() + 1)); }
+  int iterationsWithin(int most) const
+  {
+    return static_cast<int>(std::min<long>(most, budget_->left() / points() + 1));
+  }
   /// In counts per point.
   void spend(int counts) { budget_->spend(static_cast<long>(counts) * points()); }
 
   double ratio_ = 0;
-  double viscous_form_ = 0;                   ///< of isometric bending, at viscous_start_
-  double load_ = 0;         ///< with averages: on the cloth without them, as the tolerance counts it
-  double first_step_ = 0;   ///< of takeFirstStep(), in the preconditioner's norm
+  double viscous_form_ = 0;   ///< of isometric bending, at viscous_start_
+  double load_ = 0;           ///< with averages: on the cloth without them, as the tolerance counts it
+  double first_step_ = 0;     ///< of takeFirstStep(), in the preconditioner's norm
   PointVector start_, viscous_start_, shifted_, target_, force_, gradient_, product_, right_, correction_;
-  std::vector<double> weight_;                ///< of inertia, per point
+  std::vector<double> weight_;   ///< of inertia, per point
   std::vector<char> held_;
   AlignedVector<double> strains_[3], angles_, other_strains_[3], other_angles_, start_angles_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -34,4 +34,4 @@ void ClothSystem::addInertia(double rate)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += rate * model_.mass[i];
 }
 
-}  // namespace slender
+}   // namespace slender

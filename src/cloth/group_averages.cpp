@@ -10,11 +10,13 @@ namespace slender {
 namespace {
 
 constexpr int kMeetRounds = 200;
-constexpr double kBoundSlack = 1e-3;   // of forces' bounds: the cloth's own step keeps them to its tolerance alone, 5e-3 of the load
+// of forces' bounds: the cloth's own step keeps them to its tolerance alone, 5e-3 of the load
+constexpr double kBoundSlack = 1e-3;
 constexpr long kEntriesPerCount = 16;   // of sparse matrices, to a count of a WorkBudget
-constexpr int kStallRounds = 8;   // that must halve the averages' errors; slow convergence as it was seen makes a third of them
+// that must halve the averages' errors; slow convergence as it was seen makes a third of them
+constexpr int kStallRounds = 8;
 
-}  // namespace
+}   // namespace
 
 /// Guides press cloths into what is in their way.
 std::string ClothGroup::blameAverages(const CollisionReport& failure) const
@@ -25,7 +27,8 @@ std::string ClothGroup::blameAverages(const CollisionReport& failure) const
   {
     const ClothModel* cloth = point >= 0 && point < first_.back() ? model_.cloths[clothOf(point)].get() : nullptr;
     if (cloth && !cloth->averages.empty())
-      return "; the averages of cloth '" + cloth->name + "' are to be where its guide is, whatever is in the way: keep the guide clear of it, or " +
+      return "; the averages of cloth '" + cloth->name +
+             "' are to be where its guide is, whatever is in the way: keep the guide clear of it, or " +
              (cloth->averages[0].bounds.size() > 0 ? "take a lower max_traction" : "bound their forces (max_traction)");
   }
   return "";
@@ -34,19 +37,22 @@ std::string ClothGroup::blameAverages(const CollisionReport& failure) const
 /// What takes so much is seldom what the last substep failed at.
 void ClothGroup::blameWork(double h, StepReport& report) const
 {
-  const auto tracked = std::find_if(model_.cloths.begin(), model_.cloths.end(), [](const auto& cloth) { return !cloth->averages.empty(); });
+  const auto tracked = std::find_if(model_.cloths.begin(), model_.cloths.end(),
+                                    [](const auto& cloth) { return !cloth->averages.empty(); });
   const bool guided = tracked != model_.cloths.end();
   const std::string last = report.failure == StepFailure::work_exceeded ? "" : "; at last " + report.message;
   report.failure = StepFailure::work_exceeded;
-  report.message = "cloth '" + (guided ? *tracked : model_.cloths[0])->name + (model_.cloths.size() > 1 ? "' and others" : "'") +
-                   ": contact needs more work than a step is given, at " + milliseconds(h) + ": use a shorter step, or " +
-                   (guided ? "a guide that moves by less at once, does not crumple, and is clear of obstacles" :
-                             "move what holds it and obstacles by less at once, and leave it more room") +
-                   last;
+  report.message =
+      "cloth '" + (guided ? *tracked : model_.cloths[0])->name + (model_.cloths.size() > 1 ? "' and others" : "'") +
+      ": contact needs more work than a step is given, at " + milliseconds(h) + ": use a shorter step, or " +
+      (guided ? "a guide that moves by less at once, does not crumple, and is clear of obstacles"
+              : "move what holds it and obstacles by less at once, and leave it more room") +
+      last;
 }
 
-/// Collisions move averages that are prescribed. Going back and forth between both leads to where both are met, by a factor of about a thousand each time
-/// where what touches is little of what an average is taken over; where a cloth is pressed flat a hundred rounds were seen. Collisions have the last word.
+/// Collisions move averages that are prescribed. Going back and forth between both leads to where both are met, by a
+/// factor of about a thousand each time where what touches is little of what an average is taken over; where a cloth is
+/// pressed flat a hundred rounds were seen. Collisions have the last word.
 CollisionReport ClothGroup::resolve(const CollisionStep& step)
 {
   held_impulses_.setZero(3, first_.back());
@@ -89,8 +95,9 @@ void ClothGroup::prepareCorrection(std::size_t k)
   to.ready = true;
 }
 
-/// What push_ does on the masses of a cloth against averages that are met: these balance that part, so that no motion answers it. Pushes that they
-/// balance wholly, of a flat sheet that comes down on a floor, would have the rounding errors that are left as their answer.
+/// What push_ does on the masses of a cloth against averages that are met: these balance that part, so that no motion
+/// answers it. Pushes that they balance wholly, of a flat sheet that comes down on a floor, would have the rounding
+/// errors that are left as their answer.
 double ClothGroup::balancedWork(std::size_t k, double h)
 {
   constexpr int kSweeps = 100;
@@ -123,14 +130,15 @@ double ClothGroup::balancedWork(std::size_t k, double h)
   return h * h * to.gap.cwiseProduct(to.multipliers).sum();
 }
 
-/// Makes the multipliers of a cloth's averages those that bounds of their forces allow: block Gauss-Seidel over averages, each force projected into its
-/// ball. Forces so far are those of the cloth's own step and of what contacts have changed since. Returns the largest change that is needed, as
-/// meetAverages() counts it.
+/// Makes the multipliers of a cloth's averages those that bounds of their forces allow: block Gauss-Seidel over
+/// averages, each force projected into its ball. Forces so far are those of the cloth's own step and of what contacts
+/// have changed since. Returns the largest change that is needed, as meetAverages() counts it.
 double ClothGroup::boundAverages(std::size_t k, double h, double gap)
 {
   constexpr int kSweeps = 2000;
   AverageCorrection& to = corrections_[k];
-  const double unresolved = 2.0 * (model_.options.empty() ? options_ : model_.options[k]).linear_tolerance;   // of a force's direction, by the cloth's own step
+  // of a force's direction, by the cloth's own step
+  const double unresolved = 2.0 * (model_.options.empty() ? options_ : model_.options[k]).linear_tolerance;
   const Eigen::VectorXd& bounds = averagesOf(k)->bounds;
   std::vector<int>& at_bound = next_.cloths[k].at_bound;
   at_bound.clear();
@@ -169,8 +177,8 @@ double ClothGroup::boundAverages(std::size_t k, double h, double gap)
   return needed;
 }
 
-/// Moves what is free, by as little as its mass allows. Returns the largest error of an average that there was, in units of what is tolerated; nothing
-/// moves when that is at most 1.
+/// Moves what is free, by as little as its mass allows. Returns the largest error of an average that there was, in
+/// units of what is tolerated; nothing moves when that is at most 1.
 double ClothGroup::meetAverages(double h)
 {
   double worst = 0.0;
@@ -218,4 +226,4 @@ double ClothGroup::meetAverages(double h)
   return worst;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -8,7 +8,9 @@ namespace slender {
 
 PlasticFlow::PlasticFlow(const ClothModel& model) : law_(model.plasticity)
 {
-  const auto refuse = [&](const std::string& why) { throw std::invalid_argument("cloth '" + model.name + "': plasticity " + why); };
+  const auto refuse = [&](const std::string& why) {
+    throw std::invalid_argument("cloth '" + model.name + "': plasticity " + why);
+  };
   if (!(law_.yield_curvature >= 0))
     refuse("needs a yield curvature of zero or more [1/m]");
   if (!std::isfinite(law_.hardening) || !(law_.creep_time >= 0) || !std::isfinite(law_.creep_time))
@@ -41,7 +43,8 @@ void PlasticFlow::flow(ClothState& state, double duration)
   const double share = law_.creep_time > 0 ? -std::expm1(-duration / law_.creep_time) : 1.0;
   for (int h = 0; h < hinges_->count(); ++h)
   {
-    const double away = std::remainder(angles_[h] - state.rest_angles[h], 2 * M_PI), deviation = std::abs(away) / width_[h];
+    const double away = std::remainder(angles_[h] - state.rest_angles[h], 2 * M_PI),
+                 deviation = std::abs(away) / width_[h];
     if (!(deviation > law_.yield_curvature))
       continue;
     const double flow = share * (deviation - law_.yield_curvature), left = deviation - flow;
@@ -51,4 +54,4 @@ void PlasticFlow::flow(ClothState& state, double duration)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -16,12 +16,15 @@ Eigen::Vector3d areaVector(const PointVector& x, const Eigen::Vector3i& t)
   return 0.5 * (point(x, t[1]) - origin).cross(point(x, t[2]) - origin);
 }
 
-/// Drag and lift per area of a plate with unit normal n in the relative velocity u of the air [Pa], divided into along * u + normal * n.
+/// Drag and lift per area of a plate with unit normal n in the relative velocity u of the air [Pa], divided into along
+/// * u + normal * n.
 struct PlateForce
 {
   double speed = 0, across = 0, along = 0, normal = 0;
 
-  PlateForce(double drag, double lift, const Eigen::Vector3d& u, const Eigen::Vector3d& n) : speed(u.norm()), across(n.dot(u))
+  PlateForce(double drag, double lift, const Eigen::Vector3d& u, const Eigen::Vector3d& n)
+    : speed(u.norm()),
+      across(n.dot(u))
   {
     if (!(speed > 0))
       return;
@@ -30,15 +33,17 @@ struct PlateForce
   }
 };
 
-}  // namespace
+}   // namespace
 
 WindLoad::WindLoad(const ClothModel& model)
-  : model_(model), drag_factor_(0.5 * model.aerodynamics.air_density * model.aerodynamics.drag)
-  , lift_factor_(0.5 * model.aerodynamics.air_density * model.aerodynamics.lift)
+  : model_(model),
+    drag_factor_(0.5 * model.aerodynamics.air_density * model.aerodynamics.drag),
+    lift_factor_(0.5 * model.aerodynamics.air_density * model.aerodynamics.lift)
 {
   for (const double factor : {drag_factor_, lift_factor_})
     if (!(factor >= 0) || !std::isfinite(factor))
-      throw std::invalid_argument("cloth '" + model.name + "': air density, drag and lift coefficients must be zero or more");
+      throw std::invalid_argument("cloth '" + model.name +
+                                  "': air density, drag and lift coefficients must be zero or more");
   if (model.wind_coefficient > 0 || drag_factor_ > 0 || lift_factor_ > 0)
   {
     drag_.assign(model.vertices(), Eigen::Matrix3d::Zero());
@@ -46,7 +51,8 @@ WindLoad::WindLoad(const ClothModel& model)
   }
 }
 
-void WindLoad::begin(const PointVector& start, const PointVector& origin, const Eigen::Matrix3Xd& v, const Eigen::Vector3d& wind, double h, PointVector& force)
+void WindLoad::begin(const PointVector& start, const PointVector& origin, const Eigen::Matrix3Xd& v,
+                     const Eigen::Vector3d& wind, double h, PointVector& force)
 {
   const bool plates = drag_factor_ > 0 || lift_factor_ > 0;
   std::fill(drag_.begin(), drag_.end(), Eigen::Matrix3d::Zero());
@@ -69,7 +75,8 @@ void WindLoad::begin(const PointVector& start, const PointVector& origin, const 
       const Eigen::Vector3d u = wind - v.col(t[k]);
       const PlateForce plate(drag_factor_, lift_factor_, u, n);
       const Eigen::Matrix3d slope = size / 3.0 *
-        (std::max(plate.along, 0.0) * Eigen::Matrix3d::Identity() + (drag_factor_ * std::abs(plate.across) + lift_factor_ * plate.speed) * nn);
+                                    (std::max(plate.along, 0.0) * Eigen::Matrix3d::Identity() +
+                                     (drag_factor_ * std::abs(plate.across) + lift_factor_ * plate.speed) * nn);
       drag_[t[k]] += slope / h;
       point(force, t[k]) += size / 3.0 * (plate.along * u + plate.normal * n) - slope * u;
     }
@@ -91,7 +98,8 @@ void WindLoad::addHessian(BlockMatrix& matrix) const
     Eigen::Map<Eigen::Matrix3d>(matrix.values() + 9 * matrix.starts()[i]) += drag_[i];
 }
 
-void WindLoad::addForces(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind, PointVector& force) const
+void WindLoad::addForces(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind,
+                         PointVector& force) const
 {
   for (Eigen::Index f = 0; f < model_.rest.triangles.cols(); ++f)
   {
@@ -107,4 +115,4 @@ void WindLoad::addForces(const PointVector& x, const PointVector& v, const Eigen
   }
 }
 
-}  // namespace slender
+}   // namespace slender

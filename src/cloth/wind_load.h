@@ -18,10 +18,12 @@ public:
   /// False: no force, and nothing else may be called.
   bool active() const { return !drag_.empty(); }
 
-  /// For a step at whose end the velocities are (x - origin) / h; now they are v (3 x n), and the faces as they are at `start` count. What depends linearly
-  /// on the velocities at the end becomes the potential below. Of drag and lift that is a positive semidefinite part of the derivative: all of it for
-  /// the drag of a flow along the normal; the rest is taken at v. Adds to `force` what is constant.
-  void begin(const PointVector& start, const PointVector& origin, const Eigen::Matrix3Xd& v, const Eigen::Vector3d& wind, double h, PointVector& force);
+  /// For a step at whose end the velocities are (x - origin) / h; now they are v (3 x n), and the faces as they are at
+  /// `start` count. What depends linearly on the velocities at the end becomes the potential below. Of drag and lift
+  /// that is a positive semidefinite part of the derivative: all of it for the drag of a flow along the normal; the
+  /// rest is taken at v. Adds to `force` what is constant.
+  void begin(const PointVector& start, const PointVector& origin, const Eigen::Matrix3Xd& v,
+             const Eigen::Vector3d& wind, double h, PointVector& force);
   /// Potential 1/2 (x - y)^T D (x - y) of a vertex at x; adds its gradient to `slope`.
   double addGradient(int vertex, const Eigen::Vector3d& x, Eigen::Vector3d& slope) const;
   void addHessian(BlockMatrix& matrix) const;
@@ -36,4 +38,4 @@ private:
   PointVector target_;                  ///< y
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -9,7 +9,8 @@ namespace {
 
 unsigned bucketOf(const std::int32_t* cell, unsigned mask)
 {
-  unsigned h = static_cast<unsigned>(cell[0]) * 73856093u ^ static_cast<unsigned>(cell[1]) * 19349663u ^ static_cast<unsigned>(cell[2]) * 83492791u;
+  unsigned h = static_cast<unsigned>(cell[0]) * 73856093u ^ static_cast<unsigned>(cell[1]) * 19349663u ^
+               static_cast<unsigned>(cell[2]) * 83492791u;
   h ^= h >> 15;
   return h & mask;
 }
@@ -19,7 +20,7 @@ std::int32_t cellOf(double coordinate, double inverse_size)
   return static_cast<std::int32_t>(std::floor(coordinate * inverse_size));
 }
 
-}  // namespace
+}   // namespace
 
 double GridPairs::cellSize(const std::vector<BoundingBox>& boxes) const
 {
@@ -77,7 +78,8 @@ const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBo
     sorted_[--bucket_start_[bucketOf(e->cell, buckets - 1) + 1]] = *e;
   for (unsigned k = 0; k < buckets; ++k)
   {
-    const int from = bucket_start_[k + 1], to = k + 2 <= buckets ? bucket_start_[k + 2] : static_cast<int>(sorted_.size());
+    const int from = bucket_start_[k + 1],
+              to = k + 2 <= buckets ? bucket_start_[k + 2] : static_cast<int>(sorted_.size());
     for (int p = from; p < to; ++p)
       for (int q = p + 1; q < to; ++q)
       {
@@ -112,9 +114,10 @@ void GridPairs::sortPairs(int boxes)
   int from = 0;
   for (int i = 0; i < boxes; ++i)
   {
-    std::sort(pairs_.begin() + from, pairs_.begin() + first_start_[i], [](const Pair& p, const Pair& q) { return p.second < q.second; });
+    std::sort(pairs_.begin() + from, pairs_.begin() + first_start_[i],
+              [](const Pair& p, const Pair& q) { return p.second < q.second; });
     from = first_start_[i];
   }
 }
 
-}  // namespace slender
+}   // namespace slender

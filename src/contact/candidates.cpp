@@ -30,7 +30,7 @@ bool mayTouch(const ContactSurface& surface, const ContactSegment& segment, cons
          std::find(solid.ignores.begin(), solid.ignores.end(), segment.object) == solid.ignores.end();
 }
 
-}  // namespace
+}   // namespace
 
 bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap)
 {
@@ -41,8 +41,8 @@ bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const C
   return apart < 0.5 * M_PI * (a.radius + b.radius) + gap;
 }
 
-void Candidates::build(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion, double gap, double margin,
-                       double turn)
+void Candidates::build(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion,
+                       double gap, double margin, double turn)
 {
   low_ = motion.x.cwiseMin(motion.x_end).array() - margin;
   high_ = motion.x.cwiseMax(motion.x_end).array() + margin;
@@ -55,7 +55,8 @@ void Candidates::build(const ContactSurface& surface, const std::vector<SolidPie
     boxes_[i].high = high_.col(s.a).cwiseMax(high_.col(s.b)).array() + around;
   }
   pairs_.clear();
-  if (std::any_of(surface.objects.begin(), surface.objects.end(), [](const ContactObject& o) { return o.self || o.others; }))
+  if (std::any_of(surface.objects.begin(), surface.objects.end(),
+                  [](const ContactObject& o) { return o.self || o.others; }))
     for (const GridPairs::Pair& p : grid_.find(boxes_))
       if (mayTouch(surface, surface.segments[p.first], surface.segments[p.second], gap))
         pairs_.push_back(p);
@@ -72,7 +73,8 @@ void Candidates::build(const ContactSurface& surface, const std::vector<SolidPie
   built_ = true;
 }
 
-void Candidates::findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion, double gap, double margin)
+void Candidates::findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
+                             double gap, double margin)
 {
   const Pose& pose = solids_[solid];
   const ContactSolid& properties = surface.solids[solid];
@@ -82,7 +84,8 @@ void Candidates::findOnSolid(const ContactSurface& surface, int solid, const Sol
     const ContactSegment& s = surface.segments[i];
     const Eigen::Vector3d a = motion.x.col(s.a) - pose.position, b = motion.x.col(s.b) - pose.position;
     const double moved = std::sqrt(std::max((motion.x_end.col(s.a) - motion.x.col(s.a)).squaredNorm(),
-                                            (motion.x_end.col(s.b) - motion.x.col(s.b)).squaredNorm())) + corner;
+                                            (motion.x_end.col(s.b) - motion.x.col(s.b)).squaredNorm())) +
+                         corner;
     const double farthest = std::sqrt(std::max(a.squaredNorm(), b.squaredNorm())), half = 0.5 * (b - a).norm();
     // how far a point of the segment may come nearer, seen from the solid
     const double slack = moved + shift_[solid] + turn_[solid] * (farthest + moved + shift_[solid]);
@@ -115,4 +118,4 @@ bool Candidates::holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& so
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

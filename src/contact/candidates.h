@@ -30,9 +30,10 @@ public:
     const std::vector<Pose>&solids, &solids_end;
   };
 
-  /// All pairs that may come within `gap` of each other while no coordinate leaves the boxes that the points' motions fill by more than
-  /// `margin` [m], and no solid its own motion by more than `margin` and `turn` [rad].
-  void build(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion, double gap, double margin, double turn);
+  /// All pairs that may come within `gap` of each other while no coordinate leaves the boxes that the points' motions
+  /// fill by more than `margin` [m], and no solid its own motion by more than `margin` and `turn` [rad].
+  void build(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion, double gap,
+             double margin, double turn);
   void clear() { built_ = false; }
   bool holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
 
@@ -40,7 +41,8 @@ public:
   const std::vector<OnSolid>& onSolids() const { return on_solids_; }
 
 private:
-  void findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion, double gap, double margin);
+  void findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
+                   double gap, double margin);
 
   bool built_ = false;
   Eigen::Matrix3Xd low_, high_;
@@ -53,4 +55,4 @@ private:
   std::vector<int> triangles_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -14,17 +14,17 @@ namespace slender {
 
 namespace {
 
-constexpr int kMaxAdvances = 500;   // stopping early is safe: the share so far is free
-constexpr double kTolerance = 0.1;  // share of the kept gap at which the advance ends
-constexpr double kRounding = 1e-14; // of distances, over the pieces' extent
+constexpr int kMaxAdvances = 500;     // stopping early is safe: the share so far is free
+constexpr double kTolerance = 0.1;    // share of the kept gap at which the advance ends
+constexpr double kRounding = 1e-14;   // of distances, over the pieces' extent
 
 /// Times until linearly moving corners can reach the plane that separates the pieces now.
 class PlaneBound
 {
 public:
   explicit PlaneBound(double room) : room_(room) {}
-  /// A pair of corners: its distance beyond the nearest pair's, along the normal, and its rate. Where pieces nearly touch, the normal is
-  /// rounded so much that it may not separate them: then this bound says nothing.
+  /// A pair of corners: its distance beyond the nearest pair's, along the normal, and its rate. Where pieces nearly
+  /// touch, the normal is rounded so much that it may not separate them: then this bound says nothing.
   void corner(double beyond, double rate)
   {
     const double room = room_ + beyond;
@@ -39,11 +39,14 @@ private:
   double room_, time_ = std::numeric_limits<double>::infinity();
 };
 
-/// Pieces of N and M corners that move along straight lines; closest(a, b) gives the difference of the nearest points, a - b.
+/// Pieces of N and M corners that move along straight lines; closest(a, b) gives the difference of the nearest points,
+/// a - b.
 template <int N, int M, class Closest>
-double advance(const MovingPoint* const (&a)[N], const MovingPoint* const (&b)[M], const ApproachLimit& limit, Closest closest)
+double advance(const MovingPoint* const (&a)[N], const MovingPoint* const (&b)[M], const ApproachLimit& limit,
+               Closest closest)
 {
-  // Seen from the first corner of b everything is rounded in proportion to the pieces' extent and relative motion, wherever they are.
+  // Seen from the first corner of b everything is rounded in proportion to the pieces' extent and relative motion,
+  // wherever they are.
   Eigen::Vector3d ra[N], rb[M], va[N], vb[M], pa[N], pb[M];
   double extent = 0.0, speed2 = 0.0;
   const auto relative = [&](const MovingPoint& p, Eigen::Vector3d& r, Eigen::Vector3d& v) {
@@ -92,9 +95,10 @@ double advance(const MovingPoint* const (&a)[N], const MovingPoint* const (&b)[M
   return t;
 }
 
-}  // namespace
+}   // namespace
 
-double segmentsLimit(const MovingPoint& a0, const MovingPoint& a1, const MovingPoint& b0, const MovingPoint& b1, const ApproachLimit& limit)
+double segmentsLimit(const MovingPoint& a0, const MovingPoint& a1, const MovingPoint& b0, const MovingPoint& b1,
+                     const ApproachLimit& limit)
 {
   const MovingPoint* const a[2] = {&a0, &a1};
   const MovingPoint* const b[2] = {&b0, &b1};
@@ -113,7 +117,8 @@ double pointSegmentLimit(const MovingPoint& p, const MovingPoint& a, const Movin
   });
 }
 
-double pointTriangleLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const MovingPoint& c, const ApproachLimit& limit)
+double pointTriangleLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const MovingPoint& c,
+                          const ApproachLimit& limit)
 {
   const MovingPoint* const point[1] = {&p};
   const MovingPoint* const triangle[3] = {&a, &b, &c};
@@ -124,7 +129,9 @@ double pointTriangleLimit(const MovingPoint& p, const MovingPoint& a, const Movi
 }
 
 RigidMotion::RigidMotion(const Pose& from, const Pose& to)
-  : from(from), shift(to.position - from.position), turn(rotationVector(to.orientation * from.orientation.conjugate()))
+  : from(from),
+    shift(to.position - from.position),
+    turn(rotationVector(to.orientation * from.orientation.conjugate()))
 {
 }
 
@@ -133,11 +140,12 @@ Pose RigidMotion::at(double share) const
   return {from.position + share * shift, fromRotationVector(share * turn) * from.orientation};
 }
 
-double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const ConvexPiece& piece, const RigidMotion& motion,
-                         const ApproachLimit& limit)
+double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const ConvexPiece& piece,
+                         const RigidMotion& motion, const ApproachLimit& limit)
 {
-  // Seen from the solid, whose axes turn with w, a corner at r from the origin has the velocity v - w x r and an acceleration of
-  // at most 2 |w| |v| + w^2 |r|; v is constant and r runs along a line, so that both are largest at an end of the remaining time.
+  // Seen from the solid, whose axes turn with w, a corner at r from the origin has the velocity v - w x r and an
+  // acceleration of at most 2 |w| |v| + w^2 |r|; v is constant and r runs along a line, so that both are largest at an
+  // end of the remaining time.
   const double spin = motion.turn.norm();
   const MovingPoint* corner[2] = {&a, &b};
   const Eigen::Vector3d v[2] = {a.to - a.from - motion.shift, b.to - b.from - motion.shift};
@@ -177,7 +185,10 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
       // the first time at which room + beyond + rate t - acceleration t^2 / 2 = 0
       const double c = std::max(0.0, room + nearest.normal.dot(z[i] - foot)), s = nearest.normal.dot(rate[i]);
       const double root = std::sqrt(s * s + 2.0 * acceleration * c);
-      const double time = !(c > 0.0) ? 0.0 : s <= 0.0 ? (root > s ? 2.0 * c / (root - s) : plane) : acceleration > 0.0 ? (s + root) / acceleration : plane;
+      const double time = !(c > 0.0)           ? 0.0
+                          : s <= 0.0           ? (root > s ? 2.0 * c / (root - s) : plane)
+                          : acceleration > 0.0 ? (s + root) / acceleration
+                                               : plane;
       plane = std::min(plane, time);
     }
     t += std::max(room / speed, plane);
@@ -187,4 +198,4 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
   return t;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -16,7 +16,9 @@ using Elements = CollisionElements;
 
 void checkSheet(const CollisionSheet& sheet, int number, const Eigen::Matrix3Xd& rest)
 {
-  const auto fail = [&](const std::string& what) { throw std::invalid_argument("sheet " + std::to_string(number) + ": " + what); };
+  const auto fail = [&](const std::string& what) {
+    throw std::invalid_argument("sheet " + std::to_string(number) + ": " + what);
+  };
   if (!(sheet.thickness > 0.0) || !std::isfinite(sheet.thickness))
     fail("thickness is " + std::to_string(sheet.thickness) + " m; must be positive and finite");
   if (!(sheet.friction >= 0.0) || !std::isfinite(sheet.friction))
@@ -70,8 +72,8 @@ TriangleMesh boxMesh(const Box& b)
     mesh.vertices.col(i) = 0.5 * b.size.cwiseProduct(Eigen::Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
   mesh.triangles.resize(3, 12);
   mesh.triangles << 0, 0, 4, 4, 0, 0, 2, 2, 0, 0, 1, 1,   //
-                    3, 2, 5, 7, 1, 5, 7, 6, 4, 6, 3, 7,   //
-                    1, 3, 7, 6, 5, 4, 3, 7, 6, 2, 7, 5;
+      3, 2, 5, 7, 1, 5, 7, 6, 4, 6, 3, 7,                 //
+      1, 3, 7, 6, 5, 4, 3, 7, 6, 2, 7, 5;
   return mesh;
 }
 
@@ -92,7 +94,8 @@ public:
         e.v[k] = first_point + triangles(k, t);
       to_.elements.push_back(e);
       for (int k = 0; k < 3; ++k)
-        sides_.push_back({std::min(e.v[k], e.v[(k + 1) % 3]), std::max(e.v[k], e.v[(k + 1) % 3]), static_cast<int>(from + t), k});
+        sides_.push_back(
+            {std::min(e.v[k], e.v[(k + 1) % 3]), std::max(e.v[k], e.v[(k + 1) % 3]), static_cast<int>(from + t), k});
     }
     std::sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
       return std::tie(a.a, a.b, a.element, a.k) < std::tie(b.a, b.b, b.element, b.k);
@@ -145,7 +148,7 @@ private:
   std::vector<Side> sides_;
 };
 
-}  // namespace
+}   // namespace
 
 CollisionSurface asTaken(CollisionSurface surface)
 {
@@ -248,4 +251,4 @@ void CollisionElements::place(const std::vector<Pose>& poses, Eigen::Matrix3Xd& 
     x.col(i) = poses[point_object[i] - sheet_count] * Eigen::Vector3d(reference.col(i));
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,14 +7,14 @@
 
 namespace slender {
 
-/// Sheets and solids in one list of triangles, lone edges (capsules) and lone points (spheres) over one list of points: those of the
-/// sheets, then those of the solids. Planes are apart.
+/// Sheets and solids in one list of triangles, lone edges (capsules) and lone points (spheres) over one list of points:
+/// those of the sheets, then those of the solids. Planes are apart.
 struct CollisionElements
 {
   struct Element
   {
-    std::array<int, 3> v;        ///< of a lone edge two count, of a lone point one
-    std::array<int, 3> edge;     ///< that joins v[k] and v[k + 1]; -1: none
+    std::array<int, 3> v;      ///< of a lone edge two count, of a lone point one
+    std::array<int, 3> edge;   ///< that joins v[k] and v[k + 1]; -1: none
     int object;
     int corners;
     unsigned char owns_point, owns_edge;   ///< bits: each point and edge is owned by one element
@@ -41,13 +41,13 @@ struct CollisionElements
   void place(const std::vector<Pose>& poses, Eigen::Matrix3Xd& x) const;
 
   int sheet_points = 0, sheet_count = 0;
-  Eigen::Matrix3Xd reference;        ///< all points: sheets at rest, solids in their frames
-  std::vector<int> point_object;     ///< -1: a point of no triangle
+  Eigen::Matrix3Xd reference;      ///< all points: sheets at rest, solids in their frames
+  std::vector<int> point_object;   ///< -1: a point of no triangle
   std::vector<Element> elements;
   std::vector<Edge> edges;
-  std::vector<Object> objects;       ///< sheets, then solids
-  std::vector<int> planes;           ///< objects
+  std::vector<Object> objects;   ///< sheets, then solids
+  std::vector<int> planes;       ///< objects
   std::vector<char> touching;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -25,7 +25,7 @@ double leastAlong(const CollisionPair& pair, const Eigen::Matrix3Xd& x)
   return least;
 }
 
-}  // namespace
+}   // namespace
 
 CollisionPairs::CollisionPairs(const CollisionElements& elements) : elements_(elements)
 {
@@ -50,12 +50,14 @@ CollisionPairs::CollisionPairs(const CollisionElements& elements) : elements_(el
   {
     const CollisionElements::Element& e = elements.elements[i];
     groups[i] = e.object;
-    centers.col(i) = (elements.reference.col(e.v[0]) + elements.reference.col(e.v[1]) + elements.reference.col(e.v[2])) / 3.0;
+    centers.col(i) =
+        (elements.reference.col(e.v[0]) + elements.reference.col(e.v[1]) + elements.reference.col(e.v[2])) / 3.0;
   }
   tree_.build(centers, groups, elements.touching, elements.objects.size());
 }
 
-const std::vector<CollisionPair>& CollisionPairs::find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, WorkBudget& budget)
+const std::vector<CollisionPair>& CollisionPairs::find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                                                       WorkBudget& budget)
 {
   pairs_.clear();
   std::fill(strayed_.begin(), strayed_.end(), 1);
@@ -64,13 +66,15 @@ const std::vector<CollisionPair>& CollisionPairs::find(const Eigen::Matrix3Xd& f
   return pairs_;
 }
 
-const std::vector<CollisionPair>& CollisionPairs::update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, WorkBudget& budget)
+const std::vector<CollisionPair>& CollisionPairs::update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                                                         WorkBudget& budget)
 {
   bool any = false;
   for (std::size_t i = 0; i < points_.size(); ++i)
   {
     // most ends lie between the start and the first end: impulses stop motions
-    strayed_[i] = to.col(i) != searched_.col(i) && pointSegmentDistance(to.col(i), from.col(i), searched_.col(i)) > margin_[i];
+    strayed_[i] =
+        to.col(i) != searched_.col(i) && pointSegmentDistance(to.col(i), from.col(i), searched_.col(i)) > margin_[i];
     if (strayed_[i])
       searched_.col(i) = to.col(i);
     any = any || strayed_[i];
@@ -146,7 +150,8 @@ void CollisionPairs::testElements(int a, int b, const Eigen::Matrix3Xd& from)
     for (int k = 0; k < 3; ++k)
     {
       const int p = ea.v[k];
-      if ((ea.owns_point & (1 << k)) && p != eb.v[0] && p != eb.v[1] && p != eb.v[2] && points_[p].overlaps(volumes_[b]))
+      if ((ea.owns_point & (1 << k)) && p != eb.v[0] && p != eb.v[1] && p != eb.v[2] &&
+          points_[p].overlaps(volumes_[b]))
         add(p, b, false, {p, eb.v[0], eb.v[1], eb.v[2]}, from);
     }
   if (a > b || !ea.owns_edge || !eb.owns_edge)
@@ -229,12 +234,14 @@ PairPlace CollisionPairs::place(const CollisionPair& pair, const Eigen::Matrix3X
   return placeAt(pair, [&](int i) -> Eigen::Vector3d { return x.col(i); });
 }
 
-PairPlace CollisionPairs::place(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, double share) const
+PairPlace CollisionPairs::place(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                                double share) const
 {
   return placeAt(pair, [&](int i) -> Eigen::Vector3d { return from.col(i) + share * (to.col(i) - from.col(i)); });
 }
 
-double CollisionPairs::limit(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, const ApproachLimit& limit) const
+double CollisionPairs::limit(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                             const ApproachLimit& limit) const
 {
   MovingPoint p[4];
   for (int i = 0; i < 4; ++i)
@@ -242,4 +249,4 @@ double CollisionPairs::limit(const CollisionPair& pair, const Eigen::Matrix3Xd& 
   return pair.edges ? segmentsLimit(p[0], p[1], p[2], p[3], limit) : pointTriangleLimit(p[0], p[1], p[2], p[3], limit);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -9,14 +9,16 @@
 
 namespace slender {
 
-/// A vertex and a face (element), or two edges, that may come near each other, and how they lie at the start of the step.
+/// A vertex and a face (element), or two edges, that may come near each other, and how they lie at the start of the
+/// step.
 struct CollisionPair
 {
   int first, second;
   bool edges;
-  int point[4];             ///< vertex and corners, or ends of both edges
-  double gap;               ///< distance at the start beyond the cores [m]
-  double room;              ///< separated along the normal by more than this at the end, the pieces never meet (infinite: no telling) [m]
+  int point[4];   ///< vertex and corners, or ends of both edges
+  double gap;     ///< distance at the start beyond the cores [m]
+  /// separated along the normal by more than this at the end, the pieces never meet (infinite: no telling) [m]
+  double room;
   Eigen::Vector3d normal;   ///< at the start
 };
 
@@ -38,8 +40,10 @@ public:
 
   /// Finds all pairs of a step. Once the budget is spent some are missing.
   const std::vector<CollisionPair>& find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, WorkBudget& budget);
-  /// The same step with other ends: adds pairs where points have left the volumes searched, which are larger than the motion by a margin.
-  const std::vector<CollisionPair>& update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, WorkBudget& budget);
+  /// The same step with other ends: adds pairs where points have left the volumes searched, which are larger than the
+  /// motion by a margin.
+  const std::vector<CollisionPair>& update(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                                           WorkBudget& budget);
 
   /// Whether a plane is seen to keep the pieces apart.
   static bool separated(const CollisionPair& pair, const Eigen::Matrix3Xd& to);
@@ -47,9 +51,11 @@ public:
   double core(const CollisionPair& pair) const;
   double shell(const CollisionPair& pair) const;
   /// After a share of the motion.
-  PairPlace place(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, double share) const;
+  PairPlace place(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                  double share) const;
   PairPlace place(const CollisionPair& pair, const Eigen::Matrix3Xd& x) const;
-  double limit(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, const ApproachLimit& limit) const;
+  double limit(const CollisionPair& pair, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+               const ApproachLimit& limit) const;
 
 private:
   template <class Position>
@@ -69,4 +75,4 @@ private:
   std::vector<CollisionPair> pairs_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -8,10 +8,10 @@ namespace slender {
 
 namespace {
 
-constexpr double kAccuracy = 5e-3;       // of the largest miss
-constexpr double kOverRelaxation = 1.3;  // three sheets in a heap: 10 instead of 23 sweeps at the same accuracy
+constexpr double kAccuracy = 5e-3;        // of the largest miss
+constexpr double kOverRelaxation = 1.3;   // three sheets in a heap: 10 instead of 23 sweeps at the same accuracy
 
-}  // namespace
+}   // namespace
 
 bool CollisionRows::touch(int first, int count) const
 {
@@ -49,7 +49,8 @@ void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen
 {
   double* const values = y.data();
   const auto relative = [values](const CollisionRow& r) -> Eigen::Vector3d {
-    const double *a = values + 3 * r.point[0], *b = values + 3 * r.point[1], *c = values + 3 * r.point[2], *d = values + 3 * r.point[3];
+    const double *a = values + 3 * r.point[0], *b = values + 3 * r.point[1], *c = values + 3 * r.point[2],
+                 *d = values + 3 * r.point[3];
     Eigen::Vector3d u;
     for (int k = 0; k < 3; ++k)
       u[k] = r.weight[0] * a[k] + r.weight[1] * b[k] + r.weight[2] * c[k] + r.weight[3] * d[k];
@@ -75,7 +76,8 @@ void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen
     bool settled = true;
     for (CollisionRow& r : rows)
     {
-      const int moved = std::max(std::max(moved_[r.point[0]], moved_[r.point[1]]), std::max(moved_[r.point[2]], moved_[r.point[3]]));
+      const int moved =
+          std::max(std::max(moved_[r.point[0]], moved_[r.point[1]]), std::max(moved_[r.point[2]], moved_[r.point[3]]));
       if (moved <= r.seen || r.mobility <= 0.0)
         continue;
       ++work;
@@ -119,4 +121,4 @@ void CollisionRows::relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen
   }
 }
 
-}  // namespace slender
+}   // namespace slender

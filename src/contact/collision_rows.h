@@ -8,15 +8,15 @@
 
 namespace slender {
 
-/// A condition n . sum_i w_i y_i >= bound on vectors y of points (positions at the end of a step, or velocities), with friction against
-/// departures of the sum from `anchor` across n.
+/// A condition n . sum_i w_i y_i >= bound on vectors y of points (positions at the end of a step, or velocities), with
+/// friction against departures of the sum from `anchor` across n.
 struct CollisionRow
 {
   int point[4];
   double weight[4];
   Eigen::Vector3d normal, anchor;
   double bound;
-  double push;        ///< share of the bound that only moves pieces apart and causes no friction
+  double push;   ///< share of the bound that only moves pieces apart and causes no friction
   double friction;
   double tolerance;   ///< of the bound
   // set by CollisionRows
@@ -27,8 +27,8 @@ struct CollisionRow
   int seen = -1;
 };
 
-/// Solves rows by projected Gauss-Seidel: impulses that never pull, friction in Coulomb's cone. Rows are visited in their order, and only
-/// while points that they act on still move.
+/// Solves rows by projected Gauss-Seidel: impulses that never pull, friction in Coulomb's cone. Rows are visited in
+/// their order, and only while points that they act on still move.
 class CollisionRows
 {
 public:
@@ -38,10 +38,11 @@ public:
   bool touch(int first, int count) const;
   /// Everything is forgotten but the memory.
   void clear(int points);
-  /// Begins on other vectors y, for which bounds and anchors may have been changed since: a share of all impulses but pushes is the start.
+  /// Begins on other vectors y, for which bounds and anchors may have been changed since: a share of all impulses but
+  /// pushes is the start.
   void restart(const Eigen::VectorXd& inverse_mass, double share, Eigen::Matrix3Xd& y);
-  /// Adds impulses to y until no sweep changes a row by more than its tolerance or 1/200 of the largest miss at first, or for `sweeps` sweeps,
-  /// or until the budget is spent. Rows may have been added since the last call.
+  /// Adds impulses to y until no sweep changes a row by more than its tolerance or 1/200 of the largest miss at first,
+  /// or for `sweeps` sweeps, or until the budget is spent. Rows may have been added since the last call.
   void relax(const Eigen::VectorXd& inverse_mass, int sweeps, Eigen::Matrix3Xd& y, WorkBudget& budget);
 
 private:
@@ -49,4 +50,4 @@ private:
   int clock_ = 0;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -12,16 +12,18 @@ namespace slender {
 enum class Approach
 {
   arrived,
-  partly,     ///< as far as nothing touches
-  squeezed    ///< no way at all
+  partly,    ///< as far as nothing touches
+  squeezed   ///< no way at all
 };
 
-/// Minimises the energy of a system with contact whose held parts and driven solids move from the fraction `from` of a time step to `to`:
-/// as far as nothing touches, again and again, while what is in the way gives way; then to the end, with friction's forces lagging one solution
-/// behind, until they have settled. `gap` is that of contact over the shortest edge. The solution is left as the trial.
+/// Minimises the energy of a system with contact whose held parts and driven solids move from the fraction `from` of a
+/// time step to `to`: as far as nothing touches, again and again, while what is in the way gives way; then to the end,
+/// with friction's forces lagging one solution behind, until they have settled. `gap` is that of contact over the
+/// shortest edge. The solution is left as the trial.
 ///
 /// System offers what minimize() needs, and:
-/// - approach(from, to, reached): from the base towards the present trial, as far as nothing touches; that becomes the base, where all that is
+/// - approach(from, to, reached): from the base towards the present trial, as far as nothing touches; that becomes the
+/// base, where all that is
 ///   prescribed stands at the fraction `reached`;
 /// - placeHeld(to): what is held or driven, in the trial, where it is at `to`;
 /// - resolve(tolerance, gap_tolerance): how incrementSize() measures, over the shortest edge and over the smallest gap;
@@ -46,7 +48,8 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     }
     return r.ok();
   };
-  // Friction that is about to slip and contacts that run along a curve converge slowly at the end, far below what gaps resolve.
+  // Friction that is about to slip and contacts that run along a curve converge slowly at the end, far below what gaps
+  // resolve.
   NewtonConfig fine = newton, loose = newton;
   fine.tolerance = std::max(newton.tolerance, 1e-3 * gap);
   loose.tolerance = std::max(newton.tolerance, 0.02 * gap);
@@ -54,7 +57,8 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   for (int k = 0;; ++k)
   {
     double reached = to;
-    const Approach approach = k == kMaxApproaches || stepsInterrupted() ? Approach::squeezed : system.approach(from, to, reached);
+    const Approach approach =
+        k == kMaxApproaches || stepsInterrupted() ? Approach::squeezed : system.approach(from, to, reached);
     if (approach == Approach::squeezed)
     {
       total.failure = StepFailure::squeezed;
@@ -85,4 +89,4 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   }
 }
 
-}  // namespace slender
+}   // namespace slender

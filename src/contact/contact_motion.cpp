@@ -40,10 +40,10 @@ double convexMinimum(Function f)
   return best;
 }
 
-}  // namespace
+}   // namespace
 
-double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& poses,
-                                         const std::vector<Pose>& poses_end)
+double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
+                                         const std::vector<Pose>& poses, const std::vector<Pose>& poses_end)
 {
   check(x, poses);
   check(x_end, poses_end);
@@ -76,7 +76,8 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
     solid = on.solid;
     const ContactSegment& s = surface.segments[on.segment];
     limit.thickness = s.radius;
-    share = std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids[on.solid].pieces[on.piece], rigid, limit));
+    share =
+        std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids[on.solid].pieces[on.piece], rigid, limit));
   }
   return share;
 }
@@ -85,15 +86,16 @@ bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vec
 {
   check(x, poses);
   near_.build(surface, solids, {x, x, poses, poses}, options.gap, margin_, 0.0);
-  // Less than the twelfth at which the barrier is made stiffer: a step under load then ends with more room than it began with, and parts that
-  // something else than motion brought together come apart again.
+  // Less than the twelfth at which the barrier is made stiffer: a step under load then ends with more room than it
+  // began with, and parts that something else than motion brought together come apart again.
   const double least = options.gap / 20, opened = options.gap / 16;
   // never thinner than what leaves half of the distance between centrelines
   const auto room = [&](double distance) { return distance - std::min(opened, 0.5 * distance); };
   for (const GridPairs::Pair& pair : near_.pairs())
   {
     ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
-    const double distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)), thickness = a.coreRadius() + b.coreRadius();
+    const double distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)),
+                 thickness = a.coreRadius() + b.coreRadius();
     if (distance - thickness >= least)
       continue;
     if (!(distance > 1e-3 * thickness))
@@ -107,7 +109,9 @@ bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vec
     ContactSegment& s = surface.segments[on.segment];
     const Pose to_solid = poses[on.solid].inverse();
     const double distance =
-      segmentPieceDistance(solids[on.solid].pieces[on.piece], to_solid * Eigen::Vector3d(x.col(s.a)), to_solid * Eigen::Vector3d(x.col(s.b))).distance;
+        segmentPieceDistance(solids[on.solid].pieces[on.piece], to_solid * Eigen::Vector3d(x.col(s.a)),
+                             to_solid * Eigen::Vector3d(x.col(s.b)))
+            .distance;
     if (distance - s.radius >= least)
       continue;
     if (!(distance > 1e-3 * s.radius))
@@ -137,9 +141,12 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     {
       const ContactSegment &a = surface.segments[order_[p]], &b = surface.segments[order_[q]];
       const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
-      const bool counts = a.driven && b.driven ? false : a.object == b.object ? c.self && !contactNeighbours(a, b, c, options.gap) : c.others && d.others;
+      const bool counts = a.driven && b.driven   ? false
+                          : a.object == b.object ? c.self && !contactNeighbours(a, b, c, options.gap)
+                                                 : c.others && d.others;
       if (counts && boxes_[order_[p]].overlaps(boxes_[order_[q]]))
-        least = std::min(least, segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - a.coreRadius() - b.coreRadius());
+        least = std::min(
+            least, segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - a.coreRadius() - b.coreRadius());
     }
   for (std::size_t k = 0; k < solids.size(); ++k)
   {
@@ -149,7 +156,8 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     for (const ContactSegment& s : surface.segments)
     {
       const ContactObject& object = surface.objects[s.object];
-      if (!object.solids || s.driven || (solid.only >= 0 && solid.only != object.owner) || std::count(solid.ignores.begin(), solid.ignores.end(), s.object))
+      if (!object.solids || s.driven || (solid.only >= 0 && solid.only != object.owner) ||
+          std::count(solid.ignores.begin(), solid.ignores.end(), s.object))
         continue;
       const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a)), e = to_solid * Eigen::Vector3d(x.col(s.b)) - a;
       if ((a + 0.5 * e).norm() > 0.5 * e.norm() + s.radius + reach)
@@ -165,4 +173,4 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
   return least;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -53,34 +53,40 @@ void copyFour(To& to, const From& from)
   std::copy(std::begin(from), std::end(from), std::begin(to));
 }
 
-}  // namespace
+}   // namespace
 
 ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
-  : surface((checkSurface(s, o), std::move(s))), options(o), barrier(o.gap), stiffness(o.least_stiffness), margin_(o.gap)
+  : surface((checkSurface(s, o), std::move(s))),
+    options(o),
+    barrier(o.gap),
+    stiffness(o.least_stiffness),
+    margin_(o.gap)
 {
   solids.resize(surface.solids.size());
   for (std::size_t k = 0; k < solids.size(); ++k)
     std::visit(
-      [&](const auto& shape) {
-        using T = std::decay_t<decltype(shape)>;
-        if constexpr (std::is_same_v<T, std::shared_ptr<const TriangleMesh>>)
-        {
-          for (Eigen::Index i = 0; i < shape->triangles.cols(); ++i)
-            solids[k].pieces.push_back(Triangle{shape->vertices.col(shape->triangles(0, i)), shape->vertices.col(shape->triangles(1, i)),
-                                                shape->vertices.col(shape->triangles(2, i))});
-          solids[k].tree.emplace_back(*shape);
-        }
-        else
-          solids[k].pieces.push_back(shape);
-      },
-      surface.solids[k].shape);
+        [&](const auto& shape) {
+          using T = std::decay_t<decltype(shape)>;
+          if constexpr (std::is_same_v<T, std::shared_ptr<const TriangleMesh>>)
+          {
+            for (Eigen::Index i = 0; i < shape->triangles.cols(); ++i)
+              solids[k].pieces.push_back(Triangle{shape->vertices.col(shape->triangles(0, i)),
+                                                  shape->vertices.col(shape->triangles(1, i)),
+                                                  shape->vertices.col(shape->triangles(2, i))});
+            solids[k].tree.emplace_back(*shape);
+          }
+          else
+            solids[k].pieces.push_back(shape);
+        },
+        surface.solids[k].shape);
 }
 
 void ContactPotential::Impl::check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses) const
 {
   if (x.cols() != surface.points || poses.size() != surface.solids.size())
-    throw std::invalid_argument("contact: " + std::to_string(x.cols()) + " points and " + std::to_string(poses.size()) + " poses; needs " +
-                                std::to_string(surface.points) + " and " + std::to_string(surface.solids.size()));
+    throw std::invalid_argument("contact: " + std::to_string(x.cols()) + " points and " + std::to_string(poses.size()) +
+                                " poses; needs " + std::to_string(surface.points) + " and " +
+                                std::to_string(surface.solids.size()));
 }
 
 double ContactPotential::Impl::restart()
@@ -127,7 +133,8 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0;
   const double middles2 = 0.25 * (a0 + a1 - b0 - b1).squaredNorm();
   // half the lengths and the range, squared: (p + q + r)^2 <= 3 (p^2 + q^2 + r^2)
-  if (middles2 > 0.75 * (e.squaredNorm() + f.squaredNorm()) + 3.0 * range * range || segmentDistance(a0, a1, b0, b1) >= range)
+  if (middles2 > 0.75 * (e.squaredNorm() + f.squaredNorm()) + 3.0 * range * range ||
+      segmentDistance(a0, a1, b0, b1) >= range)
     return 0.0;
   const SoftGap gap = softGap(a0, a1, b0, b1, thickness);
   Contact contact{pair.first,
@@ -142,13 +149,15 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
   return addContact(gap, contact, with_stiffness);
 }
 
-double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose, bool with_stiffness)
+double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose,
+                                          bool with_stiffness)
 {
   const ContactSegment& s = surface.segments[on.segment];
   const ContactSolid& solid = surface.solids[on.solid];
   const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
-  const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a) - pose.position), b = to_solid * Eigen::Vector3d(x.col(s.b) - pose.position);
+  const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a) - pose.position),
+                        b = to_solid * Eigen::Vector3d(x.col(s.b) - pose.position);
   const double middle = pieceDistance(piece, 0.5 * (a + b), Eigen::Vector3d::Zero()).distance;
   if (middle > 0.5 * (b - a).norm() + s.radius + options.gap)
     return 0.0;
@@ -198,7 +207,8 @@ double ContactPotential::Impl::addContact(const SoftGap& gap, Contact& contact, 
   return stiffness * barrier.energy(gap.gap);
 }
 
-/// The place of contact runs along the segments as they turn: force r^T H^-1 r of the softened gap, column by column of H = L D L^T.
+/// The place of contact runs along the segments as they turn: force r^T H^-1 r of the softened gap, column by column of
+/// H = L D L^T.
 void ContactPotential::Impl::addRunning(const SoftGap& gap, const Contact& contact, double force)
 {
   constexpr double kNegligible = 1e-3;   // of the pair's own stiffness
@@ -235,7 +245,8 @@ void ContactPotential::Impl::addRunning(const SoftGap& gap, const Contact& conta
   }
 }
 
-double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact, bool with_stiffness)
+double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact,
+                                           bool with_stiffness)
 {
   const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
   if (!(most > 0.0))
@@ -263,8 +274,8 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   if (with_stiffness)
   {
     term.stiffness = most * over_slip * (Eigen::Matrix3d::Identity() - n * n.transpose());
-    // Newton's method leaps over the narrow range in which a contact sticks, from slip to slip the other way, for ever. The secant's
-    // stiffness bounds the energy from above and leads there.
+    // Newton's method leaps over the narrow range in which a contact sticks, from slip to slip the other way, for ever.
+    // The secant's stiffness bounds the energy from above and leads there.
     if (y > law.e)
     {
       contact.reversed = contact.reversed || contact.last_slip.dot(slip) < 0.0;
@@ -278,7 +289,9 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
 
 double ContactPotential::Impl::lagFriction()
 {
-  const auto before = [](const Contact& a, const Contact& b) { return a.first != b.first ? a.first < b.first : a.second < b.second; };
+  const auto before = [](const Contact& a, const Contact& b) {
+    return a.first != b.first ? a.first < b.first : a.second < b.second;
+  };
   double change = 0.0, largest = 0.0;
   auto old = lagged.begin();
   for (const Contact& contact : contacts)
@@ -307,7 +320,8 @@ ContactPotential::ContactPotential(ContactSurface surface, const ContactOptions&
 ContactPotential::~ContactPotential() = default;
 ContactPotential::ContactPotential(ContactPotential&&) noexcept = default;
 
-void ContactPotential::setCurves(int points, const std::vector<ContactSegment>& segments, const std::vector<ContactObject>& objects)
+void ContactPotential::setCurves(int points, const std::vector<ContactSegment>& segments,
+                                 const std::vector<ContactObject>& objects)
 {
   impl_->surface.points = points;
   impl_->surface.segments = segments;
@@ -340,13 +354,10 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   impl_->lagFriction();
 }
 
-double ContactPotential::lagFriction()
-{
-  return impl_->lagFriction();
-}
+double ContactPotential::lagFriction() { return impl_->lagFriction(); }
 
-double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
-                                   const std::vector<Pose>& solids_end)
+double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
+                                   const std::vector<Pose>& solids, const std::vector<Pose>& solids_end)
 {
   return impl_->stepLimit(x, x_end, solids, solids_end);
 }
@@ -377,7 +388,8 @@ void ContactPotential::setMostStiffness(double force)
 void ContactPotential::adaptStiffness()
 {
   // force over stiffness() at a fifth, a twelfth and half of the gap
-  const double gap = impl_->options.gap, c = impl_->barrier.force(gap / 5), high = impl_->barrier.force(gap / kLeastGap), low = 1.0;
+  const double gap = impl_->options.gap, c = impl_->barrier.force(gap / 5),
+               high = impl_->barrier.force(gap / kLeastGap), low = 1.0;
   double& stiffness = impl_->stiffness;
   const double share = impl_->largest_force / stiffness;
   if (share > high)
@@ -399,4 +411,4 @@ bool ContactPotential::stiffen(bool converged)
   return impl_->stiffness > before;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -17,21 +17,22 @@ public:
   /// A touching pair as friction needs it.
   struct Contact
   {
-    std::int64_t first, second;     ///< what touches: orders contacts
+    std::int64_t first, second;   ///< what touches: orders contacts
     int point[4];
     double weight[4];
     int solid;
-    Eigen::Vector3d material;       ///< in the solid's frame
+    Eigen::Vector3d material;          ///< in the solid's frame
     Eigen::Vector3d position, force;   ///< normal force on u
     double friction;
     Eigen::Vector3d last_slip = Eigen::Vector3d::Zero();
-    bool reversed = false;          ///< its slip has changed direction from one iterate to the next
+    bool reversed = false;   ///< its slip has changed direction from one iterate to the next
   };
 
   Impl(ContactSurface surface, const ContactOptions& options);
 
   double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
-  double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
+  double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
+                   const std::vector<Pose>& solids_end);
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   double lagFriction();
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
@@ -71,4 +72,4 @@ private:
   std::vector<BoundingBox> boxes_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -15,7 +15,8 @@ double closestOnSegment(const Eigen::Vector3d& p, const Eigen::Vector3d& a, cons
   return along < e2 ? along / e2 : 1.0;
 }
 
-SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0, const Eigen::Vector3d& b1)
+SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
+                              const Eigen::Vector3d& b1)
 {
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0, w = b0 - a0, c = e.cross(f);
   const double c2 = c.squaredNorm(), parallel = 1e-6 * e.squaredNorm() * f.squaredNorm();
@@ -45,7 +46,8 @@ SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& 
   return best;
 }
 
-Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c)
+Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                  const Eigen::Vector3d& c)
 {
   const Eigen::Vector3d ab = b - a, ac = c - a, normal = ab.cross(ac);
   const double n2 = normal.squaredNorm(), square = ab.squaredNorm() * ac.squaredNorm();
@@ -60,11 +62,13 @@ Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3
       inner = {u / n2, v / n2, w / n2};
       if (n2 > 1e-6 * square)
         return inner;
-      inner2 = (inner[0] * a + inner[1] * b + inner[2] * c - p).squaredNorm();   // of a needle: rounded so much that an edge may be nearer
+      // of a needle: rounded so much that an edge may be nearer
+      inner2 = (inner[0] * a + inner[1] * b + inner[2] * c - p).squaredNorm();
     }
   }
   const double ts[3] = {closestOnSegment(p, a, b), closestOnSegment(p, b, c), closestOnSegment(p, c, a)};
-  const double d2[3] = {(a + ts[0] * ab - p).squaredNorm(), (b + ts[1] * (c - b) - p).squaredNorm(), (c - ts[2] * ac - p).squaredNorm()};
+  const double d2[3] = {(a + ts[0] * ab - p).squaredNorm(), (b + ts[1] * (c - b) - p).squaredNorm(),
+                        (c - ts[2] * ac - p).squaredNorm()};
   const int k = d2[0] <= d2[1] && d2[0] <= d2[2] ? 0 : d2[1] <= d2[2] ? 1 : 2;
   if (inner2 >= 0.0 && inner2 < d2[k])
     return inner;
@@ -79,16 +83,18 @@ double pointSegmentDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, 
   return (a + closestOnSegment(p, a, b) * (b - a) - p).norm();
 }
 
-double segmentDistance(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0, const Eigen::Vector3d& b1)
+double segmentDistance(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
+                       const Eigen::Vector3d& b1)
 {
   const SegmentPair c = closestOfSegments(a0, a1, b0, b1);
   return (b0 + c.t * (b1 - b0) - a0 - c.s * (a1 - a0)).norm();
 }
 
-double pointTriangleDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c)
+double pointTriangleDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                             const Eigen::Vector3d& c)
 {
   const Eigen::Vector3d w = closestOnTriangle(p, a, b, c);
   return (w[0] * a + w[1] * b + w[2] * c - p).norm();
 }
 
-}  // namespace slender
+}   // namespace slender

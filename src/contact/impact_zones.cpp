@@ -47,7 +47,8 @@ const std::vector<ImpactZones::Zone>& ImpactZones::zones(const Eigen::VectorXd& 
       order_.push_back(i);
   }
   // members by zone; the root itself goes first
-  std::sort(order_.begin(), order_.end(), [&](int a, int b) { return std::make_pair(parent_[a], a) < std::make_pair(parent_[b], b); });
+  std::sort(order_.begin(), order_.end(),
+            [&](int a, int b) { return std::make_pair(parent_[a], a) < std::make_pair(parent_[b], b); });
   members_.reserve(2 * order_.size() + 1);   // zones point into it
   for (std::size_t from = 0, to; from < order_.size(); from = to)
   {
@@ -71,7 +72,8 @@ const std::vector<ImpactZones::Zone>& ImpactZones::zones(const Eigen::VectorXd& 
   return zones_;
 }
 
-RigidFit rigidFit(const int* points, int count, const Eigen::VectorXd& inverse_mass, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& u)
+RigidFit rigidFit(const int* points, int count, const Eigen::VectorXd& inverse_mass, const Eigen::Matrix3Xd& x,
+                  const Eigen::Matrix3Xd& u)
 {
   RigidFit fit{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   double mass = 0.0;
@@ -106,4 +108,4 @@ RigidFit rigidFit(const int* points, int count, const Eigen::VectorXd& inverse_m
   return fit;
 }
 
-}  // namespace slender
+}   // namespace slender

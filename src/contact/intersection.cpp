@@ -66,9 +66,11 @@ int orientation2(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen
 }
 
 /// Of segments in one line or plane, seen along `axis`.
-bool segmentsMeet(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& a, const Eigen::Vector3d& b, int axis)
+bool segmentsMeet(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& a,
+                  const Eigen::Vector3d& b, int axis)
 {
-  const int pa = orientation2(p, q, a, axis), pb = orientation2(p, q, b, axis), ap = orientation2(a, b, p, axis), aq = orientation2(a, b, q, axis);
+  const int pa = orientation2(p, q, a, axis), pb = orientation2(p, q, b, axis), ap = orientation2(a, b, p, axis),
+            aq = orientation2(a, b, q, axis);
   if (pa != 0 || pb != 0 || ap != 0 || aq != 0)
     return pa * pb <= 0 && ap * aq <= 0;
   for (int k = 0; k < 3; ++k)   // in a line
@@ -77,7 +79,8 @@ bool segmentsMeet(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eige
   return true;
 }
 
-bool coplanarMeet(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c)
+bool coplanarMeet(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& a,
+                  const Eigen::Vector3d& b, const Eigen::Vector3d& c)
 {
   int axis = 0;
   while (axis < 2 && orientation2(a, b, c, axis) == 0)
@@ -86,9 +89,11 @@ bool coplanarMeet(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eige
   if (turn != 0)
   {
     const auto inside = [&](const Eigen::Vector3d& r) {
-      return orientation2(a, b, r, axis) * turn >= 0 && orientation2(b, c, r, axis) * turn >= 0 && orientation2(c, a, r, axis) * turn >= 0;
+      return orientation2(a, b, r, axis) * turn >= 0 && orientation2(b, c, r, axis) * turn >= 0 &&
+             orientation2(c, a, r, axis) * turn >= 0;
     };
-    return inside(p) || inside(q) || segmentsMeet(p, q, a, b, axis) || segmentsMeet(p, q, b, c, axis) || segmentsMeet(p, q, c, a, axis);
+    return inside(p) || inside(q) || segmentsMeet(p, q, a, b, axis) || segmentsMeet(p, q, b, c, axis) ||
+           segmentsMeet(p, q, c, a, axis);
   }
   // A triangle without area: its edges, in any view that tells their line from the segment's.
   const auto meets = [&](const Eigen::Vector3d& s, const Eigen::Vector3d& t) {
@@ -97,13 +102,14 @@ bool coplanarMeet(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eige
   return meets(a, b) || meets(b, c) || meets(c, a);
 }
 
-}  // namespace
+}   // namespace
 
 int orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, const Eigen::Vector3d& d)
 {
   const Eigen::Vector3d u = a - d, v = b - d, w = c - d;
   const double volume = u.dot(v.cross(w));
-  const double size = u.cwiseAbs().dot(Eigen::Vector3d(std::abs(v.y() * w.z()) + std::abs(v.z() * w.y()), std::abs(v.z() * w.x()) + std::abs(v.x() * w.z()),
+  const double size = u.cwiseAbs().dot(Eigen::Vector3d(std::abs(v.y() * w.z()) + std::abs(v.z() * w.y()),
+                                                       std::abs(v.z() * w.x()) + std::abs(v.x() * w.z()),
                                                        std::abs(v.x() * w.y()) + std::abs(v.y() * w.x())));
   if (std::abs(volume) > 2e-15 * size)
     return volume > 0.0 ? 1 : -1;
@@ -123,8 +129,8 @@ int orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen:
   return sum.sign();
 }
 
-bool segmentMeetsTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                          const Eigen::Vector3d& c)
+bool segmentMeetsTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& a,
+                          const Eigen::Vector3d& b, const Eigen::Vector3d& c)
 {
   const int side_p = orientation(a, b, c, p), side_q = orientation(a, b, c, q);
   if (side_p * side_q > 0)
@@ -147,7 +153,8 @@ struct Side
   int a, b, object;
 };
 
-void addFaces(const Eigen::Matrix3Xi& triangles, int first, int object, std::vector<Face>& faces, std::vector<Side>& sides)
+void addFaces(const Eigen::Matrix3Xi& triangles, int first, int object, std::vector<Face>& faces,
+              std::vector<Side>& sides)
 {
   for (Eigen::Index t = 0; t < triangles.cols(); ++t)
   {
@@ -175,9 +182,10 @@ double segmentDepth(const ConvexPiece& piece, const Eigen::Vector3d& a, const Ei
   return std::min({distance(0.0), distance(1.0), distance(0.5 * (low + high))});
 }
 
-}  // namespace
+}   // namespace
 
-std::vector<Intersection> intersections(const CollisionSurface& surface, const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
+std::vector<Intersection> intersections(const CollisionSurface& surface, const Eigen::Matrix3Xd& x,
+                                        const std::vector<Pose>& solids)
 {
   std::vector<Face> faces;
   std::vector<Side> sides;
@@ -229,7 +237,8 @@ std::vector<Intersection> intersections(const CollisionSurface& surface, const E
       // the inside of a face, on what sticks out of the solid
       const auto axisMeets = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius) {
         return segmentMeetsTriangle(a, b, v[0], v[1], v[2]) ||
-               (radius > 0.0 && std::min(pointTriangleDistance(a, v[0], v[1], v[2]), pointTriangleDistance(b, v[0], v[1], v[2])) <= radius);
+               (radius > 0.0 && std::min(pointTriangleDistance(a, v[0], v[1], v[2]),
+                                         pointTriangleDistance(b, v[0], v[1], v[2])) <= radius);
       };
       if (const auto* s = std::get_if<Sphere>(&shape))
         meets = meets || axisMeets({0, 0, 0}, {0, 0, 0}, s->radius);
@@ -245,7 +254,8 @@ std::vector<Intersection> intersections(const CollisionSurface& surface, const E
         for (int i = 0; i < 8 && !meets; ++i)
           for (int axis = 0; axis < 3 && !meets; ++axis)
           {
-            const Eigen::Vector3d p = 0.5 * b->size.cwiseProduct(Eigen::Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
+            const Eigen::Vector3d p =
+                0.5 * b->size.cwiseProduct(Eigen::Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
             Eigen::Vector3d q = p;
             q[axis] = -q[axis];
             meets = axisMeets(p, q, 0.0);
@@ -254,9 +264,12 @@ std::vector<Intersection> intersections(const CollisionSurface& surface, const E
         out.push_back({{faces[f].v[0], faces[f].v[1]}, {-1, -1, static_cast<int>(k)}});
     }
   }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return std::tie(a.object, a.a, a.b) < std::tie(b.object, b.a, b.b); });
-  sides.erase(std::unique(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.object == b.object && a.a == b.a && a.b == b.b; }),
-              sides.end());
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return std::tie(a.object, a.a, a.b) < std::tie(b.object, b.a, b.b); });
+  sides.erase(
+      std::unique(sides.begin(), sides.end(),
+                  [](const Side& a, const Side& b) { return a.object == b.object && a.a == b.a && a.b == b.b; }),
+      sides.end());
   const auto mayTouch = [&](int a, int b) {
     if (a >= sheets && b >= sheets)
       return false;
@@ -265,8 +278,12 @@ std::vector<Intersection> intersections(const CollisionSurface& surface, const E
     return a == b ? surface.sheets[a].self : surface.sheets[a].others && surface.sheets[b].others;
   };
   // sorted along x, each face against the edges that begin before it ends
-  const auto low = [&](const Face& f, int k) { return std::min({points[f.v[0]][k], points[f.v[1]][k], points[f.v[2]][k]}); };
-  const auto high = [&](const Face& f, int k) { return std::max({points[f.v[0]][k], points[f.v[1]][k], points[f.v[2]][k]}); };
+  const auto low = [&](const Face& f, int k) {
+    return std::min({points[f.v[0]][k], points[f.v[1]][k], points[f.v[2]][k]});
+  };
+  const auto high = [&](const Face& f, int k) {
+    return std::max({points[f.v[0]][k], points[f.v[1]][k], points[f.v[2]][k]});
+  };
   std::sort(sides.begin(), sides.end(), [&](const Side& a, const Side& b) {
     return std::min(points[a.a].x(), points[a.b].x()) < std::min(points[b.a].x(), points[b.b].x());
   });
@@ -281,23 +298,25 @@ std::vector<Intersection> intersections(const CollisionSurface& surface, const E
       from[k] = low(f, k);
       to[k] = high(f, k);
     }
-    const auto begin = std::lower_bound(sides.begin(), sides.end(), from.x() - longest, [&](const Side& s, double value) {
-      return std::min(points[s.a].x(), points[s.b].x()) < value;
-    });
+    const auto begin = std::lower_bound(
+        sides.begin(), sides.end(), from.x() - longest,
+        [&](const Side& s, double value) { return std::min(points[s.a].x(), points[s.b].x()) < value; });
     for (auto s = begin; s != sides.end() && std::min(points[s->a].x(), points[s->b].x()) <= to.x(); ++s)
     {
       const Eigen::Vector3d &p = points[s->a], &q = points[s->b];
       if (p.x() < from.x() && q.x() < from.x())
         continue;
-      if ((p.y() < from.y() && q.y() < from.y()) || (p.y() > to.y() && q.y() > to.y()) || (p.z() < from.z() && q.z() < from.z()) ||
-          (p.z() > to.z() && q.z() > to.z()))
+      if ((p.y() < from.y() && q.y() < from.y()) || (p.y() > to.y() && q.y() > to.y()) ||
+          (p.z() < from.z() && q.z() < from.z()) || (p.z() > to.z() && q.z() > to.z()))
         continue;
-      const bool shared = std::find(f.v.begin(), f.v.end(), s->a) != f.v.end() || std::find(f.v.begin(), f.v.end(), s->b) != f.v.end();
-      if (!shared && mayTouch(s->object, f.object) && segmentMeetsTriangle(p, q, points[f.v[0]], points[f.v[1]], points[f.v[2]]))
+      const bool shared =
+          std::find(f.v.begin(), f.v.end(), s->a) != f.v.end() || std::find(f.v.begin(), f.v.end(), s->b) != f.v.end();
+      if (!shared && mayTouch(s->object, f.object) &&
+          segmentMeetsTriangle(p, q, points[f.v[0]], points[f.v[1]], points[f.v[2]]))
         out.push_back({{s->a, s->b}, {f.v[0], f.v[1], f.v[2]}});
     }
   }
   return out;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -45,7 +45,8 @@ Kdop Kdop::none()
   return out;
 }
 
-void KdopTree::build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups, const std::vector<char>& touching, std::size_t count)
+void KdopTree::build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups, const std::vector<char>& touching,
+                     std::size_t count)
 {
   touching_ = touching;
   groups_ = count;
@@ -80,8 +81,10 @@ void KdopTree::divide(int from, int to, const Eigen::Matrix3Xd& centers, const s
   if (first != last)
   {
     const int group = groups[order_[(from + to) / 2]];
-    const int lower = static_cast<int>(std::lower_bound(begin + from, begin + to, group, [&](int i, int g) { return groups[i] < g; }) - begin);
-    const int upper = static_cast<int>(std::upper_bound(begin + from, begin + to, group, [&](int g, int i) { return g < groups[i]; }) - begin);
+    const int lower = static_cast<int>(
+        std::lower_bound(begin + from, begin + to, group, [&](int i, int g) { return groups[i] < g; }) - begin);
+    const int upper = static_cast<int>(
+        std::upper_bound(begin + from, begin + to, group, [&](int g, int i) { return g < groups[i]; }) - begin);
     middle = lower > from && (upper == to || (from + to) / 2 - lower < upper - (from + to) / 2) ? lower : upper;
   }
   else
@@ -155,4 +158,4 @@ void KdopTree::between(int a, int b, std::vector<Pair>& pairs, std::size_t most)
       first ? between(child, other, pairs, most) : between(other, child, pairs, most);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,7 +7,8 @@
 
 namespace slender {
 
-/// Discrete orientation polytope of 16 sides (slabs across x, y, z, x+y, x-y, x+z, x-z, y+z), in floats rounded outwards: a cache line.
+/// Discrete orientation polytope of 16 sides (slabs across x, y, z, x+y, x-y, x+z, x-z, y+z), in floats rounded
+/// outwards: a cache line.
 struct Kdop
 {
   using Slabs = float __attribute__((vector_size(16)));   // wider ones are taken apart where vectors are narrower
@@ -33,9 +34,10 @@ struct Kdop
   }
 };
 
-/// Bounding volume hierarchy over elements whose volumes change while its shape stays. The pairs found do not depend on the shape.
-/// Refit and 74,000 pairs of a folded sheet of 10,000 triangles: 4.1 ms, where FCL's 16-sided KDOP hierarchy takes 9.7 ms (refit alone 0.2
-/// against 1.8), its AABB hierarchy 8.3 ms and the grid 6.4 ms (bench/cloth_collision_benchmark.cpp).
+/// Bounding volume hierarchy over elements whose volumes change while its shape stays. The pairs found do not depend on
+/// the shape. Refit and 74,000 pairs of a folded sheet of 10,000 triangles: 4.1 ms, where FCL's 16-sided KDOP hierarchy
+/// takes 9.7 ms (refit alone 0.2 against 1.8), its AABB hierarchy 8.3 ms and the grid 6.4 ms
+/// (bench/cloth_collision_benchmark.cpp).
 class KdopTree
 {
 public:
@@ -44,14 +46,15 @@ public:
     int first, second;   ///< elements
   };
 
-  /// Groups of elements (rising from 0) get subtrees of their own, divided at medians of the centres [m]. Pairs of groups a and b are looked for
-  /// where `touching[a * count + b]` of `count` groups says so.
-  void build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups, const std::vector<char>& touching, std::size_t count);
+  /// Groups of elements (rising from 0) get subtrees of their own, divided at medians of the centres [m]. Pairs of
+  /// groups a and b are looked for where `touching[a * count + b]` of `count` groups says so.
+  void build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups, const std::vector<char>& touching,
+             std::size_t count);
 
   /// Takes over the elements' volumes. Pairs are looked for among those of which one is `active`.
   void refit(const std::vector<Kdop>& volumes, const std::vector<char>& active);
-  /// Appends pairs of different elements whose volumes overlap, one of them active, in an order that depends on the arguments of the last
-  /// build() and refit() only. Ends as soon as there are more than `most`.
+  /// Appends pairs of different elements whose volumes overlap, one of them active, in an order that depends on the
+  /// arguments of the last build() and refit() only. Ends as soon as there are more than `most`.
   void selfPairs(std::vector<Pair>& pairs, std::size_t most = std::numeric_limits<std::size_t>::max()) const;
 
 private:
@@ -60,17 +63,18 @@ private:
   void between(int a, int b, std::vector<Pair>& pairs, std::size_t most) const;
   bool apart(int a, int b) const
   {
-    return group_[a] >= 0 && group_[b] >= 0 && !touching_[static_cast<std::size_t>(group_[a]) * groups_ + static_cast<std::size_t>(group_[b])];
+    return group_[a] >= 0 && group_[b] >= 0 &&
+           !touching_[static_cast<std::size_t>(group_[a]) * groups_ + static_cast<std::size_t>(group_[b])];
   }
 
-  std::vector<int> order_;         ///< elements, as the leaves follow each other
-  std::vector<Kdop> volumes_;      ///< nodes in depth-first order: the first child follows its parent
-  std::vector<int> second_;        ///< second child; of a leaf: -1 - element
-  std::vector<int> leaves_;        ///< below a node
-  std::vector<int> group_;         ///< of a node; -1: several
+  std::vector<int> order_;      ///< elements, as the leaves follow each other
+  std::vector<Kdop> volumes_;   ///< nodes in depth-first order: the first child follows its parent
+  std::vector<int> second_;     ///< second child; of a leaf: -1 - element
+  std::vector<int> leaves_;     ///< below a node
+  std::vector<int> group_;      ///< of a node; -1: several
   std::vector<char> touching_;
   std::size_t groups_ = 0;
   std::vector<char> active_;
 };
 
-}  // namespace slender
+}   // namespace slender

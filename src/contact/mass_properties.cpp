@@ -40,12 +40,14 @@ MassProperties of(const Box& b)
 MassProperties of(const Cylinder& c)
 {
   const double m = c.radius * c.radius / 4.0;
-  return {M_PI * c.radius * c.radius * c.length, Eigen::Vector3d::Zero(), fromMoments(m, m, c.length * c.length / 12.0)};
+  return {M_PI * c.radius * c.radius * c.length, Eigen::Vector3d::Zero(),
+          fromMoments(m, m, c.length * c.length / 12.0)};
 }
 
 MassProperties of(const Capsule& c)
 {
-  const double r = c.radius, l = c.length, tube = M_PI * r * r * l, ball = 4.0 / 3.0 * M_PI * r * r * r, volume = tube + ball;
+  const double r = c.radius, l = c.length, tube = M_PI * r * r * l, ball = 4.0 / 3.0 * M_PI * r * r * r,
+               volume = tube + ball;
   // a half ball's centre is 3/8 r beyond its flat face
   const double across = (tube * r * r / 4.0 + ball * r * r / 5.0) / volume;
   const double axial = (tube * l * l / 12.0 + ball * (r * r / 5.0 + l * l / 4.0 + 0.375 * l * r)) / volume;
@@ -64,9 +66,10 @@ void requireClosed(const TriangleMesh& mesh)
   {
     const bool twice = i > 0 && edges[i] == edges[i - 1];
     if (twice || !std::binary_search(edges.begin(), edges.end(), std::make_pair(edges[i].second, edges[i].first)))
-      throw std::invalid_argument("mass of a mesh: it is not closed and consistently oriented at the edge between vertices " +
-                                  std::to_string(edges[i].first) + " and " + std::to_string(edges[i].second) +
-                                  "; close the mesh, or give mass and inertia");
+      throw std::invalid_argument(
+          "mass of a mesh: it is not closed and consistently oriented at the edge between vertices " +
+          std::to_string(edges[i].first) + " and " + std::to_string(edges[i].second) +
+          "; close the mesh, or give mass and inertia");
   }
 }
 
@@ -97,7 +100,7 @@ MassProperties of(const std::shared_ptr<const TriangleMesh>& mesh)
   return {volume, origin + center, moments.trace() * Eigen::Matrix3d::Identity() - moments};
 }
 
-}  // namespace
+}   // namespace
 
 MassProperties massProperties(const Shape& shape)
 {
@@ -105,4 +108,4 @@ MassProperties massProperties(const Shape& shape)
   return std::visit([](const auto& s) { return of(s); }, shape);
 }
 
-}  // namespace slender
+}   // namespace slender

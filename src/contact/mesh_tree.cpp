@@ -51,4 +51,4 @@ void MeshTree::query(const BoundingBox& box, std::vector<int>& triangles) const
   std::sort(triangles.begin() + from, triangles.end());
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -24,4 +24,4 @@ private:
   std::unique_ptr<Model> model_;
 };
 
-}  // namespace slender
+}   // namespace slender

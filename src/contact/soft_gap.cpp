@@ -29,7 +29,8 @@ struct AlongSegment
   PieceDistance piece;
 };
 
-AlongSegment along(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& e, double radius, double softness, double t)
+AlongSegment along(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& e, double radius,
+                   double softness, double t)
 {
   AlongSegment at;
   at.t = t;
@@ -45,7 +46,8 @@ AlongSegment along(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eig
 }
 
 /// Newton's method on the slope, which changes its sign once, inside a shrinking bracket.
-AlongSegment minimiseAlong(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius, double softness)
+AlongSegment minimiseAlong(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius,
+                           double softness)
 {
   constexpr double kWidth = 1e-13;
   const Eigen::Vector3d e = b - a;
@@ -91,7 +93,7 @@ struct OnSegments
   Eigen::Vector3d normal;
 };
 
-}  // namespace
+}   // namespace
 
 SegmentPieceDistance segmentPieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b)
 {
@@ -113,7 +115,8 @@ SoftGap softGap(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radiu
   return out;
 }
 
-SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0, const Eigen::Vector3d& b1, double thickness)
+SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
+                const Eigen::Vector3d& b1, double thickness)
 {
   constexpr double kStep = 1e-12;   // of a segment
   const Eigen::Vector3d w0 = a0 - b0, e = a1 - a0, f = b1 - b0;
@@ -153,8 +156,12 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
     free_t = (p.t > 0.0 || p.ht < 0.0) && (p.t < 1.0 || p.ht > 0.0);
     // Away from the minimum the Hessian may be indefinite; without its mixed terms it never is.
     double ds = 0.0, dt = 0.0;
-    const auto blocked = [](double value, double step) { return (value <= 0.0 && step < 0.0) || (value >= 1.0 && step > 0.0); };
-    const auto single = [](double slope, double curvature, double safe) { return -slope / (curvature > 0.1 * safe ? curvature : safe); };
+    const auto blocked = [](double value, double step) {
+      return (value <= 0.0 && step < 0.0) || (value >= 1.0 && step > 0.0);
+    };
+    const auto single = [](double slope, double curvature, double safe) {
+      return -slope / (curvature > 0.1 * safe ? curvature : safe);
+    };
     const double safe_s = p.hss - 2.0 * p.ws * p.normal.dot(e), safe_t = p.htt + 2.0 * p.wt * p.normal.dot(f);
     const double det = p.hss * p.htt - p.hst * p.hst;
     bool both = free_s && free_t;
@@ -187,7 +194,9 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
     OnSegments trial = at(inside(p.s + reach * ds), inside(p.t + reach * dt));
     // Where the gap's rounding hides a descent, the slopes still show it.
     const double noise = 4e-16 * (p.gap + thickness + reaching);
-    const auto steepness = [&](const OnSegments& q) { return std::max(ds != 0.0 ? std::abs(q.hs) : 0.0, dt != 0.0 ? std::abs(q.ht) : 0.0); };
+    const auto steepness = [&](const OnSegments& q) {
+      return std::max(ds != 0.0 ? std::abs(q.hs) : 0.0, dt != 0.0 ? std::abs(q.ht) : 0.0);
+    };
     const auto better = [&] {
       return trial.h <= p.h + 1e-4 * reach * slope || (trial.h <= p.h + noise && steepness(trial) < 0.5 * steepness(p));
     };
@@ -220,4 +229,4 @@ SoftGap softGap(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eige
   return out;
 }
 
-}  // namespace slender
+}   // namespace slender

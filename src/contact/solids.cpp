@@ -63,7 +63,8 @@ PieceDistance of(const Box& b, const Eigen::Vector3d& p, const Eigen::Vector3d& 
 PieceDistance of(const Cylinder& c, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
 {
   const double rho = std::hypot(p.x(), p.y()), side = rho - c.radius, end = std::abs(p.z()) - 0.5 * c.length;
-  const Eigen::Vector3d radial = rho > 0.0 ? Eigen::Vector3d(p.x() / rho, p.y() / rho, 0.0) : Eigen::Vector3d(Eigen::Vector3d::UnitX());
+  const Eigen::Vector3d radial =
+      rho > 0.0 ? Eigen::Vector3d(p.x() / rho, p.y() / rho, 0.0) : Eigen::Vector3d(Eigen::Vector3d::UnitX());
   const Eigen::Vector3d axial = std::copysign(1.0, p.z()) * Eigen::Vector3d::UnitZ();
   const double around = radial.x() * e.y() - radial.y() * e.x();
   if (side > 0.0 && end > 0.0)   // the rim: a circle, whose meridian sections are points
@@ -101,7 +102,7 @@ void requirePositive(const char* what, double value)
     throw std::invalid_argument(std::string(what) + " is " + std::to_string(value) + " m; must be positive and finite");
 }
 
-}  // namespace
+}   // namespace
 
 PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& direction)
 {
@@ -131,7 +132,8 @@ void checkShape(const Shape& shape)
     if (!(*m)->vertices.allFinite())
       throw std::invalid_argument("mesh: a vertex is not finite");
     if ((*m)->triangles.minCoeff() < 0 || (*m)->triangles.maxCoeff() >= (*m)->vertices.cols())
-      throw std::invalid_argument("mesh: a triangle names a vertex outside 0 ... " + std::to_string((*m)->vertices.cols() - 1));
+      throw std::invalid_argument("mesh: a triangle names a vertex outside 0 ... " +
+                                  std::to_string((*m)->vertices.cols() - 1));
   }
 }
 
@@ -160,16 +162,17 @@ double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector
       least = std::min(least, pieceDistance(piece, a + e * k / kPlaces, e).distance);
   };
   std::visit(
-    [&](const auto& s) {
-      using T = std::decay_t<decltype(s)>;
-      if constexpr (std::is_same_v<T, std::shared_ptr<const TriangleMesh>>)
-        for (Eigen::Index i = 0; i < s->triangles.cols(); ++i)
-          look(Triangle{s->vertices.col(s->triangles(0, i)), s->vertices.col(s->triangles(1, i)), s->vertices.col(s->triangles(2, i))});
-      else
-        look(s);
-    },
-    shape);
+      [&](const auto& s) {
+        using T = std::decay_t<decltype(s)>;
+        if constexpr (std::is_same_v<T, std::shared_ptr<const TriangleMesh>>)
+          for (Eigen::Index i = 0; i < s->triangles.cols(); ++i)
+            look(Triangle{s->vertices.col(s->triangles(0, i)), s->vertices.col(s->triangles(1, i)),
+                          s->vertices.col(s->triangles(2, i))});
+        else
+          look(s);
+      },
+      shape);
   return least;
 }
 
-}  // namespace slender
+}   // namespace slender

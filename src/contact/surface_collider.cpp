@@ -12,14 +12,14 @@ namespace slender {
 
 namespace {
 
-constexpr double kKept = 0.2;        // share of a gap that no collision may go below
-constexpr double kTarget = 0.5;      // share of the gap that impulses leave
-constexpr double kNear = 2.0;        // shells, up to where places of contact at the start tell those at the end
+constexpr double kKept = 0.2;     // share of a gap that no collision may go below
+constexpr double kTarget = 0.5;   // share of the gap that impulses leave
+constexpr double kNear = 2.0;     // shells, up to where places of contact at the start tell those at the end
 constexpr int kSweeps = 25;
 constexpr int kImpulseRounds = 12;
-constexpr long kLimitWork = 8;       // of a WorkBudget: when a pair meets
+constexpr long kLimitWork = 8;   // of a WorkBudget: when a pair meets
 
-}  // namespace
+}   // namespace
 
 bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int second)
 {
@@ -37,7 +37,8 @@ bool SurfaceCollider::Impl::failSpent()
   return fail("more work than a step is given");
 }
 
-bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again)
+bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v,
+                                 bool again)
 {
   const int n = elements_.sheet_points;
   const std::size_t solids = elements_.objects.size() - elements_.sheet_count;
@@ -70,7 +71,9 @@ bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3
 double SurfaceCollider::Impl::reach(const CollisionPair& pair) const
 {
   const double shell = pairs_.shell(pair);
-  return pairs_.object(pair, false) != pairs_.object(pair, true) ? shell : std::min(shell, 0.5 * pairs_.place(pair, elements_.reference).distance);
+  return pairs_.object(pair, false) != pairs_.object(pair, true)
+             ? shell
+             : std::min(shell, 0.5 * pairs_.place(pair, elements_.reference).distance);
 }
 
 void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& place, double range)
@@ -92,10 +95,12 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
   ++report_.repulsions;
 }
 
-/// Finds all pairs that may come near each other; those within their shells, or near them and about to enter, get repulsions.
+/// Finds all pairs that may come near each other; those within their shells, or near them and about to enter, get
+/// repulsions.
 bool SurfaceCollider::Impl::examineStart()
 {
-  const std::vector<CollisionPair>& pairs = known_ ? pairs_.update(from_, to_, *budget_) : pairs_.find(from_, to_, *budget_);
+  const std::vector<CollisionPair>& pairs =
+      known_ ? pairs_.update(from_, to_, *budget_) : pairs_.find(from_, to_, *budget_);
   known_ = budget_->spend(static_cast<long>(pairs.size()));
   if (!known_)
     return failSpent();
@@ -128,14 +133,16 @@ double SurfaceCollider::Impl::planeGap(int plane, const std::vector<Pose>& poses
   return (pose.orientation * Eigen::Vector3d::UnitZ()).dot(x - pose.position);
 }
 
-/// Whether a point comes too near a plane whose origin and normal go along straight lines: the gap is quadratic in time.
+/// Whether a point comes too near a plane whose origin and normal go along straight lines: the gap is quadratic in
+/// time.
 bool SurfaceCollider::Impl::planeHit(int point, int plane) const
 {
   const int solid = elements_.planes[plane] - elements_.sheet_count;
   const Pose &p0 = step_->solids[solid], &p1 = step_->solids_end[solid];
   const Eigen::Vector3d n0 = p0.orientation * Eigen::Vector3d::UnitZ(), n1 = p1.orientation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d r0 = from_.col(point) - p0.position, r1 = to_.col(point) - p1.position;
-  const double start = n0.dot(r0), end = n1.dot(r1), goal = kKept * std::min(start, elements_.objects[elements_.point_object[point]].shell);
+  const double start = n0.dot(r0), end = n1.dot(r1),
+               goal = kKept * std::min(start, elements_.objects[elements_.point_object[point]].shell);
   const double square = (n1 - n0).dot(r1 - r0), slope = end - start - square;
   double least = std::min(start, end);
   if (square > 0.0 && slope < 0.0 && -slope < 2.0 * square)
@@ -145,7 +152,8 @@ bool SurfaceCollider::Impl::planeHit(int point, int plane) const
 
 void SurfaceCollider::Impl::addPlaneRow(int point, int plane, double gap, bool hit)
 {
-  const int object = elements_.planes[plane], solid = object - elements_.sheet_count, sheet = elements_.point_object[point];
+  const int object = elements_.planes[plane], solid = object - elements_.sheet_count,
+            sheet = elements_.point_object[point];
   const Pose& end = step_->solids_end[solid];
   const double shell = elements_.objects[sheet].shell;
   CollisionRow row{};
@@ -173,13 +181,15 @@ bool SurfaceCollider::Impl::examinePlanes()
       if (!(gap > 0.0))
         return failAtStart("a plane is passed through at the start of the step", i);
       const double shell = elements_.objects[sheet].shell;
-      if (gap < kNear * shell && std::min(gap, planeGap(static_cast<int>(plane), step_->solids_end, to_.col(i))) < shell)
+      if (gap < kNear * shell &&
+          std::min(gap, planeGap(static_cast<int>(plane), step_->solids_end, to_.col(i))) < shell)
         addPlaneRow(i, static_cast<int>(plane), gap, false);
     }
   return true;
 }
 
-/// Fills hits_ and plane_hits_: all collisions along the present motions. After the first time only pairs whose motion has changed need a look.
+/// Fills hits_ and plane_hits_: all collisions along the present motions. After the first time only pairs whose motion
+/// has changed need a look.
 void SurfaceCollider::Impl::detect()
 {
   const bool first = report_.rounds++ == 0;
@@ -322,14 +332,16 @@ bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd
   return !budget_->spent() || failSpent();
 }
 
-CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again)
+CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v,
+                                               bool again)
 {
   if (!load(step, x, v, again) || !examineStart() || !examinePlanes())
     return report_;
   hits_.clear();
   rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
   detect();
-  while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds && !budget_->spent() && !stepsInterrupted())
+  while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds && !budget_->spent() &&
+         !stepsInterrupted())
   {
     addHits();
     rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
@@ -362,11 +374,15 @@ const Eigen::Matrix3Xd& SurfaceCollider::heldImpulses() const { return impl_->he
 bool SurfaceCollider::touched(int first, int count) const { return impl_->touched(first, count); }
 int SurfaceCollider::solidOf(int point) const { return impl_->solidOf(point); }
 
-CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v, bool again)
+CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v,
+                                         bool again)
 {
   return impl_->resolve(step, x, v, again);
 }
 
-bool SurfaceCollider::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again) { return impl_->approach(step, x, again); }
+bool SurfaceCollider::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again)
+{
+  return impl_->approach(step, x, again);
+}
 
-}  // namespace slender
+}   // namespace slender

@@ -29,7 +29,10 @@ public:
   int solidOf(int point) const { return elements_.point_object.at(point) - elements_.sheet_count; }
 
 private:
-  struct PlaneHit { int point, plane; };
+  struct PlaneHit
+  {
+    int point, plane;
+  };
 
   bool load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again);
   bool examineStart();
@@ -49,7 +52,10 @@ private:
   void solveVelocities();
   void takeHeldImpulses();
   bool fail(const std::string& reason, int first = -1, int second = -1);
-  bool failAtStart(const std::string& reason, int first, int second = -1) { return !(report_.at_start = true) || fail(reason, first, second); }
+  bool failAtStart(const std::string& reason, int first, int second = -1)
+  {
+    return !(report_.at_start = true) || fail(reason, first, second);
+  }
   bool failSpent();
   int node(int point) const;
 
@@ -62,17 +68,17 @@ private:
   const CollisionStep* step_ = nullptr;
   WorkBudget unbounded_;
   WorkBudget* budget_ = &unbounded_;
-  Eigen::Matrix3Xd from_, to_;      ///< all points, at both ends of the step
-  Eigen::Matrix3Xd tested_;         ///< ends at the last detection
+  Eigen::Matrix3Xd from_, to_;   ///< all points, at both ends of the step
+  Eigen::Matrix3Xd tested_;      ///< ends at the last detection
   Eigen::Matrix3Xd displacement_, velocity_;
   Eigen::VectorXd inverse_mass_;
   Eigen::Matrix3Xd held_impulses_;
   std::vector<char> changed_;
   static constexpr double kPush = 0.1;   ///< share of the overlap of shells that a step removes [Bridson et al. 2002]
   double push_ = kPush;
-  bool known_ = false;              ///< pairs_ are those of the step's start
+  bool known_ = false;   ///< pairs_ are those of the step's start
   std::vector<CollisionPair> hits_;
   std::vector<PlaneHit> plane_hits_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -11,8 +11,9 @@ namespace slender {
 /// Of a point in the zones: those of a solid are one.
 int SurfaceCollider::Impl::node(int point) const
 {
-  return point < elements_.sheet_points ? point
-                                        : static_cast<int>(from_.cols()) + elements_.point_object[point] - elements_.sheet_count;
+  return point < elements_.sheet_points
+             ? point
+             : static_cast<int>(from_.cols()) + elements_.point_object[point] - elements_.sheet_count;
 }
 
 /// Returns whether zones grew. Collisions within a zone are none: see ImpactZones.
@@ -67,7 +68,9 @@ bool SurfaceCollider::Impl::followPrescribed(const ImpactZones::Zone& zone)
       for (const Eigen::Vector3d& p : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)})
         one = one && agrees(step_->solids[solid] * p, step_->solids_end[solid] * p);
   if (!one)
-    return fail("prescribed motions squeeze or tear a piece", zone.count > 0 ? zone.members[0] : zone.prescribed[0] < points ? zone.prescribed[0] : -1);
+    return fail("prescribed motions squeeze or tear a piece", zone.count > 0                ? zone.members[0]
+                                                              : zone.prescribed[0] < points ? zone.prescribed[0]
+                                                                                            : -1);
   if (motion.linear().trace() <= 1.0)   // 1 + 2 cos(angle)
     return fail("a solid or grasp turns by more than a quarter in a step");
   for (int k = 0; k < zone.count; ++k)
@@ -95,4 +98,4 @@ bool SurfaceCollider::Impl::moveZones()
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,7 +7,8 @@ namespace {
 
 using Pack = double __attribute__((vector_size(64)));
 using PackU __attribute__((aligned(8), may_alias)) = Pack;
-static_assert(alignof(PackU) == 8, "loads and stores may be anywhere");   // Clang overlooks aligned() beside vector_size()
+// Clang overlooks aligned() beside vector_size()
+static_assert(alignof(PackU) == 8, "loads and stores may be anywhere");
 constexpr int W = 8;
 
 inline __attribute__((always_inline)) Pack load(const double* p) { return *reinterpret_cast<const PackU*>(p); }
@@ -97,7 +98,8 @@ void factor(const ChainArrays& r)
       r.pivot[j] = bottom;
     }
   }
-  const double above = middle > 0 ? r.lower[middle] * top : 0.0, below = middle < n - 1 ? r.upper[middle] * bottom : 0.0;
+  const double above = middle > 0 ? r.lower[middle] * top : 0.0,
+               below = middle < n - 1 ? r.upper[middle] * bottom : 0.0;
   r.pivot[middle] = 1.0 / (r.diagonal[middle] - above * top_coupling - below * bottom_coupling);
 }
 
@@ -135,14 +137,15 @@ void apply(const ChainArrays& r)
   {
     const Pack w = load(r.inverse_mass + i), after = load(r.lambda + i), before = load(r.lambda + i - 1);
     for (int k = 0; k < 3; ++k)
-      store(r.x[k] + i, load(r.x[k] + i) + w * (after * load(r.direction[k] + i) - before * load(r.direction[k] + i - 1)));
+      store(r.x[k] + i,
+            load(r.x[k] + i) + w * (after * load(r.direction[k] + i) - before * load(r.direction[k] + i - 1)));
   }
 }
 
-}  // namespace
+}   // namespace
 
 extern const ChainKernels chain_kernels;
 const ChainKernels chain_kernels = {takeDirections, constraints, factor, solve, apply};
 
-}  // namespace SLENDER_ISA
-}  // namespace slender
+}   // namespace SLENDER_ISA
+}   // namespace slender

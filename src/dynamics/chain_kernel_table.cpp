@@ -13,4 +13,4 @@ const ChainKernels& chainKernels()
 #endif
 }
 
-}  // namespace slender
+}   // namespace slender

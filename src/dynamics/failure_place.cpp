@@ -32,4 +32,4 @@ std::string metres(const Eigen::Vector3d& position)
   return text;
 }
 
-}  // namespace slender
+}   // namespace slender

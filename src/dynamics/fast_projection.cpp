@@ -16,7 +16,7 @@ constexpr int kHalo = ChainArrays::kHalo;
 
 Eigen::Vector3d at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
 
-}  // namespace
+}   // namespace
 
 void FastProjection::put(double* const* p, int i, const Eigen::Vector3d& v)
 {
@@ -27,9 +27,11 @@ void FastProjection::put(double* const* p, int i, const Eigen::Vector3d& v)
 int FastProjection::addChain(const Eigen::VectorXd& rest_length, const Eigen::VectorXd& mass, bool closed)
 {
   const int n = static_cast<int>(mass.size()), edges = static_cast<int>(rest_length.size());
-  if (edges < (closed ? 3 : 1) || edges != (closed ? n : n - 1) || !(rest_length.minCoeff() > 0) || !(mass.minCoeff() > 0))
-    throw std::invalid_argument("a chain of " + std::to_string(n) + " nodes and " + std::to_string(edges) +
-                                " edges: needs one edge fewer than nodes (closed: as many, 3 at least), and positive lengths and masses");
+  if (edges < (closed ? 3 : 1) || edges != (closed ? n : n - 1) || !(rest_length.minCoeff() > 0) ||
+      !(mass.minCoeff() > 0))
+    throw std::invalid_argument(
+        "a chain of " + std::to_string(n) + " nodes and " + std::to_string(edges) +
+        " edges: needs one edge fewer than nodes (closed: as many, 3 at least), and positive lengths and masses");
   Chain chain;
   ChainArrays& a = chain.a;
   a.nodes = n;
@@ -43,7 +45,8 @@ int FastProjection::addChain(const Eigen::VectorXd& rest_length, const Eigen::Ve
   for (int k = 0; k < 3; ++k)
     for (double** p : {&a.x[k], &a.direction[k], &a.s[k]})
       allocate(*p, 0.0);
-  for (double** p : {&a.inverse_mass, &a.active, &a.c, &a.diagonal, &a.upper, &a.lower, &a.pivot, &a.factor, &a.lambda, &a.total})
+  for (double** p :
+       {&a.inverse_mass, &a.active, &a.c, &a.diagonal, &a.upper, &a.lower, &a.pivot, &a.factor, &a.lambda, &a.total})
     allocate(*p, 0.0);
   for (double** p : {&a.rest_length, &a.inverse_rest})
     allocate(*p, 1.0);
@@ -79,7 +82,8 @@ void FastProjection::releaseAll(int chain)
 void FastProjection::weld(int chain, int node, int body, const Eigen::Vector3d& r_B)
 {
   if (body < 0 || body >= static_cast<int>(bodies_.size()))
-    throw std::invalid_argument("node " + std::to_string(node) + " is welded to body " + std::to_string(body) + "; there are " + std::to_string(bodies_.size()));
+    throw std::invalid_argument("node " + std::to_string(node) + " is welded to body " + std::to_string(body) +
+                                "; there are " + std::to_string(bodies_.size()));
   setOwner(chain, node, body);
   chains_[chain].r_B[node] = r_B;
 }
@@ -246,7 +250,8 @@ ProjectionReport FastProjection::project(double h)
     turn_[b] = rotationVector(body.pose.orientation * body.start.orientation.conjugate());
     impulse_[b].setZero();
     // angular momentum for now
-    body.velocity.angular = body.pose.orientation * (body.inertia * (body.pose.orientation.conjugate() * body.velocity.angular));
+    body.velocity.angular =
+        body.pose.orientation * (body.inertia * (body.pose.orientation.conjugate() * body.velocity.angular));
   }
 
   const auto bodiesDone = [&] {
@@ -255,7 +260,8 @@ ProjectionReport FastProjection::project(double h)
       ProjectedBody& body = bodies_[b];
       body.velocity.linear += impulse_[b].head<3>() / (body.mass * h);
       body.velocity.angular += impulse_[b].tail<3>() / h;
-      body.velocity.angular = body.pose.orientation * (body.inertia.inverse() * (body.pose.orientation.conjugate() * body.velocity.angular));
+      body.velocity.angular = body.pose.orientation *
+                              (body.inertia.inverse() * (body.pose.orientation.conjugate() * body.velocity.angular));
     }
   };
   for (;;)
@@ -306,7 +312,8 @@ bool FastProjection::findOverstretched(ProjectionReport& report) const
     for (int i = 0; i < (chain.a.closed ? 2 * n : n); ++i)
     {
       const int owner = chain.owner[i % n];
-      if (owner == kHeld && held >= 0 && i - held > 1 && (chain.trial[i % n] - chain.trial[held % n]).norm() > length * (1 - 1e-9))
+      if (owner == kHeld && held >= 0 && i - held > 1 &&
+          (chain.trial[i % n] - chain.trial[held % n]).norm() > length * (1 - 1e-9))
       {
         report.chain = c;
         report.first_node = held % n;
@@ -355,4 +362,4 @@ Eigen::Vector3d FastProjection::force(int c, int node) const
   return sum / (step_ * step_);
 }
 
-}  // namespace slender
+}   // namespace slender

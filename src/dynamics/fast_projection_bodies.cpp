@@ -10,12 +10,13 @@ namespace {
 
 Eigen::Vector3d at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
 
-}  // namespace
+}   // namespace
 
 /// Bodies whose touches lie in one run are coupled; touches are sorted by chain, so by run, too, but for closed chains.
 void FastProjection::buildPattern()
 {
-  const int bodies = static_cast<int>(bodies_.size()), specials = static_cast<int>(specials_.size()), size = 6 * bodies + specials;
+  const int bodies = static_cast<int>(bodies_.size()), specials = static_cast<int>(specials_.size()),
+            size = 6 * bodies + specials;
   std::vector<std::vector<int>> blocks(bodies);   // per body, those that it is coupled to
   std::vector<std::vector<int>> of_special(specials);
   for (int b = 0; b < bodies; ++b)
@@ -74,14 +75,16 @@ void FastProjection::linearise()
     const Chain& chain = chains_[t.chain];
     const ProjectedBody& body = bodies_[t.body];
     const Eigen::Vector3d s = at(chain.a.s, t.edge), d = at(chain.a.direction, t.edge);
-    const Eigen::Vector3d arm = body.pose.orientation * chain.r_B[t.node], start_arm = body.start.orientation * chain.r_B[t.node];
+    const Eigen::Vector3d arm = body.pose.orientation * chain.r_B[t.node],
+                          start_arm = body.start.orientation * chain.r_B[t.node];
     t.row << t.sign * s, t.sign * (rotationRate(turn_[t.body]).transpose() * arm.cross(s));
     t.column << -t.sign * d, -t.sign * start_arm.cross(d);
   }
 }
 
-/// The bodies' displacements y: with T the chains' systems, A and B the touches' rows and columns, M the bodies' inertia,
-/// T lambda = c + A y and M y = B lambda. Adds A y to the right-hand sides. Special edges keep their multipliers as unknowns, too.
+/// The bodies' displacements y: with T the chains' systems, A and B the touches' rows and columns, M the bodies'
+/// inertia, T lambda = c + A y and M y = B lambda. Adds A y to the right-hand sides. Special edges keep their
+/// multipliers as unknowns, too.
 bool FastProjection::solveBodies()
 {
   const int bodies = static_cast<int>(bodies_.size()), first_special = 6 * bodies;
@@ -90,7 +93,8 @@ bool FastProjection::solveBodies()
   solution_.setZero();
   for (int b = 0; b < bodies; ++b)
   {
-    const Eigen::Matrix3d r = bodies_[b].start.orientation.toRotationMatrix(), inertia = r * bodies_[b].inertia * r.transpose();
+    const Eigen::Matrix3d r = bodies_[b].start.orientation.toRotationMatrix(),
+                          inertia = r * bodies_[b].inertia * r.transpose();
     for (int k = 0; k < 3; ++k)
     {
       entry(6 * b + k, 6 * b + k) = bodies_[b].mass;
@@ -142,7 +146,8 @@ bool FastProjection::solveBodies()
       for (std::size_t k = first; k < special; ++k)
         if (specials_[k].before >= 0 && specials_[k].run == t.run)
           for (int l = 0; l < 6; ++l)
-            entry(first_special + static_cast<int>(k), 6 * t.body + l) += specials_[k].from_before * column_[specials_[k].before] * t.row[l];
+            entry(first_special + static_cast<int>(k), 6 * t.body + l) +=
+                specials_[k].from_before * column_[specials_[k].before] * t.row[l];
     }
     for (std::size_t k = first; k < special; ++k)
     {
@@ -199,4 +204,4 @@ void FastProjection::moveBodies()
         put(chain.a.x, i, bodies_[chain.owner[i]].pose * chain.r_B[i]);
 }
 
-}  // namespace slender
+}   // namespace slender

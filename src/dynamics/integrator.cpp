@@ -46,7 +46,8 @@ Stage trapezoid(double time, double h)
   return differenceStage(time, 0.5 * h, q, v);
 }
 
-Stage backwardDifference(double tau, double newest, double oldest, History q_newest, History v_newest, History q_oldest, History v_oldest)
+Stage backwardDifference(double tau, double newest, double oldest, History q_newest, History v_newest, History q_oldest,
+                         History v_oldest)
 {
   Combination q{}, v{};
   q[q_newest] = newest;
@@ -56,7 +57,7 @@ Stage backwardDifference(double tau, double newest, double oldest, History q_new
   return differenceStage(1.0, tau, q, v);
 }
 
-}  // namespace
+}   // namespace
 
 void planStep(Integrator integrator, double spectral_radius, double h, double previous_step, StepPlan& plan)
 {
@@ -69,8 +70,8 @@ void planStep(Integrator integrator, double spectral_radius, double h, double pr
       if (previous_step > 0)
       {
         const double r = h / previous_step;
-        plan.stages.push_back(backwardDifference(h * (1 + r) / (1 + 2 * r), (1 + r) * (1 + r) / (1 + 2 * r), -r * r / (1 + 2 * r), kQ, kV,
-                                                 kQPrevious, kVPrevious));
+        plan.stages.push_back(backwardDifference(h * (1 + r) / (1 + 2 * r), (1 + r) * (1 + r) / (1 + 2 * r),
+                                                 -r * r / (1 + 2 * r), kQ, kV, kQPrevious, kVPrevious));
         return;
       }
       break;   // starts with implicit Euler: one first-order step leaves the whole of second order
@@ -79,7 +80,8 @@ void planStep(Integrator integrator, double spectral_radius, double h, double pr
       const double g = 2.0 - std::sqrt(2.0);
       plan.needs_acceleration = true;
       plan.stages.push_back(trapezoid(g, g * h));
-      plan.stages.push_back(backwardDifference(0.5 * g * h, 1.0 / (g * (2 - g)), -(1 - g) * (1 - g) / (g * (2 - g)), kQStage, kVStage, kQ, kV));
+      plan.stages.push_back(backwardDifference(0.5 * g * h, 1.0 / (g * (2 - g)), -(1 - g) * (1 - g) / (g * (2 - g)),
+                                               kQStage, kVStage, kQ, kV));
       return;
     }
     case Integrator::implicit_midpoint:
@@ -134,7 +136,10 @@ double errorConstant(Integrator integrator)
 
 int order(Integrator integrator)
 {
-  return integrator == Integrator::implicit_euler || integrator == Integrator::symplectic_euler || integrator == Integrator::imex ? 1 : 2;
+  return integrator == Integrator::implicit_euler || integrator == Integrator::symplectic_euler ||
+                 integrator == Integrator::imex
+             ? 1
+             : 2;
 }
 
-}  // namespace slender
+}   // namespace slender

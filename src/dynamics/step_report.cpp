@@ -65,4 +65,4 @@ std::string milliseconds(double seconds)
   return text;
 }
 
-}  // namespace slender
+}   // namespace slender

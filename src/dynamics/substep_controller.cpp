@@ -19,7 +19,7 @@ void countWork(const StepReport& substep, StepReport& report)
   report.factorizations += substep.factorizations;
 }
 
-}  // namespace
+}   // namespace
 
 void SubstepController::run(SubstepEquations& equations, double duration, StepReport& report)
 {
@@ -29,14 +29,16 @@ void SubstepController::run(SubstepEquations& equations, double duration, StepRe
   int cuts = 0;   // since the last success
   while (t < duration)
   {
-    // The last substep ends exactly with the step. It may be slightly longer than h, because a sliver after it would be worse.
+    // The last substep ends exactly with the step. It may be slightly longer than h, because a sliver after it would be
+    // worse.
     const bool last = t + h > duration * (1 - kRounding);
     const double length = last ? duration - t : h;
     const Substep substep{t, last ? duration : t + length, length};
     StepReport result;
     const StepFailure failure = equations.attempt(substep, result);
     const bool failed = failure != StepFailure::none;
-    // Linear solvers and collision handling end early when they are interrupted, so that their result is not a solution.
+    // Linear solvers and collision handling end early when they are interrupted, so that their result is not a
+    // solution.
     if (stepsInterrupted())
     {
       countWork(result, report);
@@ -87,10 +89,11 @@ bool SubstepController::mayHalve(double length, int cuts) const
   return cuts < rule_.max_cuts && 0.5 * length >= std::max(deepest, rule_.min_step);
 }
 
-/// Next length over the present one, for a local error that is `ratio` times the tolerance. The margin of 0.9 makes a refusal unlikely.
+/// Next length over the present one, for a local error that is `ratio` times the tolerance. The margin of 0.9 makes a
+/// refusal unlikely.
 double SubstepController::lengthFactor(double ratio) const
 {
   return 0.9 * std::pow(std::max(ratio, 1e-12), -1.0 / (rule_.order + 1));
 }
 
-}  // namespace slender
+}   // namespace slender

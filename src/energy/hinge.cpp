@@ -9,9 +9,11 @@ namespace {
 
 constexpr int kPack = 8;
 
-}  // namespace
+}   // namespace
 
-HingeBending::HingeBending(const Eigen::Matrix4Xi& hinges, const Eigen::VectorXd& stiffness, const Eigen::VectorXd& rest_angles) : hinges_(hinges)
+HingeBending::HingeBending(const Eigen::Matrix4Xi& hinges, const Eigen::VectorXd& stiffness,
+                           const Eigen::VectorXd& rest_angles)
+  : hinges_(hinges)
 {
   const Eigen::Index n = hinges.cols(), padded = (n + kPack - 1) / kPack * kPack;
   if (stiffness.size() != n || rest_angles.size() != n)
@@ -50,7 +52,8 @@ void HingeBending::setResponse(double ratio, const double* viscous_angles)
   }
 }
 
-double HingeBending::addHessian(HessianKind kind, const double* x, const std::vector<int>& slots, double* gradient, double* values) const
+double HingeBending::addHessian(HessianKind kind, const double* x, const std::vector<int>& slots, double* gradient,
+                                double* values) const
 {
   if (count() == 0)
     return 0.0;
@@ -67,4 +70,4 @@ std::vector<int> HingeBending::slotsIn(const BlockMatrix& matrix) const
   return matrix.slots(padded);
 }
 
-}  // namespace slender
+}   // namespace slender

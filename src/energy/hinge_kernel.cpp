@@ -6,8 +6,8 @@ namespace slender {
 namespace SLENDER_ISA {
 namespace {
 
-/// One face beside the edge: unit vectors along the edge, in the face and square to it, normal to the face (as both faces' normals
-/// in the flat state), and where the third point lies.
+/// One face beside the edge: unit vectors along the edge, in the face and square to it, normal to the face (as both
+/// faces' normals in the flat state), and where the third point lies.
 struct Side
 {
   Vec3<Pack> m, n;
@@ -24,7 +24,8 @@ struct Flap
 
 SLENDER_INLINE Vec3<Pack> scaled(const Vec3<Pack>& v, const Pack& s) { return v * s; }
 
-SLENDER_INLINE Side sideOf(const Vec3<Pack>& e, const Vec3<Pack>& t, Pack inverse_length, const Vec3<Pack>& p, double sign)
+SLENDER_INLINE Side sideOf(const Vec3<Pack>& e, const Vec3<Pack>& t, Pack inverse_length, const Vec3<Pack>& p,
+                           double sign)
 {
   Side s;
   const Vec3<Pack> area = cross(e, p);
@@ -54,7 +55,8 @@ SLENDER_INLINE Flap flapOf(const HingeArrays& h, const double* x, int i)
   return f;
 }
 
-/// Derivatives of the angle by the four points [1/m]: those of the third points along the normals, the edge's by the lever.
+/// Derivatives of the angle by the four points [1/m]: those of the third points along the normals, the edge's by the
+/// lever.
 SLENDER_INLINE void angleGradient(const Flap& f, Vec3<Pack> (&g)[4])
 {
   g[2] = f.left.n * -f.left.inverse_height;
@@ -106,9 +108,15 @@ double gradient(const HingeArrays& h, const double* x, double* out)
 /// += u v^T in the layout of scatterBlocks (columns).
 SLENDER_INLINE void addOuter(Pack (&m)[9], const Vec3<Pack>& u, const Vec3<Pack>& v)
 {
-  m[0] += u.x * v.x; m[1] += u.y * v.x; m[2] += u.z * v.x;
-  m[3] += u.x * v.y; m[4] += u.y * v.y; m[5] += u.z * v.y;
-  m[6] += u.x * v.z; m[7] += u.y * v.z; m[8] += u.z * v.z;
+  m[0] += u.x * v.x;
+  m[1] += u.y * v.x;
+  m[2] += u.z * v.x;
+  m[3] += u.x * v.y;
+  m[4] += u.y * v.y;
+  m[5] += u.z * v.y;
+  m[6] += u.x * v.z;
+  m[7] += u.y * v.z;
+  m[8] += u.z * v.z;
 }
 
 SLENDER_INLINE void addTransposed(Pack (&m)[9], const Pack (&a)[9], double sign)
@@ -118,11 +126,12 @@ SLENDER_INLINE void addTransposed(Pack (&m)[9], const Pack (&a)[9], double sign)
       m[3 * c + r] += sign * a[3 * r + c];
 }
 
-/// Second derivatives of the angle, weighted, for one side. With n, m, t the side's unit vectors, h its height, l the edge's length, s the
-/// foot, S = n m^T + m n^T, by the third point p and the edge vector e:
+/// Second derivatives of the angle, weighted, for one side. With n, m, t the side's unit vectors, h its height, l the
+/// edge's length, s the foot, S = n m^T + m n^T, by the third point p and the edge vector e:
 ///   pp: S / h^2;   pe: -s S / h^2 + t n^T / (l h);   ee: (s^2 / h^2 + 1 / (2 l^2)) S - s (n t^T + t n^T) / (l h)
 /// (each side's ee has an antisymmetric part; the two cancel).
-SLENDER_INLINE void sideHessian(const Side& side, const Flap& f, Pack weight, Pack (&pp)[9], Pack (&pe)[9], Pack (&ee)[9])
+SLENDER_INLINE void sideHessian(const Side& side, const Flap& f, Pack weight, Pack (&pp)[9], Pack (&pe)[9],
+                                Pack (&ee)[9])
 {
   const Pack ih = side.inverse_height, il = f.inverse_length, s = side.foot;
   const Vec3<Pack> n = scaled(side.n, weight * ih * ih), tn = scaled(side.n, weight * ih * il);
@@ -168,7 +177,8 @@ double hessian(const HingeArrays& h, const double* x, const int* slots, double* 
       b00[c] = -(b10[c] + b20[c] + b30[c]);
 
     const int* s = slots + 10 * i;
-    const auto put = [&](Pack(&block)[9], int p, int q, int at) __attribute__((always_inline)) {
+    const auto put = [&](Pack(&block)[9], int p, int q, int at) __attribute__((always_inline))
+    {
       addOuter(block, g[p] * k, g[q]);
       scatterBlocks(values, s + at, 10, block);
     };
@@ -196,7 +206,8 @@ struct Linear
 
 /// The second derivative of the angle is a sum of two products x y of linear functions for each side,
 ///   2/h^2 (n . p')(m . p') + (n . e) (m . e / l^2 + 2 t . p' / (l h)),  p' = dp - s de.
-/// With a weight w, w x y <= |w| / 4 (r x + sign(w) y / r)^2: semidefinite, not below, and equal along x r = sign(w) y / r.
+/// With a weight w, w x y <= |w| / 4 (r x + sign(w) y / r)^2: semidefinite, not below, and equal along x r = sign(w) y
+/// / r.
 SLENDER_INLINE void positiveParts(const Side& side, const Flap& f, Pack weight, Linear (&out)[2])
 {
   const Pack size = absolute(weight), one = Pack{} + 1.0, sign = weight < 0.0 ? -one : one;
@@ -225,14 +236,18 @@ double semidefiniteHessian(const HingeArrays& h, const double* x, const int* slo
     positiveParts(f.right, f, moment, right);
 
     const int* s = slots + 10 * i;
-    const auto common = [&](int p, int q, int at, auto&& ofSide) __attribute__((always_inline)) {
+    const auto common = [&](int p, int q, int at, auto&& ofSide) __attribute__((always_inline))
+    {
       Pack block[9] = {};
       addOuter(block, g[p] * k, g[q]);
       ofSide(block);
       scatterBlocks(values, s + at, 10, block);
     };
-    const auto both = [&](Vec3<Pack> Linear::*p, Vec3<Pack> Linear::*q, bool on_left, bool on_right) __attribute__((always_inline)) {
-      return [&, p, q, on_left, on_right](Pack(&block)[9]) __attribute__((always_inline)) {
+    const auto both = [&](Vec3<Pack> Linear::*p, Vec3<Pack> Linear::*q, bool on_left, bool on_right)
+        __attribute__((always_inline))
+    {
+      return [&, p, q, on_left, on_right ](Pack(&block)[9]) __attribute__((always_inline))
+      {
         for (int c = 0; c < 2; ++c)
         {
           if (on_left)
@@ -258,10 +273,10 @@ double semidefiniteHessian(const HingeArrays& h, const double* x, const int* slo
   return sum(total);
 }
 
-}  // namespace
+}   // namespace
 
 extern const HingeKernels hinge_kernels;
 const HingeKernels hinge_kernels = {angles, energy, gradient, hessian, semidefiniteHessian};
 
-}  // namespace SLENDER_ISA
-}  // namespace slender
+}   // namespace SLENDER_ISA
+}   // namespace slender

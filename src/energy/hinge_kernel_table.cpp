@@ -13,4 +13,4 @@ const HingeKernels& hingeKernels()
 #endif
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 /// Cotangent of the angle between two vectors.
 double cotangent(const Vector3d& u, const Vector3d& v) { return u.dot(v) / u.cross(v).norm(); }
 
-}  // namespace
+}   // namespace
 
 HingeRow hingeRow(const TriangleMesh& mesh, const MeshTopology& t, Eigen::Index h)
 {
@@ -73,7 +73,8 @@ std::vector<std::vector<std::pair<int, double>>> cotangentRows(const TriangleMes
     double weight = 0.0;
     for (int s = 0; s < 2; ++s)
       if (const int c = t.edge_opposites(s, e); c >= 0)
-        weight += 0.5 * cotangent(mesh.vertices.col(a) - mesh.vertices.col(c), mesh.vertices.col(b) - mesh.vertices.col(c));
+        weight +=
+            0.5 * cotangent(mesh.vertices.col(a) - mesh.vertices.col(c), mesh.vertices.col(b) - mesh.vertices.col(c));
     rows[a].emplace_back(b, weight);
     rows[b].emplace_back(a, weight);
   }
@@ -104,7 +105,9 @@ Sample sampleHinges(const TriangleMesh& mesh, const MeshTopology& t, const Vecto
   for (Eigen::Index h = 0; h < t.hinges.cols(); ++h)
   {
     const HingeRow row = hingeRow(mesh, t, h);
-    const auto p = [&](int k) -> Vector3d { return mesh.vertices.col(row.vertices[k]) - mesh.vertices.col(row.vertices[0]); };
+    const auto p = [&](int k) -> Vector3d {
+      return mesh.vertices.col(row.vertices[k]) - mesh.vertices.col(row.vertices[0]);
+    };
     const Vector3d e = p(1), along = e.normalized();
     const Vector3d left = e.cross(p(2)).normalized(), right = p(3).cross(e).normalized();
     Vector3d axes[2];
@@ -158,11 +161,15 @@ Sample sampleVertices(const TriangleMesh& mesh, const MeshTopology& t, const Vec
   return sample;
 }
 
-}  // namespace
+}   // namespace
 
-const char* toString(IsometricElement element) { return element == IsometricElement::conforming ? "conforming" : "nonconforming"; }
+const char* toString(IsometricElement element)
+{
+  return element == IsometricElement::conforming ? "conforming" : "nonconforming";
+}
 
-PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& t, IsometricElement element, double coefficient, const std::vector<char>& clamped)
+PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& t, IsometricElement element,
+                             double coefficient, const std::vector<char>& clamped)
 {
   std::vector<Eigen::Triplet<double>> entries;
   if (element == IsometricElement::nonconforming)
@@ -194,16 +201,20 @@ PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& t, Is
   return PointMatrix(static_cast<int>(mesh.vertices.cols()), entries);
 }
 
-double bendingCalibration(const TriangleMesh& mesh, const MeshTopology& t, IsometricElement element, const Vector3d& warp)
+double bendingCalibration(const TriangleMesh& mesh, const MeshTopology& t, IsometricElement element,
+                          const Vector3d& warp)
 {
-  const Sample sample = element == IsometricElement::nonconforming ? sampleHinges(mesh, t, warp) : sampleVertices(mesh, t, warp);
+  const Sample sample =
+      element == IsometricElement::nonconforming ? sampleHinges(mesh, t, warp) : sampleVertices(mesh, t, warp);
   if (!(sample.energy > 1e-9 * sample.area))   // per area a mesh of more than a few triangles has about 1
-    throw std::invalid_argument("bending: the mesh is too coarse to bend along or across its warp, or the warp is normal to it everywhere; "
-                                "refine it, or choose bending: {model: none}");
+    throw std::invalid_argument(
+        "bending: the mesh is too coarse to bend along or across its warp, or the warp is normal to it everywhere; "
+        "refine it, or choose bending: {model: none}");
   return 0.5 * sample.area / sample.energy;
 }
 
-Eigen::VectorXd hingeStiffness(const TriangleMesh& mesh, const MeshTopology& t, double coefficient, const std::vector<char>& clamped)
+Eigen::VectorXd hingeStiffness(const TriangleMesh& mesh, const MeshTopology& t, double coefficient,
+                               const std::vector<char>& clamped)
 {
   Eigen::VectorXd stiffness(t.hinges.cols());
   for (Eigen::Index h = 0; h < t.hinges.cols(); ++h)
@@ -214,4 +225,4 @@ Eigen::VectorXd hingeStiffness(const TriangleMesh& mesh, const MeshTopology& t, 
   return stiffness;
 }
 
-}  // namespace slender
+}   // namespace slender

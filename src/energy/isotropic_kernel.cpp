@@ -56,7 +56,8 @@ void forces(const IsotropicArrays& r, IsotropicEnergy& result)
 {
   const FlushDenormals scope;
   const int n = r.nodes;
-  // With c = t . t': |kappa b|^2 = 4 (1-c)/(1+c), dc/de = (t' - c t)/|e|: smooth, whereas the gradient of |kappa b| divides by it.
+  // With c = t . t': |kappa b|^2 = 4 (1-c)/(1+c), dc/de = (t' - c t)/|e|: smooth, whereas the gradient of |kappa b|
+  // divides by it.
   Pack bend = {}, stretch = {};
   for (int i = -1; i < n + 1; i += W)
   {
@@ -80,8 +81,8 @@ void forces(const IsotropicArrays& r, IsotropicEnergy& result)
     const Pack ks = load(r.stretch + i), strain = load(r.strain + i);
     const Pack tension = ks * strain, tension_before = load(r.stretch + i - 1) * load(r.strain + i - 1);
     stretch += 0.5 * tension * strain / load(r.inverse_rest_length + i);
-    const Vec3<Pack> g = load3(r.after, i - 1) + load3(r.before, i) + load3(r.t, i - 1) * tension_before - load3(r.after, i) - load3(r.before, i + 1) -
-                         load3(r.t, i) * tension;
+    const Vec3<Pack> g = load3(r.after, i - 1) + load3(r.before, i) + load3(r.t, i - 1) * tension_before -
+                         load3(r.after, i) - load3(r.before, i + 1) - load3(r.t, i) * tension;
     const int count = n - i < W ? n - i : W;
     for (int k = 0; k < count; ++k)
     {
@@ -112,7 +113,8 @@ void transport(const IsotropicArrays& r, int pieces, const int* first, const int
     d[p] = {r.u[0][at[p]], r.u[1][at[p]], r.u[2][at[p]]};
     shortest = count[p] < shortest ? count[p] : shortest;
   }
-  const auto advance = [&](int p) __attribute__((always_inline)) {
+  const auto advance = [&](int p) __attribute__((always_inline))
+  {
     const int next = at[p] + 1 < r.edges ? at[p] + 1 : 0;
     d[p] = carry(r, d[p], at[p], next);
     at[p] = next;
@@ -156,10 +158,10 @@ void turn(const IsotropicArrays& r, int from, int to)
   }
 }
 
-}  // namespace
+}   // namespace
 
 extern const IsotropicKernels isotropic_kernels;
 const IsotropicKernels isotropic_kernels = {tangents, forces, transport, turn};
 
-}  // namespace SLENDER_ISA
-}  // namespace slender
+}   // namespace SLENDER_ISA
+}   // namespace slender

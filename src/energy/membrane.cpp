@@ -17,7 +17,8 @@ constexpr int kPack = 8;
 void require(bool good, const char* name, double value, const char* range)
 {
   if (!good)
-    throw std::invalid_argument(std::string("membrane: ") + name + " must be " + range + ", got " + std::to_string(value));
+    throw std::invalid_argument(std::string("membrane: ") + name + " must be " + range + ", got " +
+                                std::to_string(value));
 }
 
 bool positive(double v) { return v > 0 && std::isfinite(v); }
@@ -26,7 +27,8 @@ bool positive(double v) { return v > 0 && std::isfinite(v); }
 Eigen::Matrix2d restEdges(const TriangleMesh& rest, Eigen::Index face, const Eigen::Vector3d& warp)
 {
   const Eigen::Vector3d origin = rest.vertices.col(rest.triangles(0, face));
-  const Eigen::Vector3d e1 = rest.vertices.col(rest.triangles(1, face)) - origin, e2 = rest.vertices.col(rest.triangles(2, face)) - origin;
+  const Eigen::Vector3d e1 = rest.vertices.col(rest.triangles(1, face)) - origin,
+                        e2 = rest.vertices.col(rest.triangles(2, face)) - origin;
   const Eigen::Vector3d cross = e1.cross(e2);
   if (!(cross.norm() > 1e-12 * std::max(e1.squaredNorm(), e2.squaredNorm())))
     throw std::invalid_argument("membrane: face " + std::to_string(face) + " (from 0) of the rest mesh has no area");
@@ -39,7 +41,7 @@ Eigen::Matrix2d restEdges(const TriangleMesh& rest, Eigen::Index face, const Eig
   return edges;
 }
 
-}  // namespace
+}   // namespace
 
 MembraneModuli isotropicMembrane(double youngs_modulus, double poissons_ratio, double thickness)
 {
@@ -61,7 +63,8 @@ MembraneModuli orthotropicMembrane(double warp, double weft, double poissons_rat
 }
 
 MembraneEnergy::MembraneEnergy(const TriangleMesh& rest, const MembraneModuli& moduli, const Eigen::Vector3d& warp)
-  : triangles_(rest.triangles), moduli_(moduli)
+  : triangles_(rest.triangles),
+    moduli_(moduli)
 {
   const Eigen::Index n = triangles_.cols(), padded = (n + kPack - 1) / kPack * kPack;
   for (Eigen::Index f = 0; f < padded; ++f)
@@ -119,7 +122,8 @@ MembraneSums MembraneEnergy::addGradient(const double* x, double* gradient) cons
   return sums;
 }
 
-MembraneSums MembraneEnergy::addHessian(HessianKind kind, const double* x, const std::vector<int>& slots, double* gradient, double* values) const
+MembraneSums MembraneEnergy::addHessian(HessianKind kind, const double* x, const std::vector<int>& slots,
+                                        double* gradient, double* values) const
 {
   MembraneSums sums;
   const auto& k = membraneKernels();
@@ -136,4 +140,4 @@ std::vector<int> MembraneEnergy::slotsIn(const BlockMatrix& matrix) const
   return matrix.slots(padded);
 }
 
-}  // namespace slender
+}   // namespace slender

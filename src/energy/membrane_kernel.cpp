@@ -8,9 +8,9 @@ namespace {
 
 struct Triangle
 {
-  Pack b[3][2];        ///< rows: F_k = sum_p x_p b[p][k]
-  Vec3<Pack> f1, f2;   ///< columns of F
-  Pack g11, g22, g12;  ///< Green's strain; g12 is that of shear, 2 G12
+  Pack b[3][2];         ///< rows: F_k = sum_p x_p b[p][k]
+  Vec3<Pack> f1, f2;    ///< columns of F
+  Pack g11, g22, g12;   ///< Green's strain; g12 is that of shear, 2 G12
 };
 
 SLENDER_INLINE Triangle triangleAt(const MembraneArrays& m, const double* x, int i)
@@ -21,7 +21,8 @@ SLENDER_INLINE Triangle triangleAt(const MembraneArrays& m, const double* x, int
       t.b[p + 1][k] = load(m.inverse[2 * p + k] + i);
   for (int k = 0; k < 2; ++k)
     t.b[0][k] = -(t.b[1][k] + t.b[2][k]);
-  const Vec3<Pack> x0 = gatherPoints(x, m.points[0] + i), e1 = gatherPoints(x, m.points[1] + i) - x0, e2 = gatherPoints(x, m.points[2] + i) - x0;
+  const Vec3<Pack> x0 = gatherPoints(x, m.points[0] + i), e1 = gatherPoints(x, m.points[1] + i) - x0,
+                   e2 = gatherPoints(x, m.points[2] + i) - x0;
   t.f1 = e1 * t.b[1][0] + e2 * t.b[2][0];
   t.f2 = e1 * t.b[1][1] + e2 * t.b[2][1];
   t.g11 = 0.5 * (dot(t.f1, t.f1) - 1.0);
@@ -126,7 +127,8 @@ SLENDER_INLINE Stress tensilePart(const Stress& s)
 }
 
 template <bool Viscous, bool Semidefinite>
-void hessianOf(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values, MembraneSums& sums)
+void hessianOf(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values,
+               MembraneSums& sums)
 {
   Totals totals;
   for (int i = 0; i < m.count; i += W)
@@ -136,7 +138,8 @@ void hessianOf(const MembraneArrays& m, const double* x, const int* slots, doubl
     addForces(m, i, t, s, out);
     if (Semidefinite)
       s = tensilePart(s);
-    // d2E/dx_p dx_q = (b_p S b_q) 1 + sum of c_ij times products of the strains' derivatives: b_p1 f1, b_p2 f2, b_p2 f1 + b_p1 f2
+    // d2E/dx_p dx_q = (b_p S b_q) 1 + sum of c_ij times products of the strains' derivatives: b_p1 f1, b_p2 f2, b_p2 f1
+    // + b_p1 f2
     const Pack area = load(m.area + i);
     const Vec3<Pack> f1 = t.f1, f2 = t.f2;
     const int* slot = slots + 6 * i;
@@ -149,9 +152,10 @@ void hessianOf(const MembraneArrays& m, const double* x, const int* slots, doubl
                    k22 = m.c22 * b22 + m.c33 * b11;
         const Pack spread = p1 * q1 * s.s11 + (p1 * q2 + p2 * q1) * s.s12 + p2 * q2 * s.s22;
         const Vec3<Pack> r1 = f1 * k11 + f2 * k12, r2 = f1 * k21 + f2 * k22;   // block = f1 r1^T + f2 r2^T
-        const Pack block[9] = {f1.x * r1.x + f2.x * r2.x + spread, f1.y * r1.x + f2.y * r2.x, f1.z * r1.x + f2.z * r2.x,
-                               f1.x * r1.y + f2.x * r2.y, f1.y * r1.y + f2.y * r2.y + spread, f1.z * r1.y + f2.z * r2.y,
-                               f1.x * r1.z + f2.x * r2.z, f1.y * r1.z + f2.y * r2.z, f1.z * r1.z + f2.z * r2.z + spread};
+        const Pack block[9] = {
+            f1.x * r1.x + f2.x * r2.x + spread, f1.y * r1.x + f2.y * r2.x,          f1.z * r1.x + f2.z * r2.x,
+            f1.x * r1.y + f2.x * r2.y,          f1.y * r1.y + f2.y * r2.y + spread, f1.z * r1.y + f2.z * r2.y,
+            f1.x * r1.z + f2.x * r2.z,          f1.y * r1.z + f2.y * r2.z,          f1.z * r1.z + f2.z * r2.z + spread};
         scatterBlocks(values, slot, 6, block);
       }
   }
@@ -166,19 +170,23 @@ void gradient(const MembraneArrays& m, const double* x, double* out, MembraneSum
 {
   m.rest_strain[0] ? gradientOf<true>(m, x, out, sums) : gradientOf<false>(m, x, out, sums);
 }
-void hessian(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values, MembraneSums& sums)
+void hessian(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values,
+             MembraneSums& sums)
 {
-  m.rest_strain[0] ? hessianOf<true, false>(m, x, slots, out, values, sums) : hessianOf<false, false>(m, x, slots, out, values, sums);
+  m.rest_strain[0] ? hessianOf<true, false>(m, x, slots, out, values, sums)
+                   : hessianOf<false, false>(m, x, slots, out, values, sums);
 }
-void semidefiniteHessian(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values, MembraneSums& sums)
+void semidefiniteHessian(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values,
+                         MembraneSums& sums)
 {
-  m.rest_strain[0] ? hessianOf<true, true>(m, x, slots, out, values, sums) : hessianOf<false, true>(m, x, slots, out, values, sums);
+  m.rest_strain[0] ? hessianOf<true, true>(m, x, slots, out, values, sums)
+                   : hessianOf<false, true>(m, x, slots, out, values, sums);
 }
 
-}  // namespace
+}   // namespace
 
 extern const MembraneKernels membrane_kernels;
 const MembraneKernels membrane_kernels = {strains, energy, gradient, hessian, semidefiniteHessian};
 
-}  // namespace SLENDER_ISA
-}  // namespace slender
+}   // namespace SLENDER_ISA
+}   // namespace slender

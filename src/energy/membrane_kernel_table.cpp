@@ -6,11 +6,12 @@ namespace slender {
 const MembraneKernels& membraneKernels()
 {
 #ifdef SLENDER_X86_KERNELS
-  static const MembraneKernels& table = pickKernels(baseline::membrane_kernels, avx2::membrane_kernels, avx512::membrane_kernels);
+  static const MembraneKernels& table =
+      pickKernels(baseline::membrane_kernels, avx2::membrane_kernels, avx512::membrane_kernels);
   return table;
 #else
   return baseline::membrane_kernels;
 #endif
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -2,15 +2,16 @@
 
 #include "slender_sim/energy/vec3.h"
 
-/// Eight doubles side by side, for kernels that are compiled once per instruction set (SLENDER_ISA). In their unnamed namespaces, so that
-/// nothing is emitted under a shared name.
+/// Eight doubles side by side, for kernels that are compiled once per instruction set (SLENDER_ISA). In their unnamed
+/// namespaces, so that nothing is emitted under a shared name.
 namespace slender {
 namespace SLENDER_ISA {
 namespace {
 
 using Pack = double __attribute__((vector_size(64)));
 using PackU __attribute__((aligned(8), may_alias)) = Pack;
-static_assert(alignof(PackU) == 8, "loads and stores may be anywhere");   // Clang overlooks aligned() beside vector_size()
+// Clang overlooks aligned() beside vector_size()
+static_assert(alignof(PackU) == 8, "loads and stores may be anywhere");
 constexpr int W = 8;
 constexpr double kTwoPi = 6.283185307179586476925286766559;
 
@@ -45,8 +46,12 @@ SLENDER_INLINE Pack nearest(Pack v)
 SLENDER_INLINE void sineCosine(Pack a, Pack& s, Pack& c)
 {
   const Pack y = a * 0.125, z = y * y;
-  s = y * (1.0 + z * (-1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800 + z * (1.0 / 6227020800.0)))))));
-  Pack v = z * (0.5 + z * (-1.0 / 24 + z * (1.0 / 720 + z * (-1.0 / 40320 + z * (1.0 / 3628800 + z * (-1.0 / 479001600))))));   // 1 - cos
+  s = y * (1.0 + z * (-1.0 / 6 +
+                      z * (1.0 / 120 +
+                           z * (-1.0 / 5040 + z * (1.0 / 362880 + z * (-1.0 / 39916800 + z * (1.0 / 6227020800.0)))))));
+  // 1 - cos
+  Pack v =
+      z * (0.5 + z * (-1.0 / 24 + z * (1.0 / 720 + z * (-1.0 / 40320 + z * (1.0 / 3628800 + z * (-1.0 / 479001600))))));
   for (int k = 0; k < 3; ++k)
   {
     s = 2.0 * s * (1.0 - v);
@@ -71,14 +76,15 @@ SLENDER_INLINE Pack angleOf(Pack s, Pack c)
   return c < 0.0 ? (s < 0.0 ? -pi - a : pi - a) : a;
 }
 
-/// atan2 in (-pi, pi] of unit vectors, to round-off: one half-angle step and one of division bring tan below tan(pi/16).
+/// atan2 in (-pi, pi] of unit vectors, to round-off: one half-angle step and one of division bring tan below
+/// tan(pi/16).
 SLENDER_INLINE Pack angleOfUnit(Pack s, Pack c)
 {
   // tan(a/2) in [0, 1] of the acute angle a, less pi/8 where that leaves a smaller one
   const Pack y = absolute(s), x = absolute(c);
   const Pack norm = squareRoot(s * s + c * c);
   const Pack t = y / (x + norm + 1e-300);
-  const double shift = 0.41421356237309504880;   // tan(pi/8)
+  const double shift = 0.41421356237309504880;                                               // tan(pi/8)
   const Pack low = Pack{} + 0.19891236737965800691, mid = Pack{} + 0.66817863791929891999;   // tan(pi/16), tan(3 pi/16)
   const Pack zero = {}, one = zero + 1.0;
   const Pack centre = t > mid ? one : t > low ? zero + shift : zero;
@@ -125,12 +131,16 @@ SLENDER_INLINE Vec3<Pack> gatherPoints(const double* x, const int* ids)
   Pack v[4];   // point k and point k + 4
   for (int k = 0; k < 4; ++k)
   {
-    const Quad low = *reinterpret_cast<const Quad*>(x + 4 * ids[k]), high = *reinterpret_cast<const Quad*>(x + 4 * ids[k + 4]);
+    const Quad low = *reinterpret_cast<const Quad*>(x + 4 * ids[k]),
+               high = *reinterpret_cast<const Quad*>(x + 4 * ids[k + 4]);
     v[k] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
   }
-  const Pack xz01 = __builtin_shufflevector(v[0], v[1], 0, 8, 2, 10, 4, 12, 6, 14), y01 = __builtin_shufflevector(v[0], v[1], 1, 9, 3, 11, 5, 13, 7, 15);
-  const Pack xz23 = __builtin_shufflevector(v[2], v[3], 0, 8, 2, 10, 4, 12, 6, 14), y23 = __builtin_shufflevector(v[2], v[3], 1, 9, 3, 11, 5, 13, 7, 15);
-  return {__builtin_shufflevector(xz01, xz23, 0, 1, 8, 9, 4, 5, 12, 13), __builtin_shufflevector(y01, y23, 0, 1, 8, 9, 4, 5, 12, 13),
+  const Pack xz01 = __builtin_shufflevector(v[0], v[1], 0, 8, 2, 10, 4, 12, 6, 14),
+             y01 = __builtin_shufflevector(v[0], v[1], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Pack xz23 = __builtin_shufflevector(v[2], v[3], 0, 8, 2, 10, 4, 12, 6, 14),
+             y23 = __builtin_shufflevector(v[2], v[3], 1, 9, 3, 11, 5, 13, 7, 15);
+  return {__builtin_shufflevector(xz01, xz23, 0, 1, 8, 9, 4, 5, 12, 13),
+          __builtin_shufflevector(y01, y23, 0, 1, 8, 9, 4, 5, 12, 13),
           __builtin_shufflevector(xz01, xz23, 2, 3, 10, 11, 6, 7, 14, 15)};
 }
 
@@ -138,18 +148,22 @@ SLENDER_INLINE Vec3<Pack> gatherPoints(const double* x, const int* ids)
 SLENDER_INLINE void scatterPoints(double* x, const int* ids, const Vec3<Pack>& v)
 {
   const Pack zero = {};
-  const Pack even = __builtin_shufflevector(v.x, v.y, 0, 8, 2, 10, 4, 12, 6, 14), odd = __builtin_shufflevector(v.x, v.y, 1, 9, 3, 11, 5, 13, 7, 15);
-  const Pack even_z = __builtin_shufflevector(v.z, zero, 0, 8, 2, 10, 4, 12, 6, 14), odd_z = __builtin_shufflevector(v.z, zero, 1, 9, 3, 11, 5, 13, 7, 15);
-  const Pack quads[4] = {__builtin_shufflevector(even, even_z, 0, 1, 8, 9, 4, 5, 12, 13), __builtin_shufflevector(odd, odd_z, 0, 1, 8, 9, 4, 5, 12, 13),
-                         __builtin_shufflevector(even, even_z, 2, 3, 10, 11, 6, 7, 14, 15), __builtin_shufflevector(odd, odd_z, 2, 3, 10, 11, 6, 7, 14, 15)};
+  const Pack even = __builtin_shufflevector(v.x, v.y, 0, 8, 2, 10, 4, 12, 6, 14),
+             odd = __builtin_shufflevector(v.x, v.y, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Pack even_z = __builtin_shufflevector(v.z, zero, 0, 8, 2, 10, 4, 12, 6, 14),
+             odd_z = __builtin_shufflevector(v.z, zero, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Pack quads[4] = {__builtin_shufflevector(even, even_z, 0, 1, 8, 9, 4, 5, 12, 13),
+                         __builtin_shufflevector(odd, odd_z, 0, 1, 8, 9, 4, 5, 12, 13),
+                         __builtin_shufflevector(even, even_z, 2, 3, 10, 11, 6, 7, 14, 15),
+                         __builtin_shufflevector(odd, odd_z, 2, 3, 10, 11, 6, 7, 14, 15)};
   for (int k = 0; k < 4; ++k)
     *reinterpret_cast<Quad*>(x + 4 * ids[k]) += __builtin_shufflevector(quads[k], quads[k], 0, 1, 2, 3);
   for (int k = 0; k < 4; ++k)
     *reinterpret_cast<Quad*>(x + 4 * ids[k + 4]) += __builtin_shufflevector(quads[k], quads[k], 4, 5, 6, 7);
 }
 
-/// Adds 3 x 3 blocks (m[3 column + row] in packs, one block per lane) to the blocks of a matrix: slot 2 b adds lane k to block b, slot
-/// 2 b + 1 its transpose. `slots` are those of lane 0; the next lane's follow `stride` later.
+/// Adds 3 x 3 blocks (m[3 column + row] in packs, one block per lane) to the blocks of a matrix: slot 2 b adds lane k
+/// to block b, slot 2 b + 1 its transpose. `slots` are those of lane 0; the next lane's follow `stride` later.
 SLENDER_INLINE void scatterBlocks(double* values, const int* slots, int stride, const Pack (&m)[9])
 {
   Pack t[8];
@@ -166,6 +180,6 @@ SLENDER_INLINE void scatterBlocks(double* values, const int* slots, int stride, 
   }
 }
 
-}  // namespace
-}  // namespace SLENDER_ISA
-}  // namespace slender
+}   // namespace
+}   // namespace SLENDER_ISA
+}   // namespace slender

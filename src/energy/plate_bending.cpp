@@ -27,7 +27,8 @@ Matrix3d formOfCurvatures(const TriangleMesh& mesh, Eigen::Index f, double nu)
 {
   Vector3d along[3];
   for (int k = 0; k < 3; ++k)
-    along[k] = (mesh.vertices.col(mesh.triangles((k + 1) % 3, f)) - mesh.vertices.col(mesh.triangles(k, f))).normalized();
+    along[k] =
+        (mesh.vertices.col(mesh.triangles((k + 1) % 3, f)) - mesh.vertices.col(mesh.triangles(k, f))).normalized();
   Matrix3d form;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)   // the normals enclose the angle that the edges do
@@ -35,9 +36,10 @@ Matrix3d formOfCurvatures(const TriangleMesh& mesh, Eigen::Index f, double nu)
   return form;
 }
 
-}  // namespace
+}   // namespace
 
-std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTopology& t, double nu, double modulus, const std::vector<char>& clamped)
+std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTopology& t, double nu, double modulus,
+                                          const std::vector<char>& clamped)
 {
   if (!(nu > -1.0 && nu < 1.0))
     throw std::invalid_argument("Poisson's ratio of bending must be in (-1, 1), got " + std::to_string(nu));
@@ -84,7 +86,8 @@ std::vector<PlateTriangle> plateTriangles(const TriangleMesh& mesh, const MeshTo
   return result;
 }
 
-PointMatrix plateBending(const TriangleMesh& mesh, const MeshTopology& t, double poissons_ratio, double modulus, const std::vector<char>& clamped)
+PointMatrix plateBending(const TriangleMesh& mesh, const MeshTopology& t, double poissons_ratio, double modulus,
+                         const std::vector<char>& clamped)
 {
   std::vector<HingeRow> rows;
   std::vector<double> per_length;
@@ -98,11 +101,13 @@ PointMatrix plateBending(const TriangleMesh& mesh, const MeshTopology& t, double
     for (int i = 0; i < triangle.count; ++i)
       for (int j = 0; j < triangle.count; ++j)
       {
-        const std::size_t hi = static_cast<std::size_t>(triangle.hinges[i]), hj = static_cast<std::size_t>(triangle.hinges[j]);
+        const std::size_t hi = static_cast<std::size_t>(triangle.hinges[i]),
+                          hj = static_cast<std::size_t>(triangle.hinges[j]);
         for (int a = 0; a < 4; ++a)
           for (int b = 0; b < 4; ++b)
-            entries.emplace_back(rows[hi].vertices[a], rows[hj].vertices[b],
-                                 triangle.form(i, j) * per_length[hi] * per_length[hj] * rows[hi].weights[a] * rows[hj].weights[b]);
+            entries.emplace_back(
+                rows[hi].vertices[a], rows[hj].vertices[b],
+                triangle.form(i, j) * per_length[hi] * per_length[hj] * rows[hi].weights[a] * rows[hj].weights[b]);
       }
   return PointMatrix(static_cast<int>(mesh.vertices.cols()), entries);
 }
@@ -113,7 +118,9 @@ double plateStiffening(const TriangleMesh& mesh, const MeshTopology& t, double n
   for (int h = 0; h < t.hingeCount(); ++h)
     hinge_of[static_cast<std::size_t>(t.hinge_edges[h])] = h;
   // symmetric tensors as (xx, yy, sqrt(2) xy)
-  const auto vectorOf = [](const Eigen::Vector2d& n) { return Vector3d(n.x() * n.x(), n.y() * n.y(), std::sqrt(2.0) * n.x() * n.y()); };
+  const auto vectorOf = [](const Eigen::Vector2d& n) {
+    return Vector3d(n.x() * n.x(), n.y() * n.y(), std::sqrt(2.0) * n.x() * n.y());
+  };
   const Vector3d trace(1, 1, 0);
   const Matrix3d exact = (1.0 - nu) * Matrix3d::Identity() + nu * trace * trace.transpose();
   Matrix3d sum = Matrix3d::Zero();
@@ -149,4 +156,4 @@ double plateStiffening(const TriangleMesh& mesh, const MeshTopology& t, double n
   return Eigen::GeneralizedSelfAdjointEigenSolver<Matrix3d>(sum, area * exact).eigenvalues().maxCoeff();
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -45,8 +45,8 @@ void evaluateEdges(const RodArrays& r, int from, int to, Pack& min_chi)
   }
 }
 
-/// Twist of a pack of joints: the angle from the transported frame to the next one, unwrapped next to where the turns would take
-/// it. Measured from the frames each time, so it never drifts however many turns it counts.
+/// Twist of a pack of joints: the angle from the transported frame to the next one, unwrapped next to where the turns
+/// would take it. Measured from the frames each time, so it never drifts however many turns it counts.
 SLENDER_INLINE Pack jointTwist(const RodArrays& r, int i, const JointFrames<Pack>& s)
 {
   const Pack chi = 1.0 + dot(s.te, s.tf);
@@ -56,7 +56,8 @@ SLENDER_INLINE Pack jointTwist(const RodArrays& r, int i, const JointFrames<Pack
   return angle + kTwoPi * nearest((expected - angle) * (1.0 / kTwoPi));
 }
 
-/// The joints of a RodSweep by name, ten used of each sixteen: two carried over, eight new. Slot k is joint (next_joint - 2 + k).
+/// The joints of a RodSweep by name, ten used of each sixteen: two carried over, eight new. Slot k is joint (next_joint
+/// - 2 + k).
 struct JointBuffer
 {
   double ee[6][16], ff[6][16], ef[3][3][16], e_te[3][16], e_tf[3][16], f_te[3][16], f_tf[3][16];
@@ -86,8 +87,9 @@ SLENDER_INLINE void storeVec(double (*b)[16], const Vec3<Pack>& v)
 template <Curvature kind>
 SLENDER_INLINE JointResponse<Pack> respond(const RodArrays& r, int i, const JointStrains<Pack>& k, Pack twist)
 {
-  const JointMaterial<Pack> p = {load(r.b11 + i), load(r.b12 + i), load(r.b22 + i), load(r.beta + i),
-                                 load(r.rest_kappa1 + i), load(r.rest_kappa2 + i), load(r.rest_twist + i)};
+  const JointMaterial<Pack> p = {load(r.b11 + i),       load(r.b12 + i),         load(r.b22 + i),
+                                 load(r.beta + i),      load(r.rest_kappa1 + i), load(r.rest_kappa2 + i),
+                                 load(r.rest_twist + i)};
   if constexpr (kind == Curvature::compensated)
   {
     JointCompensation<Pack> a;
@@ -117,7 +119,8 @@ SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffe
   }
 
   const Vec3<Pack> te = load3(r.t, i - 1), d1e = load3(r.d1, i - 1), tf = load3(r.t, i), d1f = load3(r.d1, i);
-  const JointFrames<Pack> s = {te, d1e, cross(te, d1e), tf, d1f, cross(tf, d1f), load(r.inverse_length + i - 1), load(r.inverse_length + i)};
+  const JointFrames<Pack> s = {
+      te, d1e, cross(te, d1e), tf, d1f, cross(tf, d1f), load(r.inverse_length + i - 1), load(r.inverse_length + i)};
   const JointStrains<Pack> k = jointStrains(s);
   min_chi = minimum(1.0 / k.inverse_chi, min_chi);
   JointGradient<Pack> g;
@@ -129,7 +132,8 @@ SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffe
   jointDerivatives<WithHessian, kind == Curvature::compensated>(s, k, response, g, h);
 
   // stretching of the edge after the joint: 1/2 k_s strain^2 |eBar| (thesis 4.2.1, 4.4.1)
-  const Pack ks = load(r.stretch + i), strain = load(r.strain + i) - load(r.rest_strain + i), inverse_rest = load(r.inverse_rest_length + i);
+  const Pack ks = load(r.stretch + i), strain = load(r.strain + i) - load(r.rest_strain + i),
+             inverse_rest = load(r.inverse_rest_length + i);
   const Pack tension = ks * strain;
   store(buffer.stretch + 2, 0.5 * tension * strain / inverse_rest);
   storeVec(buffer.ge, g.e);
@@ -142,7 +146,8 @@ SLENDER_INLINE void evaluateJoints(const RodArrays& r, int i, JointBuffer& buffe
   if (WithHessian)
   {
     storeSym(buffer.ee, h.ee);
-    storeSym(buffer.ff, h.ff + symmetricOuter(s.tf * (0.5 * ks * inverse_rest), s.tf) + normalProjector(tension * s.inverse_f, s.tf));
+    storeSym(buffer.ff, h.ff + symmetricOuter(s.tf * (0.5 * ks * inverse_rest), s.tf) +
+                            normalProjector(tension * s.inverse_f, s.tf));
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
         store(buffer.ef[a][b] + 2, h.ef.m[a][b]);
@@ -161,8 +166,9 @@ SLENDER_INLINE void storePart(RodPanel* panels, int first, int last, int part, P
     store(reinterpret_cast<double*>(panels + k - first) + 8 * part, m[k]);
 }
 
-/// Panels of nodes i + first .. i + last from the joints around them. With E the energy as a function of edges, dE/dx_i = dE/de_{i-1} - dE/de_i;
-/// the second derivatives follow by the same rule from the blocks of joints i-1 (slot k), i (k+1) and i+1 (k+2).
+/// Panels of nodes i + first .. i + last from the joints around them. With E the energy as a function of edges, dE/dx_i
+/// = dE/de_{i-1} - dE/de_i; the second derivatives follow by the same rule from the blocks of joints i-1 (slot k), i
+/// (k+1) and i+1 (k+2).
 SLENDER_INLINE void writePanels(const RodArrays& r, const JointBuffer& b, RodPanel* panels, int i, int first, int last)
 {
   const auto at = [](const double* p, int slot) { return load(p + slot); };
@@ -245,7 +251,8 @@ void evaluateJointsUpTo(const RodArrays& r, RodSweep& sweep, RodPanel* panels, i
       gradient[a] = (at(b.gf[a], 0) + at(b.ge[a], 1)) - (at(b.gf[a], 1) + at(b.ge[a], 2)) + weight * away - force;
     }
     gradient[3] = at(b.gtf, 1) + at(b.gte, 2);
-    const Pack local_stretch = load(b.stretch + 1), local_bend = load(b.bend_twist + 1), local_strain = absolute(load(r.strain + i));
+    const Pack local_stretch = load(b.stretch + 1), local_bend = load(b.bend_twist + 1),
+               local_strain = absolute(load(r.strain + i));
     for (int k = first; k <= last; ++k)
       for (int a = 0; a < 4; ++a)
         r.gradient[4 * (i + k) + a] = gradient[a][k];
@@ -357,10 +364,11 @@ RodEvaluation endSweep(const RodSweep& sweep)
   return result;
 }
 
-}  // namespace
+}   // namespace
 
 extern const RodKernels rod_kernels;
-const RodKernels rod_kernels = {beginSweep, {advanceSweep<Curvature::tangent>, advanceSweep<Curvature::compensated>}, endSweep};
+const RodKernels rod_kernels = {
+    beginSweep, {advanceSweep<Curvature::tangent>, advanceSweep<Curvature::compensated>}, endSweep};
 
-}  // namespace SLENDER_ISA
-}  // namespace slender
+}   // namespace SLENDER_ISA
+}   // namespace slender

@@ -13,4 +13,4 @@ const RodKernels& rodKernels()
 #endif
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -27,12 +27,15 @@ struct Face
   }
 };
 
-/// Sine of the smallest angle, about, below which the face counts as one without area: its curvatures would be round-off.
+/// Sine of the smallest angle, about, below which the face counts as one without area: its curvatures would be
+/// round-off.
 constexpr double kFlat = 1e-9;
 
-}  // namespace
+}   // namespace
 
-WillmoreEnergy::WillmoreEnergy(const Eigen::Matrix3Xi& faces, std::vector<char> counted) : faces_(faces), counted_(std::move(counted))
+WillmoreEnergy::WillmoreEnergy(const Eigen::Matrix3Xi& faces, std::vector<char> counted)
+  : faces_(faces),
+    counted_(std::move(counted))
 {
   if (faces_.size() > 0 && (faces_.minCoeff() < 0 || faces_.maxCoeff() >= static_cast<int>(counted_.size())))
     throw std::invalid_argument("WillmoreEnergy: a face names a vertex that is not there");
@@ -80,7 +83,8 @@ double WillmoreEnergy::addGradient(const double* x, double* gradient)
   const double value = energy(x);
   if (!std::isfinite(value))
     return value;
-  // dE = sum h_i . dl_i - c_i dA_i with h = l/A, c = |h|^2/2. In a face with edges e_i and the unit normal n, sum h_i . l_i is
+  // dE = sum h_i . dl_i - c_i dA_i with h = l/A, c = |h|^2/2. In a face with edges e_i and the unit normal n, sum h_i .
+  // l_i is
   // -(n . w) / 2 with w = sum e_i x h_i.
   for (Eigen::Index f = 0; f < faces_.cols(); ++f)
   {
@@ -100,7 +104,8 @@ double WillmoreEnergy::addGradient(const double* x, double* gradient)
     for (int k = 0; k < 3; ++k)
       lever[k] = 0.5 * point(curvature_, corners[k]).cross(n);
     for (int k = 0; k < 3; ++k)
-      Eigen::Map<Vector3d>(gradient + 4 * corners[k]) += by_normal.cross(face.edges[k]) + lever[(k + 2) % 3] - lever[(k + 1) % 3];
+      Eigen::Map<Vector3d>(gradient + 4 * corners[k]) +=
+          by_normal.cross(face.edges[k]) + lever[(k + 2) % 3] - lever[(k + 1) % 3];
   }
   return value;
 }
@@ -113,4 +118,4 @@ bool WillmoreEnergy::foldsOver(const double* from, const double* to) const
   return false;
 }
 
-}  // namespace slender
+}   // namespace slender

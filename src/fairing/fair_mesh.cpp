@@ -15,7 +15,8 @@ namespace {
 /// Newton-like, of a step at most: enough for the implicit Euler method to the eye.
 constexpr int kIterations = 10;
 
-/// Of smoothing lengths in mean edges: the time step is the length's fourth power, and beyond this either it or the mass is lost in rounding.
+/// Of smoothing lengths in mean edges: the time step is the length's fourth power, and beyond this either it or the
+/// mass is lost in rounding.
 constexpr double kSmoothingRange = 1000.0;
 
 void checkOptions(const FairingOptions& o)
@@ -24,7 +25,8 @@ void checkOptions(const FairingOptions& o)
   if (o.steps < 0 || o.steps > 1000000)
     throw std::invalid_argument("steps must be from 0 to 1000000, got " + std::to_string(o.steps));
   if (o.largest_hole < 3 || o.largest_hole > kLongestHole)
-    throw std::invalid_argument("the largest hole must have from 3 to " + std::to_string(kLongestHole) + " edges, got " + std::to_string(o.largest_hole));
+    throw std::invalid_argument("the largest hole must have from 3 to " + std::to_string(kLongestHole) +
+                                " edges, got " + std::to_string(o.largest_hole));
   if (!length(o.edge_length) || !length(o.smoothing))
     throw std::invalid_argument("edge length and smoothing length must be positive [m], or zero for the default");
   for (const FairingOptions::Ball& ball : o.region)
@@ -46,12 +48,14 @@ void checkSmoothing(double length, const TriangleMesh& mesh)
   if (length >= mean / kSmoothingRange && length <= mean * kSmoothingRange)
     return;
   std::ostringstream why;
-  why << "the smoothing length is " << length << " m; must be from " << mean / kSmoothingRange << " m to " << mean * kSmoothingRange
+  why << "the smoothing length is " << length << " m; must be from " << mean / kSmoothingRange << " m to "
+      << mean * kSmoothingRange
       << " m (a thousandth of the mean edge length to a thousand times it), or zero for the default";
   throw std::invalid_argument(why.str());
 }
 
-bool fillHoles(TriangleMesh& mesh, const FairingOptions& options, const FairingProgress& progress, FairingSummary& summary)
+bool fillHoles(TriangleMesh& mesh, const FairingOptions& options, const FairingProgress& progress,
+               FairingSummary& summary)
 {
   const auto loops = meshTopology(mesh).boundaries;   // later vertices are added behind: these stay valid
   HoleOptions hole;
@@ -68,8 +72,9 @@ bool fillHoles(TriangleMesh& mesh, const FairingOptions& options, const FairingP
     const HoleReport report = fillHole(mesh, loops[k], hole);
     if (!report.ok)
     {
-      summary.message = "the hole of " + std::to_string(loops[k].size()) + " edges at vertex " + std::to_string(loops[k].front()) +
-                        " (from 0) failed: " + report.message + "; a lower limit for the largest hole leaves long ones open";
+      summary.message = "the hole of " + std::to_string(loops[k].size()) + " edges at vertex " +
+                        std::to_string(loops[k].front()) + " (from 0) failed: " + report.message +
+                        "; a lower limit for the largest hole leaves long ones open";
       return false;
     }
     ++summary.holes;
@@ -96,7 +101,8 @@ bool smooth(TriangleMesh& mesh, const FairingOptions& options, const FairingProg
     const FairingReport report = flow.step(mesh.vertices);
     if (!report.ok)
     {
-      summary.message = "step " + std::to_string(k + 1) + " of " + std::to_string(options.steps) + " failed: " + report.message;
+      summary.message =
+          "step " + std::to_string(k + 1) + " of " + std::to_string(options.steps) + " failed: " + report.message;
       return false;
     }
     summary.steps += !report.stationary;
@@ -107,9 +113,10 @@ bool smooth(TriangleMesh& mesh, const FairingOptions& options, const FairingProg
   return true;
 }
 
-}  // namespace
+}   // namespace
 
-FairingSummary fairMesh(TriangleMesh& mesh, const std::string& name, const FairingOptions& options, const FairingProgress& progress)
+FairingSummary fairMesh(TriangleMesh& mesh, const std::string& name, const FairingOptions& options,
+                        const FairingProgress& progress)
 {
   checkOptions(options);
   requireSoundMesh(mesh, name);
@@ -117,10 +124,11 @@ FairingSummary fairMesh(TriangleMesh& mesh, const std::string& name, const Fairi
     checkSmoothing(options.smoothing, mesh);
   FairingSummary summary;
   TriangleMesh faired = mesh;
-  summary.ok = (!options.fill_holes || fillHoles(faired, options, progress, summary)) && (options.steps == 0 || smooth(faired, options, progress, summary));
+  summary.ok = (!options.fill_holes || fillHoles(faired, options, progress, summary)) &&
+               (options.steps == 0 || smooth(faired, options, progress, summary));
   if (summary.ok)
     mesh = std::move(faired);
   return summary;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -15,10 +15,10 @@ namespace slender {
 
 namespace {
 
-constexpr int kSteps = 20;            ///< of the flow in a round
-constexpr int kSweeps = 3;            ///< of evening out after a round
-constexpr double kSettled = 1e-4;     ///< change of the energy in a round, relative
-constexpr double kFlat = 1e-6;        ///< an energy that counts as none: the energy of a sphere is 8 pi
+constexpr int kSteps = 20;          ///< of the flow in a round
+constexpr int kSweeps = 3;          ///< of evening out after a round
+constexpr double kSettled = 1e-4;   ///< change of the energy in a round, relative
+constexpr double kFlat = 1e-6;      ///< an energy that counts as none: the energy of a sphere is 8 pi
 
 /// Mesh around a loop: third vertices of the faces at its edges, lengths at its vertices, edges between its vertices.
 struct Rim
@@ -69,7 +69,9 @@ double shortestEdges(const TriangleMesh& mesh, const std::vector<Eigen::Vector3i
 {
   double twice = 0.0;
   for (const Eigen::Vector3i& f : faces)
-    twice += (mesh.vertices.col(f[1]) - mesh.vertices.col(f[0])).cross(mesh.vertices.col(f[2]) - mesh.vertices.col(f[0])).norm();
+    twice += (mesh.vertices.col(f[1]) - mesh.vertices.col(f[0]))
+                 .cross(mesh.vertices.col(f[2]) - mesh.vertices.col(f[0]))
+                 .norm();
   return std::sqrt(2.0 * twice / (std::sqrt(3.0) * kMostFaces));
 }
 
@@ -81,15 +83,15 @@ HoleReport refused(const std::string& message)
   return report;
 }
 
-}  // namespace
+}   // namespace
 
 HoleReport fillHole(TriangleMesh& mesh, const std::vector<int>& loop, const HoleOptions& options)
 {
   if (!(options.edge_length >= 0) || !std::isfinite(options.edge_length) || options.max_rounds < 1)
     throw std::invalid_argument("fillHole: edge_length must not be negative [m], max_rounds at least 1");
   if (loop.size() < 3 || loop.size() > kLongestHole)
-    return refused("a hole of " + std::to_string(loop.size()) + " edges cannot be closed: there may be 3 to " + std::to_string(kLongestHole) +
-                   "; divide it by a strip of faces");
+    return refused("a hole of " + std::to_string(loop.size()) + " edges cannot be closed: there may be 3 to " +
+                   std::to_string(kLongestHole) + "; divide it by a strip of faces");
   const Rim rim = rimOf(mesh, meshTopology(mesh), loop, options.edge_length);
   if (loop.size() == 3 && rim.beyond[0] == rim.loop[2])
     return refused("a face without neighbours cannot be closed: its back would have the same vertices; remove it");
@@ -98,8 +100,8 @@ HoleReport fillHole(TriangleMesh& mesh, const std::vector<int>& loop, const Hole
     return refused("the hole cannot be closed: each way needs an edge that the mesh already has");
   const double shortest = shortestEdges(mesh, faces);
   if (options.edge_length > 0 && options.edge_length < shortest)
-    return refused("the patch would have more than " + std::to_string(kMostFaces) + " faces: its edges must be longer than " +
-                   std::to_string(1e3 * shortest) + " mm");
+    return refused("the patch would have more than " + std::to_string(kMostFaces) +
+                   " faces: its edges must be longer than " + std::to_string(1e3 * shortest) + " mm");
   PatchMesh patch(mesh, rim.loop, rim.lengths, std::move(faces), rim.taken);
   patch.flip();
   HoleReport report;
@@ -156,4 +158,4 @@ HoleReport fillHole(TriangleMesh& mesh, const std::vector<int>& loop, const Hole
   return report;
 }
 
-}  // namespace slender
+}   // namespace slender

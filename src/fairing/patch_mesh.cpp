@@ -18,11 +18,14 @@ double cotangent(const Vector3d& u, const Vector3d& v) { return u.dot(v) / std::
 
 std::pair<int, int> sorted(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
 
-}  // namespace
+}   // namespace
 
-PatchMesh::PatchMesh(const TriangleMesh& mesh, const std::vector<int>& loop, const std::vector<double>& edge_lengths, std::vector<Vector3i> faces,
-                     std::set<std::pair<int, int>> taken)
-  : outer_(mesh.vertices), first_(static_cast<int>(mesh.vertices.cols())), faces_(std::move(faces)), taken_(std::move(taken))
+PatchMesh::PatchMesh(const TriangleMesh& mesh, const std::vector<int>& loop, const std::vector<double>& edge_lengths,
+                     std::vector<Vector3i> faces, std::set<std::pair<int, int>> taken)
+  : outer_(mesh.vertices),
+    first_(static_cast<int>(mesh.vertices.cols())),
+    faces_(std::move(faces)),
+    taken_(std::move(taken))
 {
   for (std::size_t i = 0; i < loop.size(); ++i)
     loop_length_[loop[i]] = edge_lengths[i];
@@ -156,4 +159,4 @@ void PatchMesh::take(const Eigen::Matrix3Xd& vertices)
     points_[v] = vertices.col(first_ + static_cast<Eigen::Index>(v));
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -26,10 +26,10 @@ double bend(const Vector3d& n, const Vector3d& m)
   return scale > 0 ? 1.0 - n.dot(m) / scale : 3.0;   // a face without area is worse than a fold
 }
 
-}  // namespace
+}   // namespace
 
-std::vector<Eigen::Vector3i> triangulateLoop(const Eigen::Matrix3Xd& vertices, const std::vector<int>& loop, const std::vector<int>& beyond,
-                                             const std::set<std::pair<int, int>>& taken)
+std::vector<Eigen::Vector3i> triangulateLoop(const Eigen::Matrix3Xd& vertices, const std::vector<int>& loop,
+                                             const std::vector<int>& beyond, const std::set<std::pair<int, int>>& taken)
 {
   const int n = static_cast<int>(loop.size());
   const auto p = [&](int i) -> Vector3d { return vertices.col(loop[i]); };
@@ -88,4 +88,4 @@ std::vector<Eigen::Vector3i> triangulateLoop(const Eigen::Matrix3Xd& vertices, c
   return faces;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -13,16 +13,17 @@ namespace {
 constexpr int kCuts = 30;
 /// Share of the promised decrease that a step must bring (Armijo).
 constexpr double kSufficient = 1e-4;
-/// Below these parts of the energy, and of the vertices' coordinates, a step is round-off; below the second ones it may be.
+/// Below these parts of the energy, and of the vertices' coordinates, a step is round-off; below the second ones it may
+/// be.
 constexpr double kEnergyResolved = 1e-12, kMoveResolved = 1e-14;
 constexpr double kEnergyDoubtful = 1e-9, kMoveDoubtful = 1e-10;
 /// Iterations end where they promise this part of what the first one promised.
 constexpr double kConverged = 1e-3;
 
-}  // namespace
+}   // namespace
 
-/// What the moving vertices depend on, with numbers of its own: the moving vertices and their neighbours, whose curvatures count, and the
-/// neighbours of these.
+/// What the moving vertices depend on, with numbers of its own: the moving vertices and their neighbours, whose
+/// curvatures count, and the neighbours of these.
 struct WillmoreFlow::Part
 {
   Eigen::Index mesh_vertices;
@@ -34,7 +35,9 @@ struct WillmoreFlow::Part
   int iterations;
 
   Part(const TriangleMesh& whole, const MeshTopology& t, double step, int count, const std::vector<char>& selected)
-    : mesh_vertices(whole.vertices.cols()), time_step(step), iterations(count)
+    : mesh_vertices(whole.vertices.cols()),
+      time_step(step),
+      iterations(count)
   {
     if (iterations < 1)
       throw std::invalid_argument("Willmore flow: a step needs at least one iteration");
@@ -77,7 +80,9 @@ struct WillmoreFlow::Part
           moving.push_back(static_cast<int>(v));
       }
     if (moving.empty())
-      throw std::invalid_argument("Willmore flow: no vertex may move: the mesh's boundary and its neighbours are held, and all that is not selected");
+      throw std::invalid_argument(
+          "Willmore flow: no vertex may move: the mesh's boundary and its neighbours are held, and all that is not "
+          "selected");
     mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
     for (std::size_t i = 0; i < vertices.size(); ++i)
       mesh.vertices.col(static_cast<Eigen::Index>(i)) = whole.vertices.col(vertices[i]);
@@ -103,7 +108,8 @@ struct WillmoreFlow::Part
   }
 };
 
-WillmoreFlow::WillmoreFlow(const TriangleMesh& mesh, const MeshTopology& topology, double time_step, int iterations, const std::vector<char>& selected)
+WillmoreFlow::WillmoreFlow(const TriangleMesh& mesh, const MeshTopology& topology, double time_step, int iterations,
+                           const std::vector<char>& selected)
   : WillmoreFlow(Part(mesh, topology, time_step, iterations, selected))
 {
 }
@@ -136,13 +142,16 @@ WillmoreFlow::WillmoreFlow(Part part)
   const PointMatrix matrix(n, entries);
   cholesky_.setPattern(matrix);
   if (!cholesky_.factor(matrix, held_.data()))
-    throw std::invalid_argument("Willmore flow: the matrix is singular: faces are nearly without area, or nothing is held and the time step is too long");
+    throw std::invalid_argument(
+        "Willmore flow: the matrix is singular: faces are nearly without area, or nothing is held and the time step is "
+        "too long");
 }
 
 void WillmoreFlow::load(const Eigen::Matrix3Xd& vertices)
 {
   if (vertices.cols() != mesh_vertices_)
-    throw std::invalid_argument("Willmore flow: there must be " + std::to_string(mesh_vertices_) + " vertices, got " + std::to_string(vertices.cols()));
+    throw std::invalid_argument("Willmore flow: there must be " + std::to_string(mesh_vertices_) + " vertices, got " +
+                                std::to_string(vertices.cols()));
   for (std::size_t i = 0; i < vertices_.size(); ++i)
     point(x_, static_cast<Eigen::Index>(i)) = vertices.col(vertices_[i]);
 }
@@ -229,7 +238,8 @@ FairingReport WillmoreFlow::step(Eigen::Matrix3Xd& vertices)
       report.stationary = decrement <= kEnergyDoubtful * report.energy_before || reach <= kMoveDoubtful * size;
       if (report.stationary)
         return report;
-      return refuse("no step in the flow's direction lowers the energy; remesh the thinnest faces, or take a shorter time step");
+      return refuse(
+          "no step in the flow's direction lowers the energy; remesh the thinnest faces, or take a shorter time step");
     }
     report.cuts += cuts;
     ++report.iterations;
@@ -245,4 +255,4 @@ FairingReport WillmoreFlow::step(Eigen::Matrix3Xd& vertices)
   return report;
 }
 
-}  // namespace slender
+}   // namespace slender

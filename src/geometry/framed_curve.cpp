@@ -18,16 +18,18 @@ Eigen::Vector3d tangentOf(const Eigen::Matrix3Xd& x, int edge)
   const Eigen::Vector3d e = x.col(next) - x.col(edge);
   const double length = e.norm();
   if (!(length > 0) || !std::isfinite(length))
-    throw std::invalid_argument("nodes " + std::to_string(edge) + " and " + std::to_string(next) + " coincide or are not finite");
+    throw std::invalid_argument("nodes " + std::to_string(edge) + " and " + std::to_string(next) +
+                                " coincide or are not finite");
   return e / length;
 }
-}  // namespace
+}   // namespace
 
 Eigen::Vector3d firstDirector(const Eigen::Matrix3Xd& x, bool closed, const Eigen::Vector3d& director)
 {
   const int n = static_cast<int>(x.cols()), edges = closed ? n : n - 1;
   if (n < 2 || (closed && n < 3))
-    throw std::invalid_argument("a curve needs at least " + std::string(closed ? "3" : "2") + " nodes, got " + std::to_string(n));
+    throw std::invalid_argument("a curve needs at least " + std::string(closed ? "3" : "2") + " nodes, got " +
+                                std::to_string(n));
   if (!director.allFinite())
     throw std::invalid_argument("director is not finite");
   const Eigen::Vector3d t0 = tangentOf(x, 0), u = director - director.dot(t0) * t0;
@@ -64,7 +66,8 @@ Eigen::Matrix3Xd FramedCurve::tangentsOf(const Eigen::Matrix3Xd& x) const
 void FramedCurve::moveTo(const Eigen::Matrix3Xd& x)
 {
   if (x.cols() != x_.cols())
-    throw std::invalid_argument("moveTo: expected " + std::to_string(x_.cols()) + " nodes, got " + std::to_string(x.cols()));
+    throw std::invalid_argument("moveTo: expected " + std::to_string(x_.cols()) + " nodes, got " +
+                                std::to_string(x.cols()));
   const Eigen::Matrix3Xd old = t_, moved = tangentsOf(x);
   for (int j = 0; j < edges(); ++j)
     if (1.0 + old.col(j).dot(moved.col(j)) < kFolded)
@@ -124,14 +127,8 @@ Eigen::Vector2d FramedCurve::materialCurvature(int joint) const
   return {0.5 * kb.dot(d2(e) + d2(joint)), -0.5 * kb.dot(d1(e) + d1(joint))};
 }
 
-Eigen::Vector3d FramedCurve::d1(int edge) const
-{
-  return rotateAbout(u_.col(edge), t_.col(edge), theta[edge]);
-}
+Eigen::Vector3d FramedCurve::d1(int edge) const { return rotateAbout(u_.col(edge), t_.col(edge), theta[edge]); }
 
-Eigen::Vector3d FramedCurve::d2(int edge) const
-{
-  return t_.col(edge).cross(d1(edge));
-}
+Eigen::Vector3d FramedCurve::d2(int edge) const { return t_.col(edge).cross(d1(edge)); }
 
-}  // namespace slender
+}   // namespace slender

@@ -14,7 +14,7 @@ struct HalfEdge
 {
   int low, high;   ///< its vertices
   int side;
-  bool forward;    ///< runs from low to high
+  bool forward;   ///< runs from low to high
 };
 
 /// All sides; those of one edge follow each other, by face.
@@ -28,8 +28,9 @@ inline std::vector<HalfEdge> sortedHalfEdges(const TriangleMesh& mesh)
       const int a = mesh.triangles(k, f), b = mesh.triangles((k + 1) % 3, f);
       sides.push_back({std::min(a, b), std::max(a, b), static_cast<int>(3 * f + k), a < b});
     }
-  std::sort(sides.begin(), sides.end(),
-            [](const HalfEdge& a, const HalfEdge& b) { return std::tie(a.low, a.high, a.side) < std::tie(b.low, b.high, b.side); });
+  std::sort(sides.begin(), sides.end(), [](const HalfEdge& a, const HalfEdge& b) {
+    return std::tie(a.low, a.high, a.side) < std::tie(b.low, b.high, b.side);
+  });
   return sides;
 }
 
@@ -38,4 +39,4 @@ inline std::string edgeName(const HalfEdge& side)
   return "the edge between vertices " + std::to_string(side.low) + " and " + std::to_string(side.high) + " (from 0)";
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -12,54 +12,61 @@ namespace slender {
 constexpr double burst_ratio = 4.0;   // intervals more uneven than this are a burst, see pose_trajectory.h
 
 /// Slope at the middle of three samples; `before`, `after`: the neighbours' values minus its own.
-inline Eigen::Vector3d threePointSlope(double h_before, const Eigen::Vector3d& before, double h_after, const Eigen::Vector3d& after)
+inline Eigen::Vector3d threePointSlope(double h_before, const Eigen::Vector3d& before, double h_after,
+                                       const Eigen::Vector3d& after)
 {
   const double span = h_before + h_after;
   if (h_before * burst_ratio < h_after || h_after * burst_ratio < h_before)
-  {
     return (after - before) / span;
-  }
   return (h_before / (span * h_after)) * after - (h_after / (span * h_before)) * before;
 }
 
-/// Whether the equal samples k and k + 1 lie on both sides of the turning point of a motion, rather than being a pause: the acceleration is about the
-/// same before, at and after them. `chord(j)`: sample j minus sample j - 1. A sample after k + 1 that is not there counts as equal to it, unless the
-/// samples are `growing`.
+/// Whether the equal samples k and k + 1 lie on both sides of the turning point of a motion, rather than being a pause:
+/// the acceleration is about the same before, at and after them. `chord(j)`: sample j minus sample j - 1. A sample
+/// after k + 1 that is not there counts as equal to it, unless the samples are `growing`.
 template <class Chord>
 bool turnsSteadily(const std::vector<double>& times, std::size_t k, bool growing, const Chord& chord)
 {
-  // A motion that brakes at a constant rate and stops between two samples has accelerations that differ by a half or more at its last two samples.
+  // A motion that brakes at a constant rate and stops between two samples has accelerations that differ by a half or
+  // more at its last two samples.
   constexpr double alike = 1.0 / 3.0;
   const auto acceleration = [&](std::size_t j) {
-    return Eigen::Vector3d((chord(j + 1) / (times[j + 1] - times[j]) - chord(j) / (times[j] - times[j - 1])) / (0.5 * (times[j + 1] - times[j - 1])));
+    return Eigen::Vector3d((chord(j + 1) / (times[j + 1] - times[j]) - chord(j) / (times[j] - times[j - 1])) /
+                           (0.5 * (times[j + 1] - times[j - 1])));
   };
   if (k < 2)
-  {
     return false;
-  }
   const Eigen::Vector3d here = acceleration(k);
-  const auto same = [&here](const Eigen::Vector3d& other) { return (other - here).norm() <= alike * std::max(other.norm(), here.norm()); };
+  const auto same = [&here](const Eigen::Vector3d& other) {
+    return (other - here).norm() <= alike * std::max(other.norm(), here.norm());
+  };
   return same(acceleration(k - 1)) && (k + 2 < times.size() ? same(acceleration(k + 1)) : growing);
 }
 
-/// Whether sample k, which is neither the first nor the last, is part of a pause: a neighbour has the same value, to within `same`, and the two are no
-/// turning point.
+/// Whether sample k, which is neither the first nor the last, is part of a pause: a neighbour has the same value, to
+/// within `same`, and the two are no turning point.
 template <class Chord>
 bool pausesAt(const std::vector<double>& times, std::size_t k, bool growing, double same, const Chord& chord)
 {
   const bool before = chord(k).norm() <= same, after = chord(k + 1).norm() <= same;
-  return (before && after) || (after && !turnsSteadily(times, k, growing, chord)) || (before && !turnsSteadily(times, k - 1, growing, chord));
+  return (before && after) || (after && !turnsSteadily(times, k, growing, chord)) ||
+         (before && !turnsSteadily(times, k - 1, growing, chord));
 }
 
-/// Weights of the end value and of both slopes at the share s of a segment of length h that starts at zero, and their rates.
+/// Weights of the end value and of both slopes at the share s of a segment of length h that starts at zero, and their
+/// rates.
 struct HermiteWeights
 {
   double h01, h10, h11, d01, d10, d11;
   HermiteWeights(double s, double h)
-    : h01(s * s * (3 - 2 * s)), h10(h * s * (1 - s) * (1 - s)), h11(h * s * s * (s - 1)), d01(6 * s * (1 - s) / h), d10((1 - s) * (1 - 3 * s))
-    , d11(s * (3 * s - 2))
+    : h01(s * s * (3 - 2 * s)),
+      h10(h * s * (1 - s) * (1 - s)),
+      h11(h * s * s * (s - 1)),
+      d01(6 * s * (1 - s) / h),
+      d10((1 - s) * (1 - 3 * s)),
+      d11(s * (3 * s - 2))
   {
   }
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -48,10 +48,10 @@ std::pair<Vector3d, Vector3d> plane(const Vector3d& main, const char* main_name,
 /// Rises from 0 to 1 with two derivatives zero at both ends.
 double smoothStep(double u) { return u * u * u * (10 + u * (6 * u - 15)); }
 
-}  // namespace
+}   // namespace
 
-Eigen::Matrix3Xd trefoilCurve(const Vector3d& center, const Vector3d& axis, const Vector3d& up, double radius, double separation,
-                              double length, bool left_handed, int edges)
+Eigen::Matrix3Xd trefoilCurve(const Vector3d& center, const Vector3d& axis, const Vector3d& up, double radius,
+                              double separation, double length, bool left_handed, int edges)
 {
   check(edges >= 1, "edges", edges, "at least 1");
   check(radius > 0, "radius", radius, "> 0 m");
@@ -61,15 +61,17 @@ Eigen::Matrix3Xd trefoilCurve(const Vector3d& center, const Vector3d& axis, cons
   std::tie(e1, e2) = plane(axis, "axis", up, "up");
   const Vector3d e3 = (left_handed ? -1.0 : 1.0) * e1.cross(e2);
 
-  // The loop is a circle about the origin; the strands are wound about its upper part, -half to half, and tails leave it tangentially and
-  // bend back to e1.
+  // The loop is a circle about the origin; the strands are wound about its upper part, -half to half, and tails leave
+  // it tangentially and bend back to e1.
   constexpr int steps = 600;
   constexpr double half = M_PI / 4;
   const double h = 0.5 * separation;
   const double tail_height = (radius + h) * std::cos(half) - radius * (1 - std::cos(half));
   const double tail_start = (2 * radius + h) * std::sin(half);
   std::vector<Vector3d> points;
-  const auto add = [&](double x, double y, double z) { points.push_back(center + x * e1 + (y - tail_height) * e2 + z * e3); };
+  const auto add = [&](double x, double y, double z) {
+    points.push_back(center + x * e1 + (y - tail_height) * e2 + z * e3);
+  };
   const auto onTorus = [&](double angle, double turn) {   // angle from the top, towards e1
     const double r = radius + h * std::cos(turn);
     add(r * std::sin(angle), r * std::cos(angle), h * std::sin(turn));
@@ -92,17 +94,13 @@ Eigen::Matrix3Xd trefoilCurve(const Vector3d& center, const Vector3d& axis, cons
 
   double knot = 0.0;
   for (std::size_t k = 1; k < points.size(); ++k)
-  {
     knot += (points[k] - points[k - 1]).norm();
-  }
   check(length >= knot, "length", length, "at least " + metres(knot) + ", the length of the knot itself");
   const double tail = 0.5 * (length - knot);
   Eigen::Matrix3Xd all(3, static_cast<Eigen::Index>(points.size()) + (tail > 0 ? 2 : 0));
   const Eigen::Index first = tail > 0 ? 1 : 0;
   for (std::size_t k = 0; k < points.size(); ++k)
-  {
     all.col(first + static_cast<Eigen::Index>(k)) = points[k];
-  }
   if (tail > 0)
   {
     all.col(0) = points.front() - tail * e1;
@@ -111,8 +109,8 @@ Eigen::Matrix3Xd trefoilCurve(const Vector3d& center, const Vector3d& axis, cons
   return resampleCurve(all, false, edges);
 }
 
-Eigen::Matrix3Xd torusKnotCurve(const Vector3d& center, const Vector3d& axis, double radius, double tube_radius, int around, int through,
-                                int edges)
+Eigen::Matrix3Xd torusKnotCurve(const Vector3d& center, const Vector3d& axis, double radius, double tube_radius,
+                                int around, int through, int edges)
 {
   check(edges >= 1, "edges", edges, "at least 1");
   check(radius > 0, "radius", radius, "> 0 m");
@@ -130,12 +128,14 @@ Eigen::Matrix3Xd torusKnotCurve(const Vector3d& center, const Vector3d& axis, do
   {
     const double t = 2 * M_PI * (i % edges) / edges;
     const double r = radius + tube_radius * std::cos(through * t);
-    nodes.col(i) = center + r * (std::cos(around * t) * e1 + std::sin(around * t) * e2) + tube_radius * std::sin(through * t) * e3;
+    nodes.col(i) =
+        center + r * (std::cos(around * t) * e1 + std::sin(around * t) * e2) + tube_radius * std::sin(through * t) * e3;
   }
   return nodes;
 }
 
-Eigen::Matrix3Xd veeCurve(const Vector3d& tip, const Vector3d& direction, const Vector3d& normal, double arm, double angle, int edges)
+Eigen::Matrix3Xd veeCurve(const Vector3d& tip, const Vector3d& direction, const Vector3d& normal, double arm,
+                          double angle, int edges)
 {
   check(edges >= 2 && edges % 2 == 0, "edges", edges, "even");
   check(arm > 0, "arm", arm, "> 0 m");
@@ -153,4 +153,4 @@ Eigen::Matrix3Xd veeCurve(const Vector3d& tip, const Vector3d& direction, const 
   return nodes;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -21,7 +21,8 @@ std::string names(const std::vector<int>& items)
 
 std::string face(const TriangleMesh& mesh, int f)
 {
-  return "face " + std::to_string(f) + " (vertices " + names({mesh.triangles(0, f), mesh.triangles(1, f), mesh.triangles(2, f)}) + ", from 0)";
+  return "face " + std::to_string(f) + " (vertices " +
+         names({mesh.triangles(0, f), mesh.triangles(1, f), mesh.triangles(2, f)}) + ", from 0)";
 }
 
 void findBadIndices(const TriangleMesh& mesh, std::vector<MeshDefect>& defects)
@@ -32,7 +33,10 @@ void findBadIndices(const TriangleMesh& mesh, std::vector<MeshDefect>& defects)
     const Eigen::Vector3i t = mesh.triangles.col(f);
     const std::string fix = "; correct or remove it";
     if (t.minCoeff() < 0 || t.maxCoeff() >= n)
-      defects.push_back({MeshDefect::bad_index, {}, {f}, face(mesh, f) + " names a vertex that is not there: there are " + std::to_string(n) + fix});
+      defects.push_back({MeshDefect::bad_index,
+                         {},
+                         {f},
+                         face(mesh, f) + " names a vertex that is not there: there are " + std::to_string(n) + fix});
     else if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0])
       defects.push_back({MeshDefect::bad_index, {}, {f}, face(mesh, f) + " has a vertex twice" + fix});
   }
@@ -43,9 +47,12 @@ void findDegenerateFaces(const TriangleMesh& mesh, std::vector<MeshDefect>& defe
   for (int f = 0; f < mesh.triangles.cols(); ++f)
   {
     const auto p = [&](int k) { return mesh.vertices.col(mesh.triangles(k, f)); };
-    const double longest = std::max({(p(1) - p(0)).squaredNorm(), (p(2) - p(1)).squaredNorm(), (p(0) - p(2)).squaredNorm()});
+    const double longest =
+        std::max({(p(1) - p(0)).squaredNorm(), (p(2) - p(1)).squaredNorm(), (p(0) - p(2)).squaredNorm()});
     if (!((p(1) - p(0)).cross(p(2) - p(0)).norm() > 1e-6 * longest))
-      defects.push_back({MeshDefect::degenerate_face, {mesh.triangles(0, f), mesh.triangles(1, f), mesh.triangles(2, f)}, {f},
+      defects.push_back({MeshDefect::degenerate_face,
+                         {mesh.triangles(0, f), mesh.triangles(1, f), mesh.triangles(2, f)},
+                         {f},
                          face(mesh, f) + " has (nearly) no area; merge its vertices or remove it"});
   }
 }
@@ -61,10 +68,12 @@ void findBadEdges(const std::vector<HalfEdge>& sides, std::vector<MeshDefect>& d
     const std::vector<int> vertices{sides[k].low, sides[k].high};
     if (faces.size() > 2)
       defects.push_back({MeshDefect::non_manifold_edge, vertices, faces,
-                         edgeName(sides[k]) + " has " + std::to_string(faces.size()) + " faces: " + names(faces) + "; at most two may meet there"});
+                         edgeName(sides[k]) + " has " + std::to_string(faces.size()) + " faces: " + names(faces) +
+                             "; at most two may meet there"});
     else if (faces.size() == 2 && sides[k].forward == sides[k + 1].forward)
       opposed.push_back({MeshDefect::opposed_faces, vertices, faces,
-                         "faces " + names(faces) + " run along " + edgeName(sides[k]) + " in the same direction; turn one of them over"});
+                         "faces " + names(faces) + " run along " + edgeName(sides[k]) +
+                             " in the same direction; turn one of them over"});
   }
   defects.insert(defects.end(), opposed.begin(), opposed.end());
 }
@@ -99,8 +108,11 @@ void findBadVertices(const TriangleMesh& mesh, const std::vector<HalfEdge>& side
       else if (first[v] != r && !told[v])
       {
         told[v] = 1;
-        defects.push_back({MeshDefect::non_manifold_vertex, {v}, {first[v] / 3, f},
-                           "faces " + names({first[v] / 3, f}) + " touch in vertex " + std::to_string(v) + " (from 0) only; give each its own vertex"});
+        defects.push_back({MeshDefect::non_manifold_vertex,
+                           {v},
+                           {first[v] / 3, f},
+                           "faces " + names({first[v] / 3, f}) + " touch in vertex " + std::to_string(v) +
+                               " (from 0) only; give each its own vertex"});
       }
     }
 }
@@ -115,7 +127,8 @@ void findDuplicates(const TriangleMesh& mesh, double tolerance, std::vector<Mesh
   const Eigen::VectorXd along = mesh.vertices.transpose() * Eigen::Vector3d(0.5641895, 0.7071068, 0.4263267);
   std::vector<int> order(n);
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return std::make_pair(along[a], a) < std::make_pair(along[b], b); });
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return std::make_pair(along[a], a) < std::make_pair(along[b], b); });
   std::vector<std::pair<int, int>> pairs;
   for (std::size_t i = 0; i < order.size(); ++i)
     for (std::size_t j = i + 1; j < order.size() && along[order[j]] - along[order[i]] <= 1.01 * reach; ++j)
@@ -126,10 +139,13 @@ void findDuplicates(const TriangleMesh& mesh, double tolerance, std::vector<Mesh
       }
   std::sort(pairs.begin(), pairs.end());
   for (const auto& [a, b] : pairs)
-    defects.push_back({MeshDefect::duplicate_vertices, {a, b}, {}, "vertices " + names({a, b}) + " (from 0) lie at the same place; merge them or move one"});
+    defects.push_back({MeshDefect::duplicate_vertices,
+                       {a, b},
+                       {},
+                       "vertices " + names({a, b}) + " (from 0) lie at the same place; merge them or move one"});
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<MeshDefect> topologyDefects(const TriangleMesh& mesh)
 {
@@ -150,9 +166,11 @@ std::vector<MeshDefect> meshDefects(const TriangleMesh& mesh, double tolerance)
   std::vector<MeshDefect> defects;
   for (int v = 0; v < mesh.vertices.cols(); ++v)
     if (!mesh.vertices.col(v).allFinite())
-      defects.push_back({MeshDefect::not_finite, {v}, {}, "vertex " + std::to_string(v) + " (from 0) is not finite; correct it"});
+      defects.push_back(
+          {MeshDefect::not_finite, {v}, {}, "vertex " + std::to_string(v) + " (from 0) is not finite; correct it"});
   std::vector<MeshDefect> connectivity = topologyDefects(mesh);
-  const bool unsound = !defects.empty() || (!connectivity.empty() && connectivity.front().kind == MeshDefect::bad_index);
+  const bool unsound =
+      !defects.empty() || (!connectivity.empty() && connectivity.front().kind == MeshDefect::bad_index);
   if (!unsound)
     findDegenerateFaces(mesh, defects);
   defects.insert(defects.end(), connectivity.begin(), connectivity.end());
@@ -165,7 +183,10 @@ std::vector<MeshDefect> meshDefects(const TriangleMesh& mesh, double tolerance)
       used[mesh.triangles(k, f)] = 1;
   for (int v = 0; v < mesh.vertices.cols(); ++v)
     if (!used[v])
-      defects.push_back({MeshDefect::unreferenced_vertex, {v}, {}, "vertex " + std::to_string(v) + " (from 0) belongs to no face; remove it"});
+      defects.push_back({MeshDefect::unreferenced_vertex,
+                         {v},
+                         {},
+                         "vertex " + std::to_string(v) + " (from 0) belongs to no face; remove it"});
   return defects;
 }
 
@@ -182,4 +203,4 @@ void requireSoundMesh(const TriangleMesh& mesh, const std::string& name)
   throw std::invalid_argument(message);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -52,9 +52,7 @@ public:
   {
     std::ifstream file(path_);
     if (!file)
-    {
       throw std::runtime_error(path_ + ": cannot be opened");
-    }
     for (std::string text; std::getline(file, text);)
     {
       ++line_;
@@ -69,9 +67,7 @@ public:
       readLine(text);
     }
     if (file.bad())
-    {
       throw std::runtime_error(path_ + ": cannot be read");
-    }
     return finish();
   }
 
@@ -88,9 +84,7 @@ private:
     if (kind == "v")
     {
       for (int k = 0; k < 3; ++k)
-      {
         coordinates_.push_back(coordinate(words.next()));
-      }
     }
     else if (kind == "f")
     {
@@ -100,12 +94,8 @@ private:
     {
       current_.clear();
       for (std::string name = words.next(); !name.empty(); name = words.next())
-      {
         if (name != "default")
-        {
           current_.push_back(group(name));
-        }
-      }
     }
   }
 
@@ -113,9 +103,7 @@ private:
   {
     const auto [known, is_new] = group_places_.emplace(name, groups_.size());
     if (is_new)
-    {
       groups_.push_back({name, {}});
-    }
     return known->second;
   }
 
@@ -128,7 +116,7 @@ private:
     if (word.empty() || result.ec != std::errc() || result.ptr != end || !std::isfinite(value))
     {
       fail(line_, "vertex " + std::to_string(coordinates_.size() / 3 + 1) + ": '" + word +
-                    "' is not a finite number; must be v X Y Z");
+                      "' is not a finite number; must be v X Y Z");
     }
     return value;
   }
@@ -137,28 +125,18 @@ private:
   {
     std::vector<int> polygon;
     for (std::string word = words.next(); !word.empty(); word = words.next())
-    {
       polygon.push_back(index(word.substr(0, word.find('/')), word));
-    }
     sorted_ = polygon;
     std::sort(sorted_.begin(), sorted_.end());
     const auto twice = std::adjacent_find(sorted_.begin(), sorted_.end());
     if (twice != sorted_.end())
-    {
       fail(line_, "face with vertex " + std::to_string(*twice + 1) + " twice");
-    }
     if (polygon.size() < 3)
-    {
       fail(line_, "face with " + std::to_string(polygon.size()) + " vertices; must have at least 3");
-    }
     for (const std::size_t g : current_)
-    {
       groups_[g].vertices.insert(groups_[g].vertices.end(), polygon.begin(), polygon.end());
-    }
     for (std::size_t k = 2; k < polygon.size(); ++k)
-    {
       triangles_.push_back({{polygon[0], polygon[k - 1], polygon[k]}, line_});
-    }
   }
 
   /// From 0. Negative ones count from the last vertex so far.
@@ -167,10 +145,12 @@ private:
     long value = 0;
     const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     const long so_far = static_cast<long>(coordinates_.size() / 3);
-    const bool good = result.ec == std::errc() && result.ptr == digits.data() + digits.size() && value != 0 && value >= -so_far;
+    const bool good =
+        result.ec == std::errc() && result.ptr == digits.data() + digits.size() && value != 0 && value >= -so_far;
     if (!good || value > 1'000'000'000)
     {
-      fail(line_, "face vertex '" + word + "'; must be a whole number from 1, or negative and then at least " + std::to_string(-so_far));
+      fail(line_, "face vertex '" + word + "'; must be a whole number from 1, or negative and then at least " +
+                      std::to_string(-so_far));
     }
     return static_cast<int>(value > 0 ? value - 1 : so_far + value);
   }
@@ -178,9 +158,7 @@ private:
   TriangleMesh finish() const
   {
     if (triangles_.empty())
-    {
       throw std::runtime_error(path_ + ": has no faces (f A B C)");
-    }
     TriangleMesh mesh;
     const auto count = static_cast<Eigen::Index>(coordinates_.size() / 3);
     mesh.vertices = Eigen::Map<const Eigen::Matrix3Xd>(coordinates_.data(), 3, count);
@@ -192,7 +170,8 @@ private:
         const int vertex = triangles_[i].vertices[k];
         if (vertex >= count)
         {
-          fail(triangles_[i].line, "face vertex " + std::to_string(vertex + 1) + "; the file has " + std::to_string(count) + " vertices");
+          fail(triangles_[i].line,
+               "face vertex " + std::to_string(vertex + 1) + "; the file has " + std::to_string(count) + " vertices");
         }
         mesh.triangles(k, static_cast<Eigen::Index>(i)) = vertex;
       }
@@ -200,7 +179,11 @@ private:
     return mesh;
   }
 
-  struct Face { int vertices[3]; int line; };
+  struct Face
+  {
+    int vertices[3];
+    int line;
+  };
 
   std::string path_;
   int line_ = 0;
@@ -212,7 +195,7 @@ private:
   std::vector<std::size_t> current_;   ///< groups of the faces to come
 };
 
-}  // namespace
+}   // namespace
 
 TriangleMesh readObj(const std::string& path) { return ObjReader(path).read(); }
 
@@ -223,4 +206,4 @@ std::vector<VertexGroup> readObjGroups(const std::string& path)
   return reader.groups();
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -69,14 +69,17 @@ TriangleMesh equilateral(double width, double height, int columns, int rows)
     starts.push_back(static_cast<int>(vertices.size()));
     const int count = columns + 1 + j % 2;
     for (int i = 0; i < count; ++i)
-      vertices.emplace_back(width / columns * (j % 2 == 0 ? i : std::clamp(i - 0.5, 0.0, static_cast<double>(columns))), height * j / rows, 0.0);
+      vertices.emplace_back(width / columns * (j % 2 == 0 ? i : std::clamp(i - 0.5, 0.0, static_cast<double>(columns))),
+                            height * j / rows, 0.0);
   }
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i <= columns; ++i)
     {
       // the shifted row has one vertex more; upwards and downwards triangles follow each other along it
       const int even = (j % 2 == 0 ? starts[j] : starts[j + 1]) + i, odd = (j % 2 == 0 ? starts[j + 1] : starts[j]) + i;
-      const auto add = [&](int a, int b, int c) { j % 2 == 0 ? faces.emplace_back(a, b, c) : faces.emplace_back(a, c, b); };
+      const auto add = [&](int a, int b, int c) {
+        j % 2 == 0 ? faces.emplace_back(a, b, c) : faces.emplace_back(a, c, b);
+      };
       add(even, odd + 1, odd);
       if (i < columns)
         add(even, even + 1, odd + 1);
@@ -134,7 +137,8 @@ TriangleMesh irregular(double width, double height, int columns, int rows, unsig
 {
   TriangleMesh mesh = equilateral(width, height, columns, rows);
   std::mt19937 engine(seed);
-  const auto random = [&] { return 2.0 * (engine() * 0x1p-32) - 1.0; };   // no std:: distribution: these differ between libraries
+  // no std:: distribution: these differ between libraries
+  const auto random = [&] { return 2.0 * (engine() * 0x1p-32) - 1.0; };
   const double reach_x = 0.3 * width / columns, reach_y = 0.3 * height / rows;
   for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
   {
@@ -148,7 +152,7 @@ TriangleMesh irregular(double width, double height, int columns, int rows, unsig
   return mesh;
 }
 
-}  // namespace
+}   // namespace
 
 const char* toString(GridPattern pattern)
 {
@@ -168,7 +172,8 @@ TriangleMesh gridMesh(double width, double height, int columns, int rows, GridPa
   if (!(width > 0) || !(height > 0) || !std::isfinite(width) || !std::isfinite(height))
     throw std::invalid_argument("grid: width and height must be positive and finite [m]");
   if (columns < 1 || rows < 0)
-    throw std::invalid_argument("grid: columns must be at least 1 and rows at least 0, got " + std::to_string(columns) + " and " + std::to_string(rows));
+    throw std::invalid_argument("grid: columns must be at least 1 and rows at least 0, got " + std::to_string(columns) +
+                                " and " + std::to_string(rows));
   if (rows == 0)
     rows = std::max(1, static_cast<int>(std::lround(height / (width / columns * (right ? 1.0 : kRowHeight)))));
   if (pattern == GridPattern::irregular && (columns < 2 || rows < 2))
@@ -212,10 +217,11 @@ TriangleMesh icosphere(double radius, int levels)
   if (!(radius > 0) || !std::isfinite(radius) || levels < 0 || levels > 10)
     throw std::invalid_argument("icosphere: radius must be positive [m] and levels from 0 to 10");
   const double g = 0.5 * (1.0 + std::sqrt(5.0));
-  std::vector<Eigen::Vector3d> vertices{{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g},
-                                        {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
-  Faces faces{{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
-              {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8}, {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  std::vector<Eigen::Vector3d> vertices{{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                                        {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
+  Faces faces{{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+              {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+              {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   TriangleMesh mesh = meshOf(vertices, faces);
   const auto blowUp = [&] { mesh.vertices = radius * mesh.vertices.colwise().normalized(); };
   blowUp();
@@ -227,4 +233,4 @@ TriangleMesh icosphere(double radius, int levels)
   return mesh;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -46,7 +46,7 @@ Weights divideFaces(Eigen::Matrix3Xi& triangles, int vertices)
   return weights;
 }
 
-}  // namespace
+}   // namespace
 
 Subdivision subdivide(const TriangleMesh& mesh, int levels)
 {
@@ -65,4 +65,4 @@ Subdivision subdivide(const TriangleMesh& mesh, int levels)
   return result;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -73,7 +73,7 @@ void findBoundaries(Eigen::Index vertices, MeshTopology& t)
   }
 }
 
-}  // namespace
+}   // namespace
 
 MeshTopology meshTopology(const TriangleMesh& mesh)
 {
@@ -94,7 +94,11 @@ int orientFaces(TriangleMesh& mesh)
 {
   const std::vector<HalfEdge> sides = sortedHalfEdges(mesh);
   const auto faces = mesh.triangles.cols();
-  struct Neighbour { int face = -1; bool agrees = true; };
+  struct Neighbour
+  {
+    int face = -1;
+    bool agrees = true;
+  };
   std::vector<std::array<Neighbour, 3>> neighbours(faces);
   for (std::size_t k = 0; k + 1 < sides.size(); ++k)
   {
@@ -144,4 +148,4 @@ int orientFaces(TriangleMesh& mesh)
   return count;
 }
 
-}  // namespace slender
+}   // namespace slender

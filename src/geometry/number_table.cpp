@@ -23,7 +23,8 @@ NumberTable::NumberTable(std::vector<Entry> entries) : entries_(std::move(entrie
 
 double NumberTable::at(double time) const
 {
-  const auto after = std::upper_bound(entries_.begin(), entries_.end(), time, [](double t, const Entry& e) { return t < e.time; });
+  const auto after =
+      std::upper_bound(entries_.begin(), entries_.end(), time, [](double t, const Entry& e) { return t < e.time; });
   if (after == entries_.begin())
     return entries_.front().value;
   if (after == entries_.end())
@@ -34,7 +35,9 @@ double NumberTable::at(double time) const
 
 double NumberTable::greatest() const
 {
-  return std::max_element(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.value < b.value; })->value;
+  return std::max_element(entries_.begin(), entries_.end(),
+                          [](const Entry& a, const Entry& b) { return a.value < b.value; })
+      ->value;
 }
 
 double NumberTable::mean(double start, double end) const
@@ -50,4 +53,4 @@ double NumberTable::mean(double start, double end) const
   return volume / (end - start);
 }
 
-}  // namespace slender
+}   // namespace slender

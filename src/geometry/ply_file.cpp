@@ -23,9 +23,10 @@ struct PlyType
   int size;
   bool is_signed, is_float;
 };
-constexpr PlyType kTypes[] = {{"char", "int8", 1, true, false},   {"uchar", "uint8", 1, false, false}, {"short", "int16", 2, true, false},
-                              {"ushort", "uint16", 2, false, false}, {"int", "int32", 4, true, false},  {"uint", "uint32", 4, false, false},
-                              {"float", "float32", 4, true, true},   {"double", "float64", 8, true, true}};
+constexpr PlyType kTypes[] = {{"char", "int8", 1, true, false},    {"uchar", "uint8", 1, false, false},
+                              {"short", "int16", 2, true, false},  {"ushort", "uint16", 2, false, false},
+                              {"int", "int32", 4, true, false},    {"uint", "uint32", 4, false, false},
+                              {"float", "float32", 4, true, true}, {"double", "float64", 8, true, true}};
 
 struct PlyProperty
 {
@@ -57,7 +58,8 @@ public:
     for (const PlyElement& element : elements_)
     {
       checkElement(element);
-      for (long i = 0; i < element.count && !element.properties.empty(); ++i)   // else nothing of it is in the file, however many there are
+      for (long i = 0; i < element.count && !element.properties.empty();
+           ++i)   // else nothing of it is in the file, however many there are
         readItem(element, i);
     }
     return finish();
@@ -166,7 +168,8 @@ private:
       fail("ends early");
     std::uint64_t bits = 0;
     for (int k = 0; k < t.size; ++k)
-      bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(data_[at_ + (big_endian_ ? t.size - 1 - k : k)])) << (8 * k);
+      bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(data_[at_ + (big_endian_ ? t.size - 1 - k : k)]))
+              << (8 * k);
     at_ += t.size;
     if (t.is_float && t.size == 8)
     {
@@ -182,7 +185,8 @@ private:
       return value;
     }
     const int unused = 64 - 8 * t.size;
-    return t.is_signed ? static_cast<double>(static_cast<std::int64_t>(bits << unused) >> unused) : static_cast<double>(bits);
+    return t.is_signed ? static_cast<double>(static_cast<std::int64_t>(bits << unused) >> unused)
+                       : static_cast<double>(bits);
   }
 
   void readItem(const PlyElement& element, long i)
@@ -225,7 +229,8 @@ private:
     const std::string name = "face " + std::to_string(i) + " (from 0)";
     if (polygon_.size() < 3)
       fail(name + " with " + std::to_string(polygon_.size()) + " vertices; must have at least 3");
-    if (!std::all_of(polygon_.begin(), polygon_.end(), [](double v) { return v >= 0 && v < 1e9 && v == std::floor(v); }))   // NaN has no order
+    if (!std::all_of(polygon_.begin(), polygon_.end(),
+                     [](double v) { return v >= 0 && v < 1e9 && v == std::floor(v); }))   // NaN has no order
       fail(name + " names a vertex that the file does not have");
     std::vector<double> sorted = polygon_;
     std::sort(sorted.begin(), sorted.end());
@@ -245,7 +250,8 @@ private:
     if (*std::max_element(corners_.begin(), corners_.end()) >= count)
       fail("a face names a vertex that the file does not have: there are " + std::to_string(count));
     mesh.vertices = Eigen::Map<const Eigen::Matrix3Xd>(coordinates_.data(), 3, count);
-    mesh.triangles = Eigen::Map<const Eigen::Matrix3Xi>(corners_.data(), 3, static_cast<Eigen::Index>(corners_.size() / 3));
+    mesh.triangles =
+        Eigen::Map<const Eigen::Matrix3Xi>(corners_.data(), 3, static_cast<Eigen::Index>(corners_.size() / 3));
     return mesh;
   }
 
@@ -260,10 +266,15 @@ private:
 bool endsWith(const std::string& path, const char* end)
 {
   const std::size_t n = std::strlen(end);
-  return path.size() >= n && std::equal(end, end + n, path.end() - n, [](char a, char b) { return std::tolower(static_cast<unsigned char>(b)) == a; });
+  return path.size() >= n && std::equal(end, end + n, path.end() - n, [](char a, char b) {
+           return std::tolower(static_cast<unsigned char>(b)) == a;
+         });
 }
 
-[[noreturn]] void refuseName(const std::string& path) { throw std::runtime_error(path + ": the name of a mesh file must end in .obj or .ply"); }
+[[noreturn]] void refuseName(const std::string& path)
+{
+  throw std::runtime_error(path + ": the name of a mesh file must end in .obj or .ply");
+}
 
 void finishWriting(std::ofstream& file, const std::string& path)
 {
@@ -272,7 +283,7 @@ void finishWriting(std::ofstream& file, const std::string& path)
     throw std::runtime_error(path + ": cannot be written");
 }
 
-}  // namespace
+}   // namespace
 
 TriangleMesh readPly(const std::string& path) { return PlyReader(path).read(); }
 
@@ -304,10 +315,11 @@ void putObj(std::ofstream& file, const TriangleMesh& mesh, Eigen::Index first)
   }
   const Eigen::Index base = first + 1;
   for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
-    file << "f " << base + mesh.triangles(0, f) << ' ' << base + mesh.triangles(1, f) << ' ' << base + mesh.triangles(2, f) << '\n';
+    file << "f " << base + mesh.triangles(0, f) << ' ' << base + mesh.triangles(1, f) << ' '
+         << base + mesh.triangles(2, f) << '\n';
 }
 
-}  // namespace
+}   // namespace
 
 void writeObj(const std::string& path, const TriangleMesh& mesh)
 {
@@ -372,15 +384,17 @@ void writeColoredMesh(const std::string& path, const TriangleMesh& mesh, const E
   std::ofstream file(path, std::ios::binary);
   if (ply)
     file << "ply\nformat ascii 1.0\nelement vertex " << mesh.vertices.cols()
-         << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face "
+         << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar "
+            "green\nproperty uchar blue\nelement face "
          << mesh.triangles.cols() << "\nproperty list uchar int vertex_indices\nend_header\n";
   char line[160];
   for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
   {
     const Eigen::Vector3d x = mesh.vertices.col(i), c = colors.col(i).cwiseMax(0.0).cwiseMin(1.0);
     if (ply)
-      std::snprintf(line, sizeof line, "%.17g %.17g %.17g %d %d %d\n", x[0], x[1], x[2], static_cast<int>(std::lround(255 * c[0])),
-                    static_cast<int>(std::lround(255 * c[1])), static_cast<int>(std::lround(255 * c[2])));
+      std::snprintf(line, sizeof line, "%.17g %.17g %.17g %d %d %d\n", x[0], x[1], x[2],
+                    static_cast<int>(std::lround(255 * c[0])), static_cast<int>(std::lround(255 * c[1])),
+                    static_cast<int>(std::lround(255 * c[2])));
     else
       std::snprintf(line, sizeof line, "v %.17g %.17g %.17g %.4f %.4f %.4f\n", x[0], x[1], x[2], c[0], c[1], c[2]);
     file << line;
@@ -408,4 +422,4 @@ void writeMesh(const std::string& path, const TriangleMesh& mesh)
   refuseName(path);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -20,7 +20,8 @@ void checkSample(double time, const Pose& pose)
 {
   if (!std::isfinite(time) || !pose.position.allFinite() || !pose.orientation.coeffs().allFinite())
   {
-    throw std::invalid_argument("pose trajectory: time, position or orientation is not finite at t = " + std::to_string(time) + " s");
+    throw std::invalid_argument(
+        "pose trajectory: time, position or orientation is not finite at t = " + std::to_string(time) + " s");
   }
   if (!(pose.orientation.norm() > 1e-6))
   {
@@ -29,21 +30,19 @@ void checkSample(double time, const Pose& pose)
   }
 }
 
-}  // namespace
+}   // namespace
 
 PoseTrajectory::PoseTrajectory(std::vector<double> times, std::vector<Pose> poses)
 {
   if (times.empty() || times.size() != poses.size())
   {
-    throw std::invalid_argument("pose trajectory: " + std::to_string(times.size()) + " times and " + std::to_string(poses.size()) +
-                                " poses; needs as many of both, at least one");
+    throw std::invalid_argument("pose trajectory: " + std::to_string(times.size()) + " times and " +
+                                std::to_string(poses.size()) + " poses; needs as many of both, at least one");
   }
   times_.reserve(times.size());
   poses_.reserve(times.size());
   for (std::size_t k = 0; k < times.size(); ++k)
-  {
     append(times[k], poses[k]);
-  }
 }
 
 void PoseTrajectory::append(double time, const Pose& pose)
@@ -60,7 +59,8 @@ void PoseTrajectory::append(double time, const Pose& pose)
 
 void PoseTrajectory::forgetBefore(double time)
 {
-  // The segment of `time` starts at the last sample not after it. The slope there needs one sample more, and up to three where it may be in a pause.
+  // The segment of `time` starts at the last sample not after it. The slope there needs one sample more, and up to
+  // three where it may be in a pause.
   const auto after = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin();
   const auto drop = std::max<std::ptrdiff_t>(0, after - 4);
   times_.erase(times_.begin(), times_.begin() + drop);
@@ -76,21 +76,23 @@ Twist PoseTrajectory::slope(std::size_t k) const
             rotationVector(poses_[k - 1].orientation.conjugate() * poses_[k].orientation) / h};
   }
   if (k == 0 || k + 1 >= times_.size())
-  {
     return {};   // held beyond the ends
-  }
   const double h0 = times_[k] - times_[k - 1], h1 = times_[k + 1] - times_[k];
   const Eigen::Quaterniond back = poses_[k].orientation.conjugate();
   const auto shift = [this](std::size_t j) { return Eigen::Vector3d(poses_[j].position - poses_[j - 1].position); };
-  const auto turn = [this](std::size_t j) { return rotationVector(poses_[j - 1].orientation.conjugate() * poses_[j].orientation); };
+  const auto turn = [this](std::size_t j) {
+    return rotationVector(poses_[j - 1].orientation.conjugate() * poses_[j].orientation);
+  };
   Twist slope;
   if (!pausesAt(times_, k, growing_, same_position, shift))
   {
-    slope.linear = threePointSlope(h0, poses_[k - 1].position - poses_[k].position, h1, poses_[k + 1].position - poses_[k].position);
+    slope.linear = threePointSlope(h0, poses_[k - 1].position - poses_[k].position, h1,
+                                   poses_[k + 1].position - poses_[k].position);
   }
   if (!pausesAt(times_, k, growing_, same_orientation, turn))
   {
-    slope.angular = threePointSlope(h0, rotationVector(back * poses_[k - 1].orientation), h1, rotationVector(back * poses_[k + 1].orientation));
+    slope.angular = threePointSlope(h0, rotationVector(back * poses_[k - 1].orientation), h1,
+                                    rotationVector(back * poses_[k + 1].orientation));
   }
   return slope;
 }
@@ -100,14 +102,11 @@ Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
   if (time <= times_.front() || time >= times_.back() || times_.size() == 1)
   {
     if (velocity)
-    {
       *velocity = {};
-    }
     if (time < times_.back() || times_.size() == 1 || !(coast_ > 0))
-    {
       return time <= times_.front() ? poses_.front() : poses_.back();
-    }
-    const double after = std::min(time - times_.back(), coast_), way = after * (1.0 - 0.5 * after / coast_), speed = 1.0 - after / coast_;
+    const double after = std::min(time - times_.back(), coast_), way = after * (1.0 - 0.5 * after / coast_),
+                 speed = 1.0 - after / coast_;
     const Twist last = slope(times_.size() - 1);   // the turn about a fixed axis: body and world rates agree
     const Pose& end = poses_.back();
     if (velocity)
@@ -126,7 +125,7 @@ Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
   const Pose& a = poses_[k];
   const Pose& b = poses_[k + 1];
   const Eigen::Vector3d whole = rotationVector(a.orientation.conjugate() * b.orientation);
-  const Eigen::Vector3d rate0 = from.angular;                                   // phi' = body rate where phi = 0
+  const Eigen::Vector3d rate0 = from.angular;   // phi' = body rate where phi = 0
   const Eigen::Vector3d rate1 = rotationRate(-whole).inverse() * to.angular;
   const Eigen::Vector3d phi = w.h01 * whole + w.h10 * rate0 + w.h11 * rate1;
 
@@ -141,4 +140,4 @@ Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
   return pose;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -50,4 +50,4 @@ Eigen::VectorXd voronoiAreas(const TriangleMesh& mesh)
   return areas;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -35,14 +35,16 @@ Eigen::Vector2d semiAxesAt(const FramedLine& line, Eigen::Index node)
 
 double angleOf(int corner, int sides) { return 2.0 * M_PI * (corner - 0.5) / sides; }
 
-}  // namespace
+}   // namespace
 
 std::vector<TubeSection> tubeSections(const FramedLine& line, int most)
 {
   const int nodes = static_cast<int>(line.x.cols()), edges = static_cast<int>(line.d1.cols());
   const int stride = std::max(1, (edges + most - 1) / most);
   const int pieces = std::clamp(most / (2 * edges), 1, 4);   // per edge
-  const auto x = [&](int i) -> Vector3d { return line.x.col(line.closed ? (i + nodes) % nodes : std::clamp(i, 0, nodes - 1)); };
+  const auto x = [&](int i) -> Vector3d {
+    return line.x.col(line.closed ? (i + nodes) % nodes : std::clamp(i, 0, nodes - 1));
+  };
   const auto tangent = [&](int i) -> Vector3d {
     const bool end = !line.closed && (i == 0 || i == nodes - 1);
     return (end ? 1.0 : 0.5) * (x(i + stride) - x(i - stride));
@@ -55,7 +57,8 @@ std::vector<TubeSection> tubeSections(const FramedLine& line, int most)
     const Vector3d d0 = directorAt(line, j), d1 = directorAt(line, next);
     const Eigen::Vector2d a0 = semiAxesAt(line, j), a1 = semiAxesAt(line, next);
     const int last = next == edges ? pieces : pieces - 1;
-    const double v0 = line.values.empty() ? 0.0 : line.values[j], v1 = line.values.empty() ? 0.0 : line.values[next % nodes];
+    const double v0 = line.values.empty() ? 0.0 : line.values[j],
+                 v1 = line.values.empty() ? 0.0 : line.values[next % nodes];
     for (int k = 0; k <= last; ++k)
     {
       const double f = static_cast<double>(k) / pieces, g = 1.0 - f;
@@ -63,8 +66,8 @@ std::vector<TubeSection> tubeSections(const FramedLine& line, int most)
       const Eigen::Vector2d axes = g * a0 + f * a1;
       Vector3d d = g * d0 + f * d1;
       d = (d - d.dot(t) * t).normalized();
-      out.push_back({(1 + 2 * f) * g * g * x0 + f * g * g * m0 + f * f * (3 - 2 * f) * x1 - f * f * g * m1, axes[0] * d, axes[1] * t.cross(d),
-                     g * v0 + f * v1});
+      out.push_back({(1 + 2 * f) * g * g * x0 + f * g * g * m0 + f * f * (3 - 2 * f) * x1 - f * f * g * m1, axes[0] * d,
+                     axes[1] * t.cross(d), g * v0 + f * v1});
     }
   }
   return out;
@@ -86,7 +89,8 @@ TriangleMesh tubeMesh(const std::vector<TubeSection>& sections, int sides, bool 
     for (int side = 0; side < sides; ++side)
     {
       const double angle = angleOf(side, sides);
-      mesh.vertices.col(i * sides + side) = sections[i].x + std::cos(angle) * sections[i].u + std::sin(angle) * sections[i].w;
+      mesh.vertices.col(i * sides + side) =
+          sections[i].x + std::cos(angle) * sections[i].u + std::sin(angle) * sections[i].w;
     }
   Eigen::Index f = 0;
   const auto vertex = [&](int ring, int side) { return ring % rings * sides + side % sides; };
@@ -112,4 +116,4 @@ TriangleMesh tubeMesh(const std::vector<TubeSection>& sections, int sides, bool 
   return mesh;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -17,7 +17,7 @@ const BandKernels& kernels()
 #endif
 }
 
-}  // namespace
+}   // namespace
 
 template <int HalfBandwidth, int Block>
 void BandedLdlt<HalfBandwidth, Block>::resize(int blocks)
@@ -61,4 +61,4 @@ void BandedLdlt<HalfBandwidth, Block>::solve8(double* x, int count) const
 
 template class BandedLdlt<10, 4>;
 
-}  // namespace slender
+}   // namespace slender

@@ -11,13 +11,15 @@ using V4 = double __attribute__((vector_size(32), aligned(32), may_alias));
 using V8 = double __attribute__((vector_size(64), aligned(64), may_alias));
 using V4u __attribute__((aligned(8), may_alias)) = V4;
 using V8u __attribute__((aligned(8), may_alias)) = V8;   // rows of right-hand sides, any alignment
-static_assert(alignof(V4u) == 8 && alignof(V8u) == 8, "loads and stores may be anywhere");   // Clang overlooks aligned() beside vector_size()
+// Clang overlooks aligned() beside vector_size()
+static_assert(alignof(V4u) == 8 && alignof(V8u) == 8, "loads and stores may be anywhere");
 
 inline __attribute__((always_inline)) V4 low(V8 v) { return V4{v[0], v[1], v[2], v[3]}; }
 inline __attribute__((always_inline)) V4 high(V8 v) { return V4{v[4], v[5], v[6], v[7]}; }
 inline __attribute__((always_inline)) V8 join(V4 a, V4 b) { return V8{a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]}; }
 
-/// Past the cache when the factors are too many to stay in it: they are next read when all the others have been written.
+/// Past the cache when the factors are too many to stay in it: they are next read when all the others have been
+/// written.
 inline __attribute__((always_inline)) void storeFactor(double* p, V8 v, bool stream)
 {
 #if defined(__AVX512F__) && !defined(__clang__)   // whose builtins differ
@@ -57,9 +59,9 @@ inline __attribute__((always_inline)) void forwardBlock(const V4 (&d)[4], const 
 }
 
 /// Right-looking: each block column is factored, then subtracts L D L^T from the two blocks that it reaches.
-/// What is still to be subtracted (window: rows of the next two blocks in the next block's columns, corner: the diagonal
-/// block after that) travels in registers, so memory is touched once per panel. The forward substitution of one
-/// right-hand side rides along: its chain of dependences hides behind the factorisation's.
+/// What is still to be subtracted (window: rows of the next two blocks in the next block's columns, corner: the
+/// diagonal block after that) travels in registers, so memory is touched once per panel. The forward substitution of
+/// one right-hand side rides along: its chain of dependences hides behind the factorisation's.
 void eliminateBand(RodPanel* panels, RodPanel* factors, int from, int to, double* x, BandCarry& carry)
 {
   const FlushDenormals scope;
@@ -217,10 +219,10 @@ void solveBand8(const RodPanel* panels, int blocks, double* x)
   }
 }
 
-}  // namespace
+}   // namespace
 
 extern const BandKernels band_kernels;
 const BandKernels band_kernels = {eliminateBand, substituteBand, solveBand, solveBand8};
 
-}  // namespace SLENDER_ISA
-}  // namespace slender
+}   // namespace SLENDER_ISA
+}   // namespace slender

@@ -48,8 +48,8 @@ std::vector<int> BlockMatrix::slots(const Eigen::MatrixXi& elements) const
       {
         const int found = block(elements(p, e), elements(q, e));
         if (found < 0)
-          throw std::invalid_argument("BlockMatrix: points " + std::to_string(elements(p, e)) + " and " + std::to_string(elements(q, e)) +
-                                      " are not in the pattern");
+          throw std::invalid_argument("BlockMatrix: points " + std::to_string(elements(p, e)) + " and " +
+                                      std::to_string(elements(q, e)) + " are not in the pattern");
         slots.push_back(2 * found + (elements(p, e) < elements(q, e)));
       }
   return slots;
@@ -67,7 +67,8 @@ std::vector<int> BlockMatrix::mapOf(const PointMatrix& matrix) const
       const int j = matrix.column(k);
       map.push_back(j > i ? -1 : block(i, j));
       if (j <= i && map.back() < 0)
-        throw std::invalid_argument("BlockMatrix: points " + std::to_string(i) + " and " + std::to_string(j) + " are not in the pattern");
+        throw std::invalid_argument("BlockMatrix: points " + std::to_string(i) + " and " + std::to_string(j) +
+                                    " are not in the pattern");
     }
   return map;
 }
@@ -85,4 +86,4 @@ void BlockMatrix::addProduct(const double* x, double* y) const
   pointKernels().multiplyBlocks(points(), starts_.data(), rows_.data(), values_.data(), x, y);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -11,9 +11,12 @@ namespace slender {
 
 namespace {
 
-constexpr double kStiff = 2e5;   // W over what it takes to move a constraint's points apart from all others: a round leaves one over it, rounding errors are it times as large
-constexpr int kRounds = 3;       // to rounding
-constexpr int kFewRounds = 2;    // of a preconditioner: the gap that is left is closed when all motions of a step are known
+// W over what it takes to move a constraint's points apart from all others: a round leaves one over it, rounding errors
+// are it times as large
+constexpr double kStiff = 2e5;
+constexpr int kRounds = 3;   // to rounding
+// of a preconditioner: the gap that is left is closed when all motions of a step are known
+constexpr int kFewRounds = 2;
 
 /// Measured: entries of C^T W C, and of a factor without it, against those of S^-1.
 bool roundsSuit(const ConstrainedCholesky::Constraints& c)
@@ -40,11 +43,12 @@ void factorInPlace(Eigen::Ref<Eigen::MatrixXd> a)
   }
 }
 
-}  // namespace
+}   // namespace
 
 double ConstrainedCholesky::Rows::multiply(double factor, const double* x, double* y) const
 {
-  return pointKernels().multiply(static_cast<int>(starts.size()) - 1, starts.data(), offsets.data(), values.data(), factor, x, y);
+  return pointKernels().multiply(static_cast<int>(starts.size()) - 1, starts.data(), offsets.data(), values.data(),
+                                 factor, x, y);
 }
 
 void ConstrainedCholesky::setConstraints(const Constraints& c, bool bounded)
@@ -78,7 +82,8 @@ void ConstrainedCholesky::fill(const Constraints& from, Rows& to)
     to.offsets[k] = 4u * static_cast<unsigned>(from.innerIndexPtr()[k]);
 }
 
-bool ConstrainedCholesky::factor(const PointMatrix& pattern, const double* values, const SparseCholesky& p, const char* fixed)
+bool ConstrainedCholesky::factor(const PointMatrix& pattern, const double* values, const SparseCholesky& p,
+                                 const char* fixed)
 {
   p_ = &p;
   left_out_.clear();
@@ -115,7 +120,8 @@ bool ConstrainedCholesky::factorRounds(const PointMatrix& pattern, const double*
     if (!std::isfinite(weights_[i]))
       return false;
   }
-  const Constraints added = c.transpose() * Constraints(Eigen::Map<const Eigen::VectorXd>(weights_.data(), m).asDiagonal() * c);
+  const Constraints added =
+      c.transpose() * Constraints(Eigen::Map<const Eigen::VectorXd>(weights_.data(), m).asDiagonal() * c);
   for (Eigen::Index i = 0; i < n; ++i)
     for (Constraints::InnerIterator entry(added, i); entry; ++entry)
       entries.emplace_back(i, entry.col(), entry.value());
@@ -193,7 +199,8 @@ void ConstrainedCholesky::leaveOut(const std::vector<int>& rows)
   factorInPlace(inner);
 }
 
-/// From mu = 0: z is that of the constraints' forces so far and of a stiffness W that closes what they leave open; its forces are the next. 4 doubles each.
+/// From mu = 0: z is that of the constraints' forces so far and of a stiffness W that closes what they leave open; its
+/// forces are the next. 4 doubles each.
 void ConstrainedCholesky::solveInRounds(const double* r, const double* g, int rounds, double* z, double* mu) const
 {
   const int m = count(), n = static_cast<int>(c_.cols());
@@ -276,8 +283,8 @@ void ConstrainedCholesky::solve(const double* r, const double* g, double* z, dou
   p_->backwardPoints(y_.data(), z);
 }
 
-ConstrainedCholesky::Norms ConstrainedCholesky::solveBounded(const double* r, const double* gap, const double* bounds, double l, double tolerance, double* z,
-                                                             double* f)
+ConstrainedCholesky::Norms ConstrainedCholesky::solveBounded(const double* r, const double* gap, const double* bounds,
+                                                             double l, double tolerance, double* z, double* f)
 {
   constexpr int kSweeps = 200;
   const int m = count(), n = static_cast<int>(c_.cols());
@@ -391,4 +398,4 @@ void ConstrainedCholesky::takeOut(const double* mu, double* r) const
   c_transposed_.multiply(-1.0, mu_.data(), r);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -65,7 +65,8 @@ Inertia CyclicBandedLdlt::factor()
   Border schur = c;
   for (int i = 0; i < split; ++i)
     schur.noalias() -= b_map.row(i).transpose() * z_map.row(i);
-  // L D L^T without pivoting, as in the band: rows of very different size (positions, angles) keep their relative accuracy
+  // L D L^T without pivoting, as in the band: rows of very different size (positions, angles) keep their relative
+  // accuracy
   for (int j = 0; j < kBorder; ++j)
   {
     const double pivot = schur(j, j);
@@ -105,4 +106,4 @@ void CyclicBandedLdlt::solve(double* x) const
       x[i] -= reduced_[i * kBorder + k] * x2[k];
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,7 +7,7 @@ namespace slender {
 namespace {
 std::atomic<bool> interrupted{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "signal handlers may only touch what takes no lock");
-}  // namespace
+}   // namespace
 
 void interruptSteps() noexcept { interrupted.store(true, std::memory_order_relaxed); }
 void allowSteps() noexcept { interrupted.store(false, std::memory_order_relaxed); }
@@ -15,4 +15,4 @@ bool stepsInterrupted() noexcept { return interrupted.load(std::memory_order_rel
 
 const char* const kStepInterrupted = "the step was interrupted on request; the state is that at its start";
 
-}  // namespace slender
+}   // namespace slender

@@ -16,15 +16,16 @@ namespace {
   return limit == "baseline" ? Isa::baseline : limit == "avx2" ? Isa::avx2 : Isa::avx512;
 }
 
-}  // namespace
+}   // namespace
 
 Isa bestIsa()
 {
 #ifdef SLENDER_X86_KERNELS
-  static const Isa offered = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")
-                             ? Isa::avx512
-                         : __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? Isa::avx2
-                                                                                           : Isa::baseline;
+  static const Isa offered =
+      __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")
+          ? Isa::avx512
+      : __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? Isa::avx2
+                                                                        : Isa::baseline;
   static const Isa isa = std::min(offered, widestAllowed());
   return isa;
 #else
@@ -32,9 +33,6 @@ Isa bestIsa()
 #endif
 }
 
-const char* toString(Isa isa)
-{
-  return isa == Isa::avx512 ? "avx512" : isa == Isa::avx2 ? "avx2" : "baseline";
-}
+const char* toString(Isa isa) { return isa == Isa::avx512 ? "avx512" : isa == Isa::avx2 ? "avx2" : "baseline"; }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,13 +7,15 @@ namespace {
 
 using Quad = double __attribute__((vector_size(32)));
 using QuadU __attribute__((aligned(8), may_alias)) = Quad;
-static_assert(alignof(QuadU) == 8, "loads and stores may be anywhere");   // Clang overlooks aligned() beside vector_size()
+// Clang overlooks aligned() beside vector_size()
+static_assert(alignof(QuadU) == 8, "loads and stores may be anywhere");
 
 inline __attribute__((always_inline)) Quad load(const double* p) { return *reinterpret_cast<const Quad*>(p); }
 inline __attribute__((always_inline)) Quad loadAnywhere(const double* p) { return *reinterpret_cast<const QuadU*>(p); }
 
 template <bool Add>
-double multiplyRows(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y)
+double multiplyRows(int rows, const int* starts, const unsigned* offsets, const double* values, double factor,
+                    const double* x, double* y)
 {
   Quad form = {};
   int k = starts[0];
@@ -38,7 +40,8 @@ double multiplyRows(int rows, const int* starts, const unsigned* offsets, const 
   return form[0] + form[1] + form[2];
 }
 
-double multiply(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y)
+double multiply(int rows, const int* starts, const unsigned* offsets, const double* values, double factor,
+                const double* x, double* y)
 {
   return factor == 0.0 ? multiplyRows<false>(rows, starts, offsets, values, factor, x, y)
                        : multiplyRows<true>(rows, starts, offsets, values, factor, x, y);
@@ -54,7 +57,8 @@ void multiplyBlocks(int columns, const int* starts, const int* rows, const doubl
     for (int k = starts[j] + 1; k < end; ++k)
     {
       const double* a = values + 9 * static_cast<long>(k);
-      const Quad c0 = loadAnywhere(a), c1 = loadAnywhere(a + 3), c2 = loadAnywhere(a + 6);   // fourth lanes are other entries
+      // fourth lanes are other entries
+      const Quad c0 = loadAnywhere(a), c1 = loadAnywhere(a + 3), c2 = loadAnywhere(a + 6);
       const int i = rows[k];
       const Quad xi = load(x + 4 * i);
       Quad& yi = *reinterpret_cast<Quad*>(y + 4 * i);
@@ -74,7 +78,8 @@ void multiplyBlocks(int columns, const int* starts, const int* rows, const doubl
 /// Three columns, `stride` apart; the fourth lane of the product is not to be looked at where that is 3.
 inline __attribute__((always_inline)) Quad times(const double* columns, int stride, Quad x)
 {
-  return loadAnywhere(columns) * x[0] + loadAnywhere(columns + stride) * x[1] + loadAnywhere(columns + 2 * stride) * x[2];
+  return loadAnywhere(columns) * x[0] + loadAnywhere(columns + stride) * x[1] +
+         loadAnywhere(columns + 2 * stride) * x[2];
 }
 
 void sweepDown(const SweptMatrix& m, double* x)
@@ -128,8 +133,8 @@ double multiplyDiagonal(int points, const double* diagonal, const double* x, dou
   return form[0] + form[1] + form[2];
 }
 
-/// Columns from .. from+Columns-1 of a supernode of `count` rows, whose first row is that of column 0: solve with the triangle, then take
-/// their part from the rows below.
+/// Columns from .. from+Columns-1 of a supernode of `count` rows, whose first row is that of column 0: solve with the
+/// triangle, then take their part from the rows below.
 template <int Columns>
 inline __attribute__((always_inline)) void forward(const double* l, int count, const int* rows, int from, double* x)
 {
@@ -228,10 +233,11 @@ double dot(int points, const double* x, const double* y)
   return a[0] + a[1] + a[2];
 }
 
-}  // namespace
+}   // namespace
 
 extern const PointKernels point_kernels;
-const PointKernels point_kernels = {multiply, multiplyBlocks, forwardSupernodal, backwardSupernodal, sweepDown, sweepUp, multiplyDiagonal, dot};
+const PointKernels point_kernels = {multiply,  multiplyBlocks, forwardSupernodal, backwardSupernodal,
+                                    sweepDown, sweepUp,        multiplyDiagonal,  dot};
 
-}  // namespace SLENDER_ISA
-}  // namespace slender
+}   // namespace SLENDER_ISA
+}   // namespace slender

@@ -13,4 +13,4 @@ const PointKernels& pointKernels()
 #endif
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -43,8 +43,8 @@ Eigen::SparseMatrix<double> PointMatrix::toEigen() const
   std::vector<int> columns(offsets_.size());
   for (std::size_t k = 0; k < columns.size(); ++k)
     columns[k] = column(static_cast<int>(k));
-  return Eigen::Map<const Eigen::SparseMatrix<double>>(size(), size(), static_cast<Eigen::Index>(values_.size()), starts_.data(), columns.data(),
-                                                       values_.data());
+  return Eigen::Map<const Eigen::SparseMatrix<double>>(size(), size(), static_cast<Eigen::Index>(values_.size()),
+                                                       starts_.data(), columns.data(), values_.data());
 }
 
 double PointMatrix::multiply(const double* x, double* y) const
@@ -61,7 +61,8 @@ double PointMatrix::addProduct(double factor, const double* x, double* y) const
 
 double PointMatrix::bytes() const
 {
-  return static_cast<double>(values_.size()) * (sizeof(double) + sizeof(int)) + size() * (sizeof(int) + 8.0 * sizeof(double));
+  return static_cast<double>(values_.size()) * (sizeof(double) + sizeof(int)) +
+         size() * (sizeof(int) + 8.0 * sizeof(double));
 }
 
-}  // namespace slender
+}   // namespace slender

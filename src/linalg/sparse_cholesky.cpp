@@ -16,7 +16,8 @@ namespace slender {
 
 namespace {
 
-/// BLAS stays in its caller's thread: dense blocks here are too small for more, whose threads only spin, and sums must not depend on their number.
+/// BLAS stays in its caller's thread: dense blocks here are too small for more, whose threads only spin, and sums must
+/// not depend on their number.
 void useOneBlasThread()
 {
   static std::once_flag once;
@@ -26,7 +27,7 @@ void useOneBlasThread()
   });
 }
 
-}  // namespace
+}   // namespace
 
 struct SparseCholesky::Impl
 {
@@ -85,22 +86,24 @@ struct SparseCholesky::Impl
 
   SupernodalFactor supernodes() const
   {
-    return {static_cast<int>(factor->nsuper),      static_cast<const int*>(factor->super), static_cast<const int*>(factor->pi),
-            static_cast<const int*>(factor->px), static_cast<const int*>(factor->s),     static_cast<const double*>(factor->x)};
+    return {static_cast<int>(factor->nsuper),    static_cast<const int*>(factor->super),
+            static_cast<const int*>(factor->pi), static_cast<const int*>(factor->px),
+            static_cast<const int*>(factor->s),  static_cast<const double*>(factor->x)};
   }
 
-  /// Where the values of a block (or number) of a matrix of points go; its columns follow each other, each one shorter by one.
+  /// Where the values of a block (or number) of a matrix of points go; its columns follow each other, each one shorter
+  /// by one.
   struct Target
   {
     int at, column_length;   ///< of its first column, and of that column
     bool transposed, diagonal;
   };
-  std::vector<int> place;         ///< of each point in the order of elimination
+  std::vector<int> place;   ///< of each point in the order of elimination
   std::vector<Target> targets;
-  int unknowns = 1;               ///< per point
-  cholmod_dense* right = nullptr; ///< work space of solvePoints: for blocks
-  PointVector permuted;           ///< for numbers
-  SupernodalNumeric numeric;      ///< of matrices of points
+  int unknowns = 1;                 ///< per point
+  cholmod_dense* right = nullptr;   ///< work space of solvePoints: for blocks
+  PointVector permuted;             ///< for numbers
+  SupernodalNumeric numeric;        ///< of matrices of points
 
   cholmod_common common;
   cholmod_factor* factor = nullptr;
@@ -204,7 +207,8 @@ void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
   m.values.assign(m.rows.size(), 0.0);
   m.common.method[0].ordering = CHOLMOD_NATURAL;
   m.common.postorder = 0;
-  // wide supernodes make factoring faster; factors of numbers are made for their back-solves, which read less without the zeros
+  // wide supernodes make factoring faster; factors of numbers are made for their back-solves, which read less without
+  // the zeros
   const std::size_t widths[3] = {d == 1 ? 4u : 16u, d == 1 ? 16u : 48u, d == 1 ? 48u : 128u};
   const double zeros[3] = {0.8, d == 1 ? 0.1 : 0.3, d == 1 ? 0.05 : 0.1};
   for (int k = 0; k < 3; ++k)
@@ -246,7 +250,10 @@ bool SparseCholesky::factor(const BlockMatrix& matrix, const char* fixed)
   return m.numeric.factor(m.values.data(), static_cast<double*>(m.factor->x));
 }
 
-bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed) { return factor(matrix, matrix.values().data(), fixed); }
+bool SparseCholesky::factor(const PointMatrix& matrix, const char* fixed)
+{
+  return factor(matrix, matrix.values().data(), fixed);
+}
 
 bool SparseCholesky::factor(const PointMatrix& matrix, const double* values, const char* fixed)
 {
@@ -309,7 +316,8 @@ const std::vector<int>& SparseCholesky::rows() const { return impl_->rows; }
 int SparseCholesky::index(int row, int column) const
 {
   const auto begin = impl_->rows.begin();
-  return static_cast<int>(std::lower_bound(begin + impl_->starts[column], begin + impl_->starts[column + 1], row) - begin);
+  return static_cast<int>(std::lower_bound(begin + impl_->starts[column], begin + impl_->starts[column + 1], row) -
+                          begin);
 }
 
 bool SparseCholesky::factor()
@@ -334,4 +342,4 @@ void SparseCholesky::solve(double* x) const
   std::copy_n(static_cast<const double*>(m.solution->x), b.nrow, x);
 }
 
-}  // namespace slender
+}   // namespace slender

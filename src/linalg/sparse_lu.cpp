@@ -58,7 +58,7 @@ std::vector<int> pivotOrder(int size, const std::vector<int>& starts, const std:
   return order;
 }
 
-}  // namespace
+}   // namespace
 
 struct SparseLu::Impl
 {
@@ -103,7 +103,8 @@ std::vector<double>& SparseLu::values() { return impl_->values; }
 int SparseLu::index(int row, int column) const
 {
   const auto begin = impl_->rows.begin();
-  return static_cast<int>(std::lower_bound(begin + impl_->starts[column], begin + impl_->starts[column + 1], row) - begin);
+  return static_cast<int>(std::lower_bound(begin + impl_->starts[column], begin + impl_->starts[column + 1], row) -
+                          begin);
 }
 
 bool SparseLu::factor()
@@ -123,4 +124,4 @@ void SparseLu::solve(double* x) const
   klu_solve(m.symbolic, m.numeric, size(), 1, x, &m.common);
 }
 
-}  // namespace slender
+}   // namespace slender

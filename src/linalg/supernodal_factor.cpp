@@ -5,18 +5,20 @@
 #include <cstddef>
 
 extern "C" {
-void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha, const double* a, const int* lda, const double* beta, double* c,
+void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha, const double* a,
+            const int* lda, const double* beta, double* c, const int* ldc);
+void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k, const double* alpha,
+            const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c,
             const int* ldc);
-void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k, const double* alpha, const double* a, const int* lda,
-            const double* b, const int* ldb, const double* beta, double* c, const int* ldc);
-void dtrsm_(const char* side, const char* uplo, const char* transa, const char* diag, const int* m, const int* n, const double* alpha, const double* a,
-            const int* lda, double* b, const int* ldb);
+void dtrsm_(const char* side, const char* uplo, const char* transa, const char* diag, const int* m, const int* n,
+            const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 }
 
 namespace slender {
 
-void SupernodalNumeric::setPattern(const SupernodalFactor& factor, const std::vector<int>& starts, const std::vector<int>& matrix_rows)
+void SupernodalNumeric::setPattern(const SupernodalFactor& factor, const std::vector<int>& starts,
+                                   const std::vector<int>& matrix_rows)
 {
   f_ = factor;
   starts_ = starts;
@@ -71,12 +73,14 @@ void SupernodalNumeric::subtract(int descendant, int s, double* x)
   int end = begin;
   while (end < all && own[end] < f_.first[s + 1])
     ++end;
-  const int within = end - begin, length = all - begin, below = all - end, width = columns(descendant), height = rows(s);
+  const int within = end - begin, length = all - begin, below = all - end, width = columns(descendant),
+            height = rows(s);
   const double one = 1.0, zero = 0.0;
   const double* block = x + f_.value_starts[descendant] + begin;
   dsyrk_("L", "N", &within, &width, &one, block, &all, &zero, update_.data(), &length);
   if (below > 0)
-    dgemm_("N", "C", &below, &within, &width, &one, block + within, &all, block, &all, &zero, update_.data() + within, &length);
+    dgemm_("N", "C", &below, &within, &width, &one, block + within, &all, block, &all, &zero, update_.data() + within,
+           &length);
   for (int i = 0; i < length; ++i)
     relative_[i] = place_[own[begin + i]];
   for (int j = 0; j < within; ++j)
@@ -131,4 +135,4 @@ bool SupernodalNumeric::factor(const double* values, double* x)
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

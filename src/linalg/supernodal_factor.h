@@ -6,12 +6,14 @@
 
 namespace slender {
 
-/// Numeric part of a sparse Cholesky factorisation by supernodes, left-looking [Ng & Peyton, SIAM J. Sci. Comput. 14 (1993), 1034] as in CHOLMOD, whose own
-/// takes memory in each call (workspace, teams of OpenMP threads). This one has all of it from setPattern() on and stays in its caller's thread.
+/// Numeric part of a sparse Cholesky factorisation by supernodes, left-looking [Ng & Peyton, SIAM J. Sci. Comput. 14
+/// (1993), 1034] as in CHOLMOD, whose own takes memory in each call (workspace, teams of OpenMP threads). This one has
+/// all of it from setPattern() on and stays in its caller's thread.
 class SupernodalNumeric
 {
 public:
-  /// `starts`, `rows`: lower triangle of the matrix by columns. `factor`: where the supernodes of L lie; its arrays must stay, its values are not read.
+  /// `starts`, `rows`: lower triangle of the matrix by columns. `factor`: where the supernodes of L lie; its arrays
+  /// must stay, its values are not read.
   void setPattern(const SupernodalFactor& factor, const std::vector<int>& starts, const std::vector<int>& rows);
   /// Factors the matrix with these values (one per entry of the pattern) into x, the values of L.
   /// False when it is not positive definite (or not finite).
@@ -25,10 +27,12 @@ private:
   void queue(int s, int row);
 
   SupernodalFactor f_{};
-  std::vector<int> starts_, targets_;                ///< entries of each column of the matrix; where each goes in x
-  std::vector<int> supernode_of_, place_, relative_; ///< per row: its supernode, its place in the present one; places of the rows of an update
-  std::vector<int> head_, next_, row_;               ///< per supernode: list of those that update it next; of each the first row that does
+  std::vector<int> starts_, targets_;   ///< entries of each column of the matrix; where each goes in x
+  std::vector<int> supernode_of_, place_,
+      relative_;   ///< per row: its supernode, its place in the present one; places of the rows of an update
+  /// per supernode: list of those that update it next; of each the first row that does
+  std::vector<int> head_, next_, row_;
   std::vector<double> update_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -57,11 +57,14 @@ void SymmetricSweeps::set(double factor, const std::vector<char>& held)
         d.diagonal().array() += factor * b_->values()[b_diagonal_[i]];
       inverse = d.inverse();
     }
-    Eigen::Map<Eigen::Matrix<double, 3, 3>, 0, Eigen::OuterStride<4>>(diagonal_.data() + 12 * static_cast<std::size_t>(i)) = d;
-    Eigen::Map<Eigen::Matrix<double, 3, 3>, 0, Eigen::OuterStride<4>>(inverse_.data() + 12 * static_cast<std::size_t>(i)) = inverse;
+    Eigen::Map<Eigen::Matrix<double, 3, 3>, 0, Eigen::OuterStride<4>>(diagonal_.data() +
+                                                                      12 * static_cast<std::size_t>(i)) = d;
+    Eigen::Map<Eigen::Matrix<double, 3, 3>, 0, Eigen::OuterStride<4>>(inverse_.data() +
+                                                                      12 * static_cast<std::size_t>(i)) = inverse;
   }
-  swept_ = SweptMatrix{a_->points(), a_->starts().data(), a_->rows().data(), a_->values(), nullptr, nullptr, nullptr, nullptr, factor,
-                       order_.data(), inverse_.data()};
+  swept_ = SweptMatrix{
+      a_->points(), a_->starts().data(), a_->rows().data(), a_->values(), nullptr, nullptr, nullptr, nullptr,
+      factor,       order_.data(),       inverse_.data()};
   if (b_)
   {
     swept_.right = b_right_.data();
@@ -141,7 +144,8 @@ double SymmetricSweeps::norm(const PointVector& r)
   return std::sqrt(std::max(sweepResidual(), 0.0));
 }
 
-LinearResult SymmetricSweeps::solve(const PointVector& right_hand_side, PointVector& x, double tolerance, int max_iterations)
+LinearResult SymmetricSweeps::solve(const PointVector& right_hand_side, PointVector& x, double tolerance,
+                                    int max_iterations)
 {
   setWhole();
   LinearResult result;
@@ -159,8 +163,9 @@ LinearResult SymmetricSweeps::solve(const PointVector& right_hand_side, PointVec
   return result;
 }
 
-LinearResult SymmetricSweeps::solve(const ConstrainedCholesky& constraints, double stiffness, const PointVector& right_hand_side, PointVector& x,
-                                    double tolerance, int max_iterations, double reference, double least)
+LinearResult SymmetricSweeps::solve(const ConstrainedCholesky& constraints, double stiffness,
+                                    const PointVector& right_hand_side, PointVector& x, double tolerance,
+                                    int max_iterations, double reference, double least)
 {
   constexpr double kRounding = 1e-12;   // of the reference
   LinearResult result;
@@ -172,9 +177,10 @@ LinearResult SymmetricSweeps::solve(const ConstrainedCholesky& constraints, doub
   return result;
 }
 
-/// r_ = (D + L)^-1 times the residual; in the norm of D, where (D + L)^-1 A (D + L^T)^-1 p = t + (D + L)^-1 (p - D t) with t = (D + L^T)^-1 p
-void SymmetricSweeps::iterate(const ConstrainedCholesky* constraints, double stiffness, double square, double scale, PointVector& x, double tolerance,
-                              int max_iterations, LinearResult& result)
+/// r_ = (D + L)^-1 times the residual; in the norm of D, where (D + L)^-1 A (D + L^T)^-1 p = t + (D + L)^-1 (p - D t)
+/// with t = (D + L^T)^-1 p
+void SymmetricSweeps::iterate(const ConstrainedCholesky* constraints, double stiffness, double square, double scale,
+                              PointVector& x, double tolerance, int max_iterations, LinearResult& result)
 {
   const PointKernels& k = pointKernels();
   const int n = a_->points();
@@ -216,4 +222,4 @@ void SymmetricSweeps::iterate(const ConstrainedCholesky* constraints, double sti
   }
 }
 
-}  // namespace slender
+}   // namespace slender

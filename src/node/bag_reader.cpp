@@ -43,7 +43,10 @@ Eigen::Matrix3Xd columns(const Vectors& from)
   return columns(from, 0, from.size());
 }
 
-Eigen::VectorXd numbers(const std::vector<double>& from) { return Eigen::Map<const Eigen::VectorXd>(from.data(), static_cast<Eigen::Index>(from.size())); }
+Eigen::VectorXd numbers(const std::vector<double>& from)
+{
+  return Eigen::Map<const Eigen::VectorXd>(from.data(), static_cast<Eigen::Index>(from.size()));
+}
 
 std::vector<Eigen::Quaterniond> quaternions(const std::vector<geometry_msgs::Quaternion>& from)
 {
@@ -70,7 +73,8 @@ Eigen::Vector3d vectorOf(const geometry_msgs::Vector3& v) { return {v.x, v.y, v.
 void require(bool fits, const std::string& what)
 {
   if (!fits)
-    throw BagError("a message of " + what + " has arrays that do not fit each other: the bag was not written by slender_sim, or is damaged");
+    throw BagError("a message of " + what +
+                   " has arrays that do not fit each other: the bag was not written by slender_sim, or is damaged");
 }
 
 /// The solvers never let a NaN out.
@@ -94,7 +98,7 @@ double shortestStep(double span_ns, double steps)
   return 1e-9 * span_ns / steps;
 }
 
-}  // namespace
+}   // namespace
 
 struct BagReader::Contents
 {
@@ -109,7 +113,7 @@ struct BagReader::Contents
   std::optional<std::int64_t> first_stamp;
   std::int64_t stamp = 0;
   std::uint64_t step = 0;
-  bool step_known = false;    ///< of this instant
+  bool step_known = false;   ///< of this instant
   std::uint32_t epoch = 0;
   StepGaps gaps;
 
@@ -123,7 +127,8 @@ struct BagReader::Contents
   template <class Message>
   void stream(const std::string& topic, const char* type, std::function<void(const Message&)> use)
   {
-    streams.push_back(std::make_unique<TopicStream<Message>>(bag, topic, std::string("slender_sim/") + type, std::move(use)));
+    streams.push_back(
+        std::make_unique<TopicStream<Message>>(bag, topic, std::string("slender_sim/") + type, std::move(use)));
   }
   GraspSnapshot& grasp(const std::string& name);
   void add(const slender_sim::RodState& rod);
@@ -139,7 +144,8 @@ void BagReader::Contents::open()
   if (!fs::exists(path))
   {
     if (fs::exists(path + ".active"))
-      throw BagError(path + ": is still being written to " + path + ".active; wait for its recorder, or if that has died: rosbag reindex " + path + ".active");
+      throw BagError(path + ": is still being written to " + path +
+                     ".active; wait for its recorder, or if that has died: rosbag reindex " + path + ".active");
     throw BagError(path + ": there is no such file");
   }
   try
@@ -149,11 +155,14 @@ void BagReader::Contents::open()
   }
   catch (const rosbag::BagUnindexedException&)
   {
-    throw BagError(path + ": was not finished: its recorder still runs, or was killed; in the latter case: rosbag reindex " + path);
+    throw BagError(path +
+                   ": was not finished: its recorder still runs, or was killed; in the latter case: rosbag reindex " +
+                   path);
   }
   catch (const rosbag::BagException& e)
   {
-    throw BagError(path + ": is no ROS bag, or is cut off or damaged (" + e.what() + "); copy it anew, or try: rosbag reindex " + path);
+    throw BagError(path + ": is no ROS bag, or is cut off or damaged (" + e.what() +
+                   "); copy it anew, or try: rosbag reindex " + path);
   }
   catch (const std::runtime_error& e)   // a directory, a device
   {
@@ -163,7 +172,8 @@ void BagReader::Contents::open()
 
 void BagReader::Contents::choosePrefix(const std::string& topic_namespace)
 {
-  static const std::set<std::string> ours{"slender_sim/RodState", "slender_sim/ThreadState", "slender_sim/ClothState", "slender_sim/BodyStates"};
+  static const std::set<std::string> ours{"slender_sim/RodState", "slender_sim/ThreadState", "slender_sim/ClothState",
+                                          "slender_sim/BodyStates"};
   std::set<std::string> found;
   rosbag::View all(bag);
   for (const rosbag::ConnectionInfo* connection : all.getConnections())
@@ -171,11 +181,14 @@ void BagReader::Contents::choosePrefix(const std::string& topic_namespace)
     {
       const std::string& topic = connection->topic;
       const std::size_t length = std::string(name).size();
-      if (ours.count(connection->datatype) && topic.size() >= length && topic.compare(topic.size() - length, length, name) == 0)
+      if (ours.count(connection->datatype) && topic.size() >= length &&
+          topic.compare(topic.size() - length, length, name) == 0)
         found.insert(topic.substr(0, topic.size() - length));
     }
   if (found.empty())
-    throw BagError(path + ": holds no states of slender_sim; record with simulate --bag, with ~record_bag of a node, or at least its topic `state`");
+    throw BagError(path +
+                   ": holds no states of slender_sim; record with simulate --bag, with ~record_bag of a node, or at "
+                   "least its topic `state`");
   std::string wanted = topic_namespace, list;
   while (!wanted.empty() && wanted.back() == '/')
     wanted.pop_back();
@@ -209,7 +222,8 @@ void BagReader::Contents::readScene(const std::string& folder)
       mesh = *message;
       for (std::size_t k = 0; k < mesh.names.size(); ++k)
         require(mesh.vertex_offsets.size() == mesh.names.size() && mesh.triangle_offsets.size() == mesh.names.size() &&
-                  mesh.vertex_offsets[k] <= mesh.vertices.size() && 3 * std::size_t{mesh.triangle_offsets[k]} <= mesh.triangles.size(),
+                    mesh.vertex_offsets[k] <= mesh.vertices.size() &&
+                    3 * std::size_t{mesh.triangle_offsets[k]} <= mesh.triangles.size(),
                 "mesh");
       break;
     }
@@ -218,7 +232,8 @@ void BagReader::Contents::readScene(const std::string& folder)
 void BagReader::Contents::openStreams()
 {
   std::set<std::pair<std::string, std::string>> seen;
-  rosbag::View all(bag, [this](const rosbag::ConnectionInfo* c) { return c->topic.compare(0, prefix.size(), prefix) == 0; });
+  rosbag::View all(bag,
+                   [this](const rosbag::ConnectionInfo* c) { return c->topic.compare(0, prefix.size(), prefix) == 0; });
   for (const rosbag::ConnectionInfo* connection : all.getConnections())
   {
     const std::string& topic = connection->topic;
@@ -240,20 +255,24 @@ void BagReader::Contents::openStreams()
       stream<slender_sim::Fields>(topic, "Fields", [this](const auto& m) { add(m); });
     else if (name == "grasp_states" && type == "GraspStates")
       stream<slender_sim::GraspStates>(topic, "GraspStates", [this](const auto& m) {
-        require(m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(), "grasp_states");
+        require(m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(),
+                "grasp_states");
         for (std::size_t g = 0; g < m.name.size(); ++g)
           grasp(m.name[g]).held = GraspSnapshot::Held{m.object[g], m.active[g] != 0, poseOf(m.pose[g])};
       });
-    else if (name.compare(0, 7, "grasps/") == 0 && name.size() > 14 && name.compare(name.size() - 7, 7, "/wrench") == 0 && type == "WrenchStamped")
+    else if (name.compare(0, 7, "grasps/") == 0 && name.size() > 14 &&
+             name.compare(name.size() - 7, 7, "/wrench") == 0 && type == "WrenchStamped")
     {
       const std::string of = name.substr(7, name.size() - 14);
-      streams.push_back(std::make_unique<TopicStream<geometry_msgs::WrenchStamped>>(bag, topic, connection->datatype, [this, of](const auto& m) {
-        grasp(of).wrench = {vectorOf(m.wrench.force), vectorOf(m.wrench.torque)};
-      }));
+      streams.push_back(std::make_unique<TopicStream<geometry_msgs::WrenchStamped>>(
+          bag, topic, connection->datatype, [this, of](const auto& m) {
+            grasp(of).wrench = {vectorOf(m.wrench.force), vectorOf(m.wrench.torque)};
+          }));
     }
     else
       continue;
-    rosbag::View view(bag, [&](const rosbag::ConnectionInfo* c) { return c->topic == topic && c->datatype == connection->datatype; });
+    rosbag::View view(
+        bag, [&](const rosbag::ConnectionInfo* c) { return c->topic == topic && c->datatype == connection->datatype; });
     messages += view.size();
   }
 }
@@ -272,18 +291,17 @@ void BagReader::Contents::findStepLength()
     if (!first)
       first = {ns, message.step};
     else if (message.step > first->second)
-      step_length = shortestStep(static_cast<double>(ns - first->first), static_cast<double>(message.step - first->second));
+      step_length =
+          shortestStep(static_cast<double>(ns - first->first), static_cast<double>(message.step - first->second));
   };
   rosbag::View states(bag, rosbag::TopicQuery(prefix + "state"));
   for (const rosbag::MessageInstance& instance : states)
-  {
     if (const auto rod = instance.instantiate<slender_sim::RodState>())
       look(*rod);
     else if (const auto thread = instance.instantiate<slender_sim::ThreadState>())
       look(*thread);
     else if (const auto cloth = instance.instantiate<slender_sim::ClothState>())
       look(*cloth);
-  }
 }
 
 GraspSnapshot& BagReader::Contents::grasp(const std::string& name)
@@ -299,42 +317,48 @@ GraspSnapshot& BagReader::Contents::grasp(const std::string& name)
 void BagReader::Contents::add(const slender_sim::RodState& rod)
 {
   const std::size_t nodes = rod.nodes.size(), edges = rod.frames.size();
-  require(nodes >= 2 && edges == (rod.closed ? nodes : nodes - 1) && rod.velocities.size() == nodes && rod.twists.size() == nodes &&
-            rod.radii.size() == edges && (rod.radii_b.empty() || rod.radii_b.size() == edges),
+  require(nodes >= 2 && edges == (rod.closed ? nodes : nodes - 1) && rod.velocities.size() == nodes &&
+              rod.twists.size() == nodes && rod.radii.size() == edges &&
+              (rod.radii_b.empty() || rod.radii_b.size() == edges),
           "rod " + rod.name);
   step = rod.step;
   epoch = rod.epoch;
   step_known = true;
-  out->rods.push_back({rod.name, rod.closed != 0, columns(rod.nodes), columns(rod.velocities), quaternions(rod.frames), numbers(rod.twists),
-                       numbers(rod.radii), numbers(rod.radii_b.empty() ? rod.radii : rod.radii_b)});
+  out->rods.push_back({rod.name, rod.closed != 0, columns(rod.nodes), columns(rod.velocities), quaternions(rod.frames),
+                       numbers(rod.twists), numbers(rod.radii),
+                       numbers(rod.radii_b.empty() ? rod.radii : rod.radii_b)});
   const RodSnapshot& read = out->rods.back();
-  requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.twist.allFinite() && read.radius_a.allFinite() &&
-                  read.radius_b.allFinite(),
+  requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.twist.allFinite() &&
+                    read.radius_a.allFinite() && read.radius_b.allFinite(),
                 "rod " + rod.name);
-  require(!scene || rod.guide_nodes.empty() || appendFunctions(*scene, rod.name, "", columns(rod.guide_nodes), columns(rod.guide_forces), out->functions),
-          "state (what " + rod.name + " tracks)");
+  require(
+      !scene || rod.guide_nodes.empty() ||
+          appendFunctions(*scene, rod.name, "", columns(rod.guide_nodes), columns(rod.guide_forces), out->functions),
+      "state (what " + rod.name + " tracks)");
 }
 
 void BagReader::Contents::add(const slender_sim::ThreadState& thread)
 {
   const std::size_t nodes = thread.nodes.size(), edges = thread.frames.size();
   require(nodes >= 2 && edges == nodes - 1 && thread.ids.size() == nodes && thread.velocities.size() == nodes &&
-            thread.deposited.size() == nodes && thread.radii.size() == edges,
+              thread.deposited.size() == nodes && thread.radii.size() == edges,
           "thread " + thread.name);
   step = thread.step;
   epoch = thread.epoch;
   step_known = true;
-  out->threads.push_back({thread.name, thread.thread_id, thread.ids, columns(thread.nodes), columns(thread.velocities), thread.deposited,
-                          quaternions(thread.frames), numbers(thread.radii)});
+  out->threads.push_back({thread.name, thread.thread_id, thread.ids, columns(thread.nodes), columns(thread.velocities),
+                          thread.deposited, quaternions(thread.frames), numbers(thread.radii)});
   const ThreadSnapshot& read = out->threads.back();
-  requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.radius.allFinite(), "thread " + thread.name);
+  requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.radius.allFinite(),
+                "thread " + thread.name);
 }
 
 void BagReader::Contents::add(const slender_sim::ClothState& cloths)
 {
   const std::size_t count = cloths.names.size();
-  require(cloths.offsets.size() == count && cloths.velocities.size() == cloths.vertices.size() && cloths.guide_offsets.size() == count &&
-            cloths.function_offsets.size() == count && cloths.function_sets.size() == count,
+  require(cloths.offsets.size() == count && cloths.velocities.size() == cloths.vertices.size() &&
+              cloths.guide_offsets.size() == count && cloths.function_offsets.size() == count &&
+              cloths.function_sets.size() == count,
           "state");
   step = cloths.step;
   epoch = cloths.epoch;
@@ -347,7 +371,8 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
   for (std::size_t k = 0; k < count; ++k)
   {
     const auto [first, last] = range(cloths.offsets, k, cloths.vertices.size());
-    ClothSnapshot cloth{cloths.names[k], columns(cloths.vertices, first, last), columns(cloths.velocities, first, last), {}};
+    ClothSnapshot cloth{
+        cloths.names[k], columns(cloths.vertices, first, last), columns(cloths.velocities, first, last), {}};
     requireFinite(cloth.x.allFinite() && cloth.v.allFinite(), "cloth " + cloth.name);
     if (mesh.names == cloths.names)
     {
@@ -363,8 +388,9 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
     const auto [guide, guide_end] = range(cloths.guide_offsets, k, cloths.guide_vertices.size());
     const auto [force, force_end] = range(cloths.function_offsets, k, cloths.guide_forces.size());
     require(!scene || guide == guide_end ||
-              appendFunctions(*scene, cloths.names[k], cloths.function_sets[k], columns(cloths.guide_vertices, guide, guide_end),
-                              columns(cloths.guide_forces, force, force_end), out->functions),
+                appendFunctions(*scene, cloths.names[k], cloths.function_sets[k],
+                                columns(cloths.guide_vertices, guide, guide_end),
+                                columns(cloths.guide_forces, force, force_end), out->functions),
             "state (what " + cloths.names[k] + " tracks)");
   }
 }
@@ -373,7 +399,9 @@ void BagReader::Contents::add(const slender_sim::BodyStates& states, std::vector
 {
   require(states.pose.size() == states.name.size() && states.twist.size() == states.name.size(), "body_states");
   for (std::size_t b = 0; b < states.name.size(); ++b)
-    solids.push_back({states.name[b], poseOf(states.pose[b]), {vectorOf(states.twist[b].linear), vectorOf(states.twist[b].angular)}});
+    solids.push_back({states.name[b],
+                      poseOf(states.pose[b]),
+                      {vectorOf(states.twist[b].linear), vectorOf(states.twist[b].angular)}});
 }
 
 void BagReader::Contents::add(const slender_sim::Fields& fields)
@@ -383,7 +411,8 @@ void BagReader::Contents::add(const slender_sim::Fields& fields)
   for (const slender_sim::FieldTable& from : fields.tables)
   {
     const std::size_t columns = from.columns.size(), rows = columns > 0 ? from.values.size() / columns : 0;
-    require(known.count(from.table) > 0 && columns > 0 && from.values.size() == rows * columns, "fields (of " + from.object + ")");
+    require(known.count(from.table) > 0 && columns > 0 && from.values.size() == rows * columns,
+            "fields (of " + from.object + ")");
     FieldTable table{from.table, from.object, from.columns, Eigen::MatrixXd(rows, columns)};
     for (std::size_t i = 0; i < from.values.size(); ++i)
       table.values(static_cast<Eigen::Index>(i / columns), static_cast<Eigen::Index>(i % columns)) = from.values[i];
@@ -446,7 +475,8 @@ bool BagReader::next(SceneSnapshot& out)
     throw BagError(c.path + ": " + e.what());
   }
   if (!c.step_known && c.first_stamp && c.step_length > 0)   // bodies only, or their states were dropped
-    c.step = step_before + static_cast<std::uint64_t>(std::llround(1e-9 * static_cast<double>(c.stamp - before) / c.step_length));
+    c.step = step_before +
+             static_cast<std::uint64_t>(std::llround(1e-9 * static_cast<double>(c.stamp - before) / c.step_length));
   if (!c.first_stamp)
     c.first_stamp = c.stamp;
   if (c.step_known)
@@ -455,11 +485,14 @@ bool BagReader::next(SceneSnapshot& out)
   return true;
 }
 
-double BagReader::seconds() const { return 1e-9 * static_cast<double>(contents_->stamp - contents_->first_stamp.value_or(contents_->stamp)); }
+double BagReader::seconds() const
+{
+  return 1e-9 * static_cast<double>(contents_->stamp - contents_->first_stamp.value_or(contents_->stamp));
+}
 std::string BagReader::gaps() const { return contents_->gaps.text(contents_->step_length); }
 const SceneConfig* BagReader::scene() const { return contents_->scene ? &*contents_->scene : nullptr; }
 const std::string& BagReader::sceneProblem() const { return contents_->scene_problem; }
 std::size_t BagReader::messages() const { return contents_->messages; }
 std::size_t BagReader::done() const { return contents_->done; }
 
-}  // namespace slender
+}   // namespace slender

@@ -13,10 +13,11 @@
 
 namespace slender {
 
-BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names,
-                         const std::vector<std::string>& thread_prefixes)
+BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace,
+                         const std::vector<std::string>& grasp_names, const std::vector<std::string>& thread_prefixes)
 {
-  const std::string prefix = topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
+  const std::string prefix =
+      topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
   state_topic_ = prefix + "state";
   scene_topic_ = prefix + "scene";
   inputs_topic_ = prefix + "inputs";
@@ -56,7 +57,10 @@ BagRecorder::~BagRecorder()
 }
 
 /// What a failure leaves behind.
-std::string BagRecorder::remains() const { return "; what came before is in " + path_ + ".active (rosbag reindex reads it)"; }
+std::string BagRecorder::remains() const
+{
+  return "; what came before is in " + path_ + ".active (rosbag reindex reads it)";
+}
 
 template <class Message>
 void BagRecorder::write(const std::string& topic, const ros::Time& stamp, const Message& message)
@@ -157,8 +161,8 @@ private:
   SceneMessages messages_;
 };
 
-}  // namespace
+}   // namespace
 
 std::unique_ptr<Recorder> makeBagRecorder(const std::string& path) { return std::make_unique<SimulationBag>(path); }
 
-}  // namespace slender
+}   // namespace slender

@@ -17,23 +17,25 @@ using visualization_msgs::Marker;
 
 const std::array<std_msgs::ColorRGBA, 4>& clothColors()
 {
-  static const std::array<std_msgs::ColorRGBA, 4> colors = {color(0.20, 0.47, 0.72), color(0.85, 0.38, 0.28), color(0.40, 0.62, 0.38),
-                                                            color(0.87, 0.70, 0.32)};
+  static const std::array<std_msgs::ColorRGBA, 4> colors = {color(0.20, 0.47, 0.72), color(0.85, 0.38, 0.28),
+                                                            color(0.40, 0.62, 0.38), color(0.87, 0.70, 0.32)};
   return colors;
 }
 
-/// Both sides look the same, since rviz draws one colour for both: brightness depends on the angle only, from two sides so that a fold
-/// has a bright and a dark flank.
+/// Both sides look the same, since rviz draws one colour for both: brightness depends on the angle only, from two sides
+/// so that a fold has a bright and a dark flank.
 std_msgs::ColorRGBA shaded(const std_msgs::ColorRGBA& paint, const Vector3d& normal)
 {
-  static const Vector3d key = Vector3d(0.55, -0.65, 0.52).normalized(), fill = Vector3d(-0.75, -0.30, 0.59).normalized();
+  static const Vector3d key = Vector3d(0.55, -0.65, 0.52).normalized(),
+                        fill = Vector3d(-0.75, -0.30, 0.59).normalized();
   const double light = 0.28 + 0.62 * std::abs(normal.dot(key)) + 0.22 * std::abs(normal.dot(fill));
   const auto shade = [light](float c) { return std::min(1.0, c * light); };
   return color(shade(paint.r), shade(paint.g), shade(paint.b), paint.a);
 }
 
 /// `paints`: of each vertex (3 x n), or none.
-void addTriangles(const Eigen::Matrix3Xi& triangles, const Eigen::Matrix3Xd& x, const std_msgs::ColorRGBA& paint, const Eigen::Matrix3Xd& paints, Marker& marker)
+void addTriangles(const Eigen::Matrix3Xi& triangles, const Eigen::Matrix3Xd& x, const std_msgs::ColorRGBA& paint,
+                  const Eigen::Matrix3Xd& paints, Marker& marker)
 {
   Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, x.cols());   // weighted by area
   for (Eigen::Index f = 0; f < triangles.cols(); ++f)
@@ -49,7 +51,8 @@ void addTriangles(const Eigen::Matrix3Xi& triangles, const Eigen::Matrix3Xd& x, 
   {
     points[i] = toPoint(x.col(i));
     const double length = normals.col(i).norm();
-    colors[i] = shaded(paints.cols() ? color(paints(0, i), paints(1, i), paints(2, i)) : paint, length > 0.0 ? Vector3d(normals.col(i) / length) : Vector3d::UnitZ());
+    colors[i] = shaded(paints.cols() ? color(paints(0, i), paints(1, i), paints(2, i)) : paint,
+                       length > 0.0 ? Vector3d(normals.col(i) / length) : Vector3d::UnitZ());
   }
   marker.points.reserve(static_cast<std::size_t>(triangles.size()));
   marker.colors.reserve(static_cast<std::size_t>(triangles.size()));
@@ -69,10 +72,10 @@ void addEdges(const MeshTopology& topology, const Eigen::Matrix3Xd& x, Marker& m
       marker.points.push_back(toPoint(x.col(topology.edges(end, e))));
 }
 
-}  // namespace
+}   // namespace
 
-void addClothMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
-                     visualization_msgs::MarkerArray& out)
+void addClothMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options,
+                     double range, visualization_msgs::MarkerArray& out)
 {
   const MarkerStyle style = options.style;
   std::vector<double> spacing;   // mean distance of neighbours, per cloth [m]
@@ -94,7 +97,8 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
     {
       const auto& tracking = simulation.config().cloths[k].tracking;
       const bool regions = style == MarkerStyle::regions && tracking;
-      Eigen::Matrix3Xd paints = regions ? functionColors(simulation.functions(static_cast<int>(k)).functions.tracked) : Eigen::Matrix3Xd();
+      Eigen::Matrix3Xd paints =
+          regions ? functionColors(simulation.functions(static_cast<int>(k)).functions.tracked) : Eigen::Matrix3Xd();
       const std::vector<double> values = shownValues(model, x, options.color);
       if (!values.empty())
         paints.resize(3, x.cols());
@@ -124,7 +128,8 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
     const SceneCloth& held = simulation.state().cloths[ref.cloth];
     const ClothGrasp& grasp = held.grasps[ref.index];
     marker.scale.x = marker.scale.y = marker.scale.z = 0.4 * spacing[ref.cloth];
-    marker.color = std::holds_alternative<FixedMotion>(ref.config->motion) ? color(0.35, 0.37, 0.40) : color(0.22, 0.27, 0.33);
+    marker.color =
+        std::holds_alternative<FixedMotion>(ref.config->motion) ? color(0.35, 0.37, 0.40) : color(0.22, 0.27, 0.33);
     for (const int vertex : grasp.vertices)
       marker.points.push_back(toPoint(held.cloth.x.col(vertex)));
     if (!grasp.active)
@@ -133,4 +138,4 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -30,9 +30,11 @@ std::string fromPoints(const sensor_msgs::PointCloud2& message, Eigen::Matrix3Xd
         fields[k] = &field;
   for (const auto* field : fields)
   {
-    if (!field || field->count != 1 || (field->datatype != sensor_msgs::PointField::FLOAT32 && field->datatype != sensor_msgs::PointField::FLOAT64))
+    if (!field || field->count != 1 ||
+        (field->datatype != sensor_msgs::PointField::FLOAT32 && field->datatype != sensor_msgs::PointField::FLOAT64))
       return "it must have the fields x, y and z, float32 or float64";
-    if (std::uint64_t{field->offset} + (field->datatype == sensor_msgs::PointField::FLOAT32 ? 4 : 8) > message.point_step)   // 32 bits wrap
+    if (std::uint64_t{field->offset} + (field->datatype == sensor_msgs::PointField::FLOAT32 ? 4 : 8) >
+        message.point_step)   // 32 bits wrap
       return "a field reaches beyond point_step";
   }
   const std::uint64_t row = std::uint64_t{message.width} * message.point_step;
@@ -41,7 +43,8 @@ std::string fromPoints(const sensor_msgs::PointCloud2& message, Eigen::Matrix3Xd
   out.resize(3, static_cast<Eigen::Index>(message.width) * message.height);
   for (Eigen::Index i = 0; i < out.cols(); ++i)
   {
-    const std::uint8_t* at = message.data.data() + (i / message.width) * message.row_step + (i % message.width) * message.point_step;
+    const std::uint8_t* at =
+        message.data.data() + (i / message.width) * message.row_step + (i % message.width) * message.point_step;
     for (int k = 0; k < 3; ++k)
       if (fields[k]->datatype == sensor_msgs::PointField::FLOAT32)
       {
@@ -114,7 +117,7 @@ PoseFault checked(const Eigen::Vector3d& p, const geometry_msgs::Quaternion& q, 
   return PoseFault::none;
 }
 
-}  // namespace
+}   // namespace
 
 PoseFault fromMessage(const geometry_msgs::Pose& message, Pose& X)
 {
@@ -129,8 +132,8 @@ PoseFault fromMessage(const geometry_msgs::Transform& message, Pose& X)
 
 bool isFinite(const geometry_msgs::Twist& t)
 {
-  return std::isfinite(t.linear.x) && std::isfinite(t.linear.y) && std::isfinite(t.linear.z) && std::isfinite(t.angular.x) &&
-         std::isfinite(t.angular.y) && std::isfinite(t.angular.z);
+  return std::isfinite(t.linear.x) && std::isfinite(t.linear.y) && std::isfinite(t.linear.z) &&
+         std::isfinite(t.angular.x) && std::isfinite(t.angular.y) && std::isfinite(t.angular.z);
 }
 
 void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out)
@@ -148,7 +151,9 @@ void toMessage(const RodModel& model, const RodState& state, slender_sim::RodSta
     out.twists[i] = state.twistAt(i);
   }
   out.frames.resize(edges);
-  forEachFrame(model, state, [&](int j, const Eigen::Matrix3d& axes) { out.frames[j] = toQuaternion(Eigen::Quaterniond(axes).normalized()); });
+  forEachFrame(model, state, [&](int j, const Eigen::Matrix3d& axes) {
+    out.frames[j] = toQuaternion(Eigen::Quaterniond(axes).normalized());
+  });
   out.radii.assign(model.radius_a.data(), model.radius_a.data() + model.radius_a.size());
   if (model.radius_b == model.radius_a)
     out.radii_b.clear();
@@ -184,13 +189,14 @@ void appendPoses(const RodModel& model, const RodState& state, std::vector<geome
 
 bool isFinite(const RodState& state)
 {
-  return state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() && state.director.allFinite();
+  return state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() &&
+         state.director.allFinite();
 }
 
 bool isFinite(const RigidBodyState& state)
 {
-  return state.X_WB.position.allFinite() && state.X_WB.orientation.coeffs().allFinite() && state.velocity.linear.allFinite() &&
-         state.velocity.angular.allFinite();
+  return state.X_WB.position.allFinite() && state.X_WB.orientation.coeffs().allFinite() &&
+         state.velocity.linear.allFinite() && state.velocity.angular.allFinite();
 }
 
 void toMessage(const ThreadState& state, slender_sim::ThreadState& out)
@@ -237,7 +243,8 @@ void append(const std::string& name, const ClothState& state, slender_sim::Cloth
   }
 }
 
-void appendTracking(double error, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces, slender_sim::ClothState& out)
+void appendTracking(double error, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
+                    slender_sim::ClothState& out)
 {
   out.constraint_errors.push_back(error);
   out.guide_offsets.push_back(static_cast<std::uint32_t>(out.guide_vertices.size()));
@@ -287,7 +294,8 @@ bool isFinite(const ThreadState& state)
   const auto numbers = [](const std::vector<double>& values) {
     return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   };
-  return finite(state.x) && finite(state.v) && finite(state.d1) && numbers(state.twist) && numbers(state.spin) && numbers(state.volume);
+  return finite(state.x) && finite(state.v) && finite(state.d1) && numbers(state.twist) && numbers(state.spin) &&
+         numbers(state.volume);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -36,15 +36,17 @@ void DropCounter::drop(Drop reason, const std::string& what, const std::string& 
     ++r.silent;
     return;
   }
-  ROS_WARN("%s: dropped (%s)%s%s; %lu more for this reason since the last warning, %lu in all", what.c_str(), toString(reason),
-           detail.empty() ? "" : ": ", detail.c_str(), static_cast<unsigned long>(r.silent), static_cast<unsigned long>(r.count));
+  ROS_WARN("%s: dropped (%s)%s%s; %lu more for this reason since the last warning, %lu in all", what.c_str(),
+           toString(reason), detail.empty() ? "" : ": ", detail.c_str(), static_cast<unsigned long>(r.silent),
+           static_cast<unsigned long>(r.count));
   r.warned = now;
   r.silent = 0;
 }
 
 std::uint64_t DropCounter::total() const
 {
-  return std::accumulate(reasons_.begin(), reasons_.end(), std::uint64_t{0}, [](std::uint64_t sum, const Reason& r) { return sum + r.count; });
+  return std::accumulate(reasons_.begin(), reasons_.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const Reason& r) { return sum + r.count; });
 }
 
-}  // namespace slender
+}   // namespace slender

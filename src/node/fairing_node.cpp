@@ -13,7 +13,8 @@ namespace {
 TriangleMesh meshOf(const slender_sim::FairMesh::Request& request)
 {
   if (request.triangles.size() % 3 != 0)
-    throw std::invalid_argument("triangles: " + std::to_string(request.triangles.size()) + " numbers; must be three per triangle");
+    throw std::invalid_argument("triangles: " + std::to_string(request.triangles.size()) +
+                                " numbers; must be three per triangle");
   TriangleMesh mesh;
   mesh.vertices.resize(3, static_cast<Eigen::Index>(request.vertices.size()));
   for (std::size_t v = 0; v < request.vertices.size(); ++v)
@@ -22,7 +23,8 @@ TriangleMesh meshOf(const slender_sim::FairMesh::Request& request)
   for (std::size_t k = 0; k < request.triangles.size(); ++k)
   {
     if (request.triangles[k] >= request.vertices.size())
-      throw std::invalid_argument("triangle " + std::to_string(k / 3) + " has vertex " + std::to_string(request.triangles[k]) + "; there are " +
+      throw std::invalid_argument("triangle " + std::to_string(k / 3) + " has vertex " +
+                                  std::to_string(request.triangles[k]) + "; there are " +
                                   std::to_string(request.vertices.size()) + ", counted from 0");
     mesh.triangles.data()[k] = static_cast<int>(request.triangles[k]);
   }
@@ -48,7 +50,7 @@ FairingOptions optionsOf(const slender_sim::FairMesh::Request& request)
   return options;
 }
 
-}  // namespace
+}   // namespace
 
 FairingNode::FairingNode(ros::NodeHandle nh_priv)
 {
@@ -82,4 +84,4 @@ catch (const std::exception& error)   // a bad mesh or option; out of memory
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

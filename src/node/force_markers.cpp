@@ -7,13 +7,14 @@ namespace {
 using Eigen::Vector3d;
 using visualization_msgs::Marker;
 
-constexpr double kLever = 0.1;      // [m] at which a torque's force acts
-constexpr double kHead = 0.25;      // of an arrow's length
+constexpr double kLever = 0.1;   // [m] at which a torque's force acts
+constexpr double kHead = 0.25;   // of an arrow's length
 
 /// A shaft and four barbs, so that any number of arrows is one marker.
 void addArrow(const Vector3d& from, const Vector3d& along, Marker& marker)
 {
-  const Vector3d tip = from + along, u = along.unitOrthogonal() * along.norm(), w = along.cross(u).normalized() * along.norm();
+  const Vector3d tip = from + along, u = along.unitOrthogonal() * along.norm(),
+                 w = along.cross(u).normalized() * along.norm();
   const auto line = [&marker](const Vector3d& a, const Vector3d& b) {
     marker.points.push_back(toPoint(a));
     marker.points.push_back(toPoint(b));
@@ -24,8 +25,8 @@ void addArrow(const Vector3d& from, const Vector3d& along, Marker& marker)
 }
 
 /// An arrow that grows from `from`; none: deleted.
-Marker arrowMarker(const std_msgs::Header& header, const std::string& ns, int id, const Vector3d& from, const Vector3d& along,
-                   const std_msgs::ColorRGBA& paint)
+Marker arrowMarker(const std_msgs::Header& header, const std::string& ns, int id, const Vector3d& from,
+                   const Vector3d& along, const std_msgs::ColorRGBA& paint)
 {
   Marker marker = makeMarker(header, ns, id, Marker::ARROW);
   const double length = along.norm();
@@ -42,11 +43,13 @@ Marker arrowMarker(const std_msgs::Header& header, const std::string& ns, int id
   return marker;
 }
 
-}  // namespace
+}   // namespace
 
-void addForceMarkers(const Simulation& simulation, const std_msgs::Header& header, double scale, visualization_msgs::MarkerArray& out)
+void addForceMarkers(const Simulation& simulation, const std_msgs::Header& header, double scale,
+                     visualization_msgs::MarkerArray& out)
 {
-  const std_msgs::ColorRGBA force = color(0.85, 0.20, 0.55), torque = color(0.35, 0.25, 0.80), touch = color(0.10, 0.60, 0.35);
+  const std_msgs::ColorRGBA force = color(0.85, 0.20, 0.55), torque = color(0.35, 0.25, 0.80),
+                            touch = color(0.10, 0.60, 0.35);
   Marker contacts = makeMarker(header, "contacts", 0, Marker::LINE_LIST);
   double sum = 0.0;
   std::size_t count = 0;
@@ -81,8 +84,9 @@ void addForceMarkers(const Simulation& simulation, const std_msgs::Header& heade
   }
   for (std::size_t k = 0; k < simulation.state().threads.size(); ++k)
     if (simulation.config().threads[k].nozzle)
-      out.markers.push_back(arrowMarker(header, "nozzle_forces", static_cast<int>(k), simulation.state().threads[k].threads.front().ends[1].X_WE.position,
+      out.markers.push_back(arrowMarker(header, "nozzle_forces", static_cast<int>(k),
+                                        simulation.state().threads[k].threads.front().ends[1].X_WE.position,
                                         scale * simulation.endLoads(static_cast<int>(k))[1].force, force));
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -28,13 +28,15 @@ std::string slashed(const std::string& topic) { return !topic.empty() && topic.f
 /// The one topic that the source can mean.
 std::string topicOf(rosbag::Bag& bag, const BagSource& source)
 {
-  const std::set<std::string> types = source.bodies ? std::set<std::string>{kBodies} : std::set<std::string>{kPoints, kCloths};
+  const std::set<std::string> types =
+      source.bodies ? std::set<std::string>{kBodies} : std::set<std::string>{kPoints, kCloths};
   std::string all, good;
   std::set<std::string> fitting;
   for (const rosbag::ConnectionInfo* connection : rosbag::View(bag).getConnections())
   {
     all += (all.empty() ? "" : ", ") + connection->topic + " (" + connection->datatype + ")";
-    if (types.count(connection->datatype) && (source.topic.empty() || slashed(connection->topic) == slashed(source.topic)))
+    if (types.count(connection->datatype) &&
+        (source.topic.empty() || slashed(connection->topic) == slashed(source.topic)))
       fitting.insert(connection->topic);
   }
   for (const std::string& topic : fitting)
@@ -43,9 +45,11 @@ std::string topicOf(rosbag::Bag& bag, const BagSource& source)
     if (fitting.empty())
       good += (good.empty() ? "" : " or ") + type;
   if (fitting.empty())
-    throw std::runtime_error("has no messages " + good + (source.topic.empty() ? "" : " on " + source.topic) + "; it has: " + (all.empty() ? "nothing" : all));
+    throw std::runtime_error("has no messages " + good + (source.topic.empty() ? "" : " on " + source.topic) +
+                             "; it has: " + (all.empty() ? "nothing" : all));
   if (fitting.size() > 1)
-    throw std::runtime_error("several of its topics could be the guide: " + good + "; name one of them: {file: ..., topic: ...}");
+    throw std::runtime_error("several of its topics could be the guide: " + good +
+                             "; name one of them: {file: ..., topic: ...}");
   return *fitting.begin();
 }
 
@@ -57,11 +61,13 @@ Eigen::Matrix3Xd pointsOf(const slender_sim::ClothState& message, const std::str
   for (const std::string& name : message.names)
     names += (names.empty() ? "" : ", ") + name;
   if (found == message.names.end() && message.names.size() != 1)
-    throw std::runtime_error("has no cloth " + object + " but " + names + "; name one of them: {file: ..., cloth: ...}");
+    throw std::runtime_error("has no cloth " + object + " but " + names +
+                             "; name one of them: {file: ..., cloth: ...}");
   const std::size_t k = found == message.names.end() ? 0 : static_cast<std::size_t>(found - message.names.begin());
   const auto slice = [k](const auto& offsets, const std::vector<geometry_msgs::Point>& points) {
     Eigen::Matrix3Xd x;
-    const std::size_t first = k < offsets.size() ? offsets[k] : points.size(), last = k + 1 < offsets.size() ? offsets[k + 1] : points.size();
+    const std::size_t first = k < offsets.size() ? offsets[k] : points.size(),
+                      last = k + 1 < offsets.size() ? offsets[k + 1] : points.size();
     if (first > last || last > points.size())
       throw std::runtime_error("has a state whose offsets do not fit its vertices");
     x.resize(3, static_cast<Eigen::Index>(last - first));
@@ -88,7 +94,8 @@ public:
       frame_ = header.frame_id;
     }
     else if (!(header.stamp > last_))
-      throw std::runtime_error("its stamps do not increase: " + std::to_string(last_.toSec()) + " s is followed by " + std::to_string(header.stamp.toSec()) + " s");
+      throw std::runtime_error("its stamps do not increase: " + std::to_string(last_.toSec()) + " s is followed by " +
+                               std::to_string(header.stamp.toSec()) + " s");
     if (header.frame_id != frame_)
       throw std::runtime_error("its messages are in several frames: " + frame_ + " and " + header.frame_id);
     last_ = header.stamp;
@@ -110,7 +117,8 @@ void addBodies(const slender_sim::BodyStates& message, double time, std::map<std
   {
     Pose pose;
     if (fromMessage(message.pose[b], pose) != PoseFault::none)
-      throw std::runtime_error("at " + std::to_string(time) + " s: the pose of " + message.name[b] + " must be finite, the length of its quaternion 1");
+      throw std::runtime_error("at " + std::to_string(time) + " s: the pose of " + message.name[b] +
+                               " must be finite, the length of its quaternion 1");
     appendRecorded(bodies[message.name[b]], time, pose);
   }
 }
@@ -138,7 +146,8 @@ RecordedGuide read(const BagSource& source)
     if (const auto state = message.instantiate<slender_sim::ClothState>())
     {
       if (epoch.value_or(state->epoch) != state->epoch)
-        throw std::runtime_error("its run was reset or loaded (epoch " + std::to_string(state->epoch) + "): a guide is one motion");
+        throw std::runtime_error("its run was reset or loaded (epoch " + std::to_string(state->epoch) +
+                                 "): a guide is one motion");
       epoch = state->epoch;
       time = order.take(state->header);
       steps.add(state->epoch, state->step, time);
@@ -168,7 +177,7 @@ RecordedGuide read(const BagSource& source)
   return guide;
 }
 
-}  // namespace
+}   // namespace
 
 RecordedGuide readGuideBag(const BagSource& source)
 {
@@ -187,4 +196,4 @@ RecordedGuide readGuideBag(const BagSource& source)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -11,9 +11,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-}  // namespace
+}   // namespace
 
-GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG) : GuideStream(options.timing(), options.coast), options_(options), attach_(attach)
+GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG)
+  : GuideStream(options.timing(), options.coast),
+    options_(options),
+    attach_(attach)
 {
   if (!(options.catch_up_time > 0.0) || !(options.catch_up_speed > 0.0) || !(options.catch_up_turning > 0.0))
     throw std::invalid_argument("GuideBuffer: catch-up time and speeds must be > 0");
@@ -39,8 +42,8 @@ void GuideBuffer::forgetPlain() { plain_.X.position.setConstant(std::nan("")); }
 bool GuideBuffer::passesHere() const
 {
   const Motion now = followed(query_, rate_);
-  return now.X.position == plain_.X.position && now.X.orientation.coeffs() == plain_.X.orientation.coeffs() && now.V.linear == plain_.V.linear &&
-         now.V.angular == plain_.V.angular;
+  return now.X.position == plain_.X.position && now.X.orientation.coeffs() == plain_.X.orientation.coeffs() &&
+         now.V.linear == plain_.V.linear && now.V.angular == plain_.V.angular;
 }
 
 void GuideBuffer::rejoin(double time)
@@ -115,12 +118,17 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
 
 void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
 {
-  const auto differ = [](const Vector3d& a, const Vector3d& b, double scale) { return (a - b).norm() > kSameMotion * (1.0 + scale); };
-  const auto rotated = [](const Motion& a, const Motion& b) { return rotationVector(a.X.orientation * b.X.orientation.conjugate()); };
+  const auto differ = [](const Vector3d& a, const Vector3d& b, double scale) {
+    return (a - b).norm() > kSameMotion * (1.0 + scale);
+  };
+  const auto rotated = [](const Motion& a, const Motion& b) {
+    return rotationVector(a.X.orientation * b.X.orientation.conjugate());
+  };
   const Motion expected = blended(time, to);
   // `to` was evaluated kLimitOffset later than `from`, so the two may differ by what passes in that time.
   const double speed = (to.V.linear.norm() + to.V.angular.norm()) * kLimitOffset / kSameMotion;
-  if (!differ(from.X.position, expected.X.position, speed) && !differ(rotated(from, expected), Vector3d::Zero(), speed) &&
+  if (!differ(from.X.position, expected.X.position, speed) &&
+      !differ(rotated(from, expected), Vector3d::Zero(), speed) &&
       (from.V.linear - expected.V.linear).norm() < 1e-4 * (1e-2 + to.V.linear.norm()) &&
       (from.V.angular - expected.V.angular).norm() < 1e-4 * (1e-2 + to.V.angular.norm()))
     return;
@@ -131,8 +139,9 @@ void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
   o.r = rotated(from, to);
   o.r_rate = rotationRate(o.r).inverse() * (from.V.angular - fromRotationVector(o.r) * to.V.angular);
   o.rate_duration = timing_.overran() ? std::max(options_.catch_up_time, kDryBlend) : options_.catch_up_time;
-  o.duration = std::max({o.rate_duration, o.p.norm() / options_.catch_up_speed, o.r.norm() / options_.catch_up_turning});
+  o.duration =
+      std::max({o.rate_duration, o.p.norm() / options_.catch_up_speed, o.r.norm() / options_.catch_up_turning});
   offset_ = o;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -10,7 +10,7 @@
 namespace slender {
 namespace {
 
-constexpr int kQueueSize = 1000;               // a burst of fast trackers; in wall pace it is emptied every step
+constexpr int kQueueSize = 1000;   // a burst of fast trackers; in wall pace it is emptied every step
 constexpr std::size_t kMaxPending = 1000;
 
 /// Names of the scene's own bodies and obstacles: grasps follow those without messages.
@@ -24,11 +24,15 @@ std::set<std::string> solidNames(const SceneConfig& scene)
   return names;
 }
 
-}  // namespace
+}   // namespace
 
-GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
-                         const std::vector<std::string>& grasp_names, const std::vector<std::string>& thread_prefixes)
-  : options_(options), simulation_(&simulation), clock_(clock), pending_(kMaxPending, options.tf_timeout)
+GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation,
+                         const SimClock& clock, const std::vector<std::string>& grasp_names,
+                         const std::vector<std::string>& thread_prefixes)
+  : options_(options),
+    simulation_(&simulation),
+    clock_(clock),
+    pending_(kMaxPending, options.tf_timeout)
 {
   GuideBuffer::Options buffer_options;
   buffer_options.delay = options.guide_delay;
@@ -51,7 +55,8 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
       guided.body = body->body;
     const bool topic = std::holds_alternative<TopicMotion>(ref.config->motion);
     if (topic || !guided.body.empty())
-      guided.buffer = std::make_unique<GuideBuffer>(buffer_options, ref.config->attach, simulation.graspPose(static_cast<int>(g)));
+      guided.buffer =
+          std::make_unique<GuideBuffer>(buffer_options, ref.config->attach, simulation.graspPose(static_cast<int>(g)));
     guided_.push_back(std::move(guided));
     if (topic)
     {
@@ -62,14 +67,18 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   grasps_ = guided_.size();
   addSolids(simulation, buffer_options);
   const bool threads = addThreads(nh, simulation, buffer_options, thread_prefixes);
-  const bool bodies = std::any_of(guided_.begin(), guided_.end(), [](const Guided& guided) { return !guided.body.empty(); });
+  const bool bodies =
+      std::any_of(guided_.begin(), guided_.end(), [](const Guided& guided) { return !guided.body.empty(); });
   if (topics)
-    subscribers_.push_back(nh.subscribe("guides", kQueueSize, &GuideInputs::onGuides, this, ros::TransportHints().tcpNoDelay()));
+    subscribers_.push_back(
+        nh.subscribe("guides", kQueueSize, &GuideInputs::onGuides, this, ros::TransportHints().tcpNoDelay()));
   if (bodies)
-    subscribers_.push_back(nh.subscribe("bodies", kQueueSize, &GuideInputs::onBodies, this, ros::TransportHints().tcpNoDelay()));
+    subscribers_.push_back(
+        nh.subscribe("bodies", kQueueSize, &GuideInputs::onBodies, this, ros::TransportHints().tcpNoDelay()));
   wind_topic_ = simulation.config().wind_topic;
   if (wind_topic_)
-    subscribers_.push_back(nh.subscribe("wind", kQueueSize, &GuideInputs::onWind, this, ros::TransportHints().tcpNoDelay()));
+    subscribers_.push_back(
+        nh.subscribe("wind", kQueueSize, &GuideInputs::onWind, this, ros::TransportHints().tcpNoDelay()));
   tracking_ = std::make_unique<TrackingInputs>(nh, options_, buffer_options, simulation, clock_, tf_buffer_, drops_);
   if (topics || bodies || threads || wind_topic_ || tracking_->any())
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
@@ -81,8 +90,8 @@ void GuideInputs::subscribePose(ros::NodeHandle& nh)
   const int guided = static_cast<int>(guided_.size()) - 1;
   const boost::function<void(const geometry_msgs::PoseStamped&)> callback =
       [this, guided](const geometry_msgs::PoseStamped& message) { onPose(guided, message); };
-  subscribers_.push_back(nh.subscribe<const geometry_msgs::PoseStamped&>(guided_.back().topic, kQueueSize, callback, ros::VoidConstPtr(),
-                                                                        ros::TransportHints().tcpNoDelay()));
+  subscribers_.push_back(nh.subscribe<const geometry_msgs::PoseStamped&>(
+      guided_.back().topic, kQueueSize, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
 /// True when any of them listens to something that has a frame.
@@ -110,17 +119,20 @@ bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, 
     threads_[k].belt_topic = threads[k].floor && (threads[k].floor->belt_x.topic || threads[k].floor->belt_y.topic);
     if (threads_[k].flow_topic)
     {
-      const boost::function<void(const std_msgs::Float64&)> callback = [this, k](const std_msgs::Float64& message) { onFlow(k, message); };
-      subscribers_.push_back(nh.subscribe<const std_msgs::Float64&>(prefixes[k] + "nozzle/flow", kQueueSize, callback, ros::VoidConstPtr(),
-                                                                   ros::TransportHints().tcpNoDelay()));
+      const boost::function<void(const std_msgs::Float64&)> callback = [this, k](const std_msgs::Float64& message) {
+        onFlow(k, message);
+      };
+      subscribers_.push_back(nh.subscribe<const std_msgs::Float64&>(
+          prefixes[k] + "nozzle/flow", kQueueSize, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
     }
     if (threads_[k].belt_topic)
     {
       framed = true;
       const boost::function<void(const geometry_msgs::Vector3Stamped&)> callback =
           [this, k](const geometry_msgs::Vector3Stamped& message) { onBelt(k, message); };
-      subscribers_.push_back(nh.subscribe<const geometry_msgs::Vector3Stamped&>(prefixes[k] + "belt/velocity", kQueueSize, callback,
-                                                                               ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+      subscribers_.push_back(
+          nh.subscribe<const geometry_msgs::Vector3Stamped&>(prefixes[k] + "belt/velocity", kQueueSize, callback,
+                                                             ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
     }
   }
   return framed;
@@ -147,13 +159,18 @@ void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Opt
   obstacles_ = scene.obstacles.size();
 }
 
-bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, const std::string& whose, Pose& X)
+bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, const std::string& whose,
+                            Pose& X)
 {
   switch (fromMessage(message, X))
   {
     case PoseFault::none: return true;
-    case PoseFault::not_finite: drops_.drop(Drop::not_finite, what, "position and orientation of " + whose + " must be finite"); return false;
-    case PoseFault::bad_quaternion: drops_.drop(Drop::bad_quaternion, what, "the orientation of " + whose + ", whose length must be 1 within 1 %"); return false;
+    case PoseFault::not_finite:
+      drops_.drop(Drop::not_finite, what, "position and orientation of " + whose + " must be finite");
+      return false;
+    case PoseFault::bad_quaternion:
+      drops_.drop(Drop::bad_quaternion, what, "the orientation of " + whose + ", whose length must be 1 within 1 %");
+      return false;
   }
   return false;
 }
@@ -171,8 +188,9 @@ void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
   drops_.receive();
   if (message.poses.size() != grasps_)
   {
-    drops_.drop(Drop::wrong_length, "guides",
-                std::to_string(message.poses.size()) + " poses, but the scene has " + std::to_string(grasps_) + " grasps");
+    drops_.drop(
+        Drop::wrong_length, "guides",
+        std::to_string(message.poses.size()) + " poses, but the scene has " + std::to_string(grasps_) + " grasps");
     return;
   }
   std::vector<Entry> entries;
@@ -190,7 +208,8 @@ void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
 void GuideInputs::onBodies(const slender_sim::BodyStates& message)
 {
   drops_.receive();
-  if (message.pose.size() != message.name.size() || (!message.twist.empty() && message.twist.size() != message.name.size()))
+  if (message.pose.size() != message.name.size() ||
+      (!message.twist.empty() && message.twist.size() != message.name.size()))
   {
     drops_.drop(Drop::wrong_length, "bodies", "name, pose and twist must be equally long (twist may be empty)");
     return;
@@ -244,8 +263,10 @@ void GuideInputs::take(int source, const std::string& what, const std_msgs::Head
   const double age = -clock_.secondsAt(message.stamp) + clock_.seconds();
   if (age > options_.guide_timeout || -age > options_.guide_ahead)
   {
-    drops_.drop(age > 0.0 ? Drop::stale : Drop::from_future, what,
-                "its stamp is " + std::to_string(std::abs(age)) + " s " + (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
+    drops_.drop(
+        age > 0.0 ? Drop::stale : Drop::from_future, what,
+        "its stamp is " + std::to_string(std::abs(age)) + " s " +
+            (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
     return;
   }
   if (!pending_.holds(source, message.frame) && deliver(message, nullptr))
@@ -256,7 +277,8 @@ void GuideInputs::take(int source, const std::string& what, const std_msgs::Head
 
 void GuideInputs::dropTransform(PoseFault fault, const std::string& what, const std::string& frame)
 {
-  drops_.drop(fault == PoseFault::not_finite ? Drop::not_finite : Drop::bad_quaternion, what, "in the transform from " + frame);
+  drops_.drop(fault == PoseFault::not_finite ? Drop::not_finite : Drop::bad_quaternion, what,
+              "in the transform from " + frame);
 }
 
 bool GuideInputs::deliver(const Message& message, std::string* why)
@@ -286,7 +308,8 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
   for (const Entry& entry : message.entries)
     if (!((X_WF * entry.X_FH).position.cwiseAbs().maxCoeff() <= max_coordinate))
     {
-      drops_.drop(Drop::out_of_range, message.what, "coordinates must be within " + std::to_string(static_cast<long>(max_coordinate)) + " m");
+      drops_.drop(Drop::out_of_range, message.what,
+                  "coordinates must be within " + std::to_string(static_cast<long>(max_coordinate)) + " m");
       return true;
     }
   const double time = clock_.secondsAt(message.stamp);
@@ -310,9 +333,11 @@ void GuideInputs::processPending()
 {
   tracking_->processPending();
   takeHand();
-  pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); }, [this](const Message& message, const std::string& why) {
-    drops_.drop(Drop::no_transform, message.what, "from " + message.frame + " to " + options_.frame_id + ": " + why);
-  });
+  pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); },
+                   [this](const Message& message, const std::string& why) {
+                     drops_.drop(Drop::no_transform, message.what,
+                                 "from " + message.frame + " to " + options_.frame_id + ": " + why);
+                   });
 }
 
 void GuideInputs::apply(double time, SceneInputs& inputs)
@@ -326,7 +351,9 @@ void GuideInputs::apply(double time, SceneInputs& inputs)
         inputs.threads[solid - bodies_ - obstacles_].nozzle = guided_[g].buffer->target(time).X_WG;
         continue;
       }
-      GraspTarget& target = g < grasps_ ? inputs.grasps[g] : solid < bodies_ ? inputs.bodies[solid] : inputs.obstacles[solid - bodies_];
+      GraspTarget& target = g < grasps_       ? inputs.grasps[g]
+                            : solid < bodies_ ? inputs.bodies[solid]
+                                              : inputs.obstacles[solid - bodies_];
       target = guided_[g].buffer->target(time);
     }
   tracking_->apply(time, inputs);
@@ -415,4 +442,4 @@ std::vector<GuideInputs::Age> GuideInputs::ages() const
   return ages;
 }
 
-}  // namespace slender
+}   // namespace slender

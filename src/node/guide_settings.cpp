@@ -14,7 +14,7 @@ std::string text(double value)
   return out;
 }
 
-}  // namespace
+}   // namespace
 
 void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
 {
@@ -23,8 +23,9 @@ void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
   if (!std::isfinite(message.data))
     drops_.drop(Drop::not_finite, what, "it must be finite [m^3/s]");
   else if (message.data < 0.0 || message.data > threads_[thread].greatest_flow)
-    drops_.drop(Drop::out_of_range, what, text(message.data) + "; it must be from 0 to " + text(threads_[thread].greatest_flow) +
-                                              " m^3/s, with which a thousand edges leave the nozzle per step");
+    drops_.drop(Drop::out_of_range, what,
+                text(message.data) + "; it must be from 0 to " + text(threads_[thread].greatest_flow) +
+                    " m^3/s, with which a thousand edges leave the nozzle per step");
   else
   {
     threads_[thread].flow = message.data;
@@ -37,7 +38,8 @@ void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
 }
 
 /// In whatever frame the message names, as that stands now. Nothing when dropped.
-std::optional<Eigen::Vector3d> GuideInputs::velocityOf(const geometry_msgs::Vector3Stamped& message, const std::string& what)
+std::optional<Eigen::Vector3d> GuideInputs::velocityOf(const geometry_msgs::Vector3Stamped& message,
+                                                       const std::string& what)
 {
   Eigen::Vector3d velocity(message.vector.x, message.vector.y, message.vector.z);
   if (!velocity.allFinite())
@@ -57,7 +59,8 @@ std::optional<Eigen::Vector3d> GuideInputs::velocityOf(const geometry_msgs::Vect
   Pose X_WF;
   try
   {
-    const PoseFault fault = fromMessage(tf_buffer_.lookupTransform(options_.frame_id, frame, ros::Time(0)).transform, X_WF);
+    const PoseFault fault =
+        fromMessage(tf_buffer_.lookupTransform(options_.frame_id, frame, ros::Time(0)).transform, X_WF);
     if (fault != PoseFault::none)
     {
       dropTransform(fault, what, frame);
@@ -102,16 +105,18 @@ std::vector<GuideInputs::Setting> GuideInputs::settings() const
 {
   std::vector<Setting> settings;
   if (wind_topic_)
-    settings.push_back({"wind [m/s]", wind_ ? text(wind_->x()) + " " + text(wind_->y()) + " " + text(wind_->z()) : "none yet"});
+    settings.push_back(
+        {"wind [m/s]", wind_ ? text(wind_->x()) + " " + text(wind_->y()) + " " + text(wind_->z()) : "none yet"});
   for (std::size_t k = 0; k < threads_.size(); ++k)
   {
     const Driven& thread = threads_[k];
     if (thread.flow_topic)
       settings.push_back({prefixes_[k] + "nozzle/flow [m^3/s]", thread.flow ? text(*thread.flow) : "none yet"});
     if (thread.belt_topic)
-      settings.push_back({prefixes_[k] + "belt/velocity [m/s]", thread.belt ? text(thread.belt->x()) + " " + text(thread.belt->y()) : "none yet"});
+      settings.push_back({prefixes_[k] + "belt/velocity [m/s]",
+                          thread.belt ? text(thread.belt->x()) + " " + text(thread.belt->y()) : "none yet"});
   }
   return settings;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,27 +7,30 @@
 namespace slender {
 namespace {
 
-constexpr double kPause = 0.25;      // [s] a longer interval begins a new stream if the last sample was reached meanwhile
-constexpr double kSilence = 0.4;     // [s] a stream has ended when no sample came for this time
-constexpr double kFewSilence = 0.1;  // [s] the same for a stream of one or two samples
-constexpr double kAhead = 0.05;      // [s] a sample stamped this far ahead belongs to a planned motion, whose end is known
-constexpr double kMemory = 2.5;      // [s] the greatest needed lag is remembered for one to two times this long
-constexpr double kMargin = 1.1;      // ratio of lag to needed lag, so that the next sample may be a little later than the earlier ones
-constexpr double kMostLag = 1.0;     // [s] greatest lag; a stream that needs more stops and goes
+// [s] a longer interval begins a new stream if the last sample was reached meanwhile
+constexpr double kPause = 0.25;
+constexpr double kSilence = 0.4;      // [s] a stream has ended when no sample came for this time
+constexpr double kFewSilence = 0.1;   // [s] the same for a stream of one or two samples
+// [s] a sample stamped this far ahead belongs to a planned motion, whose end is known
+constexpr double kAhead = 0.05;
+constexpr double kMemory = 2.5;   // [s] the greatest needed lag is remembered for one to two times this long
+// ratio of lag to needed lag, so that the next sample may be a little later than the earlier ones
+constexpr double kMargin = 1.1;
+constexpr double kMostLag = 1.0;   // [s] greatest lag; a stream that needs more stops and goes
 // [s] time in which the rate changes by 1. For a sine of 1 Hz this adds at most 0.8 of its acceleration, a quarter of a
 // period out of phase with it.
 constexpr double kRamp = 0.2;
-constexpr double kBrake = 0.15;      // [s] the same for a stream that runs dry
-constexpr double kSettle = 0.5;      // [s] time constant with which the lag approaches the wanted one
-constexpr double kCatchUp = 0.1;     // greatest rate minus 1
+constexpr double kBrake = 0.15;    // [s] the same for a stream that runs dry
+constexpr double kSettle = 0.5;    // [s] time constant with which the lag approaches the wanted one
+constexpr double kCatchUp = 0.1;   // greatest rate minus 1
 
-}  // namespace
+}   // namespace
 
 GuideTiming::GuideTiming(const Options& options) : options_(options)
 {
   if (!(options.delay >= 0.0) || !(options.coast >= 0.0))
-    throw std::invalid_argument("guide timing: delay is " + std::to_string(options.delay) + " s and coast " + std::to_string(options.coast) +
-                                " s; both must be >= 0");
+    throw std::invalid_argument("guide timing: delay is " + std::to_string(options.delay) + " s and coast " +
+                                std::to_string(options.coast) + " s; both must be >= 0");
 }
 
 bool GuideTiming::sample(double stamp)
@@ -68,8 +71,8 @@ bool GuideTiming::ended(double time) const
 {
   if (fixed() || time - arrival_ > (count_ < 3 ? kFewSilence : kSilence) || last_ > arrival_ + kAhead)
     return true;
-  // While no sample was late, a missing sample is taken as the stream's end. The motion then does not depend on the times
-  // at which samples arrived.
+  // While no sample was late, a missing sample is taken as the stream's end. The motion then does not depend on the
+  // times at which samples arrived.
   return count_ > 2 && !options_.live && !options_.automatic && required() <= options_.delay;
 }
 
@@ -174,6 +177,9 @@ void GuideTiming::restart() { *this = GuideTiming(options_); }
 
 double GuideTiming::lag() const { return lag_ ? *lag_ : following_ && now_ ? *now_ - query_ : wanted(); }
 
-double GuideTiming::excess() const { return options_.automatic || fixed() ? 0.0 : std::max(0.0, required() - options_.delay); }
+double GuideTiming::excess() const
+{
+  return options_.automatic || fixed() ? 0.0 : std::max(0.0, required() - options_.delay);
+}
 
-}  // namespace slender
+}   // namespace slender

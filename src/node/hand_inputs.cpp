@@ -11,7 +11,8 @@ namespace {
 /// Of the box around an object [m].
 double diagonal(const Eigen::AlignedBox3d& box) { return box.isEmpty() ? 1.0 : std::max(box.diagonal().norm(), 1e-3); }
 
-/// The ball is little wider than the gripper of a rod, so that the rod is seen beside it, but wide enough to be caught with a mouse where all of the object is in view.
+/// The ball is little wider than the gripper of a rod, so that the rod is seen beside it, but wide enough to be caught
+/// with a mouse where all of the object is in view.
 void sizeGraspHandle(const Simulation& simulation, const GraspRef& ref, Handle& handle)
 {
   if (ref.cloth >= 0)
@@ -23,7 +24,8 @@ void sizeGraspHandle(const Simulation& simulation, const GraspRef& ref, Handle& 
     return;
   }
   const RodModel& model = simulation.rodModel(ref.rod);
-  const double radius = std::max(model.radius_a.maxCoeff(), model.radius_b.maxCoeff()), length = model.rest_length.sum();
+  const double radius = std::max(model.radius_a.maxCoeff(), model.radius_b.maxCoeff()),
+               length = model.rest_length.sum();
   handle.size = std::max(12.0 * radius, 0.08 * length);
   handle.ball = std::max(5.0 * radius, 0.02 * length);
   handle.turns = simulation.state().rods[ref.rod].grasps[ref.index].holds_frame;
@@ -36,17 +38,20 @@ struct Reach   // [m] how far a shape reaches from its origin
   double operator()(const Box& b) const { return 0.5 * b.size.norm(); }
   double operator()(const Cylinder& c) const { return std::hypot(c.radius, 0.5 * c.length); }
   double operator()(const Capsule& c) const { return c.radius + 0.5 * c.length; }
-  double operator()(const std::shared_ptr<const TriangleMesh>& mesh) const { return mesh->vertices.colwise().norm().maxCoeff(); }
+  double operator()(const std::shared_ptr<const TriangleMesh>& mesh) const
+  {
+    return mesh->vertices.colwise().norm().maxCoeff();
+  }
 };
 
-}  // namespace
+}   // namespace
 
 void GuideInputs::listenToHand(ros::NodeHandle nh, const std::string& topic)
 {
   const boost::function<void(const visualization_msgs::InteractiveMarkerFeedback&)> callback =
       [this](const visualization_msgs::InteractiveMarkerFeedback& message) { onHand(message); };
-  subscribers_.push_back(nh.subscribe<const visualization_msgs::InteractiveMarkerFeedback&>(topic + "/feedback", 100, callback, ros::VoidConstPtr(),
-                                                                                          ros::TransportHints().tcpNoDelay()));
+  subscribers_.push_back(nh.subscribe<const visualization_msgs::InteractiveMarkerFeedback&>(
+      topic + "/feedback", 100, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
   if (!tf_listener_)
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
 }
@@ -77,7 +82,9 @@ std::vector<Handle> GuideInputs::handles(const Simulation& simulation) const
     else if (g < grasps_ + bodies_ + obstacles_)
     {
       const std::size_t solid = g - grasps_;
-      const Shape* shape = solid >= bodies_ ? &scene.obstacles[solid - bodies_].shape : scene.bodies[solid].shape ? &*scene.bodies[solid].shape : nullptr;
+      const Shape* shape = solid >= bodies_            ? &scene.obstacles[solid - bodies_].shape
+                           : scene.bodies[solid].shape ? &*scene.bodies[solid].shape
+                                                       : nullptr;
       handle.size = shape ? 2.4 * std::visit(Reach(), *shape) : 0.15 * diagonal(sceneBox(simulation.state()));
       handle.ball = 0.35 * handle.size;
     }
@@ -96,7 +103,8 @@ void GuideInputs::onHand(const visualization_msgs::InteractiveMarkerFeedback& me
 {
   drops_.receive();
   using Feedback = visualization_msgs::InteractiveMarkerFeedback;
-  if (message.event_type != Feedback::POSE_UPDATE && message.event_type != Feedback::MOUSE_DOWN && message.event_type != Feedback::MOUSE_UP)
+  if (message.event_type != Feedback::POSE_UPDATE && message.event_type != Feedback::MOUSE_DOWN &&
+      message.event_type != Feedback::MOUSE_UP)
     return;
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (isDraggable(g) && handleName(g) == message.marker_name)
@@ -124,11 +132,12 @@ void GuideInputs::takeHand()
     std_msgs::Header header;   // stamp zero: now
     header.frame_id = last ? moved->second.frame : options_.frame_id;
     // the first pose of all is where the thing is: there the hand took hold of it
-    const Entry entry{static_cast<int>(g), last ? moved->second.X_FH * guided_[g].buffer->graspInGripper().inverse() : poseOf(*simulation_, g)};
+    const Entry entry{static_cast<int>(g), last ? moved->second.X_FH * guided_[g].buffer->graspInGripper().inverse()
+                                                : poseOf(*simulation_, g)};
     const bool solid = g >= grasps_ && g < grasps_ + bodies_ + obstacles_;
     take(solid ? kBodiesSource : static_cast<int>(g), handleName(g), header, {entry});
     moved = last ? hand_.erase(moved) : std::next(moved);
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -45,17 +45,22 @@ InteractiveMarker makeHandle(const Handle& handle, const std::string& frame_id)
   return out;
 }
 
-}  // namespace
+}   // namespace
 
-HandMarkers::HandMarkers(const std::string& topic, const std::string& frame_id) : frame_id_(frame_id), server_(topic, "", true) {}
+HandMarkers::HandMarkers(const std::string& topic, const std::string& frame_id)
+  : frame_id_(frame_id),
+    server_(topic, "", true)
+{
+}
 
 void HandMarkers::show(const std::vector<Handle>& handles)
 {
   server_.clear();
   for (const Handle& handle : handles)
     // other viewers, too, see the handle go with the hand
-    server_.insert(makeHandle(handle, frame_id_), [this](const visualization_msgs::InteractiveMarkerFeedbackConstPtr&) { server_.applyChanges(); });
+    server_.insert(makeHandle(handle, frame_id_),
+                   [this](const visualization_msgs::InteractiveMarkerFeedbackConstPtr&) { server_.applyChanges(); });
   server_.applyChanges();
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -21,7 +21,8 @@ std::string topicNamed(rosbag::Bag& bag, const std::string& type, const std::str
   for (const rosbag::ConnectionInfo* connection : rosbag::View(bag).getConnections())
   {
     const std::string& topic = connection->topic;
-    if (connection->datatype == type && topic.size() >= name.size() && topic.compare(topic.size() - name.size(), name.size(), name) == 0)
+    if (connection->datatype == type && topic.size() >= name.size() &&
+        topic.compare(topic.size() - name.size(), name.size(), name) == 0)
       found.insert(topic);
   }
   if (found.size() > 1)
@@ -29,7 +30,7 @@ std::string topicNamed(rosbag::Bag& bag, const std::string& type, const std::str
   return found.empty() ? std::string() : *found.begin();
 }
 
-}  // namespace
+}   // namespace
 
 InputReplay::InputReplay(const std::string& path) : path_(path)
 {
@@ -39,7 +40,8 @@ InputReplay::InputReplay(const std::string& path) : path_(path)
       throw std::runtime_error("there is no such file");
     requireRegularFile(path);
     rosbag::Bag bag(path, rosbag::bagmode::Read);
-    const std::string scene = topicNamed(bag, "std_msgs/String", "/scene"), inputs = topicNamed(bag, "slender_sim/Input", "/inputs");
+    const std::string scene = topicNamed(bag, "std_msgs/String", "/scene"),
+                      inputs = topicNamed(bag, "slender_sim/Input", "/inputs");
     if (scene.empty())
       throw std::runtime_error("has no topic scene; replay a bag that a node wrote itself (~record_bag)");
     for (const rosbag::MessageInstance& message : rosbag::View(bag, rosbag::TopicQuery(scene)))
@@ -54,7 +56,8 @@ InputReplay::InputReplay(const std::string& path) : path_(path)
       {
         const auto input = message.instantiate<slender_sim::Input>();
         if (!input)
-          throw std::runtime_error("has inputs of another version of slender_sim; replay it with the version that recorded it");
+          throw std::runtime_error(
+              "has inputs of another version of slender_sim; replay it with the version that recorded it");
         inputs_.push_back(*input);
       }
     end_ = rosbag::View(bag).getEndTime();
@@ -71,7 +74,8 @@ InputReplay::InputReplay(const std::string& path) : path_(path)
 
 const slender_sim::Input* InputReplay::settings() const
 {
-  const bool first = !inputs_.empty() && inputs_.front().kind == slender_sim::Input::SETTINGS && inputs_.front().values.size() == 5;
+  const bool first =
+      !inputs_.empty() && inputs_.front().kind == slender_sim::Input::SETTINGS && inputs_.front().values.size() == 5;
   return first ? &inputs_.front() : nullptr;
 }
 
@@ -80,4 +84,4 @@ const slender_sim::Input* InputReplay::next(std::uint64_t tick)
   return at_ < inputs_.size() && inputs_[at_].tick <= tick ? &inputs_[at_++] : nullptr;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -10,19 +10,23 @@ using visualization_msgs::Marker;
 
 std::string colorLine(MarkerColor what, double range)
 {
-  const char* const name = what == MarkerColor::strain ? "strain" : what == MarkerColor::curvature ? "curvature" : "twist";
+  const char* const name = what == MarkerColor::strain      ? "strain"
+                           : what == MarkerColor::curvature ? "curvature"
+                                                            : "twist";
   const char* const unit = what == MarkerColor::strain ? "" : what == MarkerColor::curvature ? " 1/m" : " rad/m";
   char text[120];
   std::snprintf(text, sizeof text, "%s: blue -%.3g%s, grey 0, red %.3g%s\n", name, range, unit, range, unit);
   return text;
 }
 
-}  // namespace
+}   // namespace
 
 Eigen::AlignedBox3d sceneBox(const SceneState& state)
 {
   Eigen::AlignedBox3d box;
-  const auto extend = [&box](const Eigen::Matrix3Xd& x) { box.extend(x.rowwise().minCoeff()).extend(x.rowwise().maxCoeff()); };
+  const auto extend = [&box](const Eigen::Matrix3Xd& x) {
+    box.extend(x.rowwise().minCoeff()).extend(x.rowwise().maxCoeff());
+  };
   for (const RodState& rod : state.rods)
     extend(rod.x);
   for (const ThreadGroupState& group : state.threads)
@@ -47,7 +51,8 @@ void addLegend(const Simulation& simulation, const std_msgs::Header& header, con
   if (options.forces > 0.0)
   {
     char line[160];
-    std::snprintf(line, sizeof line, "arrows, %.3g m per N: contact green, holder red, its torque over 0.1 m violet\n", options.forces);
+    std::snprintf(line, sizeof line, "arrows, %.3g m per N: contact green, holder red, its torque over 0.1 m violet\n",
+                  options.forces);
     text += line;
   }
   const Eigen::AlignedBox3d box = sceneBox(simulation.state());
@@ -64,4 +69,4 @@ void addLegend(const Simulation& simulation, const std_msgs::Header& header, con
   out.markers.push_back(std::move(marker));
 }
 
-}  // namespace slender
+}   // namespace slender

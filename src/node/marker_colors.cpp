@@ -42,7 +42,8 @@ std::vector<double> membraneStrains(const TriangleMesh& rest, const Eigen::Matri
   for (Eigen::Index f = 0; f < rest.triangles.cols(); ++f)
   {
     const Eigen::Vector3i t = rest.triangles.col(f);
-    const Vector3d U = rest.vertices.col(t[1]) - rest.vertices.col(t[0]), V = rest.vertices.col(t[2]) - rest.vertices.col(t[0]);
+    const Vector3d U = rest.vertices.col(t[1]) - rest.vertices.col(t[0]),
+                   V = rest.vertices.col(t[2]) - rest.vertices.col(t[0]);
     const Vector3d axis = U.normalized(), across = (V - V.dot(axis) * axis).normalized();
     Eigen::Matrix2d D;
     D << U.norm(), V.dot(axis), 0.0, V.dot(across);
@@ -65,7 +66,8 @@ std::vector<double> membraneStrains(const TriangleMesh& rest, const Eigen::Matri
 }
 
 /// Mean curvature per vertex [1/m], by the cotangents' Laplacian over a third of the area around; zero on the border.
-std::vector<double> meanCurvatures(const MeshTopology& topology, const Eigen::Matrix3Xi& triangles, const Eigen::Matrix3Xd& x)
+std::vector<double> meanCurvatures(const MeshTopology& topology, const Eigen::Matrix3Xi& triangles,
+                                   const Eigen::Matrix3Xd& x)
 {
   const Eigen::Index n = x.cols();
   Eigen::Matrix3Xd laplacian = Eigen::Matrix3Xd::Zero(3, n), normal = Eigen::Matrix3Xd::Zero(3, n);
@@ -91,7 +93,7 @@ std::vector<double> meanCurvatures(const MeshTopology& topology, const Eigen::Ma
   return out;
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<double> shownValues(const RodModel& model, const RodState& state, MarkerColor what)
 {
@@ -124,7 +126,8 @@ std::vector<double> shownValues(const ThreadState& state, MarkerColor what)
   if (what != MarkerColor::twist)   // a fluid has no strain
     return out;
   for (int i = 0; i < state.nodes(); ++i)
-    out.push_back(state.twist[i] * 2.0 / (state.edge(std::max(i - 1, 0)).norm() + state.edge(std::min(i, state.edges() - 1)).norm()));
+    out.push_back(state.twist[i] * 2.0 /
+                  (state.edge(std::max(i - 1, 0)).norm() + state.edge(std::min(i, state.edges() - 1)).norm()));
   return out;
 }
 
@@ -149,17 +152,19 @@ double shownRange(const Simulation& simulation, const MarkerOptions& options)
     for (const ThreadState& thread : group.threads)
       range = largest(range, shownValues(thread, options.color));
   for (std::size_t k = 0; k < state.cloths.size(); ++k)
-    range = largest(range, shownValues(simulation.clothModel(static_cast<int>(k)), state.cloths[k].cloth.x, options.color));
+    range =
+        largest(range, shownValues(simulation.clothModel(static_cast<int>(k)), state.cloths[k].cloth.x, options.color));
   return std::max(range, 1e-9);
 }
 
 std_msgs::ColorRGBA valueColor(double share)
 {
   // blue, light grey, red: negative, nothing, positive
-  static const std::array<Eigen::Array3d, 3> ends = {Eigen::Array3d(0.13, 0.36, 0.75), Eigen::Array3d(0.86, 0.86, 0.84), Eigen::Array3d(0.80, 0.14, 0.12)};
+  static const std::array<Eigen::Array3d, 3> ends = {Eigen::Array3d(0.13, 0.36, 0.75), Eigen::Array3d(0.86, 0.86, 0.84),
+                                                     Eigen::Array3d(0.80, 0.14, 0.12)};
   const double s = std::clamp(share, -1.0, 1.0), strength = std::pow(std::abs(s), 0.8);
   const Eigen::Array3d c = (1.0 - strength) * ends[1] + strength * ends[s < 0.0 ? 0 : 2];
   return color(c[0], c[1], c[2]);
 }
 
-}  // namespace slender
+}   // namespace slender

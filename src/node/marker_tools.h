@@ -15,8 +15,8 @@ namespace slender {
 
 std_msgs::ColorRGBA color(double r, double g, double b, double a = 1.0);
 visualization_msgs::Marker makeMarker(const std_msgs::Header& header, const std::string& ns, int id, int type);
-/// rviz lights its own cubes and cylinders from the camera, so that their tops are black. It does not light triangles that have colours of their own:
-/// light from above and the side is painted into these.
+/// rviz lights its own cubes and cylinders from the camera, so that their tops are black. It does not light triangles
+/// that have colours of their own: light from above and the side is painted into these.
 std_msgs::ColorRGBA lit(const std_msgs::ColorRGBA& paint, const Eigen::Vector3d& normal);
 
 /// Makes the marker a list of the mesh's triangles [m], in the marker's pose and colour, lit; creases stay sharp.
@@ -35,17 +35,19 @@ double shownRange(const Simulation& simulation, const MarkerOptions& options);
 std_msgs::ColorRGBA valueColor(double share);
 
 /// One marker per cloth and per grasp of it. `range`: see shownRange().
-void addClothMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
-                     visualization_msgs::MarkerArray& out);
+void addClothMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options,
+                     double range, visualization_msgs::MarkerArray& out);
 
 /// Arrows of forces, `scale` [m/N] long.
-void addForceMarkers(const Simulation& simulation, const std_msgs::Header& header, double scale, visualization_msgs::MarkerArray& out);
+void addForceMarkers(const Simulation& simulation, const std_msgs::Header& header, double scale,
+                     visualization_msgs::MarkerArray& out);
 
 /// A text above the scene that says what colours, axes and arrows mean; nothing when the options show none of them.
 void addLegend(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
                visualization_msgs::MarkerArray& out);
 
 /// One marker per body and obstacle that has a shape.
-void addSolidMarkers(const Simulation& simulation, const std_msgs::Header& header, visualization_msgs::MarkerArray& out);
+void addSolidMarkers(const Simulation& simulation, const std_msgs::Header& header,
+                     visualization_msgs::MarkerArray& out);
 
-}  // namespace slender
+}   // namespace slender

@@ -98,7 +98,8 @@ void MotionPlayer::waitForSubscribers()
   const ros::WallTime give_up = ros::WallTime::now() + ros::WallDuration(wait_);
   const auto missing = [this]() {
     return (tf_ && tf_pub_.getNumSubscribers() == 0) || (!solids_.empty() && bodies_pub_.getNumSubscribers() == 0) ||
-           std::any_of(pose_pubs_.begin(), pose_pubs_.end(), [](const auto& p) { return p.second.getNumSubscribers() == 0; });
+           std::any_of(pose_pubs_.begin(), pose_pubs_.end(),
+                       [](const auto& p) { return p.second.getNumSubscribers() == 0; });
   };
   while (nh_.ok() && missing() && ros::WallTime::now() < give_up)
     ros::WallDuration(0.02).sleep();
@@ -168,11 +169,11 @@ void MotionPlayer::spin()
       continue;
     if (!loop_ || instants_.size() < 2)
       break;
-    start = due;        // turn round; the turning point was just published
+    start = due;   // turn round; the turning point was just published
     forward = !forward;
     next = 1;
   }
   ros::WallDuration(0.5).sleep();   // the last messages leave
 }
 
-}  // namespace slender
+}   // namespace slender

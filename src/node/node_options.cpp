@@ -11,7 +11,8 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
   params.read("scene", o.scene);
   params.readList("set", o.overrides);
   params.read("frame_id", o.frame_id);
-  params.read<Pace>("pace", o.pace, {{"wall", Pace::wall}, {"fast", Pace::fast}, {"follow", Pace::follow}, {"step", Pace::step}});
+  params.read<Pace>("pace", o.pace,
+                    {{"wall", Pace::wall}, {"fast", Pace::fast}, {"follow", Pace::follow}, {"step", Pace::step}});
   double start = 0.0;
   params.read("start_time", start, 0.0, 4.0e9);   // stamps hold 32 bits of seconds
   if (start > 0.0)
@@ -36,19 +37,25 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
   params.read("tf_timeout", o.tf_timeout, 0.0, 100.0);
   params.read("diagnostics_rate", o.diagnostics_rate, 0.0, 1000.0, true);
   params.read("marker_rate", o.marker_rate, 0.0, 30.0, true);
-  params.read<MarkerStyle>("marker_style", o.markers.style, {{"tube", MarkerStyle::tube}, {"line", MarkerStyle::line}, {"regions", MarkerStyle::regions}});
+  params.read<MarkerStyle>(
+      "marker_style", o.markers.style,
+      {{"tube", MarkerStyle::tube}, {"line", MarkerStyle::line}, {"regions", MarkerStyle::regions}});
   params.read("interactive", o.interactive);
   params.read("marker_frames", o.markers.frames);
   params.read<MarkerColor>("marker_color", o.markers.color,
-                           {{"none", MarkerColor::none}, {"strain", MarkerColor::strain}, {"curvature", MarkerColor::curvature}, {"twist", MarkerColor::twist}});
+                           {{"none", MarkerColor::none},
+                            {"strain", MarkerColor::strain},
+                            {"curvature", MarkerColor::curvature},
+                            {"twist", MarkerColor::twist}});
   params.read("marker_range", o.markers.range, 0.0, 1e9);
   params.read("marker_forces", o.markers.forces, 0.0, 1e9);
   params.refuseUnknown();
   if (o.guide_delay_auto && o.pace != Pace::wall)
-    throw OptionError(std::string("~guide_delay: auto depends on when guides arrive, so that runs with ~pace: ") + toString(o.pace) +
-                      " would differ; give a number, two message intervals and the transport [s]");
+    throw OptionError(std::string("~guide_delay: auto depends on when guides arrive, so that runs with ~pace: ") +
+                      toString(o.pace) + " would differ; give a number, two message intervals and the transport [s]");
   if (o.speed != 1.0 && o.pace != Pace::wall)
-    throw OptionError(std::string("~speed: is for ~pace: wall; ~pace: ") + toString(o.pace) + " has a speed of its own");
+    throw OptionError(std::string("~speed: is for ~pace: wall; ~pace: ") + toString(o.pace) +
+                      " has a speed of its own");
   if (!o.replay.empty() && (o.pace == Pace::follow || o.start_time))
     throw OptionError("~replay: keeps the recorded stamps, and needs neither ~pace: follow nor ~start_time");
   if (o.scene.empty() && o.replay.empty())
@@ -74,4 +81,4 @@ const char* toString(Pace pace)
   return "?";
 }
 
-}  // namespace slender
+}   // namespace slender

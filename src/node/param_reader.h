@@ -14,8 +14,9 @@
 
 namespace slender {
 
-/// Typed reading of private parameters. rosparam hands over `1e-3` or "0.5" as strings and `1` as an integer where a double is
-/// meant; param<double>() would silently fall back to its default then, so values are converted here or refused.
+/// Typed reading of private parameters. rosparam hands over `1e-3` or "0.5" as strings and `1` as an integer where a
+/// double is meant; param<double>() would silently fall back to its default then, so values are converted here or
+/// refused.
 class ParamReader
 {
 public:
@@ -35,7 +36,8 @@ public:
   }
 
   /// `or_else`: what the message adds to the range of numbers.
-  void read(const std::string& name, double& value, double low, double high, bool open_low = false, const std::string& or_else = "")
+  void read(const std::string& name, double& value, double low, double high, bool open_low = false,
+            const std::string& or_else = "")
   {
     XmlRpc::XmlRpcValue v;
     if (!get(name, v))
@@ -124,7 +126,8 @@ public:
     {
       const std::string text = static_cast<std::string>(v);
       if (text.compare(0, 1, "[") == 0)
-        refuse(name, v, "one string here; lists come from a launch file (<rosparam param=\"" + name + "\">) or rosparam set");
+        refuse(name, v,
+               "one string here; lists come from a launch file (<rosparam param=\"" + name + "\">) or rosparam set");
       if (!text.empty())
         value.push_back(text);
       return;
@@ -177,4 +180,4 @@ private:
   std::set<std::string> known_;
 };
 
-}  // namespace slender
+}   // namespace slender

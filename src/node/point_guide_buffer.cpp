@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <stdexcept>
 
-
 namespace slender {
 namespace {
 
 double largest(const Eigen::Matrix3Xd& m) { return m.cols() > 0 ? m.colwise().norm().maxCoeff() : 0.0; }
 
-}  // namespace
+}   // namespace
 
 PointGuideBuffer::PointGuideBuffer(const GuideBuffer::Options& options, const Eigen::Matrix3Xd& points)
-  : GuideStream(options.timing(), options.coast), options_(options)
+  : GuideStream(options.timing(), options.coast),
+    options_(options)
 {
   if (!(options.catch_up_time > 0.0) || !(options.catch_up_speed > 0.0))
     throw std::invalid_argument("PointGuideBuffer: catch-up time and speed must be > 0");
@@ -30,7 +30,8 @@ void PointGuideBuffer::restart(const Eigen::Matrix3Xd& points)
 bool PointGuideBuffer::push(double time, const Eigen::Matrix3Xd& points)
 {
   if (points.cols() != x_.cols())
-    throw std::invalid_argument("guide: " + std::to_string(points.cols()) + " points, but the guide has " + std::to_string(x_.cols()));
+    throw std::invalid_argument("guide: " + std::to_string(points.cols()) + " points, but the guide has " +
+                                std::to_string(x_.cols()));
   if (!isNew(time))
     return false;
   if (!points.allFinite())   // refused samples must not reach the timing
@@ -101,7 +102,8 @@ void PointGuideBuffer::rejoin(double time)
   Eigen::Matrix3Xd expected = to, expected_rate = to_rate;
   addOffset(time, expected, expected_rate);
   const double speed = largest(to_rate);
-  if (largest(x_ - expected) <= kSameMotion + 2.0 * speed * kLimitOffset && largest(v_ - expected_rate) < 1e-4 * (1e-2 + speed))
+  if (largest(x_ - expected) <= kSameMotion + 2.0 * speed * kLimitOffset &&
+      largest(v_ - expected_rate) < 1e-4 * (1e-2 + speed))
     return;
   offset_ = x_ - to;
   offset_rate_ = v_ - to_rate;
@@ -110,4 +112,4 @@ void PointGuideBuffer::rejoin(double time)
   offset_duration_ = std::max(offset_rate_duration_, largest(offset_) / options_.catch_up_speed);
 }
 
-}  // namespace slender
+}   // namespace slender

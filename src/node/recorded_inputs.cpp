@@ -28,7 +28,8 @@ template <class Things>
 auto& checked(Things& things, std::int32_t index, const std::string& what)
 {
   if (index < 0 || static_cast<std::size_t>(index) >= things.size())
-    throw std::runtime_error("the scene has no " + what + " " + std::to_string(index) + " that its inputs move; it is not the recorded one");
+    throw std::runtime_error("the scene has no " + what + " " + std::to_string(index) +
+                             " that its inputs move; it is not the recorded one");
   return things[static_cast<std::size_t>(index)];
 }
 
@@ -39,7 +40,7 @@ Eigen::Vector3d vectorOf(const Input& input)
   return {input.values[0], input.values[1], input.values[2]};
 }
 
-}  // namespace
+}   // namespace
 
 void GuideInputs::onTaken(InputSink sink)
 {
@@ -97,7 +98,9 @@ void GuideInputs::repeat(const Input& input)
     case Input::WIND: wind_ = vectorOf(input); return;
     case Input::GUIDE_POINTS:
     case Input::GUIDE_BODY: tracking_->repeat(input); return;
-    default: throw std::runtime_error("its input " + std::to_string(input.number) + " is of an unknown kind; replay it with the version that recorded it");
+    default:
+      throw std::runtime_error("its input " + std::to_string(input.number) +
+                               " is of an unknown kind; replay it with the version that recorded it");
   }
 }
 
@@ -152,4 +155,4 @@ void TrackingInputs::skip(double seconds)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

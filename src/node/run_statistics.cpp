@@ -4,7 +4,8 @@
 
 namespace slender {
 
-void RunStatistics::add(const StepReport& report, const Simulation& simulation, double simulated_seconds, double busy_seconds)
+void RunStatistics::add(const StepReport& report, const Simulation& simulation, double simulated_seconds,
+                        double busy_seconds)
 {
   ++steps;
   iterations += static_cast<std::uint64_t>(report.iterations);
@@ -35,4 +36,4 @@ void RunStatistics::add(const StepReport& report, const Simulation& simulation, 
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -14,10 +14,11 @@ namespace {
 using Eigen::Vector3d;
 using visualization_msgs::Marker;
 
-constexpr int kSides = 16;           // of a tube
+constexpr int kSides = 16;                              // of a tube
 constexpr int kCoarseSides = 8, kManySections = 1000;   // of one with more sections
-constexpr int kMaxSections = 800;    // per rod
-constexpr int kMaxThreadSections = 3000;   // of all threads together: a coil has many turns, but 30 pictures a second must go through
+constexpr int kMaxSections = 800;                       // per rod
+// of all threads together: a coil has many turns, but 30 pictures a second must go through
+constexpr int kMaxThreadSections = 3000;
 
 const std::array<std_msgs::ColorRGBA, 4>& rodColors()
 {
@@ -34,7 +35,8 @@ std::vector<double> shares(std::vector<double> values, double range)
 }
 
 /// The stripes' edges are sharp because each side has one colour.
-void addTube(const std::vector<TubeSection>& sections, const std_msgs::ColorRGBA& base, bool valued, bool striped, bool closed, Marker& marker)
+void addTube(const std::vector<TubeSection>& sections, const std_msgs::ColorRGBA& base, bool valued, bool striped,
+             bool closed, Marker& marker)
 {
   const int sides = sections.size() > kManySections ? kCoarseSides : kSides;
   const std_msgs::ColorRGBA stripe = color(0.20, 0.24, 0.30);
@@ -48,13 +50,19 @@ void addTube(const std::vector<TubeSection>& sections, const std_msgs::ColorRGBA
     const Eigen::Vector3i t = mesh.triangles.col(f);
     const bool wall = f < walls;
     const bool dark = wall && striped && (f / 2) % sides % (sides / 2) <= 1;   // two stripes: seen from everywhere
-    const Vector3d a = mesh.vertices.col(t[0]), cap = (mesh.vertices.col(t[1]) - a).cross(mesh.vertices.col(t[2]) - a).normalized();
+    const Vector3d a = mesh.vertices.col(t[0]),
+                   cap = (mesh.vertices.col(t[1]) - a).cross(mesh.vertices.col(t[2]) - a).normalized();
     for (const int vertex : {t[0], t[1], t[2]})
     {
       // of the cap's middle it is that of its end
-      const TubeSection& section = vertex < rings * sides ? sections[vertex / sides] : vertex == rings * sides ? sections.front() : sections.back();
+      const TubeSection& section = vertex < rings * sides    ? sections[vertex / sides]
+                                   : vertex == rings * sides ? sections.front()
+                                                             : sections.back();
       marker.points.push_back(toPoint(mesh.vertices.col(vertex)));
-      marker.colors.push_back(lit(dark ? stripe : valued ? valueColor(section.value) : base, wall ? tubeNormal(section, vertex % sides, sides) : cap));
+      marker.colors.push_back(lit(dark     ? stripe
+                                  : valued ? valueColor(section.value)
+                                           : base,
+                                  wall ? tubeNormal(section, vertex % sides, sides) : cap));
     }
   }
 }
@@ -77,7 +85,8 @@ void addFrames(const RodModel& model, const RodState& s, Marker& marker)
   });
 }
 
-Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& config, const GraspState& grasp, const RodModel& model)
+Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& config, const GraspState& grasp,
+                   const RodModel& model)
 {
   Marker marker = makeMarker(header, "grasps", id, Marker::SPHERE);
   if (!grasp.active)
@@ -98,8 +107,8 @@ Marker graspMarker(const std_msgs::Header& header, int id, const GraspConfig& co
   return marker;
 }
 
-Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id, MarkerStyle style, const FramedLine& line, int most,
-                   const std_msgs::ColorRGBA& paint, bool striped, double width)
+Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id, MarkerStyle style,
+                   const FramedLine& line, int most, const std_msgs::ColorRGBA& paint, bool striped, double width)
 {
   Marker marker = makeMarker(header, ns, id, style == MarkerStyle::tube ? Marker::TRIANGLE_LIST : Marker::LINE_STRIP);
   const std::vector<TubeSection> curve = tubeSections(line, most);
@@ -120,10 +129,11 @@ Marker curveMarker(const std_msgs::Header& header, const std::string& ns, int id
 }
 
 /// Of a thread and its pieces: one marker each.
-void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
-                      visualization_msgs::MarkerArray& out)
+void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options,
+                      double range, visualization_msgs::MarkerArray& out)
 {
-  const std_msgs::ColorRGBA honey = color(0.90, 0.60, 0.12), metal = color(0.55, 0.57, 0.60), ground = color(0.42, 0.45, 0.50);
+  const std_msgs::ColorRGBA honey = color(0.90, 0.60, 0.12), metal = color(0.55, 0.57, 0.60),
+                            ground = color(0.42, 0.45, 0.50);
   double edges = 0.0;
   for (const ThreadGroupState& group : simulation.state().threads)
     for (const ThreadState& thread : group.threads)
@@ -137,8 +147,10 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
       double volume = 0.0, length = 0.0;
       for (int j = 0; j < thread.edges(); ++j)
         volume += thread.volume[j], length += thread.edge(j).norm();
-      const FramedLine line = lineOf(snapshotOf(config.name, thread), shares(shownValues(thread, options.color), range));
-      out.markers.push_back(curveMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id), options.style, line, share, honey, false,
+      const FramedLine line =
+          lineOf(snapshotOf(config.name, thread), shares(shownValues(thread, options.color), range));
+      out.markers.push_back(curveMarker(header, "threads/" + config.name, static_cast<int>(thread.thread_id),
+                                        options.style, line, share, honey, false,
                                         2.0 * std::sqrt(volume / (M_PI * length))));
     }
     if (config.nozzle)
@@ -146,8 +158,9 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
       Marker nozzle = makeMarker(header, "nozzles", static_cast<int>(k), Marker::TRIANGLE_LIST);
       const Pose& X = simulation.state().threads[k].threads.front().ends[1].X_WE;
       const double length = 4.0 * config.nozzle->diameter;
-      nozzle.pose = toMessage(Pose{X.position - X.orientation * Vector3d(0.5 * length, 0, 0),
-                                   X.orientation * Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d::UnitX())});
+      nozzle.pose =
+          toMessage(Pose{X.position - X.orientation * Vector3d(0.5 * length, 0, 0),
+                         X.orientation * Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d::UnitX())});
       nozzle.color = metal;
       paintMesh(shapeMesh(Cylinder{0.7 * config.nozzle->diameter, length}), nozzle);
       out.markers.push_back(nozzle);
@@ -159,10 +172,16 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
       const Vector3d middle = config.nozzle ? config.nozzle->pose.position : Vector3d(0, 0, 0);
       const double size = config.nozzle ? std::max(0.1, 1.5 * (middle.z() - config.floor->height)) : 1.0;
       Vector3d low = middle - Vector3d(size, size, 0), high = middle + Vector3d(size, size, 0);
-      if (config.region && (*config.region)[1].head<2>().cwiseAbs().maxCoeff() < 1e3 && (*config.region)[0].head<2>().cwiseAbs().maxCoeff() < 1e3)
+      if (config.region && (*config.region)[1].head<2>().cwiseAbs().maxCoeff() < 1e3 &&
+          (*config.region)[0].head<2>().cwiseAbs().maxCoeff() < 1e3)
         low = (*config.region)[0], high = (*config.region)[1];
       const double z = config.floor->height;
-      for (const auto& [x, y] : {std::pair(low.x(), low.y()), {high.x(), low.y()}, {high.x(), high.y()}, {low.x(), low.y()}, {high.x(), high.y()}, {low.x(), high.y()}})
+      for (const auto& [x, y] : {std::pair(low.x(), low.y()),
+                                 {high.x(), low.y()},
+                                 {high.x(), high.y()},
+                                 {low.x(), low.y()},
+                                 {high.x(), high.y()},
+                                 {low.x(), high.y()}})
       {
         floor.points.push_back(toPoint(Vector3d(x, y, z)));
         floor.colors.push_back(lit(ground, Vector3d::UnitZ()));
@@ -172,9 +191,10 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
   }
 }
 
-}  // namespace
+}   // namespace
 
-visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options)
+visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header,
+                                             const MarkerOptions& options)
 {
   visualization_msgs::MarkerArray out;
   const double range = shownRange(simulation, options);
@@ -216,7 +236,8 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
     const GraspRef& ref = simulation.grasps()[g];
     if (ref.cloth >= 0)
       continue;
-    out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config, simulation.state().rods[ref.rod].grasps[ref.index],
+    out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config,
+                                      simulation.state().rods[ref.rod].grasps[ref.index],
                                       simulation.rodModel(ref.rod)));
   }
   addThreadMarkers(simulation, header, options, range, out);
@@ -228,4 +249,4 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
   return out;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -15,8 +15,8 @@ void checkName(const std::string& name, const std::string& kind)
 {
   std::string why;
   if (name.empty() || name.find_first_of("/~") != std::string::npos || !ros::names::validate(name, why))
-    throw std::invalid_argument(kind + " \"" + name +
-                                "\": the name cannot be part of a topic; use letters, digits and _, with a letter first");
+    throw std::invalid_argument(
+        kind + " \"" + name + "\": the name cannot be part of a topic; use letters, digits and _, with a letter first");
 }
 
 void resize(slender_sim::BodyStates& states, std::size_t size)
@@ -26,7 +26,7 @@ void resize(slender_sim::BodyStates& states, std::size_t size)
   states.twist.resize(size);
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<std::string> graspTopicNames(const Simulation& simulation)
 {
@@ -64,7 +64,8 @@ slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time
   return mesh;
 }
 
-void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch)
+void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id,
+                         std::uint32_t epoch)
 {
   const SceneState& scene = simulation.state();
   geometry_msgs::PoseArray& poses = edge_poses.renew();
@@ -129,7 +130,8 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     appendTracking(error.met, scene.cloths[k].guide, scene.cloths[k].guide_forces, cloths);
     cloths.forces_at_bound.push_back(static_cast<std::uint32_t>(scene.cloths[k].cloth.at_bound.size()));
     cloths.bound_distances.push_back(error.at_bound);
-    cloths.function_sets.push_back(simulation.config().cloths[k].tracking ? simulation.functions(static_cast<int>(k)).name : std::string());
+    cloths.function_sets.push_back(
+        simulation.config().cloths[k].tracking ? simulation.functions(static_cast<int>(k)).name : std::string());
     cloths.blend_distances.push_back(error.blend);
   }
   wrenches.resize(simulation.grasps().size());
@@ -189,4 +191,4 @@ void SceneMessages::fillFields(const Simulation& simulation)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

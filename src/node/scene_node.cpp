@@ -29,24 +29,32 @@ namespace {
 bool isText(const std::string& scene)
 {
   std::error_code error;
-  return scene.find('\n') != std::string::npos || (scene.find(": ") != std::string::npos && !std::filesystem::exists(scene, error));
+  return scene.find('\n') != std::string::npos ||
+         (scene.find(": ") != std::string::npos && !std::filesystem::exists(scene, error));
 }
 
 SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
 {
   setBagReader(readGuideBag);
-  SceneConfig scene = isText(options.scene) ? parseScene(options.scene, "~scene", options.overrides) : readScene(options.scene, options.overrides);
+  SceneConfig scene = isText(options.scene) ? parseScene(options.scene, "~scene", options.overrides)
+                                            : readScene(options.scene, options.overrides);
   // one kind of state on the topic `state`
   const std::string who = "scene " + scene.name + ": ";
   const auto refuse = [&](const std::string& has, const std::string& other) {
-    throw SceneError(who + "it has " + has + ", which " + other + " simulates; they do not meet what " + toString(kind) + " simulates: put them in two scenes");
+    throw SceneError(who + "it has " + has + ", which " + other + " simulates; they do not meet what " +
+                     toString(kind) + " simulates: put them in two scenes");
   };
-  const auto tracks = [](const auto& objects) { return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; }); };
+  const auto tracks = [](const auto& objects) {
+    return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; });
+  };
   const bool tracked = tracks(scene.cloths), tracked_rods = tracks(scene.rods), follows = kind == NodeKind::tracking;
   if (follows && tracked && !scene.rods.empty())
-    throw SceneError(who + "it has tracked cloths and rods, whose states are messages of two types; put them in two scenes");
+    throw SceneError(who +
+                     "it has tracked cloths and rods, whose states are messages of two types; put them in two scenes");
   if (follows && tracked_rods && !scene.cloths.empty())
-    throw SceneError(who + "it has rods that track a guide and cloths, whose states are messages of two types; put them in two scenes");
+    throw SceneError(
+        who +
+        "it has rods that track a guide and cloths, whose states are messages of two types; put them in two scenes");
   if (kind == NodeKind::rods && tracked_rods)
     throw SceneError(who + "it has rods that track a guide; tracking_node simulates them, and rods beside them");
   if (kind != NodeKind::rods && !tracked_rods && !scene.rods.empty())
@@ -60,7 +68,9 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
   if (kind == NodeKind::cloths && tracked)
     throw SceneError(who + "it has tracked cloths; tracking_node simulates them, and cloths beside them");
   if (follows && !tracked && !tracked_rods)
-    throw SceneError(who + "it has no tracked cloths and no rods that track a guide; cloth_node and rod_node simulate what follows none");
+    throw SceneError(
+        who +
+        "it has no tracked cloths and no rods that track a guide; cloth_node and rod_node simulate what follows none");
   if (kind == NodeKind::threads && scene.threads.empty())
     throw SceneError(who + "it has no threads; rod_node simulates rods");
   if (kind == NodeKind::threads && !scene.bodies.empty())
@@ -68,19 +78,26 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
   if (kind == NodeKind::cloths && scene.cloths.empty())
     throw SceneError(who + "it has no cloths; rod_node simulates rods and bodies");
   if (options.markers.style == MarkerStyle::regions && !tracked)
-    throw OptionError("~marker_style: regions are those of tracked cloths, of which scene " + scene.name + " has none; choose tube or line");
+    throw OptionError("~marker_style: regions are those of tracked cloths, of which scene " + scene.name +
+                      " has none; choose tube or line");
   return scene;
 }
 
-}  // namespace
+}   // namespace
 
 const char* toString(NodeKind kind)
 {
-  return kind == NodeKind::rods ? "rod_node" : kind == NodeKind::threads ? "thread_node" : kind == NodeKind::cloths ? "cloth_node" : "tracking_node";
+  return kind == NodeKind::rods      ? "rod_node"
+         : kind == NodeKind::threads ? "thread_node"
+         : kind == NodeKind::cloths  ? "cloth_node"
+                                     : "tracking_node";
 }
 
 SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, NodeKind kind)
-  : nh_(nh), nh_priv_(nh_priv), kind_(kind), options_(NodeOptions::read(nh_priv))
+  : nh_(nh),
+    nh_priv_(nh_priv),
+    kind_(kind),
+    options_(NodeOptions::read(nh_priv))
 {
   nh_.setCallbackQueue(&queue_);
   nh_priv_.setCallbackQueue(&services_queue_);
@@ -88,11 +105,13 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   checkClock();
   simulation_ = std::make_unique<Simulation>(loadScene(options_, kind_));
   if (simulation_->config().statics)
-    ROS_WARN("%s: the key statics of the scene is for simulate --statics; the node does not use it", nh_priv_.getNamespace().c_str());
+    ROS_WARN("%s: the key statics of the scene is for simulate --statics; the node does not use it",
+             nh_priv_.getNamespace().c_str());
   for (const std::string& warning : simulation_->config().warnings)
     ROS_WARN("%s", warning.c_str());
   if (replay_ && options_.scene != replay_->scene() && simulation_->config().source != replay_->scene())
-    throw OptionError("~replay: " + options_.replay + ": was recorded with another scene (or other values of ~set) than ~scene; leave ~scene away");
+    throw OptionError("~replay: " + options_.replay +
+                      ": was recorded with another scene (or other values of ~set) than ~scene; leave ~scene away");
   grasp_names_ = graspTopicNames(*simulation_);
   thread_prefixes_ = threadTopicPrefixes(*simulation_);
   if (!options_.record_bag.empty())
@@ -195,10 +214,15 @@ void SceneNode::advertise()
 bool SceneNode::isStateFinite() const
 {
   const SceneState& state = simulation_->state();
-  const auto all = [](const auto& parts, const auto& finite) { return std::all_of(parts.begin(), parts.end(), finite); };
-  return all(state.rods, [](const RodState& rod) { return isFinite(rod); }) && all(state.threads, [&](const ThreadGroupState& group) {
-           return all(group.threads, [](const ThreadState& thread) { return isFinite(thread); });
-         }) && all(state.cloths, [](const SceneCloth& held) { return isFinite(held.cloth); }) &&
+  const auto all = [](const auto& parts, const auto& finite) {
+    return std::all_of(parts.begin(), parts.end(), finite);
+  };
+  return all(state.rods, [](const RodState& rod) { return isFinite(rod); }) &&
+         all(state.threads,
+             [&](const ThreadGroupState& group) {
+               return all(group.threads, [](const ThreadState& thread) { return isFinite(thread); });
+             }) &&
+         all(state.cloths, [](const SceneCloth& held) { return isFinite(held.cloth); }) &&
          all(state.bodies, [](const RigidBodyState& body) { return isFinite(body); });
 }
 
@@ -263,8 +287,11 @@ void SceneNode::publishState()
   }
   broadcastBodies();
   const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
-  if (!bag_ && !heard(state_pub_) && !heard(points_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) && !heard(grasps_pub_) && !heard(obstacles_pub_) && !heard(fields_pub_) &&
-      std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) && std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard) && std::none_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard))
+  if (!bag_ && !heard(state_pub_) && !heard(points_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) &&
+      !heard(grasps_pub_) && !heard(obstacles_pub_) && !heard(fields_pub_) &&
+      std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) &&
+      std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard) &&
+      std::none_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard))
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
   if (fields_pub_ && (bag_ || heard(fields_pub_)))
@@ -374,8 +401,8 @@ void SceneNode::publishMarkers()
   std_msgs::Header header;
   header.stamp = clock_.stamp();
   header.frame_id = options_.frame_id;
-  markers_pub_.publish(boost::make_shared<visualization_msgs::MarkerArray>(
-      sceneMarkers(*simulation_, header, options_.markers)));
+  markers_pub_.publish(
+      boost::make_shared<visualization_msgs::MarkerArray>(sceneMarkers(*simulation_, header, options_.markers)));
 }
 
 void SceneNode::work()
@@ -411,7 +438,8 @@ void SceneNode::tell()
     publishDiagnostics();
 }
 
-/// Until a step is due, or a callback came whose effect shows at once: a message while the node runs by itself, else a service call.
+/// Until a step is due, or a callback came whose effect shows at once: a message while the node runs by itself, else a
+/// service call.
 void SceneNode::waitForCallbacks()
 {
   const bool running = mode_ == Mode::running && options_.pace != Pace::step;
@@ -454,15 +482,15 @@ void SceneNode::summary() const
 {
   const RunStatistics& s = total_;
   const char* name = toString(kind_);
-  std::cout << std::setprecision(4) << name << ": " << s.steps << " steps, " << s.simulated << " s simulated, " << s.busy
-            << " s computing, real-time factor " << s.realTimeFactor() << ", worst residual " << s.residual << " of the largest force, largest strain "
-            << s.max_strain << ", Newton iterations per step " << (s.steps ? static_cast<double>(s.iterations) / s.steps : 0.0)
-            << ", cut steps " << s.cut_steps << "\n";
+  std::cout << std::setprecision(4) << name << ": " << s.steps << " steps, " << s.simulated << " s simulated, "
+            << s.busy << " s computing, real-time factor " << s.realTimeFactor() << ", worst residual " << s.residual
+            << " of the largest force, largest strain " << s.max_strain << ", Newton iterations per step "
+            << (s.steps ? static_cast<double>(s.iterations) / s.steps : 0.0) << ", cut steps " << s.cut_steps << "\n";
   if (s.skipped > 0.0)
     std::cout << name << ": slower than real time, the clock skipped " << s.skipped << " s (~max_lag)\n";
   for (std::size_t g = 0; g < s.max_force.size(); ++g)
-    std::cout << name << ": grasp " << grasp_names_[g] << ": largest force " << s.max_force[g] << " N, torque " << s.max_torque[g]
-              << " N m\n";
+    std::cout << name << ": grasp " << grasp_names_[g] << ": largest force " << s.max_force[g] << " N, torque "
+              << s.max_torque[g] << " N m\n";
   if (inputs_ && inputs_->drops().total() > 0)
     std::cout << name << ": " << inputs_->drops().total() << " messages dropped\n";
   if (bag_)
@@ -470,4 +498,4 @@ void SceneNode::summary() const
   std::cout << std::flush;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -10,7 +10,7 @@ constexpr double kIdle = 0.02;           // [s] longest sleep: how late diagnost
 constexpr double kClockPatience = 2.0;   // [s] until the first complaint that there is no /clock
 constexpr double kSkipReminder = 10.0;   // [s] between complaints about skipped time
 
-}  // namespace
+}   // namespace
 
 void SceneNode::checkClock() const
 {
@@ -19,15 +19,20 @@ void SceneNode::checkClock() const
   if (options_.pace == Pace::follow && options_.publish_clock)
     throw OptionError("~pace: follow waits for /clock, which ~publish_clock: true would publish; choose one");
   if (options_.pace == Pace::follow && !use_sim_time)
-    throw OptionError("~pace: follow needs the parameter /use_sim_time set to true (and somebody who publishes /clock)");
+    throw OptionError(
+        "~pace: follow needs the parameter /use_sim_time set to true (and somebody who publishes /clock)");
   if (options_.publish_clock && !use_sim_time)
-    throw OptionError("~publish_clock: true needs the parameter /use_sim_time set to true, or no other node will listen to /clock");
+    throw OptionError(
+        "~publish_clock: true needs the parameter /use_sim_time set to true, or no other node will listen to /clock");
   if (use_sim_time && !options_.publish_clock && options_.pace != Pace::follow)
-    throw OptionError(std::string("/use_sim_time is true, but ~pace: ") + toString(options_.pace) +
-                      " without ~publish_clock keeps its own time; use ~pace: follow, or ~publish_clock: true, or unset it");
+    throw OptionError(
+        std::string("/use_sim_time is true, but ~pace: ") + toString(options_.pace) +
+        " without ~publish_clock keeps its own time; use ~pace: follow, or ~publish_clock: true, or unset it");
   if (options_.speed != 1.0 && !options_.publish_clock && !replay_)
-    ROS_WARN("~speed: %g without ~publish_clock: stamps pass at %g times real time; poses must be stamped likewise, or with zero (now)", options_.speed,
-             options_.speed);
+    ROS_WARN(
+        "~speed: %g without ~publish_clock: stamps pass at %g times real time; poses must be stamped likewise, or with "
+        "zero (now)",
+        options_.speed, options_.speed);
 }
 
 /// With `follow` that may be the first /clock.
@@ -51,7 +56,8 @@ std::optional<ros::Time> SceneNode::firstStamp()
 
 bool SceneNode::stampsAreOfTheWall() const
 {
-  return options_.pace == Pace::wall && !options_.publish_clock && !options_.start_time && !replay_ && options_.speed == 1.0;
+  return options_.pace == Pace::wall && !options_.publish_clock && !options_.start_time && !replay_ &&
+         options_.speed == 1.0;
 }
 
 void SceneNode::anchor()
@@ -74,7 +80,8 @@ std::uint64_t SceneNode::jumped()
 
 std::uint64_t SceneNode::realign()
 {
-  // Where others keep the time, skip to their present: guides then act when they come, not late by the length of the pause.
+  // Where others keep the time, skip to their present: guides then act when they come, not late by the length of the
+  // pause.
   std::uint64_t ticks = 0;
   if (options_.pace == Pace::follow || stampsAreOfTheWall())
   {
@@ -99,7 +106,8 @@ double SceneNode::stampLag() const
 {
   if (options_.pace == Pace::follow)
     return clock_.secondsAt(ros::Time::now()) - clock_.seconds();
-  return (ros::WallTime::now() - wall_start_).toSec() - static_cast<double>(clock_.ticks() - wall_start_ticks_) * clock_.step() / options_.speed;
+  return (ros::WallTime::now() - wall_start_).toSec() -
+         static_cast<double>(clock_.ticks() - wall_start_ticks_) * clock_.step() / options_.speed;
 }
 
 /// Physics takes every step; only the clock skips, as after a pause.
@@ -121,8 +129,10 @@ void SceneNode::keepUp()
   if (ros::WallTime::now() < next_skip_warning_)
     return;
   next_skip_warning_ = ros::WallTime::now() + ros::WallDuration(kSkipReminder);
-  ROS_WARN("%s is slower than real time: %s skip %.3g s to the present (~max_lag), %.3g s so far; a longer step, fewer nodes or ~speed below 1 help",
-           nh_priv_.getNamespace().c_str(), stampsAreOfTheWall() ? "stamps" : "due times", lag, total_.skipped);
+  ROS_WARN(
+      "%s is slower than real time: %s skip %.3g s to the present (~max_lag), %.3g s so far; a longer step, fewer "
+      "nodes or ~speed below 1 help",
+      nh_priv_.getNamespace().c_str(), stampsAreOfTheWall() ? "stamps" : "due times", lag, total_.skipped);
 }
 
 ros::WallDuration SceneNode::untilDue() const
@@ -136,4 +146,4 @@ ros::WallDuration SceneNode::untilDue() const
   return ros::WallDuration(std::clamp(clock_.step() / options_.speed - stampLag(), 0.0, kIdle));
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -30,7 +30,10 @@ std::string text(const char* format, double value)
 
 void add(DiagnosticStatus& status, const std::string& key, double value) { add(status, key, text("%.6g", value)); }
 
-void add(DiagnosticStatus& status, const std::string& key, std::uint64_t value) { add(status, key, std::to_string(value)); }
+void add(DiagnosticStatus& status, const std::string& key, std::uint64_t value)
+{
+  add(status, key, std::to_string(value));
+}
 
 void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& message)
 {
@@ -73,11 +76,12 @@ void addFunctions(const Simulation& simulation, int cloth, DiagnosticStatus& sta
   const SceneCloth& held = simulation.state().cloths[cloth];
   const double time = simulation.state().time;
   add(status, "test functions of " + config.name, simulation.functions(cloth).name);
-  add(status, "blend of " + config.name + " goes on for [s]", held.blend.active(time) ? held.blend.start + held.blend.duration - time : 0.0);
+  add(status, "blend of " + config.name + " goes on for [s]",
+      held.blend.active(time) ? held.blend.start + held.blend.duration - time : 0.0);
   add(status, "blend of " + config.name + " leaves at most [m]", held.blend.left(time));
 }
 
-}  // namespace
+}   // namespace
 
 void SceneNode::publishDiagnostics()
 {
@@ -106,15 +110,18 @@ void SceneNode::remindOfBodies()
     return;
   next_body_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
   const std::string& stranger = inputs_->drops().last(Drop::unknown_name);
-  ROS_WARN("%s: nobody has published a pose yet of %s; what follows it stays where it is (topic %s)%s%s", nh_priv_.getNamespace().c_str(), waits.c_str(),
-           nh_.resolveName("bodies").c_str(), stranger.empty() ? "" : ". Messages there name others: ", stranger.c_str());
+  ROS_WARN("%s: nobody has published a pose yet of %s; what follows it stays where it is (topic %s)%s%s",
+           nh_priv_.getNamespace().c_str(), waits.c_str(), nh_.resolveName("bodies").c_str(),
+           stranger.empty() ? "" : ". Messages there name others: ", stranger.c_str());
 }
 
 std::string SceneNode::clockWentBack() const
 {
   const bool follows = mode_ == Mode::running && options_.pace == Pace::follow;
   const double behind = follows ? clock_.seconds() - clock_.secondsAt(ros::Time::now()) : 0.0;
-  return behind > kBehind ? "waits for /clock, which is " + std::to_string(behind) + " s behind the simulated time; start the node anew if it went back" : "";
+  return behind > kBehind ? "waits for /clock, which is " + std::to_string(behind) +
+                                " s behind the simulated time; start the node anew if it went back"
+                          : "";
 }
 
 DiagnosticStatus SceneNode::simulationStatus() const
@@ -156,7 +163,8 @@ DiagnosticStatus SceneNode::simulationStatus() const
   }
   if (options_.pace == Pace::wall)
     add(status, "clock skipped [s]", total_.skipped);
-  add(status, "iterations per step", recent_.steps ? static_cast<double>(recent_.iterations) / static_cast<double>(recent_.steps) : 0.0);
+  add(status, "iterations per step",
+      recent_.steps ? static_cast<double>(recent_.iterations) / static_cast<double>(recent_.steps) : 0.0);
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);
   add(status, "largest strain", recent_.max_strain);
@@ -200,7 +208,9 @@ DiagnosticStatus SceneNode::simulationStatus() const
     for (std::size_t k = 0; k < simulation_->config().cloths.size(); ++k)
       addFunctions(*simulation_, static_cast<int>(k), status);
     const auto& cloths = simulation_->config().cloths;
-    if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.tracking && cloth.tracking->sets[0].bounds.size() > 0; }))
+    if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) {
+          return cloth.tracking && cloth.tracking->sets[0].bounds.size() > 0;
+        }))
     {
       add(status, "most guide forces at their bounds", static_cast<std::uint64_t>(recent_.forces_at_bound));
       add(status, "greatest distance where forces are at their bounds [m]", refused);
@@ -215,7 +225,8 @@ DiagnosticStatus SceneNode::simulationStatus() const
     const auto& cloths = simulation_->config().cloths;
     if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.contact.has_value(); }))
     {
-      add(status, "contacts per step", recent_.steps ? static_cast<double>(recent_.repulsions) / static_cast<double>(recent_.steps) : 0.0);
+      add(status, "contacts per step",
+          recent_.steps ? static_cast<double>(recent_.repulsions) / static_cast<double>(recent_.steps) : 0.0);
       add(status, "collisions stopped", recent_.impulses);
       add(status, "rigid pieces", recent_.zones);
     }
@@ -252,7 +263,8 @@ DiagnosticStatus SceneNode::inputStatus()
     if (age.seconds && age.excess > 0.0 && *age.seconds <= options_.guide_timeout)
       raise(status, DiagnosticStatus::WARN,
             "guides arrive " + text("%.0f ms later than ~guide_delay", 1e3 * age.excess) + " allows: " + age.name +
-              text(" lags by %.3g s; raise ~guide_delay", age.lag) + (options_.pace == Pace::wall ? ", or set it to auto" : ""));
+                text(" lags by %.3g s; raise ~guide_delay", age.lag) +
+                (options_.pace == Pace::wall ? ", or set it to auto" : ""));
     const bool late = mode_ == Mode::running && clock_.seconds() - inputs_since_ > options_.guide_timeout;
     if (age.missing || (!age.seconds && late))
       raise(status, DiagnosticStatus::WARN, "no input yet for " + age.name);
@@ -278,4 +290,4 @@ DiagnosticStatus SceneNode::inputStatus()
   return status;
 }
 
-}  // namespace slender
+}   // namespace slender

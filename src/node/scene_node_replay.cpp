@@ -19,12 +19,13 @@ using slender_sim::SetGrasp;
 const std::vector<double>& values(const Input& input, std::size_t count)
 {
   if (input.values.size() != count)
-    throw std::runtime_error("its input " + std::to_string(input.number) + " has " + std::to_string(input.values.size()) + " values, not " +
-                             std::to_string(count) + "; the bag is damaged");
+    throw std::runtime_error("its input " + std::to_string(input.number) + " has " +
+                             std::to_string(input.values.size()) + " values, not " + std::to_string(count) +
+                             "; the bag is damaged");
   return input.values;
 }
 
-}  // namespace
+}   // namespace
 
 /// Before the options are used: the recorded ones take their place.
 void SceneNode::openReplay()
@@ -47,7 +48,8 @@ void SceneNode::openReplay()
 
 std::string SceneNode::refusesInput() const
 {
-  return replay_ ? "the node repeats the run in " + replay_->path() + " (~replay) and takes no other input" : std::string();
+  return replay_ ? "the node repeats the run in " + replay_->path() + " (~replay) and takes no other input"
+                 : std::string();
 }
 
 /// `tick`: when it took effect. The first one is preceded by what replaying needs to know of the parameters.
@@ -59,8 +61,8 @@ void SceneNode::note(Input input, std::uint64_t tick)
   {
     Input settings;
     settings.kind = Input::SETTINGS;
-    settings.values = {options_.guide_delay, options_.guide_delay_auto ? 1.0 : 0.0, options_.live_guides ? 1.0 : 0.0, options_.catch_up_time,
-                       options_.catch_up_speed};
+    settings.values = {options_.guide_delay, options_.guide_delay_auto ? 1.0 : 0.0, options_.live_guides ? 1.0 : 0.0,
+                       options_.catch_up_time, options_.catch_up_speed};
     note(std::move(settings), tick);
   }
   input.header.stamp = clock_.stamp();
@@ -89,8 +91,14 @@ void SceneNode::noteGrasp(const SetGrasp::Request& request)
   Input input;
   input.kind = Input::SET_GRASP;
   input.name = request.name;
-  input.values = {static_cast<double>(request.action), static_cast<double>(request.first_node), static_cast<double>(request.last_node), request.point.x,
-                  request.point.y, request.point.z, request.max_distance, request.position_only ? 1.0 : 0.0};
+  input.values = {static_cast<double>(request.action),
+                  static_cast<double>(request.first_node),
+                  static_cast<double>(request.last_node),
+                  request.point.x,
+                  request.point.y,
+                  request.point.z,
+                  request.max_distance,
+                  request.position_only ? 1.0 : 0.0};
   note(std::move(input), clock_.ticks());
 }
 
@@ -154,8 +162,10 @@ void SceneNode::repeatJump(const Input& input)
   else
   {
     const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / ("slender_sim_replay_" + std::to_string(::getpid()) + "_" + std::to_string(input.number));
-    std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(input.data.data()), static_cast<std::streamsize>(input.data.size()));
+        std::filesystem::temp_directory_path() /
+        ("slender_sim_replay_" + std::to_string(::getpid()) + "_" + std::to_string(input.number));
+    std::ofstream(file, std::ios::binary)
+        .write(reinterpret_cast<const char*>(input.data.data()), static_cast<std::streamsize>(input.data.size()));
     try
     {
       simulation_->load(file.string());
@@ -193,4 +203,4 @@ void SceneNode::repeatGrasp(const Input& input)
     throw std::runtime_error(response.message);
 }
 
-}  // namespace slender
+}   // namespace slender

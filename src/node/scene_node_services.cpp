@@ -77,7 +77,8 @@ bool SceneNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::R
   if (mode_ == Mode::failed)
     response.message = "stopped at " + failure_ + "; call ~reset first";
   else if (options_.pace != Pace::step && mode_ != Mode::paused)
-    response.message = std::string("the node runs by itself (~pace: ") + toString(options_.pace) + "); call ~pause first";
+    response.message =
+        std::string("the node runs by itself (~pace: ") + toString(options_.pace) + "); call ~pause first";
   else if (request.n == 0)
     response.message = "n must be at least 1";
   else if (stepping_)
@@ -104,7 +105,9 @@ bool SceneNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::R
     response.success = done == request.n;
     if (!response.success)
       response.message = "took " + std::to_string(done) + " of " + std::to_string(request.n) + " steps; " +
-                         (!failure_.empty() ? failure_ : !step_ended_.empty() ? step_ended_ : "the node ends");
+                         (!failure_.empty()      ? failure_
+                          : !step_ended_.empty() ? step_ended_
+                                                 : "the node ends");
   }
   response.step = simulation_->state().steps;
   response.stamp = clock_.stamp();
@@ -129,7 +132,8 @@ void SceneNode::setGrasp(const slender_sim::SetGrasp::Request& request, slender_
   response.first_node = response.last_node = -1;
   if (found == grasp_names_.end())
   {
-    response.message = "no grasp \"" + request.name + "\"; the scene has" + (grasp_names_.empty() ? " none: give it grasps: {NAME: {...}}" : ":");
+    response.message = "no grasp \"" + request.name + "\"; the scene has" +
+                       (grasp_names_.empty() ? " none: give it grasps: {NAME: {...}}" : ":");
     for (const std::string& name : grasp_names_)
       response.message += " " + name;
     return;
@@ -155,7 +159,8 @@ void SceneNode::setGrasp(const slender_sim::SetGrasp::Request& request, slender_
   response.success = response.message.empty();
 }
 
-bool SceneNode::onSetFunctions(slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response)
+bool SceneNode::onSetFunctions(slender_sim::SetFunctions::Request& request,
+                               slender_sim::SetFunctions::Response& response)
 {
   response.message = refusesInput();
   if (response.message.empty())
@@ -171,7 +176,8 @@ bool SceneNode::onSetFunctions(slender_sim::SetFunctions::Request& request, slen
   return true;
 }
 
-void SceneNode::setFunctions(const slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response)
+void SceneNode::setFunctions(const slender_sim::SetFunctions::Request& request,
+                             slender_sim::SetFunctions::Response& response)
 {
   const auto& cloths = simulation_->config().cloths;
   std::string names;
@@ -192,7 +198,8 @@ void SceneNode::setFunctions(const slender_sim::SetFunctions::Request& request, 
   else
     try
     {
-      simulation_->setFunctions(found, request.set, request.blend < 0 ? std::nullopt : std::optional<double>(request.blend));
+      simulation_->setFunctions(found, request.set,
+                                request.blend < 0 ? std::nullopt : std::optional<double>(request.blend));
       response.success = true;
     }
     catch (const std::invalid_argument& e)
@@ -202,11 +209,13 @@ void SceneNode::setFunctions(const slender_sim::SetFunctions::Request& request, 
 }
 
 /// Returns why not; empty when done.
-std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response)
+std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int grasp,
+                              slender_sim::SetGrasp::Response& response)
 {
   const GraspRef& ref = simulation_->grasps()[grasp];
   const bool cloth = ref.cloth >= 0;
-  const Eigen::Matrix3Xd& x = cloth ? simulation_->state().cloths[ref.cloth].cloth.x : simulation_->state().rods[ref.rod].x;
+  const Eigen::Matrix3Xd& x =
+      cloth ? simulation_->state().cloths[ref.cloth].cloth.x : simulation_->state().rods[ref.rod].x;
   const int nodes = static_cast<int>(x.cols());
   std::vector<int> within;
   int first = request.first_node, last = request.last_node;
@@ -237,7 +246,8 @@ std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int
       first = within.front(), last = within.back();
   }
   else
-    return "action " + std::to_string(request.action) + ": must be RELEASE, ATTACH_NODES" + (cloth ? ", ATTACH_NEAREST or ATTACH_WITHIN" : " or ATTACH_NEAREST");
+    return "action " + std::to_string(request.action) + ": must be RELEASE, ATTACH_NODES" +
+           (cloth ? ", ATTACH_NEAREST or ATTACH_WITHIN" : " or ATTACH_NEAREST");
   if (request.position_only && cloth)
     return "position_only is for rods; a cloth's vertices have no frames";
   if (request.position_only && first != last)
@@ -311,4 +321,4 @@ bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::Fil
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

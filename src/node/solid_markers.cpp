@@ -64,7 +64,7 @@ void paintMesh(const TriangleMesh& mesh, Marker& marker)
 
 namespace {
 
-constexpr double kPlaneSize = 10.0;      // [m] a piece of it is drawn
+constexpr double kPlaneSize = 10.0;   // [m] a piece of it is drawn
 
 /// Fills type, scale and points of a marker whose pose and colour are set.
 struct Drawing
@@ -95,11 +95,12 @@ struct Drawing
   }
 };
 
-}  // namespace
+}   // namespace
 
 void addSolidMarkers(const Simulation& simulation, const std_msgs::Header& header, visualization_msgs::MarkerArray& out)
 {
-  const auto add = [&](const char* ns, std::size_t id, const Shape& shape, const Pose& X_WS, const std_msgs::ColorRGBA& paint) {
+  const auto add = [&](const char* ns, std::size_t id, const Shape& shape, const Pose& X_WS,
+                       const std_msgs::ColorRGBA& paint) {
     Marker marker = makeMarker(header, ns, static_cast<int>(id), Marker::CUBE);
     marker.color = paint;
     marker.pose = toMessage(X_WS);
@@ -109,9 +110,10 @@ void addSolidMarkers(const Simulation& simulation, const std_msgs::Header& heade
   const SceneConfig& scene = simulation.config();
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
     if (scene.bodies[b].shape)
-      add("bodies", b, *scene.bodies[b].shape, simulation.state().bodies[b].X_WB * scene.bodies[b].X_BS, color(0.70, 0.28, 0.24));
+      add("bodies", b, *scene.bodies[b].shape, simulation.state().bodies[b].X_WB * scene.bodies[b].X_BS,
+          color(0.70, 0.28, 0.24));
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
     add("obstacles", k, scene.obstacles[k].shape, simulation.state().obstacles[k], color(0.62, 0.64, 0.66));
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,7 +7,8 @@
 namespace slender {
 namespace {
 
-constexpr double kLongInterval = 2.5;   // times the median: jitter of a sensor stays below, one lost message of a steady stream is 2, two are 3
+// times the median: jitter of a sensor stays below, one lost message of a steady stream is 2, two are 3
+constexpr double kLongInterval = 2.5;
 
 std::string number(double value)
 {
@@ -16,7 +17,7 @@ std::string number(double value)
   return out;
 }
 
-}  // namespace
+}   // namespace
 
 void StepGaps::add(std::uint32_t epoch, std::uint64_t step, double seconds)
 {
@@ -54,8 +55,8 @@ std::string StepGaps::text(double step_length) const
     }
   std::string out;
   if (places > 0)
-    out = std::to_string(lost) + " recorded instants are missing in " + std::to_string(places) + " places, first after " + number(first) +
-          " s; a node's own bag (~record_bag) lacks none. ";
+    out = std::to_string(lost) + " recorded instants are missing in " + std::to_string(places) +
+          " places, first after " + number(first) + " s; a node's own bag (~record_bag) lacks none. ";
   double skipped = 0.0, at = 0.0;
   for (const auto& [stride, pace] : paces_)
   {
@@ -68,7 +69,8 @@ std::string StepGaps::text(double step_length) const
     }
   }
   if (skipped > 0.0)
-    out += "The stamps skip up to " + number(skipped) + " s between two steps, after " + number(at) + " s: the node was paused, or fell behind (~max_lag). ";
+    out += "The stamps skip up to " + number(skipped) + " s between two steps, after " + number(at) +
+           " s: the node was paused, or fell behind (~max_lag). ";
   return out.empty() ? out : out.substr(0, out.size() - 1);
 }
 
@@ -88,8 +90,9 @@ std::string IntervalGaps::text() const
       first = k;
   if (places == 0)
     return "";
-  return std::to_string(places) + " intervals between its messages are longer than " + number(kLongInterval) + " times the usual " + number(usual) +
-         " s, the first one " + number(intervals[first]) + " s after " + number(times_[first]) + " s; the motion is interpolated over them.";
+  return std::to_string(places) + " intervals between its messages are longer than " + number(kLongInterval) +
+         " times the usual " + number(usual) + " s, the first one " + number(intervals[first]) + " s after " +
+         number(times_[first]) + " s; the motion is interpolated over them.";
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -31,9 +31,12 @@ template <class Message>
 class TopicStream final : public Stream
 {
 public:
-  TopicStream(const rosbag::Bag& bag, const std::string& topic, const std::string& type, std::function<void(const Message&)> use)
-    : use_(std::move(use)), topic_(topic),
-      view_(bag, [topic, type](const rosbag::ConnectionInfo* c) { return c->topic == topic && c->datatype == type; }), at_(view_.begin())
+  TopicStream(const rosbag::Bag& bag, const std::string& topic, const std::string& type,
+              std::function<void(const Message&)> use)
+    : use_(std::move(use)),
+      topic_(topic),
+      view_(bag, [topic, type](const rosbag::ConnectionInfo* c) { return c->topic == topic && c->datatype == type; }),
+      at_(view_.begin())
   {
     load();
   }
@@ -53,7 +56,8 @@ private:
       return;
     message_ = at_->template instantiate<Message>();
     if (!message_)
-      throw BagError(topic_ + ": its messages are of another version of slender_sim; export with the version that recorded them");
+      throw BagError(
+          topic_ + ": its messages are of another version of slender_sim; export with the version that recorded them");
     stamp_ = message_->header.stamp;
   }
 
@@ -64,4 +68,4 @@ private:
   boost::shared_ptr<Message> message_;
 };
 
-}  // namespace slender
+}   // namespace slender

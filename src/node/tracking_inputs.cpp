@@ -12,23 +12,33 @@ namespace {
 constexpr int kQueueSize = 100;
 constexpr std::size_t kMaxPending = 300;
 
-bool withinReach(const Eigen::Matrix3Xd& points) { return points.cols() == 0 || points.cwiseAbs().maxCoeff() <= max_coordinate; }
+bool withinReach(const Eigen::Matrix3Xd& points)
+{
+  return points.cols() == 0 || points.cwiseAbs().maxCoeff() <= max_coordinate;
+}
 
 const Eigen::Matrix3Xd& guideNow(const Simulation& simulation, int index, bool of_rod)
 {
   return of_rod ? simulation.state().rod_guides[index].nodes : simulation.state().cloths[index].guide;
 }
 
-}  // namespace
+}   // namespace
 
-TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers, const Simulation& simulation,
-                               const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops)
-  : options_(options), buffers_(buffers), clock_(clock), tf_(tf), drops_(drops), pending_(kMaxPending, options.tf_timeout)
+TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers,
+                               const Simulation& simulation, const SimClock& clock, const tf2_ros::Buffer& tf,
+                               DropCounter& drops)
+  : options_(options),
+    buffers_(buffers),
+    clock_(clock),
+    tf_(tf),
+    drops_(drops),
+    pending_(kMaxPending, options.tf_timeout)
 {
   const std::vector<ClothConfig>& cloths = simulation.config().cloths;
   const std::vector<RodConfig>& rods = simulation.config().rods;
   const auto tracks = [](const auto& object) { return object.tracking != nullptr; };
-  const auto tracked = std::count_if(cloths.begin(), cloths.end(), tracks) + std::count_if(rods.begin(), rods.end(), tracks);
+  const auto tracked =
+      std::count_if(cloths.begin(), cloths.end(), tracks) + std::count_if(rods.begin(), rods.end(), tracks);
   const auto add = [&](const auto& objects, bool of_rod) {
     for (std::size_t k = 0; k < objects.size(); ++k)
     {
@@ -48,13 +58,17 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
     const auto hints = ros::TransportHints().tcpNoDelay();
     if (guides_[g].carried)
     {
-      const boost::function<void(const slender_sim::BodyStates&)> callback = [this, index](const slender_sim::BodyStates& m) { onBodies(index, m); };
-      subscribers_.push_back(nh.subscribe<const slender_sim::BodyStates&>(guides_[g].topic, kQueueSize, callback, ros::VoidConstPtr(), hints));
+      const boost::function<void(const slender_sim::BodyStates&)> callback =
+          [this, index](const slender_sim::BodyStates& m) { onBodies(index, m); };
+      subscribers_.push_back(nh.subscribe<const slender_sim::BodyStates&>(guides_[g].topic, kQueueSize, callback,
+                                                                          ros::VoidConstPtr(), hints));
     }
     else
     {
-      const boost::function<void(const sensor_msgs::PointCloud2&)> callback = [this, index](const sensor_msgs::PointCloud2& m) { onPoints(index, m); };
-      subscribers_.push_back(nh.subscribe<const sensor_msgs::PointCloud2&>(guides_[g].topic, kQueueSize, callback, ros::VoidConstPtr(), hints));
+      const boost::function<void(const sensor_msgs::PointCloud2&)> callback =
+          [this, index](const sensor_msgs::PointCloud2& m) { onPoints(index, m); };
+      subscribers_.push_back(nh.subscribe<const sensor_msgs::PointCloud2&>(guides_[g].topic, kQueueSize, callback,
+                                                                           ros::VoidConstPtr(), hints));
     }
   }
 }
@@ -85,8 +99,10 @@ void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message
   if (!why.empty())
     return drops_.drop(Drop::wrong_length, what, why);
   if (taken.points.cols() != guides_[guide].held.cols())
-    return drops_.drop(Drop::wrong_length, what, std::to_string(taken.points.cols()) + " points, but the guide" + (guides_[guide].of_rod ? "" : "'s mesh") + " has " +
-                                                     std::to_string(guides_[guide].held.cols()) + (guides_[guide].of_rod ? " nodes" : " vertices"));
+    return drops_.drop(
+        Drop::wrong_length, what,
+        std::to_string(taken.points.cols()) + " points, but the guide" + (guides_[guide].of_rod ? "" : "'s mesh") +
+            " has " + std::to_string(guides_[guide].held.cols()) + (guides_[guide].of_rod ? " nodes" : " vertices"));
   if (!taken.points.allFinite())
     return drops_.drop(Drop::not_finite, what, "all points must be finite");
   take(std::move(taken), message.header);
@@ -96,7 +112,8 @@ void TrackingInputs::onBodies(int guide, const slender_sim::BodyStates& message)
 {
   drops_.receive();
   const std::string& what = guides_[guide].topic;
-  if (message.pose.size() != message.name.size() || (!message.twist.empty() && message.twist.size() != message.name.size()))
+  if (message.pose.size() != message.name.size() ||
+      (!message.twist.empty() && message.twist.size() != message.name.size()))
     return drops_.drop(Drop::wrong_length, what, "name, pose and twist must be equally long (twist may be empty)");
   if (std::set<std::string>(message.name.begin(), message.name.end()).size() != message.name.size())
     return drops_.drop(Drop::wrong_length, what, "a name comes twice; there must be one pose per body");
@@ -110,7 +127,8 @@ void TrackingInputs::onBodies(int guide, const slender_sim::BodyStates& message)
     if (fault == PoseFault::not_finite)
       return drops_.drop(Drop::not_finite, what, "position and orientation of " + message.name[b] + " must be finite");
     if (fault == PoseFault::bad_quaternion)
-      return drops_.drop(Drop::bad_quaternion, what, "the orientation of " + message.name[b] + ", whose length must be 1 within 1 %");
+      return drops_.drop(Drop::bad_quaternion, what,
+                         "the orientation of " + message.name[b] + ", whose length must be 1 within 1 %");
     const auto found = std::find(names.begin(), names.end(), message.name[b]);
     if (found == names.end())
       drops_.drop(Drop::unknown_name, what, "\"" + message.name[b] + "\" carries no vertices of the guide");
@@ -130,9 +148,10 @@ void TrackingInputs::take(Message message, const std_msgs::Header& header)
   message.stamp = header.stamp.isZero() ? clock_.stamp() : header.stamp;
   const double age = clock_.seconds() - clock_.secondsAt(message.stamp);
   if (age > options_.guide_timeout || -age > options_.guide_ahead)
-    return drops_.drop(age > 0.0 ? Drop::stale : Drop::from_future, what,
-                       "its stamp is " + std::to_string(std::abs(age)) + " s " +
-                         (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
+    return drops_.drop(
+        age > 0.0 ? Drop::stale : Drop::from_future, what,
+        "its stamp is " + std::to_string(std::abs(age)) + " s " +
+            (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
   if (!pending_.holds(message.guide, message.frame) && deliver(message, nullptr))
     return;
   if (!pending_.add(message.guide, message.frame, message))
@@ -150,7 +169,8 @@ bool TrackingInputs::deliver(const Message& message, std::string* why)
     {
       if (!tf_.canTransform(options_.frame_id, message.frame, message.stamp, why))
         return false;
-      if (fromMessage(tf_.lookupTransform(options_.frame_id, message.frame, message.stamp).transform, X_WF) != PoseFault::none)
+      if (fromMessage(tf_.lookupTransform(options_.frame_id, message.frame, message.stamp).transform, X_WF) !=
+          PoseFault::none)
       {
         drops_.drop(Drop::bad_quaternion, guide.topic, "in the transform from " + message.frame);
         return true;
@@ -173,7 +193,8 @@ bool TrackingInputs::deliver(const Message& message, std::string* why)
     good = good && (X_WF * pose.position).cwiseAbs().maxCoeff() <= max_coordinate;
   if (!good)
   {
-    drops_.drop(Drop::out_of_range, guide.topic, "coordinates must be within " + std::to_string(static_cast<long>(max_coordinate)) + " m");
+    drops_.drop(Drop::out_of_range, guide.topic,
+                "coordinates must be within " + std::to_string(static_cast<long>(max_coordinate)) + " m");
     return true;
   }
   bool late = false;
@@ -198,9 +219,11 @@ bool TrackingInputs::deliver(const Message& message, std::string* why)
 
 void TrackingInputs::processPending()
 {
-  pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); }, [this](const Message& message, const std::string& why) {
-    drops_.drop(Drop::no_transform, guides_[message.guide].topic, "from " + message.frame + " to " + options_.frame_id + ": " + why);
-  });
+  pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); },
+                   [this](const Message& message, const std::string& why) {
+                     drops_.drop(Drop::no_transform, guides_[message.guide].topic,
+                                 "from " + message.frame + " to " + options_.frame_id + ": " + why);
+                   });
 }
 
 void TrackingInputs::apply(double time, SceneInputs& inputs)
@@ -273,18 +296,22 @@ bool TrackingInputs::Guide::heard() const
 std::vector<TrackingInputs::Age> TrackingInputs::ages() const
 {
   std::vector<Age> ages;
-  const auto age = [this](const std::optional<double>& last) { return last ? std::optional<double>(clock_.seconds() - *last) : std::nullopt; };
+  const auto age = [this](const std::optional<double>& last) {
+    return last ? std::optional<double>(clock_.seconds() - *last) : std::nullopt;
+  };
   for (const Guide& guide : guides_)
   {
     if (guide.points)
-      ages.push_back({guide.topic, age(guide.points->lastTime()), false, guide.points->timing().lag(), guide.points->timing().excess()});
+      ages.push_back({guide.topic, age(guide.points->lastTime()), false, guide.points->timing().lag(),
+                      guide.points->timing().excess()});
     for (std::size_t b = 0; b < guide.bodies.size(); ++b)   // one may fall silent while others speak
     {
       const std::optional<double> own = age(guide.bodies[b].lastTime());
-      ages.push_back({guide.topic + " " + guide.carried->bodies[b], own, !own && guide.heard(), guide.bodies[b].timing().lag(), guide.bodies[b].timing().excess()});
+      ages.push_back({guide.topic + " " + guide.carried->bodies[b], own, !own && guide.heard(),
+                      guide.bodies[b].timing().lag(), guide.bodies[b].timing().excess()});
     }
   }
   return ages;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -72,12 +72,24 @@ private:
   std::thread thread_;
 };
 
-struct RodNodelet : SceneNodelet { RodNodelet() : SceneNodelet(NodeKind::rods) {} };
-struct ThreadNodelet : SceneNodelet { ThreadNodelet() : SceneNodelet(NodeKind::threads) {} };
-struct ClothNodelet : SceneNodelet { ClothNodelet() : SceneNodelet(NodeKind::cloths) {} };
-struct TrackingNodelet : SceneNodelet { TrackingNodelet() : SceneNodelet(NodeKind::tracking) {} };
+struct RodNodelet : SceneNodelet
+{
+  RodNodelet() : SceneNodelet(NodeKind::rods) {}
+};
+struct ThreadNodelet : SceneNodelet
+{
+  ThreadNodelet() : SceneNodelet(NodeKind::threads) {}
+};
+struct ClothNodelet : SceneNodelet
+{
+  ClothNodelet() : SceneNodelet(NodeKind::cloths) {}
+};
+struct TrackingNodelet : SceneNodelet
+{
+  TrackingNodelet() : SceneNodelet(NodeKind::tracking) {}
+};
 
-}  // namespace slender
+}   // namespace slender
 
 PLUGINLIB_EXPORT_CLASS(slender::RodNodelet, nodelet::Nodelet)
 PLUGINLIB_EXPORT_CLASS(slender::ThreadNodelet, nodelet::Nodelet)

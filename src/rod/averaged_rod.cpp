@@ -20,12 +20,21 @@ class ConstrainedRod
 {
 public:
   ConstrainedRod(RodSystem& rod, const AveragedRod::Averages& c)
-    : rod_(rod), c_(c), rows_(3 * c.rows()), columns_(4 * c.cols(), rows_), schur_(rows_, rows_), factor_(rows_), gap_(rows_), multipliers_(rows_), projection_(c)
+    : rod_(rod),
+      c_(c),
+      rows_(3 * c.rows()),
+      columns_(4 * c.cols(), rows_),
+      schur_(rows_, rows_),
+      factor_(rows_),
+      gap_(rows_),
+      multipliers_(rows_),
+      projection_(c)
   {
     multipliers_.setZero();
   }
 
-  /// Trial positions of free nodes, moved by the least sum of mass times distance squared so that they have the averages. False: averages depend on each other.
+  /// Trial positions of free nodes, moved by the least sum of mass times distance squared so that they have the
+  /// averages. False: averages depend on each other.
   bool meet(const Eigen::VectorXd& mass, const Eigen::Matrix3Xd& targets)
   {
     targets_ = &targets;
@@ -50,7 +59,10 @@ public:
   /// Of averages, in the rod's axes: three per average [N].
   const Eigen::VectorXd& multipliers() const { return multipliers_; }
 
-  RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {}) { return rod_.evaluate(with_hessian, shift); }
+  RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {})
+  {
+    return rod_.evaluate(with_hessian, shift);
+  }
   void solve()
   {
     rod_.solve();
@@ -97,7 +109,11 @@ public:
     addMultipliers(-1.0);
     return residual;
   }
-  double forceScale() const { return std::max(rod_.forceScale(), multipliers_.cwiseAbs().maxCoeff() / std::max<Eigen::Index>(1, c_.cols() / c_.rows())); }
+  double forceScale() const
+  {
+    return std::max(rod_.forceScale(),
+                    multipliers_.cwiseAbs().maxCoeff() / std::max<Eigen::Index>(1, c_.cols() / c_.rows()));
+  }
   double noiseLevel() const { return rod_.noiseLevel(); }
 
 private:
@@ -129,13 +145,15 @@ private:
   AverageProjection projection_;
 };
 
-}  // namespace
+}   // namespace
 
 class AveragedRod::Impl : public SubstepEquations
 {
 public:
   Impl(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> a, const TimeConfig& time)
-    : rod(std::move(model), time), averages(std::move(a)), equations(rod.system, *averages)
+    : rod(std::move(model), time),
+      averages(std::move(a)),
+      equations(rod.system, *averages)
   {
     plan.stages.reserve(2);
   }
@@ -176,8 +194,10 @@ public:
       rod.refuse(report, failure, kStepInterrupted);
       return;
     }
-    const char* dependent = "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
-    rod.refuseUnsolved(report, failure, substep.length, false, failure == StepFailure::singular_matrix ? dependent : "", true);
+    const char* dependent =
+        "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
+    rod.refuseUnsolved(report, failure, substep.length, false, failure == StepFailure::singular_matrix ? dependent : "",
+                       true);
   }
 
   /// Averages pull at held nodes, too, which hand that on to what holds them.
@@ -209,17 +229,20 @@ public:
   double duration = 0.0;               ///< of the present step [s]
 };
 
-AveragedRod::AveragedRod(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> averages, const TimeConfig& time)
+AveragedRod::AveragedRod(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> averages,
+                         const TimeConfig& time)
 {
   const std::string who = "rod '" + model->name + "': ";
   if (!averages || averages->rows() == 0 || averages->cols() != model->nodes())
-    throw std::invalid_argument(who + "averages of its " + std::to_string(model->nodes()) + " nodes expected, at least one");
+    throw std::invalid_argument(who + "averages of its " + std::to_string(model->nodes()) +
+                                " nodes expected, at least one");
   if (time.integrator != Integrator::implicit_euler || time.error_tolerance > 0)
     throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler, with fixed steps");
   const Eigen::VectorXd weights = *averages * Eigen::VectorXd::Ones(averages->cols());
   for (Eigen::Index i = 0; i < weights.size(); ++i)
     if (!(std::abs(weights[i] - 1.0) < 1e-9))
-      throw std::invalid_argument(who + "the weights of average " + std::to_string(i) + " sum to " + std::to_string(weights[i]) + "; must be 1");
+      throw std::invalid_argument(who + "the weights of average " + std::to_string(i) + " sum to " +
+                                  std::to_string(weights[i]) + "; must be 1");
   impl_ = std::make_unique<Impl>(std::move(model), std::move(averages), time);
 }
 AveragedRod::~AveragedRod() = default;
@@ -233,7 +256,8 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
   if (!(duration > 0) || !std::isfinite(duration))
     what = "step length";
   else if (targets.cols() != impl_->averages->rows())
-    what = "number of averages (" + std::to_string(targets.cols()) + " for " + std::to_string(impl_->averages->rows()) + ")";
+    what = "number of averages (" + std::to_string(targets.cols()) + " for " + std::to_string(impl_->averages->rows()) +
+           ")";
   else if (!targets.allFinite())
     what = "averages";
   if (!what.empty() || !rod.inputsFinite(state, inputs, what))
@@ -256,6 +280,9 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
 
 const Eigen::Matrix3Xd& AveragedRod::averageForces() const { return impl_->forces; }
 const std::vector<Wrench>& AveragedRod::wrenches() const { return impl_->rod.wrenches; }
-RodEnergies AveragedRod::energies(const RodState& state, const Eigen::Vector3d& gravity) const { return impl_->rod.energies(state, gravity); }
+RodEnergies AveragedRod::energies(const RodState& state, const Eigen::Vector3d& gravity) const
+{
+  return impl_->rod.energies(state, gravity);
+}
 
-}  // namespace slender
+}   // namespace slender

@@ -19,7 +19,7 @@ Eigen::Matrix3d cross(const Eigen::Vector3d& v)
   return m;
 }
 
-}  // namespace
+}   // namespace
 
 void checkBody(const RigidBodyModel& b)
 {
@@ -34,15 +34,17 @@ void checkBody(const RigidBodyModel& b)
   if (!(m[0] > 0))
     refuse("its smallest principal moment of inertia is " + std::to_string(m[0]) + " kg m^2; must be greater than 0");
   if (m[0] + m[1] < m[2] * (1 - 1e-6))
-    refuse("principal moments of inertia " + std::to_string(m[0]) + ", " + std::to_string(m[1]) + " and " + std::to_string(m[2]) +
-           " kg m^2: no body has a moment greater than the sum of the other two");
+    refuse("principal moments of inertia " + std::to_string(m[0]) + ", " + std::to_string(m[1]) + " and " +
+           std::to_string(m[2]) + " kg m^2: no body has a moment greater than the sum of the other two");
   if (!b.force.allFinite() || !b.torque.allFinite())
     refuse("force and torque must be finite");
   if (!(b.linear_damping >= 0) || !(b.angular_damping >= 0))
     refuse("damping must not be negative");
 }
 
-BodySystem::BodySystem(const RigidBodyModel& model) : model_(model), moment_(0.5 * model.inertia.trace() * Eigen::Matrix3d::Identity() - model.inertia)
+BodySystem::BodySystem(const RigidBodyModel& model)
+  : model_(model),
+    moment_(0.5 * model.inertia.trace() * Eigen::Matrix3d::Identity() - model.inertia)
 {
 }
 
@@ -105,7 +107,8 @@ void BodySystem::beginStage(const StepPlan& plan, std::size_t index, double h, c
   inertia_rotation_ = rotation(hat.r) - square * cross(w) * cross(w) * pose.orientation.toRotationMatrix();
   damping_target_ = tilde.x;
   damping_rotation_ = rotation(tilde.r);
-  const double inertia = 1.0 / square, linear = model_.linear_damping / stage.tau_v, angular = model_.angular_damping / stage.tau_v;
+  const double inertia = 1.0 / square, linear = model_.linear_damping / stage.tau_v,
+               angular = model_.angular_damping / stage.tau_v;
   weight_ = model_.mass * (inertia + linear);
   target_ = (inertia * inertia_target_ + linear * damping_target_) / (inertia + linear);
   rotation_weight_ = inertia + angular;
@@ -127,16 +130,20 @@ void BodySystem::evaluate(bool with_hessian)
   const Eigen::Matrix3d r = pose.orientation.toRotationMatrix();
   const Eigen::Vector3d d = pose.position - target_;
   const Eigen::Matrix3d difference = r - rotation_target_;
-  energy_ = 0.5 * weight_ * d.squaredNorm() + 0.5 * rotation_weight_ * (difference * moment_ * difference.transpose()).trace() - force_.dot(pose.position);
+  energy_ = 0.5 * weight_ * d.squaredNorm() +
+            0.5 * rotation_weight_ * (difference * moment_ * difference.transpose()).trace() -
+            force_.dot(pose.position);
   // -tr(R^ J R^T exp(-[turn])) to second order in the turn
   const Eigen::Matrix3d c = rotation_target_ * moment_ * r.transpose();
   gradient.head<3>() = weight_ * d - force_;
-  gradient.tail<3>() = rotation_weight_ * Eigen::Vector3d(c(1, 2) - c(2, 1), c(2, 0) - c(0, 2), c(0, 1) - c(1, 0)) - model_.torque;
+  gradient.tail<3>() =
+      rotation_weight_ * Eigen::Vector3d(c(1, 2) - c(2, 1), c(2, 0) - c(0, 2), c(0, 1) - c(1, 0)) - model_.torque;
   if (!with_hessian)
     return;
   hessian.setZero();
   hessian.topLeftCorner<3, 3>().diagonal().setConstant(weight_);
-  hessian.bottomRightCorner<3, 3>() = rotation_weight_ * (c.trace() * Eigen::Matrix3d::Identity() - 0.5 * (c + c.transpose()));
+  hessian.bottomRightCorner<3, 3>() =
+      rotation_weight_ * (c.trace() * Eigen::Matrix3d::Identity() - 0.5 * (c + c.transpose()));
 }
 
 void BodySystem::addShift(const HessianShift& shift)
@@ -177,7 +184,9 @@ void BodySystem::finishStep(const StepPlan& plan, RigidBodyState& next)
   const double c = plan.fraction;
   const Motion hat = combine(stage.q_hat), tilde = combine(stage.q_tilde);
   const double square = stage.tau_a * stage.tau_a;
-  const auto carriedOn = [](const Eigen::Vector3d& from, const Eigen::Vector3d& to, double share) { return Eigen::Vector3d(from + (to - from) / share); };
+  const auto carriedOn = [](const Eigen::Vector3d& from, const Eigen::Vector3d& to, double share) {
+    return Eigen::Vector3d(from + (to - from) / share);
+  };
   Eigen::Vector3d turn = turnFromStart(), rate = (turn - tilde.r) / stage.tau_v, turn_rate = (turn - hat.r) / square;
   if (c != 1.0)
   {
@@ -198,4 +207,4 @@ void BodySystem::finishStep(const StepPlan& plan, RigidBodyState& next)
   next.has_history = true;
 }
 
-}  // namespace slender
+}   // namespace slender

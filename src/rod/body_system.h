@@ -8,11 +8,12 @@
 
 namespace slender {
 
-/// Equations of one rigid body in a stage of an implicit step. The integrator acts on the centre and on the rotation vector from the
-/// orientation at the start of the step, so every method keeps its order. A stage minimises, over rotations R,
+/// Equations of one rigid body in a stage of an implicit step. The integrator acts on the centre and on the rotation
+/// vector from the orientation at the start of the step, so every method keeps its order. A stage minimises, over
+/// rotations R,
 ///   1/2 m |p - p^|^2 + 1/2 tr((R - R^) J (R - R^)^T), J the second moment of the mass,
-/// as if the body were a set of points x = p + R r that follow targets x^ = p^ + R^ r; R^ includes the centripetal acceleration.
-/// Unknowns: displacement and turn (world axes) from the base pose.
+/// as if the body were a set of points x = p + R r that follow targets x^ = p^ + R^ r; R^ includes the centripetal
+/// acceleration. Unknowns: displacement and turn (world axes) from the base pose.
 class BodySystem
 {
 public:
@@ -23,7 +24,8 @@ public:
   const RigidBodyModel& model() const { return model_; }
 
   void load(const RigidBodyState& state);
-  /// Accelerations at the start of a run, from the force and torque (about the centre) of everything attached and its extra mass.
+  /// Accelerations at the start of a run, from the force and torque (about the centre) of everything attached and its
+  /// extra mass.
   Vector6 startAcceleration(const Vector6& wrench, const Matrix6& extra_inertia);
 
   void beginStage(const StepPlan& plan, std::size_t stage, double h, const Eigen::Vector3d& gravity);
@@ -47,17 +49,21 @@ public:
   const Pose& base() const { return base_; }
   void addShift(const HessianShift& shift);
 
-  Pose pose;           ///< trial
+  Pose pose;   ///< trial
   Vector6 gradient = Vector6::Zero();
   Matrix6 hessian = Matrix6::Zero();
 
 private:
-  struct Motion { Eigen::Vector3d x, r; };   ///< centre, and rotation vector from the orientation at the start of the step
+  /// centre, and rotation vector from the orientation at the start of the step
+  struct Motion
+  {
+    Eigen::Vector3d x, r;
+  };
   Motion combine(const Combination& c) const;
   Eigen::Vector3d turnFromStart() const;
 
   const RigidBodyModel& model_;
-  Eigen::Matrix3d moment_;     ///< J, body axes
+  Eigen::Matrix3d moment_;   ///< J, body axes
   std::array<Motion, kHistoryCount> history_;
   Eigen::Quaterniond start_;
   Pose base_, saved_;
@@ -65,8 +71,8 @@ private:
   double energy_ = 0, weight_ = 0, rotation_weight_ = 0;
   Eigen::Vector3d target_, force_;
   Eigen::Matrix3d rotation_target_;
-  Eigen::Vector3d inertia_target_, damping_target_;          ///< p^, p~
-  Eigen::Matrix3d inertia_rotation_, damping_rotation_;      ///< R^, R~
+  Eigen::Vector3d inertia_target_, damping_target_;       ///< p^, p~
+  Eigen::Matrix3d inertia_rotation_, damping_rotation_;   ///< R^, R~
 };
 
-}  // namespace slender
+}   // namespace slender

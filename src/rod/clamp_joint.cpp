@@ -11,7 +11,7 @@ namespace slender {
 namespace {
 Vec3<double> vec(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Vec3<double> at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
-}  // namespace
+}   // namespace
 
 void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& sum)
 {
@@ -20,25 +20,29 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   const Vec3<double> edge_t = at(a_.t, j), edge_d1 = at(a_.d1, j), edge_d2 = cross(edge_t, edge_d1);
   const double inverse = a_.inverse_length[j];
   const bool section_first = c.side == 1;
-  const JointFrames<double> frames = section_first
-      ? JointFrames<double>{section_t, section_d1, section_d2, edge_t, edge_d1, edge_d2, inverse, inverse}
-      : JointFrames<double>{edge_t, edge_d1, edge_d2, section_t, section_d1, section_d2, inverse, inverse};
+  const JointFrames<double> frames =
+      section_first
+          ? JointFrames<double>{section_t, section_d1, section_d2, edge_t, edge_d1, edge_d2, inverse, inverse}
+          : JointFrames<double>{edge_t, edge_d1, edge_d2, section_t, section_d1, section_d2, inverse, inverse};
 
   const Eigen::Vector3d te(edge_t.x, edge_t.y, edge_t.z), de(edge_d1.x, edge_d1.y, edge_d1.z);
-  const double angle = section_first ? signedAngle(parallelTransport(c.d1, c.t, te), de, te) : signedAngle(parallelTransport(de, te, c.t), c.d1, c.t);
+  const double angle = section_first ? signedAngle(parallelTransport(c.d1, c.t, te), de, te)
+                                     : signedAngle(parallelTransport(de, te, c.t), c.d1, c.t);
   const double turned = section_first ? a_.turn[j] - c.turn : c.turn - a_.turn[j];
   c.twist = unwrapNear(angle, c.base_twist + turned);
 
   const JointStrains<double> strains = jointStrains(frames);
   c.kappa1 = strains.kappa1;
   c.kappa2 = strains.kappa2;
-  const JointMaterial<double> material = {c.scale * c.b11, c.scale * c.b12, c.scale * c.b22, c.scale * c.beta, c.rest1, c.rest2, c.rest3};
+  const JointMaterial<double> material = {c.scale * c.b11, c.scale * c.b12, c.scale * c.b22, c.scale * c.beta,
+                                          c.rest1,         c.rest2,         c.rest3};
   JointGradient<double> g;
   JointHessian<double> h;
   JointResponse<double> response;
   if (model_.curvature == Curvature::compensated)
   {
-    const JointCompensation<double> compensation = {c.scale * c.scale * c.coupling, std::sqrt(0.5 / strains.inverse_chi), std::sin(0.5 * c.twist),
+    const JointCompensation<double> compensation = {c.scale * c.scale * c.coupling,
+                                                    std::sqrt(0.5 / strains.inverse_chi), std::sin(0.5 * c.twist),
                                                     std::cos(0.5 * c.twist)};
     response = compensatedResponse(strains, c.twist, material, compensation, c.kappa1, c.kappa2);
     if (with_hessian)
@@ -99,4 +103,4 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   p.diag[3][3] += c.hessian_tt;
 }
 
-}  // namespace slender
+}   // namespace slender

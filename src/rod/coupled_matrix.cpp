@@ -17,7 +17,10 @@ Eigen::Matrix3d cross(const Eigen::Vector3d& v)
   return m;
 }
 
-double entry(const RodPanel& p, int column, int row) { return row < 4 ? p.diag[column][row] : p.below[column][row - 4]; }
+double entry(const RodPanel& p, int column, int row)
+{
+  return row < 4 ? p.diag[column][row] : p.below[column][row - 4];
+}
 
 /// The unknown that row `row` of node i's panel belongs to, -1 beyond the end of an open rod.
 int panelDof(const RodModel& model, int node, int row)
@@ -26,7 +29,7 @@ int panelDof(const RodModel& model, int node, int row)
   return at < n ? 4 * at + row % 4 : model.closed ? 4 * (at - n) + row % 4 : -1;
 }
 
-}  // namespace
+}   // namespace
 
 /// Numbers the unknowns of a rod whose grasps have changed.
 void CoupledSystem::mapUnknowns(RodPart& part)
@@ -123,7 +126,8 @@ void CoupledSystem::contactColumns(const ContactRow& contact, bool whole, Column
     if (contact.point[p] < 0)
       continue;
     const RodPart& part = partOf(contact.point[p]);
-    const Eigen::Vector3d weights = contact.along[p] * contact.normal + (whole ? contact.across[p] : 0.0) * contact.turning;
+    const Eigen::Vector3d weights =
+        contact.along[p] * contact.normal + (whole ? contact.across[p] : 0.0) * contact.turning;
     for (int c = 0; c < 3; ++c)
       mapDof(part, 4 * (contact.point[p] - part.point) + c, weights[c], row);
   }
@@ -253,12 +257,16 @@ void CoupledSystem::buildPattern()
         for (int r = c; r < kRows; ++r)
         {
           const int a = part.dof[4 * i + c], at = panelDof(model, i, r), b = at < 0 ? kPrescribed : part.dof[at];
-          part.slots.push_back(a >= 0 && b >= 0 ? matrix_.index(part.offset + std::max(a, b), part.offset + std::min(a, b)) : -1);
+          part.slots.push_back(
+              a >= 0 && b >= 0 ? matrix_.index(part.offset + std::max(a, b), part.offset + std::min(a, b)) : -1);
         }
   }
 }
 
-void CoupledSystem::add(int a, int b, double value) { matrix_.values()[matrix_.index(std::max(a, b), std::min(a, b))] += value; }
+void CoupledSystem::add(int a, int b, double value)
+{
+  matrix_.values()[matrix_.index(std::max(a, b), std::min(a, b))] += value;
+}
 
 /// The symmetric pair of entries (a, b) and (b, a) of rows of unknowns.
 void CoupledSystem::addPair(const Columns& a, const Columns& b, double value)
@@ -276,7 +284,8 @@ void CoupledSystem::addSquare(const Columns& a, double value)
       add(a.index[i], a.index[j], (i != j && a.index[i] == a.index[j] ? 2.0 : 1.0) * a.value[i] * a.value[j] * value);
 }
 
-/// Entries of carried unknowns, and what the curvature of a rotation adds: for a point at r with gradient g, (g r^T + r g^T)/2 - (g.r) I.
+/// Entries of carried unknowns, and what the curvature of a rotation adds: for a point at r with gradient g, (g r^T + r
+/// g^T)/2 - (g.r) I.
 void CoupledSystem::addCarried(const RodPart& part)
 {
   RodSystem& system = part.rod->system;
@@ -312,8 +321,8 @@ void CoupledSystem::addCarried(const RodPart& part)
   }
 }
 
-/// The turn of a clamped section that a body carries. Turning the section is turning the edge backwards, so its derivatives follow
-/// from those of the edge: gradient -(e x g + g_theta t), and so on.
+/// The turn of a clamped section that a body carries. Turning the section is turning the edge backwards, so its
+/// derivatives follow from those of the edge: gradient -(e x g + g_theta t), and so on.
 void CoupledSystem::addClamps(const RodPart& part)
 {
   const RodArrays& arrays = part.rod->system.arrays();
@@ -324,8 +333,9 @@ void CoupledSystem::addClamps(const RodPart& part)
       continue;
     const int j = c.edge, next = (j + 1) % arrays.nodes;
     const Eigen::Vector3d t(arrays.t[0][j], arrays.t[1][j], arrays.t[2][j]), e = t / arrays.inverse_length[j];
-    const Eigen::Matrix3d by_edge = -cross(c.gradient_e) + cross(e) * c.hessian_ee + t * c.hessian_et.transpose() +
-                                    c.gradient_t * arrays.inverse_length[j] * (Eigen::Matrix3d::Identity() - t * t.transpose());
+    const Eigen::Matrix3d by_edge =
+        -cross(c.gradient_e) + cross(e) * c.hessian_ee + t * c.hessian_et.transpose() +
+        c.gradient_t * arrays.inverse_length[j] * (Eigen::Matrix3d::Identity() - t * t.transpose());
     const Eigen::Vector3d by_angle = e.cross(c.hessian_et) + c.hessian_tt * t;
     Eigen::Matrix3d turn = cross(c.torque) - by_edge * cross(e) + by_angle * t.transpose();
     turn = (0.5 * (turn + turn.transpose())).eval();
@@ -407,4 +417,4 @@ void CoupledSystem::assemble(const HessianShift& shift, bool whole)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -44,7 +44,8 @@ RodEvaluation CoupledSystem::energyAt(double s)
   {
     RodSystem& system = part.rod->system;
     for (int i = 0; i < part.rod->model->nodes(); ++i)
-      system.setInertia(i, system.isMoving(i) ? s * part.rod->model->mass[i] : 0.0, system.position(i), part.rod->load(inputs_->rods[part.index], i));
+      system.setInertia(i, system.isMoving(i) ? s * part.rod->model->mass[i] : 0.0, system.position(i),
+                        part.rod->load(inputs_->rods[part.index], i));
   }
   for (BodySystem& body : bodies_)
     body.hold(s, inputs_->gravity);
@@ -59,15 +60,18 @@ bool CoupledSystem::definite(double s)
 
 double CoupledSystem::neutralBand() const
 {
-  double mass = 0.0, length = 0.0, stiffness = std::numeric_limits<double>::infinity(), rounding = 0.0, least_mass = stiffness;
+  double mass = 0.0, length = 0.0, stiffness = std::numeric_limits<double>::infinity(), rounding = 0.0,
+         least_mass = stiffness;
   for (const RodPart& part : parts_)
   {
     const RodModel& m = *part.rod->model;
     mass += m.totalMass();
     length = std::max(length, m.rest_length.sum());
-    stiffness = std::min({stiffness, m.bend_modulus.row(0).minCoeff(), m.bend_modulus.row(2).minCoeff(), m.twist_modulus.minCoeff()});
+    stiffness = std::min(
+        {stiffness, m.bend_modulus.row(0).minCoeff(), m.bend_modulus.row(2).minCoeff(), m.twist_modulus.minCoeff()});
     for (int j = 0; j < m.edges(); ++j)
-      rounding = std::max(rounding, 4 * m.stretch_modulus[j] / (m.rest_length[j] * std::min(m.mass[j], m.mass[(j + 1) % m.nodes()])));
+      rounding = std::max(
+          rounding, 4 * m.stretch_modulus[j] / (m.rest_length[j] * std::min(m.mass[j], m.mass[(j + 1) % m.nodes()])));
     least_mass = std::min(least_mass, m.mass.minCoeff());
   }
   for (const BodySystem& body : bodies_)
@@ -84,7 +88,9 @@ double CoupledSystem::neutralBand() const
 void CoupledSystem::findLowestMode()
 {
   // a start without a symmetry that a mode could be orthogonal to
-  const auto start = [](std::size_t k) { return std::sin(1.0 + 1.7 * static_cast<double>(k)) + 0.5 * std::cos(0.3 * static_cast<double>(k)); };
+  const auto start = [](std::size_t k) {
+    return std::sin(1.0 + 1.7 * static_cast<double>(k)) + 0.5 * std::cos(0.3 * static_cast<double>(k));
+  };
   for (std::size_t k = 0; k < rhs_.size(); ++k)
     rhs_[k] = start(k);
   for (RodPart& part : parts_)
@@ -92,7 +98,9 @@ void CoupledSystem::findLowestMode()
       for (std::size_t d = 0; d < part.dof.size(); ++d)
         part.rod->system.direction()[d] = part.dof[d] >= 0 ? start(d) : 0.0;
   Eigen::Map<Eigen::VectorXd> shared(rhs_.data(), static_cast<Eigen::Index>(rhs_.size()));
-  const auto own = [](RodPart& part) { return Eigen::Map<Eigen::VectorXd>(part.rod->system.direction(), static_cast<Eigen::Index>(part.dof.size())); };
+  const auto own = [](RodPart& part) {
+    return Eigen::Map<Eigen::VectorXd>(part.rod->system.direction(), static_cast<Eigen::Index>(part.dof.size()));
+  };
   for (int k = 0; k < 12; ++k)
   {
     double square = shared.squaredNorm();
@@ -118,7 +126,8 @@ void CoupledSystem::findLowestMode()
     const Eigen::Map<Eigen::Matrix4Xd> v(part.rod->system.direction(), 4, part.rod->model->nodes());
     const RodModel& m = *part.rod->model;
     for (int j = 0; j < m.edges(); ++j)
-      turn = std::max({turn, (v.col((j + 1) % m.nodes()) - v.col(j)).head<3>().norm() / m.rest_length[j], std::abs(v(3, j))});
+      turn = std::max(
+          {turn, (v.col((j + 1) % m.nodes()) - v.col(j)).head<3>().norm() / m.rest_length[j], std::abs(v(3, j))});
     move = std::max(move, v.topRows<3>().cwiseAbs().maxCoeff());
     length = std::max(length, m.rest_length.sum());
   }
@@ -161,4 +170,4 @@ bool CoupledSystem::displaceAlongMode(double alpha, RodGroupState& state)
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

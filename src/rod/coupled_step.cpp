@@ -62,7 +62,7 @@ double leastStiffness(const RodGroupModel& model, double step)
   return mass * std::max(10.0, model.contact.options.gap / (step * step));
 }
 
-}  // namespace
+}   // namespace
 
 CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodStepper::Impl*>& rods) : model_(model)
 {
@@ -118,9 +118,11 @@ void CoupledSystem::placeDriven(double fraction)
 {
   for (std::size_t b = 0; b < model_.bodies.size(); ++b)
     if (!model_.bodies[b].simulated)
-      driven_[b] = poseBetween(origin_->bodies[b].X_WB, origin_->bodies[b].velocity, inputs_->bodies[b], duration_, fraction, nullptr);
+      driven_[b] = poseBetween(origin_->bodies[b].X_WB, origin_->bodies[b].velocity, inputs_->bodies[b], duration_,
+                               fraction, nullptr);
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    obstacles_[k] = poseBetween(origin_->obstacles[k], origin_->obstacle_velocities[k], inputs_->obstacles[k], duration_, fraction, nullptr);
+    obstacles_[k] = poseBetween(origin_->obstacles[k], origin_->obstacle_velocities[k], inputs_->obstacles[k],
+                                duration_, fraction, nullptr);
 }
 
 void CoupledSystem::placeWelds()
@@ -143,7 +145,8 @@ void CoupledSystem::gather(Eigen::Matrix3Xd& x, std::vector<Pose>& solids) const
   for (std::size_t k = 0; k < model_.contact.bodies.size(); ++k)
   {
     const GroupContact::Body& b = model_.contact.bodies[k];
-    solids[obstacles_.size() + k] = (simulated_[b.body] >= 0 ? bodies_[simulated_[b.body]].pose : driven_[b.body]) * b.X_BS;
+    solids[obstacles_.size() + k] =
+        (simulated_[b.body] >= 0 ? bodies_[simulated_[b.body]].pose : driven_[b.body]) * b.X_BS;
   }
 }
 
@@ -169,7 +172,8 @@ void CoupledSystem::beginStep(const StepPlan& plan, double t)
   }
 }
 
-/// Accelerations of the bodies, and of what they carry, from the forces in the rods as they are. Contacts count from the first step on.
+/// Accelerations of the bodies, and of what they carry, from the forces in the rods as they are. Contacts count from
+/// the first step on.
 void CoupledSystem::startAccelerations()
 {
   std::vector<BodySystem::Vector6> wrench(bodies_.size(), BodySystem::Vector6::Zero());
@@ -246,7 +250,8 @@ void CoupledSystem::setCarriedInertia(const Stage& stage)
   }
 }
 
-NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, double t, double h, const NewtonConfig& newton)
+NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, double t, double h,
+                                       const NewtonConfig& newton)
 {
   const double before = s == 0 ? 0.0 : plan.stages[s - 1].time, now = plan.stages[s].time;
   for (BodySystem& body : bodies_)
@@ -271,7 +276,8 @@ NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, doub
     if (keys_ != before_keys)
       pattern_valid_ = false;
   }
-  return minimizeConfined(*this, (t + before * h) / duration_, (t + now * h) / duration_, newton, model_.contact.options.gap / least_edge_);
+  return minimizeConfined(*this, (t + before * h) / duration_, (t + now * h) / duration_, newton,
+                          model_.contact.options.gap / least_edge_);
 }
 
 Approach CoupledSystem::approach(double from, double to, double& reached)
@@ -297,7 +303,8 @@ Approach CoupledSystem::approach(double from, double to, double& reached)
         RodSystem& system = part.rod->system;
         for (int i = 0; i < part.rod->model->nodes(); ++i)
           if (system.isFree(i))
-            system.setPosition(i, system.basePosition(i) + (attempt == 0 ? alpha : 0.5) * (system.position(i) - system.basePosition(i)));
+            system.setPosition(i, system.basePosition(i) +
+                                      (attempt == 0 ? alpha : 0.5) * (system.position(i) - system.basePosition(i)));
         part.rod->placeAt(inputs_->rods[part.index], duration_, reached);
       }
       placeWelds();
@@ -345,7 +352,8 @@ void CoupledSystem::endStage(const StepPlan& plan, std::size_t s, bool last)
       RodStepper::Impl& rod = *parts_[weld.rod].rod;
       rod.stage_poses[weld.grasp] = body.pose * weld.X_BG;
       const Twist& v = body.velocity();
-      rod.carried_velocity[weld.grasp] = {v.linear + v.angular.cross(body.pose.orientation * weld.X_BG.position), v.angular};
+      rod.carried_velocity[weld.grasp] = {v.linear + v.angular.cross(body.pose.orientation * weld.X_BG.position),
+                                          v.angular};
     }
 }
 
@@ -371,7 +379,8 @@ void CoupledSystem::end(RodGroupState& state)
     }
   }
   for (std::size_t k = 0; k < obstacles_.size(); ++k)
-    state.obstacles[k] = poseBetween(state.obstacles[k], Twist(state.obstacle_velocities[k]), inputs_->obstacles[k], duration_, 1.0, &state.obstacle_velocities[k]);
+    state.obstacles[k] = poseBetween(state.obstacles[k], Twist(state.obstacle_velocities[k]), inputs_->obstacles[k],
+                                     duration_, 1.0, &state.obstacle_velocities[k]);
   state.contact_stiffness = stiffness_now_;
 }
 
@@ -400,7 +409,8 @@ double CoupledSystem::clearance(const RodGroupState& state)
       points_.middleCols(part.point, part.rod->model->nodes()) = state.rods[part.index].x;
   std::copy(state.obstacles.begin(), state.obstacles.end(), solids_.begin());
   for (std::size_t k = 0; k < model_.contact.bodies.size(); ++k)
-    solids_[state.obstacles.size() + k] = state.bodies[model_.contact.bodies[k].body].X_WB * model_.contact.bodies[k].X_BS;
+    solids_[state.obstacles.size() + k] =
+        state.bodies[model_.contact.bodies[k].body].X_WB * model_.contact.bodies[k].X_BS;
   return contact_->clearance(points_, solids_);
 }
 
@@ -410,4 +420,4 @@ const std::vector<ContactTerm>& CoupledSystem::contacts() const
   return contact_ ? contact_->terms() : none;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -15,7 +15,8 @@ void CoupledSystem::forRods(F&& f)
 {
   const int count = static_cast<int>(parts_.size());
 #ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic, 4) if (parallel_ && threads != 1) num_threads(threads > 0 ? threads : omp_get_max_threads())
+#pragma omp parallel for schedule(dynamic, 4) if (parallel_ && threads != 1) \
+    num_threads(threads > 0 ? threads : omp_get_max_threads())
 #endif
   for (int r = 0; r < count; ++r)
     f(parts_[r]);
@@ -41,7 +42,8 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
     if (part.coupled)
       part.evaluation = system.evaluateWhole(with_hessian);
     else
-      part.evaluation = part.own_terms.empty() ? system.evaluate(with_hessian, shift) : evaluateWithOwn(part, with_hessian, shift);
+      part.evaluation =
+          part.own_terms.empty() ? system.evaluate(with_hessian, shift) : evaluateWithOwn(part, with_hessian, shift);
   });
   for (const RodPart& part : parts_)
   {
@@ -64,9 +66,7 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
   }
   reduceGradient();
   if (with_hessian && unknowns_ > 0)
-  {
     sum.inertia.negative += !factor(shift);
-  }
   for (RodPart& part : parts_)
     if (part.coupled)
       part.rod->system.closeGradient();
@@ -319,7 +319,8 @@ double CoupledSystem::incrementSize() const
   for (const RodPart& part : parts_)
     largest = std::max(largest, part.rod->system.incrementSize());
   for (const BodySystem::Vector6& d : body_direction_)
-    largest = std::max({largest, d.head<3>().lpNorm<Eigen::Infinity>() / least_edge_, d.tail<3>().lpNorm<Eigen::Infinity>()});
+    largest =
+        std::max({largest, d.head<3>().lpNorm<Eigen::Infinity>() / least_edge_, d.tail<3>().lpNorm<Eigen::Infinity>()});
   if (!contact_)
     return largest;
   // a barrier is resolved when its gaps are
@@ -331,7 +332,8 @@ double CoupledSystem::incrementSize() const
       if (term.point[p] >= 0)
       {
         const RodPart& part = partOf(term.point[p]);
-        u += term.weight[p] * Eigen::Map<const Eigen::Vector3d>(part.rod->system.direction() + 4 * (term.point[p] - part.point));
+        u += term.weight[p] *
+             Eigen::Map<const Eigen::Vector3d>(part.rod->system.direction() + 4 * (term.point[p] - part.point));
       }
     at_contact = std::max(at_contact, u.norm());
   }
@@ -355,7 +357,8 @@ double CoupledSystem::residual() const
     largest = std::max(largest, part.rod->system.residual());
   for (const BodySystem& body : bodies_)
     largest = std::max({largest, body.gradient.head<3>().lpNorm<Eigen::Infinity>(),
-                        body.gradient.tail<3>().lpNorm<Eigen::Infinity>() * std::sqrt(body.model().mass / body.model().inertia.trace())});
+                        body.gradient.tail<3>().lpNorm<Eigen::Infinity>() *
+                            std::sqrt(body.model().mass / body.model().inertia.trace())});
   return largest;
 }
 
@@ -380,4 +383,4 @@ double CoupledSystem::noiseLevel() const
   return largest;
 }
 
-}  // namespace slender
+}   // namespace slender

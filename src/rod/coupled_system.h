@@ -13,10 +13,10 @@
 
 namespace slender {
 
-/// Equations of rods, the simulated bodies they are welded to, and contact, for minimize(). Rods that nothing touches and no body carries
-/// keep their own band matrices; the others share one sparse matrix, in which the unknowns of welded sections are replaced by those of
-/// their bodies. Contact with what moves as prescribed couples only neighbouring nodes, so that a rod that touches nothing else keeps its band
-/// matrix, too.
+/// Equations of rods, the simulated bodies they are welded to, and contact, for minimize(). Rods that nothing touches
+/// and no body carries keep their own band matrices; the others share one sparse matrix, in which the unknowns of
+/// welded sections are replaced by those of their bodies. Contact with what moves as prescribed couples only
+/// neighbouring nodes, so that a rod that touches nothing else keeps its band matrix, too.
 class CoupledSystem
 {
 public:
@@ -27,7 +27,8 @@ public:
   void beginStep(const StepPlan& plan, double t);
   /// Solves a stage; the rods' beginStage() has been called.
   NewtonResult solveStage(const StepPlan& plan, std::size_t stage, double t, double h, const NewtonConfig& newton);
-  /// Velocities of the bodies at the end of a stage, or (last) of the step. The rods' endStage() or finishStep() come after.
+  /// Velocities of the bodies at the end of a stage, or (last) of the step. The rods' endStage() or finishStep() come
+  /// after.
   void endStage(const StepPlan& plan, std::size_t stage, bool last);
   void commitStep();
   void end(RodGroupState& state);
@@ -38,14 +39,17 @@ public:
   // ---- stability of an equilibrium (coupled_stability.cpp)
   /// Loads an equilibrium, at which everything stands still. The calls below are about it.
   void beginStability(const RodGroupState& state, const RodGroupInputs& inputs);
-  /// Factors K + s M, with the exact second derivative of contact and without friction; returns whether it is positive definite.
+  /// Factors K + s M, with the exact second derivative of contact and without friction; returns whether it is positive
+  /// definite.
   bool definite(double s);
   RodEvaluation energyAt(double s);
   /// Half width of the band of eigenvalues that count as zero.
   double neutralBand() const;
-  /// The direction becomes the mode of the lowest eigenvalue, by inverse iteration with the matrix last factored; nothing turns by more than 1 rad.
+  /// The direction becomes the mode of the lowest eigenvalue, by inverse iteration with the matrix last factored;
+  /// nothing turns by more than 1 rad.
   void findLowestMode();
-  /// Writes into the state what is `alpha` times the mode away from the equilibrium. Returns false when something is in the way.
+  /// Writes into the state what is `alpha` times the mode away from the equilibrium. Returns false when something is in
+  /// the way.
   bool displaceAlongMode(double alpha, RodGroupState& state);
   bool hasContact() const { return contact_ != nullptr; }
   int threads = 0;
@@ -78,15 +82,16 @@ private:
   struct RodPart
   {
     RodStepper::Impl* rod = nullptr;
-    int index = 0;                 ///< in the group
-    int point = -1;                ///< its first contact point, -1: it touches nothing
+    int index = 0;    ///< in the group
+    int point = -1;   ///< its first contact point, -1: it touches nothing
     bool welded = false, touched = false;
-    bool coupled = false;          ///< has its unknowns in the matrix
-    std::vector<int> own_terms;    ///< of the present contacts: those that couple nothing, see isOwn()
-    WholeStiffness whole;          ///< of the rod's own matrix with own_terms
+    bool coupled = false;         ///< has its unknowns in the matrix
+    std::vector<int> own_terms;   ///< of the present contacts: those that couple nothing, see isOwn()
+    WholeStiffness whole;         ///< of the rod's own matrix with own_terms
     int offset = 0, unknowns = 0;
-    std::vector<int> dof;          ///< own number, kPrescribed, or carried by grasp k: -2 - k
-    std::vector<int> slots;        ///< where the entries of its panels go: index of a matrix value, -1: nowhere or not simply
+    std::vector<int> dof;   ///< own number, kPrescribed, or carried by grasp k: -2 - k
+    /// where the entries of its panels go: index of a matrix value, -1: nowhere or not simply
+    std::vector<int> slots;
     std::vector<std::array<int, 3>> carried_entries;   ///< node, column, row of those with a carried unknown
     std::vector<std::array<int, 4>> holds;             ///< grasps that dof was made for: active, first, last, body
     RodEvaluation evaluation;
@@ -138,32 +143,35 @@ private:
 
   const RodGroupModel& model_;
   std::vector<RodPart> parts_;
-  bool parallel_ = false;                       ///< enough rods for the threads to be worth their synchronisation
-  std::vector<BodySystem> bodies_;              ///< simulated ones
-  std::vector<int> simulated_;                  ///< per body of the model: index into bodies_, -1: driven
+  bool parallel_ = false;            ///< enough rods for the threads to be worth their synchronisation
+  std::vector<BodySystem> bodies_;   ///< simulated ones
+  std::vector<int> simulated_;       ///< per body of the model: index into bodies_, -1: driven
   std::vector<RigidBodyState> bodies_now_, bodies_next_;   ///< all
-  std::vector<Pose> driven_, obstacles_;        ///< driven bodies (a slot per body) and obstacles at the instant being solved for
-  std::vector<int> point_part_;                 ///< per contact point: its rod
+  /// driven bodies (a slot per body) and obstacles at the instant being solved for
+  std::vector<Pose> driven_, obstacles_;
+  std::vector<int> point_part_;   ///< per contact point: its rod
   const RodGroupState* origin_ = nullptr;
   const RodGroupInputs* inputs_ = nullptr;
   double duration_ = 0, least_edge_ = std::numeric_limits<double>::infinity();
 
   std::unique_ptr<ContactPotential> contact_;
-  double first_stiffness_ = 0;                  ///< of the barrier in a state that has none yet
-  double stiffness_now_ = 0;                    ///< of the barrier as the substep begins
-  double tolerance_ = 0, gap_tolerance_ = 0;    ///< of increments: over the shortest edge, and at contacts over the smallest gap
+  double first_stiffness_ = 0;   ///< of the barrier in a state that has none yet
+  double stiffness_now_ = 0;     ///< of the barrier as the substep begins
+  /// of increments: over the shortest edge, and at contacts over the smallest gap
+  double tolerance_ = 0, gap_tolerance_ = 0;
   Eigen::Matrix3Xd points_, points_base_, points_end_;
   std::vector<Pose> solids_, solids_base_, solids_end_;
 
   // matrix
   SparseCholesky matrix_;
   bool pattern_valid_ = false;
-  bool exact_ = false;                          ///< stability: the matrix must not be replaced by a positive definite one
+  /// stability: the matrix must not be replaced by a positive definite one
+  bool exact_ = false;
   WholeStiffness whole_;
   int unknowns_ = 0, body_offset_ = 0;
-  std::vector<std::array<int, 5>> keys_;        ///< contacts (four points, a solid) the pattern has room for, sorted
+  std::vector<std::array<int, 5>> keys_;   ///< contacts (four points, a solid) the pattern has room for, sorted
   std::vector<double> rhs_;
   std::vector<BodySystem::Vector6> body_direction_;
 };
 
-}  // namespace slender
+}   // namespace slender

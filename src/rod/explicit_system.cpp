@@ -30,9 +30,11 @@ Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q
   return q * (inertia.inverse() * (q.conjugate() * momentum));
 }
 
-}  // namespace
+}   // namespace
 
-ExplicitSystem::ExplicitSystem(const RodGroupModel* group, const std::vector<RodStepper::Impl*>& rods) : model_(group), rods_(rods)
+ExplicitSystem::ExplicitSystem(const RodGroupModel* group, const std::vector<RodStepper::Impl*>& rods)
+  : model_(group),
+    rods_(rods)
 {
   for (const RodStepper::Impl* rod : rods_)
   {
@@ -62,7 +64,8 @@ void ExplicitSystem::begin(const RodGroupState& state, const RodGroupInputs& inp
 
 bool ExplicitSystem::isWelded(const RodStepper::Impl& rod, const Weld& weld) const
 {
-  return weld.grasp < static_cast<int>(rod.work.grasps.size()) && rod.work.grasps[weld.grasp].active && rod.work.grasps[weld.grasp].body == weld.body;
+  return weld.grasp < static_cast<int>(rod.work.grasps.size()) && rod.work.grasps[weld.grasp].active &&
+         rod.work.grasps[weld.grasp].body == weld.body;
 }
 
 /// Masses of the bodies with the nodes they carry, and where they are now.
@@ -96,8 +99,8 @@ void ExplicitSystem::composeBodies()
   }
 }
 
-/// Symplectic Euler for the centre; for the rotation the momentum is advanced likewise, and the turn that belongs to it found by the
-/// midpoint rule, which keeps the energy of a tumbling body.
+/// Symplectic Euler for the centre; for the rotation the momentum is advanced likewise, and the turn that belongs to it
+/// found by the midpoint rule, which keeps the energy of a tumbling body.
 void ExplicitSystem::predictBody(Body& body, double h)
 {
   const RigidBodyModel& m = model_->bodies[body.index];
@@ -112,7 +115,8 @@ void ExplicitSystem::predictBody(Body& body, double h)
       const RodStepper::Impl& rod = *rods_[weld.rod];
       const GraspState& g = rod.work.grasps[weld.grasp];
       force += rod.wrenches[weld.grasp].force;
-      torque += rod.wrenches[weld.grasp].torque + (g.X_WG.position - body.start.position).cross(rod.wrenches[weld.grasp].force);
+      torque += rod.wrenches[weld.grasp].torque +
+                (g.X_WG.position - body.start.position).cross(rod.wrenches[weld.grasp].force);
       for (int i = g.first_node; i <= g.last_node; ++i)
       {
         const Eigen::Vector3d drag = -rod.model->damping(i) * rod.work.v.col(i);
@@ -163,8 +167,9 @@ void ExplicitSystem::placeBody(Body& body, const Pose& X, const Twist& velocity)
     {
       RodStepper::Impl& rod = *rods_[weld.rod];
       rod.stage_poses[weld.grasp] = next.X_WB * weld.X_BG;
-      rod.carried_velocity[weld.grasp] = {next.velocity.linear + next.velocity.angular.cross(rod.stage_poses[weld.grasp].position - next.X_WB.position),
-                                          next.velocity.angular};
+      rod.carried_velocity[weld.grasp] = {
+          next.velocity.linear + next.velocity.angular.cross(rod.stage_poses[weld.grasp].position - next.X_WB.position),
+          next.velocity.angular};
     }
 }
 
@@ -184,10 +189,12 @@ void ExplicitSystem::placeStart(const Body& body, const Pose& X)
     }
 }
 
-StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, double t, double h, StepReport& report, std::size_t& failed)
+StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, double t, double h, StepReport& report,
+                                 std::size_t& failed)
 {
   // before a run's first step whatever stretching a rod comes with is taken out without becoming a velocity
-  const bool first = std::any_of(rods_.begin(), rods_.end(), [](const RodStepper::Impl* rod) { return rod->work.last_step == 0.0; });
+  const bool first =
+      std::any_of(rods_.begin(), rods_.end(), [](const RodStepper::Impl* rod) { return rod->work.last_step == 0.0; });
   if (inextensible_ && first)
   {
     composeBodies();
@@ -195,7 +202,8 @@ StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, doubl
       return failure;
   }
   for (failed = 0; failed < rods_.size(); ++failed)
-    if (const StepFailure failure = rods_[failed]->explicitPredict(inputs[failed], duration, t, h, report); failure != StepFailure::none)
+    if (const StepFailure failure = rods_[failed]->explicitPredict(inputs[failed], duration, t, h, report);
+        failure != StepFailure::none)
       return failure;
   composeBodies();
   for (Body& body : bodies_)
@@ -209,12 +217,14 @@ StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, doubl
     for (Body& body : bodies_)
       placeBody(body, body.predicted, body.velocity);
   for (failed = 0; failed < rods_.size(); ++failed)
-    if (const StepFailure failure = rods_[failed]->explicitFinish(inputs[failed], duration, t, h); failure != StepFailure::none)
+    if (const StepFailure failure = rods_[failed]->explicitFinish(inputs[failed], duration, t, h);
+        failure != StepFailure::none)
       return failure;
   for (const Body& body : bodies_)
   {
     const RigidBodyState& b = bodies_next_[body.index];
-    if (!b.X_WB.position.allFinite() || !b.X_WB.orientation.coeffs().allFinite() || !b.velocity.linear.allFinite() || !b.velocity.angular.allFinite())
+    if (!b.X_WB.position.allFinite() || !b.X_WB.orientation.coeffs().allFinite() || !b.velocity.linear.allFinite() ||
+        !b.velocity.angular.allFinite())
     {
       failed = 0;
       return StepFailure::state_not_finite;
@@ -223,7 +233,8 @@ StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, doubl
   return StepFailure::none;
 }
 
-/// Restores the lengths of inextensible rods' edges. `start_only`: of the state the substep begins with, velocities staying what they are.
+/// Restores the lengths of inextensible rods' edges. `start_only`: of the state the substep begins with, velocities
+/// staying what they are.
 StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& report, std::size_t& failed)
 {
   for (std::size_t r = 0; r < rods_.size(); ++r)
@@ -274,7 +285,8 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
     failed = 0;
     while (failed + 1 < rods_.size() && chains_[failed] != std::max(result.chain, 0))
       ++failed;
-    rods_[failed]->overstretched = result.chain < 0 ? std::array<int, 2>{-1, -1} : std::array<int, 2>{result.first_node, result.last_node};
+    rods_[failed]->overstretched =
+        result.chain < 0 ? std::array<int, 2>{-1, -1} : std::array<int, 2>{result.first_node, result.last_node};
     return StepFailure::overstretched;
   }
   report.projection_iterations = std::max(report.projection_iterations, result.iterations);
@@ -302,10 +314,12 @@ void ExplicitSystem::end(RodGroupState& state)
 {
   for (std::size_t b = 0; b < bodies_now_.size(); ++b)
     if (!model_->bodies[b].simulated)
-      bodies_now_[b].X_WB = poseBetween(origin_->bodies[b].X_WB, origin_->bodies[b].velocity, inputs_->bodies[b], duration_, 1.0, &bodies_now_[b].velocity);
+      bodies_now_[b].X_WB = poseBetween(origin_->bodies[b].X_WB, origin_->bodies[b].velocity, inputs_->bodies[b],
+                                        duration_, 1.0, &bodies_now_[b].velocity);
   state.bodies = bodies_now_;
   for (std::size_t k = 0; k < state.obstacles.size(); ++k)
-    state.obstacles[k] = poseBetween(state.obstacles[k], Twist(state.obstacle_velocities[k]), inputs_->obstacles[k], duration_, 1.0, &state.obstacle_velocities[k]);
+    state.obstacles[k] = poseBetween(state.obstacles[k], Twist(state.obstacle_velocities[k]), inputs_->obstacles[k],
+                                     duration_, 1.0, &state.obstacle_velocities[k]);
 }
 
-}  // namespace slender
+}   // namespace slender

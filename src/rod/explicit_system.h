@@ -8,8 +8,8 @@
 
 namespace slender {
 
-/// Explicit substeps of rods and of the bodies they are welded to (thesis 4.6.1): forces at the start, torques handed to the bodies
-/// (4.5.3), velocities and positions, projection of inextensible rods and their bodies (4.5.2), frames.
+/// Explicit substeps of rods and of the bodies they are welded to (thesis 4.6.1): forces at the start, torques handed
+/// to the bodies (4.5.3), velocities and positions, projection of inextensible rods and their bodies (4.5.2), frames.
 class ExplicitSystem
 {
 public:
@@ -18,7 +18,8 @@ public:
 
   void begin(const RodGroupState& state, const RodGroupInputs& inputs, double duration);
   /// `failed`: the rod that a failure is about.
-  StepFailure step(const RodInputs* inputs, double duration, double t, double h, StepReport& report, std::size_t& failed);
+  StepFailure step(const RodInputs* inputs, double duration, double t, double h, StepReport& report,
+                   std::size_t& failed);
   void commitStep() { bodies_now_ = bodies_next_; }
   void end(RodGroupState& state);
 
@@ -26,12 +27,12 @@ private:
   /// A simulated body together with the nodes welded to it, whose masses it carries.
   struct Body
   {
-    int index = 0;               ///< in the group
+    int index = 0;   ///< in the group
     double mass = 0;
-    Eigen::Vector3d centre{0, 0, 0};             ///< of all masses, body axes
+    Eigen::Vector3d centre{0, 0, 0};                         ///< of all masses, body axes
     Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();   ///< about it
-    Pose start, predicted;       ///< of the centre
-    Twist velocity;              ///< likewise
+    Pose start, predicted;                                   ///< of the centre
+    Twist velocity;                                          ///< likewise
   };
 
   void composeBodies();
@@ -43,16 +44,16 @@ private:
 
   const RodGroupModel* model_;
   std::vector<RodStepper::Impl*> rods_;
-  std::vector<int> chains_;      ///< per rod: its number in the projection, -1: it stretches
+  std::vector<int> chains_;   ///< per rod: its number in the projection, -1: it stretches
   std::vector<Body> bodies_;
-  FastProjection projection_;    ///< its bodies are numbered as bodies_
+  FastProjection projection_;                              ///< its bodies are numbered as bodies_
   std::vector<RigidBodyState> bodies_now_, bodies_next_;   ///< all of the group
   const RodGroupState* origin_ = nullptr;
   const RodGroupInputs* inputs_ = nullptr;
   double duration_ = 0;
   bool inextensible_ = false;
-  std::vector<int> owner_;       ///< per node of a rod: -1 free, -2 held, or a body
+  std::vector<int> owner_;   ///< per node of a rod: -1 free, -2 held, or a body
   std::vector<Eigen::Vector3d> arm_;
 };
 
-}  // namespace slender
+}   // namespace slender

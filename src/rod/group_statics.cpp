@@ -1,6 +1,6 @@
-// Static equilibrium of rods with bodies and contact: implicit Euler steps that grow, from rest each time. Each minimises the energy with a
-// proximal term whose weight is the mass over the step squared. The weight never becomes zero, because contact needs a step. What the steps end at
-// is judged, and saddles are left, by settleStably().
+// Static equilibrium of rods with bodies and contact: implicit Euler steps that grow, from rest each time. Each
+// minimises the energy with a proximal term whose weight is the mass over the step squared. The weight never becomes
+// zero, because contact needs a step. What the steps end at is judged, and saddles are left, by settleStably().
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -38,13 +38,19 @@ class GroupEquilibrium
 {
 public:
   GroupEquilibrium(RodGroup::Impl& group, const RodGroupInputs& targets, RodGroupState state, StepReport& total)
-    : group_(group), targets_(targets), work_(std::move(state)), total_(total), force_scale_(0.0), lever_(std::numeric_limits<double>::max())
+    : group_(group),
+      targets_(targets),
+      work_(std::move(state)),
+      total_(total),
+      force_scale_(0.0),
+      lever_(std::numeric_limits<double>::max())
   {
     for (const auto& rod : group_.model.rods)
       lever_ = std::min(lever_, rod->rest_length.minCoeff());
   }
 
-  /// Steps from rest, the first of `h` seconds, until nothing is accelerated. Returns false when that does not end; failure() says why.
+  /// Steps from rest, the first of `h` seconds, until nothing is accelerated. Returns false when that does not end;
+  /// failure() says why.
   bool settle(double h);
   const RodGroupState& state() const { return work_; }
   StepFailure failure() const { return failure_; }
@@ -79,14 +85,16 @@ double GroupEquilibrium::unbalanced(double h) const
   for (std::size_t r = 0; r < work_.rods.size(); ++r)
     for (int i = 0; i < group_.model.rods[r]->nodes(); ++i)
       if (group_.rods[r]->system.isMoving(i))
-        sum = std::max(sum, group_.model.rods[r]->mass[i] * (work_.rods[r].x.col(i) - before_.rods[r].x.col(i)).norm() / (h * h));
+        sum = std::max(
+            sum, group_.model.rods[r]->mass[i] * (work_.rods[r].x.col(i) - before_.rods[r].x.col(i)).norm() / (h * h));
   for (std::size_t b = 0; b < work_.bodies.size(); ++b)
     if (group_.model.bodies[b].simulated)
     {
       const RigidBodyModel& m = group_.model.bodies[b];
       const Pose &from = before_.bodies[b].X_WB, &to = work_.bodies[b].X_WB;
       const Eigen::Vector3d turn = rotationVector(from.orientation.conjugate() * to.orientation);
-      sum = std::max({sum, m.mass * (to.position - from.position).norm() / (h * h), (m.inertia * turn).norm() / (lever_ * h * h)});
+      sum = std::max(
+          {sum, m.mass * (to.position - from.position).norm() / (h * h), (m.inertia * turn).norm() / (lever_ * h * h)});
     }
   return sum;
 }
@@ -123,8 +131,10 @@ bool GroupEquilibrium::settle(double h)
     h = std::min(h * (report.iterations < 10 ? 4.0 : 1.5), 1e6);
   }
   failure_ = StepFailure::newton_diverged;
-  total_.message = "the equilibrium did not settle: something may be free to drift; hold it, or let it settle by time stepping with damping "
-                   "(start: as_given)";
+  total_.message =
+      "the equilibrium did not settle: something may be free to drift; hold it, or let it settle by time stepping with "
+      "damping "
+      "(start: as_given)";
   return false;
 }
 
@@ -153,7 +163,8 @@ void GroupEquilibrium::restore(const Configuration& c)
 
 bool GroupEquilibrium::displace(double turn)
 {
-  // The factor of the matrix near its lowest eigenvalue, which inverse iteration needs, belongs to the saddle: other steps came in between.
+  // The factor of the matrix near its lowest eigenvalue, which inverse iteration needs, belongs to the saddle: other
+  // steps came in between.
   CoupledSystem& system = *group_.loop->coupled();
   system.beginStability(work_, group_.inputs);
   lowestEigenvalue([&](double s) { return system.definite(s); }, system.neutralBand());
@@ -167,7 +178,7 @@ bool GroupEquilibrium::settleFrom(double lowest)
   return settle(std::isfinite(lowest) ? 0.7 / std::sqrt(-lowest) : 1e-3 * group_.time.step);
 }
 
-}  // namespace
+}   // namespace
 
 StepReport RodGroup::solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs, bool leave_saddles)
 {
@@ -176,8 +187,10 @@ StepReport RodGroup::solveEquilibrium(RodGroupState& state, const RodGroupInputs
     StepReport refused;
     refused.ok = false;
     refused.failure = StepFailure::input_not_finite;
-    refused.message = "statics of rods with contact or bodies does not know torques about the tangent: weld a body with this torque, or let the scene "
-                      "settle by time stepping with damping (start: as_given)";
+    refused.message =
+        "statics of rods with contact or bodies does not know torques about the tangent: weld a body with this torque, "
+        "or let the scene "
+        "settle by time stepping with damping (start: as_given)";
     return refused;
   }
   TimeConfig time = impl_->time;
@@ -211,4 +224,4 @@ StepReport RodGroup::Impl::solveEquilibrium(RodGroupState& state, const RodGroup
   return total;
 }
 
-}  // namespace slender
+}   // namespace slender

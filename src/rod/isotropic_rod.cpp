@@ -11,10 +11,11 @@ namespace slender {
 namespace {
 
 constexpr int kHalo = IsotropicArrays::kHalo;
-constexpr int kShortPiece = 8;          ///< edges; less is not worth the correction where pieces meet
-constexpr double kCountable = 2.8;      ///< [rad] < pi: a larger change of twist in one step could be the other way round
+constexpr int kShortPiece = 8;   ///< edges; less is not worth the correction where pieces meet
+/// [rad] < pi: a larger change of twist in one step could be the other way round
+constexpr double kCountable = 2.8;
 
-}  // namespace
+}   // namespace
 
 IsotropicRod::IsotropicRod(const RodModel& model, RodSystem& system) : model_(model), system_(system)
 {
@@ -94,7 +95,8 @@ void IsotropicRod::compose()
   int first_clamp = -1;
   for (int c = 0; c < static_cast<int>(clamps.size()); ++c)
   {
-    if (first_clamp < 0 || clamps[c].node < clamps[first_clamp].node || (clamps[c].node == clamps[first_clamp].node && clamps[c].side == 0))
+    if (first_clamp < 0 || clamps[c].node < clamps[first_clamp].node ||
+        (clamps[c].node == clamps[first_clamp].node && clamps[c].side == 0))
       first_clamp = c;
     if (clamps[c].side == 1)
     {
@@ -185,7 +187,8 @@ double IsotropicRod::evaluateClamp(int index, const RodState& state, double& min
   const Eigen::Vector3d section = g.X_WG.orientation * Eigen::Vector3d(g.section_G[c.side].col(0)), t = tangent(j);
   const double cosine = section.dot(t), chi = 1.0 + cosine, sign = c.side == 1 ? 1.0 : -1.0;
   const Eigen::Vector3d b = sign * section.cross(t);
-  const Eigen::Vector3d gradient = a_.inverse_length[j] * ((-4.0 * c.b11 / (chi * chi)) * (section - cosine * t) + (clamp_moment_[index] / chi) * b);
+  const Eigen::Vector3d gradient =
+      a_.inverse_length[j] * ((-4.0 * c.b11 / (chi * chi)) * (section - cosine * t) + (clamp_moment_[index] / chi) * b);
   for (int k = 0; k < 3; ++k)
   {
     gradient_[3 * j + k] -= gradient[k];
@@ -229,7 +232,8 @@ StepFailure IsotropicRod::settle(const RodState& from, const std::vector<Pose>& 
     double inverse_lengths = 0.0;   // infinite if nodes coincide: such an edge has no tangent
     for (int j = 0; j < a_.edges; ++j)
       inverse_lengths += a_.inverse_length[j];
-    return to.director.allFinite() && std::isfinite(inverse_lengths) ? StepFailure::none : StepFailure::state_not_finite;
+    return to.director.allFinite() && std::isfinite(inverse_lengths) ? StepFailure::none
+                                                                     : StepFailure::state_not_finite;
   }
   to.d1.resize(3, a_.edges);
   to.twist = from.twist;
@@ -254,7 +258,8 @@ StepFailure IsotropicRod::settle(const RodState& from, const std::vector<Pose>& 
   return to.d1.allFinite() && to.twist.allFinite() ? StepFailure::none : StepFailure::state_not_finite;
 }
 
-/// What the joints at the ends of a held part will have when it is released: whole turns live in the sections' twists until then.
+/// What the joints at the ends of a held part will have when it is released: whole turns live in the sections' twists
+/// until then.
 void IsotropicRod::releaseTwists(const GraspState& before, RodState& to, const GraspState& g) const
 {
   for (int side = 0; side < 2; ++side)
@@ -265,16 +270,22 @@ void IsotropicRod::releaseTwists(const GraspState& before, RodState& to, const G
     if (g.first_node == g.last_node)
       to.twist[node] = g.section_twist[0] + g.section_twist[1];
     else   // the rest of the joint is rigid
-      to.twist[node] = unwrapNear(signedAngle(parallelTransport(to.d1.col(e), tangent(e), tangent(f)), to.d1.col(f), tangent(f)),
-                                  to.twist[node] + g.section_twist[side] - before.section_twist[side]);
+      to.twist[node] =
+          unwrapNear(signedAngle(parallelTransport(to.d1.col(e), tangent(e), tangent(f)), to.d1.col(f), tangent(f)),
+                     to.twist[node] + g.section_twist[side] - before.section_twist[side]);
   }
 }
 
-/// The total twist is read off the frame carried along the span from one held section to the other, and counted on from the last one;
-/// equilibrium of the frames (thesis 4.3) then shares it out in proportion to the joints' compliances.
-StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, const std::vector<Pose>& poses, RodState& to)
+/// The total twist is read off the frame carried along the span from one held section to the other, and counted on from
+/// the last one; equilibrium of the frames (thesis 4.3) then shares it out in proportion to the joints' compliances.
+StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, const std::vector<Pose>& poses,
+                                     RodState& to)
 {
-  struct Section { Eigen::Vector3d t, d1; double turn = 0.0; };
+  struct Section
+  {
+    Eigen::Vector3d t, d1;
+    double turn = 0.0;
+  };
   const std::vector<ClampJoint>& clamps = system_.clamps();
   const auto section = [&](int clamp) {
     const GraspState& g = from.grasps[clamps[clamp].grasp];
@@ -312,7 +323,8 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
   for (int p = 1; p < span.pieces; ++p)
   {
     const int edge = span.piece_first[p], last = (edge + a_.edges - 1) % a_.edges;
-    ahead[p] = ahead[p - 1] + signedAngle(parallelTransport(director(last), tangent(last), tangent(edge)), director(edge), tangent(edge));
+    ahead[p] = ahead[p - 1] + signedAngle(parallelTransport(director(last), tangent(last), tangent(edge)),
+                                          director(edge), tangent(edge));
   }
   const int last = (span.first + span.count - 1) % a_.edges;
   const double behind = ahead[span.pieces - 1];
@@ -325,7 +337,9 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
     angle = signedAngle(parallelTransport(director(last), tangent(last), end.t), end.d1, end.t) + behind;
   }
   else if (span.loop)
-    angle = signedAngle(parallelTransport(director(last), tangent(last), tangent(span.first)), director(span.first), tangent(span.first)) + behind;
+    angle = signedAngle(parallelTransport(director(last), tangent(last), tangent(span.first)), director(span.first),
+                        tangent(span.first)) +
+            behind;
 
   double moment = 0.0;
   if (span.held())
@@ -354,7 +368,8 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
         to.twist[i] = rest_twist[i] + moment / twist_stiffness[i];
     });
   else if (span.count > 1 && twist_stiffness[span.first + 1] > 0)   // of an open rod, unless all of it is held
-    to.twist.segment(span.first + 1, span.count - 1) = Eigen::Map<const Eigen::VectorXd>(rest_twist + span.first + 1, span.count - 1);
+    to.twist.segment(span.first + 1, span.count - 1) =
+        Eigen::Map<const Eigen::VectorXd>(rest_twist + span.first + 1, span.count - 1);
   if (span.before >= 0)
     phi += setSection(span.before);
   if (span.after >= 0)
@@ -374,4 +389,4 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
   return StepFailure::none;
 }
 
-}  // namespace slender
+}   // namespace slender

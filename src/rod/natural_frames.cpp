@@ -12,22 +12,28 @@ namespace {
 double voronoi(const RodModel& model, int node)
 {
   const int edges = model.edges();
-  const double before = model.closed ? model.rest_length[(node + edges - 1) % edges] : node > 0 ? model.rest_length[node - 1] : 0.0;
+  const double before = model.closed ? model.rest_length[(node + edges - 1) % edges]
+                        : node > 0   ? model.rest_length[node - 1]
+                                     : 0.0;
   return 0.5 * (before + (node < edges ? model.rest_length[node] : 0.0));
 }
 
 void requireFinite(const RodModel& model, Eigen::Index entries, bool finite, const char* what)
 {
   if (entries != model.nodes())
-    throw std::invalid_argument("rod '" + model.name + "': " + what + " needs " + std::to_string(model.nodes()) + " entries, got " + std::to_string(entries));
+    throw std::invalid_argument("rod '" + model.name + "': " + what + " needs " + std::to_string(model.nodes()) +
+                                " entries, got " + std::to_string(entries));
   if (!finite)
     throw std::invalid_argument("rod '" + model.name + "': " + what + " has an entry that is not finite");
 }
 
 /// The mean of both edges' directors in the thesis's curvature (3.14) is this times the director half way.
-double meanDirector(const RodModel& model, double twist) { return model.curvature == Curvature::tangent ? std::cos(0.5 * twist) : 1.0; }
+double meanDirector(const RodModel& model, double twist)
+{
+  return model.curvature == Curvature::tangent ? std::cos(0.5 * twist) : 1.0;
+}
 
-}  // namespace
+}   // namespace
 
 Eigen::VectorXd evenTwist(const RodModel& model, double total)
 {
@@ -48,12 +54,15 @@ void addNaturalTwist(RodModel& model, const Eigen::VectorXd& twist)
       turned += twist[i];
     const double old_mean = meanDirector(model, model.rest_twist[i]);
     if (std::abs(old_mean) < 1e-3)
-      throw std::invalid_argument("rod '" + model.name + "': its natural frames twist by half a turn at node " + std::to_string(i) + "; use shorter edges");
+      throw std::invalid_argument("rod '" + model.name + "': its natural frames twist by half a turn at node " +
+                                  std::to_string(i) + "; use shorter edges");
     const double ratio = meanDirector(model, model.rest_twist[i] + twist[i]) / old_mean;
     const Eigen::Vector2d natural = ratio * model.rest_curvature.col(i);
     const auto inFrames = [&natural](double turn) { return Eigen::Vector2d(Eigen::Rotation2Dd(-turn) * natural); };
     const double half = 0.5 * twist[i];
-    model.rest_curvature.col(i) = model.closed && i == 0 ? Eigen::Vector2d(0.5 * (inFrames(total - half) + inFrames(-half))) : inFrames(turned - half);
+    model.rest_curvature.col(i) = model.closed && i == 0
+                                      ? Eigen::Vector2d(0.5 * (inFrames(total - half) + inFrames(-half)))
+                                      : inFrames(turned - half);
     model.rest_twist[i] += twist[i];
   }
 }
@@ -65,12 +74,14 @@ void setNaturalCurvature(RodModel& model, const Eigen::Matrix2Xd& curvature)
   {
     const double turn = curvature.col(i).norm() * voronoi(model, i);
     if (turn >= 2.0)
-      throw std::invalid_argument("rod '" + model.name + "': its natural curvature turns the joint at node " + std::to_string(i) + " by " + std::to_string(turn) +
+      throw std::invalid_argument("rod '" + model.name + "': its natural curvature turns the joint at node " +
+                                  std::to_string(i) + " by " + std::to_string(turn) +
                                   " rad; must be less than 2: use shorter edges");
     // the strain of an arc as long as the joint: its turn, or the tangent of the half
     const double strain = model.curvature == Curvature::tangent ? 2.0 * std::tan(0.5 * turn) : turn;
-    model.rest_curvature.col(i) = turn > 0 ? Eigen::Vector2d(curvature.col(i).normalized() * (strain * meanDirector(model, model.rest_twist[i])))
-                                           : Eigen::Vector2d::Zero();
+    model.rest_curvature.col(i) =
+        turn > 0 ? Eigen::Vector2d(curvature.col(i).normalized() * (strain * meanDirector(model, model.rest_twist[i])))
+                 : Eigen::Vector2d::Zero();
   }
 }
 
@@ -101,4 +112,4 @@ bool isIsotropic(const RodModel& model)
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -14,14 +14,17 @@ double couplingOf(const RodModel& model, int node)
   const Eigen::Vector3d B = model.bend_modulus.col(node);
   const double alpha = 0.5 * (B[0] + B[2]);
   const bool isotropic = std::abs(B[0] - B[2]) <= 2e-9 * alpha && std::abs(B[1]) <= 2e-9 * alpha;
-  return isotropic && model.rest_curvature.col(node).norm() < 1e-9 ? std::pow(model.twist_modulus[node] / (4 * alpha), 2) : 0.0;
+  return isotropic && model.rest_curvature.col(node).norm() < 1e-9
+             ? std::pow(model.twist_modulus[node] / (4 * alpha), 2)
+             : 0.0;
 }
-}  // namespace
+}   // namespace
 
 void RodSystem::compose(const RodState& state)
 {
   const auto same = [](const GraspState& a, const GraspState& b) {
-    return a.active == b.active && a.first_node == b.first_node && a.last_node == b.last_node && a.holds_frame == b.holds_frame && a.body == b.body;
+    return a.active == b.active && a.first_node == b.first_node && a.last_node == b.last_node &&
+           a.holds_frame == b.holds_frame && a.body == b.body;
   };
   const bool unchanged = !held_.empty() && grasps_.size() == state.grasps.size() &&
                          std::equal(grasps_.begin(), grasps_.end(), state.grasps.begin(), same);
@@ -73,9 +76,11 @@ void RodSystem::compose(const RodState& state)
         c.edge = side ? node : before(node);
         const double h = model_.rest_length[c.edge];
         double l = 0.5 * h;
-        // Joints sample the curvature at the nodes: a trapezoidal rule from a clamp on. Gregory's end correction moves h/12 of
-        // the clamp's weight to the next joint and removes the leading error, the slope of the curvature at the clamp.
-        const int next = side ? (node + 1) % n : before(node), after = side ? (next + 1) % n : (model_.closed ? before(next) : next - 1);
+        // Joints sample the curvature at the nodes: a trapezoidal rule from a clamp on. Gregory's end correction moves
+        // h/12 of the clamp's weight to the next joint and removes the leading error, the slope of the curvature at the
+        // clamp.
+        const int next = side ? (node + 1) % n : before(node),
+                  after = side ? (next + 1) % n : (model_.closed ? before(next) : next - 1);
         const bool has_after = model_.closed || (after >= 0 && after < n);
         if (!jointless[next] && has_after && !jointless[after])
         {
@@ -86,15 +91,18 @@ void RodSystem::compose(const RodState& state)
         c.b12 = model_.bend_modulus(1, node) / l;
         c.b22 = model_.bend_modulus(2, node) / l;
         c.beta = model_.twist_modulus[node] / l;
-        // The half joint of the rest shape turns and twists by its share of the joint; its directors' mean lies elsewhere
-        // between the edges than the joint's own, and strains are tangents of half angles (3.13, 3.14).
+        // The half joint of the rest shape turns and twists by its share of the joint; its directors' mean lies
+        // elsewhere between the edges than the joint's own, and strains are tangents of half angles (3.13, 3.14).
         const double share = shareOfEdge(model_, node, side), m = model_.rest_twist[node];
         const Eigen::Vector2d kappa = model_.rest_curvature.col(node);
         double ratio = share;
         if (model_.curvature == Curvature::tangent)
         {
-          const double mean = std::abs(std::cos(0.5 * m)) > 1e-3 ? std::cos(0.5 * m) : 1.0, half_tangent = 0.5 * kappa.norm() / std::abs(mean);
-          ratio = half_tangent > 0 ? std::tan(share * std::atan(half_tangent)) / half_tangent * std::cos(0.5 * share * m) / mean : 0.0;
+          const double mean = std::abs(std::cos(0.5 * m)) > 1e-3 ? std::cos(0.5 * m) : 1.0,
+                       half_tangent = 0.5 * kappa.norm() / std::abs(mean);
+          ratio = half_tangent > 0
+                      ? std::tan(share * std::atan(half_tangent)) / half_tangent * std::cos(0.5 * share * m) / mean
+                      : 0.0;
         }
         const Eigen::Vector2d half = ratio * (Eigen::Rotation2Dd((side ? -0.5 : 0.5) * (1 - share) * m) * kappa);
         c.rest_kappa1 = half[0];
@@ -145,7 +153,8 @@ void RodSystem::placeGrasps(const std::vector<Pose>& X_WG)
       setPosition(i, X_WG[k] * g.nodes_G[i - g.first_node]);
     for (int j = g.first_node; j < g.last_node; ++j)
     {
-      const Eigen::Vector3d t0(a_.base_t[0][j], a_.base_t[1][j], a_.base_t[2][j]), d0(a_.base_d1[0][j], a_.base_d1[1][j], a_.base_d1[2][j]);
+      const Eigen::Vector3d t0(a_.base_t[0][j], a_.base_t[1][j], a_.base_t[2][j]),
+          d0(a_.base_d1[0][j], a_.base_d1[1][j], a_.base_d1[2][j]);
       const Eigen::Vector3d t = (position(j + 1) - position(j)).normalized();
       const Eigen::Vector3d d = X_WG[k].orientation * g.directors_G[j - g.first_node];
       a_.turn[j] = signedAngle(parallelTransport(d0, t0, t), d, t);
@@ -165,7 +174,9 @@ void RodSystem::setResponse(double r, const Eigen::Matrix4Xd* strain)
 {
   const double scale = 1.0 + r, share = r / scale;
   const int n = a_.nodes;
-  const auto rest = [&](double elastic, int row, int column) { return r > 0 ? elastic + share * ((*strain)(row, column) - elastic) : elastic; };
+  const auto rest = [&](double elastic, int row, int column) {
+    return r > 0 ? elastic + share * ((*strain)(row, column) - elastic) : elastic;
+  };
   for (int i = 0; i < n; ++i)
   {
     a_.stretch[i] = no_stretching_ ? 0.0 : scale * stretch_[i];
@@ -178,7 +189,8 @@ void RodSystem::setResponse(double r, const Eigen::Matrix4Xd* strain)
     a_.rest_kappa2[i] = rest(rest_k2_[i], 2, i);
     a_.rest_twist[i] = rest(rest_m_[i], 3, i);
   }
-  for (double* p : {a_.stretch, a_.rest_strain, a_.b11, a_.b12, a_.b22, a_.beta, a_.rest_kappa1, a_.rest_kappa2, a_.rest_twist})
+  for (double* p :
+       {a_.stretch, a_.rest_strain, a_.b11, a_.b12, a_.b22, a_.beta, a_.rest_kappa1, a_.rest_kappa2, a_.rest_twist})
     wrapHalo(p, n);
   if (model_.curvature == Curvature::compensated)
   {
@@ -197,4 +209,4 @@ void RodSystem::setResponse(double r, const Eigen::Matrix4Xd* strain)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -1,4 +1,5 @@
-// Explicit symplectic Euler [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1.2] with frames that follow quasistatically.
+// Explicit symplectic Euler [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1.2] with frames that follow
+// quasistatically.
 #include <algorithm>
 #include <cmath>
 
@@ -6,9 +7,10 @@
 
 namespace slender {
 
-/// Forces as the substep begins, and the velocities and positions that free nodes have by them alone; held nodes are put where their
-/// grasps will be.
-StepFailure RodStepper::Impl::explicitPredict(const RodInputs& inputs, double duration, double t, double h, StepReport& report)
+/// Forces as the substep begins, and the velocities and positions that free nodes have by them alone; held nodes are
+/// put where their grasps will be.
+StepFailure RodStepper::Impl::explicitPredict(const RodInputs& inputs, double duration, double t, double h,
+                                              StepReport& report)
 {
   const int n = model->nodes();
   const RodEvaluation now = evaluateStart(inputs, duration, t);
@@ -80,7 +82,8 @@ void RodStepper::Impl::elasticWrenches(const RodInputs& inputs)
   }
 }
 
-/// Positions and velocities of held nodes at an instant; those of grasps that bodies carry follow stage_poses and carried_velocity.
+/// Positions and velocities of held nodes at an instant; those of grasps that bodies carry follow stage_poses and
+/// carried_velocity.
 void RodStepper::Impl::holdNodes(const RodInputs& inputs, double duration, double at)
 {
   for (std::size_t k = 0; k < next.grasps.size(); ++k)
@@ -109,7 +112,8 @@ StepFailure RodStepper::Impl::explicitFinish(const RodInputs& inputs, double dur
     return StepFailure::state_not_finite;
   for (std::size_t k = 0; k < wrenches.size(); ++k)
   {
-    // Newton's law of a held node: gripper's force = m a + damping - (internal and external forces); the rod's is the opposite
+    // Newton's law of a held node: gripper's force = m a + damping - (internal and external forces); the rod's is the
+    // opposite
     const GraspState& g = work.grasps[k];
     if (!g.active || g.body >= 0)
       continue;
@@ -130,7 +134,8 @@ StepFailure RodStepper::Impl::explicitFinish(const RodInputs& inputs, double dur
   for (int i = 0; i < n; ++i)
     system.setPosition(i, next.x.col(i));
   system.placeGrasps(stage_poses);
-  if (viscous)   // massless frames relax in stiffness_damping seconds, which may be less than a step: that takes an implicit rate
+  if (viscous)   // massless frames relax in stiffness_damping seconds, which may be less than a step: that takes an
+                 // implicit rate
     system.setResponse(model->stiffness_damping / h, &strain_start);
   const RodEvaluation end = system.evaluate(false);
   if (end.min_chi <= kFoldedChi)
@@ -171,4 +176,4 @@ void RodStepper::Impl::takeProjection(const FastProjection& projection, int chai
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -8,7 +8,8 @@ namespace slender {
 
 double RodSystem::solveFrames()
 {
-  // Thomas' algorithm on the edge angles; held ones are decoupled. A closed rod's corner is treated by Sherman and Morrison.
+  // Thomas' algorithm on the edge angles; held ones are decoupled. A closed rod's corner is treated by Sherman and
+  // Morrison.
   const int edges = a_.edges;
   double* d = a_.theta_diagonal;
   double* off = a_.theta_off;   // off[j] couples edges j and j+1
@@ -114,4 +115,4 @@ RodEvaluation RodSystem::relaxFrames()
   return result;
 }
 
-}  // namespace slender
+}   // namespace slender

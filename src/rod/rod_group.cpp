@@ -17,26 +17,31 @@ void check(const RodGroupModel& model, Integrator integrator)
       throw std::invalid_argument(what);
   };
   need(integrator != Integrator::symplectic_euler || model.contact.rods.empty(),
-       "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler, bdf2 or tr_bdf2 (time.integrator)");
+       "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler, bdf2 or "
+       "tr_bdf2 (time.integrator)");
   for (const RigidBodyModel& body : model.bodies)
     checkBody(body);
   const int rods = static_cast<int>(model.rods.size()), bodies = static_cast<int>(model.bodies.size());
   for (const Weld& w : model.welds)
-    need(w.rod >= 0 && w.rod < rods && w.body >= 0 && w.body < bodies, "a weld names rod " + std::to_string(w.rod) + " and body " +
-         std::to_string(w.body) + "; there are " + std::to_string(rods) + " rods and " + std::to_string(bodies) + " bodies");
+    need(w.rod >= 0 && w.rod < rods && w.body >= 0 && w.body < bodies,
+         "a weld names rod " + std::to_string(w.rod) + " and body " + std::to_string(w.body) + "; there are " +
+             std::to_string(rods) + " rods and " + std::to_string(bodies) + " bodies");
   for (const GroupContact::Rod& r : model.contact.rods)
-    need(r.rod >= 0 && r.rod < rods, "contact names rod " + std::to_string(r.rod) + "; there are " + std::to_string(rods));
+    need(r.rod >= 0 && r.rod < rods,
+         "contact names rod " + std::to_string(r.rod) + "; there are " + std::to_string(rods));
   for (const GroupContact::Body& b : model.contact.bodies)
-    need(b.body >= 0 && b.body < bodies, "contact names body " + std::to_string(b.body) + "; there are " + std::to_string(bodies));
+    need(b.body >= 0 && b.body < bodies,
+         "contact names body " + std::to_string(b.body) + "; there are " + std::to_string(bodies));
 }
 
-}  // namespace
+}   // namespace
 
 Weld makeWeld(RodGroupModel& model, RodGroupState& state, int rod, int first_node, int last_node, int body)
 {
   GraspState grasp = makeGrasp(*model.rods.at(rod), state.rods.at(rod), first_node, last_node, true);
   grasp.body = model.bodies.at(body).simulated ? body : -1;
-  Weld weld{rod, static_cast<int>(state.rods[rod].grasps.size()), body, state.bodies.at(body).X_WB.inverse() * grasp.X_WG};
+  Weld weld{rod, static_cast<int>(state.rods[rod].grasps.size()), body,
+            state.bodies.at(body).X_WB.inverse() * grasp.X_WG};
   state.rods[rod].grasps.push_back(grasp);
   model.welds.push_back(weld);
   return weld;
@@ -50,7 +55,10 @@ RodGroup::RodGroup(RodGroupModel model, const TimeConfig& time)
 RodGroup::~RodGroup() = default;
 RodGroup::RodGroup(RodGroup&&) noexcept = default;
 
-StepReport RodGroup::step(RodGroupState& state, const RodGroupInputs& inputs, double duration) { return impl_->step(state, inputs, duration); }
+StepReport RodGroup::step(RodGroupState& state, const RodGroupInputs& inputs, double duration)
+{
+  return impl_->step(state, inputs, duration);
+}
 
 StepReport RodGroup::Impl::step(RodGroupState& state, const RodGroupInputs& step_inputs, double duration)
 {
@@ -108,7 +116,8 @@ void RodGroup::checkClearance(const RodGroupState& state)
 {
   const double room = clearance(state);
   if (!(room > 0))
-    throw std::invalid_argument("rods, bodies or obstacles with contact touch or cross by " + std::to_string(-1e3 * room) +
+    throw std::invalid_argument("rods, bodies or obstacles with contact touch or cross by " +
+                                std::to_string(-1e3 * room) +
                                 " mm as the scene starts: move them apart, or take thinner rods");
 }
 
@@ -133,4 +142,4 @@ void RodGroup::setThreads(int threads)
     coupled->threads = threads;
 }
 
-}  // namespace slender
+}   // namespace slender

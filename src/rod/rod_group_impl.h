@@ -23,7 +23,8 @@ public:
   }
 
   StepReport step(RodGroupState& state, const RodGroupInputs& inputs, double duration);
-  StepReport solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs, bool leave_saddles);   // group_statics.cpp
+  // group_statics.cpp
+  StepReport solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs, bool leave_saddles);
 
   RodGroupModel model;
   TimeConfig time;
@@ -33,4 +34,4 @@ public:
   RodGroupInputs inputs;   ///< with the targets of grasps that driven bodies carry
 };
 
-}  // namespace slender
+}   // namespace slender

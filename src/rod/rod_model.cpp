@@ -15,13 +15,15 @@ namespace {
 void requirePositive(double value, const char* what, int edge)
 {
   if (!(value > 0) || !std::isfinite(value))
-    throw std::invalid_argument(what + (" of edge " + std::to_string(edge)) + " must be positive and finite, got " + std::to_string(value));
+    throw std::invalid_argument(what + (" of edge " + std::to_string(edge)) + " must be positive and finite, got " +
+                                std::to_string(value));
 }
 
 void checkSections(const std::vector<RodSection>& sections, int edges)
 {
   if (static_cast<int>(sections.size()) != edges)
-    throw std::invalid_argument("expected " + std::to_string(edges) + " cross-sections, one per edge, got " + std::to_string(sections.size()));
+    throw std::invalid_argument("expected " + std::to_string(edges) + " cross-sections, one per edge, got " +
+                                std::to_string(sections.size()));
   for (int j = 0; j < edges; ++j)
   {
     const RodSection& s = sections[j];
@@ -33,11 +35,14 @@ void checkSections(const std::vector<RodSection>& sections, int edges)
     requirePositive(s.bend_modulus(0, 0), "bend modulus B11", j);
     requirePositive(s.bend_modulus.determinant(), "determinant of the bend modulus", j);
     if (std::abs(s.bend_modulus(0, 1) - s.bend_modulus(1, 0)) > 1e-9 * s.bend_modulus.norm())
-      throw std::invalid_argument("bend modulus of edge " + std::to_string(j) + " must be symmetric, got " + std::to_string(s.bend_modulus(0, 1)) + " and " + std::to_string(s.bend_modulus(1, 0)));
+      throw std::invalid_argument("bend modulus of edge " + std::to_string(j) + " must be symmetric, got " +
+                                  std::to_string(s.bend_modulus(0, 1)) + " and " +
+                                  std::to_string(s.bend_modulus(1, 0)));
   }
 }
 
-/// A curvature of the thesis (3.14) between edges twisted by m as the compensated strain; it does not depend on the rest of the joint.
+/// A curvature of the thesis (3.14) between edges twisted by m as the compensated strain; it does not depend on the
+/// rest of the joint.
 Eigen::Vector2d compensatedCurvature(const Eigen::Vector2d& kappa, double m)
 {
   const double secant = regularInverse(std::cos(0.5 * m)), cosine = 1.0 / std::hypot(1.0, 0.5 * kappa.norm() * secant);
@@ -60,7 +65,8 @@ void matchToArcs(RodModel& model)
     if (tangent)
     {
       const double along = std::pow(std::cos(half), 2);
-      const Eigen::Matrix2d scale = across * Eigen::Matrix2d::Identity() + (along - across) / (k * k) * curvature * curvature.transpose();
+      const Eigen::Matrix2d scale =
+          across * Eigen::Matrix2d::Identity() + (along - across) / (k * k) * curvature * curvature.transpose();
       bend = scale * bend * scale;
     }
     model.bend_modulus.col(i) << length * bend(0, 0), length * bend(0, 1), length * bend(1, 1);
@@ -81,18 +87,21 @@ Eigen::Vector3d directorOf(const RodModel& model, const RodState& state, int edg
   return director;
 }
 
-}  // namespace
+}   // namespace
 
-RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed, const std::vector<RodSection>& sections,
-                  const Eigen::Vector3d& director, bool naturally_straight, const JointOptions& joints)
+RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool closed,
+                  const std::vector<RodSection>& sections, const Eigen::Vector3d& director, bool naturally_straight,
+                  const JointOptions& joints)
 {
   const int n = static_cast<int>(nodes.cols());
   if (n < (closed ? 5 : 3))
-    throw std::invalid_argument("rod '" + name + "' needs at least " + (closed ? "5" : "3") + " nodes, got " + std::to_string(n));
+    throw std::invalid_argument("rod '" + name + "' needs at least " + (closed ? "5" : "3") + " nodes, got " +
+                                std::to_string(n));
   if (!nodes.allFinite())
     throw std::invalid_argument("rod '" + name + "' has a node that is not finite");
   if (naturally_straight && joints.matched_to_arcs)
-    throw std::invalid_argument("rod '" + name + "' is naturally straight: it has no arcs that its joints could be matched to");
+    throw std::invalid_argument("rod '" + name +
+                                "' is naturally straight: it has no arcs that its joints could be matched to");
   const FramedCurve curve(nodes, closed, director);
   const int edges = curve.edges();
   checkSections(sections, edges);
@@ -135,7 +144,8 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
       if (!naturally_straight)
       {
         const Eigen::Vector2d kappa = curve.materialCurvature(i);
-        model.rest_curvature.col(i) = joints.curvature == Curvature::tangent ? kappa : compensatedCurvature(kappa, curve.twist(i));
+        model.rest_curvature.col(i) =
+            joints.curvature == Curvature::tangent ? kappa : compensatedCurvature(kappa, curve.twist(i));
       }
       model.rest_twist[i] = curve.twist(i);
     }
@@ -173,15 +183,21 @@ std::string whyNotIsotropic(const RodModel& model)
   return "";
 }
 
-RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director, double total_twist)
+RodState makeRodState(const RodModel& model, const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& director,
+                      double total_twist)
 {
   if (nodes.cols() != model.nodes())
-    throw std::invalid_argument("rod '" + model.name + "' has " + std::to_string(model.nodes()) + " nodes, got " + std::to_string(nodes.cols()));
+    throw std::invalid_argument("rod '" + model.name + "' has " + std::to_string(model.nodes()) + " nodes, got " +
+                                std::to_string(nodes.cols()));
   if (!nodes.allFinite() || !std::isfinite(total_twist))
     throw std::invalid_argument("rod '" + model.name + "': a node or the total twist is not finite");
   if (model.closed && std::abs(std::remainder(total_twist, 2 * M_PI)) > 1e-6)
-    throw std::invalid_argument("rod '" + model.name + "': the frames of a closed rod meet again only after whole turns; its total twist must be a multiple of 2 pi, got " +
-                                std::to_string(total_twist) + " (a loop glued at another angle has that angle as natural twist: see addNaturalTwist)");
+    throw std::invalid_argument(
+        "rod '" + model.name +
+        "': the frames of a closed rod meet again only after whole turns; its total twist must be a multiple of 2 pi, "
+        "got " +
+        std::to_string(total_twist) +
+        " (a loop glued at another angle has that angle as natural twist: see addNaturalTwist)");
   const int n = model.nodes(), edges = model.edges();
   RodState state;
   state.x = nodes;
@@ -217,7 +233,8 @@ double shareOfEdge(const RodModel& model, int node, int side)
 
 bool doesWithoutFrames(const RodModel& model)
 {
-  return model.isotropic && !model.closed && model.rest_twist.cwiseAbs().maxCoeff() < 1e-9;   // round-off of a straight line's frames
+  // round-off of a straight line's frames
+  return model.isotropic && !model.closed && model.rest_twist.cwiseAbs().maxCoeff() < 1e-9;
 }
 
 bool framesFit(const RodModel& model, const RodState& state)
@@ -245,8 +262,8 @@ Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int n
   Eigen::Vector3d t, d1;
   if (!model.closed && (node == 0 || node == n - 1))
   {
-    // Half the rest turn and twist back from the end edge: curvature (kappa1, kappa2) turns t about kappa b = kappa1 d2 - kappa2 d1, with
-    // the directors half way of the twist.
+    // Half the rest turn and twist back from the end edge: curvature (kappa1, kappa2) turns t about kappa b = kappa1 d2
+    // - kappa2 d1, with the directors half way of the twist.
     const int edge = node == 0 ? 0 : edges - 1;
     const double side = node == 0 ? -1.0 : 1.0, m = model.rest_twist[node];
     const Eigen::Vector3d te = tangent(edge), d1e = directorOf(model, state, edge);
@@ -261,7 +278,8 @@ Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int n
   }
   else
   {
-    // between the middles of the two edges, where the node is: the turn and the twist are shared in proportion to their lengths
+    // between the middles of the two edges, where the node is: the turn and the twist are shared in proportion to their
+    // lengths
     const int e = (node + edges - 1) % edges, f = node;
     const Eigen::Vector3d te = tangent(e), tf = tangent(f);
     const double share = shareOfEdge(model, node, 0);
@@ -279,10 +297,11 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
 {
   const int n = model.nodes();
   if (first_node < 0 || last_node < first_node || last_node >= n)
-    throw std::invalid_argument("rod '" + model.name + "': held nodes " + std::to_string(first_node) + ".." + std::to_string(last_node) +
-                                " must lie in 0.." + std::to_string(n - 1));
+    throw std::invalid_argument("rod '" + model.name + "': held nodes " + std::to_string(first_node) + ".." +
+                                std::to_string(last_node) + " must lie in 0.." + std::to_string(n - 1));
   if (!holds_frame && first_node != last_node)
-    throw std::invalid_argument("rod '" + model.name + "': a point pin holds one node, not " + std::to_string(last_node - first_node + 1));
+    throw std::invalid_argument("rod '" + model.name + "': a point pin holds one node, not " +
+                                std::to_string(last_node - first_node + 1));
   if (!state.framed() && last_node > first_node)   // all at once instead of edge by edge
   {
     RodState framed = state;
@@ -324,7 +343,8 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
       continue;
     const int edge = side ? node : (node + model.edges() - 1) % model.edges();
     const Eigen::Vector3d te = (state.x.col((edge + 1) % n) - state.x.col(edge)).normalized();
-    const double angle = signedAngle(parallelTransport(section.col(1), section.col(0), te), directorOf(model, state, edge), te);
+    const double angle =
+        signedAngle(parallelTransport(section.col(1), section.col(0), te), directorOf(model, state, edge), te);
     const bool end = !model.closed && (node == 0 || node == n - 1);   // whose half joint has its rest twist
     const double expected = end ? model.rest_twist[node] : shareOfEdge(model, node, side) * state.twistAt(node);
     g.section_twist[side] = unwrapNear(side ? angle : -angle, expected);
@@ -332,4 +352,4 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
   return g;
 }
 
-}  // namespace slender
+}   // namespace slender

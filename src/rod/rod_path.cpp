@@ -12,8 +12,12 @@ namespace slender {
 class RodPath::Impl
 {
 public:
-  Impl(std::shared_ptr<const RodModel> m, const RodState& s, const RodInputs& constant, const RodInputs& scaled, double last)
-    : model(std::move(m)), state(s), system(*model), last_factor(last)
+  Impl(std::shared_ptr<const RodModel> m, const RodState& s, const RodInputs& constant, const RodInputs& scaled,
+       double last)
+    : model(std::move(m)),
+      state(s),
+      system(*model),
+      last_factor(last)
   {
     const int n = model->nodes();
     addFrames(*model, state);
@@ -72,7 +76,8 @@ public:
     return v;
   }
 
-  /// Inner product of two steps (displacement, factor): mean square of positions over the length, and the factor over its last value.
+  /// Inner product of two steps (displacement, factor): mean square of positions over the length, and the factor over
+  /// its last value.
   double inner(const Eigen::VectorXd& a, double fa, const Eigen::VectorXd& b, double fb) const
   {
     double sum = 0.0;
@@ -96,7 +101,10 @@ public:
     system.moveAlong(1.0);
   }
 
-  bool sound(const RodEvaluation& at) const { return std::isfinite(at.energy()) && at.min_chi > kFoldedChi && at.inertia.zero == 0; }
+  bool sound(const RodEvaluation& at) const
+  {
+    return std::isfinite(at.energy()) && at.min_chi > kFoldedChi && at.inertia.zero == 0;
+  }
 
   bool correct(double& at, const Eigen::VectorXd* along, double along_factor, int& iterations);
   bool tryStep(double share, int& iterations);
@@ -116,7 +124,8 @@ public:
 bool RodPath::Impl::correct(double& at, const Eigen::VectorXd* along, double along_factor, int& iterations)
 {
   constexpr int kMost = 25;
-  constexpr double kTolerance = 1e-10;   // of the length and of the last factor; differences of positions round to 1e-16 of the length
+  // of the length and of the last factor; differences of positions round to 1e-16 of the length
+  constexpr double kTolerance = 1e-10;
   double last = 1e300;
   for (iterations = 0; iterations < kMost; ++iterations)
   {
@@ -183,7 +192,8 @@ bool RodPath::Impl::tryStep(double share, int& iterations)
   return true;
 }
 
-RodPath::RodPath(std::shared_ptr<const RodModel> model, const RodState& start, const RodInputs& constant, const RodInputs& scaled, double last_factor)
+RodPath::RodPath(std::shared_ptr<const RodModel> model, const RodState& start, const RodInputs& constant,
+                 const RodInputs& scaled, double last_factor)
   : impl_(std::make_unique<Impl>(std::move(model), start, constant, scaled, last_factor))
 {
 }
@@ -209,8 +219,10 @@ StepReport RodPath::advance(double share)
   }
   report.ok = false;
   report.failure = StepFailure::newton_diverged;
-  report.message = "rod '" + m.model->name + "': the path of equilibria could not be followed further: use more edges, or a small perturbation, which "
-                   "rounds off the points where paths branch";
+  report.message =
+      "rod '" + m.model->name +
+      "': the path of equilibria could not be followed further: use more edges, or a small perturbation, which "
+      "rounds off the points where paths branch";
   return report;
 }
 
@@ -235,4 +247,4 @@ StepReport RodPath::settleAt(double factor)
 double RodPath::factor() const { return impl_->factor; }
 const RodState& RodPath::state() const { return impl_->state; }
 
-}  // namespace slender
+}   // namespace slender

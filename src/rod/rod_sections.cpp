@@ -25,9 +25,10 @@ Joint jointAt(const RodModel& model, const RodArrays& a, int node, int e)
 {
   const int f = node;
   const Vec3<double> te = at(a.t, e), d1e = at(a.d1, e), tf = at(a.t, f), d1f = at(a.d1, f);
-  const JointFrames<double> frames = {te, d1e, cross(te, d1e), tf, d1f, cross(tf, d1f), a.inverse_length[e], a.inverse_length[f]};
+  const JointFrames<double> frames = {
+      te, d1e, cross(te, d1e), tf, d1f, cross(tf, d1f), a.inverse_length[e], a.inverse_length[f]};
   const JointStrains<double> strains = jointStrains(frames);
-  const JointMaterial<double> material = {a.b11[node], a.b12[node], a.b22[node], a.beta[node],
+  const JointMaterial<double> material = {a.b11[node],         a.b12[node],         a.b22[node],       a.beta[node],
                                           a.rest_kappa1[node], a.rest_kappa2[node], a.rest_twist[node]};
   Joint joint{strains.kappa1, strains.kappa2, {}, {}, {}};
   JointGradient<double> g;
@@ -35,8 +36,11 @@ Joint jointAt(const RodModel& model, const RodArrays& a, int node, int e)
   const double m = a.twist[node];
   if (model.curvature == Curvature::compensated)
   {
-    const JointCompensation<double> compensation = {a.coupling[node], std::sqrt(0.5 / strains.inverse_chi), std::sin(0.5 * m), std::cos(0.5 * m)};
-    jointDerivatives<false, true>(frames, strains, compensatedResponse(strains, m, material, compensation, joint.kappa1, joint.kappa2), g, unused);
+    const JointCompensation<double> compensation = {a.coupling[node], std::sqrt(0.5 / strains.inverse_chi),
+                                                    std::sin(0.5 * m), std::cos(0.5 * m)};
+    jointDerivatives<false, true>(frames, strains,
+                                  compensatedResponse(strains, m, material, compensation, joint.kappa1, joint.kappa2),
+                                  g, unused);
   }
   else
     jointDerivatives<false, false>(frames, strains, tangentResponse(strains, m, material), g, unused);
@@ -78,7 +82,8 @@ void takeJoints(const RodModel& model, const RodState& state, const RodSystem& s
     const bool end = !model.closed && (i == 0 || i == model.nodes() - 1);
     if (end)
       continue;
-    const bool jointless = !(system.twistStiffness()[i] > 0);   // held: inside the held part, or a section whose half joints come later
+    // held: inside the held part, or a section whose half joints come later
+    const bool jointless = !(system.twistStiffness()[i] > 0);
     const Joint joint = jointAt(model, a, i, i > 0 ? i - 1 : model.edges() - 1);
     if (!jointless)
       length = model.twist_modulus[i] / system.twistStiffness()[i];
@@ -125,7 +130,7 @@ void blankHeldParts(const RodState& state, RodSections& out)
     }
 }
 
-}  // namespace
+}   // namespace
 
 RodSections sectionsOf(const RodModel& model, const RodState& given)
 {
@@ -141,8 +146,9 @@ RodSections sectionsOf(const RodModel& model, const RodState& given)
 
   const int nodes = model.nodes(), edges = model.edges();
   const RodArrays& a = system.arrays();
-  RodSections out{Eigen::Matrix2Xd(2, nodes), Eigen::VectorXd(nodes), Eigen::VectorXd(edges), Eigen::Matrix3Xd(3, edges),
-                  Eigen::VectorXd(edges), Eigen::Matrix3Xd::Zero(3, nodes), Eigen::Matrix3Xd::Zero(3, nodes)};
+  RodSections out{Eigen::Matrix2Xd(2, nodes),      Eigen::VectorXd(nodes), Eigen::VectorXd(edges),
+                  Eigen::Matrix3Xd(3, edges),      Eigen::VectorXd(edges), Eigen::Matrix3Xd::Zero(3, nodes),
+                  Eigen::Matrix3Xd::Zero(3, nodes)};
   for (int j = 0; j < edges; ++j)
   {
     out.strain[j] = a.strain[j];
@@ -156,4 +162,4 @@ RodSections sectionsOf(const RodModel& model, const RodState& given)
   return out;
 }
 
-}  // namespace slender
+}   // namespace slender

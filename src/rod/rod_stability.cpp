@@ -32,17 +32,17 @@ public:
   {
     for (int i = 0; i < rod_.model->nodes(); ++i)
       rod_.system.setInertia(i, s * rod_.model->mass[i], rod_.system.position(i), rod_.load(inputs_, i));
-    // The system keeps rods that may spin freely definite by a share 1e-8 of the twist stiffness. On fine meshes that is more than twisting of the
-    // whole rod costs, so that only what round-off needs is left of it: 1e-12.
+    // The system keeps rods that may spin freely definite by a share 1e-8 of the twist stiffness. On fine meshes that
+    // is more than twisting of the whole rod costs, so that only what round-off needs is left of it: 1e-12.
     const double angle = (spin_ > 0 ? 1e-12 * unit_ : 0.0) + std::max(0.0, s) * edge_inertia_;
     return rod_.system.evaluate(with_hessian, {0.0, unit_ > 0 ? (angle - spin_) / unit_ : 0.0});
   }
 
   bool definite(double s) { return evaluate(s, true).inertia.positiveDefinite(); }
 
-  /// What rounding errors of the matrix and its factor change of the eigenvalue of this mode v. They are 1e-16 of each entry, and so of stretching
-  /// sum of E A / l (|v_i| + |v_j|)^2 and of bending sum of B / l^3 (|v_i| + 2 |v_j| + |v_k|)^2, over sum of m |v|^2. Bending counts where edges
-  /// are shorter than the rod is thick.
+  /// What rounding errors of the matrix and its factor change of the eigenvalue of this mode v. They are 1e-16 of each
+  /// entry, and so of stretching sum of E A / l (|v_i| + |v_j|)^2 and of bending sum of B / l^3 (|v_i| + 2 |v_j| +
+  /// |v_k|)^2, over sum of m |v|^2. Bending counts where edges are shorter than the rod is thick.
   double rounding(const Eigen::VectorXd& v) const
   {
     const RodModel& m = *rod_.model;
@@ -52,7 +52,8 @@ public:
       stretching += m.stretch_modulus[j] / m.rest_length[j] * std::pow(size(j) + size(j + 1), 2);
     const double bend = std::max(m.bend_modulus.row(0).maxCoeff(), m.bend_modulus.row(2).maxCoeff());
     for (int i = 0; i + (m.closed ? 0 : 2) < m.nodes(); ++i)
-      bending += bend / std::pow(std::min(m.rest_length[i], m.rest_length[(i + 1) % m.edges()]), 3) * std::pow(size(i) + 2 * size(i + 1) + size(i + 2), 2);
+      bending += bend / std::pow(std::min(m.rest_length[i], m.rest_length[(i + 1) % m.edges()]), 3) *
+                 std::pow(size(i) + 2 * size(i + 1) + size(i + 2), 2);
     for (int i = 0; i < m.nodes(); ++i)
       inertia += m.mass[i] * v.segment<3>(4 * i).squaredNorm();
     constexpr double kMargin = 2.0;   // measured on 1,280 edges: 0.8
@@ -64,10 +65,12 @@ public:
   {
     const RodModel& m = *rod_.model;
     const double length = m.rest_length.sum(), mass = m.totalMass(), n = m.nodes();
-    const double stiffness = std::min({m.bend_modulus.row(0).minCoeff(), m.bend_modulus.row(2).minCoeff(), m.twist_modulus.minCoeff()});
+    const double stiffness =
+        std::min({m.bend_modulus.row(0).minCoeff(), m.bend_modulus.row(2).minCoeff(), m.twist_modulus.minCoeff()});
     double largest = 0.0;   // of the matrix's eigenvalues: stretching of one edge
     for (int j = 0; j < m.edges(); ++j)
-      largest = std::max(largest, 4 * m.stretch_modulus[j] / (m.rest_length[j] * std::min(m.mass[j], m.mass[(j + 1) % m.nodes()])));
+      largest = std::max(
+          largest, 4 * m.stretch_modulus[j] / (m.rest_length[j] * std::min(m.mass[j], m.mass[(j + 1) % m.nodes()])));
     // Rounding errors of the n entries add up like a random walk.
     const double rounding = std::numeric_limits<double>::epsilon() * largest / std::sqrt(n);
     return kNeutralShare * stiffness / (mass * std::pow(length, 3)) + 4.0 * rounding;
@@ -122,13 +125,14 @@ void scaleToTurns(const RodModel& model, Eigen::VectorXd& v)
   for (int j = 0; j < model.edges(); ++j)
   {
     const int next = (j + 1) % model.nodes();
-    turn = std::max({turn, (v.segment<3>(4 * next) - v.segment<3>(4 * j)).norm() / model.rest_length[j], std::abs(v[4 * j + 3])});
+    turn = std::max(
+        {turn, (v.segment<3>(4 * next) - v.segment<3>(4 * j)).norm() / model.rest_length[j], std::abs(v[4 * j + 3])});
   }
   // a mode that moves the rod as a whole turns nothing
   v /= std::max(turn, v.cwiseAbs().maxCoeff() / model.rest_length.sum());
 }
 
-}  // namespace
+}   // namespace
 
 RodStability assessStability(RodStepper::Impl& rod, const RodInputs& inputs, bool spectrum)
 {
@@ -163,4 +167,4 @@ RodStability assessStability(RodStepper::Impl& rod, const RodInputs& inputs, boo
   return result;
 }
 
-}  // namespace slender
+}   // namespace slender

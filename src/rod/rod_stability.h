@@ -7,15 +7,16 @@
 
 namespace slender {
 
-/// What the second derivative of the energy says of an equilibrium of one rod. Held nodes and edges are fixed; material frames are unknowns like
-/// the positions, with the sections' own (small) inertia about the tangent.
+/// What the second derivative of the energy says of an equilibrium of one rod. Held nodes and edges are fixed; material
+/// frames are unknowns like the positions, with the sections' own (small) inertia about the tangent.
 struct RodStability : EquilibriumStability
 {
   double neutral = 0.0;   ///< half width of the band around zero in which round-off decides [1/s^2]
-  Eigen::VectorXd mode;   ///< of the lowest eigenvalue: four per node as RodSystem::direction(); no edge turns by more than 1 rad
+  /// of the lowest eigenvalue: four per node as RodSystem::direction(); no edge turns by more than 1 rad
+  Eigen::VectorXd mode;
 };
 
 /// Of the configuration rod.work under these inputs. `spectrum` false: only the energy.
 RodStability assessStability(RodStepper::Impl& rod, const RodInputs& inputs, bool spectrum);
 
-}  // namespace slender
+}   // namespace slender

@@ -20,14 +20,17 @@ StepFailure RodStepper::Impl::computeAcceleration(const RodInputs& inputs, doubl
   work.a.resize(3, model->nodes());
   for (int i = 0; i < model->nodes(); ++i)
   {
-    work.a.col(i) = system.isFree(i) ? Eigen::Vector3d((-system.nodeGradient(i) - model->damping(i) * work.v.col(i)) / model->mass[i])
-                                     : Eigen::Vector3d(Eigen::Vector3d::Zero());
+    work.a.col(i) =
+        system.isFree(i)
+            ? Eigen::Vector3d((-system.nodeGradient(i) - model->damping(i) * work.v.col(i)) / model->mass[i])
+            : Eigen::Vector3d(Eigen::Vector3d::Zero());
   }
   system.store(work);
   return StepFailure::none;
 }
 
-StepFailure RodStepper::Impl::beginStep(const StepPlan& step_plan, const RodInputs& inputs, double duration, double t, double h)
+StepFailure RodStepper::Impl::beginStep(const StepPlan& step_plan, const RodInputs& inputs, double duration, double t,
+                                        double h)
 {
   (void)h;
   plan = &step_plan;
@@ -80,7 +83,8 @@ void RodStepper::Impl::endStage(std::size_t s, const RodInputs& inputs, double d
   for (int i = 0; i < model->nodes(); ++i)
   {
     stage_q.col(i) = system.position(i);
-    stage_v.col(i) = heldVelocity(inputs, duration, t + stage.time * h, i, (stage_q.col(i) - combine(stage.q_tilde, i)) / stage.tau_v);
+    stage_v.col(i) = heldVelocity(inputs, duration, t + stage.time * h, i,
+                                  (stage_q.col(i) - combine(stage.q_tilde, i)) / stage.tau_v);
   }
   if (model->stiffness_damping > 0)
     system.strains(strain_stage);
@@ -108,7 +112,8 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
     if (!keep_a)
       continue;
     const bool free = system.isMoving(i);
-    const Eigen::Vector3d a = free ? Eigen::Vector3d((q - combine(stage.q_hat, i)) / (stage.tau_a * stage.tau_a)) : Eigen::Vector3d((next.v.col(i) - v0) / h);
+    const Eigen::Vector3d a = free ? Eigen::Vector3d((q - combine(stage.q_hat, i)) / (stage.tau_a * stage.tau_a))
+                                   : Eigen::Vector3d((next.v.col(i) - v0) / h);
     const Eigen::Vector3d a0 = work.a.cols() ? Eigen::Vector3d(work.a.col(i)) : a;
     next.a.col(i) = a0 + (a - a0) / plan->a_fraction;
     if (free)
@@ -143,7 +148,8 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
   next.last_step = h;
 }
 
-Eigen::Vector3d RodStepper::Impl::heldVelocity(const RodInputs& inputs, double duration, double at, int node, const Eigen::Vector3d& otherwise)
+Eigen::Vector3d RodStepper::Impl::heldVelocity(const RodInputs& inputs, double duration, double at, int node,
+                                               const Eigen::Vector3d& otherwise)
 {
   if (system.isFree(node))
     return otherwise;
@@ -153,7 +159,8 @@ Eigen::Vector3d RodStepper::Impl::heldVelocity(const RodInputs& inputs, double d
     if (!g.active || node < g.first_node || node > g.last_node)
       continue;
     if (g.body >= 0)
-      return carried_velocity[k].linear + carried_velocity[k].angular.cross(stage_poses[k].orientation * g.nodes_G[node - g.first_node]);
+      return carried_velocity[k].linear +
+             carried_velocity[k].angular.cross(stage_poses[k].orientation * g.nodes_G[node - g.first_node]);
     Twist twist;
     const Pose pose = graspPose(g, inputs.grasps[k], duration, std::min(at / duration, 1.0), &twist);
     return twist.linear + twist.angular.cross(pose.orientation * g.nodes_G[node - g.first_node]);
@@ -184,7 +191,8 @@ void RodStepper::Impl::computeWrenches(const RodInputs&, double h)
       continue;
     for (int i = g.first_node; i <= g.last_node; ++i)
     {
-      // Newton's law of the held node: gripper's force = m a + damping - (internal and external forces); the rod's is the opposite
+      // Newton's law of the held node: gripper's force = m a + damping - (internal and external forces); the rod's is
+      // the opposite
       Eigen::Vector3d force = -system.nodeGradient(i);
       if (h > 0 && g.body < 0)
         force -= model->mass[i] * (next.v.col(i) - work.v.col(i)) / h + model->damping(i) * next.v.col(i);
@@ -195,4 +203,4 @@ void RodStepper::Impl::computeWrenches(const RodInputs&, double h)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

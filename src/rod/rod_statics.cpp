@@ -10,18 +10,20 @@
 
 namespace slender {
 
-/// The rod in the terms of EquilibriumSearch. The present configuration is rod.work. A proximal weight of 1 is 100 times the stiffness of the whole
-/// rod, shared among its nodes.
+/// The rod in the terms of EquilibriumSearch. The present configuration is rod.work. A proximal weight of 1 is 100
+/// times the stiffness of the whole rod, shared among its nodes.
 class RodStepper::Impl::RodEquilibrium
 {
 public:
   RodEquilibrium(Impl& rod, const RodInputs& inputs, StepReport& report);
-  /// Number of moves in which the grasps can be carried to their targets: each at most 2 % of the length and 0.2 rad. 0: all are there.
+  /// Number of moves in which the grasps can be carried to their targets: each at most 2 % of the length and 0.2 rad.
+  /// 0: all are there.
   double moves() const;
 
   // ---- what EquilibriumSearch needs
   NewtonResult round(double fraction, double weight);
-  double shift() const { return (rod_.next.x - rod_.work.x).colwise().norm().maxCoeff() / length_; }   // `next` is what the round began with
+  // `next` is what the round began with
+  double shift() const { return (rod_.next.x - rod_.work.x).colwise().norm().maxCoeff() / length_; }
   void takeBase();
   double weightOf(double rate) const { return rate * rod_.model->mass.maxCoeff() / unit_weight_; }
   EquilibriumStability assess(bool spectrum);
@@ -45,11 +47,17 @@ private:
 };
 
 RodStepper::Impl::RodEquilibrium::RodEquilibrium(Impl& rod, const RodInputs& inputs, StepReport& report)
-  : rod_(rod), inputs_(inputs), report_(report), targets_(inputs), newton_(rod.time.newton), length_(rod.model->rest_length.sum())
+  : rod_(rod),
+    inputs_(inputs),
+    report_(report),
+    targets_(inputs),
+    newton_(rod.time.newton),
+    length_(rod.model->rest_length.sum())
 {
   for (GraspTarget& g : targets_.grasps)
     g.velocity.reset();
-  // Scale of the proximal weight: the stiffness of the whole rod against bending, or against its loads if that is larger.
+  // Scale of the proximal weight: the stiffness of the whole rod against bending, or against its loads if that is
+  // larger.
   const RodModel& model = *rod_.model;
   const double bend = std::max(model.bend_modulus.row(0).maxCoeff(), model.bend_modulus.row(2).maxCoeff());
   double load_total = 0.0;
@@ -164,8 +172,9 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
     return refuse(report, search.failure(), explainStatics(search.failure()));
   evaluateEquilibrium(inputs, report);
   if (!(report.residual < kMostUnbalanced))
-    return refuse(report, StepFailure::newton_diverged, "no equilibrium was found: nothing balances the loads, so that the rod drifts: hold it by a "
-                                                        "grasp, or let it move by time stepping (start: as_given)");
+    return refuse(report, StepFailure::newton_diverged,
+                  "no equilibrium was found: nothing balances the loads, so that the rod drifts: hold it by a "
+                  "grasp, or let it move by time stepping (start: as_given)");
   for (std::size_t k = 0; k < work.grasps.size(); ++k)
     if (work.grasps[k].active)
       work.grasps[k].X_WG = {inputs.grasps[k].X_WG.position, inputs.grasps[k].X_WG.orientation.normalized()};
@@ -187,8 +196,9 @@ StepReport RodStepper::Impl::assessEquilibrium(const RodState& state, const RodI
   return report;
 }
 
-/// Trial of a round: free nodes, and what the proximal term holds them to, go along with the grasps, by the displacements of the held
-/// nodes before and after them. Otherwise a move longer than an edge would fold the rod next to the grasp.
+/// Trial of a round: free nodes, and what the proximal term holds them to, go along with the grasps, by the
+/// displacements of the held nodes before and after them. Otherwise a move longer than an edge would fold the rod next
+/// to the grasp.
 void RodStepper::Impl::carryFreeNodes(const RodInputs& inputs, double weight)
 {
   const int n = model->nodes();
@@ -241,4 +251,4 @@ void RodStepper::Impl::evaluateEquilibrium(const RodInputs& inputs, StepReport& 
   computeWrenches(inputs, 0.0);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -10,8 +10,9 @@
 
 namespace slender {
 
-RodStepper::RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& time) 
-  : impl_(std::make_unique<Impl>(std::move(model), time)), loop_(std::make_unique<StepLoop>(time, std::vector<Impl*>{impl_.get()}))
+RodStepper::RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& time)
+  : impl_(std::make_unique<Impl>(std::move(model), time)),
+    loop_(std::make_unique<StepLoop>(time, std::vector<Impl*>{impl_.get()}))
 {
 }
 RodStepper::~RodStepper() = default;
@@ -34,16 +35,14 @@ Eigen::Map<const Eigen::Matrix4Xd> RodStepper::lowestMode() const
   const Eigen::VectorXd& mode = impl_->lowest_mode;
   return Eigen::Map<const Eigen::Matrix4Xd>(mode.data(), 4, mode.size() / 4);
 }
-const std::vector<Wrench>& RodStepper::wrenches() const
-{
-  return impl_->wrenches;
-}
-const RodModel& RodStepper::model() const
-{
-  return *impl_->model;
-}
+const std::vector<Wrench>& RodStepper::wrenches() const { return impl_->wrenches; }
+const RodModel& RodStepper::model() const { return *impl_->model; }
 
-RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t) : model(std::move(m)), time(t), without_frames(doesWithoutFrames(*model)), system(*model)
+RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t)
+  : model(std::move(m)),
+    time(t),
+    without_frames(doesWithoutFrames(*model)),
+    system(*model)
 {
   if (time.integrator == Integrator::imex)
     throw std::invalid_argument("rod '" + model->name + "': imex is for cloth only");
@@ -61,7 +60,8 @@ void RodStepper::Impl::begin(const RodState& state)
     stage_poses[k] = state.grasps[k].X_WG;
   origin = &state.grasps;
   work = state;
-  const bool holds_frame = std::any_of(work.grasps.begin(), work.grasps.end(), [](const GraspState& g) { return g.active && g.holds_frame; });
+  const bool holds_frame = std::any_of(work.grasps.begin(), work.grasps.end(),
+                                       [](const GraspState& g) { return g.active && g.holds_frame; });
   if (!isotropic || holds_frame)
     addFrames(*model, work);
 }
@@ -96,7 +96,8 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
     what = std::string("number of ") + name + " (" + std::to_string(count) + " for " + std::to_string(expected) + ")";
     return false;
   };
-  bool good = check(inputs.gravity.allFinite(), "gravity") && check(inputs.wind.allFinite(), "wind") && check(inputs.forces.allFinite(), "a nodal force") && check(inputs.torques.allFinite(), "a torque");
+  bool good = check(inputs.gravity.allFinite(), "gravity") && check(inputs.wind.allFinite(), "wind") &&
+              check(inputs.forces.allFinite(), "a nodal force") && check(inputs.torques.allFinite(), "a torque");
   if (state.x.cols() != nodes || state.v.cols() != nodes)
     return refuse_count("nodes of the state", state.x.cols(), nodes);
   if (inputs.grasps.size() != state.grasps.size())
@@ -105,10 +106,14 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
     return refuse_count("nodal forces", inputs.forces.cols(), state.x.cols());
   if (inputs.torques.size() != 0 && inputs.torques.size() != model->edges())
     return refuse_count("torques", inputs.torques.size(), model->edges());
-  if (inputs.torques.size() != 0 && (isotropic || time.integrator == Integrator::implicit_midpoint || time.integrator == Integrator::generalized_alpha))
+  if (inputs.torques.size() != 0 && (isotropic || time.integrator == Integrator::implicit_midpoint ||
+                                     time.integrator == Integrator::generalized_alpha))
   {
-    what = isotropic ? "a torque about the tangent, which the isotropic formulation does not have (formulation: general has it),"
-                     : "a torque about the tangent, whose work the energy check of this integrator does not know (tr_bdf2 has none),";
+    what =
+        isotropic
+            ? "a torque about the tangent, which the isotropic formulation does not have (formulation: general has it),"
+            : "a torque about the tangent, whose work the energy check of this integrator does not know (tr_bdf2 has "
+              "none),";
     return false;
   }
   for (std::size_t k = 0; k < inputs.grasps.size(); ++k)
@@ -117,28 +122,38 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
     if (!state.grasps[k].active || state.grasps[k].body >= 0)
       continue;
     const double norm = g.X_WG.orientation.norm();
-    good = good && check(g.X_WG.position.allFinite() && std::isfinite(norm) && std::abs(norm - 1.0) < 1e-3, "pose of grasp ", k) &&
-           check(!g.velocity || (g.velocity->linear.allFinite() && g.velocity->angular.allFinite()), "velocity of grasp ", k);
+    good =
+        good &&
+        check(g.X_WG.position.allFinite() && std::isfinite(norm) && std::abs(norm - 1.0) < 1e-3, "pose of grasp ", k) &&
+        check(!g.velocity || (g.velocity->linear.allFinite() && g.velocity->angular.allFinite()), "velocity of grasp ",
+              k);
   }
-  bool sound = state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() && state.a.allFinite() &&
-               state.x_previous.allFinite() && state.v_previous.allFinite() && state.strain_rate.allFinite() &&
-               state.strain_rate_previous.allFinite() && state.strain_previous.allFinite();
+  bool sound = state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() &&
+               state.a.allFinite() && state.x_previous.allFinite() && state.v_previous.allFinite() &&
+               state.strain_rate.allFinite() && state.strain_rate_previous.allFinite() &&
+               state.strain_previous.allFinite();
   for (const GraspState& g : state.grasps)
-    sound = sound && (!g.active || (g.X_WG.position.allFinite() && g.X_WG.orientation.coeffs().allFinite() && g.velocity.linear.allFinite() &&
-                                    g.velocity.angular.allFinite() && std::isfinite(g.section_twist[0]) && std::isfinite(g.section_twist[1])));
-  return good && check(sound, "the state") && check(framesFit(*model, state) && (state.framed() || without_frames), "the set of material frames");
+    sound = sound && (!g.active || (g.X_WG.position.allFinite() && g.X_WG.orientation.coeffs().allFinite() &&
+                                    g.velocity.linear.allFinite() && g.velocity.angular.allFinite() &&
+                                    std::isfinite(g.section_twist[0]) && std::isfinite(g.section_twist[1])));
+  return good && check(sound, "the state") &&
+         check(framesFit(*model, state) && (state.framed() || without_frames), "the set of material frames");
 }
 
-/// Pose (and velocity) of a grasp at a fraction of the whole step: uniform motion, or a cubic through both ends' velocities.
-Pose RodStepper::Impl::graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity)
+/// Pose (and velocity) of a grasp at a fraction of the whole step: uniform motion, or a cubic through both ends'
+/// velocities.
+Pose RodStepper::Impl::graspPose(const GraspState& start, const GraspTarget& target, double duration, double s,
+                                 Twist* velocity)
 {
   return poseBetween(start.X_WG, start.velocity, target, duration, s, velocity);
 }
 
-Pose poseBetween(const Pose& start, const Twist& v0, const GraspTarget& target, double duration, double s, Twist* velocity)
+Pose poseBetween(const Pose& start, const Twist& v0, const GraspTarget& target, double duration, double s,
+                 Twist* velocity)
 {
   const Eigen::Vector3d move = target.X_WG.position - start.position;
-  const Eigen::Vector3d turn = start.orientation * rotationVector(start.orientation.conjugate() * target.X_WG.orientation);
+  const Eigen::Vector3d turn =
+      start.orientation * rotationVector(start.orientation.conjugate() * target.X_WG.orientation);
   const bool smooth = target.velocity.has_value();
   // cubic Hermite blend of displacement and end velocities; with neither the motion is uniform
   const double h01 = smooth ? s * s * (3 - 2 * s) : s, d01 = smooth ? 6 * s * (1 - s) : 1.0;
@@ -153,7 +168,8 @@ Pose poseBetween(const Pose& start, const Twist& v0, const GraspTarget& target, 
   if (s >= 1.0)
     return {target.X_WG.position, target.X_WG.orientation.normalized()};
   const Eigen::Vector3d phi = h01 * turn + duration * (h10 * v0.angular + h11 * v1.angular);
-  return {start.position + h01 * move + duration * (h10 * v0.linear + h11 * v1.linear), (fromRotationVector(phi) * start.orientation).normalized()};
+  return {start.position + h01 * move + duration * (h10 * v0.linear + h11 * v1.linear),
+          (fromRotationVector(phi) * start.orientation).normalized()};
 }
 
 double RodStepper::Impl::startEnergy(const RodInputs& inputs, double* allowance)
@@ -163,8 +179,10 @@ double RodStepper::Impl::startEnergy(const RodInputs& inputs, double* allowance)
   return mechanicalEnergy(work, inputs, system.evaluate(false), allowance);
 }
 
-/// Elastic (as evaluated) plus kinetic energy and the loads' potential. `allowance`: growth that errors of a sound step may show.
-double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const
+/// Elastic (as evaluated) plus kinetic energy and the loads' potential. `allowance`: growth that errors of a sound step
+/// may show.
+double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e,
+                                          double* allowance) const
 {
   double kinetic = 0.0, potential = 0.0, weight = 0.0;
   for (int i = 0; i < model->nodes(); ++i)
@@ -194,28 +212,38 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length,
   switch (failure)
   {
     case StepFailure::folded_back:
-      return "two consecutive edges point (nearly) opposite ways" + at + ": use more edges, a stiffer rod or a slower motion" +
-             (explicit_step ? "; if the motion is slow, the explicit step blew up: use a shorter step or an implicit integrator" : "");
+      return "two consecutive edges point (nearly) opposite ways" + at +
+             ": use more edges, a stiffer rod or a slower motion" +
+             (explicit_step
+                  ? "; if the motion is slow, the explicit step blew up: use a shorter step or an implicit integrator"
+                  : "");
     case StepFailure::singular_matrix:
-      return "the stiffness matrix could not be made definite" + at + ": moduli or masses differ by too many orders of magnitude, or a grasp or force is too fast or too large by as many";
+      return "the stiffness matrix could not be made definite" + at +
+             ": moduli or masses differ by too many orders of magnitude, or a grasp or force is too fast or too large "
+             "by as many";
     case StepFailure::state_not_finite:
       return explicit_step ? "the explicit step blew up" + at + ": use a shorter step or an implicit integrator"
                            : "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
     case StepFailure::squeezed:
-      return "contact: grasps, driven bodies or obstacles press on the rods and leave them no room" + at + ": slow these motions down, or use a shorter step";
+      return "contact: grasps, driven bodies or obstacles press on the rods and leave them no room" + at +
+             ": slow these motions down, or use a shorter step";
     case StepFailure::overstretched:
       return overstretched[0] >= 0
                  ? "nodes " + std::to_string(overstretched[0]) + " and " + std::to_string(overstretched[1]) +
                        " are held as far apart as the rod between them is long, or further" + at +
-                       ": bring the grasps closer together (projection needs some slack), or let the rod stretch (stretching: stiff)"
+                       ": bring the grasps closer together (projection needs some slack), or let the rod stretch "
+                       "(stretching: stiff)"
                  : "the projection found no configuration in which all edges keep their lengths" + at +
                        ": use a shorter step, give a taut rod some slack, or let it stretch (stretching: stiff)";
     case StepFailure::turned_too_far:
-      return "the twist changed by about half a turn" + at + ": use a shorter step or slower grasps, or formulation: general, which counts turns by the edge";
+      return "the twist changed by about half a turn" + at +
+             ": use a shorter step or slower grasps, or formulation: general, which counts turns by the edge";
     case StepFailure::energy_grew:
-      return "the energy grew out of nothing" + at + ": use a shorter step, or tr_bdf2, bdf2 or implicit_euler, which damp what the step cannot resolve";
+      return "the energy grew out of nothing" + at +
+             ": use a shorter step, or tr_bdf2, bdf2 or implicit_euler, which damp what the step cannot resolve";
     default:
-      return "Newton's method did not converge" + at + ": use a shorter step, more time.newton.max_iterations or max_cuts, or slow the grasps down";
+      return "Newton's method did not converge" + at +
+             ": use a shorter step, more time.newton.max_iterations or max_cuts, or slow the grasps down";
   }
 }
 
@@ -228,15 +256,17 @@ Largest RodStepper::Impl::unbalancedForce() const
   return force;
 }
 
-StepReport RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step, const std::string& why,
-                                            bool multipliers)
+StepReport RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step,
+                                            const std::string& why, bool multipliers)
 {
   // explicit steps end in a state that says nothing; that at their start shows what is about to blow up
   Largest strain, node;
   const bool implicit = !explicit_step && system.arrays().nodes == model->nodes();
   for (int j = 0; j < model->edges(); ++j)
-    strain.add(j, implicit ? std::abs(system.arrays().strain[j])
-                           : std::abs((work.x.col((j + 1) % model->nodes()) - work.x.col(j)).norm() / model->rest_length[j] - 1.0));
+    strain.add(
+        j, implicit
+               ? std::abs(system.arrays().strain[j])
+               : std::abs((work.x.col((j + 1) % model->nodes()) - work.x.col(j)).norm() / model->rest_length[j] - 1.0));
   if (implicit && !multipliers)
     node = unbalancedForce();
   else
@@ -244,10 +274,12 @@ StepReport RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure fail
       node.add(i, work.v.col(i).norm());
   const int at = node.any() ? node.index() : strain.index();
   report.place = {FailurePlace::Kind::rod, model->name, at, work.x.col(at)};
-  std::string text = ". The largest stretch strain is " + strain.text("") + ", in edge " + std::to_string(strain.index());
+  std::string text =
+      ". The largest stretch strain is " + strain.text("") + ", in edge " + std::to_string(strain.index());
   if (node.any())
-    text += explicit_step ? "; node " + std::to_string(at) + " is the fastest, with " + node.text("m/s") + "; it"
-                          : "; the largest unbalanced force is " + node.text("N") + ", on node " + std::to_string(at) + ", which";
+    text += explicit_step
+                ? "; node " + std::to_string(at) + " is the fastest, with " + node.text("m/s") + "; it"
+                : "; the largest unbalanced force is " + node.text("N") + ", on node " + std::to_string(at) + ", which";
   else
     text += ", whose first node";
   text += " was at " + metres(report.place.position) + " as the step began";
@@ -321,4 +353,4 @@ RodEnergies RodStepper::Impl::energies(const RodState& state, const Eigen::Vecto
   return result;
 }
 
-}  // namespace slender
+}   // namespace slender

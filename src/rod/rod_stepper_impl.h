@@ -14,10 +14,13 @@
 
 namespace slender {
 
-/// Pose (and velocity) at a fraction s of a motion from `start` to a target: uniform, or a cubic through both ends' velocities.
-Pose poseBetween(const Pose& start, const Twist& start_velocity, const GraspTarget& target, double duration, double s, Twist* velocity);
+/// Pose (and velocity) at a fraction s of a motion from `start` to a target: uniform, or a cubic through both ends'
+/// velocities.
+Pose poseBetween(const Pose& start, const Twist& start_velocity, const GraspTarget& target, double duration, double s,
+                 Twist* velocity);
 
-/// One rod's part in a step and its work space, which is reused from step to step. StepLoop runs one or several of them.
+/// One rod's part in a step and its work space, which is reused from step to step. StepLoop runs one or several of
+/// them.
 class RodStepper::Impl
 {
 public:
@@ -31,8 +34,8 @@ public:
   bool without_frames;   ///< a state may come without them
   RodSystem system;
   std::vector<Wrench> wrenches;
-  RodState work, next;              ///< start and end of a substep
-  Eigen::VectorXd lowest_mode;      ///< of the last equilibrium, see RodStepper::lowestMode()
+  RodState work, next;           ///< start and end of a substep
+  Eigen::VectorXd lowest_mode;   ///< of the last equilibrium, see RodStepper::lowestMode()
   /// Of all grasps at the instant being solved for. Those of grasps carried by bodies are set from outside.
   std::vector<Pose> stage_poses;
   std::vector<Twist> carried_velocity;   ///< of the frames of grasps carried by bodies
@@ -52,10 +55,11 @@ public:
   std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
   /// Largest unbalanced force [N] on a free node in the last evaluation of an implicit step.
   Largest unbalancedForce() const;
-  /// Refuses a step of `length` seconds that could not be solved. The message says why and where the rod was farthest from a solution.
-  /// `why`: takes the place of explainFailure(). With `multipliers`, forces that the system does not know balance the rod, and are not looked at.
-  StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step, const std::string& why = "",
-                            bool multipliers = false);
+  /// Refuses a step of `length` seconds that could not be solved. The message says why and where the rod was farthest
+  /// from a solution. `why`: takes the place of explainFailure(). With `multipliers`, forces that the system does not
+  /// know balance the rod, and are not looked at.
+  StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step,
+                            const std::string& why = "", bool multipliers = false);
   Eigen::Vector3d load(const RodInputs& inputs, int node) const;
 
   // rod_stages.cpp: an implicit substep; the stages' equations are solved between beginStage and endStage or finishStep
@@ -73,7 +77,8 @@ public:
 private:
   static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
   StepFailure computeAcceleration(const RodInputs& inputs, double duration, double t);
-  Eigen::Vector3d heldVelocity(const RodInputs& inputs, double duration, double at, int node, const Eigen::Vector3d& otherwise);
+  Eigen::Vector3d heldVelocity(const RodInputs& inputs, double duration, double at, int node,
+                               const Eigen::Vector3d& otherwise);
   Eigen::Vector3d combine(const Combination& c, int node) const;
   void computeWrenches(const RodInputs& inputs, double h);
 
@@ -102,4 +107,4 @@ private:
   Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end, strain_sag;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -10,9 +10,9 @@ namespace slender {
 
 namespace {
 constexpr int kHalo = RodArrays::kHalo;
-constexpr int kPiece = 256;          ///< nodes whose panels stay in the second-level cache from assembly to elimination
-constexpr int kLongRod = 1 << 13;    ///< nodes beyond which all panels do not
-}  // namespace
+constexpr int kPiece = 256;         ///< nodes whose panels stay in the second-level cache from assembly to elimination
+constexpr int kLongRod = 1 << 13;   ///< nodes beyond which all panels do not
+}   // namespace
 
 RodSystem::RodSystem(const RodModel& model) : model_(model)
 {
@@ -36,8 +36,9 @@ void RodSystem::allocate()
   for (int k = 0; k < 3; ++k)
     for (double** p : {&a_.x[k], &a_.base_t[k], &a_.base_d1[k], &a_.t[k], &a_.d1[k], &a_.target[k], &a_.force[k]})
       allocate(*p, 0.0);
-  for (double** p : {&a_.turn, &a_.base_twist, &a_.twist, &a_.strain, &a_.kappa1, &a_.kappa2, &a_.stretch, &a_.rest_strain, &a_.b11, &a_.b12,
-                     &a_.b22, &a_.beta, &a_.rest_kappa1, &a_.rest_kappa2, &a_.rest_twist, &a_.weight, &a_.theta_diagonal, &a_.theta_off})
+  for (double** p : {&a_.turn, &a_.base_twist, &a_.twist, &a_.strain, &a_.kappa1, &a_.kappa2, &a_.stretch,
+                     &a_.rest_strain, &a_.b11, &a_.b12, &a_.b22, &a_.beta, &a_.rest_kappa1, &a_.rest_kappa2,
+                     &a_.rest_twist, &a_.weight, &a_.theta_diagonal, &a_.theta_off})
     allocate(*p, 0.0);
   a_.coupling = nullptr;
   if (model_.curvature == Curvature::compensated)
@@ -469,7 +470,8 @@ double RodSystem::forceScale() const
     largest = std::max(largest, std::abs(a_.stretch[i] * (a_.strain[i] - a_.rest_strain[i])));
     for (int k = 0; k < 3; ++k)
       largest = std::max(largest, std::abs(a_.force[k][i]));
-    const double moment = std::hypot(a_.b11[i] * (a_.kappa1[i] - a_.rest_kappa1[i]), a_.b22[i] * (a_.kappa2[i] - a_.rest_kappa2[i]));
+    const double moment =
+        std::hypot(a_.b11[i] * (a_.kappa1[i] - a_.rest_kappa1[i]), a_.b22[i] * (a_.kappa2[i] - a_.rest_kappa2[i]));
     largest = std::max(largest, moment * a_.inverse_rest_length[i]);
   }
   for (std::size_t j = 0; j < twist_load_.size(); ++j)
@@ -483,11 +485,13 @@ double RodSystem::noiseLevel() const
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < a_.nodes; ++i)
       extent = std::max(extent, std::abs(a_.x[k][i]));
-  // Positions round to eps of the extent, so that forces round to this times the stiffness of an edge against stretching, and of a joint against
-  // bending, which is the larger one where edges are shorter than the rod is thick.
+  // Positions round to eps of the extent, so that forces round to this times the stiffness of an edge against
+  // stretching, and of a joint against bending, which is the larger one where edges are shorter than the rod is thick.
   const double bend = std::max(model_.bend_modulus.row(0).maxCoeff(), model_.bend_modulus.row(2).maxCoeff());
-  const double stiffness = max_stretch_modulus_ / min_rest_length_ + bend / (min_rest_length_ * min_rest_length_ * min_rest_length_);
-  return 4.0 * std::numeric_limits<double>::epsilon() * stiffness * (a_.stretch[0] / std::max(stretch_[0], 1e-300)) * extent;
+  const double stiffness =
+      max_stretch_modulus_ / min_rest_length_ + bend / (min_rest_length_ * min_rest_length_ * min_rest_length_);
+  return 4.0 * std::numeric_limits<double>::epsilon() * stiffness * (a_.stretch[0] / std::max(stretch_[0], 1e-300)) *
+         extent;
 }
 
 Eigen::Vector3d RodSystem::nodeGradient(int node) const
@@ -512,4 +516,4 @@ Eigen::Vector3d RodSystem::clampTorque(int grasp) const
   return torque;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -1,5 +1,6 @@
-// Rayleigh stiffness damping: every strain s gets the extra force stiffness_damping * k * ds/dt (thesis 5.3.1). A stage's rate is
-// (s - s~) / tau_v with s~ the stage's own combination of past strains, so the damping has the integrator's order.
+// Rayleigh stiffness damping: every strain s gets the extra force stiffness_damping * k * ds/dt (thesis 5.3.1). A
+// stage's rate is (s - s~) / tau_v with s~ the stage's own combination of past strains, so the damping has the
+// integrator's order.
 #include "rod_stepper_impl.h"
 
 namespace slender {
@@ -15,8 +16,9 @@ void RodStepper::Impl::startStrainHistory(const RodInputs& inputs, double durati
     work.strain_rate_previous = work.strain_rate;
 }
 
-/// A stage inside the step lies on the chord between the step's ends, but its strain does not lie on the chord of their strains, which
-/// is what its backward difference means. That sag, second order in the step, is taken from the step before.
+/// A stage inside the step lies on the chord between the step's ends, but its strain does not lie on the chord of their
+/// strains, which is what its backward difference means. That sag, second order in the step, is taken from the step
+/// before.
 void RodStepper::Impl::setViscousResponse(const Stage& stage, double h)
 {
   const Combination& c = stage.q_tilde;
@@ -30,7 +32,8 @@ void RodStepper::Impl::setViscousResponse(const Stage& stage, double h)
   if (c[kA] != 0 && work.last_step > 0)
     strain_reference += (c[kA] / work.last_step) * (work.strain_rate - work.strain_rate_previous);
   if (c[kQPrevious] != 0)
-    strain_reference += c[kQPrevious] * (work.strain_previous.cols() == strain_start.cols() ? work.strain_previous : strain_start);
+    strain_reference +=
+        c[kQPrevious] * (work.strain_previous.cols() == strain_start.cols() ? work.strain_previous : strain_start);
   if (c[kQStage] != 0)
     strain_reference += c[kQStage] * strain_stage;
   if (strain_sag.cols() > 0)
@@ -38,9 +41,9 @@ void RodStepper::Impl::setViscousResponse(const Stage& stage, double h)
   system.setResponse(model->stiffness_damping / stage.tau_v, &strain_reference);
 }
 
-/// For frames that are carried from a stage inside the step to its end, by TR-BDF2: the strain at the stage's time by the
-/// trapezoidal rule (the stage's own strain is a point on a chord, one order worse), then the two-step backward difference. Second
-/// order, and damped however fast the frames relax.
+/// For frames that are carried from a stage inside the step to its end, by TR-BDF2: the strain at the stage's time by
+/// the trapezoidal rule (the stage's own strain is a point on a chord, one order worse), then the two-step backward
+/// difference. Second order, and damped however fast the frames relax.
 void RodStepper::Impl::setViscousResponseAtEnd(const Stage& stage, double h)
 {
   const double c = plan->fraction, r = (1 - c) / c, weight = (1 + r) * (1 + r) / (1 + 2 * r);
@@ -58,7 +61,8 @@ void RodStepper::Impl::finishStrainHistory(const Stage& stage)
   else
   {
     next.strain_previous = (1 - c) * strain_start + c * strain_end;   // the chord at the stage's time
-    next.strain_rate = work.strain_rate + ((next.strain_previous + strain_sag - strain_reference) / stage.tau_v - work.strain_rate) / c;
+    next.strain_rate = work.strain_rate +
+                       ((next.strain_previous + strain_sag - strain_reference) / stage.tau_v - work.strain_rate) / c;
     next.strain_previous = strain_stage - next.strain_previous;
   }
   next.strain_rate_previous = work.strain_rate;
@@ -69,4 +73,4 @@ void RodStepper::Impl::finishStrainHistory(const Stage& stage)
     end_evaluation = system.evaluate(false);   // elastic alone
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -6,11 +6,13 @@
 
 namespace slender {
 
-/// Share of the lowest bending stiffness (bending modulus over mass and length cubed) below which an eigenvalue counts as zero. Within this band
-/// the energies of the two branches differ by its square, 1e-12 of the energy, which is lost in round-off: no computation tells them apart.
+/// Share of the lowest bending stiffness (bending modulus over mass and length cubed) below which an eigenvalue counts
+/// as zero. Within this band the energies of the two branches differ by its square, 1e-12 of the energy, which is lost
+/// in round-off: no computation tells them apart.
 constexpr double kNeutralShare = 1e-6;
 
-/// Why statics ended without an equilibrium, and what to change. Statics has no time step, so the advice never mentions one.
+/// Why statics ended without an equilibrium, and what to change. Statics has no time step, so the advice never mentions
+/// one.
 std::string explainStatics(StepFailure failure);
 
-}  // namespace slender
+}   // namespace slender

@@ -6,7 +6,9 @@
 
 namespace slender {
 
-StepLoop::StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, const RodGroupModel* group) : time_(time), rods_(std::move(rods))
+StepLoop::StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, const RodGroupModel* group)
+  : time_(time),
+    rods_(std::move(rods))
 {
   plan_.stages.reserve(2);
   if (time_.integrator == Integrator::symplectic_euler)
@@ -37,12 +39,13 @@ bool StepLoop::begin(const RodState* states, StepReport& report)
   return true;
 }
 
-/// Whether nothing but the step itself can change the energy. Methods without damping at infinite frequency can feed on a stiff rod's
-/// stretching when it turns far in a step; contact stores energy that is not counted.
+/// Whether nothing but the step itself can change the energy. Methods without damping at infinite frequency can feed on
+/// a stiff rod's stretching when it turns far in a step; contact stores energy that is not counted.
 bool StepLoop::conserves(const RodState* states) const
 {
-  bool conserving = (time_.integrator == Integrator::implicit_midpoint || time_.integrator == Integrator::generalized_alpha) &&
-                    !(coupled_ && coupled_->hasContact());
+  bool conserving =
+      (time_.integrator == Integrator::implicit_midpoint || time_.integrator == Integrator::generalized_alpha) &&
+      !(coupled_ && coupled_->hasContact());
   for (std::size_t r = 0; conserving && r < rods_.size(); ++r)
     for (std::size_t k = 0; k < states[r].grasps.size(); ++k)
       if (states[r].grasps[k].active && states[r].grasps[k].body < 0)
@@ -68,7 +71,8 @@ double StepLoop::energy(bool at_start, double* allowance)
   return sum;
 }
 
-StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double duration, RodGroupState* group, const RodGroupInputs* group_inputs)
+StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double duration, RodGroupState* group,
+                          const RodGroupInputs* group_inputs)
 {
   StepReport report;
   inputs_ = inputs;
@@ -84,7 +88,12 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
   double allowance = 0.0;
   const double start_energy = conserving_ ? energy(true, &allowance) : 0.0;
   most_energy_ = start_energy + allowance;
-  SubstepRule rule{duration, 0.0, explicit_ ? 0.0 : time_.error_tolerance, time_.min_step, order(time_.integrator), time_.newton.max_cuts};
+  SubstepRule rule{duration,
+                   0.0,
+                   explicit_ ? 0.0 : time_.error_tolerance,
+                   time_.min_step,
+                   order(time_.integrator),
+                   time_.newton.max_cuts};
   if (rule.error_tolerance > 0 && !rods_.empty())
     rule.first = states[0].next_step;
   SubstepController controller(rule);
@@ -106,8 +115,9 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
 StepFailure StepLoop::attempt(const Substep& substep, StepReport& report)
 {
   failed_ = 0;
-  const StepFailure failure = explicit_ ? explicit_->step(inputs_, duration_, substep.from, substep.length, report, failed_)
-                                        : implicitStep(substep.from, substep.length, report);
+  const StepFailure failure = explicit_
+                                  ? explicit_->step(inputs_, duration_, substep.from, substep.length, report, failed_)
+                                  : implicitStep(substep.from, substep.length, report);
   if (conserving_ && failure == StepFailure::none && energy(false, nullptr) > most_energy_)
     return StepFailure::energy_grew;
   return failure;
@@ -133,18 +143,21 @@ void StepLoop::refuse(const Substep& substep, StepFailure failure, StepReport& r
 {
   if (!rods_.empty())
   {
-    failure == StepFailure::interrupted ? rods_[failed_]->refuse(report, failure, kStepInterrupted)
-                                        : rods_[failed_]->refuseUnsolved(report, failure, substep.length, explicit_ != nullptr);
+    failure == StepFailure::interrupted
+        ? rods_[failed_]->refuse(report, failure, kStepInterrupted)
+        : rods_[failed_]->refuseUnsolved(report, failure, substep.length, explicit_ != nullptr);
     return;
   }
   report.ok = false;
   report.failure = failure;
-  report.message = failure == StepFailure::interrupted ? kStepInterrupted : "the bodies' motion was not found: use a shorter step";
+  report.message =
+      failure == StepFailure::interrupted ? kStepInterrupted : "the bodies' motion was not found: use a shorter step";
 }
 
 StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
 {
-  double previous = rods_.empty() ? 0.0 : rods_[0]->work.last_step;   // a rod that has lost its history makes all start anew
+  // a rod that has lost its history makes all start anew
+  double previous = rods_.empty() ? 0.0 : rods_[0]->work.last_step;
   for (const RodStepper::Impl* rod : rods_)
     previous = std::min(previous, rod->work.last_step);
   planStep(time_.integrator, time_.spectral_radius, h, previous, plan_);
@@ -153,7 +166,8 @@ StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
     return failure;
   };
   for (std::size_t r = 0; r < rods_.size(); ++r)
-    if (const StepFailure failure = rods_[r]->beginStep(plan_, inputs_[r], duration_, t, h); failure != StepFailure::none)
+    if (const StepFailure failure = rods_[r]->beginStep(plan_, inputs_[r], duration_, t, h);
+        failure != StepFailure::none)
       return failing(r, failure);
   if (coupled_)
     coupled_->beginStep(plan_, t);
@@ -162,7 +176,8 @@ StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
   {
     for (std::size_t r = 0; r < rods_.size(); ++r)
       rods_[r]->beginStage(s, inputs_[r], duration_, t, h);
-    const NewtonResult newton = coupled_ ? coupled_->solveStage(plan_, s, t, h, time_.newton) : minimize(rods_[0]->system, time_.newton);
+    const NewtonResult newton =
+        coupled_ ? coupled_->solveStage(plan_, s, t, h, time_.newton) : minimize(rods_[0]->system, time_.newton);
     report.iterations += newton.iterations;
     report.factorizations += newton.factorizations;
     if (!newton.ok())
@@ -173,7 +188,8 @@ StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
     if (coupled_)
       coupled_->endStage(plan_, s, last);
     for (std::size_t r = 0; r < rods_.size(); ++r)
-      last ? rods_[r]->finishStep(inputs_[r], duration_, t, h, report) : rods_[r]->endStage(s, inputs_[r], duration_, t, h);
+      last ? rods_[r]->finishStep(inputs_[r], duration_, t, h, report)
+           : rods_[r]->endStage(s, inputs_[r], duration_, t, h);
   }
   return StepFailure::none;
 }
@@ -188,4 +204,4 @@ std::size_t StepLoop::farthestFromBalance() const
   return force.any() ? static_cast<std::size_t>(force.index()) : 0;
 }
 
-}  // namespace slender
+}   // namespace slender

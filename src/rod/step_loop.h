@@ -10,7 +10,8 @@
 
 namespace slender {
 
-/// Advances one rod, or rods with bodies and contact together, by a step, and changes the states only when all of it is done.
+/// Advances one rod, or rods with bodies and contact together, by a step, and changes the states only when all of it is
+/// done.
 class StepLoop : SubstepEquations
 {
 public:
@@ -19,7 +20,8 @@ public:
   ~StepLoop() override;
 
   /// One state and one input per rod. `group`, its bodies and obstacles, for coupled rods only.
-  StepReport step(RodState* states, const RodInputs* inputs, double duration, RodGroupState* group = nullptr, const RodGroupInputs* group_inputs = nullptr);
+  StepReport step(RodState* states, const RodInputs* inputs, double duration, RodGroupState* group = nullptr,
+                  const RodGroupInputs* group_inputs = nullptr);
   CoupledSystem* coupled() { return coupled_.get(); }   ///< of implicit steps of a group, else null
 
 private:
@@ -39,10 +41,10 @@ private:
   std::unique_ptr<ExplicitSystem> explicit_;   ///< null: implicit steps
   const RodInputs* inputs_ = nullptr;
   double duration_ = 0;
-  bool conserving_ = false;         ///< the present step may not add to the energy
-  double most_energy_ = 0;          ///< of a step that conserves: that at its start and the allowance [J]
-  std::size_t failed_ = 0;   ///< rod that the last failure is about
+  bool conserving_ = false;   ///< the present step may not add to the energy
+  double most_energy_ = 0;    ///< of a step that conserves: that at its start and the allowance [J]
+  std::size_t failed_ = 0;    ///< rod that the last failure is about
   StepPlan plan_;
 };
 
-}  // namespace slender
+}   // namespace slender

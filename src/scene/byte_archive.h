@@ -9,8 +9,8 @@
 
 #include <Eigen/Core>
 
-/// Numbers, matrices and lists to bytes and back, bit by bit. Both directions are called with the same visit() function, so that
-/// they cannot drift apart. Private to saving and loading of states.
+/// Numbers, matrices and lists to bytes and back, bit by bit. Both directions are called with the same visit()
+/// function, so that they cannot drift apart. Private to saving and loading of states.
 namespace slender {
 
 class ByteWriter
@@ -32,14 +32,15 @@ public:
       const std::size_t at = bytes_.size(), size = static_cast<std::size_t>(value.size()) * sizeof(double);
       bytes_.resize(at + size);
       if (size > 0)
-      {
         std::memcpy(&bytes_[at], value.data(), size);
-      }
     }
   }
 
   template <class T>
-  void list(const std::vector<T>& values) { (*this)(static_cast<std::uint64_t>(values.size())); }
+  void list(const std::vector<T>& values)
+  {
+    (*this)(static_cast<std::uint64_t>(values.size()));
+  }
 
   const std::string& bytes() const { return bytes_; }
 
@@ -61,9 +62,7 @@ public:
       unsigned char byte = 0;   // a bool of another value than 0 and 1 would be undefined
       take(&byte, 1);
       if (byte > 1)
-      {
         throw std::runtime_error("holds neither yes nor no where it must");
-      }
       value = byte == 1;
     }
     else if constexpr (std::is_arithmetic_v<T>)
@@ -80,9 +79,7 @@ public:
                         (T::RowsAtCompileTime == Eigen::Dynamic || rows == T::RowsAtCompileTime) &&
                         (T::ColsAtCompileTime == Eigen::Dynamic || cols == T::ColsAtCompileTime);
       if (!fits)
-      {
         throw std::runtime_error("holds a matrix of impossible size");
-      }
       value.resize(rows, cols);
       take(value.data(), static_cast<std::size_t>(value.size()) * sizeof(double));
     }
@@ -94,9 +91,7 @@ public:
     std::uint64_t size = 0;
     (*this)(size);
     if (size > left())
-    {
       throw std::runtime_error("holds a list of impossible size");
-    }
     values.resize(size);
   }
 
@@ -106,9 +101,7 @@ private:
   void take(void* to, std::size_t size)
   {
     if (size > left())
-    {
       throw std::runtime_error("ends too early");
-    }
     if (size > 0)
     {
       std::memcpy(to, at_, size);
@@ -128,9 +121,7 @@ public:
   {
     const auto* bytes = static_cast<const unsigned char*>(data);
     for (std::size_t k = 0; k < size; ++k)
-    {
       value_ = (value_ ^ bytes[k]) * 0x100000001b3u;
-    }
   }
   std::uint64_t value() const { return value_; }
 
@@ -138,4 +129,4 @@ private:
   std::uint64_t value_ = 0xcbf29ce484222325u;
 };
 
-}  // namespace slender
+}   // namespace slender

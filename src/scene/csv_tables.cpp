@@ -14,13 +14,14 @@ namespace slender {
 
 namespace {
 
-/// Makes the folder, or removes the tables of an earlier run from it: of two runs with other objects the tables would be mixed.
+/// Makes the folder, or removes the tables of an earlier run from it: of two runs with other objects the tables would
+/// be mixed.
 const std::string& clearedFolder(const std::string& folder)
 {
   const auto ours = [](const std::string& name) {
-    static const std::set<std::string> names = {"nodes.csv",  "grasps.csv",   "bodies.csv",     "threads.csv",     "cloths.csv",
-                                                "tracking.csv", "rod_fields.csv", "thread_fields.csv", "cloth_fields.csv",
-                                                "energies.csv"};
+    static const std::set<std::string> names = {
+        "nodes.csv",    "grasps.csv",     "bodies.csv",        "threads.csv",      "cloths.csv",
+        "tracking.csv", "rod_fields.csv", "thread_fields.csv", "cloth_fields.csv", "energies.csv"};
     return names.count(name) > 0;
   };
   makeFolder(folder);
@@ -29,7 +30,7 @@ const std::string& clearedFolder(const std::string& folder)
   return folder;
 }
 
-}  // namespace
+}   // namespace
 
 struct CsvTables::Files
 {
@@ -38,7 +39,12 @@ struct CsvTables::Files
   std::optional<TextFile> bodies, threads, cloths, tracking;   // only scenes that have any
   std::map<std::string, TextFile> fields;                      // by name of the table
 
-  explicit Files(const std::string& to) : folder(clearedFolder(to)), nodes(to + "/nodes.csv"), grasps(to + "/grasps.csv") {}
+  explicit Files(const std::string& to)
+    : folder(clearedFolder(to)),
+      nodes(to + "/nodes.csv"),
+      grasps(to + "/grasps.csv")
+  {
+  }
 
   TextFile& opened(std::optional<TextFile>& file, const char* name, const char* header)
   {
@@ -159,13 +165,14 @@ std::string headerOf(const FieldTable& table)
   return header;
 }
 
-}  // namespace
+}   // namespace
 
 CsvTables::CsvTables(const std::string& folder) : files_(std::make_unique<Files>(folder))
 {
   files_->nodes << "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],d1x,d1y,d1z,twist [rad]";
   files_->nodes.endLine();
-  files_->grasps << "t [s],object,grasp,active,x [m],y [m],z [m],qx,qy,qz,qw,fx [N],fy [N],fz [N],tx [N m],ty [N m],tz [N m]";
+  files_->grasps
+      << "t [s],object,grasp,active,x [m],y [m],z [m],qx,qy,qz,qw,fx [N],fy [N],fz [N],tx [N m],ty [N m],tz [N m]";
   files_->grasps.endLine();
 }
 
@@ -177,14 +184,18 @@ void CsvTables::write(const SceneSnapshot& instant)
   for (const RodSnapshot& rod : instant.rods)
     writeRod(files_->nodes, time, rod);
   for (const ThreadSnapshot& thread : instant.threads)
-    writeThread(files_->opened(files_->threads, "/threads.csv",
-                               "t [s],object,thread,id,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],radius [m],deposited"),
-                time, thread);
+    writeThread(
+        files_->opened(files_->threads, "/threads.csv",
+                       "t [s],object,thread,id,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],radius [m],deposited"),
+        time, thread);
   for (const ClothSnapshot& cloth : instant.cloths)
-    writeCloth(files_->opened(files_->cloths, "/cloths.csv", "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s]"), time, cloth);
+    writeCloth(files_->opened(files_->cloths, "/cloths.csv",
+                              "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s]"),
+               time, cloth);
   for (const FunctionSnapshot& function : instant.functions)
   {
-    TextFile& file = files_->opened(files_->tracking, "/tracking.csv", "t [s],object,function,x [m],y [m],z [m],fx [N],fy [N],fz [N]");
+    TextFile& file = files_->opened(files_->tracking, "/tracking.csv",
+                                    "t [s],object,function,x [m],y [m],z [m],fx [N],fy [N],fz [N]");
     file.number(time) << ',' << function.object << ',' << function.name << ',';
     file.vector(function.average, ',') << ',';
     file.vector(function.force, ',');
@@ -194,9 +205,11 @@ void CsvTables::write(const SceneSnapshot& instant)
     writeGrasp(files_->grasps, time, grasp);
   for (const auto* solids : {&instant.bodies, &instant.obstacles})
     for (const SolidSnapshot& solid : *solids)
-      writeSolid(files_->opened(files_->bodies, "/bodies.csv",
-                                "t [s],object,x [m],y [m],z [m],qx,qy,qz,qw,vx [m/s],vy [m/s],vz [m/s],wx [rad/s],wy [rad/s],wz [rad/s]"),
-                 time, solid);
+      writeSolid(
+          files_->opened(
+              files_->bodies, "/bodies.csv",
+              "t [s],object,x [m],y [m],z [m],qx,qy,qz,qw,vx [m/s],vy [m/s],vz [m/s],wx [rad/s],wy [rad/s],wz [rad/s]"),
+          time, solid);
   for (const FieldTable& table : instant.fields)
   {
     auto place = files_->fields.find(table.table);
@@ -221,4 +234,4 @@ void CsvTables::finish()
     file.close();
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -30,9 +30,7 @@ struct Nearest
   std::string text(const std::string& what) const
   {
     if (name.empty())
-    {
       return "";
-    }
     char away[40];
     std::snprintf(away, sizeof away, "%.3g", distance);
     return "; the nearest " + what + " is " + name + ", " + away + " m away";
@@ -42,7 +40,8 @@ struct Nearest
 template <class Configs>
 int indexOf(const Configs& configs, const std::string& name)
 {
-  const auto found = std::find_if(configs.begin(), configs.end(), [&name](const auto& config) { return config.name == name; });
+  const auto found =
+      std::find_if(configs.begin(), configs.end(), [&name](const auto& config) { return config.name == name; });
   return found == configs.end() ? -1 : static_cast<int>(found - configs.begin());
 }
 
@@ -52,7 +51,10 @@ std::string quoted(const char* kind, const std::string& name) { return std::stri
 class Surroundings
 {
 public:
-  Surroundings(const Simulation& simulation, const FailurePlace& place) : simulation_(simulation), config_(simulation.config()), place_(place)
+  Surroundings(const Simulation& simulation, const FailurePlace& place)
+    : simulation_(simulation),
+      config_(simulation.config()),
+      place_(place)
   {
     object_ = place.kind == Kind::rod      ? indexOf(config_.rods, place.name)
               : place.kind == Kind::thread ? indexOf(config_.threads, place.name)
@@ -62,11 +64,11 @@ public:
   std::string text()
   {
     if (place_.kind == Kind::none || object_ < 0 || !place_.position.allFinite())
-    {
       return "";
-    }
     findHolder();
-    place_.kind == Kind::rod ? findPartnersOfRod() : place_.kind == Kind::thread ? findPartnersOfThread() : findPartnersOfCloth();
+    place_.kind == Kind::rod      ? findPartnersOfRod()
+    : place_.kind == Kind::thread ? findPartnersOfThread()
+                                  : findPartnersOfCloth();
     return holder_.text("grasp") + partner_.text("contact partner");
   }
 
@@ -77,10 +79,10 @@ private:
     for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
     {
       const GraspRef& ref = simulation_.grasps()[g];
-      if (!simulation_.isActive(static_cast<int>(g)) || (place_.kind == Kind::rod ? ref.rod : place_.kind == Kind::cloth ? ref.cloth : -1) != object_)
-      {
+      if (!simulation_.isActive(static_cast<int>(g)) || (place_.kind == Kind::rod     ? ref.rod
+                                                         : place_.kind == Kind::cloth ? ref.cloth
+                                                                                      : -1) != object_)
         continue;
-      }
       const std::string name = "'" + ref.config->name + "'";
       if (place_.kind == Kind::rod)
       {
@@ -90,20 +92,14 @@ private:
       else
       {
         for (const int vertex : state.cloths[object_].grasps[ref.index].vertices)
-        {
           holder_.add((state.cloths[object_].cloth.x.col(vertex) - place_.position).norm(), name);
-        }
       }
     }
     for (const BodyConfig& body : config_.bodies)
     {
       for (const WeldConfig& weld : body.welds)
-      {
         if (place_.kind == Kind::rod && weld.rod == object_)
-        {
           holder_.add(toNodes(object_, weld.first_node, weld.last_node), "the weld to " + quoted("body", body.name));
-        }
-      }
     }
     if (place_.kind == Kind::thread)
     {
@@ -113,7 +109,8 @@ private:
         {
           if (thread.ends[end].held)
           {
-            holder_.add(((end ? thread.x.back() : thread.x.front()) - place_.position).norm(), config_.threads[object_].nozzle ? "the nozzle" : "a held end");
+            holder_.add(((end ? thread.x.back() : thread.x.front()) - place_.position).norm(),
+                        config_.threads[object_].nozzle ? "the nozzle" : "a held end");
           }
         }
       }
@@ -132,16 +129,12 @@ private:
   {
     const SceneState& state = simulation_.state();
     for (std::size_t k = 0; k < config_.obstacles.size(); ++k)
-    {
       addSolid(config_.obstacles[k].shape, state.obstacles[k], radius, quoted("obstacle", config_.obstacles[k].name));
-    }
     for (std::size_t b = 0; b < config_.bodies.size(); ++b)
     {
       const BodyConfig& body = config_.bodies[b];
       if (body.shape && body.contact && touches(body))
-      {
         addSolid(*body.shape, state.bodies[b].X_WB * body.X_BS, radius, quoted("body", body.name));
-      }
     }
   }
 
@@ -159,24 +152,21 @@ private:
   {
     const auto& contact = config_.rods[object_].contact;
     if (!contact)
-    {
       return;
-    }
     const RodModel& model = simulation_.rodModel(object_);
     const double radius = largestRadius(model, std::min(place_.node, model.edges() - 1));
     if (contact->obstacles)
     {
       addSolids(radius, [this](const BodyConfig& body) {
-        return std::none_of(body.welds.begin(), body.welds.end(), [this](const WeldConfig& weld) { return weld.rod == object_; });
+        return std::none_of(body.welds.begin(), body.welds.end(),
+                            [this](const WeldConfig& weld) { return weld.rod == object_; });
       });
     }
     for (int r = 0; r < static_cast<int>(config_.rods.size()); ++r)
     {
       const bool own = r == object_;
       if (own ? !contact->self : !(contact->rods && config_.rods[r].contact && config_.rods[r].contact->rods))
-      {
         continue;
-      }
       const RodModel& other = simulation_.rodModel(r);
       const Eigen::Matrix3Xd& x = simulation_.state().rods[r].x;
       for (int j = 0; j < other.edges(); ++j)
@@ -185,24 +175,28 @@ private:
         const Eigen::Vector3d a = x.col(j), b = x.col((j + 1) % other.nodes());
         if (!own || comesBack(other, j, radii, pointSegmentDistance(place_.position, a, b)))
         {
-          addSegment(a, b, radii, own ? "the rod itself at edge " + std::to_string(j) : quoted("rod", config_.rods[r].name));
+          addSegment(a, b, radii,
+                     own ? "the rod itself at edge " + std::to_string(j) : quoted("rod", config_.rods[r].name));
         }
       }
     }
   }
 
-  static double largestRadius(const RodModel& model, int edge) { return std::max(model.radius_a[edge], model.radius_b[edge]); }
+  static double largestRadius(const RodModel& model, int edge)
+  {
+    return std::max(model.radius_a[edge], model.radius_b[edge]);
+  }
 
-  /// Whether an edge of the same rod lies there because the rod comes back: it is no neighbour along the rod (see contactNeighbours), and the way along the
-  /// rod is at least twice as long as the distance.
+  /// Whether an edge of the same rod lies there because the rod comes back: it is no neighbour along the rod (see
+  /// contactNeighbours), and the way along the rod is at least twice as long as the distance.
   bool comesBack(const RodModel& model, int edge, double radii, double distance) const
   {
-    const auto between = [&model](int from, int to) { return from < to ? model.rest_length.segment(from, to - from).sum() : 0.0; };
+    const auto between = [&model](int from, int to) {
+      return from < to ? model.rest_length.segment(from, to - from).sum() : 0.0;
+    };
     double along = edge >= place_.node ? between(place_.node, edge) : between(edge + 1, place_.node);
     if (model.closed)
-    {
       along = std::min(along, model.rest_length.sum() - along - model.rest_length[edge]);
-    }
     return along > 0.5 * M_PI * radii + config_.contact.gap && along > 2.0 * distance;
   }
 
@@ -224,24 +218,19 @@ private:
       }
     }
     if (config.floor)
-    {
       partner_.add(place_.position.z() - config.floor->height - radius, "the floor");
-    }
     if (config.contact && config.contact->obstacles)
-    {
       addSolids(radius, [](const BodyConfig&) { return false; });   // threads do not meet bodies
-    }
     for (int k = 0; config.contact && config.contact->threads && k < static_cast<int>(config_.threads.size()); ++k)
     {
       if (k == object_ || !config_.threads[k].contact || !config_.threads[k].contact->threads)
-      {
         continue;
-      }
       for (const ThreadState& thread : state.threads[k].threads)
       {
         for (int j = 0; j < thread.edges(); ++j)
         {
-          addSegment(thread.x[j], thread.x[j + 1], radius + thread.radius(j), quoted("thread", config_.threads[k].name));
+          addSegment(thread.x[j], thread.x[j + 1], radius + thread.radius(j),
+                     quoted("thread", config_.threads[k].name));
         }
       }
     }
@@ -251,24 +240,22 @@ private:
   {
     const auto& contact = config_.cloths[object_].contact;
     if (!contact)
-    {
       return;
-    }
     if (contact->obstacles)
     {
-      addSolids(0.0, [](const BodyConfig& body) { return body.motion.has_value(); });   // cloth meets driven bodies only
+      // cloth meets driven bodies only
+      addSolids(0.0, [](const BodyConfig& body) { return body.motion.has_value(); });
     }
     for (int k = 0; k < static_cast<int>(config_.cloths.size()); ++k)
     {
       if (k == object_ || !contact->cloths || !config_.cloths[k].contact || !config_.cloths[k].contact->cloths)
-      {
         continue;
-      }
       const Eigen::Matrix3Xi& faces = config_.cloths[k].mesh.triangles;
       const Eigen::Matrix3Xd& x = simulation_.state().cloths[k].cloth.x;
       for (Eigen::Index f = 0; f < faces.cols(); ++f)
       {
-        partner_.add(pointTriangleDistance(place_.position, x.col(faces(0, f)), x.col(faces(1, f)), x.col(faces(2, f))), quoted("cloth", config_.cloths[k].name));
+        partner_.add(pointTriangleDistance(place_.position, x.col(faces(0, f)), x.col(faces(1, f)), x.col(faces(2, f))),
+                     quoted("cloth", config_.cloths[k].name));
       }
     }
   }
@@ -280,8 +267,11 @@ private:
   Nearest holder_, partner_;
 };
 
-}  // namespace
+}   // namespace
 
-std::string surroundingsOf(const Simulation& simulation, const FailurePlace& place) { return Surroundings(simulation, place).text(); }
+std::string surroundingsOf(const Simulation& simulation, const FailurePlace& place)
+{
+  return Surroundings(simulation, place).text();
+}
 
-}  // namespace slender
+}   // namespace slender

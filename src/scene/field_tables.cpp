@@ -11,10 +11,13 @@ namespace slender {
 
 const std::vector<std::pair<std::string, RecordField>>& recordFieldNames()
 {
-  static const std::vector<std::pair<std::string, RecordField>> names = {
-    {"curvature", RecordField::curvature}, {"twist", RecordField::twist},   {"strain", RecordField::strain},
-    {"force", RecordField::force},         {"moment", RecordField::moment}, {"energy", RecordField::energy},
-    {"contact_force", RecordField::contact_force}};
+  static const std::vector<std::pair<std::string, RecordField>> names = {{"curvature", RecordField::curvature},
+                                                                         {"twist", RecordField::twist},
+                                                                         {"strain", RecordField::strain},
+                                                                         {"force", RecordField::force},
+                                                                         {"moment", RecordField::moment},
+                                                                         {"energy", RecordField::energy},
+                                                                         {"contact_force", RecordField::contact_force}};
   return names;
 }
 
@@ -26,10 +29,13 @@ constexpr double empty_cell = std::numeric_limits<double>::quiet_NaN();
 class Columns
 {
 public:
-  Columns(std::string table, const std::string& object, Eigen::Index rows) : table_{std::move(table), object, {}, Eigen::MatrixXd(rows, 0)} {}
+  Columns(std::string table, const std::string& object, Eigen::Index rows)
+    : table_{std::move(table), object, {}, Eigen::MatrixXd(rows, 0)}
+  {
+  }
 
-  /// `values` has one row per name and one column per row of the table. Edges of an open rod are one fewer than its nodes: then
-  /// the last column is written twice.
+  /// `values` has one row per name and one column per row of the table. Edges of an open rod are one fewer than its
+  /// nodes: then the last column is written twice.
   void add(const std::vector<std::string>& names, const Eigen::MatrixXd& values)
   {
     const Eigen::Index before = table_.values.cols(), rows = table_.values.rows();
@@ -48,14 +54,18 @@ private:
   FieldTable table_;
 };
 
-bool asks(const std::vector<RecordField>& fields, RecordField field) { return std::find(fields.begin(), fields.end(), field) != fields.end(); }
+bool asks(const std::vector<RecordField>& fields, RecordField field)
+{
+  return std::find(fields.begin(), fields.end(), field) != fields.end();
+}
 
 /// Forces of contact on the nodes of each rod [N]; zero without contact.
 std::vector<Eigen::Matrix3Xd> rodContactForces(const Simulation& simulation)
 {
   const std::vector<RodConfig>& rods = simulation.config().rods;
   std::vector<Eigen::Matrix3Xd> forces;
-  std::vector<std::pair<std::size_t, int>> places;   // rod and node of each point of contact: those of all rods with contact, in order
+  // rod and node of each point of contact: those of all rods with contact, in order
+  std::vector<std::pair<std::size_t, int>> places;
   for (std::size_t r = 0; r < rods.size(); ++r)
   {
     const int nodes = simulation.rodModel(static_cast<int>(r)).nodes();
@@ -78,12 +88,15 @@ std::vector<Eigen::Matrix3Xd> rodContactForces(const Simulation& simulation)
 const std::vector<std::string> contact_columns = {"contact_fx [N]", "contact_fy [N]", "contact_fz [N]"};
 
 /// `contact`: forces on the nodes, of no columns when they are not asked for.
-void addRod(const Simulation& simulation, int rod, const std::vector<RecordField>& fields, const Eigen::Matrix3Xd& contact, std::vector<FieldTable>& out)
+void addRod(const Simulation& simulation, int rod, const std::vector<RecordField>& fields,
+            const Eigen::Matrix3Xd& contact, std::vector<FieldTable>& out)
 {
   const RodModel& model = simulation.rodModel(rod);
   Columns columns("rod_fields", model.name, model.nodes());
-  const bool of_sections = std::any_of(fields.begin(), fields.end(), [](RecordField f) { return f < RecordField::energy; });
-  const RodSections sections = of_sections ? sectionsOf(model, simulation.state().rods[static_cast<std::size_t>(rod)]) : RodSections();
+  const bool of_sections =
+      std::any_of(fields.begin(), fields.end(), [](RecordField f) { return f < RecordField::energy; });
+  const RodSections sections =
+      of_sections ? sectionsOf(model, simulation.state().rods[static_cast<std::size_t>(rod)]) : RodSections();
   if (asks(fields, RecordField::curvature))
     columns.add({"kappa1 [1/m]", "kappa2 [1/m]"}, sections.curvature);
   if (asks(fields, RecordField::twist))
@@ -105,7 +118,8 @@ void addRod(const Simulation& simulation, int rod, const std::vector<RecordField
   columns.moveTo(out);
 }
 
-void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordField>& fields, std::vector<FieldTable>& out)
+void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordField>& fields,
+              std::vector<FieldTable>& out)
 {
   if (!asks(fields, RecordField::contact_force))
     return;
@@ -127,9 +141,11 @@ double threadCurvature(const ThreadState& thread, int node)
 }
 
 /// One table per piece. All follows from the state: positions, velocities and volumes.
-void addThread(const Simulation& simulation, int thread, const std::vector<RecordField>& fields, std::vector<FieldTable>& out)
+void addThread(const Simulation& simulation, int thread, const std::vector<RecordField>& fields,
+               std::vector<FieldTable>& out)
 {
-  const bool curvature = asks(fields, RecordField::curvature), strain = asks(fields, RecordField::strain), force = asks(fields, RecordField::force);
+  const bool curvature = asks(fields, RecordField::curvature), strain = asks(fields, RecordField::strain),
+             force = asks(fields, RecordField::force);
   if (!curvature && !strain && !force)
     return;
   const ThreadModel& model = simulation.threadModel(thread);
@@ -144,7 +160,8 @@ void addThread(const Simulation& simulation, int thread, const std::vector<Recor
     {
       const double length = piece.edge(j).norm(), radius = piece.radius(j);
       const double rate = (piece.v[j + 1] - piece.v[j]).dot(piece.edge(j)) / (length * length);
-      of_edges.col(j) << radius, rate, 3.0 * model.viscosity * M_PI * radius * radius * rate + M_PI * model.surface_tension * radius;
+      of_edges.col(j) << radius, rate,
+          3.0 * model.viscosity * M_PI * radius * radius * rate + M_PI * model.surface_tension * radius;
     }
     for (int i = 0; i < nodes; ++i)
     {
@@ -152,8 +169,10 @@ void addThread(const Simulation& simulation, int thread, const std::vector<Recor
       if (i > 0 && i + 1 < nodes)
         kappa[i] = threadCurvature(piece, i);
       const int before = std::max(i - 1, 0), after = std::min(i, edges - 1);
-      const Eigen::Vector3d along = (piece.edge(before).normalized() + piece.edge(after).normalized()).normalized();   // against the flow
-      const double section = 0.5 * M_PI * (of_edges(0, before) * of_edges(0, before) + of_edges(0, after) * of_edges(0, after));
+      // against the flow
+      const Eigen::Vector3d along = (piece.edge(before).normalized() + piece.edge(after).normalized()).normalized();
+      const double section =
+          0.5 * M_PI * (of_edges(0, before) * of_edges(0, before) + of_edges(0, after) * of_edges(0, after));
       flux[i] = -section * piece.v[i].dot(along);
     }
     columns.add({"thread", "id"}, names);
@@ -172,7 +191,8 @@ void addThread(const Simulation& simulation, int thread, const std::vector<Recor
 
 void addEnergies(const Simulation& simulation, std::vector<FieldTable>& out)
 {
-  const auto add = [&out](const std::string& object, double stretch, double bend, double twist, double kinetic, double gravity) {
+  const auto add = [&out](const std::string& object, double stretch, double bend, double twist, double kinetic,
+                          double gravity) {
     Columns columns("energies", object, 1);
     columns.add({"stretch [J]", "bend [J]", "twist [J]", "kinetic [J]", "gravity [J]"},
                 (Eigen::MatrixXd(5, 1) << stretch, bend, twist, kinetic, gravity).finished());
@@ -197,11 +217,12 @@ void addEnergies(const Simulation& simulation, std::vector<FieldTable>& out)
       const RigidBodyState& s = state.bodies[b];
       const Eigen::Vector3d spin = s.X_WB.orientation.conjugate() * s.velocity.angular;
       const double kinetic = 0.5 * body.mass * s.velocity.linear.squaredNorm() + 0.5 * spin.dot(body.inertia * spin);
-      add(body.name, empty_cell, empty_cell, empty_cell, kinetic, body.gravity ? -body.mass * scene.gravity.dot(s.X_WB.position) : 0.0);
+      add(body.name, empty_cell, empty_cell, empty_cell, kinetic,
+          body.gravity ? -body.mass * scene.gravity.dot(s.X_WB.position) : 0.0);
     }
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<FieldTable> fieldTablesOf(const Simulation& simulation)
 {
@@ -223,4 +244,4 @@ std::vector<FieldTable> fieldTablesOf(const Simulation& simulation)
   return out;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -12,25 +12,19 @@ namespace {
 void requireRegular(const std::string& path, const fs::file_status& status)
 {
   if (fs::is_directory(status))
-  {
     throw std::runtime_error(path + ": is a directory; name a file");
-  }
   if (!fs::is_regular_file(status))
-  {
     throw std::runtime_error(path + ": is no regular file but a device, FIFO or socket; name another file");
-  }
 }
 
-}  // namespace
+}   // namespace
 
 void makeFolder(const std::string& folder)
 {
   std::error_code error;
   fs::create_directories(folder, error);
   if (!fs::is_directory(folder))
-  {
     throw std::runtime_error(folder + ": cannot be made a folder" + (error ? ": " + error.message() : ""));
-  }
 }
 
 std::string replaceablePath(const std::string& path)
@@ -42,7 +36,9 @@ std::string replaceablePath(const std::string& path)
   {
     if (link)
     {
-      throw std::runtime_error(path + ": is a symbolic link that leads nowhere, or where this may not look; remove it, or name another file");
+      throw std::runtime_error(
+          path +
+          ": is a symbolic link that leads nowhere, or where this may not look; remove it, or name another file");
     }
     return path;
   }
@@ -55,9 +51,7 @@ void requireRegularFile(const std::string& path)
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (fs::exists(status))
-  {
     requireRegular(path, status);
-  }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -8,8 +8,8 @@
 
 namespace slender {
 
-/// Round links in a row, each turned by a quarter against the last and hooked into it. The outermost points of the first and the last
-/// are held.
+/// Round links in a row, each turned by a quarter against the last and hooked into it. The outermost points of the
+/// first and the last are held.
 void generateChain(const YamlCursor& at, const ReadContext& context, Generated& out)
 {
   const std::size_t before = at.problems().size();
@@ -29,32 +29,25 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
   rod.cross_section = readCrossSection(at_section, edges);
   readTraits(map, rod);
   warnOfRoundContact(at_section, rod);
-  const Motion motions[2] = {readMotion(map.get("start_motion"), context, false), readMotion(map.get("end_motion"), context, false)};
+  const Motion motions[2] = {readMotion(map.get("start_motion"), context, false),
+                             readMotion(map.get("end_motion"), context, false)};
   double thickness = 0.0;
   for (const auto* radii : {&rod.cross_section.a, &rod.cross_section.b})
-  {
     for (double r : *radii)
-    {
       thickness = std::max(thickness, r);
-    }
-  }
   // Closer, links two apart meet; farther, neighbours do.
   const Range allowed = Range::between(radius + thickness, 2 * (radius - thickness), "m");
   const double spacing = at_spacing.number(allowed).value_or(2 * radius - 4 * thickness);
   map.finish();
   if (up.cross(along).norm() < 1e-6)
-  {
     at_up.problem("is along direction; must point away from it");
-  }
   if (at.problems().size() == before && !allowed.holds(spacing))
   {
-    at.problem("the wire is too thick: its radius " + shortNumber(thickness) + " m must be less than a fifth of the links' radius " +
-               shortNumber(radius) + " m");
+    at.problem("the wire is too thick: its radius " + shortNumber(thickness) +
+               " m must be less than a fifth of the links' radius " + shortNumber(radius) + " m");
   }
   if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * links))
-  {
     return;
-  }
   const Eigen::Vector3d side = up.cross(along).normalized();
   for (int k = 0; k < links; ++k)
   {
@@ -74,9 +67,7 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
     for (int end = 0; end < 2; ++end)
     {
       if (k != (end == 0 ? 0 : links - 1))
-      {
         continue;
-      }
       Eigen::Index outermost = 0;
       const Eigen::Matrix3Xd nodes = arcCurve(arc.center, arc.start, arc.axis, arc.angle, edges).leftCols(edges);
       (nodes.transpose() * (end == 0 ? -along : along)).maxCoeff(&outermost);
@@ -91,4 +82,4 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -9,8 +9,8 @@
 
 namespace slender {
 
-/// Strands on the upper part of a ball, which is an obstacle; their roots follow it. They start straight out, where nothing touches,
-/// whatever their natural curl.
+/// Strands on the upper part of a ball, which is an obstacle; their roots follow it. They start straight out, where
+/// nothing touches, whatever their natural curl.
 void generateHair(const YamlCursor& at, const ReadContext& context, Generated& out)
 {
   const std::size_t before = at.problems().size();
@@ -35,9 +35,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   assign(head.motion, readSolidMotion(motion, context, false));
   head_map.finish();
   if (const auto* table = std::get_if<TableMotion>(&head.motion))
-  {
     head.pose = table->poses.evaluate(table->poses.firstTime());
-  }
 
   const YamlCursor at_curl = map.get("curl");
   YamlMap curl(at_curl);
@@ -49,17 +47,13 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   const YamlCursor at_section = map.get("cross_section");
   rod.cross_section = readCrossSection(at_section, edges);
   if (!at_section.present())
-  {
     rod.cross_section = {{4e-5}, {4e-5}};
-  }
   rod.name = name;
   readTraits(map, rod);
   warnOfRoundContact(at_section, rod);
   map.finish();
   if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * strands))
-  {
     return;
-  }
 
   const double root_distance = head_radius + 2 * std::max(rod.cross_section.a[0], rod.cross_section.b[0]);
   const Eigen::Vector3d e1 = anyNormal(up), e2 = up.cross(e1);
@@ -69,7 +63,8 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
     const double z = 1 - (1 - std::cos(cap)) * (k + dice.between(0.3, 0.7)) / strands;
     const double rho = std::sqrt(std::max(0.0, 1 - z * z));
     const double azimuth = golden_angle * k;
-    const Eigen::Vector3d out_W = head.pose.orientation * (rho * (std::cos(azimuth) * e1 + std::sin(azimuth) * e2) + z * up);
+    const Eigen::Vector3d out_W =
+        head.pose.orientation * (rho * (std::cos(azimuth) * e1 + std::sin(azimuth) * e2) + z * up);
     const Eigen::Vector3d root = head.pose.position + root_distance * out_W;
     const double own_length = length * (1 - variation * dice.between(0, 1));
     const StraightCurve straight{root, root + own_length * out_W, edges, 1.0};
@@ -83,9 +78,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
       const Eigen::Matrix3Xd helix = helixCurve(Eigen::Vector3d::Zero(), out_W, curl_radius, curl_pitch, turns, edges);
       PolylineCurve curled;
       for (Eigen::Index i = 0; i < helix.cols(); ++i)
-      {
         curled.points.push_back(rotateAbout(helix.col(i), out_W, phase));
-      }
       rod.centerline = std::move(curled);
       rod.initial = straight;
     }
@@ -99,4 +92,4 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   out.obstacles.emplace_back(std::move(head), at);
 }
 
-}  // namespace slender
+}   // namespace slender

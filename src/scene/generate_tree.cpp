@@ -16,7 +16,7 @@ constexpr int least_nodes = 5;   // of a branch
 struct Branch
 {
   int parent = -1, level = 0;
-  double at = 0.0;          ///< on the parent, fraction of its length
+  double at = 0.0;   ///< on the parent, fraction of its length
   double azimuth = 0.0, incline = 0.0, length = 0.0, radius = 0.0;
   int nodes = 0;
   Eigen::Vector3d root{0, 0, 0}, direction{0, 0, 1};
@@ -55,7 +55,8 @@ std::vector<Branch> grow(const TreeShape& shape, Dice& dice)
 /// As many nodes as asked for in all, shared out by length.
 void shareNodes(std::vector<Branch>& branches, int vertices)
 {
-  const double total = std::accumulate(branches.begin(), branches.end(), 0.0, [](double sum, const Branch& b) { return sum + b.length; });
+  const double total = std::accumulate(branches.begin(), branches.end(), 0.0,
+                                       [](double sum, const Branch& b) { return sum + b.length; });
   const int spare = vertices - least_nodes * static_cast<int>(branches.size());
   std::vector<std::pair<double, std::size_t>> rests;
   int given = 0;
@@ -68,15 +69,13 @@ void shareNodes(std::vector<Branch>& branches, int vertices)
   }
   std::sort(rests.begin(), rests.end());
   for (int k = 0; k < spare - given; ++k)
-  {
     ++branches[rests[static_cast<std::size_t>(k)].second].nodes;
-  }
 }
 
-}  // namespace
+}   // namespace
 
-/// A trunk with side branches, theirs, and so on. Each branch is a tapered rod; where it leaves its parent, a small rigid ball carries
-/// both.
+/// A trunk with side branches, theirs, and so on. Each branch is a tapered rod; where it leaves its parent, a small
+/// rigid ball carries both.
 void generateTree(const YamlCursor& at, const ReadContext& context, int first_rod, Generated& out)
 {
   const std::size_t before = at.problems().size();
@@ -100,28 +99,24 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   RodConfig rod;
   rod.material.density = 700;
   readTraits(map, rod);
-  const double joint_density = map.get("joint_density").number(Range::above(0, 1e6, "kg/m^3")).value_or(rod.material.density);
+  const double joint_density =
+      map.get("joint_density").number(Range::above(0, 1e6, "kg/m^3")).value_or(rod.material.density);
   const Motion motion = readMotion(map.get("motion"), context, false);
   map.finish();
   if (at.problems().size() != before)
-  {
     return;
-  }
 
   long count = 0, of_level = 1;
   for (int level = 0; level < shape.levels; ++level, of_level *= shape.children)
-  {
     count += of_level;
-  }
   const YamlCursor& place = at_vertices.present() ? at_vertices : at;
   if (shape.vertices < least_nodes * count)   // before they grow: 6 levels of 30 children are 750 million
   {
-    return place.problem("is too few for " + std::to_string(count) + " branches; must be at least " + std::to_string(least_nodes * count));
+    return place.problem("is too few for " + std::to_string(count) + " branches; must be at least " +
+                         std::to_string(least_nodes * count));
   }
   if (!context.claim(place, shape.vertices))
-  {
     return;
-  }
   std::vector<Branch> branches = grow(shape, dice);
   shareNodes(branches, shape.vertices);
 
@@ -140,8 +135,9 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
       const int edge = std::max({static_cast<int>(branch.at * (parent.nodes - 1)), last_joint[branch.parent] + 2, 1});
       if (edge > parent.nodes - 3)
       {
-        return place.problem("gives " + name + "_" + std::to_string(branch.parent) + " too few (" + std::to_string(parent.nodes) +
-                             ") for its " + std::to_string(shape.children) + " children; raise it, or lower levels or children");
+        return place.problem("gives " + name + "_" + std::to_string(branch.parent) + " too few (" +
+                             std::to_string(parent.nodes) + ") for its " + std::to_string(shape.children) +
+                             " children; raise it, or lower levels or children");
       }
       last_joint[branch.parent] = edge;
       const Eigen::Vector3d tangent = (line[edge + 1] - line[edge]).normalized();
@@ -182,4 +178,4 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   }
 }
 
-}  // namespace slender
+}   // namespace slender

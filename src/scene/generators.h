@@ -17,7 +17,10 @@ class Dice
 {
 public:
   explicit Dice(int seed) : engine_(static_cast<std::uint64_t>(seed)) {}
-  double between(double low, double high) { return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53); }
+  double between(double low, double high)
+  {
+    return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
+  }
 
 private:
   std::mt19937_64 engine_;
@@ -31,4 +34,4 @@ Eigen::Vector3d readDirection(const YamlCursor& at, const Eigen::Vector3d& other
 
 constexpr double golden_angle = 2.399963229728653;   // [rad] successive turns by it never line up
 
-}  // namespace slender
+}   // namespace slender

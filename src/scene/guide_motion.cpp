@@ -19,9 +19,7 @@ void GuideConfig::evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matri
   {
     vertices = preview->start;
     if (velocities)
-    {
       *velocities = preview->velocity;
-    }
     return;
   }
   const auto* carried = std::get_if<CarriedGuide>(&motion);
@@ -29,9 +27,7 @@ void GuideConfig::evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matri
   {
     vertices = mesh.vertices;
     if (velocities)
-    {
       velocities->setZero(3, vertices.cols());
-    }
     return;
   }
   std::vector<Pose> poses;
@@ -41,13 +37,12 @@ void GuideConfig::evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matri
     const PoseTrajectory& body = carried->poses[b];
     const Pose X = body.evaluate(time, &twists[b]);
     poses.push_back(carried->keeps_offset ? X * body.evaluate(body.firstTime()).inverse() : X);
-    twists[b].linear += twists[b].angular.cross(poses[b].position - X.position);   // of the point that is at the origin of `poses`
+    // of the point that is at the origin of `poses`
+    twists[b].linear += twists[b].angular.cross(poses[b].position - X.position);
   }
   carried->binding.place(poses, vertices);
   if (velocities)
-  {
     carried->binding.velocities(poses, twists, *velocities);
-  }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -1,4 +1,5 @@
-// Keys that are sound but do nothing beside the other keys of the scene: each is warned of, so that nobody believes in an effect.
+// Keys that are sound but do nothing beside the other keys of the scene: each is warned of, so that nobody believes in
+// an effect.
 #include "ignored_keys.h"
 
 #include <algorithm>
@@ -15,7 +16,10 @@ namespace slender {
 
 namespace {
 
-std::vector<YamlCursor> entriesOf(const YamlCursor& list) { return list.isList() ? list.items() : std::vector<YamlCursor>{}; }
+std::vector<YamlCursor> entriesOf(const YamlCursor& list)
+{
+  return list.isList() ? list.items() : std::vector<YamlCursor>{};
+}
 
 template <class Objects, class Condition>
 bool any(const Objects& objects, const Condition& condition)
@@ -29,25 +33,27 @@ void warnOfTime(YamlMap time, const SceneConfig& scene)
   const YamlCursor radius = time.get("spectral_radius"), newton = time.get("newton");
   if (radius.present() && integrator != Integrator::generalized_alpha)
   {
-    radius.warning(std::string("has no effect: it is for integrator: generalized_alpha, and this scene takes ") + toString(integrator) + "; leave it out");
+    radius.warning(std::string("has no effect: it is for integrator: generalized_alpha, and this scene takes ") +
+                   toString(integrator) + "; leave it out");
   }
   if (newton.present() && integrator == Integrator::symplectic_euler && scene.threads.empty())
-  {
     newton.warning("has no effect: explicit steps solve no equations by Newton's method; leave it out");
-  }
 }
 
 /// Wind acts on rods by damping.drag, on cloth by aerodynamics or damping.drag.
 void warnOfWind(const YamlCursor& wind, const SceneConfig& scene)
 {
   const bool blows = scene.wind != Eigen::Vector3d::Zero() || scene.wind_topic;
-  const bool felt = any(scene.rods, [](const RodConfig& rod) { return rod.damping.drag > 0; }) || any(scene.cloths, [](const ClothConfig& cloth) {
+  const bool felt = any(scene.rods, [](const RodConfig& rod) { return rod.damping.drag > 0; }) ||
+                    any(scene.cloths, [](const ClothConfig& cloth) {
                       return cloth.drag > 0 || cloth.aerodynamics.drag > 0 || cloth.aerodynamics.lift > 0;
                     });
   if (blows && !felt && scene.threads.empty())   // of threads it is said elsewhere
   {
-    wind.warning("has no effect: it acts on rods with damping: {drag: ...} and on cloths with aerodynamics: {drag: ..., lift: ...} or damping: {drag: ...}, of "
-                 "which the scene has none; give the drag");
+    wind.warning(
+        "has no effect: it acts on rods with damping: {drag: ...} and on cloths with aerodynamics: {drag: ..., lift: "
+        "...} or damping: {drag: ...}, of "
+        "which the scene has none; give the drag");
   }
 }
 
@@ -56,9 +62,7 @@ void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
 {
   const auto touches = [](const auto& object) { return object.contact && object.contact->obstacles; };
   if (any(scene.rods, touches) || any(scene.threads, touches) || any(scene.cloths, touches))
-  {
     return;
-  }
   const auto follows = [&scene](const std::string& name) {
     const auto by_grasp = [&name](const GraspConfig& grasp) {
       const auto* body = std::get_if<BodyMotion>(&grasp.motion);
@@ -69,15 +73,12 @@ void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
   };
   std::vector<std::string> names;
   for (const ObstacleConfig& obstacle : scene.obstacles)
-  {
     if (!follows(obstacle.name) && names.size() < 10)
-    {
       names.push_back(obstacle.name);
-    }
-  }
   if (!names.empty() && obstacles.present())
   {
-    obstacles.warning("are touched by nothing (" + joinWords(names) + "): everything passes through them. Give the rods, threads or cloths that shall touch "
+    obstacles.warning("are touched by nothing (" + joinWords(names) +
+                      "): everything passes through them. Give the rods, threads or cloths that shall touch "
                       "them a contact, for example contact: {friction: 0.3}");
   }
 }
@@ -85,14 +86,17 @@ void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
 /// Returns true for a key that is given as false.
 bool isOff(const YamlCursor& key) { return key.present() && !key.boolean().value_or(true); }
 
-/// Warns of a contact that finds no partner. `others`: the key for contact with objects of the same kind, of which the scene has any if `has_others`.
+/// Warns of a contact that finds no partner. `others`: the key for contact with objects of the same kind, of which the
+/// scene has any if `has_others`.
 void warnOfContact(YamlMap contact, const char* others, bool has_others, bool has_solids)
 {
-  const bool meets_others = has_others && !isOff(contact.get(others)), meets_solids = has_solids && !isOff(contact.get("obstacles"));
+  const bool meets_others = has_others && !isOff(contact.get(others)),
+             meets_solids = has_solids && !isOff(contact.get("obstacles"));
   if (contact.at().present() && isOff(contact.get("self")) && !meets_others && !meets_solids)
   {
     contact.at().warning(std::string("has no effect: self is false, and ") + others +
-                         " and obstacles are false or the scene has none, so that there is nothing to touch; leave contact out, or change these keys");
+                         " and obstacles are false or the scene has none, so that there is nothing to touch; leave "
+                         "contact out, or change these keys");
   }
 }
 
@@ -102,12 +106,11 @@ std::string whyNoFriction(const SceneConfig& scene)
   const auto touches = [](const auto& object) { return object.contact && object.contact->obstacles; };
   const auto slips = [&touches](const auto& object) { return touches(object) && object.contact->friction > 0; };
   if (!any(scene.rods, touches) && !any(scene.threads, touches) && !any(scene.cloths, touches))
-  {
     return "nothing touches it; give the rods, threads or cloths a contact with obstacles, or leave friction out";
-  }
   if (!any(scene.rods, slips) && !any(scene.threads, slips) && !any(scene.cloths, slips))
   {
-    return "the friction between two objects is the geometric mean of both, and that of everything that touches solids is 0; give them a friction as well";
+    return "the friction between two objects is the geometric mean of both, and that of everything that touches solids "
+           "is 0; give them a friction as well";
   }
   return "";
 }
@@ -115,9 +118,7 @@ std::string whyNoFriction(const SceneConfig& scene)
 void warnOfFriction(const YamlCursor& friction, const std::string& why)
 {
   if (friction.present() && friction.number(Range::closed(0, 100)).value_or(0.0) > 0 && !why.empty())
-  {
     friction.warning("has no effect: " + why);
-  }
 }
 
 /// The section `contact` of the scene. Rods and threads have a slip speed, cloths do not.
@@ -126,28 +127,27 @@ void warnOfSlipSpeed(const YamlCursor& slip_speed, const SceneConfig& scene)
   const auto slips = [](const auto& object) { return object.contact && object.contact->friction > 0; };
   if (slip_speed.present() && !any(scene.rods, slips) && !any(scene.threads, slips))
   {
-    slip_speed.warning("has no effect: friction is 0 for all rods and threads that touch anything; give them a friction, or leave it out");
+    slip_speed.warning(
+        "has no effect: friction is 0 for all rods and threads that touch anything; give them a friction, or leave it "
+        "out");
   }
 }
 
 void warnOfMaterial(YamlMap material, const Eigen::Vector3d& gravity)
 {
-  const YamlCursor ratio = material.get("poissons_ratio"), torsion = material.get("torsion"), density = material.get("density");
+  const YamlCursor ratio = material.get("poissons_ratio"), torsion = material.get("torsion"),
+                   density = material.get("density");
   for (const YamlCursor& key : {ratio, torsion})
-  {
     if (key.present() && material.has("twist_modulus"))
-    {
       key.warning("has no effect, since twist_modulus is given and nothing else follows from it; leave it out");
-    }
-  }
   if (density.present() && material.has("linear_density"))
-  {
     density.warning("has no effect, since linear_density is given; leave one of them out");
-  }
   const YamlCursor inextensible = material.get("inextensible");
   if (inextensible.present() && inextensible.boolean().value_or(false) && gravity == Eigen::Vector3d::Zero())
   {
-    inextensible.warning("has no effect: it raises the stretching modulus by the rod's own weight, and there is no gravity; give stretch_modulus instead");
+    inextensible.warning(
+        "has no effect: it raises the stretching modulus by the rod's own weight, and there is no gravity; give "
+        "stretch_modulus instead");
   }
 }
 
@@ -156,7 +156,8 @@ void warnOfBody(YamlMap body, const BodyConfig& config, const std::string& why_n
   const YamlCursor contact = body.get("contact"), friction = body.get("friction");
   if (contact.present() && config.contact && !config.shape)
   {
-    contact.warning("has no effect: the body has no shape that could touch anything; give it a shape, or leave contact out");
+    contact.warning(
+        "has no effect: the body has no shape that could touch anything; give it a shape, or leave contact out");
   }
   warnOfFriction(friction, !config.shape     ? "the body has no shape; give it one, or leave friction out"
                            : !config.contact ? "contact is false; leave one of them out"
@@ -165,7 +166,8 @@ void warnOfBody(YamlMap body, const BodyConfig& config, const std::string& why_n
   {
     if (config.motion && body.has(key))
     {
-      body.get(key).warning("has no effect: the body's motion is given, so that no force moves it; leave it out, or take motion: free");
+      body.get(key).warning(
+          "has no effect: the body's motion is given, so that no force moves it; leave it out, or take motion: free");
     }
   }
 }
@@ -174,28 +176,33 @@ void warnOfBody(YamlMap body, const BodyConfig& config, const std::string& why_n
 void warnOfPlasticity(YamlMap plasticity, const ClothConfig& config)
 {
   if (!plasticity.at().present() || config.mesh.triangles.cols() == 0)
-  {
     return;
-  }
   if (!(config.bending_modulus > 0))
   {
-    plasticity.at().warning("has no effect: bending.modulus is 0, so that creases have no stiffness; give a modulus, or leave plasticity out");
+    plasticity.at().warning(
+        "has no effect: bending.modulus is 0, so that creases have no stiffness; give a modulus, or leave plasticity "
+        "out");
     return;
   }
   const MeshTopology topology = meshTopology(config.mesh);
   const Eigen::VectorXd areas = faceAreas(config.mesh);
-  double narrowest = std::numeric_limits<double>::infinity();   // [m] width of a hinge: twice the area of both faces over the length of their edge
+  // [m] width of a hinge: twice the area of both faces over the length of their edge
+  double narrowest = std::numeric_limits<double>::infinity();
   for (int h = 0; h < topology.hingeCount(); ++h)
   {
     const auto faces = topology.edge_faces.col(topology.hinge_edges[static_cast<std::size_t>(h)]);
-    const double length = (config.mesh.vertices.col(topology.hinges(1, h)) - config.mesh.vertices.col(topology.hinges(0, h))).norm();
+    const double length =
+        (config.mesh.vertices.col(topology.hinges(1, h)) - config.mesh.vertices.col(topology.hinges(0, h))).norm();
     narrowest = std::min(narrowest, 2.0 * (areas[faces[0]] + areas[faces[1]]) / length);
   }
   if (config.plasticity.yield_curvature * narrowest >= M_PI)
   {
-    plasticity.get("yield_curvature").warning("is never reached, so that plasticity has no effect: no hinge of this mesh can be bent by more than half a turn, "
-                                              "which is a curvature of at most " + shortNumber(M_PI / narrowest) +
-                                              " 1/m; lower the yield curvature, or refine the mesh");
+    plasticity.get("yield_curvature")
+        .warning(
+            "is never reached, so that plasticity has no effect: no hinge of this mesh can be bent by more than half a "
+            "turn, "
+            "which is a curvature of at most " +
+            shortNumber(M_PI / narrowest) + " 1/m; lower the yield curvature, or refine the mesh");
   }
 }
 
@@ -203,30 +210,20 @@ void warnOfPlasticity(YamlMap plasticity, const ClothConfig& config)
 void warnOfClusters(YamlMap clusters, std::size_t shapes)
 {
   if (!clusters.at().present())
-  {
     return;
-  }
   const YamlCursor frames = clusters.get("frames");
   const bool one_region = clusters.get("count").integer(1, 1'000'000, "regions").value_or(2) == 1;
   for (const char* key : {"compactness", "seed", "frames"})
-  {
     if (one_region && clusters.has(key))
-    {
       clusters.get(key).warning("has no effect with count: 1, since all faces are in one region; leave it out");
-    }
-  }
   if (!one_region && frames.present() && shapes < 2)
-  {
     frames.warning("has no effect: only one shape of the guide is known when regions are clustered; leave it out");
-  }
 }
 
 void warnOfTracking(YamlMap tracked, const ClothConfig& config)
 {
   if (!config.tracking)
-  {
     return;
-  }
   const GuideMotion& motion = config.tracking->guide.motion;
   const auto* frames = std::get_if<FrameGuide>(&motion);
   const auto* carried = std::get_if<CarriedGuide>(&motion);
@@ -239,7 +236,9 @@ void warnOfTracking(YamlMap tracked, const ClothConfig& config)
     {
       if (functions.isList() && config.tracking->sets.size() == 1 && map.has(key))
       {
-        map.get(key).warning("has no effect: there is only one set of test functions, which acts from the start; leave it out, or add another set");
+        map.get(key).warning(
+            "has no effect: there is only one set of test functions, which acts from the start; leave it out, or add "
+            "another set");
       }
     }
     warnOfClusters(YamlMap(map.get("clusters")), shapes);
@@ -249,32 +248,32 @@ void warnOfTracking(YamlMap tracked, const ClothConfig& config)
 void warnOfCloth(YamlMap cloth, const SceneConfig& scene, const ClothConfig& config)
 {
   warnOfPlasticity(YamlMap(cloth.get("plasticity")), config);
-  warnOfContact(YamlMap(cloth.get("contact")), "cloths", scene.cloths.size() > 1, !scene.obstacles.empty() || !scene.bodies.empty());
-  const YamlCursor air_density = YamlMap(cloth.get("aerodynamics")).get("air_density"), thickness = YamlMap(cloth.get("material")).get("thickness");
+  warnOfContact(YamlMap(cloth.get("contact")), "cloths", scene.cloths.size() > 1,
+                !scene.obstacles.empty() || !scene.bodies.empty());
+  const YamlCursor air_density = YamlMap(cloth.get("aerodynamics")).get("air_density"),
+                   thickness = YamlMap(cloth.get("material")).get("thickness");
   if (air_density.present() && !(config.aerodynamics.drag > 0) && !(config.aerodynamics.lift > 0))
-  {
     air_density.warning("has no effect: aerodynamics.drag and lift are 0; give one of them");
-  }
   if (thickness.present() && cloth.has("membrane") && !YamlMap(cloth.get("material")).has("density"))
   {
-    thickness.warning("has no effect beside membrane and an area density, since nothing else follows from it; leave it out (contact has a thickness of its own)");
+    thickness.warning(
+        "has no effect beside membrane and an area density, since nothing else follows from it; leave it out (contact "
+        "has a thickness of its own)");
   }
   YamlMap bending(cloth.get("bending")), solver(cloth.get("solver"));
   const YamlCursor model = bending.get("model"), modulus = bending.get("modulus");
   if (model.isScalar() && model.tree()->scalar == "none" && modulus.present())
-  {
     modulus.warning("has no effect with model: none, which does not bend at all; leave it out, or take another model");
-  }
-  const bool explicit_steps = scene.time.integrator == Integrator::symplectic_euler || scene.time.integrator == Integrator::imex;
+  const bool explicit_steps =
+      scene.time.integrator == Integrator::symplectic_euler || scene.time.integrator == Integrator::imex;
   if (explicit_steps && solver.at().present())
   {
-    solver.at().warning(std::string("has no effect with time.integrator: ") + toString(scene.time.integrator) + ", which solves no such equations; leave it out");
+    solver.at().warning(std::string("has no effect with time.integrator: ") + toString(scene.time.integrator) +
+                        ", which solves no such equations; leave it out");
   }
   const YamlCursor linear = solver.get("linear"), tolerance = solver.get("tolerance");
   if (linear.isScalar() && linear.tree()->scalar == "cholesky" && tolerance.present() && !explicit_steps)
-  {
     tolerance.warning("has no effect with linear: cholesky, which is exact; leave it out");
-  }
 }
 
 void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig& scene)
@@ -283,21 +282,23 @@ void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig&
   YamlMap contact(thread.get("contact"));
   if (deposited.present() && !config.floor)
   {
-    deposited.warning("has no effect: it counts nodes that lie on the thread's floor, and there is none; give a floor, or a region in which fluid is kept");
+    deposited.warning(
+        "has no effect: it counts nodes that lie on the thread's floor, and there is none; give a floor, or a region "
+        "in which fluid is kept");
   }
   const bool has_others = scene.threads.size() > 1;
   if (config.merging > 0 && isOff(contact.get("self")) && (!has_others || isOff(contact.get("threads"))))
   {
-    merging.warning("has no effect: neither parts of the thread nor other threads are in touch with it; take contact: {self: true}");
+    merging.warning(
+        "has no effect: neither parts of the thread nor other threads are in touch with it; take contact: {self: "
+        "true}");
   }
   warnOfContact(contact, "threads", has_others, !scene.obstacles.empty() || (config.floor && config.floor->friction));
   if (config.nozzle && thread.has("nozzle"))
   {
     const YamlCursor flow = YamlMap(thread.get("nozzle")).get("flow");
     if (flow.present() && !config.nozzle->flow.topic && !(config.nozzle->flow.table.greatest() > 0))
-    {
       flow.warning("is 0, so nothing flows out of the nozzle; give it in m^3/s, or flow: {topic: true}");
-    }
   }
 }
 
@@ -308,30 +309,21 @@ void warnOfGenerator(YamlMap generator, const SceneConfig& scene, const std::str
   for (YamlMap* rods : {&chain, &tree, &hair})
   {
     if (!rods->at().present())
-    {
       continue;
-    }
     warnOfMaterial(YamlMap(rods->get("material")), scene.gravity);
-    warnOfContact(YamlMap(rods->get("contact")), "rods", scene.rods.size() > 1, !scene.obstacles.empty() || !scene.bodies.empty());
+    warnOfContact(YamlMap(rods->get("contact")), "rods", scene.rods.size() > 1,
+                  !scene.obstacles.empty() || !scene.bodies.empty());
   }
   if (chain.has("spacing") && chain.get("links").integer(1, 10'000).value_or(2) == 1)
-  {
     chain.get("spacing").warning("has no effect with links: 1; leave it out");
-  }
   for (const char* key : {"seed", "children", "length_ratio", "radius_ratio", "angle", "joint_density"})
-  {
     if (tree.has(key) && tree.get("levels").integer(1, 6).value_or(2) == 1)
-    {
       tree.get(key).warning("has no effect with levels: 1, a trunk without branches; leave it out");
-    }
-  }
   if (hair.at().present())
-  {
     warnOfFriction(YamlMap(hair.get("head")).get("friction"), why_no_friction);
-  }
 }
 
-}  // namespace
+}   // namespace
 
 void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
 {
@@ -341,19 +333,16 @@ void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
   warnOfObstacles(map.get("obstacles"), scene);
   warnOfSlipSpeed(YamlMap(map.get("contact")).get("slip_speed"), scene);
   for (const YamlCursor& obstacle : entriesOf(map.get("obstacles")))
-  {
     warnOfFriction(YamlMap(obstacle).get("friction"), why_no_friction);
-  }
   for (const YamlCursor& entry : entriesOf(map.get("rods")))
   {
     YamlMap rod(entry);
     warnOfMaterial(YamlMap(rod.get("material")), scene.gravity);
-    warnOfContact(YamlMap(rod.get("contact")), "rods", scene.rods.size() > 1, !scene.obstacles.empty() || !scene.bodies.empty());
+    warnOfContact(YamlMap(rod.get("contact")), "rods", scene.rods.size() > 1,
+                  !scene.obstacles.empty() || !scene.bodies.empty());
   }
   for (const YamlCursor& generator : entriesOf(map.get("generate")))
-  {
     warnOfGenerator(YamlMap(generator), scene, why_no_friction);
-  }
   std::size_t k = 0;   // tracked cloths come after the others
   for (const char* key : {"cloths", "tracked"})
   {
@@ -365,13 +354,9 @@ void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
   }
   const std::vector<YamlCursor> bodies = entriesOf(map.get("bodies")), threads = entriesOf(map.get("threads"));
   for (std::size_t b = 0; b < bodies.size(); ++b)
-  {
     warnOfBody(YamlMap(bodies[b]), scene.bodies[b], why_no_friction);
-  }
   for (std::size_t t = 0; t < threads.size(); ++t)
-  {
     warnOfThread(YamlMap(threads[t]), scene.threads[t], scene);
-  }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -5,7 +5,8 @@
 
 namespace slender {
 
-/// Warns of keys of a sound scene that do nothing beside its other keys. `map`: the whole scene, from which `scene` was read.
+/// Warns of keys of a sound scene that do nothing beside its other keys. `map`: the whole scene, from which `scene` was
+/// read.
 void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene);
 
-}  // namespace slender
+}   // namespace slender

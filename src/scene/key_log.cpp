@@ -83,7 +83,8 @@ std::string sceneReference(const std::vector<SceneKey>& keys)
     if (std::find(parts.begin(), parts.end(), partOf(key)) == parts.end())
       parts.push_back(partOf(key));
   std::ostringstream out;
-  out << "# Keys of scene files\n\nWritten by `scene_reference config/scenes/*.yaml test/scenes/every_key.yaml` from what the reader asks for; N: a place in a list, NAME: a name of yours.\n";
+  out << "# Keys of scene files\n\nWritten by `scene_reference config/scenes/*.yaml test/scenes/every_key.yaml` from "
+         "what the reader asks for; N: a place in a list, NAME: a name of yours.\n";
   for (const std::string& part : parts)
   {
     out << "\n## " << part << "\n\n| Key | Value |\n|---|---|\n";
@@ -99,4 +100,4 @@ std::string sceneReference(const std::vector<SceneKey>& keys)
   return out.str();
 }
 
-}  // namespace slender
+}   // namespace slender

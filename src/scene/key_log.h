@@ -8,7 +8,8 @@
 
 namespace slender {
 
-/// The keys that readers ask for, in the order of the first question. Places in lists and names that the user gives are put as N and NAME.
+/// The keys that readers ask for, in the order of the first question. Places in lists and names that the user gives are
+/// put as N and NAME.
 class KeyLog
 {
 public:
@@ -25,4 +26,4 @@ private:
   std::map<std::string, bool> named_;
 };
 
-}  // namespace slender
+}   // namespace slender

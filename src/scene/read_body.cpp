@@ -15,14 +15,10 @@ const Range inertia_entry = Range::closed(-1e15, 1e15, "kg m^2");
 std::optional<Eigen::Matrix3d> readInertia(const YamlCursor& at)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   const auto rows = at.items(3, 3);
   if (rows.empty())
-  {
     return std::nullopt;
-  }
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
   if (!rows[0].isList())
   {
@@ -34,9 +30,7 @@ std::optional<Eigen::Matrix3d> readInertia(const YamlCursor& at)
   {
     const auto row = rows[i].vector3(inertia_entry);
     if (!row)
-    {
       return std::nullopt;
-    }
     inertia.row(i) = *row;
   }
   if ((inertia - inertia.transpose()).norm() > 1e-9 * inertia.norm())
@@ -56,25 +50,15 @@ void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
   const auto per_volume = density.number(Range::above(0, 1e6, "kg/m^3"));
   const auto inertia = readInertia(at_inertia);
   if (mass.present() && density.present())
-  {
     map.at().problem("must have either mass or density");
-  }
   else if (!mass.present() && !density.present() && !body.motion)
-  {
     map.at().problem("must have a mass, or a density and a shape");
-  }
   else if (density.present() && !shape_given)
-  {
     density.problem("needs a shape to be the density of");
-  }
   else if (!at_inertia.present() && !shape_given && !body.motion)
-  {
     at_inertia.problem("is missing; a body without a shape needs [Ixx, Iyy, Izz] or three rows, in kg m^2");
-  }
   if (mass.problems().size() != before || (shape_given && !body.shape))
-  {
     return;
-  }
   try
   {
     if (kilograms && inertia)
@@ -120,37 +104,31 @@ void readWeld(const YamlCursor& at, const std::vector<RodPart>& rods, std::vecto
   map.finish();
   const auto name = at_rod.text();
   if (!name)
-  {
     return;
-  }
-  const auto found = std::find_if(rods.begin(), rods.end(), [&](const RodPart& part) { return part.config.name == *name; });
+  const auto found =
+      std::find_if(rods.begin(), rods.end(), [&](const RodPart& part) { return part.config.name == *name; });
   if (found == rods.end())
   {
     std::vector<std::string> names;
     for (const RodPart& part : rods)
-    {
       names.push_back(part.config.name);
-    }
     const std::string nearest = nearestWord(*name, names);
     names.resize(std::min<std::size_t>(names.size(), 10));
-    return at_rod.problem("is no rod of the scene" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") + "; it has: " +
-                          joinWords(names));
+    return at_rod.problem("is no rod of the scene" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") +
+                          "; it has: " + joinWords(names));
   }
   const int edges = found->edges;
-  const auto index = edges > 0 ? edge.integer(-edges, edges - 1) : std::nullopt;   // no edges: reported where the rod is
+  // no edges: reported where the rod is
+  const auto index = edges > 0 ? edge.integer(-edges, edges - 1) : std::nullopt;
   if (!index)
-  {
     return;
-  }
   const std::size_t before = edge.problems().size();
   WeldConfig weld;
   weld.rod = static_cast<int>(found - rods.begin());
   const int held = *index < 0 ? *index + edges : *index;
   std::tie(weld.first_node, weld.last_node) = nodesOfEdges(edge, held, held, found->config.closed, edges);
   if (edge.problems().size() == before)
-  {
     welds.push_back(weld);
-  }
 }
 
 BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
@@ -168,9 +146,7 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
     if (const auto* table = std::get_if<TableMotion>(&*body.motion))
     {
       if (pose)
-      {
         (at_pose.present() ? at_pose : at).problem("there is a table of poses as well; the body starts at its first");
-      }
       pose = table->poses.evaluate(table->poses.firstTime());
     }
   }
@@ -181,9 +157,7 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
   assign(body.velocity.angular, velocity.get("angular").vector3(Range::closed(-1e5, 1e5, "rad/s")));
   velocity.finish();
   if (velocity.at().present() && body.motion)
-  {
     velocity.at().problem("the body's motion is given; only free bodies start with a velocity");
-  }
   assign(body.gravity, map.get("gravity").boolean());
   assign(body.force, map.get("force").vector3(Range::closed(-1e12, 1e12, "N")));
   assign(body.torque, map.get("torque").vector3(Range::closed(-1e12, 1e12, "N m")));
@@ -200,50 +174,40 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
 }
 
 /// Nodes of one rod may be held only once, by grasps and welds together.
-void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<RodPart>& rods, const std::vector<BodyConfig>& bodies)
+void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<RodPart>& rods,
+               const std::vector<BodyConfig>& bodies)
 {
   const auto overlaps = [&](int first, int last) { return weld.first_node <= last && first <= weld.last_node; };
   const auto report = [&](const std::string& other, int first, int last) {
     at.problem("holds nodes " + std::to_string(weld.first_node) + " to " + std::to_string(weld.last_node) + " of rod " +
-               rods[weld.rod].config.name + "; " + other + " holds nodes " + std::to_string(first) + " to " + std::to_string(last));
+               rods[weld.rod].config.name + "; " + other + " holds nodes " + std::to_string(first) + " to " +
+               std::to_string(last));
   };
   for (const GraspConfig& grasp : rods[weld.rod].config.grasps)
-  {
     if (overlaps(grasp.first_node, grasp.last_node))
-    {
       return report("grasp " + grasp.name, grasp.first_node, grasp.last_node);
-    }
-  }
   for (const BodyConfig& body : bodies)
   {
     for (const WeldConfig& other : body.welds)
-    {
       if (other.rod == weld.rod && overlaps(other.first_node, other.last_node))
-      {
         return report("a weld of body " + body.name, other.first_node, other.last_node);
-      }
-    }
   }
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodPart>& rods)
 {
   std::vector<BodyConfig> bodies;
   if (!at.present())
-  {
     return bodies;
-  }
   const auto entries = at.items(0, 100'000);
   for (std::size_t k = 0; k < entries.size(); ++k)
   {
     bodies.push_back(readBody(entries[k], context, entries.size() == 1 ? "body" : "body" + std::to_string(k)));
     const YamlCursor welds = YamlMap(entries[k]).get("welds");
     if (!welds.present())
-    {
       continue;
-    }
     for (const YamlCursor& item : welds.items())
     {
       std::vector<WeldConfig> weld;
@@ -258,4 +222,4 @@ std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& cont
   return bodies;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -15,9 +15,7 @@ const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
 void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
 {
   if (!at.present())
-  {
     return;
-  }
   YamlMap map(at);
   assign(cloth.plasticity.yield_curvature, map.require("yield_curvature").number(Range::closed(0, 1e9, "1/m")));
   assign(cloth.plasticity.hardening, map.get("hardening").number(Range::closed(-1e6, 1e6, "m")));
@@ -25,7 +23,9 @@ void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
   map.finish();
   if (cloth.bending != BendingModel::hinge)
   {
-    at.problem("needs rest angles that can flow, which only bending: {model: hinge} has; the isometric models are for flat rest shapes");
+    at.problem(
+        "needs rest angles that can flow, which only bending: {model: hinge} has; the isometric models are for flat "
+        "rest shapes");
   }
 }
 
@@ -45,17 +45,14 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
 {
   double youngs_modulus = 1e6, poissons_ratio = 0.3, thickness = 3e-4;
   YamlMap material(map.get("material"));
-  const YamlCursor per_area = material.get("area_density"), per_volume = material.get("density"), modulus = material.get("youngs_modulus");
+  const YamlCursor per_area = material.get("area_density"), per_volume = material.get("density"),
+                   modulus = material.get("youngs_modulus");
   assign(thickness, material.get("thickness").number(Range::above(0, 1, "m")));
   assign(cloth.area_density, per_area.number(Range::above(0, 1e4, "kg/m^2")));
   if (const auto density = per_volume.number(Range::above(0, 1e6, "kg/m^3")))
-  {
     cloth.area_density = *density * thickness;
-  }
   if (per_area.present() && per_volume.present())
-  {
     per_volume.problem("there is an area_density as well; give one of them");
-  }
   assign(youngs_modulus, modulus.number(Range::above(0, 1e13, "Pa")));
   const YamlCursor ratio = material.get("poissons_ratio");
   assign(poissons_ratio, ratio.number(Range::above(-1, 0.5)));
@@ -72,8 +69,10 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
   bending.finish();
   if (bending_ratio.present() && cloth.bending != BendingModel::isometric_nonconforming)
   {
-    bending_ratio.problem("is for bending: {model: isometric}. Hinges have the ratio of their mesh (-1/3 on equilateral triangles), conforming bending "
-                          "has 1; leave it out");
+    bending_ratio.problem(
+        "is for bending: {model: isometric}. Hinges have the ratio of their mesh (-1/3 on equilateral triangles), "
+        "conforming bending "
+        "has 1; leave it out");
   }
   readPlasticity(map.get("plasticity"), cloth);
   if (at_membrane.present())
@@ -88,16 +87,10 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
     cloth.warp = readDirection(membrane.get("direction"), cloth.warp);
     membrane.finish();
     for (const YamlCursor& other : {modulus, ratio})
-    {
       if (other.present())
-      {
         other.problem("there is a membrane as well, which says it per width");
-      }
-    }
     if (!bending_modulus.present() && cloth.bending != BendingModel::none && at_membrane.isMap())
-    {
       at_membrane.problem("says nothing of bending; give bending: {modulus: D} in N m, or bending: {model: none}");
-    }
     try
     {
       cloth.membrane = orthotropicMembrane(warp, weft, poisson, shear);
@@ -128,9 +121,7 @@ std::vector<int> alongSide(const ClothConfig& cloth, int axis, bool far)
   {
     const double at = (cloth.mesh.vertices.col(i) - cloth.grid->corner).dot(side) / side.squaredNorm();
     if (std::abs(at - (far ? 1.0 : 0.0)) < 1e-6)
-    {
       found.push_back(static_cast<int>(i));
-    }
   }
   return found;
 }
@@ -142,78 +133,63 @@ std::vector<int> readNear(const YamlCursor& at, const Eigen::Matrix3Xd& vertices
   const auto radius = map.get("radius").number(Range::above(0, max_coordinate, "m"));
   map.finish();
   if (!point)
-  {
     return {};
-  }
   const Eigen::VectorXd distance = (vertices.colwise() - *point).colwise().norm();
   Eigen::Index nearest = 0;
   const double least = distance.minCoeff(&nearest);
   std::vector<int> found;
   for (Eigen::Index i = 0; radius && i < distance.size(); ++i)
-  {
     if (distance[i] <= *radius)
-    {
       found.push_back(static_cast<int>(i));
-    }
-  }
   if (!radius)
-  {
     found.push_back(static_cast<int>(nearest));
-  }
   else if (found.empty())
-  {
     at.problem("reaches no vertex; the nearest, " + std::to_string(nearest) + ", is " + shortNumber(least) + " m away");
-  }
   return found;
 }
 
 std::vector<int> readHeldVertices(YamlMap& map, const ClothConfig& cloth)
 {
-  const YamlCursor list = map.get("vertices"), corner = map.get("corner"), edge = map.get("edge"), near = map.get("near");
+  const YamlCursor list = map.get("vertices"), corner = map.get("corner"), edge = map.get("edge"),
+                   near = map.get("near");
   if (list.present() + corner.present() + edge.present() + near.present() != 1)
   {
     if (map.at().isMap())
     {
-      map.at().problem("must have one of vertices: [...], corner: upper_left, edge: upper or near: {point: [x, y, z], radius: r}");
+      map.at().problem(
+          "must have one of vertices: [...], corner: upper_left, edge: upper or near: {point: [x, y, z], radius: r}");
     }
     return {};
   }
   if (cloth.mesh.vertices.cols() == 0)
-  {
     return {};   // reported
-  }
   if (list.present())
   {
     std::vector<int> vertices = readIndexList(list, static_cast<int>(cloth.mesh.vertices.cols()));
     if (std::adjacent_find(vertices.begin(), vertices.end()) != vertices.end())
-    {
       list.problem("names vertex " + std::to_string(*std::adjacent_find(vertices.begin(), vertices.end())) + " twice");
-    }
     return vertices;
   }
   if (near.present())
-  {
     return readNear(near, cloth.start.cols() ? cloth.start : cloth.mesh.vertices);
-  }
   using Sides = std::pair<int, int>;   // 1: far, 0: near, -1: all, along the first and the second side
   const YamlCursor& word = corner.present() ? corner : edge;
-  const auto sides = corner.present()
-                       ? corner.choice<Sides>({{"lower_left", {0, 0}}, {"lower_right", {1, 0}}, {"upper_left", {0, 1}}, {"upper_right", {1, 1}}})
-                       : edge.choice<Sides>({{"left", {0, -1}}, {"right", {1, -1}}, {"lower", {-1, 0}}, {"upper", {-1, 1}}});
+  const auto sides =
+      corner.present()
+          ? corner.choice<Sides>(
+                {{"lower_left", {0, 0}}, {"lower_right", {1, 0}}, {"upper_left", {0, 1}}, {"upper_right", {1, 1}}})
+          : edge.choice<Sides>({{"left", {0, -1}}, {"right", {1, -1}}, {"lower", {-1, 0}}, {"upper", {-1, 1}}});
   if (!cloth.grid)
   {
     word.problem("is for grids; of a mesh take vertices: [...] or near: {point: [x, y, z], radius: r}");
     return {};
   }
   if (!sides)
-  {
     return {};
-  }
   if (sides->first < 0 || sides->second < 0)
-  {
     return sides->first < 0 ? alongSide(cloth, 1, sides->second == 1) : alongSide(cloth, 0, sides->first == 1);
-  }
-  const Eigen::Vector3d point = cloth.grid->corner + sides->first * cloth.grid->sides[0] + sides->second * cloth.grid->sides[1];
+  const Eigen::Vector3d point =
+      cloth.grid->corner + sides->first * cloth.grid->sides[0] + sides->second * cloth.grid->sides[1];
   Eigen::Index nearest = 0;
   (cloth.mesh.vertices.colwise() - point).colwise().squaredNorm().minCoeff(&nearest);
   return {static_cast<int>(nearest)};
@@ -229,9 +205,7 @@ std::vector<int> withFaces(const TriangleMesh& mesh, std::vector<int> vertices)
     const Eigen::Vector3i corners = mesh.triangles.col(f);
     const auto held = [&](int vertex) { return std::binary_search(vertices.begin(), vertices.end(), vertex); };
     if (std::any_of(corners.begin(), corners.end(), held))
-    {
       found.insert(found.end(), corners.begin(), corners.end());
-    }
   }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
@@ -243,9 +217,7 @@ std::vector<ClothLoadConfig> readClothLoads(const YamlCursor& at, const ClothCon
 {
   std::vector<ClothLoadConfig> loads;
   if (!at.present())
-  {
     return loads;
-  }
   for (const YamlCursor& item : at.items(1, 10'000))
   {
     ClothLoadConfig load;
@@ -261,9 +233,7 @@ std::vector<ClothLoadConfig> readClothLoads(const YamlCursor& at, const ClothCon
 void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& cloth)
 {
   if (!at.present())
-  {
     return;
-  }
   std::map<int, std::string> holders;
   for (const auto& [name, entry] : at.members())
   {
@@ -273,9 +243,7 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
     grasp.vertices = readHeldVertices(map, cloth);
     assign(grasp.clamp, map.get("clamp").boolean());
     if (grasp.clamp)
-    {
       grasp.vertices = withFaces(cloth.mesh, grasp.vertices);
-    }
     grasp.attach = Attach::initial;
     assign(grasp.attach, map.get("attach").choice<Attach>({{"frame", Attach::section}, {"initial", Attach::initial}}));
     grasp.motion = readMotion(map.get("motion"), context, grasp.attach == Attach::section);
@@ -296,9 +264,7 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
 std::optional<ClothContactConfig> readClothContact(const YamlCursor& at)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   ClothContactConfig contact;
   YamlMap map(at);
   assign(contact.self, map.get("self").boolean());
@@ -337,7 +303,7 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
   return cloth;
 }
 
-}  // namespace
+}   // namespace
 
 void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& cloth)
 {
@@ -346,10 +312,13 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
   const Eigen::Matrix3Xd start = readClothShape(map.get("start"), context, cloth.mesh);
   cloth.start = start.cols() ? start : cloth.start;
   readUndeformed(undeformed, context, cloth);
-  if (undeformed.present() && (cloth.bending == BendingModel::isometric_conforming || cloth.bending == BendingModel::none))
+  if (undeformed.present() &&
+      (cloth.bending == BendingModel::isometric_conforming || cloth.bending == BendingModel::none))
   {
-    undeformed.problem("gives angles at rest, which this bending model does not have; use bending: {model: hinge}, or isometric, which takes hinges "
-                       "for curved shapes at rest");
+    undeformed.problem(
+        "gives angles at rest, which this bending model does not have; use bending: {model: hinge}, or isometric, "
+        "which takes hinges "
+        "for curved shapes at rest");
   }
   cloth.aerodynamics = readAerodynamics(map.get("aerodynamics"));
   YamlMap damping(map.get("damping"));
@@ -358,10 +327,11 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
   assign(cloth.drag, damping.get("drag").number(Range::closed(0, 1e6, "N s/m^3")));
   damping.finish();
   YamlMap solver(map.get("solver"));
-  assign(cloth.solver, solver.get("linear").choice<ClothSolver>({{"auto", ClothSolver::automatic},
-                                                                 {"cholesky", ClothSolver::cholesky},
-                                                                 {"conjugate_gradients", ClothSolver::conjugate_gradients},
-                                                                 {"gauss_seidel", ClothSolver::gauss_seidel}}));
+  assign(cloth.solver,
+         solver.get("linear").choice<ClothSolver>({{"auto", ClothSolver::automatic},
+                                                   {"cholesky", ClothSolver::cholesky},
+                                                   {"conjugate_gradients", ClothSolver::conjugate_gradients},
+                                                   {"gauss_seidel", ClothSolver::gauss_seidel}}));
   assign(cloth.linear_tolerance, solver.get("tolerance").number(Range::between(0, 1)));
   assign(cloth.one_newton_step, solver.get("one_newton_step").boolean());
   solver.finish();
@@ -373,9 +343,7 @@ std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& con
 {
   std::vector<ClothConfig> cloths;
   if (!at.present())
-  {
     return cloths;
-  }
   std::map<std::string, std::string> names;   // to the path that used it first
   const auto entries = at.items(1, 1000);
   for (std::size_t k = 0; k < entries.size(); ++k)
@@ -383,11 +351,9 @@ std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& con
     cloths.push_back(readCloth(entries[k], context, entries.size() == 1 ? "cloth" : "cloth" + std::to_string(k)));
     const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
     if (!is_new)
-    {
       YamlMap(entries[k]).get("name").problem("is also the name of " + other->second + "; names must differ");
-    }
   }
   return cloths;
 }
 
-}  // namespace slender
+}   // namespace slender

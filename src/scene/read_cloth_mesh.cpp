@@ -15,15 +15,13 @@ namespace {
 const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
 constexpr int max_cells = 2000;   // per side of a grid
 
-}  // namespace
+}   // namespace
 
 void MeshFile::place(Eigen::Matrix3Xd& vertices) const
 {
   vertices *= scale;
   for (Eigen::Index i = 0; i < vertices.cols(); ++i)
-  {
     vertices.col(i) = pose * Eigen::Vector3d(vertices.col(i));
-  }
 }
 
 std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& context)
@@ -36,9 +34,7 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
   map.finish();
   const auto text = file.text();
   if (!text)
-  {
     return std::nullopt;
-  }
   read.path = *text;
   try
   {
@@ -89,9 +85,7 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
   {
     const auto cells = at_cells.items(2, 2);
     for (std::size_t k = 0; k < cells.size(); ++k)
-    {
       assign(k == 0 ? columns : rows, cells[k].integer(1, max_cells, "cells"));
-    }
     good = good && columns > 0 && rows > 0;
   }
   else if (at_cells.present())
@@ -116,14 +110,10 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
   int seed = 1;
   assign(seed, at_seed.integer(0, 2'000'000'000));
   if (at_seed.present() && pattern != GridPattern::irregular)
-  {
     at_seed.problem("is for pattern: irregular");
-  }
   map.finish();
   if (!good || !context.claim(at_cells, (columns + 1.0) * (rows > 0 ? rows + 1.0 : height / width * columns + 1)))
-  {
     return std::nullopt;
-  }
   try
   {
     mesh = gridMesh(width, height, columns, rows, pattern, static_cast<unsigned>(seed));
@@ -143,9 +133,7 @@ bool readClothMesh(const YamlCursor& at, const ReadContext& context, TriangleMes
 {
   const auto read = readMeshFile(at, context);
   if (!read)
-  {
     return false;
-  }
   mesh = read->mesh;
   try
   {
@@ -163,15 +151,13 @@ Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context
 {
   const auto read = at.present() ? readMeshFile(at, context) : std::nullopt;
   if (!read || cloth.vertices.cols() == 0)
-  {
     return {};   // none, or reported
-  }
   const TriangleMesh& mesh = read->mesh;
   const std::string& path = read->path;
   const YamlCursor file = YamlMap(at).get("file");
   const auto differs = [&](const std::string& what, Eigen::Index here, Eigen::Index there) {
-    file.problem(path + " has " + std::to_string(here) + " " + what + ", the cloth's mesh has " + std::to_string(there) +
-                 "; both must have the same triangles of the same vertices, in the same order");
+    file.problem(path + " has " + std::to_string(here) + " " + what + ", the cloth's mesh has " +
+                 std::to_string(there) + "; both must have the same triangles of the same vertices, in the same order");
   };
   if (mesh.vertices.cols() != cloth.vertices.cols())
   {
@@ -188,8 +174,11 @@ Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context
     const Eigen::Vector3i here = mesh.triangles.col(f), there = cloth.triangles.col(f);
     if (here != there)
     {
-      const auto text = [](const Eigen::Vector3i& t) { return std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]); };
-      file.problem(path + ": triangle " + std::to_string(f) + " has the vertices " + text(here) + " (from 0), that of the cloth's mesh " + text(there) +
+      const auto text = [](const Eigen::Vector3i& t) {
+        return std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]);
+      };
+      file.problem(path + ": triangle " + std::to_string(f) + " has the vertices " + text(here) +
+                   " (from 0), that of the cloth's mesh " + text(there) +
                    "; both must have the same triangles of the same vertices, in the same order");
       return {};
     }
@@ -206,4 +195,4 @@ Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context
   return mesh.vertices;
 }
 
-}  // namespace slender
+}   // namespace slender

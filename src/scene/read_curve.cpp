@@ -19,12 +19,8 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& at)
 {
   std::vector<Eigen::Vector3d> points;
   for (const YamlCursor& item : at.items(2, max_edges + 1))
-  {
     if (const auto point = item.vector3(coordinate))
-    {
       points.push_back(*point);
-    }
-  }
   return points;
 }
 
@@ -36,9 +32,7 @@ StraightCurve readStraight(YamlMap& map)
   assign(curve.edges, readEdges(map));
   assign(curve.grading, map.get("grading").number(Range::closed(0.01, 100)));
   if (!((curve.to - curve.from).norm() > 0))
-  {
     map.at().problem("from and to are the same point; must differ");
-  }
   return curve;
 }
 
@@ -59,14 +53,13 @@ ArcCurve readArc(YamlMap& map)
   const YamlCursor angle = map.get("angle");
   assign(curve.angle, angle.number(Range::closed(-2e5 * M_PI, 2e5 * M_PI, "rad")));
   if (curve.angle == 0)
-  {
     angle.problem("must not be zero");
-  }
   assign(curve.edges, readEdges(map));
   // Edges that turn by half a turn or more each lie the wrong way round the circle, or fold back.
   if (std::abs(curve.angle) >= 0.999 * M_PI * curve.edges)
   {
-    angle.problem("is too much for " + std::to_string(curve.edges) + " edges, each of which may turn by less than pi; give edges of at least " +
+    angle.problem("is too much for " + std::to_string(curve.edges) +
+                  " edges, each of which may turn by less than pi; give edges of at least " +
                   std::to_string(static_cast<long>(std::abs(curve.angle) / (0.999 * M_PI)) + 1));
   }
   return curve;
@@ -82,9 +75,7 @@ HelixCurve readHelix(YamlMap& map)
   const YamlCursor turns = map.get("turns");
   assign(curve.turns, turns.number(Range::closed(-1e5, 1e5)));
   if (curve.turns == 0)
-  {
     turns.problem("must not be zero; negative turns give a left-handed helix");
-  }
   assign(curve.edges, readEdges(map));
   return curve;
 }
@@ -151,7 +142,8 @@ FileCurve readFile(YamlMap& map, const ReadContext& context)
       curve.points = readPointFile(curve.path);
       if (curve.points.size() < 2 || curve.points.size() > max_edges + 1u)
       {
-        path.problem("holds " + std::to_string(curve.points.size()) + " points; must hold 2 to " + std::to_string(max_edges + 1));
+        path.problem("holds " + std::to_string(curve.points.size()) + " points; must hold 2 to " +
+                     std::to_string(max_edges + 1));
       }
     }
     catch (const SceneError& error)
@@ -167,23 +159,17 @@ template <class CurveKind>
 double edgesOf(const CurveKind& curve)
 {
   if constexpr (std::is_same_v<CurveKind, PolylineCurve> || std::is_same_v<CurveKind, FileCurve>)
-  {
     return std::max(curve.edges.value_or(0), static_cast<int>(curve.points.size()));
-  }
   else
-  {
     return curve.edges;
-  }
 }
 
-}  // namespace
+}   // namespace
 
 std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   const std::size_t before = at.problems().size();
   YamlMap kinds(at);
   std::optional<Curve> curve;
@@ -218,4 +204,4 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
   return at.problems().size() == before ? curve : std::nullopt;
 }
 
-}  // namespace slender
+}   // namespace slender

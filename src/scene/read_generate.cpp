@@ -17,9 +17,7 @@ Generated readGenerators(const YamlCursor& at, const ReadContext& context, int f
 {
   Generated all;
   if (!at.present())
-  {
     return all;
-  }
   for (const YamlCursor& item : at.items())
   {
     const std::size_t before = item.problems().size();
@@ -27,27 +25,17 @@ Generated readGenerators(const YamlCursor& at, const ReadContext& context, int f
     const YamlCursor chain = map.get("chain"), tree = map.get("tree"), hair = map.get("hair");
     map.finish();
     if (item.problems().size() != before)
-    {
       continue;
-    }
     if (chain.present() + tree.present() + hair.present() != 1)
-    {
       item.problem("must be one of {chain: {...}}, {tree: {...}}, {hair: {...}}");
-    }
     else if (chain.present())
-    {
       generateChain(chain, context, all);
-    }
     else if (tree.present())
-    {
       generateTree(tree, context, first_rod + static_cast<int>(all.rods.size()), all);
-    }
     else if (hair.present())
-    {
       generateHair(hair, context, all);
-    }
   }
   return all;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -13,9 +13,7 @@ std::optional<std::pair<int, int>> readIndices(const YamlCursor& at, int count)
 {
   const std::vector<int> indices = readIndexList(at, count);
   if (indices.empty())
-  {
     return std::nullopt;
-  }
   for (std::size_t k = 1; k < indices.size(); ++k)
   {
     if (indices[k] != indices[k - 1] + 1)
@@ -34,7 +32,9 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
   {
     if (map.at().isMap())
     {
-      map.at().problem("must have either edges or nodes, for example edges: [0] for the start of the rod or edges: [-1] for its end");
+      map.at().problem(
+          "must have either edges or nodes, for example edges: [0] for the start of the rod or edges: [-1] for its "
+          "end");
     }
     return;
   }
@@ -50,9 +50,7 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
   }
   const auto held = readIndices(edge_list, edges);
   if (!held || edges == 0)
-  {
     return;
-  }
   std::tie(grasp.first_node, grasp.last_node) = nodesOfEdges(edge_list, held->first, held->second, closed, edges);
 }
 
@@ -60,66 +58,54 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
 void readFrame(YamlMap& map, GraspConfig& grasp)
 {
   const Range any = Range::closed(-1e6, 1e6);
-  for (const auto& [key, vector] : {std::make_pair("direction", &grasp.direction), std::make_pair("director", &grasp.director)})
+  for (const auto& [key, vector] :
+       {std::make_pair("direction", &grasp.direction), std::make_pair("director", &grasp.director)})
   {
     const YamlCursor at = map.get(key);
     const auto value = at.vector3(any);
     if (!value)
-    {
       continue;
-    }
     if (!(value->norm() > 0))
-    {
       at.problem("must not be zero");
-    }
     else if (grasp.hold == Hold::position)
-    {
       at.problem("needs hold: frame; hold: position leaves the direction free");
-    }
     else if (grasp.attach == Attach::initial)
-    {
       at.problem("needs attach: section; attach: initial keeps the orientation that the section has at the start");
-    }
     else
-    {
       *vector = value->normalized();
-    }
   }
   if (grasp.direction.cross(grasp.director).norm() < 1e-6 && grasp.direction.norm() * grasp.director.norm() > 0)
-  {
     map.get("director").problem("is along direction; must point away from it");
-  }
 }
 
 /// Poses with an orientation of their own leave nothing for `direction` and `director` to say.
 void checkFrame(YamlMap& map, const GraspConfig& grasp)
 {
   if (grasp.direction.isZero(0) && grasp.director.isZero(0))
-  {
     return;
-  }
   const YamlCursor at = map.get(grasp.direction.isZero(0) ? "director" : "direction"), motion = map.get("motion");
   const YamlCursor table = motion.isMap() ? YamlMap(motion).get("table") : motion;
   if (!std::holds_alternative<FixedMotion>(grasp.motion) && !(motion.isMap() && table.present()))
   {
-    at.problem("and this motion both say how the section is turned; must be left out, or the motion fixed or a table of [t, x, y, z]");
+    at.problem(
+        "and this motion both say how the section is turned; must be left out, or the motion fixed or a table of [t, "
+        "x, y, z]");
     return;
   }
   if (!table.isList())
-  {
     return;
-  }
   for (const YamlCursor& row : table.items())
   {
     if (row.isList() && row.items().size() == 8)
     {
-      row.problem("has an orientation, and so has " + std::string(grasp.direction.isZero(0) ? "director" : "direction") +
+      row.problem("has an orientation, and so has " +
+                  std::string(grasp.direction.isZero(0) ? "director" : "direction") +
                   "; must be [t, x, y, z], or leave direction and director out");
     }
   }
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<int> readIndexList(const YamlCursor& at, int count)
 {
@@ -134,29 +120,29 @@ std::vector<int> readIndexList(const YamlCursor& at, int count)
     {
       const auto index = item.integer(-limit, limit - 1);
       if (!index)
-      {
         return {};
-      }
       indices.push_back(resolve(*index));
       continue;
     }
     const auto first = parseNumber(text.substr(0, dots)), last = parseNumber(text.substr(dots + 2));
-    const auto fits = [&](const std::optional<double>& x) { return x && *x == std::floor(*x) && *x >= -limit && *x < limit; };
+    const auto fits = [&](const std::optional<double>& x) {
+      return x && *x == std::floor(*x) && *x >= -limit && *x < limit;
+    };
     if (!fits(first) || !fits(last) || resolve(static_cast<int>(*first)) > resolve(static_cast<int>(*last)))
     {
-      item.problem("must be FIRST..LAST with whole numbers in [" + std::to_string(-limit) + ", " + std::to_string(limit - 1) + "]");
+      item.problem("must be FIRST..LAST with whole numbers in [" + std::to_string(-limit) + ", " +
+                   std::to_string(limit - 1) + "]");
       return {};
     }
     const int begin = resolve(static_cast<int>(*first)), end = resolve(static_cast<int>(*last)) + 1;
-    if (indices.size() + static_cast<std::size_t>(end - begin) > static_cast<std::size_t>(limit))   // else a short list of ranges could fill the memory
+    if (indices.size() + static_cast<std::size_t>(end - begin) >
+        static_cast<std::size_t>(limit))   // else a short list of ranges could fill the memory
     {
       item.problem("makes a list longer than the " + std::to_string(limit) + " places that there are; give each once");
       return {};
     }
     for (int index = begin; index < end; ++index)
-    {
       indices.push_back(index);
-    }
   }
   std::sort(indices.begin(), indices.end());
   return indices;
@@ -171,7 +157,8 @@ std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool
   }
   if (closed && last + 1 == edges)
   {
-    at.problem("holds the edge that joins the last node to the first; hold an edge in [0, " + std::to_string(edges - 2) + "]");
+    at.problem("holds the edge that joins the last node to the first; hold an edge in [0, " +
+               std::to_string(edges - 2) + "]");
   }
   return {first, last + 1};
 }
@@ -187,7 +174,8 @@ GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadC
   assign(grasp.attach, map.get("attach").choice<Attach>({{"section", Attach::section}, {"initial", Attach::initial}}));
   readFrame(map, grasp);
   const bool oriented = grasp.direction.norm() + grasp.director.norm() > 0;
-  grasp.motion = readMotion(map.get("motion"), context, grasp.hold == Hold::frame && grasp.attach == Attach::section && !oriented);
+  grasp.motion =
+      readMotion(map.get("motion"), context, grasp.hold == Hold::frame && grasp.attach == Attach::section && !oriented);
   checkFrame(map, grasp);
   if (grasp.hold == Hold::position && grasp.first_node != grasp.last_node)
   {
@@ -198,4 +186,4 @@ GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadC
   return grasp;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -16,8 +16,9 @@ namespace slender {
 
 namespace {
 
-/// Files that a path with one '*' in its last part stands for, by the number in place of the star. Throws std::runtime_error naming a folder that is not there,
-/// a file without a number, and numbers that are missing or come twice.
+/// Files that a path with one '*' in its last part stands for, by the number in place of the star. Throws
+/// std::runtime_error naming a folder that is not there, a file without a number, and numbers that are missing or come
+/// twice.
 std::vector<std::string> matchingFiles(const std::string& pattern)
 {
   const std::filesystem::path path(pattern);
@@ -27,22 +28,19 @@ std::vector<std::string> matchingFiles(const std::string& pattern)
   const std::string head = name.substr(0, star), tail = name.substr(star + 1);
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error))
-  {
     throw std::runtime_error("there is no folder " + folder.string());
-  }
   std::vector<std::pair<long, std::string>> found;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error))
   {
     const std::string file = entry.path().filename().string();
     if (file.size() < head.size() + tail.size() || file.compare(0, head.size(), head) != 0 ||
         file.compare(file.size() - tail.size(), tail.size(), tail) != 0)
-    {
       continue;
-    }
     const std::string middle = file.substr(head.size(), file.size() - head.size() - tail.size());
     if (middle.empty() || middle.size() > 9 || middle.find_first_not_of("0123456789") != std::string::npos)
     {
-      throw std::runtime_error(entry.path().string() + " matches, but has no frame's number in place of the star; move it elsewhere");
+      throw std::runtime_error(entry.path().string() +
+                               " matches, but has no frame's number in place of the star; move it elsewhere");
     }
     found.emplace_back(std::stol(middle), entry.path().string());
   }
@@ -50,31 +48,30 @@ std::vector<std::string> matchingFiles(const std::string& pattern)
   std::vector<std::string> files;
   for (std::size_t k = 0; k < found.size(); ++k)
   {
-    const long stride = k > 0 ? found[1].first - found[0].first : 0, here = k > 0 ? found[k].first - found[k - 1].first : 0;
+    const long stride = k > 0 ? found[1].first - found[0].first : 0,
+               here = k > 0 ? found[k].first - found[k - 1].first : 0;
     if (k > 0 && here == 0)
-    {
       throw std::runtime_error(found[k - 1].second + " and " + found[k].second + " are the same frame");
-    }
     if (here != stride)   // every so manieth frame is fine
     {
       const std::size_t gap = here > stride ? k : 1;
-      throw std::runtime_error("frame " + std::to_string(found[gap - 1].first + std::min(here, stride)) + " is missing between " + found[gap - 1].second +
-                               " and " + found[gap].second);
+      throw std::runtime_error("frame " + std::to_string(found[gap - 1].first + std::min(here, stride)) +
+                               " is missing between " + found[gap - 1].second + " and " + found[gap].second);
     }
     files.push_back(found[k].second);
   }
   return files;
 }
 
-std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double begin, const ReadContext& context, const GuideSource& source)
+std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double begin, const ReadContext& context,
+                                      const GuideSource& source)
 {
   const auto pattern = at.text();
   if (!pattern || source.config.mesh.vertices.cols() == 0)
-  {
     return std::nullopt;
-  }
   const auto star = pattern->find('*');
-  if (star == std::string::npos || pattern->find('*', star + 1) != std::string::npos || pattern->find('/', star) != std::string::npos)
+  if (star == std::string::npos || pattern->find('*', star + 1) != std::string::npos ||
+      pattern->find('/', star) != std::string::npos)
   {
     at.problem("must have one * in the name of the file, for example guide/frame_*.obj");
     return std::nullopt;
@@ -97,7 +94,8 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
   const TriangleMesh& mesh = source.config.mesh;
   if (3 * static_cast<std::size_t>(mesh.vertices.cols()) * files.size() > max_guide_numbers)
   {
-    at.problem("has " + std::to_string(files.size()) + " frames, too many for memory; leave out some and lower the rate");
+    at.problem("has " + std::to_string(files.size()) +
+               " frames, too many for memory; leave out some and lower the rate");
     return std::nullopt;
   }
   FrameGuide guide;
@@ -109,15 +107,14 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
       TriangleMesh frame = readMesh(files[k]);
       if (frame.vertices.cols() != mesh.vertices.cols() || frame.triangles != mesh.triangles)
       {
-        at.problem(files[k] + " has " + std::to_string(frame.vertices.cols()) + " vertices and " + std::to_string(frame.triangles.cols()) +
-                   " triangles, the guide's mesh has " + std::to_string(mesh.vertices.cols()) + " and " + std::to_string(mesh.triangles.cols()) +
+        at.problem(files[k] + " has " + std::to_string(frame.vertices.cols()) + " vertices and " +
+                   std::to_string(frame.triangles.cols()) + " triangles, the guide's mesh has " +
+                   std::to_string(mesh.vertices.cols()) + " and " + std::to_string(mesh.triangles.cols()) +
                    "; all frames must have the mesh's triangles, in its order");
         return std::nullopt;
       }
       if (source.file)
-      {
         source.file->place(frame.vertices);
-      }
       if (!(frame.vertices.cwiseAbs().maxCoeff() <= max_coordinate))
       {
         at.problem(files[k] + " has coordinates beyond " + shortNumber(max_coordinate) + " m");
@@ -132,9 +129,7 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
     }
   }
   if (begin <= 0)   // else the guide stands still until then
-  {
     guide.points.startInMotion();
-  }
   return GuideMotion(std::move(guide));
 }
 
@@ -146,29 +141,17 @@ std::optional<CarriedGuide> readGroups(const YamlCursor& at, const ReadContext& 
   std::vector<GuideBinding::Share> shares;
   const auto add = [&](const std::string& name, const std::vector<int>& group) {
     for (const int vertex : group)
-    {
       shares.push_back({vertex, static_cast<int>(guide.bodies.size()), 1.0});
-    }
     guide.bodies.push_back(name);
   };
   if (at.isScalar())
-  {
     for (const VertexGroup& group : readGroupsOf(at, context, source.file))
-    {
       add(group.name, group.vertices);
-    }
-  }
   else if (at.present())
-  {
     for (const auto& [name, list] : at.members())
-    {
       add(name, readIndexList(list, vertices));
-    }
-  }
   if (vertices == 0 || guide.bodies.empty())
-  {
     return std::nullopt;
-  }
   try
   {
     guide.binding = GuideBinding(source.config.mesh.vertices, std::vector<Pose>(guide.bodies.size()), shares);
@@ -186,9 +169,7 @@ void takeBodyPoses(const YamlCursor& at, const std::vector<BodyTrajectory>& reco
 {
   std::vector<std::string> names;
   for (const BodyTrajectory& body : recorded)
-  {
     names.push_back(body.body);
-  }
   for (const std::string& name : guide.bodies)
   {
     const auto found = std::find(names.begin(), names.end(), name);
@@ -205,9 +186,7 @@ void readBodyPoses(const YamlCursor& at, const ReadContext& context, CarriedGuid
 {
   const auto file = at.text();
   if (!file)
-  {
     return;
-  }
   try
   {
     takeBodyPoses(at, readPoseFile(context.resolve(*file)), guide);
@@ -222,9 +201,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
 {
   GuideMotion& motion = source.config.motion;
   if (!at.present())
-  {
     return;
-  }
   if (at.isScalar())
   {
     at.choice<bool>({{"fixed", true}});
@@ -232,30 +209,30 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   }
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const YamlCursor frames = map.get("frames"), bodies = map.get("bodies"), topic = map.get("topic"), bag = map.get("bag");
-  const YamlCursor rate = map.get("rate"), begin = map.get("begin"), groups = map.get("groups"), attach = map.get("attach"), late = map.get("late");
+  const YamlCursor frames = map.get("frames"), bodies = map.get("bodies"), topic = map.get("topic"),
+                   bag = map.get("bag");
+  const YamlCursor rate = map.get("rate"), begin = map.get("begin"), groups = map.get("groups"),
+                   attach = map.get("attach"), late = map.get("late");
   map.finish();
   if (frames.present() + bodies.present() + topic.present() + bag.present() != 1)
   {
     if (at.problems().size() == before)
     {
-      at.problem("must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {bag: FILE.bag}, {topic: points}, "
-                 "{topic: bodies, groups: obj}");
+      at.problem(
+          "must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {bag: "
+          "FILE.bag}, {topic: points}, "
+          "{topic: bodies, groups: obj}");
     }
     return;
   }
   const std::optional<bool> chosen = topic.choice<bool>({{"points", true}, {"bodies", false}});
   if (topic.present() && !chosen)
-  {
     return;
-  }
   const bool by_points = chosen.value_or(false);
   const bool by_bodies = bodies.present() || (topic.present() && !by_points) || (bag.present() && groups.present());
   const auto only_for = [](const YamlCursor& key, bool fits, const char* what) {
     if (key.present() && !fits)
-    {
       key.problem(std::string("is for ") + what);
-    }
   };
   only_for(rate, frames.present(), "frames");
   only_for(begin, frames.present() || bag.present(), "frames and bags");
@@ -267,14 +244,10 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   if (frames.present())
   {
     if (!rate.present())
-    {
       YamlMap(at).require("rate");
-    }
     const auto hertz = rate.number(Range::above(0, 1e6, "Hz"));
     if (hertz)
-    {
       assign(motion, readFrames(frames, *hertz, first, context, source));
-    }
     return;
   }
   if (by_points)
@@ -294,17 +267,13 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   }
   auto carried = readGroups(groups, context, source);
   if (!carried)
-  {
     return;
-  }
   assign(carried->keeps_offset, attach.choice<bool>({{"initial", true}, {"frame", false}}));
   if (bag.present())
   {
     const auto recorded = readBag(bag, context, true, first, object);
     if (!recorded)
-    {
       return;
-    }
     takeBodyPoses(bag, recorded->bodies, *carried);
   }
   else
@@ -312,9 +281,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
     readBodyPoses(bodies, context, *carried);
   }
   if (topic.present() || carried->poses.size() == carried->bodies.size())   // else reported
-  {
     motion = std::move(*carried);
-  }
 }
 
 /// A cloth of the scene as the guide.
@@ -322,54 +289,47 @@ void readPreview(const YamlCursor& at, const std::vector<ClothConfig>& cloths, G
 {
   const auto name = at.name();
   if (!name)
-  {
     return;
-  }
   std::vector<std::string> names;
   for (std::size_t k = 0; k < cloths.size(); ++k)
   {
     const ClothConfig& cloth = cloths[k];
     if (cloth.tracking)
-    {
       continue;
-    }
     names.push_back(cloth.name);
     if (cloth.name == *name)
     {
       source.config.mesh = cloth.mesh;
       source.grid = cloth.grid;
-      ClothGuide guide{static_cast<int>(k), cloth.start.cols() ? cloth.start : cloth.mesh.vertices, cloth.start_velocity};
+      ClothGuide guide{static_cast<int>(k), cloth.start.cols() ? cloth.start : cloth.mesh.vertices,
+                       cloth.start_velocity};
       if (guide.velocity.cols() == 0)
-      {
         guide.velocity.setZero(3, guide.start.cols());
-      }
       source.config.motion = std::move(guide);
       return;
     }
   }
-  at.problem(names.empty() ? "there is no such cloth: the scene has no cloths: [{...}]" : "there is no such cloth; the scene's cloths are: " + joinWords(names));
+  at.problem(names.empty() ? "there is no such cloth: the scene has no cloths: [{...}]"
+                           : "there is no such cloth; the scene's cloths are: " + joinWords(names));
 }
 
-}  // namespace
+}   // namespace
 
 std::optional<double> readLate(const YamlCursor& at)
 {
   if (!at.isMap())
-  {
     return at.choice<double>({{"hold", 0.0}, {"extrapolate", 0.2}});
-  }
   YamlMap map(at);
   const auto coast = map.require("extrapolate").number(Range::above(0, 60, "s"));
   map.finish();
   return coast;
 }
 
-std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& context, const std::optional<MeshFile>& file)
+std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& context,
+                                      const std::optional<MeshFile>& file)
 {
   if (!at.choice<bool>({{"obj", true}}))
-  {
     return {};
-  }
   if (!file)
   {
     at.problem("needs a mesh from an OBJ file, whose groups (g NAME) it takes; give {NAME: [vertices]} instead");
@@ -379,9 +339,7 @@ std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& c
   {
     std::vector<VertexGroup> groups = readObjGroups(context.resolve(file->path));
     if (groups.empty())
-    {
       at.problem(file->path + " has no groups (g NAME); give {NAME: [vertices]} instead");
-    }
     return groups;
   }
   catch (const std::exception& error)
@@ -391,7 +349,8 @@ std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& c
   }
 }
 
-GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths, const std::string& object)
+GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths,
+                      const std::string& object)
 {
   GuideSource source;
   YamlMap map(at);
@@ -399,12 +358,8 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
   if (cloth.present())
   {
     for (const YamlCursor& other : {mesh, grid, motion})
-    {
       if (other.present())
-      {
         other.problem("does not go with cloth, which is mesh and motion of the guide");
-      }
-    }
     readPreview(cloth, cloths, source);
     map.finish();
     return source;
@@ -413,7 +368,8 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
   {
     if (at.isMap())
     {
-      at.problem("must have one of mesh: {file: PATH}, grid: {corner: [...], sides: [[...], [...]], cells: N}, cloth: NAME");
+      at.problem(
+          "must have one of mesh: {file: PATH}, grid: {corner: [...], sides: [[...], [...]], cells: N}, cloth: NAME");
     }
   }
   else if (grid.present())
@@ -435,4 +391,4 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
   return source;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -14,11 +14,12 @@ BagReader& bagReader()
   return reader;
 }
 
-}  // namespace
+}   // namespace
 
 void setBagReader(BagReader reader) { bagReader() = std::move(reader); }
 
-std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& context, bool bodies, double begin, const std::string& object)
+std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& context, bool bodies, double begin,
+                                     const std::string& object)
 {
   BagSource source;
   source.bodies = bodies;
@@ -37,9 +38,7 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
     assign(source.file, at.text());
   }
   if (source.file.empty())
-  {
     return std::nullopt;
-  }
   source.file = context.resolve(source.file);
   if (!bagReader())
   {
@@ -50,9 +49,7 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
   {
     RecordedGuide recorded = bagReader()(source);
     if (!recorded.gaps.empty())
-    {
       at.warning(recorded.gaps);
-    }
     return recorded;
   }
   catch (const std::runtime_error& error)
@@ -62,18 +59,18 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
   }
 }
 
-void readBagPoints(const YamlCursor& at, const ReadContext& context, double begin, const std::string& object, GuideSource& source)
+void readBagPoints(const YamlCursor& at, const ReadContext& context, double begin, const std::string& object,
+                   GuideSource& source)
 {
   const Eigen::Index vertices = source.config.mesh.vertices.cols();
   auto recorded = readBag(at, context, false, begin, object);
   if (!recorded || vertices == 0)
-  {
     return;
-  }
   const Eigen::Matrix3Xd& first = recorded->points.frames().front();
   if (first.cols() != vertices)
   {
-    at.problem("has " + std::to_string(first.cols()) + " points, but the guide's mesh has " + std::to_string(vertices) + " vertices");
+    at.problem("has " + std::to_string(first.cols()) + " points, but the guide's mesh has " + std::to_string(vertices) +
+               " vertices");
     return;
   }
   for (const Eigen::Matrix3Xd& frame : recorded->points.frames())
@@ -85,10 +82,8 @@ void readBagPoints(const YamlCursor& at, const ReadContext& context, double begi
     }
   }
   if (begin <= 0)   // else the guide stands still until then
-  {
     recorded->points.startInMotion();
-  }
   source.config.motion = FrameGuide{std::move(recorded->points)};
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -29,9 +29,7 @@ std::optional<TableMotion> readTable(const YamlCursor& at, bool needs_orientatio
     }
     std::vector<double> numbers = *row;
     if (numbers.size() == 4)
-    {
       numbers.insert(numbers.end(), {0, 0, 0, 1});
-    }
     try
     {
       appendRecorded(motion.poses, numbers[0], checkedPose(numbers.data() + 1));
@@ -50,9 +48,7 @@ std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCurs
   const auto file = path.text();
   const auto name = body.text();
   if (!file || !name)
-  {
     return std::nullopt;
-  }
   try
   {
     auto bodies = readPoseFile(context.resolve(*file));
@@ -60,9 +56,7 @@ std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCurs
     for (BodyTrajectory& entry : bodies)
     {
       if (entry.body == *name)
-      {
         return TableMotion{std::move(entry.poses)};
-      }
       names.push_back(entry.body);
     }
     body.problem("is not in " + *file + "; it has: " + joinWords(names));
@@ -78,20 +72,16 @@ void checkTopic(const YamlCursor& topic)
 {
   const auto on = topic.boolean();
   if (on && !*on)
-  {
     topic.problem("must be true; without a topic it is written motion: fixed");
-  }
 }
 
-}  // namespace
+}   // namespace
 
 Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation)
 {
   Motion motion = FixedMotion{};
   if (!at.present())
-  {
     return motion;
-  }
   if (at.isScalar())
   {
     assign(motion, at.choice<Motion>({{"fixed", FixedMotion{}}, {"topic", TopicMotion{}}}));
@@ -105,9 +95,7 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
   if (given != 1)
   {
     if (at.problems().size() == before)
-    {
       at.problem("must be fixed or one of {topic: true}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}");
-    }
   }
   else if (topic.present())
   {
@@ -121,9 +109,7 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
   else if (file.present())
   {
     if (!body.present())
-    {
       body.problem("is missing; the file holds several bodies");
-    }
     assign(motion, readFileMotion(file, body, context));
   }
   else if (const auto name = body.text())
@@ -137,16 +123,13 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
 {
   const std::optional<GivenMotion> fixed = GivenMotion{FixedMotion{}};
   if (!at.present())
-  {
     return may_be_free ? std::nullopt : fixed;
-  }
   if (at.isScalar())
   {
-    std::vector<std::pair<std::string, std::optional<GivenMotion>>> words{{"fixed", fixed}, {"topic", GivenMotion{TopicMotion{}}}};
+    std::vector<std::pair<std::string, std::optional<GivenMotion>>> words{{"fixed", fixed},
+                                                                          {"topic", GivenMotion{TopicMotion{}}}};
     if (may_be_free)
-    {
       words.emplace_back("free", std::nullopt);
-    }
     return at.choice(words).value_or(fixed);
   }
   const std::size_t before = at.problems().size();
@@ -174,4 +157,4 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
   return poses ? GivenMotion{std::move(*poses)} : fixed;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -20,36 +20,45 @@ constexpr double max_scene_nodes = 1e7;
 /// What the parts need to know of the scene around them.
 struct ReadContext
 {
-  std::string directory;                   ///< files are relative to it
+  std::string directory;   ///< files are relative to it
   Eigen::Vector3d gravity{0, 0, -9.81};
-  double step = 0.01;                      ///< time.step [s]
-  mutable double nodes = 0;                ///< of rods and cloths so far
+  double step = 0.01;         ///< time.step [s]
+  mutable double nodes = 0;   ///< of rods and cloths so far
   std::string resolve(const std::string& path) const { return path[0] == '/' ? path : directory + "/" + path; }
-  /// Counts nodes that are about to be made; false, and reported, when the scene gets too many: a few words can ask for more than fits into memory.
+  /// Counts nodes that are about to be made; false, and reported, when the scene gets too many: a few words can ask for
+  /// more than fits into memory.
   bool claim(const YamlCursor& at, double more) const;
 };
 
-/// Whole numbers of [0, count), sorted; an entry "3..7" stands for all between, negative ones count from the end. `count` 0: not known,
-/// not checked. Empty when reported.
+/// Whole numbers of [0, count), sorted; an entry "3..7" stands for all between, negative ones count from the end.
+/// `count` 0: not known, not checked. Empty when reported.
 std::vector<int> readIndexList(const YamlCursor& at, int count);
 std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context);
 /// `edges` of the rod, or 0 when its centreline could not be read: then indices are not checked.
 /// Nodes held when edges first..last of the rod are (see GraspConfig); reports the joining edge of a closed rod.
 std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges);
-GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges);
+GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed,
+                      int edges);
 /// Point loads of a rod with so many edges (0: not known).
 std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, bool closed, int edges);
 CrossSection readCrossSection(const YamlCursor& at, int edges);
-/// Warns that contact treats elliptical sections of a rod as circles. Call this after its cross-section and its contact have been read.
+/// Warns that contact treats elliptical sections of a rod as circles. Call this after its cross-section and its contact
+/// have been read.
 void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod);
 Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
 /// A rod, and how many edges it has: 0 when its centreline could not be read.
-struct RodPart { RodConfig config; int edges = 0; };
+struct RodPart
+{
+  RodConfig config;
+  int edges = 0;
+};
 /// What rods of a scene and those of a generator have in common: curvature, formulation, material, damping, contact.
 void readTraits(YamlMap& map, RodConfig& rod);
-/// `track` of a rod with so many edges (0: not known), all else of which has been read; null without it, or when something was reported.
-std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context, const RodConfig& rod, int edges);
+/// `track` of a rod with so many edges (0: not known), all else of which has been read; null without it, or when
+/// something was reported.
+std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context,
+                                                       const RodConfig& rod, int edges);
 RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
 
 /// What the generators of a scene make, each with the place that asked for it. Welds count rods from `first_rod`.
@@ -70,13 +79,14 @@ std::optional<Pose> readPose(const YamlCursor& at);
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
 std::optional<RodContact> readRodContact(const YamlCursor& at);
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context);
-/// Chooses the edges and the break-up radius of threads whose entries `at` do not give them, and says what is not resolved. All other
-/// objects of the scene, its gravity and its time have been read.
+/// Chooses the edges and the break-up radius of threads whose entries `at` do not give them, and says what is not
+/// resolved. All other objects of the scene, its gravity and its time have been read.
 void completeThreads(SceneConfig& scene, const std::vector<YamlCursor>& at);
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context);
 /// The list `tracked`: appends to the cloths.
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
-ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods, const std::vector<ThreadConfig>& threads);
+ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods,
+                          const std::vector<ThreadConfig>& threads);
 std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodPart>& rods);
@@ -90,4 +100,4 @@ void checkStatics(const YamlCursor& at, const SceneConfig& scene);
 /// Reports fields that nothing in the scene has; called when all objects have been read.
 void checkRecord(const YamlCursor& at, const SceneConfig& scene);
 
-}  // namespace slender
+}   // namespace slender

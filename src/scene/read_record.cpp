@@ -28,7 +28,8 @@ void checkRecord(const YamlCursor& at, const SceneConfig& scene)
   if (scene.record.fields.empty() || !at.problems().empty())
     return;
   const YamlCursor fields = YamlMap(at).get("fields");
-  const bool bodies = std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyConfig& body) { return !body.motion; });
+  const bool bodies =
+      std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyConfig& body) { return !body.motion; });
   for (const YamlCursor& item : fields.items())
   {
     const auto field = item.choice(recordFieldNames());
@@ -38,16 +39,19 @@ void checkRecord(const YamlCursor& at, const SceneConfig& scene)
       item.problem("is recorded of rods, cloths and simulated bodies, and the scene has none; leave it out");
     if (*field == RecordField::contact_force && scene.rods.empty() && scene.cloths.empty())
       item.problem("is recorded of rods and cloths, and the scene has none; leave it out");
-    const bool of_threads = *field == RecordField::curvature || *field == RecordField::strain || *field == RecordField::force;
+    const bool of_threads =
+        *field == RecordField::curvature || *field == RecordField::strain || *field == RecordField::force;
     if (*field < RecordField::energy && scene.rods.empty() && !(of_threads && !scene.threads.empty()))
       item.problem(of_threads ? "is recorded of rods and threads, and the scene has none; leave it out"
                               : "is recorded of rods, and the scene has none; leave it out");
-    const auto projected = std::find_if(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.stretching == Stretching::projected; });
+    const auto projected = std::find_if(scene.rods.begin(), scene.rods.end(),
+                                        [](const RodConfig& rod) { return rod.stretching == Stretching::projected; });
     if (*field == RecordField::force && projected != scene.rods.end())
       item.problem("is not known of rod " + projected->name +
-                   ", whose edges keep their lengths by projection (stretching: projected): its tension is no function of the state; "
+                   ", whose edges keep their lengths by projection (stretching: projected): its tension is no function "
+                   "of the state; "
                    "leave it out, or take stretching: stiff");
   }
 }
 
-}  // namespace slender
+}   // namespace slender

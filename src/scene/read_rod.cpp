@@ -26,9 +26,7 @@ void checkCount(const YamlCursor& at, std::size_t count, int edges)
 std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   if (!at.isList())
   {
     const auto alpha = at.number(stiffness);
@@ -36,9 +34,7 @@ std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
   }
   const auto rows = at.items(2, 2);
   if (rows.empty())
-  {
     return std::nullopt;
-  }
   Eigen::Matrix2d B = Eigen::Matrix2d::Zero();
   if (!rows[0].isList() && !rows[1].isList())
   {
@@ -53,9 +49,7 @@ std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
     {
       const auto value = entries.empty() ? std::nullopt : entries[j].number(Range::closed(-1e15, 1e15, "N m^2"));
       if (!value)
-      {
         return std::nullopt;
-      }
       B(i, j) = *value;
     }
   }
@@ -71,9 +65,7 @@ std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
 void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod, int edges)
 {
   if (!at.present())
-  {
     return;
-  }
   for (const auto& [name, value] : at.members())
   {
     const std::size_t before = value.problems().size();
@@ -108,9 +100,7 @@ int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
   const YamlCursor director = map.get("director");
   assign(rod.director, director.vector3(Range::closed(-1e6, 1e6)));
   if (map.at().problems().size() != before)
-  {
     return 0;
-  }
   try
   {
     const Eigen::Matrix3Xd rest = restNodes(rod, context.gravity);
@@ -130,9 +120,7 @@ int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
     }
     const Eigen::Vector3d tangent = rest.col(1) - rest.col(0);
     if (rod.director.norm() > 0 && rod.director.cross(tangent).norm() < 1e-6 * rod.director.norm() * tangent.norm())
-    {
       director.problem("is along the first edge; must point away from it");
-    }
     return edges;
   }
   catch (const std::invalid_argument& error)
@@ -161,9 +149,8 @@ void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
   const std::size_t joints = edges == 0 ? 0 : rod.closed ? edges : edges - 1;
   const auto checkJoints = [joints, &rod](const YamlCursor& at, std::size_t count) {
     if (joints > 0 && count != 1 && count != joints)
-    {
-      at.problem("has " + std::to_string(count) + " entries; must have 1 or " + std::to_string(joints) + (rod.closed ? " (one per node)" : " (one per inner node)"));
-    }
+      at.problem("has " + std::to_string(count) + " entries; must have 1 or " + std::to_string(joints) +
+                 (rod.closed ? " (one per node)" : " (one per inner node)"));
   };
   if (const auto twist = at_twist.numbers(Range::closed(-1e5, 1e5, "rad")))
   {
@@ -171,16 +158,12 @@ void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
     rod.rest_twist = *twist;
   }
   if (!at_curvature.present())
-  {
     return;
-  }
   const Range curvature = Range::closed(-1e6, 1e6, "1/m");
   const auto pair = [&curvature](const YamlCursor& at) {
     const auto values = at.numbers(curvature);
     if (values && values->size() != 2)
-    {
       at.problem("must be [kappa1, kappa2]");
-    }
     return values && values->size() == 2 ? Eigen::Vector2d((*values)[0], (*values)[1]) : Eigen::Vector2d(0, 0);
   };
   const auto entries = at_curvature.items(1);
@@ -191,50 +174,43 @@ void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
   else
   {
     for (const YamlCursor& entry : entries)
-    {
       rod.natural_curvature.push_back(pair(entry));
-    }
     checkJoints(at_curvature, entries.size());
   }
   if (rod.naturally_straight)
-  {
     at_curvature.problem("contradicts naturally_straight: true; leave one of them out");
-  }
   if (rod.joints.matched_to_arcs)
   {
-    at_curvature.problem("contradicts matched_to_arcs: true, whose arcs are those of the centreline; leave one of them out");
+    at_curvature.problem(
+        "contradicts matched_to_arcs: true, whose arcs are those of the centreline; leave one of them out");
   }
 }
 
-/// Moduli that the scene leaves out may only follow from a Young's modulus that it states: the default one has nothing to do with the
-/// moduli that are given. A Young's modulus that nothing follows from is worth a warning.
+/// Moduli that the scene leaves out may only follow from a Young's modulus that it states: the default one has nothing
+/// to do with the moduli that are given. A Young's modulus that nothing follows from is worth a warning.
 void checkModuli(const YamlMap& material, const YamlCursor& at_youngs)
 {
   std::vector<std::string> given, missing;
   for (const char* key : {"stretch_modulus", "bend_modulus", "twist_modulus"})
-  {
     (material.has(key) ? given : missing).push_back(key);
-  }
   if (!given.empty() && !missing.empty() && !at_youngs.present())
   {
-    material.at().problem("gives " + joinWords(given) + " but not " + joinWords(missing) + "; give " + (missing.size() == 1 ? "this too" : "these too") +
-                          ", or youngs_modulus (and poissons_ratio), from which the rest follows with the cross-section");
+    material.at().problem(
+        "gives " + joinWords(given) + " but not " + joinWords(missing) + "; give " +
+        (missing.size() == 1 ? "this too" : "these too") +
+        ", or youngs_modulus (and poissons_ratio), from which the rest follows with the cross-section");
   }
   if (missing.empty() && at_youngs.present())
-  {
     at_youngs.warning("has no effect, since stretch_modulus, bend_modulus and twist_modulus are given; leave it out");
-  }
 }
 
-}  // namespace
+}   // namespace
 
 CrossSection readCrossSection(const YamlCursor& at, int edges)
 {
   CrossSection section{{0.005}, {0.005}};
   if (!at.present())
-  {
     return section;
-  }
   YamlMap map(at);
   const YamlCursor round = map.get("radius"), ellipse = map.get("ellipse");
   map.finish();
@@ -268,10 +244,9 @@ CrossSection readCrossSection(const YamlCursor& at, int edges)
 void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod)
 {
   if (!rod.contact)
-  {
     return;
-  }
-  // an entry list is one number, the two ends of a taper, or one number per edge; the most eccentric section is the one to name
+  // an entry list is one number, the two ends of a taper, or one number per edge; the most eccentric section is the one
+  // to name
   const CrossSection& section = rod.cross_section;
   const std::size_t count = std::max(section.a.size(), section.b.size());
   const auto entry = [count](const std::vector<double>& list, std::size_t k) {
@@ -280,7 +255,8 @@ void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod)
   double worst = 1.0, a = 0.0, b = 0.0;
   for (std::size_t k = 0; k < count; ++k)
   {
-    const double here_a = entry(section.a, k), here_b = entry(section.b, k), ratio = std::max(here_a / here_b, here_b / here_a);
+    const double here_a = entry(section.a, k), here_b = entry(section.b, k),
+                 ratio = std::max(here_a / here_b, here_b / here_a);
     if (ratio > worst)
     {
       worst = ratio;
@@ -290,9 +266,10 @@ void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod)
   }
   if (worst > 1.0 + 1e-9)   // round-off of half-axes that are meant to be equal
   {
-    at_section.warning("rod " + rod.name + " has elliptical sections (half-axes " + shortNumber(a) + " m and " + shortNumber(b) +
-                       " m), but contact treats each section as a circle of the larger half-axis, " + shortNumber(std::max(a, b)) +
-                       " m; bending and twisting use the ellipse. Give the rod a round section or leave out its contact");
+    at_section.warning(
+        "rod " + rod.name + " has elliptical sections (half-axes " + shortNumber(a) + " m and " + shortNumber(b) +
+        " m), but contact treats each section as a circle of the larger half-axis, " + shortNumber(std::max(a, b)) +
+        " m; bending and twisting use the ellipse. Give the rod a round section or leave out its contact");
   }
 }
 
@@ -304,7 +281,8 @@ Material readMaterial(const YamlCursor& at)
   const YamlCursor at_youngs = map.get("youngs_modulus");
   assign(material.youngs_modulus, at_youngs.number(Range::above(0, 1e15, "Pa")));
   assign(material.poissons_ratio, map.get("poissons_ratio").number(Range::above(-1, 0.5)));
-  assign(material.torsion, map.get("torsion").choice<Torsion>({{"polar", Torsion::polar}, {"saint_venant", Torsion::saint_venant}}));
+  assign(material.torsion,
+         map.get("torsion").choice<Torsion>({{"polar", Torsion::polar}, {"saint_venant", Torsion::saint_venant}}));
   material.linear_density = map.get("linear_density").number(Range::above(0, 1e6, "kg/m"));
   material.stretch_modulus = map.get("stretch_modulus").number(modulus);
   assign(material.inextensible, map.get("inextensible").boolean());
@@ -328,17 +306,22 @@ Damping readDamping(const YamlCursor& at)
 
 void readTraits(YamlMap& map, RodConfig& rod)
 {
-  const auto curvature = map.get("curvature").choice<std::optional<Curvature>>(
-      {{"auto", std::nullopt}, {"tangent", Curvature::tangent}, {"compensated", Curvature::compensated}});
+  const auto curvature =
+      map.get("curvature")
+          .choice<std::optional<Curvature>>(
+              {{"auto", std::nullopt}, {"tangent", Curvature::tangent}, {"compensated", Curvature::compensated}});
   if (curvature && *curvature)
   {
     rod.automatic_curvature = false;
     rod.joints.curvature = **curvature;
   }
-  assign(rod.formulation,
-         map.get("formulation").choice<Formulation>(
-             {{"auto", Formulation::automatic}, {"isotropic", Formulation::isotropic}, {"general", Formulation::general}}));
-  assign(rod.stretching, map.get("stretching").choice<Stretching>({{"stiff", Stretching::stiff}, {"projected", Stretching::projected}}));
+  assign(rod.formulation, map.get("formulation")
+                              .choice<Formulation>({{"auto", Formulation::automatic},
+                                                    {"isotropic", Formulation::isotropic},
+                                                    {"general", Formulation::general}}));
+  assign(
+      rod.stretching,
+      map.get("stretching").choice<Stretching>({{"stiff", Stretching::stiff}, {"projected", Stretching::projected}}));
   rod.material = readMaterial(map.get("material"));
   rod.damping = readDamping(map.get("damping"));
   rod.contact = readRodContact(map.get("contact"));
@@ -356,15 +339,14 @@ RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::str
   assign(rod.joints.matched_to_arcs, matched.boolean());
   if (rod.joints.matched_to_arcs && rod.naturally_straight)
   {
-    matched.problem("must not be true of a rod with naturally_straight: true, which has no arcs to match its joints to");
+    matched.problem(
+        "must not be true of a rod with naturally_straight: true, which has no arcs to match its joints to");
   }
   assign(rod.initial_twist, map.get("initial_twist").number(Range::closed(-1e5, 1e5, "rad")));
   const int edges = readCenterline(map, context, rod);
   readNaturalFrames(map, rod, edges);
   if (edges > 0 && rod.initial)
-  {
     checkInitial(map, context, rod);
-  }
   const YamlCursor at_section = map.get("cross_section");
   rod.cross_section = readCrossSection(at_section, edges);
   readTraits(map, rod);
@@ -376,4 +358,4 @@ RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::str
   return {std::move(rod), edges};
 }
 
-}  // namespace slender
+}   // namespace slender

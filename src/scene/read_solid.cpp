@@ -22,16 +22,15 @@ Eigen::Quaterniond fromRpy(const Eigen::Vector3d& rpy)
 {
   using Eigen::AngleAxisd;
   using Eigen::Vector3d;
-  return AngleAxisd(rpy.z(), Vector3d::UnitZ()) * AngleAxisd(rpy.y(), Vector3d::UnitY()) * AngleAxisd(rpy.x(), Vector3d::UnitX());
+  return AngleAxisd(rpy.z(), Vector3d::UnitZ()) * AngleAxisd(rpy.y(), Vector3d::UnitY()) *
+         AngleAxisd(rpy.x(), Vector3d::UnitX());
 }
 
 Plane readPlane(YamlMap& map, std::optional<Pose>& pose)
 {
   const YamlCursor point = map.get("point"), normal = map.get("normal");
   if (!point.present() && !normal.present())
-  {
     return {};
-  }
   if (pose)
   {
     map.at().problem("has a point or normal, and there is a pose as well; give one or the other");
@@ -72,9 +71,7 @@ std::optional<Shape> readMesh(YamlMap& map, const ReadContext& context)
   const double scale = map.get("scale").number(Range::above(0, 1e6)).value_or(1.0);
   const auto path = file.text();
   if (!path)
-  {
     return std::nullopt;
-  }
   try
   {
     requireRegularFile(context.resolve(*path));
@@ -89,14 +86,12 @@ std::optional<Shape> readMesh(YamlMap& map, const ReadContext& context)
   }
 }
 
-}  // namespace
+}   // namespace
 
 std::optional<Pose> readPose(const YamlCursor& at)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   Pose pose;
   YamlMap map(at);
   assign(pose.position, map.get("position").vector3(coordinate));
@@ -111,7 +106,8 @@ std::optional<Pose> readPose(const YamlCursor& at)
     const auto entries = orientation.numbers(Range::closed(-2, 2));
     if (entries && entries->size() != 4)
     {
-      orientation.problem("has " + std::to_string(entries->size()) + " entries; must be a unit quaternion [x, y, z, w]");
+      orientation.problem("has " + std::to_string(entries->size()) +
+                          " entries; must be a unit quaternion [x, y, z, w]");
     }
     else if (entries)
     {
@@ -136,9 +132,7 @@ std::optional<Pose> readPose(const YamlCursor& at)
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   const std::size_t before = at.problems().size();
   if (!at.isMap())
   {
@@ -171,12 +165,11 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
   kinds.finish();
   if (given != 1 && at.problems().size() == before)
   {
-    at.problem("names " + std::to_string(given) + " shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh");
+    at.problem("names " + std::to_string(given) +
+               " shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh");
   }
   if (at.problems().size() != before)
-  {
     return std::nullopt;
-  }
   try
   {
     checkShape(*shape);
@@ -191,14 +184,13 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
 
 namespace {
 
-/// Reads the contact of rods or threads. `others`: the key for contact with objects of the same kind, and the member that it sets.
+/// Reads the contact of rods or threads. `others`: the key for contact with objects of the same kind, and the member
+/// that it sets.
 template <class Contact>
 std::optional<Contact> readTouch(const YamlCursor& at, const char* others, bool Contact::*touches_others)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   Contact contact;
   YamlMap map(at);
   assign(contact.self, map.get("self").boolean());
@@ -209,13 +201,17 @@ std::optional<Contact> readTouch(const YamlCursor& at, const char* others, bool 
   return contact;
 }
 
-}  // namespace
+}   // namespace
 
 std::optional<RodContact> readRodContact(const YamlCursor& at) { return readTouch(at, "rods", &RodContact::rods); }
 
-std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at) { return readTouch(at, "threads", &ThreadContactConfig::threads); }
+std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at)
+{
+  return readTouch(at, "threads", &ThreadContactConfig::threads);
+}
 
-ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods, const std::vector<ThreadConfig>& threads)
+ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods,
+                          const std::vector<ThreadConfig>& threads)
 {
   ContactConfig contact;
   const std::size_t before = at.problems().size();
@@ -226,23 +222,18 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods
     if (rod.config.contact)
     {
       for (const auto* radii : {&rod.config.cross_section.a, &rod.config.cross_section.b})
-      {
         for (double radius : *radii)
-        {
           smallest = std::min(smallest, radius);
-        }
-      }
     }
   }
   for (const ThreadConfig& thread : threads)
   {
     if (thread.contact)
     {
-      smallest = std::min(smallest, thread.nozzle ? 0.125 * thread.nozzle->diameter : std::numeric_limits<double>::infinity());
+      smallest =
+          std::min(smallest, thread.nozzle ? 0.125 * thread.nozzle->diameter : std::numeric_limits<double>::infinity());
       for (double radius : thread.radius)
-      {
         smallest = std::min(smallest, radius);
-      }
     }
   }
   const bool any = std::isfinite(smallest);
@@ -252,8 +243,10 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods
   map.finish();
   if (at.present() && !any && at.problems().size() == before)
   {
-    at.problem("no rod or thread takes part; give those that do a contact of their own, for example contact: {friction: 0.3} (a cloth's own says its "
-               "thickness instead of a gap)");
+    at.problem(
+        "no rod or thread takes part; give those that do a contact of their own, for example contact: {friction: 0.3} "
+        "(a cloth's own says its "
+        "thickness instead of a gap)");
   }
   return contact;
 }
@@ -262,9 +255,7 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
 {
   std::vector<ObstacleConfig> obstacles;
   if (!at.present())
-  {
     return obstacles;
-  }
   const auto entries = at.items(0, 100'000);
   for (std::size_t k = 0; k < entries.size(); ++k)
   {
@@ -281,7 +272,8 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
     {
       if (pose)
       {
-        (at_pose.present() ? at_pose : map.at()).problem("there is a table of poses as well; the obstacle starts at its first");
+        (at_pose.present() ? at_pose : map.at())
+            .problem("there is a table of poses as well; the obstacle starts at its first");
       }
       pose = table->poses.evaluate(table->poses.firstTime());
     }
@@ -292,4 +284,4 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
   return obstacles;
 }
 
-}  // namespace slender
+}   // namespace slender

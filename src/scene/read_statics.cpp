@@ -15,18 +15,14 @@ void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
   if (at.present() == node.present())
   {
     if (map.at().isMap())
-    {
       map.at().problem("must have either at: start, end or an arc length [m], or node: INDEX");
-    }
     return;
   }
   const int nodes = edges == 0 ? max_edges + 1 : edges + (closed ? 0 : 1);
   if (node.present())
   {
     if (const auto index = node.integer(-nodes, nodes - 1))
-    {
       load.node = *index < 0 ? *index + nodes : *index;
-    }
     return;
   }
   const std::string word = at.isScalar() ? at.tree()->scalar : "";
@@ -34,9 +30,7 @@ void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
   {
     load.node = word == "start" ? 0 : nodes - 1;
     if (closed)
-    {
       at.problem("is not for a closed rod, which has no ends; give an arc length [m], or node: INDEX");
-    }
     return;
   }
   assign(load.arc_length, at.number(Range::closed(0, 1e9, "m, start or end")));
@@ -51,9 +45,12 @@ RodLoadConfig readRodLoad(const YamlCursor& at, bool closed, int edges)
   assign(load.force, force.vector3(Range::closed(-1e15, 1e15, "N")));
   if (torque.isList())
   {
-    torque.problem("is a vector, and a torque that keeps its direction in the world has no potential: its work depends on the way that the rod turns, so "
-                   "that no energy tells which equilibrium is stable; must be a number [N m] about the tangent. For a bending moment give a couple: force: "
-                   "F at one node and force: -F at the next");
+    torque.problem(
+        "is a vector, and a torque that keeps its direction in the world has no potential: its work depends on the way "
+        "that the rod turns, so "
+        "that no energy tells which equilibrium is stable; must be a number [N m] about the tangent. For a bending "
+        "moment give a couple: force: "
+        "F at one node and force: -F at the next");
   }
   else
   {
@@ -61,18 +58,14 @@ RodLoadConfig readRodLoad(const YamlCursor& at, bool closed, int edges)
   }
   map.finish();
   if (at.isMap() && !force.present() && !torque.present())
-  {
     at.problem("has neither force: [x, y, z] nor torque; must have one of them");
-  }
   return load;
 }
 
 std::optional<PathConfig> readPath(const YamlCursor& at)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   PathConfig path;
   YamlMap map(at);
   assign(path.from, map.get("from").number(factor_range));
@@ -80,9 +73,7 @@ std::optional<PathConfig> readPath(const YamlCursor& at)
   assign(path.to, to.number(factor_range));
   assign(path.steps, map.get("steps").integer(1, 100'000));
   if (path.from == path.to)
-  {
     to.problem("is the factor that the path starts from; must differ from it");
-  }
   map.finish();
   return path;
 }
@@ -92,9 +83,7 @@ std::optional<double> readBuckling(const YamlCursor& at)
 {
   constexpr double kFarEnough = 1e6;
   if (!at.present())
-  {
     return std::nullopt;
-  }
   if (at.isMap())
   {
     YamlMap map(at);
@@ -109,39 +98,25 @@ std::optional<double> readBuckling(const YamlCursor& at)
 std::string whyNotAlone(const SceneConfig& scene)
 {
   if (scene.rods.size() != 1)
-  {
     return "there are " + std::to_string(scene.rods.size()) + " rods";
-  }
   if (scene.rods[0].contact)
-  {
     return "rod " + scene.rods[0].name + " has contact";
-  }
   if (!scene.cloths.empty())
-  {
     return "there is the cloth " + scene.cloths[0].name;
-  }
   for (const BodyConfig& body : scene.bodies)
-  {
     if (!body.motion || !body.welds.empty())
-    {
       return "there is the body " + body.name;
-    }
-  }
   return "";
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, bool closed, int edges)
 {
   std::vector<RodLoadConfig> loads;
   if (at.present())
-  {
     for (const YamlCursor& item : at.items(1, 10'000))
-    {
       loads.push_back(readRodLoad(item, closed, edges));
-    }
-  }
   return loads;
 }
 
@@ -160,18 +135,14 @@ StartConfig readStart(const YamlCursor& at)
   assign(start.accept_unstable, map.get("accept_unstable").boolean());
   map.finish();
   if (start.keep_velocities && !start.equilibrium)
-  {
     keep.problem("needs equilibrium: true; a scene that starts as given keeps all velocities anyway");
-  }
   return start;
 }
 
 std::optional<StaticsConfig> readStatics(const YamlCursor& at)
 {
   if (!at.present())
-  {
     return std::nullopt;
-  }
   StaticsConfig statics;
   YamlMap map(at);
   const YamlCursor factors = map.get("factors"), path = map.get("path"), perturbation = map.get("perturbation");
@@ -179,17 +150,14 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
   {
     statics.factors = *values;
     if (values->empty())
-    {
       factors.problem("is empty; must have at least one factor");
-    }
   }
   statics.path = readPath(path);
   if (factors.present() && path.present())
-  {
     path.problem("and factors are two ways to choose the factors; leave one of them out");
-  }
-  assign(statics.scales, map.get("scales").choice<FactorScales>(
-                           {{"all", FactorScales::all}, {"gravity", FactorScales::gravity}, {"loads", FactorScales::loads}}));
+  assign(statics.scales,
+         map.get("scales").choice<FactorScales>(
+             {{"all", FactorScales::all}, {"gravity", FactorScales::gravity}, {"loads", FactorScales::loads}}));
   assign(statics.perturbation, perturbation.number(Range::closed(-1, 1)));
   statics.buckling = readBuckling(map.get("buckling"));
   map.finish();
@@ -199,32 +167,33 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
 void checkStatics(const YamlCursor& at, const SceneConfig& scene)
 {
   if (!scene.statics)
-  {
     return;
-  }
   const StaticsConfig& statics = *scene.statics;
   if (!scene.threads.empty())
-  {
     at.problem("is for rods, cloths and bodies; the scene has threads, which flow");
-  }
   YamlMap map(at);
   const std::string joined = whyNotAlone(scene);
-  for (const auto& [key, given] : {std::make_pair("path", statics.path.has_value()), std::make_pair("buckling", statics.buckling.has_value()),
-                                   std::make_pair("perturbation", statics.perturbation != 0)})
+  for (const auto& [key, given] :
+       {std::make_pair("path", statics.path.has_value()), std::make_pair("buckling", statics.buckling.has_value()),
+        std::make_pair("perturbation", statics.perturbation != 0)})
   {
     if (given && !joined.empty())
     {
-      map.get(key).problem("is for scenes of one rod that touches nothing and carries no body, but " + joined + "; factors can be given for all scenes");
+      map.get(key).problem("is for scenes of one rod that touches nothing and carries no body, but " + joined +
+                           "; factors can be given for all scenes");
     }
   }
   const auto bears = [](const auto& object) { return !object.loads.empty(); };
-  const bool loaded = std::any_of(scene.rods.begin(), scene.rods.end(), bears) || std::any_of(scene.cloths.begin(), scene.cloths.end(), bears);
+  const bool loaded = std::any_of(scene.rods.begin(), scene.rods.end(), bears) ||
+                      std::any_of(scene.cloths.begin(), scene.cloths.end(), bears);
   const bool weighs = scene.gravity.norm() > 0 && statics.scales != FactorScales::loads;
   const bool pulls = loaded && statics.scales != FactorScales::gravity;
   if (!weighs && !pulls)
   {
-    at.problem("has nothing to scale: a load factor multiplies gravity and the loads of rods and cloths (scales); give one of them");
+    at.problem(
+        "has nothing to scale: a load factor multiplies gravity and the loads of rods and cloths (scales); give one of "
+        "them");
   }
 }
 
-}  // namespace slender
+}   // namespace slender

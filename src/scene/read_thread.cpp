@@ -38,9 +38,7 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
   {
     timed.topic = topic.boolean().value_or(true);
     if (!timed.topic)
-    {
       topic.problem("must be true; without a topic it is written as a number");
-    }
     timed.table = constant(initial.number(range).value_or(0.0));
   }
   else
@@ -52,9 +50,7 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
       const auto time = pair.empty() ? std::nullopt : pair[0].number(Range::closed(-1e9, 1e9, "s"));
       const auto value = pair.empty() ? std::nullopt : pair[1].number(range);
       if (time && value)
-      {
         entries.push_back({*time, *value});
-      }
     }
     try
     {
@@ -79,21 +75,18 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double
   nozzle.pose.orientation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), along);
   const YamlCursor flow = map.get("flow");
   if (flow.present())
-  {
     nozzle.flow = readTimed(flow, Range::closed(0, 1e3, "m^3/s"));
-  }
   assign(nozzle.motion, readSolidMotion(map.get("motion"), context, false));
   const YamlCursor at_swirl = map.get("swirl");
   assign(swirl, at_swirl.number(Range::closed(0, 1, "of the coil's radius")));
   if (swirl > 0 && !std::holds_alternative<FixedMotion>(nozzle.motion))
-  {
     at_swirl.problem("is for nozzles that stand; this one has a motion of its own");
-  }
   if (const auto* table = std::get_if<TableMotion>(&nozzle.motion))
   {
     if (position.present() || direction.present())
     {
-      (position.present() ? position : direction).problem("there is a table of poses as well; the nozzle starts at its first");
+      (position.present() ? position : direction)
+          .problem("there is a table of poses as well; the nozzle starts at its first");
     }
     nozzle.pose = table->poses.evaluate(0.0);
   }
@@ -114,9 +107,7 @@ FloorConfig readFloor(const YamlCursor& at)
     const YamlCursor x = velocity.get("x"), y = velocity.get("y"), topic = velocity.get("topic");
     velocity.finish();
     if (topic.present())
-    {
       floor.belt_x.topic = floor.belt_y.topic = topic.boolean().value_or(true);
-    }
     if (x.present())
     {
       const bool on_topic = floor.belt_x.topic;
@@ -135,7 +126,8 @@ FloorConfig readFloor(const YamlCursor& at)
     const auto velocity = belt.numbers(speed);
     if (velocity && velocity->size() != 2)
     {
-      belt.problem("has " + std::to_string(velocity->size()) + " numbers; must be [vx, vy] in m/s, or {x: ..., y: ..., topic: true}");
+      belt.problem("has " + std::to_string(velocity->size()) +
+                   " numbers; must be [vx, vy] in m/s, or {x: ..., y: ..., topic: true}");
     }
     else if (velocity)
     {
@@ -147,9 +139,7 @@ FloorConfig readFloor(const YamlCursor& at)
   assign(floor.on_surface, on_surface.boolean());
   floor.friction = friction.number(Range::closed(0, 100, "[-]"));
   if (floor.friction && floor.on_surface)
-  {
     on_surface.problem("is for floors that the thread sticks to, without floor.friction");
-  }
   map.finish();
   return floor;
 }
@@ -163,12 +153,11 @@ void readEdges(const YamlCursor& at, ThreadConfig& thread)
   assign(thread.shortest_edge, shortest.number(length));
   assign(thread.most_deposited, map.get("deposited").integer(4, 10'000'000, "nodes"));
   if (feed.present() && !thread.nozzle)
-  {
     feed.problem("is for threads with a nozzle");
-  }
   if (shortest.present() && thread.longest_edge > 0 && thread.shortest_edge > 0.4 * thread.longest_edge)
   {
-    shortest.problem("must be at most 0.4 of edges.longest (" + shortNumber(0.4 * thread.longest_edge) + " m), or edges would be joined and divided in turn");
+    shortest.problem("must be at most 0.4 of edges.longest (" + shortNumber(0.4 * thread.longest_edge) +
+                     " m), or edges would be joined and divided in turn");
   }
   map.finish();
 }
@@ -176,11 +165,10 @@ void readEdges(const YamlCursor& at, ThreadConfig& thread)
 /// true, false or {until: SHARE}.
 void readMerging(const YamlCursor& at, ThreadConfig& thread)
 {
-  constexpr double half_discs = 0.6;   // distance of the centroids of the halves of a round section, over twice the radius before
+  // distance of the centroids of the halves of a round section, over twice the radius before
+  constexpr double half_discs = 0.6;
   if (!at.present())
-  {
     return;
-  }
   if (at.isMap())
   {
     YamlMap map(at);
@@ -193,9 +181,7 @@ void readMerging(const YamlCursor& at, ThreadConfig& thread)
     thread.merging = half_discs;
   }
   if (thread.merging > 0 && !thread.contact)
-  {
     at.problem("is for parts that touch; give the thread a contact, for example contact: {self: true}");
-  }
 }
 
 ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
@@ -210,7 +196,8 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
   assign(thread.surface_tension, fluid.get("surface_tension").number(Range::closed(0, 1e3, "N/m")));
   fluid.finish();
 
-  const YamlCursor nozzle = map.get("nozzle"), centerline = map.get("centerline"), radius = map.get("radius"), ends = map.get("ends");
+  const YamlCursor nozzle = map.get("nozzle"), centerline = map.get("centerline"), radius = map.get("radius"),
+                   ends = map.get("ends");
   if (nozzle.present() == centerline.present())
   {
     at.problem("must have either a nozzle that it flows out of, or a centerline (with radius)");
@@ -219,21 +206,15 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
   {
     thread.nozzle = readNozzle(nozzle, context, thread.swirl);
     for (const YamlCursor& other : {radius, ends})
-    {
       if (other.present())
-      {
         other.problem("is for threads with a centerline; the nozzle says it here");
-      }
-    }
   }
   else
   {
     thread.centerline = readCurve(centerline, context);
     thread.radius = radius.numbers(Range::above(0, 10, "m")).value_or(std::vector<double>{});
     if (!radius.present())
-    {
       map.require("radius");
-    }
     if (thread.centerline && !thread.radius.empty())
     {
       try
@@ -248,22 +229,22 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
     YamlMap held(ends);
     const char* names[2] = {"oldest", "newest"};
     for (int end = 0; end < 2; ++end)
-    {
       assign(thread.held[end], held.get(names[end]).choice<bool>({{"free", false}, {"held", true}}));
-    }
     held.finish();
   }
   const YamlCursor floor = map.get("floor");
   if (floor.present())
-  {
     thread.floor = readFloor(floor);
-  }
   thread.contact = readThreadContact(map.get("contact"));
   readMerging(map.get("merging"), thread);
   if (thread.floor && thread.floor->friction && !(thread.contact && thread.contact->obstacles))
   {
-    YamlMap(floor).get("friction").problem("makes the floor an obstacle, which this thread does not touch; give it contact: {obstacles: true}, or leave "
-                                           "friction out, then it sticks");
+    YamlMap(floor)
+        .get("friction")
+        .problem(
+            "makes the floor an obstacle, which this thread does not touch; give it contact: {obstacles: true}, or "
+            "leave "
+            "friction out, then it sticks");
   }
   readEdges(map.get("edges"), thread);
   assign(thread.breakup_radius, map.get("breakup_radius").number(Range::closed(0, max_coordinate, "m")));
@@ -276,27 +257,21 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
     const Range anywhere = Range::closed(-1e9, 1e9, "m");
     const auto a = low.vector3(anywhere), b = high.vector3(anywhere);
     if (a && b && !(b->array() > a->array()).all())
-    {
       high.problem("must be greater than region.from in every component");
-    }
     else if (a && b)
-    {
       thread.region = {*a, *b};
-    }
   }
   map.finish();
   return thread;
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context)
 {
   std::vector<ThreadConfig> threads;
   if (!at.present())
-  {
     return threads;
-  }
   std::map<std::string, std::string> names;   // to the path that used it first
   const auto entries = at.items(1, 10'000);
   for (std::size_t k = 0; k < entries.size(); ++k)
@@ -304,11 +279,9 @@ std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& c
     threads.push_back(readThread(entries[k], context, entries.size() == 1 ? "thread" : "thread" + std::to_string(k)));
     const auto [other, is_new] = names.emplace(threads.back().name, entries[k].path());
     if (!is_new)
-    {
       YamlMap(entries[k]).get("name").problem("is also the name of " + other->second + "; names must differ");
-    }
   }
   return threads;
 }
 
-}  // namespace slender
+}   // namespace slender

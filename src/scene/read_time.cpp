@@ -10,28 +10,26 @@ TimeConfig readTime(const YamlCursor& at)
   YamlMap map(at);
   assign(time.step, map.get("step").number(Range::above(0, 10, "s")));
   assign(time.duration, map.get("duration").number(Range::above(0, 1e7, "s")));
-  assign(time.integrator, map.get("integrator").choice<Integrator>({{"implicit_euler", Integrator::implicit_euler},
-                                                                    {"bdf2", Integrator::bdf2},
-                                                                    {"tr_bdf2", Integrator::tr_bdf2},
-                                                                    {"implicit_midpoint", Integrator::implicit_midpoint},
-                                                                    {"generalized_alpha", Integrator::generalized_alpha},
-                                                                    {"symplectic_euler", Integrator::symplectic_euler},
-                                                                    {"imex", Integrator::imex}}));
+  assign(time.integrator, map.get("integrator")
+                              .choice<Integrator>({{"implicit_euler", Integrator::implicit_euler},
+                                                   {"bdf2", Integrator::bdf2},
+                                                   {"tr_bdf2", Integrator::tr_bdf2},
+                                                   {"implicit_midpoint", Integrator::implicit_midpoint},
+                                                   {"generalized_alpha", Integrator::generalized_alpha},
+                                                   {"symplectic_euler", Integrator::symplectic_euler},
+                                                   {"imex", Integrator::imex}}));
   assign(time.spectral_radius, map.get("spectral_radius").number(Range::closed(0, 1)));
   const YamlCursor error_tolerance = map.get("error_tolerance");
   assign(time.error_tolerance, error_tolerance.number(Range::closed(0, 1, "m")));
-  if (time.error_tolerance > 0 && (time.integrator == Integrator::symplectic_euler || time.integrator == Integrator::imex))
-  {
+  if (time.error_tolerance > 0 &&
+      (time.integrator == Integrator::symplectic_euler || time.integrator == Integrator::imex))
     error_tolerance.problem("is for implicit integrators; steps of symplectic_euler and imex are of fixed length");
-  }
   const YamlCursor min_step = map.get("min_step");
   if (const auto value = min_step.number(Range::above(0, 10, "s")))
   {
     time.min_step = *value;
     if (*value > time.step)
-    {
       min_step.problem("is longer than time.step; must be in (0, " + shortNumber(time.step) + "] s");
-    }
   }
   time.min_step = std::min(time.min_step, time.step);
   YamlMap newton(map.get("newton"));
@@ -43,4 +41,4 @@ TimeConfig readTime(const YamlCursor& at)
   return time;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -28,8 +28,8 @@ struct TrackedCurve
 
 struct GuideNodes
 {
-  Eigen::Matrix3Xd nodes;         ///< [m]; none when reported
-  Eigen::VectorXd shares;         ///< of the rod's length that belong to them
+  Eigen::Matrix3Xd nodes;   ///< [m]; none when reported
+  Eigen::VectorXd shares;   ///< of the rod's length that belong to them
 };
 
 std::vector<Eigen::Vector3d> readPoints(const YamlCursor& points, const YamlCursor& file, const ReadContext& context)
@@ -56,16 +56,13 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& points, const YamlCurs
     }
   }
   for (const YamlCursor& item : points.present() ? points.items() : std::vector<YamlCursor>{})
-  {
     if (const auto point = item.vector3(coordinate))
-    {
       out.push_back(*point);
-    }
-  }
   return out;
 }
 
-/// Evenly spaced nodes of the rod where it starts, or points, which lie along it by their shares of the polyline's length.
+/// Evenly spaced nodes of the rod where it starts, or points, which lie along it by their shares of the polyline's
+/// length.
 GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurve& rod)
 {
   const YamlCursor nodes = map.get("nodes"), points = map.get("points"), file = map.get("file");
@@ -74,9 +71,7 @@ GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurv
   if (nodes.present() + points.present() + file.present() != 1)
   {
     if (map.at().isMap())
-    {
       map.at().problem("must have one of nodes: N (of the rod), points: [[x, y, z], ...], file: PATH");
-    }
     return guide;
   }
   if (nodes.present())
@@ -102,24 +97,22 @@ GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurv
   const std::vector<Eigen::Vector3d> given = readPoints(points, file, context);
   const YamlCursor& from = points.present() ? points : file;
   if (map.at().problems().size() != before)
-  {
     return guide;
-  }
   if (static_cast<int>(given.size()) < fewest)
   {
-    from.problem("has " + std::to_string(given.size()) + " points; a guide" + (rod.closed ? " of a closed rod" : "") + " needs at least " + std::to_string(fewest));
+    from.problem("has " + std::to_string(given.size()) + " points; a guide" + (rod.closed ? " of a closed rod" : "") +
+                 " needs at least " + std::to_string(fewest));
     return guide;
   }
   Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(given.size()));
   for (std::size_t k = 0; k < given.size(); ++k)
-  {
     matrix.col(static_cast<Eigen::Index>(k)) = given[k];
-  }
   const Eigen::VectorXd lengths = edgeLengths(matrix, rod.closed);
   Eigen::Index shortest = 0;
   if (!(lengths.minCoeff(&shortest) > 1e-9 * lengths.sum()))
   {
-    from.problem("points " + std::to_string(shortest) + " and " + std::to_string((shortest + 1) % lengths.size()) + " are at the same place; must differ");
+    from.problem("points " + std::to_string(shortest) + " and " + std::to_string((shortest + 1) % lengths.size()) +
+                 " are at the same place; must differ");
     return guide;
   }
   guide.nodes = std::move(matrix);
@@ -134,12 +127,11 @@ std::optional<PointTrajectory> readTable(const YamlCursor& at, int nodes)
   {
     const auto row = item.numbers(coordinate);
     if (!row)
-    {
       return std::nullopt;
-    }
     if (row->size() != 1 + 3 * static_cast<std::size_t>(nodes))
     {
-      item.problem("has " + std::to_string(row->size()) + " numbers; must be [t, x0, y0, z0, x1, ...] of the guide's " + std::to_string(nodes) + " nodes");
+      item.problem("has " + std::to_string(row->size()) + " numbers; must be [t, x0, y0, z0, x1, ...] of the guide's " +
+                   std::to_string(nodes) + " nodes");
       return std::nullopt;
     }
     try
@@ -159,9 +151,7 @@ std::optional<PointTrajectory> readMotionFile(const YamlCursor& at, const ReadCo
 {
   const auto path = at.text();
   if (!path)
-  {
     return std::nullopt;
-  }
   try
   {
     PointTrajectory points = readPointMotion(context.resolve(*path), nodes);
@@ -185,9 +175,7 @@ std::optional<PointTrajectory> readMotionFile(const YamlCursor& at, const ReadCo
 void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConfig& guide)
 {
   if (!at.present())
-  {
     return;
-  }
   if (at.isScalar())
   {
     at.choice<bool>({{"fixed", true}});
@@ -200,36 +188,26 @@ void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConf
   if (table.present() + file.present() + topic.present() != 1)
   {
     if (at.problems().size() == before)
-    {
       at.problem("must be fixed or one of {table: [[t, x0, y0, z0, x1, ...], ...]}, {file: FILE.csv}, {topic: points}");
-    }
     return;
   }
   if (late.present() && !topic.present())
-  {
     late.problem("is for guides by topic");
-  }
   assign(guide.coast, readLate(late));
   if (topic.present())
   {
     if (topic.choice<bool>({{"points", true}}))
-    {
       guide.motion = TopicGuide{};
-    }
     return;
   }
   const int nodes = static_cast<int>(guide.mesh.vertices.cols());
   if (nodes == 0)
-  {
     return;   // reported
-  }
   auto points = table.present() ? readTable(table, nodes) : readMotionFile(file, context, nodes);
   if (points)
   {
     if (points->times().front() <= 0)   // else the guide stands still until then
-    {
       points->startInMotion();
-    }
     guide.motion = FrameGuide{std::move(*points)};
   }
 }
@@ -237,25 +215,20 @@ void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConf
 TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, const MassMatrix& weights)
 {
   if (!at.present())
-  {
     return curveHats(weights);
-  }
   YamlMap map(at);
   const YamlCursor basis = map.get("basis"), segments = map.get("segments");
   map.finish();
   if (basis.present() == segments.present())
   {
     if (at.isMap())
-    {
       at.problem("must be one of {basis: hats}, {segments: N}");
-    }
     return {};
   }
   if (basis.present())
-  {
     return basis.choice<bool>({{"hats", true}}) ? curveHats(weights) : TestFunctions{};
-  }
-  const auto count = segments.integer(1, rod.rest.cols() > 0 ? static_cast<long>(rod.rest.cols()) : max_edges + 1, "segments");
+  const auto count =
+      segments.integer(1, rod.rest.cols() > 0 ? static_cast<long>(rod.rest.cols()) : max_edges + 1, "segments");
   return count && rod.rest.cols() > 0 ? curveSegments(*count, rod.shares, rod.closed) : TestFunctions{};
 }
 
@@ -263,23 +236,18 @@ TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, 
 void checkTraits(const YamlCursor& at, const RodConfig& rod)
 {
   if (rod.contact)
-  {
     at.problem("is not for a rod that touches things; leave out contact or track");
-  }
   if (rod.stretching == Stretching::projected)
-  {
     at.problem("takes implicit steps; with it stretching must be stiff");
-  }
 }
 
-}  // namespace
+}   // namespace
 
-std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context, const RodConfig& config, int edges)
+std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context,
+                                                       const RodConfig& config, int edges)
 {
   if (!at.present())
-  {
     return nullptr;
-  }
   const std::size_t before = at.problems().size();
   TrackedCurve rod;
   rod.closed = config.closed;
@@ -310,26 +278,26 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
   set.functions = readCurveFunctions(at_functions, rod, weights);
   map.finish();
   checkTraits(at, config);
-  if (set.functions.count() > most_functions || 12.0 * set.functions.count() * static_cast<double>(rod.rest.cols()) > max_guide_numbers)
+  if (set.functions.count() > most_functions ||
+      12.0 * set.functions.count() * static_cast<double>(rod.rest.cols()) > max_guide_numbers)
   {
-    (at_functions.present() ? at_functions : at).problem("makes " + std::to_string(set.functions.count()) + " test functions of " + std::to_string(rod.rest.cols()) +
-                                                         " nodes, too many for one rod; leave out some");
+    (at_functions.present() ? at_functions : at)
+        .problem("makes " + std::to_string(set.functions.count()) + " test functions of " +
+                 std::to_string(rod.rest.cols()) + " nodes, too many for one rod; leave out some");
   }
   if (!good || at.problems().size() != before)
-  {
     return nullptr;
-  }
   try
   {
-    auto constraints = std::make_shared<WeakConstraints>(curveConstraints(set.functions, weights, rod.rest, rod.closed));
+    auto constraints =
+        std::make_shared<WeakConstraints>(curveConstraints(set.functions, weights, rod.rest, rod.closed));
     std::vector<char> held;
     for (const GraspConfig& grasp : config.grasps)
     {
       held.resize(static_cast<std::size_t>(rod.rest.cols()), 0);
-      for (int i = std::max(0, grasp.first_node); i <= grasp.last_node && i < rod.rest.cols(); ++i)   // others were reported
-      {
+      for (int i = std::max(0, grasp.first_node); i <= grasp.last_node && i < rod.rest.cols();
+           ++i)   // others were reported
         held[static_cast<std::size_t>(i)] = 1;
-      }
     }
     constraints->requireIndependent(held);
     set.constraints = std::move(constraints);
@@ -344,4 +312,4 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
   return tracking;
 }
 
-}  // namespace slender
+}   // namespace slender

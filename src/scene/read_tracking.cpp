@@ -20,9 +20,14 @@ constexpr double default_blend = 0.2;   // [s]
 /// The mesh that tracks, and how it comes from the guide's.
 struct TrackedMesh
 {
-  enum Kind { same, subdivided, separate } kind = subdivided;
-  Subdivision subdivision;            ///< of the guide; separate: its mesh only
-  std::optional<MeshFile> file;       ///< separate
+  enum Kind
+  {
+    same,
+    subdivided,
+    separate
+  } kind = subdivided;
+  Subdivision subdivision;        ///< of the guide; separate: its mesh only
+  std::optional<MeshFile> file;   ///< separate
   bool good = false;
 };
 
@@ -35,9 +40,7 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
   {
     tracked.kind = TrackedMesh::same;
     if (at.present() && !at.choice<bool>({{"same", true}}))
-    {
       return tracked;
-    }
   }
   else
   {
@@ -48,36 +51,30 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
       tracked.file = readMeshFile(at, context);
       tracked.good = tracked.file.has_value();
       if (tracked.good)
-      {
         tracked.subdivision.mesh = tracked.file->mesh;
-      }
     }
     else
     {
       const auto given = map.require("subdivide").integer(1, 10, "levels");
       map.finish();
       if (!given)
-      {
         return tracked;
-      }
       levels = *given;
       if (std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols()) > 2 * max_fine_vertices)
       {
-        map.get("subdivide").problem("makes more than " + std::to_string(static_cast<int>(max_fine_vertices)) + " vertices");
+        map.get("subdivide")
+            .problem("makes more than " + std::to_string(static_cast<int>(max_fine_vertices)) + " vertices");
         return tracked;
       }
-      if (!context.claim(map.get("subdivide"), 0.5 * std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols())))
-      {
+      if (!context.claim(map.get("subdivide"),
+                         0.5 * std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols())))
         return tracked;
-      }
     }
   }
   if (tracked.kind != TrackedMesh::separate)
   {
     if (coarse.vertices.cols() == 0)
-    {
       return tracked;   // reported
-    }
     tracked.subdivision = subdivide(coarse, levels);
     tracked.good = true;
   }
@@ -85,7 +82,9 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
   {
     if (tracked.good)
     {
-      requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path : guide.file ? guide.file->path : "undeformed");
+      requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path
+                                                 : guide.file ? guide.file->path
+                                                              : "undeformed");
     }
   }
   catch (const std::invalid_argument& error)
@@ -100,9 +99,7 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
 std::vector<Eigen::Matrix3Xd> framesOf(const GuideConfig& guide, int sampled)
 {
   if (const auto* frames = std::get_if<FrameGuide>(&guide.motion))
-  {
     return frames->points.frames();
-  }
   std::vector<Eigen::Matrix3Xd> shapes(1, guide.mesh.vertices);
   const auto* carried = std::get_if<CarriedGuide>(&guide.motion);
   if (carried && !carried->poses.empty())
@@ -116,7 +113,8 @@ std::vector<Eigen::Matrix3Xd> framesOf(const GuideConfig& guide, int sampled)
     shapes.resize(static_cast<std::size_t>(std::max(2, 5 * sampled)));
     for (std::size_t k = 0; k < shapes.size(); ++k)
     {
-      guide.evaluate(first + (last - first) * static_cast<double>(k) / static_cast<double>(shapes.size() - 1), shapes[k]);
+      guide.evaluate(first + (last - first) * static_cast<double>(k) / static_cast<double>(shapes.size() - 1),
+                     shapes[k]);
     }
   }
   return shapes;
@@ -138,32 +136,28 @@ TestFunctions readClusters(const YamlCursor& at, const GuideConfig& guide)
   const bool simulated = std::holds_alternative<ClothGuide>(guide.motion);
   if (live || simulated)
   {
-    at.warning(std::string("the guide's motion is not known before it runs, as it is that of ") + (live ? "messages" : "a cloth") +
-               ": regions are clustered by its first shape alone; give regions, or cluster a recorded motion of the guide");
+    at.warning(
+        std::string("the guide's motion is not known before it runs, as it is that of ") +
+        (live ? "messages" : "a cloth") +
+        ": regions are clustered by its first shape alone; give regions, or cluster a recorded motion of the guide");
   }
-  return regionBasis(guide.mesh, clusterFaces(guide.mesh.triangles, framesOf(guide, options.sampled_frames), options).region);
+  return regionBasis(guide.mesh,
+                     clusterFaces(guide.mesh.triangles, framesOf(guide, options.sampled_frames), options).region);
 }
 
-std::vector<PaintedRegion> readRegions(const YamlCursor& at, const ReadContext& context, const GuideSource& guide, const TrackedMesh& tracked)
+std::vector<PaintedRegion> readRegions(const YamlCursor& at, const ReadContext& context, const GuideSource& guide,
+                                       const TrackedMesh& tracked)
 {
   std::vector<PaintedRegion> regions;
   if (at.isScalar())
   {
     for (const VertexGroup& group : readGroupsOf(at, context, guide.file))
-    {
       regions.push_back({group.name, group.vertices, {}});
-    }
     if (tracked.kind != TrackedMesh::separate)
-    {
       return regions;
-    }
     for (const VertexGroup& group : readGroupsOf(at, context, tracked.file))
-    {
       for (PaintedRegion& region : regions)
-      {
         region.tracked = region.name == group.name ? group.vertices : region.tracked;
-      }
-    }
     return regions;
   }
   for (const auto& [name, entry] : at.members())
@@ -173,39 +167,38 @@ std::vector<PaintedRegion> readRegions(const YamlCursor& at, const ReadContext& 
     region.guide = readIndexList(map.require("guide"), static_cast<int>(guide.config.mesh.vertices.cols()));
     const YamlCursor own = tracked.kind == TrackedMesh::separate ? map.require("tracked") : map.get("tracked");
     if (own.present())
-    {
       region.tracked = readIndexList(own, static_cast<int>(tracked.subdivision.mesh.vertices.cols()));
-    }
     map.finish();
     regions.push_back(std::move(region));
   }
   return regions;
 }
 
-/// `named`: an entry of a list of sets, which gets its name and when it takes over, or null. Throws std::invalid_argument for functions that do not fit the meshes.
-TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, const GuideSource& guide, const TrackedMesh& tracked, FunctionSet* named)
+/// `named`: an entry of a list of sets, which gets its name and when it takes over, or null. Throws
+/// std::invalid_argument for functions that do not fit the meshes.
+TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, const GuideSource& guide,
+                            const TrackedMesh& tracked, FunctionSet* named)
 {
   YamlMap map(at);
-  const YamlCursor basis = map.get("basis"), vertices = map.get("vertices"), regions = map.get("regions"), clusters = map.get("clusters");
+  const YamlCursor basis = map.get("basis"), vertices = map.get("vertices"), regions = map.get("regions"),
+                   clusters = map.get("clusters");
   if (named)
   {
     assign(named->name, map.require("name").name());
     if (const auto from = map.get("from").number(Range::above(0, 1e7, "s")))
-    {
       named->from = *from;
-    }
     assign(named->blend, map.get("blend").number(Range::closed(0, 1e7, "s")));
   }
   map.finish();
   if (basis.present() + regions.present() + clusters.present() > 1)
   {
-    at.problem("must be one of {basis: subdivision}, {regions: obj}, {regions: {NAME: {guide: [...], tracked: [...]}}}, {clusters: {count: N}}");
+    at.problem(
+        "must be one of {basis: subdivision}, {regions: obj}, {regions: {NAME: {guide: [...], tracked: [...]}}}, "
+        "{clusters: {count: N}}");
     return {};
   }
   if (vertices.present() && (regions.present() || clusters.present()))
-  {
     vertices.problem("is for basis: subdivision");
-  }
   if (clusters.present())
   {
     if (tracked.kind != TrackedMesh::same)
@@ -219,24 +212,25 @@ TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, co
   {
     const std::vector<PaintedRegion> painted = readRegions(regions, context, guide, tracked);
     if (painted.empty())
-    {
       return {};
-    }
     return tracked.kind == TrackedMesh::separate
-             ? paintedRegions(painted, static_cast<int>(guide.config.mesh.vertices.cols()), static_cast<int>(tracked.subdivision.mesh.vertices.cols()))
-             : paintedRegions(painted, tracked.subdivision);
+               ? paintedRegions(painted, static_cast<int>(guide.config.mesh.vertices.cols()),
+                                static_cast<int>(tracked.subdivision.mesh.vertices.cols()))
+               : paintedRegions(painted, tracked.subdivision);
   }
   if (basis.present() && !basis.choice<bool>({{"subdivision", true}}))
-  {
     return {};
-  }
   if (tracked.kind == TrackedMesh::separate)
   {
-    at.problem("must be given as regions: {NAME: {guide: [...], tracked: [...]}} (or obj) when the tracked mesh is a file of its own");
+    at.problem(
+        "must be given as regions: {NAME: {guide: [...], tracked: [...]}} (or obj) when the tracked mesh is a file of "
+        "its own");
     return {};
   }
   return subdivisionBasis(tracked.subdivision,
-                          vertices.present() ? readIndexList(vertices, static_cast<int>(guide.config.mesh.vertices.cols())) : std::vector<int>{});
+                          vertices.present()
+                              ? readIndexList(vertices, static_cast<int>(guide.config.mesh.vertices.cols()))
+                              : std::vector<int>{});
 }
 
 /// Largest traction [Pa] for a test function, or for all (no name).
@@ -252,27 +246,20 @@ std::vector<Traction> readTractions(const YamlCursor& at)
   const Range range = Range::above(0, 1e12, "Pa");
   std::vector<Traction> tractions;
   if (at.present() && !at.isMap())
-  {
     tractions.push_back({"", at, at.number(range).value_or(1.0)});
-  }
   else if (at.present())
-  {
     for (const auto& [name, entry] : at.members())
-    {
       tractions.push_back({name, entry, entry.number(range).value_or(1.0)});
-    }
-  }
   return tractions;
 }
 
 /// Bounds of forces [N] of all test functions; empty without. `used`: of which of the tractions, per one of them.
-Eigen::VectorXd boundsOf(const std::vector<Traction>& tractions, const WeakConstraints& constraints, std::vector<char>& used)
+Eigen::VectorXd boundsOf(const std::vector<Traction>& tractions, const WeakConstraints& constraints,
+                         std::vector<char>& used)
 {
   Eigen::VectorXd bounds;
   if (tractions.empty())
-  {
     return bounds;
-  }
   bounds.setConstant(constraints.count(), std::numeric_limits<double>::infinity());
   for (std::size_t t = 0; t < tractions.size(); ++t)
   {
@@ -290,8 +277,9 @@ Eigen::VectorXd boundsOf(const std::vector<Traction>& tractions, const WeakConst
 }
 
 /// Those of one entry; without constraints when something was reported.
-FunctionSet readFunctionSet(const YamlCursor& at, bool named, const std::vector<Traction>& tractions, std::vector<char>& used, const ReadContext& context,
-                            const GuideSource& guide, const TrackedMesh& tracked, const ClothConfig& cloth)
+FunctionSet readFunctionSet(const YamlCursor& at, bool named, const std::vector<Traction>& tractions,
+                            std::vector<char>& used, const ReadContext& context, const GuideSource& guide,
+                            const TrackedMesh& tracked, const ClothConfig& cloth)
 {
   FunctionSet set;
   set.blend = named ? default_blend : 0.0;
@@ -299,19 +287,16 @@ FunctionSet readFunctionSet(const YamlCursor& at, bool named, const std::vector<
   {
     set.functions = readFunctions(at, context, guide, tracked, named ? &set : nullptr);
     if (set.functions.count() == 0)
-    {
       return set;   // reported
-    }
     // of the mesh as it lies on its guide, whatever its lengths at rest are
-    auto constraints = std::make_shared<WeakConstraints>(set.functions, hatMassMatrix(guide.config.mesh), hatMassMatrix(tracked.subdivision.mesh));
+    auto constraints = std::make_shared<WeakConstraints>(set.functions, hatMassMatrix(guide.config.mesh),
+                                                         hatMassMatrix(tracked.subdivision.mesh));
     std::vector<char> held;
     for (const GraspConfig& grasp : cloth.grasps)
     {
       held.resize(static_cast<std::size_t>(cloth.mesh.vertices.cols()), 0);
       for (const int vertex : grasp.vertices)
-      {
         held[vertex] = 1;
-      }
     }
     constraints->requireIndependent(held);
     set.bounds = boundsOf(tractions, *constraints, used);
@@ -324,8 +309,9 @@ FunctionSet readFunctionSet(const YamlCursor& at, bool named, const std::vector<
   return set;
 }
 
-std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const std::vector<Traction>& tractions, const ReadContext& context,
-                                                   const GuideSource& guide, const TrackedMesh& tracked, const ClothConfig& cloth)
+std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const std::vector<Traction>& tractions,
+                                                   const ReadContext& context, const GuideSource& guide,
+                                                   const TrackedMesh& tracked, const ClothConfig& cloth)
 {
   auto tracking = std::make_shared<TrackingConfig>();
   tracking->guide = guide.config;
@@ -333,37 +319,29 @@ std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const s
   tracking->size = (coarse.rowwise().maxCoeff() - coarse.rowwise().minCoeff()).norm();
   std::vector<char> used(tractions.size(), 0);
   if (!at.isList())
-  {
     tracking->sets.push_back(readFunctionSet(at, false, tractions, used, context, guide, tracked, cloth));
-  }
   for (const YamlCursor& entry : at.isList() ? at.items(1, 100) : std::vector<YamlCursor>())
   {
     const FunctionSet set = readFunctionSet(entry, true, tractions, used, context, guide, tracked, cloth);
     for (const FunctionSet& other : tracking->sets)
     {
       if (!set.name.empty() && other.name == set.name)
-      {
         YamlMap(entry).get("name").problem("is also the name of another set; names must differ");
-      }
       if (set.from && other.from == set.from)
-      {
         YamlMap(entry).get("from").problem("is also when set " + other.name + " takes over; times must differ");
-      }
     }
     tracking->sets.push_back(set);
   }
-  const bool good = std::all_of(tracking->sets.begin(), tracking->sets.end(), [](const FunctionSet& set) { return set.constraints != nullptr; });
+  const bool good = std::all_of(tracking->sets.begin(), tracking->sets.end(),
+                                [](const FunctionSet& set) { return set.constraints != nullptr; });
   for (std::size_t t = 0; good && t < tractions.size(); ++t)
-  {
     if (!used[t])
-    {
       tractions[t].at.problem("is for a test function that is not there");
-    }
-  }
   return tracking;
 }
 
-ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths, const std::string& default_name)
+ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths,
+                             const std::string& default_name)
 {
   ClothConfig cloth;
   cloth.name = default_name;
@@ -375,9 +353,7 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   const GuideSource guide = readGuide(map.require("guide"), context, cloths, cloth.name);
   const TrackedMesh tracked = readTrackedMesh(map.get("mesh"), context, guide);
   if (tracked.good)
-  {
     cloth.mesh = tracked.subdivision.mesh;
-  }
   if (tracked.kind != TrackedMesh::separate)
   {
     cloth.grid = guide.grid;
@@ -393,35 +369,28 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   readClothTraits(map, context, cloth);
   map.finish();
   if (tracked.good && guide.config.mesh.vertices.cols() > 0)
-  {
     cloth.tracking = readTracking(at_functions, tractions, context, guide, tracked, cloth);
-  }
   return cloth;
 }
 
-}  // namespace
+}   // namespace
 
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths)
 {
   if (!at.present())
-  {
     return;
-  }
   std::map<std::string, std::string> names;   // to what has it
   for (const ClothConfig& cloth : cloths)
-  {
     names.emplace(cloth.name, "a cloth");
-  }
   const auto entries = at.items(1, 1000);
   for (std::size_t k = 0; k < entries.size(); ++k)
   {
-    cloths.push_back(readTrackedCloth(entries[k], context, cloths, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
+    cloths.push_back(
+        readTrackedCloth(entries[k], context, cloths, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
     const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
     if (!is_new)
-    {
       YamlMap(entries[k]).get("name").problem("is also the name of " + other->second + "; names must differ");
-    }
   }
 }
 
-}  // namespace slender
+}   // namespace slender

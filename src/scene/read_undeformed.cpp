@@ -12,19 +12,22 @@ namespace {
 constexpr double fewest_edges = 4.0;   // of a wave that a mesh can show
 
 /// Folds that the mesh cannot show would vanish, or come out as longer ones.
-bool foldsFit(const YamlCursor& at, const YamlCursor& at_along, const Eigen::Vector3d& along, double wavelength, const TriangleMesh& cloth)
+bool foldsFit(const YamlCursor& at, const YamlCursor& at_along, const Eigen::Vector3d& along, double wavelength,
+              const TriangleMesh& cloth)
 {
   const double length = extent(cloth, along), edge = meanFaceEdge(cloth);
   if (length < 0.25 * wavelength)
   {
-    at_along.problem("the cloth is " + shortNumber(length) + " m long along it, less than a quarter of a wavelength, and gets no folds; "
+    at_along.problem("the cloth is " + shortNumber(length) +
+                     " m long along it, less than a quarter of a wavelength, and gets no folds; "
                      "take a direction within the cloth, or a shorter wavelength");
     return false;
   }
   if (wavelength < fewest_edges * edge)
   {
-    at.problem("is less than " + shortNumber(fewest_edges) + " edges of the mesh (" + shortNumber(edge) + " m on average), which cannot show it; take " +
-               shortNumber(fewest_edges * edge) + " m or more, or a finer mesh");
+    at.problem("is less than " + shortNumber(fewest_edges) + " edges of the mesh (" + shortNumber(edge) +
+               " m on average), which cannot show it; take " + shortNumber(fewest_edges * edge) +
+               " m or more, or a finer mesh");
     return false;
   }
   return true;
@@ -36,20 +39,27 @@ bool ridgesFit(const YamlCursor& at, const Eigen::Vector3d& axis, int count, con
   const double round = 2 * M_PI * meanRadius(cloth, axis), edge = meanFaceEdge(cloth);
   if (round < count * fewest_edges * edge)
   {
-    at.problem("makes ridges of less than " + shortNumber(fewest_edges) + " edges of the mesh (" + shortNumber(edge) + " m on average), which cannot show them; " +
-               (round < fewest_edges * edge ? "" : "take " + std::to_string(static_cast<int>(round / (fewest_edges * edge))) + " or fewer, or ") + "use a finer mesh");
+    at.problem("makes ridges of less than " + shortNumber(fewest_edges) + " edges of the mesh (" + shortNumber(edge) +
+               " m on average), which cannot show them; " +
+               (round < fewest_edges * edge
+                    ? ""
+                    : "take " + std::to_string(static_cast<int>(round / (fewest_edges * edge))) + " or fewer, or ") +
+               "use a finer mesh");
     return false;
   }
   return true;
 }
 
 /// The cloth's mesh folded, ridged or crinkled; empty when reported.
-Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, const YamlCursor& ridges, const YamlCursor& crinkles, const TriangleMesh& cloth)
+Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, const YamlCursor& ridges,
+                             const YamlCursor& crinkles, const TriangleMesh& cloth)
 {
   if (folds.present() + ridges.present() + crinkles.present() != 1)
   {
-    at.problem("must have one of {file: PATH}, {folds: {along: [...], wavelength: L, height: H}}, {ridges: {axis: [...], count: N, height: H}}, "
-               "{crinkles: {height: H}}");
+    at.problem(
+        "must have one of {file: PATH}, {folds: {along: [...], wavelength: L, height: H}}, {ridges: {axis: [...], "
+        "count: N, height: H}}, "
+        "{crinkles: {height: H}}");
     return {};
   }
   YamlMap shape(folds.present() ? folds : ridges.present() ? ridges : crinkles);
@@ -73,30 +83,23 @@ Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, cons
     }
     const YamlCursor scale = shape.require(folds.present() ? "wavelength" : "count");
     if (folds.present())
-    {
       assign(wavelength, scale.number(Range::above(0, 1e3, "m")));
-    }
     else
-    {
       assign(count, scale.integer(1, 100'000, "ridges"));
-    }
     const bool known = along.problems().size() == before && cloth.vertices.cols() > 0;
-    if (known && !(folds.present() ? foldsFit(scale, along, direction, wavelength, cloth) : ridgesFit(scale, direction, count, cloth)))
-    {
+    if (known && !(folds.present() ? foldsFit(scale, along, direction, wavelength, cloth)
+                                   : ridgesFit(scale, direction, count, cloth)))
       return {};
-    }
   }
   shape.finish();
   if (!height || cloth.vertices.cols() == 0)
-  {
     return {};
-  }
   return folds.present()    ? folded(cloth, direction, wavelength, *height)
          : ridges.present() ? ridged(cloth, direction, count, *height)
                             : crinkled(cloth, *height, static_cast<unsigned>(seed));
 }
 
-}  // namespace
+}   // namespace
 
 void readUndeformed(const YamlCursor& at, const ReadContext& context, ClothConfig& cloth)
 {
@@ -117,10 +120,8 @@ void readUndeformed(const YamlCursor& at, const ReadContext& context, ClothConfi
     return;
   }
   if (cloth.start.cols() == 0)
-  {
     cloth.start = cloth.mesh.vertices;
-  }
   cloth.mesh.vertices = shape;
 }
 
-}  // namespace slender
+}   // namespace slender

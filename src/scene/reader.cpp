@@ -29,17 +29,16 @@ std::vector<RodPart> readRods(const YamlCursor& at, const ReadContext& context)
     rods.back().config.place = entry.place();
     const auto [rod, new_rod] = rod_names.emplace(rods.back().config.name, entry.path());
     if (!new_rod)
-    {
       YamlMap(entry).get("name").problem("is also the name of " + rod->second + "; names must differ");
-    }
     for (const GraspConfig& grasp : rods.back().config.grasps)
     {
       const std::string path = entry.path() + ".grasps." + grasp.name;
       const auto [other, new_grasp] = grasp_names.emplace(grasp.name, path);
       if (!new_grasp)
       {
-        YamlMap(YamlMap(entry).get("grasps")).get(grasp.name).problem("has the same name as " + other->second +
-                                                                      "; grasps of a scene need different names");
+        YamlMap(YamlMap(entry).get("grasps"))
+            .get(grasp.name)
+            .problem("has the same name as " + other->second + "; grasps of a scene need different names");
       }
     }
   }
@@ -50,7 +49,8 @@ std::vector<RodPart> readRods(const YamlCursor& at, const ReadContext& context)
 void takeGeneratedRods(Generated& generated, std::vector<RodPart>& rods)
 {
   std::set<std::string> names, grasps;
-  const auto take = [&](std::set<std::string>& used, const std::string& what, const std::string& name, const YamlCursor* maker) {
+  const auto take = [&](std::set<std::string>& used, const std::string& what, const std::string& name,
+                        const YamlCursor* maker) {
     if (!used.insert(name).second && maker)
     {
       maker->problem("makes a " + what + " " + name + ", whose name is taken; give the generator another name");
@@ -62,18 +62,14 @@ void takeGeneratedRods(Generated& generated, std::vector<RodPart>& rods)
   {
     take(names, "rod", part.config.name, nullptr);
     for (const GraspConfig& grasp : part.config.grasps)
-    {
       take(grasps, "grasp", grasp.name, nullptr);
-    }
   }
   bool good = true;   // one generator repeats itself thousands of times
   for (auto& [part, maker] : generated.rods)
   {
     good = good && take(names, "rod", part.config.name, &maker);
     for (const GraspConfig& grasp : part.config.grasps)
-    {
       good = good && take(grasps, "grasp", grasp.name, &maker);
-    }
     part.config.place = maker.place();
     rods.push_back(std::move(part));
   }
@@ -106,14 +102,10 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
   {
     names.push_back(body.name);
     if (!body.motion)
-    {
       simulated.insert(body.name);
-    }
   }
   for (const ObstacleConfig& obstacle : scene.obstacles)
-  {
     names.push_back(obstacle.name);
-  }
   const auto check = [&](const std::vector<GraspConfig>& grasps, const YamlCursor& entry, const char* instead) {
     for (const GraspConfig& grasp : grasps)
     {
@@ -127,19 +119,16 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
       else if (!known)
       {
         const std::string nearest = nearestWord(motion->body, names);
-        at().warning("the scene has no body or obstacle of this name" + (nearest.empty() ? std::string() : " (did you mean " + nearest + "?)") +
-                   ": the grasp stays where it is, unless a node hears of the body in its bodies topic");
+        at().warning("the scene has no body or obstacle of this name" +
+                     (nearest.empty() ? std::string() : " (did you mean " + nearest + "?)") +
+                     ": the grasp stays where it is, unless a node hears of the body in its bodies topic");
       }
     }
   };
   for (std::size_t r = 0; r < rods.size(); ++r)
-  {
     check(scene.rods[r].grasps, rods[r], "weld the rod to it instead (bodies: welds)");
-  }
   for (std::size_t k = 0; k < cloths.size(); ++k)
-  {
     check(scene.cloths[k].grasps, cloths[k], "cloth follows obstacles and driven bodies only");
-  }
 }
 
 /// Cloth is corrected after its step so that it gives way, which nothing that is simulated along with it would notice.
@@ -151,8 +140,10 @@ void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cl
   {
     if (scene.cloths[k].contact && scene.cloths[k].contact->obstacles)
     {
-      YamlMap(cloths[k]).get("contact").problem("body " + body->name + " is simulated, and cloth does not push bodies; give the body a motion or "
-                                                "contact: false, or the cloth contact: {obstacles: false}");
+      YamlMap(cloths[k]).get("contact").problem(
+          "body " + body->name +
+          " is simulated, and cloth does not push bodies; give the body a motion or "
+          "contact: false, or the cloth contact: {obstacles: false}");
     }
   }
 }
@@ -162,12 +153,8 @@ void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cl
 {
   std::map<std::string, std::string> owners;   // to the rod or cloth that has it
   for (const RodConfig& rod : scene.rods)
-  {
     for (const GraspConfig& grasp : rod.grasps)
-    {
       owners.emplace(grasp.name, rod.name);
-    }
-  }
   for (std::size_t k = 0; k < cloths.size(); ++k)
   {
     for (const GraspConfig& grasp : scene.cloths[k].grasps)
@@ -175,23 +162,31 @@ void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cl
       const auto [other, is_new] = owners.emplace(grasp.name, scene.cloths[k].name);
       if (!is_new)
       {
-        YamlMap(YamlMap(cloths[k]).get("grasps")).get(grasp.name).problem("has the same name as a grasp of " + other->second +
-                                                                        "; grasps of a scene need different names");
+        YamlMap(YamlMap(cloths[k]).get("grasps"))
+            .get(grasp.name)
+            .problem("has the same name as a grasp of " + other->second + "; grasps of a scene need different names");
       }
     }
   }
 }
 
-std::vector<YamlCursor> entriesOf(const YamlCursor& list) { return list.isList() ? list.items() : std::vector<YamlCursor>{}; }
+std::vector<YamlCursor> entriesOf(const YamlCursor& list)
+{
+  return list.isList() ? list.items() : std::vector<YamlCursor>{};
+}
 
 /// All that has a place in space.
 void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
 {
-  const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads"), at_cloths = map.get("cloths"), at_tracked = map.get("tracked");
+  const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads"), at_cloths = map.get("cloths"),
+                   at_tracked = map.get("tracked");
   const YamlCursor at_rods = map.get("rods");
-  if (!at_rods.present() && !at_generate.present() && !at_threads.present() && !at_cloths.present() && !at_tracked.present())
+  if (!at_rods.present() && !at_generate.present() && !at_threads.present() && !at_cloths.present() &&
+      !at_tracked.present())
   {
-    at_rods.problem("is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}], tracked: [{...}] or generate: [{...}]");
+    at_rods.problem(
+        "is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}], tracked: [{...}] or generate: "
+        "[{...}]");
   }
   const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
   std::vector<RodPart> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<RodPart>{};
@@ -207,13 +202,9 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   SolidNames names;
   const std::vector<YamlCursor> obstacles = entriesOf(at_obstacles), bodies = entriesOf(at_bodies);
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
-  {
     names.take(obstacles[k], scene.obstacles[k].name, false);
-  }
   for (std::size_t k = 0; k < scene.bodies.size(); ++k)
-  {
     names.take(bodies[k], scene.bodies[k].name, false);
-  }
   for (auto& [obstacle, maker] : generated.obstacles)
   {
     names.take(maker, obstacle.name, true);
@@ -225,14 +216,10 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     scene.bodies.push_back(std::move(body));
   }
   for (RodPart& part : rods)
-  {
     scene.rods.push_back(std::move(part.config));
-  }
   std::vector<YamlCursor> cloths = entriesOf(at_cloths);
   for (const YamlCursor& entry : entriesOf(at_tracked))
-  {
     cloths.push_back(entry);
-  }
   completeThreads(scene, entriesOf(at_threads));
   checkFollowed(scene, entriesOf(at_rods), cloths);
   checkGraspNames(scene, cloths);
@@ -246,36 +233,41 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   {
     if (scene.time.integrator != Integrator::implicit_euler && !(scene.rods.empty() && scene.bodies.empty()))
     {
-      map.get(map.has("cloths") ? "cloths" : "tracked").warning("makes implicit_euler the default integrator of the rods and bodies as well, which is of first order; without cloth it is " +
-                                std::string(toString(scene.time.integrator)) + ": give time.integrator to choose (cloth takes implicit_euler or tr_bdf2)");
+      map.get(map.has("cloths") ? "cloths" : "tracked")
+          .warning(
+              "makes implicit_euler the default integrator of the rods and bodies as well, which is of first order; "
+              "without cloth it is " +
+              std::string(toString(scene.time.integrator)) +
+              ": give time.integrator to choose (cloth takes implicit_euler or tr_bdf2)");
     }
     scene.time.integrator = Integrator::implicit_euler;
   }
   else if (scene.time.integrator != Integrator::implicit_euler && scene.time.integrator != Integrator::tr_bdf2 &&
            scene.time.integrator != Integrator::imex && scene.time.integrator != Integrator::symplectic_euler)
   {
-    YamlMap(time).get("integrator").problem("is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler");
+    YamlMap(time)
+        .get("integrator")
+        .problem("is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler");
   }
   if (YamlMap(time).has("spectral_radius"))
-  {
     YamlMap(time).get("spectral_radius").problem("is for generalized_alpha, which cloth does not have; leave it out");
-  }
   if (scene.start.equilibrium)
   {
     for (const ClothConfig& cloth : scene.cloths)
     {
       if (cloth.tracking || cloth.contact)
       {
-        map.get("start").problem("is not for cloth that " + std::string(cloth.tracking ? "tracks a guide" : "has contact") + ", as cloth " + cloth.name +
-                                 " does; must be as_given");
+        map.get("start").problem("is not for cloth that " +
+                                 std::string(cloth.tracking ? "tracks a guide" : "has contact") + ", as cloth " +
+                                 cloth.name + " does; must be as_given");
         return;
       }
     }
   }
 }
 
-/// Threads take implicit Euler steps of fixed length, and nothing blows on them. Alone they refuse what they do not have; beside other objects,
-/// which may have it, that is a warning.
+/// Threads take implicit Euler steps of fixed length, and nothing blows on them. Alone they refuse what they do not
+/// have; beside other objects, which may have it, that is a warning.
 void checkThreadTime(YamlMap& map, const SceneConfig& scene)
 {
   YamlMap time(map.get("time"));
@@ -285,7 +277,8 @@ void checkThreadTime(YamlMap& map, const SceneConfig& scene)
   };
   if (time.has("integrator") && scene.time.integrator != Integrator::implicit_euler)
   {
-    refuse(time.get("integrator"), "is not for threads; must be implicit_euler", "does not hold for the scene's threads, which take implicit Euler steps.");
+    refuse(time.get("integrator"), "is not for threads; must be implicit_euler",
+           "does not hold for the scene's threads, which take implicit Euler steps.");
   }
   if (scene.start.equilibrium)
   {
@@ -298,9 +291,7 @@ void checkThreadTime(YamlMap& map, const SceneConfig& scene)
            "does not hold for the scene's threads, whose steps are of fixed length.");
   }
   if (scene.wind != Eigen::Vector3d::Zero() || scene.wind_topic)
-  {
     map.get("wind").warning("does not act on threads.");
-  }
 }
 
 /// Rods that track a guide take implicit Euler steps of fixed length.
@@ -308,21 +299,16 @@ void checkTrackedTime(YamlMap& map, SceneConfig& scene)
 {
   YamlMap time(map.get("time"));
   if (!time.has("integrator"))
-  {
     scene.time.integrator = Integrator::implicit_euler;
-  }
   else if (scene.time.integrator != Integrator::implicit_euler)
-  {
     time.get("integrator").problem("is not for rods that track a guide; must be implicit_euler");
-  }
   if (scene.time.error_tolerance > 0)
   {
-    time.get("error_tolerance").problem("is not for rods that track a guide, whose steps are of fixed length; leave it out");
+    time.get("error_tolerance")
+        .problem("is not for rods that track a guide, whose steps are of fixed length; leave it out");
   }
   if (scene.start.equilibrium)
-  {
     map.get("start").problem("is not for rods that track a guide; must be as_given");
-  }
 }
 
 SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::string& directory, KeyLog* log = nullptr)
@@ -337,7 +323,8 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   }
   YamlMap map(root);
   // The largest acceleration serves scaled problems, whose lengths, masses and moduli are of order one.
-  const Range acceleration = Range::closed(-1e9, 1e9, "m/s^2"), speed = Range::closed(-max_wind_speed, max_wind_speed, "m/s");
+  const Range acceleration = Range::closed(-1e9, 1e9, "m/s^2"),
+              speed = Range::closed(-max_wind_speed, max_wind_speed, "m/s");
   assign(scene.name, map.get("name").text());
   assign(scene.gravity, map.get("gravity").vector3(acceleration));
   const YamlCursor wind = map.get("wind");
@@ -360,37 +347,37 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   readObjects(map, context, scene);
   checkRecord(record, scene);
   checkStatics(statics, scene);
-  const bool touches = std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
+  const bool touches =
+      std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
   if (touches && !YamlMap(time).has("integrator"))
   {
-    scene.time.integrator = Integrator::implicit_euler;   // methods of second order carry an impact's velocity on and bounce
+    // methods of second order carry an impact's velocity on and bounce
+    scene.time.integrator = Integrator::implicit_euler;
   }
   if (touches && scene.time.integrator == Integrator::symplectic_euler)
   {
-    YamlMap(time).get("integrator").problem("takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
-                                            "bdf2 or tr_bdf2, or no rod may have contact");
+    YamlMap(time)
+        .get("integrator")
+        .problem(
+            "takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
+            "bdf2 or tr_bdf2, or no rod may have contact");
   }
   if (std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.tracking != nullptr; }))
-  {
     checkTrackedTime(map, scene);
-  }
   if (!scene.threads.empty())
-  {
     checkThreadTime(map, scene);
-  }
   if (!scene.cloths.empty())
-  {
     checkClothTime(map, scene);
-  }
-  if (scene.time.integrator == Integrator::imex && !(scene.rods.empty() && scene.threads.empty() && scene.bodies.empty()))
+  if (scene.time.integrator == Integrator::imex &&
+      !(scene.rods.empty() && scene.threads.empty() && scene.bodies.empty()))
   {
-    YamlMap(time).get("integrator").problem("is for cloth only; must be another one in scenes with rods, threads or bodies");
+    YamlMap(time)
+        .get("integrator")
+        .problem("is for cloth only; must be another one in scenes with rods, threads or bodies");
   }
   map.finish();
   if (!problems.empty())
-  {
     throw SceneError(problems.text());
-  }
   warnOfIgnoredKeys(map, scene);
   scene.warnings = problems.warnings();
   return scene;
@@ -407,29 +394,29 @@ std::string lookedIn(const std::string& path)
 {
   std::error_code error;
   const std::filesystem::path folder = std::filesystem::current_path(error);
-  return std::filesystem::path(path).is_absolute() || error ? "" : " in " + folder.string() + " (give a whole path if it is elsewhere)";
+  return std::filesystem::path(path).is_absolute() || error
+             ? ""
+             : " in " + folder.string() + " (give a whole path if it is elsewhere)";
 }
 
-}  // namespace
+}   // namespace
 
 std::string fileText(const std::string& path)
 {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
   {
-    throw SceneError(path + ": " + (std::filesystem::exists(path, error) ? "is not a regular file" : "no such file" + lookedIn(path)));
+    throw SceneError(
+        path + ": " +
+        (std::filesystem::exists(path, error) ? "is not a regular file" : "no such file" + lookedIn(path)));
   }
   if (std::filesystem::file_size(path, error) > max_file_size)
-  {
     throw SceneError(path + ": is larger than " + std::to_string(max_file_size >> 20) + " MiB");
-  }
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
   text << file.rdbuf();
   if (!file)
-  {
     throw SceneError(path + ": cannot be read");
-  }
   return text.str();
 }
 
@@ -437,11 +424,9 @@ bool ReadContext::claim(const YamlCursor& at, double more) const
 {
   nodes += more;
   if (nodes <= max_scene_nodes)
-  {
     return true;
-  }
-  at.problem("makes " + shortNumber(more) + " nodes, with which the scene has " + shortNumber(nodes) + "; all its rods and cloths together may have " +
-             shortNumber(max_scene_nodes));
+  at.problem("makes " + shortNumber(more) + " nodes, with which the scene has " + shortNumber(nodes) +
+             "; all its rods and cloths together may have " + shortNumber(max_scene_nodes));
   nodes -= more;   // what comes after may still fit
   return false;
 }
@@ -451,9 +436,7 @@ SceneConfig parseScene(const std::string& text, const std::string& name, const s
 {
   YamlTree tree = parseYaml(text, name);
   for (const std::string& assignment : overrides)
-  {
     applyOverride(tree, assignment);
-  }
   SceneConfig scene = readTree(tree, name, directory);
   scene.file = name;
   scene.source = overrides.empty() ? text : writeYaml(tree);
@@ -470,4 +453,4 @@ SceneConfig readScene(const std::string& path, const std::vector<std::string>& o
   return parseScene(fileText(path), path, overrides, directoryOf(path));
 }
 
-}  // namespace slender
+}   // namespace slender

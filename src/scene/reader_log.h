@@ -12,4 +12,4 @@ std::string fileText(const std::string& path);
 /// Reads a scene file and notes what is asked for. Throws as readScene.
 void logKeys(const std::string& path, KeyLog& log);
 
-}  // namespace slender
+}   // namespace slender

@@ -61,7 +61,8 @@ bool isFrameName(const std::string& name)
 {
   const std::string start = "frame_", end = ".obj";
   const std::size_t digits = name.size() - std::min(name.size(), start.size() + end.size());
-  return digits >= 6 && name.compare(0, start.size(), start) == 0 && name.compare(name.size() - end.size(), end.size(), end) == 0 &&
+  return digits >= 6 && name.compare(0, start.size(), start) == 0 &&
+         name.compare(name.size() - end.size(), end.size(), end) == 0 &&
          name.find_first_not_of("0123456789", start.size()) == name.size() - end.size();
 }
 
@@ -108,7 +109,7 @@ private:
   long frame_ = 0;
 };
 
-}  // namespace
+}   // namespace
 
 std::string objComment(const std::string& scene, double time)
 {
@@ -121,4 +122,4 @@ std::unique_ptr<Recorder> makeCsvRecorder(const std::string& folder) { return st
 
 std::unique_ptr<Recorder> makeObjRecorder(const std::string& folder) { return std::make_unique<ObjRecorder>(folder); }
 
-}  // namespace slender
+}   // namespace slender

@@ -15,24 +15,26 @@ struct SceneRod
 };
 
 /// The model of a rod whose rest shape is `rest`, with the curvature and the formulation that the rod asks for.
-SceneRod buildSceneRod(const RodConfig& rod, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& gravity, Integrator integrator);
+SceneRod buildSceneRod(const RodConfig& rod, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& gravity,
+                       Integrator integrator);
 
 /// Dead loads of a rod as RodInputs has them; both are empty where the scene gives none.
 struct RodLoads
 {
-  Eigen::Matrix3Xd forces;    ///< per node [N]
-  Eigen::VectorXd torques;    ///< about the tangent of each edge [N m]
+  Eigen::Matrix3Xd forces;   ///< per node [N]
+  Eigen::VectorXd torques;   ///< about the tangent of each edge [N m]
 };
 
-/// Spreads the point loads of a rod over its nodes and edges. Each of the two edges at an inner node bears half of a torque there.
+/// Spreads the point loads of a rod over its nodes and edges. Each of the two edges at an inner node bears half of a
+/// torque there.
 RodLoads rodLoads(const RodConfig& rod, const RodModel& model, Integrator integrator);
 
-/// Gives a clamped section the orientation of `direction` and `director` in place of that of its motion's poses. What is left out of the two stays
-/// as it is at the start, at `section`: the tangent, or the first material axis, carried to the new tangent by the smallest rotation. Returns the angle
-/// by which the section turns at the first pose [rad].
+/// Gives a clamped section the orientation of `direction` and `director` in place of that of its motion's poses. What
+/// is left out of the two stays as it is at the start, at `section`: the tangent, or the first material axis, carried
+/// to the new tangent by the smallest rotation. Returns the angle by which the section turns at the first pose [rad].
 double orientGrasp(GraspConfig& grasp, const Pose& section);
 
 /// The state at rest at the nodes `initial`, with its frames.
 RodState startSceneRod(const RodConfig& rod, const SceneRod& built, const Eigen::Matrix3Xd& initial);
 
-}  // namespace slender
+}   // namespace slender

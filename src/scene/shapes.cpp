@@ -17,9 +17,7 @@ Eigen::Matrix3Xd toMatrix(const std::vector<Eigen::Vector3d>& points)
 {
   Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(points.size()));
   for (std::size_t k = 0; k < points.size(); ++k)
-  {
     matrix.col(static_cast<Eigen::Index>(k)) = points[k];
-  }
   return matrix;
 }
 
@@ -31,73 +29,78 @@ bool endsMeet(const Eigen::Matrix3Xd& nodes)
 
 Eigen::Matrix3Xd dropLast(const Eigen::Matrix3Xd& nodes) { return nodes.leftCols(nodes.cols() - 1); }
 
-/// Points of the curve. With `edges` the formulas use that number instead of their own (polylines and files keep their points).
+/// Points of the curve. With `edges` the formulas use that number instead of their own (polylines and files keep their
+/// points).
 Eigen::Matrix3Xd curvePoints(const Curve& curve, const Eigen::Vector3d& gravity, std::optional<int> edges)
 {
   return std::visit(
-    [&](const auto& c) -> Eigen::Matrix3Xd {
-      using T = std::decay_t<decltype(c)>;
-      if constexpr (std::is_same_v<T, StraightCurve>)
-      {
-        return straightCurve(c.from, c.to, edges.value_or(c.edges), c.grading);
-      }
-      else if constexpr (std::is_same_v<T, ArcCurve>)
-      {
-        return arcCurve(c.center, c.start, c.axis, c.angle, edges.value_or(c.edges));
-      }
-      else if constexpr (std::is_same_v<T, HelixCurve>)
-      {
-        return helixCurve(c.center, c.axis, c.radius, c.pitch, c.turns, edges.value_or(c.edges));
-      }
-      else if constexpr (std::is_same_v<T, CatenaryCurve>)
-      {
-        const Eigen::Vector3d down = gravity.norm() > 0 ? gravity : Eigen::Vector3d(0, 0, -1);
-        return catenaryCurve(c.from, c.to, c.length, down, edges.value_or(c.edges));
-      }
-      else if constexpr (std::is_same_v<T, TrefoilCurve>)
-      {
-        const double separation = c.separation > 0 ? c.separation : c.radius / 8;
-        return trefoilCurve(c.center, c.axis, c.up, c.radius, separation, c.length, c.left_handed, edges.value_or(c.edges));
-      }
-      else if constexpr (std::is_same_v<T, TorusKnotCurve>)
-      {
-        return torusKnotCurve(c.center, c.axis, c.radius, c.tube_radius, c.around, c.through, edges.value_or(c.edges));
-      }
-      else if constexpr (std::is_same_v<T, VeeCurve>)
-      {
-        return veeCurve(c.tip, c.direction, c.normal, c.arm, c.angle, edges.value_or(c.edges));
-      }
-      else
-      {
-        return toMatrix(c.points);
-      }
-    },
-    curve);
+      [&](const auto& c) -> Eigen::Matrix3Xd {
+        using T = std::decay_t<decltype(c)>;
+        if constexpr (std::is_same_v<T, StraightCurve>)
+        {
+          return straightCurve(c.from, c.to, edges.value_or(c.edges), c.grading);
+        }
+        else if constexpr (std::is_same_v<T, ArcCurve>)
+        {
+          return arcCurve(c.center, c.start, c.axis, c.angle, edges.value_or(c.edges));
+        }
+        else if constexpr (std::is_same_v<T, HelixCurve>)
+        {
+          return helixCurve(c.center, c.axis, c.radius, c.pitch, c.turns, edges.value_or(c.edges));
+        }
+        else if constexpr (std::is_same_v<T, CatenaryCurve>)
+        {
+          const Eigen::Vector3d down = gravity.norm() > 0 ? gravity : Eigen::Vector3d(0, 0, -1);
+          return catenaryCurve(c.from, c.to, c.length, down, edges.value_or(c.edges));
+        }
+        else if constexpr (std::is_same_v<T, TrefoilCurve>)
+        {
+          const double separation = c.separation > 0 ? c.separation : c.radius / 8;
+          return trefoilCurve(c.center, c.axis, c.up, c.radius, separation, c.length, c.left_handed,
+                              edges.value_or(c.edges));
+        }
+        else if constexpr (std::is_same_v<T, TorusKnotCurve>)
+        {
+          return torusKnotCurve(c.center, c.axis, c.radius, c.tube_radius, c.around, c.through,
+                                edges.value_or(c.edges));
+        }
+        else if constexpr (std::is_same_v<T, VeeCurve>)
+        {
+          return veeCurve(c.tip, c.direction, c.normal, c.arm, c.angle, edges.value_or(c.edges));
+        }
+        else
+        {
+          return toMatrix(c.points);
+        }
+      },
+      curve);
 }
 
-bool isSampled(const Curve& curve) { return std::holds_alternative<PolylineCurve>(curve) || std::holds_alternative<FileCurve>(curve); }
+bool isSampled(const Curve& curve)
+{
+  return std::holds_alternative<PolylineCurve>(curve) || std::holds_alternative<FileCurve>(curve);
+}
 
 std::optional<int> sampledEdges(const Curve& curve)
 {
   if (const auto* polyline = std::get_if<PolylineCurve>(&curve))
-  {
     return polyline->edges;
-  }
   const auto* file = std::get_if<FileCurve>(&curve);
   return file ? file->edges : std::nullopt;
 }
 
-}  // namespace
+}   // namespace
 
-Eigen::Matrix3Xd curveNodes(const Curve& curve, const Eigen::Vector3d& gravity) { return curvePoints(curve, gravity, std::nullopt); }
+Eigen::Matrix3Xd curveNodes(const Curve& curve, const Eigen::Vector3d& gravity)
+{
+  return curvePoints(curve, gravity, std::nullopt);
+}
 
 Eigen::Matrix3Xd restNodes(const RodConfig& rod, const Eigen::Vector3d& gravity)
 {
   Eigen::Matrix3Xd nodes = curvePoints(rod.centerline, gravity, std::nullopt);
   if (rod.closed && endsMeet(nodes))
-  {
     nodes = dropLast(nodes);
-  }
   const auto edges = sampledEdges(rod.centerline);
   return edges ? resampleCurve(nodes, rod.closed, *edges) : nodes;
 }
@@ -105,20 +108,18 @@ Eigen::Matrix3Xd restNodes(const RodConfig& rod, const Eigen::Vector3d& gravity)
 Eigen::Matrix3Xd initialNodes(const RodConfig& rod, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& gravity)
 {
   if (!rod.initial)
-  {
     return rest;
-  }
   const Eigen::VectorXd lengths = edgeLengths(rest, rod.closed);
   const bool uniform = lengths.maxCoeff() - lengths.minCoeff() <= 1e-9 * lengths.mean();
   const int edges = static_cast<int>(lengths.size());
-  // Formulas give the nodes themselves where the rest edges are equal; else many points, to be sampled at the rest spacing.
+  // Formulas give the nodes themselves where the rest edges are equal; else many points, to be sampled at the rest
+  // spacing.
   const int asked = uniform ? edges : 16 * edges;
   Eigen::Matrix3Xd points = curvePoints(*rod.initial, gravity, asked);
   if (rod.closed)
-  {
     points = endsMeet(points) ? dropLast(points) : curvePoints(*rod.initial, gravity, asked - 1);
-  }
-  const bool as_given = points.cols() == rest.cols() && (isSampled(*rod.initial) ? !sampledEdges(*rod.initial) : uniform);
+  const bool as_given =
+      points.cols() == rest.cols() && (isSampled(*rod.initial) ? !sampledEdges(*rod.initial) : uniform);
   return as_given ? points : resampleCurve(points, rod.closed, lengthFractions(lengths));
 }
 
@@ -126,13 +127,9 @@ std::vector<double> perEdge(const std::vector<double>& values, int edges, const 
 {
   const auto count = static_cast<std::size_t>(edges);
   if (values.size() == count)
-  {
     return values;
-  }
   if (values.size() == 1)
-  {
     return std::vector<double>(count, values[0]);
-  }
   if (values.size() == 2)
   {
     std::vector<double> all(count);
@@ -143,8 +140,8 @@ std::vector<double> perEdge(const std::vector<double>& values, int edges, const 
     }
     return all;
   }
-  throw std::invalid_argument(std::string(name) + " has " + std::to_string(values.size()) + " entries; must have 1, 2 (taper) or " +
-                              std::to_string(edges) + " (one per edge)");
+  throw std::invalid_argument(std::string(name) + " has " + std::to_string(values.size()) +
+                              " entries; must have 1, 2 (taper) or " + std::to_string(edges) + " (one per edge)");
 }
 
 std::vector<RodSection> rodSections(const RodConfig& rod, int edges)
@@ -165,10 +162,11 @@ std::vector<RodSection> rodSections(const RodConfig& rod, int edges)
     section.b = b[j];
     section.linear_density = material.linear_density.value_or(material.density * area);
     section.stretch_modulus = material.stretch_modulus.value_or(youngs * area);
-    section.bend_modulus = material.bend_modulus.value_or(Eigen::Matrix2d(Eigen::Vector2d(a2, b2).asDiagonal()) * (youngs * area / 4));
+    section.bend_modulus =
+        material.bend_modulus.value_or(Eigen::Matrix2d(Eigen::Vector2d(a2, b2).asDiagonal()) * (youngs * area / 4));
     section.twist_modulus = material.twist_modulus.value_or(shear * torsion);
   }
   return sections;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -13,9 +13,12 @@ namespace {
 
 Pose sectionOffset(const Pose& X_WM, const Pose& X_WG) { return X_WM.inverse() * X_WG; }
 
-bool isIdentity(const Pose& X) { return X.position == Eigen::Vector3d::Zero() && X.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs(); }
+bool isIdentity(const Pose& X)
+{
+  return X.position == Eigen::Vector3d::Zero() && X.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs();
+}
 
-}  // namespace
+}   // namespace
 
 Simulation::Simulation(SceneConfig config, bool solve_start) : config_(std::move(config)), gravity_(config_.gravity)
 {
@@ -32,14 +35,10 @@ Simulation::Simulation(SceneConfig config, bool solve_start) : config_(std::move
   {
     const auto* table = std::get_if<TableMotion>(&grasps_[g].config->motion);
     if (grasps_[g].config->attach == Attach::initial)
-    {
       takeOffset(static_cast<int>(g), table ? table->poses.firstTime() : 0.0);
-    }
   }
   if (config_.start.equilibrium && solve_start)
-  {
     findEquilibrium();
-  }
   initial_ = state_;
 }
 
@@ -49,21 +48,15 @@ void Simulation::inputsAt(double time, SceneInputs& inputs) const
   const auto given = [time](const GivenMotion& motion, const Pose& now) {
     GraspTarget target{now, Twist{}};
     if (const auto* table = std::get_if<TableMotion>(&motion))
-    {
       target.X_WG = table->poses.evaluate(time, &*target.velocity);
-    }
     return target;
   };
   inputs.bodies.clear();
   for (std::size_t b = 0; b < config_.bodies.size(); ++b)
-  {
     inputs.bodies.push_back(given(config_.bodies[b].motion.value_or(FixedMotion{}), state_.bodies[b].X_WB));
-  }
   inputs.obstacles.clear();
   for (std::size_t k = 0; k < config_.obstacles.size(); ++k)
-  {
     inputs.obstacles.push_back(given(config_.obstacles[k].motion, state_.obstacles[k]));
-  }
   addThreadInputs(inputs, time);
   addGuideInputs(inputs, time);
   addRodGuides(inputs, time);
@@ -85,7 +78,10 @@ void Simulation::inputsAt(double time, SceneInputs& inputs) const
   }
 }
 
-void Simulation::defaultInputs(SceneInputs& inputs) const { inputsAt(static_cast<double>(state_.steps + 1) * config_.time.step, inputs); }
+void Simulation::defaultInputs(SceneInputs& inputs) const
+{
+  inputsAt(static_cast<double>(state_.steps + 1) * config_.time.step, inputs);
+}
 
 SceneInputs Simulation::defaultInputs() const
 {
@@ -99,14 +95,10 @@ GraspTarget Simulation::targetOf(int grasp, const Pose& X_WM, const std::optiona
   checkGrasp(grasp);
   const Pose& offset = state_.grasp_offsets[grasp];
   if (isIdentity(offset))
-  {
     return {X_WM, velocity};   // not multiplied by an identity, which would round
-  }
   GraspTarget target{X_WM * offset, velocity};
   if (velocity)
-  {
     target.velocity->linear += velocity->angular.cross(X_WM.orientation * offset.position);
-  }
   return target;
 }
 
@@ -120,10 +112,9 @@ void Simulation::checkInputs(const SceneInputs& inputs) const
 {
   const auto check = [](const char* name, std::size_t given, std::size_t expected, const char* of) {
     if (given != expected)
-    {
-      throw std::invalid_argument(std::string("inputs.") + name + " has " + std::to_string(given) + " targets; must have " +
-                                  std::to_string(expected) + ", one per " + of + " of the scene");
-    }
+      throw std::invalid_argument(std::string("inputs.") + name + " has " + std::to_string(given) +
+                                  " targets; must have " + std::to_string(expected) + ", one per " + of +
+                                  " of the scene");
   };
   check("grasps", inputs.grasps.size(), grasps_.size(), "grasp");
   check("bodies", inputs.bodies.size(), config_.bodies.size(), "body");
@@ -146,12 +137,8 @@ void Simulation::fillRodInputs(const SceneInputs& inputs)
     rod_inputs_[r].grasps.resize(state_.rods[r].grasps.size());   // welds last: the group fills them
   }
   for (std::size_t g = 0; g < grasps_.size(); ++g)
-  {
     if (grasps_[g].rod >= 0)
-    {
       rod_inputs_[grasps_[g].rod].grasps[grasps_[g].index] = drivenTarget(static_cast<int>(g), inputs);
-    }
-  }
 }
 
 GraspTarget Simulation::drivenTarget(int grasp, const SceneInputs& inputs) const
@@ -166,7 +153,7 @@ StepReport Simulation::step(const SceneInputs& inputs)
   fillRodInputs(inputs);
   // One part's failure must leave the others where they were, too.
   const std::size_t apart =
-    models_.size() - group_rods_.size() + (group_ ? 1 : 0) + config_.threads.size() + config_.cloths.size();
+      models_.size() - group_rods_.size() + (group_ ? 1 : 0) + config_.threads.size() + config_.cloths.size();
   const bool several = apart > 1 || functionsDue();
   const std::vector<RodState> before = several ? state_.rods : std::vector<RodState>();
   const std::vector<ThreadGroupState> threads_before = several ? state_.threads : std::vector<ThreadGroupState>();
@@ -187,18 +174,14 @@ StepReport Simulation::step(const SceneInputs& inputs)
     takeOver();
     total = stepThreads(inputs);
     if (total.ok)
-    {
       total.merge(stepCloths(inputs));
-    }
     if (total.ok)
     {
       takeRodTargets(inputs);
       total.merge(stepAll());
     }
     if (total.ok && group_)
-    {
       total.merge(stepGroup(inputs, false));
-    }
   }
   catch (...)
   {
@@ -224,14 +207,10 @@ StepReport Simulation::step(const SceneInputs& inputs)
 void Simulation::setThreads(int threads)
 {
   if (threads < 1)
-  {
     throw std::invalid_argument("threads = " + std::to_string(threads) + "; must be at least 1");
-  }
   threads_ = threads;
   if (group_)
-  {
     group_->setThreads(threads);
-  }
 }
 
 void Simulation::takeWrenches()
@@ -240,13 +219,12 @@ void Simulation::takeWrenches()
   {
     const int rod = grasps_[g].rod;
     if (rod >= 0)
-    {
       state_.wrenches[g] = rodWrenches(rod)[grasps_[g].index];
-    }
   }
   for (std::size_t k = 0; k < thread_steppers_.size(); ++k)
   {
-    state_.end_loads[k] = thread_steppers_[k] ? thread_steppers_[k]->endLoads() : touching_->endLoads(touching_index_[k]);
+    state_.end_loads[k] =
+        thread_steppers_[k] ? thread_steppers_[k]->endLoads() : touching_->endLoads(touching_index_[k]);
   }
 }
 
@@ -256,7 +234,8 @@ void Simulation::checkGrasp(int grasp) const
 {
   if (grasp < 0 || grasp >= static_cast<int>(grasps_.size()))
   {
-    throw std::invalid_argument("grasp = " + std::to_string(grasp) + "; must be in [0, " + std::to_string(grasps_.size()) + ")");
+    throw std::invalid_argument("grasp = " + std::to_string(grasp) + "; must be in [0, " +
+                                std::to_string(grasps_.size()) + ")");
   }
 }
 
@@ -280,18 +259,18 @@ void Simulation::attach(int grasp, int first_node, int last_node, Hold hold)
                                 std::to_string(model.nodes() - 1) + "]");
   }
   if (hold == Hold::position && first_node != last_node)
-  {
     throw std::invalid_argument("grasp " + ref.config->name + ": " + nodes + ": a point pin holds one node");
-  }
   for (std::size_t other = 0; other < rod.grasps.size(); ++other)
   {
     const GraspState& held = rod.grasps[other];
-    if (static_cast<int>(other) != ref.index && held.active && first_node <= held.last_node && held.first_node <= last_node)
+    if (static_cast<int>(other) != ref.index && held.active && first_node <= held.last_node &&
+        held.first_node <= last_node)
     {
       const auto& grasps = config_.rods[ref.rod].grasps;
       throw std::invalid_argument("grasp " + ref.config->name + ": " + nodes + " overlap " +
-                                  (other < grasps.size() ? "grasp " + grasps[other].name : std::string("a weld")) + ", which holds " + std::to_string(held.first_node) +
-                                  " to " + std::to_string(held.last_node));
+                                  (other < grasps.size() ? "grasp " + grasps[other].name : std::string("a weld")) +
+                                  ", which holds " + std::to_string(held.first_node) + " to " +
+                                  std::to_string(held.last_node));
     }
   }
   checkHeld(ref.rod, ref.index, first_node, last_node);
@@ -312,17 +291,11 @@ void Simulation::takeOffset(int grasp, double time)
   {
     SceneInputs now;
     for (const RigidBodyState& b : state_.bodies)
-    {
       now.bodies.push_back({b.X_WB, {}});
-    }
     for (const Pose& pose : state_.obstacles)
-    {
       now.obstacles.push_back({pose, {}});
-    }
     if (const GraspTarget* frame = followed(*body, now))
-    {
       setOffset(grasp, frame->X_WG);
-    }
   }
 }
 
@@ -332,4 +305,4 @@ const Wrench& Simulation::wrench(int grasp) const
   return state_.wrenches[grasp];
 }
 
-}  // namespace slender
+}   // namespace slender

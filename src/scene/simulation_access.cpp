@@ -27,7 +27,8 @@ const std::string& Simulation::heldObject(int grasp) const
 const Eigen::Matrix3Xd& Simulation::pinForces(int cloth) const
 {
   const auto& stepper = cloth_steppers_.at(static_cast<std::size_t>(cloth));
-  return stepper ? stepper->pinForces() : touching_cloths_[cloth_places_[cloth].group].group.pinForces(cloth_places_[cloth].index);
+  return stepper ? stepper->pinForces()
+                 : touching_cloths_[cloth_places_[cloth].group].group.pinForces(cloth_places_[cloth].index);
 }
 
 Eigen::Matrix3Xd Simulation::contactForces(int cloth) const
@@ -48,4 +49,4 @@ ClothEnergies Simulation::clothEnergies(int cloth) const
   return clothStepper(cloth).energies(state_.cloths[static_cast<std::size_t>(cloth)].cloth, config_.gravity);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -18,7 +18,8 @@ namespace slender {
 
 namespace {
 
-/// Puts the grasp's direction and director into its motion. A section that turns to them within the first step is worth a warning.
+/// Puts the grasp's direction and director into its motion. A section that turns to them within the first step is worth
+/// a warning.
 void turnGrasp(GraspConfig& grasp, const Pose& section, SceneConfig& scene)
 {
   constexpr double kNoticeable = 0.05;   // [rad]
@@ -27,8 +28,10 @@ void turnGrasp(GraspConfig& grasp, const Pose& section, SceneConfig& scene)
   {
     char degrees[32];
     std::snprintf(degrees, sizeof degrees, "%.0f", turn * 180 / M_PI);
-    scene.warnings.push_back((scene.file.empty() ? "scene " + scene.name : scene.file) + ": grasp " + grasp.name + ": direction or director turns the section by " +
-                             degrees + " degrees within the first step; start: equilibrium turns it slowly, before the first step");
+    scene.warnings.push_back(
+        (scene.file.empty() ? "scene " + scene.name : scene.file) + ": grasp " + grasp.name +
+        ": direction or director turns the section by " + degrees +
+        " degrees within the first step; start: equilibrium turns it slowly, before the first step");
   }
 }
 
@@ -36,12 +39,13 @@ void turnGrasp(GraspConfig& grasp, const Pose& section, SceneConfig& scene)
 bool holdsTangent(const RodConfig& rod, const RodModel& model, int edge)
 {
   const auto held = [&rod](int node) {
-    return std::any_of(rod.grasps.begin(), rod.grasps.end(), [node](const GraspConfig& g) { return g.first_node <= node && node <= g.last_node; });
+    return std::any_of(rod.grasps.begin(), rod.grasps.end(),
+                       [node](const GraspConfig& g) { return g.first_node <= node && node <= g.last_node; });
   };
   return held(edge) && held((edge + 1) % model.nodes());
 }
 
-}  // namespace
+}   // namespace
 
 /// The loads that act all the time.
 void Simulation::takeLoads(int r, const RodModel& model)
@@ -55,8 +59,10 @@ void Simulation::takeLoads(int r, const RodModel& model)
   if (loads.torques.size() > 0 && std::none_of(rod.grasps.begin(), rod.grasps.end(), clamps) &&
       std::none_of(config_.bodies.begin(), config_.bodies.end(), carries))
   {
-    throw std::invalid_argument("loads: nothing balances the torque, since no grasp holds a frame of the rod (hold: frame) and no body is welded to it: "
-                                "its material frames, which have no inertia, would spin without end");
+    throw std::invalid_argument(
+        "loads: nothing balances the torque, since no grasp holds a frame of the rod (hold: frame) and no body is "
+        "welded to it: "
+        "its material frames, which have no inertia, would spin without end");
   }
   for (int j = 0; j < static_cast<int>(loads.torques.size()); ++j)
   {
@@ -64,8 +70,10 @@ void Simulation::takeLoads(int r, const RodModel& model)
     {
       config_.warnings.push_back((rod.place.empty() ? "rod " + rod.name : rod.place) +
                                  ": a torque of loads goes along with the tangent of edge " + std::to_string(j) +
-                                 ", which may turn. Such a torque has no potential: statics finds its equilibria, but stability and the lowest eigenvalue "
-                                 "leave out that it turns, and a rod that they call stable may flutter. Hold the nodes of this edge by hold: position to guide it");
+                                 ", which may turn. Such a torque has no potential: statics finds its equilibria, but "
+                                 "stability and the lowest eigenvalue "
+                                 "leave out that it turns, and a rod that they call stable may flutter. Hold the nodes "
+                                 "of this edge by hold: position to guide it");
       break;
     }
   }
@@ -89,21 +97,18 @@ void Simulation::buildRods()
       RodModel& model = built.model;
       Eigen::Matrix3Xd velocities;
       if (rod.tracking)
-      {
         placeOnGuide(static_cast<int>(r), model, initial, velocities);
-      }
       RodState state = startSceneRod(rod, built, initial);
       if (velocities.cols() > 0)
-      {
         state.v = velocities;
-      }
       for (std::size_t g = 0; g < rod.grasps.size(); ++g)
       {
         GraspConfig& grasp = rod.grasps[g];
         if (grasp.first_node < 0 || grasp.last_node >= model.nodes() || grasp.first_node > grasp.last_node)
         {
-          throw std::invalid_argument("grasp " + grasp.name + " holds nodes " + std::to_string(grasp.first_node) + " to " +
-                                      std::to_string(grasp.last_node) + "; must be in [0, " + std::to_string(model.nodes() - 1) + "]");
+          throw std::invalid_argument("grasp " + grasp.name + " holds nodes " + std::to_string(grasp.first_node) +
+                                      " to " + std::to_string(grasp.last_node) + "; must be in [0, " +
+                                      std::to_string(model.nodes() - 1) + "]");
         }
         state.grasps.push_back(makeGrasp(model, state, grasp.first_node, grasp.last_node, grasp.hold == Hold::frame));
         turnGrasp(grasp, state.grasps.back().X_WG, config_);
@@ -138,9 +143,7 @@ StepReport Simulation::stepAll()
     }
   }
   if (alone == 0)
-  {
     return total;
-  }
   if (count == 1)
   {
     total.merge(stepAlone(0));
@@ -149,16 +152,15 @@ StepReport Simulation::stepAll()
   std::vector<StepReport> reports(models_.size());
   std::vector<std::exception_ptr> errors(models_.size());
 #ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) if (threads_ != 1 && alone > 1 && nodes >= kWorthThreads) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
+#pragma omp parallel for schedule(dynamic) if (threads_ != 1 && alone > 1 && nodes >= kWorthThreads) \
+    num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
 #endif
   for (int r = 0; r < count; ++r)
   {
     try
     {
       if (isAlone(r))
-      {
         reports[r] = stepAlone(r);
-      }
     }
     catch (...)
     {
@@ -166,31 +168,26 @@ StepReport Simulation::stepAll()
     }
   }
   for (const std::exception_ptr& error : errors)
-  {
     if (error)
-    {
       std::rethrow_exception(error);
-    }
-  }
   for (int r = 0; r < count; ++r)
-  {
     if (isAlone(r))
-    {
       total.merge(reports[r]);
-    }
-  }
   return total;
 }
 
 StepReport Simulation::stepAlone(int rod)
 {
-  return tracked_rods_[rod] ? tracked_rods_[rod]->stepper.step(state_.rods[rod], rod_inputs_[rod], tracked_rods_[rod]->targets, config_.time.step)
+  return tracked_rods_[rod] ? tracked_rods_[rod]->stepper.step(state_.rods[rod], rod_inputs_[rod],
+                                                               tracked_rods_[rod]->targets, config_.time.step)
                             : steppers_[rod]->step(state_.rods[rod], rod_inputs_[rod], config_.time.step);
 }
 
 const std::vector<Wrench>& Simulation::rodWrenches(int rod) const
 {
-  return tracked_rods_[rod] ? tracked_rods_[rod]->stepper.wrenches() : steppers_[rod] ? steppers_[rod]->wrenches() : group_->wrenches(group_index_[rod]);
+  return tracked_rods_[rod] ? tracked_rods_[rod]->stepper.wrenches()
+         : steppers_[rod]   ? steppers_[rod]->wrenches()
+                            : group_->wrenches(group_index_[rod]);
 }
 
 RodEnergies Simulation::energies(int rod) const
@@ -200,4 +197,4 @@ RodEnergies Simulation::energies(int rod) const
                                : group_->energies(group_index_[rod], state_.rods[rod], config_.gravity);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -1,4 +1,5 @@
-// Statics of a scene: the equilibrium from which it starts, equilibria under growing loads, and the load at which they cease to be stable.
+// Statics of a scene: the equilibrium from which it starts, equilibria under growing loads, and the load at which they
+// cease to be stable.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,7 +19,10 @@ std::string shortText(double value)
   return text;
 }
 
-double largestDistance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) { return (a - b).colwise().norm().maxCoeff(); }
+double largestDistance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b)
+{
+  return (a - b).colwise().norm().maxCoeff();
+}
 
 void fail(StaticsRun& run, const std::string& message)
 {
@@ -35,15 +39,13 @@ double sumOfLoads(const RodModel& model, const RodInputs& loads)
   {
     Eigen::Vector3d force = model.mass[i] * loads.gravity;
     if (loads.forces.cols() > 0)
-    {
       force += loads.forces.col(i);
-    }
     sum += force.norm();
   }
   return sum + loads.torques.cwiseAbs().sum() / model.rest_length.sum();
 }
 
-}  // namespace
+}   // namespace
 
 void Simulation::findEquilibrium()
 {
@@ -52,17 +54,20 @@ void Simulation::findEquilibrium()
   const StepReport report = solveStatics(1.0);
   if (!report.ok)
   {
-    throw SimulationError("start: equilibrium: " + report.message + " (start: as_given starts from the shape in the scene)");
+    throw SimulationError("start: equilibrium: " + report.message +
+                          " (start: as_given starts from the shape in the scene)");
   }
   if (!report.stable)
   {
-    const std::string unstable = "start: equilibrium: the equilibrium is unstable (lowest eigenvalue " + shortText(report.lowest_eigenvalue) +
-                                 " 1/s^2), and no stable one was reached from it";
+    const std::string unstable = "start: equilibrium: the equilibrium is unstable (lowest eigenvalue " +
+                                 shortText(report.lowest_eigenvalue) + " 1/s^2), and no stable one was reached from it";
     if (!config_.start.accept_unstable)
     {
-      throw SimulationError(unstable + ": start from a shape that is nearer to the stable equilibrium (initial), or hold what drifts by a grasp "
-                                       "(start: as_given starts from the shape in the scene; start: {equilibrium: true, accept_unstable: true} "
-                                       "starts from the unstable equilibrium)");
+      throw SimulationError(
+          unstable +
+          ": start from a shape that is nearer to the stable equilibrium (initial), or hold what drifts by a grasp "
+          "(start: as_given starts from the shape in the scene; start: {equilibrium: true, accept_unstable: true} "
+          "starts from the unstable equilibrium)");
     }
     config_.warnings.push_back(unstable + ": start.accept_unstable starts from it all the same");
   }
@@ -77,20 +82,18 @@ void Simulation::checkHasStatics() const
   {
     if (cloth.tracking || cloth.contact)
     {
-      throw SceneError(where + ": statics is not for cloth that " + (cloth.tracking ? "tracks a guide" : "has contact") + ", as cloth " + cloth.name +
+      throw SceneError(where + ": statics is not for cloth that " +
+                       (cloth.tracking ? "tracks a guide" : "has contact") + ", as cloth " + cloth.name +
                        " does; let it settle by time stepping with damping");
     }
   }
   for (const RodConfig& rod : config_.rods)
-  {
     if (rod.tracking)
-    {
       throw SceneError(where + ": statics is not for rods that track a guide, as rod " + rod.name + " does");
-    }
-  }
   if (config_.rods.empty() && config_.cloths.empty() && !group_)
   {
-    throw SceneError(where + ": statics needs a rod, a cloth or a simulated body; threads flow, and have no equilibrium");
+    throw SceneError(where +
+                     ": statics needs a rod, a cloth or a simulated body; threads flow, and have no equilibrium");
   }
 }
 
@@ -117,9 +120,7 @@ RodInputs Simulation::loadsAt(int rod, double factor) const
   inputs.forces = (scaled ? factor : 1.0) * rod_loads_[rod].forces;
   inputs.torques = (scaled ? factor : 1.0) * rod_loads_[rod].torques;
   if (imperfection_.cols() > 0)
-  {
     inputs.forces = inputs.forces.cols() > 0 ? Eigen::Matrix3Xd(inputs.forces + imperfection_) : imperfection_;
-  }
   return inputs;
 }
 
@@ -142,43 +143,30 @@ StepReport Simulation::solveStatics(double factor)
 {
   std::vector<Twist> velocities;
   for (const RigidBodyState& body : state_.bodies)
-  {
     velocities.push_back(body.velocity);
-  }
   gravity_ = gravityAt(factor);
   StepReport report;
   for (std::size_t r = 0; r < steppers_.size() && report.ok; ++r)
   {
     const RodInputs loads = loadsAt(static_cast<int>(r), factor);
     if (steppers_[r])
-    {
       report.merge(steppers_[r]->solveEquilibrium(state_.rods[r], loads));
-    }
     else
-    {
       rod_inputs_[r] = loads;   // the group takes them from here
-    }
   }
   if (report.ok && group_)
-  {
     report.merge(stepGroup(static_inputs_, true));
-  }
   if (report.ok)
-  {
     report.merge(solveCloths(factor));
-  }
   gravity_ = config_.gravity;
   if (config_.start.keep_velocities)
-  {
     for (std::size_t b = 0; b < velocities.size(); ++b)
-    {
       state_.bodies[b].velocity = velocities[b];
-    }
-  }
   return report;
 }
 
-/// The stable equilibria of all cloths under loads of this factor; the state is where the search begins. fillClothInputs() comes before.
+/// The stable equilibria of all cloths under loads of this factor; the state is where the search begins.
+/// fillClothInputs() comes before.
 StepReport Simulation::solveCloths(double factor)
 {
   StepReport total;
@@ -191,9 +179,7 @@ StepReport Simulation::solveCloths(double factor)
     total.merge(cloth_steppers_[k]->solveEquilibrium(state_.cloths[k].cloth, loads));
   }
   if (total.ok)
-  {
     takeClothWrenches();
-  }
   return total;
 }
 
@@ -211,7 +197,8 @@ StaticsRow Simulation::rowAt(double factor, const StepReport& report) const
   }
   for (std::size_t k = 0; k < state_.cloths.size(); ++k)
   {
-    row.displacement = std::max(row.displacement, largestDistance(state_.cloths[k].cloth.x, initial_.cloths[k].cloth.x));
+    row.displacement =
+        std::max(row.displacement, largestDistance(state_.cloths[k].cloth.x, initial_.cloths[k].cloth.x));
   }
   return row;
 }
@@ -223,28 +210,18 @@ StaticsRun Simulation::runStatics()
   StaticsRun run;
   const StaticsConfig statics = config_.statics.value_or(StaticsConfig{});
   if (statics.buckling)
-  {
     findCritical(*statics.buckling, run);
-  }
   const bool only_buckling = statics.buckling && statics.factors.empty() && !statics.path;
   const std::vector<double> factors = statics.factors.empty() ? std::vector<double>{1.0} : statics.factors;
   if (statics.perturbation != 0 && run.end.ok)
-  {
     perturb(statics.path ? statics.path->from : factors.front(), run);
-  }
   if (run.end.ok && statics.path)
-  {
     runPath(*statics.path, run);
-  }
   else if (run.end.ok && !only_buckling)
-  {
     runFactors(factors, run);
-  }
   imperfection_.resize(3, 0);
   if (run.end.ok)
-  {
     takeWrenches();
-  }
   return run;
 }
 
@@ -254,14 +231,14 @@ void Simulation::perturb(double first_factor, StaticsRun& run)
   RodState state = state_.rods[0];
   run.end.merge(steppers_[0]->solveEquilibrium(state, loadsAt(0, first_factor), false));
   if (!run.end.ok)
-  {
     return;
-  }
   const Eigen::Matrix3Xd mode = steppers_[0]->lowestMode().topRows<3>();
   const double size = mode.colwise().norm().sum();
   if (!(size > 0))
   {
-    fail(run, "statics.perturbation: the lowest mode of the first equilibrium moves no node, so that no force lies along it; leave perturbation out");
+    fail(run,
+         "statics.perturbation: the lowest mode of the first equilibrium moves no node, so that no force lies along "
+         "it; leave perturbation out");
     return;
   }
   imperfection_ = config_.statics->perturbation * sumOfLoads(*models_[0], loadsPerFactor(0, 1.0)) / size * mode;
@@ -301,9 +278,7 @@ void Simulation::runPath(const PathConfig& path, StaticsRun& run)
   {
     const StepReport moved = walk.advance(1.0 / path.steps);
     if (moved.ok && walk.factor() > 1.0)
-    {
       walk.settleAt(1.0);   // where that fails, the path ends just beyond
-    }
     if (!moved.ok)
     {
       fail(run, "load factor " + shortText(path.from + walk.factor() * range) + ": " + moved.message);
@@ -315,30 +290,32 @@ void Simulation::runPath(const PathConfig& path, StaticsRun& run)
     report.iterations = moved.iterations;
     run.rows.push_back(rowAt(factor, report));
     if (walk.factor() >= 1.0)
-    {
       return;
-    }
   }
-  fail(run, "statics.path: the path has become " + std::to_string(kMostTimes) + " times as long as its scale without reaching factor " +
-              shortText(path.to) + "; it ends at factor " + shortText(run.rows.back().factor));
+  fail(run, "statics.path: the path has become " + std::to_string(kMostTimes) +
+                " times as long as its scale without reaching factor " + shortText(path.to) + "; it ends at factor " +
+                shortText(run.rows.back().factor));
 }
 
 /// Follows the path from factor 0 until its equilibria are unstable, or the factor turns back; then bisects.
 void Simulation::findCritical(double up_to, StaticsRun& run)
 {
   constexpr int kMostSteps = 1000;
-  constexpr double kRelative = 1e-7;   // far below the mesh's error; the neutral band of eigenvalues is 1e-6 of a bending frequency squared
+  // far below the mesh's error; the neutral band of eigenvalues is 1e-6 of a bending frequency squared
+  constexpr double kRelative = 1e-7;
   RodStepper& stepper = *steppers_[0];
   const RodModel& model = *models_[0];
   RodState safe = state_.rods[0];
   const StepReport first = stepper.solveEquilibrium(safe, loadsAt(0, 0.0), false);
   if (!first.ok || !first.stable)
   {
-    fail(run, "statics.buckling: " + (first.ok ? std::string("the equilibrium without the load (factor 0) is unstable") : "load factor 0: " + first.message));
+    fail(run, "statics.buckling: " + (first.ok ? std::string("the equilibrium without the load (factor 0) is unstable")
+                                               : "load factor 0: " + first.message));
     return;
   }
   const RodInputs unit = loadsPerFactor(0, 1.0);
-  const double length = model.rest_length.sum(), bend = std::max(model.bend_modulus.row(0).maxCoeff(), model.bend_modulus.row(2).maxCoeff());
+  const double length = model.rest_length.sum(),
+               bend = std::max(model.bend_modulus.row(0).maxCoeff(), model.bend_modulus.row(2).maxCoeff());
   const double scale = std::min(up_to, 10.0 * bend / (length * length * sumOfLoads(model, unit)));
   double low = 0.0, before = 0.0, high = 0.0, share = 0.02;
   RodPath walk(models_[0], safe, loadsAt(0, 0.0), unit, scale);
@@ -353,14 +330,13 @@ void Simulation::findCritical(double up_to, StaticsRun& run)
     }
     high = walk.factor();
     if (high <= low || !stepper.assessEquilibrium(walk.state(), loadsAt(0, high)).stable)
-    {
       break;
-    }
     before = low;
     low = high;
     safe = walk.state();
   }
-  const double reach = 2.0 * largestDistance(walk.state().x, safe.x) + 1e-6 * length;   // what is further away is another path
+  // what is further away is another path
+  const double reach = 2.0 * largestDistance(walk.state().x, safe.x) + 1e-6 * length;
   CriticalLoad critical;
   critical.fold = true;
   high = high > low ? high : low + 2.0 * (low - before);
@@ -386,4 +362,4 @@ void Simulation::findCritical(double up_to, StaticsRun& run)
   run.critical = std::move(critical);
 }
 
-}  // namespace slender
+}   // namespace slender

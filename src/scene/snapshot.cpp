@@ -13,10 +13,12 @@ Eigen::Quaterniond edgeFrame(const ThreadState& state, int edge)
 
 RodSnapshot snapshotOf(const RodModel& model, const RodState& state)
 {
-  RodSnapshot out{model.name, model.closed, state.x, state.v, {}, Eigen::VectorXd(model.nodes()), model.radius_a, model.radius_b};
+  RodSnapshot out{model.name,     model.closed,  state.x, state.v, {}, Eigen::VectorXd(model.nodes()),
+                  model.radius_a, model.radius_b};
   for (int i = 0; i < model.nodes(); ++i)
     out.twist[i] = state.twistAt(i);
-  forEachFrame(model, state, [&](int, const Eigen::Matrix3d& axes) { out.frames.push_back(Eigen::Quaterniond(axes).normalized()); });
+  forEachFrame(model, state,
+               [&](int, const Eigen::Matrix3d& axes) { out.frames.push_back(Eigen::Quaterniond(axes).normalized()); });
   return out;
 }
 
@@ -43,8 +45,8 @@ ThreadSnapshot snapshotOf(const std::string& name, const ThreadState& state)
   return out;
 }
 
-void appendFunctions(const std::string& object, const FunctionSet& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
-                     std::vector<FunctionSnapshot>& out)
+void appendFunctions(const std::string& object, const FunctionSet& set, const Eigen::Matrix3Xd& guide,
+                     const Eigen::Matrix3Xd& forces, std::vector<FunctionSnapshot>& out)
 {
   const std::string prefix = set.name.empty() ? "" : set.name + "/";
   const Eigen::Matrix3Xd averages = set.constraints->averages(guide);
@@ -52,8 +54,8 @@ void appendFunctions(const std::string& object, const FunctionSet& set, const Ei
     out.push_back({object, prefix + set.constraints->name(i), averages.col(i), forces.col(i)});
 }
 
-bool appendFunctions(const SceneConfig& scene, const std::string& object, const std::string& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
-                     std::vector<FunctionSnapshot>& out)
+bool appendFunctions(const SceneConfig& scene, const std::string& object, const std::string& set,
+                     const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces, std::vector<FunctionSnapshot>& out)
 {
   const TrackingConfig* tracking = nullptr;
   const auto look = [&](const auto& objects) {
@@ -84,7 +86,8 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
   {
     out.rods.push_back(snapshotOf(simulation.rodModel(static_cast<int>(r)), state.rods[r]));
     if (const auto& tracking = scene.rods[r].tracking)
-      appendFunctions(scene.rods[r].name, tracking->sets.front(), state.rod_guides[r].nodes, state.rod_guides[r].forces, out.functions);
+      appendFunctions(scene.rods[r].name, tracking->sets.front(), state.rod_guides[r].nodes, state.rod_guides[r].forces,
+                      out.functions);
   }
   for (std::size_t k = 0; k < state.threads.size(); ++k)
     for (const ThreadState& thread : state.threads[k].threads)
@@ -95,7 +98,8 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
     const ClothModel& model = simulation.clothModel(static_cast<int>(k));
     out.cloths.push_back({model.name, cloth.cloth.x, cloth.cloth.v, model.rest.triangles});
     if (scene.cloths[k].tracking)
-      appendFunctions(model.name, simulation.functions(static_cast<int>(k)), cloth.guide, cloth.guide_forces, out.functions);
+      appendFunctions(model.name, simulation.functions(static_cast<int>(k)), cloth.guide, cloth.guide_forces,
+                      out.functions);
   }
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {
@@ -113,4 +117,4 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
   return out;
 }
 
-}  // namespace slender
+}   // namespace slender

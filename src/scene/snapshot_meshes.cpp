@@ -27,12 +27,15 @@ struct Surface
     for (int k = 0; k < 8; ++k)
       mesh.vertices.col(k) = 0.5 * b.size.cwiseProduct(Vector3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1));
     mesh.triangles << 0, 0, 4, 4, 0, 0, 2, 2, 0, 0, 1, 1,   //
-                      2, 3, 5, 7, 1, 5, 6, 7, 4, 6, 3, 7,   //
-                      3, 1, 7, 6, 5, 4, 7, 3, 6, 2, 7, 5;
+        2, 3, 5, 7, 1, 5, 6, 7, 4, 6, 3, 7,                 //
+        3, 1, 7, 6, 5, 4, 7, 3, 6, 2, 7, 5;
     return mesh;
   }
 
-  TriangleMesh operator()(const Cylinder& c) const { return turned({{c.radius, -0.5 * c.length}, {c.radius, 0.5 * c.length}}); }
+  TriangleMesh operator()(const Cylinder& c) const
+  {
+    return turned({{c.radius, -0.5 * c.length}, {c.radius, 0.5 * c.length}});
+  }
 
   TriangleMesh operator()(const Capsule& c) const
   {
@@ -65,7 +68,7 @@ void moveBy(const Pose& X, TriangleMesh& mesh)
   mesh.vertices = (X.orientation.toRotationMatrix() * mesh.vertices).colwise() + X.position;
 }
 
-}  // namespace
+}   // namespace
 
 FramedLine lineOf(const RodSnapshot& rod)
 {
@@ -96,7 +99,8 @@ FramedLine lineOf(const ThreadSnapshot& thread, const std::vector<double>& value
 
 TriangleMesh shapeMesh(const Shape& shape) { return std::visit(Surface{}, shape); }
 
-std::vector<ObjectMesh> objectMeshes(const SceneSnapshot& instant, const SceneConfig* scene, const TubeResolution& resolution)
+std::vector<ObjectMesh> objectMeshes(const SceneSnapshot& instant, const SceneConfig* scene,
+                                     const TubeResolution& resolution)
 {
   std::vector<ObjectMesh> out;
   const auto tube = [&](const FramedLine& line) {
@@ -104,7 +108,11 @@ std::vector<ObjectMesh> objectMeshes(const SceneSnapshot& instant, const SceneCo
     return tubeMesh(tubeSections(line, most), resolution.sides, line.closed);
   };
   for (const RodSnapshot& rod : instant.rods)
-    out.push_back({ObjectKind::rod, rod.name, static_cast<int>(&rod - instant.rods.data()), tube(lineOf(rod)), {std::uint64_t(rod.x.cols())}});
+    out.push_back({ObjectKind::rod,
+                   rod.name,
+                   static_cast<int>(&rod - instant.rods.data()),
+                   tube(lineOf(rod)),
+                   {std::uint64_t(rod.x.cols())}});
   std::map<std::string, int> threads;
   for (const ThreadSnapshot& thread : instant.threads)
   {
@@ -118,10 +126,16 @@ std::vector<ObjectMesh> objectMeshes(const SceneSnapshot& instant, const SceneCo
   for (const ClothSnapshot& cloth : instant.cloths)
   {
     if (cloth.triangles.cols() == 0)
-      throw std::invalid_argument("cloth " + cloth.name + ": its triangles are not there; the bag needs the topic `mesh`");
-    out.push_back({ObjectKind::cloth, cloth.name, static_cast<int>(&cloth - instant.cloths.data()), {cloth.x, cloth.triangles}, {std::uint64_t(cloth.x.cols())}});
+      throw std::invalid_argument("cloth " + cloth.name +
+                                  ": its triangles are not there; the bag needs the topic `mesh`");
+    out.push_back({ObjectKind::cloth,
+                   cloth.name,
+                   static_cast<int>(&cloth - instant.cloths.data()),
+                   {cloth.x, cloth.triangles},
+                   {std::uint64_t(cloth.x.cols())}});
   }
-  const auto solid = [&](ObjectKind kind, const SolidSnapshot& recorded, int index, const Shape& shape, const Pose& X_BS) {
+  const auto solid = [&](ObjectKind kind, const SolidSnapshot& recorded, int index, const Shape& shape,
+                         const Pose& X_BS) {
     ObjectMesh object{kind, recorded.name, index, shapeMesh(shape), {}};
     if (object.mesh.vertices.cols() == 0)
       return;
@@ -138,4 +152,4 @@ std::vector<ObjectMesh> objectMeshes(const SceneSnapshot& instant, const SceneCo
   return out;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -16,9 +16,7 @@ void visitList(Archive& archive, Values& values)
 {
   archive.list(values);
   for (auto& value : values)
-  {
     archive(value);
-  }
 }
 
 template <class Archive, class PoseType>
@@ -41,14 +39,10 @@ void visitGrasp(Archive& archive, State& grasp)
   archive(grasp.velocity.angular);
   archive.list(grasp.nodes_G);
   for (auto& node : grasp.nodes_G)
-  {
     archive(node);
-  }
   archive.list(grasp.directors_G);
   for (auto& director : grasp.directors_G)
-  {
     archive(director);
-  }
   for (int side = 0; side < 2; ++side)
   {
     archive(grasp.section_G[side]);
@@ -66,9 +60,7 @@ void visitRod(Archive& archive, State& rod)
   archive(rod.director);
   archive.list(rod.grasps);
   for (auto& grasp : rod.grasps)
-  {
     visitGrasp(archive, grasp);
-  }
   archive(rod.last_step);
   archive(rod.next_step);
   archive(rod.a);
@@ -107,9 +99,7 @@ void visitThreads(Archive& archive, State& group)
 {
   archive.list(group.threads);
   for (auto& thread : group.threads)
-  {
     visitThread(archive, thread);
-  }
   archive(group.next_thread_id);
   archive(group.dropped_volume);
   archive(group.left_volume);
@@ -176,9 +166,7 @@ void visitScene(Archive& archive, State& scene)
   archive(scene.steps);
   archive.list(scene.rods);
   for (auto& rod : scene.rods)
-  {
     visitRod(archive, rod);
-  }
   archive.list(scene.rod_guides);
   for (auto& guide : scene.rod_guides)
   {
@@ -187,36 +175,24 @@ void visitScene(Archive& archive, State& scene)
   }
   archive.list(scene.threads);
   for (auto& group : scene.threads)
-  {
     visitThreads(archive, group);
-  }
   archive.list(scene.cloths);
   for (auto& cloth : scene.cloths)
-  {
     visitSceneCloth(archive, cloth);
-  }
   archive.list(scene.bodies);
   for (auto& body : scene.bodies)
-  {
     visitBody(archive, body);
-  }
   archive.list(scene.obstacles);
   for (auto& pose : scene.obstacles)
-  {
     visitPose(archive, pose);
-  }
   archive.list(scene.obstacle_velocities);
   for (auto& velocity : scene.obstacle_velocities)
-  {
     visitTwist(archive, velocity);
-  }
   archive(scene.contact_stiffness);
   archive(scene.thread_contact_stiffness);
   archive.list(scene.grasp_offsets);
   for (auto& offset : scene.grasp_offsets)
-  {
     visitPose(archive, offset);
-  }
   archive.list(scene.wrenches);
   for (auto& wrench : scene.wrenches)
   {
@@ -247,14 +223,16 @@ public:
       finite_ = finite_ && value.allFinite();
   }
   template <class T>
-  void list(const std::vector<T>&) {}
+  void list(const std::vector<T>&)
+  {
+  }
   bool finite() const { return finite_; }
 
 private:
   bool finite_ = true;
 };
 
-}  // namespace
+}   // namespace
 
 std::string stateBytes(const SceneState& state)
 {
@@ -290,16 +268,12 @@ SceneState stateOfBytes(const char* bytes, std::size_t size)
   SceneState state;
   visitScene(reader, state);
   if (reader.left() != 0)
-  {
     throw std::runtime_error("has bytes after its end");
-  }
   FiniteCheck numbers;
   visitScene(numbers, state);
   if (!numbers.finite())
-  {
     throw std::runtime_error("holds numbers that are not finite");
-  }
   return state;
 }
 
-}  // namespace slender
+}   // namespace slender

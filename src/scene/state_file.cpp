@@ -13,8 +13,8 @@
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/scene/state_bytes.h"
 
-/// Saving and loading of a simulation's state. The file: magic, version, fingerprint of the scene, size and checksum of the
-/// payload, payload; numbers as this machine keeps them (the magic number tells the byte order).
+/// Saving and loading of a simulation's state. The file: magic, version, fingerprint of the scene, size and checksum of
+/// the payload, payload; numbers as this machine keeps them (the magic number tells the byte order).
 namespace slender {
 
 namespace {
@@ -23,7 +23,10 @@ constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-e
 constexpr std::uint64_t version = 14;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
-std::string errorText(const std::string& path, const std::string& what) { return path + ": " + what + ": " + std::strerror(errno); }
+std::string errorText(const std::string& path, const std::string& what)
+{
+  return path + ": " + what + ": " + std::strerror(errno);
+}
 
 /// Writes all bytes to a temporary file beside `wanted` and then takes its place, so that there is never half a file.
 void writeDurably(const std::string& wanted, const std::string& bytes)
@@ -33,9 +36,7 @@ void writeDurably(const std::string& wanted, const std::string& bytes)
   ::unlink(temporary.c_str());   // of a process that was killed
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (file < 0)
-  {
     throw std::runtime_error(errorText(path, "cannot be written there"));
-  }
   std::size_t written = 0;
   bool good = true;
   while (good && written < bytes.size())
@@ -55,7 +56,8 @@ void writeDurably(const std::string& wanted, const std::string& bytes)
     throw std::runtime_error(text);
   }
   const auto slash = path.find_last_of('/');
-  const int folder = ::open(slash == std::string::npos ? "." : path.substr(0, slash + 1).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int folder =
+      ::open(slash == std::string::npos ? "." : path.substr(0, slash + 1).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder >= 0)
   {
     ::fsync(folder);   // makes the new name durable too, where the file system can
@@ -68,36 +70,23 @@ std::string misfit(const RodState& rod, const RodModel& model, const RodState& n
 {
   const Eigen::Index n = model.nodes();
   if (rod.x.cols() != n || rod.v.cols() != n)
-  {
     return "rod " + model.name + " has another number of nodes";
-  }
   if (!framesFit(model, rod) || !(rod.framed() || doesWithoutFrames(model)))
-  {
     return "rod " + model.name + " has material frames, or a director instead of them, that do not fit it";
-  }
   for (const auto* memory : {&rod.a, &rod.x_previous, &rod.v_previous})
-  {
     if (memory->cols() != 0 && memory->cols() != n)
-    {
       return "rod " + model.name + " has integrator memory of another size";
-    }
-  }
   if (rod.grasps.size() != now.grasps.size())
-  {
     return "rod " + model.name + " has another number of grasps";
-  }
   for (std::size_t g = 0; g < rod.grasps.size(); ++g)
   {
     const GraspState& grasp = rod.grasps[g];
     if (grasp.first_node < 0 || grasp.first_node > grasp.last_node || grasp.last_node >= n)
-    {
       return "a grasp of rod " + model.name + " holds nodes that do not exist";
-    }
     const auto edges = static_cast<std::size_t>(grasp.last_node - grasp.first_node);
-    if (grasp.nodes_G.size() != edges + 1 || grasp.directors_G.size() != edges || (edges > 0 && !grasp.holds_frame) || grasp.body != now.grasps[g].body)
-    {
+    if (grasp.nodes_G.size() != edges + 1 || grasp.directors_G.size() != edges || (edges > 0 && !grasp.holds_frame) ||
+        grasp.body != now.grasps[g].body)
       return "a grasp of rod " + model.name + " does not fit together";
-    }
   }
   return "";
 }
@@ -106,8 +95,9 @@ std::string misfit(const RodState& rod, const RodModel& model, const RodState& n
 bool fits(const ThreadState& thread)
 {
   const std::size_t nodes = thread.x.size(), edges = thread.volume.size();
-  return nodes >= 2 && edges + 1 == nodes && thread.v.size() == nodes && thread.twist.size() == nodes && thread.id.size() == nodes &&
-                    thread.deposited.size() == nodes && thread.d1.size() == edges && thread.spin.size() == edges;
+  return nodes >= 2 && edges + 1 == nodes && thread.v.size() == nodes && thread.twist.size() == nodes &&
+         thread.id.size() == nodes && thread.deposited.size() == nodes && thread.d1.size() == edges &&
+         thread.spin.size() == edges;
 }
 
 /// Likewise of a cloth: the stepper checks the rest.
@@ -119,9 +109,10 @@ bool fits(const SceneCloth& held, const SceneCloth& now, const ClothModel& model
   bool good = held.cloth.x.cols() == now.cloth.x.cols() && held.cloth.v.cols() == now.cloth.v.cols() &&
               held.cloth.rest_angles.size() == now.cloth.rest_angles.size() &&
               held.cloth.stiffening.size() == now.cloth.stiffening.size() && held.grasps.size() == now.grasps.size() &&
-              held.guide.cols() == now.guide.cols() && held.guide_velocity.cols() == now.guide_velocity.cols() && held.guide_forces.cols() == count &&
-              (averages || held.cloth.average_set == 0) && held.blend.gap.cols() == (blends ? count : 0) &&
-              held.blend.rate.cols() == held.blend.gap.cols() && (held.blend.duration > 0) == blends;
+              held.guide.cols() == now.guide.cols() && held.guide_velocity.cols() == now.guide_velocity.cols() &&
+              held.guide_forces.cols() == count && (averages || held.cloth.average_set == 0) &&
+              held.blend.gap.cols() == (blends ? count : 0) && held.blend.rate.cols() == held.blend.gap.cols() &&
+              (held.blend.duration > 0) == blends;
   const auto there = [&held](int vertex) { return vertex >= 0 && vertex < held.cloth.x.cols(); };
   good = good && std::all_of(held.cloth.pins.begin(), held.cloth.pins.end(), there);
   std::size_t pins = 0;
@@ -134,7 +125,7 @@ bool fits(const SceneCloth& held, const SceneCloth& now, const ClothModel& model
   return good && pins == held.cloth.pins.size();
 }
 
-}  // namespace
+}   // namespace
 
 void Simulation::save(const std::string& path) const
 {
@@ -142,10 +133,9 @@ void Simulation::save(const std::string& path) const
   Checksum checksum;
   checksum.add(payload.data(), payload.size());
   ByteWriter file;
-  for (std::uint64_t word : {magic, version, fingerprint(), static_cast<std::uint64_t>(payload.size()), checksum.value()})
-  {
+  for (std::uint64_t word :
+       {magic, version, fingerprint(), static_cast<std::uint64_t>(payload.size()), checksum.value()})
     file(word);
-  }
   writeDurably(path, file.bytes() + payload);
 }
 
@@ -154,39 +144,27 @@ void Simulation::load(const std::string& path)
   requireRegularFile(path);
   std::ifstream file(path, std::ios::binary);
   if (!file)
-  {
     throw std::runtime_error(errorText(path, "cannot be opened for reading"));
-  }
   std::ostringstream text;
   text << file.rdbuf();
   const std::string bytes = text.str();
   if (file.bad() || bytes.empty())
-  {
     throw std::runtime_error(path + ": is empty or cannot be read");
-  }
 
   std::uint64_t header[5] = {};
   ByteReader reader(bytes.data(), bytes.size());
   if (bytes.size() >= sizeof(std::uint64_t))
-  {
     reader(header[0]);
-  }
   if (header[0] != magic)
-  {
     throw std::runtime_error(path + ": is not a saved state (of a machine with this byte order)");
-  }
   if (bytes.size() < header_size)
-  {
     throw std::runtime_error(path + ": ends too early");
-  }
   for (int k = 1; k < 5; ++k)
-  {
     reader(header[k]);
-  }
   if (header[1] != version)
   {
-    throw std::runtime_error(path + ": has format version " + std::to_string(header[1]) + "; this program reads version " +
-                             std::to_string(version));
+    throw std::runtime_error(path + ": has format version " + std::to_string(header[1]) +
+                             "; this program reads version " + std::to_string(version));
   }
   if (header[3] != reader.left())
   {
@@ -196,12 +174,12 @@ void Simulation::load(const std::string& path)
   Checksum checksum;
   checksum.add(bytes.data() + header_size, bytes.size() - header_size);
   if (header[4] != checksum.value())
-  {
     throw std::runtime_error(path + ": is damaged (its checksum does not fit)");
-  }
   if (header[2] != fingerprint())
   {
-    throw std::runtime_error(path + ": belongs to another scene (rods, moduli, grasps, threads, cloths, gravity, step and integrator must be the same)");
+    throw std::runtime_error(path +
+                             ": belongs to another scene (rods, moduli, grasps, threads, cloths, gravity, step and "
+                             "integrator must be the same)");
   }
 
   SceneState loaded;
@@ -214,45 +192,31 @@ void Simulation::load(const std::string& path)
     throw std::runtime_error(path + ": " + error.what());
   }
   std::string problem;
-  if (loaded.rods.size() != models_.size() || loaded.rod_guides.size() != state_.rod_guides.size() || loaded.threads.size() != thread_models_.size() || loaded.cloths.size() != cloth_models_.size() ||
+  if (loaded.rods.size() != models_.size() || loaded.rod_guides.size() != state_.rod_guides.size() ||
+      loaded.threads.size() != thread_models_.size() || loaded.cloths.size() != cloth_models_.size() ||
       loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
       loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||
       loaded.wrenches.size() != grasps_.size() || loaded.end_loads.size() != thread_models_.size())
-  {
     problem = "has another number of rods, threads, cloths, bodies, obstacles or grasps";
-  }
   for (std::size_t r = 0; problem.empty() && r < models_.size(); ++r)
-  {
     problem = misfit(loaded.rods[r], *models_[r], state_.rods[r]);
-  }
   for (std::size_t r = 0; problem.empty() && r < state_.rod_guides.size(); ++r)
-  {
-    if (loaded.rod_guides[r].nodes.cols() != state_.rod_guides[r].nodes.cols() || loaded.rod_guides[r].forces.cols() != state_.rod_guides[r].forces.cols())
-    {
+    if (loaded.rod_guides[r].nodes.cols() != state_.rod_guides[r].nodes.cols() ||
+        loaded.rod_guides[r].forces.cols() != state_.rod_guides[r].forces.cols())
       problem = "the guide of rod " + models_[r]->name + " has another size";
-    }
-  }
   for (std::size_t k = 0; problem.empty() && k < thread_models_.size(); ++k)
   {
     const auto& threads = loaded.threads[k].threads;
     // a thread that nothing holds may have left its region
     const bool gone = threads.empty() && config_.threads[k].nozzle;
     if (gone || !std::all_of(threads.begin(), threads.end(), [](const ThreadState& thread) { return fits(thread); }))
-    {
       problem = "thread " + thread_models_[k]->name + " does not fit together";
-    }
   }
   for (std::size_t k = 0; problem.empty() && k < cloth_models_.size(); ++k)
-  {
     if (!fits(loaded.cloths[k], state_.cloths[k], *cloth_models_[k]))
-    {
       problem = "cloth " + cloth_models_[k]->name + " does not fit together";
-    }
-  }
   if (!problem.empty())
-  {
     throw std::runtime_error(path + ": " + problem);
-  }
   try
   {
     checkTouchingCloths(loaded);
@@ -264,4 +228,4 @@ void Simulation::load(const std::string& path)
   state_ = std::move(loaded);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -10,9 +10,7 @@ std::uint64_t Simulation::fingerprint() const
   const auto text = [&out](const std::string& word) {
     out(static_cast<std::uint64_t>(word.size()));
     for (char c : word)
-    {
       out(c);
-    }
   };
   const auto tracked = [&](const TrackingConfig& tracking) {
     out(tracking.guide.mesh.vertices);
@@ -56,11 +54,9 @@ std::uint64_t Simulation::fingerprint() const
     out(model.isotropic);
     out(model.inextensible);
     out(static_cast<int>(model.curvature));
-    for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a, &model.radius_b,
-                                          &model.twist_modulus, &model.rest_twist, &model.drag})
-    {
+    for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a,
+                                          &model.radius_b, &model.twist_modulus, &model.rest_twist, &model.drag})
       out(*values);
-    }
     out(model.bend_modulus);
     out(model.rest_curvature);
     out(model.mass_damping);
@@ -80,9 +76,7 @@ std::uint64_t Simulation::fingerprint() const
       out(load.torque);
     }
     if (const auto& tracking = config_.rods[r].tracking)
-    {
       tracked(*tracking);
-    }
     const RodContact touch = config_.rods[r].contact.value_or(RodContact{});
     out(config_.rods[r].contact.has_value());
     out(touch.self);
@@ -93,12 +87,11 @@ std::uint64_t Simulation::fingerprint() const
   for (const auto& model : thread_models_)
   {
     text(model->name);
-    for (const double value : {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
-                               model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length, model->limits.min_radius,
-                               model->limits.edge_grading, model->limits.highest_edge_length, model->limits.max_step})
-    {
+    for (const double value :
+         {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
+          model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length, model->limits.min_radius,
+          model->limits.edge_grading, model->limits.highest_edge_length, model->limits.max_step})
       out(value);
-    }
     out(model->floor.present);
     out(model->floor.friction);
     out(model->limits.max_deposited);
@@ -120,33 +113,24 @@ std::uint64_t Simulation::fingerprint() const
     out(model.rest.vertices);
     out(static_cast<std::uint64_t>(model.rest.triangles.cols()));
     for (Eigen::Index f = 0; f < model.rest.triangles.cols(); ++f)
-    {
       for (int corner = 0; corner < 3; ++corner)
-      {
         out(model.rest.triangles(corner, f));
-      }
-    }
     out(model.mass);
     out(model.warp);
     out(model.undeformed);
-    for (const double value : {model.membrane.c11, model.membrane.c12, model.membrane.c22, model.membrane.c33, model.bending_modulus,
-                               model.mass_damping, model.stiffness_damping, model.wind_coefficient, model.aerodynamics.air_density,
-                               model.aerodynamics.drag, model.aerodynamics.lift, model.plasticity.yield_curvature, model.plasticity.hardening,
-                               model.plasticity.creep_time, config_.cloths[k].linear_tolerance})
-    {
+    for (const double value :
+         {model.membrane.c11, model.membrane.c12, model.membrane.c22, model.membrane.c33, model.bending_modulus,
+          model.mass_damping, model.stiffness_damping, model.wind_coefficient, model.aerodynamics.air_density,
+          model.aerodynamics.drag, model.aerodynamics.lift, model.plasticity.yield_curvature,
+          model.plasticity.hardening, model.plasticity.creep_time, config_.cloths[k].linear_tolerance})
       out(value);
-    }
     out(static_cast<int>(model.bending));
     if (model.bending_poissons_ratio)
-    {
       out(*model.bending_poissons_ratio);
-    }
     out(static_cast<int>(config_.cloths[k].solver));
     out(config_.cloths[k].one_newton_step);
     if (const auto& tracking = config_.cloths[k].tracking)
-    {
       tracked(*tracking);
-    }
     const ClothContactConfig touch = config_.cloths[k].contact.value_or(ClothContactConfig{});
     out(config_.cloths[k].contact.has_value());
     out(touch.self);
@@ -160,15 +144,11 @@ std::uint64_t Simulation::fingerprint() const
       out(static_cast<int>(grasp.attach));
     }
     for (const char face : model.clamped_faces)
-    {
       out(static_cast<int>(face));
-    }
     for (const ClothLoadConfig& load : config_.cloths[k].loads)
     {
       for (const int vertex : load.vertices)
-      {
         out(vertex);
-      }
       out(load.force);
     }
   }
@@ -181,13 +161,11 @@ std::uint64_t Simulation::fingerprint() const
     out(static_cast<std::uint64_t>(body.welds.size()));
   }
   for (const ObstacleConfig& obstacle : config_.obstacles)
-  {
     text(obstacle.name);
-  }
   out(config_.contact.gap);
   Checksum checksum;
   checksum.add(out.bytes().data(), out.bytes().size());
   return checksum.value();
 }
 
-}  // namespace slender
+}   // namespace slender

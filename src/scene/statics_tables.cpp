@@ -46,11 +46,12 @@ void writeModes(TextFile& file, long step, const StaticsRow& row, const std::vec
   }
 }
 
-}  // namespace
+}   // namespace
 
 void clearStatics(const std::string& folder)
 {
-  clearEarlierRun(folder, [](const std::string& name) { return name == kRows || name == kModes; }, kBeginning);
+  clearEarlierRun(
+      folder, [](const std::string& name) { return name == kRows || name == kModes; }, kBeginning);
 }
 
 void writeStatics(const std::string& folder, const StaticsRun& run, const std::vector<std::string>& rods)
@@ -76,4 +77,4 @@ void writeStatics(const std::string& folder, const StaticsRun& run, const std::v
   modes.close();
 }
 
-}  // namespace slender
+}   // namespace slender

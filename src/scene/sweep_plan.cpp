@@ -51,12 +51,10 @@ SweepAxis readAxis(const std::string& path, const YamlCursor& at)
     return axis;
   }
   for (const YamlCursor& item : at.items(1))
-  {
     if (item.isScalar())
       axis.values.push_back(item.tree()->scalar);
     else
       item.problem("must be a single value; lists in quotes, as in --set");
-  }
   return axis;
 }
 
@@ -121,7 +119,7 @@ void tryValues(const SweepPlan& plan, Problems& problems)
   }
 }
 
-}  // namespace
+}   // namespace
 
 long SweepPlan::points() const
 {
@@ -143,10 +141,7 @@ std::vector<std::string> SweepPlan::overrides(long point) const
   return all;
 }
 
-SceneConfig SweepPlan::sceneOf(long point) const
-{
-  return readScene(scene, overrides(point));
-}
+SceneConfig SweepPlan::sceneOf(long point) const { return readScene(scene, overrides(point)); }
 
 SweepPlan readSweepPlan(const std::string& path)
 {
@@ -166,9 +161,7 @@ SweepPlan readSweepPlan(const std::string& path)
     plan.axes.push_back(readAxis(name, at));
     points *= static_cast<double>(plan.axes.back().values.size());
     if (points > max_points)   // the values of more axes might not fit into memory
-    {
       break;
-    }
   }
   if (axes.isMap() && plan.axes.empty())
     axes.problem("names no value to vary");
@@ -192,4 +185,4 @@ SweepPlan readSweepPlan(const std::string& path)
   return plan;
 }
 
-}  // namespace slender
+}   // namespace slender

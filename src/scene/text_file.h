@@ -21,9 +21,7 @@ public:
   explicit TextFile(std::string path) : path_(std::move(path)), file_(path_, std::ios::binary | std::ios::trunc)
   {
     if (!file_)
-    {
       throw std::runtime_error(path_ + ": cannot be opened for writing: " + std::strerror(errno));
-    }
   }
 
   TextFile& operator<<(const std::string& text)
@@ -72,9 +70,7 @@ private:
   void check()
   {
     if (!file_)
-    {
       throw WriteError(path_ + ": writing failed: " + std::strerror(errno));
-    }
   }
 
   std::string path_;
@@ -82,4 +78,4 @@ private:
   std::string line_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -1,4 +1,5 @@
-// Edges and break-up of threads whose scene does not say them, from what the flow will form; and what to say when that is not resolved.
+// Edges and break-up of threads whose scene does not say them, from what the flow will form; and what to say when that
+// is not resolved.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,8 +15,8 @@ namespace slender {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
-constexpr double kFewPerTurn = 10.0;    // edges: with fewer, frequencies of coils err by more than about 5 %
-constexpr double kWideStep = 0.3;       // [rad] of a coil in a step: implicit Euler then errs by about 5 % in frequency
+constexpr double kFewPerTurn = 10.0;   // edges: with fewer, frequencies of coils err by more than about 5 %
+constexpr double kWideStep = 0.3;      // [rad] of a coil in a step: implicit Euler then errs by about 5 % in frequency
 
 double distanceTo(const ObstacleConfig& obstacle, const Eigen::Vector3d& point)
 {
@@ -32,13 +33,13 @@ double distanceTo(const ObstacleConfig& obstacle, const Eigen::Vector3d& point)
     return least;
   }
   return std::visit(
-    [&](const auto& shape) {
-      if constexpr (std::is_constructible_v<ConvexPiece, decltype(shape)>)
-        return pieceDistance(ConvexPiece(shape), p, Eigen::Vector3d::UnitX()).distance;
-      else
-        return kUnknown;
-    },
-    obstacle.shape);
+      [&](const auto& shape) {
+        if constexpr (std::is_constructible_v<ConvexPiece, decltype(shape)>)
+          return pieceDistance(ConvexPiece(shape), p, Eigen::Vector3d::UnitX()).distance;
+        else
+          return kUnknown;
+      },
+      obstacle.shape);
 }
 
 /// From the nozzle straight down to the first obstacle, infinite when there is none below.
@@ -62,7 +63,7 @@ double fallOnto(const std::vector<ObstacleConfig>& obstacles, const Eigen::Vecto
 struct Falls
 {
   std::vector<double> heights, flows;
-  double least = kUnknown;      ///< of the heights
+  double least = kUnknown;   ///< of the heights
   bool flow_known = true;
 };
 
@@ -156,21 +157,23 @@ void checkHeight(const Falls& falls, const ThreadConfig& thread, const YamlCurso
   YamlMap map(YamlMap(at).get("nozzle"));
   const YamlCursor place = std::holds_alternative<TableMotion>(nozzle.motion) ? map.get("motion") : map.get("position");
   const double radius = 0.5 * nozzle.diameter;
-  const std::string what = thread.floor && !(thread.contact && thread.contact->obstacles) ? "its floor" : "what it flows onto";
+  const std::string what =
+      thread.floor && !(thread.contact && thread.contact->obstacles) ? "its floor" : "what it flows onto";
   if (!(falls.least > radius))
   {
-    place.problem("brings the nozzle to " + millimetres(falls.least) + " above " + what + "; must be more than its radius " + millimetres(radius) +
-                  ", or no thread forms between them");
+    place.problem("brings the nozzle to " + millimetres(falls.least) + " above " + what +
+                  "; must be more than its radius " + millimetres(radius) + ", or no thread forms between them");
   }
   else if (falls.least < 2 * nozzle.diameter)
   {
-    place.warning("brings the nozzle to " + millimetres(falls.least) + " above " + what + ", less than two of its diameters: what forms there is hardly " +
+    place.warning("brings the nozzle to " + millimetres(falls.least) + " above " + what +
+                  ", less than two of its diameters: what forms there is hardly " +
                   "a thread. Raise the nozzle, or take results as rough.");
   }
 }
 
-/// Thin fluid that comes out slowly does not form a thread: it hangs as a drop until its weight tears it off. Slender theory has no end cap that
-/// would keep such a drop round.
+/// Thin fluid that comes out slowly does not form a thread: it hangs as a drop until its weight tears it off. Slender
+/// theory has no end cap that would keep such a drop round.
 void checkDripping(const ThreadConfig& thread, const YamlCursor& at, double gravity)
 {
   const NozzleConfig& nozzle = *thread.nozzle;
@@ -181,9 +184,13 @@ void checkDripping(const ThreadConfig& thread, const YamlCursor& at, double grav
   const double least = leastJettingSpeed(fall, thread.surface_tension);
   if (flow < least * area)
   {
-    YamlMap(YamlMap(at).get("nozzle")).get("flow").problem("is " + about(flow / area) + " m/s in the nozzle, at which so thin a fluid drips: surface tension draws "
-                                                           "it up, and no thread forms. Must be at least " + about(least * area) +
-                                                           " m^3/s, or the fluid more viscous, or fluid.surface_tension: 0 for the falling part alone");
+    YamlMap(YamlMap(at).get("nozzle"))
+        .get("flow")
+        .problem("is " + about(flow / area) +
+                 " m/s in the nozzle, at which so thin a fluid drips: surface tension draws "
+                 "it up, and no thread forms. Must be at least " +
+                 about(least * area) +
+                 " m^3/s, or the fluid more viscous, or fluid.surface_tension: 0 for the falling part alone");
   }
 }
 
@@ -193,31 +200,34 @@ void checkGiven(const Needs& needs, const Falls& falls, const ThreadConfig& thre
   YamlMap edges(YamlMap(at).get("edges"));
   if (thread.feed_length > 0 && thread.feed_length > 0.5 * falls.least)
   {
-    edges.get("feed").problem("is more than half of the fall of " + millimetres(falls.least) + "; must be at most " + about(0.1 * falls.least) +
-                              " m for ten edges, or leave it out");
+    edges.get("feed").problem("is more than half of the fall of " + millimetres(falls.least) + "; must be at most " +
+                              about(0.1 * falls.least) + " m for ten edges, or leave it out");
     return;
   }
   const Landing& landing = needs.tightest;
   if (!landing.slender())
   {
-    YamlMap(at).get("nozzle").warning("a coil would be no wider than the thread (" + millimetres(landing.coil_radius) + " beside a radius of " +
-                                      millimetres(landing.radius) + "): it falls as a jet and ends in a puddle, which is no thread. Only the falling " +
-                                      "part is to be trusted.");
+    YamlMap(at).get("nozzle").warning(
+        "a coil would be no wider than the thread (" + millimetres(landing.coil_radius) + " beside a radius of " +
+        millimetres(landing.radius) +
+        "): it falls as a jet and ends in a puddle, which is no thread. Only the falling " + "part is to be trusted.");
     return;
   }
   const double longest = thread.longest_edge > 0 ? thread.longest_edge : thread.feed_length;
   if (longest > 0 && edgesPerTurn(landing, longest) < kFewPerTurn)
   {
     (thread.longest_edge > 0 ? edges.get("longest") : edges.get("feed"))
-      .warning("coils of a radius of about " + millimetres(landing.coil_radius) + " form at the floor, and such edges make only " +
-               about(edgesPerTurn(landing, longest)) + " per turn, too few to resolve them. Use edges.longest: " +
-               about(needs.edges.longest) + ", or leave feed, longest and shortest out.");
+        .warning("coils of a radius of about " + millimetres(landing.coil_radius) +
+                 " form at the floor, and such edges make only " + about(edgesPerTurn(landing, longest)) +
+                 " per turn, too few to resolve them. Use edges.longest: " + about(needs.edges.longest) +
+                 ", or leave feed, longest and shortest out.");
   }
   if (longest > 0 && landing.frequency * step > kWideStep)
   {
-    edges.at().warning("the thread coils with about " + about(landing.frequency) + " rad/s, of which a step of " + about(step) +
-                       " s makes " + about(landing.frequency * step) + " rad, too much to resolve. Use time.step: " +
-                       about(needs.edges.longest_step) + ", or leave feed, longest and shortest out, then steps are divided.");
+    edges.at().warning("the thread coils with about " + about(landing.frequency) + " rad/s, of which a step of " +
+                       about(step) + " s makes " + about(landing.frequency * step) +
+                       " rad, too much to resolve. Use time.step: " + about(needs.edges.longest_step) +
+                       ", or leave feed, longest and shortest out, then steps are divided.");
   }
 }
 
@@ -227,12 +237,16 @@ void takeLengths(const Needs& needs, ThreadConfig& thread)
   const bool none = !(thread.feed_length > 0) && !(thread.longest_edge > 0) && !(thread.shortest_edge > 0);
   if (!(thread.longest_edge > 0))
   {
-    thread.longest_edge = thread.feed_length > 0 ? std::min(thread.feed_length, needs.edges.longest) : needs.edges.longest;
-    thread.highest_edge = std::max(thread.longest_edge, thread.feed_length > 0 ? std::min(thread.feed_length, needs.edges.highest) : needs.edges.highest);
+    thread.longest_edge =
+        thread.feed_length > 0 ? std::min(thread.feed_length, needs.edges.longest) : needs.edges.longest;
+    thread.highest_edge =
+        std::max(thread.longest_edge,
+                 thread.feed_length > 0 ? std::min(thread.feed_length, needs.edges.highest) : needs.edges.highest);
   }
   if (!(thread.feed_length > 0))
   {
-    thread.feed_length = thread.highest_edge > 0 ? thread.highest_edge : std::min(thread.longest_edge, needs.edges.highest);
+    thread.feed_length =
+        thread.highest_edge > 0 ? thread.highest_edge : std::min(thread.longest_edge, needs.edges.highest);
   }
   if (none)
   {
@@ -241,8 +255,8 @@ void takeLengths(const Needs& needs, ThreadConfig& thread)
   }
 }
 
-/// The nozzle starts on a circle, turning as the coil will, until the fluid has landed and turned four times. Coils form at once then, of which
-/// otherwise some turns are folds.
+/// The nozzle starts on a circle, turning as the coil will, until the fluid has landed and turned four times. Coils
+/// form at once then, of which otherwise some turns are folds.
 GivenMotion swirlOf(const Landing& landing, const NozzleConfig& nozzle, double share, double height)
 {
   constexpr int kPerTurn = 12, kTurnsAfter = 4, kMostTurns = 500;
@@ -269,9 +283,12 @@ void swirl(const Falls& falls, const Needs& needs, ThreadConfig& thread, const Y
     return;
   const YamlCursor key = YamlMap(YamlMap(at).get("nozzle")).get("swirl");
   if (falls.heights.empty())
-    key.warning("has no effect: there is nothing below the nozzle on which a coil could form; give a floor, or leave it out");
+    key.warning(
+        "has no effect: there is nothing below the nozzle on which a coil could form; give a floor, or leave it out");
   else if (!falls.flow_known)
-    key.warning("has no effect: no flow is known beforehand, and the radius of the coil follows from it; give nozzle.flow, or leave it out");
+    key.warning(
+        "has no effect: no flow is known beforehand, and the radius of the coil follows from it; give nozzle.flow, or "
+        "leave it out");
   else if (!needs.tightest.slender())
     key.warning("has no effect: a coil would be no wider than the thread; leave it out");
   else
@@ -288,7 +305,8 @@ void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& 
   if (!std::isfinite(falls.least))   // it falls for ever
   {
     if (!(thread.feed_length > 0))
-      thread.feed_length = thread.longest_edge > 0 ? std::min(thread.longest_edge, thread.nozzle->diameter) : thread.nozzle->diameter;
+      thread.feed_length =
+          thread.longest_edge > 0 ? std::min(thread.longest_edge, thread.nozzle->diameter) : thread.nozzle->diameter;
     if (!parts_given)
       thread.breakup_radius = 0.01 * thread.nozzle->diameter;
     swirl(falls, Needs(), thread, at);
@@ -302,7 +320,8 @@ void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& 
     thread.breakup_radius = 0.05 * std::min(0.5 * thread.nozzle->diameter, needs.thinnest);
   if (!falls.flow_known && thread.nozzle->flow.topic && !(thread.longest_edge > 0) && !(thread.feed_length > 0))
   {
-    map.get("edges").warning("the flow comes by messages, so edges are chosen for a flow of " + about(falls.flows.front()) +
+    map.get("edges").warning("the flow comes by messages, so edges are chosen for a flow of " +
+                             about(falls.flows.front()) +
                              " m^3/s. Give nozzle.flow.initial a typical flow, or edges.longest.");
   }
   if (falls.flow_known)
@@ -311,7 +330,7 @@ void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& 
   swirl(falls, needs, thread, at);
 }
 
-}  // namespace
+}   // namespace
 
 void completeThreads(SceneConfig& scene, const std::vector<YamlCursor>& at)
 {
@@ -320,31 +339,37 @@ void completeThreads(SceneConfig& scene, const std::vector<YamlCursor>& at)
     ThreadConfig& thread = scene.threads[k];
     YamlMap map(at[k]);
     if (!map.has("fluid"))
-      map.get("fluid").warning("is absent: water-thin or thick, the fluid decides what forms. Taken are density: 1000, viscosity: 1, surface_tension: 0.");
+      map.get("fluid").warning(
+          "is absent: water-thin or thick, the fluid decides what forms. Taken are density: 1000, viscosity: 1, "
+          "surface_tension: 0.");
     if (!thread.nozzle)
       continue;
     YamlMap nozzle(map.get("nozzle"));
     if (!nozzle.has("flow"))
-      nozzle.get("flow").warning("is absent, so nothing flows out of the nozzle. Give it in m^3/s, or flow: {topic: true}.");
+      nozzle.get("flow").warning(
+          "is absent, so nothing flows out of the nozzle. Give it in m^3/s, or flow: {topic: true}.");
     complete(scene, thread, at[k]);
     const double most = greatestFlow(thread, scene.time.step);
     if (thread.nozzle->flow.table.greatest() > most)
     {
-      nozzle.get("flow").problem("is too much: over a thousand edges would leave the nozzle in one step; must be at most " + shortNumber(most) +
-                                 " m^3/s, or with longer edges.feed or a shorter time.step more");
+      nozzle.get("flow").problem(
+          "is too much: over a thousand edges would leave the nozzle in one step; must be at most " +
+          shortNumber(most) + " m^3/s, or with longer edges.feed or a shorter time.step more");
     }
     if (thread.breakup_radius >= 0.5 * thread.nozzle->diameter)
     {
-      map.get("breakup_radius").problem("must be less than the nozzle's radius " + shortNumber(0.5 * thread.nozzle->diameter) +
-                                        " m, or the thread would break wherever it is");
+      map.get("breakup_radius")
+          .problem("must be less than the nozzle's radius " + shortNumber(0.5 * thread.nozzle->diameter) +
+                   " m, or the thread would break wherever it is");
     }
     YamlMap edges(map.get("edges"));
     if (!edges.has("longest") && thread.longest_edge > 0 && thread.shortest_edge > 0.4 * thread.longest_edge)
     {
-      edges.get("shortest").problem("must be at most 0.4 of edges.longest (" + shortNumber(0.4 * thread.longest_edge) +
-                                                        " m), or edges would be joined and divided in turn");
+      edges.get("shortest")
+          .problem("must be at most 0.4 of edges.longest (" + shortNumber(0.4 * thread.longest_edge) +
+                   " m), or edges would be joined and divided in turn");
     }
   }
 }
 
-}  // namespace slender
+}   // namespace slender

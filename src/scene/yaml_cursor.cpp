@@ -48,20 +48,16 @@ std::string quote(const YamlTree& tree)
       {
         text += (text.size() > 1 ? ", " : "") + (item.kind == YamlTree::Kind::map ? std::string("{...}") : quote(item));
         if (text.size() > 60)
-        {
           break;
-        }
       }
       text += "]";
   }
   for (char& c : text)
-  {
     c = std::iscntrl(static_cast<unsigned char>(c)) ? ' ' : c;
-  }
   return text.size() > 60 ? text.substr(0, 57) + "..." : text;
 }
 
-}  // namespace
+}   // namespace
 
 std::string shortNumber(double value)
 {
@@ -74,9 +70,7 @@ std::string joinWords(const std::vector<std::string>& words)
 {
   std::string text;
   for (const std::string& word : words)
-  {
     text += (text.empty() ? "" : ", ") + word;
-  }
   return text;
 }
 
@@ -101,11 +95,9 @@ std::string Range::text() const
 {
   const std::string unit_text = *unit ? std::string(" ") + unit : "";
   if (std::isinf(low) && std::isinf(high))
-  {
     return "a finite number" + (*unit ? " [" + std::string(unit) + "]" : "");
-  }
-  return std::string("in ") + (open_low ? "(" : "[") + shortNumber(low) + ", " + shortNumber(high) + (open_high ? ")" : "]") +
-         unit_text;
+  return std::string("in ") + (open_low ? "(" : "[") + shortNumber(low) + ", " + shortNumber(high) +
+         (open_high ? ")" : "]") + unit_text;
 }
 
 std::string Problems::placeOf(const YamlTree* tree, const YamlTree* parent, const std::string& path) const
@@ -113,24 +105,19 @@ std::string Problems::placeOf(const YamlTree* tree, const YamlTree* parent, cons
   const YamlTree* place = tree ? tree : parent;
   std::string line = file_;
   if (place && !place->origin.empty())
-  {
     line = place->origin;
-  }
   else if (place && place->line > 0)
-  {
     line += ":" + std::to_string(place->line);
-  }
   return line + ": " + (path.empty() ? "scene" : path);
 }
 
-std::string Problems::lineOf(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason) const
+std::string Problems::lineOf(const YamlTree* tree, const YamlTree* parent, const std::string& path,
+                             const std::string& reason) const
 {
   std::string line = placeOf(tree, parent, path);
   const std::string value = tree ? quote(*tree) : "";
   if (!value.empty())
-  {
     line += " = " + value;
-  }
   return line + ": " + reason;
 }
 
@@ -143,31 +130,23 @@ void Problems::warn(const YamlTree* tree, const YamlTree* parent, const std::str
 {
   const std::string line = lineOf(tree, parent, path, text);
   if (warnings_.size() < max_reported && std::find(warnings_.begin(), warnings_.end(), line) == warnings_.end())
-  {
     warnings_.push_back(line);
-  }
 }
 
 std::string Problems::text() const
 {
   std::string text;
   for (std::size_t k = 0; k < std::min(lines_.size(), max_reported); ++k)
-  {
     text += (k ? "\n" : "") + lines_[k];
-  }
   if (lines_.size() > max_reported)
-  {
     text += "\n" + file_ + ": and " + std::to_string(lines_.size() - max_reported) + " more problems";
-  }
   return text;
 }
 
 bool YamlCursor::check(YamlTree::Kind kind, const char* expected) const
 {
   if (!tree_)
-  {
     return false;
-  }
   if (tree_->kind != kind)
   {
     problem(std::string("is ") + toString(tree_->kind) + "; must be " + expected);
@@ -186,9 +165,7 @@ std::optional<double> YamlCursor::numberIn(const Range& range) const
 {
   const std::string expected = "a number " + range.text();
   if (!check(YamlTree::Kind::scalar, expected.c_str()))
-  {
     return std::nullopt;
-  }
   const auto value = parseNumber(tree_->scalar);
   if (!value)
   {
@@ -211,7 +188,8 @@ std::optional<double> YamlCursor::numberIn(const Range& range) const
 std::optional<int> YamlCursor::integer(long low, long high, const char* unit) const
 {
   const Range range = Range::closed(static_cast<double>(low), static_cast<double>(high), unit);
-  problems_->asked(path_, low == -high - 1 ? "a place, counted from 0, or from the end by negative numbers" : "a whole number " + range.text());
+  problems_->asked(path_, low == -high - 1 ? "a place, counted from 0, or from the end by negative numbers"
+                                           : "a whole number " + range.text());
   const auto value = numberIn(range);
   if (value && *value != std::floor(*value))
   {
@@ -225,19 +203,13 @@ std::optional<bool> YamlCursor::boolean() const
 {
   problems_->asked(path_, "true or false");
   if (!check(YamlTree::Kind::scalar, "true or false"))
-  {
     return std::nullopt;
-  }
   std::string word = tree_->scalar;
   std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) { return std::tolower(c); });
   if (word == "true" || word == "yes" || word == "on")
-  {
     return true;
-  }
   if (word == "false" || word == "no" || word == "off")
-  {
     return false;
-  }
   problem("must be true or false");
   return std::nullopt;
 }
@@ -251,9 +223,7 @@ std::optional<std::string> YamlCursor::text() const
 std::optional<std::string> YamlCursor::word() const
 {
   if (!check(YamlTree::Kind::scalar, "a text"))
-  {
     return std::nullopt;
-  }
   if (tree_->scalar.empty())
   {
     problem("is empty; must be a text");
@@ -285,9 +255,7 @@ std::optional<Eigen::Vector3d> YamlCursor::vector3(const Range& range) const
   const std::string expected = "a list [x, y, z] of numbers " + range.text();
   problems_->asked(path_, expected);
   if (!check(YamlTree::Kind::list, expected.c_str()))
-  {
     return std::nullopt;
-  }
   if (tree_->items.size() != 3)
   {
     problem("has " + std::to_string(tree_->items.size()) + " entries; must be " + expected);
@@ -309,9 +277,7 @@ std::optional<std::vector<double>> YamlCursor::numbers(const Range& range) const
 {
   problems_->asked(path_, "a number or a list of numbers " + range.text());
   if (!tree_)
-  {
     return std::nullopt;
-  }
   if (!isList())
   {
     const auto value = numberIn(range);
@@ -333,9 +299,7 @@ int YamlCursor::chosen(const std::vector<std::string>& words) const
   const std::string expected = "one of: " + joinWords(words);
   problems_->asked(path_, expected);
   if (!check(YamlTree::Kind::scalar, expected.c_str()))
-  {
     return -1;
-  }
   const auto found = std::find(words.begin(), words.end(), tree_->scalar);
   if (found == words.end())
   {
@@ -351,25 +315,19 @@ std::vector<YamlCursor> YamlCursor::items(std::size_t min_size, std::size_t max_
   std::vector<YamlCursor> entries;
   problems_->asked(path_, "");
   if (!check(YamlTree::Kind::list, "a list"))
-  {
     return entries;
-  }
   const std::size_t size = tree_->items.size();
   if (size < min_size || size > max_size)
   {
     std::string allowed = min_size == max_size ? std::to_string(min_size) : "at least " + std::to_string(min_size);
     if (min_size != max_size && max_size != std::numeric_limits<std::size_t>::max())
-    {
       allowed = std::to_string(min_size) + " to " + std::to_string(max_size);
-    }
     problem("has " + std::to_string(size) + " entries; must have " + allowed);
     return entries;
   }
   entries.reserve(size);
   for (std::size_t k = 0; k < size; ++k)
-  {
     entries.emplace_back(&tree_->items[k], tree_, path_ + "." + std::to_string(k), *problems_);
-  }
   return entries;
 }
 
@@ -378,26 +336,18 @@ std::vector<std::pair<std::string, YamlCursor>> YamlCursor::members() const
   std::vector<std::pair<std::string, YamlCursor>> entries;
   problems_->named(path_);
   if (!check(YamlTree::Kind::map, "a map of names"))
-  {
     return entries;
-  }
   for (const auto& [key, value] : tree_->members)
-  {
     entries.emplace_back(key, YamlCursor(&value, tree_, path_ + (path_.empty() ? "" : ".") + key, *problems_));
-  }
   return entries;
 }
 
 YamlMap::YamlMap(const YamlCursor& at) : at_(at)
 {
   if (at.isMap())
-  {
     map_ = at.tree();
-  }
   else if (at.present())
-  {
     at.problem(std::string("is ") + toString(at.tree()->kind) + "; must be a map of keys and values");
-  }
 }
 
 YamlCursor YamlMap::get(const std::string& key)
@@ -412,28 +362,24 @@ YamlCursor YamlMap::require(const std::string& key)
 {
   YamlCursor value = get(key);
   if (!value.present() && map_)
-  {
     value.problem("is missing");
-  }
   return value;
 }
 
 void YamlMap::finish()
 {
   if (!map_)
-  {
     return;
-  }
   for (const auto& [key, value] : map_->members)
   {
     if (std::find(known_.begin(), known_.end(), key) == known_.end())
     {
       const std::string nearest = nearestWord(key, known_);
       at_.problems().add(&value, map_, at_.path() + (at_.path().empty() ? "" : ".") + key,
-                         "unknown key" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") + "; known here: " +
-                           joinWords(known_));
+                         "unknown key" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") +
+                             "; known here: " + joinWords(known_));
     }
   }
 }
 
-}  // namespace slender
+}   // namespace slender

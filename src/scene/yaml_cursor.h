@@ -18,7 +18,7 @@ struct Range
 {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  bool open_low = false;    ///< low itself is not allowed
+  bool open_low = false;   ///< low itself is not allowed
   bool open_high = false;
   const char* unit = "";
 
@@ -26,8 +26,10 @@ struct Range
   std::string text() const;
 
   static Range closed(double low, double high, const char* unit = "") { return {low, high, false, false, unit}; }
-  static Range above(double low, double high, const char* unit = "") { return {low, high, true, false, unit}; }   ///< (low, high]
-  static Range between(double low, double high, const char* unit = "") { return {low, high, true, true, unit}; }  ///< (low, high)
+  /// (low, high]
+  static Range above(double low, double high, const char* unit = "") { return {low, high, true, false, unit}; }
+  /// (low, high)
+  static Range between(double low, double high, const char* unit = "") { return {low, high, true, true, unit}; }
 };
 
 /// Everything wrong with one scene, in the order found.
@@ -37,13 +39,14 @@ public:
   /// `log`: gets every key that is asked for; may be null.
   explicit Problems(std::string file, KeyLog* log = nullptr) : file_(std::move(file)), log_(log) {}
 
-  /// Adds "FILE:LINE: PATH = VALUE: reason" (or the override in place of file and line). `tree` may be null: then `parent` tells
-  /// the line.
+  /// Adds "FILE:LINE: PATH = VALUE: reason" (or the override in place of file and line). `tree` may be null: then
+  /// `parent` tells the line.
   void add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason);
   /// "FILE:LINE: PATH".
   std::string placeOf(const YamlTree* tree, const YamlTree* parent, const std::string& path) const;
   void addText(const std::string& line) { lines_.push_back(line); }
-  /// Adds the warning "FILE:LINE: PATH = VALUE: text", once. Warnings do not make the scene unusable: empty() does not count them.
+  /// Adds the warning "FILE:LINE: PATH = VALUE: text", once. Warnings do not make the scene unusable: empty() does not
+  /// count them.
   void warn(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& text);
   const std::vector<std::string>& warnings() const { return warnings_; }
 
@@ -66,18 +69,24 @@ public:
 private:
   std::string file_;
   KeyLog* log_;
-  std::string lineOf(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason) const;
+  std::string lineOf(const YamlTree* tree, const YamlTree* parent, const std::string& path,
+                     const std::string& reason) const;
 
   std::vector<std::string> lines_, warnings_;
 };
 
-/// One value of a scene with its path: typed, checked access. Every getter returns nothing when the value is absent or wrong, and
-/// reports it in the second case, so that reading goes on and finds the other problems too.
+/// One value of a scene with its path: typed, checked access. Every getter returns nothing when the value is absent or
+/// wrong, and reports it in the second case, so that reading goes on and finds the other problems too.
 class YamlCursor
 {
 public:
   YamlCursor(const YamlTree* tree, const YamlTree* parent, std::string path, Problems& problems)
-    : tree_(tree), parent_(parent), path_(std::move(path)), problems_(&problems) {}
+    : tree_(tree),
+      parent_(parent),
+      path_(std::move(path)),
+      problems_(&problems)
+  {
+  }
 
   bool present() const { return tree_ != nullptr; }
   bool isScalar() const { return tree_ && tree_->kind == YamlTree::Kind::scalar; }
@@ -91,7 +100,8 @@ public:
   std::string place() const { return problems_->placeOf(tree_, parent_, path_); }
   /// Reports what is wrong with this value.
   void problem(const std::string& reason) const { problems_->add(tree_, parent_, path_, reason); }
-  /// Warns of this value: the scene runs, but not as its writer may expect. The text says what happens instead and what to do.
+  /// Warns of this value: the scene runs, but not as its writer may expect. The text says what happens instead and what
+  /// to do.
   void warning(const std::string& text) const { problems_->warn(tree_, parent_, path_, text); }
 
   std::optional<double> number(const Range& range) const;
@@ -110,15 +120,14 @@ public:
   {
     std::vector<std::string> words;
     for (const auto& entry : choices)
-    {
       words.push_back(entry.first);
-    }
     const int found = chosen(words);
     return found < 0 ? std::nullopt : std::optional<Value>(choices[found].second);
   }
 
   /// Entries of a list; reports and returns none for anything else. `size`: allowed sizes.
-  std::vector<YamlCursor> items(std::size_t min_size = 0, std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
+  std::vector<YamlCursor> items(std::size_t min_size = 0,
+                                std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
   /// Members of a map, in file order; reports and returns none for anything else.
   std::vector<std::pair<std::string, YamlCursor>> members() const;
 
@@ -157,9 +166,7 @@ template <class Target, class Value>
 void assign(Target& target, const std::optional<Value>& value)
 {
   if (value)
-  {
     target = *value;
-  }
 }
 
 /// "1.5e-3" rather than "0.001500".
@@ -169,4 +176,4 @@ std::string shortNumber(double value);
 std::string nearestWord(const std::string& word, const std::vector<std::string>& words);
 std::string joinWords(const std::vector<std::string>& words);
 
-}  // namespace slender
+}   // namespace slender

@@ -50,14 +50,13 @@ public:
   {
     const auto found = anchors_.find(anchor);
     if (found == anchors_.end())
-    {
       fail(mark.line + 1, "an alias inside its own anchor");
-    }
     count(found->second.second - 1, mark.line + 1);   // before the copy is made
     finished(found->second.first, 0);
   }
 
-  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override
   {
     open(mark, YamlTree::Kind::list, anchor);
   }
@@ -88,17 +87,13 @@ private:
   {
     count_ += more;
     if (count_ > max_values)
-    {
       fail(line, "more than " + std::to_string(max_values) + " values");
-    }
   }
 
   void open(const YAML::Mark& mark, YamlTree::Kind kind, YAML::anchor_t anchor)
   {
     if (levels_.size() >= max_depth)
-    {
       fail(mark.line + 1, "nested more than " + std::to_string(max_depth) + " levels deep");
-    }
     Level level;
     level.value.kind = kind;
     level.value.line = mark.line + 1;
@@ -119,9 +114,7 @@ private:
   {
     count(1, value.line);
     if (anchor)
-    {
       anchors_[anchor] = {value, size};
-    }
     if (levels_.empty())
     {
       root_ = std::move(value);
@@ -136,15 +129,11 @@ private:
     if (!level.has_key)
     {
       if (value.kind == YamlTree::Kind::list || value.kind == YamlTree::Kind::map)
-      {
         fail(value.line, "a key must be a plain word, not a list or a map");
-      }
       level.key = value.scalar;
       level.has_key = true;
       if (level.value.find(level.key))
-      {
         fail(value.line, "key '" + level.key + "' is given twice");
-      }
       return;
     }
     level.value.members.emplace_back(std::move(level.key), std::move(value));
@@ -162,28 +151,18 @@ void emit(YAML::Emitter& out, const YamlTree& tree, int depth)
 {
   switch (tree.kind)
   {
-    case YamlTree::Kind::null:
-      out << YAML::Null;
-      break;
-    case YamlTree::Kind::scalar:
-      out << tree.scalar;
-      break;
+    case YamlTree::Kind::null: out << YAML::Null; break;
+    case YamlTree::Kind::scalar: out << tree.scalar; break;
     case YamlTree::Kind::list:
     {
       bool plain = !tree.items.empty();
       for (const YamlTree& item : tree.items)
-      {
         plain = plain && item.kind == YamlTree::Kind::scalar;
-      }
       if (plain)
-      {
         out << YAML::Flow;
-      }
       out << YAML::BeginSeq;
       for (const YamlTree& item : tree.items)
-      {
         emit(out, item, depth + 1);
-      }
       out << YAML::EndSeq;
       break;
     }
@@ -204,29 +183,19 @@ void setOrigin(YamlTree& tree, const std::string& origin)
   tree.origin = origin;
   tree.line = 0;
   for (YamlTree& item : tree.items)
-  {
     setOrigin(item, origin);
-  }
   for (auto& member : tree.members)
-  {
     setOrigin(member.second, origin);
-  }
 }
 
 std::vector<std::string> split(const std::string& path)
 {
   std::vector<std::string> parts(1);
   for (char c : path)
-  {
     if (c == '.')
-    {
       parts.emplace_back();
-    }
     else
-    {
       parts.back() += c;
-    }
-  }
   return parts;
 }
 
@@ -239,32 +208,29 @@ std::string placesByName(const YamlTree& list)
   {
     const YamlTree* name = list.items[k].kind == YamlTree::Kind::map ? list.items[k].find("name") : nullptr;
     if (name && name->kind == YamlTree::Kind::scalar)
-    {
       text += (text.empty() ? " (" : ", ") + std::to_string(k) + " is " + name->scalar;
-    }
   }
   return text.empty() ? text : text + ")";
 }
 
-/// A new grasp can be set as a whole. A key of a grasp that is not there is a mistaken name: the reader would only see a grasp that holds nothing.
-void requireKnownGrasp(const YamlTree& map, const std::string& path, const std::string& name, std::size_t parts, const std::string& where)
+/// A new grasp can be set as a whole. A key of a grasp that is not there is a mistaken name: the reader would only see
+/// a grasp that holds nothing.
+void requireKnownGrasp(const YamlTree& map, const std::string& path, const std::string& name, std::size_t parts,
+                       const std::string& where)
 {
   const std::vector<std::string> passed = split(path);
   if (passed.back() != "grasps" || parts == passed.size() + 1)
-  {
     return;
-  }
   std::vector<std::string> names;
   for (const auto& member : map.members)
-  {
     names.push_back(member.first);
-  }
   const std::string nearest = nearestWord(name, names);
-  throw SceneError(where + ": " + path + " has no grasp '" + name + "'" + (names.empty() ? "" : "; it has: " + joinWords(names)) +
+  throw SceneError(where + ": " + path + " has no grasp '" + name + "'" +
+                   (names.empty() ? "" : "; it has: " + joinWords(names)) +
                    (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
 }
 
-}  // namespace
+}   // namespace
 
 const char* toString(YamlTree::Kind kind)
 {
@@ -281,12 +247,8 @@ const char* toString(YamlTree::Kind kind)
 const YamlTree* YamlTree::find(const std::string& key) const
 {
   for (const auto& member : members)
-  {
     if (member.first == key)
-    {
       return &member.second;
-    }
-  }
   return nullptr;
 }
 
@@ -303,14 +265,10 @@ YamlTree parseYaml(const std::string& text, const std::string& file)
     YAML::Parser parser(stream);
     TreeBuilder builder(file);
     if (!parser.HandleNextDocument(builder))
-    {
       return {};
-    }
     TreeBuilder second(file);
     if (parser.HandleNextDocument(second))
-    {
       throw SceneError(file + ": holds more than one YAML document; keep one");
-    }
     return builder.take();
   }
   catch (const YAML::Exception& error)
@@ -331,9 +289,7 @@ void applyOverride(YamlTree& root, const std::string& assignment)
   const std::string where = "--set " + assignment;
   const auto equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
-  {
     throw SceneError(where + ": must be PATH=VALUE, for example rods.0.material.youngs_modulus=1e7");
-  }
   YamlTree value = parseYaml(assignment.substr(equals + 1), where);
   setOrigin(value, where);
 
@@ -344,9 +300,7 @@ void applyOverride(YamlTree& root, const std::string& assignment)
   {
     const std::string here = passed.empty() ? "the scene" : "'" + passed + "'";
     if (part.empty())
-    {
       throw SceneError(where + ": the path has an empty part; parts are separated by single dots");
-    }
     if (at->kind == YamlTree::Kind::null)
     {
       at->kind = YamlTree::Kind::map;
@@ -354,7 +308,8 @@ void applyOverride(YamlTree& root, const std::string& assignment)
     }
     if (at->kind == YamlTree::Kind::scalar)
     {
-      throw SceneError(where + ": " + here + " is the single value '" + at->scalar + "' and has no part '" + part + "'");
+      throw SceneError(where + ": " + here + " is the single value '" + at->scalar + "' and has no part '" + part +
+                       "'");
     }
     if (at->kind == YamlTree::Kind::list)
     {
@@ -362,8 +317,8 @@ void applyOverride(YamlTree& root, const std::string& assignment)
       const auto index = parseNumber(part);
       if (!index || !(*index >= -size && *index < size) || *index != std::floor(*index))
       {
-        throw SceneError(where + ": " + here + " is a list; '" + part + "' must be a whole number in [" + std::to_string(-size) +
-                         ", " + std::to_string(size - 1) + "]" + placesByName(*at));
+        throw SceneError(where + ": " + here + " is a list; '" + part + "' must be a whole number in [" +
+                         std::to_string(-size) + ", " + std::to_string(size - 1) + "]" + placesByName(*at));
       }
       at = &at->items[static_cast<long>(*index) + (*index < 0 ? size : 0)];
     }
@@ -381,4 +336,4 @@ void applyOverride(YamlTree& root, const std::string& assignment)
   *at = std::move(value);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -10,11 +10,17 @@ namespace slender {
 /// yaml_tree.cpp. Aliases become copies, so that overriding one value never changes another; repeated keys are errors.
 struct YamlTree
 {
-  enum class Kind { null, scalar, list, map };
+  enum class Kind
+  {
+    null,
+    scalar,
+    list,
+    map
+  };
 
   Kind kind = Kind::null;
-  int line = 0;                    ///< from 1; 0 when it came from an override
-  std::string origin;              ///< the override that set it, else empty
+  int line = 0;         ///< from 1; 0 when it came from an override
+  std::string origin;   ///< the override that set it, else empty
   std::string scalar;
   std::vector<YamlTree> items;
   std::vector<std::pair<std::string, YamlTree>> members;   ///< in file order
@@ -31,8 +37,8 @@ YamlTree parseYaml(const std::string& text, const std::string& file);
 /// The document written out again (what nodes publish after overrides).
 std::string writeYaml(const YamlTree& tree);
 
-/// Applies "path.to.value=YAML": keys that are missing are created, list entries are numbers from 0 (negative: from the end).
-/// Throws SceneError that says which part of the path does not fit.
+/// Applies "path.to.value=YAML": keys that are missing are created, list entries are numbers from 0 (negative: from the
+/// end). Throws SceneError that says which part of the path does not fit.
 void applyOverride(YamlTree& root, const std::string& assignment);
 
-}  // namespace slender
+}   // namespace slender

@@ -29,11 +29,15 @@ struct Look
 const std::vector<Look>& looks()
 {
   static const std::vector<Look> all{
-    {"vinyl", {}},
-    {"silk", {"tracked.0.damping.stiffness=0", "time.step=0.0025"}},
-    {"ribbed", {"tracked.0.undeformed={ridges: {axis: [0, 0, 1], count: 5, height: 0.02}, lengths: true}", "tracked.0.bending.modulus=3e-4"}},
-    {"cellophane", {"tracked.0.undeformed={crinkles: {height: 0.015}, lengths: true}", "tracked.0.bending.modulus=3e-4"}},
-    {"wind", {"tracked.0.damping.stiffness=0", "tracked.0.aerodynamics={drag: 1.2, lift: 0.8}", "wind.velocity=[-25, 8, 0]"}},
+      {"vinyl", {}},
+      {"silk", {"tracked.0.damping.stiffness=0", "time.step=0.0025"}},
+      {"ribbed",
+       {"tracked.0.undeformed={ridges: {axis: [0, 0, 1], count: 5, height: 0.02}, lengths: true}",
+        "tracked.0.bending.modulus=3e-4"}},
+      {"cellophane",
+       {"tracked.0.undeformed={crinkles: {height: 0.015}, lengths: true}", "tracked.0.bending.modulus=3e-4"}},
+      {"wind",
+       {"tracked.0.damping.stiffness=0", "tracked.0.aerodynamics={drag: 1.2, lift: 0.8}", "wind.velocity=[-25, 8, 0]"}},
   };
   return all;
 }
@@ -58,7 +62,8 @@ double bending(const MeshTopology& topology, const TriangleMesh& mesh, const Mat
     if (topology.edge_faces(1, e) < 0)
       continue;
     const double l = (x.col(topology.edges(0, e)) - x.col(topology.edges(1, e))).norm();
-    const double angle = std::acos(std::clamp(normal(topology.edge_faces(0, e)).dot(normal(topology.edge_faces(1, e))), -1.0, 1.0));
+    const double angle =
+        std::acos(std::clamp(normal(topology.edge_faces(0, e)).dot(normal(topology.edge_faces(1, e))), -1.0, 1.0));
     sum += l * angle * angle;
     length += l;
   }
@@ -78,17 +83,22 @@ double strain(const MeshTopology& topology, const Matrix3Xd& rest, const Matrix3
   return std::sqrt(sum / static_cast<double>(topology.edges.cols()));
 }
 
-double rms(const Matrix3Xd& a, const Matrix3Xd& b) { return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols())); }
+double rms(const Matrix3Xd& a, const Matrix3Xd& b)
+{
+  return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
+}
 
-}  // namespace
+}   // namespace
 
 void runBackflip(StudyContext& context)
 {
   useOneBlasThread();
-  SurfacePicture& picture = context.picture("backflip", "Five looks of a backflip at the landing, and their guide (thesis figure 6.9)");
+  SurfacePicture& picture =
+      context.picture("backflip", "Five looks of a backflip at the landing, and their guide (thesis figure 6.9)");
   picture.view = {0.35, 1.0, -0.2};
   picture.columns = 6;
-  Plot& plot = context.plot("backflip_folds", "Looks of a backflip: angles between faces", "time [s]", "root mean square [rad]");
+  Plot& plot =
+      context.plot("backflip_folds", "Looks of a backflip: angles between faces", "time [s]", "root mean square [rad]");
   plot.log_x = plot.log_y = plot.markers = false;
   constexpr double kShown = 1.4;   // [s] landed
   const double duration = context.quick() ? 0.5 : 2.0;
@@ -113,7 +123,8 @@ void runBackflip(StudyContext& context)
 
     Course course;
     const double step = config.time.step;
-    const int steps = static_cast<int>(std::lround(duration / step)), every = static_cast<int>(std::lround(0.1 / step)), shown = static_cast<int>(std::lround(std::min(kShown, duration) / step));
+    const int steps = static_cast<int>(std::lround(duration / step)), every = static_cast<int>(std::lround(0.1 / step)),
+              shown = static_cast<int>(std::lround(std::min(kShown, duration) / step));
     double folds = 0, stretch = 0, away = 0, error = 0;
     std::size_t guide_meetings = 0, own = 0;
     int kept = 0, cuts = 0;
@@ -152,9 +163,16 @@ void runBackflip(StudyContext& context)
     }
     meetings += own;
     worst = std::max(worst, error);
-    context.row().set("look", look.name).set("folds_rad", folds / kept).set("strain_rms", stretch / kept).set("from_guide_m", away / kept)
-      .set("average_error_over_size", error).set("intersections", static_cast<double>(own)).set("intersections_of_guide", static_cast<double>(guide_meetings))
-      .set("cut_steps", cuts).set("ms_per_step", 1e3 * course.seconds / steps);
+    context.row()
+        .set("look", look.name)
+        .set("folds_rad", folds / kept)
+        .set("strain_rms", stretch / kept)
+        .set("from_guide_m", away / kept)
+        .set("average_error_over_size", error)
+        .set("intersections", static_cast<double>(own))
+        .set("intersections_of_guide", static_cast<double>(guide_meetings))
+        .set("cut_steps", cuts)
+        .set("ms_per_step", 1e3 * course.seconds / steps);
     courses.push_back(std::move(course));
   }
   double least = std::numeric_limits<double>::infinity();
@@ -169,9 +187,12 @@ void runBackflip(StudyContext& context)
   context.metric("intersections", static_cast<double>(meetings));
   context.metric("worst_average_error_over_size", worst);
   context.metric("least_difference_m", least);
-  context.note("folds: root mean square of the angles between faces; from_guide: root mean square distance from the subdivided guide; both, like strain_rms (of "
-               "edges), means over frames of 0.1 s. least_difference: of the two looks that differ least, root mean square distance of their vertices. "
-               "intersections: of all frames, by a check of all pairs; intersections_of_guide: of the subdivided guide.");
+  context.note(
+      "folds: root mean square of the angles between faces; from_guide: root mean square distance from the subdivided "
+      "guide; both, like strain_rms (of "
+      "edges), means over frames of 0.1 s. least_difference: of the two looks that differ least, root mean square "
+      "distance of their vertices. "
+      "intersections: of all frames, by a check of all pairs; intersections_of_guide: of the subdivided guide.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

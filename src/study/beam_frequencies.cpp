@@ -13,12 +13,13 @@ namespace {
 
 struct Oscillation
 {
-  double omega;      ///< [rad/s]
-  double decay;      ///< part of the amplitude lost per period
+  double omega;   ///< [rad/s]
+  double decay;   ///< part of the amplitude lost per period
   double cpu_seconds;
 };
 
-/// Fits q_{k+1} - 2 rho cos(d) q_k + rho^2 q_{k-1} = 0 by least squares: d the phase and rho the factor between samples.
+/// Fits q_{k+1} - 2 rho cos(d) q_k + rho^2 q_{k-1} = 0 by least squares: d the phase and rho the factor between
+/// samples.
 Oscillation fit(const std::vector<double>& q, double interval)
 {
   double a11 = 0, a12 = 0, a22 = 0, r1 = 0, r2 = 0;
@@ -78,16 +79,19 @@ Oscillation vibrate(int mode, int edges, Integrator integrator, int steps_per_pe
   return o;
 }
 
-}  // namespace
+}   // namespace
 
 void runBeamFrequencies(StudyContext& context)
 {
-  // Relative bounds at 40 edges: the for modes 1 and 4; modes 2 and 3 in the ratio of the discrete rod's own errors.
+  // Relative bounds at 40 edges: the for modes 1 and 4; modes 2 and 3 in the ratio of the discrete rod's own
+  // errors.
   const double bounds[] = {0.001, 0.0033, 0.0070, 0.012};
   const std::vector<int> meshes = context.quick() ? std::vector<int>{40} : std::vector<int>{20, 40, 80, 160};
   const int fine_steps = context.quick() ? 400 : 1000;
-  Plot& plot = context.plot("beam_frequencies", "Clamped-free rod: frequency error against resolution", "edges", "relative error of the frequency");
-  Plot& damping = context.plot("beam_damping", "Numerical damping of the first mode", "steps per period", "amplitude lost per period");
+  Plot& plot = context.plot("beam_frequencies", "Clamped-free rod: frequency error against resolution", "edges",
+                            "relative error of the frequency");
+  Plot& damping = context.plot("beam_damping", "Numerical damping of the first mode", "steps per period",
+                               "amplitude lost per period");
   int done = 0;
   const int total = 4 * static_cast<int>(meshes.size()) + 20;
   for (const int edges : meshes)
@@ -98,10 +102,15 @@ void runBeamFrequencies(StudyContext& context)
       const Oscillation o = vibrate(mode, edges, Integrator::implicit_midpoint, fine_steps);
       const double finer = 40.0 / edges;
       Row& row = context.row();
-      row.set("quantity", "frequency").set("integrator", toString(Integrator::implicit_midpoint)).set("mode", mode).set("edges", edges);
+      row.set("quantity", "frequency")
+          .set("integrator", toString(Integrator::implicit_midpoint))
+          .set("mode", mode)
+          .set("edges", edges);
       row.set("steps_per_period", fine_steps);
       row.check(o.omega, expected, expected * bounds[mode - 1] * finer * finer, "cos(x) cosh(x) = -1");
-      row.set("relative_error", o.omega / expected - 1).set("loss_per_period", o.decay).set("cpu_seconds", o.cpu_seconds);
+      row.set("relative_error", o.omega / expected - 1)
+          .set("loss_per_period", o.decay)
+          .set("cpu_seconds", o.cpu_seconds);
       Series& s = plot.at("mode " + std::to_string(mode));
       s.x.push_back(edges);
       s.y.push_back(std::abs(o.omega / expected - 1));
@@ -115,14 +124,21 @@ void runBeamFrequencies(StudyContext& context)
     {
       context.progress(done++, total, std::string("damping of ") + toString(integrator));
       const Oscillation o = vibrate(1, edges, integrator, steps);
-      context.row().set("quantity", "time error").set("integrator", toString(integrator)).set("mode", 1).set("edges", edges)
-          .set("steps_per_period", steps).set("relative_error", o.omega / exact.omega - 1).set("loss_per_period", o.decay)
+      context.row()
+          .set("quantity", "time error")
+          .set("integrator", toString(integrator))
+          .set("mode", 1)
+          .set("edges", edges)
+          .set("steps_per_period", steps)
+          .set("relative_error", o.omega / exact.omega - 1)
+          .set("loss_per_period", o.decay)
           .set("cpu_seconds", o.cpu_seconds);
       Series& s = damping.at(toString(integrator));
       s.x.push_back(steps);
       s.y.push_back(std::abs(o.decay));
     }
-  context.note("loss_per_period: numerical damping, 1 - amplitude ratio over one period. Frequencies in sqrt(E I/(rho A L^4)).");
+  context.note(
+      "loss_per_period: numerical damping, 1 - amplitude ratio over one period. Frequencies in sqrt(E I/(rho A L^4)).");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

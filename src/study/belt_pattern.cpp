@@ -34,7 +34,7 @@ double periods(const std::vector<Landings::Point>& points, const Extent& extent,
   return 0.5 * count;
 }
 
-}  // namespace
+}   // namespace
 
 BeltTrace classifyBeltTrace(const std::vector<Landings::Point>& points, double belt, double straight_below)
 {
@@ -72,7 +72,8 @@ BeltTrace classifyBeltTrace(const std::vector<Landings::Point>& points, double b
   else if (wound > 0.5)   // once around for each time across
     t.pattern = "translated coiling";
   else if (t.swing < 0.6 && (t.swing < 0.45 || std::abs(ratio - 2) < 0.5))
-    // never turns against the belt, and goes along it twice while across it once; small ones go along by less than an edge
+    // never turns against the belt, and goes along it twice while across it once; small ones go along by less than an
+    // edge
     t.pattern = "meanders";
   else if (wound < 0.1 && t.swing > 0.95 && t.swing < 1.4)   // a full turn to the left, then one to the right
     t.pattern = "alternating loops";
@@ -81,4 +82,4 @@ BeltTrace classifyBeltTrace(const std::vector<Landings::Point>& points, double b
   return t;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

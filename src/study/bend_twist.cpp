@@ -13,10 +13,12 @@
 namespace slender::study {
 namespace {
 
-constexpr double kFlat = 1e-3;     ///< out-of-plane extent over length below which a shape counts as planar
-constexpr double kCoarse = 0.4;    ///< turn of a joint [rad] beyond which a mesh does not resolve the coils: 16 edges a turn
+constexpr double kFlat = 1e-3;   ///< out-of-plane extent over length below which a shape counts as planar
+/// turn of a joint [rad] beyond which a mesh does not resolve the coils: 16 edges a turn
+constexpr double kCoarse = 0.4;
 
-/// Extent of the three-dimensional state next to the boundary, nu = 0.5 (bendtwist_amplitude.csv, good to about one percent).
+/// Extent of the three-dimensional state next to the boundary, nu = 0.5 (bendtwist_amplitude.csv, good to about one
+/// percent).
 struct Extent
 {
   double y, phi_over_pi, value;
@@ -43,7 +45,8 @@ public:
   void follow(double y, double phi)
   {
     const double y0 = y_, phi0 = phi_;
-    const int moves = std::max(1, static_cast<int>(std::ceil(std::max(std::abs(phi / phi0 - 1), std::abs(y / y0 - 1)) / 0.005)));
+    const int moves =
+        std::max(1, static_cast<int>(std::ceil(std::max(std::abs(phi / phi0 - 1), std::abs(y / y0 - 1)) / 0.005)));
     for (int k = 1; k <= moves; ++k)
     {
       const RodState last = rod_.state;
@@ -87,8 +90,9 @@ private:
     y_ = y;
     phi_ = phi;
     const double gamma = std::pow(y * phi, 3);
-    rod_ = naturalRod(sectionOf(1e5 * std::max(1.0, gamma), 1.0, 1.0, 1.0 / (1.0 + nu_)), planarNodes([phi](double s) { return phi * s; }),
-                      Eigen::Vector3d::UnitY(), {Curvature::tangent, matched_});
+    rod_ = naturalRod(sectionOf(1e5 * std::max(1.0, gamma), 1.0, 1.0, 1.0 / (1.0 + nu_)),
+                      planarNodes([phi](double s) { return phi * s; }), Eigen::Vector3d::UnitY(),
+                      {Curvature::tangent, matched_});
     rod_.inputs.gravity = {0, 0, -gamma};
     rod_.hold(0, 0, true);
     Eigen::Matrix3d down;   // columns t, d1, d2
@@ -108,7 +112,8 @@ private:
   RodSetup rod_;
 };
 
-/// Planar equilibrium of the continuous rod, theta'' = Gamma (1-s) sin(theta), integrated from its tip (theta' = phi there).
+/// Planar equilibrium of the continuous rod, theta'' = Gamma (1-s) sin(theta), integrated from its tip (theta' = phi
+/// there).
 std::vector<double> planarAngles(double gamma, double phi, double tip, int intervals)
 {
   std::vector<double> angles(intervals + 1);
@@ -130,7 +135,8 @@ std::vector<double> planarAngles(double gamma, double phi, double tip, int inter
   return angles;
 }
 
-/// The boundary of the discrete rod at fixed y: bisection, 1e-6 of phi, of the planar state's stability. NaN: not within 15 %.
+/// The boundary of the discrete rod at fixed y: bisection, 1e-6 of phi, of the planar state's stability. NaN: not
+/// within 15 %.
 double boundary(HangingCurl curl, const BendTwistPoint& p)
 {
   curl.follow(p.y, p.phi);
@@ -153,7 +159,8 @@ double boundary(HangingCurl curl, const BendTwistPoint& p)
   return 0.5 * (inside + outside);
 }
 
-/// Counts wrong answers: on each side of the boundary by where the pushed rod goes, and by the planar state's stability.
+/// Counts wrong answers: on each side of the boundary by where the pushed rod goes, and by the planar state's
+/// stability.
 class Classifier
 {
 public:
@@ -182,7 +189,7 @@ private:
   int wrong_ = 0;
 };
 
-}  // namespace
+}   // namespace
 
 void runBendTwist(StudyContext& context)
 {
@@ -193,7 +200,8 @@ void runBendTwist(StudyContext& context)
     if (ratios.empty() || ratios.back() != p.nu)
       ratios.push_back(p.nu);
 
-  Plot& errors = context.plot("bend_twist_error", "Boundary of the planar state: error of the discrete rod", "turn of a joint, phi / n [rad]", "relative error of phi");
+  Plot& errors = context.plot("bend_twist_error", "Boundary of the planar state: error of the discrete rod",
+                              "turn of a joint, phi / n [rad]", "relative error of phi");
   errors.lines = false;
   double worst_boundary = 0;
   int wrong = 0, coarse_wrong = 0, done = 0;
@@ -253,7 +261,8 @@ void runBendTwist(StudyContext& context)
         }
       }
     }
-    for (auto p = std::rbegin(kBendTwistLongRods); p != std::rend(kBendTwistLongRods); ++p)   // listed from long to short
+    for (auto p = std::rbegin(kBendTwistLongRods); p != std::rend(kBendTwistLongRods);
+         ++p)   // listed from long to short
       if (p->nu == nu)
       {
         plot.at("boundary, exact").x.push_back(p->phi / M_PI);
@@ -272,7 +281,8 @@ void runBendTwist(StudyContext& context)
         Classifier classes(row, plot);
         classes.at(curl, "above", 1.03 * p.y, p.phi, true);
         classes.at(curl, "below", 0.97 * p.y, p.phi, false);
-        row.check(classes.wrong(), 0, 0.5, "wrong answers of 4, 3 % off the boundary").set("cpu_seconds", threadSeconds() - begin);
+        row.check(classes.wrong(), 0, 0.5, "wrong answers of 4, 3 % off the boundary")
+            .set("cpu_seconds", threadSeconds() - begin);
         wrong += classes.wrong();
       }
   }
@@ -292,11 +302,19 @@ void runBendTwist(StudyContext& context)
   context.metric("wrong_classes", wrong);
   context.metric("wrong_classes_coarse", coarse_wrong);
   context.metric("worst_boundary_error", worst_boundary);
-  context.note("Each state is classified twice: by the out-of-plane extent (over L) of the equilibrium that a rod pushed off the plane by "
-               "5e-4 L goes to,");
-  context.note("and by the inertia of the Hessian at the planar equilibrium. boundary_error: where the latter changes, by bisection in phi at fixed y.");
-  context.note("A plain joint that turns by a is (1 + a^2/2) times too stiff. Where a > 0.4 rad (under 16 edges a turn; n = 100 beyond 6 turns) it is");
-  context.note("shown without a check (wrong_classes_coarse), and joints matched to their natural turn, which suit such coils, are checked.");
+  context.note(
+      "Each state is classified twice: by the out-of-plane extent (over L) of the equilibrium that a rod pushed off "
+      "the plane by "
+      "5e-4 L goes to,");
+  context.note(
+      "and by the inertia of the Hessian at the planar equilibrium. boundary_error: where the latter changes, by "
+      "bisection in phi at fixed y.");
+  context.note(
+      "A plain joint that turns by a is (1 + a^2/2) times too stiff. Where a > 0.4 rad (under 16 edges a turn; n = 100 "
+      "beyond 6 turns) it is");
+  context.note(
+      "shown without a check (wrong_classes_coarse), and joints matched to their natural turn, which suit such coils, "
+      "are checked.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

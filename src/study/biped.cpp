@@ -13,11 +13,23 @@ namespace {
 
 enum Body
 {
-  hips, chest, right_upper_arm, right_forearm, left_upper_arm, left_forearm, right_thigh, right_shin, right_foot, left_thigh, left_shin, left_foot,
+  hips,
+  chest,
+  right_upper_arm,
+  right_forearm,
+  left_upper_arm,
+  left_forearm,
+  right_thigh,
+  right_shin,
+  right_foot,
+  left_thigh,
+  left_shin,
+  left_foot,
   kBodies
 };
 
-// Of the outline [m]: half widths and heights of the trunk, arms and legs in the plane y, z before they are drawn apart to an X.
+// Of the outline [m]: half widths and heights of the trunk, arms and legs in the plane y, z before they are drawn apart
+// to an X.
 constexpr double kHip = 0.76, kWaist = 1.02, kArmLow = 1.12, kTop = 1.28, kTrunk = 0.18, kArm = 0.56, kLegInside = 0.02;
 constexpr double kElbow = kTrunk + 0.28, kKnee = 0.40, kAnkle = 0.10;
 constexpr double kArmSlope = -0.6, kLegSlope = 0.12;
@@ -43,13 +55,15 @@ std::array<double, kBodies> sharesAt(double y, double z)
   const bool left = y > 0;
   const double out = std::abs(y) - kTrunk;
   const double arm = z > kArmLow - 1e-9 ? beyond(out) : 0.0, leg = beyond(kHip - z);
-  const double forearm = beyond(std::abs(y) - kElbow), shin = beyond(kKnee - z), foot = beyond(kAnkle - z), upper = beyond(z - kWaist);
+  const double forearm = beyond(std::abs(y) - kElbow), shin = beyond(kKnee - z), foot = beyond(kAnkle - z),
+               upper = beyond(z - kWaist);
   const double trunk = (1 - arm) * (1 - leg);
   share[hips] = trunk * (1 - upper);
   share[chest] = trunk * upper;
   share[left ? left_upper_arm : right_upper_arm] = arm * (1 - forearm);
   share[left ? left_forearm : right_forearm] = arm * forearm;
-  const double mine = z < kHip - 1e-9 ? 1.0 : std::clamp(0.5 + 0.5 * std::abs(y) / kBlend, 0.0, 1.0);   // of both legs, at the trunk
+  // of both legs, at the trunk
+  const double mine = z < kHip - 1e-9 ? 1.0 : std::clamp(0.5 + 0.5 * std::abs(y) / kBlend, 0.0, 1.0);
   share[left ? left_thigh : right_thigh] = leg * (1 - arm) * (1 - shin) * mine;
   share[left ? right_thigh : left_thigh] = leg * (1 - arm) * (1 - shin) * (1 - mine);
   share[left ? left_shin : right_shin] = leg * (1 - arm) * shin * (1 - foot);
@@ -58,32 +72,41 @@ std::array<double, kBodies> sharesAt(double y, double z)
 }
 
 Pose turnedAbout(const Vector3d& joint, const Eigen::Quaterniond& turn) { return {joint - turn * joint, turn}; }
-Eigen::Quaterniond about(const Vector3d& axis, double angle) { return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)); }
+Eigen::Quaterniond about(const Vector3d& axis, double angle)
+{
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis));
+}
 
-/// Angle [rad] of a joint of the right side in a walk: mean and two harmonics, fitted to a recorded walk (CMU motion capture; 1.25 s for two steps,
-/// 0.98 m/s). Flexion forwards; the left side follows half a period later.
+/// Angle [rad] of a joint of the right side in a walk: mean and two harmonics, fitted to a recorded walk (CMU motion
+/// capture; 1.25 s for two steps, 0.98 m/s). Flexion forwards; the left side follows half a period later.
 struct Swing
 {
   double mean, c1, s1, c2, s2;
-  double at(double phase) const { return mean + c1 * std::cos(phase) + s1 * std::sin(phase) + c2 * std::cos(2 * phase) + s2 * std::sin(2 * phase); }
+  double at(double phase) const
+  {
+    return mean + c1 * std::cos(phase) + s1 * std::sin(phase) + c2 * std::cos(2 * phase) + s2 * std::sin(2 * phase);
+  }
 };
 constexpr Swing kHipSwing{0.173, 0.311, -0.168, -0.083, -0.002}, kKneeSwing{0.540, -0.128, -0.437, -0.245, 0.222},
-  kShoulderSwing{-0.063, -0.299, 0.117, -0.027, -0.011}, kElbowSwing{0.327, -0.188, 0.056, 0.015, -0.005};
+    kShoulderSwing{-0.063, -0.299, 0.117, -0.027, -0.011}, kElbowSwing{0.327, -0.188, 0.056, 0.015, -0.005};
 constexpr double kSpeed = 0.98;   // [m/s]
 
-}  // namespace
+}   // namespace
 
 Biped::Biped(double cell)
 {
   const auto cells = [&](double length) { return static_cast<int>(std::lround(length / cell)); };
-  const int trunk = cells(kTrunk), inside = cells(kLegInside), reach = cells(kTrunk + kArm), hip = cells(kHip), arm = cells(kArmLow), top = cells(kTop);
+  const int trunk = cells(kTrunk), inside = cells(kLegInside), reach = cells(kTrunk + kArm), hip = cells(kHip),
+            arm = cells(kArmLow), top = cells(kTop);
   const auto used = [&](int i, int j) {   // cell from i to i + 1 across, j to j + 1 up
     const int out = i < 0 ? -i - 1 : i;
     if (j < 0 || j >= top || out >= reach)
       return false;
     return j < hip ? out >= inside && out < trunk : out < trunk || j >= arm;
   };
-  const auto isInner = [&](int i, int j) { return used(i, j) && used(i - 1, j) && used(i, j - 1) && used(i - 1, j - 1); };
+  const auto isInner = [&](int i, int j) {
+    return used(i, j) && used(i - 1, j) && used(i, j - 1) && used(i - 1, j - 1);
+  };
 
   std::vector<Eigen::Vector2d> outline;
   for (int j = 0; j <= top; ++j)
@@ -116,7 +139,8 @@ Biped::Biped(double cell)
       {
         if (!used(i, j))
           continue;
-        const int a = vertex(i, j, sheet), b = vertex(i + 1, j, sheet), c = vertex(i + 1, j + 1, sheet), d = vertex(i, j + 1, sheet);
+        const int a = vertex(i, j, sheet), b = vertex(i + 1, j, sheet), c = vertex(i + 1, j + 1, sheet),
+                  d = vertex(i, j + 1, sheet);
         // by turns, but no edge within a sheet joins two vertices of the outline: the other sheet would have it, too
         const bool rises = isInner(i, j) || isInner(i + 1, j + 1), falls = isInner(i + 1, j) || isInner(i, j + 1);
         const bool rising = rises && (!falls || (i + j) % 2 == 0);
@@ -149,31 +173,40 @@ Biped::Biped(double cell)
         sum[b] += shares[v][b];
     body_of_face_.push_back(static_cast<int>(std::max_element(sum.begin(), sum.end()) - sum.begin()));
   }
-  binding_.emplace(mesh_.vertices, std::vector<Pose>(kBodies), all);   // all at the origin: poses are moves from the rest shape
+  // all at the origin: poses are moves from the rest shape
+  binding_.emplace(mesh_.vertices, std::vector<Pose>(kBodies), all);
 }
 
 std::vector<Pose> Biped::poses(double t) const
 {
-  const double begun = std::clamp(t / 0.25, 0.0, 1.0), ease = begun * begun * begun * (10 - 15 * begun + 6 * begun * begun);
+  const double begun = std::clamp(t / 0.25, 0.0, 1.0),
+               ease = begun * begun * begun * (10 - 15 * begun + 6 * begun * begun);
   const Vector3d sideways = Vector3d::UnitY();
   std::vector<Pose> pose(kBodies);
   const double phase = 2 * M_PI * t / kPeriod;
-  const Pose root{{kSpeed * std::max(0.0, t - 0.125 * (1 - ease)) * ease, 0, 0.015 * ease * std::cos(2 * phase)}, Eigen::Quaterniond::Identity()};
+  const Pose root{{kSpeed * std::max(0.0, t - 0.125 * (1 - ease)) * ease, 0, 0.015 * ease * std::cos(2 * phase)},
+                  Eigen::Quaterniond::Identity()};
   pose[hips] = root;
   pose[chest] = root * turnedAbout({0, 0, kWaist}, about(Vector3d::UnitZ(), 0.12 * ease * std::cos(phase)));
   for (const bool left : {false, true})
   {
     const double p = phase + (left ? M_PI : 0.0), side = left ? 1.0 : -1.0;
-    const Vector3d shoulder = drawnApart(side * kTrunk, 0.5 * (kArmLow + kTop)), elbow = drawnApart(side * kElbow, 0.5 * (kArmLow + kTop));
-    const Vector3d hip(0, side * 0.1, kHip), knee = drawnApart(side * 0.1, kKnee), ankle = drawnApart(side * 0.1, kAnkle);
+    const Vector3d shoulder = drawnApart(side * kTrunk, 0.5 * (kArmLow + kTop)),
+                   elbow = drawnApart(side * kElbow, 0.5 * (kArmLow + kTop));
+    const Vector3d hip(0, side * 0.1, kHip), knee = drawnApart(side * 0.1, kKnee),
+                                             ankle = drawnApart(side * 0.1, kAnkle);
     const Eigen::Quaterniond lowered = about(Vector3d::UnitX(), -side * 0.45 * ease);
     // turned about y by -a, what hangs goes forwards
-    pose[left ? left_upper_arm : right_upper_arm] = pose[chest] * turnedAbout(shoulder, about(sideways, -ease * kShoulderSwing.at(p)) * lowered);
-    pose[left ? left_forearm : right_forearm] = pose[left ? left_upper_arm : right_upper_arm] * turnedAbout(elbow, about(sideways, -ease * kElbowSwing.at(p)));
+    pose[left ? left_upper_arm : right_upper_arm] =
+        pose[chest] * turnedAbout(shoulder, about(sideways, -ease * kShoulderSwing.at(p)) * lowered);
+    pose[left ? left_forearm : right_forearm] =
+        pose[left ? left_upper_arm : right_upper_arm] * turnedAbout(elbow, about(sideways, -ease * kElbowSwing.at(p)));
     pose[left ? left_thigh : right_thigh] = root * turnedAbout(hip, about(sideways, -ease * kHipSwing.at(p)));
-    pose[left ? left_shin : right_shin] = pose[left ? left_thigh : right_thigh] * turnedAbout(knee, about(sideways, ease * kKneeSwing.at(p)));
+    pose[left ? left_shin : right_shin] =
+        pose[left ? left_thigh : right_thigh] * turnedAbout(knee, about(sideways, ease * kKneeSwing.at(p)));
     pose[left ? left_foot : right_foot] =
-      pose[left ? left_shin : right_shin] * turnedAbout(ankle, about(sideways, ease * 0.6 * (kHipSwing.at(p) - kKneeSwing.at(p))));
+        pose[left ? left_shin : right_shin] *
+        turnedAbout(ankle, about(sideways, ease * 0.6 * (kHipSwing.at(p) - kKneeSwing.at(p))));
   }
   return pose;
 }
@@ -185,4 +218,4 @@ Eigen::Matrix3Xd Biped::at(double t) const
   return x;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

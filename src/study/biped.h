@@ -8,8 +8,8 @@
 
 namespace slender::study {
 
-/// A walking puppet in the shape of an X (thesis 6.5.4): two sheets of cells, sewn along their outline, skinned over twelve bodies. It stands on z = 0 at the
-/// origin and walks along x.
+/// A walking puppet in the shape of an X (thesis 6.5.4): two sheets of cells, sewn along their outline, skinned over
+/// twelve bodies. It stands on z = 0 at the origin and walks along x.
 class Biped
 {
 public:
@@ -18,8 +18,9 @@ public:
 
   const TriangleMesh& mesh() const { return mesh_; }                     ///< at rest, facing outwards
   const std::vector<int>& bodyOfFace() const { return body_of_face_; }   ///< that moves it, for the most part
-  Eigen::Matrix3Xd at(double t) const;                                   ///< vertices [m] at a time [s]; at rest at t <= 0, in full swing from 0.25 s on
-  static constexpr double kPeriod = 1.25;                                ///< of two steps [s]
+  /// vertices [m] at a time [s]; at rest at t <= 0, in full swing from 0.25 s on
+  Eigen::Matrix3Xd at(double t) const;
+  static constexpr double kPeriod = 1.25;   ///< of two steps [s]
 
 private:
   std::vector<Pose> poses(double t) const;
@@ -29,4 +30,4 @@ private:
   std::optional<GuideBinding> binding_;
 };
 
-}  // namespace slender::study
+}   // namespace slender::study

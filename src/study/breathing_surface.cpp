@@ -38,16 +38,20 @@ GuidedCloth breathing(int levels, double frequency, double damping)
   return c;
 }
 
-}  // namespace
+}   // namespace
 
 void runBreathingSurface(StudyContext& context)
 {
   useOneBlasThread();
-  SurfacePicture& picture = context.picture("breathing_surface", "A surface that breathes at 6 Hz and 12 Hz (thesis figure 6.4), at its largest");
+  SurfacePicture& picture = context.picture(
+      "breathing_surface", "A surface that breathes at 6 Hz and 12 Hz (thesis figure 6.4), at its largest");
   picture.view = {0.5, 1.0, -0.8};
-  Plot& plot = context.plot("breathing_surface_energy", "Breathing surface, 6 Hz: kinetic energy below the guide's scale", "time [s]", "energy [mJ]");
+  Plot& plot =
+      context.plot("breathing_surface_energy", "Breathing surface, 6 Hz: kinetic energy below the guide's scale",
+                   "time [s]", "energy [mJ]");
   plot.log_x = plot.log_y = plot.markers = false;
-  Plot& ratios = context.plot("breathing_surface_tugging", "Breathing surface: how points tug", "frequency [Hz]", "fine kinetic energy, points over averages");
+  Plot& ratios = context.plot("breathing_surface_tugging", "Breathing surface: how points tug", "frequency [Hz]",
+                              "fine kinetic energy, points over averages");
 
   struct Case
   {
@@ -55,9 +59,7 @@ void runBreathingSurface(StudyContext& context)
   };
   std::vector<Case> cases{{1.5, kDamping}, {3.0, kDamping}, {kRapid, kDamping}, {12.0, kDamping}};
   if (!context.quick())
-  {
     cases.insert(cases.end(), {{24.0, kDamping}, {kRapid, 0.0}, {kRapid, 4 * kDamping}});
-  }
   const int breaths = context.quick() ? 4 : 12;
   int done = 0;
   for (const auto& [frequency, damping] : cases)
@@ -72,7 +74,8 @@ void runBreathingSurface(StudyContext& context)
       GuidedStepper run(c, how);
       double kinetic = 0, bending = 0, worst = 0;
       const double period = 1.0 / frequency;
-      const int steps = static_cast<int>(std::lround(breaths * period / c.step)), shown = static_cast<int>(std::lround((breaths - 0.5) * period / c.step));
+      const int steps = static_cast<int>(std::lround(breaths * period / c.step)),
+                shown = static_cast<int>(std::lround((breaths - 0.5) * period / c.step));
       int counted = 0;
       for (int k = 1; k <= steps; ++k)
       {
@@ -87,7 +90,8 @@ void runBreathingSurface(StudyContext& context)
           plot.at(label).y.push_back(1e3 * energy);
         }
         if (k == shown && damping == kDamping && (frequency == kRapid || frequency == 12.0))
-          picture.panels.push_back({label + " prescribed, " + (frequency == kRapid ? "6 Hz" : "12 Hz"), {{{run.cloth().state.x, c.fine.mesh.triangles}}}});
+          picture.panels.push_back({label + " prescribed, " + (frequency == kRapid ? "6 Hz" : "12 Hz"),
+                                    {{{run.cloth().state.x, c.fine.mesh.triangles}}}});
         if (run.time() < period)
           continue;   // until it breathes steadily
         ++counted;
@@ -95,10 +99,16 @@ void runBreathingSurface(StudyContext& context)
         bending += run.stepper().energies(run.cloth().state, c.gravity).bending;
       }
       energies[how == Follow::points] = kinetic / counted;
-      context.row().set("frequency_Hz", frequency).set("damping_s", damping).set("constraints", label)
-        .set("vertices", static_cast<double>(c.fine.mesh.vertices.cols())).set("count", run.constraints().count())
-        .set("fine_kinetic_mJ", 1e3 * kinetic / counted).set("bending_mJ", 1e3 * bending / counted).set("average_error_m", worst)
-        .set("ms_per_step", 1e3 * run.seconds() / steps);
+      context.row()
+          .set("frequency_Hz", frequency)
+          .set("damping_s", damping)
+          .set("constraints", label)
+          .set("vertices", static_cast<double>(c.fine.mesh.vertices.cols()))
+          .set("count", run.constraints().count())
+          .set("fine_kinetic_mJ", 1e3 * kinetic / counted)
+          .set("bending_mJ", 1e3 * bending / counted)
+          .set("average_error_m", worst)
+          .set("ms_per_step", 1e3 * run.seconds() / steps);
     }
     const double ratio = energies[1] / energies[0];
     if (damping == kDamping)
@@ -111,8 +121,11 @@ void runBreathingSurface(StudyContext& context)
     if (frequency == 1.5)
       context.metric("tugging_ratio_slow", ratio);
   }
-  context.note("fine_kinetic: of velocities less their L2 projection onto the guide's hat functions, mean from the second breath on; tugging_ratio: points over "
-               "averages, at 6 Hz, tugging_ratio_slow: at 1.5 Hz. average_error of points: distance of the averages from the guide's.");
+  context.note(
+      "fine_kinetic: of velocities less their L2 projection onto the guide's hat functions, mean from the second "
+      "breath on; tugging_ratio: points over "
+      "averages, at 6 Hz, tugging_ratio_slow: at 1.5 Hz. average_error of points: distance of the averages from the "
+      "guide's.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -11,17 +11,18 @@
 namespace slender::study {
 namespace {
 
-/// EI = L = rho A = 1, so g = Gamma. The reference is inextensible: EA is so large that the rod's own weight strains it by no
-/// more than 1e-5.
+/// EI = L = rho A = 1, so g = Gamma. The reference is inextensible: EA is so large that the rod's own weight strains it
+/// by no more than 1e-5.
 double stretchModulus(double gamma) { return std::max(1e7, 1e5 * gamma); }
 
-/// The rod bends in a boundary layer at the clamp whose length is L / sqrt(Gamma). With fewer edges in it than this a mesh does not show
-/// its shape: at a fifth of an edge H/W is off by 15 %, at a sixteenth by 230 %.
+/// The rod bends in a boundary layer at the clamp whose length is L / sqrt(Gamma). With fewer edges in it than this a
+/// mesh does not show its shape: at a fifth of an edge H/W is off by 15 %, at a sixteenth by 230 %.
 constexpr double kLayerEdges = 5;
 
 double layerEdges(double gamma, int edges) { return edges / std::sqrt(std::max(gamma, 1.0)); }
 
-/// Nodes along x in [0, 1] whose first edge is at most a fifth of the boundary layer; the others grow in a constant ratio.
+/// Nodes along x in [0, 1] whose first edge is at most a fifth of the boundary layer; the others grow in a constant
+/// ratio.
 Eigen::Matrix3Xd gradedNodes(double gamma, int edges)
 {
   const double first = 1 / (kLayerEdges * std::sqrt(std::max(gamma, 1.0)));
@@ -73,7 +74,8 @@ Outcome runStatic(double gamma, const Eigen::Matrix3Xd& nodes)
   RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
   const double start = threadSeconds();
   const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
-  return {report.ok ? aspectRatio(rod) : std::numeric_limits<double>::quiet_NaN(), threadSeconds() - start, report.message};
+  return {report.ok ? aspectRatio(rod) : std::numeric_limits<double>::quiet_NaN(), threadSeconds() - start,
+          report.message};
 }
 
 /// Released horizontally and damped (critically in its slowest mode) until it stands still.
@@ -84,10 +86,16 @@ Outcome runSettled(double gamma, int edges)
   RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 0.2 / rate, 1e-9));
   const double start = threadSeconds();
   const std::string problem = settle(stepper, rod, 0.2 / rate, 1e-9 * rate, 2000);
-  return {problem.empty() ? aspectRatio(rod) : std::numeric_limits<double>::quiet_NaN(), threadSeconds() - start, problem};
+  return {problem.empty() ? aspectRatio(rod) : std::numeric_limits<double>::quiet_NaN(), threadSeconds() - start,
+          problem};
 }
 
-enum class How { uniform, graded, settled };
+enum class How
+{
+  uniform,
+  graded,
+  settled
+};
 
 /// Relative. Five edges in the boundary layer or more make the second term at most 1 %.
 double boundOf(double gamma, int edges, bool graded)
@@ -95,18 +103,21 @@ double boundOf(double gamma, int edges, bool graded)
   return graded ? 0.01 : 0.003 + 0.25 * std::pow(1 / layerEdges(gamma, edges), 2);
 }
 
-}  // namespace
+}   // namespace
 
 void runCantilever(StudyContext& context)
 {
-  const std::vector<int> edges = context.quick() ? std::vector<int>{20, 40, 80} : std::vector<int>{20, 40, 80, 160, 320};
+  const std::vector<int> edges =
+      context.quick() ? std::vector<int>{20, 40, 80} : std::vector<int>{20, 40, 80, 160, 320};
   std::vector<double> gammas;
   for (int k = 0; k <= 7 * (context.quick() ? 1 : 4); ++k)
     gammas.push_back(std::pow(10.0, -2 + (context.quick() ? 1.0 : 0.25) * k));
   const int total = static_cast<int>(gammas.size() * edges.size());
 
-  Plot& errors = context.plot("cantilever_error", "Heavy cantilever, static: error of H/W against resolution", "free edges n", "relative error of H/W");
-  Plot& cost = context.plot("cantilever_cost", "Heavy cantilever, static: error against run time", "CPU time [s]", "relative error of H/W");
+  Plot& errors = context.plot("cantilever_error", "Heavy cantilever, static: error of H/W against resolution",
+                              "free edges n", "relative error of H/W");
+  Plot& cost = context.plot("cantilever_cost", "Heavy cantilever, static: error against run time", "CPU time [s]",
+                            "relative error of H/W");
   double order = std::numeric_limits<double>::infinity(), worst = 0;
   int done = 0, unresolved = 0, refused = 0;
   for (const double gamma : gammas)
@@ -127,11 +138,17 @@ void runCantilever(StudyContext& context)
           continue;
         if (how == How::graded && layerEdges(gamma, n) >= kLayerEdges)
           continue;   // equal edges are as short
-        const Outcome o = how == How::settled ? runSettled(gamma, n) : runStatic(gamma, how == How::graded ? gradedNodes(gamma, n) : evenNodes(n));
+        const Outcome o = how == How::settled
+                              ? runSettled(gamma, n)
+                              : runStatic(gamma, how == How::graded ? gradedNodes(gamma, n) : evenNodes(n));
         const double relative = o.ratio / expected - 1;
         const bool resolved = how == How::graded || layerEdges(gamma, n) >= kLayerEdges;
         Row& row = context.row();
-        row.set("how", how == How::settled ? "settled" : how == How::graded ? "static, graded" : "static").set("Gamma", gamma).set("edges", n);
+        row.set("how", how == How::settled  ? "settled"
+                       : how == How::graded ? "static, graded"
+                                            : "static")
+            .set("Gamma", gamma)
+            .set("edges", n);
         if (resolved)
           row.check(o.ratio, expected, expected * boundOf(gamma, n, how == How::graded), "inextensible elastica");
         else
@@ -157,8 +174,9 @@ void runCantilever(StudyContext& context)
     }
     if (!whole_decade || gamma > (context.quick() ? 2 : 2000))
       continue;
-    // The clamp's boundary layer is L/sqrt(Gamma) wide; at 30 edges in it the error follows its leading term. For small loads
-    // that term is small and the error soon reaches the round-off of the iteration: the last pair above it counts.
+    // The clamp's boundary layer is L/sqrt(Gamma) wide; at 30 edges in it the error follows its leading term. For small
+    // loads that term is small and the error soon reaches the round-off of the iteration: the last pair above it
+    // counts.
     const CantileverTip stretched = heavyCantilever(gamma, gamma / stretchModulus(gamma));
     double coarse = 0, fine = 0;
     int used = 0;
@@ -172,17 +190,26 @@ void runCantilever(StudyContext& context)
       used = n;
     }
     const double seen = observedOrder(coarse, fine);
-    context.row().set("how", "order").set("Gamma", gamma).set("edges", used).set("observed_order", seen).set("relative_error", fine);
+    context.row()
+        .set("how", "order")
+        .set("Gamma", gamma)
+        .set("edges", used)
+        .set("observed_order", seen)
+        .set("relative_error", fine);
     order = seen >= order ? order : seen;   // keeps NaN
   }
   context.metric("observed_order", order);
   context.metric("worst_resolved_error", worst);
   context.metric("unresolved", unresolved);
   context.row().set("how", "unresolved meshes").check(refused, 0, 0.5, "each gives an answer, though no accurate one");
-  context.note("Rows that are not resolved have fewer than five edges in the boundary layer at the clamp, L / sqrt(Gamma) long. They are named and not passed.");
+  context.note(
+      "Rows that are not resolved have fewer than five edges in the boundary layer at the clamp, L / sqrt(Gamma) long. "
+      "They are named and not passed.");
   context.note("graded: the first edge is a fifth of the boundary layer and the others grow in a constant ratio.");
   context.note("EA is set so that the rod's weight strains it by at most 1e-5: the reference is inextensible.");
-  context.note("observed_order: smallest over Gamma = 0.01 to 1000, from two meshes that put 30 and 60 edges or more into the boundary layer.");
+  context.note(
+      "observed_order: smallest over Gamma = 0.01 to 1000, from two meshes that put 30 and 60 edges or more into the "
+      "boundary layer.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -4,7 +4,8 @@
 
 namespace slender::study {
 
-double cantileverStrip(GridPattern pattern, BendingModel bending, double gamma, double stiffness, double width, int cells, double& seconds)
+double cantileverStrip(GridPattern pattern, BendingModel bending, double gamma, double stiffness, double width,
+                       int cells, double& seconds)
 {
   const double h = 1.0 / (cells + 0.5), start = threadSeconds();
   // rows of vertices across the strip: along them a sheet bends without stretching
@@ -40,4 +41,4 @@ double cantileverStrip(GridPattern pattern, BendingModel bending, double gamma, 
   return -tip.z() / tip.x();
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A chain of rings drawn taut: hooked links hold, and part when one of them is cut or bends open (thesis 4.7.2, Fig. 4.7).
+// A chain of rings drawn taut: hooked links hold, and part when one of them is cut or bends open (thesis 4.7.2,
+// Fig. 4.7).
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -11,7 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// How often one ring winds through another [-]; open ones closed by a straight edge. Exact for polylines (solid angles).
+/// How often one ring winds through another [-]; open ones closed by a straight edge. Exact for polylines (solid
+/// angles).
 int linking(const RodState& a, const RodState& b)
 {
   double sum = 0;
@@ -19,7 +21,8 @@ int linking(const RodState& a, const RodState& b)
   for (Eigen::Index i = 0; i < a.x.cols(); ++i)
     for (Eigen::Index j = 0; j < b.x.cols(); ++j)
     {
-      const Vector3d r13 = b.x.col(j) - a.x.col(i), r14 = next(b, j) - a.x.col(i), r23 = b.x.col(j) - next(a, i), r24 = next(b, j) - next(a, i);
+      const Vector3d r13 = b.x.col(j) - a.x.col(i), r14 = next(b, j) - a.x.col(i), r23 = b.x.col(j) - next(a, i),
+                     r24 = next(b, j) - next(a, i);
       const Vector3d sides[4] = {r13.cross(r14), r14.cross(r24), r24.cross(r23), r23.cross(r13)};
       double angle = 0;
       for (int k = 0; k < 4; ++k)
@@ -57,7 +60,8 @@ void cut(GroupSetup& g, int rod)
   g.model.rods[rod] = open;
 }
 
-void drawChain(Plot& picture, const std::string& label, const std::vector<std::shared_ptr<const RodModel>>& models, const std::vector<RodState>& links, double lower)
+void drawChain(Plot& picture, const std::string& label, const std::vector<std::shared_ptr<const RodModel>>& models,
+               const std::vector<RodState>& links, double lower)
 {
   for (std::size_t k = 0; k < links.size(); ++k)
     draw(picture, label, links[k].x, models[k]->closed, {{0.5, 1, -0.3}, {0, 0, 1}}, {0, 0, -lower});
@@ -65,15 +69,16 @@ void drawChain(Plot& picture, const std::string& label, const std::vector<std::s
 
 std::string pullTable(double from, double to, double way)
 {
-  return "generate.0.chain.end_motion={table: [[0, 0, 0, 0, 0, 0, 0, 1], [" + std::to_string(from) + ", 0, 0, 0, 0, 0, 0, 1], [" + std::to_string(to) + ", " +
-         std::to_string(way) + ", 0, 0, 0, 0, 0, 1]]}";
+  return "generate.0.chain.end_motion={table: [[0, 0, 0, 0, 0, 0, 0, 1], [" + std::to_string(from) +
+         ", 0, 0, 0, 0, 0, 0, 1], [" + std::to_string(to) + ", " + std::to_string(way) + ", 0, 0, 0, 0, 0, 1]]}";
 }
 
 /// Closed rings, drawn taut; then the one in the middle is cut.
 void cutChain(StudyContext& context, int links, int edges, double way, Plot& picture)
 {
-  Simulation scene = packageScene("chain", {"generate.0.chain.opening=0", "generate.0.chain.links=" + std::to_string(links),
-                                            "generate.0.chain.edges=" + std::to_string(edges), pullTable(0.3, 1.3, way)});
+  Simulation scene =
+      packageScene("chain", {"generate.0.chain.opening=0", "generate.0.chain.links=" + std::to_string(links),
+                             "generate.0.chain.edges=" + std::to_string(edges), pullTable(0.3, 1.3, way)});
   const double step = scene.config().time.step, pulled = 1.6;
   double penetration = 0, weight = 0;
   while (scene.state().time < pulled - 0.5 * step)
@@ -87,9 +92,14 @@ void cutChain(StudyContext& context, int links, int edges, double way, Plot& pic
   for (const auto& model : g.model.rods)
     weight += model->totalMass() * scene.config().gravity.norm();
   drawChain(picture, "drawn taut", g.model.rods, g.state.rods, 0);
-  const auto row = [&](const char* quantity) -> Row& { return context.row().set("case", "closed links, one cut").set("n", edges).set("quantity", quantity); };
-  row("hooked pairs when drawn taut").set("tension", -scene.wrench(1).force.x()).check(hooked(g.state.rods), links - 1, 0.5, "as built: no link has passed through another");
-  row("weight on the ends [N]").check(-scene.wrench(0).force.z() - scene.wrench(1).force.z(), weight, 0.01 * weight, "rho A l g");
+  const auto row = [&](const char* quantity) -> Row& {
+    return context.row().set("case", "closed links, one cut").set("n", edges).set("quantity", quantity);
+  };
+  row("hooked pairs when drawn taut")
+      .set("tension", -scene.wrench(1).force.x())
+      .check(hooked(g.state.rods), links - 1, 0.5, "as built: no link has passed through another");
+  row("weight on the ends [N]")
+      .check(-scene.wrench(0).force.z() - scene.wrench(1).force.z(), weight, 0.01 * weight, "rho A l g");
 
   const int middle = links / 2;
   cut(g, middle);
@@ -104,10 +114,14 @@ void cutChain(StudyContext& context, int links, int edges, double way, Plot& pic
       parted = k * step;
     for (std::size_t look = 0; look < looks.size(); ++look)
       if (std::abs(k * step - looks[look]) < 0.5 * step)
-        drawChain(picture, std::to_string(static_cast<int>(1e3 * looks[look])) + " ms after the cut", g.model.rods, g.state.rods, 0.25 * static_cast<double>(look + 1));
+        drawChain(picture, std::to_string(static_cast<int>(1e3 * looks[look])) + " ms after the cut", g.model.rods,
+                  g.state.rods, 0.25 * static_cast<double>(look + 1));
   }
-  const int left = linking(g.state.rods[middle - 1], g.state.rods[middle]), right = linking(g.state.rods[middle], g.state.rods[middle + 1]);
-  row("hooks that hold at the cut link's weaker side").set("parted_after", parted).check(std::min(left, right), 0, 0.5, "the chain parts there");
+  const int left = linking(g.state.rods[middle - 1], g.state.rods[middle]),
+            right = linking(g.state.rods[middle], g.state.rods[middle + 1]);
+  row("hooks that hold at the cut link's weaker side")
+      .set("parted_after", parted)
+      .check(std::min(left, right), 0, 0.5, "the chain parts there");
   row("hooked pairs elsewhere").check(hooked(g.state.rods) - left - right, links - 3, 0.5, "all others hold");
   row("largest penetration [m]").check(std::max(0.0, penetration), 0, 1e-9, "all pairs, brute force");
   context.metric("tension_when_cut", -scene.wrench(1).force.x());
@@ -137,18 +151,28 @@ void openChain(StudyContext& context, Plot& picture)
       broke = scene.state().time;
       extension = scene.state().rods.back().grasps[0].X_WG.position.x() - start;
     }
-    if ((drawn == 0 && scene.state().time > 1.5) || (drawn == 1 && scene.state().time > 3.4) || (drawn == 2 && broke > 0 && scene.state().time > broke + 0.05))
-      drawChain(picture, scene.state().time < 1.6 ? "hanging" : broke > 0 ? "50 ms after it broke" : "about to break", models, scene.state().rods, 0.3 * drawn++);
+    if ((drawn == 0 && scene.state().time > 1.5) || (drawn == 1 && scene.state().time > 3.4) ||
+        (drawn == 2 && broke > 0 && scene.state().time > broke + 0.05))
+      drawChain(picture,
+                scene.state().time < 1.6 ? "hanging"
+                : broke > 0              ? "50 ms after it broke"
+                                         : "about to break",
+                models, scene.state().rods, 0.3 * drawn++);
   }
   const int after = hooked(scene.state().rods);
-  const auto row = [&](const char* quantity) -> Row& { return context.row().set("case", "open links (scene)").set("n", scene.rodModel(0).edges()).set("quantity", quantity); };
+  const auto row = [&](const char* quantity) -> Row& {
+    return context.row()
+        .set("case", "open links (scene)")
+        .set("n", scene.rodModel(0).edges())
+        .set("quantity", quantity);
+  };
   row("break").set("time", broke).set("tension", strongest).set("extension", extension).set("hooked_after", after);
   row("largest penetration [m]").check(std::max(0.0, penetration), 0, 1e-9, "all pairs, brute force");
   context.metric("break_tension", strongest);
   context.metric("hooked_after_break", after);
 }
 
-}  // namespace
+}   // namespace
 
 void runChain(StudyContext& context)
 {
@@ -159,7 +183,8 @@ void runChain(StudyContext& context)
     return;
   }
   cutChain(context, 7, 30, 0.3, closed);
-  openChain(context, addPicture(context, "chain_open", "Chain of open links drawn apart (scene chain)", "right [m]", "up [m]"));
+  openChain(context,
+            addPicture(context, "chain_open", "Chain of open links drawn apart (scene chain)", "right [m]", "up [m]"));
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A character of thin material that walks as its guide does (thesis 6.5.4, figures 6.2 and 6.10): as it is, in a headwind, crinkled.
+// A character of thin material that walks as its guide does (thesis 6.5.4, figures 6.2 and 6.10): as it is, in a
+// headwind, crinkled.
 #include <cmath>
 #include <stdexcept>
 
@@ -35,7 +36,7 @@ GuidedCloth character(const Biped& biped, const std::vector<int>& region, double
   return c;
 }
 
-}  // namespace
+}   // namespace
 
 void runCharacter(StudyContext& context)
 {
@@ -47,10 +48,13 @@ void runCharacter(StudyContext& context)
   ClusteringOptions clusters;
   clusters.regions = 280;
   const std::vector<int> region = clusterFaces(biped.mesh().triangles, walk, clusters).region;
-  SurfacePicture& picture = context.picture("character", "A walking character of thin material, 280 regions (thesis figures 6.2, 6.10)");
+  SurfacePicture& picture =
+      context.picture("character", "A walking character of thin material, 280 regions (thesis figures 6.2, 6.10)");
   picture.view = {-0.8, 0.6, -0.1};
   picture.columns = 4;
-  Plot& plot = context.plot("character_flutter", "A walking character: kinetic energy of what its regions' averages do not see", "time [s]", "energy [mJ]");
+  Plot& plot =
+      context.plot("character_flutter", "A walking character: kinetic energy of what its regions' averages do not see",
+                   "time [s]", "energy [mJ]");
   plot.log_x = plot.log_y = plot.markers = false;
 
   const double duration = context.quick() ? 1.2 : 5.0;
@@ -88,15 +92,25 @@ void runCharacter(StudyContext& context)
     worst = std::max(worst, error);
     const Vector3d here(guide.row(0).mean(), 0, 0);
     if (picture.panels.empty())
-      picture.panels.push_back({"guide and its regions", {{{guide.colwise() - here, c.guide.triangles}, true, huesOf(c.guide.triangles, region)}}});
+      picture.panels.push_back(
+          {"guide and its regions",
+           {{{guide.colwise() - here, c.guide.triangles}, true, huesOf(c.guide.triangles, region)}}});
     picture.panels.push_back({name, {{{run.cloth().state.x.colwise() - here, c.guide.triangles}}}});
-    context.row().set("look", name).set("vertices", static_cast<double>(guide.cols())).set("count", run.constraints().count())
-      .set("rms_from_guide_m", std::sqrt(away)).set("flutter_mJ", 1e3 * flutter).set("average_error_m", error)
-      .set("ms_per_step", 1e3 * run.seconds() / steps).set("seconds_per_simulated_second", run.seconds() / duration);
+    context.row()
+        .set("look", name)
+        .set("vertices", static_cast<double>(guide.cols()))
+        .set("count", run.constraints().count())
+        .set("rms_from_guide_m", std::sqrt(away))
+        .set("flutter_mJ", 1e3 * flutter)
+        .set("average_error_m", error)
+        .set("ms_per_step", 1e3 * run.seconds() / steps)
+        .set("seconds_per_simulated_second", run.seconds() / duration);
   }
   context.metric("worst_average_error_m", worst);
-  context.note("steps of 10 ms, without collisions; flutter: kinetic energy of the velocities relative to the guide's, mean. The thesis: 3038 vertices, 280 "
-               "constraints, 43.2 s per frame.");
+  context.note(
+      "steps of 10 ms, without collisions; flutter: kinetic energy of the velocities relative to the guide's, mean. "
+      "The thesis: 3038 vertices, 280 "
+      "constraints, 43.2 s per frame.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -58,19 +58,22 @@ struct Method
   double linear_tolerance = ClothOptions{}.linear_tolerance;
 };
 
-constexpr Method kMethods[] = {{"implicit, Newton, cholesky", Integrator::implicit_euler, false, ClothSolver::cholesky},
-                               {"implicit, Newton, conjugate gradients", Integrator::implicit_euler, false, ClothSolver::conjugate_gradients},
-                               {"implicit, one step, cholesky", Integrator::implicit_euler, true, ClothSolver::cholesky},
-                               {"implicit, one step, conjugate gradients to 0.02", Integrator::implicit_euler, true, ClothSolver::conjugate_gradients, 0.02},
-                               {"implicit, one step, conjugate gradients", Integrator::implicit_euler, true, ClothSolver::conjugate_gradients},
-                               {"implicit, one step, conjugate gradients to 1e-3", Integrator::implicit_euler, true, ClothSolver::conjugate_gradients, 1e-3},
-                               {"TR-BDF2, Newton, cholesky", Integrator::tr_bdf2, false, ClothSolver::cholesky},
-                               {"TR-BDF2, Newton, conjugate gradients", Integrator::tr_bdf2, false, ClothSolver::conjugate_gradients},
-                               {"TR-BDF2, one step, conjugate gradients", Integrator::tr_bdf2, true, ClothSolver::conjugate_gradients},
-                               {"IMEX", Integrator::imex, false, ClothSolver::automatic},
-                               {"explicit", Integrator::symplectic_euler, false, ClothSolver::automatic}};
+constexpr Method kMethods[] = {
+    {"implicit, Newton, cholesky", Integrator::implicit_euler, false, ClothSolver::cholesky},
+    {"implicit, Newton, conjugate gradients", Integrator::implicit_euler, false, ClothSolver::conjugate_gradients},
+    {"implicit, one step, cholesky", Integrator::implicit_euler, true, ClothSolver::cholesky},
+    {"implicit, one step, conjugate gradients to 0.02", Integrator::implicit_euler, true,
+     ClothSolver::conjugate_gradients, 0.02},
+    {"implicit, one step, conjugate gradients", Integrator::implicit_euler, true, ClothSolver::conjugate_gradients},
+    {"implicit, one step, conjugate gradients to 1e-3", Integrator::implicit_euler, true,
+     ClothSolver::conjugate_gradients, 1e-3},
+    {"TR-BDF2, Newton, cholesky", Integrator::tr_bdf2, false, ClothSolver::cholesky},
+    {"TR-BDF2, Newton, conjugate gradients", Integrator::tr_bdf2, false, ClothSolver::conjugate_gradients},
+    {"TR-BDF2, one step, conjugate gradients", Integrator::tr_bdf2, true, ClothSolver::conjugate_gradients},
+    {"IMEX", Integrator::imex, false, ClothSolver::automatic},
+    {"explicit", Integrator::symplectic_euler, false, ClothSolver::automatic}};
 
-}  // namespace
+}   // namespace
 
 void runClothAccuracy(StudyContext& context)
 {
@@ -79,7 +82,8 @@ void runClothAccuracy(StudyContext& context)
   std::vector<double> implicit_steps{0.01, 0.005, 0.0025};
   if (!context.quick())
     implicit_steps = {0.02, 0.01, 0.005, 0.0025, 0.00125};
-  const std::vector<double> explicit_steps = context.quick() ? std::vector<double>{1e-4, 2e-5} : std::vector<double>{2e-4, 1e-4, 5e-5, 2e-5};
+  const std::vector<double> explicit_steps =
+      context.quick() ? std::vector<double>{1e-4, 2e-5} : std::vector<double>{2e-4, 1e-4, 5e-5, 2e-5};
   for (const bool flag : {false, true})
   {
     const std::string name = flag ? "flag" : "swinging";
@@ -90,18 +94,22 @@ void runClothAccuracy(StudyContext& context)
     context.progress(0, 2, name + ", converged run");
     double seconds = 0;
     const double h = context.quick() ? 1e-5 : 5e-6;
-    const Eigen::Matrix3Xd coarse = runTo(end, setup, fine, 2 * h, seconds), finer = runTo(end, setup, fine, h, seconds);
+    const Eigen::Matrix3Xd coarse = runTo(end, setup, fine, 2 * h, seconds),
+                           finer = runTo(end, setup, fine, h, seconds);
     if (coarse.cols() == 0 || finer.cols() == 0)
       throw std::runtime_error("cloth_accuracy: the converged run failed");
     const Eigen::Matrix3Xd exact = 2 * finer - coarse;
-    const auto rms = [&](const Eigen::Matrix3Xd& x) { return std::sqrt((x - exact).squaredNorm() / static_cast<double>(x.cols())); };
+    const auto rms = [&](const Eigen::Matrix3Xd& x) {
+      return std::sqrt((x - exact).squaredNorm() / static_cast<double>(x.cols()));
+    };
     context.metric("reference_uncertainty_mm_" + name, 1e3 * rms(finer));
     const double moved = 1e3 * rms(setup.state.x);
     WorkPrecision front(context, "cloth_accuracy_" + name, "Cloth, " + name, "RMS error of the vertices [mm]", moved);
     double order = std::numeric_limits<double>::infinity(), second_order = order;
     for (const Method& method : kMethods)
     {
-      const bool is_explicit = method.integrator == Integrator::symplectic_euler || method.integrator == Integrator::imex;
+      const bool is_explicit =
+          method.integrator == Integrator::symplectic_euler || method.integrator == Integrator::imex;
       double previous = 0;
       for (const double step : is_explicit ? explicit_steps : implicit_steps)
       {
@@ -137,7 +145,9 @@ void runClothAccuracy(StudyContext& context)
     context.metric("observed_order_" + name, order);
     context.metric("observed_order_tr_bdf2_" + name, second_order);
   }
-  context.note("reference: explicit runs at two steps, extrapolated; observed_order: least of implicit Euler's rows, and of TR-BDF2's with full Newton, from their last two steps; an error of 100 %: how far the vertices moved.");
+  context.note(
+      "reference: explicit runs at two steps, extrapolated; observed_order: least of implicit Euler's rows, and of "
+      "TR-BDF2's with full Newton, from their last two steps; an error of 100 %: how far the vertices moved.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

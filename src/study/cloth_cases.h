@@ -22,8 +22,10 @@ inline void useOneBlasThread()
     openblas_set_num_threads(1);
 }
 
-constexpr GridPattern kPatterns[] = {GridPattern::equilateral, GridPattern::alternating, GridPattern::one_diagonal, GridPattern::irregular};
-constexpr BendingModel kBendingModels[] = {BendingModel::hinge, BendingModel::isometric_nonconforming, BendingModel::isometric_conforming};
+constexpr GridPattern kPatterns[] = {GridPattern::equilateral, GridPattern::alternating, GridPattern::one_diagonal,
+                                     GridPattern::irregular};
+constexpr BendingModel kBendingModels[] = {BendingModel::hinge, BendingModel::isometric_nonconforming,
+                                           BendingModel::isometric_conforming};
 
 /// Model, state and inputs of one cloth that belong together; no gravity.
 struct ClothSetup
@@ -32,7 +34,9 @@ struct ClothSetup
   ClothState state;
   ClothInputs inputs;
 
-  explicit ClothSetup(ClothModel m) : model(std::make_shared<ClothModel>(std::move(m))), state(makeClothState(*model, model->rest.vertices))
+  explicit ClothSetup(ClothModel m)
+    : model(std::make_shared<ClothModel>(std::move(m))),
+      state(makeClothState(*model, model->rest.vertices))
   {
     inputs.gravity.setZero();
   }
@@ -80,4 +84,4 @@ double leastSeconds(double budget, Function f)
   return least;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// Collisions of cloth: pairs by themselves, then scenes after every step of which an exact check of all pairs looks for intersections.
+// Collisions of cloth: pairs by themselves, then scenes after every step of which an exact check of all pairs looks for
+// intersections.
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -24,7 +25,8 @@ struct Scene
   ClothGroupInputs inputs;
   double step = 5e-3;
   int steps = 200;
-  std::function<void(Scene&, double time)> drive = [](Scene&, double) {};   ///< sets the inputs of the step that ends at a time
+  /// sets the inputs of the step that ends at a time
+  std::function<void(Scene&, double time)> drive = [](Scene&, double) {};
 };
 
 TriangleMesh sheetMesh(int columns, int rows, double width, double height)   // about the origin
@@ -34,9 +36,11 @@ TriangleMesh sheetMesh(int columns, int rows, double width, double height)   // 
   return mesh;
 }
 
-void addCloth(Scene& s, const TriangleMesh& mesh, const Pose& pose, double friction, double thickness = 2e-3, double bending = 2e-6)
+void addCloth(Scene& s, const TriangleMesh& mesh, const Pose& pose, double friction, double thickness = 2e-3,
+              double bending = 2e-6)
 {
-  ClothModel cloth = buildCloth("sheet " + std::to_string(s.model.cloths.size()), mesh, 0.2, isotropicMembrane(2e6, 0.3, 5e-4));
+  ClothModel cloth =
+      buildCloth("sheet " + std::to_string(s.model.cloths.size()), mesh, 0.2, isotropicMembrane(2e6, 0.3, 5e-4));
   cloth.bending_modulus = bending;
   cloth.stiffness_damping = 1e-3;
   Eigen::Matrix3Xd x(3, mesh.vertices.cols());
@@ -77,7 +81,8 @@ std::shared_ptr<TriangleMesh> torus(double major, double minor, int nu, int nv)
     {
       const double u = 2 * M_PI * i / nu, v = 2 * M_PI * j / nv, r = major + minor * std::cos(v);
       mesh->vertices.col(i * nv + j) << r * std::cos(u), r * std::sin(u), minor * std::sin(v);
-      const int a = i * nv + j, b = (i + 1) % nu * nv + j, c = (i + 1) % nu * nv + (j + 1) % nv, d = i * nv + (j + 1) % nv;
+      const int a = i * nv + j, b = (i + 1) % nu * nv + j, c = (i + 1) % nu * nv + (j + 1) % nv,
+                d = i * nv + (j + 1) % nv;
       mesh->triangles.col(2 * a) << a, b, c;
       mesh->triangles.col(2 * a + 1) << a, c, d;
     }
@@ -97,13 +102,13 @@ Scene needle(int n)
 {
   const auto cone = std::make_shared<TriangleMesh>();   // with a tip of 3.8 degrees
   cone->vertices.resize(3, 5);
-  cone->vertices << 0, 0.01, 0, -0.01, 0,  //
-                    0, 0, 0.01, 0, -0.01,  //
-                    0.15, -0.15, -0.15, -0.15, -0.15;
+  cone->vertices << 0, 0.01, 0, -0.01, 0,   //
+      0, 0, 0.01, 0, -0.01,                 //
+      0.15, -0.15, -0.15, -0.15, -0.15;
   cone->triangles.resize(3, 6);
-  cone->triangles << 0, 0, 0, 0, 1, 1,  //
-                     1, 2, 3, 4, 3, 4,  //
-                     2, 3, 4, 1, 2, 3;
+  cone->triangles << 0, 0, 0, 0, 1, 1,   //
+      1, 2, 3, 4, 3, 4,                  //
+      2, 3, 4, 1, 2, 3;
   return drape("a needle", n, cone, {{0.003, 0.002, 0}, Quaterniond::Identity()});
 }
 
@@ -113,7 +118,8 @@ Scene heap(int n)
   s.name = "three sheets in a heap";
   for (int k = 0; k < 3; ++k)
   {
-    const Quaterniond turn(Eigen::AngleAxisd(0.6 * k, Vector3d::UnitZ()) * Eigen::AngleAxisd(0.9 - 0.3 * k, Vector3d::UnitX()));
+    const Quaterniond turn(Eigen::AngleAxisd(0.6 * k, Vector3d::UnitZ()) *
+                           Eigen::AngleAxisd(0.9 - 0.3 * k, Vector3d::UnitX()));
     addCloth(s, sheetMesh(n, n, 0.4, 0.4), {{0.03 * k, -0.02 * k, 0.25 + 0.2 * k}, turn}, 0.3);
   }
   addSolid(s, Plane{});
@@ -164,7 +170,9 @@ Scene throughRing(int n)
   pin(s, held);
   const Eigen::Matrix3Xd rest = s.inputs.cloths[0].pins;
   s.steps = 600;
-  s.drive = [rest](Scene& scene, double time) { scene.inputs.cloths[0].pins = rest.colwise() - Vector3d(0, 0, 0.12 * time); };
+  s.drive = [rest](Scene& scene, double time) {
+    scene.inputs.cloths[0].pins = rest.colwise() - Vector3d(0, 0, 0.12 * time);
+  };
   return s;
 }
 
@@ -177,12 +185,14 @@ double stretch(const Scene& s)
     const Eigen::Matrix3Xd &x = s.state.cloths[k].x, &rest = s.model.cloths[k]->rest.vertices;
     const auto& edges = s.model.cloths[k]->topology.edges;
     for (Eigen::Index e = 0; e < edges.cols(); ++e)
-      most = std::max(most, (x.col(edges(1, e)) - x.col(edges(0, e))).norm() / (rest.col(edges(1, e)) - rest.col(edges(0, e))).norm() - 1.0);
+      most = std::max(most, (x.col(edges(1, e)) - x.col(edges(0, e))).norm() /
+                                    (rest.col(edges(1, e)) - rest.col(edges(0, e))).norm() -
+                                1.0);
   }
   return most;
 }
 
-}  // namespace
+}   // namespace
 
 void runClothCollisionSafety(StudyContext& context)
 {
@@ -252,10 +262,22 @@ void runClothCollisionSafety(StudyContext& context)
     for (const auto& cloth : s.model.cloths)
       triangles += static_cast<int>(cloth->rest.triangles.cols());
     const double over = (seconds - alone_seconds) / alone_seconds;
-    context.row().set("part", "scene").set("kind", s.name).set("triangles", triangles).set("steps", steps).set("intersections", static_cast<double>(found)).set("largest_stretch", most_stretch)
-        .set("ms_per_step", 1e3 * seconds / steps).set("longest_ms", 1e3 * longest).set("collisions_over_solve", over)
-        .set("repulsions", static_cast<double>(sum.repulsions) / steps).set("impulses", static_cast<double>(sum.impulses) / steps)
-        .set("rounds", static_cast<double>(sum.rounds) / steps).set("zone_steps", zone_steps).set("largest_zone", sum.zone_points).set("cuts", cuts);
+    context.row()
+        .set("part", "scene")
+        .set("kind", s.name)
+        .set("triangles", triangles)
+        .set("steps", steps)
+        .set("intersections", static_cast<double>(found))
+        .set("largest_stretch", most_stretch)
+        .set("ms_per_step", 1e3 * seconds / steps)
+        .set("longest_ms", 1e3 * longest)
+        .set("collisions_over_solve", over)
+        .set("repulsions", static_cast<double>(sum.repulsions) / steps)
+        .set("impulses", static_cast<double>(sum.impulses) / steps)
+        .set("rounds", static_cast<double>(sum.rounds) / steps)
+        .set("zone_steps", zone_steps)
+        .set("largest_zone", sum.zone_points)
+        .set("cuts", cuts);
     intersections += found;
     worst_share = std::max(worst_share, over);
   }
@@ -263,8 +285,10 @@ void runClothCollisionSafety(StudyContext& context)
   context.metric("refused", refused);
   context.metric("nan_count", not_finite);
   context.metric("collisions_over_solve_max", worst_share);
-  context.note("intersections: edges that meet a face, summed over all steps, by all pairs; collisions_over_solve: CPU time of a step less that of "
-               "the cloths' own, over the latter.");
+  context.note(
+      "intersections: edges that meet a face, summed over all steps, by all pairs; collisions_over_solve: CPU time of "
+      "a step less that of "
+      "the cloths' own, over the latter.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A preview that ends where it shall, and what becomes of it in full resolution, free and tracked (thesis 6.5.1, figure 6.1).
+// A preview that ends where it shall, and what becomes of it in full resolution, free and tracked (thesis 6.5.1,
+// figure 6.1).
 #include <cmath>
 #include <stdexcept>
 
@@ -24,7 +25,8 @@ TriangleMesh tube(const Capsule& capsule, const Pose& pose)
   const double half = 0.5 * capsule.length + capsule.radius;
   for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
   {
-    const double angle = 2 * M_PI * mesh.vertices(0, i), z = half * (2 * mesh.vertices(1, i) - 1), beyond = std::max(0.0, std::abs(z) - 0.5 * capsule.length);
+    const double angle = 2 * M_PI * mesh.vertices(0, i), z = half * (2 * mesh.vertices(1, i) - 1),
+                 beyond = std::max(0.0, std::abs(z) - 0.5 * capsule.length);
     const double r = std::sqrt(std::max(0.0, capsule.radius * capsule.radius - beyond * beyond));
     mesh.vertices.col(i) = pose * Vector3d(r * std::cos(angle), r * std::sin(angle), z);
   }
@@ -45,16 +47,26 @@ std::vector<int> orderAs(const Matrix3Xd& wanted, const Matrix3Xd& given)
   return order;
 }
 
-double rms(const Matrix3Xd& a, const Matrix3Xd& b) { return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols())); }
+double rms(const Matrix3Xd& a, const Matrix3Xd& b)
+{
+  return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
+}
 
-}  // namespace
+}   // namespace
 
 void runClothOnBranch(StudyContext& context)
 {
   useOneBlasThread();
   // in the quick form a quarter of the vertices
-  Simulation scene = context.quick() ? packageScene("cloth_on_branch", {"cloths.1.grid.cells=[24, 16]", "tracked.0.mesh.subdivide=2"}) : packageScene("cloth_on_branch");
-  enum { preview, free, tracked };
+  Simulation scene =
+      context.quick() ? packageScene("cloth_on_branch", {"cloths.1.grid.cells=[24, 16]", "tracked.0.mesh.subdivide=2"})
+                      : packageScene("cloth_on_branch");
+  enum
+  {
+    preview,
+    free,
+    tracked
+  };
   const SceneConfig& config = scene.config();
   const TrackingConfig& tracking = *config.cloths[tracked].tracking;
   const std::vector<int> order = orderAs(config.cloths[tracked].mesh.vertices, config.cloths[free].mesh.vertices);
@@ -62,17 +74,27 @@ void runClothOnBranch(StudyContext& context)
     const Matrix3Xd& x = scene.state().cloths[cloth].cloth.x;
     return cloth == free ? Matrix3Xd(x(Eigen::all, order)) : x;
   };
-  const auto fromPreview = [&](int cloth) { return tracking.sets[0].constraints->error(tracking.sets[0].constraints->averages(vertices(preview)), vertices(cloth)); };
+  const auto fromPreview = [&](int cloth) {
+    return tracking.sets[0].constraints->error(tracking.sets[0].constraints->averages(vertices(preview)),
+                                               vertices(cloth));
+  };
 
-  SurfacePicture& picture = context.picture("cloth_on_branch", "A cloth blown against a branch (thesis figure 6.1): preview, free and tracked in full resolution");
+  SurfacePicture& picture = context.picture(
+      "cloth_on_branch",
+      "A cloth blown against a branch (thesis figure 6.1): preview, free and tracked in full resolution");
   picture.view = {-0.35, 1.0, -0.3};
   picture.columns = 3;
-  Plot& plot = context.plot("cloth_on_branch_distance", "Cloth on a branch: how far the averages of its quarters are from the preview's", "time [s]", "distance [m]");
+  Plot& plot = context.plot("cloth_on_branch_distance",
+                            "Cloth on a branch: how far the averages of its quarters are from the preview's",
+                            "time [s]", "distance [m]");
   plot.log_x = plot.markers = false;
   const TriangleMesh branch = tube(std::get<Capsule>(config.obstacles.front().shape), config.obstacles.front().pose);
-  const auto draw = [&](int cloth, const std::string& label) {   // in small triangles, which can be drawn one behind the other
+  // in small triangles, which can be drawn one behind the other
+  const auto draw = [&](int cloth, const std::string& label) {
     const Subdivision fine = subdivide(config.cloths[cloth].mesh, cloth == preview ? 4 : 0);
-    picture.panels.push_back({label, {{{scene.state().cloths[cloth].cloth.x * fine.weights.transpose(), fine.mesh.triangles}}, {branch, false}}});
+    picture.panels.push_back(
+        {label,
+         {{{scene.state().cloths[cloth].cloth.x * fine.weights.transpose(), fine.mesh.triangles}}, {branch, false}}});
   };
   const double step = config.time.step;
   const int steps = static_cast<int>(std::lround(config.time.duration / step));
@@ -92,9 +114,14 @@ void runClothOnBranch(StudyContext& context)
       plot.at(config.cloths[cloth].name).y.push_back(std::max(fromPreview(cloth), 1e-17));
     }
     if (k % 10 == 0)   // the three as they are at the same time
-      context.row().set("time_s", k * step).set("free_from_preview_m", fromPreview(free)).set("tracked_from_preview_m", fromPreview(tracked))
-        .set("free_vertices_rms_m", rms(vertices(free).leftCols(tracking.guide.mesh.vertices.cols()), vertices(preview)))
-        .set("tracked_vertices_rms_m", rms(vertices(tracked).leftCols(tracking.guide.mesh.vertices.cols()), vertices(preview)));
+      context.row()
+          .set("time_s", k * step)
+          .set("free_from_preview_m", fromPreview(free))
+          .set("tracked_from_preview_m", fromPreview(tracked))
+          .set("free_vertices_rms_m",
+               rms(vertices(free).leftCols(tracking.guide.mesh.vertices.cols()), vertices(preview)))
+          .set("tracked_vertices_rms_m",
+               rms(vertices(tracked).leftCols(tracking.guide.mesh.vertices.cols()), vertices(preview)));
   }
   draw(preview, "preview, " + std::to_string(config.cloths[preview].mesh.vertices.cols()) + " vertices");
   draw(free, "free, " + std::to_string(order.size()) + " vertices");
@@ -104,8 +131,10 @@ void runClothOnBranch(StudyContext& context)
   context.metric("free_from_preview_over_size", away / size);
   context.metric("free_speed", scene.state().cloths[free].cloth.v.colwise().norm().maxCoeff());
   context.metric("seconds_per_step", seconds / steps);
-  context.note("from_preview: greatest distance of the average of a quarter from the preview's; of the tracked one the worst after any step. vertices_rms: of the "
-               "vertices that the meshes share.");
+  context.note(
+      "from_preview: greatest distance of the average of a quarter from the preview's; of the tracked one the worst "
+      "after any step. vertices_rms: of the "
+      "vertices that the meshes share.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

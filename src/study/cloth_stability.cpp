@@ -17,9 +17,11 @@ namespace {
 
 bool isFinite(const ClothState& s) { return s.x.allFinite() && s.v.allFinite() && s.rest_angles.allFinite(); }
 
-/// Runs up to `steps` steps of h; `motion` sets the inputs for the end of each. `keeps_energy`: beyond what there is to give (deformation,
-/// and the fall through the sheet's size) none may appear; not asked of what is moved or of explicit steps, which are bounded by refusal.
-StabilityCell run(ClothSetup& cloth, const ClothOptions& options, double h, int steps, const std::function<void(int, ClothInputs&)>& motion, bool keeps_energy = true)
+/// Runs up to `steps` steps of h; `motion` sets the inputs for the end of each. `keeps_energy`: beyond what there is to
+/// give (deformation, and the fall through the sheet's size) none may appear; not asked of what is moved or of explicit
+/// steps, which are bounded by refusal.
+StabilityCell run(ClothSetup& cloth, const ClothOptions& options, double h, int steps,
+                  const std::function<void(int, ClothInputs&)>& motion, bool keeps_energy = true)
 {
   StabilityCell cell;
   cell.linear_steps = options.one_newton_step || options.integrator == Integrator::symplectic_euler;
@@ -28,7 +30,8 @@ StabilityCell run(ClothSetup& cloth, const ClothOptions& options, double h, int 
   const ClothEnergies start = stepper.energies(cloth.state, gravity);
   const Eigen::Matrix3Xd& rest = cloth.model->rest.vertices;
   const double size = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).norm();
-  const double scale = start.membrane + start.bending + start.kinetic + cloth.model->totalMass() * gravity.norm() * size;
+  const double scale =
+      start.membrane + start.bending + start.kinetic + cloth.model->totalMass() * gravity.norm() * size;
   const double begin = threadSeconds();
   for (int k = 0; k < steps; ++k)
   {
@@ -36,10 +39,12 @@ StabilityCell run(ClothSetup& cloth, const ClothOptions& options, double h, int 
       motion(k, cloth.inputs);
     const ClothState before = cloth.state;
     const StepReport report = stepper.step(cloth.state, cloth.inputs, h);
-    const bool finite = isFinite(cloth.state) && (!report.ok || (stepper.pinForces().allFinite() && std::isfinite(report.max_strain)));
+    const bool finite =
+        isFinite(cloth.state) && (!report.ok || (stepper.pinForces().allFinite() && std::isfinite(report.max_strain)));
     if (!cell.took(report, finite, stateBytes(before) == stateBytes(cloth.state)))
       break;
-    if (!motion && keeps_energy && !cell.energyIs((stepper.energies(cloth.state, gravity).total() - start.total()) / scale, 1e-2))
+    if (!motion && keeps_energy &&
+        !cell.energyIs((stepper.energies(cloth.state, gravity).total() - start.total()) / scale, 1e-2))
       break;
   }
   cell.cpu_seconds = threadSeconds() - begin;
@@ -65,7 +70,8 @@ TriangleMesh needleMesh()
   for (int k = 0; k < 12; ++k)
   {
     const auto face = mesh.triangles.col(static_cast<Eigen::Index>(random() % mesh.triangles.cols()));
-    const Eigen::Vector3d a = mesh.vertices.col(face[0]), b = mesh.vertices.col(face[1]), c = mesh.vertices.col(face[2]);
+    const Eigen::Vector3d a = mesh.vertices.col(face[0]), b = mesh.vertices.col(face[1]),
+                          c = mesh.vertices.col(face[2]);
     const Eigen::Vector3d foot = a + (b - a) * (c - a).dot(b - a) / (b - a).squaredNorm();
     mesh.vertices.col(face[2]) = foot + 1e-4 * (c - foot);
   }
@@ -79,14 +85,15 @@ TriangleMesh needleMesh()
   return mesh;
 }
 
-}  // namespace
+}   // namespace
 
 void runClothStability(StudyContext& context)
 {
   useOneBlasThread();
   StabilityTally tally(context);
   int cases = 0, not_recovered = 0;
-  const auto report = [&](const std::string& what, const ClothSetup& cloth, double h, const StabilityCell& cell, bool expects_recovery) {
+  const auto report = [&](const std::string& what, const ClothSetup& cloth, double h, const StabilityCell& cell,
+                          bool expects_recovery) {
     Row& row = context.row();
     row.set("case", what).set("model", toString(cloth.model->bending)).set("step_s", h);
     tally.record(row, cell);
@@ -106,7 +113,8 @@ void runClothStability(StudyContext& context)
     models.push_back(BendingModel::isometric_conforming);
 
   // Stiffness over ten decades, steps up to 1/10 s
-  const std::vector<double> steps = context.quick() ? std::vector<double>{0.01, 0.1} : std::vector<double>{0.001, 0.01, 1.0 / 30, 0.1};
+  const std::vector<double> steps =
+      context.quick() ? std::vector<double>{0.01, 0.1} : std::vector<double>{0.001, 0.01, 1.0 / 30, 0.1};
   for (const BendingModel bending : models)
     for (const bool newton : {true, false})
       for (int decade = -2; decade <= 8; decade += context.quick() ? 5 : 2)
@@ -140,7 +148,8 @@ void runClothStability(StudyContext& context)
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         hung(cloth);
         for (Eigen::Index i = 0; i < cloth.state.x.cols(); ++i)
-          if (std::find(cloth.state.pins.begin(), cloth.state.pins.end(), static_cast<int>(i)) == cloth.state.pins.end())
+          if (std::find(cloth.state.pins.begin(), cloth.state.pins.end(), static_cast<int>(i)) ==
+              cloth.state.pins.end())
             cloth.state.x.col(i) = 0.25 * Eigen::Vector3d(1 + uniform(random), 1 + uniform(random), uniform(random));
         report("random positions", cloth, h, run(cloth, common, h, settling, nullptr), true);
       }
@@ -184,7 +193,8 @@ void runClothStability(StudyContext& context)
                      inputs.pins.col(0) += Eigen::Vector3d(0, 0, travelled > 1.0 ? move : 0.0);
                      travelled += move;
                      if (move <= 0 && inputs.pins(2, 0) < inputs.pins(2, 1))
-                       inputs.pins.col(0) += Eigen::Vector3d(0, 0, std::min(0.2, inputs.pins(2, 1) - inputs.pins(2, 0)));
+                       inputs.pins.col(0) +=
+                           Eigen::Vector3d(0, 0, std::min(0.2, inputs.pins(2, 1) - inputs.pins(2, 0)));
                    }),
                true);
       }
@@ -208,18 +218,24 @@ cloths:
   - grid: {corner: [0, 0, 0], sides: [[0.5, 0, 0], [0, 0.5, 0]], cells: 8, pattern: alternating}
     material: {density: 1000, thickness: %g, youngs_modulus: %g, poissons_ratio: 0.3}
     grasps: {left: {corner: lower_left}, right: {corner: lower_right}}
-)", thickness, youngs_modulus);
+)",
+                  thickness, youngs_modulus);
     return MapScene{text, {}};
   };
-  const std::vector<double> map_steps = context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
+  const std::vector<double> map_steps =
+      context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
   const int map_length = context.quick() ? 5 : 15;
-  stabilityMap(context, tally, "cloth_stability_stiffness", "Young's modulus [Pa]", context.quick() ? std::vector<double>{1e4, 1e8} : std::vector<double>{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10},
-               map_steps, map_length, [&](double modulus) { return hanging(modulus, 5e-4); });
-  stabilityMap(context, tally, "cloth_stability_slenderness", "thickness over side", context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1},
+  stabilityMap(
+      context, tally, "cloth_stability_stiffness", "Young's modulus [Pa]",
+      context.quick() ? std::vector<double>{1e4, 1e8} : std::vector<double>{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10},
+      map_steps, map_length, [&](double modulus) { return hanging(modulus, 5e-4); });
+  stabilityMap(context, tally, "cloth_stability_slenderness", "thickness over side",
+               context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1},
                map_steps, map_length, [&](double slenderness) { return hanging(1e6, 0.5 * slenderness); });
   context.metric("not_recovered", not_recovered);
   context.metric("cases", static_cast<double>(context.rows().size()));
-  context.note("not_recovered: of sheets crushed, mirrored or yanked, those strained by half or more in the last step.");
+  context.note(
+      "not_recovered: of sheets crushed, mirrored or yanked, those strained by half or more in the last step.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -55,7 +55,7 @@ Fit fitOf(const TriangleMesh& mesh, const std::vector<int>& body, const std::vec
   return {joint_seams / joints, seams / all, impure / area.sum()};
 }
 
-}  // namespace
+}   // namespace
 
 void runClustering(StudyContext& context)
 {
@@ -67,7 +67,8 @@ void runClustering(StudyContext& context)
   SurfacePicture& picture = context.picture("clustering", "200 regions of a walking character (thesis figure 6.7)");
   picture.view = {-0.8, 0.6, -0.1};
   picture.columns = 4;
-  Plot& plot = context.plot("clustering_seams", "Seams of regions at the joints", "regions", "share of the joints' length");
+  Plot& plot =
+      context.plot("clustering_seams", "Seams of regions at the joints", "regions", "share of the joints' length");
   plot.log_y = false;
 
   const int seeds = context.quick() ? 2 : 10;
@@ -91,7 +92,8 @@ void runClustering(StudyContext& context)
         options.max_iterations = 32;
         options.seed = static_cast<unsigned>(seed);
         const auto start = std::chrono::steady_clock::now();
-        const Clustering clusters = clusterFaces(mesh.triangles, aware ? walk : std::vector<Eigen::Matrix3Xd>{mesh.vertices}, options);
+        const Clustering clusters =
+            clusterFaces(mesh.triangles, aware ? walk : std::vector<Eigen::Matrix3Xd>{mesh.vertices}, options);
         seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / seeds;
         iterations += static_cast<double>(clusters.iterations) / seeds;
         settled += static_cast<double>(clusters.settled) / seeds;
@@ -110,9 +112,16 @@ void runClustering(StudyContext& context)
         }
       }
       joints_of[aware] = mean.joint_seams;
-      context.row().set("clustering", aware ? "animation-aware" : "static").set("vertices", static_cast<double>(mesh.vertices.cols())).set("regions", count)
-        .set("seams_at_joints", mean.joint_seams).set("seams_anywhere", mean.seams).set("impure_area", mean.impure).set("iterations", iterations)
-        .set("settled", settled).set("seconds", seconds);
+      context.row()
+          .set("clustering", aware ? "animation-aware" : "static")
+          .set("vertices", static_cast<double>(mesh.vertices.cols()))
+          .set("regions", count)
+          .set("seams_at_joints", mean.joint_seams)
+          .set("seams_anywhere", mean.seams)
+          .set("impure_area", mean.impure)
+          .set("iterations", iterations)
+          .set("settled", settled)
+          .set("seconds", seconds);
       plot.at(aware ? "animation-aware" : "static").x.push_back(count);
       plot.at(aware ? "animation-aware" : "static").y.push_back(mean.joint_seams);
       if (count == 200 && aware)
@@ -127,9 +136,12 @@ void runClustering(StudyContext& context)
   context.metric("seams_at_joints_gain", gain);
   context.metric("seconds", seconds_200);
   context.metric("iterations", iterations_200);
-  context.note("seams_at_joints: share of the length of edges between faces of different bodies that lie between two regions; seams_anywhere: "
-               "of all edges; impure_area: of faces that move with another body than most of their region; means over seeds. The thesis: 3038 vertices, "
-               "200 regions, 32 iterations, less than five minutes.");
+  context.note(
+      "seams_at_joints: share of the length of edges between faces of different bodies that lie between two regions; "
+      "seams_anywhere: "
+      "of all edges; impure_area: of faces that move with another body than most of their region; means over seeds. "
+      "The thesis: 3038 vertices, "
+      "200 regions, 32 iterations, less than five minutes.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

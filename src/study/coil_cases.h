@@ -9,7 +9,8 @@ namespace slender::study {
 /// Thread whose steady coils are known: thesis 5.5, in its units, without surface tension.
 struct CoilFluid
 {
-  static constexpr double density = 5e-4, viscosity = 0.2, gravity = 9.81, diameter = 0.09, speed = 0.615;   ///< of the nozzle, and of the fluid in it
+  /// of the nozzle, and of the fluid in it
+  static constexpr double density = 5e-4, viscosity = 0.2, gravity = 9.81, diameter = 0.09, speed = 0.615;
 };
 
 /// A steady coil on a still floor.
@@ -35,14 +36,14 @@ public:
 
   /// Slope of the angle by least squares [rad/s], 0 for fewer than three points.
   double frequency() const;
-  double radius() const;         ///< mean, 0 without points
+  double radius() const;   ///< mean, 0 without points
   /// Standard deviation of the radius over its mean: zero for a circle about the nozzle's axis.
   double unsteadiness() const;
   double turns() const;
-  double perTurn() const;        ///< landing points
+  double perTurn() const;   ///< landing points
 
 private:
   std::vector<double> times_, angles_, radii_;
 };
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,5 +1,6 @@
-// A thread that coils on a still floor: frequency and radius against the height of the nozzle, going up and then down (thesis 5.5,
-// Fig. 5.2; coiling_grid.csv: steady coils in the rotating frame after Ribe 2004, with their linear stability).
+// A thread that coils on a still floor: frequency and radius against the height of the nozzle, going up and then down
+// (thesis 5.5, Fig. 5.2; coiling_grid.csv: steady coils in the rotating frame after Ribe 2004, with their linear
+// stability).
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -11,8 +12,8 @@
 namespace slender::study {
 namespace {
 
-constexpr double kDensity = CoilFluid::density, kMu = CoilFluid::viscosity, kGravity = CoilFluid::gravity, kDiameter = CoilFluid::diameter,
-                 kSpeed = CoilFluid::speed, kBound = 0.05;
+constexpr double kDensity = CoilFluid::density, kMu = CoilFluid::viscosity, kGravity = CoilFluid::gravity,
+                 kDiameter = CoilFluid::diameter, kSpeed = CoilFluid::speed, kBound = 0.05;
 
 double heightUnit() { return std::cbrt(kMu * kMu / (kDensity * kDensity * kGravity)); }
 double frequencyUnit() { return std::cbrt(kGravity * kGravity * kDensity / kMu); }
@@ -22,7 +23,8 @@ std::vector<double> heightsOf(const std::vector<int>& branches)
 {
   std::vector<double> heights;
   for (const SteadyCoil& c : steadyCoils())
-    if (c.stable && std::count(branches.begin(), branches.end(), c.branch) && (heights.empty() || c.height > heights.back() * 1.0001))
+    if (c.stable && std::count(branches.begin(), branches.end(), c.branch) &&
+        (heights.empty() || c.height > heights.back() * 1.0001))
       heights.push_back(c.height);
   return heights;
 }
@@ -32,7 +34,9 @@ class Pouring
 public:
   /// Radius and frequency: a first guess, for the resolution.
   Pouring(double height, double radius, double frequency, double step_angle, double per_turn)
-    : step_angle_(step_angle), per_turn_(per_turn), frequency_(frequency)
+    : step_angle_(step_angle),
+      per_turn_(per_turn),
+      frequency_(frequency)
   {
     resolve(height, radius);
     thread_ = nozzleThread(model_, {0, 0, height}, kSpeed);
@@ -46,7 +50,9 @@ public:
   void raise(double height)
   {
     ThreadStepper stepper = makeStepper(thread_);
-    const double from = thread_.inputs.ends[1].position.z(), rate = (from > 8 && from < 20 ? 0.005 : 0.03) * kSpeed * (1 + from);   // slower where branches end
+    // slower where branches end
+    const double from = thread_.inputs.ends[1].position.z(),
+                 rate = (from > 8 && from < 20 ? 0.005 : 0.03) * kSpeed * (1 + from);
     const int steps = static_cast<int>(std::ceil(std::abs(height - from) / (rate * step())));
     for (int k = 1; k <= steps; ++k)
     {
@@ -54,7 +60,8 @@ public:
       advance(stepper, thread_, step(), "coiling");
     }
   }
-  /// Swirls the nozzle about its axis at the frequency guessed, less and less: from high up the thread would otherwise fold to and fro.
+  /// Swirls the nozzle about its axis at the frequency guessed, less and less: from high up the thread would otherwise
+  /// fold to and fro.
   void stir(double radius, double duration)
   {
     ThreadStepper stepper = makeStepper(thread_);
@@ -63,7 +70,8 @@ public:
     while (thread_.time < start + duration)
     {
       const double t = thread_.time + step() - start, r = radius * std::max(0.0, 1 - t / duration);
-      thread_.inputs.ends[1].position = centre + r * Eigen::Vector3d(std::cos(frequency * t), std::sin(frequency * t), 0);
+      thread_.inputs.ends[1].position =
+          centre + r * Eigen::Vector3d(std::cos(frequency * t), std::sin(frequency * t), 0);
       advance(stepper, thread_, step(), "coiling");
     }
     thread_.inputs.ends[1].position = centre;
@@ -143,13 +151,16 @@ struct Results
 };
 
 /// One height: measures, compares, plots. Returns the branch.
-int record(StudyContext& context, Pouring& pouring, double height, const std::string& way, double settling_turns, Results& results)
+int record(StudyContext& context, Pouring& pouring, double height, const std::string& way, double settling_turns,
+           Results& results)
 {
   const CoilTrace trace = pouring.observe(settling_turns, 4);
   const double frequency = trace.frequency(), radius = trace.radius();
   Row& row = context.row();
   row.set("way", way).set("H", height).set("H_nd", height / heightUnit()).set("Omega", frequency).set("R", radius);
-  row.set("Omega_nd", frequency / frequencyUnit()).set("R_nd", radius / heightUnit()).set("unsteadiness", trace.unsteadiness());
+  row.set("Omega_nd", frequency / frequencyUnit())
+      .set("R_nd", radius / heightUnit())
+      .set("unsteadiness", trace.unsteadiness());
   row.set("nodes", pouring.thread().state.nodes()).set("nodes_per_turn", trace.perTurn()).set("step", pouring.step());
   const SteadyCoil* coil = nearestStableCoil(height, frequency);
   int branch = 0;
@@ -165,14 +176,16 @@ int record(StudyContext& context, Pouring& pouring, double height, const std::st
   return branch;
 }
 
-}  // namespace
+}   // namespace
 
 void runCoiling(StudyContext& context)
 {
   Results results{context.plot("coiling_frequency", "Coiling frequency against height", "H / H*", "Omega / Omega*"),
-                  context.plot("coiling_radius", "Coil radius against height", "H / H*", "R / H*"), {}, {}};
+                  context.plot("coiling_radius", "Coil radius against height", "H / H*", "R / H*"),
+                  {},
+                  {}};
   std::vector<double> heights = heightsOf({1, 3}), inertial = heightsOf({7});
-  if (context.quick())   
+  if (context.quick())
   {
     std::vector<double> some;
     for (std::size_t k = 0; k < heights.size(); ++k)
@@ -223,15 +236,20 @@ void runCoiling(StudyContext& context)
   for (const SteadyCoil& c : steadyCoils())
     results.plot(c.stable ? "steady, stable" : "steady, unstable", c.height, c.frequency, c.radius, true);
   const double frequency = median(results.frequency_errors), radius = median(results.radius_errors);
-  context.row().set("way", "median relative error of Omega").check(frequency, 0.0, kBound, "steady coils on their stable branches");
+  context.row()
+      .set("way", "median relative error of Omega")
+      .check(frequency, 0.0, kBound, "steady coils on their stable branches");
   context.row().set("way", "median relative error of R").check(radius, 0.0, kBound, "the same");
   // without hysteresis this would be 1
-  context.row().set("way", "hysteresis: jump going up over jump going down").check(jump_up / jump_down, 13.64 / 10.0, 0.2, "where the stable branches end");
+  context.row()
+      .set("way", "hysteresis: jump going up over jump going down")
+      .check(jump_up / jump_down, 13.64 / 10.0, 0.2, "where the stable branches end");
   context.metric("median_relative_error_frequency", frequency);
   context.metric("median_relative_error_radius", radius);
-  context.metric("worst_relative_error_frequency", *std::max_element(results.frequency_errors.begin(), results.frequency_errors.end()));
+  context.metric("worst_relative_error_frequency",
+                 *std::max_element(results.frequency_errors.begin(), results.frequency_errors.end()));
   context.metric("jump_up_at_H", jump_up);
   context.metric("jump_down_at_H", jump_down);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -108,7 +108,8 @@ Contact decide(const MovingPair& pair, long double from, long double to, long do
     const long double d = way.norm();
     near = near || d <= rounding;
     // The way, where pieces nearly touch, is rounded more than what is across both.
-    const Wide across = pair.edges ? Wide((w->p[1] - w->p[0]).cross(w->p[3] - w->p[2])) : Wide((w->p[2] - w->p[1]).cross(w->p[3] - w->p[1]));
+    const Wide across = pair.edges ? Wide((w->p[1] - w->p[0]).cross(w->p[3] - w->p[2]))
+                                   : Wide((w->p[2] - w->p[1]).cross(w->p[3] - w->p[1]));
     for (const Wide& direction : {way, across, Wide(-across)})
     {
       const long double size = direction.norm();
@@ -128,7 +129,8 @@ double extent(const MovingPair& pair)
 {
   double size = 0.0;
   for (int i = 0; i < 3; ++i)
-    size = std::max({size, (pair.point[i].from - pair.point[3].from).cwiseAbs().maxCoeff(), (pair.point[i].to - pair.point[3].to).cwiseAbs().maxCoeff()});
+    size = std::max({size, (pair.point[i].from - pair.point[3].from).cwiseAbs().maxCoeff(),
+                     (pair.point[i].to - pair.point[3].to).cwiseAbs().maxCoeff()});
   return size;
 }
 
@@ -142,8 +144,19 @@ Vector3d vector(Random& random, double size)
   return {x, y, uniform(random, -size, size)};
 }
 
-constexpr const char* kKinds[] = {"general", "fast", "coplanar motion", "parallel", "needle", "without extent", "at rest", "touching at the start",
-                                  "constructed", "constructed at a border", "grid", "far from the origin", "sliding closely"};
+constexpr const char* kKinds[] = {"general",
+                                  "fast",
+                                  "coplanar motion",
+                                  "parallel",
+                                  "needle",
+                                  "without extent",
+                                  "at rest",
+                                  "touching at the start",
+                                  "constructed",
+                                  "constructed at a border",
+                                  "grid",
+                                  "far from the origin",
+                                  "sliding closely"};
 constexpr int kKindCount = static_cast<int>(std::size(kKinds));
 
 /// Changes the motion so that the pieces meet at a time t at given places of both.
@@ -168,69 +181,69 @@ MovingPair draw(Random& random, int kind)
   }
   switch (kind)
   {
-  case 2:
-    for (MovingPoint& p : m.point)
-      p.from.z() = p.to.z() = 0.0;
-    break;
-  case 3:   // edges parallel to each other or to the triangle, at the start or throughout
-  {
-    const Vector3d along = vector(random, 1.0), shift = vector(random, 1.0), other = vector(random, 1.0);
-    m.point[1].from = m.point[0].from + along;
-    m.point[3].from = m.point[2].from + uniform(random, -2, 2) * along;
-    if (random() % 2)
-      for (int i = 0; i < 4; ++i)
-        m.point[i].to = m.point[i].from + (i < (m.edges ? 2 : 1) ? shift : other);
-    break;
-  }
-  case 4:   // two corners of the second piece nearly in one place or three nearly in a line
-  {
-    const double thin = std::pow(10.0, uniform(random, -14, -3));
-    const double s = random() % 2 ? uniform(random, 0, 1) : 0.0;
-    for (int k : {0, 1})
+    case 2:
+      for (MovingPoint& p : m.point)
+        p.from.z() = p.to.z() = 0.0;
+      break;
+    case 3:   // edges parallel to each other or to the triangle, at the start or throughout
     {
-      Vector3d& p = k ? m.point[3].to : m.point[3].from;
-      const Vector3d &a = k ? m.point[1].to : m.point[1].from, &b = k ? m.point[2].to : m.point[2].from;
-      p = (m.edges ? b : Vector3d(a + s * (b - a))) + vector(random, thin);
+      const Vector3d along = vector(random, 1.0), shift = vector(random, 1.0), other = vector(random, 1.0);
+      m.point[1].from = m.point[0].from + along;
+      m.point[3].from = m.point[2].from + uniform(random, -2, 2) * along;
+      if (random() % 2)
+        for (int i = 0; i < 4; ++i)
+          m.point[i].to = m.point[i].from + (i < (m.edges ? 2 : 1) ? shift : other);
+      break;
     }
-    break;
-  }
-  case 5:
-    for (int k : {0, 1})
+    case 4:   // two corners of the second piece nearly in one place or three nearly in a line
     {
-      Vector3d& p = k ? m.point[3].to : m.point[3].from;
-      p = k ? m.point[2].to : m.point[2].from;
-    }
-    if (random() % 2)
-      m.point[1] = m.point[2];
-    break;
-  case 6:
-    for (MovingPoint& p : m.point)
-      p.to = p.from;
-    break;
-  case 10:   // few places: everything degenerate happens, exactly
-    for (MovingPoint& p : m.point)
-      for (int k = 0; k < 3; ++k)
+      const double thin = std::pow(10.0, uniform(random, -14, -3));
+      const double s = random() % 2 ? uniform(random, 0, 1) : 0.0;
+      for (int k : {0, 1})
       {
-        p.from[k] = static_cast<int>(random() % 4);
-        p.to[k] = p.from[k] + static_cast<int>(random() % 5) - 2;
+        Vector3d& p = k ? m.point[3].to : m.point[3].from;
+        const Vector3d &a = k ? m.point[1].to : m.point[1].from, &b = k ? m.point[2].to : m.point[2].from;
+        p = (m.edges ? b : Vector3d(a + s * (b - a))) + vector(random, thin);
       }
-    break;
-  case 12:   // across the other at a small distance, which hardly changes
-  {
-    const double height = std::pow(10.0, uniform(random, -9, -3));
-    for (MovingPoint& p : m.point)
-      p.from.z() = p.to.z() = 0.0;
-    for (int i = 0; i < (m.edges ? 2 : 1); ++i)
-    {
-      m.point[i].from.z() = height;
-      m.point[i].to.z() = height * uniform(random, -0.2, 1.0);
+      break;
     }
-    break;
+    case 5:
+      for (int k : {0, 1})
+      {
+        Vector3d& p = k ? m.point[3].to : m.point[3].from;
+        p = k ? m.point[2].to : m.point[2].from;
+      }
+      if (random() % 2)
+        m.point[1] = m.point[2];
+      break;
+    case 6:
+      for (MovingPoint& p : m.point)
+        p.to = p.from;
+      break;
+    case 10:   // few places: everything degenerate happens, exactly
+      for (MovingPoint& p : m.point)
+        for (int k = 0; k < 3; ++k)
+        {
+          p.from[k] = static_cast<int>(random() % 4);
+          p.to[k] = p.from[k] + static_cast<int>(random() % 5) - 2;
+        }
+      break;
+    case 12:   // across the other at a small distance, which hardly changes
+    {
+      const double height = std::pow(10.0, uniform(random, -9, -3));
+      for (MovingPoint& p : m.point)
+        p.from.z() = p.to.z() = 0.0;
+      for (int i = 0; i < (m.edges ? 2 : 1); ++i)
+      {
+        m.point[i].from.z() = height;
+        m.point[i].to.z() = height * uniform(random, -0.2, 1.0);
+      }
+      break;
+    }
+    default: break;
   }
-  default:
-    break;
-  }
-  if (kind == 4 || kind == 5 || kind == 7 || kind == 8 || kind == 9 || (kind == 11 && random() % 2))   // most of them collide
+  if (kind == 4 || kind == 5 || kind == 7 || kind == 8 || kind == 9 ||
+      (kind == 11 && random() % 2))   // most of them collide
   {
     double w[4];
     if (m.edges)
@@ -243,7 +256,8 @@ MovingPair draw(Random& random, int kind)
     }
     else
     {
-      const double u = kind == 9 ? static_cast<double>(random() % 2) : uniform(random, 0, 1), v = uniform(random, 0, 1) * (1.0 - u);
+      const double u = kind == 9 ? static_cast<double>(random() % 2) : uniform(random, 0, 1),
+                   v = uniform(random, 0, 1) * (1.0 - u);
       w[0] = 1.0;
       w[1] = -u;
       w[2] = -v;
@@ -278,7 +292,7 @@ double limitOf(const MovingPair& m, const ApproachLimit& limit)
                  : pointTriangleLimit(m.point[0], m.point[1], m.point[2], m.point[3], limit);
 }
 
-}  // namespace
+}   // namespace
 
 Contact referenceContact(const MovingPair& pair, double from, double to)
 {
@@ -296,8 +310,10 @@ bool cubicContact(const MovingPair& pair)
     v[i] = pair.point[i].to - o.to - r[i];
   }
   const auto triple = [](const Vector3d& a, const Vector3d& b, const Vector3d& c) { return a.dot(b.cross(c)); };
-  const double c0 = triple(r[0], r[1], r[2]), c1 = triple(v[0], r[1], r[2]) + triple(r[0], v[1], r[2]) + triple(r[0], r[1], v[2]),
-               c2 = triple(r[0], v[1], v[2]) + triple(v[0], r[1], v[2]) + triple(v[0], v[1], r[2]), c3 = triple(v[0], v[1], v[2]);
+  const double c0 = triple(r[0], r[1], r[2]),
+               c1 = triple(v[0], r[1], r[2]) + triple(r[0], v[1], r[2]) + triple(r[0], r[1], v[2]),
+               c2 = triple(r[0], v[1], v[2]) + triple(v[0], r[1], v[2]) + triple(v[0], v[1], r[2]),
+               c3 = triple(v[0], v[1], v[2]);
   const auto value = [&](double t) { return c0 + t * (c1 + t * (c2 + t * c3)); };
   double ends[4] = {0.0, 1.0, 1.0, 1.0};   // between them it is monotonic
   int count = 1;
@@ -317,7 +333,8 @@ bool cubicContact(const MovingPair& pair)
     for (int i = 0; i < 3; ++i)
       p[i] = r[i] + t * v[i];
     p[3].setZero();
-    return (pair.edges ? segmentDistance(p[0], p[1], p[2], p[3]) : pointTriangleDistance(p[0], p[1], p[2], p[3])) <= tolerance;
+    return (pair.edges ? segmentDistance(p[0], p[1], p[2], p[3]) : pointTriangleDistance(p[0], p[1], p[2], p[3])) <=
+           tolerance;
   };
   for (int k = 0; k < count; ++k)
   {
@@ -384,9 +401,17 @@ void runCollisionPairs(StudyContext& context, int count)
     const Tally& t = tallies[kind];
     if (t.pairs == 0)
       continue;
-    context.row().set("part", "pairs").set("kind", kKinds[kind]).set("pairs", t.pairs).set("contacts", t.contacts).set("missed", t.missed)
-        .set("false_hits", t.false_hits).set("ns_per_test", 1e9 * t.seconds / t.pairs).set("cubic_missed", t.cubic_missed)
-        .set("cubic_false_hits", t.cubic_false).set("cubic_ns_per_test", 1e9 * t.cubic_seconds / t.pairs);
+    context.row()
+        .set("part", "pairs")
+        .set("kind", kKinds[kind])
+        .set("pairs", t.pairs)
+        .set("contacts", t.contacts)
+        .set("missed", t.missed)
+        .set("false_hits", t.false_hits)
+        .set("ns_per_test", 1e9 * t.seconds / t.pairs)
+        .set("cubic_missed", t.cubic_missed)
+        .set("cubic_false_hits", t.cubic_false)
+        .set("cubic_ns_per_test", 1e9 * t.cubic_seconds / t.pairs);
     total.pairs += t.pairs;
     total.contacts += t.contacts;
     total.missed += t.missed;
@@ -398,10 +423,11 @@ void runCollisionPairs(StudyContext& context, int count)
   context.metric("pairs", total.pairs);
   context.metric("contacts", total.contacts);
   context.metric("missed", total.missed);
-  context.metric("false_positive_share", static_cast<double>(total.false_hits) / std::max(1, total.pairs - total.contacts));
+  context.metric("false_positive_share",
+                 static_cast<double>(total.false_hits) / std::max(1, total.pairs - total.contacts));
   context.metric("ns_per_test", 1e9 * total.seconds / total.pairs);
   context.metric("cubic_missed", total.cubic_missed);
   context.metric("cubic_ns_per_test", 1e9 * total.cubic_seconds / total.pairs);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -12,18 +12,24 @@ struct MovingPair
   bool edges;
 };
 
-enum class Contact { none, some, undecided };
+enum class Contact
+{
+  none,
+  some,
+  undecided
+};
 
-/// Whether the pieces touch at a time in [from, to]. Times are divided until over a piece of time a fixed direction separates all corners at both
-/// ends, hence between them (their offsets are linear in time), by more than the rounding of long doubles; or the pieces are seen to touch.
-/// Undecided: closer than rounding (1e-15 of the extent) lets see, or not decided after 2^40.
+/// Whether the pieces touch at a time in [from, to]. Times are divided until over a piece of time a fixed direction
+/// separates all corners at both ends, hence between them (their offsets are linear in time), by more than the rounding
+/// of long doubles; or the pieces are seen to touch. Undecided: closer than rounding (1e-15 of the extent) lets see, or
+/// not decided after 2^40.
 Contact referenceContact(const MovingPair& pair, double from, double to);
 
-/// The usual test: roots of the cubic of coplanarity in doubles, then the distance there against a tolerance (1e-6 of the extent). Returns
-/// whether it reports a collision.
+/// The usual test: roots of the cubic of coplanarity in doubles, then the distance there against a tolerance (1e-6 of
+/// the extent). Returns whether it reports a collision.
 bool cubicContact(const MovingPair& pair);
 
 /// Part one of the study cloth_collision_safety: `count` pairs of both kinds, random and degenerate.
 void runCollisionPairs(StudyContext& context, int count);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -24,13 +24,16 @@ int addObstacle(GroupSetup& group, const Shape& shape, const Pose& pose, double 
   return static_cast<int>(group.state.obstacles.size()) - 1;
 }
 
-RodSetup rodThrough(const Eigen::Matrix3Xd& points, bool closed, double radius, double youngs_modulus, double density, int edges)
+RodSetup rodThrough(const Eigen::Matrix3Xd& points, bool closed, double radius, double youngs_modulus, double density,
+                    int edges)
 {
   const Eigen::Matrix3Xd nodes = resampleCurve(points, closed, edges);
   const double area = M_PI * radius * radius, bend = youngs_modulus * 0.25 * area * radius * radius;
-  const RodSection section{radius, radius, density * area, youngs_modulus * area, bend * Eigen::Matrix2d::Identity(), bend / 1.3};
+  const RodSection section{radius,    radius, density * area, youngs_modulus * area, bend * Eigen::Matrix2d::Identity(),
+                           bend / 1.3};
   RodSetup rod;
-  auto model = std::make_shared<RodModel>(buildRod("rod", nodes, closed, std::vector<RodSection>(edges, section), Eigen::Vector3d::Zero(), true));
+  auto model = std::make_shared<RodModel>(
+      buildRod("rod", nodes, closed, std::vector<RodSection>(edges, section), Eigen::Vector3d::Zero(), true));
   rod.state = makeRodState(*model, nodes, Eigen::Vector3d::Zero());
   rod.model = model;
   rod.inputs.gravity.setZero();
@@ -46,7 +49,8 @@ Eigen::Matrix3Xd overhandKnot(double size, double tail)
   for (int i = 0; i <= kPoints; ++i)
   {
     const double t = kEnd * (2.0 * i / kPoints - 1.0), t2 = t * t;
-    x.col(i + 1) = size * Eigen::Vector3d(t * (t2 - 3.0) / 2.0, t2 * (t2 - 4.0) / 4.0 + 0.5, 0.12 * t * (t2 * t2 - 10.0));
+    x.col(i + 1) =
+        size * Eigen::Vector3d(t * (t2 - 3.0) / 2.0, t2 * (t2 - 4.0) / 4.0 + 0.5, 0.12 * t * (t2 * t2 - 10.0));
   }
   const Eigen::Vector3d first = x.col(1), last = x.col(kPoints + 1);
   x.col(0) = first - tail * Eigen::Vector3d::UnitX();
@@ -65,7 +69,8 @@ double segmentsApart(const Vector3d& a, const Vector3d& b, const Vector3d& c, co
     const double l2 = along.squaredNorm();
     return l2 > 0 ? std::clamp(along.dot(p - from) / l2, 0.0, 1.0) : 0.0;
   };
-  // the distance is convex in (s, t): minimum over the edges of the square, and inside if the lines' common normal meets both
+  // the distance is convex in (s, t): minimum over the edges of the square, and inside if the lines' common normal
+  // meets both
   double best = std::numeric_limits<double>::infinity();
   for (double s : {0.0, 1.0})
     best = std::min(best, (a + s * u - c - onto(a + s * u, c, v) * v).norm());
@@ -95,11 +100,18 @@ double obstacleApart(const Shape& shape, const Pose& pose, const Vector3d& a, co
   return std::numeric_limits<double>::infinity();
 }
 
-}  // namespace
+}   // namespace
 
 double bruteForceClearance(const GroupSetup& g)
 {
-  struct Piece { Vector3d a, b; double radius, from, to, whole; int rod; bool closed, self; double low, high; };
+  struct Piece
+  {
+    Vector3d a, b;
+    double radius, from, to, whole;
+    int rod;
+    bool closed, self;
+    double low, high;
+  };
   std::vector<Piece> pieces;
   for (const GroupContact::Rod& touching : g.model.contact.rods)
   {
@@ -109,8 +121,8 @@ double bruteForceClearance(const GroupSetup& g)
     for (int j = 0; j < m.edges(); ++j)
     {
       const Vector3d a = x.col(j), b = x.col((j + 1) % m.nodes());
-      pieces.push_back({a, b, m.radius_a[j], s, s + m.rest_length[j], m.rest_length.sum(), touching.rod, m.closed, touching.self,
-                        std::min(a.x(), b.x()) - m.radius_a[j], std::max(a.x(), b.x()) + m.radius_a[j]});
+      pieces.push_back({a, b, m.radius_a[j], s, s + m.rest_length[j], m.rest_length.sum(), touching.rod, m.closed,
+                        touching.self, std::min(a.x(), b.x()) - m.radius_a[j], std::max(a.x(), b.x()) + m.radius_a[j]});
       s += m.rest_length[j];
     }
   }
@@ -135,9 +147,10 @@ double bruteForceClearance(const GroupSetup& g)
       least = std::min(least, segmentsApart(p.a, p.b, q.a, q.b) - p.radius - q.radius);
     }
     for (std::size_t k = 0; k < g.state.obstacles.size(); ++k)
-      least = std::min(least, obstacleApart(g.model.contact.obstacles[k].shape, g.state.obstacles[k], p.a, p.b) - p.radius);
+      least =
+          std::min(least, obstacleApart(g.model.contact.obstacles[k].shape, g.state.obstacles[k], p.a, p.b) - p.radius);
   }
   return least;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// CPU time per step and memory against size, for every solver with contact and without: measured, and fitted by powers of the size.
+// CPU time per step and memory against size, for every solver with contact and without: measured, and fitted by powers
+// of the size.
 #include <malloc.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -47,7 +48,8 @@ rods:
     cross_section: {radius: 0.004}
     material: {density: 1100, youngs_modulus: 1.0e7, poissons_ratio: 0.45}
     grasps: {left: {edges: [0]}}
-)", 0.005 * (vertices - 1), vertices - 1);
+)",
+                0.005 * (vertices - 1), vertices - 1);
 }
 
 std::string threadScene(int vertices)
@@ -59,28 +61,36 @@ threads:
     centerline: {straight: {from: [0, 0, 0], to: [%.17g, 0, 0], edges: %.0f}}
     radius: 0.000875
     ends: {oldest: held, newest: held}
-)", 0.0005 * (vertices - 1), vertices - 1);
+)",
+                0.0005 * (vertices - 1), vertices - 1);
 }
 
 std::string clothScene(int vertices)
 {
   const double cells = std::max(1.0, std::round(std::sqrt(static_cast<double>(vertices)) - 1));
   const std::string side = format("%.17g", 0.01 * cells, 0);
-  return "time: {step: 0.01, duration: 1}\ncloths:\n  - grid: {corner: [0, 0, 0], sides: [[" + side + ", 0, 0], [0, " + side + format(R"(, 0]], cells: %.0f, pattern: alternating}
+  return "time: {step: 0.01, duration: 1}\ncloths:\n  - grid: {corner: [0, 0, 0], sides: [[" + side + ", 0, 0], [0, " +
+         side +
+         format(R"(, 0]], cells: %.0f, pattern: alternating}
     material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 5.0e5, poissons_ratio: 0.3}
     solver: {one_newton_step: true}
     grasps: {left: {corner: lower_left}, right: {corner: lower_right}}
-)", cells, 0);
+)",
+                cells, 0);
 }
 
-/// The guide is subdivided so often: 4^subdivisions vertices for each of its own, all of whose hats are test functions. It waves (guideAt).
+/// The guide is subdivided so often: 4^subdivisions vertices for each of its own, all of whose hats are test functions.
+/// It waves (guideAt).
 std::string trackedScene(int vertices, int subdivisions)
 {
-  const double finer = std::exp2(subdivisions), cells = std::max(1.0, std::round((std::sqrt(static_cast<double>(vertices)) - 1) / finer));
+  const double finer = std::exp2(subdivisions),
+               cells = std::max(1.0, std::round((std::sqrt(static_cast<double>(vertices)) - 1) / finer));
   const std::string side = format("%.17g", 0.01 * finer * cells, 0), count = format("%.0f", cells, 0);
-  return "time: {step: 0.01, duration: 1}\ntracked:\n  - guide: {grid: {corner: [0, 0, 0], sides: [[" + side + ", 0, 0], [0, " + side + ", 0]], cells: [" + count + ", " + count +
+  return "time: {step: 0.01, duration: 1}\ntracked:\n  - guide: {grid: {corner: [0, 0, 0], sides: [[" + side +
+         ", 0, 0], [0, " + side + ", 0]], cells: [" + count + ", " + count +
          R"(], pattern: alternating}, motion: {topic: points}}
-    mesh: {subdivide: )" + std::to_string(subdivisions) + R"(}
+    mesh: {subdivide: )" +
+         std::to_string(subdivisions) + R"(}
     test_functions: {basis: subdivision}
     material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 5.0e5, poissons_ratio: 0.3}
     bending: {model: hinge}
@@ -91,7 +101,8 @@ std::string trackedScene(int vertices, int subdivisions)
 /// Lies on a floor, all of it, and may touch itself.
 std::string onFloor(std::string scene, double height, const char* contact)
 {
-  return scene + "    contact: " + contact + format("\nobstacles: [{name: floor, shape: {plane: {}}, pose: {position: [0, 0, %.17g]}}]\n", height, 0);
+  return scene + "    contact: " + contact +
+         format("\nobstacles: [{name: floor, shape: {plane: {}}, pose: {position: [0, 0, %.17g]}}]\n", height, 0);
 }
 
 const std::vector<Family>& families()
@@ -104,7 +115,8 @@ const std::vector<Family>& families()
       {"cloth", false, clothScene},
       {"cloth", true, [](int n) { return onFloor(clothScene(n), -0.00101, "{friction: 0.3, thickness: 0.002}"); }},
       {"tracked", false, [](int n) { return trackedScene(n, 3); }},
-      {"tracked", true, [](int n) { return onFloor(trackedScene(n, 3), -0.00101, "{friction: 0.3, thickness: 0.002}"); }},
+      {"tracked", true,
+       [](int n) { return onFloor(trackedScene(n, 3), -0.00101, "{friction: 0.3, thickness: 0.002}"); }},
       {"tracked_closely", false, [](int n) { return trackedScene(n, 1); }},
   };
   return all;
@@ -161,7 +173,8 @@ void measure(const std::string& scene, double enough, Sample& sample)
   const auto advance = [&] {
     simulation.defaultInputs(inputs);
     if (!config.cloths.empty() && config.cloths[0].tracking)
-      guideAt(simulation.state().time + config.time.step, config.cloths[0].tracking->guide.mesh.vertices, inputs.guides.at(0));
+      guideAt(simulation.state().time + config.time.step, config.cloths[0].tracking->guide.mesh.vertices,
+              inputs.guides.at(0));
     const double begin = threadSeconds();
     const StepReport report = simulation.step(inputs);
     const double seconds = threadSeconds() - begin;
@@ -186,7 +199,7 @@ void measure(const std::string& scene, double enough, Sample& sample)
   sample.linear_iterations /= sample.steps;
   malloc_trim(0);   // what building has left
   sample.bytes = residentBytes() - before;
-  sample.vertices = !config.rods.empty() ? simulation.rodModel(0).nodes()
+  sample.vertices = !config.rods.empty()      ? simulation.rodModel(0).nodes()
                     : !config.threads.empty() ? static_cast<double>(simulation.state().threads[0].threads[0].nodes())
                                               : simulation.clothModel(0).vertices();
   sample.all_seconds = threadSeconds() - start;
@@ -222,7 +235,8 @@ Sample measureApart(const std::string& scene, double enough)
   int status = 0;
   waitpid(child, &status, 0);
   if (got != static_cast<ssize_t>(sizeof sample))
-    std::snprintf(sample.error, sizeof sample.error, "the process ended by itself (signal %d), of memory perhaps", WIFSIGNALED(status) ? WTERMSIG(status) : 0);
+    std::snprintf(sample.error, sizeof sample.error, "the process ended by itself (signal %d), of memory perhaps",
+                  WIFSIGNALED(status) ? WTERMSIG(status) : 0);
   return sample;
 }
 
@@ -268,27 +282,33 @@ struct Line
   double at(double x) const { return constant + slope * x; }
 };
 
-constexpr double kFitFrom = 3500;   // vertices; below, what does not depend on the size shows, and cloth of up to 3,000 has another linear solver
+// vertices; below, what does not depend on the size shows, and cloth of up to 3,000 has another linear solver
+constexpr double kFitFrom = 3500;
 constexpr double kLarge = 1e6;
 
-}  // namespace
+}   // namespace
 
 void runCostModel(StudyContext& context)
 {
   useOneBlasThread();
-  const std::vector<int> sizes = context.quick() ? std::vector<int>{100, 1000, 4000, 6000, 8000}
-                                                 : std::vector<int>{100, 300, 1000, 4000, 10000, 30000, 100000, 300000, 1000000};
-  const double enough = context.quick() ? 0.1 : 1.0;    // [s] of steps
+  const std::vector<int> sizes = context.quick()
+                                     ? std::vector<int>{100, 1000, 4000, 6000, 8000}
+                                     : std::vector<int>{100, 300, 1000, 4000, 10000, 30000, 100000, 300000, 1000000};
+  const double enough = context.quick() ? 0.1 : 1.0;     // [s] of steps
   const double longest = context.quick() ? 10.0 : 240;   // [s] for a size
-  Plot& free = context.plot("cost_model", "Cost of a step against size, without contact: measured, and powers fitted from 3,500 vertices on", "vertices", "CPU time per step [s]");
-  Plot& touching = context.plot("cost_model_contact", "Likewise of what lies on a floor and may touch itself", "vertices", "CPU time per step [s]");
+  Plot& free = context.plot(
+      "cost_model", "Cost of a step against size, without contact: measured, and powers fitted from 3,500 vertices on",
+      "vertices", "CPU time per step [s]");
+  Plot& touching = context.plot("cost_model_contact", "Likewise of what lies on a floor and may touch itself",
+                                "vertices", "CPU time per step [s]");
   Plot& memory = context.plot("cost_model_memory", "Memory against size", "vertices", "resident memory [bytes]");
   double worst_misfit = 0;
   int done = 0;
   const int total = static_cast<int>(families().size() * sizes.size());
   for (const Family& family : families())
   {
-    const std::string label = std::string(family.name) + (family.contact ? ", contact" : ""), key = std::string(family.name) + (family.contact ? "_contact" : "");
+    const std::string label = std::string(family.name) + (family.contact ? ", contact" : ""),
+                      key = std::string(family.name) + (family.contact ? "_contact" : "");
     Plot& time = family.contact ? touching : free;
     std::vector<double> x, y, bytes;
     double last_time = 0, last_bytes = 0, last_size = 0;
@@ -300,14 +320,23 @@ void runCostModel(StudyContext& context)
         continue;   // by the fit
       const Sample s = measureApart(family.scene(size), enough);
       Row& row = context.row();
-      row.set("solver", family.name).set("contact", family.contact ? "yes" : "no").set("vertices", *s.error ? size : s.vertices);
+      row.set("solver", family.name)
+          .set("contact", family.contact ? "yes" : "no")
+          .set("vertices", *s.error ? size : s.vertices);
       if (*s.error)
       {
         row.set("outcome", s.error);
         throw std::runtime_error(label + ", " + std::to_string(size) + " vertices: " + s.error);
       }
-      row.set("outcome", "measured").set("seconds_per_step", s.seconds).set("us_per_vertex", 1e6 * s.seconds / s.vertices).set("steps", s.steps).set("iterations", s.iterations)
-          .set("linear_iterations", s.linear_iterations).set("bytes", s.bytes).set("bytes_per_vertex", s.bytes / s.vertices).set("run_seconds", s.all_seconds);
+      row.set("outcome", "measured")
+          .set("seconds_per_step", s.seconds)
+          .set("us_per_vertex", 1e6 * s.seconds / s.vertices)
+          .set("steps", s.steps)
+          .set("iterations", s.iterations)
+          .set("linear_iterations", s.linear_iterations)
+          .set("bytes", s.bytes)
+          .set("bytes_per_vertex", s.bytes / s.vertices)
+          .set("run_seconds", s.all_seconds);
       time.at(label).x.push_back(s.vertices);
       time.at(label).y.push_back(s.seconds);
       memory.at(label).x.push_back(s.vertices);
@@ -321,7 +350,9 @@ void runCostModel(StudyContext& context)
       last_size = size, last_time = s.all_seconds, last_bytes = s.bytes;
     }
     if (x.size() < 3)
-      throw std::runtime_error(label + ": a power law of " + std::to_string(x.size()) + " sizes would fit whatever they are; three are needed from " + std::to_string(static_cast<int>(kFitFrom)) + " vertices on");
+      throw std::runtime_error(label + ": a power law of " + std::to_string(x.size()) +
+                               " sizes would fit whatever they are; three are needed from " +
+                               std::to_string(static_cast<int>(kFitFrom)) + " vertices on");
     time.at(label).points = true;
     const PowerLaw law(x, y);
     const Line space(x, bytes);   // what any process takes, and so much for each vertex
@@ -332,21 +363,35 @@ void runCostModel(StudyContext& context)
       line.x.push_back(at);
       line.y.push_back(law.at(at));
     }
-    context.row().set("solver", family.name).set("contact", family.contact ? "yes" : "no").set("vertices", kLarge).set("outcome", "by the fit")
-        .set("seconds_per_step", law.at(kLarge)).set("us_per_vertex", 1e6 * law.at(kLarge) / kLarge).set("bytes", space.at(kLarge)).set("bytes_per_vertex", space.slope)
-        .set("exponent", law.exponent).set("fit_misfit", law.misfit).set("fitted_up_to", x.back());
+    context.row()
+        .set("solver", family.name)
+        .set("contact", family.contact ? "yes" : "no")
+        .set("vertices", kLarge)
+        .set("outcome", "by the fit")
+        .set("seconds_per_step", law.at(kLarge))
+        .set("us_per_vertex", 1e6 * law.at(kLarge) / kLarge)
+        .set("bytes", space.at(kLarge))
+        .set("bytes_per_vertex", space.slope)
+        .set("exponent", law.exponent)
+        .set("fit_misfit", law.misfit)
+        .set("fitted_up_to", x.back());
     context.metric("exponent_" + key, law.exponent);
     context.metric("seconds_per_step_1e6_" + key, law.at(kLarge));
     context.metric("bytes_per_vertex_" + key, space.slope);
     worst_misfit = std::max(worst_misfit, law.misfit);
     char text[240];
-    std::snprintf(text, sizeof text, "%s: %.3g us n^%.3f per step for n vertices (root mean square misfit %.1f %%, %zu sizes up to %.0f); %.0f bytes for each vertex more", label.c_str(),
-                  1e6 * law.factor, law.exponent, 100 * law.misfit, x.size(), x.back(), space.slope);
+    std::snprintf(text, sizeof text,
+                  "%s: %.3g us n^%.3f per step for n vertices (root mean square misfit %.1f %%, %zu sizes up to %.0f); "
+                  "%.0f bytes for each vertex more",
+                  label.c_str(), 1e6 * law.factor, law.exponent, 100 * law.misfit, x.size(), x.back(), space.slope);
     context.note(text);
   }
   context.metric("fit_misfit", worst_misfit);
-  context.note("CPU time of one thread; edges are as long at all sizes, so that length or area grows; contact: all of it lies on a floor and may touch itself. Steps 5 to 16 of each scene: rods, threads and cloths "
-               "fall from a clamp, tracked cloths follow a guide that waves, of a 64th of the vertices, closely: a fourth. Cloth: one Newton step. Sizes that would take too long or too much memory are left to the fit.");
+  context.note(
+      "CPU time of one thread; edges are as long at all sizes, so that length or area grows; contact: all of it lies "
+      "on a floor and may touch itself. Steps 5 to 16 of each scene: rods, threads and cloths "
+      "fall from a clamp, tracked cloths follow a guide that waves, of a 64th of the vertices, closely: a fourth. "
+      "Cloth: one Newton step. Sizes that would take too long or too much memory are left to the fit.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// Shells that are curved at rest: under no load they stay as they are, and about that shape they vibrate like the shells they stand for.
+// Shells that are curved at rest: under no load they stay as they are, and about that shape they vibrate like the
+// shells they stand for.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -68,8 +69,8 @@ TriangleMesh boxMesh(double size, int cells, bool open)
   return mesh;
 }
 
-/// A sheet 0.2 m x 0.4 m folded across its length at every `period`-th row, each time by `degrees` to the other side (`alternate`) or to the
-/// same one.
+/// A sheet 0.2 m x 0.4 m folded across its length at every `period`-th row, each time by `degrees` to the other side
+/// (`alternate`) or to the same one.
 TriangleMesh foldedSheet(int rows, int period, double degrees, bool alternate)
 {
   TriangleMesh mesh = gridMesh(0.2, 0.4, rows / 2, rows, GridPattern::one_diagonal);
@@ -132,12 +133,13 @@ struct Setting
   double damping = 0.0;   ///< by stiffness [s]
 };
 
-const Setting kSettings[] = {{"implicit_euler"},
-                             {"implicit_euler, cholesky", Integrator::implicit_euler, ClothSolver::cholesky},
-                             {"implicit_euler, conjugate_gradients", Integrator::implicit_euler, ClothSolver::conjugate_gradients},
-                             {"one_newton_step", Integrator::implicit_euler, ClothSolver::automatic, true},
-                             {"tr_bdf2, damped", Integrator::tr_bdf2, ClothSolver::automatic, false, 0.02, 1e-3},
-                             {"symplectic_euler", Integrator::symplectic_euler, ClothSolver::automatic, false, 2.5e-4}};
+const Setting kSettings[] = {
+    {"implicit_euler"},
+    {"implicit_euler, cholesky", Integrator::implicit_euler, ClothSolver::cholesky},
+    {"implicit_euler, conjugate_gradients", Integrator::implicit_euler, ClothSolver::conjugate_gradients},
+    {"one_newton_step", Integrator::implicit_euler, ClothSolver::automatic, true},
+    {"tr_bdf2, damped", Integrator::tr_bdf2, ClothSolver::automatic, false, 0.02, 1e-3},
+    {"symplectic_euler", Integrator::symplectic_euler, ClothSolver::automatic, false, 2.5e-4}};
 
 SceneConfig sceneOf(const RestShape& shape, BendingModel bending, const Setting& setting)
 {
@@ -182,8 +184,13 @@ double atRest(StudyContext& context, const RestShape& shape, BendingModel bendin
 {
   Simulation simulation(sceneOf(shape, bending, setting));
   const double worst = creep(simulation, kSeconds);
-  context.row().set("case", "at rest").set("shape", shape.name).set("model", toString(bending)).set("setting", setting.name)
-    .set("vertices", static_cast<double>(shape.mesh.vertices.cols())).check(worst, 0.0, kMostCreep, "10 s without load; over the size");
+  context.row()
+      .set("case", "at rest")
+      .set("shape", shape.name)
+      .set("model", toString(bending))
+      .set("setting", setting.name)
+      .set("vertices", static_cast<double>(shape.mesh.vertices.cols()))
+      .check(worst, 0.0, kMostCreep, "10 s without load; over the size");
   return worst;
 }
 
@@ -198,10 +205,14 @@ tracked:
   - guide: {mesh: {file: guide.obj}, motion: fixed}
     mesh: {subdivide: 1}
     material: {area_density: 0.15, thickness: 0.001, youngs_modulus: 1.0e5, poissons_ratio: 0.3}
-)", "tracked", {}, folder.string()));
+)",
+                                   "tracked", {}, folder.string()));
   const double worst = creep(simulation, kSeconds);
-  context.row().set("case", "tracked, at rest").set("shape", shape.name).set("model", "isometric, tracked")
-    .check(worst, 0.0, kMostCreep, "10 s without load; over the size");
+  context.row()
+      .set("case", "tracked, at rest")
+      .set("shape", shape.name)
+      .set("model", "isometric, tracked")
+      .check(worst, 0.0, kMostCreep, "10 s without load; over the size");
   return worst;
 }
 
@@ -222,7 +233,11 @@ int acceptedWrongly(StudyContext& context, const std::vector<RestShape>& shapes)
     }
     const bool refused = message.find("bending: {model: hinge}") != std::string::npos;
     wrong += !refused;
-    context.row().set("case", "refused").set("shape", shape.name).set("model", "conforming").check(refused, 1.0, 0.5, "refused with the fix");
+    context.row()
+        .set("case", "refused")
+        .set("shape", shape.name)
+        .set("model", "conforming")
+        .check(refused, 1.0, 0.5, "refused with the fix");
   }
   return wrong;
 }
@@ -239,12 +254,14 @@ void creeps(StudyContext& context)
     context.progress(done++, total, shape.name);
     for (const Setting& setting : kSettings)
       if (!context.quick() || &setting == &kSettings[done % 6])
-        take(atRest(context, shape, BendingModel::isometric_nonconforming, setting));   // scenes take hinges by themselves
+        // scenes take hinges by themselves
+        take(atRest(context, shape, BendingModel::isometric_nonconforming, setting));
     if (!context.quick())
       take(atRest(context, shape, BendingModel::hinge, kSettings[0]));
     take(atRest(context, shape, BendingModel::none, kSettings[0]));
   }
-  const std::filesystem::path folder = std::filesystem::temp_directory_path() / ("slender_curved_shells_" + std::to_string(::getpid()));
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("slender_curved_shells_" + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   for (const int k : {0, 1, 2})
     if (!context.quick() || k == 2)
@@ -269,7 +286,10 @@ constexpr int kModes = 4;
 const ShellMaterial kShell{1.0, 1e6, 0.3, 1e6 * 2e-3 * 2e-3 / 12, -1.0 / 3};
 
 /// Largest relative difference of two lists of frequencies.
-double difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b) { return (a.array() / b.array() - 1).abs().maxCoeff(); }
+double difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b)
+{
+  return (a.array() / b.array() - 1).abs().maxCoeff();
+}
 
 /// A strip bent to an arc of 120 degrees, clamped at both ends. One more row of faces is held at each end, so that the
 /// edge between that row and the strip is clamped.
@@ -278,7 +298,8 @@ VibratingShell arch(int columns)
   constexpr double kRadius = 0.2, kAngle = 2 * M_PI / 3;
   const int rows = 5 * columns;
   const double length = kRadius * kAngle, row = length / rows, width = columns * row / std::sqrt(0.75);
-  VibratingShell shell{"arch", gridMesh(width, length + 2 * row, columns, rows + 2, GridPattern::equilateral), {}, {}, 0.0};
+  VibratingShell shell{
+      "arch", gridMesh(width, length + 2 * row, columns, rows + 2, GridPattern::equilateral), {}, {}, 0.0};
   for (Eigen::Index i = 0; i < shell.mesh.vertices.cols(); ++i)
   {
     const double s = shell.mesh.vertices(1, i) - row, a = s / kRadius - 0.5 * kAngle;
@@ -312,8 +333,10 @@ VibratingShell cap(int rings)
 /// Largest relative error of the frequencies of a mesh.
 double frequencyError(StudyContext& context, const VibratingShell& shell, double bound)
 {
-  ClothModel model = buildCloth(shell.name, shell.mesh, kShell.area_density,
-                                isotropicMembrane(kShell.stretching * (1 - kShell.membrane_ratio * kShell.membrane_ratio), kShell.membrane_ratio, 1.0));
+  ClothModel model =
+      buildCloth(shell.name, shell.mesh, kShell.area_density,
+                 isotropicMembrane(kShell.stretching * (1 - kShell.membrane_ratio * kShell.membrane_ratio),
+                                   kShell.membrane_ratio, 1.0));
   model.bending = BendingModel::hinge;
   model.bending_modulus = kShell.bending;
   clampFaces(model, shell.held);
@@ -323,7 +346,10 @@ double frequencyError(StudyContext& context, const VibratingShell& shell, double
   {
     worst = std::max(worst, std::abs(found[k] / shell.expected[k] - 1));
     Row& row = context.row();
-    row.set("case", "frequency " + std::to_string(k + 1)).set("shape", shell.name).set("model", "hinge").set("vertices", model.vertices());
+    row.set("case", "frequency " + std::to_string(k + 1))
+        .set("shape", shell.name)
+        .set("model", "hinge")
+        .set("vertices", model.vertices());
     row.set("relative_error", found[k] / shell.expected[k] - 1).set("reference_unsure_by", shell.unsure);
     row.check(found[k], shell.expected[k], bound * shell.expected[k], "Ritz");
   }
@@ -347,17 +373,21 @@ void frequencies(StudyContext& context)
   context.metric("worst_frequency_error", worst);
 }
 
-}  // namespace
+}   // namespace
 
 void runCurvedShells(StudyContext& context)
 {
   useOneBlasThread();
   creeps(context);
   frequencies(context);
-  context.note("frequencies: of small motions about the rest shape, of a mesh with hinge bending against the method of Ritz for the continuous shell, both with the same "
-               "Poisson's ratios of bending (-1/3) and of the membrane (0.3).");
-  context.note("at rest: nothing acts on the shells, so that all motion is the model's own. Models: as the scene asks for them; for curved shapes scenes "
-               "take hinges instead of isometric bending.");
+  context.note(
+      "frequencies: of small motions about the rest shape, of a mesh with hinge bending against the method of Ritz for "
+      "the continuous shell, both with the same "
+      "Poisson's ratios of bending (-1/3) and of the membrane (0.3).");
+  context.note(
+      "at rest: nothing acts on the shells, so that all motion is the model's own. Models: as the scene asks for them; "
+      "for curved shapes scenes "
+      "take hinges instead of isometric bending.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -19,14 +19,28 @@ struct Point
 };
 
 /// Rows `thread` of the reference (bending, vertical clamped nozzle, no inertia), every tenth of the length.
-const std::vector<Point> kNoSurfaceTension = {
-    {0, 3, 0.06}, {0.01438076, 2.595828, 0.1127951}, {0.07825042, 2.19656, 0.177465}, {0.1799894, 1.805055, 0.2497164}, {0.3084207, 1.421477, 0.3251751},
-    {0.470274, 1.050872, 0.3997248}, {0.6774262, 0.7037547, 0.4699576}, {0.9410097, 0.3976945, 0.5337534}, {1.267775, 0.1611389, 0.5910452},
-    {1.648193, 0.02804899, 0.6446511}, {2.051164, 0, 0.7}};
-const std::vector<Point> kSurfaceTension10 = {
-    {0, 3, 0.06}, {0.03031502, 2.553635, 0.1108463}, {0.1491785, 2.122216, 0.1730725}, {0.3176674, 1.707189, 0.2421377}, {0.5209551, 1.30813, 0.3139036},
-    {0.769758, 0.9359228, 0.3847472}, {1.070091, 0.6040781, 0.452133}, {1.422842, 0.3289028, 0.5151485}, {1.823333, 0.1299488, 0.5749393},
-    {2.257466, 0.02287093, 0.6348531}, {2.704545, 0, 0.7}};
+const std::vector<Point> kNoSurfaceTension = {{0, 3, 0.06},
+                                              {0.01438076, 2.595828, 0.1127951},
+                                              {0.07825042, 2.19656, 0.177465},
+                                              {0.1799894, 1.805055, 0.2497164},
+                                              {0.3084207, 1.421477, 0.3251751},
+                                              {0.470274, 1.050872, 0.3997248},
+                                              {0.6774262, 0.7037547, 0.4699576},
+                                              {0.9410097, 0.3976945, 0.5337534},
+                                              {1.267775, 0.1611389, 0.5910452},
+                                              {1.648193, 0.02804899, 0.6446511},
+                                              {2.051164, 0, 0.7}};
+const std::vector<Point> kSurfaceTension10 = {{0, 3, 0.06},
+                                              {0.03031502, 2.553635, 0.1108463},
+                                              {0.1491785, 2.122216, 0.1730725},
+                                              {0.3176674, 1.707189, 0.2421377},
+                                              {0.5209551, 1.30813, 0.3139036},
+                                              {0.769758, 0.9359228, 0.3847472},
+                                              {1.070091, 0.6040781, 0.452133},
+                                              {1.422842, 0.3289028, 0.5151485},
+                                              {1.823333, 0.1299488, 0.5749393},
+                                              {2.257466, 0.02287093, 0.6348531},
+                                              {2.704545, 0, 0.7}};
 
 ThreadSetup draggedThread(double gamma, double feed)
 {
@@ -75,7 +89,8 @@ Outcome drag(double gamma, double feed, double h, const std::vector<Point>& refe
 {
   ThreadSetup t = draggedThread(gamma, feed);
   ThreadStepper stepper = makeStepper(t);
-  while (t.time < 300.0)   // the draw ratio of 11.7 is not far below that of draw resonance, 20.2: disturbances die out slowly
+  while (t.time <
+         300.0)   // the draw ratio of 11.7 is not far below that of draw resonance, 20.2: disturbances die out slowly
     advance(stepper, t, h, "dragged_catenary");
   Outcome o;
   // nodes land one by one: the mean of what the passage of some edges shows
@@ -101,7 +116,7 @@ Outcome drag(double gamma, double feed, double h, const std::vector<Point>& refe
   return o;
 }
 
-}  // namespace
+}   // namespace
 
 void runDraggedCatenary(StudyContext& context)
 {
@@ -118,7 +133,8 @@ void runDraggedCatenary(StudyContext& context)
     const Outcome seen = drag(gamma, feed, h, reference);
     Row& row = context.row();
     row.set("test", test).set("quantity", "largest distance from the reference, over the drop height");
-    row.check(seen.error / kHeight, 0.0, kBound, "boundary-value problem with bending, clamped nozzle").set("largest_relative_error_of_speed", seen.speed_error);
+    row.check(seen.error / kHeight, 0.0, kBound, "boundary-value problem with bending, clamped nozzle")
+        .set("largest_relative_error_of_speed", seen.speed_error);
     row.set("nodes", seen.state.nodes());
     for (const Eigen::Vector3d& x : seen.state.x)
       if (x.x() < 3)
@@ -136,4 +152,4 @@ void runDraggedCatenary(StudyContext& context)
   }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -116,14 +116,15 @@ void loadTheEnd(StudyContext& context, int edges, const std::vector<double>& loa
   }
 }
 
-}  // namespace
+}   // namespace
 
 void runElastica(StudyContext& context)
 {
   const std::vector<int> meshes = context.quick() ? std::vector<int>{40} : std::vector<int>{40, 80, 160};
-  const std::vector<double> compressions = context.quick() ? std::vector<double>{0.05, 0.3, 0.5}
-                                                           : std::vector<double>{0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5};
-  const std::vector<double> loads = context.quick() ? std::vector<double>{1, 10} : std::vector<double>{0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100};
+  const std::vector<double> compressions =
+      context.quick() ? std::vector<double>{0.05, 0.3, 0.5} : std::vector<double>{0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5};
+  const std::vector<double> loads =
+      context.quick() ? std::vector<double>{1, 10} : std::vector<double>{0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100};
   Plot& plot = context.plot("elastica_error", "Elastica: error against resolution", "edges", "relative error");
   int done = 0;
   const int total = 3 * static_cast<int>(meshes.size());
@@ -138,7 +139,9 @@ void runElastica(StudyContext& context)
     loadTheEnd(context, edges, loads, plot);
   }
   context.note("end load: the deflection within 0.5 % of itself, the tip's x within 0.5 % of the length.");
-  context.note("parameter: end shortening over length, or end load P L^2/(E I). Bounds between the issue's follow second order.");
+  context.note(
+      "parameter: end shortening over length, or end load P L^2/(E I). Bounds between the issue's follow second "
+      "order.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

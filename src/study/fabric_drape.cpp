@@ -1,4 +1,5 @@
-// Drape coefficient of fabrics by Cusick's method (ISO 9073-9: a disc of 30 cm on a support of 18 cm), and the droop of their strips.
+// Drape coefficient of fabrics by Cusick's method (ISO 9073-9: a disc of 30 cm on a support of 18 cm), and the droop of
+// their strips.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,36 +19,38 @@ using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846, kGravity = 9.81;
 constexpr double kDisc = 0.15, kSupport = 0.09;   // radii [m]
-// As in the test, the rim is lowered, not dropped: its weight comes on over this time. Folds are multistable, and in a fall those win that grow
-// fastest, which the damping of the integrator decides: silk dropped at once came to rest at 0.34 (implicit, 10 ms) and 0.28 (explicit), each
-// an equilibrium that the other integrator keeps.
-constexpr double kLowering = 1.5, kMostWaiting = 2.1;              // [s]
-constexpr double kRestInterval = 0.2, kRestDisplacement = 1e-4;    // [s, m] at rest: no vertex has moved farther
+// As in the test, the rim is lowered, not dropped: its weight comes on over this time. Folds are multistable, and in a
+// fall those win that grow fastest, which the damping of the integrator decides: silk dropped at once came to rest at
+// 0.34 (implicit, 10 ms) and 0.28 (explicit), each an equilibrium that the other integrator keeps.
+constexpr double kLowering = 1.5, kMostWaiting = 2.1;             // [s]
+constexpr double kRestInterval = 0.2, kRestDisplacement = 1e-4;   // [s, m] at rest: no vertex has moved farther
 
 struct Fabric
 {
   const char* name;
-  double area_density;       ///< [kg/m^2]
-  double bending;            ///< rigidity B, mean of warp and weft [N m]
-  double shear;              ///< G [N/m]
-  double least, most;        ///< published drape coefficients
+  double area_density;   ///< [kg/m^2]
+  double bending;        ///< rigidity B, mean of warp and weft [N m]
+  double shear;          ///< G [N/m]
+  double least, most;    ///< published drape coefficients
   const char* source;
 };
 
-// Typical of their class: specimens differ by a factor of two and more. 1 gf cm^2/cm = 9.807e-5 N m/m, 1 gf/(cm degree) = 56.2 N/m.
-// Those of silk, cotton and denim lie within what Feng et al. (SIGGRAPH Asia 2022, 618 fabrics) measured on fabrics of such weight, as far as compared by eye.
+// Typical of their class: specimens differ by a factor of two and more. 1 gf cm^2/cm = 9.807e-5 N m/m, 1 gf/(cm degree)
+// = 56.2 N/m. Those of silk, cotton and denim lie within what Feng et al. (SIGGRAPH Asia 2022, 618 fabrics) measured on
+// fabrics of such weight, as far as compared by eye.
 constexpr Fabric kFabrics[] = {
-  {"silk", 0.065, 0.9e-6, 17, 0.20, 0.40, 
-   "65 g/m2 (15 momme), B 0.009 gf cm2/cm, G 0.3 gf/(cm deg): typical of habotai and crepe de chine in KES tests"},
-  {"cotton", 0.13, 8.8e-6, 56, 0.60, 0.76, 
-   "130 g/m2, B 0.09 gf cm2/cm, G 1.0 gf/(cm deg): typical of shirting (poplin) in KES tests"},
-  {"wool", 0.2635, 13.3e-6, 48, 0.40, 0.70, 
-   "263.5 g/m2, B 0.136 gf cm2/cm, G 0.86 gf/(cm deg): typical of men's winter suiting in KES tests (Kawabata 1980)"},
-  {"denim", 0.407, 6.5e-5, 150, 0.70, 0.90, 
-   "12 oz/yd2, B 0.66 gf cm2/cm, G 2.7 gf/(cm deg): typical of raw denim in KES tests"}};
+    {"silk", 0.065, 0.9e-6, 17, 0.20, 0.40,
+     "65 g/m2 (15 momme), B 0.009 gf cm2/cm, G 0.3 gf/(cm deg): typical of habotai and crepe de chine in KES tests"},
+    {"cotton", 0.13, 8.8e-6, 56, 0.60, 0.76,
+     "130 g/m2, B 0.09 gf cm2/cm, G 1.0 gf/(cm deg): typical of shirting (poplin) in KES tests"},
+    {"wool", 0.2635, 13.3e-6, 48, 0.40, 0.70,
+     "263.5 g/m2, B 0.136 gf cm2/cm, G 0.86 gf/(cm deg): typical of men's winter suiting in KES tests (Kawabata 1980)"},
+    {"denim", 0.407, 6.5e-5, 150, 0.70, 0.90,
+     "12 oz/yd2, B 0.66 gf cm2/cm, G 2.7 gf/(cm deg): typical of raw denim in KES tests"}};
 
-/// A disc in rings of nearly equilateral triangles, `free_rings` of them outside the support, turned against each other at random so that
-/// no number of waves is preferred. The clamped section is the middle of the cells within the last pinned ring.
+/// A disc in rings of nearly equilateral triangles, `free_rings` of them outside the support, turned against each other
+/// at random so that no number of waves is preferred. The clamped section is the middle of the cells within the last
+/// pinned ring.
 struct Disc
 {
   TriangleMesh mesh;
@@ -69,7 +72,8 @@ Disc drapeDisc(int free_rings)
   for (int ring = 1; ring <= rings; ++ring)
   {
     const double radius = ring <= inner ? ring * pinned / inner : kDisc - (rings - ring) * h;
-    const int count = static_cast<int>(std::lround(2 * kPi * radius / (h / std::sqrt(0.75)))), first = static_cast<int>(vertices.size());
+    const int count = static_cast<int>(std::lround(2 * kPi * radius / (h / std::sqrt(0.75)))),
+              first = static_cast<int>(vertices.size());
     const double start = last.empty() ? turn(random) : last[0] + std::fmod(turn(random), 2 * kPi / count);
     std::vector<double> angles;
     for (int k = 0; k < count; ++k)
@@ -115,7 +119,9 @@ double drapeCoefficient(const TriangleMesh& mesh, const Eigen::Matrix3Xd& x)
     Eigen::Matrix<double, 2, 3> p;
     for (int k = 0; k < 3; ++k)
       p.col(k) = x.col(mesh.triangles(k, f)).head<2>();
-    const auto pixel = [](double a) { return std::clamp(static_cast<int>((a + 1.05 * kDisc) / kPixel), 0, kPixels - 1); };
+    const auto pixel = [](double a) {
+      return std::clamp(static_cast<int>((a + 1.05 * kDisc) / kPixel), 0, kPixels - 1);
+    };
     const auto cross = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); };
     for (int i = pixel(p.row(0).minCoeff()); i <= pixel(p.row(0).maxCoeff()); ++i)
       for (int j = pixel(p.row(1).minCoeff()); j <= pixel(p.row(1).maxCoeff()); ++j)
@@ -174,7 +180,8 @@ struct Draped
   Eigen::Matrix3Xd x;
 };
 
-/// No specimen is quite flat: gentle waves of the overhang, about 1 mm at the rim, whatever the mesh. They, not its irregularities, decide on the folds.
+/// No specimen is quite flat: gentle waves of the overhang, about 1 mm at the rim, whatever the mesh. They, not its
+/// irregularities, decide on the folds.
 void addCreases(unsigned seed, Eigen::Matrix3Xd& x)
 {
   constexpr double kAmplitude = 5e-4;   // [m] of each wave
@@ -185,7 +192,8 @@ void addCreases(unsigned seed, Eigen::Matrix3Xd& x)
     const double c = amplitude(random), s = amplitude(random);
     for (Eigen::Index i = 0; i < x.cols(); ++i)
     {
-      const double angle = std::atan2(x(1, i), x(0, i)), overhang = (x.col(i).head<2>().norm() - kSupport) / (kDisc - kSupport);
+      const double angle = std::atan2(x(1, i), x(0, i)),
+                   overhang = (x.col(i).head<2>().norm() - kSupport) / (kDisc - kSupport);
       x(2, i) += std::max(0.0, overhang) * overhang * (c * std::cos(wave * angle) + s * std::sin(wave * angle));
     }
   }
@@ -194,7 +202,8 @@ void addCreases(unsigned seed, Eigen::Matrix3Xd& x)
 Draped drapeFabric(StudyContext& context, const Fabric& fabric, const Disc& disc, Integrator integrator, unsigned seed)
 {
   constexpr double kTensile = 300;   // [N/m]; its own weight strains the disc by less than a thousandth
-  ClothModel model = buildCloth(fabric.name, disc.mesh, fabric.area_density, orthotropicMembrane(kTensile, kTensile, 0.0, fabric.shear));
+  ClothModel model = buildCloth(fabric.name, disc.mesh, fabric.area_density,
+                                orthotropicMembrane(kTensile, kTensile, 0.0, fabric.shear));
   model.bending_modulus = fabric.bending;
   model.mass_damping = 8.0;
   ClothSetup cloth(std::move(model));
@@ -213,13 +222,15 @@ Draped drapeFabric(StudyContext& context, const Fabric& fabric, const Disc& disc
       shortest = std::min(shortest, (disc.mesh.vertices.col(edges(0, e)) - disc.mesh.vertices.col(edges(1, e))).norm());
     h = 0.5 * shortest / std::sqrt(kTensile / fabric.area_density);
   }
-  const int steps = static_cast<int>(std::ceil(kRestInterval / h)), intervals = static_cast<int>(std::lround((kLowering + kMostWaiting) / kRestInterval));
+  const int steps = static_cast<int>(std::ceil(kRestInterval / h)),
+            intervals = static_cast<int>(std::lround((kLowering + kMostWaiting) / kRestInterval));
   const double step = kRestInterval / steps;
   const std::string label = std::string(fabric.name) + ", " + toString(integrator);
   Draped draped;
   const double start = threadSeconds();
   int interval = 0;
-  for (double t = 0.0; interval < intervals && (t < kLowering + kRestInterval || draped.moved > kRestDisplacement); ++interval)
+  for (double t = 0.0; interval < intervals && (t < kLowering + kRestInterval || draped.moved > kRestDisplacement);
+       ++interval)
   {
     context.progress(interval, intervals, label);
     const Eigen::Matrix3Xd before = cloth.state.x;
@@ -278,19 +289,31 @@ void drapes(StudyContext& context)
           picture.panels.push_back({text, {{{d.x, disc.mesh.triangles}}}});
         }
       }
-      context.row().set("case", "drape").set("fabric", fabric.name).set("integrator", toString(c.integrator))
-        .set("vertices", static_cast<double>(disc.mesh.vertices.cols())).set("coefficient", mean).set("lowest_drape", lowest)
-        .set("highest_drape", highest).set("waves", waves).set("moved_last_mm", 1e3 * moved).set("ms_per_step", ms);
+      context.row()
+          .set("case", "drape")
+          .set("fabric", fabric.name)
+          .set("integrator", toString(c.integrator))
+          .set("vertices", static_cast<double>(disc.mesh.vertices.cols()))
+          .set("coefficient", mean)
+          .set("lowest_drape", lowest)
+          .set("highest_drape", highest)
+          .set("waves", waves)
+          .set("moved_last_mm", 1e3 * moved)
+          .set("ms_per_step", ms);
       least = std::min(least, mean);
       most = std::max(most, mean);
       finest = mean;
     }
     context.metric(std::string("drape_coefficient_") + fabric.name, finest);
-    context.row().set("case", "drape, in the published range").set("fabric", fabric.name)
-      .set("bending_length_mm", 1e3 * std::cbrt(fabric.bending / (kGravity * fabric.area_density)))
-      .check(finest, 0.5 * (fabric.least + fabric.most), 0.5 * (fabric.most - fabric.least), fabric.source);
-    context.row().set("case", "drape, spread over meshes and integrators").set("fabric", fabric.name)
-      .check(most - least, 0.0, 0.05, "the same within 0.05");
+    context.row()
+        .set("case", "drape, in the published range")
+        .set("fabric", fabric.name)
+        .set("bending_length_mm", 1e3 * std::cbrt(fabric.bending / (kGravity * fabric.area_density)))
+        .check(finest, 0.5 * (fabric.least + fabric.most), 0.5 * (fabric.most - fabric.least), fabric.source);
+    context.row()
+        .set("case", "drape, spread over meshes and integrators")
+        .set("fabric", fabric.name)
+        .check(most - least, 0.0, 0.05, "the same within 0.05");
   }
 }
 
@@ -308,22 +331,31 @@ void droops(StudyContext& context)
     const double wide_ratio = exact.drop / exact.extent, narrow_ratio = narrow.drop / narrow.extent;
     const double expected = 0.5 * (wide_ratio + narrow_ratio), range = 0.5 * (narrow_ratio - wide_ratio);
     double seconds = 0;
-    const double ratio =
-      cantileverStrip(GridPattern::equilateral, BendingModel::isometric_nonconforming, gamma, stiffness, kWidth, cells, seconds);
-    context.row().set("case", "droop of a strip, H/W").set("fabric", fabric.name).set("Gamma", gamma).set("cpu_seconds", seconds)
-      .check(ratio, expected, range + expected * (0.02 + 0.25 * gamma / (cells * cells)), "cantilever_master.csv, as in study plate");
+    const double ratio = cantileverStrip(GridPattern::equilateral, BendingModel::isometric_nonconforming, gamma,
+                                         stiffness, kWidth, cells, seconds);
+    context.row()
+        .set("case", "droop of a strip, H/W")
+        .set("fabric", fabric.name)
+        .set("Gamma", gamma)
+        .set("cpu_seconds", seconds)
+        .check(ratio, expected, range + expected * (0.02 + 0.25 * gamma / (cells * cells)),
+               "cantilever_master.csv, as in study plate");
   }
 }
 
-}  // namespace
+}   // namespace
 
 void runFabricDrape(StudyContext& context)
 {
   useOneBlasThread();
   drapes(context);
   droops(context);
-  context.note("drape: lowered over 1.5 s, then left until no vertex moves farther than 0.1 mm in 0.2 s, but at most 2.1 s (moved_last_mm: what was left).");
-  context.note("coefficient: (shadow - support) / (disc - support), the mean of the drapes; waves: the strongest along the edge, drape by drape");
+  context.note(
+      "drape: lowered over 1.5 s, then left until no vertex moves farther than 0.1 mm in 0.2 s, but at most 2.1 s "
+      "(moved_last_mm: what was left).");
+  context.note(
+      "coefficient: (shadow - support) / (disc - support), the mean of the drapes; waves: the strongest along the "
+      "edge, drape by drape");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -32,7 +32,8 @@ struct Extrusion
     const int n = 3000;
     dz = kHeight / n;
     const double flux = kInflow * 0.25 * M_PI * kDiameter * kDiameter;
-    // with A = flux/U and the tension T = 3 mu A U' + pi gamma a:  T' = rho A (U U' - g),  U' = (T - pi gamma a)/(3 mu A)
+    // with A = flux/U and the tension T = 3 mu A U' + pi gamma a:  T' = rho A (U U' - g),  U' = (T - pi gamma a)/(3 mu
+    // A)
     const auto slope = [&](double u, double tension) {
       const double area = flux / u;
       return (tension - c.gamma * std::sqrt(M_PI * area)) / (3 * kMu * area);
@@ -81,7 +82,8 @@ struct Outcome
 };
 
 /// Draws for four times the fluid's time of flight, then takes the mean over the passage of some edges.
-Outcome draw(const Case& c, const Extrusion& exact, double feed, double h, Plot* plot, SurfaceShape shape = SurfaceShape::cylinder)
+Outcome draw(const Case& c, const Extrusion& exact, double feed, double h, Plot* plot,
+             SurfaceShape shape = SurfaceShape::cylinder)
 {
   ThreadModel m;
   m.name = "fiber";
@@ -160,13 +162,17 @@ Outcome draw(const Case& c, const Extrusion& exact, double feed, double h, Plot*
   return o;
 }
 
-}  // namespace
+}   // namespace
 
 void runFiberExtrusion(StudyContext& context)
 {
-  const Case cases[] = {{"no gravity", 0, 0, false}, {"gravity", 100, 0, false}, {"gravity, inertia", 100, 0, true}, {"gravity, inertia, surface tension", 100, 10, true}};
+  const Case cases[] = {{"no gravity", 0, 0, false},
+                        {"gravity", 100, 0, false},
+                        {"gravity, inertia", 100, 0, true},
+                        {"gravity, inertia, surface tension", 100, 10, true}};
   const double feed = context.quick() ? 0.01 : 0.005, h = context.quick() ? 0.02 : 0.01;
-  Plot& plot = context.plot("fiber_extrusion", "Steady drawing: speed along the thread", "distance from the nozzle [cm]", "speed [cm/s]");
+  Plot& plot = context.plot("fiber_extrusion", "Steady drawing: speed along the thread",
+                            "distance from the nozzle [cm]", "speed [cm/s]");
   plot.log_x = plot.log_y = false;
   plot.markers = false;
   int done = 0;
@@ -175,14 +181,22 @@ void runFiberExtrusion(StudyContext& context)
     context.progress(done++, 4, c.name);
     const Extrusion exact(c);
     const Outcome seen = draw(c, exact, feed, h, &plot);
-    checkRelative(context, c.name, "speed at half height", seen.middle_speed, exact.at(0.5 * kHeight), kBound, "3 mu (A U')' + pi gamma a' + rho A g = rho A U U'");
-    checkRelative(context, c.name, "tension at the nozzle", seen.top_tension, exact.top_tension, kBound, "3 mu A U' + pi gamma a");
+    checkRelative(context, c.name, "speed at half height", seen.middle_speed, exact.at(0.5 * kHeight), kBound,
+                  "3 mu (A U')' + pi gamma a' + rho A g = rho A U U'");
+    checkRelative(context, c.name, "tension at the nozzle", seen.top_tension, exact.top_tension, kBound,
+                  "3 mu A U' + pi gamma a");
     Row& row = context.row();
-    row.set("test", c.name).set("quantity", "speed, rms of the relative error along the thread").check(seen.rms, 0.0, kBound, "the same").set("worst_node", seen.worst);
+    row.set("test", c.name)
+        .set("quantity", "speed, rms of the relative error along the thread")
+        .check(seen.rms, 0.0, kBound, "the same")
+        .set("worst_node", seen.worst);
     if (c.gamma > 0)
     {
       const Outcome cone = draw(c, exact, feed, h, nullptr, SurfaceShape::cone);
-      context.row().set("test", c.name).set("quantity", "speed at half height, surface of cones").set("measured", cone.middle_speed)
+      context.row()
+          .set("test", c.name)
+          .set("quantity", "speed at half height, surface of cones")
+          .set("measured", cone.middle_speed)
           .set("relative_error", cone.middle_speed / exact.at(0.5 * kHeight) - 1);
     }
     const std::string label = std::string(c.name) + " (exact)";
@@ -195,10 +209,15 @@ void runFiberExtrusion(StudyContext& context)
   const Extrusion exact(cases[2]);
   double errors[2];
   for (int k = 0; k < 2; ++k)
-    errors[k] = draw(cases[2], exact, 0.02 / (k + 1), 0.02 / (k + 1), nullptr).middle_speed / exact.at(0.5 * kHeight) - 1;
-  context.note("The equation has the tension pi gamma a of a slender thread, as the thread has with surface_shape cylinder. This thread's surface");
-  context.note("is inclined by up to 0.5 below the nozzle: the thesis's cones, which count that, differ from the equation by 2 %.");
+    errors[k] =
+        draw(cases[2], exact, 0.02 / (k + 1), 0.02 / (k + 1), nullptr).middle_speed / exact.at(0.5 * kHeight) - 1;
+  context.note(
+      "The equation has the tension pi gamma a of a slender thread, as the thread has with surface_shape cylinder. "
+      "This thread's surface");
+  context.note(
+      "is inclined by up to 0.5 below the nozzle: the thesis's cones, which count that, differ from the equation by 2 "
+      "%.");
   context.metric("observed_order", observedOrder(errors[0], errors[1]));
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A flag in the wind (thesis figure 2.1): isometric bending beside nonlinear hinges. Its motion is chaotic, so statistics are compared.
+// A flag in the wind (thesis figure 2.1): isometric bending beside nonlinear hinges. Its motion is chaotic, so
+// statistics are compared.
 #include <cmath>
 
 #include "sheet_cases.h"
@@ -53,13 +54,14 @@ double spreadOf(const std::vector<double>& values)
   return std::sqrt(sum / static_cast<double>(values.size()));
 }
 
-}  // namespace
+}   // namespace
 
 void runFlag(StudyContext& context)
 {
   useOneBlasThread();
   const SheetScene scene = flagScene(context.quick() ? 36 : 60, context.quick() ? 4.0 : 12.0);
-  SurfacePicture& picture = context.picture("flag", "A flag of 1.2 m x 0.8 m in wind (thesis figure 2.1), at the same times");
+  SurfacePicture& picture =
+      context.picture("flag", "A flag of 1.2 m x 0.8 m in wind (thesis figure 2.1), at the same times");
   picture.view = {0.4, 1.0, -0.25};
   Plot& spectra = context.plot("flag_wrinkles", "Flag: where its curvature lies", "wavelength [m]",
                                "share of the variance of mean curvature");
@@ -72,9 +74,10 @@ void runFlag(StudyContext& context)
     BendingModel bending;
     double shake;
   };
-  const Case cases[] = {{"isometric", BendingModel::isometric_nonconforming, 0.0},
-                        {"hinge", BendingModel::hinge, 0.0},
-                        {"isometric, shaken start", BendingModel::isometric_nonconforming, 1e-3 * kWidth / scene.columns}};
+  const Case cases[] = {
+      {"isometric", BendingModel::isometric_nonconforming, 0.0},
+      {"hinge", BendingModel::hinge, 0.0},
+      {"isometric, shaken start", BendingModel::isometric_nonconforming, 1e-3 * kWidth / scene.columns}};
   std::vector<SheetRun> runs;
   std::vector<Spectrum> of_runs;
   for (const Case& c : cases)
@@ -91,12 +94,19 @@ void runFlag(StudyContext& context)
     }
     for (const Eigen::Matrix3Xd& x : run.frames)
       out.push_back(std::sqrt(x.row(1).squaredNorm() / static_cast<double>(x.cols())));
-    context.row().set("model", c.name).set("vertices", static_cast<double>(scene.start.cols())).set("corner_along_m", meanOf(along))
-      .set("corner_height_m", meanOf(down)).set("corner_swing_m", spreadOf(across)).set("rms_out_of_plane_m", meanOf(out))
-      .set("mean_wavelength_m", of_runs.back().mean()).set("spectrum_distance", distance(of_runs.back(), of_runs.front()))
-      .set("rms_difference", difference(scene, run.frames.back(), runs.front().frames.back()).rms)
-      .set("ms_per_step", 1e3 * run.seconds_per_step).set("cloth_alone_ms", 1e3 * run.cloth_seconds)
-      .set("intersections", static_cast<double>(run.intersections));
+    context.row()
+        .set("model", c.name)
+        .set("vertices", static_cast<double>(scene.start.cols()))
+        .set("corner_along_m", meanOf(along))
+        .set("corner_height_m", meanOf(down))
+        .set("corner_swing_m", spreadOf(across))
+        .set("rms_out_of_plane_m", meanOf(out))
+        .set("mean_wavelength_m", of_runs.back().mean())
+        .set("spectrum_distance", distance(of_runs.back(), of_runs.front()))
+        .set("rms_difference", difference(scene, run.frames.back(), runs.front().frames.back()).rms)
+        .set("ms_per_step", 1e3 * run.seconds_per_step)
+        .set("cloth_alone_ms", 1e3 * run.cloth_seconds)
+        .set("intersections", static_cast<double>(run.intersections));
     Series& spectrum = spectra.at(c.name);
     spectrum.x = of_runs.back().wavelength;
     spectrum.y = of_runs.back().share;
@@ -111,7 +121,8 @@ void runFlag(StudyContext& context)
   context.metric("spectrum_distance_of_chance", distance(of_runs[2], of_runs[0]));
   context.metric("hinge_over_isometric_step", runs[1].seconds_per_step / runs[0].seconds_per_step);
   context.metric("hinge_over_isometric_cloth_alone", runs[1].cloth_seconds / runs[0].cloth_seconds);
-  context.note("means over the time after " + std::to_string(scene.keep_from).substr(0, 3) + " s; the shaken start says how far apart runs of one "
+  context.note("means over the time after " + std::to_string(scene.keep_from).substr(0, 3) +
+               " s; the shaken start says how far apart runs of one "
                "model are; rms_difference: of the last states, over the width");
   const std::size_t frames = runs[0].frames.size();
   for (const std::size_t k : {frames / 3, 2 * frames / 3, frames - 1})
@@ -124,4 +135,4 @@ void runFlag(StudyContext& context)
     }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -48,4 +48,4 @@ struct GroupSetup
   }
 };
 
-}  // namespace slender::study
+}   // namespace slender::study

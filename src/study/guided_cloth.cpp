@@ -30,11 +30,15 @@ ClothOptions optionsOf(const GuidedCloth& c)
   return options;
 }
 
-}  // namespace
+}   // namespace
 
 GuidedStepper::GuidedStepper(const GuidedCloth& c, Follow how)
-  : case_(c), how_(how), constraints_(std::make_shared<const WeakConstraints>(c.constraints())), cloth_(modelOf(c, how, *constraints_))
-  , stepper_(cloth_.model, optionsOf(c)), guide_(c.at(0.0))
+  : case_(c),
+    how_(how),
+    constraints_(std::make_shared<const WeakConstraints>(c.constraints())),
+    cloth_(modelOf(c, how, *constraints_)),
+    stepper_(cloth_.model, optionsOf(c)),
+    guide_(c.at(0.0))
 {
   cloth_.state = makeClothState(*cloth_.model, guide_ * c.fine.weights.transpose());
   cloth_.state.v = c.velocity(0.0) * c.fine.weights.transpose();
@@ -69,8 +73,10 @@ StepReport GuidedStepper::step(const Matrix3Xd& guide)
 }
 
 FineScale::FineScale(const GuidedCloth& c)
-  : weights_(c.fine.weights), mass_(hatMassMatrix(c.fine.mesh)), coarse_(Eigen::MatrixXd(weights_.transpose() * mass_ * weights_))
-  , density_(c.model.totalMass() / faceAreas(c.fine.mesh).sum())
+  : weights_(c.fine.weights),
+    mass_(hatMassMatrix(c.fine.mesh)),
+    coarse_(Eigen::MatrixXd(weights_.transpose() * mass_ * weights_)),
+    density_(c.model.totalMass() / faceAreas(c.fine.mesh).sum())
 {
 }
 
@@ -93,4 +99,4 @@ TriangleMesh guideSheet(double side, int cells, double height)
   return mesh;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

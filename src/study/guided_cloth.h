@@ -25,13 +25,13 @@ enum class Follow
 struct GuidedCloth
 {
   std::string name;
-  Subdivision fine;                             ///< of the guide's undeformed mesh
-  TriangleMesh guide;                           ///< undeformed
+  Subdivision fine;     ///< of the guide's undeformed mesh
+  TriangleMesh guide;   ///< undeformed
   TestFunctions functions;
   ClothModel model;                             ///< of fine.mesh
   std::function<Eigen::Matrix3Xd(double)> at;   ///< vertices of the guide [m] at a time [s]
   Eigen::Vector3d gravity{0, 0, 0}, wind{0, 0, 0};
-  double step = 0.01;                           ///< [s]
+  double step = 0.01;   ///< [s]
   bool one_newton_step = true;
   double linear_tolerance = ClothOptions().linear_tolerance;
 
@@ -47,7 +47,8 @@ class GuidedStepper
 public:
   GuidedStepper(const GuidedCloth& c, Follow how);
 
-  /// Goes to the next instant, at which the guide is at `guide` (default: where the case's is). On failure nothing changes.
+  /// Goes to the next instant, at which the guide is at `guide` (default: where the case's is). On failure nothing
+  /// changes.
   StepReport step();
   StepReport step(const Eigen::Matrix3Xd& guide);
 
@@ -69,7 +70,8 @@ private:
   double time_ = 0, seconds_ = 0;
 };
 
-/// What a field on the fine mesh has below the scale of the guide: itself less its L2 projection onto the guide's hat functions.
+/// What a field on the fine mesh has below the scale of the guide: itself less its L2 projection onto the guide's hat
+/// functions.
 class FineScale
 {
 public:
@@ -88,4 +90,4 @@ private:
 /// A square sheet in the plane z = `height` with its middle over the origin, as a guide of cells x cells.
 TriangleMesh guideSheet(double side, int cells, double height);
 
-}  // namespace slender::study
+}   // namespace slender::study

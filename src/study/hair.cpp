@@ -54,13 +54,20 @@ void runHair(StudyContext& context)
       show("turned after " + std::to_string(static_cast<int>(1e3 * k * step)) + " ms", 0.6);
   }
   show("after " + std::to_string(static_cast<int>(1e3 * steps * step)) + " ms", 1.2);
-  const auto row = [&](const char* quantity) -> Row& { return context.row().set("vertices", vertices).set("steps", steps).set("quantity", quantity); };
-  row("seconds per step, one thread").set("mean", seconds / steps).set("slowest", slowest).set("iterations_per_step", static_cast<double>(iterations) / steps)
-      .set("contacts", static_cast<double>(contacts)).set("fastest_m_s", fastest).set("least_gap_um", 1e6 * clearance);
+  const auto row = [&](const char* quantity) -> Row& {
+    return context.row().set("vertices", vertices).set("steps", steps).set("quantity", quantity);
+  };
+  row("seconds per step, one thread")
+      .set("mean", seconds / steps)
+      .set("slowest", slowest)
+      .set("iterations_per_step", static_cast<double>(iterations) / steps)
+      .set("contacts", static_cast<double>(contacts))
+      .set("fastest_m_s", fastest)
+      .set("least_gap_um", 1e6 * clearance);
   row("largest penetration [m]").check(std::max(0.0, -clearance), 0, 1e-9, "all pairs, brute force");
   row("steps with a number that is not finite").check(std::isfinite(fastest) ? 0 : 1, 0, 0.5, "none");
   context.metric("seconds_per_step", seconds / steps);
   context.metric("least_gap", clearance);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

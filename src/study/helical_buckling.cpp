@@ -22,12 +22,20 @@ struct Case
 constexpr Case kThesis{"thesis", 9.29, 1.345, 0.789, 27, 0.3}, kPeer{"peer", 100, 1.345, 0.789, 27, 3};
 
 /// helix_discrete.csv, convention "ghost": peak of the exact discrete equilibrium and its end moment.
-struct Discrete { int edges; double peak, moment; };
-constexpr Discrete kDiscrete[] = {{100, 0.7535229518, 14.27727667}, {150, 0.827687372, 14.26578564}, {200, 0.8622676274, 14.26051673},
-                                  {300, 0.8914502872, 14.25609991}, {400, 0.902827241, 14.25438358}, {600, 0.9113978407, 14.25309228}};
+struct Discrete
+{
+  int edges;
+  double peak, moment;
+};
+constexpr Discrete kDiscrete[] = {{100, 0.7535229518, 14.27727667}, {150, 0.827687372, 14.26578564},
+                                  {200, 0.8622676274, 14.26051673}, {300, 0.8914502872, 14.25609991},
+                                  {400, 0.902827241, 14.25438358},  {600, 0.9113978407, 14.25309228}};
 
 /// Infinite rod [van der Heijden & Thompson 2000]: D = (4 alpha/M) sin phi0, R = M L/beta + 2 phi0.
-struct Helix { double peak, moment; };
+struct Helix
+{
+  double peak, moment;
+};
 Helix exactHelix(const Case& c)
 {
   const double turn = 2 * kPi * c.turns;
@@ -54,7 +62,8 @@ Eigen::Matrix3Xd helixNodes(const Case& c, const Eigen::VectorXd& fractions)
   for (int i = 0; i < fine; ++i)
   {
     const double s = (i + 0.5) * ds - 0.5 * c.length, t = std::tanh(scale * s);
-    const double cosine = std::cos(h.peak) + (1 - std::cos(h.peak)) * t * t, sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    const double cosine = std::cos(h.peak) + (1 - std::cos(h.peak)) * t * t,
+                 sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
     turn += ds * h.moment / (c.alpha * (1 + cosine));
     points.col(i + 1) = points.col(i) + ds * Eigen::Vector3d(cosine, sine * std::cos(turn), sine * std::sin(turn));
   }
@@ -77,18 +86,23 @@ Result solve(const Case& c, int edges, double refinement, Curvature curvature)
   Eigen::VectorXd lengths(edges);
   const int first = refinement == 1 ? edges : static_cast<int>(std::lround(edges / (1 + refinement)));
   for (int j = 0; j < edges; ++j)
-    lengths[j] = refinement == 1 ? c.length / edges : j < first ? 0.5 * c.length / first : 0.5 * c.length / (edges - first);
+    lengths[j] = refinement == 1 ? c.length / edges
+                 : j < first     ? 0.5 * c.length / first
+                                 : 0.5 * c.length / (edges - first);
   const Eigen::VectorXd fractions = lengthFractions(lengths);
   Eigen::Matrix3Xd straight = Eigen::Matrix3Xd::Zero(3, edges + 1);
   straight.row(0) = c.length * fractions.transpose();
-  RodSetup rod = naturalRod(sectionOf(2e7 * c.alpha, c.alpha, c.alpha, c.beta), straight, Eigen::Vector3d::UnitY(), {curvature, false});
+  RodSetup rod = naturalRod(sectionOf(2e7 * c.alpha, c.alpha, c.alpha, c.beta), straight, Eigen::Vector3d::UnitY(),
+                            {curvature, false});
   rod.inputs.gravity.setZero();
-  // The frames of an isotropic rod may be chosen freely: with the turns as rest twist of the opposite sign they hardly twist, and joints do
-  // not feel that the mean of both edges' curvatures (3.14) is cos(m/2) of either. Compensated ones need no such help.
+  // The frames of an isotropic rod may be chosen freely: with the turns as rest twist of the opposite sign they hardly
+  // twist, and joints do not feel that the mean of both edges' curvatures (3.14) is cos(m/2) of either. Compensated
+  // ones need no such help.
   const double untwisted = curvature == Curvature::tangent ? 2 * kPi * c.turns : 0.0;
   auto model = std::make_shared<RodModel>(*rod.model);
   for (int i = 0; i <= edges; ++i)
-    model->rest_twist[i] = -untwisted * 0.5 * ((i > 0 ? lengths[i - 1] : 0.0) + (i < edges ? lengths[i] : 0.0)) / c.length;
+    model->rest_twist[i] =
+        -untwisted * 0.5 * ((i > 0 ? lengths[i - 1] : 0.0) + (i < edges ? lengths[i] : 0.0)) / c.length;
   rod.model = model;
   const Helix exact = exactHelix(c);
   const Eigen::Matrix3Xd start = helixNodes(c, fractions);
@@ -97,7 +111,8 @@ Result solve(const Case& c, int edges, double refinement, Curvature curvature)
   rod.hold(edges, edges, true);
   for (int k = 0; k < 2; ++k)
   {
-    Pose& target = rod.inputs.grasps[k].X_WG;   // tangents along the axis; 27 whole turns: the same director at both ends
+    // tangents along the axis; 27 whole turns: the same director at both ends
+    Pose& target = rod.inputs.grasps[k].X_WG;
     target.position = k * (c.length - c.shortening) * Eigen::Vector3d::UnitX();
     target.orientation.setIdentity();
   }
@@ -118,7 +133,8 @@ Result solve(const Case& c, int edges, double refinement, Curvature curvature)
   }
   const int top = static_cast<int>(std::max_element(phi.begin() + 1, phi.end() - 1) - phi.begin());
   // parabola through the three highest
-  const double a = middle[top - 1] - middle[top], b = middle[top + 1] - middle[top], fa = phi[top - 1] - phi[top], fb = phi[top + 1] - phi[top];
+  const double a = middle[top - 1] - middle[top], b = middle[top + 1] - middle[top], fa = phi[top - 1] - phi[top],
+               fb = phi[top + 1] - phi[top];
   const double bow = (fb / b - fa / a) / (b - a), slope = fb / b - bow * b;
   const double shift = -0.5 * slope / bow;
   result.peak = phi[top] - 0.25 * slope * slope / bow;
@@ -140,7 +156,8 @@ Result solve(const Case& c, int edges, double refinement, Curvature curvature)
 void runCompensated(StudyContext& context, Plot& errors)
 {
   const Helix exact = exactHelix(kThesis);
-  const std::vector<int> meshes = context.quick() ? std::vector<int>{50, 100, 200} : std::vector<int>{50, 70, 100, 150, 200, 300, 400, 600};
+  const std::vector<int> meshes =
+      context.quick() ? std::vector<int>{50, 100, 200} : std::vector<int>{50, 70, 100, 150, 200, 300, 400, 600};
   for (const double refinement : {1.0, 2.0})
     for (const int edges : meshes)
     {
@@ -151,24 +168,32 @@ void runCompensated(StudyContext& context, Plot& errors)
       const std::string name = refinement == 1 ? "compensated" : "compensated, one half twice as fine";
       const double relative = r.peak / exact.peak - 1;
       Row& row = context.row();
-      row.set("case", name).set("n", edges).set("quantity", "peak").set("relative_error", relative).set("envelope_error", r.envelope_error);
+      row.set("case", name)
+          .set("n", edges)
+          .set("quantity", "peak")
+          .set("relative_error", relative)
+          .set("envelope_error", r.envelope_error);
       // the thesis's joints: -2.8e3 / n^2, and -1.5e3 / n^2 with one half twice as fine
       if (edges >= 100)
         row.check(r.peak, exact.peak, (refinement == 1 ? 2e2 : 4e2) / (edges * edges) * exact.peak, "closed form");
       errors.at(name).x.push_back(edges);
       errors.at(name).y.push_back(std::abs(relative));
       if (edges == 200 && refinement == 1)
-        context.metric("gain_compensated_200", std::abs(solve(kThesis, edges, 1, Curvature::tangent).peak / exact.peak - 1) / std::abs(relative));
+        context.metric(
+            "gain_compensated_200",
+            std::abs(solve(kThesis, edges, 1, Curvature::tangent).peak / exact.peak - 1) / std::abs(relative));
     }
 }
 
-}  // namespace
+}   // namespace
 
 void runHelicalBuckling(StudyContext& context)
 {
-  Plot& envelope = context.plot("helical_buckling", "Localised helical buckling: envelope against tanh^2", "s / s*", "(cos phi - cos phi0) / (1 - cos phi0)");
+  Plot& envelope = context.plot("helical_buckling", "Localised helical buckling: envelope against tanh^2", "s / s*",
+                                "(cos phi - cos phi0) / (1 - cos phi0)");
   envelope.log_x = envelope.log_y = false;
-  Plot& errors = context.plot("helical_buckling_error", "Localised helical buckling: error of the maximal deviation", "edges", "relative error of phi0");
+  Plot& errors = context.plot("helical_buckling_error", "Localised helical buckling: error of the maximal deviation",
+                              "edges", "relative error of phi0");
   const Helix exact = exactHelix(kThesis);
   std::vector<double> n, error;
   int done = 0;
@@ -181,7 +206,10 @@ void runHelicalBuckling(StudyContext& context)
     const Result r = solve(kThesis, d.edges, 1, Curvature::tangent);
     const double relative = r.peak / exact.peak - 1;
     Row& row = context.row();
-    row.set("case", "uniform").set("n", d.edges).set("quantity", "peak").set("error_times_n2", relative * d.edges * d.edges);
+    row.set("case", "uniform")
+        .set("n", d.edges)
+        .set("quantity", "peak")
+        .set("error_times_n2", relative * d.edges * d.edges);
     row.check(r.peak, d.peak, 0.005 * d.peak, "helix_discrete.csv, ghost");
     Row& moment = context.row();
     moment.set("case", "uniform").set("n", d.edges).set("quantity", "moment");
@@ -212,7 +240,11 @@ void runHelicalBuckling(StudyContext& context)
   {
     context.progress(done++, total, "half refined, " + std::to_string(edges) + " edges");
     const Result r = solve(kThesis, edges, 2, Curvature::tangent);
-    context.row().set("case", "one half twice as fine").set("n", edges).set("quantity", "peak").set("relative_error", r.peak / exact.peak - 1)
+    context.row()
+        .set("case", "one half twice as fine")
+        .set("n", edges)
+        .set("quantity", "peak")
+        .set("relative_error", r.peak / exact.peak - 1)
         .set("envelope_error", r.envelope_error);
     errors.at("one half twice as fine").x.push_back(edges);
     errors.at("one half twice as fine").y.push_back(std::abs(r.peak / exact.peak - 1));
@@ -224,12 +256,24 @@ void runHelicalBuckling(StudyContext& context)
   context.row().set("case", "uniform").set("n", 1200).set("quantity", "peak").set("relative_error", finest);
   context.metric("order", observedOrder(error.back(), finest));
   context.metric("order_200_to_600", -logSlope(n, error));
-  context.note("compensated: curvature: compensated, against the smooth rod. gain_compensated_200: its error at n = 200 against that of the thesis's joints.");
-  context.note("order: from n = 600 to 1200. From 200 to 600 the table's own equilibria give 1.88: their error n^2 still grows there.");
+  context.note(
+      "compensated: curvature: compensated, against the smooth rod. gain_compensated_200: its error at n = 200 against "
+      "that of the thesis's joints.");
+  context.note(
+      "order: from n = 600 to 1200. From 200 to 600 the table's own equilibria give 1.88: their error n^2 still grows "
+      "there.");
   const Helix peer = exactHelix(kPeer);
   const Result r = solve(kPeer, 1000, 1, Curvature::tangent);
-  context.row().set("case", "L = 100, slack 3").set("n", 1000).set("quantity", "peak").check(r.peak, peer.peak, 0.005 * peer.peak, "closed form");
-  context.row().set("case", "L = 100, slack 3").set("n", 1000).set("quantity", "moment").check(r.moment, peer.moment, 0.005 * peer.moment, "closed form");
+  context.row()
+      .set("case", "L = 100, slack 3")
+      .set("n", 1000)
+      .set("quantity", "peak")
+      .check(r.peak, peer.peak, 0.005 * peer.peak, "closed form");
+  context.row()
+      .set("case", "L = 100, slack 3")
+      .set("n", 1000)
+      .set("quantity", "moment")
+      .check(r.moment, peer.moment, 0.005 * peer.moment, "closed form");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// Localised helical buckling through a scene file: the shipped scene and other rods, as `simulate` runs them (thesis 4.7.1, Fig. 4.3).
+// Localised helical buckling through a scene file: the shipped scene and other rods, as `simulate` runs them
+// (thesis 4.7.1, Fig. 4.3).
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,7 +14,8 @@
 namespace slender::study {
 namespace {
 
-/// A rod, and the smooth solution of its clamped-clamped boundary-value problem (helix_summary.csv: phi0_finite, M3_finite).
+/// A rod, and the smooth solution of its clamped-clamped boundary-value problem (helix_summary.csv: phi0_finite,
+/// M3_finite).
 struct Helix
 {
   const char* name;
@@ -49,8 +51,9 @@ std::vector<std::string> overridesOf(const Helix& h, int edges)
           "rods.0.grasps.right.motion.table.1.1=" + number(-h.shortening)};
 }
 
-/// The largest angle between the rod and its axis, by a parabola through the three steepest edges. The angle does not depend on where
-/// along the rod the helix sits nor on how it is turned about the axis, which both cost next to no energy.
+/// The largest angle between the rod and its axis, by a parabola through the three steepest edges. The angle does not
+/// depend on where along the rod the helix sits nor on how it is turned about the axis, which both cost next to no
+/// energy.
 double peakOf(const Eigen::Matrix3Xd& x)
 {
   const int edges = static_cast<int>(x.cols()) - 1;
@@ -88,16 +91,24 @@ void check(StudyContext& context, const std::string& name, int edges, const Heli
   const double peak_error = r.peak / h.peak - 1, moment_error = r.moment / h.moment - 1;
   // The bounds are those that were asked for at n = 200. The error falls with 1/n^2.
   Row& peak = context.row();
-  peak.set("case", name).set("n", edges).set("quantity", "peak [rad]").set("relative_error", peak_error).set("speed", r.speed);
+  peak.set("case", name)
+      .set("n", edges)
+      .set("quantity", "peak [rad]")
+      .set("relative_error", peak_error)
+      .set("speed", r.speed);
   peak.check(r.peak, h.peak, 0.005 * h.peak, "helix_summary.csv, phi0_finite");
   Row& moment = context.row();
-  moment.set("case", name).set("n", edges).set("quantity", "moment [N m]").set("relative_error", moment_error).set("speed", r.speed);
+  moment.set("case", name)
+      .set("n", edges)
+      .set("quantity", "moment [N m]")
+      .set("relative_error", moment_error)
+      .set("speed", r.speed);
   moment.check(r.moment, h.moment, 0.001 * h.moment, "helix_summary.csv, M3_finite");
   worst.peak = std::max(worst.peak, std::abs(peak_error));
   worst.moment = std::max(worst.moment, std::abs(moment_error));
 }
 
-}  // namespace
+}   // namespace
 
 void runHelicalScene(StudyContext& context)
 {
@@ -129,17 +140,27 @@ void runHelicalScene(StudyContext& context)
   context.progress(done++, total, "frames turned by 40 rad");
   const Reached turned = simulate({"rods.0.centerline.straight.edges=200", "rods.0.rest_twist=-40"});
   Row& frames = context.row();
-  frames.set("case", "shipped, frames turned").set("n", kEdges).set("quantity", "peak [rad]").set("speed", turned.speed);
+  frames.set("case", "shipped, frames turned")
+      .set("n", kEdges)
+      .set("quantity", "peak [rad]")
+      .set("speed", turned.speed);
   // The strains are the same up to round-off, which the 2,000 steps hardly amplify (3e-14 was measured).
   frames.check(turned.peak, shipped.peak, 1e-9 * shipped.peak, "the same rod with its frames as they are");
   context.metric("frames_matter", std::abs(turned.peak / shipped.peak - 1));
 
   context.progress(done++, total, "the thesis's curvature");
   const Reached tangent = simulate({"rods.0.centerline.straight.edges=200", "rods.0.curvature=tangent"});
-  context.row().set("case", "shipped, curvature: tangent").set("n", kEdges).set("quantity", "peak [rad]").set("measured", tangent.peak)
-      .set("relative_error", tangent.peak / kShipped.peak - 1).set("speed", tangent.speed);
+  context.row()
+      .set("case", "shipped, curvature: tangent")
+      .set("n", kEdges)
+      .set("quantity", "peak [rad]")
+      .set("measured", tangent.peak)
+      .set("relative_error", tangent.peak / kShipped.peak - 1)
+      .set("speed", tangent.speed);
   context.metric("tangent_peak_error", std::abs(tangent.peak / kShipped.peak - 1));
-  context.note("The row of the thesis's curvature (curvature: tangent) shows what scenes gave before isotropic sections had a default of their own.");
+  context.note(
+      "The row of the thesis's curvature (curvature: tangent) shows what scenes gave before isotropic sections had a "
+      "default of their own.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,10 +1,13 @@
-// Quadratic isometric bending beside nonlinear hinges, as thesis table 2.1: what a gradient, a Hessian and whole steps cost.
+// Quadratic isometric bending beside nonlinear hinges, as thesis table 2.1: what a gradient, a Hessian and whole steps
+// cost.
 //
-// Implicit steps are compared twice. Solved as ClothStepper does, both models take the same conjugate gradients: small meshes by symmetric sweeps, large
-// ones by the constant n x n factor of mass and rest membrane, in which there is no bending at these stiffnesses, so that hinges lose nothing with it.
-// Either way most of a step is the solution, and the ratio is near 1 (implicit_step_speedup_min): the isometric model saves the assembly of its
-// Hessian, not the solution. Hinges solved as is usual are compared besides: factored in every step, or by conjugate gradients preconditioned by
-// the inverse diagonal blocks or by their own Hessian at rest, to the same error; whichever is fastest (..._over_usual_hinge_solvers_min).
+// Implicit steps are compared twice. Solved as ClothStepper does, both models take the same conjugate gradients: small
+// meshes by symmetric sweeps, large ones by the constant n x n factor of mass and rest membrane, in which there is no
+// bending at these stiffnesses, so that hinges lose nothing with it. Either way most of a step is the solution, and the
+// ratio is near 1 (implicit_step_speedup_min): the isometric model saves the assembly of its Hessian, not the solution.
+// Hinges solved as is usual are compared besides: factored in every step, or by conjugate gradients preconditioned by
+// the inverse diagonal blocks or by their own Hessian at rest, to the same error; whichever is fastest
+// (..._over_usual_hinge_solvers_min).
 #include <cmath>
 
 #include <Eigen/LU>
@@ -106,7 +109,8 @@ struct UsualSolvers
   double block_diagonal, rest_hessian;
 };
 
-/// Each with the loosest tolerance that leaves no more error, in the norm of the matrix, than the step's own solution does.
+/// Each with the loosest tolerance that leaves no more error, in the norm of the matrix, than the step's own solution
+/// does.
 UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
 {
   constexpr int kTimed = 5;   // iterations
@@ -114,7 +118,8 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
   ClothOptions options = linearized();
   options.solver = ClothSolver::conjugate_gradients;
   ClothSystem system(*hinged.model, options);
-  PointVector x, ahead, rest, guess, right(4 * n, 0.0), product(4 * n, 0.0), correction(4 * n, 0.0), exact(4 * n, 0.0), away(4 * n, 0.0);
+  PointVector x, ahead, rest, guess, right(4 * n, 0.0), product(4 * n, 0.0), correction(4 * n, 0.0), exact(4 * n, 0.0),
+      away(4 * n, 0.0);
   toPoints(hinged.state.x, x);
   toPoints(hinged.model->rest.vertices, rest);
   toPoints(kImplicitStep * hinged.state.v, guess);
@@ -188,29 +193,32 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
   };
   UsualSolvers result;
   result.block_diagonal = seconds(
-    [&] {
-      for (int i = 0; i < n; ++i)
-        inverse[i] = Eigen::Map<const Eigen::Matrix3d>(system.matrix().values() + 9 * static_cast<std::size_t>(system.matrix().starts()[i])).inverse();
-    },
-    [&](const PointVector& r, PointVector& z) {
-      for (int i = 0; i < n; ++i)
-        point(z, i) = inverse[i] * point(r, i);
-    });
-  result.rest_hessian = seconds([] {}, [&](const PointVector& r, PointVector& z) { at_rest.solvePoints(r.data(), z.data()); });
+      [&] {
+        for (int i = 0; i < n; ++i)
+          inverse[i] = Eigen::Map<const Eigen::Matrix3d>(system.matrix().values() +
+                                                         9 * static_cast<std::size_t>(system.matrix().starts()[i]))
+                           .inverse();
+      },
+      [&](const PointVector& r, PointVector& z) {
+        for (int i = 0; i < n; ++i)
+          point(z, i) = inverse[i] * point(r, i);
+      });
+  result.rest_hessian =
+      seconds([] {}, [&](const PointVector& r, PointVector& z) { at_rest.solvePoints(r.data(), z.data()); });
   return result;
 }
 
 struct Costs
 {
   double gradient[2], hessian[2], explicit_step[2], implicit_step[2];   ///< hinge, isometric [s]
-  double factored_step;         ///< implicit, hinges, by Cholesky [s]
-  UsualSolvers usual;           ///< likewise, by conjugate gradients
+  double factored_step;                                                 ///< implicit, hinges, by Cholesky [s]
+  UsualSolvers usual;                                                   ///< likewise, by conjugate gradients
   double product_over_bound;
   double small_bend_difference;   ///< of the two gradients at small bend angles, over the gradient [-]
 };
 
-/// Difference of the two models' gradients where the mesh is bent a little, over the gradient's norm. Isometric bending is the
-/// small-angle limit of these hinges, so the difference is of the order of the slope.
+/// Difference of the two models' gradients where the mesh is bent a little, over the gradient's norm. Isometric bending
+/// is the small-angle limit of these hinges, so the difference is of the order of the slope.
 double gradientDifference(const TriangleMesh& mesh, const HingeBending& hinges, const PointMatrix& matrix)
 {
   Eigen::Matrix3Xd bent = mesh.vertices;
@@ -249,9 +257,13 @@ Costs measure(const TriangleMesh& mesh, bool flag)
   const auto element = IsometricElement::nonconforming;
   const int n = hinged.model->vertices();
   PointMatrix matrix;
-  costs.hessian[1] = leastSeconds(0.0, [&] {
-    matrix = isometricBending(mesh, t, element, 1e-4 * bendingCalibration(mesh, t, element, Eigen::Vector3d::UnitX()));
-  }) / kStepsShared;
+  costs.hessian[1] =
+      leastSeconds(0.0,
+                   [&] {
+                     matrix = isometricBending(mesh, t, element,
+                                               1e-4 * bendingCalibration(mesh, t, element, Eigen::Vector3d::UnitX()));
+                   }) /
+      kStepsShared;
   const double coefficient = 1e-4 * bendingCalibration(mesh, t, element, Eigen::Vector3d::UnitX());
   const HingeBending hinges(t.hinges, hingeStiffness(mesh, t, coefficient), hinged.state.rest_angles);
   costs.small_bend_difference = gradientDifference(mesh, hinges, matrix);
@@ -264,12 +276,15 @@ Costs measure(const TriangleMesh& mesh, bool flag)
   costs.hessian[0] = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k)   // in turn: others use the machine too
   {
-    costs.gradient[0] = std::min(costs.gradient[0], leastSeconds(0.02, [&] { hinges.addGradient(x.data(), gradient.data()); }));
-    costs.gradient[1] = std::min(costs.gradient[1], leastSeconds(0.02, [&] { matrix.addProduct(1.0, x.data(), gradient.data()); }));
-    costs.hessian[0] = std::min(costs.hessian[0], leastSeconds(0.02, [&] {
-      blocks.setZero();
-      hinges.addHessian(HessianKind::exact, x.data(), slots, gradient.data(), blocks.values());
-    }));
+    costs.gradient[0] =
+        std::min(costs.gradient[0], leastSeconds(0.02, [&] { hinges.addGradient(x.data(), gradient.data()); }));
+    costs.gradient[1] =
+        std::min(costs.gradient[1], leastSeconds(0.02, [&] { matrix.addProduct(1.0, x.data(), gradient.data()); }));
+    costs.hessian[0] =
+        std::min(costs.hessian[0], leastSeconds(0.02, [&] {
+                   blocks.setZero();
+                   hinges.addHessian(HessianKind::exact, x.data(), slots, gradient.data(), blocks.values());
+                 }));
   }
   costs.product_over_bound = costs.gradient[1] / readSeconds(matrix.bytes());
 
@@ -285,8 +300,10 @@ Costs measure(const TriangleMesh& mesh, bool flag)
     costs.factored_step = std::min(costs.factored_step, stepSeconds(hinged, factored, kImplicitStep, 3));
     for (int k = 0; k < 2; ++k)
     {
-      costs.explicit_step[k] = std::min(costs.explicit_step[k], stepSeconds(*setups[k], explicit_options, kExplicitStep, 10));
-      costs.implicit_step[k] = std::min(costs.implicit_step[k], stepSeconds(*setups[k], linearized(), kImplicitStep, 6));
+      costs.explicit_step[k] =
+          std::min(costs.explicit_step[k], stepSeconds(*setups[k], explicit_options, kExplicitStep, 10));
+      costs.implicit_step[k] =
+          std::min(costs.implicit_step[k], stepSeconds(*setups[k], linearized(), kImplicitStep, 6));
     }
   }
   costs.usual = usualSolvers(hinged, costs.factored_step);
@@ -300,16 +317,18 @@ TriangleMesh meshOf(const Published& size)
     const int side = static_cast<int>(std::lround(std::sqrt(size.vertices)));
     return gridMesh(1.0, 1.0, side - 1, side - 1, GridPattern::alternating);
   }
-  return gridMesh(1.0, 1.0, static_cast<int>(std::lround(std::sqrt(size.vertices * std::sqrt(0.75)))) - 1, 0, GridPattern::irregular);
+  return gridMesh(1.0, 1.0, static_cast<int>(std::lround(std::sqrt(size.vertices * std::sqrt(0.75)))) - 1, 0,
+                  GridPattern::irregular);
 }
 
-}  // namespace
+}   // namespace
 
 void runIbmVsHinge(StudyContext& context)
 {
   useOneBlasThread();
   Plot& plot = context.plot("ibm_vs_hinge", "Hinges over isometric bending: time", "vertices", "ratio");
-  double gradient = 1e300, hessian = 0, implicit = 1e300, factored = 1e300, over_usual = 1e300, bound = 0, bend_difference = 0;
+  double gradient = 1e300, hessian = 0, implicit = 1e300, factored = 1e300, over_usual = 1e300, bound = 0,
+         bend_difference = 0;
   for (const bool flag : {false, true})
     for (const Published& p : flag ? kFlag : kDrape)
     {
@@ -322,40 +341,59 @@ void runIbmVsHinge(StudyContext& context)
       {
         const char* what;
         const double *here, *published;
-      } lines[] = {{"gradient", c.gradient, p.gradient}, {"Hessian", c.hessian, p.hessian}, {"explicit step", c.explicit_step, p.explicit_step},
+      } lines[] = {{"gradient", c.gradient, p.gradient},
+                   {"Hessian", c.hessian, p.hessian},
+                   {"explicit step", c.explicit_step, p.explicit_step},
                    {"implicit step", c.implicit_step, p.implicit_step}};
       for (const auto& line : lines)
       {
-        context.row().set("scene", flag ? "flag" : "hung sheet").set("mesh", p.regular ? "regular" : "irregular")
-          .set("vertices", static_cast<double>(mesh.vertices.cols())).set("part", line.what).set("hinge_ms", 1e3 * line.here[0])
-          .set("isometric_ms", 1e3 * line.here[1]).set("ratio", line.here[0] / line.here[1]).set("thesis_hinge_ms", line.published[0])
-          .set("thesis_isometric_ms", line.published[1]).set("thesis_ratio", line.published[0] / line.published[1]);
-        Series& series = plot.at(std::string(line.what) + (flag ? ", flag" : ", hung sheet") + (p.regular ? "" : ", irregular"));
+        context.row()
+            .set("scene", flag ? "flag" : "hung sheet")
+            .set("mesh", p.regular ? "regular" : "irregular")
+            .set("vertices", static_cast<double>(mesh.vertices.cols()))
+            .set("part", line.what)
+            .set("hinge_ms", 1e3 * line.here[0])
+            .set("isometric_ms", 1e3 * line.here[1])
+            .set("ratio", line.here[0] / line.here[1])
+            .set("thesis_hinge_ms", line.published[0])
+            .set("thesis_isometric_ms", line.published[1])
+            .set("thesis_ratio", line.published[0] / line.published[1]);
+        Series& series =
+            plot.at(std::string(line.what) + (flag ? ", flag" : ", hung sheet") + (p.regular ? "" : ", irregular"));
         series.x.push_back(static_cast<double>(mesh.vertices.cols()));
         series.y.push_back(line.here[0] / line.here[1]);
       }
-      const std::pair<const char*, double> usual[] = {{"implicit step, hinges factored", c.factored_step},
-                                                      {"implicit step, hinges by block-diagonal CG", c.usual.block_diagonal},
-                                                      {"implicit step, hinges by CG with their rest Hessian", c.usual.rest_hessian}};
+      const std::pair<const char*, double> usual[] = {
+          {"implicit step, hinges factored", c.factored_step},
+          {"implicit step, hinges by block-diagonal CG", c.usual.block_diagonal},
+          {"implicit step, hinges by CG with their rest Hessian", c.usual.rest_hessian}};
       double fastest = std::numeric_limits<double>::infinity();
       for (const auto& [part, seconds] : usual)
       {
         fastest = std::min(fastest, seconds);
         Row& row = context.row();
-        row.set("scene", flag ? "flag" : "hung sheet").set("mesh", p.regular ? "regular" : "irregular")
-          .set("vertices", static_cast<double>(mesh.vertices.cols())).set("part", part).set("isometric_ms", 1e3 * c.implicit_step[1]);
+        row.set("scene", flag ? "flag" : "hung sheet")
+            .set("mesh", p.regular ? "regular" : "irregular")
+            .set("vertices", static_cast<double>(mesh.vertices.cols()))
+            .set("part", part)
+            .set("isometric_ms", 1e3 * c.implicit_step[1]);
         if (std::isfinite(seconds))
           row.set("hinge_ms", 1e3 * seconds).set("ratio", seconds / c.implicit_step[1]);
       }
-      context.row().set("scene", flag ? "flag" : "hung sheet").set("mesh", p.regular ? "regular" : "irregular")
-        .set("vertices", static_cast<double>(mesh.vertices.cols())).set("part", "product over reading its bytes").set("ratio", c.product_over_bound);
+      context.row()
+          .set("scene", flag ? "flag" : "hung sheet")
+          .set("mesh", p.regular ? "regular" : "irregular")
+          .set("vertices", static_cast<double>(mesh.vertices.cols()))
+          .set("part", "product over reading its bytes")
+          .set("ratio", c.product_over_bound);
       bend_difference = std::max(bend_difference, c.small_bend_difference);
       gradient = std::min(gradient, c.gradient[0] / c.gradient[1]);
       hessian = std::max(hessian, c.hessian[1] / c.hessian[0]);
       implicit = std::min(implicit, c.implicit_step[0] / c.implicit_step[1]);
       factored = std::min(factored, c.factored_step / c.implicit_step[1]);
       over_usual = std::min(over_usual, fastest / c.implicit_step[1]);
-      if (p.vertices > 20000)   // smaller ones stay in the cache next to the processor, where its arithmetic is the bound
+      if (p.vertices >
+          20000)   // smaller ones stay in the cache next to the processor, where its arithmetic is the bound
         bound = std::max(bound, c.product_over_bound);
     }
   context.metric("small_bend_gradient_difference", bend_difference);
@@ -367,10 +405,18 @@ void runIbmVsHinge(StudyContext& context)
   if (bound > 0)
     context.metric("product_over_bandwidth_bound", bound);
   context.note("Isometric Hessian: assembled once, spread over 1,000 steps; a step then does nothing for it.");
-  context.note("implicit step (implicit_step_speedup_min): both by conjugate gradients to the same tolerance, by sweeps or (above 3,000 vertices) preconditioned by mass and rest membrane, the same matrix for both: bending is too small here to be in it, so hinges may use it as well.");
-  context.note("implicit_step_speedup_over_usual_hinge_solvers_min: over the fastest of hinges factored in every step, by CG with their diagonal blocks, and by CG with their Hessian at rest; the last two to the error of the step's own solution, assembly and solution only; no figure: slower than factoring.");
+  context.note(
+      "implicit step (implicit_step_speedup_min): both by conjugate gradients to the same tolerance, by sweeps or "
+      "(above 3,000 vertices) preconditioned by mass and rest membrane, the same matrix for both: bending is too small "
+      "here to be in it, so hinges may use it as well.");
+  context.note(
+      "implicit_step_speedup_over_usual_hinge_solvers_min: over the fastest of hinges factored in every step, by CG "
+      "with their diagonal blocks, and by CG with their Hessian at rest; the last two to the error of the step's own "
+      "solution, assembly and solution only; no figure: slower than factoring.");
   context.note("hung sheet: from four corners, damped; the thesis's drape and its collisions are not in these steps.");
-  context.note("bandwidth bound: least time of reading as many bytes as a product must move (matrix, x, y), in the same run; the metric is of the largest meshes.");
+  context.note(
+      "bandwidth bound: least time of reading as many bytes as a product must move (matrix, x, y), in the same run; "
+      "the metric is of the largest meshes.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

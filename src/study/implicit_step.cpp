@@ -18,14 +18,17 @@ constexpr double kStep = 0.01;   // [s]
 
 const char* nameOf(ClothSolver solver)
 {
-  return solver == ClothSolver::cholesky ? "cholesky" : solver == ClothSolver::gauss_seidel ? "gauss_seidel" : "conjugate_gradients";
+  return solver == ClothSolver::cholesky       ? "cholesky"
+         : solver == ClothSolver::gauss_seidel ? "gauss_seidel"
+                                               : "conjugate_gradients";
 }
 
 constexpr double kMembrane = 1e3, kStiffMembrane = 5e4;   // [N/m]
 
 ClothSetup pinnedSheet(int side, double membrane)
 {
-  ClothModel model = buildCloth("sheet", gridMesh(1.0, 1.0, side - 1, side - 1, GridPattern::alternating), 0.15, isotropicMembrane(1e3 * membrane, 0.3, 1e-3));
+  ClothModel model = buildCloth("sheet", gridMesh(1.0, 1.0, side - 1, side - 1, GridPattern::alternating), 0.15,
+                                isotropicMembrane(1e3 * membrane, 0.3, 1e-3));
   model.bending_modulus = 1e-4;
   ClothSetup cloth(std::move(model));
   cloth.pin({0, side - 1});
@@ -33,15 +36,16 @@ ClothSetup pinnedSheet(int side, double membrane)
   return cloth;
 }
 
-/// Least time to factor the matrix of a step from this state, by supernodes as CHOLMOD does, with nested dissection of points and wide supernodes.
+/// Least time to factor the matrix of a step from this state, by supernodes as CHOLMOD does, with nested dissection of
+/// points and wide supernodes.
 double factorSeconds(const ClothSetup& cloth, double budget)
 {
   const ClothModel& model = *cloth.model;
   const MeshTopology& t = model.topology;
   const int n = model.vertices();
   const auto element = IsometricElement::nonconforming;
-  const PointMatrix bending =
-    isometricBending(model.rest, t, element, model.bending_modulus * bendingCalibration(model.rest, t, element, model.warp));
+  const PointMatrix bending = isometricBending(
+      model.rest, t, element, model.bending_modulus * bendingCalibration(model.rest, t, element, model.warp));
   BlockMatrix matrix(n, {model.rest.triangles, t.hinges});
   const MembraneEnergy membrane(model.rest, model.membrane, model.warp);
   PointVector x, gradient(4 * n, 0.0);
@@ -146,13 +150,23 @@ void compareSolvers(StudyContext& context, int side, double membrane)
   const Trajectory exact = follow(sheet, options, steps, 1);
   const auto line = [&](const char* name, double tolerance, const Trajectory& t) {
     Row& row = context.row();
-    row.set("vertices", side * side).set("membrane_N_m", membrane).set("newton", name).set("step_ms", 1e3 * t.seconds)
-      .set("iterations", static_cast<double>(t.iterations) / steps).set("linear_iterations", static_cast<double>(t.linear_iterations) / steps)
-      .set("largest_stretch", t.stretch).set("error_mm", 1e3 * rms(t.x, fine.x)).set("solver_error_mm", 1e3 * rms(t.x, exact.x));
+    row.set("vertices", side * side)
+        .set("membrane_N_m", membrane)
+        .set("newton", name)
+        .set("step_ms", 1e3 * t.seconds)
+        .set("iterations", static_cast<double>(t.iterations) / steps)
+        .set("linear_iterations", static_cast<double>(t.linear_iterations) / steps)
+        .set("largest_stretch", t.stretch)
+        .set("error_mm", 1e3 * rms(t.x, fine.x))
+        .set("solver_error_mm", 1e3 * rms(t.x, exact.x));
     if (tolerance > 0)
       row.set("tolerance", tolerance);
   };
-  context.row().set("vertices", side * side).set("membrane_N_m", membrane).set("newton", "full, an eighth of the step").set("largest_stretch", fine.stretch);
+  context.row()
+      .set("vertices", side * side)
+      .set("membrane_N_m", membrane)
+      .set("newton", "full, an eighth of the step")
+      .set("largest_stretch", fine.stretch);
   line("one step, cholesky", 0, exact);
   double over_factorised = 0, over_step = 0;
   for (const ClothSolver solver : {ClothSolver::gauss_seidel, ClothSolver::conjugate_gradients})
@@ -180,12 +194,13 @@ void compareSolvers(StudyContext& context, int side, double membrane)
   }
 }
 
-}  // namespace
+}   // namespace
 
 void runImplicitStep(StudyContext& context)
 {
   const std::vector<int> sides = context.quick() ? std::vector<int>{20, 40, 80} : std::vector<int>{20, 40, 80, 160};
-  Plot& plot = context.plot("implicit_step", "Sheet pinned at two corners, dt 10 ms: time of a step", "vertices", "CPU time [ms]");
+  Plot& plot = context.plot("implicit_step", "Sheet pinned at two corners, dt 10 ms: time of a step", "vertices",
+                            "CPU time [ms]");
   std::vector<double> vertices, times;
   for (const int side : sides)
     for (const bool newton : {false, true})
@@ -216,13 +231,19 @@ void runImplicitStep(StudyContext& context)
       }
       seconds.erase(seconds.begin());   // factors what stays
       std::sort(seconds.begin(), seconds.end());
-      const double median = seconds[seconds.size() / 2], factoring = *std::min_element(factorings.begin(), factorings.end());
+      const double median = seconds[seconds.size() / 2],
+                   factoring = *std::min_element(factorings.begin(), factorings.end());
       Row& row = context.row();
-      row.set("vertices", side * side).set("newton", newton ? "full" : "one step")
-        .set("solver", nameOf(stepper.solver())).set("step_ms", 1e3 * median)
-        .set("least_ms", 1e3 * seconds.front()).set("iterations", static_cast<double>(iterations) / steps)
-        .set("linear_iterations", static_cast<double>(linear) / steps).set("factorisation_ms", 1e3 * factoring)
-        .set("step_over_factorisation", median / factoring).set("largest_stretch", strain);
+      row.set("vertices", side * side)
+          .set("newton", newton ? "full" : "one step")
+          .set("solver", nameOf(stepper.solver()))
+          .set("step_ms", 1e3 * median)
+          .set("least_ms", 1e3 * seconds.front())
+          .set("iterations", static_cast<double>(iterations) / steps)
+          .set("linear_iterations", static_cast<double>(linear) / steps)
+          .set("factorisation_ms", 1e3 * factoring)
+          .set("step_over_factorisation", median / factoring)
+          .set("largest_stretch", strain);
       plot.at(newton ? "step, full Newton" : "step, one Newton step").x.push_back(side * side);
       plot.at(newton ? "step, full Newton" : "step, one Newton step").y.push_back(1e3 * median);
       if (newton)
@@ -230,7 +251,9 @@ void runImplicitStep(StudyContext& context)
       plot.at("one factorisation").x.push_back(side * side);
       plot.at("one factorisation").y.push_back(1e3 * factoring);
       const Parts parts = partsOf(cloth, options, 0.05);
-      row.set("assembly_ms", 1e3 * parts.assembly).set("solve_ms", 1e3 * parts.solve).set("evaluation_ms", 1e3 * parts.evaluation);
+      row.set("assembly_ms", 1e3 * parts.assembly)
+          .set("solve_ms", 1e3 * parts.solve)
+          .set("evaluation_ms", 1e3 * parts.evaluation);
       // what the linear solver leaves, over what the step moves
       ClothState one = cloth.state, exact = cloth.state;
       ClothOptions direct = options;
@@ -245,10 +268,15 @@ void runImplicitStep(StudyContext& context)
   for (const double membrane : {kMembrane, kStiffMembrane})
     compareSolvers(context, context.quick() ? 20 : 40, membrane);
   context.metric("growth_exponent", std::log(times.back() / times[1]) / std::log(vertices.back() / vertices[1]));
-  context.note("factorisation: METIS on the graph of points, CHOLMOD's analysis, wide supernodes, one thread, the same matrix, between the steps; least of all.");
-  context.note("rows with error_mm: over one trajectory, against full Newton with an eighth of the step; solver_error_mm: against one Newton step, factorised. "
-               "The stretch is that of the two triangles at the pins: it grows as the mesh gets finer and the sheet swings through, whatever the solver.");
+  context.note(
+      "factorisation: METIS on the graph of points, CHOLMOD's analysis, wide supernodes, one thread, the same matrix, "
+      "between the steps; least of all.");
+  context.note(
+      "rows with error_mm: over one trajectory, against full Newton with an eighth of the step; solver_error_mm: "
+      "against one Newton step, factorised. "
+      "The stretch is that of the two triangles at the pins: it grows as the mesh gets finer and the sheet swings "
+      "through, whatever the solver.");
   context.note("solve_error: of the last step's positions against a factorised solve, over the step's motion.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

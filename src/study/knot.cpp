@@ -1,4 +1,5 @@
-// Open overhand knots: end force against the size of the loop (Audoly, Clauvelin & Neukirch 2007; thesis 4.7.1, Fig. 4.1).
+// Open overhand knots: end force against the size of the loop (Audoly, Clauvelin & Neukirch 2007; thesis 4.7.1,
+// Fig. 4.1).
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -11,7 +12,10 @@
 namespace slender::study {
 namespace {
 
-struct Loop { double epsilon = 0, force = 0; };   ///< sqrt(h / R), F h^2 / B
+struct Loop
+{
+  double epsilon = 0, force = 0;
+};   ///< sqrt(h / R), F h^2 / B
 
 /// Radius of the loop: length over turn of the part whose tangent runs against the tails'.
 double loopRadius(const RodState& rod, double edge)
@@ -39,7 +43,8 @@ std::vector<Loop> pullKnot(StudyContext& context, double radius, const std::vect
   const int edges = context.quick() ? 300 : 500;
   const double edge = length / edges;
   // naturally straight, tied loosely
-  RodSetup rod = rodThrough(trefoilCurve({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.11, 4 * radius, length, false, edges), false, radius, 1.0, 1.0, edges);
+  RodSetup rod = rodThrough(trefoilCurve({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.11, 4 * radius, length, false, edges),
+                            false, radius, 1.0, 1.0, edges);
   auto model = std::make_shared<RodModel>(*rod.model);
   model->bend_modulus.colwise() = Eigen::Vector3d(1, 0, 1);
   model->twist_modulus.setConstant(1 / 1.3);
@@ -60,8 +65,10 @@ std::vector<Loop> pullKnot(StudyContext& context, double radius, const std::vect
   double at = 0.0;
   int done = 0;
   const auto visit = [&](std::size_t k) {
-    context.progress(done++, 2 * static_cast<int>(pulls.size()), "h = " + std::to_string(radius) + ", pulled by " + std::to_string(pulls[k]));
-    const int steps = std::max(20, static_cast<int>(400 * std::abs(pulls[k] - at)));   // no more than an edge or two at a time
+    context.progress(done++, 2 * static_cast<int>(pulls.size()),
+                     "h = " + std::to_string(radius) + ", pulled by " + std::to_string(pulls[k]));
+    // no more than an edge or two at a time
+    const int steps = std::max(20, static_cast<int>(400 * std::abs(pulls[k] - at)));
     for (int i = 1; i <= steps; ++i)
     {
       g.inputs.rods[0].grasps[1].X_WG = start;
@@ -75,7 +82,8 @@ std::vector<Loop> pullKnot(StudyContext& context, double radius, const std::vect
     sums[k].epsilon += std::sqrt(radius / size);
     sums[k].force += force * radius * radius;
   };
-  // Nodes make contact a little bumpy: slopes of 0.08 gap over half an edge, 0.002, are as much friction. The mean of both ways is without it.
+  // Nodes make contact a little bumpy: slopes of 0.08 gap over half an edge, 0.002, are as much friction. The mean of
+  // both ways is without it.
   for (std::size_t k = 0; k < pulls.size(); ++k)
     visit(k);
   if (context.quick())
@@ -89,7 +97,8 @@ std::vector<Loop> pullKnot(StudyContext& context, double radius, const std::vect
 
 void forceLaw(StudyContext& context)
 {
-  Plot& plot = context.plot("knot", "Overhand knot without friction: end force against loop size", "eps = sqrt(h / R)", "F h^2 / B");
+  Plot& plot = context.plot("knot", "Overhand knot without friction: end force against loop size", "eps = sqrt(h / R)",
+                            "F h^2 / B");
   std::vector<double> xs, ys;
   // loops so small that the clamps are several times sqrt(B / F) away
   const std::vector<double> pulls = context.quick() ? std::vector<double>{0.25} : std::vector<double>{0.25, 0.3, 0.35};
@@ -97,7 +106,11 @@ void forceLaw(StudyContext& context)
     for (const Loop& loop : pullKnot(context, radius, pulls))
     {
       const double law = 0.5 * std::pow(loop.epsilon, 4);
-      context.row().set("h", radius).set("eps", loop.epsilon).set("F_h2_over_B", loop.force).set("ratio", loop.force / law);
+      context.row()
+          .set("h", radius)
+          .set("eps", loop.epsilon)
+          .set("F_h2_over_B", loop.force)
+          .set("ratio", loop.force / law);
       plot.at("measured").points = true;
       plot.at("measured").x.push_back(loop.epsilon);
       plot.at("measured").y.push_back(loop.force);
@@ -113,7 +126,9 @@ void forceLaw(StudyContext& context)
     return;
   const double exponent = logSlope(xs, ys);
   context.metric("exponent", exponent);
-  context.row().set("quantity", "slope of log F over log eps, eps <= 0.1").check(exponent, 4.0, 0.6, "F h^2/B = eps^4/2 (knot.csv, no friction), 15 %");
+  context.row()
+      .set("quantity", "slope of log F over log eps, eps <= 0.1")
+      .check(exponent, 4.0, 0.6, "F h^2/B = eps^4/2 (knot.csv, no friction), 15 %");
   // the law is the leading order: the coefficient is that which the ratio tends to
   double n = 0, x = 0, y = 0, xx = 0, xy = 0;
   for (std::size_t k = 0; k < xs.size(); ++k)
@@ -129,7 +144,7 @@ void forceLaw(StudyContext& context)
   context.row().set("quantity", "F h^2/B over eps^4/2 for eps to 0").check(limit, 1.0, 0.15, "the same");
 }
 
-}  // namespace
+}   // namespace
 
 void runKnot(StudyContext& context)
 {
@@ -137,4 +152,4 @@ void runKnot(StudyContext& context)
   twistKnot(context);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

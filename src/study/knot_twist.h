@@ -7,4 +7,4 @@ namespace slender::study {
 /// The part of study knot that turns a clamped trefoil knot until it jumps, both ways.
 void twistKnot(StudyContext& context);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -13,26 +13,39 @@
 namespace slender::study {
 namespace {
 
-/// Exact thresholds of the inextensible rod, its sag included (lateral_rod_ellipse.csv, lateral_rod_ellipse_saint_venant.csv).
+/// Exact thresholds of the inextensible rod, its sag included (lateral_rod_ellipse.csv,
+/// lateral_rod_ellipse_saint_venant.csv).
 struct Threshold
 {
-  bool polar;      ///< twist modulus G A (a^2+b^2)/4, or else Saint-Venant's G pi a^3 b^3/(a^2+b^2)
+  bool polar;   ///< twist modulus G A (a^2+b^2)/4, or else Saint-Venant's G pi a^3 b^3/(a^2+b^2)
   double nu, a_over_b;
-  double gamma;    ///< rho A g L^3 / A1, A1 the weak bending modulus; 0: none up to a tip angle of 86 degrees
+  double gamma;   ///< rho A g L^3 / A1, A1 the weak bending modulus; 0: none up to a tip angle of 86 degrees
 };
 constexpr Threshold kThresholds[] = {
-    {true, 0, 1.5, 0}, {true, 0, 2, 0}, {true, 0, 3, 139.48574}, {true, 0, 4, 92.043172}, {true, 0, 5, 97.251857},
-    {true, 0, 7, 121.11371}, {true, 0, 10, 163.84953}, {true, 0, 15, 239.15771}, {true, 0, 20, 315.92941}, {true, 0, 50, 782.05664},
-    {true, 0.3, 1.5, 0}, {true, 0.3, 2, 0}, {true, 0.3, 3, 53.415613}, {true, 0.3, 4, 56.67438}, {true, 0.3, 5, 65.114802},
-    {true, 0.3, 7, 85.344272}, {true, 0.3, 10, 118.00056}, {true, 0.3, 15, 174.04315}, {true, 0.3, 20, 230.7141},
-    {true, 0.3, 50, 573.20961}, {true, 0.5, 1.5, 0}, {true, 0.5, 2, 98.117444}, {true, 0.5, 3, 42.245725}, {true, 0.5, 4, 47.513241},
-    {true, 0.5, 5, 55.547375}, {true, 0.5, 7, 73.699074}, {true, 0.5, 10, 102.47392}, {true, 0.5, 15, 151.56477},
-    {true, 0.5, 20, 201.10635}, {true, 0.5, 50, 500.15019},
-    {false, 0, 2, 70.657349}, {false, 0, 3, 22.787965}, {false, 0, 5, 19.346308}, {false, 0, 10, 18.436101}, {false, 0, 20, 18.24064},
-    {false, 0, 100, 18.18045}, {false, 0.3, 2, 31.925559}, {false, 0.3, 3, 18.828696}, {false, 0.3, 5, 16.717601},
-    {false, 0.3, 10, 16.116639}, {false, 0.3, 20, 15.985377}, {false, 0.3, 100, 15.944807}, {false, 0.5, 2, 25.608025},
-    {false, 0.5, 3, 17.105039}, {false, 0.5, 5, 15.462902}, {false, 0.5, 10, 14.982041}, {false, 0.5, 20, 14.876321},
-    {false, 0.5, 100, 14.843599},
+    {true, 0, 1.5, 0},           {true, 0, 2, 0},
+    {true, 0, 3, 139.48574},     {true, 0, 4, 92.043172},
+    {true, 0, 5, 97.251857},     {true, 0, 7, 121.11371},
+    {true, 0, 10, 163.84953},    {true, 0, 15, 239.15771},
+    {true, 0, 20, 315.92941},    {true, 0, 50, 782.05664},
+    {true, 0.3, 1.5, 0},         {true, 0.3, 2, 0},
+    {true, 0.3, 3, 53.415613},   {true, 0.3, 4, 56.67438},
+    {true, 0.3, 5, 65.114802},   {true, 0.3, 7, 85.344272},
+    {true, 0.3, 10, 118.00056},  {true, 0.3, 15, 174.04315},
+    {true, 0.3, 20, 230.7141},   {true, 0.3, 50, 573.20961},
+    {true, 0.5, 1.5, 0},         {true, 0.5, 2, 98.117444},
+    {true, 0.5, 3, 42.245725},   {true, 0.5, 4, 47.513241},
+    {true, 0.5, 5, 55.547375},   {true, 0.5, 7, 73.699074},
+    {true, 0.5, 10, 102.47392},  {true, 0.5, 15, 151.56477},
+    {true, 0.5, 20, 201.10635},  {true, 0.5, 50, 500.15019},
+    {false, 0, 2, 70.657349},    {false, 0, 3, 22.787965},
+    {false, 0, 5, 19.346308},    {false, 0, 10, 18.436101},
+    {false, 0, 20, 18.24064},    {false, 0, 100, 18.18045},
+    {false, 0.3, 2, 31.925559},  {false, 0.3, 3, 18.828696},
+    {false, 0.3, 5, 16.717601},  {false, 0.3, 10, 16.116639},
+    {false, 0.3, 20, 15.985377}, {false, 0.3, 100, 15.944807},
+    {false, 0.5, 2, 25.608025},  {false, 0.5, 3, 17.105039},
+    {false, 0.5, 5, 15.462902},  {false, 0.5, 10, 14.982041},
+    {false, 0.5, 20, 14.876321}, {false, 0.5, 100, 14.843599},
 };
 
 constexpr double kGrading = 5;   ///< of the meshes that resolve the clamp: last edge over first
@@ -74,7 +87,8 @@ public:
     pushOff(rod, Eigen::Vector3d::UnitY(), 5e-4);
     RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
     const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
-    return report.ok && report.stable ? rod.state.x.row(1).cwiseAbs().maxCoeff() : std::numeric_limits<double>::quiet_NaN();
+    return report.ok && report.stable ? rod.state.x.row(1).cwiseAbs().maxCoeff()
+                                      : std::numeric_limits<double>::quiet_NaN();
   }
 
 private:
@@ -83,8 +97,8 @@ private:
   std::shared_ptr<const RodModel> planar_;
 };
 
-/// Smallest load at which the planar state is unstable: in moves of 2 % from half the threshold, then bisected to 1e-6. NaN: none up to
-/// twice the threshold.
+/// Smallest load at which the planar state is unstable: in moves of 2 % from half the threshold, then bisected to 1e-6.
+/// NaN: none up to twice the threshold.
 double smallestUnstable(HeavyCantilever& rod, double expected)
 {
   double stable = 0.5 * expected;
@@ -107,14 +121,17 @@ double smallestUnstable(HeavyCantilever& rod, double expected)
   return 0.5 * (stable + unstable);
 }
 
-}  // namespace
+}   // namespace
 
 void runLateralBuckling(StudyContext& context)
 {
   const std::vector<int> meshes = context.quick() ? std::vector<int>{50} : std::vector<int>{50, 100, 200};
-  Plot& errors = context.plot("lateral_buckling_error", "Lateral buckling: error against resolution (nu = 0.3)", "edges", "relative error of Gamma_c");
-  Plot& plots_polar = context.plot("lateral_buckling_polar", "Lateral buckling, polar twist modulus", "a / b", "Gamma_c = rho A g L^3 / A1");
-  Plot& plots_venant = context.plot("lateral_buckling_saint_venant", "Lateral buckling, Saint-Venant twist modulus", "a / b", "Gamma_c = rho A g L^3 / A1");
+  Plot& errors = context.plot("lateral_buckling_error", "Lateral buckling: error against resolution (nu = 0.3)",
+                              "edges", "relative error of Gamma_c");
+  Plot& plots_polar = context.plot("lateral_buckling_polar", "Lateral buckling, polar twist modulus", "a / b",
+                                   "Gamma_c = rho A g L^3 / A1");
+  Plot& plots_venant = context.plot("lateral_buckling_saint_venant", "Lateral buckling, Saint-Venant twist modulus",
+                                    "a / b", "Gamma_c = rho A g L^3 / A1");
   int done = 0;
   double worst_uniform = 0, order = std::numeric_limits<double>::infinity();
   const int total = static_cast<int>(2 * std::size(kThresholds) * meshes.size());
@@ -139,8 +156,11 @@ void runLateralBuckling(StudyContext& context)
         HeavyCantilever rod(t, edges, grading);
         const auto newRow = [&]() -> Row& {
           Row& row = context.row();
-          return row.set("torsion", t.polar ? "polar" : "Saint-Venant").set("nu", t.nu).set("a_over_b", t.a_over_b)
-              .set("mesh", grading == 1 ? "uniform" : "graded").set("edges", edges);
+          return row.set("torsion", t.polar ? "polar" : "Saint-Venant")
+              .set("nu", t.nu)
+              .set("a_over_b", t.a_over_b)
+              .set("mesh", grading == 1 ? "uniform" : "graded")
+              .set("edges", edges);
         };
         Row& row = newRow();
         if (t.gamma == 0)
@@ -151,16 +171,21 @@ void runLateralBuckling(StudyContext& context)
             rod.load(gamma);
             stable = stable && rod.planarIsStable();
           }
-          row.set("tip_angle_deg", rod.tipAngle() * 180 / M_PI).check(stable ? 0 : 1, 0, 0.5, "no buckling up to a tip angle of 84 degrees");
+          row.set("tip_angle_deg", rod.tipAngle() * 180 / M_PI)
+              .check(stable ? 0 : 1, 0, 0.5, "no buckling up to a tip angle of 84 degrees");
           continue;
         }
-        const double gamma = smallestUnstable(rod, t.gamma), error = gamma / t.gamma - 1, angle = rod.tipAngle() * 180 / M_PI;
+        const double gamma = smallestUnstable(rod, t.gamma), error = gamma / t.gamma - 1,
+                     angle = rod.tipAngle() * 180 / M_PI;
         row.set("tip_angle_deg", angle).set("relative_error", error);
-        // Near the sag beyond which nothing buckles the threshold runs away with the slightest change: there the clamp must be resolved.
+        // Near the sag beyond which nothing buckles the threshold runs away with the slightest change: there the clamp
+        // must be resolved.
         if (angle < 75 || grading > 1)
           row.check(gamma, t.gamma, 0.02 * t.gamma, "lateral_rod_ellipse tables");
         else
-          row.set("measured", gamma).set("expected", t.gamma).set("source", "clamp not resolved for this sag: no check");
+          row.set("measured", gamma)
+              .set("expected", t.gamma)
+              .set("source", "clamp not resolved for this sag: no check");
         double extents[2];
         for (const int side : {0, 1})
         {
@@ -169,8 +194,11 @@ void runLateralBuckling(StudyContext& context)
         }
         row.set("cpu_seconds", threadSeconds() - begin);
         if (angle < 75 || grading > 1)
-          newRow().set("extent_at_0.98", extents[0]).set("extent_at_1.02", extents[1])
-              .check(!(extents[0] < 1e-3) + !(extents[1] > 1e-3), 0, 0.5, "wrong classes of a rod pushed aside, 2 % below and above");
+          newRow()
+              .set("extent_at_0.98", extents[0])
+              .set("extent_at_1.02", extents[1])
+              .check(!(extents[0] < 1e-3) + !(extents[1] > 1e-3), 0, 0.5,
+                     "wrong classes of a rod pushed aside, 2 % below and above");
         if (edges == meshes.front() && grading > 1)
         {
           Series& s = plot.at("discrete, n = " + std::to_string(edges) + nu);
@@ -196,8 +224,10 @@ void runLateralBuckling(StudyContext& context)
   if (meshes.size() > 1)
     context.metric("observed_order", order);
   context.metric("worst_relative_error_uniform", worst_uniform);
-  context.note("Threshold: inertia of the Hessian at the planar equilibrium. Extents: over L, of the stable equilibrium found from a push of 5e-4 L.");
+  context.note(
+      "Threshold: inertia of the Hessian at the planar equilibrium. Extents: over L, of the stable equilibrium found "
+      "from a push of 5e-4 L.");
   context.note("graded: edges five times as long at the tip as at the clamp.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// What a scene does not name costs nothing: instructions per step and memory of every feature in scenes without it, beside scenes with it.
+// What a scene does not name costs nothing: instructions per step and memory of every feature in scenes without it,
+// beside scenes with it.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -27,7 +28,10 @@ struct Scene
 };
 
 /// Small, so that what does not depend on the size weighs as much as it ever does.
-const Scene kRod = {"rod", "rod", 0.005, R"(
+const Scene kRod = {"rod",
+                    "rod",
+                    0.005,
+                    R"(
 name: rod
 time: {step: 0.005, duration: 1}
 rods:
@@ -36,9 +40,13 @@ rods:
     cross_section: {radius: 0.005}
     material: {density: 1000, youngs_modulus: 1.0e7}
     grasps: {clamp: {edges: [0]}}
-)", {}};
+)",
+                    {}};
 
-const Scene kExplicitRod = {"rod, explicit, isotropic", "rod", 2e-5, R"(
+const Scene kExplicitRod = {"rod, explicit, isotropic",
+                            "rod",
+                            2e-5,
+                            R"(
 name: rod
 time: {step: 2.0e-5, duration: 1, integrator: symplectic_euler}
 rods:
@@ -47,9 +55,13 @@ rods:
     cross_section: {radius: 0.005}
     material: {density: 1000, youngs_modulus: 1.0e7}
     grasps: {clamp: {nodes: [0], hold: position}}
-)", {}};
+)",
+                            {}};
 
-const Scene kThread = {"thread", "thread", 0.001, R"(
+const Scene kThread = {"thread",
+                       "thread",
+                       0.001,
+                       R"(
 name: thread
 time: {step: 0.001, duration: 1}
 threads:
@@ -58,9 +70,13 @@ threads:
     centerline: {straight: {from: [0, 0, 0], to: [0.025, 0, 0], edges: 50}}
     radius: 0.000875
     ends: {oldest: held, newest: held}
-)", {}};
+)",
+                       {}};
 
-const Scene kCloth = {"cloth", "cloth", 0.01, R"(
+const Scene kCloth = {"cloth",
+                      "cloth",
+                      0.01,
+                      R"(
 name: cloth
 time: {step: 0.01, duration: 1}
 cloths:
@@ -70,9 +86,13 @@ cloths:
     bending: {model: hinge}
     solver: {one_newton_step: true}
     grasps: {left: {corner: lower_left}, right: {corner: lower_right}}
-)", {}};
+)",
+                      {}};
 
-const Scene kTracked = {"tracked", "tracked", 0.01, R"(
+const Scene kTracked = {"tracked",
+                        "tracked",
+                        0.01,
+                        R"(
 name: tracked
 time: {step: 0.01, duration: 1}
 tracked:
@@ -83,7 +103,8 @@ tracked:
     material: {area_density: 0.2, thickness: 0.001, youngs_modulus: 1.0e5}
     bending: {model: hinge}
     solver: {one_newton_step: true}
-)", {}};
+)",
+                        {}};
 
 Scene with(const Scene& scene, const std::vector<std::string>& overrides)
 {
@@ -109,42 +130,83 @@ std::vector<Feature> features()
 {
   const std::string plane = "obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, 0.0949]}}]";
   const Scene rod_on_floor = with(kRod, {"rods.0.contact={self: false, friction: 0}", plane});
-  const Scene cloth_on_ball = with(kCloth, {"cloths.0.contact={self: false, friction: 0, thickness: 0.002}",
-                                            "obstacles=[{name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0.15, 0.15, 0.198]}}]"});
+  const Scene cloth_on_ball =
+      with(kCloth, {"cloths.0.contact={self: false, friction: 0, thickness: 0.002}",
+                    "obstacles=[{name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0.15, 0.15, 0.198]}}]"});
   const Scene thread_with_itself = with(kThread, {"threads.0.contact={self: true, friction: 0}"});
   const std::vector<Scene> all = {kRod, kExplicitRod, kThread, kCloth, kTracked};
   return {
       {"contact",
-       {"src/contact/", "include/slender_sim/contact/", "src/thread/touching_threads", "include/slender_sim/thread/touching_threads", "src/cloth/cloth_group",
+       {"src/contact/", "include/slender_sim/contact/", "src/thread/touching_threads",
+        "include/slender_sim/thread/touching_threads", "src/cloth/cloth_group",
         "include/slender_sim/cloth/cloth_group"},
        "[cC]ontact|[tT]ouching|[cC]ollision|[cC]ollide",
        all,
        {rod_on_floor, thread_with_itself, cloth_on_ball}},
-      {"self-contact", {}, "\\bself\\b|self_", {kRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball},
-       {with(rod_on_floor, {"rods.0.contact.self=true"}), thread_with_itself, with(cloth_on_ball, {"cloths.0.contact.self=true"})}},
-      {"friction", {"include/slender_sim/contact/friction"}, "[fF]riction|\\bslip", {kRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball, thread_with_itself},
+      {"self-contact",
+       {},
+       "\\bself\\b|self_",
+       {kRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball},
+       {with(rod_on_floor, {"rods.0.contact.self=true"}), thread_with_itself,
+        with(cloth_on_ball, {"cloths.0.contact.self=true"})}},
+      {"friction",
+       {"include/slender_sim/contact/friction"},
+       "[fF]riction|\\bslip",
+       {kRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball, thread_with_itself},
        {with(rod_on_floor, {"rods.0.contact.friction=0.3"}), with(cloth_on_ball, {"cloths.0.contact.friction=0.3"})}},
       {"rigid bodies",
-       {"src/rod/body_system", "src/rod/coupled_", "src/rod/rod_group", "include/slender_sim/rod/rod_group", "include/slender_sim/rod/rigid_body",
-        "src/dynamics/fast_projection_bodies"},
+       {"src/rod/body_system", "src/rod/coupled_", "src/rod/rod_group", "include/slender_sim/rod/rod_group",
+        "include/slender_sim/rod/rigid_body", "src/dynamics/fast_projection_bodies"},
        "\\b[bB]od(y|ies)|\\bweld",
        all,
-       {with(kRod, {"bodies=[{name: disc, mass: 0.1, shape: {sphere: {radius: 0.02}}, contact: false, welds: [{rod: rod, edge: -1}]}]"})}},
-      {"material frames", {"src/rod/rod_frames", "src/rod/rod_system", "src/energy/rod_energy_kernel", "include/slender_sim/geometry/framed_curve"}, "\\bd1\\b|\\bd2\\b",
-       {kExplicitRod, kCloth, kTracked}, {with(kExplicitRod, {"rods.0.formulation=general"})}},
+       {with(kRod, {"bodies=[{name: disc, mass: 0.1, shape: {sphere: {radius: 0.02}}, contact: false, welds: [{rod: "
+                    "rod, edge: -1}]}]"})}},
+      {"material frames",
+       {"src/rod/rod_frames", "src/rod/rod_system", "src/energy/rod_energy_kernel",
+        "include/slender_sim/geometry/framed_curve"},
+       "\\bd1\\b|\\bd2\\b",
+       {kExplicitRod, kCloth, kTracked},
+       {with(kExplicitRod, {"rods.0.formulation=general"})}},
       {"twist", {}, "[tT]wist", {kExplicitRod, kCloth, kTracked}, {with(kExplicitRod, {"rods.0.formulation=general"})}},
-      {"surface tension", {"include/slender_sim/energy/surface_tension"}, "surface_tension", all, {with(kThread, {"threads.0.fluid.surface_tension=0.02"})}},
-      {"merging", {}, "merging", {kRod, kThread, kCloth, kTracked, thread_with_itself}, {with(thread_with_itself, {"threads.0.merging=true", "threads.0.fluid.surface_tension=0.02"})}},
-      {"adaptivity", {"src/thread/thread_remesh", "include/slender_sim/thread/thread_remesh"}, "error_tolerance|error_estimate|[rR]emesh", all,
-       {with(kRod, {"time.error_tolerance=1e-5"}), with(kThread, {"threads.0.edges={longest: 0.001}"}), with(kCloth, {"time.error_tolerance=1e-4"})}},
-      {"plasticity", {"src/cloth/plastic_flow", "include/slender_sim/cloth/plastic_flow"}, "[pP]lastic", all,
+      {"surface tension",
+       {"include/slender_sim/energy/surface_tension"},
+       "surface_tension",
+       all,
+       {with(kThread, {"threads.0.fluid.surface_tension=0.02"})}},
+      {"merging",
+       {},
+       "merging",
+       {kRod, kThread, kCloth, kTracked, thread_with_itself},
+       {with(thread_with_itself, {"threads.0.merging=true", "threads.0.fluid.surface_tension=0.02"})}},
+      {"adaptivity",
+       {"src/thread/thread_remesh", "include/slender_sim/thread/thread_remesh"},
+       "error_tolerance|error_estimate|[rR]emesh",
+       all,
+       {with(kRod, {"time.error_tolerance=1e-5"}), with(kThread, {"threads.0.edges={longest: 0.001}"}),
+        with(kCloth, {"time.error_tolerance=1e-4"})}},
+      {"plasticity",
+       {"src/cloth/plastic_flow", "include/slender_sim/cloth/plastic_flow"},
+       "[pP]lastic",
+       all,
        {with(kCloth, {"cloths.0.plasticity={yield_curvature: 0.1, creep_time: 0.1}"})}},
-      {"wind", {"src/cloth/wind_load"}, "\\bwind\\b|wind_|[dD]rag|erodynamic", all,
-       {with(kRod, {"rods.0.damping={drag: 0.1}", "wind={velocity: [1, 2, 0]}"}), with(kCloth, {"cloths.0.damping={drag: 0.5}", "wind={velocity: [1, 2, 0]}"})}},
-      {"damping", {"src/rod/rod_viscous"}, "[dD]amping|[vV]iscous", {kRod, kExplicitRod, kCloth, kTracked},
-       {with(kRod, {"rods.0.damping={mass: 0.1, stiffness: 0.001}"}), with(kCloth, {"cloths.0.damping={mass: 0.1, stiffness: 0.001}"})}},
-      {"tracking", {"src/tracking/", "include/slender_sim/tracking/", "src/scene/simulation_guides", "src/linalg/constrained_cholesky"}, "[tT]racking|[aA]verages|[gG]uide",
-       {kRod, kExplicitRod, kThread, kCloth}, {kTracked}},
+      {"wind",
+       {"src/cloth/wind_load"},
+       "\\bwind\\b|wind_|[dD]rag|erodynamic",
+       all,
+       {with(kRod, {"rods.0.damping={drag: 0.1}", "wind={velocity: [1, 2, 0]}"}),
+        with(kCloth, {"cloths.0.damping={drag: 0.5}", "wind={velocity: [1, 2, 0]}"})}},
+      {"damping",
+       {"src/rod/rod_viscous"},
+       "[dD]amping|[vV]iscous",
+       {kRod, kExplicitRod, kCloth, kTracked},
+       {with(kRod, {"rods.0.damping={mass: 0.1, stiffness: 0.001}"}),
+        with(kCloth, {"cloths.0.damping={mass: 0.1, stiffness: 0.001}"})}},
+      {"tracking",
+       {"src/tracking/", "include/slender_sim/tracking/", "src/scene/simulation_guides",
+        "src/linalg/constrained_cholesky"},
+       "[tT]racking|[aA]verages|[gG]uide",
+       {kRod, kExplicitRod, kThread, kCloth},
+       {kTracked}},
       {"recording", {"src/scene/recorder"}, "[rR]ecord", all, {[] {
          Scene s = kRod;
          s.options = {"--csv", "FOLDER"};
@@ -165,17 +227,23 @@ struct Share
 class Attribution
 {
 public:
-  Attribution(const Profiler& profiler, const Feature& feature) : profiler_(profiler), feature_(feature), words_(feature.words) {}
+  Attribution(const Profiler& profiler, const Feature& feature)
+    : profiler_(profiler),
+      feature_(feature),
+      words_(feature.words)
+  {
+  }
 
   bool hasFile(const std::string& file) const
   {
-    return std::any_of(feature_.files.begin(), feature_.files.end(), [&](const char* start) { return file.rfind(start, 0) == 0; });
+    return std::any_of(feature_.files.begin(), feature_.files.end(),
+                       [&](const char* start) { return file.rfind(start, 0) == 0; });
   }
 
   bool hasLine(const SourceLine& at) { return hasFile(at.file) || speaksOfIt(at, profiler_.text(at), lines_); }
 
-  /// The same of a line that takes memory. Settings among the fields of a record, in braces, are part of it: the list of what touches has a coefficient
-  /// of friction in each entry, and is there with or without friction.
+  /// The same of a line that takes memory. Settings among the fields of a record, in braces, are part of it: the list
+  /// of what touches has a coefficient of friction in each entry, and is there with or without friction.
   bool takesMemory(const SourceLine& at)
   {
     static const std::regex fields("\\{[^{}]*\\}");
@@ -197,22 +265,24 @@ public:
       const bool own_function = hasFile(cost.function_file);
       const bool of_a_library = !isOfPackage(cost.callee_file);
       if (cost.callee.empty() ? own_function || hasLine(cost.at) : own_function && of_a_library)
-        places[cost.at.file + ":" + std::to_string(cost.at.line)] += static_cast<double>(cost.instructions) / profile.steps;
+        places[cost.at.file + ":" + std::to_string(cost.at.line)] +=
+            static_cast<double>(cost.instructions) / profile.steps;
     }
     for (const auto& [place, instructions] : places)
       share.instructions += instructions;
     share.where = most(places);
   }
 
-  /// Of the simulation: what is taken while the scene file is read is given back, and a rod's model is what the scene says of it, in
-  /// numbers: its moduli, of which twisting has one, are there whatever becomes of it.
+  /// Of the simulation: what is taken while the scene file is read is given back, and a rod's model is what the scene
+  /// says of it, in numbers: its moduli, of which twisting has one, are there whatever becomes of it.
   void count(const std::vector<Allocation>& allocations, Share& share)
   {
     std::map<std::string, double> places;
     for (const Allocation& a : allocations)
     {
       const auto within = [&](const char* name) {
-        return std::any_of(a.functions.begin(), a.functions.end(), [&](const std::string& f) { return f.find(name) != std::string::npos; });
+        return std::any_of(a.functions.begin(), a.functions.end(),
+                           [&](const std::string& f) { return f.find(name) != std::string::npos; });
       };
       if (!within("slender::Simulation::") || within("slender::buildRod("))
         continue;
@@ -262,7 +332,9 @@ double heapCalls(const StepProfile& profile, std::string& where)
   const auto isOneOf = [](const std::string& name, std::initializer_list<const char*> names) {
     return std::any_of(names.begin(), names.end(), [&](const char* n) { return name == n; });
   };
-  const auto isHeap = [&](const std::string& f) { return isOneOf(f, {"malloc", "calloc", "realloc", "memalign", "posix_memalign", "aligned_alloc"}); };
+  const auto isHeap = [&](const std::string& f) {
+    return isOneOf(f, {"malloc", "calloc", "realloc", "memalign", "posix_memalign", "aligned_alloc"});
+  };
   double calls = 0;
   std::map<std::string, double> places;
   for (const InstructionCost& cost : profile.costs)
@@ -287,7 +359,12 @@ double heapCalls(const StepProfile& profile, std::string& where)
 class Runs
 {
 public:
-  Runs(StudyContext& context, const Profiler& profiler, int total) : context_(context), profiler_(profiler), total_(total) {}
+  Runs(StudyContext& context, const Profiler& profiler, int total)
+    : context_(context),
+      profiler_(profiler),
+      total_(total)
+  {
+  }
 
   const StepProfile& profile(const Scene& scene)
   {
@@ -295,7 +372,8 @@ public:
     if (added)
     {
       context_.progress(done_++, total_, std::string("instructions of ") + scene.name);
-      found->second = profiler_.instructions(scene.text, scene.step, scene.options, context_.quick() ? 8 : 24, context_.quick() ? 4 : 12);
+      found->second = profiler_.instructions(scene.text, scene.step, scene.options, context_.quick() ? 8 : 24,
+                                             context_.quick() ? 4 : 12);
     }
     return found->second;
   }
@@ -332,15 +410,15 @@ private:
 
 double perStep(const StepProfile& profile) { return static_cast<double>(profile.instructions) / profile.steps; }
 
-}  // namespace
+}   // namespace
 
 void runLean(StudyContext& context)
 {
   const std::filesystem::path program = thisProgram();
   const Profiler profiler((program.parent_path() / "simulate").string(), SLENDER_SOURCE_DIR);
   Runs runs(context, profiler, context.quick() ? 16 : 34);
-  Plot& plot = context.plot("lean", "Features per step: where the scene does not name them, and where it does", "feature, in the order of the table",
-                            "instructions over those of the step");
+  Plot& plot = context.plot("lean", "Features per step: where the scene does not name them, and where it does",
+                            "feature, in the order of the table", "instructions over those of the step");
   plot.log_x = false;
   plot.lines = false;
   double worst_instructions = 0, worst_bytes = 0;
@@ -361,8 +439,16 @@ void runLean(StudyContext& context)
       std::string name = scene.name;
       if (scene.options.size() > 0)
         name += ", " + scene.options[1];
-      context.row().set("feature", feature.name).set("in_scene", "absent").set("solver", scene.solver).set("scene", name).set("instructions_per_step", perStep(profile))
-          .set("of_feature", share.instructions).set("share", overhead).set("bytes", share.bytes).set("where", share.where);
+      context.row()
+          .set("feature", feature.name)
+          .set("in_scene", "absent")
+          .set("solver", scene.solver)
+          .set("scene", name)
+          .set("instructions_per_step", perStep(profile))
+          .set("of_feature", share.instructions)
+          .set("share", overhead)
+          .set("bytes", share.bytes)
+          .set("where", share.where);
       plot.at("absent").x.push_back(number);
       plot.at("absent").y.push_back(std::max(overhead, 1e-7));   // zero has no place on a logarithmic axis
     }
@@ -376,8 +462,15 @@ void runLean(StudyContext& context)
       std::string name = scene.name;
       for (std::size_t k = 1; k < scene.options.size(); k += 2)
         name += ", " + scene.options[k];
-      context.row().set("feature", feature.name).set("in_scene", "used").set("solver", scene.solver).set("scene", name).set("instructions_per_step", perStep(profile))
-          .set("of_feature", share.instructions).set("share", share.instructions / perStep(profile)).set("where", share.where);
+      context.row()
+          .set("feature", feature.name)
+          .set("in_scene", "used")
+          .set("solver", scene.solver)
+          .set("scene", name)
+          .set("instructions_per_step", perStep(profile))
+          .set("of_feature", share.instructions)
+          .set("share", share.instructions / perStep(profile))
+          .set("where", share.where);
       plot.at("used").x.push_back(number);
       plot.at("used").y.push_back(std::max(share.instructions / perStep(profile), 1e-7));
     }
@@ -389,16 +482,26 @@ void runLean(StudyContext& context)
     std::string where;
     const double calls = heapCalls(profile, where);
     most = std::max(most, calls);
-    context.row().set("feature", "allocations per warm step").set("in_scene", "all").set("solver", scene.solver).set("scene", scene.name)
-        .set("instructions_per_step", perStep(profile)).set("allocations_per_step", calls).set("where", where);
+    context.row()
+        .set("feature", "allocations per warm step")
+        .set("in_scene", "all")
+        .set("solver", scene.solver)
+        .set("scene", scene.name)
+        .set("instructions_per_step", perStep(profile))
+        .set("allocations_per_step", calls)
+        .set("where", where);
   }
   context.metric("max_instruction_overhead_absent", worst_instructions);
   context.metric("max_bytes_absent", worst_bytes);
   context.metric("allocations_per_step", most);
-  context.note("of_feature: instructions of the functions in the feature's files, with what libraries do for them, and of lines elsewhere that speak of it; bytes: what the "
-               "simulation takes from the heap there (a run of 4 steps, the reader and the models of rods apart); where: the place with the most. Instruction set: baseline, which valgrind knows. "
-               "allocations_per_step: calls of the heap in warm steps, from the end of one to the end of the next, the scene's inputs included. used: by the same count; a part that is mostly other code (frames, "
-               "contact) shows in instructions_per_step. Markers and diagnostics of the nodes are not counted here.");
+  context.note(
+      "of_feature: instructions of the functions in the feature's files, with what libraries do for them, and of lines "
+      "elsewhere that speak of it; bytes: what the "
+      "simulation takes from the heap there (a run of 4 steps, the reader and the models of rods apart); where: the "
+      "place with the most. Instruction set: baseline, which valgrind knows. "
+      "allocations_per_step: calls of the heap in warm steps, from the end of one to the end of the next, the scene's "
+      "inputs included. used: by the same count; a part that is mostly other code (frames, "
+      "contact) shows in instructions_per_step. Markers and diagnostics of the nodes are not counted here.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -66,7 +66,8 @@ public:
   static std::unique_ptr<Measure> make(const SceneConfig& scene)
   {
     const auto holds_nothing = [](const auto& object) { return object.grasps.empty(); };
-    if (std::all_of(scene.rods.begin(), scene.rods.end(), holds_nothing) && std::all_of(scene.cloths.begin(), scene.cloths.end(), holds_nothing))
+    if (std::all_of(scene.rods.begin(), scene.rods.end(), holds_nothing) &&
+        std::all_of(scene.cloths.begin(), scene.cloths.end(), holds_nothing))
       throw std::invalid_argument("loads: the scene has no grasp");
     return std::make_unique<Loads>();
   }
@@ -92,9 +93,15 @@ public:
   }
   Row finish() const override
   {
-    const BeltTrace t = classifyBeltTrace(landings_ ? landings_->points() : std::vector<Landings::Point>(), belt_, 0.5 * thinnest_);
-    return Row().set("pattern", t.pattern).set("amplitude [m]", t.amplitude).set("frequency_across [rad/s]", t.frequency_y)
-        .set("frequency_along [rad/s]", t.frequency_x).set("windings", t.windings).set("swing [turns]", t.swing);
+    const BeltTrace t =
+        classifyBeltTrace(landings_ ? landings_->points() : std::vector<Landings::Point>(), belt_, 0.5 * thinnest_);
+    return Row()
+        .set("pattern", t.pattern)
+        .set("amplitude [m]", t.amplitude)
+        .set("frequency_across [rad/s]", t.frequency_y)
+        .set("frequency_along [rad/s]", t.frequency_x)
+        .set("windings", t.windings)
+        .set("swing [turns]", t.swing);
   }
   static std::unique_ptr<Measure> make(const SceneConfig& scene)
   {
@@ -108,8 +115,8 @@ private:
   double belt_ = 0.0, thinnest_ = std::numeric_limits<double>::infinity();
 };
 
-/// How far the first rod ever leaves a plane. What buckles out of it does so by a third of its width and more; ends that are not quite in
-/// line bend it out by less.
+/// How far the first rod ever leaves a plane. What buckles out of it does so by a third of its width and more; ends
+/// that are not quite in line bend it out by less.
 class Planarity : public Measure
 {
 public:
@@ -117,10 +124,16 @@ public:
   {
     const Eigen::Matrix3Xd& x = simulation.state().rods[0].x;
     const Eigen::Matrix3Xd centered = x.colwise() - x.rowwise().mean();
-    const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(centered * centered.transpose()).eigenvalues().cwiseMax(0).cwiseSqrt();
+    const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(centered * centered.transpose())
+                                       .eigenvalues()
+                                       .cwiseMax(0)
+                                       .cwiseSqrt();
     farthest_ = std::max(farthest_, spread[0] / spread[2]);
   }
-  Row finish() const override { return Row().set("shape", farthest_ < 0.2 ? "planar" : "spatial").set("thickness_over_width", farthest_); }
+  Row finish() const override
+  {
+    return Row().set("shape", farthest_ < 0.2 ? "planar" : "spatial").set("thickness_over_width", farthest_);
+  }
   static std::unique_ptr<Measure> make(const SceneConfig& scene)
   {
     if (scene.rods.empty())
@@ -132,7 +145,8 @@ private:
   double farthest_ = 0.0;
 };
 
-/// Whether the first thread, held at both ends at one height, stops as a U on its way down or hangs on as a catenary (thesis 5.5).
+/// Whether the first thread, held at both ends at one height, stops as a U on its way down or hangs on as a catenary
+/// (thesis 5.5).
 class Sagging : public Measure
 {
 public:
@@ -160,7 +174,10 @@ public:
   Row finish() const override
   {
     // 0.18: the lowest of a string without surface tension or inertia; a fifth of that has all but stopped
-    return Row().set("shape", slowest_ < 0.035 ? "U" : "catenary").set("slowest", slowest_).set("sag_over_distance", sag_ / distance_);
+    return Row()
+        .set("shape", slowest_ < 0.035 ? "U" : "catenary")
+        .set("slowest", slowest_)
+        .set("sag_over_distance", sag_ / distance_);
   }
   static std::unique_ptr<Measure> make(const SceneConfig& scene)
   {
@@ -183,23 +200,31 @@ private:
 
   const ThreadConfig thread_;
   Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();
-  double distance_ = 0.0, speed_unit_ = 0.0, sag_ = 0.0, time_ = 0.0, slowest_ = std::numeric_limits<double>::infinity();
+  double distance_ = 0.0, speed_unit_ = 0.0, sag_ = 0.0, time_ = 0.0,
+         slowest_ = std::numeric_limits<double>::infinity();
   bool over_ = false;
 };
 
-}  // namespace
+}   // namespace
 
 const std::vector<MeasureKind>& measureKinds()
 {
   static const std::vector<MeasureKind> kinds = {
-      {"extents", "box around all nodes and the fastest of them, at the end",
-       {"x_min [m]", "x_max [m]", "y_min [m]", "y_max [m]", "z_min [m]", "z_max [m]", "speed_max [m/s]"}, &Extents::make},
+      {"extents",
+       "box around all nodes and the fastest of them, at the end",
+       {"x_min [m]", "x_max [m]", "y_min [m]", "y_max [m]", "z_min [m]", "z_max [m]", "speed_max [m/s]"},
+       &Extents::make},
       {"loads", "largest force and torque on a grasp", {"force_max [N]", "torque_max [N m]"}, &Loads::make},
-      {"belt_pattern", "what the first thread draws on its belt",
-       {"pattern", "amplitude [m]", "frequency_across [rad/s]", "frequency_along [rad/s]", "windings", "swing [turns]"}, &BeltPattern::make},
+      {"belt_pattern",
+       "what the first thread draws on its belt",
+       {"pattern", "amplitude [m]", "frequency_across [rad/s]", "frequency_along [rad/s]", "windings", "swing [turns]"},
+       &BeltPattern::make},
       {"planarity", "whether the first rod stays in a plane", {"shape", "thickness_over_width"}, &Planarity::make},
-      {"sagging", "whether the first thread, held at both ends, stops as a U or sags on as a catenary; slowest in units of rho g L^2 / mu",
-       {"shape", "slowest", "sag_over_distance"}, &Sagging::make},
+      {"sagging",
+       "whether the first thread, held at both ends, stops as a U or sags on as a catenary; slowest in units of rho g "
+       "L^2 / mu",
+       {"shape", "slowest", "sag_over_distance"},
+       &Sagging::make},
   };
   return kinds;
 }
@@ -212,4 +237,4 @@ const MeasureKind* findMeasure(const std::string& name)
   return nullptr;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -20,16 +20,17 @@ struct Case
   double edge = 1.0, shift = 0.0, ratio = 1.0;   ///< ratio of the radii
 };
 
-constexpr double kUntil = 0.3;   // of the sum of the radii: below what is compared
-constexpr double kEdges = 24.0;  // radii long
+constexpr double kUntil = 0.3;    // of the sum of the radii: below what is compared
+constexpr double kEdges = 24.0;   // radii long
 
 /// [s]
 double timeScale(const Case& c) { return c.viscosity * c.radius / c.surface_tension; }
 
-/// The model: surface tension 2 pi gamma r draws two balls of radius r = (r1 + r2)/2 together, mu (4 pi/3) rho |d'| resists, so
+/// The model: surface tension 2 pi gamma r draws two balls of radius r = (r1 + r2)/2 together, mu (4 pi/3) rho |d'|
+/// resists, so
 ///   d' = -(3/2) gamma r / (mu rho),  rho^2 = r^2 - d^2/4,
-/// for d = 2 r cos(a) of constant radius a - sin(a) cos(a) = 3 gamma t / (2 mu r). Free threads also thicken, r' = gamma/(6 mu). By
-/// Runge-Kutta's method for a^3, which begins smoothly.
+/// for d = 2 r cos(a) of constant radius a - sin(a) cos(a) = 3 gamma t / (2 mu r). Free threads also thicken, r' =
+/// gamma/(6 mu). By Runge-Kutta's method for a^3, which begins smoothly.
 double modelDistance(const Case& c, double time)
 {
   const double growth = c.surface_tension / (6 * c.viscosity);
@@ -42,8 +43,8 @@ double modelDistance(const Case& c, double time)
   double u = 0.0;
   for (int k = 0; k < steps; ++k)
   {
-    const double t = k * h, k1 = rate(t, u), k2 = rate(t + 0.5 * h, u + 0.5 * h * k1), k3 = rate(t + 0.5 * h, u + 0.5 * h * k2),
-                 k4 = rate(t + h, u + h * k3);
+    const double t = k * h, k1 = rate(t, u), k2 = rate(t + 0.5 * h, u + 0.5 * h * k1),
+                 k3 = rate(t + 0.5 * h, u + 0.5 * h * k2), k4 = rate(t + h, u + h * k3);
     u += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
   }
   return 2 * (c.radius + growth * time) * std::cos(std::cbrt(u));
@@ -63,7 +64,8 @@ Seen mergePair(const Case& c, int steps, double duration, double until)
   const double radii[2] = {2 * c.radius / (1 + c.ratio), 2 * c.radius * c.ratio / (1 + c.ratio)};
   for (int k = 0; k < 2; ++k)
   {
-    ThreadSetup t = straightThread(kEdges * c.radius, Eigen::VectorXd::Constant(static_cast<int>(std::lround(kEdges / c.edge)), radii[k]));
+    ThreadSetup t = straightThread(kEdges * c.radius,
+                                   Eigen::VectorXd::Constant(static_cast<int>(std::lround(kEdges / c.edge)), radii[k]));
     t.model.viscosity = c.viscosity;
     t.model.surface_tension = c.surface_tension;
     t.model.density = 1e-4 * c.viscosity * c.viscosity / (c.surface_tension * c.radius);   // inertia is no matter
@@ -106,8 +108,10 @@ double largestInfluence()
     std::string text = "name: off\ntime: {step: 0.002, duration: 1}\nthreads:\n";
     for (int k = 0; k < 2; ++k)
       if (k ? second : first)
-        text += "  - {name: t" + std::to_string(k) + ", fluid: {density: 1400, viscosity: 20, surface_tension: 0.05}, radius: 0.001,\n" +
-                "     centerline: {straight: {from: [0, 0, " + (k ? "0.0015" : "0") + "], to: [0.03, 0, 0.002], edges: 20}}, ends: {oldest: held}}\n";
+        text += "  - {name: t" + std::to_string(k) +
+                ", fluid: {density: 1400, viscosity: 20, surface_tension: 0.05}, radius: 0.001,\n" +
+                "     centerline: {straight: {from: [0, 0, " + (k ? "0.0015" : "0") +
+                "], to: [0.03, 0, 0.002], edges: 20}}, ends: {oldest: held}}\n";
     return parseScene(text, "merging");
   };
   Simulation both(scene(true, true)), first(scene(true, false)), second(scene(false, true));
@@ -135,11 +139,14 @@ void pile(StudyContext& context)
   plot.markers = false;
   for (const bool merging : {false, true})
   {
-    Simulation s(parseScene(std::string("name: pile\ntime: {step: 0.002, duration: 4}\nthreads:\n"
-                                        "  - {name: honey, fluid: {density: 1400, viscosity: 100, surface_tension: 0.3}, floor: {height: 0},\n"
-                                        "     nozzle: {position: [0, 0, 0.06], direction: [0.01, 0.02, -1], diameter: 0.01, flow: 4.0e-6},\n"
-                                        "     edges: {feed: 0.004, longest: 0.005, shortest: 0.0015}, contact: {self: true}, merging: ") +
-                              (merging ? "true" : "false") + "}\n", "merging"));
+    Simulation s(parseScene(
+        std::string(
+            "name: pile\ntime: {step: 0.002, duration: 4}\nthreads:\n"
+            "  - {name: honey, fluid: {density: 1400, viscosity: 100, surface_tension: 0.3}, floor: {height: 0},\n"
+            "     nozzle: {position: [0, 0, 0.06], direction: [0.01, 0.02, -1], diameter: 0.01, flow: 4.0e-6},\n"
+            "     edges: {feed: 0.004, longest: 0.005, shortest: 0.0015}, contact: {self: true}, merging: ") +
+            (merging ? "true" : "false") + "}\n",
+        "merging"));
     const int steps = static_cast<int>(std::lround(duration / 0.002));
     for (int k = 0; k < steps; ++k)
     {
@@ -162,15 +169,20 @@ void pile(StudyContext& context)
   }
 }
 
-}  // namespace
+}   // namespace
 
 void runMerging(StudyContext& context)
 {
   const int steps = context.quick() ? 200 : 800;
-  const Case cases[] = {{"honey", 10, 0.05, 1e-3},           {"pitch", 1e6, 0.03, 1e-2},          {"thin", 0.1, 0.07, 1e-4},
-                        {"short edges", 10, 0.05, 1e-3, 0.5}, {"long edges", 10, 0.05, 1e-3, 3.0}, {"nodes between nodes", 10, 0.05, 1e-3, 1.0, 0.4},
+  const Case cases[] = {{"honey", 10, 0.05, 1e-3},
+                        {"pitch", 1e6, 0.03, 1e-2},
+                        {"thin", 0.1, 0.07, 1e-4},
+                        {"short edges", 10, 0.05, 1e-3, 0.5},
+                        {"long edges", 10, 0.05, 1e-3, 3.0},
+                        {"nodes between nodes", 10, 0.05, 1e-3, 1.0, 0.4},
                         {"unequal radii", 10, 0.05, 1e-3, 1.0, 0.0, 1.5}};
-  Plot& plot = context.plot("merging", "two parallel threads in touch", "gamma t / (mu r) [-]", "distance of the axes / 2 r [-]");
+  Plot& plot = context.plot("merging", "two parallel threads in touch", "gamma t / (mu r) [-]",
+                            "distance of the axes / 2 r [-]");
   plot.log_x = plot.log_y = false;
   plot.markers = false;
   const char* source = "2 pi gamma r = mu (4 pi/3) rho |d'|, rho^2 = r^2 - d^2/4, r' = gamma/(6 mu)";
@@ -188,7 +200,8 @@ void runMerging(StudyContext& context)
       Row& row = context.row();
       row.set("test", c.name).set("quantity", "distance of the axes").set("t", seen.time[k]);
       const double expected = modelDistance(c, seen.time[k]);
-      row.check(seen.distance[k], expected, 0.01 * expected, source).set("relative_error", seen.distance[k] / expected - 1);
+      row.check(seen.distance[k], expected, 0.01 * expected, source)
+          .set("relative_error", seen.distance[k] / expected - 1);
     }
     Series& series = plot.at(c.name);
     for (int k = 0; k < steps; k += steps / 50)
@@ -221,4 +234,4 @@ void runMerging(StudyContext& context)
   pile(context);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

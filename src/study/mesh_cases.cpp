@@ -56,13 +56,15 @@ TriangleMesh closedGrid(int along, int around, const std::function<Vector3d(doub
   return mesh;
 }
 
-void drawFaces(Plot& picture, const std::string& label, const TriangleMesh& mesh, const Camera& camera, Eigen::Index first_face, const Vector3d& shift)
+void drawFaces(Plot& picture, const std::string& label, const TriangleMesh& mesh, const Camera& camera,
+               Eigen::Index first_face, const Vector3d& shift)
 {
   std::set<std::pair<int, int>> drawn;
   for (Eigen::Index f = first_face; f < mesh.triangles.cols(); ++f)
   {
     const Eigen::Vector3i t = mesh.triangles.col(f);
-    const Vector3d normal = Vector3d(mesh.vertices.col(t[1]) - mesh.vertices.col(t[0])).cross(mesh.vertices.col(t[2]) - mesh.vertices.col(t[0]));
+    const Vector3d normal = Vector3d(mesh.vertices.col(t[1]) - mesh.vertices.col(t[0]))
+                                .cross(mesh.vertices.col(t[2]) - mesh.vertices.col(t[0]));
     if (normal.dot(camera.view) > 0)
       continue;
     for (int k = 0; k < 3; ++k)
@@ -77,4 +79,4 @@ void drawFaces(Plot& picture, const std::string& label, const TriangleMesh& mesh
   }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

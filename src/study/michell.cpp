@@ -1,4 +1,5 @@
-// Michell's (Zajac's) instability: the twist at which a ring of a naturally straight isotropic rod leaves its plane (thesis 4.7.1, Fig. 4.4).
+// Michell's (Zajac's) instability: the twist at which a ring of a naturally straight isotropic rod leaves its plane
+// (thesis 4.7.1, Fig. 4.4).
 #include <cmath>
 #include <string>
 
@@ -14,8 +15,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// Ring of radius 1 with bending modulus 1. The imposed twist is a rest twist of the opposite sign: a closed rod turned by any angle
-/// before its ends were joined.
+/// Ring of radius 1 with bending modulus 1. The imposed twist is a rest twist of the opposite sign: a closed rod turned
+/// by any angle before its ends were joined.
 class Ring
 {
 public:
@@ -26,14 +27,15 @@ public:
     for (int i = 0; i < edges; ++i)
       nodes.col(i) = radius * Eigen::Vector3d(std::cos(2 * kPi * i / edges), std::sin(2 * kPi * i / edges), 0);
     const RodSection section{0.01, 0.01, 1.0, 1e6, Eigen::Matrix2d::Identity(), beta};
-    model_ = buildRod("ring", nodes, true, std::vector<RodSection>(edges, section), Eigen::Vector3d::UnitZ(), true, {curvature, false});
+    model_ = buildRod("ring", nodes, true, std::vector<RodSection>(edges, section), Eigen::Vector3d::UnitZ(), true,
+                      {curvature, false});
     state_ = makeRodState(model_, nodes, Eigen::Vector3d::UnitZ());
   }
 
   void twist(double angle) { model_.rest_twist.setConstant(-angle / edges_); }
 
-  /// Whether the energy has a minimum in the plane. A millionth of the bending stiffness on all nodes decides the rigid motions, which
-  /// cost nothing.
+  /// Whether the energy has a minimum in the plane. A millionth of the bending stiffness on all nodes decides the rigid
+  /// motions, which cost nothing.
   bool planarIsStable() const
   {
     RodSystem system(model_);
@@ -44,15 +46,16 @@ public:
     return system.evaluate(true).inertia.positiveDefinite();
   }
 
-  /// The same of the isotropic formulation, which has no Hessian: differences of its gradient in the modes of two waves around the ring.
-  /// By symmetry the first instability is one of these.
+  /// The same of the isotropic formulation, which has no Hessian: differences of its gradient in the modes of two waves
+  /// around the ring. By symmetry the first instability is one of these.
   bool planarIsStableIsotropic() const
   {
     Eigen::MatrixXd modes(3 * edges_, 6);
     for (int i = 0; i < edges_; ++i)
     {
       const double phi = 2 * kPi * i / edges_;
-      const Eigen::Vector3d axes[3] = {{std::cos(phi), std::sin(phi), 0}, {-std::sin(phi), std::cos(phi), 0}, {0, 0, 1}};
+      const Eigen::Vector3d axes[3] = {
+          {std::cos(phi), std::sin(phi), 0}, {-std::sin(phi), std::cos(phi), 0}, {0, 0, 1}};
       for (int k = 0; k < 3; ++k)
       {
         modes.block<3, 1>(3 * i, 2 * k) = std::cos(2 * phi) * axes[k];
@@ -77,8 +80,10 @@ public:
     };
     Eigen::Matrix<double, 6, 6> hessian;
     for (int k = 0; k < 6; ++k)
-      hessian.col(k) = modes.transpose() * (gradient(step * modes.col(k)) - gradient(-step * modes.col(k))) / (2 * step);
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(0.5 * (hessian + hessian.transpose())).eigenvalues()[0] > 0;
+      hessian.col(k) =
+          modes.transpose() * (gradient(step * modes.col(k)) - gradient(-step * modes.col(k))) / (2 * step);
+    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(0.5 * (hessian + hessian.transpose()))
+               .eigenvalues()[0] > 0;
   }
 
   /// Growth of a small lateral push of the second mode over a damped motion of two seconds: above 1, unstable.
@@ -124,11 +129,12 @@ private:
   RodState state_;
 };
 
-}  // namespace
+}   // namespace
 
 void runMichell(StudyContext& context)
 {
-  Plot& plot = context.plot("michell", "Michell's instability of a twisted ring, n = 50", "beta / alpha", "twist [rad]");
+  Plot& plot =
+      context.plot("michell", "Michell's instability of a twisted ring, n = 50", "beta / alpha", "twist [rad]");
   plot.log_x = plot.log_y = false;
   const double step = context.quick() ? 0.5 : 0.1;
   const std::vector<int> meshes = {50, 100};
@@ -148,12 +154,19 @@ void runMichell(StudyContext& context)
       const char* source = "reference 2b: closed n-gon, 2 pi sqrt 3 (1 + 31.3/n^2)";
       row("general").check(stable, expected, 0.01 * expected, source);
       row("isotropic").check(isotropic, expected, 0.01 * expected, source);
-      row("both").check(isotropic, stable, 1e-3 * stable, "the other formulation; the smallest differences of a gradient and the general one's weight on rigid motions");
+      row("both").check(isotropic, stable, 1e-3 * stable,
+                        "the other formulation; the smallest differences of a gradient and the general one's weight on "
+                        "rigid motions");
       if (edges != 50)
         continue;
       const double compensated = Ring(edges, beta, Curvature::compensated).threshold(expected, false);
-      context.row().set("n", edges).set("beta_over_alpha", beta).set("curvature", "compensated").set("relative_error", compensated / smooth - 1)
-          .check(compensated, smooth, 0.0025 * smooth, "2 pi sqrt 3 alpha / beta, continuous (the thesis's joints: 1.3 % off)");
+      context.row()
+          .set("n", edges)
+          .set("beta_over_alpha", beta)
+          .set("curvature", "compensated")
+          .set("relative_error", compensated / smooth - 1)
+          .check(compensated, smooth, 0.0025 * smooth,
+                 "2 pi sqrt 3 alpha / beta, continuous (the thesis's joints: 1.3 % off)");
       plot.at("compensated, n = 50").x.push_back(beta);
       plot.at("compensated, n = 50").y.push_back(compensated);
       plot.at("theory (continuous)").x.push_back(beta);
@@ -178,4 +191,4 @@ void runMichell(StudyContext& context)
     }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

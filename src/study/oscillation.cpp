@@ -22,7 +22,8 @@ Eigen::MatrixXd tones(const Eigen::Vector2d& omega, Eigen::Index samples, double
   return basis;
 }
 
-/// The best of a grid of frequencies about the mean one, which the zero crossings give; spaced finely enough for Gauss-Newton.
+/// The best of a grid of frequencies about the mean one, which the zero crossings give; spaced finely enough for
+/// Gauss-Newton.
 Eigen::Vector2d scan(const std::vector<Eigen::VectorXd>& signals, double interval)
 {
   const Eigen::Index samples = signals.front().size();
@@ -47,7 +48,8 @@ Eigen::Vector2d scan(const std::vector<Eigen::VectorXd>& signals, double interva
       double misfit = 0;
       for (const Eigen::VectorXd& q : signals)
       {
-        const Eigen::VectorXd thin = Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<>>(q.data(), basis.rows(), Eigen::InnerStride<>(stride));
+        const Eigen::VectorXd thin = Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<>>(
+            q.data(), basis.rows(), Eigen::InnerStride<>(stride));
         misfit += (thin - basis * normal.solve(basis.transpose() * thin)).squaredNorm();
       }
       if (misfit < least)
@@ -59,7 +61,7 @@ Eigen::Vector2d scan(const std::vector<Eigen::VectorXd>& signals, double interva
   return best;
 }
 
-}  // namespace
+}   // namespace
 
 TwoTones fitTwoTones(const std::vector<std::vector<double>>& signals, double interval)
 {
@@ -110,4 +112,4 @@ TwoTones fitTwoTones(const std::vector<std::vector<double>>& signals, double int
   return {omega[0] / (2 * M_PI), omega[1] / (2 * M_PI), misfit};
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

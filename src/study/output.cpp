@@ -60,7 +60,6 @@ std::string jsonString(const std::string& text)
 {
   std::string out = "\"";
   for (const char c : text)
-  {
     if (c == '"' || c == '\\')
       out += std::string("\\") + c;
     else if (c == '\n')
@@ -73,7 +72,6 @@ std::string jsonString(const std::string& text)
     }
     else
       out += c;
-  }
   return out + "\"";
 }
 
@@ -117,7 +115,10 @@ void writeScript(std::ostream& out, const Plot& plot, const std::string& picture
   for (const Series& s : plot.series)
   {
     const bool line = s.line || (plot.lines && !s.points), markers = !s.line && (!line || plot.markers);
-    out << (index ? ", \\\n     " : "") << "$series" << index << " using 1:2 with " << (!line ? "points" : markers ? "linespoints" : "lines");
+    out << (index ? ", \\\n     " : "") << "$series" << index << " using 1:2 with "
+        << (!line     ? "points"
+            : markers ? "linespoints"
+                      : "lines");
     if (markers)
       out << " pointtype " << index % 13 + 4;
     out << " title " << gnuplotString(s.label);
@@ -140,11 +141,12 @@ bool runGnuplot(const std::string& script, bool& missing)
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR)
       return false;
-  missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;   // how older C libraries report a program that is not there
+  // how older C libraries report a program that is not there
+  missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-}  // namespace
+}   // namespace
 
 void printTable(std::ostream& out, const StudyContext& context)
 {
@@ -250,10 +252,7 @@ std::vector<std::string> csvCells(const std::string& line)
   return cells;
 }
 
-std::string valueText(const Row& row, const std::string& key)
-{
-  return cell(row, key, "%.12g");
-}
+std::string valueText(const Row& row, const std::string& key) { return cell(row, key, "%.12g"); }
 
 void writeCsv(std::ostream& out, const StudyContext& context)
 {
@@ -288,14 +287,16 @@ std::string writePlots(const std::string& directory, const StudyContext& context
   std::string problem;
   for (const Plot& plot : context.plots())
   {
-    const bool drawable = std::any_of(plot.series.begin(), plot.series.end(), [](const Series& s) { return !s.x.empty(); });
+    const bool drawable =
+        std::any_of(plot.series.begin(), plot.series.end(), [](const Series& s) { return !s.x.empty(); });
     if (drawable && problem.empty())
       problem = drawn(plot.name, [&](std::ostream& out, const std::string& png) { writeScript(out, plot, png); });
   }
   for (const SurfacePicture& picture : context.pictures())
     if (problem.empty() && !picture.panels.empty())
-      problem = drawn(picture.name, [&](std::ostream& out, const std::string& png) { writeSurfaceScript(out, picture, png); });
+      problem = drawn(picture.name,
+                      [&](std::ostream& out, const std::string& png) { writeSurfaceScript(out, picture, png); });
   return problem;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

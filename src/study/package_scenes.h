@@ -5,7 +5,8 @@
 
 namespace slender::study {
 
-/// The scenes that studies run and what they refer to, by their paths in `config`: built in, so that a study needs no files (cmake/study.cmake).
+/// The scenes that studies run and what they refer to, by their paths in `config`: built in, so that a study needs no
+/// files (cmake/study.cmake).
 const std::map<std::string, const char*>& packageFiles();
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A sheet whose guide contracts in its plane: regions of test functions set the scale of its folds (thesis figures 6.5 and 6.6).
+// A sheet whose guide contracts in its plane: regions of test functions set the scale of its folds (thesis figures 6.5
+// and 6.6).
 #include <cmath>
 #include <random>
 #include <stdexcept>
@@ -39,12 +40,14 @@ GuidedCloth contracting(int cells, const std::vector<int>& region)
 /// Square patches of so many cells in the left and in the right half.
 std::vector<int> patches(int cells, int left, int right)
 {
-  const int half = cells / 2, left_columns = half / left, left_patches = left_columns * (cells / left), right_columns = half / right;
+  const int half = cells / 2, left_columns = half / left, left_patches = left_columns * (cells / left),
+            right_columns = half / right;
   std::vector<int> region;
   for (int j = 0; j < cells; ++j)
     for (int i = 0; i < cells; ++i)
     {
-      const int r = i < half ? (j / left) * left_columns + i / left : left_patches + (j / right) * right_columns + (i - half) / right;
+      const int r = i < half ? (j / left) * left_columns + i / left
+                             : left_patches + (j / right) * right_columns + (i - half) / right;
       region.insert(region.end(), 2, r);   // two faces per cell, in the order of gridMesh
     }
   return region;
@@ -107,11 +110,14 @@ void changeRegions(StudyContext& context, int cells, const TriangleMesh& sheet)
 {
   constexpr double kFrom = 1.5, kEnd = 3.0;
   constexpr int kFew = 16, kMany = 256;
-  SurfacePicture& picture = context.picture("partitions_changed", "16 regions, and 256 that take over while the sheet moves");
+  SurfacePicture& picture =
+      context.picture("partitions_changed", "16 regions, and 256 that take over while the sheet moves");
   picture.view = {0.25, 0.8, -0.9};
   picture.columns = 4;
-  Plot& away = context.plot("partitions_changed_distance", "256 regions take over from 16 at 1.5 s", "time [s]", "greatest distance of an average of the 256 from the guide's [m]");
-  Plot& speed = context.plot("partitions_changed_speed", "256 regions take over from 16 at 1.5 s", "time [s]", "greatest speed of a vertex [m/s]");
+  Plot& away = context.plot("partitions_changed_distance", "256 regions take over from 16 at 1.5 s", "time [s]",
+                            "greatest distance of an average of the 256 from the guide's [m]");
+  Plot& speed = context.plot("partitions_changed_speed", "256 regions take over from 16 at 1.5 s", "time [s]",
+                             "greatest speed of a vertex [m/s]");
   for (Plot* plot : {&away, &speed})
   {
     plot->log_x = plot->log_y = false;
@@ -141,7 +147,8 @@ void changeRegions(StudyContext& context, int cells, const TriangleMesh& sheet)
     disturb(x);
     const std::string label = duration > 0 ? "blended within 0.4 s" : "in one step";
     FunctionBlend blend;
-    const int change = static_cast<int>(std::lround(kFrom / c.step)), steps = static_cast<int>(std::lround(kEnd / c.step));
+    const int change = static_cast<int>(std::lround(kFrom / c.step)),
+              steps = static_cast<int>(std::lround(kEnd / c.step));
     for (int k = 0; k < steps; ++k)
     {
       const double t = k * c.step;
@@ -172,26 +179,29 @@ void changeRegions(StudyContext& context, int cells, const TriangleMesh& sheet)
       if (duration > 0 && k == change + 20)
         picture.panels.push_back({"half of the blend", {{{x, sheet.triangles}}}});
     }
-    picture.panels.push_back({duration > 0 ? "256 regions, blended" : "256 regions, in one step", {{{x, sheet.triangles}}}});
+    picture.panels.push_back(
+        {duration > 0 ? "256 regions, blended" : "256 regions, in one step", {{{x, sheet.triangles}}}});
   }
   context.metric("change_speed_over_blended", greatest[0] / greatest[1]);
   context.metric("error_after_change_m", error);
 }
 
-}  // namespace
+}   // namespace
 
 void runPartitions(StudyContext& context)
 {
   useOneBlasThread();
   const int cells = context.quick() ? 48 : 72, scale = cells / 24;
-  SurfacePicture& scales = context.picture("partitions", "A contracting sheet tracked by 16, 64, 256 and 1024 regions (thesis figure 6.6)");
+  SurfacePicture& scales =
+      context.picture("partitions", "A contracting sheet tracked by 16, 64, 256 and 1024 regions (thesis figure 6.6)");
   SurfacePicture& spread = context.picture("partitions_spread", "Regions of one size and of two (thesis figure 6.5)");
   for (SurfacePicture* picture : {&scales, &spread})
   {
     picture->view = {0.25, 0.8, -0.9};
     picture->columns = picture == &scales ? 4 : 2;
   }
-  Plot& plot = context.plot("partitions_scale", "Regions set the scale of folds", "size of a region (root of its area) [m]", "[m]");
+  Plot& plot = context.plot("partitions_scale", "Regions set the scale of folds",
+                            "size of a region (root of its area) [m]", "[m]");
   const TriangleMesh sheet = guideSheet(kSide, cells, 0.0);
 
   std::vector<SurfacePicture::Panel> below;
@@ -206,11 +216,20 @@ void runPartitions(StudyContext& context)
     const Clustering clusters = clusterFaces(sheet.triangles, {sheet.vertices}, options);
     const GuidedCloth c = contracting(cells, clusters.region);
     const Folded folded = fold(c);
-    const double length = wavelength(sheet, folded.x, cells, 0, cells), size = kSide / std::sqrt(static_cast<double>(count));
+    const double length = wavelength(sheet, folded.x, cells, 0, cells),
+                 size = kSide / std::sqrt(static_cast<double>(count));
     const double out = std::sqrt(folded.x.row(2).squaredNorm() / static_cast<double>(folded.x.cols()));
-    context.row().set("regions", static_cast<double>(count)).set("spread", "clusters").set("part", "all").set("vertices", static_cast<double>(sheet.vertices.cols()))
-      .set("region_size_m", size).set("wavelength_m", length).set("rms_from_guide_m", folded.away).set("rms_out_of_plane_m", out)
-      .set("average_error_m", folded.error).set("ms_per_step", folded.ms);
+    context.row()
+        .set("regions", static_cast<double>(count))
+        .set("spread", "clusters")
+        .set("part", "all")
+        .set("vertices", static_cast<double>(sheet.vertices.cols()))
+        .set("region_size_m", size)
+        .set("wavelength_m", length)
+        .set("rms_from_guide_m", folded.away)
+        .set("rms_out_of_plane_m", out)
+        .set("average_error_m", folded.error)
+        .set("ms_per_step", folded.ms);
     plot.at("mean wavelength of folds").x.push_back(size);
     plot.at("mean wavelength of folds").y.push_back(length);
     plot.at("RMS distance from the guide").x.push_back(size);
@@ -219,7 +238,8 @@ void runPartitions(StudyContext& context)
     last_wavelength = length;
     last_away = folded.away;
     first_wavelength = count == 16 ? length : first_wavelength;
-    scales.panels.push_back({std::to_string(count) + " regions", {{sheet, true, huesOf(sheet.triangles, clusters.region)}}});
+    scales.panels.push_back(
+        {std::to_string(count) + " regions", {{sheet, true, huesOf(sheet.triangles, clusters.region)}}});
     below.push_back({"", {{{folded.x, sheet.triangles}}}});
   }
   scales.panels.insert(scales.panels.end(), below.begin(), below.end());
@@ -238,10 +258,16 @@ void runPartitions(StudyContext& context)
     for (const int half : {0, 1})
     {
       lengths[half] = wavelength(sheet, folded.x, cells, half * cells / 2, cells / 2);
-      context.row().set("regions", static_cast<double>(1 + *std::max_element(region.begin(), region.end()))).set("spread", name)
-        .set("part", half ? "right half" : "left half").set("vertices", static_cast<double>(sheet.vertices.cols()))
-        .set("region_size_m", (half ? right : left) * kSide / cells).set("wavelength_m", lengths[half]).set("rms_from_guide_m", folded.away)
-        .set("average_error_m", folded.error).set("ms_per_step", folded.ms);
+      context.row()
+          .set("regions", static_cast<double>(1 + *std::max_element(region.begin(), region.end())))
+          .set("spread", name)
+          .set("part", half ? "right half" : "left half")
+          .set("vertices", static_cast<double>(sheet.vertices.cols()))
+          .set("region_size_m", (half ? right : left) * kSide / cells)
+          .set("wavelength_m", lengths[half])
+          .set("rms_from_guide_m", folded.away)
+          .set("average_error_m", folded.error)
+          .set("ms_per_step", folded.ms);
     }
     context.metric(std::string("left_over_right_") + name, lengths[0] / lengths[1]);
     spread.panels.push_back({name, {{sheet, true, huesOf(sheet.triangles, region)}}});
@@ -250,9 +276,12 @@ void runPartitions(StudyContext& context)
   spread.panels.insert(spread.panels.end(), below.begin(), below.end());
   context.progress(6, 7, "regions that change");
   changeRegions(context, cells, sheet);
-  context.note("the guide contracts by 12 % in both directions of its plane; wavelength: geometric mean over the spectrum of mean curvature; "
-               "out_of_order: how often more regions did not mean finer folds and closer tracking; "
-               "change_speed_over_blended: greatest speed of a vertex after 256 regions take over from 16 in one step, over that with a blend of 0.4 s");
+  context.note(
+      "the guide contracts by 12 % in both directions of its plane; wavelength: geometric mean over the spectrum of "
+      "mean curvature; "
+      "out_of_order: how often more regions did not mean finer folds and closer tracking; "
+      "change_speed_over_blended: greatest speed of a vertex after 256 regions take over from 16 in one step, over "
+      "that with a blend of 0.4 s");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -18,13 +18,15 @@ RodSetup settled(RodSetup rod, const std::string& what)
   return rod;
 }
 
-/// Arc of 45 degrees, R = 1 m, 1 cm square section, E = 1e9 Pa, nu = 0, 6 N out of its plane at the tip [Bathe & Bolourchi 1979 in other
-/// units; Simo & Vu-Quoc 1986].
+/// Arc of 45 degrees, R = 1 m, 1 cm square section, E = 1e9 Pa, nu = 0, 6 N out of its plane at the tip [Bathe &
+/// Bolourchi 1979 in other units; Simo & Vu-Quoc 1986].
 Eigen::Vector3d bentCantilever(int edges)
 {
-  const double youngs = 1e9, side = 0.01, bend = youngs * std::pow(side, 4) / 12, twist = 0.5 * youngs * 0.140577 * std::pow(side, 4);
+  const double youngs = 1e9, side = 0.01, bend = youngs * std::pow(side, 4) / 12,
+               twist = 0.5 * youngs * 0.140577 * std::pow(side, 4);
   RodSection section = sectionOf(youngs * side * side, bend, bend, twist);
-  const Eigen::Matrix3Xd arc = arcCurve({1, 0, 0}, {0, 0, 0}, {0, 0, -1}, 0.25 * kPi, edges);   // from the origin along y, towards +x
+  // from the origin along y, towards +x
+  const Eigen::Matrix3Xd arc = arcCurve({1, 0, 0}, {0, 0, 0}, {0, 0, -1}, 0.25 * kPi, edges);
   RodSetup rod = naturalRod(section, arc, Eigen::Vector3d::UnitZ());
   rod.hold(0, 0, true);
   rod.inputs.gravity.setZero();
@@ -33,7 +35,7 @@ Eigen::Vector3d bentCantilever(int edges)
   return settled(rod, "45-degree cantilever").tip();
 }
 
-}  // namespace
+}   // namespace
 
 void runPeerCases(StudyContext& context)
 {
@@ -57,7 +59,10 @@ void runPeerCases(StudyContext& context)
     }
     plot.at("45-degree arc").x.push_back(edges);
     plot.at("45-degree arc").y.push_back((tip - published).norm());
-    struct Load { double w, x, y; };
+    struct Load
+    {
+      double w, x, y;
+    };
     for (const Load& load : {Load{1, 0.99125, -0.12347}, Load{9, 0.68897, -0.67308}, Load{25, 0.38616, -0.85590}})
     {
       RodCase rod_case;
@@ -69,7 +74,9 @@ void runPeerCases(StudyContext& context)
       for (int c = 0; c < 2; ++c)
       {
         Row& row = context.row();
-        row.set("case", "cantilever, w L^3/EI = " + std::to_string(static_cast<int>(load.w))).set("n", edges).set("component", names[c]);
+        row.set("case", "cantilever, w L^3/EI = " + std::to_string(static_cast<int>(load.w)))
+            .set("n", edges)
+            .set("component", names[c]);
         const double exact = c ? load.y : load.x;
         if (checked)
           row.check(end[c], exact, 0.005 * std::abs(exact), "exact elastica under its distributed load");
@@ -83,4 +90,4 @@ void runPeerCases(StudyContext& context)
   }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A naturally curled ribbon, drawn flat and let go again slowly: two helices of opposite handedness meet in a perversion (thesis 4.7.2).
+// A naturally curled ribbon, drawn flat and let go again slowly: two helices of opposite handedness meet in a
+// perversion (thesis 4.7.2).
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -60,7 +61,8 @@ struct Ribbon
   }
 };
 
-/// Tension at which the clamped flat ribbon buckles: B z'''' = (F - A^2 K^2 / C) z'', psi = -(A K / C) z with z = z' = 0 at the ends.
+/// Tension at which the clamped flat ribbon buckles: B z'''' = (F - A^2 K^2 / C) z'', psi = -(A K / C) z with z = z' =
+/// 0 at the ends.
 double criticalTension(double curvature) { return std::pow(kThin * curvature, 2) / kTwist - 4 * M_PI * M_PI * kWide; }
 
 /// Curvature and torsion [1/m] of a helix.
@@ -69,8 +71,9 @@ struct Helix
   double curvature, torsion;
 };
 
-/// The helix of least energy under a tension when its ends may turn freely, as the two halves of a perversion let each other do:
-/// least A/2 (k - K)^2 + C/2 (t - T)^2 - F |t| / r over k = r sin(a), t = +- r cos(a); r follows for each a, and a by golden section.
+/// The helix of least energy under a tension when its ends may turn freely, as the two halves of a perversion let each
+/// other do: least A/2 (k - K)^2 + C/2 (t - T)^2 - F |t| / r over k = r sin(a), t = +- r cos(a); r follows for each a,
+/// and a by golden section.
 Helix helixUnderTension(const Ribbon& ribbon, double tension, double handedness)
 {
   const double rest = handedness * ribbon.torsion;
@@ -95,8 +98,9 @@ Helix helixUnderTension(const Ribbon& ribbon, double tension, double handedness)
 /// What the centreline alone shows.
 struct Centreline
 {
-  std::vector<double> k, t;        ///< curvature and torsion per edge [1/m]; zero at the ends
-  std::vector<double> torsion;     ///< mean over one natural turn, weighted with curvature squared: straight parts do not count
+  std::vector<double> k, t;   ///< curvature and torsion per edge [1/m]; zero at the ends
+  /// mean over one natural turn, weighted with curvature squared: straight parts do not count
+  std::vector<double> torsion;
 
   explicit Centreline(const Eigen::Matrix3Xd& x) : k(x.cols() - 1, 0.0), t(x.cols() - 1, 0.0)
   {
@@ -106,7 +110,10 @@ struct Centreline
     {
       const Eigen::Vector3d before = edge(j - 1).cross(edge(j)), after = edge(j).cross(edge(j + 1));
       const double l = edge(j).norm();
-      k[j] = 0.5 * (std::atan2(before.norm(), edge(j - 1).dot(edge(j))) + std::atan2(after.norm(), edge(j).dot(edge(j + 1)))) / l;
+      k[j] =
+          0.5 *
+          (std::atan2(before.norm(), edge(j - 1).dot(edge(j))) + std::atan2(after.norm(), edge(j).dot(edge(j + 1)))) /
+          l;
       t[j] = signedAngle(before.normalized(), after.normalized(), edge(j) / l) / l;
     }
     for (int j = 0; j < edges; ++j)
@@ -135,8 +142,8 @@ struct Centreline
     return mean;
   }
 
-  /// Lengths (as parts of the rod) of the stretches of one handedness, in order; sign +: right-handed. Weak torsion, under a tenth of
-  /// the largest, belongs to none.
+  /// Lengths (as parts of the rod) of the stretches of one handedness, in order; sign +: right-handed. Weak torsion,
+  /// under a tenth of the largest, belongs to none.
   std::vector<double> stretches() const
   {
     double most = 0;
@@ -162,8 +169,11 @@ void release(StudyContext& context, int edges)
   Ribbon ribbon(edges, kPitch);
   ribbon.drawFlat(1.2 * criticalTension(ribbon.curvature));
   RodStepper stepper(ribbon.rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
-  Plot& picture = context.plot("perversion_shapes_" + std::to_string(edges), "Natural (top), drawn flat (middle) and released (bottom); height drawn larger", "x [L]", "z [L]");
-  Plot& profile = context.plot("perversion_torsion_" + std::to_string(edges), "Torsion of the centreline, mean over a turn", "s [L]", "torsion [1/L]");
+  Plot& picture =
+      context.plot("perversion_shapes_" + std::to_string(edges),
+                   "Natural (top), drawn flat (middle) and released (bottom); height drawn larger", "x [L]", "z [L]");
+  Plot& profile = context.plot("perversion_torsion_" + std::to_string(edges),
+                               "Torsion of the centreline, mean over a turn", "s [L]", "torsion [1/L]");
   picture.log_x = picture.log_y = picture.markers = profile.log_x = profile.log_y = profile.markers = false;
   const auto draw = [&](const std::string& label, const Eigen::Matrix3Xd& x, double across, double up) {
     Series& s = picture.at(label);
@@ -196,13 +206,15 @@ void release(StudyContext& context, int edges)
       return context.row().set("quantity", quantity).set("edges", edges).set("ends_apart", target);
     };
     Row& row = newRow("perversions");
-    row.check(refused.empty() && stable ? static_cast<double>(stretches.size()) - 1 : NAN, 1, 0.5, "one change of handedness");
+    row.check(refused.empty() && stable ? static_cast<double>(stretches.size()) - 1 : NAN, 1, 0.5,
+              "one change of handedness");
     row.set("tension", tension).set("cpu_seconds", threadSeconds() - begin);
     if (!refused.empty())
       row.set("refused", refused);
     if (stretches.size() == 2)
       newRow("left-handed share")
-          .check(std::abs(std::min(stretches[0], stretches[1])) / (std::abs(stretches[0]) + std::abs(stretches[1])), 0.5, 0.05, "mirror images");
+          .check(std::abs(std::min(stretches[0], stretches[1])) / (std::abs(stretches[0]) + std::abs(stretches[1])),
+                 0.5, 0.05, "mirror images");
     for (const int side : {0, 1})
     {
       const Helix half = line.middleOf(side);
@@ -216,11 +228,14 @@ void release(StudyContext& context, int edges)
         wound.set("measured", half.torsion).set("expected", exact.torsion);
         continue;
       }
-      bent.check(half.curvature, exact.curvature, 0.05 * exact.curvature, source).set("relative_error", half.curvature / exact.curvature - 1);
-      wound.check(half.torsion, exact.torsion, 0.05 * std::abs(exact.torsion), source).set("relative_error", half.torsion / exact.torsion - 1);
+      bent.check(half.curvature, exact.curvature, 0.05 * exact.curvature, source)
+          .set("relative_error", half.curvature / exact.curvature - 1);
+      wound.check(half.torsion, exact.torsion, 0.05 * std::abs(exact.torsion), source)
+          .set("relative_error", half.torsion / exact.torsion - 1);
     }
     Series& s = profile.at("ends " + std::to_string(target).substr(0, 4) + " L apart");
-    const std::size_t margin = static_cast<std::size_t>(edges / kTurns / 2);   // means over less than a turn are left out
+    // means over less than a turn are left out
+    const std::size_t margin = static_cast<std::size_t>(edges / kTurns / 2);
     for (std::size_t j = margin; j + margin < line.torsion.size(); ++j)
     {
       s.x.push_back((j + 0.5) / edges);
@@ -230,7 +245,7 @@ void release(StudyContext& context, int edges)
   draw("released", ribbon.rod.state.x, 0.0, 0.0);
 }
 
-}  // namespace
+}   // namespace
 
 void runPerversion(StudyContext& context)
 {
@@ -248,7 +263,10 @@ void runPerversion(StudyContext& context)
       ribbon.drawFlat(middle);
       (unstableModes(*ribbon.rod.model, ribbon.rod.state, ribbon.rod.inputs.gravity) ? low : high) = middle;
     }
-    context.row().set("quantity", "critical tension").set("edges", edges).check(high, expected, 0.01 * expected, "linear stability, A^2 K^2/C - 4 pi^2 B/L^2")
+    context.row()
+        .set("quantity", "critical tension")
+        .set("edges", edges)
+        .check(high, expected, 0.01 * expected, "linear stability, A^2 K^2/C - 4 pi^2 B/L^2")
         .set("relative_error", high / expected - 1);
     context.progress(k, 64, "release");
     release(context, edges);
@@ -258,8 +276,12 @@ void runPerversion(StudyContext& context)
     if (std::get<std::string>(*row.find("quantity")) == "perversions")
       perversions = std::get<double>(*row.find("measured"));
   context.metric("perversions", perversions);
-  context.note("Section 3 : 1 (B = 9 A, C = 1.385 A), 12 natural turns on the unit length. Without contact: with the ends nearer than about 0.4 L a loop");
-  context.note("would pass through itself and undo the perversion. The helix theory is that of infinite halves: six turns each leave a few percent.");
+  context.note(
+      "Section 3 : 1 (B = 9 A, C = 1.385 A), 12 natural turns on the unit length. Without contact: with the ends "
+      "nearer than about 0.4 L a loop");
+  context.note(
+      "would pass through itself and undo the perversion. The helix theory is that of infinite halves: six turns each "
+      "leave a few percent.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

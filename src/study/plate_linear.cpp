@@ -63,20 +63,22 @@ struct Free
   }
 };
 
-/// A grid with a margin of one cell on the sides asked for, so that holding its vertices clamps; [0, width] x [0, height] without it.
+/// A grid with a margin of one cell on the sides asked for, so that holding its vertices clamps; [0, width] x [0,
+/// height] without it.
 TriangleMesh plateMesh(GridPattern pattern, double width, double height, int columns, bool left, bool others)
 {
   const bool triangular = pattern == GridPattern::equilateral || pattern == GridPattern::irregular;
   const double h = width / columns;
   const int rows = std::max(2, static_cast<int>(std::lround(height / (triangular ? h * std::sqrt(0.75) : h))));
   const double v = height / rows;
-  TriangleMesh mesh = gridMesh(width + h * (left + others), height + 2 * v * others, columns + left + others, rows + 2 * others, pattern);
+  TriangleMesh mesh = gridMesh(width + h * (left + others), height + 2 * v * others, columns + left + others,
+                               rows + 2 * others, pattern);
   mesh.vertices.row(0).array() -= left ? h : 0.0;
   mesh.vertices.row(1).array() -= others ? v : 0.0;
   return mesh;
 }
 
-}  // namespace
+}   // namespace
 
 double plateEnergy(const TriangleMesh& rest, const MeshTopology& t, BendingModel model, const Eigen::Matrix3Xd& x)
 {
@@ -84,7 +86,8 @@ double plateEnergy(const TriangleMesh& rest, const MeshTopology& t, BendingModel
   PointVector points, product(4 * x.cols());
   toPoints(x, points);
   if (model == BendingModel::hinge)
-    return HingeBending(t.hinges, hingeStiffness(rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount())).energy(points.data());
+    return HingeBending(t.hinges, hingeStiffness(rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()))
+        .energy(points.data());
   return 0.5 * isometricBending(rest, t, elementOf(model), coefficient).multiply(points.data(), product.data());
 }
 
@@ -123,7 +126,8 @@ double squarePlateDeflection(GridPattern pattern, const PlateModel& model, int c
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < free.number.size(); ++i)
   {
-    const double r2 = (mesh.vertices.col(static_cast<Eigen::Index>(i)).head<2>() - Eigen::Vector2d(0.5, 0.5)).squaredNorm();
+    const double r2 =
+        (mesh.vertices.col(static_cast<Eigen::Index>(i)).head<2>() - Eigen::Vector2d(0.5, 0.5)).squaredNorm();
     if (r2 > 0.15 * 0.15)
       continue;
     const Eigen::Vector3d basis(1, r2, r2 * r2);
@@ -182,7 +186,8 @@ double lateralBucklingLoad(GridPattern pattern, const PlateModel& model, double 
   {
     const Eigen::MatrixXd image = solver.solve(Eigen::MatrixXd(-(geometric * w)));
     const Eigen::MatrixXd k = image.transpose() * (stiffness * image), g = -(image.transpose() * (geometric * image));
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(0.5 * (g + g.transpose()), 0.5 * (k + k.transpose()));
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(0.5 * (g + g.transpose()),
+                                                                         0.5 * (k + k.transpose()));
     w = image * ritz.eigenvectors();
     load = 1.0 / ritz.eigenvalues()[kVectors - 1];
   }
@@ -191,12 +196,14 @@ double lateralBucklingLoad(GridPattern pattern, const PlateModel& model, double 
 
 double squarePlateDeflection(GridPattern pattern, BendingModel model, int cells, bool clamped)
 {
-  return squarePlateDeflection(pattern, [model](const TriangleMesh& mesh) { return plateStiffness(mesh, model); }, cells, clamped);
+  return squarePlateDeflection(
+      pattern, [model](const TriangleMesh& mesh) { return plateStiffness(mesh, model); }, cells, clamped);
 }
 
 double lateralBucklingLoad(GridPattern pattern, BendingModel model, double width, int cells)
 {
-  return lateralBucklingLoad(pattern, [model](const TriangleMesh& mesh) { return plateStiffness(mesh, model); }, width, cells);
+  return lateralBucklingLoad(
+      pattern, [model](const TriangleMesh& mesh) { return plateStiffness(mesh, model); }, width, cells);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -22,13 +22,15 @@ PlateModel modelWith(double nu)
   return [nu](const TriangleMesh& mesh) { return plateBending(mesh, meshTopology(mesh), nu, 1.0).toEigen(); };
 }
 
-/// rho g h L^3 / D at which a plate 1 x width held along a vertical side buckles sideways. The thresholds of lateral_plate.csv
-/// (nu = -1/3: lateral_plate_two_poisson.csv) over the thin-strip limit 12.8538 sqrt(2 (1 - nu)^2 (1 + nu)), which are smooth in nu, are joined by
-/// the polynomial through all six. Leaving out the point at 0.3 changes none of the values used here by more than 1e-3 of itself.
+/// rho g h L^3 / D at which a plate 1 x width held along a vertical side buckles sideways. The thresholds of
+/// lateral_plate.csv (nu = -1/3: lateral_plate_two_poisson.csv) over the thin-strip limit 12.8538 sqrt(2 (1 - nu)^2 (1
+/// + nu)), which are smooth in nu, are joined by the polynomial through all six. Leaving out the point at 0.3 changes
+/// none of the values used here by more than 1e-3 of itself.
 double lateralThreshold(double width, double nu)
 {
   constexpr std::array<double, 6> at = {-1.0 / 3, 0.0, 0.2, 0.3, 0.4, 0.5};
-  constexpr std::array<double, 6> quarter = {22.80549522, 21.32425736, 19.14900922, 17.71344449, 16.04321839, 14.1317593};
+  constexpr std::array<double, 6> quarter = {22.80549522, 21.32425736, 19.14900922,
+                                             17.71344449, 16.04321839, 14.1317593};
   constexpr std::array<double, 6> half = {26.29199274, 24.96336677, 22.96446579, 21.59557142, 19.95238298, 18.00314331};
   const auto limit = [](double ratio) { return 12.8538 * std::sqrt(2 * (1 - ratio) * (1 - ratio) * (1 + ratio)); };
   double sum = 0;
@@ -43,7 +45,8 @@ double lateralThreshold(double width, double nu)
   return sum * limit(nu);
 }
 
-/// Square plates. The bounds are those of the study plate: 2 % of the value extrapolated to fine meshes, and an error that halves with the cells.
+/// Square plates. The bounds are those of the study plate: 2 % of the value extrapolated to fine meshes, and an error
+/// that halves with the cells.
 void uniformLoad(StudyContext& context)
 {
   const std::vector<int> sizes = context.quick() ? std::vector<int>{26, 52} : std::vector<int>{26, 52, 104};
@@ -59,18 +62,31 @@ void uniformLoad(StudyContext& context)
           context.progress(n, sizes.back(), how + " " + toString(pattern));
           coarse = fine;
           fine = squarePlateDeflection(pattern, modelWith(nu), n, clamped);
-          context.row().set("case", how).set("mesh", toString(pattern)).set("nu", nu).set("cells", n).set("value", fine)
-            .set("relative_error", fine / expected - 1);
+          context.row()
+              .set("case", how)
+              .set("mesh", toString(pattern))
+              .set("nu", nu)
+              .set("cells", n)
+              .set("value", fine)
+              .set("relative_error", fine / expected - 1);
         }
         const double extrapolated = 2 * fine - coarse;
-        context.row().set("case", how + ", extrapolated").set("mesh", toString(pattern)).set("nu", nu).set("cells", sizes.back())
-          .set("relative_error", extrapolated / expected - 1)
-          .check(extrapolated, expected, 0.02 * expected, "Kirchhoff plate, centre D w/(q a^4); the same for all nu");
+        context.row()
+            .set("case", how + ", extrapolated")
+            .set("mesh", toString(pattern))
+            .set("nu", nu)
+            .set("cells", sizes.back())
+            .set("relative_error", extrapolated / expected - 1)
+            .check(extrapolated, expected, 0.02 * expected, "Kirchhoff plate, centre D w/(q a^4); the same for all nu");
         if (std::abs(fine / expected - 1) > 0.01)
         {
           const double ratio = (fine - expected) / (coarse - expected);
-          context.row().set("case", how + ", error over the coarser one's").set("mesh", toString(pattern)).set("nu", nu).set("cells", sizes.back())
-            .check(std::max(ratio, 0.5), 0.5, 0.1, "halves, or better");
+          context.row()
+              .set("case", how + ", error over the coarser one's")
+              .set("mesh", toString(pattern))
+              .set("nu", nu)
+              .set("cells", sizes.back())
+              .check(std::max(ratio, 0.5), 0.5, 0.1, "halves, or better");
         }
       }
 }
@@ -85,10 +101,17 @@ void lateralBuckling(StudyContext& context)
         for (const int n : sizes)
         {
           context.progress(n, sizes.back(), std::string("lateral buckling ") + toString(pattern));
-          const double load = lateralBucklingLoad(pattern, modelWith(nu), width, n), expected = lateralThreshold(width, nu);
-          context.row().set("case", "lateral buckling").set("mesh", toString(pattern)).set("nu", nu).set("width", width).set("cells", n)
-            .set("relative_error", load / expected - 1)
-            .check(load, expected, expected * (0.02 + 2.0 / n), "lateral_plate.csv joined by a polynomial in nu; bound 2 % + 2/n");
+          const double load = lateralBucklingLoad(pattern, modelWith(nu), width, n),
+                       expected = lateralThreshold(width, nu);
+          context.row()
+              .set("case", "lateral buckling")
+              .set("mesh", toString(pattern))
+              .set("nu", nu)
+              .set("width", width)
+              .set("cells", n)
+              .set("relative_error", load / expected - 1)
+              .check(load, expected, expected * (0.02 + 2.0 / n),
+                     "lateral_plate.csv joined by a polynomial in nu; bound 2 % + 2/n");
         }
 }
 
@@ -100,13 +123,20 @@ void otherMeshes(StudyContext& context)
     {
       const TriangleMesh mesh = gridMesh(1, 1, 26, 0, pattern);
       const double deflection = squarePlateDeflection(pattern, modelWith(nu), 52, false);
-      context.row().set("case", "simply supported").set("mesh", toString(pattern)).set("nu", nu).set("cells", 52).set("value", deflection)
-        .set("relative_error", deflection / 0.004062352661 - 1).set("stiffening", plateStiffening(mesh, meshTopology(mesh), nu))
-        .set("reason", "not made of parallelograms: too stiff, scenes warn");
+      context.row()
+          .set("case", "simply supported")
+          .set("mesh", toString(pattern))
+          .set("nu", nu)
+          .set("cells", 52)
+          .set("value", deflection)
+          .set("relative_error", deflection / 0.004062352661 - 1)
+          .set("stiffening", plateStiffening(mesh, meshTopology(mesh), nu))
+          .set("reason", "not made of parallelograms: too stiff, scenes warn");
     }
 }
 
-/// Product of the matrix, and implicit steps of a sheet that falls while two of its corners are held, with a ratio over without.
+/// Product of the matrix, and implicit steps of a sheet that falls while two of its corners are held, with a ratio over
+/// without.
 void cost(StudyContext& context)
 {
   const int cells = context.quick() ? 30 : 100;
@@ -148,7 +178,7 @@ void cost(StudyContext& context)
   context.metric("step_over_isometric", step[1] / step[0]);
 }
 
-}  // namespace
+}   // namespace
 
 void runPlatePoisson(StudyContext& context)
 {
@@ -157,8 +187,10 @@ void runPlatePoisson(StudyContext& context)
   lateralBuckling(context);
   otherMeshes(context);
   cost(context);
-  context.note("product_over_isometric, step_over_isometric: CPU time with bending: {poissons_ratio} over without, of the matrix times a vector and of "
-               "an implicit step.");
+  context.note(
+      "product_over_isometric, step_over_isometric: CPU time with bending: {poissons_ratio} over without, of the "
+      "matrix times a vector and of "
+      "an implicit step.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -15,10 +15,7 @@ extern char** environ;
 
 namespace slender {
 
-std::string thisProgram()
-{
-  return std::filesystem::read_symlink("/proc/self/exe").string();
-}
+std::string thisProgram() { return std::filesystem::read_symlink("/proc/self/exe").string(); }
 
 std::string shellWord(const std::string& word)
 {
@@ -41,7 +38,8 @@ pid_t startProcess(std::vector<std::string> words)
   return pid;
 }
 
-void runProcesses(std::size_t count, std::size_t jobs, const std::function<std::vector<std::string>(std::size_t)>& command,
+void runProcesses(std::size_t count, std::size_t jobs,
+                  const std::function<std::vector<std::string>(std::size_t)>& command,
                   const std::function<void(std::size_t, const std::string&)>& ended)
 {
   std::map<pid_t, std::size_t> running;
@@ -64,7 +62,12 @@ void runProcesses(std::size_t count, std::size_t jobs, const std::function<std::
 }
 
 Progress::Progress(std::string name, std::string what, std::size_t total)
-    : name_(std::move(name)), what_(std::move(what)), total_(total), terminal_(isatty(STDERR_FILENO) == 1), start_(std::chrono::steady_clock::now()), shown_(start_)
+  : name_(std::move(name)),
+    what_(std::move(what)),
+    total_(total),
+    terminal_(isatty(STDERR_FILENO) == 1),
+    start_(std::chrono::steady_clock::now()),
+    shown_(start_)
 {
 }
 
@@ -77,14 +80,16 @@ Progress::~Progress()
 void Progress::show(std::size_t done)
 {
   const auto now = std::chrono::steady_clock::now();
-  if (done == 0 || done == done_ || (done < total_ && now - shown_ < std::chrono::milliseconds(terminal_ ? 100 : 10000)))
+  if (done == 0 || done == done_ ||
+      (done < total_ && now - shown_ < std::chrono::milliseconds(terminal_ ? 100 : 10000)))
     return;
   shown_ = now;
   done_ = done;
   const double spent = std::chrono::duration<double>(now - start_).count();
-  std::fprintf(stderr, "%s%s  %zu/%zu %s  %.0f s left%s", terminal_ ? "\r" : "", name_.c_str(), done, total_, what_.c_str(),
-               spent / static_cast<double>(done) * static_cast<double>(total_ - done), terminal_ ? "  " : "\n");
+  std::fprintf(stderr, "%s%s  %zu/%zu %s  %.0f s left%s", terminal_ ? "\r" : "", name_.c_str(), done, total_,
+               what_.c_str(), spent / static_cast<double>(done) * static_cast<double>(total_ - done),
+               terminal_ ? "  " : "\n");
   shown_line_ = terminal_;
 }
 
-}  // namespace slender
+}   // namespace slender

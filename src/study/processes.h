@@ -20,8 +20,10 @@ std::string shellWord(const std::string& word);
 /// Starts words[0] (an absolute path). Throws std::runtime_error.
 pid_t startProcess(std::vector<std::string> words);
 
-/// Runs command(0), ... command(count - 1), `jobs` at a time. After each has ended: ended(k, why), `why` empty for exit status 0.
-void runProcesses(std::size_t count, std::size_t jobs, const std::function<std::vector<std::string>(std::size_t)>& command,
+/// Runs command(0), ... command(count - 1), `jobs` at a time. After each has ended: ended(k, why), `why` empty for exit
+/// status 0.
+void runProcesses(std::size_t count, std::size_t jobs,
+                  const std::function<std::vector<std::string>(std::size_t)>& command,
                   const std::function<void(std::size_t, const std::string&)>& ended);
 
 /// "NAME  done/total WHAT  n s left" on stderr: rewritten in place on a terminal, else a line every ten seconds.
@@ -42,4 +44,4 @@ private:
   std::chrono::steady_clock::time_point shown_;
 };
 
-}  // namespace slender
+}   // namespace slender

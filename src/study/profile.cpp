@@ -39,17 +39,19 @@ void splitFrame(const std::string& frame, const std::string& sources, SourceLine
   at.file = packagePath(sources, place.substr(0, number));
 }
 
-}  // namespace
+}   // namespace
 
 std::string packagePath(const std::string& sources, const std::string& path)
 {
-  // The compiler may have been given relative paths, and a cache of objects others' absolute ones: what counts is that we have the file.
+  // The compiler may have been given relative paths, and a cache of objects others' absolute ones: what counts is that
+  // we have the file.
   static std::map<std::pair<std::string, std::string>, std::string> known;
   const auto [found, added] = known.emplace(std::make_pair(sources, path), path);
   if (!added)
     return found->second;
   for (const char* part : {"src/", "include/slender_sim/"})
-    for (std::size_t at = path.rfind(part); at != std::string::npos; at = at == 0 ? std::string::npos : path.rfind(part, at - 1))
+    for (std::size_t at = path.rfind(part); at != std::string::npos;
+         at = at == 0 ? std::string::npos : path.rfind(part, at - 1))
       if ((at == 0 || path[at - 1] == '/') && fs::exists(sources + "/" + path.substr(at)))
         return found->second = path.substr(at);
   return path;
@@ -149,14 +151,18 @@ std::vector<Allocation> readDhat(const std::string& text, const std::string& sou
   return all;
 }
 
-Profiler::Profiler(std::string simulate, std::string sources) : simulate_(std::move(simulate)), sources_(std::move(sources))
+Profiler::Profiler(std::string simulate, std::string sources)
+  : simulate_(std::move(simulate)),
+    sources_(std::move(sources))
 {
   if (std::system("valgrind --version > /dev/null 2>&1") != 0)
-    throw std::runtime_error("valgrind is missing, which counts instructions: apt-get install valgrind (scripts/setup does)");
+    throw std::runtime_error(
+        "valgrind is missing, which counts instructions: apt-get install valgrind (scripts/setup does)");
   if (!fs::exists(simulate_))
     throw std::runtime_error("there is no " + simulate_ + ", whose instructions are counted: build all of the package");
   if (!fs::exists(sources_ + "/src/scene/simulation.cpp"))
-    throw std::runtime_error("the sources that this program was built from are not in " + sources_ + " any more: instructions are told apart by their lines");
+    throw std::runtime_error("the sources that this program was built from are not in " + sources_ +
+                             " any more: instructions are told apart by their lines");
   std::string name = (fs::temp_directory_path() / "slender_sim_lean_XXXXXX").string();
   if (!mkdtemp(name.data()))
     throw std::runtime_error("cannot make a folder in " + fs::temp_directory_path().string());
@@ -185,14 +191,16 @@ const std::string& Profiler::text(const SourceLine& at) const
   return static_cast<std::size_t>(at.line) <= found->second.size() ? found->second[at.line - 1] : nothing;
 }
 
-std::string Profiler::run(const std::string& tool, const std::string& scene, double step, const std::vector<std::string>& options, int steps) const
+std::string Profiler::run(const std::string& tool, const std::string& scene, double step,
+                          const std::vector<std::string>& options, int steps) const
 {
   for (const auto& old : fs::directory_iterator(folder_))
     fs::remove_all(old);
   const std::string file = folder_ + "/scene.yaml", log = folder_ + "/log.txt";
   std::ofstream(file) << scene;
   // One thread, and instructions that valgrind knows: so that counts do not depend on the machine.
-  std::string command = "SLENDER_ISA=baseline OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 valgrind " + tool + " " + shellWord(simulate_) + " " + shellWord(file) + " --quiet --threads 1 --duration " +
+  std::string command = "SLENDER_ISA=baseline OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 valgrind " + tool + " " +
+                        shellWord(simulate_) + " " + shellWord(file) + " --quiet --threads 1 --duration " +
                         std::to_string(step * steps);
   for (std::string word : options)
   {
@@ -205,26 +213,34 @@ std::string Profiler::run(const std::string& tool, const std::string& scene, dou
   return folder_ + "/out";
 }
 
-StepProfile Profiler::instructions(const std::string& scene, double step, const std::vector<std::string>& options, int steps, int counted) const
+StepProfile Profiler::instructions(const std::string& scene, double step, const std::vector<std::string>& options,
+                                   int steps, int counted) const
 {
-  const std::string out = run("--tool=callgrind --compress-strings=no --compress-pos=no '--dump-after=slender::Simulation::step(*' --callgrind-out-file=" +
-                                  shellWord(folder_ + "/out"),
-                              scene, step, options, steps);
+  const std::string out =
+      run("--tool=callgrind --compress-strings=no --compress-pos=no '--dump-after=slender::Simulation::step(*' "
+          "--callgrind-out-file=" +
+              shellWord(folder_ + "/out"),
+          scene, step, options, steps);
   StepProfile profile;
   for (int k = steps - counted + 1; k <= steps; ++k)   // a file per step: what came after the step before, and the step
   {
     std::ifstream file(out + "." + std::to_string(k));
     if (!file)
-      throw std::runtime_error("callgrind has not seen step " + std::to_string(k) + ": does " + simulate_ + " have symbols?");
+      throw std::runtime_error("callgrind has not seen step " + std::to_string(k) + ": does " + simulate_ +
+                               " have symbols?");
     readCallgrind(file, sources_, profile);
     ++profile.steps;
   }
   return profile;
 }
 
-std::vector<Allocation> Profiler::allocations(const std::string& scene, double step, const std::vector<std::string>& options, int steps) const
+std::vector<Allocation> Profiler::allocations(const std::string& scene, double step,
+                                              const std::vector<std::string>& options, int steps) const
 {
-  return readDhat(wholeFile(run("--tool=dhat --fullpath-after=/ --num-callers=60 --dhat-out-file=" + shellWord(folder_ + "/out"), scene, step, options, steps)), sources_);
+  return readDhat(
+      wholeFile(run("--tool=dhat --fullpath-after=/ --num-callers=60 --dhat-out-file=" + shellWord(folder_ + "/out"),
+                    scene, step, options, steps)),
+      sources_);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

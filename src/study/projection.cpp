@@ -1,4 +1,5 @@
-// Inextensible rods: fast projection (thesis 4.5.2) against stiff stretching, explicit and implicit, on a rope that swings from one end.
+// Inextensible rods: fast projection (thesis 4.5.2) against stiff stretching, explicit and implicit, on a rope that
+// swings from one end.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,9 +12,9 @@
 namespace slender::study {
 namespace {
 
-constexpr double kEnd = 0.6;      // [s] past the lowest point
+constexpr double kEnd = 0.6;   // [s] past the lowest point
 constexpr int kEdges = 50;
-constexpr double kStretch = 1e4;  // [N]; the rope weighs half a newton
+constexpr double kStretch = 1e4;   // [N]; the rope weighs half a newton
 
 struct Method
 {
@@ -27,8 +28,8 @@ struct Run
 {
   Eigen::Vector3d tip;
   double cpu = std::numeric_limits<double>::infinity();   ///< per simulated second
-  double length_error = 0;                 ///< largest | |e|/L - 1 | at any time
-  int iterations = 0, cuts = 0;            ///< most projection iterations in a step; cut steps
+  double length_error = 0;                                ///< largest | |e|/L - 1 | at any time
+  int iterations = 0, cuts = 0;                           ///< most projection iterations in a step; cut steps
   long total_iterations = 0;
   std::string failure;
 };
@@ -68,7 +69,7 @@ Run release(const Method& method, double step)
   return run;
 }
 
-}  // namespace
+}   // namespace
 
 void runProjection(StudyContext& context)
 {
@@ -77,19 +78,28 @@ void runProjection(StudyContext& context)
   if (!context.quick())
     steps.insert(steps.end(), {5e-5, 2e-5});
 
-  // the inextensible rope: first order in the step, so two Richardson steps; the difference of the last two is its error
+  // the inextensible rope: first order in the step, so two Richardson steps; the difference of the last two is its
+  // error
   context.progress(0, 4, "converged solution");
   const double h = context.quick() ? 4e-5 : 1e-5;
-  const Eigen::Vector3d a = release(projected, 4 * h).tip, b = release(projected, 2 * h).tip, c = release(projected, h).tip;
+  const Eigen::Vector3d a = release(projected, 4 * h).tip, b = release(projected, 2 * h).tip,
+                        c = release(projected, h).tip;
   const Eigen::Vector3d coarse = 2 * b - a, fine = 2 * c - b, exact = fine + (fine - coarse) / 3;
   const double uncertain = (exact - fine).norm();
-  context.row().set("method", "reference").set("tip_x", exact.x()).set("tip_z", exact.z()).set("last_correction_mm", 1e3 * uncertain);
+  context.row()
+      .set("method", "reference")
+      .set("tip_x", exact.x())
+      .set("tip_z", exact.z())
+      .set("last_correction_mm", 1e3 * uncertain);
 
-  Plot& pareto = context.plot("projection_pareto", "Swinging rope, 50 edges: tip error at 0.6 s against run time", "CPU seconds per simulated second", "tip error [mm]");
-  Plot& constraint = context.plot("projection_constraint", "Largest error of an edge's length", "step [s]", "| |e| / L - 1 |");
+  Plot& pareto = context.plot("projection_pareto", "Swinging rope, 50 edges: tip error at 0.6 s against run time",
+                              "CPU seconds per simulated second", "tip error [mm]");
+  Plot& constraint =
+      context.plot("projection_constraint", "Largest error of an edge's length", "step [s]", "| |e| / L - 1 |");
   std::vector<Method> methods = {projected, general};
   for (const double stretch : {1e2, 1e4})
-    methods.push_back({"stiff stretching, explicit, EA " + std::to_string(static_cast<int>(stretch)) + " N", Integrator::symplectic_euler, true, false, stretch});
+    methods.push_back({"stiff stretching, explicit, EA " + std::to_string(static_cast<int>(stretch)) + " N",
+                       Integrator::symplectic_euler, true, false, stretch});
   methods.push_back({"stiff stretching, implicit Euler", Integrator::implicit_euler, false, false});
   methods.push_back({"stiff stretching, TR-BDF2", Integrator::tr_bdf2, false, false});
   std::vector<double> errors, used;
@@ -105,7 +115,10 @@ void runProjection(StudyContext& context)
         run.cpu = std::min(run.cpu, release(method, step).cpu);
       const double error = run.failure.empty() ? (run.tip - exact).norm() : std::numeric_limits<double>::quiet_NaN();
       Row& row = context.row();
-      row.set("method", method.name).set("step_s", step).set("tip_error_mm", 1e3 * error).set("cpu_per_second", run.cpu);
+      row.set("method", method.name)
+          .set("step_s", step)
+          .set("tip_error_mm", 1e3 * error)
+          .set("cpu_per_second", run.cpu);
       row.set("length_error", run.length_error).set("iterations_max", run.iterations);
       row.set("iterations_mean", run.total_iterations / (kEnd / step)).set("cuts", run.cuts);
       if (!run.failure.empty())
@@ -124,7 +137,11 @@ void runProjection(StudyContext& context)
       if (step <= 1e-3)
       {
         most = std::max(most, run.iterations);
-        context.row().set("method", method.name).set("step_s", step).set("quantity", "iterations").check(run.iterations, 0, 5, "thesis 4.5.2: 3 to 5 iterations");
+        context.row()
+            .set("method", method.name)
+            .set("step_s", step)
+            .set("quantity", "iterations")
+            .check(run.iterations, 0, 5, "thesis 4.5.2: 3 to 5 iterations");
       }
       (method.isotropic ? isotropic_cpu : general_cpu) += run.cpu;
       if (method.isotropic)
@@ -139,4 +156,4 @@ void runProjection(StudyContext& context)
   context.metric("order", logSlope(used, errors));
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

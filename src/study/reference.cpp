@@ -35,13 +35,13 @@ double simpson(const std::vector<double>& theta, double h, const F& f)
   return sum * h / 3.0;
 }
 
-}  // namespace
+}   // namespace
 
 CantileverTip heavyCantilever(double gamma, double stretch)
 {
-  // theta_{i-1} - 2 theta_i + theta_{i+1} = h^2/12 (f_{i-1} + 10 f_i + f_{i+1}) inside. At the free end theta' = f = 0, so that
-  // theta_{n-1} = theta_n - h^3/6 f'_n + h^4/24 f''_n + O(h^5), f' = gamma cos(theta), f'' = -2 gamma stretch sin cos.
-  // 50 points in the boundary layer; round-off grows as n^2, so no more than that
+  // theta_{i-1} - 2 theta_i + theta_{i+1} = h^2/12 (f_{i-1} + 10 f_i + f_{i+1}) inside. At the free end theta' = f = 0,
+  // so that theta_{n-1} = theta_n - h^3/6 f'_n + h^4/24 f''_n + O(h^5), f' = gamma cos(theta), f'' = -2 gamma stretch
+  // sin cos. 50 points in the boundary layer; round-off grows as n^2, so no more than that
   const int n = 2 * std::clamp(static_cast<int>(25 * std::sqrt(gamma)), 1000, 8000);
   const double h = 1.0 / n;
   const auto f = [&](double s, double t) {
@@ -74,7 +74,8 @@ CantileverTip heavyCantilever(double gamma, double stretch)
         a = 1 - h * h / 12 * df(s - h, theta[i - 1]);
         b = -2 - h * h * 10 / 12 * df(s, t);
         c = 1 - h * h / 12 * df(s + h, theta[i + 1]);
-        r = theta[i - 1] - 2 * t + theta[i + 1] - h * h / 12 * (f(s - h, theta[i - 1]) + 10 * f(s, t) + f(s + h, theta[i + 1]));
+        r = theta[i - 1] - 2 * t + theta[i + 1] -
+            h * h / 12 * (f(s - h, theta[i - 1]) + 10 * f(s, t) + f(s + h, theta[i + 1]));
       }
       else
       {
@@ -107,7 +108,8 @@ CantileverTip heavyCantilever(double gamma, double stretch)
 
 ElasticaShape bucklingElastica(double compression, bool clamped)
 {
-  const double k = bisect([&](double m) { return 2 - 2 * std::comp_ellint_2(m) / std::comp_ellint_1(m) - compression; }, 1e-9, 0.9999);
+  const double k = bisect([&](double m) { return 2 - 2 * std::comp_ellint_2(m) / std::comp_ellint_1(m) - compression; },
+                          1e-9, 0.9999);
   const double quarter = std::comp_ellint_1(k);
   const double root = (clamped ? 4 : 2) * quarter;
   return {root * root, k / quarter};
@@ -126,7 +128,8 @@ CantileverTip endLoadedCantilever(double load)
       },
       std::log(1e-7), std::log(kPi / 2 * (1 - 1e-9)));
   const double u = std::exp(log_u), k = modulus(u);
-  return {1 - 2 / std::sqrt(load) * (std::comp_ellint_2(k) - std::ellint_2(k, phi0(u))), std::sqrt(2 * std::cos(u) / load)};
+  return {1 - 2 / std::sqrt(load) * (std::comp_ellint_2(k) - std::ellint_2(k, phi0(u))),
+          std::sqrt(2 * std::cos(u) / load)};
 }
 
 double cantileverRoot(int mode)
@@ -150,4 +153,4 @@ double cantileverModeSlope(int mode, double s)
   return b * (std::sinh(x) + std::sin(x) - sigma * (std::cosh(x) - std::cos(x)));
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -8,7 +8,8 @@ namespace slender::study {
 Eigen::VectorXi huesOf(const Eigen::Matrix3Xi& triangles, const std::vector<int>& region_of_face)
 {
   const int regions = 1 + *std::max_element(region_of_face.begin(), region_of_face.end());
-  std::vector<std::set<int>> at_vertex(static_cast<std::size_t>(triangles.maxCoeff() + 1)), beside(static_cast<std::size_t>(regions));
+  std::vector<std::set<int>> at_vertex(static_cast<std::size_t>(triangles.maxCoeff() + 1)),
+      beside(static_cast<std::size_t>(regions));
   for (Eigen::Index f = 0; f < triangles.cols(); ++f)
     for (const int v : triangles.col(f))
       at_vertex[v].insert(region_of_face[f]);
@@ -38,4 +39,4 @@ Eigen::VectorXi huesOf(const Eigen::Matrix3Xi& triangles, const std::vector<int>
   return hues;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -11,4 +11,4 @@ namespace slender::study {
 /// A hue for each face, so that regions beside each other differ wherever kHues are enough.
 Eigen::VectorXi huesOf(const Eigen::Matrix3Xi& triangles, const std::vector<int>& region_of_face);
 
-}  // namespace slender::study
+}   // namespace slender::study

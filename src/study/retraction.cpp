@@ -31,7 +31,7 @@ Outcome retract(int edges, double h, double time)
 double exactRadius(double t) { return kRadius + kGamma * t / (6 * kMu); }
 double exactLength(double t) { return kLength * std::pow(kRadius / exactRadius(t), 2); }
 
-}  // namespace
+}   // namespace
 
 void runRetraction(StudyContext& context)
 {
@@ -40,8 +40,10 @@ void runRetraction(StudyContext& context)
   for (const double time : {0.5, 1.0, 2.0})
   {
     const Outcome seen = retract(40, h, time);
-    checkRelative(context, "free ends", "length", seen.length, exactLength(time), 0.01, "L0 (1 + gamma t/(6 mu a0))^-2").set("t", time);
-    checkRelative(context, "free ends", "radius", seen.radius, exactRadius(time), 0.01, "a0 + gamma t/(6 mu)").set("t", time);
+    checkRelative(context, "free ends", "length", seen.length, exactLength(time), 0.01, "L0 (1 + gamma t/(6 mu a0))^-2")
+        .set("t", time);
+    checkRelative(context, "free ends", "radius", seen.radius, exactRadius(time), 0.01, "a0 + gamma t/(6 mu)")
+        .set("t", time);
     drift = std::max(drift, std::abs(seen.volume_drift));
   }
   const auto error = [&](double step) { return retract(20, step, 1.0).length / exactLength(1.0) - 1; };
@@ -49,4 +51,4 @@ void runRetraction(StudyContext& context)
   context.metric("volume_drift", drift);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

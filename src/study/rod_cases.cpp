@@ -5,7 +5,8 @@
 
 namespace slender::study {
 
-RodCase circularRod(double length, double radius, double youngs_modulus, double poissons_ratio, double density, int edges)
+RodCase circularRod(double length, double radius, double youngs_modulus, double poissons_ratio, double density,
+                    int edges)
 {
   const double area = M_PI * radius * radius;
   RodCase c;
@@ -95,7 +96,10 @@ TimeConfig timeConfig(Integrator integrator, double step, double tolerance)
   return time;
 }
 
-double observedOrder(double coarse_error, double fine_error) { return std::log2(std::abs(coarse_error) / std::abs(fine_error)); }
+double observedOrder(double coarse_error, double fine_error)
+{
+  return std::log2(std::abs(coarse_error) / std::abs(fine_error));
+}
 
 double logSlope(const std::vector<double>& x, const std::vector<double>& y)
 {
@@ -124,4 +128,4 @@ bool isSecondOrder(Integrator integrator)
   return integrator != Integrator::implicit_euler && integrator != Integrator::symplectic_euler;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -13,20 +13,21 @@ namespace slender::study {
 /// A straight rod along x from the origin, y its first director; stiffnesses given directly.
 struct RodCase
 {
-  double length = 1.0;             ///< [m]
+  double length = 1.0;   ///< [m]
   int edges = 40;
-  double radius = 1e-3;            ///< [m] (only for the record: stiffnesses are those below)
-  double linear_density = 1.0;     ///< [kg/m]
-  double stretch = 1e7;            ///< E A [N]
-  double bend = 1.0;               ///< E I [N m^2]
-  double twist = 1.0 / 1.3;        ///< G J [N m^2]; nu = 0.3
-  double mass_damping = 0.0;       ///< [1/s]
-  double stiffness_damping = 0.0;  ///< [s]
-  double drag = 0.0;               ///< [N s/m^2]: force per length and velocity
+  double radius = 1e-3;             ///< [m] (only for the record: stiffnesses are those below)
+  double linear_density = 1.0;      ///< [kg/m]
+  double stretch = 1e7;             ///< E A [N]
+  double bend = 1.0;                ///< E I [N m^2]
+  double twist = 1.0 / 1.3;         ///< G J [N m^2]; nu = 0.3
+  double mass_damping = 0.0;        ///< [1/s]
+  double stiffness_damping = 0.0;   ///< [s]
+  double drag = 0.0;                ///< [N s/m^2]: force per length and velocity
 };
 
 /// Solid circular section: EA = E pi r^2, EI = E pi r^4/4, GJ = EI/(1+nu).
-RodCase circularRod(double length, double radius, double youngs_modulus, double poissons_ratio, double density, int edges);
+RodCase circularRod(double length, double radius, double youngs_modulus, double poissons_ratio, double density,
+                    int edges);
 
 /// Model, state and inputs of one rod that belong together.
 struct RodSetup
@@ -71,4 +72,4 @@ const std::vector<Integrator>& implicitIntegrators();
 /// True for the methods of second order.
 bool isSecondOrder(Integrator integrator);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,5 +1,5 @@
-// Random scenes in which rods are pulled, dropped and whipped against each other and against obstacles. After every step an independent
-// check of all pairs looks for penetrations.
+// Random scenes in which rods are pulled, dropped and whipped against each other and against obstacles. After every
+// step an independent check of all pairs looks for penetrations.
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -18,9 +18,13 @@ using Random = std::mt19937;
 
 double uniform(Random& random, double from, double to)
 {
-  return from + (to - from) * (static_cast<double>(random()) / static_cast<double>(Random::max()));   // the same on every machine
+  // the same on every machine
+  return from + (to - from) * (static_cast<double>(random()) / static_cast<double>(Random::max()));
 }
-double logUniform(Random& random, double from, double to) { return std::exp(uniform(random, std::log(from), std::log(to))); }
+double logUniform(Random& random, double from, double to)
+{
+  return std::exp(uniform(random, std::log(from), std::log(to)));
+}
 Vector3d direction(Random& random)
 {
   for (;;)
@@ -44,7 +48,8 @@ Scene knot(Random& random)
 {
   Scene s;
   const double size = 0.05, radius = size * uniform(random, 0.03, 0.07);
-  RodSetup rod = rodThrough(overhandKnot(size, uniform(random, 0.05, 0.2)), false, radius, logUniform(random, 1e5, 1e7), 1100, 60 + random() % 60);
+  RodSetup rod = rodThrough(overhandKnot(size, uniform(random, 0.05, 0.2)), false, radius, logUniform(random, 1e5, 1e7),
+                            1100, 60 + random() % 60);
   const int last = rod.model->nodes() - 1;
   rod.hold(0, 0, true);
   rod.hold(last, last, true);
@@ -76,7 +81,8 @@ Scene heap(Random& random)
   for (int r = 0; r < count; ++r)
   {
     const double radius = uniform(random, 0.002, 0.005), height = 0.08 + 0.025 * r, angle = uniform(random, 0, M_PI);
-    const Vector3d middle(uniform(random, -0.03, 0.03), uniform(random, -0.03, 0.03), height), along(std::cos(angle), std::sin(angle), 0);
+    const Vector3d middle(uniform(random, -0.03, 0.03), uniform(random, -0.03, 0.03), height),
+        along(std::cos(angle), std::sin(angle), 0);
     const bool closed = random() % 3 == 0;
     Eigen::Matrix3Xd points(3, closed ? 60 : 2);
     if (closed)
@@ -84,7 +90,8 @@ Scene heap(Random& random)
         points.col(i) = middle + 0.06 * Vector3d(std::cos(2 * M_PI * i / 60), std::sin(2 * M_PI * i / 60), 0);
     else
       points << middle - 0.15 * along, middle + 0.15 * along;
-    addTouching(s.group, rodThrough(points, closed, radius, logUniform(random, 1e5, 1e8), 1100, 24 + random() % 30), uniform(random, 0, 0.8));
+    addTouching(s.group, rodThrough(points, closed, radius, logUniform(random, 1e5, 1e8), 1100, 24 + random() % 30),
+                uniform(random, 0, 0.8));
   }
   s.group.setGravity(Vector3d(0, 0, -9.81));
   s.step = 2e-3;
@@ -108,7 +115,8 @@ Scene whip(Random& random)
     rod.hold(0, 0, false);
   addTouching(s.group, rod, uniform(random, 0, 0.5));
   const Vector3d across = (Vector3d::UnitY() + 0.5 * direction(random)).normalized();
-  const Pose bar{Vector3d(uniform(random, 0.15, 0.4), 0, -uniform(random, 0.02, 0.1)), Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), across)};
+  const Pose bar{Vector3d(uniform(random, 0.15, 0.4), 0, -uniform(random, 0.02, 0.1)),
+                 Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), across)};
   addObstacle(s.group, Capsule{logUniform(random, 0.0005, 0.005), 0.4}, bar, 0.2);
   s.steps = 40;
   return s;
@@ -122,14 +130,18 @@ double smallestRadius(const GroupSetup& g)
   return least;
 }
 
-}  // namespace
+}   // namespace
 
 void runRodContactSafety(StudyContext& context)
 {
   using Maker = Scene (*)(Random&);
   const std::pair<const char*, Maker> kinds[] = {{"knot", knot}, {"heap", heap}, {"whip", whip}};
   const int total = context.quick() ? 30 : 1000;
-  struct Tally { int scenes = 0, steps = 0, penetrations = 0, refused = 0, cuts = 0, not_finite = 0; double least = std::numeric_limits<double>::infinity(); };
+  struct Tally
+  {
+    int scenes = 0, steps = 0, penetrations = 0, refused = 0, cuts = 0, not_finite = 0;
+    double least = std::numeric_limits<double>::infinity();
+  };
   std::map<std::string, Tally> tallies;
   std::map<std::string, int> reasons;
   for (int n = 0; n < total; ++n)
@@ -168,8 +180,14 @@ void runRodContactSafety(StudyContext& context)
   int penetrations = 0, refused = 0, steps = 0, not_finite = 0;
   for (const auto& [kind, t] : tallies)
   {
-    context.row().set("kind", kind).set("scenes", t.scenes).set("steps", t.steps).set("penetrations", t.penetrations).set("refused_scenes", t.refused)
-        .set("cut_steps", t.cuts).set("least_clearance_um", 1e6 * t.least);
+    context.row()
+        .set("kind", kind)
+        .set("scenes", t.scenes)
+        .set("steps", t.steps)
+        .set("penetrations", t.penetrations)
+        .set("refused_scenes", t.refused)
+        .set("cut_steps", t.cuts)
+        .set("least_clearance_um", 1e6 * t.least);
     penetrations += t.penetrations;
     refused += t.refused;
     steps += t.steps;
@@ -180,7 +198,9 @@ void runRodContactSafety(StudyContext& context)
   context.metric("penetrations", penetrations);
   context.metric("refused_scenes", refused);
   context.metric("nan_count", not_finite);
-  context.note("penetrations: steps after which two surfaces overlap, found by all pairs; refused: scenes that ended with a step that said why.");
+  context.note(
+      "penetrations: steps after which two surfaces overlap, found by all pairs; refused: scenes that ended with a "
+      "step that said why.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

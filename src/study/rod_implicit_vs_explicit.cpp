@@ -59,7 +59,8 @@ Strand play(bool soft, const TimeConfig& time, int frames)
   {
     for (int i = 1; i <= per_frame; ++i)
     {
-      rod.inputs.grasps[0].X_WG.position = start.position + rootPosition((f + static_cast<double>(i) / per_frame) * kFrame);
+      rod.inputs.grasps[0].X_WG.position =
+          start.position + rootPosition((f + static_cast<double>(i) / per_frame) * kFrame);
       const StepReport report = stepper.step(rod.state, rod.inputs, kFrame / per_frame);
       strand.iterations += report.iterations;
       strand.cuts += report.cut_steps;
@@ -95,7 +96,8 @@ double largestExplicitStep(bool soft)
   const RodSetup rod = hair(soft);
   const RodModel& m = *rod.model;
   const double h = m.rest_length[1], line = m.mass[1] / h;
-  const double limit = 2 / std::max(2 / h * std::sqrt(m.stretch_modulus[1] / line), 4 / (h * h) * std::sqrt(m.bend_modulus(0, 1) / line));
+  const double limit = 2 / std::max(2 / h * std::sqrt(m.stretch_modulus[1] / line),
+                                    4 / (h * h) * std::sqrt(m.bend_modulus(0, 1) / line));
   double stable = 0, unstable = 3 * limit;
   for (double step = limit; stable == 0; step *= 0.8)
     (play(soft, timeConfig(Integrator::symplectic_euler, step), 15).failure.empty() ? stable : unstable) = step;
@@ -107,16 +109,18 @@ double largestExplicitStep(bool soft)
   return stable;
 }
 
-}  // namespace
+}   // namespace
 
 void runImplicitVsExplicit(StudyContext& context)
 {
-  Plot& plot = context.plot("rod_implicit_vs_explicit", "Hair strand, 200 vertices: error against run time", "CPU time [s]", "rms error [m]");
+  Plot& plot = context.plot("rod_implicit_vs_explicit", "Hair strand, 200 vertices: error against run time",
+                            "CPU time [s]", "rms error [m]");
   double worst_ratio = std::numeric_limits<double>::infinity(), worst_speedup = worst_ratio;
   for (const bool soft : {true, false})
   {
     const char* material = soft ? "soft stretch" : "own EA";
-    const int frames = context.quick() ? (soft ? 10 : 1) : (soft ? 300 : 30);   // at its own EA the explicit code takes 30,000 steps per frame
+    // at its own EA the explicit code takes 30,000 steps per frame
+    const int frames = context.quick() ? (soft ? 10 : 1) : (soft ? 300 : 30);
     context.progress(soft ? 0 : 10, 20, std::string(material) + ", largest explicit step");
     const double explicit_step = largestExplicitStep(soft);
     context.progress(soft ? 1 : 11, 20, std::string(material) + ", explicit run");
@@ -129,10 +133,19 @@ void runImplicitVsExplicit(StudyContext& context)
     const Strand exact = play(soft, timeConfig(Integrator::tr_bdf2, 5e-5, 1e-8), frames);
     const double explicit_error = distance(explicit_run, exact);
     const auto add = [&](const char* integrator, double step, double tolerance, const Strand& s, double error) {
-      context.row().set("material", material).set("integrator", integrator).set("step_s", step).set("newton_tolerance", tolerance)
-          .set("frames", frames).set("rms_error_m", error).set("cpu_seconds", s.cpu_seconds).set("speedup", explicit_run.cpu_seconds / s.cpu_seconds)
+      context.row()
+          .set("material", material)
+          .set("integrator", integrator)
+          .set("step_s", step)
+          .set("newton_tolerance", tolerance)
+          .set("frames", frames)
+          .set("rms_error_m", error)
+          .set("cpu_seconds", s.cpu_seconds)
+          .set("speedup", explicit_run.cpu_seconds / s.cpu_seconds)
           .set("microseconds_per_step", 1e6 * s.cpu_seconds / (frames * std::ceil(kFrame / step - 1e-9)))
-          .set("iterations", s.iterations).set("cuts", s.cuts).set("failure", s.failure.empty() ? "" : s.failure);
+          .set("iterations", s.iterations)
+          .set("cuts", s.cuts)
+          .set("failure", s.failure.empty() ? "" : s.failure);
       if (!s.failure.empty())
         return;
       Series& series = plot.at(std::string(integrator) + ", " + material);
@@ -167,7 +180,11 @@ void runImplicitVsExplicit(StudyContext& context)
       }
     }
     const double ratio = implicit_step / explicit_step, speedup = explicit_run.cpu_seconds / cheapest;
-    context.row().set("material", material).set("integrator", "summary").set("step_ratio", ratio).set("speedup", speedup)
+    context.row()
+        .set("material", material)
+        .set("integrator", "summary")
+        .set("step_ratio", ratio)
+        .set("speedup", speedup)
         .set("rms_error_m", explicit_error);
     context.metric(std::string("step_ratio_") + (soft ? "soft" : "own_EA"), ratio);
     context.metric(std::string("speedup_") + (soft ? "soft" : "own_EA"), speedup);
@@ -176,10 +193,17 @@ void runImplicitVsExplicit(StudyContext& context)
   }
   context.metric("step_ratio", worst_ratio);
   context.metric("speedup", worst_speedup);
-  context.note("hair: 0.3 m, r = 0.05 mm, E = 3 GPa, 1300 kg/m^3, drag for a terminal speed of 0.4 m/s, root shaken by 3 cm at 1 Hz.");
-  context.note("step_ratio: largest implicit step without cuts (a frame at most) over the largest stable explicit step;");
-  context.note("speedup: explicit run at that step over the cheapest implicit run whose error is no larger. The lesser of both materials counts;");
-  context.note("soft stretch: EA lowered until stretching limits the explicit step no more than bending does. The thesis has 70 and 8.6.");
+  context.note(
+      "hair: 0.3 m, r = 0.05 mm, E = 3 GPa, 1300 kg/m^3, drag for a terminal speed of 0.4 m/s, root shaken by 3 cm at "
+      "1 Hz.");
+  context.note(
+      "step_ratio: largest implicit step without cuts (a frame at most) over the largest stable explicit step;");
+  context.note(
+      "speedup: explicit run at that step over the cheapest implicit run whose error is no larger. The lesser of both "
+      "materials counts;");
+  context.note(
+      "soft stretch: EA lowered until stretching limits the explicit step no more than bending does. The thesis has 70 "
+      "and 8.6.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -19,10 +19,12 @@ namespace {
 struct Cost
 {
   double gradient = std::numeric_limits<double>::infinity();   ///< frames and gradient
-  double assemble = gradient;                                  ///< frames, gradient, Hessian, factorisation, forward substitution
-  double solve = gradient, update = gradient;   ///< backward substitution; measures, trial along the direction, frames made new base
-  double factor = gradient;                     ///< of a matrix of this shape alone, for comparison
-  double step = gradient;                       ///< a whole step over its Newton iterations
+  /// frames, gradient, Hessian, factorisation, forward substitution
+  double assemble = gradient;
+  /// backward substitution; measures, trial along the direction, frames made new base
+  double solve = gradient, update = gradient;
+  double factor = gradient;   ///< of a matrix of this shape alone, for comparison
+  double step = gradient;     ///< a whole step over its Newton iterations
   double iterations_per_step = 0;
   double total() const { return assemble + solve + update; }
 };
@@ -66,7 +68,8 @@ void timeParts(const RodSetup& rod, int repeats, Cost& cost)
   system.setResponse(0.0, nullptr);
   const double step = 1e-3;
   for (int i = 0; i < rod.model->nodes(); ++i)
-    system.setInertia(i, system.isFree(i) ? rod.model->mass[i] / (step * step) : 0.0, rod.state.x.col(i), rod.model->mass[i] * rod.inputs.gravity);
+    system.setInertia(i, system.isFree(i) ? rod.model->mass[i] / (step * step) : 0.0, rod.state.x.col(i),
+                      rod.model->mass[i] * rod.inputs.gravity);
   system.evaluate(true);
   system.accept();
   for (int i = 0; i < repeats; ++i)
@@ -79,7 +82,8 @@ void timeParts(const RodSetup& rod, int repeats, Cost& cost)
     const double c = threadSeconds();
     system.solve();
     const double d = threadSeconds();
-    const double limit = system.incrementSize() + system.slope() < 0 ? 0.5 : system.stepLimit();   // as Newton measures them
+    // as Newton measures them
+    const double limit = system.incrementSize() + system.slope() < 0 ? 0.5 : system.stepLimit();
     system.moveAlong(limit);
     system.accept();
     const double e = threadSeconds();
@@ -107,13 +111,15 @@ void timeParts(const RodSetup& rod, int repeats, Cost& cost)
   }
 }
 
-}  // namespace
+}   // namespace
 
 void runRodScaling(StudyContext& context)
 {
-  const std::vector<int> sizes = context.quick() ? std::vector<int>{50, 200, 1000, 10000, 100000}
-                                                 : std::vector<int>{50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000};
-  Plot& plot = context.plot("rod_scaling", "Newton iteration of a rod: time against size", "nodes", "time per iteration [s]");
+  const std::vector<int> sizes =
+      context.quick() ? std::vector<int>{50, 200, 1000, 10000, 100000}
+                      : std::vector<int>{50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000, 50000, 100000};
+  Plot& plot =
+      context.plot("rod_scaling", "Newton iteration of a rod: time against size", "nodes", "time per iteration [s]");
   std::vector<double> x, y, whole;
   double at_1000 = 0, largest = 0, iterations = 0;
   int done = 0;
@@ -127,13 +133,25 @@ void runRodScaling(StudyContext& context)
     timeParts(rod, std::clamp(work / nodes, 10, 4000), cost);
     const double total = cost.total(), per_node = 1e6 / nodes;
     const double band = cost.assemble - cost.gradient;
-    context.row().set("nodes", nodes).set("microseconds_per_node", total * per_node).set("frames_gradient_us", cost.gradient * per_node)
-        .set("hessian_factor_us", band * per_node).set("solve_us", cost.solve * per_node).set("update_us", cost.update * per_node)
-        .set("frames_gradient_share", cost.gradient / total).set("hessian_factor_share", band / total)
-        .set("solve_share", cost.solve / total).set("update_share", cost.update / total).set("factor_alone_us", cost.factor * per_node)
-        .set("whole_step_us", cost.step * per_node).set("iterations_per_step", cost.iterations_per_step).set("seconds_per_iteration", total);
-    const std::pair<const char*, double> parts[] = {{"whole iteration", total}, {"frames, gradient", cost.gradient}, {"Hessian, factorisation", band},
-                                                    {"solve", cost.solve}, {"update", cost.update}, {"whole step per iteration", cost.step}};
+    context.row()
+        .set("nodes", nodes)
+        .set("microseconds_per_node", total * per_node)
+        .set("frames_gradient_us", cost.gradient * per_node)
+        .set("hessian_factor_us", band * per_node)
+        .set("solve_us", cost.solve * per_node)
+        .set("update_us", cost.update * per_node)
+        .set("frames_gradient_share", cost.gradient / total)
+        .set("hessian_factor_share", band / total)
+        .set("solve_share", cost.solve / total)
+        .set("update_share", cost.update / total)
+        .set("factor_alone_us", cost.factor * per_node)
+        .set("whole_step_us", cost.step * per_node)
+        .set("iterations_per_step", cost.iterations_per_step)
+        .set("seconds_per_iteration", total);
+    const std::pair<const char*, double> parts[] = {
+        {"whole iteration", total},       {"frames, gradient", cost.gradient},
+        {"Hessian, factorisation", band}, {"solve", cost.solve},
+        {"update", cost.update},          {"whole step per iteration", cost.step}};
     for (const auto& part : parts)
     {
       plot.at(part.first).x.push_back(nodes);
@@ -155,9 +173,15 @@ void runRodScaling(StudyContext& context)
   context.metric("microseconds_per_node_iteration", at_1000);
   context.metric("microseconds_per_node_iteration_worst", largest);
   context.metric("scaling_exponent_whole_step", logSlope(x, whole));
-  context.note("microseconds_per_node: one Newton iteration, at 1000 nodes in the metric: frames + gradient + Hessian + factor + solve + update.");
-  context.note("hessian_factor: assembly, factorisation and forward substitution run in one pass, piece by piece; factor_alone: a stored band's.");
-  context.note("whole_step_us: a step with everything around the iterations (predictor, wrenches, copies of the state), per iteration and node.");
+  context.note(
+      "microseconds_per_node: one Newton iteration, at 1000 nodes in the metric: frames + gradient + Hessian + factor "
+      "+ solve + update.");
+  context.note(
+      "hessian_factor: assembly, factorisation and forward substitution run in one pass, piece by piece; factor_alone: "
+      "a stored band's.");
+  context.note(
+      "whole_step_us: a step with everything around the iterations (predictor, wrenches, copies of the state), per "
+      "iteration and node.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

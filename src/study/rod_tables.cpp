@@ -18,16 +18,16 @@ namespace {
 
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
-/// A row of the thesis's table, and a scene with as many vertices and the same step. Its materials are not given there: ours are such that
-/// explicit steps of that length are stable.
+/// A row of the thesis's table, and a scene with as many vertices and the same step. Its materials are not given there:
+/// ours are such that explicit steps of that length are stable.
 struct Example
 {
   const char* figure;
   const char* what;
   int vertices;
-  double step;      ///< [ms]
+  double step;                                              ///< [ms]
   double forces, contact, quasistatic, projection, total;   ///< thesis [ms]
-  int settling;     ///< steps until something happens
+  int settling;                                             ///< steps until something happens
   const char* scene;
 };
 
@@ -178,7 +178,11 @@ Parts timeParts(const Simulation& simulation, int repeats)
     const double gradient = timeOf(repeats, [&] { system.evaluate(false); });
     parts.forces += timeOf(repeats, [&] { system.load(state); }) + gradient;
     // frames are carried along by one more evaluation at the new positions
-    parts.quasistatic += timeOf(repeats, [&] { system.evaluate(false); system.solveFrames(); system.storeTurned(to); });
+    parts.quasistatic += timeOf(repeats, [&] {
+      system.evaluate(false);
+      system.solveFrames();
+      system.storeTurned(to);
+    });
   }
   return parts;
 }
@@ -194,7 +198,7 @@ Simulation make(const Example& e, Integrator integrator, bool with_contact)
   return Simulation(config);
 }
 
-}  // namespace
+}   // namespace
 
 void runRodTables(StudyContext& context)
 {
@@ -207,7 +211,9 @@ void runRodTables(StudyContext& context)
     context.progress(done++, count, e.what);
     const bool contact = std::isfinite(e.contact);
     const std::string name = std::string("figure ") + e.figure;
-    const auto timeSteps = [&](Simulation& simulation) { return timeOf(3, [&] { advance(simulation, batch, name); }) / batch; };
+    const auto timeSteps = [&](Simulation& simulation) {
+      return timeOf(3, [&] { advance(simulation, batch, name); }) / batch;
+    };
     const int settling = context.quick() ? e.settling / 10 : e.settling;
 
     Simulation simulation = make(e, contact ? Integrator::implicit_euler : Integrator::symplectic_euler, true);
@@ -219,8 +225,14 @@ void runRodTables(StudyContext& context)
     const double total = timeSteps(simulation);
     const Parts parts = timeParts(simulation, 50);
     Row& row = context.row();
-    row.set("figure", e.figure).set("example", e.what).set("vertices", vertices).set("thesis_vertices", e.vertices).set("step_ms", e.step);
-    row.set("method", contact ? "implicit Euler, general, contact" : simulation.rodModel(0).isotropic ? "explicit, isotropic, projected" : "explicit, general, projected");
+    row.set("figure", e.figure)
+        .set("example", e.what)
+        .set("vertices", vertices)
+        .set("thesis_vertices", e.vertices)
+        .set("step_ms", e.step);
+    row.set("method", contact                            ? "implicit Euler, general, contact"
+                      : simulation.rodModel(0).isotropic ? "explicit, isotropic, projected"
+                                                         : "explicit, general, projected");
     row.set("forces_ms", 1e3 * parts.forces).set("thesis_forces_ms", e.forces);
     double contact_time = kAbsent, projection = kAbsent, quasistatic = 1e3 * parts.quasistatic;
     if (contact)
@@ -232,15 +244,20 @@ void runRodTables(StudyContext& context)
       quasistatic = kAbsent;   // angles are unknowns of the implicit step
     }
     else
-      projection = std::max(0.0, 1e3 * (total - parts.forces - parts.quasistatic));   // and bodies, velocities, copies of the state
+      // and bodies, velocities, copies of the state
+      projection = std::max(0.0, 1e3 * (total - parts.forces - parts.quasistatic));
     row.set("contact_ms", contact_time).set("thesis_contact_ms", e.contact);
     row.set("quasistatic_ms", quasistatic).set("thesis_quasistatic_ms", e.quasistatic);
     row.set("projection_ms", projection).set("thesis_projection_ms", e.projection);
     row.set("total_ms", 1e3 * total).set("thesis_total_ms", e.total).set("speedup", e.total / (1e3 * total));
     row.set("projection_iterations", report.projection_iterations).set("newton_iterations", report.iterations);
     if (e.total / (1e3 * total) < 10)
-      row.set("why_not_10x", contact ? "contact takes implicit steps: barriers that nothing passes, friction and all stiffness in one sparse system, solved by Newton's method"
-                                     : "so few vertices that copying the state and setting up body and projection weigh as much as the rod");
+      row.set(
+          "why_not_10x",
+          contact
+              ? "contact takes implicit steps: barriers that nothing passes, friction and all stiffness in one sparse "
+                "system, solved by Newton's method"
+              : "so few vertices that copying the state and setting up body and projection weigh as much as the rod");
     most_iterations = std::max(most_iterations, report.projection_iterations);
     most_apart = std::max(most_apart, static_cast<int>(std::abs(vertices - e.vertices)));
     least = std::min(least, e.total / (1e3 * total));
@@ -250,4 +267,4 @@ void runRodTables(StudyContext& context)
   context.metric("vertices_from_thesis_max", most_apart);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

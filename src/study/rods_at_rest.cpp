@@ -20,8 +20,8 @@ struct Rod
   double x, z;   ///< tip of the exact inextensible elastica [m]
 };
 
-/// Evenly spaced nodes, or 200 nodes set closer near the clamp, where a soft rod bends within millimetres: s = u (0.4 + 0.6 u),
-/// first edge 2 mm, last 8 mm.
+/// Evenly spaced nodes, or 200 nodes set closer near the clamp, where a soft rod bends within millimetres: s = u (0.4 +
+/// 0.6 u), first edge 2 mm, last 8 mm.
 Eigen::Matrix3Xd restNodes(bool graded)
 {
   Eigen::Matrix3Xd nodes = Eigen::Matrix3Xd::Zero(3, kNodes);
@@ -45,7 +45,7 @@ RodSetup clampedRod(const Rod& r, bool stretches, bool graded, double mass_dampi
   return rod;
 }
 
-}  // namespace
+}   // namespace
 
 void runRodsAtRest(StudyContext& context)
 {
@@ -65,21 +65,30 @@ void runRodsAtRest(StudyContext& context)
         context.progress(done++, 20, dynamic ? "settling" : "static");
         // Critically damped in the slowest mode, as in the cantilever study.
         const double gamma = 4 * kDensity * kGravity / (r.youngs_modulus * r.radius * r.radius);
-        const double unit = std::sqrt(r.youngs_modulus * r.radius * r.radius / (4 * kDensity));   // sqrt(EI/(rho A L^4)) [1/s]
+        // sqrt(EI/(rho A L^4)) [1/s]
+        const double unit = std::sqrt(r.youngs_modulus * r.radius * r.radius / (4 * kDensity));
         const double rate = unit * std::sqrt(3.5 * 3.5 + 1.45 * gamma);
         RodSetup rod = clampedRod(r, stretches, graded, dynamic ? 2 * rate : 0.0);
         RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 0.01, 1e-8));
         const double begin = threadSeconds();
-        const std::string refused = dynamic ? settle(stepper, rod, 0.2 / rate, 1e-8, 5000) : stepper.solveEquilibrium(rod.state, rod.inputs).message;
+        const std::string refused = dynamic ? settle(stepper, rod, 0.2 / rate, 1e-8, 5000)
+                                            : stepper.solveEquilibrium(rod.state, rod.inputs).message;
         const double seconds = threadSeconds() - begin;
 
         CantileverTip exact{-r.z, r.x};
         if (stretches)
           exact = heavyCantilever(gamma, kDensity * kGravity / r.youngs_modulus);
-        const double error = !refused.empty() ? std::numeric_limits<double>::quiet_NaN() : 1e3 * std::hypot(rod.tip().x() - exact.extent, rod.tip().z() + exact.drop);
+        const double error = !refused.empty()
+                                 ? std::numeric_limits<double>::quiet_NaN()
+                                 : 1e3 * std::hypot(rod.tip().x() - exact.extent, rod.tip().z() + exact.drop);
         Row& row = context.row();
-        row.set("how", dynamic ? "settled" : "static").set("mesh", graded ? "graded" : "even").set("model", stretches ? "EA = E pi r^2" : "inextensible");
-        row.set("radius_m", r.radius).set("E_Pa", r.youngs_modulus).set("tip_x", rod.tip().x()).set("tip_z", rod.tip().z());
+        row.set("how", dynamic ? "settled" : "static")
+            .set("mesh", graded ? "graded" : "even")
+            .set("model", stretches ? "EA = E pi r^2" : "inextensible");
+        row.set("radius_m", r.radius)
+            .set("E_Pa", r.youngs_modulus)
+            .set("tip_x", rod.tip().x())
+            .set("tip_z", rod.tip().z());
         row.set("expected_x", exact.extent).set("expected_z", -exact.drop);
         row.set("quantity", "tip error [mm]");
         const char* source = stretches ? "extensible elastica" : "exact elastica";
@@ -95,10 +104,15 @@ void runRodsAtRest(StudyContext& context)
       }
   context.metric("max_tip_error_mm", worst[1]);
   context.metric("max_tip_error_even_mm", worst[0]);
-  context.note("graded: the 200 nodes stand closer at the clamp (edges of 2 to 8 mm, `grading: 4` in a scene). On even nodes the last rod, whose");
+  context.note(
+      "graded: the 200 nodes stand closer at the clamp (edges of 2 to 8 mm, `grading: 4` in a scene). On even nodes "
+      "the last rod, whose");
   context.note("bending layer Gamma^(-1/2) L = 5 mm is one edge long, misses 0.3 mm with every clamp that was tried.");
-  context.note("inextensible: EA is raised until the rod's weight strains it by 1e-6, since the exact elastica does not stretch;");
-  context.note("the rows with the material's own EA are compared with the elastica that stretches (0.98 % at E = 1e6 Pa).");
+  context.note(
+      "inextensible: EA is raised until the rod's weight strains it by 1e-6, since the exact elastica does not "
+      "stretch;");
+  context.note(
+      "the rows with the material's own EA are compared with the elastica that stretches (0.98 % at E = 1e6 Pa).");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A rubber band that shall look like a guide curve (thesis figure 6.3): it is held at anchor points, or segments between them have the guide's centres of mass.
+// A rubber band that shall look like a guide curve (thesis figure 6.3): it is held at anchor points, or segments
+// between them have the guide's centres of mass.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -24,11 +25,11 @@ constexpr double kStep = 1e-3, kSettle = 1.0, kPulse = 0.02;   // [s]
 struct Band
 {
   std::shared_ptr<const RodModel> model;
-  Matrix3Xd guide;                                 ///< nodes of the guide shape, as many as the band's
+  Matrix3Xd guide;   ///< nodes of the guide shape, as many as the band's
   std::shared_ptr<const WeakConstraints> segments;
-  Eigen::MatrixXd functions;                       ///< segments x nodes
-  MassMatrix mass;                                 ///< of hat functions along the band [m]
-  double density = 0;                              ///< [kg/m]
+  Eigen::MatrixXd functions;   ///< segments x nodes
+  MassMatrix mass;             ///< of hat functions along the band [m]
+  double density = 0;          ///< [kg/m]
 };
 
 Band makeBand(int per_segment)
@@ -39,15 +40,23 @@ Band makeBand(int per_segment)
   band.guide.resize(3, nodes);
   for (int i = 0; i < nodes; ++i)
   {
-    const double angle = 2 * M_PI * i / nodes, radius = 0.1 * (1.0 + 0.22 * std::cos(3 * angle) + 0.1 * std::sin(2 * angle));
-    circle.col(i) << 0.09 * std::cos(angle), 0.09 * std::sin(angle), 0;   // shorter than the guide: a band under tension
+    const double angle = 2 * M_PI * i / nodes,
+                 radius = 0.1 * (1.0 + 0.22 * std::cos(3 * angle) + 0.1 * std::sin(2 * angle));
+    // shorter than the guide: a band under tension
+    circle.col(i) << 0.09 * std::cos(angle), 0.09 * std::sin(angle), 0;
     band.guide.col(i) << radius * std::cos(angle), radius * std::sin(angle), 0;
   }
   constexpr double kModulus = 2e5, kRadius = 1.5e-3;
   const double area = M_PI * kRadius * kRadius, inertia = 0.25 * area * kRadius * kRadius;
   band.density = 1100 * area;
-  const RodSection section{kRadius, kRadius, band.density, kModulus * area, kModulus * inertia * Eigen::Matrix2d::Identity(), kModulus * inertia / 1.5};
-  RodModel model = buildRod("band", circle, true, std::vector<RodSection>(static_cast<std::size_t>(nodes), section), Vector3d::UnitZ(), false);
+  const RodSection section{kRadius,
+                           kRadius,
+                           band.density,
+                           kModulus * area,
+                           kModulus * inertia * Eigen::Matrix2d::Identity(),
+                           kModulus * inertia / 1.5};
+  RodModel model = buildRod("band", circle, true, std::vector<RodSection>(static_cast<std::size_t>(nodes), section),
+                            Vector3d::UnitZ(), false);
   model.mass_damping = 5.0;
   model.stiffness_damping = 1e-3;
   band.model = std::make_shared<const RodModel>(std::move(model));
@@ -80,14 +89,20 @@ double fineKinetic(const Band& band, const Matrix3Xd& v)
 
 struct BandRun
 {
-  Matrix3Xd still, moved;          ///< before the acceleration; when it ends, seen from the guide
-  double kinetic = 0, change = 0;  ///< mean from the acceleration on [J]; greatest distance of a node from where it was on the guide [m]
-  double error = 0, ms = 0;        ///< greatest distance of a segment's centre from the guide's [m]; CPU time per step
+  Matrix3Xd still, moved;   ///< before the acceleration; when it ends, seen from the guide
+  /// mean from the acceleration on [J]; greatest distance of a node from where it was on the guide [m]
+  double kinetic = 0, change = 0;
+  double error = 0, ms = 0;   ///< greatest distance of a segment's centre from the guide's [m]; CPU time per step
 };
 
-enum class Motion { shift, turn };
+enum class Motion
+{
+  shift,
+  turn
+};
 
-/// Settles on the guide, which is then accelerated sideways, or about its middle (at 0.1 m from there), for kPulse and goes on at that speed.
+/// Settles on the guide, which is then accelerated sideways, or about its middle (at 0.1 m from there), for kPulse and
+/// goes on at that speed.
 BandRun run(const Band& band, bool averages, Motion motion, double acceleration)
 {
   TimeConfig time;
@@ -104,7 +119,8 @@ BandRun run(const Band& band, bool averages, Motion motion, double acceleration)
     }
   RodStepper held(band.model, time);
   AveragedRod averaged(band.model, std::make_shared<const WeakConstraints::Matrix>(band.segments->matrix()), time);
-  const int settle = static_cast<int>(std::lround(kSettle / kStep)), pulse = static_cast<int>(std::lround(kPulse / kStep)), after = 4 * pulse;
+  const int settle = static_cast<int>(std::lround(kSettle / kStep)),
+            pulse = static_cast<int>(std::lround(kPulse / kStep)), after = 4 * pulse;
   BandRun result;
   double seconds = 0;
   for (int k = 1; k <= settle + pulse + after; ++k)
@@ -112,7 +128,8 @@ BandRun run(const Band& band, bool averages, Motion motion, double acceleration)
     const double t = (k - settle) * kStep, accelerated = std::clamp(t, 0.0, kPulse);
     const double far = acceleration * (0.5 * accelerated * accelerated + accelerated * std::max(0.0, t - kPulse));
     const bool turns = motion == Motion::turn;
-    const Vector3d way = turns ? Vector3d(0, 0, 0) : Vector3d(far, 0, 0), spin(0, 0, turns ? acceleration * accelerated / 0.1 : 0.0);
+    const Vector3d way = turns ? Vector3d(0, 0, 0) : Vector3d(far, 0, 0),
+                   spin(0, 0, turns ? acceleration * accelerated / 0.1 : 0.0);
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(turns ? far / 0.1 : 0.0, Vector3d::UnitZ()).toRotationMatrix();
     const Matrix3Xd guide = (turn * band.guide).colwise() + way;
     for (int r = 0; r < static_cast<int>(inputs.grasps.size()); ++r)
@@ -143,13 +160,16 @@ BandRun run(const Band& band, bool averages, Motion motion, double acceleration)
   return result;
 }
 
-}  // namespace
+}   // namespace
 
 void runRubberBand(StudyContext& context)
 {
   const Band band = makeBand(context.quick() ? 8 : 16);
-  Plot& picture = addPicture(context, "rubber_band", "A rubber band and its guide: still (above), accelerated to the right (below)", "[m]", "[m]");
-  Plot& changes = context.plot("rubber_band_change", "How far the band leaves its shape", "acceleration of the guide [m/s^2]", "greatest distance [m]");
+  Plot& picture =
+      addPicture(context, "rubber_band", "A rubber band and its guide: still (above), accelerated to the right (below)",
+                 "[m]", "[m]");
+  Plot& changes = context.plot("rubber_band_change", "How far the band leaves its shape",
+                               "acceleration of the guide [m/s^2]", "greatest distance [m]");
   const Camera camera{{0, 0, -1}, {0, 1, 0}};
   struct Case
   {
@@ -158,8 +178,12 @@ void runRubberBand(StudyContext& context)
   };
   std::vector<Case> cases{{Motion::shift, 10}, {Motion::shift, 1000}, {Motion::turn, 100}};
   if (!context.quick())
-    cases.insert(cases.end(), {{Motion::shift, 100}, {Motion::shift, 300}, {Motion::shift, 3000},
-                               {Motion::turn, 10}, {Motion::turn, 30}, {Motion::turn, 300}});
+    cases.insert(cases.end(), {{Motion::shift, 100},
+                               {Motion::shift, 300},
+                               {Motion::shift, 3000},
+                               {Motion::turn, 10},
+                               {Motion::turn, 30},
+                               {Motion::turn, 300}});
   int done = 0;
   for (const auto& [motion, acceleration] : cases)
   {
@@ -171,9 +195,18 @@ void runRubberBand(StudyContext& context)
       const BandRun r = run(band, averages, motion, acceleration);
       const std::string label = averages ? "averages" : "points";
       kinetic[averages] = r.kinetic;
-      context.row().set("motion", shifts ? "shift" : "turn").set("acceleration_m_per_s2", acceleration).set("constraints", label).set("nodes", band.model->nodes()).set("count", kAnchors)
-        .set("rms_from_guide_still_m", std::sqrt((r.still - band.guide).squaredNorm() / static_cast<double>(r.still.cols())))
-        .set("greatest_change_m", r.change).set("fine_kinetic_mJ", 1e3 * r.kinetic).set("average_error_m", r.error).set("ms_per_step", r.ms);
+      context.row()
+          .set("motion", shifts ? "shift" : "turn")
+          .set("acceleration_m_per_s2", acceleration)
+          .set("constraints", label)
+          .set("nodes", band.model->nodes())
+          .set("count", kAnchors)
+          .set("rms_from_guide_still_m",
+               std::sqrt((r.still - band.guide).squaredNorm() / static_cast<double>(r.still.cols())))
+          .set("greatest_change_m", r.change)
+          .set("fine_kinetic_mJ", 1e3 * r.kinetic)
+          .set("average_error_m", r.error)
+          .set("ms_per_step", r.ms);
       Series& change = changes.at(label + (shifts ? ", shift" : ", turn"));
       change.points = true;
       change.x.push_back(acceleration);
@@ -197,9 +230,12 @@ void runRubberBand(StudyContext& context)
     if (acceleration == (shifts ? 1000 : 100))
       context.metric(shifts ? "tugging_ratio_shift" : "tugging_ratio", kinetic[0] / kinetic[1]);
   }
-  context.note("the guide is accelerated for 20 ms, sideways or in a turn (acceleration at 0.1 m from its middle); fine_kinetic: of "
-               "velocities seen from the guide, less their L2 projection onto the segments' functions, mean from then on for 100 ms; tugging_ratio: points over averages, "
-               "turned at 100 m/s^2; shifted, averages change nothing");
+  context.note(
+      "the guide is accelerated for 20 ms, sideways or in a turn (acceleration at 0.1 m from its middle); "
+      "fine_kinetic: of "
+      "velocities seen from the guide, less their L2 projection onto the segments' functions, mean from then on for "
+      "100 ms; tugging_ratio: points over averages, "
+      "turned at 100 m/s^2; shifted, averages change nothing");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// Threads held between two plates that sag: the middle's path in time, and catenary or U (thesis 5.5, Fig. 5.4; sag_D0175.csv, sag_D0033.csv).
+// Threads held between two plates that sag: the middle's path in time, and catenary or U (thesis 5.5, Fig. 5.4;
+// sag_D0175.csv, sag_D0033.csv).
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -20,26 +21,16 @@ struct Reference
 
 /// String model (no bending) with inertia, plates 2.5 apart.
 const std::vector<Reference> kReference = {
-    {0.175, 0.0, 0.0300, 0.44157, 0.083852, 0.082929},
-    {0.175, 0.0, 0.0600, 0.95563, 0.077909, 0.073392},
-    {0.175, 0.0, 0.1000, 1.3472, 0.073922, 0.064344},
-    {0.175, 0.0, 0.1500, 1.8778, 0.071053, 0.052003},
-    {0.175, 0.0, 0.2000, 2.6924, 0.068615, 0.038199},
-    {0.175, 20.0, 0.0300, 0.44157, 0.08409, 0.083214},
-    {0.175, 20.0, 0.0600, 0.88566, 0.078774, 0.074409},
-    {0.175, 20.0, 0.1000, 1.2301, 0.075834, 0.066655},
-    {0.175, 20.0, 0.1500, 1.5662, 0.073969, 0.056087},
-    {0.175, 20.0, 0.2000, 2.1649, 0.072778, 0.04429},
-    {0.033, 0.0, 0.0300, 0.44157, 0.015812, 0.015638},
-    {0.033, 0.0, 0.0600, 0.95563, 0.014691, 0.01384},
-    {0.033, 0.0, 0.1000, 1.3472, 0.013939, 0.012133},
-    {0.033, 0.0, 0.1500, 1.8778, 0.013398, 0.0098063},
-    {0.033, 0.0, 0.2000, 2.6924, 0.012939, 0.0072032},
-    {0.033, 20.0, 0.0300, 0.4372, 0.01599, 0.015851},
-    {0.033, 20.0, 0.0600, 0.64654, 0.015503, 0.014832},
-    {0.033, 20.0, 0.1000, 0.69433, 0.015698, 0.014291},
-    {0.033, 20.0, 0.1500, 0.74003, 0.016019, 0.013602},
-    {0.033, 20.0, 0.2000, 0.77275, 0.01639, 0.012805}};
+    {0.175, 0.0, 0.0300, 0.44157, 0.083852, 0.082929},  {0.175, 0.0, 0.0600, 0.95563, 0.077909, 0.073392},
+    {0.175, 0.0, 0.1000, 1.3472, 0.073922, 0.064344},   {0.175, 0.0, 0.1500, 1.8778, 0.071053, 0.052003},
+    {0.175, 0.0, 0.2000, 2.6924, 0.068615, 0.038199},   {0.175, 20.0, 0.0300, 0.44157, 0.08409, 0.083214},
+    {0.175, 20.0, 0.0600, 0.88566, 0.078774, 0.074409}, {0.175, 20.0, 0.1000, 1.2301, 0.075834, 0.066655},
+    {0.175, 20.0, 0.1500, 1.5662, 0.073969, 0.056087},  {0.175, 20.0, 0.2000, 2.1649, 0.072778, 0.04429},
+    {0.033, 0.0, 0.0300, 0.44157, 0.015812, 0.015638},  {0.033, 0.0, 0.0600, 0.95563, 0.014691, 0.01384},
+    {0.033, 0.0, 0.1000, 1.3472, 0.013939, 0.012133},   {0.033, 0.0, 0.1500, 1.8778, 0.013398, 0.0098063},
+    {0.033, 0.0, 0.2000, 2.6924, 0.012939, 0.0072032},  {0.033, 20.0, 0.0300, 0.4372, 0.01599, 0.015851},
+    {0.033, 20.0, 0.0600, 0.64654, 0.015503, 0.014832}, {0.033, 20.0, 0.1000, 0.69433, 0.015698, 0.014291},
+    {0.033, 20.0, 0.1500, 0.74003, 0.016019, 0.013602}, {0.033, 20.0, 0.2000, 0.77275, 0.01639, 0.012805}};
 
 ThreadSetup heldThread(double length, double diameter, double gamma, int edges)
 {
@@ -94,7 +85,7 @@ double slowest(double length, double diameter, double gamma, int edges)
   return lowest;
 }
 
-}  // namespace
+}   // namespace
 
 void runSagging(StudyContext& context)
 {
@@ -138,8 +129,10 @@ void runSagging(StudyContext& context)
 
   const double capillary = std::sqrt(kTension / (kDensity * kGravity));
   Plot& map = context.plot("sagging_shapes", "Catenary or U", "D / a", "L / a");
-  const std::vector<double> lengths = context.quick() ? std::vector<double>{1.0, 2.5} : std::vector<double>{0.6, 1.0, 1.6, 2.5, 4.0};
-  const std::vector<double> ratios = context.quick() ? std::vector<double>{0.3, 0.7, 1.4, 3.0} : std::vector<double>{0.2, 0.35, 0.6, 0.8, 1.25, 1.7, 3.0, 5.0};
+  const std::vector<double> lengths =
+      context.quick() ? std::vector<double>{1.0, 2.5} : std::vector<double>{0.6, 1.0, 1.6, 2.5, 4.0};
+  const std::vector<double> ratios = context.quick() ? std::vector<double>{0.3, 0.7, 1.4, 3.0}
+                                                     : std::vector<double>{0.2, 0.35, 0.6, 0.8, 1.25, 1.7, 3.0, 5.0};
   int wrong = 0, cases = 0, done = 0;
   for (const double length : lengths)
     for (const double ratio : ratios)
@@ -153,8 +146,14 @@ void runSagging(StudyContext& context)
       const bool catenary = speed > 0.2, right = catenary == (ratio > 1);
       wrong += !right;
       ++cases;
-      context.row().set("test", "shape").set("L_over_a", length / capillary).set("D_over_a", diameter / capillary).set("L_D_over_4.7a2", ratio)
-          .set("slowed_to", speed).set("shape", catenary ? "catenary" : "U").set("agrees", right ? "yes" : "no");
+      context.row()
+          .set("test", "shape")
+          .set("L_over_a", length / capillary)
+          .set("D_over_a", diameter / capillary)
+          .set("L_D_over_4.7a2", ratio)
+          .set("slowed_to", speed)
+          .set("shape", catenary ? "catenary" : "U")
+          .set("agrees", right ? "yes" : "no");
       Series& s = map.at(catenary ? "catenary" : "U");
       s.points = true;
       s.x.push_back(diameter / capillary);
@@ -168,9 +167,13 @@ void runSagging(StudyContext& context)
   const double fraction = static_cast<double>(wrong) / cases;
   context.row().set("test", "misclassified").check(fraction, 0.0, 0.1, "L D = 4.7 a^2, Le Merrer et al. 2008");
   context.metric("misclassified_fraction", fraction);
-  context.note("Paths: the reference is a string; the thick thread is held back by its bending and its clamps, and its rows are no checks.");
-  context.note("slowed_to: lowest speed of the middle over that without surface tension; it crosses 0.2 within a tenth of L D = 4.7 a^2 and zero");
+  context.note(
+      "Paths: the reference is a string; the thick thread is held back by its bending and its clamps, and its rows are "
+      "no checks.");
+  context.note(
+      "slowed_to: lowest speed of the middle over that without surface tension; it crosses 0.2 within a tenth of L D = "
+      "4.7 a^2 and zero");
   context.note("near L D = 4 a^2, where the surface tension of two vertical ends carries the weight.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -42,7 +42,7 @@ private:
   std::string path_;
 };
 
-}  // namespace
+}   // namespace
 
 SceneConfig packageSceneConfig(const std::string& name, const std::vector<std::string>& overrides)
 {
@@ -51,7 +51,10 @@ SceneConfig packageSceneConfig(const std::string& name, const std::vector<std::s
   return parseScene(text, name + ".yaml", overrides, folder.scenes());
 }
 
-Simulation packageScene(const std::string& name, const std::vector<std::string>& overrides) { return Simulation(packageSceneConfig(name, overrides)); }
+Simulation packageScene(const std::string& name, const std::vector<std::string>& overrides)
+{
+  return Simulation(packageSceneConfig(name, overrides));
+}
 
 GroupSetup groupOf(const Simulation& scene)
 {
@@ -77,9 +80,11 @@ GroupSetup groupOf(const Simulation& scene)
   return g;
 }
 
-void draw(Plot& picture, const std::string& label, const Eigen::Matrix3Xd& nodes, bool closed, const Camera& camera, const Eigen::Vector3d& shift)
+void draw(Plot& picture, const std::string& label, const Eigen::Matrix3Xd& nodes, bool closed, const Camera& camera,
+          const Eigen::Vector3d& shift)
 {
-  const Eigen::Vector3d up = (camera.up - camera.up.dot(camera.view) * camera.view / camera.view.squaredNorm()).normalized();
+  const Eigen::Vector3d up =
+      (camera.up - camera.up.dot(camera.view) * camera.view / camera.view.squaredNorm()).normalized();
   const Eigen::Vector3d right = camera.view.cross(up).normalized();
   Series& series = picture.at(label);
   if (!series.x.empty())
@@ -96,7 +101,8 @@ void draw(Plot& picture, const std::string& label, const Eigen::Matrix3Xd& nodes
   }
 }
 
-Plot& addPicture(StudyContext& context, const std::string& name, const std::string& title, const std::string& x_label, const std::string& y_label)
+Plot& addPicture(StudyContext& context, const std::string& name, const std::string& title, const std::string& x_label,
+                 const std::string& y_label)
 {
   Plot& picture = context.plot(name, title, x_label, y_label);
   picture.log_x = picture.log_y = picture.markers = false;
@@ -104,4 +110,4 @@ Plot& addPicture(StudyContext& context, const std::string& name, const std::stri
   return picture;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

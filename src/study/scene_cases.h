@@ -29,6 +29,7 @@ void draw(Plot& picture, const std::string& label, const Eigen::Matrix3Xd& nodes
           const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
 
 /// A plot for draw(): equal axes, no markers.
-Plot& addPicture(StudyContext& context, const std::string& name, const std::string& title, const std::string& x_label, const std::string& y_label);
+Plot& addPicture(StudyContext& context, const std::string& name, const std::string& title, const std::string& x_label,
+                 const std::string& y_label);
 
-}  // namespace slender::study
+}   // namespace slender::study

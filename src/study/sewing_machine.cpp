@@ -1,5 +1,6 @@
-// A thread that falls on a moving belt (thesis 5.5, Figs. 5.1 and 5.3): patterns with the belt's speed rising and falling, against the
-// quasi-static geometric model of Brun, Audoly, Ribe, Eaves and Lister, PRL 114, 174501 (2015) (sewing_gm.csv).
+// A thread that falls on a moving belt (thesis 5.5, Figs. 5.1 and 5.3): patterns with the belt's speed rising and
+// falling, against the quasi-static geometric model of Brun, Audoly, Ribe, Eaves and Lister, PRL 114, 174501 (2015)
+// (sewing_gm.csv).
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -12,14 +13,15 @@
 namespace slender::study {
 namespace {
 
-/// Silicone oil of Morris et al. (2008), CGS units, at a height where inertia is small: H (g/nu^2)^(1/3) = 0.59, Omega^2 H / g = 0.16.
+/// Silicone oil of Morris et al. (2008), CGS units, at a height where inertia is small: H (g/nu^2)^(1/3) = 0.59,
+/// Omega^2 H / g = 0.16.
 constexpr double kHeight = 2.5, kSpeed = 0.0537;
 
 /// What the full and the quick form differ in. The quick one finds the same thresholds at a third of the cost.
 struct Resolution
 {
-  double per_turn, step_angle;      ///< edges, and of the coil per step [rad]
-  double still, settle, watch;      ///< turns: on the still belt, at a new speed of the belt, and then recorded
+  double per_turn, step_angle;   ///< edges, and of the coil per step [rad]
+  double still, settle, watch;   ///< turns: on the still belt, at a new speed of the belt, and then recorded
 };
 constexpr Resolution kFull{30, 0.03, 80, 15, 15}, kQuick{20, 0.045, 60, 12, 12};
 
@@ -43,8 +45,10 @@ ThreadSetup fallingThread(double radius, const Resolution& resolution)
   return t;
 }
 
-/// Runs on for some turns of the coil while the belt comes to its new speed and the nozzle gives the thread a nudge, then records.
-std::vector<Landings::Point> observe(ThreadSetup& t, double belt, double coil_radius, double coil_frequency, double step_angle, double settle, double turns)
+/// Runs on for some turns of the coil while the belt comes to its new speed and the nozzle gives the thread a nudge,
+/// then records.
+std::vector<Landings::Point> observe(ThreadSetup& t, double belt, double coil_radius, double coil_frequency,
+                                     double step_angle, double settle, double turns)
 {
   ThreadStepper stepper = makeStepper(t);
   const double h = step_angle / coil_frequency, start = t.time, period = 2 * M_PI / coil_frequency;
@@ -65,7 +69,7 @@ std::vector<Landings::Point> observe(ThreadSetup& t, double belt, double coil_ra
   return landings.points();
 }
 
-}  // namespace
+}   // namespace
 
 void runSewingMachine(StudyContext& context)
 {
@@ -73,7 +77,8 @@ void runSewingMachine(StudyContext& context)
   const Resolution& resolution = context.quick() ? kQuick : kFull;
   double frequency = 7.8, radius = 0.185;
   ThreadSetup still = fallingThread(radius, resolution);
-  std::vector<Landings::Point> coil = observe(still, 0.0, radius, frequency, resolution.step_angle, resolution.still, 6);
+  std::vector<Landings::Point> coil =
+      observe(still, 0.0, radius, frequency, resolution.step_angle, resolution.still, 6);
   double x = 0, y = 0, r = 0, angle = 0;
   for (const Landings::Point& p : coil)
   {
@@ -84,7 +89,8 @@ void runSewingMachine(StudyContext& context)
   {
     r += std::hypot(coil[k].x - x, coil[k].y - y) / static_cast<double>(coil.size());
     if (k > 0)
-      angle += std::remainder(std::atan2(coil[k].y - y, coil[k].x - x) - std::atan2(coil[k - 1].y - y, coil[k - 1].x - x), 2 * M_PI);
+      angle += std::remainder(
+          std::atan2(coil[k].y - y, coil[k].x - x) - std::atan2(coil[k - 1].y - y, coil[k - 1].x - x), 2 * M_PI);
   }
   radius = r;
   frequency = std::abs(angle) / (coil.back().time - coil.front().time);
@@ -126,15 +132,22 @@ void runSewingMachine(StudyContext& context)
     const auto look = [&](double ratio) {
       const bool fresh = patterns.empty() && !rising;
       const double settle = (fresh ? 2 : 1) * resolution.settle;
-      return classifyBeltTrace(observe(t, ratio * speed, radius, frequency, resolution.step_angle, settle, resolution.watch), ratio * speed,
-                               0.05 * radius);
+      return classifyBeltTrace(
+          observe(t, ratio * speed, radius, frequency, resolution.step_angle, settle, resolution.watch), ratio * speed,
+          0.05 * radius);
     };
     const auto record = [&](double ratio, const BeltTrace& trace) {
       seen_at.push_back(ratio);
       patterns.push_back(trace.pattern);
-      context.row().set("way", way).set("V_over_Uc", ratio).set("pattern", trace.pattern).set("amplitude_over_Rc", trace.amplitude / radius)
-          .set("frequency_across", trace.frequency_y / frequency).set("frequency_along", trace.frequency_x / frequency)
-          .set("windings", trace.windings).set("swing_turns", trace.swing);
+      context.row()
+          .set("way", way)
+          .set("V_over_Uc", ratio)
+          .set("pattern", trace.pattern)
+          .set("amplitude_over_Rc", trace.amplitude / radius)
+          .set("frequency_across", trace.frequency_y / frequency)
+          .set("frequency_along", trace.frequency_x / frequency)
+          .set("windings", trace.windings)
+          .set("swing_turns", trace.swing);
       Series& s = plot.at(trace.pattern + ", " + way);
       s.points = true;
       s.x.push_back(ratio);
@@ -142,7 +155,8 @@ void runSewingMachine(StudyContext& context)
     };
     for (const double ratio : ratios)
     {
-      context.progress(done++, static_cast<int>((context.quick() ? 1 : 2) * ratios.size()), way + " to V/Uc = " + std::to_string(ratio));
+      context.progress(done++, static_cast<int>((context.quick() ? 1 : 2) * ratios.size()),
+                       way + " to V/Uc = " + std::to_string(ratio));
       const ThreadSetup before = t;
       const BeltTrace trace = look(ratio);
       if (patterns.empty() || trace.pattern == patterns.back())
@@ -166,22 +180,34 @@ void runSewingMachine(StudyContext& context)
       // the last change of this kind on the way
       double at = std::nan("");
       for (std::size_t k = 1; k < patterns.size(); ++k)
-        if (patterns[k - 1] == threshold.from && patterns[k] != threshold.from && (threshold.to[0] == '\0' || patterns[k] == threshold.to))
+        if (patterns[k - 1] == threshold.from && patterns[k] != threshold.from &&
+            (threshold.to[0] == '\0' || patterns[k] == threshold.to))
           at = 0.5 * (seen_at[k - 1] + seen_at[k]);
       Row& row = context.row();
       row.set("way", way).set("pattern", std::string("end of ") + threshold.from);
       // the quick form sees no better than half of its smaller steps
-      row.check(at, std::clamp(at, threshold.low, threshold.high), 0.06 + (context.quick() ? 0.5 * interval / parts : 0.0), threshold.source);
+      row.check(at, std::clamp(at, threshold.low, threshold.high),
+                0.06 + (context.quick() ? 0.5 * interval / parts : 0.0), threshold.source);
       row.set("tabled", threshold.tabled).set("off_tabled", at - threshold.tabled);
       off_tabled = std::max(off_tabled, std::abs(at - threshold.tabled));
     }
   }
   context.metric("largest_distance_from_tabled", off_tabled);
-  context.note("tabled: where the geometric model's solution ends in sewing_gm.csv. That model is quasi-static with one fitted law for the heel; here");
-  context.note("coils and loops last to higher belt speeds, the more so the higher the thread falls: coils rising to 0.375, 0.41 and 0.44 from 2, 3 and");
-  context.note("6 cm, loops to 0.565 and 0.62 from 2 and 3 cm. At 3 cm twice the resolution, a quarter of the step, six times longer settling or a");
-  context.note("hundredth of the inertia (density and 1/g) change the end of the coils by less than 0.02. No W pattern: loops go over into meanders.");
-  context.note("V in units of the coil's own speed on a still belt. Thresholds lie between two speeds; NaN: this change was not seen.");
+  context.note(
+      "tabled: where the geometric model's solution ends in sewing_gm.csv. That model is quasi-static with one fitted "
+      "law for the heel; here");
+  context.note(
+      "coils and loops last to higher belt speeds, the more so the higher the thread falls: coils rising to 0.375, "
+      "0.41 and 0.44 from 2, 3 and");
+  context.note(
+      "6 cm, loops to 0.565 and 0.62 from 2 and 3 cm. At 3 cm twice the resolution, a quarter of the step, six times "
+      "longer settling or a");
+  context.note(
+      "hundredth of the inertia (density and 1/g) change the end of the coils by less than 0.02. No W pattern: loops "
+      "go over into meanders.");
+  context.note(
+      "V in units of the coil's own speed on a still belt. Thresholds lie between two speeds; NaN: this change was not "
+      "seen.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -17,7 +17,8 @@ RodSection sectionOf(double stretch, double bend1, double bend2, double twist)
   return s;
 }
 
-RodSetup naturalRod(const RodSection& section, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& director, const JointOptions& joints)
+RodSetup naturalRod(const RodSection& section, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& director,
+                    const JointOptions& joints)
 {
   const std::vector<RodSection> sections(static_cast<std::size_t>(rest.cols() - 1), section);
   RodModel model = buildRod("study", rest, false, sections, director, false, joints);
@@ -71,4 +72,4 @@ void pushOff(RodSetup& rod, const Eigen::Vector3d& direction, double amplitude)
   lay(rod, nodes, director);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

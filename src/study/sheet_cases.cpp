@@ -114,8 +114,8 @@ Spectrum wrinkles(const SheetScene& scene, const std::vector<Eigen::Matrix3Xd>& 
       {
         const auto at = [&](int p, int q) -> Vector3d { return x.col((j + q) * (scene.columns + 1) + i + p); };
         const Vector3d normal = (at(1, 0) - at(-1, 0)).cross(Vector3d(at(0, 1) - at(0, -1))).normalized();
-        curvature(i - 1, j - 1) =
-          normal.dot((at(1, 0) - 2 * at(0, 0) + at(-1, 0)) / (du * du) + (at(0, 1) - 2 * at(0, 0) + at(0, -1)) / (dv * dv));
+        curvature(i - 1, j - 1) = normal.dot((at(1, 0) - 2 * at(0, 0) + at(-1, 0)) / (du * du) +
+                                             (at(0, 1) - 2 * at(0, 0) + at(0, -1)) / (dv * dv));
       }
     const Eigen::MatrixXd power = (cu * curvature * cv.transpose()).cwiseAbs2();
     for (int k = 0; k < nu; ++k)
@@ -149,4 +149,4 @@ ShapeDifference difference(const SheetScene& scene, const Eigen::Matrix3Xd& a, c
   return {std::sqrt(apart.squaredNorm() / static_cast<double>(apart.size())) / size, apart.maxCoeff() / size};
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -7,16 +7,17 @@
 #include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/study/study.h"
 
-/// Square or rectangular sheets run with one bending model or another, all else equal, and what sets their shapes apart.
+/// Square or rectangular sheets run with one bending model or another, all else equal, and what sets their shapes
+/// apart.
 namespace slender::study {
 
 struct SheetScene
 {
   std::string name;
-  TriangleMesh mesh;            ///< gridMesh() of a right-angled pattern, not moved
-  int columns = 0, rows = 0;    ///< its cells
-  Eigen::Matrix3Xd start;       ///< 3 x n [m]
-  ClothModel model;             ///< of this mesh; its bending model is replaced
+  TriangleMesh mesh;           ///< gridMesh() of a right-angled pattern, not moved
+  int columns = 0, rows = 0;   ///< its cells
+  Eigen::Matrix3Xd start;      ///< 3 x n [m]
+  ClothModel model;            ///< of this mesh; its bending model is replaced
   ClothContact contact;
   std::vector<ContactSolid> solids;   ///< at the identity pose
   std::vector<int> pins;
@@ -29,15 +30,17 @@ struct SheetRun
   std::vector<Eigen::Matrix3Xd> frames;   ///< kept states, the last one at the end
   std::vector<Eigen::Vector3d> corner;    ///< the vertex farthest from the first one, after each step from keep_from on
   double seconds_per_step = 0;            ///< CPU time, collisions included
-  double cloth_seconds = 0;             ///< CPU time per step of the cloth's own, without collisions
+  double cloth_seconds = 0;               ///< CPU time per step of the cloth's own, without collisions
   double speed = 0;                       ///< RMS at the end [m/s]
   std::size_t intersections = 0;          ///< at the end
 };
 
-/// `shake`: the start is shifted by random numbers up to this size [m]. Throws std::runtime_error when a step is refused.
+/// `shake`: the start is shifted by random numbers up to this size [m]. Throws std::runtime_error when a step is
+/// refused.
 SheetRun runSheet(StudyContext& context, const SheetScene& scene, BendingModel bending, double shake);
 
-/// Shares of the variance of mean curvature by wavelength on the sheet, in bands of half an octave from the shortest resolved one on.
+/// Shares of the variance of mean curvature by wavelength on the sheet, in bands of half an octave from the shortest
+/// resolved one on.
 struct Spectrum
 {
   std::vector<double> wavelength, share;   ///< [m] (geometric mean of the band), [-] (sum 1)
@@ -54,4 +57,4 @@ struct ShapeDifference
 };
 ShapeDifference difference(const SheetScene& scene, const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b);
 
-}  // namespace slender::study
+}   // namespace slender::study

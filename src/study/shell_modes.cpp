@@ -18,7 +18,8 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Points and weights of Gauss's rule on [-1, 1], from the eigenvalues of Legendre's three-term recursion [Golub and Welsch 1969].
+/// Points and weights of Gauss's rule on [-1, 1], from the eigenvalues of Legendre's three-term recursion [Golub and
+/// Welsch 1969].
 void gaussRule(int count, VectorXd& points, VectorXd& weights)
 {
   MatrixXd jacobi = MatrixXd::Zero(count, count);
@@ -32,7 +33,10 @@ void gaussRule(int count, VectorXd& points, VectorXd& weights)
 /// Value and first two derivatives of a function of one variable.
 using Jet = Eigen::Vector3d;
 
-Jet product(const Jet& a, const Jet& b) { return {a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2 * a[1] * b[1] + a[0] * b[2]}; }
+Jet product(const Jet& a, const Jet& b)
+{
+  return {a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2 * a[1] * b[1] + a[0] * b[2]};
+}
 
 /// Legendre polynomials 0 .. count - 1 at s.
 std::vector<Jet> legendre(int count, double s)
@@ -40,20 +44,25 @@ std::vector<Jet> legendre(int count, double s)
   std::vector<Jet> p{Jet(1, 0, 0), Jet(s, 1, 0)};
   const Jet variable(s, 1, 0);
   for (int k = 2; k < count; ++k)
-    p.push_back(((2 * k - 1) * product(variable, p[static_cast<std::size_t>(k - 1)]) - (k - 1) * p[static_cast<std::size_t>(k - 2)]) / k);
+    p.push_back(((2 * k - 1) * product(variable, p[static_cast<std::size_t>(k - 1)]) -
+                 (k - 1) * p[static_cast<std::size_t>(k - 2)]) /
+                k);
   p.resize(static_cast<std::size_t>(count));
   return p;
 }
 
-/// Adds the energy and the inertia at one point of integration. Rows of `strains`: two stretches, shear angle, two curvatures, twice the twist.
-/// Rows of `moves`: the displacement.
+/// Adds the energy and the inertia at one point of integration. Rows of `strains`: two stretches, shear angle, two
+/// curvatures, twice the twist. Rows of `moves`: the displacement.
 struct RitzSum
 {
   MatrixXd stiffness, mass;
   Eigen::Matrix<double, 6, 6> moduli = Eigen::Matrix<double, 6, 6>::Zero();
   double density = 0.0;
 
-  RitzSum(const ShellMaterial& m, Eigen::Index size) : stiffness(MatrixXd::Zero(size, size)), mass(MatrixXd::Zero(size, size)), density(m.area_density)
+  RitzSum(const ShellMaterial& m, Eigen::Index size)
+    : stiffness(MatrixXd::Zero(size, size)),
+      mass(MatrixXd::Zero(size, size)),
+      density(m.area_density)
   {
     const auto plane = [this](int first, double modulus, double ratio) {
       moduli.block<2, 2>(first, first) << modulus, ratio * modulus, ratio * modulus, modulus;
@@ -74,7 +83,8 @@ struct RitzSum
   }
 };
 
-/// One harmonic around the axis of a cap: displacements U cos(m a) along the meridian, V sin(m a) around it and W cos(m a) outwards.
+/// One harmonic around the axis of a cap: displacements U cos(m a) along the meridian, V sin(m a) around it and W cos(m
+/// a) outwards.
 VectorXd capHarmonic(const ShellMaterial& material, double radius, double angle, int m, int terms)
 {
   VectorXd points, weights;
@@ -87,7 +97,8 @@ VectorXd capHarmonic(const ShellMaterial& material, double radius, double angle,
     const double p = 0.5 * angle * (1.0 + points[q]), s = p / angle, sine = std::sin(p), cotangent = std::cos(p) / sine;
     const Jet square(s * s, 2 * s / angle, 2 / (angle * angle)), rim = Jet(1, 0, 0) - square;
     const auto power = [&](int k) -> Jet {
-      return {std::pow(s, k), k > 0 ? k * std::pow(s, k - 1) / angle : 0.0, k > 1 ? k * (k - 1) * std::pow(s, k - 2) / (angle * angle) : 0.0};
+      return {std::pow(s, k), k > 0 ? k * std::pow(s, k - 1) / angle : 0.0,
+              k > 1 ? k * (k - 1) * std::pow(s, k - 2) / (angle * angle) : 0.0};
     };
     const std::vector<Jet> along = legendre(terms, 2 * s * s - 1);
     for (int k = 0; k < terms; ++k)
@@ -99,16 +110,23 @@ VectorXd capHarmonic(const ShellMaterial& material, double radius, double angle,
       for (int family = 0; family < families; ++family)
       {
         // At the pole the displacement is smooth where U + V goes as s^(m+1), U - V as s^(m-1) and W as s^m.
-        const Jet zero = Jet::Zero(), f = family == 0 ? product(tangential, power(m + 1)) : family == 1 && m > 0 ? product(tangential, power(m - 1)) : zero;
+        const Jet zero = Jet::Zero(), f = family == 0            ? product(tangential, power(m + 1))
+                                          : family == 1 && m > 0 ? product(tangential, power(m - 1))
+                                                                 : zero;
         const bool outwards = family == families - 1;
-        const Jet u = outwards ? zero : f, v = outwards || m == 0 ? zero : family == 0 ? f : Jet(-f), w = outwards ? normal : zero;
+        const Jet u = outwards ? zero : f,
+                  v = outwards || m == 0 ? zero
+                      : family == 0      ? f
+                                         : Jet(-f),
+                  w = outwards ? normal : zero;
         const Jet turn = u - Jet(w[1], w[2], 0);   // beta_phi times the radius; the last entry is not used
         const Jet across = v + m / sine * w;       // beta_theta times the radius, whose slope follows
         const double across_slope = v[1] + m / sine * (w[1] - cotangent * w[0]);
         const int column = family * terms + k;
         strains.col(column) << (u[1] + w[0]) / radius, (m * v[0] / sine + cotangent * u[0] + w[0]) / radius,
-          (v[1] - cotangent * v[0] - m * u[0] / sine) / radius, turn[1] / (radius * radius), (m * across[0] / sine + cotangent * turn[0]) / (radius * radius),
-          (across_slope - cotangent * across[0] - m * turn[0] / sine) / (radius * radius);
+            (v[1] - cotangent * v[0] - m * u[0] / sine) / radius, turn[1] / (radius * radius),
+            (m * across[0] / sine + cotangent * turn[0]) / (radius * radius),
+            (across_slope - cotangent * across[0] - m * turn[0] / sine) / (radius * radius);
         moves.col(column) << u[0], v[0], w[0];
       }
     }
@@ -117,13 +135,14 @@ VectorXd capHarmonic(const ShellMaterial& material, double radius, double angle,
   return sum.frequencies();
 }
 
-}  // namespace
+}   // namespace
 
 BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state)
 {
   const MeshTopology& t = model.topology;
   const MembraneEnergy membrane(model.rest, model.membrane, model.warp);
-  const double coefficient = model.bending_modulus * bendingCalibration(model.rest, t, IsometricElement::nonconforming, model.warp);
+  const double coefficient =
+      model.bending_modulus * bendingCalibration(model.rest, t, IsometricElement::nonconforming, model.warp);
   BlockMatrix matrix(model.vertices(), {model.rest.triangles, t.hinges});
   PointVector x, gradient(4 * static_cast<std::size_t>(model.vertices()), 0.0);
   toPoints(state.x, x);
@@ -131,13 +150,15 @@ BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state)
   membrane.addHessian(HessianKind::exact, x.data(), membrane.slotsIn(matrix), gradient.data(), matrix.values());
   if (model.bending == BendingModel::hinge)
   {
-    const HingeBending hinges(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces), state.rest_angles);
+    const HingeBending hinges(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces),
+                              state.rest_angles);
     hinges.addHessian(HessianKind::exact, x.data(), hinges.slotsIn(matrix), gradient.data(), matrix.values());
     return matrix;
   }
   if (model.bending != BendingModel::isometric_nonconforming || model.bending_poissons_ratio)
     throw std::runtime_error("elasticHessian: only hinges and isometric bending without a ratio of its own");
-  const PointMatrix bending = isometricBending(model.rest, t, IsometricElement::nonconforming, coefficient, model.clamped_faces);
+  const PointMatrix bending =
+      isometricBending(model.rest, t, IsometricElement::nonconforming, coefficient, model.clamped_faces);
   matrix.add(1.0, bending, matrix.mapOf(bending));
   return matrix;
 }
@@ -156,7 +177,8 @@ VectorXd meshFrequencies(const ClothModel& model, const std::vector<int>& held, 
   std::vector<PointVector> basis(static_cast<std::size_t>(vectors), PointVector(4 * static_cast<std::size_t>(n), 0.0));
   for (int k = 0; k < vectors; ++k)
     for (int i = 0; i < 3 * n; ++i)
-      basis[static_cast<std::size_t>(k)][4 * static_cast<std::size_t>(i / 3) + static_cast<std::size_t>(i % 3)] = std::sin(1.0 + 1.7 * i + 0.9 * k * i);
+      basis[static_cast<std::size_t>(k)][4 * static_cast<std::size_t>(i / 3) + static_cast<std::size_t>(i % 3)] =
+          std::sin(1.0 + 1.7 * i + 0.9 * k * i);
   VectorXd values;
   for (int round = 0; round < rounds; ++round)
   {
@@ -194,7 +216,8 @@ VectorXd meshFrequencies(const ClothModel& model, const std::vector<int>& held, 
   return values.head(count).cwiseSqrt();
 }
 
-VectorXd archFrequencies(const ShellMaterial& material, double radius, double angle, double width, int degree, int count)
+VectorXd archFrequencies(const ShellMaterial& material, double radius, double angle, double width, int degree,
+                         int count)
 {
   const int along = degree + 1, across = degree / 2 + 1, size = along * across;
   const double length = radius * angle;
@@ -214,12 +237,14 @@ VectorXd archFrequencies(const ShellMaterial& material, double radius, double an
       for (int i = 0; i < along; ++i)
         for (int j = 0; j < across; ++j)
         {
-          const Jet f = product(end, in_s[static_cast<std::size_t>(i)]), g = in_y[static_cast<std::size_t>(j)], h = product(ends, in_s[static_cast<std::size_t>(i)]);
+          const Jet f = product(end, in_s[static_cast<std::size_t>(i)]), g = in_y[static_cast<std::size_t>(j)],
+                    h = product(ends, in_s[static_cast<std::size_t>(i)]);
           const double value = f[0] * g[0], by_s = to_s * f[1] * g[0], by_y = to_y * f[0] * g[1];
           const int u = i * across + j, v = size + u, w = 2 * size + u;
           strains.col(u) << by_s, 0, by_y, by_s / radius, 0, 1.5 * by_y / radius;
           strains.col(v) << 0, by_y, by_s, 0, 0, -0.5 * by_s / radius;
-          strains.col(w) << h[0] * g[0] / radius, 0, 0, -to_s * to_s * h[2] * g[0], -to_y * to_y * h[0] * g[2], -2 * to_s * to_y * h[1] * g[1];
+          strains.col(w) << h[0] * g[0] / radius, 0, 0, -to_s * to_s * h[2] * g[0], -to_y * to_y * h[0] * g[2],
+              -2 * to_s * to_y * h[1] * g[1];
           moves(0, u) = moves(1, v) = value;
           moves(2, w) = h[0] * g[0];
         }
@@ -241,4 +266,4 @@ VectorXd capFrequencies(const ShellMaterial& material, double radius, double ang
   return Eigen::Map<VectorXd>(all.data(), count);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

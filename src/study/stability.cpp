@@ -106,13 +106,19 @@ Outcome StabilityCell::outcome() const
 
 StabilityTally::StabilityTally(StudyContext& context) : context_(context)
 {
-  for (const char* metric : {"nan_count", "unexplained_failures", "silently_wrong", "not_compared", "done", "cut", "refused"})
+  for (const char* metric :
+       {"nan_count", "unexplained_failures", "silently_wrong", "not_compared", "done", "cut", "refused"})
     context.metric(metric, 0);
-  context.note("done: every step at once; cut: some in shorter steps; refused: the step said why and left the state alone. UNSOUND: a state that "
-               "is not finite, a refusal without a reason or with a changed state (unexplained_failures); energy out of nothing, a step called done with forces unbalanced "
-               "by a tenth of the largest, or (silently_wrong; fine_distance > 0.5, maps) another way than that of a run with a quarter of the step: farther from it after a step than half as "
-               "far as that run ever moves, with a hundredth of the size allowed besides. not_compared: cells done or cut without that comparison (those beside the maps, and where the "
-               "finer run is refused).");
+  context.note(
+      "done: every step at once; cut: some in shorter steps; refused: the step said why and left the state alone. "
+      "UNSOUND: a state that "
+      "is not finite, a refusal without a reason or with a changed state (unexplained_failures); energy out of "
+      "nothing, a step called done with forces unbalanced "
+      "by a tenth of the largest, or (silently_wrong; fine_distance > 0.5, maps) another way than that of a run with a "
+      "quarter of the step: farther from it after a step than half as "
+      "far as that run ever moves, with a hundredth of the size allowed besides. not_compared: cells done or cut "
+      "without that comparison (those beside the maps, and where the "
+      "finer run is refused).");
 }
 
 void StabilityTally::record(Row& row, const StabilityCell& cell)
@@ -122,7 +128,11 @@ void StabilityTally::record(Row& row, const StabilityCell& cell)
   not_finite_ += cell.finite ? 0 : 1;
   unexplained_ += cell.explained ? 0 : 1;
   not_compared_ += (outcome == Outcome::done || outcome == Outcome::cut) && cell.fine_distance < 0 ? 1 : 0;
-  row.set("outcome", toString(outcome)).set("steps", cell.steps).set("cuts", cell.cuts).set("residual", cell.residual).set("energy_growth", cell.energy_growth)
+  row.set("outcome", toString(outcome))
+      .set("steps", cell.steps)
+      .set("cuts", cell.cuts)
+      .set("residual", cell.residual)
+      .set("energy_growth", cell.energy_growth)
       .set("max_strain", cell.max_strain);
   if (cell.fine_distance >= 0)
     row.set("fine_distance", cell.fine_distance);
@@ -196,21 +206,23 @@ Energy energyOf(const Simulation& simulation)
 struct Run
 {
   StabilityCell cell;
-  std::optional<Path> path;   ///< none of what cannot be set up
+  std::optional<Path> path;            ///< none of what cannot be set up
   std::vector<double> energy, scale;   ///< per step [J]; of what there is to give
 };
 
 constexpr int kAlong = 64;
 
-/// Of a guide that moves far in a step the force at the end says little about its work. Then `along`, the same motion in kAlong times as many steps, as far as that
-/// goes, has the energy that the guide has given; null: the end of the step counts.
+/// Of a guide that moves far in a step the force at the end says little about its work. Then `along`, the same motion
+/// in kAlong times as many steps, as far as that goes, has the energy that the guide has given; null: the end of the
+/// step counts.
 Run run(const MapScene& scene, double step, int steps, const Run* along = nullptr)
 {
   Run r;
   std::optional<Simulation> simulation;
   try
   {
-    simulation.emplace(parseScene(scene.yaml, "map.yaml", {"time={step: " + std::to_string(step * 1e6) + "e-6, duration: 1}"}));
+    simulation.emplace(
+        parseScene(scene.yaml, "map.yaml", {"time={step: " + std::to_string(step * 1e6) + "e-6, duration: 1}"}));
   }
   catch (const std::exception& refusal)
   {
@@ -257,7 +269,8 @@ Run run(const MapScene& scene, double step, int steps, const Run* along = nullpt
     }
     r.energy.push_back(now.now);
     r.scale.push_back(scale);
-    const double growth = along ? (now.now - along->energy[there]) / along->scale[there] : (now.now - start.now - work) / scale;
+    const double growth =
+        along ? (now.now - along->energy[there]) / along->scale[there] : (now.now - start.now - work) / scale;
     // one step and many may end in folds that differ by a little of what there is
     if (!r.cell.energyIs(growth, r.cell.linear_steps || along ? 1e-2 : energyGrowth(Integrator::implicit_euler)))
       break;
@@ -266,7 +279,7 @@ Run run(const MapScene& scene, double step, int steps, const Run* along = nullpt
   return r;
 }
 
-}  // namespace
+}   // namespace
 
 StabilityCell runScene(const MapScene& scene, double step, int steps)
 {
@@ -288,8 +301,9 @@ StabilityCell runScene(const MapScene& scene, double step, int steps)
   return coarse.cell;
 }
 
-void stabilityMap(StudyContext& context, StabilityTally& tally, const std::string& name, const std::string& quantity, const std::vector<double>& values,
-                  const std::vector<double>& step_lengths, int steps, const std::function<MapScene(double)>& scene)
+void stabilityMap(StudyContext& context, StabilityTally& tally, const std::string& name, const std::string& quantity,
+                  const std::vector<double>& values, const std::vector<double>& step_lengths, int steps,
+                  const std::function<MapScene(double)>& scene)
 {
   Plot& plot = context.plot(name, "Outcome over " + quantity + " and step", quantity, "step [s]");
   plot.lines = false;
@@ -306,4 +320,4 @@ void stabilityMap(StudyContext& context, StabilityTally& tally, const std::strin
     }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -13,8 +13,10 @@
 namespace slender::study {
 namespace {
 
-constexpr double kThickness = 2e-3;   ///< over the length: what in-plane deformation changes of the loads is of its square
-constexpr double kAway = 1e-5;        ///< of the length: a plate that left its plane is farther, one that stayed is at 1e-9
+/// over the length: what in-plane deformation changes of the loads is of its square
+constexpr double kThickness = 2e-3;
+/// of the length: a plate that left its plane is farther, one that stayed is at 1e-9
+constexpr double kAway = 1e-5;
 
 /// A plate of length 1 with D = 1 in the plane z = 0, and how it is loaded.
 struct PlateCase
@@ -23,14 +25,15 @@ struct PlateCase
   int cells = 0;
   ClothModel model;
   std::vector<int> held;
-  double expected = 0.0;                          ///< threshold of plate theory
-  std::function<void(ClothSetup&, double)> load;  ///< sets the inputs, and for a plate that is compressed its shape
+  double expected = 0.0;                           ///< threshold of plate theory
+  std::function<void(ClothSetup&, double)> load;   ///< sets the inputs, and for a plate that is compressed its shape
 };
 
 ClothModel plateOf(const std::string& name, const TriangleMesh& mesh, BendingModel bending, double membrane_ratio)
 {
   const double stretching = 12 / (kThickness * kThickness);
-  ClothModel model = buildCloth(name, mesh, 1.0, isotropicMembrane(stretching * (1 - membrane_ratio * membrane_ratio), membrane_ratio, 1.0));
+  ClothModel model = buildCloth(
+      name, mesh, 1.0, isotropicMembrane(stretching * (1 - membrane_ratio * membrane_ratio), membrane_ratio, 1.0));
   model.bending = bending;
   model.bending_modulus = 1.0;
   return model;
@@ -49,9 +52,11 @@ int negativeModes(const ClothSetup& plate)
     k = k < 0 ? -1 : count++;
   std::vector<Eigen::Triplet<double>> entries;
   for (int j = 0; j < hessian.points(); ++j)
-    for (int k = hessian.starts()[static_cast<std::size_t>(j)]; k < hessian.starts()[static_cast<std::size_t>(j) + 1]; ++k)
+    for (int k = hessian.starts()[static_cast<std::size_t>(j)]; k < hessian.starts()[static_cast<std::size_t>(j) + 1];
+         ++k)
     {
-      const int i = hessian.rows()[static_cast<std::size_t>(k)], row = number[static_cast<std::size_t>(i)], column = number[static_cast<std::size_t>(j)];
+      const int i = hessian.rows()[static_cast<std::size_t>(k)], row = number[static_cast<std::size_t>(i)],
+                column = number[static_cast<std::size_t>(j)];
       for (int a = 0; a < 3 && row >= 0 && column >= 0; ++a)
         for (int b = 0; b < 3; ++b)
           if (i != j || a >= b)
@@ -83,7 +88,8 @@ double meshThreshold(const PlateCase& c)
 {
   double low = 0.5 * c.expected, high = 1.5 * c.expected;
   if (negativeModes(flatPlate(c, low)) > 0 || negativeModes(flatPlate(c, high)) == 0)
-    throw std::runtime_error("statics_stability: the threshold of plate " + c.label + " is not near that of plate theory");
+    throw std::runtime_error("statics_stability: the threshold of plate " + c.label +
+                             " is not near that of plate theory");
   while (high - low > 1e-3 * low)
   {
     const double middle = 0.5 * (low + high);
@@ -110,20 +116,30 @@ void judge(StudyContext& context, const PlateCase& c, double threshold, double f
   tally.unstable_ends += report.ok && !report.stable;
   tally.worst_residual = std::max(tally.worst_residual, report.ok ? report.residual : 0.0);
   Row& row = context.row();
-  row.set("family", c.family).set("case", c.label).set("edges", c.cells).set("factor", factor * threshold / c.expected).set("decided_by", "mesh");
-  row.set("unstable_modes_of_branch", before).set("unstable_modes_of_end", after).set("distance", away).set("lowest_eigenvalue", report.lowest_eigenvalue);
+  row.set("family", c.family)
+      .set("case", c.label)
+      .set("edges", c.cells)
+      .set("factor", factor * threshold / c.expected)
+      .set("decided_by", "mesh");
+  row.set("unstable_modes_of_branch", before)
+      .set("unstable_modes_of_end", after)
+      .set("distance", away)
+      .set("lowest_eigenvalue", report.lowest_eigenvalue);
   row.set("stable", report.stable ? "yes" : "no").set("saddles_left", report.escapes).set("energy", report.energy);
   if (!report.ok)
     row.set("refused", report.message);
-  row.check(wrong + called_stable, 0, 0.5, leaves ? "must leave its plane for a stable state" : "must stay in its plane");
+  row.check(wrong + called_stable, 0, 0.5,
+            leaves ? "must leave its plane for a stable state" : "must stay in its plane");
 }
 
-/// Returns a plate of length 1 that stands upright and is clamped along x = 0. Gravity acts along -y. The load is rho g h L^3 / D.
+/// Returns a plate of length 1 that stands upright and is clamped along x = 0. Gravity acts along -y. The load is rho g
+/// h L^3 / D.
 PlateCase lateralPlate(double width, int cells, BendingModel bending)
 {
   const double h = 1.0 / cells, row = std::sqrt(0.75);
   // Rows of triangles run across the plate, so that its clamped edge is one of their lines. One row beyond it is held.
-  const int rows = static_cast<int>(std::lround(cells / row)), columns = std::max(1, static_cast<int>(std::lround(width / h)));
+  const int rows = static_cast<int>(std::lround(cells / row)),
+            columns = std::max(1, static_cast<int>(std::lround(width / h)));
   TriangleMesh mesh = gridMesh(width, 1.0 + 1.0 / rows, columns, rows + 1, GridPattern::equilateral);
   PlateCase c;
   for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
@@ -143,13 +159,16 @@ PlateCase lateralPlate(double width, int cells, BendingModel bending)
   return c;
 }
 
-/// A square plate, held along its boundary so that it may turn there, whose width is reduced. The load is C times the strain over D.
+/// A square plate, held along its boundary so that it may turn there, whose width is reduced. The load is C times the
+/// strain over D.
 PlateCase compressedPlate(int cells, BendingModel bending)
 {
   constexpr double kRatio = 0.3;
   TriangleMesh mesh = gridMesh(1.0, 1.0, cells, 0, GridPattern::equilateral);
   PlateCase c;
-  c.held = verticesWhere(mesh, [](const Eigen::Vector3d& p) { return std::min({p.x(), 1 - p.x(), p.y(), 1 - p.y()}) < 1e-9; });
+  c.held = verticesWhere(mesh, [](const Eigen::Vector3d& p) {
+    return std::min({p.x(), 1 - p.x(), p.y(), 1 - p.y()}) < 1e-9;
+  });
   c.family = "compressed_plate";
   c.label = toString(bending);
   c.cells = cells;
@@ -165,12 +184,13 @@ PlateCase compressedPlate(int cells, BendingModel bending)
   return c;
 }
 
-}  // namespace
+}   // namespace
 
 void addPlates(StudyContext& context, StaticsTally& tally)
 {
   useOneBlasThread();
-  // So many cells make the triangles of these plates equilateral within half a percent. Triangles that are one percent too long change the thresholds by two.
+  // So many cells make the triangles of these plates equilateral within half a percent. Triangles that are one percent
+  // too long change the thresholds by two.
   const std::vector<int> meshes = context.quick() ? std::vector<int>{20} : std::vector<int>{20, 32, 52};
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
     for (const int cells : meshes)
@@ -181,11 +201,16 @@ void addPlates(StudyContext& context, StaticsTally& tally)
         const PlateCase c = width > 0 ? lateralPlate(width, cells, bending) : compressedPlate(cells, bending);
         context.progress(tally.cases, 0, c.family + " " + c.label);
         const double threshold = meshThreshold(c);
-        context.row().set("family", c.family).set("case", c.label + ": threshold").set("edges", cells).set("relative_error", threshold / c.expected - 1)
-          .check(threshold, c.expected, c.expected * (0.02 + 2.0 / cells), "plate theory; bound of the study plate, 2 % + 2/n");
+        context.row()
+            .set("family", c.family)
+            .set("case", c.label + ": threshold")
+            .set("edges", cells)
+            .set("relative_error", threshold / c.expected - 1)
+            .check(threshold, c.expected, c.expected * (0.02 + 2.0 / cells),
+                   "plate theory; bound of the study plate, 2 % + 2/n");
         for (const double factor : {0.97, 1.03, 1.2})
           judge(context, c, threshold, factor, tally);
       }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -11,8 +11,8 @@ struct StaticsTally
   double worst_residual = 0;
 };
 
-/// Plates that start exactly flat, below and above the loads at which they buckle: a cantilevered one that stands upright, and one that is compressed in its plane.
-/// Thresholds of the meshes are checked against plate theory.
+/// Plates that start exactly flat, below and above the loads at which they buckle: a cantilevered one that stands
+/// upright, and one that is compressed in its plane. Thresholds of the meshes are checked against plate theory.
 void addPlates(StudyContext& context, StaticsTally& tally);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,5 +1,5 @@
-// Statics from states that are exactly symmetric, on both sides of the loads at which they lose their stability: it must stay where the state is
-// stable, leave it where it is not, and never call an unstable end stable.
+// Statics from states that are exactly symmetric, on both sides of the loads at which they lose their stability: it
+// must stay where the state is stable, leave it where it is not, and never call an unstable end stable.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -26,18 +26,22 @@ struct StaticsCase
 {
   std::string family, label;
   int edges = 0;
-  double factor = 1.0;       ///< over the threshold of the continuous rod
-  double trusted = 0.02;     ///< |factor - 1| beyond which the continuous threshold decides; nearer to it the mesh's own Hessian does
-  RodSetup rod;              ///< in equilibrium on the branch, exactly symmetric
-  double ground = 0.0;       ///< [1/s^2] eigenvalues of rigid motions, which cost nothing, are this far from negative ones; 0: there are none
+  double factor = 1.0;   ///< over the threshold of the continuous rod
+  /// |factor - 1| beyond which the continuous threshold decides; nearer to it the mesh's own Hessian does
+  double trusted = 0.02;
+  RodSetup rod;   ///< in equilibrium on the branch, exactly symmetric
+  /// [1/s^2] eigenvalues of rigid motions, which cost nothing, are this far from negative ones; 0: there are none
+  double ground = 0.0;
   std::function<double(const RodState&)> away;   ///< distance from the branch over the length
 };
 
-/// Where rigid motions cost nothing, eigenvalues of this size [1/s^2] are nothing but their round-off, of a rod with B = rho A = 1: a share of the
-/// lowest bending mode, 12 / L^4, and rounding errors of the stretching entries over the masses.
+/// Where rigid motions cost nothing, eigenvalues of this size [1/s^2] are nothing but their round-off, of a rod with B
+/// = rho A = 1: a share of the lowest bending mode, 12 / L^4, and rounding errors of the stretching entries over the
+/// masses.
 double groundOf(double stretch, double length, int edges)
 {
-  return 1e-3 / std::pow(length, 4) + 8 * std::numeric_limits<double>::epsilon() * 4 * stretch * std::pow(edges / length, 2);
+  return 1e-3 / std::pow(length, 4) +
+         8 * std::numeric_limits<double>::epsilon() * 4 * stretch * std::pow(edges / length, 2);
 }
 
 /// Number of negative eigenvalues of K + ground M, by the rod's own matrix. Shares no line with the statics' search.
@@ -56,10 +60,12 @@ int negativeModes(const RodSetup& rod, double ground)
   return inertia.negative + inertia.zero;
 }
 
-constexpr double kAway = 1e-5;   ///< ratio of distance to length; a state that left its branch is farther away, and one that stayed is within 1e-9
+/// ratio of distance to length; a state that left its branch is farther away, and one that stayed is within 1e-9
+constexpr double kAway = 1e-5;
 
 /// `shape`: a number for the column `localisation`, of the end where the rod left its branch.
-void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally, const std::function<double(const RodState&)>& shape = nullptr)
+void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally,
+           const std::function<double(const RodState&)>& shape = nullptr)
 {
   const int before = negativeModes(c.rod, c.ground);
   const bool near = std::abs(c.factor - 1) <= c.trusted;
@@ -69,7 +75,8 @@ void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally, con
   const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
   const double away = report.ok ? c.away(rod.state) : 0.0;
   const int after = report.ok ? negativeModes(rod, c.ground) : 0;
-  const bool refused = !report.ok, wrong = refused || (leaves && (away < kAway || after > 0)) || (!leaves && away > kAway);
+  const bool refused = !report.ok,
+             wrong = refused || (leaves && (away < kAway || after > 0)) || (!leaves && away > kAway);
   const bool called_stable = report.ok && report.stable && after > 0;
   ++tally.cases;
   tally.wrong += wrong;
@@ -78,14 +85,22 @@ void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally, con
   tally.unstable_ends += report.ok && !report.stable;
   tally.worst_residual = std::max(tally.worst_residual, report.ok ? report.residual : 0.0);
   Row& row = context.row();
-  row.set("family", c.family).set("case", c.label).set("edges", c.edges).set("factor", c.factor).set("decided_by", near ? "mesh" : "reference");
-  row.set("unstable_modes_of_branch", before).set("unstable_modes_of_end", after).set("distance", away).set("lowest_eigenvalue", report.lowest_eigenvalue);
+  row.set("family", c.family)
+      .set("case", c.label)
+      .set("edges", c.edges)
+      .set("factor", c.factor)
+      .set("decided_by", near ? "mesh" : "reference");
+  row.set("unstable_modes_of_branch", before)
+      .set("unstable_modes_of_end", after)
+      .set("distance", away)
+      .set("lowest_eigenvalue", report.lowest_eigenvalue);
   row.set("stable", report.stable ? "yes" : "no").set("saddles_left", report.escapes).set("energy", report.energy);
   if (refused)
     row.set("refused", report.message);
   if (shape && away > kAway)
     row.set("localisation", shape(rod.state));
-  row.check(wrong + called_stable, 0, 0.5, leaves ? "must leave the branch for a stable state" : "must stay on the branch");
+  row.check(wrong + called_stable, 0, 0.5,
+            leaves ? "must leave the branch for a stable state" : "must stay on the branch");
 }
 
 /// Solves for the equilibrium within the plane, by a rod that is too stiff across it.
@@ -100,8 +115,12 @@ double acrossPlane(const RodState& s) { return s.x.row(1).cwiseAbs().maxCoeff();
 /// Heavy cantilevers of elliptical section (lateral_rod_ellipse.csv); A1 = L = rho A = 1.
 void addLateral(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
-  struct Section { double nu, a_over_b, gamma; };
-  constexpr Section kSections[] = {{0.3, 3, 53.415613}, {0.5, 2.5, 0}, {0.3, 5, 65.114802}, {0.3, 10, 118.00056}, {0.5, 20, 201.10635}};
+  struct Section
+  {
+    double nu, a_over_b, gamma;
+  };
+  constexpr Section kSections[] = {
+      {0.3, 3, 53.415613}, {0.5, 2.5, 0}, {0.3, 5, 65.114802}, {0.3, 10, 118.00056}, {0.5, 20, 201.10635}};
   for (const Section& s : kSections)
     for (const int edges : meshes)
       for (const double factor : {0.97, 1.02, 1.2, 1.5})
@@ -115,7 +134,8 @@ void addLateral(StudyContext& context, StaticsTally& tally, const std::vector<in
         c.edges = edges;
         c.factor = factor;
         c.trusted = s.gamma > 0 ? 0.01 + 60.0 / (edges * edges) : 1e9;
-        c.rod = naturalRod(sectionOf(1e5 * std::max(100.0, 2 * gamma), r2, 1.0, 0.5 * (1 + r2) / (1 + s.nu)), nodes, Eigen::Vector3d::UnitZ());
+        c.rod = naturalRod(sectionOf(1e5 * std::max(100.0, 2 * gamma), r2, 1.0, 0.5 * (1 + r2) / (1 + s.nu)), nodes,
+                           Eigen::Vector3d::UnitZ());
         c.rod.hold(0, 0, true);
         c.rod.inputs.gravity = {0, 0, -factor * gamma};
         if (factor != 1.2)   // at 1.2 the start is the straight rod itself
@@ -191,8 +211,8 @@ private:
   {
     phi_ = phi;
     const double gamma = std::pow(p_.y * phi, 3);
-    rod_ = naturalRod(sectionOf(1e5 * std::max(1.0, gamma), 1.0, 1.0, 1.0 / (1.0 + p_.nu)), nodes([&](int j) { return phi * (j + 0.5) / edges_; }),
-                      Eigen::Vector3d::UnitY());
+    rod_ = naturalRod(sectionOf(1e5 * std::max(1.0, gamma), 1.0, 1.0, 1.0 / (1.0 + p_.nu)),
+                      nodes([&](int j) { return phi * (j + 0.5) / edges_; }), Eigen::Vector3d::UnitY());
     rod_.inputs.gravity = {0, 0, -gamma};
     rod_.hold(0, 0, true);
     Eigen::Matrix3d down;   // columns t, d1, d2
@@ -210,7 +230,8 @@ void addBendTwist(StudyContext& context, StaticsTally& tally, const std::vector<
 {
   for (const BendTwistPoint& p : kBendTwistBoundary)
   {
-    const bool wanted = (p.nu == 0.5 || p.nu == 0.4 || p.nu == 0.3) && (p.y == 0.2 || p.y == 0.3 || p.y == 0.4 || p.y == 0.5);
+    const bool wanted =
+        (p.nu == 0.5 || p.nu == 0.4 || p.nu == 0.3) && (p.y == 0.2 || p.y == 0.3 || p.y == 0.4 || p.y == 0.5);
     for (const int edges : meshes)
     {
       if (!wanted || p.phi / edges > 0.4)   // the mesh must resolve the coils: 16 edges a turn
@@ -224,7 +245,8 @@ void addBendTwist(StudyContext& context, StaticsTally& tally, const std::vector<
         c.label = "nu " + std::to_string(p.nu).substr(0, 4) + ", y " + std::to_string(p.y).substr(0, 3);
         c.edges = edges;
         c.factor = factor;
-        c.trusted = 0.005 + 0.4 * std::pow(p.phi / edges, 2);   // the boundary's error is of second order in the turn of a joint
+        // the boundary's error is of second order in the turn of a joint
+        c.trusted = 0.005 + 0.4 * std::pow(p.phi / edges, 2);
         c.rod = curl.rod();
         c.away = acrossPlane;
         context.progress(tally.cases, 0, c.family + " " + c.label);
@@ -236,11 +258,16 @@ void addBendTwist(StudyContext& context, StaticsTally& tally, const std::vector<
 
 double acrossAxis(const RodState& s) { return s.x.bottomRows(2).colwise().norm().maxCoeff(); }
 
-/// Tension T of a straight rod of stiffness EA = `stretch` whose threshold is that of an inextensible rod under the tension `effective`. An edge of
-/// length 1 + T/EA that turns by the angle t adds T (1 + T/EA) t^2 / 2 to the second derivative, in place of T t^2 / 2.
-double tensionOf(double effective, double stretch) { return 0.5 * stretch * (std::sqrt(1.0 + 4.0 * effective / stretch) - 1.0); }
+/// Tension T of a straight rod of stiffness EA = `stretch` whose threshold is that of an inextensible rod under the
+/// tension `effective`. An edge of length 1 + T/EA that turns by the angle t adds T (1 + T/EA) t^2 / 2 to the second
+/// derivative, in place of T t^2 / 2.
+double tensionOf(double effective, double stretch)
+{
+  return 0.5 * stretch * (std::sqrt(1.0 + 4.0 * effective / stretch) - 1.0);
+}
 
-/// A clamped rod under torque and tension (greenhill.csv, column clamped: w'''' - i M w''' - T w'' = 0 with w = w' = 0 at both ends). B = L = rho A = 1.
+/// A clamped rod under torque and tension (greenhill.csv, column clamped: w'''' - i M w''' - T w'' = 0 with w = w' = 0
+/// at both ends). B = L = rho A = 1.
 struct TwistedRod
 {
   const char* family;
@@ -296,7 +323,8 @@ void addHelices(StudyContext& context, StaticsTally& tally, const std::vector<in
       }
 }
 
-/// Largest angle between the rod and its axis over the root of its mean square: 1.4 for a helix along the whole rod, whose envelope is a sine.
+/// Largest angle between the rod and its axis over the root of its mean square: 1.4 for a helix along the whole rod,
+/// whose envelope is a sine.
 double localisation(const RodState& s)
 {
   double largest = 0.0, sum = 0.0;
@@ -310,11 +338,13 @@ double localisation(const RodState& s)
   return largest / std::sqrt(std::max(sum, 1e-300));
 }
 
-/// Long rods, whose thresholds are within 1.1 % of M^2 = 4 B T of the infinite rod. They are so extensible that buckling takes much length out of
-/// them, and then the helix is localised (Coyne 1990, van der Heijden and Thompson 2000).
+/// Long rods, whose thresholds are within 1.1 % of M^2 = 4 B T of the infinite rod. They are so extensible that
+/// buckling takes much length out of them, and then the helix is localised (Coyne 1990, van der Heijden and Thompson
+/// 2000).
 void addLocalisedHelices(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
-  constexpr TwistedRod kRods[] = {{"localised_helix", 500, 45.16117543, 2e3, 600}, {"localised_helix", 1000, 63.55930846, 5e3, 600}};
+  constexpr TwistedRod kRods[] = {{"localised_helix", 500, 45.16117543, 2e3, 600},
+                                  {"localised_helix", 1000, 63.55930846, 5e3, 600}};
   for (const TwistedRod& rod : kRods)
     for (const int edges : meshes)
       for (const double factor : {0.97, 1.03, 1.1, 1.15})
@@ -322,7 +352,8 @@ void addLocalisedHelices(StudyContext& context, StaticsTally& tally, const std::
         if (edges < 80)   // a turn of the helix needs at least eight edges
           continue;
         StaticsCase c = twistedRod(rod, edges, factor);
-        // Well beyond the threshold a rod without contact may pass through itself and become straight again, with less twist.
+        // Well beyond the threshold a rod without contact may pass through itself and become straight again, with less
+        // twist.
         const double twist = c.rod.state.twist.sum();
         c.away = [twist](const RodState& s) { return std::max(acrossAxis(s), std::abs(s.twist.sum() - twist)); };
         context.progress(tally.cases, 0, c.family + " " + c.label);
@@ -330,7 +361,8 @@ void addLocalisedHelices(StudyContext& context, StaticsTally& tally, const std::
       }
 }
 
-/// Twisted rings (Michell, Zajac) of radius 1 and bending modulus 1, free in space: the twist is a rest twist of the opposite sign.
+/// Twisted rings (Michell, Zajac) of radius 1 and bending modulus 1, free in space: the twist is a rest twist of the
+/// opposite sign.
 void addRings(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
   for (const double beta : {0.6, 0.77, 1.5})
@@ -340,7 +372,8 @@ void addRings(StudyContext& context, StaticsTally& tally, const std::vector<int>
         Eigen::Matrix3Xd nodes(3, edges);
         for (int i = 0; i < edges; ++i)
           nodes.col(i) << std::cos(2 * kPi * i / edges), std::sin(2 * kPi * i / edges), 0.0;
-        RodModel model = buildRod("ring", nodes, true, std::vector<RodSection>(edges, sectionOf(1e6, 1.0, 1.0, beta)), Eigen::Vector3d::UnitZ(), true);
+        RodModel model = buildRod("ring", nodes, true, std::vector<RodSection>(edges, sectionOf(1e6, 1.0, 1.0, beta)),
+                                  Eigen::Vector3d::UnitZ(), true);
         StaticsCase c;
         c.rod.state = makeRodState(model, nodes, Eigen::Vector3d::UnitZ());
         model.rest_twist.setConstant(-factor * 2 * kPi * std::sqrt(3.0) / beta / edges);
@@ -352,10 +385,12 @@ void addRings(StudyContext& context, StaticsTally& tally, const std::vector<int>
         c.factor = factor;
         c.trusted = 0.005 + 35.0 / (edges * edges);   // the n-gon's threshold is high by 31.3/n^2
         c.ground = groundOf(1e6, 2 * kPi, edges);
-        // The square of the extent across the plane, or how much twist has gone: a ring that passes through itself may become a circle again.
+        // The square of the extent across the plane, or how much twist has gone: a ring that passes through itself may
+        // become a circle again.
         c.away = [](const RodState& s) {
           const Eigen::Matrix3Xd x = s.x.colwise() - s.x.rowwise().mean();
-          const double across = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(x * x.transpose() / x.cols()).eigenvalues()[0];
+          const double across =
+              Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(x * x.transpose() / x.cols()).eigenvalues()[0];
           return std::max(across, std::abs(s.twist.sum()));
         };
         context.progress(tally.cases, 0, c.family + " " + c.label);
@@ -363,7 +398,8 @@ void addRings(StudyContext& context, StaticsTally& tally, const std::vector<int>
       }
 }
 
-/// Columns: pushed together between clamps (Euler), under a dead load at the tip (Euler), under their own weight (Greenhill: 7.8373 B/L^3).
+/// Columns: pushed together between clamps (Euler), under a dead load at the tip (Euler), under their own weight
+/// (Greenhill: 7.8373 B/L^3).
 void addColumns(StudyContext& context, StaticsTally& tally, const std::vector<int>& meshes)
 {
   constexpr double kStretch = 1e5;
@@ -411,11 +447,12 @@ void addColumns(StudyContext& context, StaticsTally& tally, const std::vector<in
       }
 }
 
-}  // namespace
+}   // namespace
 
 void runStaticsStability(StudyContext& context)
 {
-  const std::vector<int> meshes = context.quick() ? std::vector<int>{20, 80} : std::vector<int>{20, 40, 80, 160, 320, 640, 1280};
+  const std::vector<int> meshes =
+      context.quick() ? std::vector<int>{20, 80} : std::vector<int>{20, 40, 80, 160, 320, 640, 1280};
   StaticsTally tally;
   addLateral(context, tally, meshes);
   addBendTwist(context, tally, meshes);
@@ -430,12 +467,19 @@ void runStaticsStability(StudyContext& context)
   context.metric("refused", tally.refused);
   context.metric("reported_unstable", tally.unstable_ends);
   context.metric("worst_residual", tally.worst_residual);
-  context.note("Each case starts exactly on the branch (planar, straight or circular). Within `trusted` of the continuous threshold the inertia of the "
-               "mesh's own Hessian decides which answer is right, beyond it the reference does.");
-  context.note("Localised helices: long rods under tension. `localisation` is the largest angle to the axis over the root of its mean square: 1.4 for a sine "
-               "along the whole rod, more for a helix that is localised, 0 for a rod that passed through itself and is straight again.");
-  context.note("Plates: `edges` are cells along the plate, `factor` is over the threshold of plate theory. The loads are 0.97, 1.03 and 1.2 times the threshold of the "
-               "same mesh, which the inertia of its Hessian gives.");
+  context.note(
+      "Each case starts exactly on the branch (planar, straight or circular). Within `trusted` of the continuous "
+      "threshold the inertia of the "
+      "mesh's own Hessian decides which answer is right, beyond it the reference does.");
+  context.note(
+      "Localised helices: long rods under tension. `localisation` is the largest angle to the axis over the root of "
+      "its mean square: 1.4 for a sine "
+      "along the whole rod, more for a helix that is localised, 0 for a rod that passed through itself and is straight "
+      "again.");
+  context.note(
+      "Plates: `edges` are cells along the plate, `factor` is over the threshold of plate theory. The loads are 0.97, "
+      "1.03 and 1.2 times the threshold of the "
+      "same mesh, which the inertia of its Hessian gives.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A vertical strip pressed on a floor with Coulomb friction: the compression at which its foot slips (Sano, Yamaguchi & Wada 2017).
+// A vertical strip pressed on a floor with Coulomb friction: the compression at which its foot slips (Sano, Yamaguchi &
+// Wada 2017).
 #include <cmath>
 #include <iterator>
 #include <string>
@@ -12,16 +13,21 @@ namespace slender::study {
 namespace {
 
 /// stickslip_inverse.csv: first slip as the compression eps (over L) grows, for a coefficient of friction.
-struct Slip { double mu, compression; };
-constexpr Slip kSlips[] = {{0.05, 0.01238049378}, {0.1, 0.04687417821}, {0.15, 0.09690456801}, {0.2, 0.1548673548}, {0.25, 0.2144635647}, {0.3, 0.2715634261}};
+struct Slip
+{
+  double mu, compression;
+};
+constexpr Slip kSlips[] = {{0.05, 0.01238049378}, {0.1, 0.04687417821}, {0.15, 0.09690456801},
+                           {0.2, 0.1548673548},   {0.25, 0.2144635647}, {0.3, 0.2715634261}};
 
 struct Result
 {
-  double compression = 0;                      ///< of the foot's first slip, 0: none
-  std::vector<double> compressions, ratios;    ///< |Fx| / N on the way there
+  double compression = 0;                     ///< of the foot's first slip, 0: none
+  std::vector<double> compressions, ratios;   ///< |Fx| / N on the way there
 };
 
-/// L = B = 1. The strip is far stiffer out of its plane, so the problem is planar; light and damped, so the motion is quasistatic.
+/// L = B = 1. The strip is far stiffer out of its plane, so the problem is planar; light and damped, so the motion is
+/// quasistatic.
 Result press(int edges, const Slip& slip)
 {
   const double radius = 5e-4, gap = 5e-5, foot = radius + 0.5 * gap;
@@ -48,7 +54,8 @@ Result press(int edges, const Slip& slip)
   g.model.contact.rods.push_back({0, false, false, true, slip.mu});
   addObstacle(g, Plane{}, {});
   g.model.contact.options.gap = gap;
-  g.model.contact.options.slip_speed = 5e-5;   // creep: at most 2e-6 in a move; less, and the range that sticks is no longer resolved
+  // creep: at most 2e-6 in a move; less, and the range that sticks is no longer resolved
+  g.model.contact.options.slip_speed = 5e-5;
   const double step = 0.02;
   RodGroup group(g.model, timeConfig(Integrator::implicit_euler, step, 1e-8));
   const Pose start = rod.inputs.grasps[0].X_WG;
@@ -77,11 +84,12 @@ Result press(int edges, const Slip& slip)
   return result;
 }
 
-}  // namespace
+}   // namespace
 
 void runStickSlip(StudyContext& context)
 {
-  Plot& plot = context.plot("stick_slip", "Pressed strip: horizontal over vertical force until the foot slips", "compression / L", "|Fx| / N");
+  Plot& plot = context.plot("stick_slip", "Pressed strip: horizontal over vertical force until the foot slips",
+                            "compression / L", "|Fx| / N");
   plot.log_x = plot.log_y = false;
   const std::vector<int> meshes = context.quick() ? std::vector<int>{40} : std::vector<int>{40, 80};
   int done = 0;
@@ -95,7 +103,10 @@ void runStickSlip(StudyContext& context)
       const Slip &a = kSlips[k > 0 ? k - 1 : 0], &b = kSlips[k > 0 ? k : 1];
       const double power = std::log(b.mu / a.mu) / std::log(b.compression / a.compression);
       const double mu = r.compression > 0 ? slip.mu * std::pow(r.compression / slip.compression, power) : 0.0;
-      context.row().set("n", edges).set("compression", r.compression).set("expected_compression", slip.compression)
+      context.row()
+          .set("n", edges)
+          .set("compression", r.compression)
+          .set("expected_compression", slip.compression)
           .check(mu, slip.mu, 0.01 * slip.mu, "stickslip_inverse.csv: mu at the compression of the first slip");
       if (edges != meshes.front())
         continue;
@@ -105,4 +116,4 @@ void runStickSlip(StudyContext& context)
     }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

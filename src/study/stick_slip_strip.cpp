@@ -1,4 +1,5 @@
-// A vertical cloth strip pressed on a floor with Coulomb friction: the compression at which its foot slips (Sano, Yamaguchi & Wada 2017).
+// A vertical cloth strip pressed on a floor with Coulomb friction: the compression at which its foot slips (Sano,
+// Yamaguchi & Wada 2017).
 #include <cmath>
 #include <iterator>
 #include <stdexcept>
@@ -12,18 +13,23 @@ namespace slender::study {
 
 namespace {
 
-/// stickslip_inverse.csv: first slip as the compression eps (over L) grows, for a coefficient of friction; the floor's force N there.
+/// stickslip_inverse.csv: first slip as the compression eps (over L) grows, for a coefficient of friction; the floor's
+/// force N there.
 struct Slip
 {
   double mu, compression, normal;
 };
-constexpr Slip kSlips[] = {{0.05, 0.01238049378, 20.28494139}, {0.1, 0.04687417821, 20.54906118}, {0.15, 0.09690456801, 20.93474898},
-                           {0.2, 0.1548673548, 21.38052121},   {0.25, 0.2144635647, 21.82808739}, {0.3, 0.2715634261, 22.23208412}};
+constexpr Slip kSlips[] = {{0.05, 0.01238049378, 20.28494139}, {0.1, 0.04687417821, 20.54906118},
+                           {0.15, 0.09690456801, 20.93474898}, {0.2, 0.1548673548, 21.38052121},
+                           {0.25, 0.2144635647, 21.82808739},  {0.3, 0.2715634261, 22.23208412}};
 
-constexpr double kHeld = 0.85;      // of the slip's compression, up to where pins hold the foot: as it buckles, the strip bounces
-constexpr double kStill = 1e-3;     // largest speed at which they let go: near its buckling the strip comes to rest slowly
+// of the slip's compression, up to where pins hold the foot: as it buckles, the strip bounces
+constexpr double kHeld = 0.85;
+// largest speed at which they let go: near its buckling the strip comes to rest slowly
+constexpr double kStill = 1e-3;
 constexpr double kPatience = 5.0;   // for it, at most
-constexpr double kMembrane = 2e4;   // over the bending modulus, per L^2: the strip shortens by N / 2e4 = 0.1 %, which is taken off
+// over the bending modulus, per L^2: the strip shortens by N / 2e4 = 0.1 %, which is taken off
+constexpr double kMembrane = 2e4;
 
 struct Result
 {
@@ -32,8 +38,9 @@ struct Result
   int steps = 0;
 };
 
-/// L = D = 1, mass per area 1. `crossed`: share of a cell that a wave crosses in a step. Contact comes after the cloth's own step: only
-/// where that moves the foot little against its neighbours are its impulses in the proportion of the forces.
+/// L = D = 1, mass per area 1. `crossed`: share of a cell that a wave crosses in a step. Contact comes after the
+/// cloth's own step: only where that moves the foot little against its neighbours are its impulses in the proportion of
+/// the forces.
 Result press(StudyContext& context, int cells, const Slip& slip, double crossed)
 {
   constexpr double kThickness = 4e-4;
@@ -97,7 +104,8 @@ Result press(StudyContext& context, int cells, const Slip& slip, double crossed)
     if (!report.ok)
       throw std::runtime_error("stick_slip_strip, mu = " + std::to_string(slip.mu) + ": " + report.message);
     if (result.steps++ % 200 == 0)
-      context.progress(static_cast<int>(100 * compression / slip.compression), 115, "mu = " + std::to_string(slip.mu).substr(0, 4));
+      context.progress(static_cast<int>(100 * compression / slip.compression), 115,
+                       "mu = " + std::to_string(slip.mu).substr(0, 4));
     foot = state.cloths[0].x(0, columns / 2);
     if (std::abs(foot) > 2e-3)
     {
@@ -109,7 +117,7 @@ Result press(StudyContext& context, int cells, const Slip& slip, double crossed)
   return result;
 }
 
-}  // namespace
+}   // namespace
 
 void runStickSlipStrip(StudyContext& context)
 {
@@ -119,11 +127,13 @@ void runStickSlipStrip(StudyContext& context)
     int cells;
     double crossed;
   };
-  constexpr double kChecked = 0.25;   // of longer steps some are shown: from half a cell on, friction may fail to hold a strip that is still nearly straight
-  constexpr int kQuickCells = 12;     // the cost goes with the square
+  // of longer steps some are shown: from half a cell on, friction may fail to hold a strip that is still nearly
+  // straight
+  constexpr double kChecked = 0.25;
+  constexpr int kQuickCells = 12;   // the cost goes with the square
   const std::vector<Case> cases =
-    context.quick() ? std::vector<Case>{{kQuickCells, kChecked}, {kQuickCells, 5.0}}
-                    : std::vector<Case>{{20, kChecked}, {40, kChecked}, {20, 0.5}, {20, 1.0}, {20, 2.0}, {20, 5.0}};
+      context.quick() ? std::vector<Case>{{kQuickCells, kChecked}, {kQuickCells, 5.0}}
+                      : std::vector<Case>{{20, kChecked}, {40, kChecked}, {20, 0.5}, {20, 1.0}, {20, 2.0}, {20, 5.0}};
   for (const Case& c : cases)
     for (std::size_t k = 0; k < std::size(kSlips); ++k)
     {
@@ -139,15 +149,22 @@ void runStickSlipStrip(StudyContext& context)
       const double power = std::log(b.mu / a.mu) / std::log(b.compression / a.compression);
       const double mu = r.compression > 0 ? slip.mu * std::pow(bent / slip.compression, power) : 0.0;
       Row& row = context.row();
-      row.set("cells", c.cells).set("cells_per_step", c.crossed).set("mu", slip.mu).set("compression", r.compression > 0 ? bent : 0.0)
-        .set("expected_compression", slip.compression).set("steps", r.steps).set("ms_per_step", 1e3 * r.seconds / r.steps);
+      row.set("cells", c.cells)
+          .set("cells_per_step", c.crossed)
+          .set("mu", slip.mu)
+          .set("compression", r.compression > 0 ? bent : 0.0)
+          .set("expected_compression", slip.compression)
+          .set("steps", r.steps)
+          .set("ms_per_step", 1e3 * r.seconds / r.steps);
       if (r.compression > 0)
         row.set("relative_error", mu / slip.mu - 1);
       if (checked)
         row.check(mu, slip.mu, 0.03 * slip.mu, "stickslip_inverse.csv: mu at the compression of the first slip");
     }
-  context.note("cells_per_step: cells that a stretching wave crosses in a step; contact comes after the cloth's own step, and is in the "
-               "proportion of the forces for short steps only. compression 0: no slip up to 1.15 of the expected compression");
+  context.note(
+      "cells_per_step: cells that a stretching wave crosses in a step; contact comes after the cloth's own step, and "
+      "is in the "
+      "proportion of the forces for short steps only. compression 0: no slip up to 1.15 of the expected compression");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -63,7 +63,10 @@ Series& Plot::at(const std::string& label)
 }
 
 StudyContext::StudyContext(std::string study, bool quick, bool show_progress)
-  : name_(std::move(study)), quick_(quick), show_progress_(show_progress), on_terminal_(isatty(STDERR_FILENO) == 1),
+  : name_(std::move(study)),
+    quick_(quick),
+    show_progress_(show_progress),
+    on_terminal_(isatty(STDERR_FILENO) == 1),
     last_progress_(std::chrono::steady_clock::now())
 {
 }
@@ -79,7 +82,8 @@ void StudyContext::progress(int done, int total, const std::string& what)
   if (elapsed < (on_terminal_ ? 0.05 : 10.0))
     return;
   last_progress_ = now;
-  std::fprintf(stderr, on_terminal_ ? "\r%s  %d/%d  %s\033[K" : "%s  %d/%d  %s\n", name_.c_str(), done, total, what.c_str());
+  std::fprintf(stderr, on_terminal_ ? "\r%s  %d/%d  %s\033[K" : "%s  %d/%d  %s\n", name_.c_str(), done, total,
+               what.c_str());
   std::fflush(stderr);
   line_shown_ = on_terminal_;
 }
@@ -108,7 +112,8 @@ void StudyContext::metric(const std::string& key, double value)
   metrics_.emplace_back(key, value);
 }
 
-Plot& StudyContext::plot(const std::string& name, const std::string& title, const std::string& x_label, const std::string& y_label)
+Plot& StudyContext::plot(const std::string& name, const std::string& title, const std::string& x_label,
+                         const std::string& y_label)
 {
   Plot& plot = plots_.emplace_back();
   plot.name = name;
@@ -147,4 +152,4 @@ void StudyContext::finish()
     metric("worst_error_over_bound", worst);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -15,7 +15,8 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// A triangle on the page, and the brightness of its corners (a grey one's lies between 2 and 3, of hue k between 4 + 2 k and 5 + 2 k).
+/// A triangle on the page, and the brightness of its corners (a grey one's lies between 2 and 3, of hue k between 4 + 2
+/// k and 5 + 2 k).
 struct Facet
 {
   Eigen::Vector2d corner[3];
@@ -48,7 +49,8 @@ std::vector<Facet> facetsOf(const SurfacePicture::Panel& panel, const SurfacePic
       facets.push_back(facet);
     }
   }
-  std::stable_sort(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.depth > b.depth; });   // far ones first
+  // far ones first
+  std::stable_sort(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.depth > b.depth; });
   return facets;
 }
 
@@ -61,7 +63,7 @@ bool hasHues(const SurfacePicture& picture)
   return false;
 }
 
-}  // namespace
+}   // namespace
 
 std::string gnuplotString(const std::string& text)
 {
@@ -84,15 +86,17 @@ void writeSurfaceScript(std::ostream& out, const SurfacePicture& picture, const 
   }
   const int columns = std::min<int>(picture.columns, static_cast<int>(panels.size()));
   const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
-  const double width = 1.08 * box.sizes().x(), height = 1.05 * box.sizes().y() + 0.1 * box.sizes().x();   // with room for labels
+  // with room for labels
+  const double width = 1.08 * box.sizes().x(), height = 1.05 * box.sizes().y() + 0.1 * box.sizes().x();
   const double pixels = std::min(1500.0 / (columns * width), 1800.0 / (rows * height));
   char line[160];
-  std::snprintf(line, sizeof line, "set terminal pngcairo size %.0f,%.0f noenhanced font \"sans,14\"\n", columns * width * pixels,
-                rows * height * pixels + 60);
-  out << line << "set output " << gnuplotString(png) << "\nset title " << gnuplotString(picture.title) << " offset 0,-0.3\n"
+  std::snprintf(line, sizeof line, "set terminal pngcairo size %.0f,%.0f noenhanced font \"sans,14\"\n",
+                columns * width * pixels, rows * height * pixels + 60);
+  out << line << "set output " << gnuplotString(png) << "\nset title " << gnuplotString(picture.title)
+      << " offset 0,-0.3\n"
       << "unset key\nunset tics\nunset border\nunset colorbox\nset lmargin at screen 0\nset rmargin at screen 1\n"
-      << "set bmargin at screen 0\nset tmargin at screen "
-      << 1.0 - 60.0 / (rows * height * pixels + 60) << "\nset view map\nset pm3d explicit scansforward corners2color mean border retrace\n"
+      << "set bmargin at screen 0\nset tmargin at screen " << 1.0 - 60.0 / (rows * height * pixels + 60)
+      << "\nset view map\nset pm3d explicit scansforward corners2color mean border retrace\n"
       << "set palette defined (0 \"#20120c\", 1 \"#f4c9a0\", 2 \"#101418\", 3 \"#b4bcc8\"";
   int last = 3;
   if (hasHues(picture))
@@ -106,7 +110,8 @@ void writeSurfaceScript(std::ostream& out, const SurfacePicture& picture, const 
   out << line;
   for (std::size_t p = 0; p < panels.size(); ++p)
   {
-    const double x = (static_cast<double>(p % columns) + 0.5) * width, y = (rows - 1 - static_cast<double>(p / columns)) * height;
+    const double x = (static_cast<double>(p % columns) + 0.5) * width,
+                 y = (rows - 1 - static_cast<double>(p / columns)) * height;
     std::snprintf(line, sizeof line, " at %.6g,%.6g,0 center front\n", x, y + 0.04 * width);
     out << "set label " << gnuplotString(picture.panels[p].label) << line;
   }
@@ -129,4 +134,4 @@ void writeSurfaceScript(std::ostream& out, const SurfacePicture& picture, const 
   out << "EOD\nsplot $facets using 1:2:3:4 with pm3d\n";
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -13,4 +13,4 @@ std::string gnuplotString(const std::string& text);
 /// A gnuplot script that draws the picture into a PNG file.
 void writeSurfaceScript(std::ostream& out, const SurfacePicture& picture, const std::string& png);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// Error against run time of a viscous thread that sags between two plates: integrators, steps, edges and tolerances against a converged run.
+// Error against run time of a viscous thread that sags between two plates: integrators, steps, edges and tolerances
+// against a converged run.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -13,7 +14,8 @@ namespace slender::study {
 namespace {
 
 /// The thesis's oil of Fig. 5.4, CGS units.
-constexpr double kDensity = 0.907, kMu = 100.0, kTension = 20.0, kGravity = 981.0, kLength = 2.5, kRadius = 0.0875, kEnd = 0.1;
+constexpr double kDensity = 0.907, kMu = 100.0, kTension = 20.0, kGravity = 981.0, kLength = 2.5, kRadius = 0.0875,
+                 kEnd = 0.1;
 constexpr int kSamples = 99;
 
 struct Run
@@ -55,7 +57,7 @@ Run sag(int edges, double h, double tolerance, Integrator integrator)
   return run;
 }
 
-}  // namespace
+}   // namespace
 
 void runThreadAccuracy(StudyContext& context)
 {
@@ -63,15 +65,20 @@ void runThreadAccuracy(StudyContext& context)
   const double h = context.quick() ? 2e-4 : 1e-4, fine = 1e-8;
   context.progress(0, 1, "converged run");
   // first order in the step, second in the edges: extrapolated in both
-  const Eigen::VectorXd rough = sag(edges, 2 * h, fine, Integrator::implicit_euler).depth, half = sag(edges, h, fine, Integrator::implicit_euler).depth,
+  const Eigen::VectorXd rough = sag(edges, 2 * h, fine, Integrator::implicit_euler).depth,
+                        half = sag(edges, h, fine, Integrator::implicit_euler).depth,
                         coarse = sag(edges / 2, h, fine, Integrator::implicit_euler).depth;
   if (rough.size() == 0 || half.size() == 0 || coarse.size() == 0)
     throw std::runtime_error("thread_accuracy: the converged run failed");
   const Eigen::VectorXd exact = half + (half - rough) + (half - coarse) / 3;
-  const auto rms = [&](const Eigen::VectorXd& depth) { return (depth - exact).norm() / std::sqrt(static_cast<double>(kSamples)); };
-  context.metric("reference_uncertainty_mm", 10 * ((half - coarse) / 3 - (half - rough)).norm() / std::sqrt(static_cast<double>(kSamples)) / 4);
+  const auto rms = [&](const Eigen::VectorXd& depth) {
+    return (depth - exact).norm() / std::sqrt(static_cast<double>(kSamples));
+  };
+  context.metric("reference_uncertainty_mm",
+                 10 * ((half - coarse) / 3 - (half - rough)).norm() / std::sqrt(static_cast<double>(kSamples)) / 4);
 
-  WorkPrecision front(context, "thread_accuracy", "Sagging thread", "RMS error of the depth at 0.1 s [mm]", 10 * exact.norm() / std::sqrt(static_cast<double>(kSamples)));
+  WorkPrecision front(context, "thread_accuracy", "Sagging thread", "RMS error of the depth at 0.1 s [mm]",
+                      10 * exact.norm() / std::sqrt(static_cast<double>(kSamples)));
   struct Candidate
   {
     Integrator integrator;
@@ -79,7 +86,8 @@ void runThreadAccuracy(StudyContext& context)
     double step, tolerance;
   };
   std::vector<Candidate> candidates;
-  const std::vector<double> steps = context.quick() ? std::vector<double>{0.01, 0.0025, 1e-3} : std::vector<double>{0.02, 0.01, 0.005, 0.0025, 1e-3, 5e-4, 2e-4};
+  const std::vector<double> steps = context.quick() ? std::vector<double>{0.01, 0.0025, 1e-3}
+                                                    : std::vector<double>{0.02, 0.01, 0.005, 0.0025, 1e-3, 5e-4, 2e-4};
   for (const int n : {12, 25, 50, 100})
   {
     for (const double step : steps)
@@ -95,7 +103,8 @@ void runThreadAccuracy(StudyContext& context)
     const std::string name = toString(c.integrator);
     context.progress(done++, static_cast<int>(candidates.size()), name);
     Run run = sag(c.edges, c.step, c.tolerance, c.integrator);
-    for (int k = 0; k < 2 && run.depth.size() != 0 && c.integrator == Integrator::implicit_euler; ++k)   // the fastest of three
+    for (int k = 0; k < 2 && run.depth.size() != 0 && c.integrator == Integrator::implicit_euler;
+         ++k)   // the fastest of three
       run.cpu = std::min(run.cpu, sag(c.edges, c.step, c.tolerance, c.integrator).cpu);
     Row& row = context.row();
     row.set("integrator", name).set("edges", c.edges).set("step_s", c.step).set("newton_tolerance", c.tolerance);
@@ -116,4 +125,4 @@ void runThreadAccuracy(StudyContext& context)
   front.conclude();
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

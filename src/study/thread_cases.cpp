@@ -60,7 +60,7 @@ int youngestOnFloor(const ThreadState& s)
   return i;
 }
 
-}  // namespace
+}   // namespace
 
 Landings::Landings(const ThreadState& s) : last_(youngestOnFloor(s) < 0 ? s.next_id : s.id[youngestOnFloor(s)]) {}
 
@@ -88,8 +88,8 @@ void advance(ThreadStepper& stepper, ThreadSetup& thread, double h, const std::s
   thread.time += h;
 }
 
-Row& checkRelative(StudyContext& context, const std::string& test, const std::string& quantity, double measured, double expected, double relative,
-                   const std::string& source)
+Row& checkRelative(StudyContext& context, const std::string& test, const std::string& quantity, double measured,
+                   double expected, double relative, const std::string& source)
 {
   Row& row = context.row();
   row.set("test", test).set("quantity", quantity);
@@ -97,4 +97,4 @@ Row& checkRelative(StudyContext& context, const std::string& test, const std::st
   return row;
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

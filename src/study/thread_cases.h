@@ -53,7 +53,7 @@ ThreadStepper makeStepper(const ThreadSetup& thread);
 void advance(ThreadStepper& stepper, ThreadSetup& thread, double h, const std::string& what);
 
 /// Adds a row that checks `measured` within `relative` of `expected`.
-Row& checkRelative(StudyContext& context, const std::string& test, const std::string& quantity, double measured, double expected, double relative,
-                   const std::string& source);
+Row& checkRelative(StudyContext& context, const std::string& test, const std::string& quantity, double measured,
+                   double expected, double relative, const std::string& source);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// A coiling thread (thesis Fig. 5.5): the largest steps of implicit and explicit integration, and what a simulated second costs.
+// A coiling thread (thesis Fig. 5.5): the largest steps of implicit and explicit integration, and what a simulated
+// second costs.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -52,7 +53,7 @@ double coilFrequency(ThreadSetup& t, Integrator integrator, double h, double dur
   return p.size() < 2 ? 0.0 : std::abs(angle) / (p.back().time - p.front().time);
 }
 
-}  // namespace
+}   // namespace
 
 void runThreadImplicitVsExplicit(StudyContext& context)
 {
@@ -64,13 +65,18 @@ void runThreadImplicitVsExplicit(StudyContext& context)
   // implicit: while the coil's frequency stays within 2 %
   double implicit_step = 0, implicit_cpu = 0;
   context.progress(1, 3, "implicit steps");
-  for (const double h : {0.01, 0.02, 0.04, 0.06, 0.08, 0.1})   // the stepper itself divides one in which more than an edge flows out
+  for (const double h :
+       {0.01, 0.02, 0.04, 0.06, 0.08, 0.1})   // the stepper itself divides one in which more than an edge flows out
   {
     ThreadSetup t = settled;
     double seconds = 0;
     coilFrequency(t, Integrator::implicit_euler, h, 40.0, &seconds);   // first its own steady state
     const double seen = coilFrequency(t, Integrator::implicit_euler, h, 40.0, &seconds), error = seen / kFrequency - 1;
-    context.row().set("integrator", "implicit_euler").set("step", h).set("frequency_error", error).set("cpu_per_second", seconds);
+    context.row()
+        .set("integrator", "implicit_euler")
+        .set("step", h)
+        .set("frequency_error", error)
+        .set("cpu_per_second", seconds);
     if (std::abs(error) > 0.02)
       break;
     implicit_step = h;
@@ -106,7 +112,9 @@ void runThreadImplicitVsExplicit(StudyContext& context)
         away = std::max(away, (t.state.x[i] - other.state.x[same - other.state.id.begin()]).norm());
     }
     const bool stable = away < 0.01 * kRadius;
-    row.set("outcome", stable ? "stable" : "rattles").set("cpu_per_second", seconds).set("distance_from_implicit_over_R", away / kRadius);
+    row.set("outcome", stable ? "stable" : "rattles")
+        .set("cpu_per_second", seconds)
+        .set("distance_from_implicit_over_R", away / kRadius);
     if (!stable)
       continue;
     explicit_step = h;
@@ -115,9 +123,10 @@ void runThreadImplicitVsExplicit(StudyContext& context)
   }
   context.metric("step_ratio", implicit_step / explicit_step);
   context.metric("speedup", explicit_cpu / implicit_cpu);
-  context.note("implicit: the largest step that keeps the coil's frequency within 2 %; explicit: the largest that stays");
+  context.note(
+      "implicit: the largest step that keeps the coil's frequency within 2 %; explicit: the largest that stays");
   context.note("within 1 % of the coil's radius of an implicit integration with a step of 1e-3, by factors of sqrt 2.");
   context.note("The explicit step evaluates strains and forces once each.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

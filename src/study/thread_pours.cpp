@@ -382,7 +382,8 @@ void pourAll(StudyContext& context)
   context.note(
       "works: without a warning. refused: when the scene was read. stopped: in a step, whose message says why.");
   context.note(
-      "worst_energy_growth: in a step, over the energy in the air. Where the reader warned of a puddle it is not judged.");
+      "worst_energy_growth: in a step, over the energy in the air. Where the reader warned of a puddle it is not "
+      "judged.");
   context.note(
       "budget_spent: pours that end before their duration, because so much may be computed for one. Until then they "
       "are judged.");

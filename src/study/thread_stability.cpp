@@ -1,4 +1,5 @@
-// Viscous threads under whatever may be asked of them: done or refused with a reason, never NaN, no fluid lost, bounded memory.
+// Viscous threads under whatever may be asked of them: done or refused with a reason, never NaN, no fluid lost, bounded
+// memory.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -101,10 +102,11 @@ ThreadSetup pour(double viscosity, double surface_tension, double speed = 0.05)
 Verdict pourByDefaults(double viscosity, double surface_tension, double h, int steps)
 {
   char text[500];
-  std::snprintf(text, sizeof text,
-                "time: {step: %g, duration: 1}\nthreads:\n  - fluid: {density: 1000, viscosity: %g, surface_tension: %g}\n"
-                "    nozzle: {position: [0, 0, 0.1], diameter: 5e-3, flow: 1e-6}\n    floor: {height: 0}\n",
-                h, viscosity, surface_tension);
+  std::snprintf(
+      text, sizeof text,
+      "time: {step: %g, duration: 1}\nthreads:\n  - fluid: {density: 1000, viscosity: %g, surface_tension: %g}\n"
+      "    nozzle: {position: [0, 0, 0.1], diameter: 5e-3, flow: 1e-6}\n    floor: {height: 0}\n",
+      h, viscosity, surface_tension);
   Verdict v;
   try
   {
@@ -123,13 +125,16 @@ Verdict pourByDefaults(double viscosity, double surface_tension, double h, int s
   return v;
 }
 
-void record(StudyContext& context, StabilityTally& tally, double& volume_drift, const std::string& test, double h, const Verdict& v)
+void record(StudyContext& context, StabilityTally& tally, double& volume_drift, const std::string& test, double h,
+            const Verdict& v)
 {
   Row& row = context.row();
   row.set("case", test).set("step_s", h);
   tally.record(row, v.cell);
   row.check(v.volume_drift, 0.0, 1e-10, "all fluid is accounted for");
-  row.set("folds", v.folds).set("most_nodes", static_cast<double>(v.most_nodes)).set("most_threads", static_cast<double>(v.most_threads));
+  row.set("folds", v.folds)
+      .set("most_nodes", static_cast<double>(v.most_nodes))
+      .set("most_threads", static_cast<double>(v.most_threads));
   volume_drift = std::max(volume_drift, v.volume_drift);
 }
 
@@ -140,10 +145,12 @@ Verdict stretch(double ratio, double h, int steps)
   t.model.viscosity = 1e3;
   t.hold(0);
   t.hold(1);
-  return run(t, h, steps, [=](double time, ThreadInputs& inputs) { inputs.ends[1].position.x() = 0.1 * std::pow(ratio, time / (h * steps)); });
+  return run(t, h, steps, [=](double time, ThreadInputs& inputs) {
+    inputs.ends[1].position.x() = 0.1 * std::pow(ratio, time / (h * steps));
+  });
 }
 
-}  // namespace
+}   // namespace
 
 void runThreadStability(StudyContext& context)
 {
@@ -155,7 +162,8 @@ void runThreadStability(StudyContext& context)
     std::snprintf(text, sizeof text, "%s %g", what.c_str(), value);
     return std::string(text);
   };
-  const std::vector<double> viscosities = context.quick() ? std::vector<double>{1e-3, 1e3, 1e9} : std::vector<double>{1e-3, 1e-1, 1e1, 1e3, 1e6, 1e9};
+  const std::vector<double> viscosities =
+      context.quick() ? std::vector<double>{1e-3, 1e3, 1e9} : std::vector<double>{1e-3, 1e-1, 1e1, 1e3, 1e6, 1e9};
   const std::vector<double> tensions = {0.0, 0.07, 1.0};
   int done = 0;
   for (const double mu : viscosities)
@@ -184,15 +192,20 @@ threads:
     centerline: {straight: {from: [0, 0, 0], to: [0.1, 0, 0], edges: 20}}
     radius: %g
     ends: {oldest: held, newest: held}
-)", gravity, viscosity, radius);
+)",
+                  gravity, viscosity, radius);
     return MapScene{text, {}};
   };
-  const std::vector<double> map_steps = context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 1e-1};
+  const std::vector<double> map_steps =
+      context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 1e-1};
   stabilityMap(context, tally, "thread_stability_viscosity", "viscosity [Pa s]",
-               context.quick() ? std::vector<double>{1e-2, 1e2, 1e6} : std::vector<double>{1e-3, 1e-2, 1e-1, 1, 1e1, 1e2, 1e4, 1e6, 1e9}, map_steps, 10,
-               [&](double viscosity) { return held(viscosity, 2e-3, -9.81); });
-  stabilityMap(context, tally, "thread_stability_slenderness", "radius over length", context.quick() ? std::vector<double>{1e-4, 1e-2, 0.1} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3},
-               map_steps, 10, [&](double slenderness) { return held(100, 0.1 * slenderness, -9.81); });
+               context.quick() ? std::vector<double>{1e-2, 1e2, 1e6}
+                               : std::vector<double>{1e-3, 1e-2, 1e-1, 1, 1e1, 1e2, 1e4, 1e6, 1e9},
+               map_steps, 10, [&](double viscosity) { return held(viscosity, 2e-3, -9.81); });
+  stabilityMap(
+      context, tally, "thread_stability_slenderness", "radius over length",
+      context.quick() ? std::vector<double>{1e-4, 1e-2, 0.1} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3},
+      map_steps, 10, [&](double slenderness) { return held(100, 0.1 * slenderness, -9.81); });
   for (const double ratio : {1e2, 1e5})
     record(context, tally, drift, name("stretched by", ratio), 0.1, stretch(ratio, 0.1, 200));
 
@@ -202,12 +215,18 @@ threads:
     const char* name;
     Motion motion;
   } motions[] = {
-      {"nozzle that jumps by 5 cm twice a second", [](double t, ThreadInputs& in) { in.ends[1].position = {0.05 * (std::fmod(t, 1.0) < 0.5), 0, 0.1}; }},
-      {"nozzle that turns about its axis, 3 rad/s", [start = pour(1, 0).inputs.ends[1].orientation](double t, ThreadInputs& in) {
+      {"nozzle that jumps by 5 cm twice a second",
+       [](double t, ThreadInputs& in) {
+         in.ends[1].position = {0.05 * (std::fmod(t, 1.0) < 0.5), 0, 0.1};
+       }},
+      {"nozzle that turns about its axis, 3 rad/s",
+       [start = pour(1, 0).inputs.ends[1].orientation](double t, ThreadInputs& in) {
          in.ends[1].orientation = Eigen::Quaterniond(Eigen::AngleAxisd(3 * t, Eigen::Vector3d::UnitZ())) * start;
        }},
-      {"flow that stops and starts again", [flow](double t, ThreadInputs& in) { in.flow_rate = std::fmod(t, 1.0) < 0.5 ? flow : 0.0; }},
-      {"belt that reverses", [](double t, ThreadInputs& in) { in.belt_velocity.x() = std::fmod(t, 1.0) < 0.5 ? 0.2 : -0.2; }},
+      {"flow that stops and starts again",
+       [flow](double t, ThreadInputs& in) { in.flow_rate = std::fmod(t, 1.0) < 0.5 ? flow : 0.0; }},
+      {"belt that reverses",
+       [](double t, ThreadInputs& in) { in.belt_velocity.x() = std::fmod(t, 1.0) < 0.5 ? 0.2 : -0.2; }},
   };
   for (const auto& m : motions)
     for (const double mu : {1.0, 1e2, 1e4})
@@ -216,7 +235,8 @@ threads:
         context.progress(done, done + 1, m.name);
         ++done;
         const int steps = static_cast<int>((context.quick() ? 1.5 : 4.0) / h);
-        record(context, tally, drift, std::string(m.name) + name(", viscosity", mu), h, run(pour(mu, 0.03), h, steps, m.motion));
+        record(context, tally, drift, std::string(m.name) + name(", viscosity", mu), h,
+               run(pour(mu, 0.03), h, steps, m.motion));
       }
 
   context.progress(done, done + 1, "an hour");
@@ -225,9 +245,11 @@ threads:
   const Verdict late = run(pour(1e2, 0.03), h, static_cast<int>(hour / h), steady);
   record(context, tally, drift, name("poured, seconds:", hour), h, late);
   const double growth = static_cast<double>(late.most_nodes) / static_cast<double>(early.most_nodes);
-  context.row().set("case", "most nodes at a time, over those of the first minute").check(growth, 1.0, 0.1, "bounded memory");
+  context.row()
+      .set("case", "most nodes at a time, over those of the first minute")
+      .check(growth, 1.0, 0.1, "bounded memory");
   context.metric("volume_drift", drift);
   context.metric("most_nodes_in_the_long_run", static_cast<double>(late.most_nodes));
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

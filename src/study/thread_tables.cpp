@@ -20,10 +20,10 @@ struct Example
   const char* figure;
   const char* what;
   const char* vertices;
-  double step;                       ///< [s]
-  double fastest, slowest, average;  ///< thesis [ms] per frame
-  double seconds;                    ///< simulated before and while frames are timed
-  const char* scene;                 ///< null: the package's hair
+  double step;                        ///< [s]
+  double fastest, slowest, average;   ///< thesis [ms] per frame
+  double seconds;                     ///< simulated before and while frames are timed
+  const char* scene;                  ///< null: the package's hair
 };
 
 const Example kExamples[] = {
@@ -58,7 +58,7 @@ threads:
     {"4.8", "hair", "54460", 10e-3, 23500, 226000, 77000, 0.125, nullptr},
 };
 
-}  // namespace
+}   // namespace
 
 void runThreadTables(StudyContext& context)
 {
@@ -71,7 +71,8 @@ void runThreadTables(StudyContext& context)
     const std::string step = "time.step=" + std::to_string(e.step);
     if (!e.scene && context.quick())
       continue;   // minutes
-    Simulation simulation = e.scene ? Simulation(parseScene(e.scene, std::string("table_5_1/") + e.figure, {step})) : packageScene("hair", {step});
+    Simulation simulation = e.scene ? Simulation(parseScene(e.scene, std::string("table_5_1/") + e.figure, {step}))
+                                    : packageScene("hair", {step});
     const double seconds = context.quick() ? 0.2 * e.seconds : e.seconds;
     double fastest = std::numeric_limits<double>::infinity(), slowest = 0.0, total = 0.0;
     int frames = 0, fewest = std::numeric_limits<int>::max(), most = 0, cuts = 0;
@@ -100,10 +101,21 @@ void runThreadTables(StudyContext& context)
       ++frames;
     }
     const double mean = 1e3 * total / frames;
-    context.row().set("figure", e.figure).set("example", e.what).set("vertices", std::to_string(fewest) + "-" + std::to_string(most))
-        .set("thesis_vertices", e.vertices).set("step_ms", 1e3 * e.step).set("frames", frames).set("cut_steps", cuts)
-        .set("fastest_ms", 1e3 * fastest).set("thesis_fastest_ms", e.fastest).set("slowest_ms", 1e3 * slowest).set("thesis_slowest_ms", e.slowest)
-        .set("mean_ms", mean).set("thesis_mean_ms", e.average).set("speedup", e.average / mean);
+    context.row()
+        .set("figure", e.figure)
+        .set("example", e.what)
+        .set("vertices", std::to_string(fewest) + "-" + std::to_string(most))
+        .set("thesis_vertices", e.vertices)
+        .set("step_ms", 1e3 * e.step)
+        .set("frames", frames)
+        .set("cut_steps", cuts)
+        .set("fastest_ms", 1e3 * fastest)
+        .set("thesis_fastest_ms", e.fastest)
+        .set("slowest_ms", 1e3 * slowest)
+        .set("thesis_slowest_ms", e.slowest)
+        .set("mean_ms", mean)
+        .set("thesis_mean_ms", e.average)
+        .set("speedup", e.average / mean);
     most_cut = std::max(most_cut, cuts * e.step / seconds);
     least = std::min(least, e.average / mean);
   }
@@ -111,4 +123,4 @@ void runThreadTables(StudyContext& context)
   context.metric("cut_steps_share_max", most_cut);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

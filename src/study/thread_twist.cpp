@@ -23,7 +23,8 @@ double torque(const Eigen::VectorXd& radii, double h, double turns, double* twis
   const int steps = static_cast<int>(std::ceil(2 * M_PI * turns / (kRate * h)));
   for (int k = 1; k <= steps; ++k)
   {
-    t.inputs.ends[1].orientation = Eigen::Quaterniond(Eigen::AngleAxisd(kRate * k * h, Eigen::Vector3d::UnitX())) * start.orientation;
+    t.inputs.ends[1].orientation =
+        Eigen::Quaterniond(Eigen::AngleAxisd(kRate * k * h, Eigen::Vector3d::UnitX())) * start.orientation;
     advance(stepper, t, h, "thread_twist");
   }
   if (twist)
@@ -43,9 +44,12 @@ Eigen::VectorXd stepped(int edges)
   return radii;
 }
 
-double exactStepped() { return kRate / (0.5 * kLength * (1 / std::pow(0.1, 4) + 1 / std::pow(0.2, 4)) / (0.5 * M_PI * kMu)); }
+double exactStepped()
+{
+  return kRate / (0.5 * kLength * (1 / std::pow(0.1, 4) + 1 / std::pow(0.2, 4)) / (0.5 * M_PI * kMu));
+}
 
-}  // namespace
+}   // namespace
 
 void runThreadTwist(StudyContext& context)
 {
@@ -55,7 +59,8 @@ void runThreadTwist(StudyContext& context)
     double twist = 0.0;
     const double seen = torque(Eigen::VectorXd::Constant(edges, 0.1), step, 5.0, &twist);
     checkRelative(context, "uniform", "torque", seen, uniform, 0.01, "(pi/2) mu a^4 rate/L").set("edges", edges);
-    checkRelative(context, "uniform", "sum of twists over turns", twist, 1.0, 1e-6, "no turn is lost in five").set("edges", edges);
+    checkRelative(context, "uniform", "sum of twists over turns", twist, 1.0, 1e-6, "no turn is lost in five")
+        .set("edges", edges);
   }
   double errors[3];
   int k = 0;
@@ -64,13 +69,20 @@ void runThreadTwist(StudyContext& context)
     const double seen = torque(stepped(edges), step, 0.1);
     errors[k++] = seen / exactStepped() - 1;
     if (edges < 160)
-      context.row().set("test", "half a = 0.1, half a = 0.2").set("quantity", "torque").set("measured", seen)
-          .set("relative_error", errors[k - 1]).set("edges", edges);
+      context.row()
+          .set("test", "half a = 0.1, half a = 0.2")
+          .set("quantity", "torque")
+          .set("measured", seen)
+          .set("relative_error", errors[k - 1])
+          .set("edges", edges);
     else
-      checkRelative(context, "half a = 0.1, half a = 0.2", "torque", seen, exactStepped(), 0.01, "rate / sum l_i/(pi mu a_i^4/2)").set("edges", edges);
+      checkRelative(context, "half a = 0.1, half a = 0.2", "torque", seen, exactStepped(), 0.01,
+                    "rate / sum l_i/(pi mu a_i^4/2)")
+          .set("edges", edges);
   }
   context.metric("observed_order", observedOrder(errors[1], errors[2]));
-  context.note("The joint at the step has the mean radius of its two edges, as in the thesis: an error of first order.");
+  context.note(
+      "The joint at the step has the mean radius of its two edges, as in the thesis: an error of first order.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

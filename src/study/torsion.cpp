@@ -29,13 +29,15 @@ struct TwistedRod
   }
   void turnTo(double angle)
   {
-    rod.inputs.grasps[1].X_WG.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX())) * start.orientation;
+    rod.inputs.grasps[1].X_WG.orientation =
+        Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX())) * start.orientation;
   }
   RodSetup rod;
   Pose start;
 };
 
-/// Period of a disc on the rod, J phi'' = torque(phi): velocity Verlet around the rod's own steps, as a gripper would do it.
+/// Period of a disc on the rod, J phi'' = torque(phi): velocity Verlet around the rod's own steps, as a gripper would
+/// do it.
 double pendulumPeriod(const Pendulum& p, double stiffness, int edges, Integrator integrator, int steps_per_period)
 {
   TwistedRod t(p, edges);
@@ -71,11 +73,12 @@ double pendulumPeriod(const Pendulum& p, double stiffness, int edges, Integrator
   return 2 * (last - first) / (crossings - 1);
 }
 
-}  // namespace
+}   // namespace
 
 void runTorsion(StudyContext& context)
 {
-  const Pendulum pendulums[] = {{"steel wire", 1.0, 2e11, 0.3, 0.001, 0.001, 7800}, {"rubber cord", 0.5, 1e7, 0.5, 0.002, 5e-6, 1100}};
+  const Pendulum pendulums[] = {{"steel wire", 1.0, 2e11, 0.3, 0.001, 0.001, 7800},
+                                {"rubber cord", 0.5, 1e7, 0.5, 0.002, 5e-6, 1100}};
   const std::vector<int> meshes = context.quick() ? std::vector<int>{20} : std::vector<int>{10, 40, 160};
   int done = 0;
   for (const Pendulum& p : pendulums)
@@ -107,13 +110,19 @@ void runTorsion(StudyContext& context)
         const double period = pendulumPeriod(p, stiffness, edges, integrator, 200);
         const double expected = 2 * M_PI * std::sqrt(p.inertia / stiffness);
         Row& row = context.row();
-        row.set("case", p.name).set("quantity", "period [s]").set("edges", edges).set("integrator", toString(integrator));
-        row.check(period, expected, kBound * expected, "2 pi sqrt(J L / beta)").set("cpu_seconds", threadSeconds() - start);
+        row.set("case", p.name)
+            .set("quantity", "period [s]")
+            .set("edges", edges)
+            .set("integrator", toString(integrator));
+        row.check(period, expected, kBound * expected, "2 pi sqrt(J L / beta)")
+            .set("cpu_seconds", threadSeconds() - start);
       }
     }
   }
-  context.note("period: the disc's angle by velocity Verlet, 200 steps per period, the rod between two grasps; material frames are quasistatic,");
+  context.note(
+      "period: the disc's angle by velocity Verlet, 200 steps per period, the rod between two grasps; material frames "
+      "are quasistatic,");
   context.note("so the rod's own polar inertia (2e-6 and 5e-4 of the period) is left out of the reference as well.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

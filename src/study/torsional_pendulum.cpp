@@ -20,7 +20,8 @@ struct Pendulum
 };
 
 /// Mean period between upward zero crossings of the disc's angle, half a turn of amplitude.
-double period(const Pendulum& p, int edges, Integrator integrator, int steps_per_period, double expected, StepReport& worst)
+double period(const Pendulum& p, int edges, Integrator integrator, int steps_per_period, double expected,
+              StepReport& worst)
 {
   RodCase wire = circularRod(p.length, p.radius, p.youngs_modulus, p.poissons_ratio, p.density, edges);
   Eigen::Matrix3Xd nodes = Eigen::Matrix3Xd::Zero(3, edges + 1);
@@ -29,7 +30,8 @@ double period(const Pendulum& p, int edges, Integrator integrator, int steps_per
   rod.hold(0, 0, true);
   GroupSetup g;
   g.add(rod);
-  g.add("disc", p.mass, {0.5 * p.inertia, 0.5 * p.inertia, p.inertia}, {nodes.col(edges), Eigen::Quaterniond::Identity()});
+  g.add("disc", p.mass, {0.5 * p.inertia, 0.5 * p.inertia, p.inertia},
+        {nodes.col(edges), Eigen::Quaterniond::Identity()});
   g.weld(0, edges, 0);
   g.setGravity({0, 0, -9.81});
   const double h = expected / steps_per_period;
@@ -57,22 +59,25 @@ double period(const Pendulum& p, int edges, Integrator integrator, int steps_per
   return crossings > 1 ? (last - first) / (crossings - 1) : std::nan("");
 }
 
-}  // namespace
+}   // namespace
 
 void runTorsionalPendulum(StudyContext& context)
 {
   // Reference cases of torsion_pendulum.csv; the disc's mass strains the wire by under 1e-3.
-  const Pendulum pendulums[] = {{"steel wire", 1.0, 2e11, 0.3, 0.001, 7800, 1.0, 0.001}, {"rubber cord", 0.5, 1e7, 0.5, 0.002, 1100, 0.01, 5e-6}};
+  const Pendulum pendulums[] = {{"steel wire", 1.0, 2e11, 0.3, 0.001, 7800, 1.0, 0.001},
+                                {"rubber cord", 0.5, 1e7, 0.5, 0.002, 1100, 0.01, 5e-6}};
   const std::vector<int> meshes = context.quick() ? std::vector<int>{10} : std::vector<int>{5, 10, 40};
   const std::vector<int> steps = context.quick() ? std::vector<int>{400} : std::vector<int>{200, 400, 800};
   int done = 0;
   const int total = static_cast<int>(2 * meshes.size() * steps.size() * implicitIntegrators().size());
   for (const Pendulum& p : pendulums)
   {
-    const double stiffness = circularRod(p.length, p.radius, p.youngs_modulus, p.poissons_ratio, p.density, 1).twist / p.length;
+    const double stiffness =
+        circularRod(p.length, p.radius, p.youngs_modulus, p.poissons_ratio, p.density, 1).twist / p.length;
     const double expected = 2 * M_PI * std::sqrt(p.inertia / stiffness);
     Plot& plot = context.plot(std::string("torsional_pendulum_") + (p.radius > 0.0015 ? "rubber" : "steel"),
-                              std::string("Torsional pendulum, ") + p.name + ": error against step", "steps per period", "relative error of the period");
+                              std::string("Torsional pendulum, ") + p.name + ": error against step", "steps per period",
+                              "relative error of the period");
     for (const int edges : meshes)
       for (const Integrator integrator : implicitIntegrators())
         for (const int n : steps)
@@ -82,8 +87,12 @@ void runTorsionalPendulum(StudyContext& context)
           StepReport worst;
           const double measured = period(p, edges, integrator, n, expected, worst);
           Row& row = context.row();
-          row.set("case", p.name).set("edges", edges).set("integrator", toString(integrator)).set("steps_per_period", n);
-          row.check(measured, expected, 0.002 * expected, "2 pi sqrt(J L / beta)").set("relative_error", measured / expected - 1);
+          row.set("case", p.name)
+              .set("edges", edges)
+              .set("integrator", toString(integrator))
+              .set("steps_per_period", n);
+          row.check(measured, expected, 0.002 * expected, "2 pi sqrt(J L / beta)")
+              .set("relative_error", measured / expected - 1);
           row.set("iterations_per_step", worst.iterations).set("cpu_seconds", threadSeconds() - begin);
           if (edges == meshes.back())
           {
@@ -92,7 +101,9 @@ void runTorsionalPendulum(StudyContext& context)
           }
         }
   }
-  context.note("The disc swings by half a turn to each side; the wire hangs in gravity, its twist follows quasistatically (no polar inertia).");
+  context.note(
+      "The disc swings by half a turn to each side; the wire hangs in gravity, its twist follows quasistatically (no "
+      "polar inertia).");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -37,7 +37,8 @@ TriangleMesh boxMesh(double side)
   return box;
 }
 
-void finish(TrackedCase& c, const TestFunctions& functions, double area_density, const MembraneModuli& membrane, double bending, double damping)
+void finish(TrackedCase& c, const TestFunctions& functions, double area_density, const MembraneModuli& membrane,
+            double bending, double damping)
 {
   c.constraints = std::make_shared<WeakConstraints>(functions, hatMassMatrix(c.guide), hatMassMatrix(c.tracked.mesh));
   c.constraints->requireIndependent({});
@@ -58,16 +59,22 @@ TrackedCase flyingSheet()
   c.tracked = subdivide(c.guide, 3);
   std::vector<PaintedRegion> quarters;
   for (int q = 0; q < 4; ++q)
-    quarters.push_back({"quarter" + std::to_string(q), verticesWhere(c.guide, [q](const Eigen::Vector3d& x) {
-                          return ((q & 1) ? x.x() > 0.8 : x.x() < 0.7) && ((q & 2) ? x.y() > 0.55 : x.y() < 0.45);
-                        }), {}});
+    quarters.push_back({"quarter" + std::to_string(q),
+                        verticesWhere(c.guide,
+                                      [q](const Eigen::Vector3d& x) {
+                                        return ((q & 1) ? x.x() > 0.8 : x.x() < 0.7) &&
+                                               ((q & 2) ? x.y() > 0.55 : x.y() < 0.45);
+                                      }),
+                        {}});
   finish(c, paintedRegions(quarters, c.tracked), 0.15, orthotropicMembrane(500, 500, 0.3, 190), 5e-5, 1e-3);
   c.motion = [rest = c.guide.vertices](double t) {
     Eigen::Matrix3Xd x = rest;
     const double flight = 1.5 * t;
     for (Eigen::Index i = 0; i < x.cols(); ++i)
-      x.col(i) += Eigen::Vector3d(flight, 0.1 * std::sin(2 * t), 0.5 * flight - 0.4 * t * t + 0.15 * std::sin(2 * rest(0, i) + 3 * rest(1, i) - 6 * t) -
-                                  0.15 * std::sin(2 * rest(0, i) + 3 * rest(1, i)));
+      x.col(i) +=
+          Eigen::Vector3d(flight, 0.1 * std::sin(2 * t),
+                          0.5 * flight - 0.4 * t * t + 0.15 * std::sin(2 * rest(0, i) + 3 * rest(1, i) - 6 * t) -
+                              0.15 * std::sin(2 * rest(0, i) + 3 * rest(1, i)));
     return x;
   };
   c.published_tracked = 17.7;
@@ -145,7 +152,7 @@ TrackedCase walkingFigure()
   return c;
 }
 
-}  // namespace
+}   // namespace
 
 TrackedCase breathingSurface(int cells, int subdivisions)
 {
@@ -159,8 +166,9 @@ TrackedCase breathingSurface(int cells, int subdivisions)
     Eigen::Matrix3Xd x = rest;
     const double size = 1.0 + 0.25 * (1 - std::cos(12 * t));
     for (Eigen::Index i = 0; i < x.cols(); ++i)
-      x.col(i) = Eigen::Vector3d(0.5 + size * (rest(0, i) - 0.5), 0.5 + size * (rest(1, i) - 0.5),
-                                 0.1 * std::sin(12 * t) * std::cos(2 * kPi * rest(0, i)) * std::cos(2 * kPi * rest(1, i)));
+      x.col(i) =
+          Eigen::Vector3d(0.5 + size * (rest(0, i) - 0.5), 0.5 + size * (rest(1, i) - 0.5),
+                          0.1 * std::sin(12 * t) * std::cos(2 * kPi * rest(0, i)) * std::cos(2 * kPi * rest(1, i)));
     return x;
   };
   c.gravity.setZero();
@@ -178,4 +186,4 @@ ClothState TrackedCase::start() const
 
 std::vector<TrackedCase> thesisCases() { return {flyingSheet(), turnedBox(), flippedBag(), walkingFigure()}; }
 
-}  // namespace slender::study
+}   // namespace slender::study

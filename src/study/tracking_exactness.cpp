@@ -12,15 +12,15 @@ namespace slender::study {
 
 namespace {
 
-constexpr double kStep = 0.01;    // [s]
-constexpr double kBound = 1e-10;  // |c| over the area of a test function and the guide's size
+constexpr double kStep = 0.01;     // [s]
+constexpr double kBound = 1e-10;   // |c| over the area of a test function and the guide's size
 
 struct Scene
 {
   std::string what;
   TrackedCase cloth;
   bool full_newton = false, contact = false;
-  double thickness = 4e-3;            ///< with contact
+  double thickness = 4e-3;   ///< with contact
   std::vector<ContactSolid> solids = {};
   std::vector<Pose> poses = {};
 };
@@ -43,9 +43,12 @@ std::vector<Scene> scenes(bool quick)
   all.push_back(wind);
   Scene jumps{"sheet whose guide jumps", sheet};
   jumps.cloth.motion = [rest = sheet.guide.vertices](double t) {
-    const int jump = static_cast<int>(std::floor(t / (10 * kStep) + 1e-6));   // by its own size and more, turned each time
+    // by its own size and more, turned each time
+    const int jump = static_cast<int>(std::floor(t / (10 * kStep) + 1e-6));
     const Eigen::Vector3d to(3 * std::sin(7.0 * jump), 2 * (1 - std::cos(5.0 * jump)), 2 * std::sin(3.0 * jump));
-    return Eigen::Matrix3Xd((Eigen::AngleAxisd(2.0 * jump, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix() * rest).colwise() + to);
+    return Eigen::Matrix3Xd(
+        (Eigen::AngleAxisd(2.0 * jump, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix() * rest).colwise() +
+        to);
   };
   all.push_back(jumps);
   Scene ball{"sheet lowered over a ball", sheet};
@@ -60,7 +63,8 @@ std::vector<Scene> scenes(bool quick)
   all.push_back(ball);
   Scene crumpled{"bag whose rim is pressed together", bag};
   crumpled.contact = true;
-  crumpled.cloth.motion = [rest = bag.guide.vertices](double t) {   // its rim is pressed to 15 % of its depth; to 5 % collisions forbid some averages (4.6e-5)
+  // its rim is pressed to 15 % of its depth; to 5 % collisions forbid some averages (4.6e-5)
+  crumpled.cloth.motion = [rest = bag.guide.vertices](double t) {
     Eigen::Matrix3Xd x = rest;
     const double middle = 0.5 * (rest.row(0).minCoeff() + rest.row(0).maxCoeff());
     for (Eigen::Index i = 0; i < x.cols(); ++i)
@@ -111,7 +115,8 @@ Result follow(StudyContext& context, const Scene& scene, int steps)
     inputs.cloths[0].averages = c.constraints->averages(c.motion(k * kStep));
     const StepReport report = group.step(state, inputs, kStep);
     if (!report.ok)
-      throw std::runtime_error("tracking_exactness: " + scene.what + ", step " + std::to_string(k) + ": " + report.message);
+      throw std::runtime_error("tracking_exactness: " + scene.what + ", step " + std::to_string(k) + ": " +
+                               report.message);
     result.worst = std::max(result.worst, c.constraints->error(inputs.cloths[0].averages, state.cloths[0].x) / size);
     result.force = std::max(result.force, group.averageForces(0).colwise().norm().maxCoeff());
     result.contacts += report.repulsions + report.impulses;
@@ -122,7 +127,7 @@ Result follow(StudyContext& context, const Scene& scene, int steps)
   return result;
 }
 
-}  // namespace
+}   // namespace
 
 void runTrackingExactness(StudyContext& context)
 {
@@ -131,12 +136,18 @@ void runTrackingExactness(StudyContext& context)
   {
     const Result r = follow(context, scene, context.quick() ? 40 : 120);
     not_finite += !r.finite;
-    context.row().set("scene", scene.what).set("vertices", scene.cloth.model->vertices()).set("constraints", scene.cloth.constraints->count())
-      .set("steps", r.steps).set("cut_steps", r.cuts).set("contacts", static_cast<double>(r.contacts)).set("largest_force_N", r.force)
-      .check(r.finite ? r.worst : std::nan(""), 0.0, kBound, "thesis 6.3.2: averages are met exactly");
+    context.row()
+        .set("scene", scene.what)
+        .set("vertices", scene.cloth.model->vertices())
+        .set("constraints", scene.cloth.constraints->count())
+        .set("steps", r.steps)
+        .set("cut_steps", r.cuts)
+        .set("contacts", static_cast<double>(r.contacts))
+        .set("largest_force_N", r.force)
+        .check(r.finite ? r.worst : std::nan(""), 0.0, kBound, "thesis 6.3.2: averages are met exactly");
   }
   context.metric("nan_count", not_finite);
   context.note("measured: greatest |c| after any step, over the area of its test function and the guide's size.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -1,4 +1,5 @@
-// Ways of enforcing weak constraints (thesis 6.3.3) on the same motion: Lagrange multipliers, penalty forces, manifold projection. Error against run time.
+// Ways of enforcing weak constraints (thesis 6.3.3) on the same motion: Lagrange multipliers, penalty forces, manifold
+// projection. Error against run time.
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -35,7 +36,8 @@ GuidedCloth shakenSheet()
     for (Eigen::Index i = 0; i < x.cols(); ++i)
     {
       const double angle = 2.0 * ramp * std::sin(5.0 * t) * rest(0, i);   // twists about its x axis
-      x.col(i) << rest(0, i), rest(1, i) * std::cos(angle), rest(1, i) * std::sin(angle) + 0.05 * ramp * std::sin(12.0 * t + 6.0 * rest(0, i));
+      x.col(i) << rest(0, i), rest(1, i) * std::cos(angle),
+          rest(1, i) * std::sin(angle) + 0.05 * ramp * std::sin(12.0 * t + 6.0 * rest(0, i));
     }
     return x;
   };
@@ -47,8 +49,11 @@ class Outside
 {
 public:
   explicit Outside(const GuidedCloth& c)
-    : case_(c), constraints_(c.constraints()), inverse_mass_(c.model.mass.cwiseInverse()), weights_(constraints_.matrix())
-    , gram_(Eigen::MatrixXd(weights_ * inverse_mass_.asDiagonal() * weights_.transpose()))
+    : case_(c),
+      constraints_(c.constraints()),
+      inverse_mass_(c.model.mass.cwiseInverse()),
+      weights_(constraints_.matrix()),
+      gram_(Eigen::MatrixXd(weights_ * inverse_mass_.asDiagonal() * weights_.transpose()))
   {
     for (Eigen::Index i = 0; i < gram_.rows(); ++i)
       masses_.push_back(1.0 / gram_(i, i));
@@ -58,7 +63,8 @@ public:
   /// Largest penalty stiffness [N/m] that explicit forces of steps h bear: h < 2 / omega, without damping.
   double stableStiffness(double h) const
   {
-    const double largest = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(gram_, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
+    const double largest =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(gram_, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
     return 4.0 / (h * h * largest);
   }
 
@@ -100,7 +106,12 @@ struct Run
   std::vector<Matrix3Xd> frames;   ///< at tenths of the duration
 };
 
-enum class Method { multipliers, penalty, projection };
+enum class Method
+{
+  multipliers,
+  penalty,
+  projection
+};
 
 Run follow(const GuidedCloth& base, const Outside& outside, Method method, double h, double stiffness)
 {
@@ -151,17 +162,17 @@ double distance(const std::vector<Matrix3Xd>& a, const std::vector<Matrix3Xd>& b
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
-}  // namespace
+}   // namespace
 
 void runTrackingMethods(StudyContext& context)
 {
   useOneBlasThread();
   const GuidedCloth c = shakenSheet();
   const Outside outside(c);
-  Plot& paths = context.plot("tracking_methods", "Ways of tracking: error against run time, steps of 20 ms down", "CPU time per simulated second [s]",
-                             "RMS distance from the converged motion [m]");
-  Plot& drift = context.plot("tracking_methods_constraints", "Ways of tracking: how well averages are kept", "CPU time per simulated second [s]",
-                             "greatest distance of an average [m]");
+  Plot& paths = context.plot("tracking_methods", "Ways of tracking: error against run time, steps of 20 ms down",
+                             "CPU time per simulated second [s]", "RMS distance from the converged motion [m]");
+  Plot& drift = context.plot("tracking_methods_constraints", "Ways of tracking: how well averages are kept",
+                             "CPU time per simulated second [s]", "greatest distance of an average [m]");
   const int halvings = context.quick() ? 2 : 5;   // of 20 ms
   GuidedCloth exact = c;
   exact.one_newton_step = false;
@@ -170,7 +181,8 @@ void runTrackingMethods(StudyContext& context)
   if (!reference.ok)
     throw std::runtime_error("reference: " + reference.reason);
 
-  const std::vector<double> stiffnesses = context.quick() ? std::vector<double>{1e1, 1e2, 1e3} : std::vector<double>{1e0, 1e1, 1e2, 1e3, 1e4, 1e5};
+  const std::vector<double> stiffnesses =
+      context.quick() ? std::vector<double>{1e1, 1e2, 1e3} : std::vector<double>{1e0, 1e1, 1e2, 1e3, 1e4, 1e5};
   struct Way
   {
     std::string name;
@@ -180,7 +192,8 @@ void runTrackingMethods(StudyContext& context)
   std::vector<Way> ways{{"multipliers", Method::multipliers, 0}, {"projection", Method::projection, 0}};
   for (const double stiffness : stiffnesses)
     ways.push_back({"penalty, " + std::to_string(static_cast<int>(stiffness)) + " N/m", Method::penalty, stiffness});
-  double fine_multipliers = 0, coarse_multipliers = 0, worst_multipliers = 0, best_penalty = std::numeric_limits<double>::infinity(), coarse_projection = 0;
+  double fine_multipliers = 0, coarse_multipliers = 0, worst_multipliers = 0,
+         best_penalty = std::numeric_limits<double>::infinity(), coarse_projection = 0;
   int done = 0, blown_up = 0;
   for (const Way& way : ways)
   {
@@ -200,7 +213,10 @@ void runTrackingMethods(StudyContext& context)
         continue;
       }
       const double error = distance(run.frames, reference.frames);
-      row.set("outcome", "done").set("cpu_seconds", run.seconds).set("rms_error_m", error).set("average_error_m", run.constraint_error);
+      row.set("outcome", "done")
+          .set("cpu_seconds", run.seconds)
+          .set("rms_error_m", error)
+          .set("average_error_m", run.constraint_error);
       paths.at(way.name).x.push_back(run.seconds / kDuration);
       paths.at(way.name).y.push_back(error);
       drift.at(way.name).x.push_back(run.seconds / kDuration);
@@ -232,8 +248,13 @@ void runTrackingMethods(StudyContext& context)
     if (!run.ok)
       throw std::runtime_error("stiff sheet: " + run.reason);
     const double error = distance(run.frames, smooth_reference.frames);
-    context.row().set("method", "multipliers, bending " + std::to_string(static_cast<int>(kSmooth)) + " times as stiff").set("step_ms", 1e3 * h).set("outcome", "done").set("cpu_seconds", run.seconds)
-        .set("rms_error_m", error).set("average_error_m", run.constraint_error);
+    context.row()
+        .set("method", "multipliers, bending " + std::to_string(static_cast<int>(kSmooth)) + " times as stiff")
+        .set("step_ms", 1e3 * h)
+        .set("outcome", "done")
+        .set("cpu_seconds", run.seconds)
+        .set("rms_error_m", error)
+        .set("average_error_m", run.constraint_error);
     (k == 0 ? coarse_smooth : fine_smooth) = error;
   }
   context.metric("order_of_multipliers_smooth", std::log2(coarse_smooth / fine_smooth) / halvings);
@@ -242,8 +263,11 @@ void runTrackingMethods(StudyContext& context)
   context.metric("projection_over_multipliers_20ms", coarse_projection / coarse_multipliers);
   context.metric("order_of_multipliers", std::log2(coarse_multipliers / fine_multipliers) / halvings);
   context.metric("penalty_blown_up", blown_up);
-  context.note("errors against multipliers at a quarter of the shortest step with full Newton and a linear tolerance of 1e-6; penalty: forces of springs and dampers as they are when the step begins, "
-               "unstable above stable_stiffness; projection: free step, then the nearest positions by mass that have the averages.");
+  context.note(
+      "errors against multipliers at a quarter of the shortest step with full Newton and a linear tolerance of 1e-6; "
+      "penalty: forces of springs and dampers as they are when the step begins, "
+      "unstable above stable_stiffness; projection: free step, then the nearest positions by mass that have the "
+      "averages.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -10,11 +10,11 @@ namespace slender::study {
 
 namespace {
 
-constexpr double kStep = 0.01;     // [s]
-constexpr int kRepeats = 3;        // of each step that is timed, from the same state; the quickest counts
-constexpr double kEqual = 1.05;    // ratio of errors that counts as equal
-constexpr int kMostPasses = 10;    // to get there
-constexpr double kExact = 1e-9;    // tolerance of the linear solver in steps that others are compared with
+constexpr double kStep = 0.01;    // [s]
+constexpr int kRepeats = 3;       // of each step that is timed, from the same state; the quickest counts
+constexpr double kEqual = 1.05;   // ratio of errors that counts as equal
+constexpr int kMostPasses = 10;   // to get there
+constexpr double kExact = 1e-9;   // tolerance of the linear solver in steps that others are compared with
 
 /// Sums over the steps of a run.
 struct Cost
@@ -34,10 +34,12 @@ class Solver
 public:
   Cost cost;
 
-  Solver(const std::shared_ptr<const ClothModel>& model, ClothOptions options, bool collides) : stepper_(model, options), exact_(model, [options]() mutable {
-      options.linear_tolerance = kExact;
-      return options;
-    }())
+  Solver(const std::shared_ptr<const ClothModel>& model, ClothOptions options, bool collides)
+    : stepper_(model, options),
+      exact_(model, [options]() mutable {
+        options.linear_tolerance = kExact;
+        return options;
+      }())
   {
     if (!collides)
       return;
@@ -103,7 +105,12 @@ struct Costs
   Cost tracked, beside, alone;   ///< beside: free steps from the tracked cloth's states; alone: of a free run
 };
 
-enum class Purpose { errors, times, times_with_collisions };
+enum class Purpose
+{
+  errors,
+  times,
+  times_with_collisions
+};
 
 Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int steps, Purpose purpose)
 {
@@ -123,7 +130,8 @@ Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int ste
   {
     if (i % 10 == 0)
       context.progress(i, steps, c.name);
-    const bool counts = i > 0, compares = counts && !collides && i % 5 == 0;   // what stays is factored in the first one
+    // what stays is factored in the first one
+    const bool counts = i > 0, compares = counts && !collides && i % 5 == 0;
     inputs.averages = c.constraints->averages(c.motion((i + 1) * kStep));
     const int repeats = counts && purpose != Purpose::errors ? kRepeats : 1;
     beside.step(state, free_inputs, counts, compares, repeats);
@@ -134,7 +142,7 @@ Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int ste
   return {tracked.cost, beside.cost, alone.cost};
 }
 
-}  // namespace
+}   // namespace
 
 void runTrackingOverhead(StudyContext& context)
 {
@@ -163,24 +171,45 @@ void runTrackingOverhead(StudyContext& context)
     worst_colliding = std::max(worst_colliding, colliding_overhead);
     worst_run = std::max(worst_run, run_overhead);
     worst_error = std::max(worst_error, tracked.error() / beside.error());
-    context.row().set("case", c.name).set("section", c.section).set("guide", static_cast<double>(c.guide.vertices.cols()))
-      .set("vertices", c.model->vertices()).set("constraints", c.constraints->count()).set("tracked_ms", tracked.milliseconds())
-      .set("free_ms", beside.milliseconds()).set("overhead", overhead).set("free_run_ms", alone.milliseconds()).set("overhead_run", run_overhead)
-      .set("colliding_tracked_ms", colliding.tracked.milliseconds()).set("colliding_free_ms", colliding.beside.milliseconds())
-      .set("overhead_colliding", colliding_overhead).set("tolerance", tolerance).set("tracked_iterations", tracked.iterations()).set("free_iterations", beside.iterations())
-      .set("free_run_iterations", alone.iterations()).set("tracked_error_um", 1e6 * tracked.error()).set("free_error_um", 1e6 * beside.error())
-      .set("free_run_error_um", 1e6 * alone.error())
-      .set("equal_error", tracked.error() <= kEqual * beside.error() ? "yes" : "no").set("published_tracked_s", c.published_tracked).set("published_free_s", c.published_free)
-      .set("published_overhead", c.published_tracked / c.published_free - 1);
+    context.row()
+        .set("case", c.name)
+        .set("section", c.section)
+        .set("guide", static_cast<double>(c.guide.vertices.cols()))
+        .set("vertices", c.model->vertices())
+        .set("constraints", c.constraints->count())
+        .set("tracked_ms", tracked.milliseconds())
+        .set("free_ms", beside.milliseconds())
+        .set("overhead", overhead)
+        .set("free_run_ms", alone.milliseconds())
+        .set("overhead_run", run_overhead)
+        .set("colliding_tracked_ms", colliding.tracked.milliseconds())
+        .set("colliding_free_ms", colliding.beside.milliseconds())
+        .set("overhead_colliding", colliding_overhead)
+        .set("tolerance", tolerance)
+        .set("tracked_iterations", tracked.iterations())
+        .set("free_iterations", beside.iterations())
+        .set("free_run_iterations", alone.iterations())
+        .set("tracked_error_um", 1e6 * tracked.error())
+        .set("free_error_um", 1e6 * beside.error())
+        .set("free_run_error_um", 1e6 * alone.error())
+        .set("equal_error", tracked.error() <= kEqual * beside.error() ? "yes" : "no")
+        .set("published_tracked_s", c.published_tracked)
+        .set("published_free_s", c.published_free)
+        .set("published_overhead", c.published_tracked / c.published_free - 1);
   }
   context.metric("max_overhead", worst);
   context.metric("max_overhead_colliding", worst_colliding);
   context.metric("max_overhead_of_runs", worst_run);
   context.metric("max_error_ratio", worst_error);
-  context.note("free_ms, overhead: steps without tracking from the tracked cloth's own states; free_run_ms, overhead_run: of the same cloth left to itself, "
-               "which falls, or stays at rest, and has less to solve. colliding: with collisions of the cloth with itself, as overhead.");
-  context.note("errors: what conjugate gradients leave of a step's positions; the tracked run's tolerance is such that its error is not larger.");
+  context.note(
+      "free_ms, overhead: steps without tracking from the tracked cloth's own states; free_run_ms, overhead_run: of "
+      "the same cloth left to itself, "
+      "which falls, or stays at rest, and has less to solve. colliding: with collisions of the cloth with itself, as "
+      "overhead.");
+  context.note(
+      "errors: what conjugate gradients leave of a step's positions; the tracked run's tolerance is such that its "
+      "error is not larger.");
   context.note("published: with collisions, on a 2 GHz CPU of 2007.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

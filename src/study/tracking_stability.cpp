@@ -59,37 +59,71 @@ std::vector<GuideCase> guideCases()
   };
   const auto there_and_back = [](int k, int steps) { return std::abs(1.0 - 2.0 * fraction(k, steps)); };   // 1, 0, 1
   return {
-    {"collapses to a point and back", false, true,
-     [=](const Matrix3Xd& rest, int k, int steps) { return about_middle(rest, there_and_back(k, steps) * Eigen::Matrix3d::Identity()); }},
-    {"collapses to a line and back", false, true,
-     [=](const Matrix3Xd& rest, int k, int steps) { return about_middle(rest, Vector3d(1, there_and_back(k, steps), 1).asDiagonal()); }},
-    {"collapses at once and stays", false, false, [=](const Matrix3Xd& rest, int, int) { return about_middle(rest, Eigen::Matrix3d::Zero()); }},
-    {"explodes a thousandfold and comes back", false, true,
-     [=](const Matrix3Xd& rest, int k, int steps) { return about_middle(rest, std::pow(1000.0, 1.0 - there_and_back(k, steps)) * Eigen::Matrix3d::Identity()); }},
-    {"explodes by half in every step", false, false,
-     [=](const Matrix3Xd& rest, int k, int) { return about_middle(rest, std::pow(1.5, std::min(k, 60)) * Eigen::Matrix3d::Identity()); }},
-    {"moves at 10 m/s and stops dead", false, true,
-     [](const Matrix3Xd& rest, int k, int steps) { return Matrix3Xd(rest.colwise() + Vector3d(0.1 * (std::min(k, steps / 2) - steps / 2), 0, 0)); }},
-    {"jumps by 10 m", false, true, [](const Matrix3Xd& rest, int k, int) { return Matrix3Xd(rest.colwise() + Vector3d(0, 0, k >= 5 && k < 10 ? 10.0 : 0.0)); }},
-    {"jumps to and fro by 1 m", false, true,
-     [](const Matrix3Xd& rest, int k, int steps) { return Matrix3Xd(rest.colwise() + Vector3d(0, k % 2 && k < steps / 2 ? 1.0 : 0.0, 0)); }},
-    {"jumps to a million metres", false, false, [](const Matrix3Xd& rest, int, int) { return Matrix3Xd(rest.colwise() + Vector3d(1e6, 0, 0)); }},
-    {"turns inside out at once", false, false, [=](const Matrix3Xd& rest, int, int) { return about_middle(rest, Vector3d(-1, 1, 1).asDiagonal()); }},
-    {"spins at 30 turns per second", false, false,
-     [=](const Matrix3Xd& rest, int k, int) { return about_middle(rest, Eigen::AngleAxisd(0.6 * M_PI * k, Vector3d(1, 1, 1).normalized()).toRotationMatrix()); }},
-    {"scatters at random", false, true,
-     [](const Matrix3Xd& rest, int k, int steps) {
-       Matrix3Xd x = rest;
-       std::mt19937 random(static_cast<unsigned>(k));
-       for (Eigen::Index i = 0; i < x.size() && k < steps / 2; ++i)
-         x.data()[i] += 0.4 * (random() * 0x1p-32 - 0.5);
-       return x;
-     }},
-    refused("has a vertex that is not a number", [](Matrix3Xd x) { x(1, 3) = std::nan(""); return x; }),
-    refused("has an infinite vertex", [](Matrix3Xd x) { x(2, 0) = std::numeric_limits<double>::infinity(); return x; }),
-    refused("has lost a vertex", [](const Matrix3Xd& x) { return Matrix3Xd(x.leftCols(x.cols() - 1)); }),
-    refused("has a vertex more", [](const Matrix3Xd& x) { Matrix3Xd more(3, x.cols() + 1); more << x, Vector3d::Zero(); return more; }),
-    refused("is empty", [](const Matrix3Xd&) { return Matrix3Xd(3, 0); }),
+      {"collapses to a point and back", false, true,
+       [=](const Matrix3Xd& rest, int k, int steps) {
+         return about_middle(rest, there_and_back(k, steps) * Eigen::Matrix3d::Identity());
+       }},
+      {"collapses to a line and back", false, true,
+       [=](const Matrix3Xd& rest, int k, int steps) {
+         return about_middle(rest, Vector3d(1, there_and_back(k, steps), 1).asDiagonal());
+       }},
+      {"collapses at once and stays", false, false,
+       [=](const Matrix3Xd& rest, int, int) { return about_middle(rest, Eigen::Matrix3d::Zero()); }},
+      {"explodes a thousandfold and comes back", false, true,
+       [=](const Matrix3Xd& rest, int k, int steps) {
+         return about_middle(rest, std::pow(1000.0, 1.0 - there_and_back(k, steps)) * Eigen::Matrix3d::Identity());
+       }},
+      {"explodes by half in every step", false, false,
+       [=](const Matrix3Xd& rest, int k, int) {
+         return about_middle(rest, std::pow(1.5, std::min(k, 60)) * Eigen::Matrix3d::Identity());
+       }},
+      {"moves at 10 m/s and stops dead", false, true,
+       [](const Matrix3Xd& rest, int k, int steps) {
+         return Matrix3Xd(rest.colwise() + Vector3d(0.1 * (std::min(k, steps / 2) - steps / 2), 0, 0));
+       }},
+      {"jumps by 10 m", false, true,
+       [](const Matrix3Xd& rest, int k, int) {
+         return Matrix3Xd(rest.colwise() + Vector3d(0, 0, k >= 5 && k < 10 ? 10.0 : 0.0));
+       }},
+      {"jumps to and fro by 1 m", false, true,
+       [](const Matrix3Xd& rest, int k, int steps) {
+         return Matrix3Xd(rest.colwise() + Vector3d(0, k % 2 && k < steps / 2 ? 1.0 : 0.0, 0));
+       }},
+      {"jumps to a million metres", false, false,
+       [](const Matrix3Xd& rest, int, int) { return Matrix3Xd(rest.colwise() + Vector3d(1e6, 0, 0)); }},
+      {"turns inside out at once", false, false,
+       [=](const Matrix3Xd& rest, int, int) { return about_middle(rest, Vector3d(-1, 1, 1).asDiagonal()); }},
+      {"spins at 30 turns per second", false, false,
+       [=](const Matrix3Xd& rest, int k, int) {
+         return about_middle(rest,
+                             Eigen::AngleAxisd(0.6 * M_PI * k, Vector3d(1, 1, 1).normalized()).toRotationMatrix());
+       }},
+      {"scatters at random", false, true,
+       [](const Matrix3Xd& rest, int k, int steps) {
+         Matrix3Xd x = rest;
+         std::mt19937 random(static_cast<unsigned>(k));
+         for (Eigen::Index i = 0; i < x.size() && k < steps / 2; ++i)
+           x.data()[i] += 0.4 * (random() * 0x1p-32 - 0.5);
+         return x;
+       }},
+      refused("has a vertex that is not a number",
+              [](Matrix3Xd x) {
+                x(1, 3) = std::nan("");
+                return x;
+              }),
+      refused("has an infinite vertex",
+              [](Matrix3Xd x) {
+                x(2, 0) = std::numeric_limits<double>::infinity();
+                return x;
+              }),
+      refused("has lost a vertex", [](const Matrix3Xd& x) { return Matrix3Xd(x.leftCols(x.cols() - 1)); }),
+      refused("has a vertex more",
+              [](const Matrix3Xd& x) {
+                Matrix3Xd more(3, x.cols() + 1);
+                more << x, Vector3d::Zero();
+                return more;
+              }),
+      refused("is empty", [](const Matrix3Xd&) { return Matrix3Xd(3, 0); }),
   };
 }
 
@@ -97,17 +131,19 @@ std::vector<GuideCase> guideCases()
 struct Verdict
 {
   StabilityCell cell;
-  int refused = 0;              ///< steps
-  bool finished = true;         ///< within the time for a cell
+  int refused = 0;                 ///< steps
+  bool finished = true;            ///< within the time for a cell
   double worst = 0, fastest = 0;   ///< of |c| over the shell's size; largest velocity at the end [m/s]
 };
 
 bool isFinite(const SceneCloth& s)
 {
-  return s.cloth.x.allFinite() && s.cloth.v.allFinite() && s.cloth.rest_angles.allFinite() && s.guide.allFinite() && s.guide_forces.allFinite();
+  return s.cloth.x.allFinite() && s.cloth.v.allFinite() && s.cloth.rest_angles.allFinite() && s.guide.allFinite() &&
+         s.guide_forces.allFinite();
 }
 
-/// A refusal must say why and leave the state as it was; the run goes on with the next guide. After ten refusals, or `budget` of CPU time [s], it ends.
+/// A refusal must say why and leave the state as it was; the run goes on with the next guide. After ten refusals, or
+/// `budget` of CPU time [s], it ends.
 Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double budget)
 {
   Verdict v;
@@ -146,7 +182,8 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
       {
         const ClothEnergies e = simulation.clothEnergies(0);
         still = e.total();
-        scale = e.membrane + e.bending + e.kinetic + simulation.clothModel(0).totalMass() * simulation.config().gravity.norm() * size;
+        scale = e.membrane + e.bending + e.kinetic +
+                simulation.clothModel(0).totalMass() * simulation.config().gravity.norm() * size;
       }
       if (scale > 0 && !v.cell.energyIs((simulation.clothEnergies(0).total() - still) / scale, 1.0))
         break;
@@ -194,7 +231,7 @@ GuidedCloth sheetWith(const TestFunctions& functions, const Subdivision& fine, c
   return c;
 }
 
-}  // namespace
+}   // namespace
 
 void runTrackingStability(StudyContext& context)
 {
@@ -214,12 +251,14 @@ void runTrackingStability(StudyContext& context)
   for (const char* bending : {"hinge", "isometric"})
     for (const bool newton : {false, true})
       for (const char* step : {"0.01", "0.1"})
-        settings.push_back({std::string(bending) + (newton ? ", Newton, " : ", one step, ") + step + " s",
-                            {s + "bending={model: " + bending + "}", s + "solver={one_newton_step: " + (newton ? "false" : "true") + "}",
-                             std::string("time.step=") + step}});
+        settings.push_back(
+            {std::string(bending) + (newton ? ", Newton, " : ", one step, ") + step + " s",
+             {s + "bending={model: " + bending + "}",
+              s + "solver={one_newton_step: " + (newton ? "false" : "true") + "}", std::string("time.step=") + step}});
   if (context.quick())
     settings = {settings[0], settings[3], settings[5]};
-  settings.push_back({"hinge, one step, 0.01 s, self-contact", {s + "solver={one_newton_step: true}", s + "contact={thickness: 0.002}"}});
+  settings.push_back({"hinge, one step, 0.01 s, self-contact",
+                      {s + "solver={one_newton_step: true}", s + "contact={thickness: 0.002}"}});
   const std::vector<GuideCase> guides = guideCases();
   const int steps = context.quick() ? 40 : 100, total = static_cast<int>(settings.size() * guides.size());
   for (const Setting& setting : settings)
@@ -232,16 +271,21 @@ void runTrackingStability(StudyContext& context)
       Simulation simulation(parseScene(kScene, "sheet.yaml", setting.set));
       Verdict v = run(simulation, guide, steps, context.quick() ? 1.5 : 20.0);
       // refusals of good guides end the cell; those of bad ones are what is wanted, and the steps after them
-      if (guide.to_be_refused && v.cell.complaint.empty() && !(v.refused == 5 && (v.cell.steps == steps - 5 || !v.finished)))
+      if (guide.to_be_refused && v.cell.complaint.empty() &&
+          !(v.refused == 5 && (v.cell.steps == steps - 5 || !v.finished)))
       {
         v.cell.explained = false;
-        v.cell.complaint = "guides that are no good were refused " + std::to_string(v.refused) + " times instead of 5, or the run did not go on";
+        v.cell.complaint = "guides that are no good were refused " + std::to_string(v.refused) +
+                           " times instead of 5, or the run did not go on";
       }
       Row& row = context.row();
       row.set("case", "guide " + guide.name).set("setting", setting.name);
       tally.record(row, v.cell);
-      row.set("steps_refused", v.refused).set("finished", v.finished ? "yes" : "slow").set("average_error_over_size", v.worst).set("end_strain", v.cell.end_strain)
-        .set("fastest_at_end", v.fastest);
+      row.set("steps_refused", v.refused)
+          .set("finished", v.finished ? "yes" : "slow")
+          .set("average_error_over_size", v.worst)
+          .set("end_strain", v.cell.end_strain)
+          .set("fastest_at_end", v.fastest);
       ++cells;
       unfinished += !v.finished;
       not_recovered += guide.comes_to_rest && v.refused == 0 && v.finished && !(v.cell.end_strain < 0.5);
@@ -249,11 +293,12 @@ void runTrackingStability(StudyContext& context)
       most = std::max(most, v.worst);
     }
 
-  // Constraints: the same region twice, but for less and less at one vertex; all vertices prescribed; held vertices whose average is prescribed
+  // Constraints: the same region twice, but for less and less at one vertex; all vertices prescribed; held vertices
+  // whose average is prescribed
   const TriangleMesh guide = guideSheet(0.4, 3, 0.0);
   const Subdivision fine = subdivide(guide, 2);
-  const auto constrained = [&](const std::string& what, const TestFunctions& functions, const std::vector<int>& held, const TriangleMesh& of,
-                               const Subdivision& on) {
+  const auto constrained = [&](const std::string& what, const TestFunctions& functions, const std::vector<int>& held,
+                               const TriangleMesh& of, const Subdivision& on) {
     Verdict v;
     const GuidedCloth c = sheetWith(functions, on, of);
     v.cell.linear_steps = true;
@@ -274,7 +319,8 @@ void runTrackingStability(StudyContext& context)
         const ClothState& now = stepper.cloth().state;
         if (report.ok)
           force = stepper.stepper().averageForces().cwiseAbs().maxCoeff();
-        if (!v.cell.took(report, now.x.allFinite() && now.v.allFinite() && std::isfinite(force), now.x == before.x && now.v == before.v))
+        if (!v.cell.took(report, now.x.allFinite() && now.v.allFinite() && std::isfinite(force),
+                         now.x == before.x && now.v == before.v))
           break;
         v.worst = std::max(v.worst, stepper.error() / 0.56);
       }
@@ -342,14 +388,19 @@ tracked:
     mesh: {subdivide: 2}
     material: {density: 1000, thickness: %g, youngs_modulus: %g, poissons_ratio: 0.3}
     bending: {model: hinge}
-)", thickness, youngs_modulus);
+)",
+                  thickness, youngs_modulus);
     return MapScene{text, rolled};
   };
-  const std::vector<double> map_steps = context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
+  const std::vector<double> map_steps =
+      context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
   const int map_length = context.quick() ? 5 : 15;
-  stabilityMap(context, tally, "tracking_stability_stiffness", "Young's modulus [Pa]", context.quick() ? std::vector<double>{1e4, 1e8} : std::vector<double>{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10},
-               map_steps, map_length, [&](double modulus) { return rolled_up(modulus, 5e-4); });
-  stabilityMap(context, tally, "tracking_stability_slenderness", "thickness over side", context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1},
+  stabilityMap(
+      context, tally, "tracking_stability_stiffness", "Young's modulus [Pa]",
+      context.quick() ? std::vector<double>{1e4, 1e8} : std::vector<double>{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10},
+      map_steps, map_length, [&](double modulus) { return rolled_up(modulus, 5e-4); });
+  stabilityMap(context, tally, "tracking_stability_slenderness", "thickness over side",
+               context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1},
                map_steps, map_length, [&](double slenderness) { return rolled_up(1e6, 0.4 * slenderness); });
 
   context.metric("not_recovered", not_recovered);
@@ -357,10 +408,14 @@ tracked:
   context.metric("cells", static_cast<double>(context.rows().size()));
   context.metric("worst_average_error_over_size", worst);
   context.metric("worst_average_error_over_size_in_contact", worst_in_contact);
-  context.note("Guides that are no good must be refused for as long as they are, and the run "
-               "goes on. unfinished: cells stopped after 20 s of CPU time (quick: 1.5 s), for the most part of contact in guides that crush the "
-               "shell. not_recovered: strained by half or more at the end though the guide came back; in contact, collisions have the last word "
-               "where both cannot be had; errors are over the shell's size, with a thousandth of its distance from the origin added for rounding.");
+  context.note(
+      "Guides that are no good must be refused for as long as they are, and the run "
+      "goes on. unfinished: cells stopped after 20 s of CPU time (quick: 1.5 s), for the most part of contact in "
+      "guides that crush the "
+      "shell. not_recovered: strained by half or more at the end though the guide came back; in contact, collisions "
+      "have the last word "
+      "where both cannot be had; errors are over the shell's size, with a thousandth of its distance from the origin "
+      "added for rounding.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -40,7 +40,8 @@ Wrench loadOn(const Simulation& scene)
   {
     const RodModel& m = scene.rodModel(static_cast<int>(r));
     for (int i = 0; i < m.nodes(); ++i)
-      add(scene.state().rods[r].x.col(i), m.mass[i] * config.gravity + (m.drag.size() > 0 ? m.drag[i] : 0.0) * config.wind);
+      add(scene.state().rods[r].x.col(i),
+          m.mass[i] * config.gravity + (m.drag.size() > 0 ? m.drag[i] : 0.0) * config.wind);
   }
   for (std::size_t b = 0; b < config.bodies.size(); ++b)
     add(scene.state().bodies[b].X_WB.position, config.bodies[b].mass * config.gravity);
@@ -56,27 +57,37 @@ double tipsApart(const Simulation& scene, const Simulation& other)
   return most;
 }
 
-}  // namespace
+}   // namespace
 
 void runTree(StudyContext& context)
 {
   const int vertices = context.quick() ? 1000 : 2158;
   const auto tree = [](int count, bool windy, const char* start) {
-    return packageScene("tree", {"generate.0.tree.vertices=" + std::to_string(count), std::string("start=") + start, windy ? "record.every=4" : "wind.velocity=[0, 0, 0]"});
+    return packageScene("tree", {"generate.0.tree.vertices=" + std::to_string(count), std::string("start=") + start,
+                                 windy ? "record.every=4" : "wind.velocity=[0, 0, 0]"});
   };
   context.progress(0, 3, "at rest");
   const Simulation calm = tree(vertices, false, "equilibrium"), bent = tree(vertices, true, "equilibrium");
-  const auto row = [&](const char* quantity) -> Row& { return context.row().set("vertices", verticesOf(bent)).set("quantity", quantity); };
+  const auto row = [&](const char* quantity) -> Row& {
+    return context.row().set("vertices", verticesOf(bent)).set("quantity", quantity);
+  };
   const Wrench load = loadOn(bent), root = bent.wrench(0);
-  row("force on the root less weight and wind [N]").set("size", load.force.norm()).check((root.force - load.force).norm(), 0, 1e-4 * load.force.norm(), "balance at rest in the wind: through all joints");
-  row("moment on the root less weight and wind [N m]").set("size", load.torque.norm()).check((root.torque - load.torque).norm(), 0, 1e-4 * load.torque.norm(), "balance at rest in the wind");
+  row("force on the root less weight and wind [N]")
+      .set("size", load.force.norm())
+      .check((root.force - load.force).norm(), 0, 1e-4 * load.force.norm(),
+             "balance at rest in the wind: through all joints");
+  row("moment on the root less weight and wind [N m]")
+      .set("size", load.torque.norm())
+      .check((root.torque - load.torque).norm(), 0, 1e-4 * load.torque.norm(), "balance at rest in the wind");
   const double deflection = tipsApart(bent, calm);
   context.metric("tip_deflection", deflection);
 
   // the storm sets in
-  Plot& picture = addPicture(context, "tree", "Tree (scene tree) as it grew, at rest in the wind, and as the storm sets in", "x [m]", "z [m]");
+  Plot& picture = addPicture(
+      context, "tree", "Tree (scene tree) as it grew, at rest in the wind, and as the storm sets in", "x [m]", "z [m]");
   drawTree(picture, "at rest in the wind", bent, {3.5, 0, 0});
-  Plot& sway = context.plot("tree_sway", "Tree in a wind of 12 m/s: farthest tip from where it stands in the end", "t [s]", "distance [m]");
+  Plot& sway = context.plot("tree_sway", "Tree in a wind of 12 m/s: farthest tip from where it stands in the end",
+                            "t [s]", "distance [m]");
   sway.log_x = sway.markers = false;
   Simulation storm = tree(vertices, true, "as_given");
   drawTree(picture, "grown", storm, {0, 0, 0});
@@ -97,10 +108,14 @@ void runTree(StudyContext& context)
   }
   drawTree(picture, std::to_string(duration).substr(0, 3) + " s", storm, {7, 0, 0});
   const double per_step = 1e3 * seconds / static_cast<double>(storm.state().steps);
-  row("storm").set("time", duration).set("ms_per_step", per_step).set("finite", finite ? "yes" : "no").set("from_rest", tipsApart(storm, bent));
+  row("storm")
+      .set("time", duration)
+      .set("ms_per_step", per_step)
+      .set("finite", finite ? "yes" : "no")
+      .set("from_rest", tipsApart(storm, bent));
   context.metric("ms_per_step", per_step);
   context.metric("ms_per_simulated_ms", per_step / (1e3 * storm.config().time.step));
   context.note("Thesis, table 4.1: 22 ms per step of 0.1 ms, 220 ms per simulated ms, on a 2.66 GHz Core 2 Duo.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -42,7 +42,8 @@ double plateForce(bool exponential, double gamma, int edges, double h, double ti
 
 double exactForce(bool exponential, double gamma, double time)
 {
-  const double area0 = M_PI * kRadius * kRadius, length = plateLength(exponential, time), rate = exponential ? 1.0 : 1.0 / length;
+  const double area0 = M_PI * kRadius * kRadius, length = plateLength(exponential, time),
+               rate = exponential ? 1.0 : 1.0 / length;
   return 3.0 * kMu * area0 / length * rate + M_PI * gamma * kRadius / std::sqrt(length);
 }
 
@@ -86,7 +87,7 @@ double hangingLength(double gamma, double time)
   return length;
 }
 
-}  // namespace
+}   // namespace
 
 void runTrouton(StudyContext& context)
 {
@@ -96,12 +97,16 @@ void runTrouton(StudyContext& context)
     for (const double gamma : exponential ? std::vector<double>{0.0, 20.0} : std::vector<double>{0.0})
       for (const double time : {1.0, 2.0})
       {
-        const std::string test = std::string(exponential ? "plates, L = exp(t)" : "plates, speed 1") + ", gamma " + std::to_string(static_cast<int>(gamma));
+        const std::string test = std::string(exponential ? "plates, L = exp(t)" : "plates, speed 1") + ", gamma " +
+                                 std::to_string(static_cast<int>(gamma));
         double radius = 0.0;
         const double force = plateForce(exponential, gamma, edges, h, time, &radius);
         const double length = plateLength(exponential, time);
-        checkRelative(context, test, "force", force, exactForce(exponential, gamma, time), kBound, "3 mu A L'/L + pi gamma a").set("t", time);
-        checkRelative(context, test, "radius", radius, kRadius / std::sqrt(length), kBound, "a0 sqrt(L0/L)").set("t", time);
+        checkRelative(context, test, "force", force, exactForce(exponential, gamma, time), kBound,
+                      "3 mu A L'/L + pi gamma a")
+            .set("t", time);
+        checkRelative(context, test, "radius", radius, kRadius / std::sqrt(length), kBound, "a0 sqrt(L0/L)")
+            .set("t", time);
       }
 
   const double t_star = 3 * kMu / 981.0;
@@ -113,19 +118,25 @@ void runTrouton(StudyContext& context)
       const std::string test = "hanging, gamma " + std::to_string(static_cast<int>(gamma));
       const double length = gamma == 0 ? -std::log(1 - part) / part : hangingLength(gamma, part * t_star);
       checkRelative(context, test, "length", seen.length, length, kBound,
-                    gamma == 0 ? "-L0 (t*/t) ln(1-t/t*)" : "3 mu dA/dt = -rho g A0 S + gamma sqrt(pi A)").set("t", part * t_star);
+                    gamma == 0 ? "-L0 (t*/t) ln(1-t/t*)" : "3 mu dA/dt = -rho g A0 S + gamma sqrt(pi A)")
+          .set("t", part * t_star);
       if (gamma == 0)
-        checkRelative(context, test, "radius at the top", seen.top_radius, kRadius * std::sqrt(1 - part), kBound, "a0 sqrt(1-t/t*)")
+        checkRelative(context, test, "radius at the top", seen.top_radius, kRadius * std::sqrt(1 - part), kBound,
+                      "a0 sqrt(1-t/t*)")
             .set("t", part * t_star);
     }
 
-  const auto time_error = [&](double step) { return plateForce(true, 20.0, 10, step, 1.0) / exactForce(true, 20.0, 1.0) - 1; };
+  const auto time_error = [&](double step) {
+    return plateForce(true, 20.0, 10, step, 1.0) / exactForce(true, 20.0, 1.0) - 1;
+  };
   context.metric("observed_order_time", observedOrder(time_error(0.01), time_error(0.005)));
   // The step's error is the same on all meshes: differences of three of them.
   const double coarse = hang(0.0, 10, 4e-3, 0.5 * t_star).length, middle = hang(0.0, 20, 4e-3, 0.5 * t_star).length,
                fine = hang(0.0, 40, 4e-3, 0.5 * t_star).length;
   context.metric("observed_order_space", observedOrder(coarse - middle, middle - fine));
-  context.note("inertia: none in the formulas; between the plates rho = 1e-6, hanging rho = 1 as in the reference (rho L^2/(mu t*) = 3e-4).");
+  context.note(
+      "inertia: none in the formulas; between the plates rho = 1e-6, hanging rho = 1 as in the reference (rho L^2/(mu "
+      "t*) = 3e-4).");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

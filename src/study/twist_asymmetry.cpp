@@ -1,4 +1,5 @@
-// Twist of a naturally curved rod of flat section whose one end is turned (thesis Fig. 4.2): the bend keeps it on the turned side.
+// Twist of a naturally curved rod of flat section whose one end is turned (thesis Fig. 4.2): the bend keeps it on the
+// turned side.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,9 +15,10 @@
 namespace slender::study {
 namespace {
 
-constexpr double kWeak = 1.0, kStrong = 4.0, kTwist = 1.6 / 1.3;   ///< a flat ellipse, 2 : 1, bent the easy way; nu = 0.3; L = 1
-constexpr double kBend = 1.0 / 12;                                 ///< length of the V's bend: four edges of 48
-constexpr double kTurnStep = 0.05;                                 ///< [rad]
+/// a flat ellipse, 2 : 1, bent the easy way; nu = 0.3; L = 1
+constexpr double kWeak = 1.0, kStrong = 4.0, kTwist = 1.6 / 1.3;
+constexpr double kBend = 1.0 / 12;   ///< length of the V's bend: four edges of 48
+constexpr double kTurnStep = 0.05;   ///< [rad]
 
 struct Shape
 {
@@ -36,7 +38,8 @@ struct Halves
 
 /// The smooth rod with its centreline held: psi is the angle by which sections have turned from their natural place,
 ///   C psi'' = k(s)^2 (B1 (1 - cos psi) sin psi + B2 sin psi cos psi),  psi(0) = 0, psi(1) = Theta.
-/// Finite differences on a fine grid; each new Theta starts from the last state and goes downhill in energy (proximal Newton).
+/// Finite differences on a fine grid; each new Theta starts from the last state and goes downhill in energy (proximal
+/// Newton).
 class HeldCurve
 {
 public:
@@ -131,7 +134,8 @@ public:
 
   StepReport turnTo(double theta)
   {
-    rod_.inputs.grasps[1].X_WG.orientation = start_ * Eigen::AngleAxisd(theta, Eigen::Vector3d::UnitX());   // x: the section's tangent
+    // x: the section's tangent
+    rod_.inputs.grasps[1].X_WG.orientation = start_ * Eigen::AngleAxisd(theta, Eigen::Vector3d::UnitX());
     return stepper_->solveEquilibrium(rod_.state, rod_.inputs);
   }
 
@@ -198,10 +202,12 @@ void holdCentreline(StudyContext& context, const Shape& shape, const std::vector
 {
   const std::vector<double> looks = {1, 2, 4, 6, 10, 15, 17, 21, 25, 30, 33};   // well apart from the V's jumps
   const std::vector<double> profiles = {2, 6, 17, 21};
-  Plot& share = context.plot(std::string("twist_asymmetry_share_") + shape.name, std::string(shape.name) + ", centreline held: twist on the turned side",
+  Plot& share = context.plot(std::string("twist_asymmetry_share_") + shape.name,
+                             std::string(shape.name) + ", centreline held: twist on the turned side",
                              "applied angle [turns]", "share of the twist");
-  Plot& profile = context.plot(std::string("twist_asymmetry_profile_") + shape.name, std::string(shape.name) + ", centreline held, n = 49: angle of sections",
-                               "s [L]", "angle from the natural place [turns]");
+  Plot& profile = context.plot(std::string("twist_asymmetry_profile_") + shape.name,
+                               std::string(shape.name) + ", centreline held, n = 49: angle of sections", "s [L]",
+                               "angle from the natural place [turns]");
   for (Plot* p : {&share, &profile})
     p->log_x = p->log_y = p->markers = false;
 
@@ -235,18 +241,29 @@ void holdCentreline(StudyContext& context, const Shape& shape, const std::vector
       share.at("n = " + std::to_string(edges + 1)).y.push_back(path.back().share());
       if (!isAt(looks, theta))
         return;
-      context.row().set("shape", shape.name).set("centreline", "held").set("vertices", edges + 1).set("turned_by_rad", theta)
-          .set("quantity", "share of the turned half").set("twist_turned", path.back().turned).set("twist_clamped", path.back().clamped)
-          .check(path.back().share(), smooth.share(), 0.02 * coarse, "smooth rod, its balance of twist solved on a fine grid");
+      context.row()
+          .set("shape", shape.name)
+          .set("centreline", "held")
+          .set("vertices", edges + 1)
+          .set("turned_by_rad", theta)
+          .set("quantity", "share of the turned half")
+          .set("twist_turned", path.back().turned)
+          .set("twist_clamped", path.back().clamped)
+          .check(path.back().share(), smooth.share(), 0.02 * coarse,
+                 "smooth rod, its balance of twist solved on a fine grid");
       if (edges == 48 && isAt(profiles, theta))
         addProfile(profile, "turned by " + number(theta) + " rad", rod, edges);
     });
     Row& row = context.row();
-    row.set("shape", shape.name).set("centreline", "held").set("vertices", edges + 1).set("quantity", "angle of the first jump [rad]");
+    row.set("shape", shape.name)
+        .set("centreline", "held")
+        .set("vertices", edges + 1)
+        .set("quantity", "angle of the first jump [rad]");
     if (!refused.empty())
       row.check(std::numeric_limits<double>::quiet_NaN(), jump(exact), 1, "").set("refused", refused);
     else if (jump(exact) > 0)
-      row.check(jump(path), jump(exact), 0.1 * coarse * jump(exact), "smooth rod, its balance of twist solved on a fine grid");
+      row.check(jump(path), jump(exact), 0.1 * coarse * jump(exact),
+                "smooth rod, its balance of twist solved on a fine grid");
     else
       row.check(jump(path), 0, 0.5 * kTurnStep, "none in the smooth rod");
   }
@@ -256,10 +273,12 @@ void holdCentreline(StudyContext& context, const Shape& shape, const std::vector
 void freeCentreline(StudyContext& context, const Shape& shape, int fine)
 {
   const std::vector<double> looks = {1, 2, 3, 4, 5};
-  Plot& picture = context.plot(std::string("twist_asymmetry_free_") + shape.name, std::string(shape.name) + ", centreline free, n = 49: seen from the side and above",
+  Plot& picture = context.plot(std::string("twist_asymmetry_free_") + shape.name,
+                               std::string(shape.name) + ", centreline free, n = 49: seen from the side and above",
                                "x + y/2 [L]", "z + y/2 [L]");
-  Plot& profile = context.plot(std::string("twist_asymmetry_free_profile_") + shape.name, std::string(shape.name) + ", centreline free, n = 49: twist up to here",
-                               "s [L]", "twist from the clamp [turns]");
+  Plot& profile = context.plot(std::string("twist_asymmetry_free_profile_") + shape.name,
+                               std::string(shape.name) + ", centreline free, n = 49: twist up to here", "s [L]",
+                               "twist from the clamp [turns]");
   for (Plot* p : {&picture, &profile})
     p->log_x = p->log_y = p->markers = false;
   picture.equal_axes = true;
@@ -277,8 +296,14 @@ void freeCentreline(StudyContext& context, const Shape& shape, int fine)
         refined.push_back(h.share());
         return;
       }
-      context.row().set("shape", shape.name).set("centreline", "free").set("vertices", edges + 1).set("turned_by_rad", theta)
-          .set("quantity", "share of the turned half").set("twist_turned", h.turned).set("twist_clamped", h.clamped)
+      context.row()
+          .set("shape", shape.name)
+          .set("centreline", "free")
+          .set("vertices", edges + 1)
+          .set("turned_by_rad", theta)
+          .set("quantity", "share of the turned half")
+          .set("twist_turned", h.turned)
+          .set("twist_clamped", h.clamped)
           .check(h.share(), refined.at(look++), 0.02, std::to_string(fine + 1) + " vertices");
       addProfile(profile, "turned by " + number(theta) + " rad", rod, edges);
       Series& s = picture.at("turned by " + number(theta) + " rad");
@@ -293,7 +318,7 @@ void freeCentreline(StudyContext& context, const Shape& shape, int fine)
   }
 }
 
-}  // namespace
+}   // namespace
 
 void runTwistAsymmetry(StudyContext& context)
 {
@@ -306,13 +331,22 @@ void runTwistAsymmetry(StudyContext& context)
     // how far one can turn before a tenth of the twist is on the clamped side
     TurnedRod rod(shape, 48, true);
     double reach = 0;
-    turnUp(rod, 20, [&](double theta) { reach = rod.halves().share() > 0.9 && reach > theta - 1.5 * kTurnStep ? theta : reach; });
+    turnUp(rod, 20, [&](double theta) {
+      reach = rod.halves().share() > 0.9 && reach > theta - 1.5 * kTurnStep ? theta : reach;
+    });
     context.metric(std::string("turns_on_one_side_") + shape.name, reach / (2 * M_PI));
   }
-  context.note("Elliptic section 2 : 1 bent the easy way (B1 = 1, B2 = 4, C = 1.6/1.3, L = 1). V: a right angle in four edges of 48; n = 49 as in table 4.1.");
-  context.note("Held: every node pinned in place, so only frames move. Free: both ends clamped, one turned about its tangent.");
-  context.note("Within the last joint before a clamp the profile bends a little: the end correction gives that joint more length than the clamp.");
-  context.note("turns_on_one_side: applied turns (centreline held) up to which nine tenths of the twist stay on the turned side.");
+  context.note(
+      "Elliptic section 2 : 1 bent the easy way (B1 = 1, B2 = 4, C = 1.6/1.3, L = 1). V: a right angle in four edges "
+      "of 48; n = 49 as in table 4.1.");
+  context.note(
+      "Held: every node pinned in place, so only frames move. Free: both ends clamped, one turned about its tangent.");
+  context.note(
+      "Within the last joint before a clamp the profile bends a little: the end correction gives that joint more "
+      "length than the clamp.");
+  context.note(
+      "turns_on_one_side: applied turns (centreline held) up to which nine tenths of the twist stay on the turned "
+      "side.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

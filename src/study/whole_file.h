@@ -15,4 +15,4 @@ inline std::string wholeFile(const std::string& path)
   return text.str();
 }
 
-}  // namespace slender
+}   // namespace slender

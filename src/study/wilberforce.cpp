@@ -16,8 +16,8 @@
 namespace slender::study {
 namespace {
 
-/// Cases of wilberforce.csv: the wire is clamped above, the body welded to its lower end with its centre of mass on the helix's axis
-/// at the height of that end; its moments, all equal, bring bobbing and turning into resonance.
+/// Cases of wilberforce.csv: the wire is clamped above, the body welded to its lower end with its centre of mass on the
+/// helix's axis at the height of that end; its moments, all equal, bring bobbing and turning into resonance.
 struct Spring
 {
   const char* name;
@@ -37,14 +37,20 @@ constexpr int kStepsPerPeriod = 60;
 struct Record
 {
   double interval;
-  std::vector<double> height, angle;           ///< of the body, from its equilibrium [m], [rad]
-  std::vector<double> bobbing, turning;        ///< kinetic energies [J]
-  std::vector<double> sway;                    ///< horizontal distance from the axis [m]
+  std::vector<double> height, angle;      ///< of the body, from its equilibrium [m], [rad]
+  std::vector<double> bobbing, turning;   ///< kinetic energies [J]
+  std::vector<double> sway;               ///< horizontal distance from the axis [m]
 };
 
 /// How the coil's joints are made. Errors are of second order each time, but of different size.
-struct Joints { const char* name; JointOptions options; };
-constexpr Joints kJoints[] = {{"plain", {Curvature::tangent, false}}, {"compensated", {Curvature::compensated, false}}, {"matched", {Curvature::tangent, true}},
+struct Joints
+{
+  const char* name;
+  JointOptions options;
+};
+constexpr Joints kJoints[] = {{"plain", {Curvature::tangent, false}},
+                              {"compensated", {Curvature::compensated, false}},
+                              {"matched", {Curvature::tangent, true}},
                               {"compensated, matched", {Curvature::compensated, true}}};
 
 /// Nodes on the coil.
@@ -113,8 +119,10 @@ Record swing(const Spring& s, int edges_per_turn, const JointOptions& joints, do
 void draw(StudyContext& context, const Spring& s, const Record& r)
 {
   const std::string title = std::string("Wilberforce pendulum ") + s.name;
-  Plot& energy = context.plot(std::string("wilberforce_energy_") + s.name, title + ": exchange of energy", "time [s]", "kinetic energy [J]");
-  Plot& motion = context.plot(std::string("wilberforce_motion_") + s.name, title + ": motion of the bob", "time [s]", "");
+  Plot& energy = context.plot(std::string("wilberforce_energy_") + s.name, title + ": exchange of energy", "time [s]",
+                              "kinetic energy [J]");
+  Plot& motion =
+      context.plot(std::string("wilberforce_motion_") + s.name, title + ": motion of the bob", "time [s]", "");
   energy.log_x = energy.log_y = energy.markers = motion.log_x = motion.log_y = motion.markers = false;
   for (std::size_t k = 0; k < r.height.size(); ++k)
   {
@@ -130,11 +138,12 @@ void draw(StudyContext& context, const Spring& s, const Record& r)
   }
 }
 
-}  // namespace
+}   // namespace
 
 void runWilberforce(StudyContext& context)
 {
-  Plot& errors = context.plot("wilberforce_error", "Wilberforce pendulum: error of the upper frequency", "edges per turn", "relative error of f2");
+  Plot& errors = context.plot("wilberforce_error", "Wilberforce pendulum: error of the upper frequency",
+                              "edges per turn", "relative error of f2");
   for (const Spring& s : kSprings)
     for (const int per_turn : {12, 24, 48})
       for (const Joints& joints : kJoints)
@@ -150,7 +159,11 @@ void runWilberforce(StudyContext& context)
         const TwoTones tones = fitTwoTones({r.height, r.angle}, r.interval);
         const double seconds = threadSeconds() - begin, exact_beat = 1 / (s.f2 - s.f1);
         const auto newRow = [&](const char* quantity) -> Row& {
-          return context.row().set("case", s.name).set("quantity", quantity).set("joints", joints.name).set("edges_per_turn", per_turn);
+          return context.row()
+              .set("case", s.name)
+              .set("quantity", quantity)
+              .set("joints", joints.name)
+              .set("edges_per_turn", per_turn);
         };
         const auto add = [&](const char* quantity, double measured, double expected, double relative) {
           Row& row = newRow(quantity);
@@ -168,9 +181,11 @@ void runWilberforce(StudyContext& context)
         line.y.push_back(std::abs(tones.f2 / s.f2 - 1));
 
         // largest kinetic energy within the half period about the middle of the first beat, and in all
-        const std::size_t middle = static_cast<std::size_t>(0.5 / (tones.f2 - tones.f1) / r.interval), reach = kStepsPerPeriod / 2;
+        const std::size_t middle = static_cast<std::size_t>(0.5 / (tones.f2 - tones.f1) / r.interval),
+                          reach = kStepsPerPeriod / 2;
         const auto peak = [](const std::vector<double>& e, std::size_t from, std::size_t to) {
-          return *std::max_element(e.begin() + static_cast<std::ptrdiff_t>(from), e.begin() + static_cast<std::ptrdiff_t>(to));
+          return *std::max_element(e.begin() + static_cast<std::ptrdiff_t>(from),
+                                   e.begin() + static_cast<std::ptrdiff_t>(to));
         };
         const double all = peak(r.bobbing, 0, r.bobbing.size());
         newRow("left in bobbing at half a beat").set("measured", peak(r.bobbing, middle - reach, middle + reach) / all);
@@ -179,9 +194,13 @@ void runWilberforce(StudyContext& context)
         if (per_turn == 24 && checked)
           draw(context, s, r);
       }
-  context.note("Nodes on the coil; joints as of the scene keys matched_to_arcs and curvature: compensated ones do not replace matching, and are");
+  context.note(
+      "Nodes on the coil; joints as of the scene keys matched_to_arcs and curvature: compensated ones do not replace "
+      "matching, and are");
   context.note("shown, not checked (beats amplify errors of the frequencies by f / (f2 - f1)). Start: 3 mm upwards,");
-  context.note("everything else at rest. Frequencies: two tones fitted to height and angle of 2.2 beats; tr_bdf2, 60 steps a period.");
+  context.note(
+      "everything else at rest. Frequencies: two tones fitted to height and angle of 2.2 beats; tr_bdf2, 60 steps a "
+      "period.");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -18,7 +18,10 @@ constexpr int kSteps = 16;
 constexpr double kTube = 0.45;   ///< radius [m]
 
 /// Centreline of a trefoil on a torus, and the torus's normal there.
-Vector3d centreline(double s) { return {(2 + std::cos(3 * s)) * std::cos(2 * s), (2 + std::cos(3 * s)) * std::sin(2 * s), std::sin(3 * s)}; }
+Vector3d centreline(double s)
+{
+  return {(2 + std::cos(3 * s)) * std::cos(2 * s), (2 + std::cos(3 * s)) * std::sin(2 * s), std::sin(3 * s)};
+}
 
 Vector3d onTube(double s, double t)
 {
@@ -30,7 +33,7 @@ Vector3d onTube(double s, double t)
 struct Case
 {
   const char* name;
-  int along, around;                        ///< 2 along around triangles
+  int along, around;                           ///< 2 along around triangles
   double thesis_factorization, thesis_steps;   ///< [s]
 };
 
@@ -88,11 +91,12 @@ Outcome flow(const TriangleMesh& start, const MeshTopology& topology, double edg
   return outcome;
 }
 
-}  // namespace
+}   // namespace
 
 void runWillmoreSmoothing(StudyContext& context)
 {
-  Plot& plot = context.plot("willmore_smoothing", "A rough trefoil tube smoothed by Willmore flow", "step", "1/2 int H^2");
+  Plot& plot =
+      context.plot("willmore_smoothing", "A rough trefoil tube smoothed by Willmore flow", "step", "1/2 int H^2");
   plot.log_x = false;
   Eigen::Matrix3Xd line(3, 4000);
   for (Eigen::Index k = 0; k < line.cols(); ++k)
@@ -123,12 +127,21 @@ void runWillmoreSmoothing(StudyContext& context)
     const Outcome even = flow(smooth, topology, edge);   // what the flow does to the tube itself
     const double before = roughness(rough.vertices, line), after = roughness(best.mesh.vertices, line);
     const double swelling = volume(best.mesh) / volume(smooth) - 1.0;
-    context.row().set("triangles", static_cast<double>(smooth.triangles.cols())).set("thesis_mesh", c.name)
-        .set("factorization_s", best.factorization).set("thesis_factorization_s", c.thesis_factorization)
-        .set("sixteen_steps_s", best.steps).set("thesis_sixteen_steps_s", c.thesis_steps).set("iterations", best.iterations)
-        .set("energy_start", best.energies.front()).set("energy", best.energies.back()).set("energy_smooth_tube", even.energies.front())
-        .set("rms_from_tube_start_m", before).set("rms_from_tube_m", after)
-        .set("volume_change", swelling).set("volume_change_smooth_tube", volume(even.mesh) / volume(smooth) - 1.0);
+    context.row()
+        .set("triangles", static_cast<double>(smooth.triangles.cols()))
+        .set("thesis_mesh", c.name)
+        .set("factorization_s", best.factorization)
+        .set("thesis_factorization_s", c.thesis_factorization)
+        .set("sixteen_steps_s", best.steps)
+        .set("thesis_sixteen_steps_s", c.thesis_steps)
+        .set("iterations", best.iterations)
+        .set("energy_start", best.energies.front())
+        .set("energy", best.energies.back())
+        .set("energy_smooth_tube", even.energies.front())
+        .set("rms_from_tube_start_m", before)
+        .set("rms_from_tube_m", after)
+        .set("volume_change", swelling)
+        .set("volume_change_smooth_tube", volume(even.mesh) / volume(smooth) - 1.0);
     context.metric("factorization_s_" + triangles, best.factorization);
     context.metric("sixteen_steps_s_" + triangles, best.steps);
     context.metric("roughness_left_" + triangles, after / before);
@@ -141,15 +154,22 @@ void runWillmoreSmoothing(StudyContext& context)
     }
     if (&c != kCases)
       continue;
-    Plot& picture = addPicture(context, "willmore_smoothing_meshes", triangles + " triangles, before and after 16 steps", "x [m]", "y [m]");
+    Plot& picture = addPicture(context, "willmore_smoothing_meshes",
+                               triangles + " triangles, before and after 16 steps", "x [m]", "y [m]");
     const Camera camera{{0, 0, -1}, {0, 1, 0}};
     drawFaces(picture, "start", rough, camera);
     drawFaces(picture, "16 steps", best.mesh, camera, 0, {8.0, 0, 0});
   }
-  context.note("The thesis's times are a 2 GHz notebook's of 2006 (PARDISO); its meshes are not published, so a tube about a trefoil has as many triangles.");
-  context.note("Each coordinate of each vertex is off by up to a quarter of an edge; the time step is that of an edge, e^4.");
-  context.note("A thin tube swells in Willmore flow, as its energy is that of its length over its radius: volume_change_smooth_tube shows how much.");
-  context.note("factorization_s: wall clock, with the analysis; sixteen_steps_s: processor time. The best of " + std::to_string(repeats) + ".");
+  context.note(
+      "The thesis's times are a 2 GHz notebook's of 2006 (PARDISO); its meshes are not published, so a tube about a "
+      "trefoil has as many triangles.");
+  context.note(
+      "Each coordinate of each vertex is off by up to a quarter of an edge; the time step is that of an edge, e^4.");
+  context.note(
+      "A thin tube swells in Willmore flow, as its energy is that of its length over its radius: "
+      "volume_change_smooth_tube shows how much.");
+  context.note("factorization_s: wall clock, with the analysis; sixteen_steps_s: processor time. The best of " +
+               std::to_string(repeats) + ".");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -22,7 +22,10 @@ struct Start
   TriangleMesh mesh;
 };
 
-Start icosahedron(int levels) { return {"icosahedron, subdivided " + std::to_string(levels) + " times", subdivide(icosphere(1.0, 0), levels).mesh}; }
+Start icosahedron(int levels)
+{
+  return {"icosahedron, subdivided " + std::to_string(levels) + " times", subdivide(icosphere(1.0, 0), levels).mesh};
+}
 
 Start roughSphere(int levels, double roughness)
 {
@@ -33,7 +36,8 @@ Start roughSphere(int levels, double roughness)
   return {"sphere with radii +-" + std::to_string(static_cast<int>(100 * roughness + 0.5)) + " %", mesh};
 }
 
-/// int H^2 as the conforming isometric model of the mesh itself has it: L and M are those of the mesh, with Voronoi cells.
+/// int H^2 as the conforming isometric model of the mesh itself has it: L and M are those of the mesh, with Voronoi
+/// cells.
 double independentEnergy(const TriangleMesh& mesh)
 {
   PointVector x, y;
@@ -44,7 +48,7 @@ double independentEnergy(const TriangleMesh& mesh)
 
 struct Run
 {
-  std::vector<double> errors;   ///< of int H^2, relative, from the start on
+  std::vector<double> errors;               ///< of int H^2, relative, from the start on
   double factorization = 0.0, step = 0.0;   ///< [s]
   int cuts = 0;
   TriangleMesh mesh;
@@ -71,7 +75,7 @@ Run run(const TriangleMesh& start, double time_step, int iterations)
   return run;
 }
 
-}  // namespace
+}   // namespace
 
 void runWillmoreSphere(StudyContext& context)
 {
@@ -100,10 +104,18 @@ void runWillmoreSphere(StudyContext& context)
       for (int k = kSteps; k >= 0 && std::abs(r.errors[k]) <= 0.01; --k)
         within = k;
       Row& row = context.row();
-      row.set("start", start.name).set("vertices", static_cast<double>(start.mesh.vertices.cols())).set("h_m4", scheme.time_step)
-          .set("iterations", scheme.iterations).set("error_start", r.errors.front()).set("error_after_10_steps", r.errors.back())
-          .set("error_voronoi", independent).set("steps_to_1_percent", within).set("radius_spread", radii.maxCoeff() / radii.minCoeff() - 1.0)
-          .set("halvings", r.cuts).set("factorization_s", r.factorization).set("step_s", r.step);
+      row.set("start", start.name)
+          .set("vertices", static_cast<double>(start.mesh.vertices.cols()))
+          .set("h_m4", scheme.time_step)
+          .set("iterations", scheme.iterations)
+          .set("error_start", r.errors.front())
+          .set("error_after_10_steps", r.errors.back())
+          .set("error_voronoi", independent)
+          .set("steps_to_1_percent", within)
+          .set("radius_spread", radii.maxCoeff() / radii.minCoeff() - 1.0)
+          .set("halvings", r.cuts)
+          .set("factorization_s", r.factorization)
+          .set("step_s", r.step);
       const bool main = &start == &starts.front() && &scheme == kSchemes, last = &scheme == std::end(kSchemes) - 1;
       if (main || last)
       {
@@ -121,15 +133,24 @@ void runWillmoreSphere(StudyContext& context)
       context.metric("steps_to_1_percent", within);
       context.metric("factorization_s", r.factorization);
       context.metric("step_s", r.step);
-      Plot& picture = addPicture(context, "willmore_sphere_meshes", "icosahedron subdivided 4 times, and after 10 steps", "x [m]", "z [m]");
+      Plot& picture = addPicture(context, "willmore_sphere_meshes",
+                                 "icosahedron subdivided 4 times, and after 10 steps", "x [m]", "z [m]");
       const Camera camera{{0.2, 1, -0.1}, {0, 0, 1}};
       drawFaces(picture, "start", start.mesh, camera);
       drawFaces(picture, "10 steps", r.mesh, camera, 0, {2.5, 0, 0});
     }
-  context.note("The thesis (2 GHz notebook, 2006): 10 steps of 12 ms, prefactorisation 200 ms, for the icosahedron subdivided 4 times.");
-  context.note("h: time step of the flow; the matrix M/h + K is that of the start, factorised once. factorization_s counts topology and analysis.");
-  context.note("iterations: at most, of each step. Checked: the thesis's case in semi-implicit steps, and all starts in iterated ones of h = 1 m^4.");
-  context.note("error_voronoi: the same integral of the final mesh by isometricBending() with its own Voronoi cells (reference 3c).");
+  context.note(
+      "The thesis (2 GHz notebook, 2006): 10 steps of 12 ms, prefactorisation 200 ms, for the icosahedron subdivided 4 "
+      "times.");
+  context.note(
+      "h: time step of the flow; the matrix M/h + K is that of the start, factorised once. factorization_s counts "
+      "topology and analysis.");
+  context.note(
+      "iterations: at most, of each step. Checked: the thesis's case in semi-implicit steps, and all starts in "
+      "iterated ones of h = 1 m^4.");
+  context.note(
+      "error_voronoi: the same integral of the final mesh by isometricBending() with its own Voronoi cells (reference "
+      "3c).");
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -6,16 +6,18 @@
 
 namespace slender::study {
 
-WorkPrecision::WorkPrecision(StudyContext& context, const std::string& name, const std::string& problem, const std::string& error_label, double scale)
-    : context_(context),
-      plot_(context.plot(name, problem + ": error against run time", "CPU seconds per simulated second", error_label)),
-      problem_(problem),
-      scale_(scale)
+WorkPrecision::WorkPrecision(StudyContext& context, const std::string& name, const std::string& problem,
+                             const std::string& error_label, double scale)
+  : context_(context),
+    plot_(context.plot(name, problem + ": error against run time", "CPU seconds per simulated second", error_label)),
+    problem_(problem),
+    scale_(scale)
 {
   plot_.lines = false;
 }
 
-void WorkPrecision::add(Row& row, const std::string& method, const std::string& setting, double error, double cpu_per_second, bool counts)
+void WorkPrecision::add(Row& row, const std::string& method, const std::string& setting, double error,
+                        double cpu_per_second, bool counts)
 {
   row.set("relative_error", error / scale_).set("cpu_per_second", cpu_per_second);
   if (!std::isfinite(error))
@@ -45,16 +47,18 @@ void WorkPrecision::conclude()
   const Run* before = nullptr;
   for (const double level : {0.1, 0.01, 1e-3, 1e-4, 1e-5})
   {
-    const auto best = std::find_if(front.begin(), front.end(), [&](const Run* run) { return run->error <= level * scale_; });
+    const auto best =
+        std::find_if(front.begin(), front.end(), [&](const Run* run) { return run->error <= level * scale_; });
     if (best == front.end() || *best == before)
       continue;
     before = *best;
     char text[64];
     std::snprintf(text, sizeof text, "for %g %% error take ", 100 * level);
     std::string note = problem_ + ": " + text + before->method + ", " + before->setting;
-    std::snprintf(text, sizeof text, ": %.2g s per simulated second, %.2g %%", before->cpu_per_second, 100 * before->error / scale_);
+    std::snprintf(text, sizeof text, ": %.2g s per simulated second, %.2g %%", before->cpu_per_second,
+                  100 * before->error / scale_);
     context_.note(note + text);
   }
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

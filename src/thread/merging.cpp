@@ -19,7 +19,7 @@ double nearest(const Eigen::Matrix3Xd& x, const ContactSegment& s, const Eigen::
   return t;
 }
 
-}  // namespace
+}   // namespace
 
 double mergingWork(double r, double d0, double d)
 {
@@ -28,7 +28,8 @@ double mergingWork(double r, double d0, double d)
   const double a = angle(d0), b = angle(d);
   // Gauss's rule with five points, on four parts: exact to rounding for the whole range
   constexpr double kAt[5] = {-0.9061798459386640, -0.5384693101056831, 0.0, 0.5384693101056831, 0.9061798459386640};
-  constexpr double kWeight[5] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889, 0.4786286704993665, 0.2369268850561891};
+  constexpr double kWeight[5] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889, 0.4786286704993665,
+                                 0.2369268850561891};
   constexpr int kParts = 4;
   double sum = 0.0;
   for (int part = 0; part < kParts; ++part)
@@ -40,11 +41,14 @@ double mergingWork(double r, double d0, double d)
   return 0.5 * (b - a) / kParts * sum;
 }
 
-void MergingPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments, const std::vector<MergingFluid>& fluids,
-                             const std::vector<GridPairs::Pair>& pairs, const std::vector<char>& held, double gap, double h)
+void MergingPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
+                             const std::vector<MergingFluid>& fluids, const std::vector<GridPairs::Pair>& pairs,
+                             const std::vector<char>& held, double gap, double h)
 {
   clear();
-  const auto isLast = [&](int j) { return j + 1 == static_cast<int>(segments.size()) || segments[j + 1].object != segments[j].object; };
+  const auto isLast = [&](int j) {
+    return j + 1 == static_cast<int>(segments.size()) || segments[j + 1].object != segments[j].object;
+  };
   const auto meetBoth = [&](int own, int other) {
     const ContactSegment &s = segments[own], &o = segments[other];
     const bool still = held[o.a] && held[o.b];
@@ -61,9 +65,11 @@ void MergingPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Contac
     }
 }
 
-/// Node a of segment `own` (b with far_end) and segment `other`, if that holds the place of its strand that is nearest around there.
-void MergingPotential::meet(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments, const std::vector<MergingFluid>& fluids,
-                            int own, bool far_end, int other, double gap, double h)
+/// Node a of segment `own` (b with far_end) and segment `other`, if that holds the place of its strand that is nearest
+/// around there.
+void MergingPotential::meet(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
+                            const std::vector<MergingFluid>& fluids, int own, bool far_end, int other, double gap,
+                            double h)
 {
   const ContactSegment &s = segments[own], &o = segments[other];
   const int point = far_end ? s.b : s.a, count = static_cast<int>(segments.size());
@@ -89,7 +95,7 @@ void MergingPotential::meet(const Eigen::Matrix3Xd& x, const std::vector<Contact
   if (t == 0.0 && sameStrand(other - 1) && nearest(x, segments[other - 1], p, beside) < 1.0)
     return;
   if (t == 1.0 && sameStrand(other + 1))
-    return;   // that one's beginning
+    return;                 // that one's beginning
   if (t > 0.0 && t < 1.0)   // inside a bend both edges have such a place: the nearer one counts
   {
     if (sameStrand(other - 1))
@@ -144,9 +150,10 @@ double MergingPotential::evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness
     term.force = -(place.attraction + place.drag * rho * away) * place.normal;
     term.position = x.col(place.point[0]) - 0.5 * d * place.normal;
     if (with_stiffness && rho > 0.0)
-      term.stiffness = std::max(0.0, place.drag * (rho - 0.25 * d * away / rho)) * place.normal * place.normal.transpose();
+      term.stiffness =
+          std::max(0.0, place.drag * (rho - 0.25 * d * away / rho)) * place.normal * place.normal.transpose();
   }
   return energy;
 }
 
-}  // namespace slender
+}   // namespace slender

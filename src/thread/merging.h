@@ -17,9 +17,10 @@ struct MergingFluid
 ///
 ///   F = 2 pi gamma r - mu (4 pi/3) rho |d'|,   rho^2 = r^2 - d^2/4,
 ///
-/// with one pair of balls per length 2r of a thread, so that the force per length does not depend on the edges; each node stands for its
-/// half edges and meets the nearest places of other strands. These places, with their directions, are those at the start of the step. There
-/// the first term is constant and d enters the second at the end of the step: over a step h the potential is
+/// with one pair of balls per length 2r of a thread, so that the force per length does not depend on the edges; each
+/// node stands for its half edges and meets the nearest places of other strands. These places, with their directions,
+/// are those at the start of the step. There the first term is constant and d enters the second at the end of the step:
+/// over a step h the potential is
 ///
 ///   W(d) = 2 pi gamma r d + (4 pi mu / 3 h) int_d0^d rho(s) (s - d0) ds,
 ///
@@ -27,9 +28,11 @@ struct MergingFluid
 class MergingPotential
 {
 public:
-  /// Finds what merges in a step of h seconds. `radii`, of the segments as they are; `pairs` of segments near each other; `held`, per point.
-  void begin(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments, const std::vector<MergingFluid>& fluids,
-             const std::vector<GridPairs::Pair>& pairs, const std::vector<char>& held, double gap, double h);
+  /// Finds what merges in a step of h seconds. `radii`, of the segments as they are; `pairs` of segments near each
+  /// other; `held`, per point.
+  void begin(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
+             const std::vector<MergingFluid>& fluids, const std::vector<GridPairs::Pair>& pairs,
+             const std::vector<char>& held, double gap, double h);
   void clear()
   {
     places_.clear();
@@ -43,14 +46,14 @@ public:
 private:
   struct Place
   {
-    int point[3];                ///< a node, and the ends of the segment that it meets
-    double t;                    ///< where on it
-    Eigen::Vector3d normal;      ///< from there to the node
-    double start, radius;        ///< d0, r [m]
-    double attraction, drag;     ///< 2 pi gamma r [N] and 4 pi mu / 3 h [N/m^2], times the number of pairs of balls
+    int point[3];              ///< a node, and the ends of the segment that it meets
+    double t;                  ///< where on it
+    Eigen::Vector3d normal;    ///< from there to the node
+    double start, radius;      ///< d0, r [m]
+    double attraction, drag;   ///< 2 pi gamma r [N] and 4 pi mu / 3 h [N/m^2], times the number of pairs of balls
   };
-  void meet(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments, const std::vector<MergingFluid>& fluids, int own,
-            bool far_end, int other, double gap, double h);
+  void meet(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
+            const std::vector<MergingFluid>& fluids, int own, bool far_end, int other, double gap, double h);
 
   std::vector<Place> places_;
   std::vector<ContactTerm> terms_;
@@ -59,4 +62,4 @@ private:
 /// int_d0^d rho(s) (s - d0) ds of balls of radius r [m^3].
 double mergingWork(double r, double d0, double d);
 
-}  // namespace slender
+}   // namespace slender

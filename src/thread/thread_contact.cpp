@@ -10,9 +10,12 @@ namespace {
 
 constexpr int kRows = 11;   // of a panel: its own block, the next, and the positions after that
 
-double entry(const RodPanel& p, int column, int row) { return row < 4 ? p.diag[column][row] : p.below[column][row - 4]; }
+double entry(const RodPanel& p, int column, int row)
+{
+  return row < 4 ? p.diag[column][row] : p.below[column][row - 4];
+}
 
-}  // namespace
+}   // namespace
 
 int ThreadContact::dofOf(int point) const
 {
@@ -130,7 +133,9 @@ void ThreadContact::buildPattern()
     Part& part = parts_[p];
     part.slots.clear();
     if (part.touched)
-      forPanels(part, [&](int a, int b) { part.slots.push_back(a < 0 ? -1 : matrix_.index(std::max(a, b), std::min(a, b))); });
+      forPanels(part, [&](int a, int b) {
+        part.slots.push_back(a < 0 ? -1 : matrix_.index(std::max(a, b), std::min(a, b)));
+      });
   }
 }
 
@@ -157,7 +162,7 @@ void ThreadContact::assemble(const HessianShift& shift, bool whole)
     }
   }
   // of four points, block(i, j) for i, j
-  const auto add = [&](const int (&points)[4], auto&& block) {
+  const auto add = [&](const int(&points)[4], auto&& block) {
     int base[4];
     for (int k = 0; k < 4; ++k)
     {
@@ -244,9 +249,7 @@ RodEvaluation ThreadContact::evaluate(bool with_hessian, const HessianShift& shi
       }
   });
   if (with_hessian && unknowns_ > 0)
-  {
     sum.inertia.negative += !factor(shift);
-  }
   for (std::size_t p = 0; p < part_count_; ++p)
     if (parts_[p].touched)
       parts_[p].thread->system.closeGradient();
@@ -269,7 +272,9 @@ void ThreadContact::solve()
     });
     matrix_.solve(rhs_.data());
   }
-  forDofs([&](Part& part, std::size_t u) { part.thread->system.direction()[u] = part.dof[u] < 0 ? 0.0 : rhs_[part.offset + part.dof[u]]; });
+  forDofs([&](Part& part, std::size_t u) {
+    part.thread->system.direction()[u] = part.dof[u] < 0 ? 0.0 : rhs_[part.offset + part.dof[u]];
+  });
   for (std::size_t p = 0; p < part_count_; ++p)
     if (!parts_[p].touched)
       parts_[p].thread->system.solve();
@@ -329,7 +334,8 @@ double ThreadContact::incrementSize() const
       }
     at_contact = std::max(at_contact, u.norm());
   }
-  return at_contact > 0.0 ? std::max(largest, tolerance_ * at_contact / (gap_tolerance_ * contact_.smallestGap())) : largest;
+  return at_contact > 0.0 ? std::max(largest, tolerance_ * at_contact / (gap_tolerance_ * contact_.smallestGap()))
+                          : largest;
 }
 
 double ThreadContact::slope() const
@@ -365,4 +371,4 @@ double ThreadContact::noiseLevel() const
   return largest;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -13,8 +13,8 @@
 
 namespace slender {
 
-/// Equations of threads with contact and merging, for minimize(). Threads that nothing touches keep their own band matrices; the others
-/// share one sparse matrix.
+/// Equations of threads with contact and merging, for minimize(). Threads that nothing touches keep their own band
+/// matrices; the others share one sparse matrix.
 class ThreadContact : public RemeshGuard
 {
 public:
@@ -27,17 +27,20 @@ public:
   };
 
   // ---- a step (thread_contact_step.cpp)
-  /// Of these threads; obstacles move from `from` to `to` in `duration` seconds, floors with the velocities `belts` of the model's threads.
+  /// Of these threads; obstacles move from `from` to `to` in `duration` seconds, floors with the velocities `belts` of
+  /// the model's threads.
   void beginStep(const std::vector<Thread>& threads, const std::vector<Pose>& from, const std::vector<Pose>& to,
                  const std::vector<Eigen::Vector3d>& belts, double duration, double stiffness);
   /// A substep of h seconds from the fraction `from` of the step to `to`, after all threads' prepare().
   StepFailure solve(double from, double to, double h, StepReport& report);
   double stiffness() const { return stiffness_now_; }
-  double clearance(const std::vector<const ThreadState*>& states, const std::vector<int>& kinds, const std::vector<Pose>& obstacles);
+  double clearance(const std::vector<const ThreadState*>& states, const std::vector<int>& kinds,
+                   const std::vector<Pose>& obstacles);
   /// After clearance() of the same: the two that are nearest to each other, "thread 'honey' and obstacle 'plate'".
   std::string nearest(const std::vector<const ThreadState*>& states, const std::vector<Pose>& obstacles) const;
   const std::vector<ContactTerm>& terms() const { return contact_.terms(); }
-  bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const override;
+  bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from,
+              const Eigen::Vector3d& to) const override;
   bool mayJoin(const ThreadState& state, int i) const override;
 
   // ---- the system of a substep, as minimize() needs it (thread_contact.cpp)
@@ -67,11 +70,11 @@ private:
   {
     ThreadStepper::Impl* thread = nullptr;
     int kind = 0;
-    int point = 0;                 ///< its first contact point
-    bool touched = false;          ///< has its unknowns in the matrix
+    int point = 0;          ///< its first contact point
+    bool touched = false;   ///< has its unknowns in the matrix
     int offset = 0, unknowns = 0;
-    std::vector<int> dof;          ///< own number of every unknown of its system, -1: held
-    std::vector<int> slots;        ///< where the entries of its panels go, -1: nowhere
+    std::vector<int> dof;     ///< own number of every unknown of its system, -1: held
+    std::vector<int> slots;   ///< where the entries of its panels go, -1: nowhere
     RodEvaluation evaluation;
   };
   const ThreadSystem& systemOf(const Part& part) const { return part.thread->system; }
@@ -85,7 +88,8 @@ private:
   /// Of a contact point: its unknowns' first number in its part, -1: held.
   int dofOf(int point) const;
 
-  /// Calls f(other, j, core) for every edge that the edges first to last of `state` may touch; stops and returns false when f does.
+  /// Calls f(other, j, core) for every edge that the edges first to last of `state` may touch; stops and returns false
+  /// when f does.
   template <class F>
   bool forOthers(const ThreadState& state, int first, int last, F&& f) const;
   void addCurve(const ThreadState& state, int kind);
@@ -100,21 +104,22 @@ private:
 
   const TouchingModel& model_;
   ContactPotential contact_;
-  double first_stiffness_;                      ///< of the barrier in a state that has none yet
+  double first_stiffness_;   ///< of the barrier in a state that has none yet
   MergingPotential merging_;
   bool merges_ = false;
   std::vector<Part> parts_;
-  std::size_t part_count_ = 0;                  ///< of parts_ in use
+  std::size_t part_count_ = 0;   ///< of parts_ in use
   double duration_ = 0, least_edge_ = 0, stiffness_now_ = 0;
   std::vector<Pose> solids_from_, solids_to_;   ///< over the step
   Eigen::Matrix3Xd points_, points_base_, points_end_, points_target_;
   std::vector<Pose> solids_, solids_base_, solids_end_;
-  std::vector<ContactSegment> segments_;        ///< with their full radii
+  std::vector<ContactSegment> segments_;   ///< with their full radii
   std::vector<ContactObject> objects_;
-  std::vector<MergingFluid> fluids_;            ///< per object
-  std::vector<char> held_;                      ///< per point
+  std::vector<MergingFluid> fluids_;   ///< per object
+  std::vector<char> held_;             ///< per point
   std::vector<int> point_part_;
-  double tolerance_ = 0, gap_tolerance_ = 0;    ///< of increments: over the shortest edge, and at contacts over the smallest gap
+  /// of increments: over the shortest edge, and at contacts over the smallest gap
+  double tolerance_ = 0, gap_tolerance_ = 0;
 
   // matrix
   SparseCholesky matrix_{true};
@@ -126,4 +131,4 @@ private:
   std::vector<double> rhs_;
 };
 
-}  // namespace slender
+}   // namespace slender

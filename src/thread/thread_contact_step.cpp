@@ -25,9 +25,12 @@ ContactSurface solidsOf(const TouchingModel& model)
   return surface;
 }
 
-}  // namespace
+}   // namespace
 
-ThreadContact::ThreadContact(const TouchingModel& model) : model_(model), contact_(solidsOf(model), model.options), first_stiffness_(contact_.stiffness())
+ThreadContact::ThreadContact(const TouchingModel& model)
+  : model_(model),
+    contact_(solidsOf(model), model.options),
+    first_stiffness_(contact_.stiffness())
 {
   for (const ThreadTouch& touch : model.touches)
     merges_ = merges_ || touch.merging > 0.0;
@@ -60,8 +63,9 @@ void ThreadContact::addCurve(const ThreadState& state, int kind)
   fluids_.push_back({touch.merging > 0.0, model.surface_tension, model.viscosity});
 }
 
-void ThreadContact::beginStep(const std::vector<Thread>& threads, const std::vector<Pose>& from, const std::vector<Pose>& to,
-                              const std::vector<Eigen::Vector3d>& belts, double duration, double stiffness)
+void ThreadContact::beginStep(const std::vector<Thread>& threads, const std::vector<Pose>& from,
+                              const std::vector<Pose>& to, const std::vector<Eigen::Vector3d>& belts, double duration,
+                              double stiffness)
 {
   pattern_valid_ = pattern_valid_ && part_count_ == threads.size();
   part_count_ = threads.size();
@@ -140,7 +144,8 @@ bool ThreadContact::load(double from, double h)
     return false;
   // not what an attempt that failed left; no less than weights, what stops a node within the gap, and merging ask for
   double least = std::max(stiffness_now_, model_.options.least_stiffness);
-  // what would double the length of the thread in a step is force enough: where parts are jammed, gaps do not open however stiff the barrier is
+  // what would double the length of the thread in a step is force enough: where parts are jammed, gaps do not open
+  // however stiff the barrier is
   double most = least;
   for (std::size_t p = 0; p < part_count_; ++p)
   {
@@ -149,18 +154,21 @@ bool ThreadContact::load(double from, double h)
     for (int i = 0; i < a.nodes; ++i)
       least = std::max(least, a.weight[i] * h * h * std::max(gravity, model_.options.gap / (duration_ * duration_)));
     const ThreadStepper::Impl& thread = *parts_[p].thread;
-    most = std::max(most, 3.0 * thread.model->viscosity * thread.work.totalVolume() / (objects_[p].curve_length * duration_));
+    most = std::max(most,
+                    3.0 * thread.model->viscosity * thread.work.totalVolume() / (objects_[p].curve_length * duration_));
   }
   if (merges_)
   {
     merging_.begin(points_base_, segments_, fluids_, contact_.nearPairs(), held_, model_.options.gap, h);
     least = std::max(least, merging_.largestAttraction());
   }
-  constexpr double kLargest = std::numeric_limits<double>::max();   // of loads that overflow: what they do to the threads says why
+  // of loads that overflow: what they do to the threads says why
+  constexpr double kLargest = std::numeric_limits<double>::max();
   contact_.setMostStiffness(std::min(std::max(most, least), kLargest));
   contact_.setStiffness(std::min(least, kLargest));
   whole_ = {};
-  contact_.begin(points_base_, solids_base_, duration_);   // friction sticks below a speed over the whole step, cut or not
+  // friction sticks below a speed over the whole step, cut or not
+  contact_.begin(points_base_, solids_base_, duration_);
 
   mapUnknowns();
   keys_before_.swap(keys_);
@@ -179,7 +187,8 @@ StepFailure ThreadContact::solve(double from, double to, double h, StepReport& r
     return StepFailure::squeezed;
   for (;;)
   {
-    const NewtonResult result = minimizeConfined(*this, from, to, parts_[0].thread->newton, model_.options.gap / least_edge_);
+    const NewtonResult result =
+        minimizeConfined(*this, from, to, parts_[0].thread->newton, model_.options.gap / least_edge_);
     report.iterations += result.iterations;
     report.factorizations += result.factorizations;
     if (!result.ok())
@@ -204,8 +213,8 @@ StepFailure ThreadContact::solve(double from, double to, double h, StepReport& r
   return StepFailure::none;
 }
 
-/// Moves from the base towards the targets of what is held and the present guess of all else, as far as nothing touches; solids go from
-/// where they stand at the fraction `from` of the step to `to`.
+/// Moves from the base towards the targets of what is held and the present guess of all else, as far as nothing
+/// touches; solids go from where they stand at the fraction `from` of the step to `to`.
 Approach ThreadContact::approach(double from, double to, double& reached)
 {
   gather(points_target_);
@@ -252,7 +261,8 @@ void ThreadContact::placeHeld(double /*to*/)
         parts_[p].thread->placeNode(i, points_target_.col(parts_[p].point + i));
 }
 
-double ThreadContact::clearance(const std::vector<const ThreadState*>& states, const std::vector<int>& kinds, const std::vector<Pose>& solids)
+double ThreadContact::clearance(const std::vector<const ThreadState*>& states, const std::vector<int>& kinds,
+                                const std::vector<Pose>& solids)
 {
   segments_.clear();
   objects_.clear();
@@ -273,12 +283,15 @@ double ThreadContact::clearance(const std::vector<const ThreadState*>& states, c
   return contact_.clearance(x, solids_);
 }
 
-std::string ThreadContact::nearest(const std::vector<const ThreadState*>& states, const std::vector<Pose>& obstacles) const
+std::string ThreadContact::nearest(const std::vector<const ThreadState*>& states,
+                                   const std::vector<Pose>& obstacles) const
 {
   std::vector<Eigen::Vector3d> x;
   for (const ThreadState* state : states)
     x.insert(x.end(), state->x.begin(), state->x.end());
-  const auto nameOf = [&](const ContactSegment& s) { return "thread '" + model_.threads[objects_[s.object].owner]->name + "'"; };
+  const auto nameOf = [&](const ContactSegment& s) {
+    return "thread '" + model_.threads[objects_[s.object].owner]->name + "'";
+  };
   double least = std::numeric_limits<double>::infinity();
   std::string names;
   for (std::size_t p = 0; p < segments_.size(); ++p)
@@ -300,7 +313,8 @@ std::string ThreadContact::nearest(const std::vector<const ThreadState*>& states
       }
     }
     for (std::size_t k = 0; object.solids && !a.driven && k < model_.obstacles.size(); ++k)
-      if (const double room = distanceToShape(model_.obstacles[k].shape, obstacles[k], x[a.a], x[a.b]) - a.radius; room < least)
+      if (const double room = distanceToShape(model_.obstacles[k].shape, obstacles[k], x[a.a], x[a.b]) - a.radius;
+          room < least)
       {
         least = room;
         names = nameOf(a) + " and obstacle '" + model_.obstacles[k].name + "'";
@@ -315,10 +329,12 @@ std::string ThreadContact::nearest(const std::vector<const ThreadState*>& states
   return names;
 }
 
-bool ThreadContact::allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from, const Eigen::Vector3d& to) const
+bool ThreadContact::allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from,
+                           const Eigen::Vector3d& to) const
 {
   const MovingPoint node{from, to}, a{state.x[first], state.x[first]}, b{state.x[last + 1], state.x[last + 1]};
-  const double reach_a = std::max((from - a.from).norm(), (to - a.from).norm()), reach_b = std::max((from - b.from).norm(), (to - b.from).norm());
+  const double reach_a = std::max((from - a.from).norm(), (to - a.from).norm()),
+               reach_b = std::max((from - b.from).norm(), (to - b.from).norm());
   const double radius = std::max(state.radius(first), state.radius(last)), gap = model_.options.gap;
   const auto isFree = [&](const ThreadState& other, int j, double core) {
     const Eigen::Vector3d &p = other.x[j], &q = other.x[j + 1];
@@ -370,7 +386,9 @@ bool ThreadContact::forOthers(const ThreadState& state, int first, int last, F&&
       }
       if (!own.self)
         return true;
-      const auto neighbours = [&](double apart, int j) { return apart < 0.5 * M_PI * (radius + state.radius(j)) + gap; };
+      const auto neighbours = [&](double apart, int j) {
+        return apart < 0.5 * M_PI * (radius + state.radius(j)) + gap;
+      };
       double apart = 0.0;
       for (int j = first - 1; j >= 0; apart += state.edge(j--).norm())
         if (!neighbours(apart, j) && !f(state, j, core))
@@ -383,4 +401,4 @@ bool ThreadContact::forOthers(const ThreadState& state, int first, int last, F&&
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -8,15 +8,17 @@ namespace slender {
 
 namespace {
 
-constexpr double kPerTurn = 20.0;      // edges per turn of the coil, which keep the quick form of study `coiling` within 2 %
-constexpr double kOverFall = 25.0;     // smallest number of edges over the fall
-constexpr double kStepAngle = 0.06;    // [rad] turn of the coil per step, with which implicit Euler errs by about 1 % in frequency
+// edges per turn of the coil, which keep the quick form of study `coiling` within 2 %
+constexpr double kPerTurn = 20.0;
+constexpr double kOverFall = 25.0;   // smallest number of edges over the fall
+// [rad] turn of the coil per step, with which implicit Euler errs by about 1 % in frequency
+constexpr double kStepAngle = 0.06;
 
 double areaOf(double diameter) { return 0.25 * M_PI * diameter * diameter; }
 
-/// Logarithm of the speed at the nozzle for a speed `landing` at the floor, by integration from the floor upwards, where the
-/// equation is stable: with u = log U and p = u' it is p' = (exp(u) p - g exp(-u)) / (3 nu). Returns -infinity when the speed would
-/// fall below `least` on the way.
+/// Logarithm of the speed at the nozzle for a speed `landing` at the floor, by integration from the floor upwards,
+/// where the equation is stable: with u = log U and p = u' it is p' = (exp(u) p - g exp(-u)) / (3 nu). Returns
+/// -infinity when the speed would fall below `least` on the way.
 double logSpeedAtNozzle(const ThreadFall& fall, double landing, double least)
 {
   constexpr int kSteps = 400;
@@ -44,7 +46,7 @@ double speedAtFloor(const ThreadFall& fall, double start)
   return low;
 }
 
-}  // namespace
+}   // namespace
 
 Landing estimateLanding(const ThreadFall& fall)
 {
@@ -66,7 +68,8 @@ double leastJettingSpeed(const ThreadFall& fall, double surface_tension)
   if (fall.viscosity > std::sqrt(0.5 * fall.density * surface_tension * fall.diameter))
     return 0.0;
   constexpr double kWater = 0.37;   // for water in air, by the authors
-  const double bond = 0.5 * fall.density * fall.gravity * fall.diameter * fall.diameter / surface_tension, x = 1.0 + kWater * bond;
+  const double bond = 0.5 * fall.density * fall.gravity * fall.diameter * fall.diameter / surface_tension,
+               x = 1.0 + kWater * bond;
   const double y = x - std::sqrt(x * x - 1.0);
   return 2.0 * y * std::sqrt(surface_tension / (fall.density * fall.diameter));
 }
@@ -94,4 +97,4 @@ double edgesPerTurn(const Landing& landing, double edge_length)
   return 2.0 * M_PI * landing.coil_radius / edge_length;
 }
 
-}  // namespace slender
+}   // namespace slender

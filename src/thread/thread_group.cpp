@@ -85,7 +85,8 @@ void dropThreads(ThreadGroupState& state, const ThreadLimits& limits)
   for (std::size_t k = 0; k < state.threads.size();)
   {
     const ThreadState& t = state.threads[k];
-    const bool outside = std::none_of(t.x.begin(), t.x.end(), [&](const Eigen::Vector3d& x) { return limits.scene.contains(x); });
+    const bool outside =
+        std::none_of(t.x.begin(), t.x.end(), [&](const Eigen::Vector3d& x) { return limits.scene.contains(x); });
     const bool lies = std::all_of(t.deposited.begin(), t.deposited.end(), [](char d) { return d != 0; });
     if (lies)
       lying += t.nodes();
@@ -102,4 +103,4 @@ void dropThreads(ThreadGroupState& state, const ThreadLimits& limits)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

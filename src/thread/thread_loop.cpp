@@ -16,7 +16,11 @@ class ThreadSubsteps : public SubstepEquations
 {
 public:
   ThreadSubsteps(const ThreadPart* parts, int count, double duration, ThreadContact* contact)
-    : parts_(parts), end_(parts + count), duration_(duration), contact_(contact), failed_(parts)
+    : parts_(parts),
+      end_(parts + count),
+      duration_(duration),
+      contact_(contact),
+      failed_(parts)
   {
   }
 
@@ -53,7 +57,7 @@ StepFailure ThreadSubsteps::attempt(const Substep& substep, StepReport& report)
       return failure;
   failed_ = parts_;
   const StepFailure failure =
-    contact_ ? contact_->solve(from / duration_, to / duration_, h, report) : parts_->thread->solveAlone(h, report);
+      contact_ ? contact_->solve(from / duration_, to / duration_, h, report) : parts_->thread->solveAlone(h, report);
   if (failure != StepFailure::none)
   {
     failed_ = farthestFromBalance();
@@ -71,10 +75,12 @@ StepFailure ThreadSubsteps::attempt(const Substep& substep, StepReport& report)
   return StepFailure::none;
 }
 
-/// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by bit.
+/// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by
+/// bit.
 bool ThreadSubsteps::shorterMayHelp(StepFailure failure) const
 {
-  return !failed_->thread->explicit_step && failure != StepFailure::overstretched && failed_->thread->overgrownEdge() < 0;
+  return !failed_->thread->explicit_step && failure != StepFailure::overstretched &&
+         failed_->thread->overgrownEdge() < 0;
 }
 
 /// Takes out the sharpest fold of a part, if there is one.
@@ -101,7 +107,7 @@ void ThreadSubsteps::refuse(const Substep& substep, StepFailure failure, StepRep
     thread.refuseUnsolved(report, failure, substep.length);
 }
 
-}  // namespace
+}   // namespace
 
 StepReport advanceThreads(const ThreadPart* parts, int count, double duration, ThreadContact* contact)
 {
@@ -126,4 +132,4 @@ StepReport advanceThreads(const ThreadPart* parts, int count, double duration, T
   return report;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -13,8 +13,8 @@ struct ThreadPart
   const ThreadInputs* inputs;
 };
 
-/// Advances threads together by `duration` [s], in substeps common to all. `contact` (null: a single thread that touches nothing) solves
-/// their equations. On failure the states are untouched and the report says why.
+/// Advances threads together by `duration` [s], in substeps common to all. `contact` (null: a single thread that
+/// touches nothing) solves their equations. On failure the states are untouched and the report says why.
 StepReport advanceThreads(const ThreadPart* parts, int count, double duration, ThreadContact* contact);
 
-}  // namespace slender
+}   // namespace slender

@@ -31,7 +31,7 @@ Eigen::Vector3d carried(const Eigen::Vector3d& d1, const Eigen::Vector3d& from, 
   return (d - to * to.dot(d)).normalized();
 }
 
-}  // namespace
+}   // namespace
 
 Eigen::Vector3d splitPoint(const ThreadState& state, int j, double fraction)
 {
@@ -65,7 +65,10 @@ Eigen::Vector3d splitPoint(const ThreadState& state, int j, double fraction)
   return x;
 }
 
-void splitEdge(ThreadState& state, int j, double fraction) { splitEdge(state, j, fraction, splitPoint(state, j, fraction)); }
+void splitEdge(ThreadState& state, int j, double fraction)
+{
+  splitEdge(state, j, fraction, splitPoint(state, j, fraction));
+}
 
 void splitEdge(ThreadState& state, int j, double fraction, const Eigen::Vector3d& x)
 {
@@ -100,19 +103,22 @@ void splitEdge(ThreadState& state, int j, double fraction, const Eigen::Vector3d
   // The twist between the middles of neighbouring edges stays spread as it was. At a held end it lies on half an edge.
   const double first_span = 0.5 * (length + before), second_span = 0.5 * (length + after);
   const double twist_a = state.twist[j] / first_span, twist_b = state.twist[j + 1] / second_span;
-  const double left_turn = -twist_a * 0.5 * to_b, right_turn = twist_b * 0.5 * to_a;   // their middles moved by these lengths
+  // their middles moved by these lengths
+  const double left_turn = -twist_a * 0.5 * to_b, right_turn = twist_b * 0.5 * to_a;
   const Eigen::Vector3d left = (x - a).normalized(), right = (b - x).normalized(), d1 = state.d1[j];
   state.x.insert(state.x.begin() + j + 1, x);
   state.v.insert(state.v.begin() + j + 1, v);
   state.id.insert(state.id.begin() + j + 1, state.next_id++);
-  state.deposited.insert(state.deposited.begin() + j + 1, static_cast<char>(state.deposited[j] && state.deposited[j + 1]));
+  state.deposited.insert(state.deposited.begin() + j + 1,
+                         static_cast<char>(state.deposited[j] && state.deposited[j + 1]));
   state.twist.insert(state.twist.begin() + j + 1, right_turn - left_turn);
   state.twist[j] += left_turn;
   state.twist[j + 2] -= right_turn;
   state.d1[j] = carried(d1, t, left, left_turn);
   state.d1.insert(state.d1.begin() + j + 1, carried(d1, t, right, right_turn));
   // angular momentum stays; the moment of inertia of an edge goes with the square of its volume over its length
-  const double left_inertia = left_volume * left_volume / (x - a).norm(), right_inertia = right_volume * right_volume / (b - x).norm();
+  const double left_inertia = left_volume * left_volume / (x - a).norm(),
+               right_inertia = right_volume * right_volume / (b - x).norm();
   state.spin[j] *= volume * volume / length / (left_inertia + right_inertia);
   state.spin.insert(state.spin.begin() + j + 1, state.spin[j]);
   state.volume[j] = left_volume;
@@ -139,7 +145,8 @@ void removeNode(ThreadState& state, int i)
   state.d1[i - 1] = carried(state.d1[i - 1], te, t, turn);
   state.twist[i - 1] += turn;
   state.twist[i + 1] += rest;
-  state.spin[i - 1] = (ve * ve / le * state.spin[i - 1] + vf * vf / lf * state.spin[i]) * joined.norm() / ((ve + vf) * (ve + vf));
+  state.spin[i - 1] =
+      (ve * ve / le * state.spin[i - 1] + vf * vf / lf * state.spin[i]) * joined.norm() / ((ve + vf) * (ve + vf));
   state.volume[i - 1] = ve + vf;
   state.x.erase(state.x.begin() + i);
   state.v.erase(state.v.begin() + i);
@@ -160,7 +167,8 @@ bool mayRemove(const ThreadState& state, int i, const RemeshGuard* guard)
   if (!guard)
     return true;
   const double le = state.edge(i - 1).norm(), lf = state.edge(i).norm();
-  return guard->allows(state, i - 1, i, state.x[i], state.x[i - 1] + le / (le + lf) * (state.x[i + 1] - state.x[i - 1]));
+  return guard->allows(state, i - 1, i, state.x[i],
+                       state.x[i - 1] + le / (le + lf) * (state.x[i + 1] - state.x[i - 1]));
 }
 
 bool mendFold(ThreadState& state, int fold, const RemeshGuard* guard)
@@ -205,7 +213,8 @@ bool breakThread(ThreadState& state, double min_radius, ThreadState& older)
   if (at < 0)
     return false;
 
-  // Each half of the edge's fluid thickens the edge beyond its node. A quarter of it, which that node had, comes to the next one.
+  // Each half of the edge's fluid thickens the edge beyond its node. A quarter of it, which that node had, comes to the
+  // next one.
   const double half = 0.5 * state.volume[at];
   const auto pass = [&](int from, int to) {
     const double own = (to > 0 ? state.volume[to - 1] : 0.0) + (to < state.edges() ? state.volume[to] : 0.0);
@@ -251,4 +260,4 @@ void dropOldest(ThreadState& state, int count, double& account)
   state.ends[0].held = false;
 }
 
-}  // namespace slender
+}   // namespace slender

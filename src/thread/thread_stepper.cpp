@@ -33,15 +33,18 @@ std::pair<double, double> rangeOfRadii(const ThreadState& state)
   return {least, most};
 }
 
-}  // namespace
+}   // namespace
 
-ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton, Integrator integrator)
+ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton,
+                             Integrator integrator)
 {
   checkThreadModel(*model);
   if (integrator != Integrator::implicit_euler && integrator != Integrator::symplectic_euler)
-    throw std::invalid_argument("thread '" + model->name + "': integrator is " + toString(integrator) + ", allowed: implicit_euler, symplectic_euler");
+    throw std::invalid_argument("thread '" + model->name + "': integrator is " + toString(integrator) +
+                                ", allowed: implicit_euler, symplectic_euler");
   if (model->floor.slips())
-    throw std::invalid_argument("thread '" + model->name + "': floor.friction is " + std::to_string(model->floor.friction) +
+    throw std::invalid_argument("thread '" + model->name + "': floor.friction is " +
+                                std::to_string(model->floor.friction) +
                                 ", but a floor that slips needs TouchingThreads");
   impl_ = std::make_unique<Impl>(std::move(model), newton, integrator == Integrator::symplectic_euler);
 }
@@ -54,16 +57,11 @@ StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, d
   const ThreadPart part{impl_.get(), &state, &inputs};
   return advanceThreads(&part, 1, duration, nullptr);
 }
-const std::array<EndLoad, 2>& ThreadStepper::endLoads() const
-{
-  return impl_->loads;
-}
-const ThreadModel& ThreadStepper::model() const
-{
-  return *impl_->model;
-}
+const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return impl_->loads; }
+const ThreadModel& ThreadStepper::model() const { return *impl_->model; }
 
-bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs& inputs, double duration, std::string& what) const
+bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs& inputs, double duration,
+                                       std::string& what) const
 {
   // names are built only when they are needed: a good step takes no memory
   const auto check = [&](bool good, const char* name) {
@@ -75,21 +73,23 @@ bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs&
   check(inputs.gravity.allFinite(), "gravity");
   check(inputs.belt_velocity.allFinite(), "belt velocity");
   check(inputs.flow_rate >= 0 && std::isfinite(inputs.flow_rate), "flow rate (must be zero or more)");
-  check(inputs.flow_rate == 0 || (model->nozzle_diameter > 0 && s.ends[1].held), "flow rate (must be zero: the thread hangs on no nozzle)");
+  check(inputs.flow_rate == 0 || (model->nozzle_diameter > 0 && s.ends[1].held),
+        "flow rate (must be zero: the thread hangs on no nozzle)");
   for (int end = 0; end < 2; ++end)
     if (s.ends[end].held)
       for (const Pose* pose : {&inputs.ends[end], &s.ends[end].X_WE})
         check(pose->position.allFinite() && std::abs(pose->orientation.norm() - 1.0) < 1e-3,
               end ? "pose of the newest end" : "pose of the oldest end");
   const std::size_t nodes = s.x.size(), edges = s.volume.size();
-  bool sound = nodes >= 2 && edges + 1 == nodes && s.v.size() == nodes && s.twist.size() == nodes && s.id.size() == nodes &&
-               s.deposited.size() == nodes && s.d1.size() == edges && s.spin.size() == edges;
+  bool sound = nodes >= 2 && edges + 1 == nodes && s.v.size() == nodes && s.twist.size() == nodes &&
+               s.id.size() == nodes && s.deposited.size() == nodes && s.d1.size() == edges && s.spin.size() == edges;
   if (!check(sound, "number of nodes or edges of the state"))
     return false;
   for (std::size_t i = 0; i < nodes; ++i)
     sound = sound && s.x[i].allFinite() && s.v[i].allFinite() && std::isfinite(s.twist[i]);
   for (std::size_t j = 0; j < edges; ++j)
-    sound = sound && s.d1[j].allFinite() && std::isfinite(s.spin[j]) && std::isfinite(s.volume[j]) && s.volume[j] > 0 && s.x[j] != s.x[j + 1];
+    sound = sound && s.d1[j].allFinite() && std::isfinite(s.spin[j]) && std::isfinite(s.volume[j]) && s.volume[j] > 0 &&
+            s.x[j] != s.x[j + 1];
   check(sound, "the state");
   return what.empty();
 }
@@ -111,12 +111,13 @@ std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double leng
   if (const int j = overgrownEdge(); j >= 0)
   {
     const bool at_nozzle = j + 1 == work.edges() && work.ends[1].held;
-    return "edge " + std::to_string(j) + " of " + std::to_string(work.edges()) + " has grown " + millimetres(work.radius(j)) +
-           " wide in radius over a length of " + millimetres(work.edge(j).norm()) +
+    return "edge " + std::to_string(j) + " of " + std::to_string(work.edges()) + " has grown " +
+           millimetres(work.radius(j)) + " wide in radius over a length of " + millimetres(work.edge(j).norm()) +
            (at_nozzle && !work.deposited[j] && model->surface_tension > 0
-              ? ": surface tension draws it up into the nozzle faster than it flows out. Use more flow or a finer nozzle"
-              : at_nozzle ? ", because the nozzle is too near to what the fluid lands on: raise the nozzle"
-                          : ", which is a puddle and no thread: use a more viscous fluid, or less flow or height") +
+                ? ": surface tension draws it up into the nozzle faster than it flows out. Use more flow or a finer "
+                  "nozzle"
+            : at_nozzle ? ", because the nozzle is too near to what the fluid lands on: raise the nozzle"
+                        : ", which is a puddle and no thread: use a more viscous fluid, or less flow or height") +
            (j + 1 == work.edges() ? ", or use shorter edges.feed" : ", or shorter edges.longest");
   }
   if (explicit_step)
@@ -128,16 +129,21 @@ std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double leng
       return "two consecutive edges point (nearly) opposite ways" + at + ": use shorter edges or a shorter step" +
              (model->floor.present && work.ends[1].held ? ", and keep the nozzle above the floor" : "");
     case StepFailure::singular_matrix:
-      return "the matrix could not be made definite" + at + ": radii (" + millimetres(radii.first) + " to " + millimetres(radii.second) +
-             ") or edge lengths differ by too many orders of magnitude, or a nozzle is too fast by as many. Use a larger breakup_radius" +
-             (model->limits.min_radius > 0 ? " than " + millimetres(model->limits.min_radius) : ", which is not set here") +
+      return "the matrix could not be made definite" + at + ": radii (" + millimetres(radii.first) + " to " +
+             millimetres(radii.second) +
+             ") or edge lengths differ by too many orders of magnitude, or a nozzle is too fast by as many. Use a "
+             "larger breakup_radius" +
+             (model->limits.min_radius > 0 ? " than " + millimetres(model->limits.min_radius)
+                                           : ", which is not set here") +
              ", so that the thread parts before it is so thin";
     case StepFailure::state_not_finite:
       return "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
     case StepFailure::squeezed:
-      return "contact leaves no room for what lies between what is held or driven" + at + ": give way, or move it more slowly";
+      return "contact leaves no room for what lies between what is held or driven" + at +
+             ": give way, or move it more slowly";
     default:
-      return "Newton's method did not converge" + at + ": use a shorter step, more time.newton.max_iterations or max_cuts, or move the nozzle slowly";
+      return "Newton's method did not converge" + at +
+             ": use a shorter step, more time.newton.max_iterations or max_cuts, or move the nozzle slowly";
   }
 }
 
@@ -159,14 +165,16 @@ StepReport ThreadStepper::Impl::refuseUnsolved(StepReport& report, StepFailure f
   {
     const int node = grown >= 0 ? grown : force.index();
     report.place = {FailurePlace::Kind::thread, model->name, node, work.x[node]};
-    text += grown >= 0 ? ". The edge begins" : ". The largest unbalanced force is " + force.text("N") + ", on node " + std::to_string(node) + " of " +
-                                                 std::to_string(work.nodes()) + ", which was";
+    text += grown >= 0 ? ". The edge begins"
+                       : ". The largest unbalanced force is " + force.text("N") + ", on node " + std::to_string(node) +
+                             " of " + std::to_string(work.nodes()) + ", which was";
     text += " at " + metres(report.place.position) + (grown >= 0 ? "" : " as the step began");
   }
   return refuse(report, failure, text);
 }
 
-bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& inputs, double duration, StepReport& report)
+bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& inputs, double duration,
+                                StepReport& report)
 {
   std::string what;
   if (!inputsFinite(state, inputs, duration, what))
@@ -179,18 +187,20 @@ bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& in
   start_ends = state.ends;
   loads = {};
   flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
-  if (model->floor.sticks() && state.ends[1].held && model->nozzle_diameter > 0 && !(inputs.ends[1].position.z() > model->floor.height))
+  if (model->floor.sticks() && state.ends[1].held && model->nozzle_diameter > 0 &&
+      !(inputs.ends[1].position.z() > model->floor.height))
   {
     refuse(report, StepFailure::input_not_finite,
-           "the nozzle is at a height of " + millimetres(inputs.ends[1].position.z()) + ", not above its floor at " + millimetres(model->floor.height) +
-             "; keep it above");
+           "the nozzle is at a height of " + millimetres(inputs.ends[1].position.z()) + ", not above its floor at " +
+               millimetres(model->floor.height) + "; keep it above");
     return false;
   }
   constexpr double kMostFed = 1e4;   // edges in one step
   if (!(flow_speed_ * duration <= kMostFed * model->feed_length))
   {
     refuse(report, StepFailure::input_not_finite,
-           "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or longer feed_length");
+           "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or "
+           "longer feed_length");
     return false;
   }
   return true;
@@ -238,4 +248,4 @@ void ThreadStepper::Impl::takeOver(double h)
     push(h);
 }
 
-}  // namespace slender
+}   // namespace slender

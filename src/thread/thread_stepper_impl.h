@@ -12,11 +12,17 @@ namespace slender {
 /// A thread's part in a step and its work space, which is reused from step to step.
 ///
 /// Deposited nodes move with the floor and need no equations. The system holds only the active part of the thread, from
-/// three nodes before its oldest free node on. A held end adds the inside of its holder as one more edge, so that its section is an ordinary joint.
+/// three nodes before its oldest free node on. A held end adds the inside of its holder as one more edge, so that its
+/// section is an ordinary joint.
 class ThreadStepper::Impl
 {
 public:
-  Impl(std::shared_ptr<const ThreadModel> m, const NewtonConfig& n, bool is_explicit) : model(std::move(m)), newton(n), explicit_step(is_explicit) {}
+  Impl(std::shared_ptr<const ThreadModel> m, const NewtonConfig& n, bool is_explicit)
+    : model(std::move(m)),
+      newton(n),
+      explicit_step(is_explicit)
+  {
+  }
 
   // ---- a step in substeps, see advanceThreads()
   /// Returns false if an input or the state is not sound. The report then says so.
@@ -33,8 +39,8 @@ public:
   StepFailure solveAlone(double h, StepReport& report);
   /// Takes the solution over.
   void takeOver(double h);
-  /// Divides, joins and takes away edges, as far as the guard (may be null) allows; nothing of it when the step needs none.
-  /// Returns false if it would take more edges than a motion can mean.
+  /// Divides, joins and takes away edges, as far as the guard (may be null) allows; nothing of it when the step needs
+  /// none. Returns false if it would take more edges than a motion can mean.
   bool remesh(const RemeshGuard* guard);
   int foldedNode() const;
   /// The edge whose section has grown beyond what a thread can be; -1: there is none. See explainFailure().
@@ -43,7 +49,8 @@ public:
   std::string explainFailure(StepFailure failure, double length) const;
   /// Largest unbalanced force [N] on a free node in the last evaluation, by the thread's numbers of nodes.
   Largest unbalancedForce() const;
-  /// Refuses a step of `length` seconds that could not be solved. The message says why and where the thread was farthest from a solution.
+  /// Refuses a step of `length` seconds that could not be solved. The message says why and where the thread was
+  /// farthest from a solution.
   StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length) const;
 
   /// When the first node goes through the floor, as a fraction of the substep; above 1: none does.
@@ -51,7 +58,10 @@ public:
   /// Stops those that do about then where they meet the floor, and holds them.
   void stopLanding(double h, double earliest);
 
-  bool endHeld(int node) const { return (node == 0 && work.ends[0].held) || (node + 1 == work.nodes() && work.ends[1].held); }
+  bool endHeld(int node) const
+  {
+    return (node == 0 && work.ends[0].held) || (node + 1 == work.nodes() && work.ends[1].held);
+  }
   bool isHeld(int node) const { return work.deposited[node] || endHeld(node); }
   /// Its number in the system; less than 0: it lies on the floor and moves with that.
   int inSystem(int node) const { return node < first_ ? -1 : node - first_ + offset_; }
@@ -83,7 +93,10 @@ private:
   EndLoad endLoad(int end) const;
   double fedVolume(double h) const { return flow_speed_ * model->nozzleArea() * h; }
   /// Volume of an edge with what flows in during the substep.
-  double volume(int j, double h) const { return work.volume[j] + (j + 2 == work.nodes() && work.ends[1].held ? fedVolume(h) : 0.0); }
+  double volume(int j, double h) const
+  {
+    return work.volume[j] + (j + 2 == work.nodes() && work.ends[1].held ? fedVolume(h) : 0.0);
+  }
   /// Both its nodes lie on the floor: it moves as a solid.
   bool isSolid(int j) const { return work.deposited[j] && work.deposited[j + 1]; }
   /// Where a held end goes on this substep.
@@ -100,4 +113,4 @@ private:
   int first_ = 0, offset_ = 0;           ///< the oldest active node, and its number in the system
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -8,9 +8,9 @@
 
 namespace slender {
 
-/// Sets the configuration from which the step's strains are measured. It is the present one, except at the nozzle. There
-/// the fluid moves on like a solid plug while the nozzle stands, so the last edge is longer by what flows out, and it is
-/// less turned against the nozzle. Returns false if the thread is folded.
+/// Sets the configuration from which the step's strains are measured. It is the present one, except at the nozzle.
+/// There the fluid moves on like a solid plug while the nozzle stands, so the last edge is longer by what flows out,
+/// and it is less turned against the nozzle. Returns false if the thread is folded.
 bool ThreadStepper::Impl::loadSystem(double h)
 {
   const int n = work.nodes();
@@ -56,8 +56,9 @@ bool ThreadStepper::Impl::loadSystem(double h)
   return system.takeRestStrains().min_chi > kFoldedChi;
 }
 
-/// The part of an edge that is not yet below the floor: on a roll that draws the thread down, the edge between the last node taken up and
-/// the first one above stretches only there. So a node stiffens gradually as it comes down, and results do not jump when it arrives.
+/// The part of an edge that is not yet below the floor: on a roll that draws the thread down, the edge between the last
+/// node taken up and the first one above stretches only there. So a node stiffens gradually as it comes down, and
+/// results do not jump when it arrives.
 double ThreadStepper::Impl::deformingShare(int j) const
 {
   constexpr double kLeast = 1e-3;
@@ -93,13 +94,15 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
         length_after = share * length;
         volume_after *= share;
         radius_after = std::sqrt(area / M_PI);
-        system.setSpin(k, 0.5 * model->density * volume_after * radius_after * radius_after / (h * h), h * work.spin[i]);
+        system.setSpin(k, 0.5 * model->density * volume_after * radius_after * radius_after / (h * h),
+                       h * work.spin[i]);
       }
     }
     const bool has_joint = (i > first_ || offset_) && (i + 1 < n || work.ends[1].held);
     if (has_joint && length_before + length_after > 0)
     {
-      const double r = length_before > 0 && length_after > 0 ? 0.5 * (radius_before + radius_after) : std::max(radius_before, radius_after);
+      const double r = length_before > 0 && length_after > 0 ? 0.5 * (radius_before + radius_after)
+                                                             : std::max(radius_before, radius_after);
       const double r4 = M_PI * r * r * r * r / (0.5 * (length_before + length_after));
       system.setJoint(k, 0.75 * mu * r4 / h, 0.5 * mu * r4 / h);
     }
@@ -157,7 +160,8 @@ StepFailure ThreadStepper::Impl::solve(double h, StepReport& report)
       return result.failure;
     report.residual = result.residual;
     report.max_strain = std::max(report.max_strain, result.max_strain);
-  } while (land(h));
+  }
+  while (land(h));
   return StepFailure::none;
 }
 
@@ -347,11 +351,13 @@ double ThreadStepper::Impl::longestEdge(int j) const
   if (!model->floor.present || limits.edge_grading == 0.0)
     return limits.max_edge_length;
   const double above = 0.5 * (work.x[j].z() + work.x[j + 1].z()) - model->floor.height;
-  return std::max(limits.max_edge_length, std::min(limits.highest_edge_length, limits.max_edge_length + limits.edge_grading * above));
+  return std::max(limits.max_edge_length,
+                  std::min(limits.highest_edge_length, limits.max_edge_length + limits.edge_grading * above));
 }
 
-/// A drop that hangs from a fine nozzle is some capillary lengths wide, whatever the nozzle; all else is not much wider than the nozzle. An
-/// edge of a thread that is wider, and wider than it is long, is fluid that piles up between two nodes which cannot move.
+/// A drop that hangs from a fine nozzle is some capillary lengths wide, whatever the nozzle; all else is not much wider
+/// than the nozzle. An edge of a thread that is wider, and wider than it is long, is fluid that piles up between two
+/// nodes which cannot move.
 int ThreadStepper::Impl::overgrownEdge() const
 {
   constexpr double kWider = 5.0;
@@ -360,7 +366,8 @@ int ThreadStepper::Impl::overgrownEdge() const
   const double gravity = inputs_->gravity.norm();
   if (model->surface_tension > 0.0 && gravity == 0.0)
     return -1;
-  const double capillary = model->surface_tension > 0.0 ? std::sqrt(model->surface_tension / (model->density * gravity)) : 0.0;
+  const double capillary =
+      model->surface_tension > 0.0 ? std::sqrt(model->surface_tension / (model->density * gravity)) : 0.0;
   const double allowed = kWider * std::max(0.5 * model->nozzle_diameter, capillary);
   for (int j = first_; j < work.edges(); ++j)
     if (!isSolid(j))
@@ -384,7 +391,8 @@ bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
   if (at_nozzle)
   {
     // the edge at the nozzle grows from half a feed length to one and a half
-    for (double length = work.edge(work.edges() - 1).norm(); length >= 1.5 * feed; length = work.edge(work.edges() - 1).norm())
+    for (double length = work.edge(work.edges() - 1).norm(); length >= 1.5 * feed;
+         length = work.edge(work.edges() - 1).norm())
       split(work.edges() - 1, feed / length, guard);
     if (work.edges() > 1 && !work.deposited[work.nodes() - 2] && work.edge(work.edges() - 1).norm() < 0.2 * feed &&
         mayRemove(work, work.nodes() - 2, guard))
@@ -418,4 +426,4 @@ bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

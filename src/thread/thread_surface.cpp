@@ -34,7 +34,8 @@ double ThreadSystem::addSurface(bool with_hessian)
 void ThreadSystem::addEdgePair(int i, const LengthFunction& f, bool with_hessian)
 {
   const int n = a_.nodes;
-  const Eigen::Vector3d s = i > 0 ? get(a_.t, i - 1) : Eigen::Vector3d::Zero(), t = i + 1 < n ? get(a_.t, i) : Eigen::Vector3d::Zero();
+  const Eigen::Vector3d s = i > 0 ? get(a_.t, i - 1) : Eigen::Vector3d::Zero(),
+                        t = i + 1 < n ? get(a_.t, i) : Eigen::Vector3d::Zero();
   const Eigen::Vector3d g1 = gamma_ * f.d1 * s, g2 = gamma_ * f.d2 * t;
   const auto gradient = [&](int node) { return Eigen::Map<Eigen::Vector3d>(gradient_.data() + 4 * node); };
   gradient(i) += g1 - g2;
@@ -46,17 +47,21 @@ void ThreadSystem::addEdgePair(int i, const LengthFunction& f, bool with_hessian
     return;
 
   const auto own = [&](double second, double first, const Eigen::Vector3d& u, double inverse) {
-    return Eigen::Matrix3d(gamma_ * (second * u * u.transpose() + first * inverse * (Eigen::Matrix3d::Identity() - u * u.transpose())));
+    return Eigen::Matrix3d(
+        gamma_ * (second * u * u.transpose() + first * inverse * (Eigen::Matrix3d::Identity() - u * u.transpose())));
   };
-  const Eigen::Matrix3d h11 = i > 0 ? own(f.d11, f.d1, s, a_.inverse_length[i - 1]) : Eigen::Matrix3d(Eigen::Matrix3d::Zero());
-  const Eigen::Matrix3d h22 = i + 1 < n ? own(f.d22, f.d2, t, a_.inverse_length[i]) : Eigen::Matrix3d(Eigen::Matrix3d::Zero());
+  const Eigen::Matrix3d h11 =
+      i > 0 ? own(f.d11, f.d1, s, a_.inverse_length[i - 1]) : Eigen::Matrix3d(Eigen::Matrix3d::Zero());
+  const Eigen::Matrix3d h22 =
+      i + 1 < n ? own(f.d22, f.d2, t, a_.inverse_length[i]) : Eigen::Matrix3d(Eigen::Matrix3d::Zero());
   const Eigen::Matrix3d h12 = gamma_ * f.d12 * s * t.transpose();
   const auto diagonal = [&](int node, const Eigen::Matrix3d& h) {
     for (int c = 0; c < 3; ++c)
       for (int r = c; r < 3; ++r)
         matrix_.panels()[node].diag[c][r] += h(r, c);
   };
-  const auto below = [&](int node, int blocks, const Eigen::Matrix3d& h) {   // h: rows at `node`, columns `blocks` further on
+  // h: rows at `node`, columns `blocks` further on
+  const auto below = [&](int node, int blocks, const Eigen::Matrix3d& h) {
     for (int c = 0; c < 3; ++c)
       for (int r = 0; r < 3; ++r)
         matrix_.panels()[node].below[c][4 * (blocks - 1) + r] += h(c, r);
@@ -76,4 +81,4 @@ void ThreadSystem::addEdgePair(int i, const LengthFunction& f, bool with_hessian
     below(i - 1, 2, -h12);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -19,9 +19,26 @@ void ThreadSystem::allocate(int capacity)
   for (int k = 0; k < 3; ++k)
     for (double** p : {&a_.x[k], &a_.base_t[k], &a_.base_d1[k], &a_.t[k], &a_.d1[k], &a_.target[k], &a_.force[k]})
       array(*p);
-  for (double** p : {&a_.turn, &a_.base_twist, &a_.twist, &a_.strain, &a_.kappa1, &a_.kappa2, &a_.stretch, &a_.rest_strain, &a_.b11, &a_.b12,
-                     &a_.b22, &a_.beta, &a_.rest_kappa1, &a_.rest_kappa2, &a_.rest_twist, &a_.weight, &a_.theta_diagonal, &a_.theta_off,
-                     &a_.inverse_length, &a_.inverse_rest_length})
+  for (double** p : {&a_.turn,
+                     &a_.base_twist,
+                     &a_.twist,
+                     &a_.strain,
+                     &a_.kappa1,
+                     &a_.kappa2,
+                     &a_.stretch,
+                     &a_.rest_strain,
+                     &a_.b11,
+                     &a_.b12,
+                     &a_.b22,
+                     &a_.beta,
+                     &a_.rest_kappa1,
+                     &a_.rest_kappa2,
+                     &a_.rest_twist,
+                     &a_.weight,
+                     &a_.theta_diagonal,
+                     &a_.theta_off,
+                     &a_.inverse_length,
+                     &a_.inverse_rest_length})
     array(*p);
   for (auto* v : {&gradient_, &reactions_, &direction_, &reduced_})
     v->resize(4 * capacity);
@@ -46,8 +63,9 @@ void ThreadSystem::resize(int nodes)
   a_.closed = false;
   matrix_.resize(nodes);
   const auto clear = [&](double* p, double value) { std::fill(p - kHalo, p + nodes + kHalo, value); };
-  for (double* p : {a_.turn, a_.base_twist, a_.twist, a_.strain, a_.stretch, a_.rest_strain, a_.b11, a_.b12, a_.b22, a_.beta, a_.rest_kappa1,
-                    a_.rest_kappa2, a_.rest_twist, a_.weight, a_.force[0], a_.force[1], a_.force[2], a_.target[0], a_.target[1], a_.target[2]})
+  for (double* p : {a_.turn,     a_.base_twist, a_.twist,    a_.strain,      a_.stretch,     a_.rest_strain, a_.b11,
+                    a_.b12,      a_.b22,        a_.beta,     a_.rest_kappa1, a_.rest_kappa2, a_.rest_twist,  a_.weight,
+                    a_.force[0], a_.force[1],   a_.force[2], a_.target[0],   a_.target[1],   a_.target[2]})
     clear(p, 0.0);
   clear(a_.inverse_length, 1.0);
   clear(a_.inverse_rest_length, 1.0);
@@ -123,7 +141,8 @@ RodEvaluation ThreadSystem::evaluateWhole(bool with_hessian)
   const RodKernels& kernels = rodKernels();
   RodSweep sweep;
   kernels.begin(a_, sweep);
-  kernels.advance[static_cast<int>(Curvature::tangent)](a_, sweep, with_hessian ? matrix_.panels() : nullptr, 0, a_.nodes);
+  kernels.advance[static_cast<int>(Curvature::tangent)](a_, sweep, with_hessian ? matrix_.panels() : nullptr, 0,
+                                                        a_.nodes);
   RodEvaluation result = kernels.end(sweep);
   if (gamma_ != 0.0)
     result.stretch += addSurface(with_hessian);
@@ -346,4 +365,4 @@ double ThreadSystem::noiseLevel() const
   return 4.0 * std::numeric_limits<double>::epsilon() * max_modulus_ * extent / min_rest_length_;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -24,7 +24,7 @@ public:
   std::vector<std::vector<std::unique_ptr<ThreadStepper::Impl>>> pool;   ///< per thread of the model and part of it
   std::vector<ThreadContact::Thread> threads;
   std::vector<ThreadPart> parts;
-  std::vector<ThreadInputs> still;                                       ///< inputs without flow
+  std::vector<ThreadInputs> still;   ///< inputs without flow
   std::vector<Eigen::Vector3d> belts;
   std::vector<std::array<EndLoad, 2>> loads;
   TouchingState work;
@@ -46,15 +46,16 @@ public:
   }
   std::string meeting;   ///< what touches, by the last clearance()
 
-  /// An end that is held cannot give way. Returns false, and fills the report, when an obstacle comes nearer to one than the thread is thick: no
-  /// shorter step helps then.
+  /// An end that is held cannot give way. Returns false, and fills the report, when an obstacle comes nearer to one
+  /// than the thread is thick: no shorter step helps then.
   bool endsHaveRoom(const TouchingState& state, const TouchingInputs& inputs, StepReport& report) const
   {
     for (std::size_t k = 0; k < state.threads.size(); ++k)
       for (const ThreadState& thread : state.threads[k].threads)
         for (int end = 0; end < 2 && model.touches[k].solids; ++end)
         {
-          const Eigen::Vector3d from = end ? thread.x.back() : thread.x.front(), to = inputs.threads[k].ends[end].position;
+          const Eigen::Vector3d from = end ? thread.x.back() : thread.x.front(),
+                                to = inputs.threads[k].ends[end].position;
           const double radius = thread.radius(end ? thread.edges() - 1 : 0);
           for (std::size_t o = 0; thread.ends[end].held && o < state.obstacles.size(); ++o)
           {
@@ -66,9 +67,10 @@ public:
               continue;
             report.ok = false;
             report.failure = StepFailure::squeezed;
-            report.message = "obstacle '" + obstacle.name + "' comes within " + std::to_string(1e3 * room) + " mm of the " +
-                             (end && model.threads[k]->nozzle_diameter > 0 ? "nozzle" : "held end") + " of thread '" + model.threads[k]->name +
-                             "', which is " + std::to_string(1e3 * radius) + " mm in radius there: keep them further apart";
+            report.message = "obstacle '" + obstacle.name + "' comes within " + std::to_string(1e3 * room) +
+                             " mm of the " + (end && model.threads[k]->nozzle_diameter > 0 ? "nozzle" : "held end") +
+                             " of thread '" + model.threads[k]->name + "', which is " + std::to_string(1e3 * radius) +
+                             " mm in radius there: keep them further apart";
             return false;
           }
         }
@@ -81,15 +83,17 @@ namespace {
 TouchingModel checked(TouchingModel model)
 {
   if (model.threads.empty() || model.threads.size() != model.touches.size())
-    throw std::invalid_argument("touching threads: " + std::to_string(model.threads.size()) + " threads with contact properties of " +
-                                std::to_string(model.touches.size()) + "; there must be one each");
+    throw std::invalid_argument("touching threads: " + std::to_string(model.threads.size()) +
+                                " threads with contact properties of " + std::to_string(model.touches.size()) +
+                                "; there must be one each");
   for (std::size_t k = 0; k < model.threads.size(); ++k)
   {
     checkThreadModel(*model.threads[k]);
     const ThreadTouch& touch = model.touches[k];
     const auto check = [&](bool good, const char* what, double value, const char* range) {
       if (!good)
-        throw std::invalid_argument("thread '" + model.threads[k]->name + "': " + what + " is " + std::to_string(value) + ", allowed: " + range);
+        throw std::invalid_argument("thread '" + model.threads[k]->name + "': " + what + " is " +
+                                    std::to_string(value) + ", allowed: " + range);
     };
     check(touch.friction >= 0.0 && std::isfinite(touch.friction), "friction", touch.friction, "zero or more");
     check(touch.merging >= 0.0 && touch.merging < 1.0, "merging", touch.merging, "zero to 1 (exclusive)");
@@ -112,7 +116,7 @@ void renumber(std::vector<ThreadState>& threads, std::uint64_t before)
   }
 }
 
-}  // namespace
+}   // namespace
 
 TouchingThreads::TouchingThreads(TouchingModel model, const NewtonConfig& newton)
   : impl_(std::make_unique<Impl>(checked(std::move(model)), newton))
@@ -126,17 +130,22 @@ StepReport TouchingThreads::step(TouchingState& state, const TouchingInputs& inp
   Impl& m = *impl_;
   StepReport report;
   const std::size_t count = m.model.threads.size(), obstacles = m.model.obstacles.size();
-  const auto sound = [](const Pose& X) { return X.position.allFinite() && std::abs(X.orientation.norm() - 1.0) < 1e-3; };
-  const bool fits = state.threads.size() == count && inputs.threads.size() == count && state.obstacles.size() == obstacles &&
-                    inputs.obstacles.size() == obstacles &&
-                    std::none_of(state.threads.begin(), state.threads.end(), [](const ThreadGroupState& g) { return g.threads.empty(); });
+  const auto sound = [](const Pose& X) {
+    return X.position.allFinite() && std::abs(X.orientation.norm() - 1.0) < 1e-3;
+  };
+  const bool fits = state.threads.size() == count && inputs.threads.size() == count &&
+                    state.obstacles.size() == obstacles && inputs.obstacles.size() == obstacles &&
+                    std::none_of(state.threads.begin(), state.threads.end(),
+                                 [](const ThreadGroupState& g) { return g.threads.empty(); });
   if (!fits || !std::all_of(inputs.obstacles.begin(), inputs.obstacles.end(), sound) ||
-      !std::all_of(inputs.threads.begin(), inputs.threads.end(), [](const ThreadInputs& in) { return in.belt_velocity.allFinite(); }))
+      !std::all_of(inputs.threads.begin(), inputs.threads.end(),
+                   [](const ThreadInputs& in) { return in.belt_velocity.allFinite(); }))
   {
     report.ok = false;
     report.failure = StepFailure::input_not_finite;
-    report.message = fits ? "the pose of an obstacle or a belt's velocity is not finite or not valid; correct this input"
-                          : "the number of threads or obstacles is not that of the model; correct this input";
+    report.message = fits
+                         ? "the pose of an obstacle or a belt's velocity is not finite or not valid; correct this input"
+                         : "the number of threads or obstacles is not that of the model; correct this input";
     return report;
   }
   if (!m.endsHaveRoom(state, inputs, report))
@@ -202,4 +211,4 @@ const std::array<EndLoad, 2>& TouchingThreads::endLoads(int thread) const { retu
 const std::vector<ContactTerm>& TouchingThreads::contacts() const { return impl_->contact.terms(); }
 const TouchingModel& TouchingThreads::model() const { return impl_->model; }
 
-}  // namespace slender
+}   // namespace slender

@@ -45,8 +45,9 @@ inline int parseCount(const std::string& option, const std::string& text, int lo
 {
   double value = 0.0;
   if (!parseNumber(text, value) || value != std::floor(value) || value < low || value > high)
-    throw BadInput(option + " " + text + ": must be a whole number in [" + std::to_string(low) + ", " + std::to_string(high) + "]");
+    throw BadInput(option + " " + text + ": must be a whole number in [" + std::to_string(low) + ", " +
+                   std::to_string(high) + "]");
   return static_cast<int>(value);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -23,15 +23,17 @@ using slender::ObjectMesh;
 
 const char* const name = "bag_to_video";
 const char* const usage =
-  "usage: bag_to_video BAG --out FILE.mp4|FILE.gif [options]\n"
-  "  --fps N          frames per second of the video (default: mp4 25, gif 12.5)\n"
-  "  --speed X        recorded seconds per second of the video (default 1)\n"
-  "  --size WxH       of the picture in pixels, even numbers (default: mp4 1280x720, gif 640x360)\n"
-  "  --from X,Y,Z     direction from what is seen to the eye (default 0.55,-1,0.45); the distance is such that all recorded motion is seen\n"
-  "  --namespace NS   of the recorded topics, e.g. /rod_node; needed for a bag of several nodes\n"
-  "  --scene-dir DIR  where the files lie that the recorded scene names (default: here); needed for bodies, obstacles, nozzles and floors\n"
-  "  --quiet          print nothing but errors\n"
-  "Exit status: 0 done, 2 bad input, 3 failed.\n";
+    "usage: bag_to_video BAG --out FILE.mp4|FILE.gif [options]\n"
+    "  --fps N          frames per second of the video (default: mp4 25, gif 12.5)\n"
+    "  --speed X        recorded seconds per second of the video (default 1)\n"
+    "  --size WxH       of the picture in pixels, even numbers (default: mp4 1280x720, gif 640x360)\n"
+    "  --from X,Y,Z     direction from what is seen to the eye (default 0.55,-1,0.45); the distance is such that all "
+    "recorded motion is seen\n"
+    "  --namespace NS   of the recorded topics, e.g. /rod_node; needed for a bag of several nodes\n"
+    "  --scene-dir DIR  where the files lie that the recorded scene names (default: here); needed for bodies, "
+    "obstacles, nozzles and floors\n"
+    "  --quiet          print nothing but errors\n"
+    "Exit status: 0 done, 2 bad input, 3 failed.\n";
 
 struct VideoOptions
 {
@@ -56,9 +58,14 @@ public:
       throw BadInput("ffmpeg is not installed; it joins the pictures: apt install ffmpeg");
     std::signal(SIGPIPE, SIG_IGN);   // told by fwrite
     char input[200];
-    std::snprintf(input, sizeof input, "ffmpeg -y -loglevel error -f rawvideo -pixel_format rgb24 -video_size %dx%d -framerate %.9g -i - ", width, height, fps);
-    const std::string output = gif ? "-filter_complex 'split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4' -f gif "
-                                   : "-sws_flags fast_bilinear -c:v libx264 -preset veryfast -crf 18 -pix_fmt yuv420p -movflags +faststart -f mp4 ";
+    std::snprintf(input, sizeof input,
+                  "ffmpeg -y -loglevel error -f rawvideo -pixel_format rgb24 -video_size %dx%d -framerate %.9g -i - ",
+                  width, height, fps);
+    const std::string output =
+        gif ? "-filter_complex "
+              "'split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4' -f gif "
+            : "-sws_flags fast_bilinear -c:v libx264 -preset veryfast -crf 18 -pix_fmt yuv420p -movflags +faststart -f "
+              "mp4 ";
     pipe_ = popen((input + output + slender::shellWord(file)).c_str(), "w");
     if (!pipe_)
       throw std::runtime_error(std::string("ffmpeg cannot be started: ") + std::strerror(errno));
@@ -78,14 +85,16 @@ public:
   {
     const int status = pclose(pipe_);
     pipe_ = nullptr;
-    if (status != 0 || slender::picturesIn(file_) != pictures_)   // the status does not tell when the end of the file could not be written
+    if (status != 0 || slender::picturesIn(file_) !=
+                           pictures_)   // the status does not tell when the end of the file could not be written
       fail();
   }
 
 private:
   [[noreturn]] void fail() const
   {
-    throw std::runtime_error(std::string("ffmpeg failed to write the ") + (gif_ ? "gif" : "mp4") + "; its message is above (is there room on the disk?)");
+    throw std::runtime_error(std::string("ffmpeg failed to write the ") + (gif_ ? "gif" : "mp4") +
+                             "; its message is above (is there room on the disk?)");
   }
 
   std::string file_;
@@ -152,7 +161,8 @@ void run(const slender::ExportOptions& options, const VideoOptions& video)
   slender::PicturePainter painter(view);
   const double fps = video.fps.value_or(gif ? 12.5 : 25.0);
   if (gif && fps > 50)
-    throw BadInput("--fps " + std::to_string(fps) + ": a gif counts in hundredths of a second and has at most 50 pictures per second");
+    throw BadInput("--fps " + std::to_string(fps) +
+                   ": a gif counts in hundredths of a second and has at most 50 pictures per second");
   slender::Staged file(slender::Staged::Kind::file, options.out);
   Ffmpeg ffmpeg(file.part(), gif, fps, view.width, view.height);
 
@@ -160,7 +170,9 @@ void run(const slender::ExportOptions& options, const VideoOptions& video)
   const std::vector<std::uint8_t>* picture = nullptr;   // of `last`
   const auto seen = [&](const slender::SceneSnapshot& instant) {
     std::vector<slender::ObjectMesh> objects = slender::objectMeshes(instant, bag.scene(), resolution);
-    const auto add = [&objects](std::vector<slender::ObjectMesh> more) { std::move(more.begin(), more.end(), std::back_inserter(objects)); };
+    const auto add = [&objects](std::vector<slender::ObjectMesh> more) {
+      std::move(more.begin(), more.end(), std::back_inserter(objects));
+    };
     add(slender::holderMeshes(instant, bag.scene()));
     if (bag.scene())
       add(slender::planeMeshes(instant, *bag.scene(), view.box, view.ground));
@@ -187,34 +199,40 @@ void run(const slender::ExportOptions& options, const VideoOptions& video)
   file.keep();
 }
 
-}  // namespace
+}   // namespace
 
 int main(int argc, char** argv)
 {
   VideoOptions video;
   const std::map<std::string, slender::OptionTaker> own = {
-    {"--fps", [&](const std::string& option, const std::string& value) { video.fps = slender::parsePositive(option, value, 1000); }},
-    {"--speed", [&](const std::string& option, const std::string& value) { video.speed = slender::parsePositive(option, value, 1e6); }},
-    {"--size", [&](const std::string& option, const std::string& value) {
-       const auto x = value.find('x');
-       if (x == std::string::npos)
-         throw BadInput(option + " " + value + ": must be like 1280x720");
-       video.size = {slender::parseCount(option, value.substr(0, x), 16, 4096), slender::parseCount(option, value.substr(x + 1), 16, 4096)};
-       if (video.size->first % 2 || video.size->second % 2)
-         throw BadInput(option + " " + value + ": must be even numbers, which videos need");
-     }},
-    {"--from", [&](const std::string& option, const std::string& value) {
-       std::size_t at = 0;
-       for (int k = 0; k < 3; ++k)
-       {
-         const std::size_t comma = k < 2 ? value.find(',', at) : value.size();
-         if (comma == std::string::npos || !slender::parseNumber(value.substr(at, comma - at), video.from[k]))
-           throw BadInput(option + " " + value + ": must be three numbers like 1,-1,0.5");
-         at = comma + 1;
-       }
-       if (!(video.from.norm() > 1e-9))
-         throw BadInput(option + " " + value + ": must not be zero");
-     }},
+      {"--fps", [&](const std::string& option,
+                    const std::string& value) { video.fps = slender::parsePositive(option, value, 1000); }},
+      {"--speed", [&](const std::string& option,
+                      const std::string& value) { video.speed = slender::parsePositive(option, value, 1e6); }},
+      {"--size",
+       [&](const std::string& option, const std::string& value) {
+         const auto x = value.find('x');
+         if (x == std::string::npos)
+           throw BadInput(option + " " + value + ": must be like 1280x720");
+         video.size = {slender::parseCount(option, value.substr(0, x), 16, 4096),
+                       slender::parseCount(option, value.substr(x + 1), 16, 4096)};
+         if (video.size->first % 2 || video.size->second % 2)
+           throw BadInput(option + " " + value + ": must be even numbers, which videos need");
+       }},
+      {"--from",
+       [&](const std::string& option, const std::string& value) {
+         std::size_t at = 0;
+         for (int k = 0; k < 3; ++k)
+         {
+           const std::size_t comma = k < 2 ? value.find(',', at) : value.size();
+           if (comma == std::string::npos || !slender::parseNumber(value.substr(at, comma - at), video.from[k]))
+             throw BadInput(option + " " + value + ": must be three numbers like 1,-1,0.5");
+           at = comma + 1;
+         }
+         if (!(video.from.norm() > 1e-9))
+           throw BadInput(option + " " + value + ": must not be zero");
+       }},
   };
-  return slender::exportProgram(name, usage, argc, argv, own, [&](const slender::ExportOptions& options) { run(options, video); });
+  return slender::exportProgram(name, usage, argc, argv, own,
+                                [&](const slender::ExportOptions& options) { run(options, video); });
 }

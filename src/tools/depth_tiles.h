@@ -9,15 +9,18 @@
 
 namespace slender {
 
-/// A picture of numbers of which the largest counts, for example of what is nearest. It knows which of its tiles were drawn on: the others need no
-/// clearing, and nobody needs to look at them.
+/// A picture of numbers of which the largest counts, for example of what is nearest. It knows which of its tiles were
+/// drawn on: the others need no clearing, and nobody needs to look at them.
 class DepthTiles
 {
 public:
   static constexpr int kTile = 16;   ///< cells along a side
 
   DepthTiles(int width, int height, float nothing)
-    : width_(width), height_(height), across_((width + kTile - 1) / kTile), nothing_(nothing),
+    : width_(width),
+      height_(height),
+      across_((width + kTile - 1) / kTile),
+      nothing_(nothing),
       cells_(static_cast<std::size_t>(width) * height, nothing),
       drawn_(static_cast<std::size_t>(across_) * ((height + kTile - 1) / kTile), 0)
   {
@@ -35,8 +38,9 @@ public:
     list_.clear();
   }
 
-  /// Calls span(row, first, end, value, slope) for the cells of columns first..end-1 whose middles lie in a triangle. Its corners are (column, row, number);
-  /// `value` is the number at the first of these cells, and grows by `slope` from column to column.
+  /// Calls span(row, first, end, value, slope) for the cells of columns first..end-1 whose middles lie in a triangle.
+  /// Its corners are (column, row, number); `value` is the number at the first of these cells, and grows by `slope`
+  /// from column to column.
   template <class Span>
   void fill(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, const Eigen::Vector3d& p2, const Span& span)
   {
@@ -44,7 +48,9 @@ public:
     const double area = u.x() * v.y() - u.y() * v.x();
     if (!(std::abs(area) > 1e-12))
       return;
-    const auto bound = [](double x, int high) { return static_cast<int>(std::clamp(x, 0.0, static_cast<double>(high))); };
+    const auto bound = [](double x, int high) {
+      return static_cast<int>(std::clamp(x, 0.0, static_cast<double>(high)));
+    };
     const int left = bound(std::ceil(std::min({p0.x(), p1.x(), p2.x()}) - 0.5), width_);
     const int right = bound(std::floor(std::max({p0.x(), p1.x(), p2.x()}) - 0.5) + 1, width_);
     const int top = bound(std::ceil(std::min({p0.y(), p1.y(), p2.y()}) - 0.5), height_);
@@ -67,7 +73,8 @@ public:
         continue;
       const int first = static_cast<int>(std::ceil(low)), end = static_cast<int>(std::floor(high)) + 1;
       if (first < end)
-        span(row, left + first, left + end, static_cast<float>(p0.z() + b * u.z() + c * v.z() + first * slope), static_cast<float>(slope));
+        span(row, left + first, left + end, static_cast<float>(p0.z() + b * u.z() + c * v.z() + first * slope),
+             static_cast<float>(slope));
     }
   }
 
@@ -82,7 +89,8 @@ public:
   /// Whether the tile of a cell was drawn on; a cell outside counts as empty.
   bool isDrawn(int column, int row) const
   {
-    return column >= 0 && row >= 0 && column < width_ && row < height_ && drawn_[static_cast<std::size_t>(row / kTile) * across_ + column / kTile];
+    return column >= 0 && row >= 0 && column < width_ && row < height_ &&
+           drawn_[static_cast<std::size_t>(row / kTile) * across_ + column / kTile];
   }
 
 private:
@@ -116,4 +124,4 @@ private:
   std::vector<int> list_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -13,8 +13,8 @@ namespace slender {
 
 namespace fs = std::filesystem;
 
-int exportProgram(const std::string& name, const std::string& usage, int argc, char** argv, const std::map<std::string, OptionTaker>& own,
-                  const std::function<void(const ExportOptions&)>& run)
+int exportProgram(const std::string& name, const std::string& usage, int argc, char** argv,
+                  const std::map<std::string, OptionTaker>& own, const std::function<void(const ExportOptions&)>& run)
 {
   constexpr int exit_done = 0, exit_bad_input = 2, exit_failed = 3;
   ExportOptions options;
@@ -81,12 +81,13 @@ BagReader openBag(const std::string& program, const ExportOptions& options, cons
 {
   BagReader bag(options.bag, options.topic_namespace, options.scene_folder);
   if (!bag.scene() && !options.quiet)
-    std::fprintf(stderr, "%s: %s without the recorded scene (--scene-dir: where the files lie that it names): %s\n", program.c_str(),
-                 loses.c_str(), bag.sceneProblem().c_str());
+    std::fprintf(stderr, "%s: %s without the recorded scene (--scene-dir: where the files lie that it names): %s\n",
+                 program.c_str(), loses.c_str(), bag.sceneProblem().c_str());
   return bag;
 }
 
-void eachInstant(const std::string& program, const ExportOptions& options, BagReader& bag, const std::function<void(const SceneSnapshot&)>& use)
+void eachInstant(const std::string& program, const ExportOptions& options, BagReader& bag,
+                 const std::function<void(const SceneSnapshot&)>& use)
 {
   std::optional<Progress> progress;
   if (!options.quiet)
@@ -160,4 +161,4 @@ void Staged::keep()
   kept_ = true;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -18,16 +18,17 @@ struct ExportOptions
 /// Takes the value of an option of one program; throws BadInput.
 using OptionTaker = std::function<void(const std::string& option, const std::string& value)>;
 
-/// Parses `BAG --out PATH [--namespace NS] [--scene-dir DIR] [--quiet]` and a program's own options, and runs it. Its exit status: 0 done,
-/// 2 bad input (BadInput, BagError), 3 another failure.
-int exportProgram(const std::string& name, const std::string& usage, int argc, char** argv, const std::map<std::string, OptionTaker>& own,
-                  const std::function<void(const ExportOptions&)>& run);
+/// Parses `BAG --out PATH [--namespace NS] [--scene-dir DIR] [--quiet]` and a program's own options, and runs it. Its
+/// exit status: 0 done, 2 bad input (BadInput, BagError), 3 another failure.
+int exportProgram(const std::string& name, const std::string& usage, int argc, char** argv,
+                  const std::map<std::string, OptionTaker>& own, const std::function<void(const ExportOptions&)>& run);
 
 /// Opens the bag, and says on stderr when its scene cannot be read, and that `loses` then.
 BagReader openBag(const std::string& program, const ExportOptions& options, const std::string& loses);
 
 /// Goes through the bag with progress on stderr, and warns there when steps are missing.
-void eachInstant(const std::string& program, const ExportOptions& options, BagReader& bag, const std::function<void(const SceneSnapshot&)>& use);
+void eachInstant(const std::string& program, const ExportOptions& options, BagReader& bag,
+                 const std::function<void(const SceneSnapshot&)>& use);
 
 /// Which instants become frames: all (fps 0), or the first at or after each 1/fps seconds.
 class FrameChoice
@@ -41,11 +42,16 @@ private:
   long next_ = 0;
 };
 
-/// A folder or file that has its name only once it is complete: until keep() it is PATH.part, and is removed without it.
+/// A folder or file that has its name only once it is complete: until keep() it is PATH.part, and is removed without
+/// it.
 class Staged
 {
 public:
-  enum class Kind { folder, file };
+  enum class Kind
+  {
+    folder,
+    file
+  };
   /// Throws BadInput when `path` is a folder that is not empty, or cannot be made.
   Staged(Kind kind, std::string path);
   Staged(const Staged&) = delete;
@@ -60,4 +66,4 @@ private:
   bool kept_ = false;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -11,7 +11,8 @@
 #include "slender_sim/fairing/fair_mesh.h"
 #include "slender_sim/geometry/mesh_file.h"
 
-/// fair_mesh IN OUT: smooths meshes and closes their holes by Willmore flow. Exit status 0 done, 2 bad input, 3 the fairing failed.
+/// fair_mesh IN OUT: smooths meshes and closes their holes by Willmore flow. Exit status 0 done, 2 bad input, 3 the
+/// fairing failed.
 namespace {
 
 using slender::BadInput, slender::parseCount, slender::parseNumber, slender::parsePositive;
@@ -20,16 +21,18 @@ using Clock = std::chrono::steady_clock;
 constexpr int exit_done = 0, exit_bad_input = 2, exit_failed = 3;
 
 const char* const usage =
-  "usage: fair_mesh IN OUT [options]\n"
-  "  IN, OUT             meshes, .obj or .ply [m]\n"
-  "  --steps N           steps of the Willmore flow (default: 10; with --fill-holes 0)\n"
-  "  --smoothing L       length [m]: a step halves bumps of wavelength 2 pi L, longer ones less (default: the mean edge length)\n"
-  "  --region X,Y,Z,R    only vertices in this ball move [m]; may be repeated\n"
-  "  --fill-holes        first close the holes by patches that continue the surface around them\n"
-  "  --largest-hole N    leave boundaries of more than N edges open (default: 1000)\n"
-  "  --edge-length L     of the patches [m] (default: that around each hole)\n"
-  "  --quiet             print nothing but errors\n"
-  "A boundary and the vertices next to it keep their places. Exit status: 0 done, 2 bad input, 3 the fairing failed (no OUT then).\n";
+    "usage: fair_mesh IN OUT [options]\n"
+    "  IN, OUT             meshes, .obj or .ply [m]\n"
+    "  --steps N           steps of the Willmore flow (default: 10; with --fill-holes 0)\n"
+    "  --smoothing L       length [m]: a step halves bumps of wavelength 2 pi L, longer ones less (default: the mean "
+    "edge length)\n"
+    "  --region X,Y,Z,R    only vertices in this ball move [m]; may be repeated\n"
+    "  --fill-holes        first close the holes by patches that continue the surface around them\n"
+    "  --largest-hole N    leave boundaries of more than N edges open (default: 1000)\n"
+    "  --edge-length L     of the patches [m] (default: that around each hole)\n"
+    "  --quiet             print nothing but errors\n"
+    "A boundary and the vertices next to it keep their places. Exit status: 0 done, 2 bad input, 3 the fairing failed "
+    "(no OUT then).\n";
 
 struct Options
 {
@@ -46,7 +49,8 @@ slender::FairingOptions::Ball parseBall(const std::string& name, const std::stri
   for (int k = 0; k < 4; ++k)
   {
     const std::size_t comma = text.find(',', begin);
-    if ((comma == std::string::npos) != (k == 3) || !parseNumber(text.substr(begin, comma - begin), numbers[k]) || (k == 3 && !(numbers[3] > 0)))
+    if ((comma == std::string::npos) != (k == 3) || !parseNumber(text.substr(begin, comma - begin), numbers[k]) ||
+        (k == 3 && !(numbers[3] > 0)))
       throw BadInput(name + " " + text + ": must be X,Y,Z,R, the middle and the positive radius of a ball");
     begin = comma + 1;
   }
@@ -107,7 +111,8 @@ public:
     shown_ = true;
     constexpr std::size_t width = 40;
     const std::size_t filled = width * done / total;
-    std::fprintf(stderr, "\r[%s%s] %s %zu of %zu  ", std::string(filled, '#').c_str(), std::string(width - filled, '.').c_str(), what, done, total);
+    std::fprintf(stderr, "\r[%s%s] %s %zu of %zu  ", std::string(filled, '#').c_str(),
+                 std::string(width - filled, '.').c_str(), what, done, total);
   }
 
   void clear()
@@ -132,8 +137,9 @@ int run(const Options& options)
   slender::FairingSummary summary;
   {
     Progress progress(!options.quiet && ::isatty(STDERR_FILENO));
-    summary = slender::fairMesh(mesh, in, options.fairing,
-                                [&progress](const char* what, std::size_t done, std::size_t total) { progress.show(what, done, total); });
+    summary = slender::fairMesh(
+        mesh, in, options.fairing,
+        [&progress](const char* what, std::size_t done, std::size_t total) { progress.show(what, done, total); });
   }
   if (!summary.ok)
   {
@@ -143,17 +149,20 @@ int run(const Options& options)
   slender::writeMesh(out, mesh);
   if (options.quiet)
     return exit_done;
-  std::printf("mesh              %s, %ld vertices, %ld faces\n", out.c_str(), static_cast<long>(mesh.vertices.cols()), static_cast<long>(mesh.triangles.cols()));
+  std::printf("mesh              %s, %ld vertices, %ld faces\n", out.c_str(), static_cast<long>(mesh.vertices.cols()),
+              static_cast<long>(mesh.triangles.cols()));
   if (fills)
-    std::printf("holes             %d closed by %d vertices, %d left open\n", summary.holes, summary.patch_vertices, summary.open_holes);
+    std::printf("holes             %d closed by %d vertices, %d left open\n", summary.holes, summary.patch_vertices,
+                summary.open_holes);
   if (flows)
-    std::printf("steps             %d%s, %d halvings\n1/2 int H^2       %.6g, was %.6g (a sphere has 8 pi = 25.13)\n", summary.steps,
-                summary.stationary ? " (stationary)" : "", summary.cuts, summary.energy, summary.energy_before);
+    std::printf("steps             %d%s, %d halvings\n1/2 int H^2       %.6g, was %.6g (a sphere has 8 pi = 25.13)\n",
+                summary.steps, summary.stationary ? " (stationary)" : "", summary.cuts, summary.energy,
+                summary.energy_before);
   std::printf("wall              %.4g s\n", std::chrono::duration<double>(Clock::now() - start).count());
   return exit_done;
 }
 
-}  // namespace
+}   // namespace
 
 int main(int argc, char** argv)
 {

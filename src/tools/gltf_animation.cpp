@@ -23,7 +23,7 @@ Eigen::Matrix3Xf normalsOf(const Eigen::Matrix3Xf& x, const Eigen::Matrix3Xi& tr
   return vertexNormals({x.cast<double>(), triangles}).cast<float>();
 }
 
-}  // namespace
+}   // namespace
 
 class GltfWriter
 {
@@ -44,7 +44,8 @@ public:
     motion_.name = "recorded";
     for (const auto& [object, parts] : from_.of_object_)
       for (std::size_t k = 0; k < parts.size(); ++k)
-        addPart(from_.parts_[parts[k]], k, parts.size() > 1, k + 1 < parts.size() ? &from_.parts_[parts[k + 1]] : nullptr);
+        addPart(from_.parts_[parts[k]], k, parts.size() > 1,
+                k + 1 < parts.size() ? &from_.parts_[parts[k + 1]] : nullptr);
     if (!motion_.channels.empty())
       model_.animations.push_back(motion_);
   }
@@ -52,7 +53,8 @@ public:
   void write(const std::string& path)
   {
     if (model_.buffers[0].data.size() > std::numeric_limits<std::uint32_t>::max() - (1u << 24))
-      throw std::runtime_error(path + ": would be larger than the 4 GiB of a .glb file; take fewer frames (--fps) or sides (--sides)");
+      throw std::runtime_error(
+          path + ": would be larger than the 4 GiB of a .glb file; take fewer frames (--fps) or sides (--sides)");
     tinygltf::TinyGLTF writer;
     std::ofstream file(path, std::ios::binary);   // the library's own does not tell that a disk is full
     const bool written = file && writer.WriteGltfSceneToStream(&model_, file, false, true);
@@ -88,10 +90,14 @@ private:
 
   int vectors(const Eigen::Matrix3Xf& v, bool bounds)
   {
-    return accessor(v.data(), static_cast<std::size_t>(v.cols()), TINYGLTF_TYPE_VEC3, bounds, TINYGLTF_TARGET_ARRAY_BUFFER);
+    return accessor(v.data(), static_cast<std::size_t>(v.cols()), TINYGLTF_TYPE_VEC3, bounds,
+                    TINYGLTF_TARGET_ARRAY_BUFFER);
   }
 
-  int numbers(const std::vector<float>& v, bool bounds = false) { return accessor(v.data(), v.size(), TINYGLTF_TYPE_SCALAR, bounds); }
+  int numbers(const std::vector<float>& v, bool bounds = false)
+  {
+    return accessor(v.data(), v.size(), TINYGLTF_TYPE_SCALAR, bounds);
+  }
 
   int view(const void* data, std::size_t bytes, int target)
   {
@@ -138,11 +144,13 @@ private:
     const Eigen::Matrix3Xf normals = normalsOf(base, part.triangles);
     primitive.attributes["POSITION"] = vectors(base, true);
     primitive.attributes["NORMAL"] = vectors(normals, false);
-    const bool moves = std::any_of(part.positions.begin(), part.positions.end(), [&](const Eigen::Matrix3Xf& x) { return x != base; });
+    const bool moves =
+        std::any_of(part.positions.begin(), part.positions.end(), [&](const Eigen::Matrix3Xf& x) { return x != base; });
     if (moves)
       for (std::size_t k = 1; k < part.positions.size(); ++k)
-        primitive.targets.push_back({{"POSITION", vectors(part.positions[k] - base, true)},
-                                     {"NORMAL", vectors(normalsOf(part.positions[k], part.triangles) - normals, false)}});
+        primitive.targets.push_back(
+            {{"POSITION", vectors(part.positions[k] - base, true)},
+             {"NORMAL", vectors(normalsOf(part.positions[k], part.triangles) - normals, false)}});
     tinygltf::Mesh mesh;
     mesh.name = part.name + (several ? "." + std::to_string(number) : "");
     mesh.primitives.push_back(primitive);
@@ -176,7 +184,8 @@ private:
   /// Seen from its first frame until its object's next part begins, or has no frame any more: nothing of size zero is.
   void animateVisibility(const GltfAnimation::Part& part, int node, const GltfAnimation::Part* next)
   {
-    const std::size_t first = part.frames.front(), end = next ? next->frames.front() : part.frames.back() + 1, frames = from_.seconds_.size();
+    const std::size_t first = part.frames.front(), end = next ? next->frames.front() : part.frames.back() + 1,
+                      frames = from_.seconds_.size();
     std::vector<float> times, scales;
     const auto key = [&](std::size_t frame, float scale) {
       times.push_back(static_cast<float>(from_.seconds_[frame]));
@@ -189,7 +198,8 @@ private:
     key(first, 1.0f);
     if (end < frames)
       key(end, 0.0f);
-    channel(node, "scale", "STEP", numbers(times, true), accessor(scales.data(), times.size(), TINYGLTF_TYPE_VEC3, false));
+    channel(node, "scale", "STEP", numbers(times, true),
+            accessor(scales.data(), times.size(), TINYGLTF_TYPE_VEC3, false));
     model_.nodes[node].scale.assign(3, first == 0 ? 1.0 : 0.0);
   }
 
@@ -219,7 +229,8 @@ void GltfAnimation::add(double seconds, const std::vector<ObjectMesh>& objects)
   for (const ObjectMesh& object : objects)
   {
     std::vector<std::size_t>& parts = of_object_[{object.kind, object.name}];
-    if (parts.empty() || parts_[parts.back()].key != object.key || parts_[parts.back()].triangles != object.mesh.triangles)
+    if (parts.empty() || parts_[parts.back()].key != object.key ||
+        parts_[parts.back()].triangles != object.mesh.triangles)
     {
       parts.push_back(parts_.size());
       parts_.push_back({object.kind, object.name, object.index, object.key, object.mesh.triangles, {}, {}});
@@ -232,4 +243,4 @@ void GltfAnimation::add(double seconds, const std::vector<ObjectMesh>& objects)
 
 void GltfAnimation::write(const std::string& path) const { GltfWriter(*this).write(path); }
 
-}  // namespace slender
+}   // namespace slender

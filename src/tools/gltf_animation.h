@@ -10,8 +10,9 @@
 
 namespace slender {
 
-/// Moving surfaces as one binary glTF 2.0 file: morph targets whose weights are animated, linear between frames. Where the triangles of an
-/// object change, another mesh takes over, in one step. glTF's y axis is up: a root node turns our z axis there, buffers hold our axes.
+/// Moving surfaces as one binary glTF 2.0 file: morph targets whose weights are animated, linear between frames. Where
+/// the triangles of an object change, another mesh takes over, in one step. glTF's y axis is up: a root node turns our
+/// z axis there, buffers hold our axes.
 class GltfAnimation
 {
 public:
@@ -38,7 +39,8 @@ private:
 
   std::vector<double> seconds_;
   std::vector<Part> parts_;
-  std::map<std::pair<ObjectKind, std::string>, std::vector<std::size_t>> of_object_;   ///< its parts, in the order of time
+  /// its parts, in the order of time
+  std::map<std::pair<ObjectKind, std::string>, std::vector<std::size_t>> of_object_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -25,11 +25,13 @@ ObjectMesh ball(const std::string& name, const Vector3d& at, double diameter)
 template <class Objects>
 auto named(const Objects& objects, const std::string& name)
 {
-  const auto found = std::find_if(objects.begin(), objects.end(), [&name](const auto& object) { return object.name == name; });
+  const auto found =
+      std::find_if(objects.begin(), objects.end(), [&name](const auto& object) { return object.name == name; });
   return found == objects.end() ? nullptr : &*found;
 }
 
-void addRodGrasp(const GraspSnapshot& grasp, const RodSnapshot& rod, const GraspConfig* config, std::vector<ObjectMesh>& out)
+void addRodGrasp(const GraspSnapshot& grasp, const RodSnapshot& rod, const GraspConfig* config,
+                 std::vector<ObjectMesh>& out)
 {
   const Pose& X = grasp.held->X_WG;
   Eigen::Index node = 0;
@@ -45,11 +47,13 @@ void addRodGrasp(const GraspSnapshot& grasp, const RodSnapshot& rod, const Grasp
     out.push_back(placed(ObjectKind::gripper, grasp.name, 0, shapeMesh(Box{{length + width, width, width}}), X));
 }
 
-void addClothGrasp(const GraspSnapshot& grasp, const ClothSnapshot& cloth, const GraspConfig* config, std::vector<ObjectMesh>& out)
+void addClothGrasp(const GraspSnapshot& grasp, const ClothSnapshot& cloth, const GraspConfig* config,
+                   std::vector<ObjectMesh>& out)
 {
   const double area = std::max(1e-12, (cloth.x.rowwise().maxCoeff() - cloth.x.rowwise().minCoeff()).squaredNorm());
   const double diameter = 0.6 * std::sqrt(area / static_cast<double>(cloth.x.cols()));
-  // the bag holds the grasp's frame, which lies in the middle of its vertices: those of the scene, unless a service let it hold others
+  // the bag holds the grasp's frame, which lies in the middle of its vertices: those of the scene, unless a service let
+  // it hold others
   Vector3d middle = Vector3d::Zero();
   if (config)
     for (const int vertex : config->vertices)
@@ -61,8 +65,9 @@ void addClothGrasp(const GraspSnapshot& grasp, const ClothSnapshot& cloth, const
       out.push_back(ball(grasp.name, cloth.x.col(vertex), diameter));
 }
 
-/// Returns the unit vector from the outlet into the nozzle at `time` [s] of the scene. It is opposite to the direction that the scene gives. The poses of
-/// a nozzle that is moved by messages are not among what is recorded of each instant: its newest edge, which runs into it, takes their place.
+/// Returns the unit vector from the outlet into the nozzle at `time` [s] of the scene. It is opposite to the direction
+/// that the scene gives. The poses of a nozzle that is moved by messages are not among what is recorded of each
+/// instant: its newest edge, which runs into it, takes their place.
 Vector3d upstream(const NozzleConfig& nozzle, const ThreadSnapshot& thread, double time)
 {
   if (std::holds_alternative<TopicMotion>(nozzle.motion))
@@ -71,7 +76,7 @@ Vector3d upstream(const NozzleConfig& nozzle, const ThreadSnapshot& thread, doub
   return -((table ? table->poses.evaluate(time) : nozzle.pose).orientation * Vector3d::UnitX());
 }
 
-}  // namespace
+}   // namespace
 
 std::vector<ObjectMesh> holderMeshes(const SceneSnapshot& instant, const SceneConfig* scene)
 {
@@ -99,12 +104,14 @@ std::vector<ObjectMesh> holderMeshes(const SceneSnapshot& instant, const SceneCo
     const double diameter = config->nozzle->diameter, length = 4.0 * diameter;
     const Vector3d along = upstream(*config->nozzle, thread, instant.time);
     out.push_back(placed(ObjectKind::nozzle, thread.name + "_nozzle", 0, shapeMesh(Cylinder{0.7 * diameter, length}),
-                         Pose{thread.x.col(thread.x.cols() - 1) + 0.5 * length * along, Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along)}));
+                         Pose{thread.x.col(thread.x.cols() - 1) + 0.5 * length * along,
+                              Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along)}));
   }
   return out;
 }
 
-std::vector<ObjectMesh> planeMeshes(const SceneSnapshot& instant, const SceneConfig& scene, const Eigen::AlignedBox3d& box, const std::optional<double>& ground)
+std::vector<ObjectMesh> planeMeshes(const SceneSnapshot& instant, const SceneConfig& scene,
+                                    const Eigen::AlignedBox3d& box, const std::optional<double>& ground)
 {
   std::vector<ObjectMesh> out;
   const double h = 0.7 * box.diagonal().norm();
@@ -138,4 +145,4 @@ std::optional<double> groundOf(const SceneConfig* scene)
   return std::nullopt;
 }
 
-}  // namespace slender
+}   // namespace slender

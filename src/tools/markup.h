@@ -13,4 +13,4 @@ inline std::string escaped(const std::string& text)
   return out;
 }
 
-}  // namespace slender
+}   // namespace slender

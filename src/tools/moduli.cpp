@@ -16,7 +16,7 @@ std::string rangeOf(double low, double high)
   return text;
 }
 
-}  // namespace
+}   // namespace
 
 void printModuli(const Simulation& simulation)
 {
@@ -26,20 +26,21 @@ void printModuli(const Simulation& simulation)
   for (int r = 0; r < rods; ++r)
   {
     const RodModel& m = simulation.rodModel(r);
-    const auto bend = [&m](int row) { return rangeOf(m.bend_modulus.row(row).minCoeff(), m.bend_modulus.row(row).maxCoeff()); };
+    const auto bend = [&m](int row) {
+      return rangeOf(m.bend_modulus.row(row).minCoeff(), m.bend_modulus.row(row).maxCoeff());
+    };
     const std::string bends = bend(0) == bend(2) ? bend(0) : "[" + bend(0) + ", " + bend(2) + "]";
-    const std::string text = "stretch " + rangeOf(m.stretch_modulus.minCoeff(), m.stretch_modulus.maxCoeff()) + " N, bend " + bends + " N m^2, twist " +
+    const std::string text = "stretch " + rangeOf(m.stretch_modulus.minCoeff(), m.stretch_modulus.maxCoeff()) +
+                             " N, bend " + bends + " N m^2, twist " +
                              rangeOf(m.twist_modulus.minCoeff(), m.twist_modulus.maxCoeff()) + " N m^2";
-    const auto ends = [&text](const std::string& line) { return line.size() > text.size() && line.compare(line.size() - text.size(), text.size(), text) == 0; };
+    const auto ends = [&text](const std::string& line) {
+      return line.size() > text.size() && line.compare(line.size() - text.size(), text.size(), text) == 0;
+    };
     const auto same = std::find_if(lines.begin(), lines.end(), [&ends](const auto& line) { return ends(line.first); });
     if (same != lines.end())
-    {
       ++same->second;
-    }
     else if (static_cast<int>(lines.size()) <= kMostLines)
-    {
       lines.emplace_back("rod " + m.name + ": " + text, 0);
-    }
   }
   for (std::size_t k = 0; k < lines.size() && k < kMostLines; ++k)
   {
@@ -47,9 +48,7 @@ void printModuli(const Simulation& simulation)
     lines[k].second > 0 ? std::printf(" (and %d more rods)\n", lines[k].second) : std::printf("\n");
   }
   if (static_cast<int>(lines.size()) > kMostLines)
-  {
     std::printf("moduli            other rods have other moduli\n");
-  }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -14,7 +14,7 @@ using Eigen::Vector3f;
 
 namespace {
 
-constexpr int kSuper = 2;            // samples per pixel and direction
+constexpr int kSuper = 2;   // samples per pixel and direction
 constexpr int kShadowCells = 1536;
 constexpr double kTanHalfHeight = 0.3;
 constexpr float kNeverLit = -std::numeric_limits<float>::infinity();
@@ -26,15 +26,20 @@ bool isTube(ObjectKind kind) { return kind == ObjectKind::rod || kind == ObjectK
 
 std::uint8_t toByte(float share) { return static_cast<std::uint8_t>(255.0f * std::clamp(share, 0.0f, 1.0f) + 0.5f); }
 
-}  // namespace
+}   // namespace
 
 PicturePainter::PicturePainter(const PictureView& view)
-  : view_(view), width_(kSuper * view.width), height_(kSuper * view.height), samples_(width_, height_, 0.0f),
-    shadow_(kShadowCells, kShadowCells, kNeverLit), triangles_(static_cast<std::size_t>(width_) * height_)
+  : view_(view),
+    width_(kSuper * view.width),
+    height_(kSuper * view.height),
+    samples_(width_, height_, 0.0f),
+    shadow_(kShadowCells, kShadowCells, kNeverLit),
+    triangles_(static_cast<std::size_t>(width_) * height_)
 {
   placeCamera();
   sun_ = (0.55 * right_ - 0.75 * forward_ + 1.3 * Vector3d::UnitZ()).normalized();
-  const Vector3d across = sun_.cross(std::abs(sun_.z()) > 0.9 ? Vector3d(Vector3d::UnitX()) : Vector3d(Vector3d::UnitZ())).normalized();
+  const Vector3d across =
+      sun_.cross(std::abs(sun_.z()) > 0.9 ? Vector3d(Vector3d::UnitX()) : Vector3d(Vector3d::UnitZ())).normalized();
   sun_axes_.row(0) = across;
   sun_axes_.row(1) = sun_.cross(across);
   sun_axes_.row(2) = sun_;
@@ -48,7 +53,8 @@ PicturePainter::PicturePainter(const PictureView& view)
 void PicturePainter::placeCamera()
 {
   forward_ = -view_.from.normalized();
-  right_ = std::abs(forward_.z()) > 0.999 ? Vector3d(1, 0, 0) : Vector3d(forward_.cross(Vector3d::UnitZ()).normalized());
+  right_ =
+      std::abs(forward_.z()) > 0.999 ? Vector3d(1, 0, 0) : Vector3d(forward_.cross(Vector3d::UnitZ()).normalized());
   up_ = right_.cross(forward_);
   scale_ = 0.5 * height_ / kTanHalfHeight;
   const double tan_width = kTanHalfHeight * width_ / height_, margin = 0.9;
@@ -91,7 +97,8 @@ void PicturePainter::paintBackground()
           }
           const Vector3d at = eye_ + (*view_.ground - eye_.z()) / along.z() * along;
           const double fade = std::clamp(1.6 - 0.5 * (at - view_.box.center()).norm() / size, 0.0, 1.0);
-          const bool odd = (static_cast<long>(std::floor(at.x() / cell)) + static_cast<long>(std::floor(at.y() / cell))) & 1;
+          const bool odd =
+              (static_cast<long>(std::floor(at.x() / cell)) + static_cast<long>(std::floor(at.y() / cell))) & 1;
           const Vector3d paint = Vector3d(0.80, 0.80, 0.79) * (odd ? 0.96 : 1.0);
           sum += fade * paint + (1 - fade) * sky;
           drop += 0.38 * fade * paint;
@@ -108,8 +115,11 @@ void PicturePainter::paintBackground()
       if (column < -1 || row < -1 || column > kShadowCells || row > kShadowCells)
         continue;   // no shadow reaches there
       const Vector3f share = drop.cast<float>() * 255.0f / (kSuper * kSuper);
-      ground_.push_back({pixel, static_cast<std::int16_t>(column), static_cast<std::int16_t>(row),
-                         static_cast<float>(at.z() + 2.0 / sun_scale_), {share[0], share[1], share[2]}});
+      ground_.push_back({pixel,
+                         static_cast<std::int16_t>(column),
+                         static_cast<std::int16_t>(row),
+                         static_cast<float>(at.z() + 2.0 / sun_scale_),
+                         {share[0], share[1], share[2]}});
     }
 }
 
@@ -121,7 +131,8 @@ void PicturePainter::draw(const std::vector<ObjectMesh>& objects)
   const double nearest = 1e-3 * view_.box.diagonal().norm();
   // a floor hides what is below it, but for what sinks in a little
   const bool floor = view_.ground && eye_.z() > *view_.ground;
-  const double below = floor ? *view_.ground - 0.004 * view_.box.diagonal().norm() : -std::numeric_limits<double>::infinity();
+  const double below =
+      floor ? *view_.ground - 0.004 * view_.box.diagonal().norm() : -std::numeric_limits<double>::infinity();
   std::uint32_t count = 0;
   for (const ObjectMesh& object : objects)
   {
@@ -131,7 +142,8 @@ void PicturePainter::draw(const std::vector<ObjectMesh>& objects)
     {
       const Vector3d d = mesh.vertices.col(i) - eye_;
       const double depth = forward_.dot(d);
-      seen.col(i) << 0.5 * width_ + scale_ * right_.dot(d) / depth, 0.5 * height_ - scale_ * up_.dot(d) / depth, depth > nearest ? 1.0 / depth : -1.0;
+      seen.col(i) << 0.5 * width_ + scale_ * right_.dot(d) / depth, 0.5 * height_ - scale_ * up_.dot(d) / depth,
+          depth > nearest ? 1.0 / depth : -1.0;
     }
     for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
     {
@@ -169,7 +181,8 @@ void PicturePainter::drawShadows(const std::vector<ObjectMesh>& objects)
     seen.topRows<2>() *= sun_scale_;
     for (Eigen::Index f = 0; f < object.mesh.triangles.cols(); ++f)
     {
-      const Vector3d a = seen.col(object.mesh.triangles(0, f)), b = seen.col(object.mesh.triangles(1, f)), c = seen.col(object.mesh.triangles(2, f));
+      const Vector3d a = seen.col(object.mesh.triangles(0, f)), b = seen.col(object.mesh.triangles(1, f)),
+                     c = seen.col(object.mesh.triangles(2, f));
       if (isTube(object.kind) && (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x() < 0)
         continue;   // the dark side of a tube
       shadow_.fill(a, b, c, [&](int row, int first, int end, float height, float slope) {
@@ -184,8 +197,8 @@ void PicturePainter::drawShadows(const std::vector<ObjectMesh>& objects)
 /// Share of the sun that reaches a height above the cells around (column, row).
 float PicturePainter::lit(int column, int row, float height) const
 {
-  if (!shadow_.isDrawn(column - 1, row - 1) && !shadow_.isDrawn(column + 1, row - 1) && !shadow_.isDrawn(column - 1, row + 1) &&
-      !shadow_.isDrawn(column + 1, row + 1))
+  if (!shadow_.isDrawn(column - 1, row - 1) && !shadow_.isDrawn(column + 1, row - 1) &&
+      !shadow_.isDrawn(column - 1, row + 1) && !shadow_.isDrawn(column + 1, row + 1))
     return 1.0f;
   int free = 0;
   if (column > 0 && row > 0 && column + 1 < kShadowCells && row + 1 < kShadowCells)
@@ -215,7 +228,8 @@ void PicturePainter::paintShadowsOnGround()
 
 PicturePainter::Face PicturePainter::faceOf(std::uint32_t triangle, const std::vector<ObjectMesh>& objects) const
 {
-  const auto after = std::upper_bound(parts_.begin(), parts_.end(), triangle, [](std::uint32_t t, const Part& part) { return t < part.first; });
+  const auto after = std::upper_bound(parts_.begin(), parts_.end(), triangle,
+                                      [](std::uint32_t t, const Part& part) { return t < part.first; });
   const Part& part = *(after - 1);
   const ObjectMesh& object = objects[static_cast<std::size_t>(&part - parts_.data())];
   const Eigen::Index index = triangle - part.first;
@@ -233,7 +247,8 @@ PicturePainter::Face PicturePainter::faceOf(std::uint32_t triangle, const std::v
   face.inverse_area = 1.0f / (face.u.x() * face.v.y() - face.u.y() * face.v.x());
   const Vector3d flat = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
   const double towards_sun = flat.dot(sun_);
-  const double slope = std::sqrt(1 / std::max(0.01, towards_sun * towards_sun) - 1);   // how much higher the next cell is
+  // how much higher the next cell is
+  const double slope = std::sqrt(1 / std::max(0.01, towards_sun * towards_sun) - 1);
   face.bias = static_cast<float>((1 + 2.2 * slope) / sun_scale_);
   const bool cloth = object.kind == ObjectKind::cloth, back = flat.dot(eye_ - x[0]) < 0;
   for (std::size_t k = 0; k < 3; ++k)
@@ -244,11 +259,13 @@ PicturePainter::Face PicturePainter::faceOf(std::uint32_t triangle, const std::v
     const Vector3d to_eye = (eye_ - x[k]).normalized();
     if (back)   // of a cloth
       normal = -normal;
-    const double direct = std::max(0.0, normal.dot(sun_)), mirrored = cloth ? 0.0 : std::max(0.0, normal.dot((sun_ + to_eye).normalized()));
+    const double direct = std::max(0.0, normal.dot(sun_)),
+                 mirrored = cloth ? 0.0 : std::max(0.0, normal.dot((sun_ + to_eye).normalized()));
     Vector3d at = sun_axes_ * x[k] - sun_corner_;
     at.head<2>() *= sun_scale_;
     face.inverse_depth[static_cast<int>(k)] = static_cast<float>(seen[k].z());
-    face.corners[k] = {at.cast<float>(), static_cast<float>(0.465 + 0.085 * normal.z()), static_cast<float>(0.55 * direct),
+    face.corners[k] = {at.cast<float>(), static_cast<float>(0.465 + 0.085 * normal.z()),
+                       static_cast<float>(0.55 * direct),
                        static_cast<float>(direct > 0 ? 0.3 * std::pow(mirrored, 40.0) : 0.0)};
   }
   Vector3d paint = objectColor(object.kind, object.index);
@@ -273,7 +290,8 @@ Vector3f PicturePainter::shade(std::uint32_t triangle, float column, float row, 
   const float x = column - face.p0.x(), y = row - face.p0.y();
   float b = (x * face.v.y() - y * face.v.x()) * face.inverse_area * face.inverse_depth[1];
   float c = (face.u.x() * y - face.u.y() * x) * face.inverse_area * face.inverse_depth[2];
-  float a = (1.0f - (x * (face.v.y() - face.u.y()) + y * (face.u.x() - face.v.x())) * face.inverse_area) * face.inverse_depth[0];
+  float a = (1.0f - (x * (face.v.y() - face.u.y()) + y * (face.u.x() - face.v.x())) * face.inverse_area) *
+            face.inverse_depth[0];
   const float sum = 1.0f / (a + b + c);   // shares as on the surface, not on the picture
   a *= sum;
   b *= sum;
@@ -281,9 +299,12 @@ Vector3f PicturePainter::shade(std::uint32_t triangle, float column, float row, 
   const auto& [A, B, C] = face.corners;
   const Vector3f sun = a * A.sun + b * B.sun + c * C.sun;
   const float direct = a * A.direct + b * B.direct + c * C.direct;
-  const float light = direct > 0 ? lit(static_cast<int>(std::floor(sun.x())), static_cast<int>(std::floor(sun.y())), sun.z() + face.bias) : 0.0f;
+  const float light = direct > 0 ? lit(static_cast<int>(std::floor(sun.x())), static_cast<int>(std::floor(sun.y())),
+                                       sun.z() + face.bias)
+                                 : 0.0f;
   const float gloss = light * (a * A.gloss + b * B.gloss + c * C.gloss);
-  return (face.paint * (a * A.ambient + b * B.ambient + c * C.ambient + light * direct) + Vector3f::Constant(gloss)).cwiseMin(1.0f);
+  return (face.paint * (a * A.ambient + b * B.ambient + c * C.ambient + light * direct) + Vector3f::Constant(gloss))
+      .cwiseMin(1.0f);
 }
 
 void PicturePainter::paintTile(int tile, const std::vector<ObjectMesh>& objects)
@@ -315,7 +336,8 @@ void PicturePainter::paintTile(int tile, const std::vector<ObjectMesh>& objects)
       std::uint8_t* pixel = &out_[3 * (static_cast<std::size_t>(row / kSuper) * view_.width + column / kSuper)];
       const float share = 1.0f / (kSuper * kSuper);
       for (int k = 0; k < 3; ++k)
-        pixel[k] = static_cast<std::uint8_t>(255.0f * share * sum[k] + share * static_cast<float>(kSuper * kSuper - count) * pixel[k] + 0.5f);
+        pixel[k] = static_cast<std::uint8_t>(255.0f * share * sum[k] +
+                                             share * static_cast<float>(kSuper * kSuper - count) * pixel[k] + 0.5f);
     }
 }
 
@@ -330,4 +352,4 @@ const std::vector<std::uint8_t>& PicturePainter::paint(const std::vector<ObjectM
   return out_;
 }
 
-}  // namespace slender
+}   // namespace slender

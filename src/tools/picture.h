@@ -16,15 +16,16 @@ namespace slender {
 
 struct PictureView
 {
-  int width = 1280, height = 720;             ///< [pixels]
-  Eigen::Vector3d from{0.55, -1.0, 0.45};     ///< direction from what is seen to the eye
-  Eigen::AlignedBox3d box;                    ///< what is to be seen; not empty
-  std::optional<double> ground;               ///< height of a floor [m]
-  int tube_sides = 16;                        ///< of rods, which get stripes along their material frames
+  int width = 1280, height = 720;           ///< [pixels]
+  Eigen::Vector3d from{0.55, -1.0, 0.45};   ///< direction from what is seen to the eye
+  Eigen::AlignedBox3d box;                  ///< what is to be seen; not empty
+  std::optional<double> ground;             ///< height of a floor [m]
+  int tube_sides = 16;                      ///< of rods, which get stripes along their material frames
 };
 
-/// One picture after the other from the same place. Perspective, one sun with shadows, light from the sky; each pixel is the mean of four samples.
-/// The background is computed once. Of each picture only the parts are computed that objects, or their shadows on the floor, cover.
+/// One picture after the other from the same place. Perspective, one sun with shadows, light from the sky; each pixel
+/// is the mean of four samples. The background is computed once. Of each picture only the parts are computed that
+/// objects, or their shadows on the floor, cover.
 class PicturePainter
 {
 public:
@@ -45,24 +46,25 @@ private:
   /// What is interpolated over a triangle: the place in the shadow map, and light.
   struct Corner
   {
-    Eigen::Vector3f sun;               ///< column, row, height in the shadow map
+    Eigen::Vector3f sun;   ///< column, row, height in the shadow map
     float ambient, direct, gloss;
   };
   /// A triangle that is seen, with what shading needs of it.
   struct Face
   {
-    Eigen::Vector2f p0, u, v;          ///< first corner and edges in the picture [samples]
+    Eigen::Vector2f p0, u, v;   ///< first corner and edges in the picture [samples]
     float inverse_area;
-    Eigen::Vector3f inverse_depth;     ///< of the corners
+    Eigen::Vector3f inverse_depth;   ///< of the corners
     std::array<Corner, 3> corners;
-    float bias;                        ///< [m] by which shadows are let in, so that a surface does not shade itself
+    float bias;   ///< [m] by which shadows are let in, so that a surface does not shade itself
     Eigen::Vector3f paint;
   };
   /// Where in all_ an object's triangles begin.
   struct Part
   {
     std::uint32_t first;
-    Eigen::Matrix3Xd seen;             ///< per vertex: column, row, 1 / distance along the view (negative: behind the eye)
+    /// per vertex: column, row, 1 / distance along the view (negative: behind the eye)
+    Eigen::Matrix3Xd seen;
     Eigen::Matrix3Xd normals;
   };
 
@@ -84,14 +86,14 @@ private:
   Eigen::Matrix3d sun_axes_;   ///< rows: across, up, towards the sun
   double sun_scale_ = 1.0;     ///< shadow cells per metre
   Eigen::Vector3d sun_corner_;
-  DepthTiles samples_;                        ///< 1 / distance along the view; 0: nothing
-  DepthTiles shadow_;                         ///< height towards the sun of what is lit
-  std::vector<std::uint32_t> triangles_;      ///< of the samples: the nearest one, counted over all objects
+  DepthTiles samples_;                     ///< 1 / distance along the view; 0: nothing
+  DepthTiles shadow_;                      ///< height towards the sun of what is lit
+  std::vector<std::uint32_t> triangles_;   ///< of the samples: the nearest one, counted over all objects
   std::vector<Part> parts_;
-  std::vector<std::int32_t> face_of_;         ///< of the triangles: index into faces_, -1: not made yet
+  std::vector<std::int32_t> face_of_;   ///< of the triangles: index into faces_, -1: not made yet
   std::vector<Face> faces_;
   std::vector<std::uint8_t> background_, out_;
   std::vector<GroundPixel> ground_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -19,20 +19,21 @@ using slender::BadInput, slender::parseCount, slender::parseNumber;
 constexpr int exit_done = 0, exit_bad_input = 2;
 
 const char* const usage =
-  "usage: regions SCENE.yaml OUT [options]    test functions of a scene's tracked cloth\n"
-  "       regions MESH OUT --count N [options]    regions found by clustering the faces of a mesh\n"
-  "  OUT                 coloured mesh: .ply or .obj (colours behind the coordinates)\n"
-  "  --object NAME       of several tracked cloths (default: the first)\n"
-  "  --functions NAME    of several sets of test functions (default: the first)\n"
-  "  --guide             the guide's mesh with its functions instead of the tracked one\n"
-  "  --set PATH=VALUE    override a value of the scene; may be repeated\n"
-  "  --count N           regions\n"
-  "  --frames PATTERN    the mesh's motion, e.g. walk/frame_*.obj: regions suit all frames (default: the mesh at rest)\n"
-  "  --compactness MU    from 0, flat regions, to 1, compact ones (default: 0.5)\n"
-  "  --seed S            of the first regions and the choice of frames (default: 1)\n"
-  "  --sampled-frames N  of all frames (default: 20)\n"
-  "  --quiet             print nothing but errors\n"
-  "Exit status: 0 done, 2 bad input.\n";
+    "usage: regions SCENE.yaml OUT [options]    test functions of a scene's tracked cloth\n"
+    "       regions MESH OUT --count N [options]    regions found by clustering the faces of a mesh\n"
+    "  OUT                 coloured mesh: .ply or .obj (colours behind the coordinates)\n"
+    "  --object NAME       of several tracked cloths (default: the first)\n"
+    "  --functions NAME    of several sets of test functions (default: the first)\n"
+    "  --guide             the guide's mesh with its functions instead of the tracked one\n"
+    "  --set PATH=VALUE    override a value of the scene; may be repeated\n"
+    "  --count N           regions\n"
+    "  --frames PATTERN    the mesh's motion, e.g. walk/frame_*.obj: regions suit all frames (default: the mesh at "
+    "rest)\n"
+    "  --compactness MU    from 0, flat regions, to 1, compact ones (default: 0.5)\n"
+    "  --seed S            of the first regions and the choice of frames (default: 1)\n"
+    "  --sampled-frames N  of all frames (default: 20)\n"
+    "  --quiet             print nothing but errors\n"
+    "Exit status: 0 done, 2 bad input.\n";
 
 struct Options
 {
@@ -96,7 +97,9 @@ Options parseOptions(int argc, char** argv)
   const std::string& in = options.files[0];
   const auto dot = in.rfind('.');
   if (!options.count && dot != std::string::npos && (in.substr(dot) == ".obj" || in.substr(dot) == ".ply"))
-    throw BadInput(in + ": is a mesh; say into how many regions to divide it: --count N (or give a scene, whose test functions are shown)");
+    throw BadInput(in +
+                   ": is a mesh; say into how many regions to divide it: --count N (or give a scene, whose test "
+                   "functions are shown)");
   if (!options.count && clustering)
     throw BadInput("--frames, --compactness, --seed and --sampled-frames cluster a mesh: give --count as well");
   return options;
@@ -114,7 +117,8 @@ std::string quoted(const std::string& text)
 slender::SceneConfig clusteringScene(const Options& o)
 {
   char numbers[120];
-  std::snprintf(numbers, sizeof numbers, "count: %d, compactness: %.17g, seed: %d, frames: %d", *o.count, o.compactness, o.seed, o.sampled);
+  std::snprintf(numbers, sizeof numbers, "count: %d, compactness: %.17g, seed: %d, frames: %d", *o.count, o.compactness,
+                o.seed, o.sampled);
   const std::string text = "tracked:\n  - guide: {mesh: {file: " + quoted(o.files[0]) + "}" +
                            (o.frames.empty() ? "" : ", motion: {frames: " + quoted(o.frames) + ", rate: 30}") +
                            "}\n    mesh: same\n    test_functions: {clusters: {" + numbers + "}}\n";
@@ -124,7 +128,8 @@ slender::SceneConfig clusteringScene(const Options& o)
 int run(const Options& options)
 {
   const auto start = std::chrono::steady_clock::now();
-  const slender::SceneConfig scene = options.count ? clusteringScene(options) : slender::readScene(options.files[0], options.overrides);
+  const slender::SceneConfig scene =
+      options.count ? clusteringScene(options) : slender::readScene(options.files[0], options.overrides);
   const slender::ClothConfig* cloth = nullptr;
   for (const slender::ClothConfig& candidate : scene.cloths)
     if (!cloth && candidate.tracking && (options.object.empty() || options.object == candidate.name))
@@ -132,8 +137,9 @@ int run(const Options& options)
   if (!cloth)
     throw BadInput(options.files[0] + ": has no tracked cloth" + (options.object.empty() ? "" : " " + options.object));
   const slender::TrackingConfig& tracking = *cloth->tracking;
-  const auto set = std::find_if(tracking.sets.begin(), tracking.sets.end(),
-                                [&](const slender::FunctionSet& s) { return options.functions.empty() || options.functions == s.name; });
+  const auto set = std::find_if(tracking.sets.begin(), tracking.sets.end(), [&](const slender::FunctionSet& s) {
+    return options.functions.empty() || options.functions == s.name;
+  });
   if (set == tracking.sets.end())
     throw BadInput(options.files[0] + ": tracked cloth " + cloth->name + " has no test functions " + options.functions);
   const slender::TestFunctions::Values& values = options.guide ? set->functions.guide : set->functions.tracked;
@@ -150,12 +156,14 @@ int run(const Options& options)
   }
   std::printf("object            %s\n", cloth->name.c_str());
   std::printf("vertices          %ld\n", static_cast<long>(mesh.vertices.cols()));
-  std::printf("test functions    %d, over %ld to %ld vertices\n", set->functions.count(), static_cast<long>(fewest), static_cast<long>(most));
-  std::printf("wall              %.3g s\n", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  std::printf("test functions    %d, over %ld to %ld vertices\n", set->functions.count(), static_cast<long>(fewest),
+              static_cast<long>(most));
+  std::printf("wall              %.3g s\n",
+              std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   return exit_done;
 }
 
-}  // namespace
+}   // namespace
 
 int main(int argc, char** argv)
 {

@@ -25,9 +25,11 @@ namespace fs = std::filesystem;
 const char kStyle[] =
     "body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;padding:0 1em;color:#222}"
     "h1{border-bottom:3px solid #246}h2{margin-top:2.5em;border-bottom:1px solid #999}h3{margin:2em 0 .3em}"
-    "table{border-collapse:collapse;font-size:13px;margin:.7em 0}td,th{border:1px solid #ccc;padding:2px 7px;text-align:left}"
+    "table{border-collapse:collapse;font-size:13px;margin:.7em 0}td,th{border:1px solid #ccc;padding:2px "
+    "7px;text-align:left}"
     "th{background:#eef2f6;position:sticky;top:0}td.n{text-align:right;font-variant-numeric:tabular-nums}"
-    "img{max-width:100%;border:1px solid #ddd;margin:.5em 0}.wide{overflow:auto;max-height:32em}.bad{color:#b00020;font-weight:bold}"
+    "img{max-width:100%;border:1px solid #ddd;margin:.5em "
+    "0}.wide{overflow:auto;max-height:32em}.bad{color:#b00020;font-weight:bold}"
     ".good{color:#166534}.words{color:#444}summary{cursor:pointer;color:#246}nav a{margin-right:1.2em}";
 
 std::string base64(const std::string& bytes)
@@ -64,7 +66,8 @@ std::string cell(const std::string& text)
   return std::string("<td class=n>") + number + "</td>";
 }
 
-/// Returns two table cells with the bar of a metric and whether the value meets it, or nothing if the metric has no bar.
+/// Returns two table cells with the bar of a metric and whether the value meets it, or nothing if the metric has no
+/// bar.
 std::string rating(const std::string& study, const std::string& metric, double value)
 {
   const study::Bar* bar = study::findBar(study, metric);
@@ -126,13 +129,15 @@ void writeRows(std::ostream& page, const std::string& csv)
     ++rows;
   }
   if (rows > 1)
-    page << "<details" << (rows <= 25 ? " open" : "") << "><summary>" << rows - 1 << " rows</summary><div class=wide><table>\n"
+    page << "<details" << (rows <= 25 ? " open" : "") << "><summary>" << rows - 1
+         << " rows</summary><div class=wide><table>\n"
          << table.str() << "</table></div></details>\n";
 }
 
 void writeStudy(std::ostream& page, const ReportedStudy& study, const Loaded& loaded)
 {
-  page << "<h3 id=\"" << escaped(study.name) << "\">" << escaped(study.name) << "</h3>\n<p class=words>" << escaped(study.description) << "</p>\n";
+  page << "<h3 id=\"" << escaped(study.name) << "\">" << escaped(study.name) << "</h3>\n<p class=words>"
+       << escaped(study.description) << "</p>\n";
   if (!loaded.error.empty())
     page << "<p class=bad>failed: " << escaped(loaded.error) << "</p>\n";
   std::vector<std::string> pictures;
@@ -142,14 +147,16 @@ void writeStudy(std::ostream& page, const ReportedStudy& study, const Loaded& lo
       pictures.push_back(entry.path().string());
   std::sort(pictures.begin(), pictures.end());
   for (const std::string& picture : pictures)
-    page << "<img alt=\"" << escaped(fs::path(picture).stem().string()) << "\" src=\"data:image/png;base64," << base64(wholeFile(picture)) << "\">\n";
+    page << "<img alt=\"" << escaped(fs::path(picture).stem().string()) << "\" src=\"data:image/png;base64,"
+         << base64(wholeFile(picture)) << "\">\n";
   if (!loaded.metrics.empty())
   {
     page << "<table>";
     for (const auto& [key, text] : loaded.metrics)
     {
       double value = 0.0;
-      page << "<tr><td>" << escaped(key) << "</td>" << cell(text) << (isNumber(text, value) ? rating(study.name, key, value) : "") << "</tr>\n";
+      page << "<tr><td>" << escaped(key) << "</td>" << cell(text)
+           << (isNumber(text, value) ? rating(study.name, key, value) : "") << "</tr>\n";
     }
     page << "</table>\n";
   }
@@ -169,7 +176,7 @@ void writeStudy(std::ostream& page, const ReportedStudy& study, const Loaded& lo
   }
 }
 
-}  // namespace
+}   // namespace
 
 std::string reportPage(const std::string& title, const std::vector<std::pair<std::string, std::string>>& facts,
                        const std::vector<ReportSection>& sections)
@@ -180,42 +187,47 @@ std::string reportPage(const std::string& title, const std::vector<std::pair<std
       loaded[study.name] = load(study);
 
   std::ostringstream page;
-  page << "<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8><title>" << escaped(title) << "</title><style>" << kStyle << "</style></head><body>\n<h1>"
-       << escaped(title) << "</h1>\n<table>";
+  page << "<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8><title>" << escaped(title) << "</title><style>"
+       << kStyle << "</style></head><body>\n<h1>" << escaped(title) << "</h1>\n<table>";
   for (const auto& [key, text] : facts)
     page << "<tr><td>" << escaped(key) << "</td><td>" << escaped(text) << "</td></tr>\n";
   page << "</table>\n<nav><a href=\"#advice\">Advice</a><a href=\"#bars\">Bars</a>";
   for (std::size_t k = 0; k < sections.size(); ++k)
     page << "<a href=\"#section" << k << "\">" << escaped(sections[k].title) << "</a>";
-  page << "</nav>\n<h2 id=advice>What to take</h2>\n<p class=words>From the fronts of error against run time below; errors against each problem's own "
+  page << "</nav>\n<h2 id=advice>What to take</h2>\n<p class=words>From the fronts of error against run time below; "
+          "errors against each problem's own "
           "size, CPU time of one thread of this machine.</p><ul>\n";
   for (const ReportSection& section : sections)
     for (const ReportedStudy& study : section.studies)
       for (const std::string& note : loaded[study.name].notes)
         if (note.find(" error take ") != std::string::npos)
           page << "<li>" << escaped(note) << "</li>\n";
-  page << "</ul>\n<h2 id=bars>Bars</h2>\n<p class=words>worst_error_over_bound: the largest error of a study's checks over its bound.</p>\n<table>"
+  page << "</ul>\n<h2 id=bars>Bars</h2>\n<p class=words>worst_error_over_bound: the largest error of a study's checks "
+          "over its bound.</p>\n<table>"
           "<tr><th>study</th><th>figure</th><th>measured</th><th>bar</th><th></th></tr>\n";
   for (const ReportSection& section : sections)
     for (const ReportedStudy& study : section.studies)
     {
       const Loaded& result = loaded[study.name];
       if (!result.error.empty())
-        page << "<tr><td><a href=\"#" << escaped(study.name) << "\">" << escaped(study.name) << "</a></td><td colspan=4 class=bad>failed</td></tr>\n";
+        page << "<tr><td><a href=\"#" << escaped(study.name) << "\">" << escaped(study.name)
+             << "</a></td><td colspan=4 class=bad>failed</td></tr>\n";
       for (const auto& [key, text] : result.metrics)
       {
         double value = std::nan("");
         const bool number = isNumber(text, value);
-        const std::string verdict = number ? rating(study.name, key, value) : "<td></td><td class=bad>not a number</td>";
+        const std::string verdict =
+            number ? rating(study.name, key, value) : "<td></td><td class=bad>not a number</td>";
         if (!verdict.empty())
-          page << "<tr><td><a href=\"#" << escaped(study.name) << "\">" << escaped(study.name) << "</a></td><td>" << escaped(key) << "</td>" << cell(text)
-               << verdict << "</tr>\n";
+          page << "<tr><td><a href=\"#" << escaped(study.name) << "\">" << escaped(study.name) << "</a></td><td>"
+               << escaped(key) << "</td>" << cell(text) << verdict << "</tr>\n";
       }
     }
   page << "</table>\n";
   for (std::size_t k = 0; k < sections.size(); ++k)
   {
-    page << "<h2 id=\"section" << k << "\">" << escaped(sections[k].title) << "</h2>\n<p class=words>" << escaped(sections[k].words) << "</p>\n";
+    page << "<h2 id=\"section" << k << "\">" << escaped(sections[k].title) << "</h2>\n<p class=words>"
+         << escaped(sections[k].words) << "</p>\n";
     for (const ReportedStudy& study : sections[k].studies)
       writeStudy(page, study, loaded[study.name]);
   }
@@ -223,4 +235,4 @@ std::string reportPage(const std::string& title, const std::vector<std::pair<std
   return page.str();
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -19,8 +19,9 @@ struct ReportSection
   std::vector<ReportedStudy> studies;
 };
 
-/// The whole page: machine and versions, advice from the notes, a table of all bars, then the sections. Pictures are part of it.
+/// The whole page: machine and versions, advice from the notes, a table of all bars, then the sections. Pictures are
+/// part of it.
 std::string reportPage(const std::string& title, const std::vector<std::pair<std::string, std::string>>& facts,
                        const std::vector<ReportSection>& sections);
 
-}  // namespace slender
+}   // namespace slender

@@ -7,7 +7,9 @@
 int main(int argc, char** argv)
 try
 {
-  const char* const usage = "usage: scene_reference SCENE.yaml...\nwrites, in Markdown, every key that is asked for as these scenes are read\n";
+  const char* const usage =
+      "usage: scene_reference SCENE.yaml...\nwrites, in Markdown, every key that is asked for as these scenes are "
+      "read\n";
   if (argc == 2 && (std::string(argv[1]) == "--help" || std::string(argv[1]) == "-h"))
   {
     std::cout << usage;

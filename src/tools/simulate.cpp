@@ -25,8 +25,8 @@
 #include "slender_sim/node/guide_bag.h"
 #endif
 
-/// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed, or its results could not be written,
-/// 128 + N stopped by signal N.
+/// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed, or
+/// its results could not be written, 128 + N stopped by signal N.
 namespace {
 
 using slender::BadInput;
@@ -38,20 +38,25 @@ using Clock = std::chrono::steady_clock;
 constexpr int exit_done = 0, exit_bad_input = 2, exit_failed = 3;
 
 const char* const usage =
-  "usage: simulate SCENE.yaml [options]\n"
-  "  --duration S        simulated seconds (default: time.duration of the scene)\n"
-  "  --bag FILE          record a ROS bag (only in a build with ROS)\n"
-  "  --csv DIR           record tables: DIR/nodes.csv, DIR/grasps.csv\n"
-  "  --obj DIR           record one OBJ file per instant\n"
-  "  --state FILE        save the state that was reached, as the nodes' save_state does; after a failure as well\n"
-  "  --set PATH=VALUE    override a value of the scene, e.g. rods.0.material.youngs_modulus=1e7; may be repeated\n"
-  "  --threads N         threads for scenes of several rods; results do not depend on it\n"
-  "  --statics           only find equilibria: those that `statics` of the scene asks for, or one. Prints residual, energy, lowest\n"
-  "                      eigenvalue and stability of each; tables of them with --csv. Exit status 3 without a stable one\n"
-  "  --quiet             print nothing but warnings and errors\n"
-  "record.every of the scene says which steps are recorded. Exit status: 0 done, 2 bad input, 3 the simulation failed,\n"
-  "or its results could not be written (disk full): the message names what is left of them; 130 stopped by SIGINT (Ctrl-C),\n"
-  "143 by SIGTERM: within the step, whose start is then the end of what is recorded. A second signal ends it at once.\n";
+    "usage: simulate SCENE.yaml [options]\n"
+    "  --duration S        simulated seconds (default: time.duration of the scene)\n"
+    "  --bag FILE          record a ROS bag (only in a build with ROS)\n"
+    "  --csv DIR           record tables: DIR/nodes.csv, DIR/grasps.csv\n"
+    "  --obj DIR           record one OBJ file per instant\n"
+    "  --state FILE        save the state that was reached, as the nodes' save_state does; after a failure as well\n"
+    "  --set PATH=VALUE    override a value of the scene, e.g. rods.0.material.youngs_modulus=1e7; may be repeated\n"
+    "  --threads N         threads for scenes of several rods; results do not depend on it\n"
+    "  --statics           only find equilibria: those that `statics` of the scene asks for, or one. Prints residual, "
+    "energy, lowest\n"
+    "                      eigenvalue and stability of each; tables of them with --csv. Exit status 3 without a stable "
+    "one\n"
+    "  --quiet             print nothing but warnings and errors\n"
+    "record.every of the scene says which steps are recorded. Exit status: 0 done, 2 bad input, 3 the simulation "
+    "failed,\n"
+    "or its results could not be written (disk full): the message names what is left of them; 130 stopped by SIGINT "
+    "(Ctrl-C),\n"
+    "143 by SIGTERM: within the step, whose start is then the end of what is recorded. A second signal ends it at "
+    "once.\n";
 
 struct Options
 {
@@ -70,76 +75,43 @@ Options parseOptions(int argc, char** argv)
     const std::string argument = argv[k];
     const auto value = [&]() -> std::string {
       if (k + 1 >= argc)
-      {
         throw BadInput(argument + ": its value is missing\n" + usage);
-      }
       return argv[++k];
     };
-    if (argument != "--set" && argument.size() > 1 && argument[0] == '-' && std::find(argv + 1, argv + k, argument) != argv + k)
-    {
+    if (argument != "--set" && argument.size() > 1 && argument[0] == '-' &&
+        std::find(argv + 1, argv + k, argument) != argv + k)
       throw BadInput(argument + ": is given twice\n" + usage);
-    }
     if (argument == "--duration")
-    {
       options.duration = slender::parsePositive(argument, value(), 1e7);
-    }
     else if (argument == "--threads")
-    {
       options.threads = slender::parseCount(argument, value(), 1, 1024);
-    }
     else if (argument == "--bag")
-    {
       options.bag = value();
-    }
     else if (argument == "--csv")
-    {
       options.csv = value();
-    }
     else if (argument == "--obj")
-    {
       options.obj = value();
-    }
     else if (argument == "--state")
-    {
       options.state = value();
-    }
     else if (argument == "--set")
-    {
       options.overrides.push_back(value());
-    }
     else if (argument == "--quiet")
-    {
       options.quiet = true;
-    }
     else if (argument == "--statics")
-    {
       options.statics = true;
-    }
     else if (argument == "--help" || argument == "-h")
-    {
       options.help = true;
-    }
     else if (argument.size() > 1 && argument[0] == '-')
-    {
       throw BadInput(argument + ": unknown option\n" + usage);
-    }
     else if (!options.scene.empty())
-    {
       throw BadInput(argument + ": only one scene can be run\n" + usage);
-    }
     else
-    {
       options.scene = argument;
-    }
   }
   if (options.scene.empty() && !options.help)
-  {
     throw BadInput(std::string("a scene file is missing\n") + usage);
-  }
   if (options.statics && options.duration)
-  {
     throw BadInput(std::string("--duration: statics has no time; leave out --duration or --statics\n") + usage);
-  }
   return options;
 }
 
@@ -148,18 +120,12 @@ std::vector<std::unique_ptr<Recorder>> makeRecorders(const Options& options)
 {
   std::vector<std::unique_ptr<Recorder>> recorders;
   if (!options.csv.empty())
-  {
     recorders.push_back(slender::makeCsvRecorder(options.csv));
-  }
   if (!options.obj.empty())
-  {
     recorders.push_back(slender::makeObjRecorder(options.obj));
-  }
 #ifdef SLENDER_WITH_BAG
   if (!options.bag.empty())
-  {
     recorders.push_back(slender::makeBagRecorder(options.bag));
-  }
 #endif
   return recorders;
 }
@@ -176,9 +142,7 @@ void stopOnSignals()
   };
   action.sa_flags = static_cast<int>(SA_RESETHAND);
   for (const int signal : {SIGINT, SIGTERM})
-  {
     ::sigaction(signal, &action, nullptr);
-  }
 }
 
 /// A bar on a terminal; nothing when the output goes elsewhere.
@@ -191,17 +155,16 @@ public:
   {
     const auto now = Clock::now();
     if (!on_ || now - last_ < std::chrono::milliseconds(100))
-    {
       return;
-    }
     last_ = now;
     shown_ = true;
     const double part = static_cast<double>(done) / static_cast<double>(total_);
     const double wall = std::chrono::duration<double>(now - start_).count();
     constexpr int width = 40;
     const int filled = static_cast<int>(part * width);
-    std::fprintf(stderr, "\r[%s%s] %3.0f %%  t = %.3f s  x%.2f real time  %.0f s left  ", std::string(filled, '#').c_str(),
-                 std::string(width - filled, '.').c_str(), 100 * part, simulated, simulated / wall, wall * (1 / part - 1));
+    std::fprintf(stderr, "\r[%s%s] %3.0f %%  t = %.3f s  x%.2f real time  %.0f s left  ",
+                 std::string(filled, '#').c_str(), std::string(width - filled, '.').c_str(), 100 * part, simulated,
+                 simulated / wall, wall * (1 / part - 1));
   }
 
   void clear()
@@ -223,9 +186,7 @@ slender::ThreadVolumes volumesOf(const Simulation& simulation)
 {
   slender::ThreadVolumes volumes;
   for (const slender::ThreadGroupState& thread : simulation.state().threads)
-  {
     volumes.add(thread);
-  }
   return volumes;
 }
 
@@ -234,10 +195,10 @@ bool checkVolumes(const Simulation& simulation)
 {
   const double missing = volumesOf(simulation).missing();
   if (std::abs(missing) <= slender::ThreadVolumes::kMostMissing)
-  {
     return true;
-  }
-  std::fprintf(stderr, "simulate: %.3g of the threads' fluid is not accounted for, more than %.0e: this is a defect of the program, please report it\n",
+  std::fprintf(stderr,
+               "simulate: %.3g of the threads' fluid is not accounted for, more than %.0e: this is a defect of the "
+               "program, please report it\n",
                missing, slender::ThreadVolumes::kMostMissing);
   return false;
 }
@@ -258,31 +219,33 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   if (total.repulsions > 0 || total.impulses > 0)
   {
     std::printf("cloth contacts    %.1f per step, %ld collisions stopped, %ld rigid pieces\n",
-                total.repulsions / std::max(1.0, static_cast<double>(simulation.state().steps)), total.impulses, total.zones);
+                total.repulsions / std::max(1.0, static_cast<double>(simulation.state().steps)), total.impulses,
+                total.zones);
   }
   if (total.mended_folds > 0)
-  {
     std::printf("mended folds      %d\n", total.mended_folds);
-  }
-  const auto tracks = [](const auto& objects) { return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; }); };
+  const auto tracks = [](const auto& objects) {
+    return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; });
+  };
   if (tracks(simulation.config().cloths) || tracks(simulation.config().rods))
   {
     std::printf("tracking          averages at most %.2g of the guide's size away\n", total.tracking_error);
     if (total.forces_at_bound > 0)
-    {
       std::printf("bounded forces    at most %d at their bounds, whose averages were not met\n", total.forces_at_bound);
-    }
   }
   if (!simulation.config().threads.empty())
   {
     const slender::ThreadVolumes volumes = volumesOf(simulation);
-    std::printf("fluid             %.9g m^3 at the start, %.9g m^3 fed: %.9g m^3 in the scene, %.9g m^3 left the region, %.9g m^3 dropped "
-                "(edges.deposited); missing %.2g\n",
-                volumes.start, volumes.fed, volumes.present, volumes.left, volumes.dropped, volumes.missing());
+    std::printf(
+        "fluid             %.9g m^3 at the start, %.9g m^3 fed: %.9g m^3 in the scene, %.9g m^3 left the region, %.9g "
+        "m^3 dropped "
+        "(edges.deposited); missing %.2g\n",
+        volumes.start, volumes.fed, volumes.present, volumes.left, volumes.dropped, volumes.missing());
   }
   if (total.projection_iterations > 0)
   {
-    std::printf("projection        at most %d iterations a step, squared edge lengths to %.2g of their own\n", total.projection_iterations, total.constraint_error);
+    std::printf("projection        at most %d iterations a step, squared edge lengths to %.2g of their own\n",
+                total.projection_iterations, total.constraint_error);
   }
 }
 
@@ -312,9 +275,7 @@ int runStatics(const Options& options, Simulation& simulation, Clock::time_point
   std::vector<std::unique_ptr<Recorder>> recorders = makeRecorders(options);
   const slender::StaticsRun found = simulation.runStatics();
   if (!simulation.config().threads.empty())
-  {
     std::fprintf(stderr, "simulate: warning: --statics leaves the scene's threads, which flow, as they are given\n");
-  }
   for (auto& recorder : recorders)
   {
     recorder->record(simulation, found.rows.empty() ? found.end : found.rows.back().report);
@@ -324,19 +285,13 @@ int runStatics(const Options& options, Simulation& simulation, Clock::time_point
   {
     std::vector<std::string> rods;
     for (const slender::RodConfig& rod : simulation.config().rods)
-    {
       rods.push_back(rod.name);
-    }
     slender::writeStatics(options.csv, found, rods);
   }
   if (!options.state.empty())
-  {
     saveState(simulation, options.state);
-  }
   if (!options.quiet)
-  {
     printStatics(simulation, found, std::chrono::duration<double>(Clock::now() - start).count());
-  }
   return slender::reportStatics(simulation.config(), found) ? exit_done : exit_failed;
 }
 
@@ -347,14 +302,13 @@ int run(const Options& options)
 #else
   if (!options.bag.empty())
   {
-    throw BadInput("--bag " + options.bag + ": this build has no ROS and cannot write bags; build with -DWITH_ROS=ON, or use --csv");
+    throw BadInput("--bag " + options.bag +
+                   ": this build has no ROS and cannot write bags; build with -DWITH_ROS=ON, or use --csv");
   }
 #endif
   slender::SceneConfig config = slender::readScene(options.scene, options.overrides);
   if (options.duration)
-  {
     config.time.duration = *options.duration;
-  }
   const double step = config.time.step;
   const int every = config.record.every;
   const long steps = slender::stepsUntil(config.time.duration, step);
@@ -363,28 +317,21 @@ int run(const Options& options)
   const auto start = Clock::now();
   Simulation simulation(std::move(config), !options.statics);
   for (const std::string& warning : simulation.config().warnings)
-  {
     std::fprintf(stderr, "simulate: warning: %s\n", warning.c_str());
-  }
   if (options.threads)
-  {
     simulation.setThreads(*options.threads);
-  }
   if (simulation.config().statics && !options.statics)
   {
-    std::fprintf(stderr, "simulate: warning: the key statics of the scene is for --statics, without which it is not used\n");
+    std::fprintf(stderr,
+                 "simulate: warning: the key statics of the scene is for --statics, without which it is not used\n");
   }
   stopOnSignals();   // before there is anything to finish: until here a signal ends the process at once
   if (options.statics)
-  {
     return runStatics(options, simulation, start);
-  }
   std::vector<std::unique_ptr<Recorder>> recorders = makeRecorders(options);
   StepReport total;
   for (auto& recorder : recorders)
-  {
     recorder->record(simulation, total);
-  }
   Progress progress(!options.quiet && ::isatty(STDERR_FILENO), steps);
   bool ok = true;
   slender::SceneInputs inputs;
@@ -409,32 +356,22 @@ int run(const Options& options)
     }
     total.merge(report);
     if (k % every == 0)
-    {
       for (auto& recorder : recorders)
-      {
         recorder->record(simulation, report);
-      }
-    }
     progress.show(k, simulation.state().time);
   }
   for (auto& recorder : recorders)
-  {
     recorder->finish();   // after a failure as well: what was reached is worth looking at
-  }
   if (!options.state.empty())
-  {
     saveState(simulation, options.state);
-  }
   progress.clear();
   if (!options.quiet)
-  {
     printSummary(simulation, total, std::chrono::duration<double>(Clock::now() - start).count());
-  }
   const bool balanced = checkVolumes(simulation);
   return stopped_by != 0 && !ok ? 128 + stopped_by : balanced && ok ? exit_done : exit_failed;
 }
 
-}  // namespace
+}   // namespace
 
 int main(int argc, char** argv)
 {

@@ -13,7 +13,8 @@ void printRow(const StaticsRow& row)
   std::printf("load factor       %.9g\n", row.factor);
   std::printf("  residual        %.3g of the largest force\n", r.residual);
   std::printf("  energy          %.9g J\n", r.energy);
-  std::printf("  lowest eigenvalue %.6g 1/s^2%s\n", r.lowest_eigenvalue, r.lowest_eigenvalue == 0 ? " (a motion that costs nothing)" : "");
+  std::printf("  lowest eigenvalue %.6g 1/s^2%s\n", r.lowest_eigenvalue,
+              r.lowest_eigenvalue == 0 ? " (a motion that costs nothing)" : "");
   std::printf("  stable          %s, %d unstable equilibria left on the way\n", r.stable ? "yes" : "no", r.escapes);
   std::printf("  largest move    %.6g m\n", row.displacement);
 }
@@ -21,23 +22,24 @@ void printRow(const StaticsRow& row)
 /// Lines of a path are short: there may be thousands.
 void printPath(const std::vector<StaticsRow>& rows)
 {
-  std::printf("%14s %12s %16s %18s %8s %14s\n", "load factor", "residual", "energy [J]", "eigenvalue [1/s^2]", "stable", "move [m]");
+  std::printf("%14s %12s %16s %18s %8s %14s\n", "load factor", "residual", "energy [J]", "eigenvalue [1/s^2]", "stable",
+              "move [m]");
   for (const StaticsRow& row : rows)
   {
-    std::printf("%14.8g %12.3g %16.9g %18.6g %8s %14.6g\n", row.factor, row.report.residual, row.report.energy, row.report.lowest_eigenvalue,
-                row.report.stable ? "yes" : "no", row.displacement);
+    std::printf("%14.8g %12.3g %16.9g %18.6g %8s %14.6g\n", row.factor, row.report.residual, row.report.energy,
+                row.report.lowest_eigenvalue, row.report.stable ? "yes" : "no", row.displacement);
   }
 }
 
-}  // namespace
+}   // namespace
 
 void printEquilibria(const SceneConfig& scene, const StaticsRun& found)
 {
   if (found.critical)
   {
     std::printf("critical factor   %.9g (%s)\n", found.critical->factor,
-                found.critical->fold ? "a limit load: no equilibrium is near beyond it" :
-                                       "paths branch: beyond it the equilibrium is unstable");
+                found.critical->fold ? "a limit load: no equilibrium is near beyond it"
+                                     : "paths branch: beyond it the equilibrium is unstable");
   }
   if (hasPath(scene))
   {
@@ -45,9 +47,7 @@ void printEquilibria(const SceneConfig& scene, const StaticsRun& found)
     return;
   }
   for (const StaticsRow& row : found.rows)
-  {
     printRow(row);
-  }
 }
 
 bool reportStatics(const SceneConfig& scene, const StaticsRun& found)
@@ -58,28 +58,25 @@ bool reportStatics(const SceneConfig& scene, const StaticsRun& found)
     return false;
   }
   if (hasPath(scene))
-  {
     return true;   // the user asks for a path whether it is stable or not
-  }
   const bool accept = scene.start.accept_unstable;
   for (const StaticsRow& row : found.rows)
   {
     if (row.report.stable)
-    {
       continue;
-    }
     std::fprintf(stderr,
-                 "simulate: %sload factor %.9g: the equilibrium is unstable (lowest eigenvalue %.3g 1/s^2), and no stable one was "
+                 "simulate: %sload factor %.9g: the equilibrium is unstable (lowest eigenvalue %.3g 1/s^2), and no "
+                 "stable one was "
                  "reached from it%s\n",
                  accept ? "warning: " : "", row.factor, row.report.lowest_eigenvalue,
-                 accept ? "" : ": start from a shape that is nearer to the stable equilibrium (initial), hold what drifts by a "
-                               "grasp, or accept it (start: {equilibrium: true, accept_unstable: true})");
+                 accept
+                     ? ""
+                     : ": start from a shape that is nearer to the stable equilibrium (initial), hold what drifts by a "
+                       "grasp, or accept it (start: {equilibrium: true, accept_unstable: true})");
     if (!accept)
-    {
       return false;
-    }
   }
   return true;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -8,8 +8,9 @@ namespace slender {
 /// Prints the critical load and the equilibria of `simulate --statics` to stdout, with units.
 void printEquilibria(const SceneConfig& scene, const StaticsRun& found);
 
-/// Prints to stderr why statics failed, and which equilibria are unstable. Returns false when the program has failed: when
-/// an equilibrium was not found, or when one is unstable that the scene does not accept. On a path all are accepted.
+/// Prints to stderr why statics failed, and which equilibria are unstable. Returns false when the program has failed:
+/// when an equilibrium was not found, or when one is unstable that the scene does not accept. On a path all are
+/// accepted.
 bool reportStatics(const SceneConfig& scene, const StaticsRun& found);
 
-}  // namespace slender
+}   // namespace slender

@@ -33,9 +33,11 @@ const char kUsage[] =
     "  NAME     a study of `study list`, or all\n"
     "  --quick  fewer cases and coarser ones: at most a minute or two each\n"
     "  --judge  fails a study that exceeds a bound or misses a bar (timings are not judged)\n"
-    "  check    runs the quick form of every study, or of those named, and judges it; --xml writes the results in JUnit's format\n"
+    "  check    runs the quick form of every study, or of those named, and judges it; --xml writes the results in "
+    "JUnit's format\n"
     "  --json   metrics and rows of all studies run\n"
-    "  --out    a CSV table and PNG plots of each study (the directory is made); report: DIR/report.html, one page with all of them.\n"
+    "  --out    a CSV table and PNG plots of each study (the directory is made); report: DIR/report.html, one page "
+    "with all of them.\n"
     "           Stopped, it goes on where it was;\n"
     "           with names: of these studies alone\n"
     "  --jobs   studies at a time (default 1; times are of CPUs, but more of them disturb each other a little)\n"
@@ -233,7 +235,7 @@ int check(const std::vector<std::string>& words)
   return slender::checkStudies(options) == 0 ? kDone : kStudyFailed;
 }
 
-}  // namespace
+}   // namespace
 
 int main(int argc, char** argv)
 {

@@ -61,7 +61,7 @@ void writeXml(const std::string& path, const std::vector<CheckedStudy>& studies)
     throw BadInput("check: cannot write " + path);
 }
 
-}  // namespace
+}   // namespace
 
 int checkStudies(const StudyCheckOptions& options)
 {
@@ -74,26 +74,27 @@ int checkStudies(const StudyCheckOptions& options)
   const auto command = [&](std::size_t k) {
     chosen[k].start = Clock::now();
     return std::vector<std::string>{"/bin/sh", "-c",
-                                    "exec " + shellWord(thisProgram()) + " run " + chosen[k].name + " --quick --judge > " +
-                                        shellWord(log(k)) + " 2>&1"};
+                                    "exec " + shellWord(thisProgram()) + " run " + chosen[k].name +
+                                        " --quick --judge > " + shellWord(log(k)) + " 2>&1"};
   };
   int failed = 0;
-  runProcesses(chosen.size(), static_cast<std::size_t>(options.jobs), command, [&](std::size_t k, const std::string& why) {
-    CheckedStudy& s = chosen[k];
-    s.seconds = std::chrono::duration<double>(Clock::now() - s.start).count();
-    s.failure = why;
-    std::printf("%-28s %6.1f s  %s\n", s.name.c_str(), s.seconds, why.empty() ? "passed" : "FAILED");
-    if (!why.empty())
-    {
-      ++failed;
-      std::cout << wholeFile(log(k));
-    }
-    std::fflush(stdout);
-  });
+  runProcesses(chosen.size(), static_cast<std::size_t>(options.jobs), command,
+               [&](std::size_t k, const std::string& why) {
+                 CheckedStudy& s = chosen[k];
+                 s.seconds = std::chrono::duration<double>(Clock::now() - s.start).count();
+                 s.failure = why;
+                 std::printf("%-28s %6.1f s  %s\n", s.name.c_str(), s.seconds, why.empty() ? "passed" : "FAILED");
+                 if (!why.empty())
+                 {
+                   ++failed;
+                   std::cout << wholeFile(log(k));
+                 }
+                 std::fflush(stdout);
+               });
   fs::remove_all(folder);
   if (!options.xml.empty())
     writeXml(options.xml, chosen);
   return failed;
 }
 
-}  // namespace slender
+}   // namespace slender

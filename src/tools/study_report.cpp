@@ -36,22 +36,52 @@ struct Plan
 const std::vector<Plan>& plans()
 {
   static const std::vector<Plan> all = {
-      {"Error against run time", "Each problem once, every way to solve it: integrators, steps, resolutions, tolerances; against one converged run.",
-       {"swing", "thread_accuracy", "cloth_accuracy", "tracking_methods"}, {"cantilever", "rods_at_rest", "peer_cases", "projection"}},
-      {"Stability", "Stiff and extreme cases. Done, done with cut steps, or refused with a reason; never NaN, a crash or silently wrong.",
-       {"rod_stability", "thread_stability", "cloth_stability", "tracking_stability", "statics_stability"}, {"rod_contact_safety", "cloth_collision_safety"}},
-      {"Repeatability", "Runs of fresh processes, whose heaps and numbers of threads differ: equal bit by bit.", {"repeatability"}, {}},
-      {"Beside the thesis's tables", "Times per step or frame of the thesis's examples, whose machine was of 2008.",
-       {"rod_tables", "thread_tables", "ibm_vs_hinge", "implicit_step"}, {"tracking_overhead", "willmore_smoothing", "hair", "tree"}},
-      {"Cost against size", "", {"cost_model", "rod_scaling"}, {"rod_implicit_vs_explicit", "thread_implicit_vs_explicit"}},
-      {"What a scene does not name", "Instructions counted by valgrind, told apart by the lines of the sources that they come from.", {"lean"}, {}},
-      {"Phase diagrams", "Where one behaviour ends and the next begins.", {"michell", "bend_twist", "sagging"}, {"sewing_machine", "coiling", "greenhill"}},
-      {"Rods against formulas", "", {"elastica", "torsion", "torsional_pendulum", "twist_asymmetry"},
-       {"beam_frequencies", "lateral_buckling", "perversion", "wilberforce", "helical_buckling", "helical_scene", "stick_slip", "knot", "plectoneme", "chain"}},
-      {"Threads against formulas", "", {"trouton", "thread_twist", "retraction"}, {"thread_defaults", "merging", "fiber_extrusion", "dragged_catenary"}},
-      {"Cloth against formulas and measurements", "", {"willmore_sphere", "willmore_hole", "fabric_drape", "plate_poisson", "curved_shells"},
+      {"Error against run time",
+       "Each problem once, every way to solve it: integrators, steps, resolutions, tolerances; against one converged "
+       "run.",
+       {"swing", "thread_accuracy", "cloth_accuracy", "tracking_methods"},
+       {"cantilever", "rods_at_rest", "peer_cases", "projection"}},
+      {"Stability",
+       "Stiff and extreme cases. Done, done with cut steps, or refused with a reason; never NaN, a crash or silently "
+       "wrong.",
+       {"rod_stability", "thread_stability", "cloth_stability", "tracking_stability", "statics_stability"},
+       {"rod_contact_safety", "cloth_collision_safety"}},
+      {"Repeatability",
+       "Runs of fresh processes, whose heaps and numbers of threads differ: equal bit by bit.",
+       {"repeatability"},
+       {}},
+      {"Beside the thesis's tables",
+       "Times per step or frame of the thesis's examples, whose machine was of 2008.",
+       {"rod_tables", "thread_tables", "ibm_vs_hinge", "implicit_step"},
+       {"tracking_overhead", "willmore_smoothing", "hair", "tree"}},
+      {"Cost against size",
+       "",
+       {"cost_model", "rod_scaling"},
+       {"rod_implicit_vs_explicit", "thread_implicit_vs_explicit"}},
+      {"What a scene does not name",
+       "Instructions counted by valgrind, told apart by the lines of the sources that they come from.",
+       {"lean"},
+       {}},
+      {"Phase diagrams",
+       "Where one behaviour ends and the next begins.",
+       {"michell", "bend_twist", "sagging"},
+       {"sewing_machine", "coiling", "greenhill"}},
+      {"Rods against formulas",
+       "",
+       {"elastica", "torsion", "torsional_pendulum", "twist_asymmetry"},
+       {"beam_frequencies", "lateral_buckling", "perversion", "wilberforce", "helical_buckling", "helical_scene",
+        "stick_slip", "knot", "plectoneme", "chain"}},
+      {"Threads against formulas",
+       "",
+       {"trouton", "thread_twist", "retraction"},
+       {"thread_defaults", "merging", "fiber_extrusion", "dragged_catenary"}},
+      {"Cloth against formulas and measurements",
+       "",
+       {"willmore_sphere", "willmore_hole", "fabric_drape", "plate_poisson", "curved_shells"},
        {"plate", "stick_slip_strip", "flag", "drape", "stiffness_range"}},
-      {"Tracking", "Shells that follow a guide exactly on average.", {"breathing_surface", "rubber_band", "clustering"},
+      {"Tracking",
+       "Shells that follow a guide exactly on average.",
+       {"breathing_surface", "rubber_band", "clustering"},
        {"tracking_exactness", "partitions", "character", "cloth_on_branch", "backflip"}},
   };
   return all;
@@ -64,7 +94,8 @@ void checkPlans()
   {
     std::ptrdiff_t times = 0;
     for (const Plan& plan : plans())
-      times += std::count(plan.quick.begin(), plan.quick.end(), s.name) + std::count(plan.more.begin(), plan.more.end(), s.name);
+      times += std::count(plan.quick.begin(), plan.quick.end(), s.name) +
+               std::count(plan.more.begin(), plan.more.end(), s.name);
     if (times != 1)
       throw std::logic_error("report: " + s.name + " is in " + std::to_string(times) + " sections; must be in one");
   }
@@ -108,10 +139,12 @@ void prepare(const ReportOptions& options)
   if (!fs::exists(file))
     std::ofstream(file) << wanted;
   else if (wholeFile(file) != wanted)
-    throw BadInput(options.out + " holds the results of another program or extent (" + file + "); give another --out or delete it");
+    throw BadInput(options.out + " holds the results of another program or extent (" + file +
+                   "); give another --out or delete it");
 }
 
-std::vector<std::pair<std::string, std::string>> facts(const ReportOptions& options, double seconds, std::size_t studies)
+std::vector<std::pair<std::string, std::string>> facts(const ReportOptions& options, double seconds,
+                                                       std::size_t studies)
 {
   utsname system{};
   uname(&system);
@@ -123,11 +156,12 @@ std::vector<std::pair<std::string, std::string>> facts(const ReportOptions& opti
           {"memory", systemValue("/proc/meminfo", "MemTotal")},
           {"system", std::string(system.sysname) + " " + system.release},
           {"compiler", "GCC " __VERSION__},
-          {"Eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." + std::to_string(EIGEN_MINOR_VERSION)},
+          {"Eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
+                        std::to_string(EIGEN_MINOR_VERSION)},
           {"this call", took}};
 }
 
-}  // namespace
+}   // namespace
 
 int makeReport(const ReportOptions& options)
 {
@@ -152,7 +186,8 @@ int makeReport(const ReportOptions& options)
   }
   for (const std::string& name : options.only)
     if (std::none_of(sections.begin(), sections.end(), [&](const ReportSection& section) {
-          return std::any_of(section.studies.begin(), section.studies.end(), [&](const ReportedStudy& s) { return s.name == name; });
+          return std::any_of(section.studies.begin(), section.studies.end(),
+                             [&](const ReportedStudy& s) { return s.name == name; });
         }))
       throw BadInput("report: " + name + " is no study of the " + (options.quick ? "quick" : "full") + " report");
   prepare(options);
@@ -167,33 +202,38 @@ int makeReport(const ReportOptions& options)
     const std::string json = s.folder + "/result.json";
     // under its own name only once it is whole
     return std::vector<std::string>{"/bin/sh", "-c",
-                                    shellWord(thisProgram()) + " run " + s.name + (options.quick ? " --quick" : "") + " --out " + shellWord(s.folder) + " --json " +
-                                        shellWord(json + ".part") + " > " + shellWord(s.folder + "/log.txt") + " 2>&1; status=$?; [ $status -le 1 ] && mv " +
-                                        shellWord(json + ".part") + " " + shellWord(json) + "; exit $status"};
+                                    shellWord(thisProgram()) + " run " + s.name + (options.quick ? " --quick" : "") +
+                                        " --out " + shellWord(s.folder) + " --json " + shellWord(json + ".part") +
+                                        " > " + shellWord(s.folder + "/log.txt") +
+                                        " 2>&1; status=$?; [ $status -le 1 ] && mv " + shellWord(json + ".part") + " " +
+                                        shellWord(json) + "; exit $status"};
   };
   const auto start = std::chrono::steady_clock::now();
   Progress progress("report", "studies", todo.size());
   std::size_t done = 0;
   int failed = 0;
-  runProcesses(todo.size(), static_cast<std::size_t>(options.jobs), command, [&](std::size_t k, const std::string& why) {
-    if (!why.empty())
-    {
-      ++failed;
-      std::cerr << "study: " << todo[k]->name << " " << why << ", see " << todo[k]->folder << "/log.txt\n";
-      if (!fs::exists(todo[k]->folder + "/result.json"))
-        todo[k]->failure = why;
-    }
-    progress.show(++done);
-  });
+  runProcesses(todo.size(), static_cast<std::size_t>(options.jobs), command,
+               [&](std::size_t k, const std::string& why) {
+                 if (!why.empty())
+                 {
+                   ++failed;
+                   std::cerr << "study: " << todo[k]->name << " " << why << ", see " << todo[k]->folder << "/log.txt\n";
+                   if (!fs::exists(todo[k]->folder + "/result.json"))
+                     todo[k]->failure = why;
+                 }
+                 progress.show(++done);
+               });
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::string page = options.out + "/report.html";
   std::ofstream file(page);
-  file << reportPage("slender_sim: error against run time, stability, cost", facts(options, seconds, todo.size()), sections);
+  file << reportPage("slender_sim: error against run time, stability, cost", facts(options, seconds, todo.size()),
+                     sections);
   file.close();
   if (!file)
     throw BadInput("cannot write " + page);
-  std::cout << page << ": " << todo.size() << " studies in " << static_cast<long>(seconds) << " s, " << failed << " failed\n";
+  std::cout << page << ": " << todo.size() << " studies in " << static_cast<long>(seconds) << " s, " << failed
+            << " failed\n";
   return failed;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,16 +7,16 @@ namespace slender {
 
 struct ReportOptions
 {
-  std::string out;     ///< directory
+  std::string out;                 ///< directory
   std::vector<std::string> only;   ///< names of studies; empty: all of the report
   bool quick = false;
-  long jobs = 1;       ///< studies at a time
+  long jobs = 1;   ///< studies at a time
 };
 
-/// Runs the studies of the report, each as a process of its own (`study run NAME --json ... --out OUT/data/NAME`), those that OUT
-/// holds already left out, and writes OUT/report.html, which needs no other file. Progress on stderr. Returns the number of studies
-/// that failed; the page names them. Throws BadInput when OUT holds results of another program or extent,
-/// or cannot be written, and for names that the report has not.
+/// Runs the studies of the report, each as a process of its own (`study run NAME --json ... --out OUT/data/NAME`),
+/// those that OUT holds already left out, and writes OUT/report.html, which needs no other file. Progress on stderr.
+/// Returns the number of studies that failed; the page names them. Throws BadInput when OUT holds results of another
+/// program or extent, or cannot be written, and for names that the report has not.
 int makeReport(const ReportOptions& options);
 
-}  // namespace slender
+}   // namespace slender

@@ -24,10 +24,12 @@ using slender::SweepPlan;
 constexpr int kDone = 0, kSomeFailed = 1, kBadInput = 2;
 
 const char kUsage[] =
-    "usage: sweep PLAN.yaml --out DIR [--jobs N] [--engine local|parallel|slurm] [--engine-options WORDS] [--point K] [--count]\n"
+    "usage: sweep PLAN.yaml --out DIR [--jobs N] [--engine local|parallel|slurm] [--engine-options WORDS] [--point K] "
+    "[--count]\n"
     "  --out             DIR/results.csv at the end; runs that are done already are not done again\n"
     "  --jobs            runs at a time (default: one per processor; Slurm: as it allows)\n"
-    "  --engine          parallel: GNU parallel, with --engine-options '--sshlogin a,b' on several machines that share DIR\n"
+    "  --engine          parallel: GNU parallel, with --engine-options '--sshlogin a,b' on several machines that share "
+    "DIR\n"
     "                    slurm: an array of tasks, with --engine-options '--partition=long --time=60'\n"
     "  --point           only run K, for any other engine; a last call without it does what is missing and collects\n"
     "  --count           prints the number of runs\n"
@@ -106,7 +108,7 @@ int run(const Options& options)
   return failed ? kSomeFailed : kDone;
 }
 
-}  // namespace
+}   // namespace
 
 int main(int argc, char** argv)
 {

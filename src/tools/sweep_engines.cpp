@@ -32,14 +32,17 @@ std::vector<long> missingPoints(const SweepPlan& plan, const std::string& out)
   return missing;
 }
 
-Crashed runLocally(const SweepPlan& plan, const std::string& plan_file, const std::string& out, const std::vector<long>& todo, std::size_t jobs)
+Crashed runLocally(const SweepPlan& plan, const std::string& plan_file, const std::string& out,
+                   const std::vector<long>& todo, std::size_t jobs)
 {
   Crashed crashed;
   Progress progress("sweep " + plan.name, "runs", todo.size());
   std::size_t done = 0;
   runProcesses(
       todo.size(), jobs,
-      [&](std::size_t k) { return std::vector<std::string>{thisProgram(), plan_file, "--out", out, "--point", std::to_string(todo[k])}; },
+      [&](std::size_t k) {
+        return std::vector<std::string>{thisProgram(), plan_file, "--out", out, "--point", std::to_string(todo[k])};
+      },
       [&](std::size_t k, const std::string& why) {
         if (!why.empty())
           crashed[todo[k]] = why;
@@ -49,22 +52,26 @@ Crashed runLocally(const SweepPlan& plan, const std::string& plan_file, const st
 }
 
 /// The engine's command; `list` holds the points to run, one per line.
-std::string command(const SweepPlan& plan, const std::string& plan_file, const std::string& out, const std::string& list, std::size_t runs,
-                    const Engine& engine)
+std::string command(const SweepPlan& plan, const std::string& plan_file, const std::string& out,
+                    const std::string& list, std::size_t runs, const Engine& engine)
 {
-  const std::string run = shellWord(thisProgram()) + " " + shellWord(fs::absolute(plan_file)) + " --out " + shellWord(fs::absolute(out)) + " --point ";
+  const std::string run = shellWord(thisProgram()) + " " + shellWord(fs::absolute(plan_file)) + " --out " +
+                          shellWord(fs::absolute(out)) + " --point ";
   if (engine.kind == "parallel")
-    return "exec parallel " + (engine.jobs > 0 ? "--jobs " + std::to_string(engine.jobs) + " " : "") + engine.options + " --arg-file " +
-           shellWord(list) + " " + shellWord(run + "{}");
+    return "exec parallel " + (engine.jobs > 0 ? "--jobs " + std::to_string(engine.jobs) + " " : "") + engine.options +
+           " --arg-file " + shellWord(list) + " " + shellWord(run + "{}");
   const std::string tasks = std::to_string(std::min(runs, kArrayTasks));
-  const std::string script = "awk -v task=$SLURM_ARRAY_TASK_ID 'NR % " + tasks + " == task' " + shellWord(fs::absolute(list)) +
-                             " | while read -r point; do " + run + "$point < /dev/null; done";
-  return "exec sbatch --wait --job-name=" + shellWord("sweep_" + plan.name) + " --array=0-" + std::to_string(std::min(runs, kArrayTasks) - 1) +
-         (engine.jobs > 0 ? "%" + std::to_string(engine.jobs) : "") + " --output=" + shellWord(fs::absolute(out).string() + "/slurm-%a.log") + " " +
-         engine.options + " --wrap " + shellWord(script);
+  const std::string script = "awk -v task=$SLURM_ARRAY_TASK_ID 'NR % " + tasks + " == task' " +
+                             shellWord(fs::absolute(list)) + " | while read -r point; do " + run +
+                             "$point < /dev/null; done";
+  return "exec sbatch --wait --job-name=" + shellWord("sweep_" + plan.name) + " --array=0-" +
+         std::to_string(std::min(runs, kArrayTasks) - 1) + (engine.jobs > 0 ? "%" + std::to_string(engine.jobs) : "") +
+         " --output=" + shellWord(fs::absolute(out).string() + "/slurm-%a.log") + " " + engine.options + " --wrap " +
+         shellWord(script);
 }
 
-Crashed runByEngine(const SweepPlan& plan, const std::string& plan_file, const std::string& out, const std::vector<long>& todo, const Engine& engine)
+Crashed runByEngine(const SweepPlan& plan, const std::string& plan_file, const std::string& out,
+                    const std::vector<long>& todo, const Engine& engine)
 {
   const std::string program = engine.kind == "slurm" ? "sbatch" : "parallel";
   if (std::system(("command -v " + program + " > /dev/null").c_str()) != 0)
@@ -76,7 +83,8 @@ Crashed runByEngine(const SweepPlan& plan, const std::string& plan_file, const s
     lines += std::to_string(point) + "\n";
   writeWhole(list, lines);
   const auto done = [&] {
-    return static_cast<std::size_t>(std::count_if(todo.begin(), todo.end(), [&](long point) { return fs::exists(pointFile(out, point)); }));
+    return static_cast<std::size_t>(
+        std::count_if(todo.begin(), todo.end(), [&](long point) { return fs::exists(pointFile(out, point)); }));
   };
   const pid_t pid = startProcess({"/bin/sh", "-c", command(plan, plan_file, out, list, todo.size(), engine)});
   int status = 0;
@@ -90,25 +98,29 @@ Crashed runByEngine(const SweepPlan& plan, const std::string& plan_file, const s
     progress.show(done());
   }
   if (done() == 0 && status != 0)
-    throw BadInput("--engine " + engine.kind + ": " + program + " ran nothing, see above; its options: " + engine.options);
+    throw BadInput("--engine " + engine.kind + ": " + program +
+                   " ran nothing, see above; its options: " + engine.options);
   Crashed crashed;
   for (const long point : todo)
     if (!fs::exists(pointFile(out, point)))
-      crashed[point] = engine.kind == "slurm" ? "left no result, see " + out + "/slurm-*.log" : "left no result, see above";
+      crashed[point] =
+          engine.kind == "slurm" ? "left no result, see " + out + "/slurm-*.log" : "left no result, see above";
   fs::remove(list);
   return crashed;
 }
 
-}  // namespace
+}   // namespace
 
-std::map<long, std::string> runMissing(const SweepPlan& plan, const std::string& plan_file, const std::string& out, const Engine& engine)
+std::map<long, std::string> runMissing(const SweepPlan& plan, const std::string& plan_file, const std::string& out,
+                                       const Engine& engine)
 {
   const std::vector<long> todo = missingPoints(plan, out);
   if (todo.empty())
     return {};
   if (engine.kind != "local")
     return runByEngine(plan, plan_file, out, todo, engine);
-  return runLocally(plan, plan_file, out, todo, engine.jobs > 0 ? engine.jobs : std::max(1u, std::thread::hardware_concurrency()));
+  return runLocally(plan, plan_file, out, todo,
+                    engine.jobs > 0 ? engine.jobs : std::max(1u, std::thread::hardware_concurrency()));
 }
 
-}  // namespace slender::sweep
+}   // namespace slender::sweep

@@ -16,8 +16,9 @@ struct Engine
 };
 
 /// Starts this program once per point that is not done, as `sweep PLAN --out DIR --point K`, waits, and shows progress.
-/// Returns the points that left no result, to be tried again by the next call, and why. Throws BadInput for an engine that is not
-/// installed or refuses its options.
-std::map<long, std::string> runMissing(const SweepPlan& plan, const std::string& plan_file, const std::string& out, const Engine& engine);
+/// Returns the points that left no result, to be tried again by the next call, and why. Throws BadInput for an engine
+/// that is not installed or refuses its options.
+std::map<long, std::string> runMissing(const SweepPlan& plan, const std::string& plan_file, const std::string& out,
+                                       const Engine& engine);
 
-}  // namespace slender::sweep
+}   // namespace slender::sweep

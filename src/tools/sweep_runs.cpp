@@ -72,7 +72,8 @@ std::string csvLine(const std::vector<std::string>& cells)
 }
 
 /// One line of results.csv; `measured`: empty when the run failed.
-std::string resultLine(const SweepPlan& plan, long point, const std::string& reason, const std::vector<study::Row>& measured)
+std::string resultLine(const SweepPlan& plan, long point, const std::string& reason,
+                       const std::vector<study::Row>& measured)
 {
   std::vector<std::string> cells{std::to_string(point)};
   for (const std::string& override : plan.overrides(point))
@@ -92,7 +93,8 @@ std::vector<study::Row> measure(const SweepPlan& plan, long point)
   for (const auto* kind : kindsOf(plan))
     measures.push_back(kind->make(scene));
   const double step = scene.time.step;
-  const long steps = stepsUntil(scene.time.duration, step), first = plan.after > 0 ? std::min(steps, stepsUntil(plan.after, step)) : 0;
+  const long steps = stepsUntil(scene.time.duration, step),
+             first = plan.after > 0 ? std::min(steps, stepsUntil(plan.after, step)) : 0;
   Simulation simulation(std::move(scene));
   simulation.setThreads(1);
   for (long k = 0; k <= steps; ++k)
@@ -133,7 +135,7 @@ std::string draw(const SweepPlan& plan, const std::string& folder, const std::ve
   return study::writePlots(folder, context);
 }
 
-}  // namespace
+}   // namespace
 
 void checkPlan(const SweepPlan& plan)
 {
@@ -183,7 +185,8 @@ void prepare(const SweepPlan& plan, const std::string& out)
 void runPoint(const SweepPlan& plan, const std::string& out, long point)
 {
   if (point >= plan.points())
-    throw BadInput("--point " + std::to_string(point) + ": the plan has " + std::to_string(plan.points()) + " runs, from 0");
+    throw BadInput("--point " + std::to_string(point) + ": the plan has " + std::to_string(plan.points()) +
+                   " runs, from 0");
   if (fs::exists(pointFile(out, point)))
     return;
   std::string line;
@@ -236,4 +239,4 @@ long collect(const SweepPlan& plan, const std::string& out, const std::map<long,
   return failed;
 }
 
-}  // namespace slender::sweep
+}   // namespace slender::sweep

@@ -8,7 +8,8 @@
 /// The runs of a sweep and their files: DIR/points/K.csv is there, whole, when run K is done. Engines only start runs.
 namespace slender::sweep {
 
-/// Throws BadInput when the plan names a measure or a column to plot that does not exist, or a measure that its scene cannot give.
+/// Throws BadInput when the plan names a measure or a column to plot that does not exist, or a measure that its scene
+/// cannot give.
 void checkPlan(const SweepPlan& plan);
 
 /// Makes DIR. Throws BadInput when it holds runs of another plan or scene.
@@ -23,7 +24,8 @@ void runPoint(const SweepPlan& plan, const std::string& out, long point);
 /// Writes a file whole or not at all. Throws std::runtime_error.
 void writeWhole(const std::string& path, const std::string& text);
 
-/// DIR/results.csv and the plan's plot. `crashed`: points without a result, and why. Returns the number of runs that failed.
+/// DIR/results.csv and the plan's plot. `crashed`: points without a result, and why. Returns the number of runs that
+/// failed.
 long collect(const SweepPlan& plan, const std::string& out, const std::map<long, std::string>& crashed);
 
-}  // namespace slender::sweep
+}   // namespace slender::sweep

@@ -12,7 +12,10 @@ namespace {
 class Bytes
 {
 public:
-  explicit Bytes(const std::string& path) : file_(path, std::ios::binary | std::ios::ate) { size_ = file_ ? static_cast<std::uint64_t>(file_.tellg()) : 0; }
+  explicit Bytes(const std::string& path) : file_(path, std::ios::binary | std::ios::ate)
+  {
+    size_ = file_ ? static_cast<std::uint64_t>(file_.tellg()) : 0;
+  }
 
   std::uint64_t size() const { return size_; }
   bool good() const { return good_; }
@@ -45,7 +48,8 @@ struct Span
   std::uint64_t begin = 0, end = 0;
 };
 
-/// Finds the first box of this type in `outer`. Returns false if there is none or if the boxes do not fill `outer` exactly.
+/// Finds the first box of this type in `outer`. Returns false if there is none or if the boxes do not fill `outer`
+/// exactly.
 bool findBox(Bytes& file, const Span& outer, const std::string& type, Span& found)
 {
   bool any = false;
@@ -87,7 +91,8 @@ long picturesInMp4(Bytes& file)
 long picturesInGif(Bytes& file)
 {
   constexpr std::uint64_t extension = 0x21, image = 0x2c, trailer = 0x3b;
-  const auto table = [](std::uint64_t flags) -> std::uint64_t { return flags & 0x80 ? 3u << ((flags & 7) + 1) : 0; };   // [bytes] of colours
+  // [bytes] of colours
+  const auto table = [](std::uint64_t flags) -> std::uint64_t { return flags & 0x80 ? 3u << ((flags & 7) + 1) : 0; };
   std::uint64_t at = 13 + table(file.number(10, 1));
   for (long count = 0; file.good();)
   {
@@ -114,7 +119,7 @@ long picturesInGif(Bytes& file)
   return 0;
 }
 
-}  // namespace
+}   // namespace
 
 long picturesIn(const std::string& path)
 {
@@ -122,4 +127,4 @@ long picturesIn(const std::string& path)
   return file.size() > 6 && file.text(0, 3) == "GIF" ? picturesInGif(file) : picturesInMp4(file);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -51,9 +51,13 @@ Eigen::Matrix3Xi neighbours(const Eigen::Matrix3Xi& triangles)
 class Partition
 {
 public:
-  Partition(const Eigen::Matrix3Xi& triangles, const std::vector<Eigen::Matrix3Xd>& frames, const std::vector<int>& sampled, double mu)
-    : faces_(static_cast<int>(triangles.cols())), frames_(static_cast<int>(sampled.size())), beside_(neighbours(triangles)), facts_(faces_ * frames_)
-    , flatness_(1.0 - mu)
+  Partition(const Eigen::Matrix3Xi& triangles, const std::vector<Eigen::Matrix3Xd>& frames,
+            const std::vector<int>& sampled, double mu)
+    : faces_(static_cast<int>(triangles.cols())),
+      frames_(static_cast<int>(sampled.size())),
+      beside_(neighbours(triangles)),
+      facts_(faces_ * frames_),
+      flatness_(1.0 - mu)
   {
     for (int t = 0; t < frames_; ++t)
     {
@@ -116,7 +120,10 @@ public:
     {
       double distortion;
       int face, region;
-      bool operator>(const Candidate& o) const { return std::tie(distortion, face, region) > std::tie(o.distortion, o.face, o.region); }
+      bool operator>(const Candidate& o) const
+      {
+        return std::tie(distortion, face, region) > std::tie(o.distortion, o.face, o.region);
+      }
     };
     std::priority_queue<Candidate, std::vector<Candidate>, std::greater<>> queue;
     region.assign(faces_, -1);
@@ -192,7 +199,8 @@ private:
     for (int t = 0; t < frames_; ++t)
     {
       const Fact &f = facts_[face * frames_ + t], &p = proxies_[to * frames_ + t];
-      worst = std::max(worst, f.area * (compactness_[t] * (f.centroid - p.centroid).squaredNorm() + flatness_ * (f.normal - p.normal).squaredNorm()));
+      worst = std::max(worst, f.area * (compactness_[t] * (f.centroid - p.centroid).squaredNorm() +
+                                        flatness_ * (f.normal - p.normal).squaredNorm()));
     }
     return worst;
   }
@@ -212,14 +220,16 @@ void check(const Eigen::Matrix3Xi& triangles, const std::vector<Eigen::Matrix3Xd
       throw std::invalid_argument("clustering: " + what);
   };
   require(!frames.empty(), "at least one frame is needed");
-  require(o.regions >= 1 && o.regions <= triangles.cols(),
-          "regions must be from 1 to the number of faces, " + std::to_string(triangles.cols()) + ", got " + std::to_string(o.regions));
+  require(o.regions >= 1 && o.regions <= triangles.cols(), "regions must be from 1 to the number of faces, " +
+                                                               std::to_string(triangles.cols()) + ", got " +
+                                                               std::to_string(o.regions));
   require(o.compactness >= 0 && o.compactness <= 1, "compactness must be in [0, 1]");
   require(o.sampled_frames >= 1 && o.max_iterations >= 1, "sampled_frames and max_iterations must be at least 1");
   for (std::size_t t = 0; t < frames.size(); ++t)
   {
-    require(frames[t].cols() == frames[0].cols() && triangles.maxCoeff() < frames[t].cols(), "frame " + std::to_string(t) + " has " +
-            std::to_string(frames[t].cols()) + " vertices, " + std::to_string(frames[0].cols()) + " expected");
+    require(frames[t].cols() == frames[0].cols() && triangles.maxCoeff() < frames[t].cols(),
+            "frame " + std::to_string(t) + " has " + std::to_string(frames[t].cols()) + " vertices, " +
+                std::to_string(frames[0].cols()) + " expected");
     require(frames[t].allFinite(), "frame " + std::to_string(t) + " is not finite");
   }
 }
@@ -229,7 +239,8 @@ std::vector<int> firstSeeds(const std::vector<int>& part, int regions, std::mt19
 {
   const int parts = 1 + *std::max_element(part.begin(), part.end());
   if (parts > regions)
-    throw std::invalid_argument("clustering: the mesh has " + std::to_string(parts) + " connected parts, more than the " + std::to_string(regions) +
+    throw std::invalid_argument("clustering: the mesh has " + std::to_string(parts) +
+                                " connected parts, more than the " + std::to_string(regions) +
                                 " regions: ask for at least one region per part");
   const std::vector<int> order = chosen(engine, static_cast<int>(part.size()), static_cast<int>(part.size()));
   std::vector<int> seeds;
@@ -246,9 +257,10 @@ std::vector<int> firstSeeds(const std::vector<int>& part, int regions, std::mt19
   return seeds;
 }
 
-}  // namespace
+}   // namespace
 
-Clustering clusterFaces(const Eigen::Matrix3Xi& triangles, const std::vector<Eigen::Matrix3Xd>& frames, const ClusteringOptions& options)
+Clustering clusterFaces(const Eigen::Matrix3Xi& triangles, const std::vector<Eigen::Matrix3Xd>& frames,
+                        const ClusteringOptions& options)
 {
   check(triangles, frames, options);
   std::mt19937 engine(options.seed);
@@ -278,4 +290,4 @@ Clustering clusterFaces(const Eigen::Matrix3Xi& triangles, const std::vector<Eig
   return result;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -11,7 +11,7 @@ using Triplets = std::vector<Eigen::Triplet<double>>;
 
 Eigen::Index nodesOf(const Eigen::VectorXd& shares, bool closed) { return shares.size() - (closed ? 1 : 0); }
 
-}  // namespace
+}   // namespace
 
 MassMatrix polylineWeights(const Eigen::VectorXd& guide, const Eigen::VectorXd& nodes, bool closed)
 {
@@ -53,7 +53,8 @@ TestFunctions curveSegments(int count, const Eigen::VectorXd& nodes, bool closed
   {
     const double at = nodes[i] * count;
     const int border = static_cast<int>(std::lround(at));
-    const bool between = std::abs(at - border) < 1e-9 * count && (closed || (border > 0 && border < count));   // rounded sums of edge lengths
+    // rounded sums of edge lengths
+    const bool between = std::abs(at - border) < 1e-9 * count && (closed || (border > 0 && border < count));
     if (between && count > 1)
     {
       entries.emplace_back((border + count - 1) % count, i, 0.5);
@@ -67,11 +68,12 @@ TestFunctions curveSegments(int count, const Eigen::VectorXd& nodes, bool closed
   return functions;
 }
 
-WeakConstraints curveConstraints(TestFunctions functions, const MassMatrix& weights, const Eigen::Matrix3Xd& rest, bool closed)
+WeakConstraints curveConstraints(TestFunctions functions, const MassMatrix& weights, const Eigen::Matrix3Xd& rest,
+                                 bool closed)
 {
   const MassMatrix mass = hatMassMatrix(rest, closed);
   functions.guide = functions.tracked;
   return WeakConstraints(functions, mass * weights, mass);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -2,8 +2,9 @@
 
 namespace slender {
 
-FunctionBlend FunctionBlend::between(const WeakConstraints& functions, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& guide_velocity,
-                                     const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, double start, double duration)
+FunctionBlend FunctionBlend::between(const WeakConstraints& functions, const Eigen::Matrix3Xd& guide,
+                                     const Eigen::Matrix3Xd& guide_velocity, const Eigen::Matrix3Xd& x,
+                                     const Eigen::Matrix3Xd& v, double start, double duration)
 {
   FunctionBlend blend;
   if (!(duration > 0))
@@ -43,4 +44,4 @@ double FunctionBlend::left(double time) const
   return (shares.gap * gap + shares.rate * rate).colwise().norm().maxCoeff();
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,10 +7,14 @@ namespace slender {
 
 namespace {
 
-/// Hues by the golden ratio lie far apart for successive functions; lightness changes along, too, for there are hundreds.
+/// Hues by the golden ratio lie far apart for successive functions; lightness changes along, too, for there are
+/// hundreds.
 Eigen::Vector3d colorOf(Eigen::Index function)
 {
-  const double hue = 6.0 * std::fmod(0.13 + 0.6180339887498949 * static_cast<double>(function), 1.0), value = function % 3 == 0 ? 0.95 : function % 3 == 1 ? 0.75 : 0.85;
+  const double hue = 6.0 * std::fmod(0.13 + 0.6180339887498949 * static_cast<double>(function), 1.0),
+               value = function % 3 == 0   ? 0.95
+                       : function % 3 == 1 ? 0.75
+                                           : 0.85;
   const auto channel = [&](double shift) {
     const double k = std::fmod(shift + hue, 6.0);
     return value * (1.0 - 0.65 * std::max(0.0, std::min({k, 4.0 - k, 1.0})));
@@ -18,7 +22,7 @@ Eigen::Vector3d colorOf(Eigen::Index function)
   return {channel(5.0), channel(3.0), channel(1.0)};
 }
 
-}  // namespace
+}   // namespace
 
 Eigen::Matrix3Xd functionColors(const TestFunctions::Values& values)
 {
@@ -34,8 +38,9 @@ Eigen::Matrix3Xd functionColors(const TestFunctions::Values& values)
     }
   }
   for (Eigen::Index v = 0; v < values.cols(); ++v)
-    colors.col(v) = sums[v] > 1.0 ? Eigen::Vector3d(colors.col(v) / sums[v]) : Eigen::Vector3d(colors.col(v) + (1.0 - sums[v]) * Eigen::Vector3d::Constant(0.85));
+    colors.col(v) = sums[v] > 1.0 ? Eigen::Vector3d(colors.col(v) / sums[v])
+                                  : Eigen::Vector3d(colors.col(v) + (1.0 - sums[v]) * Eigen::Vector3d::Constant(0.85));
   return colors;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -16,7 +16,8 @@ TestFunctions::Values valuesOf(const Triplets& entries, std::size_t functions, E
   return values;
 }
 
-void paint(const PaintedRegion& region, const std::vector<int>& vertices, int count, const char* mesh, int row, Triplets& entries)
+void paint(const PaintedRegion& region, const std::vector<int>& vertices, int count, const char* mesh, int row,
+           Triplets& entries)
 {
   const std::string who = "region '" + region.name + "': ";
   if (vertices.empty())
@@ -24,13 +25,13 @@ void paint(const PaintedRegion& region, const std::vector<int>& vertices, int co
   for (const int v : vertices)
   {
     if (v < 0 || v >= count)
-      throw std::invalid_argument(who + "vertex " + std::to_string(v) + " is not on the " + mesh + " mesh, which has vertices 0 to " +
-                                  std::to_string(count - 1));
+      throw std::invalid_argument(who + "vertex " + std::to_string(v) + " is not on the " + mesh +
+                                  " mesh, which has vertices 0 to " + std::to_string(count - 1));
     entries.emplace_back(row, v, 1.0);
   }
 }
 
-}  // namespace
+}   // namespace
 
 TestFunctions paintedRegions(const std::vector<PaintedRegion>& regions, int guide_vertices, int tracked_vertices)
 {
@@ -62,7 +63,8 @@ TestFunctions paintedRegions(const std::vector<PaintedRegion>& regions, const Su
   functions.guide = valuesOf(guide, regions.size(), coarse);
   const TestFunctions::Values prolonged = functions.guide * subdivision.weights.transpose();
   for (std::size_t r = 0; r < regions.size(); ++r)
-    for (TestFunctions::Values::InnerIterator entry(prolonged, static_cast<Eigen::Index>(r)); entry && regions[r].tracked.empty(); ++entry)
+    for (TestFunctions::Values::InnerIterator entry(prolonged, static_cast<Eigen::Index>(r));
+         entry && regions[r].tracked.empty(); ++entry)
       painted.emplace_back(static_cast<int>(r), static_cast<int>(entry.col()), entry.value());
   functions.tracked = valuesOf(painted, regions.size(), fine);
   return functions;
@@ -81,8 +83,8 @@ TestFunctions subdivisionBasis(const Subdivision& subdivision, const std::vector
   for (std::size_t k = 0; k < chosen.size(); ++k)
   {
     if (chosen[k] < 0 || chosen[k] >= coarse)
-      throw std::invalid_argument("test functions: vertex " + std::to_string(chosen[k]) + " is not on the guide mesh, which has vertices 0 to " +
-                                  std::to_string(coarse - 1));
+      throw std::invalid_argument("test functions: vertex " + std::to_string(chosen[k]) +
+                                  " is not on the guide mesh, which has vertices 0 to " + std::to_string(coarse - 1));
     functions.names.push_back("vertex " + std::to_string(chosen[k]));
     guide.emplace_back(static_cast<int>(k), chosen[k], 1.0);
     for (Eigen::SparseMatrix<double>::InnerIterator entry(columns, chosen[k]); entry; ++entry)
@@ -96,7 +98,8 @@ TestFunctions subdivisionBasis(const Subdivision& subdivision, const std::vector
 TestFunctions regionBasis(const TriangleMesh& mesh, const std::vector<int>& region_of_face)
 {
   if (static_cast<Eigen::Index>(region_of_face.size()) != mesh.triangles.cols())
-    throw std::invalid_argument("regions: one per face expected, " + std::to_string(mesh.triangles.cols()) + " of them");
+    throw std::invalid_argument("regions: one per face expected, " + std::to_string(mesh.triangles.cols()) +
+                                " of them");
   const int regions = region_of_face.empty() ? 0 : 1 + *std::max_element(region_of_face.begin(), region_of_face.end());
   std::vector<int> faces(regions, 0);
   const Eigen::VectorXd areas = faceAreas(mesh), around = vertexAreas(mesh);
@@ -123,4 +126,4 @@ TestFunctions regionBasis(const TriangleMesh& mesh, const std::vector<int>& regi
   return functions;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -19,17 +19,19 @@ MassMatrix assembled(const Triplets& entries, Eigen::Index size)
   return mass;
 }
 
-WeakConstraints::Matrix scaledRows(const TestFunctions::Values& values, const MassMatrix& mass, const std::vector<std::string>& names, const char* mesh, Eigen::VectorXd* measures)
+WeakConstraints::Matrix scaledRows(const TestFunctions::Values& values, const MassMatrix& mass,
+                                   const std::vector<std::string>& names, const char* mesh, Eigen::VectorXd* measures)
 {
   if (values.cols() != mass.rows())
-    throw std::invalid_argument("test functions of " + std::to_string(values.cols()) + " vertices do not fit a " + mesh + " mesh of " +
-                                std::to_string(mass.rows()));
+    throw std::invalid_argument("test functions of " + std::to_string(values.cols()) + " vertices do not fit a " +
+                                mesh + " mesh of " + std::to_string(mass.rows()));
   WeakConstraints::Matrix c = values * mass;
   const Eigen::VectorXd sums = c * Eigen::VectorXd::Ones(c.cols());
   for (Eigen::Index i = 0; i < c.rows(); ++i)
   {
     if (!(sums[i] > 0) || !std::isfinite(sums[i]))
-      throw std::invalid_argument("test function '" + names[i] + "' is empty on the " + mesh + " mesh (its integral is not positive): leave it out");
+      throw std::invalid_argument("test function '" + names[i] + "' is empty on the " + mesh +
+                                  " mesh (its integral is not positive): leave it out");
     c.row(i) *= 1.0 / sums[i];
   }
   if (measures)
@@ -38,7 +40,7 @@ WeakConstraints::Matrix scaledRows(const TestFunctions::Values& values, const Ma
   return c;
 }
 
-}  // namespace
+}   // namespace
 
 MassMatrix hatMassMatrix(const TriangleMesh& rest)
 {
@@ -68,8 +70,9 @@ MassMatrix hatMassMatrix(const Eigen::Matrix3Xd& rest_nodes, bool closed)
 }
 
 WeakConstraints::WeakConstraints(const TestFunctions& functions, const MassMatrix& guide, const MassMatrix& tracked)
-  : names_(functions.names), c_(scaledRows(functions.tracked, tracked, names_, "tracked", &measures_))
-  , guide_(scaledRows(functions.guide, guide, names_, "guide", nullptr))
+  : names_(functions.names),
+    c_(scaledRows(functions.tracked, tracked, names_, "tracked", &measures_)),
+    guide_(scaledRows(functions.guide, guide, names_, "guide", nullptr))
 {
   if (c_.rows() != functions.count() || guide_.rows() != functions.count())
     throw std::invalid_argument("test functions: one row per name expected on both meshes");
@@ -86,12 +89,8 @@ void WeakConstraints::averages(const Eigen::Matrix3Xd& guide, Eigen::Matrix3Xd& 
 {
   result.setZero(3, guide_.rows());
   for (Eigen::Index i = 0; i < guide_.rows(); ++i)
-  {
     for (Matrix::InnerIterator it(guide_, i); it; ++it)
-    {
       result.col(i) += it.value() * guide.col(it.col());
-    }
-  }
 }
 
 double WeakConstraints::distance(int i, const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& tracked) const
@@ -119,10 +118,12 @@ void WeakConstraints::requireIndependent(const std::vector<char>& held) const
   {
     const double length = free.row(i).norm();
     if (!(length > 0))
-      throw std::invalid_argument("test function '" + names_[i] + "' acts on held vertices only: leave it out or release some");
+      throw std::invalid_argument("test function '" + names_[i] +
+                                  "' acts on held vertices only: leave it out or release some");
     free.row(i) *= 1.0 / length;
   }
-  // The smallest eigenvalue of the rows' Gram matrix, and what combination of them leaves so little, by inverse iteration.
+  // The smallest eigenvalue of the rows' Gram matrix, and what combination of them leaves so little, by inverse
+  // iteration.
   constexpr double kDependent = 1e-11, kShift = 1e-13;
   const Eigen::SparseMatrix<double> gram(free * free.transpose());
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor;
@@ -153,7 +154,8 @@ void WeakConstraints::requireIndependent(const std::vector<char>& held) const
   if (others.empty())
     others = "very many others";
   throw std::invalid_argument("test function '" + names_[parts.back()] + "' depends on " + others +
-                              (held.empty() ? "" : " (on the vertices that are not held)") + ": leave it out or change its region");
+                              (held.empty() ? "" : " (on the vertices that are not held)") +
+                              ": leave it out or change its region");
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -67,11 +67,14 @@ TEST(ClampedEdges, aCantileveredStripConvergesWithSecondOrder)
   constexpr double kBeam = 1.0 / 8;   // q L^4 / (8 D)
   for (const GridPattern pattern : {GridPattern::one_diagonal, GridPattern::equilateral})
   {
-    const double coarse = tipDeflection(pattern, 10, true) / kBeam - 1, fine = tipDeflection(pattern, 20, true) / kBeam - 1;
+    const double coarse = tipDeflection(pattern, 10, true) / kBeam - 1,
+                 fine = tipDeflection(pattern, 20, true) / kBeam - 1;
     EXPECT_LT(std::abs(fine), 0.01) << toString(pattern);
-    EXPECT_NEAR(coarse / fine, 4.0, 0.4) << toString(pattern);   // second order; the next term is a hundredth of the first
+    // second order; the next term is a hundredth of the first
+    EXPECT_NEAR(coarse / fine, 4.0, 0.4) << toString(pattern);
     // Without it the hinge of the edge is half as stiff as that of half a cell, and the error is of first order.
-    const double soft_coarse = tipDeflection(pattern, 10, false) / kBeam - 1, soft_fine = tipDeflection(pattern, 20, false) / kBeam - 1;
+    const double soft_coarse = tipDeflection(pattern, 10, false) / kBeam - 1,
+                 soft_fine = tipDeflection(pattern, 20, false) / kBeam - 1;
     EXPECT_GT(soft_fine, 0.05) << toString(pattern);
     EXPECT_NEAR(soft_coarse / soft_fine, 2.0, 0.2) << toString(pattern);
   }
@@ -101,7 +104,8 @@ TEST(ClampedEdges, onlyHingesBesideClampedFacesAreStiffer)
     x(2, i) = 1e-5 * random.vector().x();
   const PointVector points = pointsOf(x);
   PointVector y(points.size());
-  const double isometric = 0.5 * isometricBending(mesh, t, IsometricElement::nonconforming, 1.0, clamped).multiply(points.data(), y.data());
+  const double isometric =
+      0.5 * isometricBending(mesh, t, IsometricElement::nonconforming, 1.0, clamped).multiply(points.data(), y.data());
   const double hinges = HingeBending(t.hinges, held, VectorXd::Zero(t.hingeCount())).energy(points.data());
   EXPECT_GT(hinges, 0.0);
   EXPECT_NEAR(isometric / hinges, 1.0, 1e-6);
@@ -147,13 +151,15 @@ TEST(ClampedEdges, aReleasedClampIsGoneAndComesBack)
     bool with_ratio;
     Integrator integrator;
   };
-  for (const Kind& kind : {Kind{BendingModel::hinge, false, Integrator::implicit_euler}, Kind{BendingModel::hinge, false, Integrator::symplectic_euler},
+  for (const Kind& kind : {Kind{BendingModel::hinge, false, Integrator::implicit_euler},
+                           Kind{BendingModel::hinge, false, Integrator::symplectic_euler},
                            Kind{BendingModel::isometric_nonconforming, false, Integrator::tr_bdf2},
                            Kind{BendingModel::isometric_nonconforming, true, Integrator::implicit_euler},
                            Kind{BendingModel::isometric_nonconforming, true, Integrator::imex}})
   {
     SCOPED_TRACE(std::string(toString(kind.bending)) + ", " + toString(kind.integrator));
-    const auto clamped_model = stripModel(kind.bending, kind.with_ratio, true), plain_model = stripModel(kind.bending, kind.with_ratio, false);
+    const auto clamped_model = stripModel(kind.bending, kind.with_ratio, true),
+               plain_model = stripModel(kind.bending, kind.with_ratio, false);
     ClothOptions options;
     options.integrator = kind.integrator;
     ClothStepper stepper(clamped_model, options), plain(plain_model, options), again(clamped_model, options);
@@ -180,7 +186,8 @@ TEST(ClampedEdges, aReleasedClampIsGoneAndComesBack)
 
 TEST(ClampedEdges, staticsFollowsTheClampsThatAreHeld)
 {
-  const auto clamped_model = stripModel(BendingModel::isometric_nonconforming, true, true), plain_model = stripModel(BendingModel::isometric_nonconforming, true, false);
+  const auto clamped_model = stripModel(BendingModel::isometric_nonconforming, true, true),
+             plain_model = stripModel(BendingModel::isometric_nonconforming, true, false);
   ClothStepper stepper(clamped_model, ClothOptions{}), plain(plain_model, ClothOptions{});
   // The margin's lower line and the strip's upper end are held: the margin is free to bend.
   const TriangleMesh& mesh = clamped_model->rest;
@@ -206,5 +213,5 @@ TEST(ClampedEdges, staticsFollowsTheClampsThatAreHeld)
   EXPECT_EQ((settle(stepper, marginOf(mesh, 6)) - held).cwiseAbs().maxCoeff(), 0.0);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -18,7 +18,8 @@ struct Plate
   ClothInputs inputs;
 
   Plate(const TriangleMesh& mesh, double thickness, const std::vector<int>& held, bool clamped)
-    : model(std::make_shared<ClothModel>(buildCloth("plate", mesh, 1.0, isotropicMembrane(12 / (thickness * thickness), 0.0, 1.0))))
+    : model(std::make_shared<ClothModel>(
+          buildCloth("plate", mesh, 1.0, isotropicMembrane(12 / (thickness * thickness), 0.0, 1.0))))
   {
     model->bending_modulus = 1.0;
     model->bending_poissons_ratio = 0.0;
@@ -96,14 +97,16 @@ TEST(ClothStatics, theLowestEigenvalueIsTheSquareOfTheLowestFrequency)
   const StepReport report = stepper.assessEquilibrium(plate.state, plate.inputs);
   ASSERT_TRUE(report.ok) << report.message;
   EXPECT_TRUE(report.stable);
-  EXPECT_NEAR(report.lowest_eigenvalue, std::pow(1.875104, 4), 0.01 * std::pow(1.875104, 4));   // of a cantilever; order as above
+  // of a cantilever; order as above
+  EXPECT_NEAR(report.lowest_eigenvalue, std::pow(1.875104, 4), 0.01 * std::pow(1.875104, 4));
   EXPECT_GT(stepper.lowestMode().row(2).cwiseAbs().maxCoeff(), 0.1);
   EXPECT_LT(stepper.lowestMode().topRows(2).cwiseAbs().maxCoeff(), 1e-6);
 }
 
 TEST(ClothStatics, aPointLoadBendsASupportedPlateAsTheorySays)
 {
-  constexpr double kForce = 1e-4, kExpected = 0.011600 * kForce;   // Timoshenko: 0.01160 P a^2 / D for a square, whatever Poisson's ratio
+  // Timoshenko: 0.01160 P a^2 / D for a square, whatever Poisson's ratio
+  constexpr double kForce = 1e-4, kExpected = 0.011600 * kForce;
   constexpr int kCells = 32;
   Plate plate = supported(kCells);
   const int centre = kCells / 2 * (kCells + 1) + kCells / 2;
@@ -111,7 +114,8 @@ TEST(ClothStatics, aPointLoadBendsASupportedPlateAsTheorySays)
   plate.inputs.forces(2, centre) = kForce;
   const StepReport report = solve(plate);
   ASSERT_TRUE(report.ok) << report.message;
-  EXPECT_NEAR(plate.state.x(2, centre), kExpected, (0.02 + 1.0 / kCells) * kExpected);   // the study plate's bound for supported plates, halved
+  // the study plate's bound for supported plates, halved
+  EXPECT_NEAR(plate.state.x(2, centre), kExpected, (0.02 + 1.0 / kCells) * kExpected);
   ClothStepper stepper(plate.model, ClothOptions{});
   ASSERT_TRUE(stepper.assessEquilibrium(plate.state, plate.inputs).ok);
   EXPECT_NEAR(stepper.pinForces().row(2).sum(), kForce, 1e-6 * kForce);   // the pins bear the load
@@ -119,7 +123,8 @@ TEST(ClothStatics, aPointLoadBendsASupportedPlateAsTheorySays)
 
 TEST(ClothStatics, aPlateCompressedBeyondItsBucklingLoadLeavesItsPlane)
 {
-  constexpr double kThickness = 0.01, kBuckling = 4 * M_PI * M_PI * kThickness * kThickness / 12;   // strain: N = C eps = 4 pi^2 D / a^2
+  // strain: N = C eps = 4 pi^2 D / a^2
+  constexpr double kThickness = 0.01, kBuckling = 4 * M_PI * M_PI * kThickness * kThickness / 12;
   const auto compressed = [&](double factor) {
     Plate plate = supported(16);
     plate.state.x.row(0) *= 1 - factor * kBuckling;
@@ -147,21 +152,25 @@ TEST(ClothStatics, aPlateCompressedBeyondItsBucklingLoadLeavesItsPlane)
   EXPECT_LT(buckled.energy, saddle.energy);
   EXPECT_GT(above.deflection(), 0.1 * kThickness);
   ASSERT_TRUE(solve(again).ok);
-  EXPECT_EQ((above.state.x - again.state.x).cwiseAbs().maxCoeff(), 0.0);   // the side is chosen by the mode, not by chance
+  // the side is chosen by the mode, not by chance
+  EXPECT_EQ((above.state.x - again.state.x).cwiseAbs().maxCoeff(), 0.0);
 }
 
 TEST(ClothStatics, aFlatSheetWhoseEdgesComeTogetherHangsInACatenary)
 {
-  // An inextensible, limp strip of length 1 between two lines at a distance of 0.6: 2 a sinh(0.3 / a) = 1, sag a (cosh(0.3 / a) - 1) = 0.36.
+  // An inextensible, limp strip of length 1 between two lines at a distance of 0.6: 2 a sinh(0.3 / a) = 1, sag a
+  // (cosh(0.3 / a) - 1) = 0.36.
   constexpr double kSpan = 0.6, kWidth = 0.25;
   double a = 0.2;
   for (int k = 0; k < 50; ++k)   // Newton's method
-    a -= (2 * a * std::sinh(kSpan / (2 * a)) - 1) / (2 * std::sinh(kSpan / (2 * a)) - kSpan / a * std::cosh(kSpan / (2 * a)));
+    a -= (2 * a * std::sinh(kSpan / (2 * a)) - 1) /
+         (2 * std::sinh(kSpan / (2 * a)) - kSpan / a * std::cosh(kSpan / (2 * a)));
   const double sag = a * (std::cosh(kSpan / (2 * a)) - 1);
   EXPECT_GT(sag, 0.36);
   for (const int rows : {16, 32})
   {
-    constexpr double kLoad = 1e6, kThickness = 1e-4;   // q L^3 / D: bending reaches no farther than sqrt(D / H) = 0.002 of the length
+    // q L^3 / D: bending reaches no farther than sqrt(D / H) = 0.002 of the length
+    constexpr double kLoad = 1e6, kThickness = 1e-4;
     const TriangleMesh mesh = gridMesh(kWidth, 1.0, rows / 4, rows, GridPattern::alternating);
     std::vector<int> held;
     for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
@@ -169,13 +178,15 @@ TEST(ClothStatics, aFlatSheetWhoseEdgesComeTogetherHangsInACatenary)
         held.push_back(static_cast<int>(i));
     Plate sheet(mesh, kThickness, held, false);
     sheet.inputs.gravity = Vector3d(0, 0, -kLoad);
-    sheet.inputs.pins.row(1).array() = 0.5 + kSpan * (sheet.inputs.pins.row(1).array() - 0.5);   // the search starts from the flat sheet
+    // the search starts from the flat sheet
+    sheet.inputs.pins.row(1).array() = 0.5 + kSpan * (sheet.inputs.pins.row(1).array() - 0.5);
     ClothStepper stepper(sheet.model, ClothOptions{});
     const StepReport report = stepper.solveEquilibrium(sheet.state, sheet.inputs);
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_TRUE(report.stable);
-    // A strain of e makes the sheet longer by at most e, and a sheet that is longer by 1 % sags by 1.2 % more. A chain of n straight links sags by
-    // 1.0 / n^2 more than the catenary (measured: 0.9). Bending that pinned edges do not feel changes less than D / (H a^2) = 1e-4.
+    // A strain of e makes the sheet longer by at most e, and a sheet that is longer by 1 % sags by 1.2 % more. A chain
+    // of n straight links sags by 1.0 / n^2 more than the catenary (measured: 0.9). Bending that pinned edges do not
+    // feel changes less than D / (H a^2) = 1e-4.
     const double bound = 1.2 * report.max_strain + 1.0 / (rows * rows) + 1e-4;
     EXPECT_NEAR(sheet.deflection() / sag, 1.0, bound) << rows;
     // The edges bear the weight, and pull inwards by q a per width.
@@ -215,5 +226,5 @@ TEST(ClothStatics, whatHasNoEquilibriumIsRefused)
   EXPECT_NE(blown.message.find("leave out wind"), std::string::npos) << blown.message;
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -23,7 +23,8 @@ Rod softRod(const Load& load)
   const Matrix3Xd nodes = load.loop ? ringNodes(n, 0.1) : helixNodes(n, 0.15, 0.1, 0.5);
   RodSection section = modulusSection(5e-3, 4e-3, 5.0, 0.3);
   section.bend_modulus << 6e-3, 1e-3, 1e-3, 3e-3;
-  RodModel model = buildRod("r", nodes, load.loop, uniformSections(section, load.loop ? n : n - 1), Vector3d::Zero(), false);
+  RodModel model =
+      buildRod("r", nodes, load.loop, uniformSections(section, load.loop ? n : n - 1), Vector3d::Zero(), false);
   if (load.damped)
   {
     model.mass_damping = 0.8;
@@ -45,7 +46,8 @@ GraspTarget poseAt(const GraspState& start, double t)
   const double w = 6.0, a = 0.03;
   const Vector3d direction(0.5, -0.3, 0.8), axis = Vector3d(0.3, 0.9, -0.2).normalized();
   const double s = 1 - std::cos(w * t), rate = w * std::sin(w * t);
-  return {{start.X_WG.position + a * s * direction, (Eigen::AngleAxisd(0.4 * s, axis) * start.X_WG.orientation).normalized()},
+  return {{start.X_WG.position + a * s * direction,
+           (Eigen::AngleAxisd(0.4 * s, axis) * start.X_WG.orientation).normalized()},
           Twist{a * rate * direction, 0.4 * rate * axis}};
 }
 
@@ -76,8 +78,7 @@ TimeConfig exactly(Integrator integrator)
 }
 
 class Order : public ::testing::TestWithParam<Load>
-{
-};
+{};
 
 TEST_P(Order, OfEveryIntegrator)
 {
@@ -89,7 +90,8 @@ TEST_P(Order, OfEveryIntegrator)
     double x[3], v[3];
     for (int k = 0; k < 3; ++k)
     {
-      const RodState end = run(GetParam(), exactly(integrator), duration, (order(integrator) == 2 ? 160 : 1280) << k);   // first order shows later
+      // first order shows later
+      const RodState end = run(GetParam(), exactly(integrator), duration, (order(integrator) == 2 ? 160 : 1280) << k);
       x[k] = (end.x - reference.x).colwise().norm().maxCoeff();
       v[k] = (end.v - reference.v).colwise().norm().maxCoeff();
     }
@@ -102,8 +104,10 @@ TEST_P(Order, OfEveryIntegrator)
 }
 
 INSTANTIATE_TEST_SUITE_P(Loads, Order,
-                         ::testing::Values(Load{"plain", false, false, false}, Load{"damped", true, false, false}, Load{"moving", false, true, false},
-                                           Load{"damped_and_moving", true, true, false}, Load{"loop", true, true, true}),
+                         ::testing::Values(Load{"plain", false, false, false}, Load{"damped", true, false, false},
+                                           Load{"moving", false, true, false},
+                                           Load{"damped_and_moving", true, true, false},
+                                           Load{"loop", true, true, true}),
                          [](const auto& info) { return info.param.name; });
 
 TEST(ErrorControl, MeetsItsTolerance)
@@ -123,7 +127,8 @@ TEST(ErrorControl, MeetsItsTolerance)
       const RodState end = run(load, time, duration, 8, &total);   // 20 ms each: far too long for one step
       const double error = (end.x - reference.x).colwise().norm().maxCoeff();
       // local errors add up, and grow at most a few times in a motion as short as this
-      EXPECT_LT(error, 3 * tolerance * total.substeps) << toString(integrator) << " " << tolerance << " steps " << total.substeps;
+      EXPECT_LT(error, 3 * tolerance * total.substeps)
+          << toString(integrator) << " " << tolerance << " steps " << total.substeps;
       EXPECT_LE(total.error_estimate, tolerance);
       EXPECT_GT(total.substeps, 8);
       if (last_steps > 0)
@@ -139,5 +144,5 @@ TEST(ErrorControl, MeetsItsTolerance)
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

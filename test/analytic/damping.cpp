@@ -1,4 +1,5 @@
-// Rayleigh damping of a vibrating cantilever: damping ratio alpha / (2 omega) + beta omega / 2 for mass and stiffness damping alpha, beta.
+// Rayleigh damping of a vibrating cantilever: damping ratio alpha / (2 omega) + beta omega / 2 for mass and stiffness
+// damping alpha, beta.
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
@@ -13,7 +14,8 @@ struct Mode
   Eigen::VectorXd shape;   ///< transverse, unit in the mass
 };
 
-/// Transverse modes of the discrete cantilever, from differences of its gradient (exact: where it is straight no angle has a torque).
+/// Transverse modes of the discrete cantilever, from differences of its gradient (exact: where it is straight no angle
+/// has a torque).
 Mode transverseMode(const Rod& rod, int number)
 {
   const int n = rod.model->nodes(), free = n - 1;
@@ -33,7 +35,8 @@ Mode transverseMode(const Rod& rod, int number)
       k(i, j) = (up[4 * (i + 1) + 2] - down[4 * (i + 1) + 2]) / (2 * step);
   }
   const Eigen::VectorXd mass = rod.model->mass.tail(free);
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (k + k.transpose()), mass.asDiagonal().toDenseMatrix());
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (k + k.transpose()),
+                                                                        mass.asDiagonal().toDenseMatrix());
   return {std::sqrt(modes.eigenvalues()[number]), modes.eigenvectors().col(number)};
 }
 
@@ -45,8 +48,7 @@ struct Case
 };
 
 class RayleighDamping : public ::testing::TestWithParam<Case>
-{
-};
+{};
 
 TEST_P(RayleighDamping, RatioOfAMode)
 {
@@ -74,18 +76,21 @@ TEST_P(RayleighDamping, RatioOfAMode)
   for (int k = 0; k < periods * per_period; ++k)
     ASSERT_TRUE(stepper.step(rod.state, rod.inputs, h).ok);
   // q'' + 2 ratio omega q' + omega^2 q = 0 from rest: after whole periods q = q0 exp(-ratio omega t)
-  const double q = mode.shape.dot(rod.model->mass.tail(n - 1).cwiseProduct(rod.state.x.row(2).tail(n - 1).transpose())) / amplitude;
+  const double q =
+      mode.shape.dot(rod.model->mass.tail(n - 1).cwiseProduct(rod.state.x.row(2).tail(n - 1).transpose())) / amplitude;
   const double expected = std::exp(-ratio * mode.omega * periods * per_period * h);
   // time error: (omega h)^2 / 12 of a phase of 4 pi, met at a maximum; symplectic Euler omega h / 2
   EXPECT_NEAR(q / expected, 1.0, 2e-3) << "ratio " << ratio << " omega " << mode.omega;
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, RayleighDamping,
-                         ::testing::Values(Case{Integrator::implicit_midpoint, 0.0, 5e-3, 0}, Case{Integrator::implicit_midpoint, 1.0, 0.0, 0},
-                                           Case{Integrator::tr_bdf2, 1.0, 3e-3, 0}, Case{Integrator::tr_bdf2, 2.0, 1e-3, 1},
-                                           Case{Integrator::bdf2, 1.0, 3e-3, 0}, Case{Integrator::generalized_alpha, 1.0, 3e-3, 1},
-                                           Case{Integrator::symplectic_euler, 1.0, 1e-3, 1}),
-                         [](const auto& info) { return std::string(toString(info.param.integrator)) + "_" + std::to_string(info.index); });
+INSTANTIATE_TEST_SUITE_P(
+    Cases, RayleighDamping,
+    ::testing::Values(Case{Integrator::implicit_midpoint, 0.0, 5e-3, 0},
+                      Case{Integrator::implicit_midpoint, 1.0, 0.0, 0}, Case{Integrator::tr_bdf2, 1.0, 3e-3, 0},
+                      Case{Integrator::tr_bdf2, 2.0, 1e-3, 1}, Case{Integrator::bdf2, 1.0, 3e-3, 0},
+                      Case{Integrator::generalized_alpha, 1.0, 3e-3, 1},
+                      Case{Integrator::symplectic_euler, 1.0, 1e-3, 1}),
+    [](const auto& info) { return std::string(toString(info.param.integrator)) + "_" + std::to_string(info.index); });
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

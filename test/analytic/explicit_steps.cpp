@@ -45,7 +45,8 @@ TEST(ExplicitSteps, MomentaAreConserved)
       error = std::max(error, report.constraint_error);
     }
     EXPECT_LT((g.momentum() - p).norm(), 1e-11 * p.norm()) << nameOf(kind);
-    // Forces and constraints act at the start's positions, so each step keeps it; the general frames' last Newton step leaves little.
+    // Forces and constraints act at the start's positions, so each step keeps it; the general frames' last Newton step
+    // leaves little.
     EXPECT_LT((g.angularMomentum() - l).norm(), 1e-9 * l.norm()) << nameOf(kind);
     EXPECT_LE(iterations, kind.inextensible ? 5 : 0);
     EXPECT_LE(error, 1e-8);
@@ -60,7 +61,8 @@ TEST(ExplicitSteps, MomentaAreConserved)
 
 TEST(ExplicitSteps, TorsionalPendulum)
 {
-  // T = 2 pi sqrt(J L / beta), as in RigidBodies.TorsionalPendulum: here the torque is handed over explicitly (thesis 4.5.3)
+  // T = 2 pi sqrt(J L / beta), as in RigidBodies.TorsionalPendulum: here the torque is handed over explicitly
+  // (thesis 4.5.3)
   for (const Kind& kind : kKinds)
   {
     const double length = 1.0, beta = 2e-3, inertia = 1e-3;
@@ -72,7 +74,9 @@ TEST(ExplicitSteps, TorsionalPendulum)
     g.addRod(rod);
     Twist spin;
     spin.angular << 5.0, 0, 0;   // amplitude 3.5 rad: more than half a turn must be counted
-    g.weld(0, 10, 10, g.addBody(bodyOf(1.0, {inertia, 0.6 * inertia, 0.6 * inertia}), {Vector3d(length, 0, 0), Eigen::Quaterniond::Identity()}, spin));
+    g.weld(0, 10, 10,
+           g.addBody(bodyOf(1.0, {inertia, 0.6 * inertia, 0.6 * inertia}),
+                     {Vector3d(length, 0, 0), Eigen::Quaterniond::Identity()}, spin));
     g.setGravity(kNone);
     RodGroup group(g.model, kExplicit);
     const double period = 2 * M_PI * std::sqrt(inertia * length / beta);
@@ -91,7 +95,8 @@ TEST(ExplicitSteps, TorsionalPendulum)
         const double crossing = time - period / per_period * (1 - before / (before - after));
         if (found > 1)
         {
-          EXPECT_NEAR(crossing - last, period, 1e-6 * period) << nameOf(kind);   // (omega h)^2 / 24 = 4e-9, and the general frames' lag
+          // (omega h)^2 / 24 = 4e-9, and the general frames' lag
+          EXPECT_NEAR(crossing - last, period, 1e-6 * period) << nameOf(kind);
         }
         last = crossing;
       }
@@ -102,7 +107,8 @@ TEST(ExplicitSteps, TorsionalPendulum)
 
 TEST(ExplicitSteps, InextensibleRodLosesNoEnergyAndNoLength)
 {
-  // A rope swinging from one end: constraints do no work, gravity's is given back. The error of the energy is the step's.
+  // A rope swinging from one end: constraints do no work, gravity's is given back. The error of the energy is the
+  // step's.
   double drift[2];
   for (int fine = 0; fine < 2; ++fine)
   {
@@ -121,9 +127,12 @@ TEST(ExplicitSteps, InextensibleRodLosesNoEnergyAndNoLength)
       ASSERT_TRUE(report.ok) << report.message;
       ASSERT_LE(report.projection_iterations, 5);
       for (int j = 0; j < rod.model->edges(); ++j)
-        ASSERT_NEAR((rod.state.x.col(j + 1) - rod.state.x.col(j)).squaredNorm() / std::pow(rod.model->rest_length[j], 2), 1.0, 1e-8);
+        ASSERT_NEAR(
+            (rod.state.x.col(j + 1) - rod.state.x.col(j)).squaredNorm() / std::pow(rod.model->rest_length[j], 2), 1.0,
+            1e-8);
       // what changes the momentum is the weight and what the gripper does
-      const Vector3d expected = before + h * (rod.model->totalMass() * rod.inputs.gravity - stepper.wrenches()[0].force);
+      const Vector3d expected =
+          before + h * (rod.model->totalMass() * rod.inputs.gravity - stepper.wrenches()[0].force);
       ASSERT_LT((rod.momentum() - expected).norm(), 1e-12);
       drift[fine] = std::max(drift[fine], std::abs(stepper.energies(rod.state, rod.inputs.gravity).total() - start));
     }
@@ -143,10 +152,12 @@ TEST(ExplicitSteps, TurnsAreCounted)
   for (int k = 1; k <= 2500; ++k)
   {
     const double angle = 2.5 * (k <= 1250 ? k : 2500 - k);
-    rod.inputs.grasps[1].X_WG.orientation = Eigen::AngleAxisd(angle, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
+    rod.inputs.grasps[1].X_WG.orientation =
+        Eigen::AngleAxisd(angle, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
     const StepReport report = stepper.step(rod.state, rod.inputs, 1e-4);
     ASSERT_TRUE(report.ok) << report.message;
-    const double total = rod.state.twist.sum() + rod.state.grasps[0].section_twist[1] + rod.state.grasps[1].section_twist[0];
+    const double total =
+        rod.state.twist.sum() + rod.state.grasps[0].section_twist[1] + rod.state.grasps[1].section_twist[0];
     ASSERT_NEAR(total, angle, 1e-9 * (1 + angle));
   }
 }
@@ -165,7 +176,8 @@ TEST(ExplicitSteps, AReleasedPartKeepsItsTurns)
     RodStepper stepper(rod.model, kExplicit);
     for (int k = 1; k <= 400; ++k)
     {
-      rod.inputs.grasps[2].X_WG.orientation = Eigen::AngleAxisd(16 * M_PI * k / 400, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
+      rod.inputs.grasps[2].X_WG.orientation =
+          Eigen::AngleAxisd(16 * M_PI * k / 400, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
       const StepReport report = stepper.step(rod.state, rod.inputs, 1e-4);
       ASSERT_TRUE(report.ok) << nameOf(kind) << " " << report.message;
     }
@@ -173,7 +185,8 @@ TEST(ExplicitSteps, AReleasedPartKeepsItsTurns)
     rod.state.forgetHistory();
     const StepReport report = stepper.step(rod.state, rod.inputs, 1e-4);
     ASSERT_TRUE(report.ok) << nameOf(kind) << " " << report.message;
-    const double total = rod.state.twist.sum() + rod.state.grasps[0].section_twist[1] + rod.state.grasps[1].section_twist[0];
+    const double total =
+        rod.state.twist.sum() + rod.state.grasps[0].section_twist[1] + rod.state.grasps[1].section_twist[0];
     EXPECT_NEAR(total, 0.0, 1e-9) << nameOf(kind);
   }
 }
@@ -212,7 +225,8 @@ TEST(ExplicitSteps, NodesAtOnePlaceAreRefused)
 
 TEST(ExplicitSteps, EnergiesAreThoseOfTheFormulation)
 {
-  // Eight turns on a coil of 40 nodes: the general formulation's mean curvature would lose a third of the bending energy.
+  // Eight turns on a coil of 40 nodes: the general formulation's mean curvature would lose a third of the bending
+  // energy.
   const Matrix3Xd nodes = helixNodes(40, 0.1, 0.3, 3);
   Rod rod(openRod(nodes, modulusSection(1.345, 0.789, 1e4, 1.0), true), nodes);
   rod.model->isotropic = true;
@@ -229,7 +243,7 @@ TEST(ExplicitSteps, EnergiesAreThoseOfTheFormulation)
       start = stepper.energies(rod.state, kNone).total();
   }
   const RodEnergies end = stepper.energies(rod.state, kNone);
-  EXPECT_GT(end.kinetic, 0.05 * start);   // twist has become motion
+  EXPECT_GT(end.kinetic, 0.05 * start);            // twist has become motion
   EXPECT_NEAR(end.total(), start, 5e-4 * start);   // symplectic: swings by about omega h; measured 7e-5
 }
 
@@ -244,7 +258,9 @@ Group pendulum(const Kind& kind, int nodes, double stretch)
   rod.hold(0, 0);
   Group g;
   g.addRod(rod);
-  g.weld(0, nodes - 1, nodes - 1, g.addBody(bodyOf(0.1, {1e-4, 2e-4, 2e-4}), {Vector3d(0, 0, -stretch * length - 0.02), Eigen::Quaterniond::Identity()}));
+  g.weld(0, nodes - 1, nodes - 1,
+         g.addBody(bodyOf(0.1, {1e-4, 2e-4, 2e-4}),
+                   {Vector3d(0, 0, -stretch * length - 0.02), Eigen::Quaterniond::Identity()}));
   g.setGravity({0, 0, -9.81});
   return g;
 }
@@ -306,7 +322,8 @@ TEST(ExplicitSteps, LoadsAndDampingOfBodiesAreThoseOfImplicitSteps)
       EXPECT_TRUE(group.step(g.state, g.inputs, h).ok);
     return g.state.bodies[0].X_WB;
   };
-  const Pose exact = run(Integrator::implicit_midpoint, 4e-5), a = run(Integrator::symplectic_euler, 2e-5), b = run(Integrator::symplectic_euler, 1e-5);
+  const Pose exact = run(Integrator::implicit_midpoint, 4e-5), a = run(Integrator::symplectic_euler, 2e-5),
+             b = run(Integrator::symplectic_euler, 1e-5);
   EXPECT_LT((b.position - exact.position).norm(), 4e-6);
   EXPECT_LT(rotationVector(b.orientation * exact.orientation.conjugate()).norm(), 2e-5);
   EXPECT_LT((2 * b.position - a.position - exact.position).norm(), 0.02 * (a.position - exact.position).norm());
@@ -321,7 +338,8 @@ TEST(ExplicitSteps, GroupsGoOnBitByBit)
     changed->inextensible = true;
     model = changed;
   }
-  const int far = g.addBody(bodyOf(0.01, {2e-6, 3e-6, 4e-6}), {Vector3d(g.state.rods[0].x.col(8)), Eigen::Quaterniond::Identity()});
+  const int far =
+      g.addBody(bodyOf(0.01, {2e-6, 3e-6, 4e-6}), {Vector3d(g.state.rods[0].x.col(8)), Eigen::Quaterniond::Identity()});
   g.weld(0, 8, 8, far);
   RodGroup group(g.model, kExplicit);
   for (int k = 0; k < 2000; ++k)
@@ -363,7 +381,8 @@ TEST(ExplicitSteps, TwistThatCannotBeCountedIsRefused)
   rod.hold(20, 20);
   RodStepper stepper(rod.model, kExplicit);
   // the section turns about an axis across the rod and back: its frame comes back turned by half a turn about the rod
-  rod.inputs.grasps[1].X_WG.orientation = Eigen::AngleAxisd(M_PI, Vector3d::UnitZ()) * rod.inputs.grasps[1].X_WG.orientation;
+  rod.inputs.grasps[1].X_WG.orientation =
+      Eigen::AngleAxisd(M_PI, Vector3d::UnitZ()) * rod.inputs.grasps[1].X_WG.orientation;
   const StepReport report = stepper.step(rod.state, rod.inputs, 1e-4);
   EXPECT_FALSE(report.ok);
   EXPECT_FALSE(report.message.empty());
@@ -376,5 +395,5 @@ TEST(ExplicitSteps, ContactIsRefused)
   EXPECT_THROW(RodGroup(g.model, kExplicit), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -38,7 +38,8 @@ void setInMotion(Rod& rod, double speed)
   for (int i = 0; i < rod.model->nodes(); ++i)
   {
     const Vector3d r = (rod.state.x.col(i) - centre(rod)) / 0.1;
-    rod.state.v.col(i) = speed * (Vector3d(0.3, -0.2, 0.5) + Vector3d(0.2, 0.5, -0.3).cross(r) + Vector3d(0.4 * r.z(), 0.3 * r.x() * r.y(), -0.5 * r.x()));
+    rod.state.v.col(i) = speed * (Vector3d(0.3, -0.2, 0.5) + Vector3d(0.2, 0.5, -0.3).cross(r) +
+                                  Vector3d(0.4 * r.z(), 0.3 * r.x() * r.y(), -0.5 * r.x()));
   }
 }
 
@@ -99,11 +100,11 @@ TEST_P(FreeMotion, AngularMomentum)
     const double loss = (rod.angularMomentum() - start).norm() / start.norm();
     double claimed = 0.02;   // second order: 30 rad/s and more of vibration at 1 ms, (omega h)^2 per radian
     if (is(Integrator::implicit_midpoint))
-      claimed = 1e-9;        // conserved, being quadratic, to Newton's residual
+      claimed = 1e-9;   // conserved, being quadratic, to Newton's residual
     if (is(Integrator::symplectic_euler))
-      claimed = 2e-3;        // conserved but for the frames, which trail by a Newton step
+      claimed = 2e-3;   // conserved but for the frames, which trail by a Newton step
     if (is(Integrator::implicit_euler))
-      claimed = 0.5;         // claims nothing, but must not gain
+      claimed = 0.5;   // claims nothing, but must not gain
     EXPECT_LT(loss, claimed);
     EXPECT_LT(rod.angularMomentum().norm(), start.norm() * (is(Integrator::implicit_euler) ? 1.0 : 1.0 + claimed));
   }
@@ -123,7 +124,8 @@ TEST_P(FreeMotion, EnergyStaysInItsBounds)
     {
       ASSERT_TRUE(stepper.step(rod.state, rod.inputs, h).ok);
       const double now = stepper.energies(rod.state, Vector3d::Zero()).total();
-      EXPECT_LE(now, is(Integrator::implicit_euler) ? last + 1e-9 * start : 1.1 * start) << "step " << k;   // 1e-9: Newton's residual
+      // 1e-9: Newton's residual
+      EXPECT_LE(now, is(Integrator::implicit_euler) ? last + 1e-9 * start : 1.1 * start) << "step " << k;
       last = now;
       least = std::min(least, now);
       most = std::max(most, now);
@@ -172,20 +174,22 @@ TEST_P(FreeMotion, DragAndMassDampingReachTerminalVelocity)
     // the solution v_t (1 - exp(-rate t)), error (rate h)^2 / 12 of it for second order, rate h / 2 for first
     const Vector3d exact = terminal * (1 - std::exp(-rate));
     const double error = order(GetParam()) == 2 ? rate * h * rate * h : rate * h;
-    EXPECT_LT((rod.state.v.colwise() - exact).cwiseAbs().maxCoeff(), error * terminal.norm() * rate * std::exp(-rate) + 1e-9);
+    EXPECT_LT((rod.state.v.colwise() - exact).cwiseAbs().maxCoeff(),
+              error * terminal.norm() * rate * std::exp(-rate) + 1e-9);
   }
 }
 
 TEST_P(FreeMotion, ARestingLoopStays)
 {
-  // Naturally curved ring at rest, and a naturally straight one bent to a ring: by symmetry neither moves, but for the second's
-  // uniform stretch, B / (R^2 EA) = (r / 2R)^2.
+  // Naturally curved ring at rest, and a naturally straight one bent to a ring: by symmetry neither moves, but for the
+  // second's uniform stretch, B / (R^2 EA) = (r / 2R)^2.
   for (bool straight : {false, true})
   {
     const int n = 24;
     const double radius = 0.1, r = 0.004;
     const Matrix3Xd nodes = ringNodes(n, radius);
-    Rod rod(buildRod("ring", nodes, true, uniformSections(roundSection(r, 1e6, 1000), n), Vector3d::Zero(), straight), nodes);
+    Rod rod(buildRod("ring", nodes, true, uniformSections(roundSection(r, 1e6, 1000), n), Vector3d::Zero(), straight),
+            nodes);
     rod.inputs.gravity.setZero();
     RodStepper stepper(rod.model, time());
     const double h = is(Integrator::symplectic_euler) ? 5e-5 : 1e-3;
@@ -199,7 +203,8 @@ TEST_P(FreeMotion, ARestingLoopStays)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, FreeMotion, ::testing::ValuesIn(allIntegrators()), [](const auto& info) { return toString(info.param); });
+INSTANTIATE_TEST_SUITE_P(All, FreeMotion, ::testing::ValuesIn(allIntegrators()),
+                         [](const auto& info) { return toString(info.param); });
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -12,17 +12,28 @@ namespace slender::test {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-const GridPattern kPatterns[] = {GridPattern::one_diagonal, GridPattern::alternating, GridPattern::equilateral, GridPattern::irregular};
-enum class Model { hinge, nonconforming, conforming };
+const GridPattern kPatterns[] = {GridPattern::one_diagonal, GridPattern::alternating, GridPattern::equilateral,
+                                 GridPattern::irregular};
+enum class Model
+{
+  hinge,
+  nonconforming,
+  conforming
+};
 const Model kModels[] = {Model::hinge, Model::nonconforming, Model::conforming};
 
-IsometricElement elementOf(Model model) { return model == Model::conforming ? IsometricElement::conforming : IsometricElement::nonconforming; }
+IsometricElement elementOf(Model model)
+{
+  return model == Model::conforming ? IsometricElement::conforming : IsometricElement::nonconforming;
+}
 
-double bendingEnergy(const TriangleMesh& rest, const MeshTopology& t, Model model, double coefficient, const Matrix3Xd& x)
+double bendingEnergy(const TriangleMesh& rest, const MeshTopology& t, Model model, double coefficient,
+                     const Matrix3Xd& x)
 {
   const PointVector points = pointsOf(x);
   if (model == Model::hinge)
-    return HingeBending(t.hinges, hingeStiffness(rest, t, coefficient), VectorXd::Zero(t.hingeCount())).energy(points.data());
+    return HingeBending(t.hinges, hingeStiffness(rest, t, coefficient), VectorXd::Zero(t.hingeCount()))
+        .energy(points.data());
   PointVector y(points.size());
   return 0.5 * isometricBending(rest, t, elementOf(model), coefficient).multiply(points.data(), y.data());
 }
@@ -44,12 +55,14 @@ double coveredArea(const TriangleMesh& mesh, const MeshTopology& t, Model model)
 /// The plane z = 0 rolled up along a direction in it.
 Matrix3Xd rolled(const Matrix3Xd& flat, double radius, double degrees)
 {
-  const Vector3d along(std::cos(degrees * kPi / 180), std::sin(degrees * kPi / 180), 0), across(-along.y(), along.x(), 0);
+  const Vector3d along(std::cos(degrees * kPi / 180), std::sin(degrees * kPi / 180), 0),
+      across(-along.y(), along.x(), 0);
   Matrix3Xd x(3, flat.cols());
   for (Eigen::Index i = 0; i < flat.cols(); ++i)
   {
     const double angle = along.dot(flat.col(i)) / radius;
-    x.col(i) = across * across.dot(flat.col(i)) + radius * (std::sin(angle) * along + (1 - std::cos(angle)) * Vector3d::UnitZ());
+    x.col(i) = across * across.dot(flat.col(i)) +
+               radius * (std::sin(angle) * along + (1 - std::cos(angle)) * Vector3d::UnitZ());
   }
   return x;
 }
@@ -61,7 +74,8 @@ TEST(PlateBending, RolledLatticesMatchTheReference)
   int compared = 0;
   for (std::string line; std::getline(file, line);)
   {
-    const GridPattern pattern = line.rfind("right_single", 0) == 0 ? GridPattern::one_diagonal : GridPattern::alternating;
+    const GridPattern pattern =
+        line.rfind("right_single", 0) == 0 ? GridPattern::one_diagonal : GridPattern::alternating;
     if (line.rfind("right_", 0) != 0)
       continue;
     std::istringstream cells(line);
@@ -73,17 +87,15 @@ TEST(PlateBending, RolledLatticesMatchTheReference)
     const TriangleMesh mesh = gridMesh(24, 24, 24, 24, pattern);
     const MeshTopology t = meshTopology(mesh);
     const Matrix3Xd x = rolled(mesh.vertices, radius, v[1]);
-    const auto ratio = [&](Model model) { return bendingEnergy(mesh, t, model, 1.0, x) * 2 * radius * radius / coveredArea(mesh, t, model); };
+    const auto ratio = [&](Model model) {
+      return bendingEnergy(mesh, t, model, 1.0, x) * 2 * radius * radius / coveredArea(mesh, t, model);
+    };
     EXPECT_NEAR(ratio(Model::hinge), hinge, 1e-8) << line;
     EXPECT_NEAR(ratio(Model::nonconforming), nonconforming, 1e-8) << line;
     if (pattern == GridPattern::one_diagonal)   // with Voronoi cells, alternating diagonals make no difference either
-    {
       EXPECT_NEAR(ratio(Model::conforming), conforming, 1e-8) << line;
-    }
     else
-    {
       EXPECT_NEAR(ratio(Model::conforming), 1.0, 0.02 * 64 / (radius * radius)) << line;
-    }
     ++compared;
   }
   EXPECT_EQ(compared, 30);
@@ -102,12 +114,14 @@ TEST(PlateBending, CylindersHaveTheEnergyOfPlateTheory)
         const double coefficient = D * bendingCalibration(mesh, t, elementOf(model), Vector3d::UnitX());
         const double energy = bendingEnergy(mesh, t, model, coefficient, rolled(mesh.vertices, radius, direction));
         const double expected = 0.5 * D * coveredArea(mesh, t, model) / (radius * radius);
-        EXPECT_NEAR(energy / expected, 1.0, 0.02) << toString(pattern) << " model " << int(model) << " direction " << direction;
+        EXPECT_NEAR(energy / expected, 1.0, 0.02)
+            << toString(pattern) << " model " << int(model) << " direction " << direction;
       }
   }
 }
 
-/// The one inner edge is a straight line in every cylinder along or across the warp: no calibration can give these an energy.
+/// The one inner edge is a straight line in every cylinder along or across the warp: no calibration can give these an
+/// energy.
 TEST(PlateBending, TooCoarseMeshesAreRefused)
 {
   TriangleMesh square;
@@ -127,8 +141,10 @@ TEST(PlateBending, CalibrationsOfLatticesAreThird)
     const TriangleMesh mesh = gridMesh(20, height, 20, 20, pattern);
     const MeshTopology t = meshTopology(mesh);
     // at the edge the directions' shares differ
-    EXPECT_NEAR(bendingCalibration(mesh, t, IsometricElement::nonconforming, Vector3d::UnitX()), 1.0 / 3, 0.015) << toString(pattern);
-    EXPECT_NEAR(bendingCalibration(mesh, t, IsometricElement::conforming, Vector3d::UnitX()), 1.0, 1e-2) << toString(pattern);
+    EXPECT_NEAR(bendingCalibration(mesh, t, IsometricElement::nonconforming, Vector3d::UnitX()), 1.0 / 3, 0.015)
+        << toString(pattern);
+    EXPECT_NEAR(bendingCalibration(mesh, t, IsometricElement::conforming, Vector3d::UnitX()), 1.0, 1e-2)
+        << toString(pattern);
   }
 }
 
@@ -140,11 +156,16 @@ TEST(PlateBending, SpheresHaveTheirWillmoreEnergy)
   {
     // reference/rod_plate/sphere_willmore.csv, level 4: coefficient 1
     const double ratio = bendingEnergy(sphere, t, model, 1.0, sphere.vertices) / (8 * kPi);
-    const double expected = model == Model::hinge ? 1.015275595 : model == Model::nonconforming ? 1.015098972 : 0.9988855204;
+    const double expected = model == Model::hinge           ? 1.015275595
+                            : model == Model::nonconforming ? 1.015098972
+                                                            : 0.9988855204;
     EXPECT_NEAR(ratio, expected, model == Model::conforming ? 2e-3 : 1e-5);
     // Poisson's ratio -1/3 of hinges: D (1 + nu) / 2 of the energy with D H^2 / 2
-    const double calibrated = bendingEnergy(sphere, t, model, bendingCalibration(sphere, t, elementOf(model), Vector3d::UnitX()), sphere.vertices);
-    EXPECT_NEAR(calibrated / (8 * kPi), model == Model::conforming ? 1.0 : 1.0 / 3, model == Model::conforming ? 0.02 : 0.02 / 3) << int(model);
+    const double calibrated = bendingEnergy(
+        sphere, t, model, bendingCalibration(sphere, t, elementOf(model), Vector3d::UnitX()), sphere.vertices);
+    EXPECT_NEAR(calibrated / (8 * kPi), model == Model::conforming ? 1.0 : 1.0 / 3,
+                model == Model::conforming ? 0.02 : 0.02 / 3)
+        << int(model);
   }
 }
 
@@ -165,9 +186,7 @@ TEST(IsometricBending, IsSemidefiniteAndLeavesAffineMapsOfFlatSheetsAlone)
       const VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<MatrixXd>(K).eigenvalues();
       const double fourth = eigenvalues[3];
       if (element == IsometricElement::nonconforming)
-      {
         EXPECT_GT(fourth, 1e-6 * size) << toString(pattern);
-      }
       EXPECT_LT(std::abs(eigenvalues[2]), 1e-12 * size);
     }
 }
@@ -219,7 +238,8 @@ TEST(PointMatrix, ProductsMatchDenseOnes)
   const MembraneEnergy membrane(mesh, orthotropicMembrane(3.0, 1.2, 0.4, 0.5));
   BlockMatrix blocks(K.size(), {mesh.triangles, t.hinges});
   PointVector gradient(4 * K.size(), 0.0);
-  membrane.addHessian(HessianKind::exact, pointsOf(mesh.vertices + 0.1 * x).data(), membrane.slotsIn(blocks), gradient.data(), blocks.values());
+  membrane.addHessian(HessianKind::exact, pointsOf(mesh.vertices + 0.1 * x).data(), membrane.slotsIn(blocks),
+                      gradient.data(), blocks.values());
   const MatrixXd before = denseOf(blocks);
   EXPECT_LT((before - before.transpose()).norm(), 1e-14 * before.norm());
   blocks.add(0.5, K, blocks.mapOf(K));
@@ -235,5 +255,5 @@ TEST(PointMatrix, ProductsMatchDenseOnes)
   EXPECT_THROW(BlockMatrix(K.size(), {mesh.triangles}).mapOf(K), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -31,7 +31,8 @@ Twist tumble(Integrator integrator, int count, Pose& end)
 
 TEST(RigidBodies, TumblingHasTheIntegratorsOrder)
 {
-  for (Integrator integrator : {Integrator::implicit_euler, Integrator::bdf2, Integrator::tr_bdf2, Integrator::implicit_midpoint, Integrator::generalized_alpha})
+  for (Integrator integrator : {Integrator::implicit_euler, Integrator::bdf2, Integrator::tr_bdf2,
+                                Integrator::implicit_midpoint, Integrator::generalized_alpha})
   {
     Pose exact_pose, coarse_pose, fine_pose;
     const Twist exact = tumble(Integrator::tr_bdf2, 6400, exact_pose);
@@ -40,9 +41,11 @@ TEST(RigidBodies, TumblingHasTheIntegratorsOrder)
     const auto momentum = [&](const Pose& x, const Twist& v) {
       return Vector3d(x.orientation * Vector3d(inertia.cwiseProduct(x.orientation.conjugate() * v.angular)));
     };
-    EXPECT_LT((momentum(exact_pose, exact) - inertia.cwiseProduct(spin)).norm(), 1e-6);   // constant: 6400 steps leave 2e-7
+    // constant: 6400 steps leave 2e-7
+    EXPECT_LT((momentum(exact_pose, exact) - inertia.cwiseProduct(spin)).norm(), 1e-6);
     const double ratio = (coarse.angular - exact.angular).norm() / (fine.angular - exact.angular).norm();
-    const double pose_ratio = coarse_pose.orientation.angularDistance(exact_pose.orientation) / fine_pose.orientation.angularDistance(exact_pose.orientation);
+    const double pose_ratio = coarse_pose.orientation.angularDistance(exact_pose.orientation) /
+                              fine_pose.orientation.angularDistance(exact_pose.orientation);
     const double order = integrator == Integrator::implicit_euler ? 1.0 : 2.0;
     EXPECT_NEAR(std::log2(ratio), order, 0.2) << toString(integrator);
     EXPECT_NEAR(std::log2(pose_ratio), order, 0.2) << toString(integrator);
@@ -59,7 +62,8 @@ TEST(RigidBodies, TorsionalPendulum)
   g.addRod(rod);
   Twist spin;
   spin.angular << 0.5, 0, 0;
-  const int body = g.addBody(bodyOf(1.0, {inertia, 0.6 * inertia, 0.6 * inertia}), {Vector3d(length, 0, 0), Eigen::Quaterniond::Identity()}, spin);
+  const int body = g.addBody(bodyOf(1.0, {inertia, 0.6 * inertia, 0.6 * inertia}),
+                             {Vector3d(length, 0, 0), Eigen::Quaterniond::Identity()}, spin);
   g.weld(0, 10, 10, body);
   g.setGravity(kNone);
   RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
@@ -76,9 +80,7 @@ TEST(RigidBodies, TorsionalPendulum)
     {
       crossing = time - h + h * before / (before - after);
       if (found++ > 0)
-      {
         EXPECT_NEAR(crossing - last, period, 2e-4 * period);   // TR-BDF2's phase error at 400 steps a period is 1e-4
-      }
       last = crossing;
     }
   }
@@ -144,7 +146,8 @@ TEST(RigidBodies, HeavyBodyIsAClamp)
     ASSERT_TRUE(stepper.step(held.state, held.inputs, 2e-3).ok);
     ASSERT_TRUE(group.step(g.state, g.inputs, 2e-3).ok);
   }
-  EXPECT_LT((held.state.x - g.state.rods[0].x).cwiseAbs().maxCoeff(), 1e-6);   // the body moves by mass ratio times g t^2
+  // the body moves by mass ratio times g t^2
+  EXPECT_LT((held.state.x - g.state.rods[0].x).cwiseAbs().maxCoeff(), 1e-6);
 }
 
 TEST(RigidBodies, DrivenBodyCarriesItsRod)
@@ -171,7 +174,8 @@ TEST(RigidBodies, DrivenBodyCarriesItsRod)
     ASSERT_TRUE(group.step(g.state, g.inputs, 5e-3).ok);
   }
   EXPECT_LT((held.state.x - g.state.rods[0].x).cwiseAbs().maxCoeff(), 1e-12);
-  EXPECT_LT((stepper.wrenches()[0].force - group.wrenches(0)[0].force).norm(), 1e-9 * stepper.wrenches()[0].force.norm());
+  EXPECT_LT((stepper.wrenches()[0].force - group.wrenches(0)[0].force).norm(),
+            1e-9 * stepper.wrenches()[0].force.norm());
 }
 
 TEST(RigidBodies, HangingBodyAtRest)
@@ -184,7 +188,8 @@ TEST(RigidBodies, HangingBodyAtRest)
   Group g;
   g.addRod(rope);
   const double mass = 0.08;
-  g.weld(0, 20, 20, g.addBody(bodyOf(mass, {1e-5, 1e-5, 1e-5}), {Vector3d(0.61, 0, 0), Eigen::Quaterniond::Identity()}));
+  g.weld(0, 20, 20,
+         g.addBody(bodyOf(mass, {1e-5, 1e-5, 1e-5}), {Vector3d(0.61, 0, 0), Eigen::Quaterniond::Identity()}));
   RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
   const StepReport report = group.solveEquilibrium(g.state, g.inputs);
   ASSERT_TRUE(report.ok) << report.message;
@@ -229,5 +234,5 @@ TEST(RigidBodies, ImpossibleInertiaIsRefused)
   EXPECT_THROW(checkBody(bodyOf(1.0, {1, 0, 1})), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

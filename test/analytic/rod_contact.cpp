@@ -12,7 +12,8 @@ const Vector3d kNone = Vector3d::Zero();
 /// Rope of the given number of nodes lying along x at height z.
 Rod rope(int n, double length, double radius, double z, double youngs = 1e6)
 {
-  Rod rod(openRod(straightNodes(n, length, Vector3d(0, 0, z)), roundSection(radius, youngs, 1000.0)), straightNodes(n, length, Vector3d(0, 0, z)));
+  Rod rod(openRod(straightNodes(n, length, Vector3d(0, 0, z)), roundSection(radius, youngs, 1000.0)),
+          straightNodes(n, length, Vector3d(0, 0, z)));
   rod.inputs.gravity << 0, 0, -9.81;
   return rod;
 }
@@ -92,7 +93,8 @@ TEST(RodContact, CoulombsLawOnASlope)
 
 TEST(RodContact, MovedObstaclePushesARope)
 {
-  // a cylinder across a rope held at both ends pushes it down by 8 cm at 1 m/s: the rope is in contact, taut, and nowhere inside
+  // a cylinder across a rope held at both ends pushes it down by 8 cm at 1 m/s: the rope is in contact, taut, and
+  // nowhere inside
   const double radius = 0.003;
   Rod rod = rope(41, 0.4, radius, 0.0, 1e5);
   rod.hold(0, 0);
@@ -116,8 +118,8 @@ TEST(RodContact, MovedObstaclePushesARope)
   EXPECT_LT(force, 0.0);
 }
 
-/// The twist of a straight rod that may touch is the turn of its ends, whatever the solver did on the way: frames belong to the same instant
-/// as positions.
+/// The twist of a straight rod that may touch is the turn of its ends, whatever the solver did on the way: frames
+/// belong to the same instant as positions.
 TEST(RodContact, TwistFollowsTheClamps)
 {
   for (Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
@@ -132,7 +134,8 @@ TEST(RodContact, TwistFollowsTheClamps)
     RodGroup group(g.model, withIntegrator(integrator));
     for (double turn : {1e-4, 0.01, 0.5})
     {
-      g.inputs.rods[0].grasps[1].X_WG.orientation = fromRotationVector(Vector3d(turn, 0, 0)) * rod.inputs.grasps[1].X_WG.orientation;
+      g.inputs.rods[0].grasps[1].X_WG.orientation =
+          fromRotationVector(Vector3d(turn, 0, 0)) * rod.inputs.grasps[1].X_WG.orientation;
       ASSERT_TRUE(group.step(g.state, g.inputs, 1e-3).ok);
       const RodState& state = g.state.rods[0];
       double twist = state.twist.sum();
@@ -175,7 +178,8 @@ TEST(RodContact, WhipDoesNotPassAThinObstacle)
   Rod rod = rope(101, 0.5, radius, 0.0, 1e8);
   rod.state.v.row(2).setConstant(-50.0);
   g.addRod(rod);
-  g.addObstacle(Capsule{0.002, 0.4}, {Vector3d(0.253, 0, -0.3), Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitX()))}, 0.2);
+  g.addObstacle(Capsule{0.002, 0.4},
+                {Vector3d(0.253, 0, -0.3), Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitX()))}, 0.2);
   touch(g, 0.2 * radius);
   RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
   for (int k = 0; k < 12; ++k)
@@ -204,7 +208,8 @@ TEST(RodContact, BodyFallsOnRopesAndStaysOnThem)
   Group g;
   g.addRod(left);
   g.addRod(right);
-  const int plate = g.addBody(bodyOf(0.05, {6e-5, 3e-5, 8e-5}), {Vector3d(0.2, 0, 0.03), Eigen::Quaterniond::Identity()});
+  const int plate =
+      g.addBody(bodyOf(0.05, {6e-5, 3e-5, 8e-5}), {Vector3d(0.2, 0, 0.03), Eigen::Quaterniond::Identity()});
   touch(g, 0.1 * radius);
   g.model.contact.bodies.push_back({plate, Box{Vector3d(0.06, 0.12, 0.01)}, {}, -1.0});
   RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
@@ -242,5 +247,5 @@ TEST(RodContact, RestartIsBitEqual)
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -1,4 +1,5 @@
-// Statics ends at a stable equilibrium, or says that it did not: lowest eigenvalues, saddles that are left, paths through folds.
+// Statics ends at a stable equilibrium, or says that it did not: lowest eigenvalues, saddles that are left, paths
+// through folds.
 #include <gtest/gtest.h>
 
 #include "slender_sim/geometry/curves.h"
@@ -9,7 +10,8 @@
 namespace slender::test {
 namespace {
 
-/// A heavy cantilever along x with L = rho A = A1 = 1, whose section carries the weight on the strong axis: a/b = 2.5, polar twist modulus, nu = 0.5.
+/// A heavy cantilever along x with L = rho A = A1 = 1, whose section carries the weight on the strong axis: a/b = 2.5,
+/// polar twist modulus, nu = 0.5.
 Rod lateralRod(int edges, double gamma)
 {
   constexpr double kRatio = 2.5;
@@ -24,7 +26,8 @@ Rod lateralRod(int edges, double gamma)
   return rod;
 }
 
-constexpr double kLateral = 56.0;   ///< above the threshold of lateralRod(), which lies between those of a/b = 2 (98) and 3 (42)
+/// above the threshold of lateralRod(), which lies between those of a/b = 2 (98) and 3 (42)
+constexpr double kLateral = 56.0;
 
 StepReport solve(Rod& rod, bool leave_saddles = true)
 {
@@ -157,8 +160,8 @@ TEST(StableStatics, aColumnUnderABodyLeavesTheStraightShapeBeyondEulersLoad)
 
 TEST(RodPath, goesThroughTheFoldsOfAShallowArch)
 {
-  // An arch between clamps, pressed down in its middle: the load rises to a limit point, falls, and rises again. Kept in its plane by a section that
-  // is stiff across it, and the symmetry keeps the path on the symmetric branch.
+  // An arch between clamps, pressed down in its middle: the load rises to a limit point, falls, and rises again. Kept
+  // in its plane by a section that is stiff across it, and the symmetry keeps the path on the symmetric branch.
   constexpr int n = 61;
   const double angle = 1.2;   // of the arc; B L / (E A h^2) is small enough for a limit point
   Matrix3Xd x(3, n);
@@ -200,9 +203,9 @@ TEST(RodPath, goesThroughTheFoldsOfAShallowArch)
   }
   EXPECT_TRUE(fell);
   EXPECT_LT(lowest_after, highest);
-  EXPECT_GE(path.factor(), last);   // and came out on the other side
+  EXPECT_GE(path.factor(), last);                                 // and came out on the other side
   EXPECT_LT(path.state().x(2, (n - 1) / 2), rod.state.x(2, 0));   // hanging below its ends
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

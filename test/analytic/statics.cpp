@@ -56,7 +56,8 @@ TEST(Cantilever, SmallDeflectionIsLinearTheory)
 
 TEST(Cantilever, ClampIsSecondOrder)
 {
-  // Gamma = w L^3 / B = 20: bent by 60 degrees. Against the exact elastica by Richardson; 1e-5 from the published (0.66234, -0.69540).
+  // Gamma = w L^3 / B = 20: bent by 60 degrees. Against the exact elastica by Richardson; 1e-5 from the published
+  // (0.66234, -0.69540).
   const RodSection section = roundSection(0.002, 1e9, 1000);
   for (double shear : {0.0, 0.5})
   {
@@ -68,7 +69,11 @@ TEST(Cantilever, ClampIsSecondOrder)
     {
       const double error = (cantileverTip(edges + 1, 1.0, section, shear) - exact).norm();
       // second order is reached from 40 edges on; unequal edges differ threefold in length
-      EXPECT_GT(std::log2(last / error), edges == 10 ? -1 : edges == 20 ? 1.3 : edges == 40 ? 1.7 : 1.8) << edges << " edges, shear " << shear;
+      EXPECT_GT(std::log2(last / error), edges == 10   ? -1
+                                         : edges == 20 ? 1.3
+                                         : edges == 40 ? 1.7
+                                                       : 1.8)
+          << edges << " edges, shear " << shear;
       last = error;
     }
     EXPECT_LT(last, shear > 0 ? 5e-4 : 3e-4);   // 80 edges
@@ -90,11 +95,13 @@ TEST(Catenary, OfALongThinRod)
   double a = 0.3;
   for (int k = 0; k < 50; ++k)
   {
-    const double f = 2 * a * std::sinh(0.5 * span / a) - length, df = 2 * std::sinh(0.5 * span / a) - span / a * std::cosh(0.5 * span / a);
+    const double f = 2 * a * std::sinh(0.5 * span / a) - length,
+                 df = 2 * std::sinh(0.5 * span / a) - span / a * std::cosh(0.5 * span / a);
     a -= f / df;
   }
   const double lowest = rod.state.x.row(2).minCoeff();
-  // polygon of 80 edges: h^2 / (8 a) = 0.4 mm of sag at the bottom; bending over 47 mm with a radius of 230 mm, some 0.02 of that length
+  // polygon of 80 edges: h^2 / (8 a) = 0.4 mm of sag at the bottom; bending over 47 mm with a radius of 230 mm, some
+  // 0.02 of that length
   EXPECT_NEAR(lowest, a - a * std::cosh(0.5 * span / a), 2e-3);
   for (int i = 0; i < n; ++i)
   {
@@ -114,7 +121,8 @@ TEST(Catenary, OfALongThinRod)
 
 TEST(Catenary, IsFoundFromAnyStart)
 {
-  // Ropes from limp to stiff, from the stretched line and from a compressed arch the wrong length: one equilibrium each.
+  // Ropes from limp to stiff, from the stretched line and from a compressed arch the wrong length: one equilibrium
+  // each.
   for (double r : {2e-4, 1e-3, 4e-3})
     for (double youngs : {1e6, 1e8})
     {
@@ -154,11 +162,13 @@ TEST(Arc, BetweenClampsCarriesAPureMoment)
   rod.hold(0, 0);
   rod.hold(n - 1, n - 1);
   rod.inputs.grasps[1].X_WG.position = radius * Vector3d(std::sin(phi), 0, 1 - std::cos(phi));
-  rod.inputs.grasps[1].X_WG.orientation = Eigen::AngleAxisd(-phi, Vector3d::UnitY()) * rod.inputs.grasps[1].X_WG.orientation;
+  rod.inputs.grasps[1].X_WG.orientation =
+      Eigen::AngleAxisd(-phi, Vector3d::UnitY()) * rod.inputs.grasps[1].X_WG.orientation;
   RodStepper stepper(rod.model, TimeConfig{});
   settle(rod, stepper);
   const double moment = bend * phi / length;
-  // turns per edge of 0.03 rad: relative error phi_edge^2 / 12 times a few; force by a chord that is longer than the rod by 4e-5
+  // turns per edge of 0.03 rad: relative error phi_edge^2 / 12 times a few; force by a chord that is longer than the
+  // rod by 4e-5
   EXPECT_NEAR(stepper.wrenches()[0].torque.y(), -moment, 2e-3 * moment);
   EXPECT_NEAR(stepper.wrenches()[1].torque.y(), moment, 2e-3 * moment);
   for (int i = 0; i < n; ++i)
@@ -245,13 +255,16 @@ TEST(Wrench, OfASettledRunIsTheStaticOne)
       rod.inputs.grasps[1].X_WG.position = start.position + std::min(1.0, k / 100.0) * (end.position - start.position);
       ASSERT_TRUE(stepper.step(rod.state, rod.inputs, 0.01).ok);
     }
-    EXPECT_LT((rod.state.x - fixed.state.x).cwiseAbs().maxCoeff(), 1e-6) << toString(integrator);   // damped by exp(-4 * 9) and more
+    // damped by exp(-4 * 9) and more
+    EXPECT_LT((rod.state.x - fixed.state.x).cwiseAbs().maxCoeff(), 1e-6) << toString(integrator);
     // stretching that the step does not resolve hardly dies away with the midpoint rule
     const double tolerance = integrator == Integrator::implicit_midpoint ? 5e-4 : 1e-5;
     for (int g = 0; g < 2; ++g)
     {
-      EXPECT_LT((stepper.wrenches()[g].force - statics.wrenches()[g].force).norm(), tolerance * rod.weight()) << toString(integrator);
-      EXPECT_LT((stepper.wrenches()[g].torque - statics.wrenches()[g].torque).norm(), tolerance * rod.weight() * 0.5) << toString(integrator);
+      EXPECT_LT((stepper.wrenches()[g].force - statics.wrenches()[g].force).norm(), tolerance * rod.weight())
+          << toString(integrator);
+      EXPECT_LT((stepper.wrenches()[g].torque - statics.wrenches()[g].torque).norm(), tolerance * rod.weight() * 0.5)
+          << toString(integrator);
     }
   }
 }
@@ -289,7 +302,8 @@ TEST(Grasps, AttachAndRelease)
     const double mass = rod.model->totalMass(), v0 = rod.momentum().z() / mass, t = steps * h;
     run();
     const double expected = -9.81 + (v0 + 9.81) * std::exp(-t);   // v' = g - v
-    EXPECT_NEAR(rod.momentum().z() / mass, expected, 2 * h) << toString(integrator);   // first order: h / 2 of the damped part
+    // first order: h / 2 of the damped part
+    EXPECT_NEAR(rod.momentum().z() / mass, expected, 2 * h) << toString(integrator);
     EXPECT_EQ(stepper.wrenches()[0].force.norm() + stepper.wrenches()[grasp].force.norm(), 0.0);
   }
 }
@@ -308,24 +322,29 @@ std::pair<double, double> column(int n, double bend, double stretch, double shor
 
 TEST(Column, BucklesAtEulersLoad)
 {
-  // clamped at both ends: P = 4 pi^2 B / L^2 [Euler]. Stretch stiff enough that the column shortens by 1e-3 before it buckles.
+  // clamped at both ends: P = 4 pi^2 B / L^2 [Euler]. Stretch stiff enough that the column shortens by 1e-3 before it
+  // buckles.
   const double bend = 1.0, critical = 4 * M_PI * M_PI * bend, stretch = critical / 1e-3;
   const int n = 41;
   const auto [below, straight] = column(n, bend, stretch, 0.97e-3);
   EXPECT_LT(straight, 1e-6);
   EXPECT_NEAR(below, 0.97 * critical, 1e-6 * critical);
-  // just beyond, it deflects at the critical load: slightly changed by the discrete model (4 pi^2 / 12 h^2) and by compression (1e-3)
+  // just beyond, it deflects at the critical load: slightly changed by the discrete model (4 pi^2 / 12 h^2) and by
+  // compression (1e-3)
   for (double shortening : {1.01e-3, 1.1e-3, 2e-3, 1e-2})
   {
     const auto [load, deflection] = column(n, bend, stretch, shortening);
     EXPECT_GT(deflection, 1e-3);
-    EXPECT_NEAR(load / critical, 1.0, 4 * M_PI * M_PI / 12 / ((n - 1) * (n - 1)) + 1e-3 + 0.5 * shortening) << shortening;   // the elastica stiffens by half the shortening
+    // the elastica stiffens by half the shortening
+    EXPECT_NEAR(load / critical, 1.0, 4 * M_PI * M_PI / 12 / ((n - 1) * (n - 1)) + 1e-3 + 0.5 * shortening)
+        << shortening;
     // y = A/2 (1 - cos 2 pi x): shortening by bending pi^2 A^2 / 4, with A the largest deflection
     const double bent = shortening - load / stretch;
     ASSERT_GT(bent, 0);
-    EXPECT_NEAR(deflection, 2 / M_PI * std::sqrt(bent), 0.02 * deflection) << shortening;   // at 1 % beyond, the load's own error counts double
+    // at 1 % beyond, the load's own error counts double
+    EXPECT_NEAR(deflection, 2 / M_PI * std::sqrt(bent), 0.02 * deflection) << shortening;
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

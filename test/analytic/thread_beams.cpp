@@ -1,4 +1,5 @@
-// Viscous beams under their weight: the elastic beam's deflections with velocities in place of displacements and 3 mu in place of E.
+// Viscous beams under their weight: the elastic beam's deflections with velocities in place of displacements and 3 mu
+// in place of E.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -21,7 +22,8 @@ double sagSpeed(int edges, bool second_end, int node)
   t.model.nozzle_diameter = 0.0;   // No nozzle: its radius would limit that of the edges.
   t.inputs.gravity = {0, 0, -kGravity};
   t.inputs.ends[0] = Pose{};
-  t.inputs.ends[1] = {{1, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY()))};   // x into the thread, y along d1
+  // x into the thread, y along d1
+  t.inputs.ends[1] = {{1, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY()))};
   t.state.ends[0] = {true, t.inputs.ends[0]};
   t.state.ends[1] = {second_end, t.inputs.ends[1]};
   ThreadStepper stepper = t.stepper();
@@ -61,5 +63,5 @@ TEST(ThreadBeams, HoldersBearTheWeight)
   EXPECT_EQ(stepper.endLoads()[1].force.norm(), 0.0);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -8,7 +8,8 @@ namespace {
 
 TEST(Twist, AThousandTurnsAreCounted)
 {
-  // beta / B so small that the straight rod stays stable: the torque at 1000 turns is a tenth of what buckles it (8.99 B / L).
+  // beta / B so small that the straight rod stays stable: the torque at 1000 turns is a tenth of what buckles it (8.99
+  // B / L).
   const double bend = 1.0, twist = 1e-4, length = 1.0;
   for (Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2, Integrator::generalized_alpha})
   {
@@ -27,20 +28,23 @@ TEST(Twist, AThousandTurnsAreCounted)
       ASSERT_TRUE(report.ok) << report.message;
       if (k % 100 == 0 || k == steps)
       {
-        // the frames carry no inertia: at each step the twist is uniform, torque beta angle / L on one gripper and against the other
-        // (generalised alpha balances forces 1 / (1 + rho) of the way through the step, and reports that torque)
+        // the frames carry no inertia: at each step the twist is uniform, torque beta angle / L on one gripper and
+        // against the other (generalised alpha balances forces 1 / (1 + rho) of the way through the step, and reports
+        // that torque)
         const double at = integrator == Integrator::generalized_alpha ? k - 1 + 1 / 1.8 : k;
         const double torque = twist * per_step * at / length;
         EXPECT_NEAR(stepper.wrenches()[1].torque.x(), -torque, 1e-9 * torque) << k;
         EXPECT_NEAR(stepper.wrenches()[0].torque.x(), torque, 1e-9 * torque) << k;
-        const double total = rod.state.twist.sum() + rod.state.grasps[0].section_twist[1] + rod.state.grasps[1].section_twist[0];
+        const double total =
+            rod.state.twist.sum() + rod.state.grasps[0].section_twist[1] + rod.state.grasps[1].section_twist[0];
         EXPECT_NEAR(total, per_step * k, 1e-9 * per_step * k);
       }
     }
     // and all the way back: nothing is left
     for (int k = steps - 1; k >= 0; --k)
     {
-      rod.inputs.grasps[1].X_WG.orientation = Eigen::AngleAxisd(per_step * k, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
+      rod.inputs.grasps[1].X_WG.orientation =
+          Eigen::AngleAxisd(per_step * k, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
       ASSERT_TRUE(stepper.step(rod.state, rod.inputs, 0.01).ok);
     }
     EXPECT_LT(rod.state.twist.cwiseAbs().maxCoeff(), 1e-9);
@@ -51,7 +55,8 @@ TEST(Twist, AThousandTurnsAreCounted)
 
 TEST(Twist, StaticTorqueOfAnUnevenRod)
 {
-  // Twists of parts in series: sum of (length / beta) torque = angle, with unequal edges and moduli, and a held edge in between.
+  // Twists of parts in series: sum of (length / beta) torque = angle, with unequal edges and moduli, and a held edge in
+  // between.
   const int n = 8;
   Matrix3Xd nodes = Matrix3Xd::Zero(3, n);
   nodes.row(0) << 0.0, 0.1, 0.25, 0.3, 0.5, 0.65, 0.7, 0.9;
@@ -64,14 +69,16 @@ TEST(Twist, StaticTorqueOfAnUnevenRod)
   rod.hold(0, 0);
   rod.hold(n - 1, n - 1);
   const double angle = 2.0;
-  rod.inputs.grasps[1].X_WG.orientation = Eigen::AngleAxisd(angle, Vector3d::UnitX()) * rod.inputs.grasps[1].X_WG.orientation;
+  rod.inputs.grasps[1].X_WG.orientation =
+      Eigen::AngleAxisd(angle, Vector3d::UnitX()) * rod.inputs.grasps[1].X_WG.orientation;
   RodStepper stepper(rod.model, TimeConfig{});
   const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
   ASSERT_TRUE(report.ok) << report.message;
   double compliance = 0;
   for (int j = 0; j + 1 < n; ++j)
     compliance += (nodes(0, j + 1) - nodes(0, j)) / sections[j].twist_modulus;
-  // The joint's modulus is the mean of its edges' and not their mean compliance: with steps of modulus this is only first order; here 15 %
+  // The joint's modulus is the mean of its edges' and not their mean compliance: with steps of modulus this is only
+  // first order; here 15 %
   EXPECT_NEAR(stepper.wrenches()[0].torque.x() * compliance / angle, 1.0, 0.15);
   EXPECT_NEAR(stepper.wrenches()[0].torque.x() + stepper.wrenches()[1].torque.x(), 0.0, 1e-12);
   EXPECT_LT(stepper.wrenches()[0].force.norm(), 1e-9);
@@ -87,7 +94,8 @@ TEST(Twist, StaticTurnsAddUp)
   RodStepper stepper(rod.model, TimeConfig{});
   for (int k = 1; k <= 10; ++k)
   {
-    rod.inputs.grasps[1].X_WG.orientation = Eigen::AngleAxisd(turn * k, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
+    rod.inputs.grasps[1].X_WG.orientation =
+        Eigen::AngleAxisd(turn * k, Vector3d::UnitX()) * rod.inputs.grasps[0].X_WG.orientation;
     const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_NEAR(stepper.wrenches()[0].torque.x(), twist * turn * k, 1e-9) << k;
@@ -96,8 +104,9 @@ TEST(Twist, StaticTurnsAddUp)
 
 TEST(Twist, FramesOfAHeldCentrelineJumpOverABend)
 {
-  // A flat rod pinned along a V and turned at one end: nothing but frames can move. The bend keeps the twist on the turned side, until
-  // at 18.1 rad (19.35 for the smooth rod) a whole turn slips over it at once. Every solution must be one.
+  // A flat rod pinned along a V and turned at one end: nothing but frames can move. The bend keeps the twist on the
+  // turned side, until at 18.1 rad (19.35 for the smooth rod) a whole turn slips over it at once. Every solution must
+  // be one.
   const int edges = 48;
   Matrix3Xd nodes = Matrix3Xd::Zero(3, edges + 1);
   for (int j = 0; j < edges; ++j)
@@ -139,10 +148,12 @@ TEST(Twist, FramesOfAHeldCentrelineJumpOverABend)
 
 TEST(Twist, ATwistedRingPressesOnNothingButItself)
 {
-  // A planar ring with whole turns of twist: uniform twist 2 pi k / n, torque beta 2 pi k / L, elastic energy (2 pi k)^2 beta / (2 L).
+  // A planar ring with whole turns of twist: uniform twist 2 pi k / n, torque beta 2 pi k / L, elastic energy (2 pi
+  // k)^2 beta / (2 L).
   const int n = 40, turns = 1;
   const double radius = 0.2, bend = 1.0, twist = 0.5;
-  const RodModel model = buildRod("ring", ringNodes(n, radius), true, uniformSections(modulusSection(bend, twist, 1e5, 1.0), n), Vector3d::Zero(), true);
+  const RodModel model = buildRod("ring", ringNodes(n, radius), true,
+                                  uniformSections(modulusSection(bend, twist, 1e5, 1.0), n), Vector3d::Zero(), true);
   Rod rod(model, ringNodes(n, radius), 2 * M_PI * turns);
   rod.inputs.gravity.setZero();
   RodStepper stepper(rod.model, withIntegrator(Integrator::implicit_midpoint));
@@ -159,10 +170,12 @@ TEST(Twist, ATwistedRingPressesOnNothingButItself)
 
 TEST(Twist, ARingBeyondZajacsThresholdLeavesItsPlane)
 {
-  // Linking number is what a loop keeps: with beta / B = 2 the threshold is 2 pi sqrt 3 / 2 = 0.87 turns, so one turn must writhe.
+  // Linking number is what a loop keeps: with beta / B = 2 the threshold is 2 pi sqrt 3 / 2 = 0.87 turns, so one turn
+  // must writhe.
   const int n = 40;
   const double radius = 0.2;
-  const RodModel model = buildRod("ring", ringNodes(n, radius), true, uniformSections(modulusSection(1.0, 2.0, 1e5, 1.0), n), Vector3d::Zero(), true);
+  const RodModel model = buildRod("ring", ringNodes(n, radius), true,
+                                  uniformSections(modulusSection(1.0, 2.0, 1e5, 1.0), n), Vector3d::Zero(), true);
   Rod rod(model, ringNodes(n, radius), 2 * M_PI);
   rod.inputs.gravity.setZero();
   for (int i = 0; i < n; ++i)
@@ -177,5 +190,5 @@ TEST(Twist, ARingBeyondZajacsThresholdLeavesItsPlane)
   EXPECT_LT(rod.state.twist.sum(), 0.95 * 2 * M_PI);   // twist has become writhe
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

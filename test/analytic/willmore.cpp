@@ -55,7 +55,9 @@ TEST(WillmoreFlow, StepDividesWavesByTheirWaveNumber)
     {
       TriangleMesh mesh = gridMesh(1.0, 1.0, kCells, kCells, GridPattern::one_diagonal);
       const double k = 2 * M_PI * kCells / cells, q = std::sqrt(2.0) * k, height = 1e-6;
-      const auto wave = [&](Eigen::Index v) { return height * std::cos(k * (mesh.vertices(0, v) - 0.5)) * std::cos(k * (mesh.vertices(1, v) - 0.5)); };
+      const auto wave = [&](Eigen::Index v) {
+        return height * std::cos(k * (mesh.vertices(0, v) - 0.5)) * std::cos(k * (mesh.vertices(1, v) - 0.5));
+      };
       for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v)
         mesh.vertices(2, v) = wave(v);
       WillmoreFlow flow(mesh, meshTopology(mesh), strength / std::pow(q, 4));
@@ -68,14 +70,16 @@ TEST(WillmoreFlow, StepDividesWavesByTheirWaveNumber)
           product += mesh.vertices(2, v) * wave(v);
           square += wave(v) * wave(v);
         }
-      // the Laplacian of the grid is off by (k cell)^2 / 12, 1.3 % for 16 cells, and comes squared; lumping adds as much
-      EXPECT_NEAR(product / square * (1 + strength), 1.0, 0.05 * 256 / (cells * cells) * strength / (1 + strength) + 0.01)
-        << cells << " cells, strength " << strength;
+      // the Laplacian of the grid is off by (k cell)^2 / 12, 1.3 % for 16 cells, and comes squared; lumping adds as
+      // much
+      EXPECT_NEAR(product / square * (1 + strength), 1.0,
+                  0.05 * 256 / (cells * cells) * strength / (1 + strength) + 0.01)
+          << cells << " cells, strength " << strength;
     }
 }
 
-/// Iterated steps are those of the implicit Euler method, of first order where h resolves the mesh's own motions within the surface, whose times are
-/// about edge^4 = 5e-4 m^4.
+/// Iterated steps are those of the implicit Euler method, of first order where h resolves the mesh's own motions within
+/// the surface, whose times are about edge^4 = 5e-4 m^4.
 TEST(WillmoreFlow, StepsConvergeWithTheTimeStep)
 {
   TriangleMesh start = icosphere(1.0, 3);
@@ -97,5 +101,5 @@ TEST(WillmoreFlow, StepsConvergeWithTheTimeStep)
   EXPECT_NEAR((one - two).norm() / (two - four).norm(), 2.0, 0.3);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -29,7 +29,8 @@ struct Recording
   std::set<std::string> tables;
 };
 
-class Tables : public Exports, public testing::WithParamInterface<Recording> {};
+class Tables : public Exports, public testing::WithParamInterface<Recording>
+{};
 
 TEST_P(Tables, areThoseOfTheRunItself)
 {
@@ -47,16 +48,21 @@ TEST_P(Tables, areThoseOfTheRunItself)
 }
 
 INSTANTIATE_TEST_SUITE_P(
-  All, Tables,
-  testing::Values(Recording{"demo_rope", "--duration 0.1", {"nodes.csv", "grasps.csv"}},
-                  Recording{"honey_coil", "--duration 1.2 --set 'record.fields=[curvature, strain, force]'", {"nodes.csv", "grasps.csv", "threads.csv", "thread_fields.csv"}},
-                  Recording{"handkerchief", "--duration 0.1", {"nodes.csv", "grasps.csv", "cloths.csv"}},
-                  Recording{"obstacle_course", "--duration 0.1 --set 'record.fields=[force, moment, energy, contact_force]'",
-                            {"nodes.csv", "grasps.csv", "bodies.csv", "rod_fields.csv", "energies.csv"}},
-                  Recording{"box", "--duration 0.1 --set 'tracked.0.test_functions=[{name: foot, regions: {foot: {guide: [0..3]}}}, {name: tight, basis: subdivision, from: 0.05}]'",
-                            {"nodes.csv", "grasps.csv", "cloths.csv", "tracking.csv"}},
-                  Recording{"tracked_rope", "--duration 0.1", {"nodes.csv", "grasps.csv", "tracking.csv"}}),
-  [](const auto& info) { return std::string(info.param.scene); });
+    All, Tables,
+    testing::Values(Recording{"demo_rope", "--duration 0.1", {"nodes.csv", "grasps.csv"}},
+                    Recording{"honey_coil",
+                              "--duration 1.2 --set 'record.fields=[curvature, strain, force]'",
+                              {"nodes.csv", "grasps.csv", "threads.csv", "thread_fields.csv"}},
+                    Recording{"handkerchief", "--duration 0.1", {"nodes.csv", "grasps.csv", "cloths.csv"}},
+                    Recording{"obstacle_course",
+                              "--duration 0.1 --set 'record.fields=[force, moment, energy, contact_force]'",
+                              {"nodes.csv", "grasps.csv", "bodies.csv", "rod_fields.csv", "energies.csv"}},
+                    Recording{"box",
+                              "--duration 0.1 --set 'tracked.0.test_functions=[{name: foot, regions: {foot: {guide: "
+                              "[0..3]}}}, {name: tight, basis: subdivision, from: 0.05}]'",
+                              {"nodes.csv", "grasps.csv", "cloths.csv", "tracking.csv"}},
+                    Recording{"tracked_rope", "--duration 0.1", {"nodes.csv", "grasps.csv", "tracking.csv"}}),
+    [](const auto& info) { return std::string(info.param.scene); });
 
 TEST_F(Exports, withoutTheScenesFilesTablesLackOnlyTheirAverages)
 {
@@ -66,7 +72,8 @@ TEST_F(Exports, withoutTheScenesFilesTablesLackOnlyTheirAverages)
   EXPECT_NE(result.output.find("tracking.csv is left out"), std::string::npos) << result.output;
   EXPECT_NE(result.output.find("box_guide.obj"), std::string::npos) << result.output;
   EXPECT_EQ(namesIn(path("exported")), (std::set<std::string>{"nodes.csv", "grasps.csv", "cloths.csv"}));
-  EXPECT_TRUE(contentsOf(path("direct/cloths.csv")) == contentsOf(path("exported/cloths.csv")));   // times from the stamps
+  // times from the stamps
+  EXPECT_TRUE(contentsOf(path("direct/cloths.csv")) == contentsOf(path("exported/cloths.csv")));
 }
 
 TEST_F(Exports, objAndPlySequencesOfACloth)
@@ -135,7 +142,8 @@ struct Glb
     const int rows = a.type == TINYGLTF_TYPE_VEC3 ? 3 : 1;
     EXPECT_EQ(a.componentType, TINYGLTF_COMPONENT_TYPE_FLOAT);
     Eigen::MatrixXf out(rows, static_cast<Eigen::Index>(a.count));
-    std::memcpy(out.data(), model.buffers[view.buffer].data.data() + view.byteOffset + a.byteOffset, out.size() * sizeof(float));
+    std::memcpy(out.data(), model.buffers[view.buffer].data.data() + view.byteOffset + a.byteOffset,
+                out.size() * sizeof(float));
     return out;
   }
 
@@ -182,11 +190,15 @@ TEST_F(Exports, glbShowsTheRecordedFrames)
 {
   for (const auto& [scene, duration] : {std::pair("handkerchief", "0.2"), {"demo_rope", "0.2"}, {"honey_coil", "1.0"}})
   {
-    const std::string bag = record(scene, std::string("--duration ") + duration), file = path(scene + std::string(scene == std::string("demo_rope") ? ".GLB" : ".glb"));
+    const std::string bag = record(scene, std::string("--duration ") + duration),
+                      file = path(scene + std::string(scene == std::string("demo_rope") ? ".GLB" : ".glb"));
     expectExported(mesh + " " + bag + " --quiet --fps 12.5 --scene-dir " + source + "/config/scenes --out " + file);
     const Glb glb(file);
     const std::vector<double>& turn = glb.model.nodes.at(0).rotation;   // our z to glTF's y
-    EXPECT_LT((Eigen::Quaterniond(turn.at(3), turn[0], turn[1], turn[2]) * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitY()).norm(), 1e-12);
+    EXPECT_LT((Eigen::Quaterniond(turn.at(3), turn[0], turn[1], turn[2]) * Eigen::Vector3d::UnitZ() -
+               Eigen::Vector3d::UnitY())
+                  .norm(),
+              1e-12);
     BagReader reader(bag);
     SceneSnapshot instant;
     FrameChoice choice(12.5);
@@ -202,7 +214,8 @@ TEST_F(Exports, glbShowsTheRecordedFrames)
       for (std::size_t k = 0; k < seen.size(); ++k)
       {
         ASSERT_EQ(seen[k].cols(), objects[k].mesh.vertices.cols());
-        EXPECT_LT((seen[k].cast<double>() - objects[k].mesh.vertices).cwiseAbs().maxCoeff(), 3e-7) << scene << " " << reader.seconds();
+        EXPECT_LT((seen[k].cast<double>() - objects[k].mesh.vertices).cwiseAbs().maxCoeff(), 3e-7)
+            << scene << " " << reader.seconds();
       }
     }
     EXPECT_GE(frames, 3);
@@ -217,14 +230,16 @@ TEST_F(Exports, videosHaveTheirFramesAndSize)
   const std::string bag = record("handkerchief", "--duration 0.2");
   expectExported(video + " " + bag + " --quiet --size 160x96 --out " + path("x.mp4"));
   expectExported(video + " " + bag + " --quiet --size 160x96 --speed 0.5 --out " + path("x.gif"));
-  const std::string probe = "ffprobe -v error -count_frames -show_entries stream=codec_name,width,height,nb_read_frames -of csv=p=0 ";
+  const std::string probe =
+      "ffprobe -v error -count_frames -show_entries stream=codec_name,width,height,nb_read_frames -of csv=p=0 ";
   EXPECT_EQ(shell(probe + path("x.mp4")).output, "h264,160,96,6\n");   // 0, 0.04 ... 0.2 s
   EXPECT_EQ(shell(probe + path("x.gif")).output, "gif,160,96,6\n");
   for (const char* name : {"x.mp4", "x.gif"})
   {
     EXPECT_EQ(picturesIn(path(name)), 6) << name;
     const std::string whole = contentsOf(path(name));
-    for (const std::size_t left : {whole.size() - 1, whole.size() / 2, whole.size() / 5, std::size_t{10}, std::size_t{0}})
+    for (const std::size_t left :
+         {whole.size() - 1, whole.size() / 2, whole.size() / 5, std::size_t{10}, std::size_t{0}})
     {
       std::ofstream(path("cut"), std::ios::binary | std::ios::trunc) << whole.substr(0, left);
       EXPECT_EQ(picturesIn(path("cut")), 0) << name << " cut to " << left << " bytes";
@@ -250,11 +265,13 @@ TEST(Picture, showsTheNearerSurfaceLitFromAboveAndItsShadow)
     return Eigen::Vector3d(picture[3 * (200 * y + x)], picture[3 * (200 * y + x) + 1], picture[3 * (200 * y + x) + 2]);
   };
   const auto empty = painter.paint({});
-  const auto behind = painter.paint({ball({0, 1, 0.7}, 0.5, ObjectKind::body), ball({0, 0, 1}, 0.5, ObjectKind::thread)});
-  const auto turned = painter.paint({ball({0, 0, 1}, 0.5, ObjectKind::thread), ball({0, 1, 0.7}, 0.5, ObjectKind::body)});
-  EXPECT_TRUE(behind == turned);   // the order does not matter
-  EXPECT_GT(pixel(behind, 100, 100).x(), 2 * pixel(behind, 100, 100).z());            // honey-coloured, not red
-  EXPECT_GT(pixel(behind, 100, 80).sum(), pixel(behind, 100, 120).sum() + 60);        // brighter above
+  const auto behind =
+      painter.paint({ball({0, 1, 0.7}, 0.5, ObjectKind::body), ball({0, 0, 1}, 0.5, ObjectKind::thread)});
+  const auto turned =
+      painter.paint({ball({0, 0, 1}, 0.5, ObjectKind::thread), ball({0, 1, 0.7}, 0.5, ObjectKind::body)});
+  EXPECT_TRUE(behind == turned);                                                 // the order does not matter
+  EXPECT_GT(pixel(behind, 100, 100).x(), 2 * pixel(behind, 100, 100).z());       // honey-coloured, not red
+  EXPECT_GT(pixel(behind, 100, 80).sum(), pixel(behind, 100, 120).sum() + 60);   // brighter above
   EXPECT_TRUE(pixel(behind, 2, 2) == pixel(empty, 2, 2));
   int darker = 0;
   for (int y = 100; y < 200; ++y)
@@ -286,40 +303,47 @@ TEST(Holders, areShownInVideos)
 {
   const Simulation rods(parseScene(R"(
 rods: [{name: r, centerline: {straight: {to: [1, 0, 0], edges: 10}}, cross_section: {radius: 0.01}, grasps: {left: {edges: [0]}, pin: {nodes: [5], hold: position}}}]
-)", "scene"));
+)",
+                                   "scene"));
   SceneSnapshot instant = snapshotOf(rods);
   std::vector<ObjectMesh> holders = holderMeshes(instant, &rods.config());
   ASSERT_EQ(holders.size(), 2u);
   EXPECT_NEAR((boxOf(holders[0]).sizes() - Eigen::Vector3d::Constant(0.036)).norm(), 0.0, 1e-9);
-  EXPECT_EQ(holders[0].mesh.vertices.cols(), 8);            // a box at the clamped end
+  EXPECT_EQ(holders[0].mesh.vertices.cols(), 8);   // a box at the clamped end
   EXPECT_LT(boxOf(holders[0]).center().norm(), 1e-9);
-  EXPECT_GT(holders[1].mesh.vertices.cols(), 100);          // a ball at the pinned node
+  EXPECT_GT(holders[1].mesh.vertices.cols(), 100);   // a ball at the pinned node
   EXPECT_LT((boxOf(holders[1]).center() - Eigen::Vector3d(0.5, 0, 0)).norm(), 1e-9);
   instant.grasps[0].held->active = false;
   EXPECT_EQ(holderMeshes(instant, &rods.config()).size(), 1u);
 
   const Simulation cloth(parseScene(R"(
 cloths: [{name: c, grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 4}, grasps: {edge: {near: {point: [0, 0, 0], radius: 0.3}}}}]
-)", "scene"));
+)",
+                                    "scene"));
   instant = snapshotOf(cloth);
   const std::size_t held = cloth.config().cloths[0].grasps[0].vertices.size();
   ASSERT_GT(held, 1u);
   EXPECT_EQ(holderMeshes(instant, &cloth.config()).size(), held);
   EXPECT_EQ(holderMeshes(instant, nullptr).size(), 1u);
-  instant.grasps[0].held->X_WG.position.x() += 0.5;         // it holds other vertices by now
+  instant.grasps[0].held->X_WG.position.x() += 0.5;   // it holds other vertices by now
   holders = holderMeshes(instant, &cloth.config());
   ASSERT_EQ(holders.size(), 1u);
   EXPECT_LT((boxOf(holders[0]).center() - instant.grasps[0].held->X_WG.position).norm(), 1e-9);
 
-  const Simulation thread(parseScene("threads: [{name: t, nozzle: {position: [0, 0, 0.1], diameter: 0.01, flow: 1.0e-6}, floor: {height: 0}}]", "scene"));
+  const Simulation thread(parseScene(
+      "threads: [{name: t, nozzle: {position: [0, 0, 0.1], diameter: 0.01, flow: 1.0e-6}, floor: {height: 0}}]",
+      "scene"));
   holders = holderMeshes(snapshotOf(thread), &thread.config());
   ASSERT_EQ(holders.size(), 1u);
   // The nozzle stands upright above its outlet, however the newest edge is tilted.
   EXPECT_NEAR(boxOf(holders[0]).min().z(), 0.1, 1e-6);
   EXPECT_NEAR(boxOf(holders[0]).max().z(), 0.14, 1e-6);
 
-  const Simulation turning(parseScene("threads: [{name: t, nozzle: {diameter: 0.01, flow: 1.0e-6, motion: {table: [[0, 0, 0, 0.1, 0, 0.70710678118654752, 0, "
-                                      "0.70710678118654752], [1, 0, 0, 0.1, 0, 0, 0, 1]]}}, floor: {height: 0}}]", "scene"));
+  const Simulation turning(
+      parseScene("threads: [{name: t, nozzle: {diameter: 0.01, flow: 1.0e-6, motion: {table: [[0, 0, 0, 0.1, 0, "
+                 "0.70710678118654752, 0, "
+                 "0.70710678118654752], [1, 0, 0, 0.1, 0, 0, 0, 1]]}}, floor: {height: 0}}]",
+                 "scene"));
   instant = snapshotOf(turning);
   holders = holderMeshes(instant, &turning.config());
   ASSERT_EQ(holders.size(), 1u);
@@ -335,7 +359,8 @@ TEST(Holders, tiltedPlanesAreShownBesideTheGround)
   const Simulation scene(parseScene(R"(
 rods: [{}]
 obstacles: [{name: floor, shape: {plane: {}}}, {name: plate, shape: {plane: {point: [0, 0, 1], normal: [-1, 0, 1]}}}]
-)", "scene"));
+)",
+                                    "scene"));
   const std::optional<double> ground = groundOf(&scene.config());
   ASSERT_TRUE(ground);
   EXPECT_EQ(*ground, 0.0);
@@ -347,5 +372,5 @@ obstacles: [{name: floor, shape: {plane: {}}}, {name: plate, shape: {plane: {poi
     EXPECT_NEAR(planes[0].mesh.vertices(2, i) - planes[0].mesh.vertices(0, i), 1.0, 1e-12);   // z = 1 + x
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

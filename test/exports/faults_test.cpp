@@ -105,11 +105,13 @@ TEST_F(ExportFaults, severalNodesInOneBag)
 TEST_F(ExportFaults, optionsThatMakeNoSense)
 {
   const std::string bag = record("cantilever", "--duration 0.1");
-  for (const std::string& command : {csv, csv + " " + bag, csv + " " + bag + " --out", csv + " a b --out c", csv + " " + bag + " --fps 3 --out " + path("x"),
-                                     mesh + " " + bag + " --format stl --out " + path("x"), mesh + " " + bag + " --sides 2 --out " + path("x"),
-                                     mesh + " " + bag + " --fps 0 --out " + path("x"), mesh + " " + bag + " --out " + path("nowhere/x.glb"),
-                                     video + " " + bag + " --out " + path("x.avi"), video + " " + bag + " --size 161x90 --out " + path("x.mp4"),
-                                     video + " " + bag + " --from 0,0,0 --out " + path("x.mp4"), csv + " " + bag + " --out /proc/nowhere"})
+  for (const std::string& command :
+       {csv, csv + " " + bag, csv + " " + bag + " --out", csv + " a b --out c",
+        csv + " " + bag + " --fps 3 --out " + path("x"), mesh + " " + bag + " --format stl --out " + path("x"),
+        mesh + " " + bag + " --sides 2 --out " + path("x"), mesh + " " + bag + " --fps 0 --out " + path("x"),
+        mesh + " " + bag + " --out " + path("nowhere/x.glb"), video + " " + bag + " --out " + path("x.avi"),
+        video + " " + bag + " --size 161x90 --out " + path("x.mp4"),
+        video + " " + bag + " --from 0,0,0 --out " + path("x.mp4"), csv + " " + bag + " --out /proc/nowhere"})
   {
     const Result result = shell(command);
     EXPECT_EQ(result.status, 2) << command << "\n" << result.output;
@@ -130,11 +132,12 @@ TEST_F(ExportFaults, fullDisksLeaveNothingBehind)
   const std::string bag = record("handkerchief", "--duration 0.2");
   for (const auto& [program, out] : {std::pair(csv, "tables"), {mesh, "meshes"}, {mesh, "x.glb"}, {video, "x.mp4"}})
   {
-    const Result result = shell("bash -c \"trap '' XFSZ; ulimit -f 4; " + program + " " + bag + " --out " + path(out) + "\"");
+    const Result result =
+        shell("bash -c \"trap '' XFSZ; ulimit -f 4; " + program + " " + bag + " --out " + path(out) + "\"");
     EXPECT_EQ(result.status, 3) << program << "\n" << result.output;
     EXPECT_FALSE(fs::exists(path(out)) || fs::exists(path(out) + std::string(".part"))) << program;
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -55,7 +55,8 @@ protected:
   std::string record(const std::string& scene, const std::string& options)
   {
     const std::string bag = path(scene + ".bag");
-    const Result result = shell(std::string(SLENDER_SIMULATE) + " " + source + "/config/scenes/" + scene + ".yaml --quiet --bag " + bag + " " + options);
+    const Result result = shell(std::string(SLENDER_SIMULATE) + " " + source + "/config/scenes/" + scene +
+                                ".yaml --quiet --bag " + bag + " " + options);
     EXPECT_EQ(result.status, 0) << result.output;
     return bag;
   }
@@ -69,4 +70,4 @@ protected:
   std::string folder_;
 };
 
-}  // namespace slender
+}   // namespace slender

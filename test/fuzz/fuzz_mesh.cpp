@@ -1,4 +1,5 @@
-// OBJ (first byte even) and PLY (odd): read or refused with std::runtime_error; what was read has indices of its own vertices and finite numbers.
+// OBJ (first byte even) and PLY (odd): read or refused with std::runtime_error; what was read has indices of its own
+// vertices and finite numbers.
 #include <cstdlib>
 #include <stdexcept>
 
@@ -16,7 +17,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try
   {
     const slender::TriangleMesh mesh = slender::readMesh(file.path());
-    if (!mesh.vertices.allFinite() || (mesh.triangles.size() > 0 && (mesh.triangles.minCoeff() < 0 || mesh.triangles.maxCoeff() >= mesh.vertices.cols())))
+    if (!mesh.vertices.allFinite() ||
+        (mesh.triangles.size() > 0 &&
+         (mesh.triangles.minCoeff() < 0 || mesh.triangles.maxCoeff() >= mesh.vertices.cols())))
       std::abort();
     slender::meshDefects(mesh);
     if (&file == &obj)

@@ -1,5 +1,5 @@
-// Clouds of points (first byte even) and streams of poses (odd), as nodes take them from messages: taken over or refused, and a guide that follows what
-// was taken over stays finite.
+// Clouds of points (first byte even) and streams of poses (odd), as nodes take them from messages: taken over or
+// refused, and a guide that follows what was taken over stays finite.
 #include <cmath>
 #include <cstdlib>
 #include <stdexcept>
@@ -55,9 +55,11 @@ void followPoints(const Eigen::Matrix3Xd& points)
 geometry_msgs::Pose poseOf(FuzzedDataProvider& in)
 {
   geometry_msgs::Pose pose;
-  for (double* number : {&pose.position.x, &pose.position.y, &pose.position.z, &pose.orientation.x, &pose.orientation.y, &pose.orientation.z})
+  for (double* number : {&pose.position.x, &pose.position.y, &pose.position.z, &pose.orientation.x, &pose.orientation.y,
+                         &pose.orientation.z})
     *number = in.ConsumeFloatingPoint<double>();
-  const double rest = 1.0 - pose.orientation.x * pose.orientation.x - pose.orientation.y * pose.orientation.y - pose.orientation.z * pose.orientation.z;
+  const double rest = 1.0 - pose.orientation.x * pose.orientation.x - pose.orientation.y * pose.orientation.y -
+                      pose.orientation.z * pose.orientation.z;
   pose.orientation.w = rest > 0 && in.ConsumeBool() ? std::sqrt(rest) : in.ConsumeFloatingPoint<double>();
   return pose;
 }
@@ -71,20 +73,22 @@ void followPoses(FuzzedDataProvider& in)
   while (in.remaining_bytes() > 0)
   {
     slender::Pose X;
-    const double stamp = now + 1e-9 * in.ConsumeIntegral<std::int32_t>();   // stamps come in nanoseconds, early, late and twice
+    // stamps come in nanoseconds, early, late and twice
+    const double stamp = now + 1e-9 * in.ConsumeIntegral<std::int32_t>();
     if (slender::fromMessage(poseOf(in), X) == slender::PoseFault::none && X.position.cwiseAbs().maxCoeff() < kFar)
       guide.push(stamp, X);
     now += 1e-9 * in.ConsumeIntegral<std::uint32_t>();
     const slender::GraspTarget target = guide.target(now);
     const slender::Twist rate = target.velocity.value_or(slender::Twist());
-    if (!target.X_WG.position.allFinite() || !target.X_WG.orientation.coeffs().allFinite() || !rate.linear.allFinite() || !rate.angular.allFinite())
+    if (!target.X_WG.position.allFinite() || !target.X_WG.orientation.coeffs().allFinite() ||
+        !rate.linear.allFinite() || !rate.angular.allFinite())
       std::abort();
     if (in.ConsumeIntegral<std::uint8_t>() == 0)
       guide.attachAt(target.X_WG);
   }
 }
 
-}  // namespace
+}   // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
 {

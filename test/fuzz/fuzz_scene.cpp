@@ -1,4 +1,5 @@
-// Scene files: read, with the meshes and motions that they describe, or refused with SceneError. Files they name are relative to config/scenes.
+// Scene files: read, with the meshes and motions that they describe, or refused with SceneError. Files they name are
+// relative to config/scenes.
 #include <cstdint>
 
 #include "slender_sim/scene/reader.h"
@@ -7,7 +8,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 {
   try
   {
-    slender::parseScene(std::string(reinterpret_cast<const char*>(data), size), "fuzz", {}, SLENDER_SOURCE_DIR "/config/scenes");
+    slender::parseScene(std::string(reinterpret_cast<const char*>(data), size), "fuzz", {},
+                        SLENDER_SOURCE_DIR "/config/scenes");
   }
   catch (const slender::SceneError&)
   {

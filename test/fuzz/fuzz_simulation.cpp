@@ -1,4 +1,5 @@
-// Scenes that can be read: made into a simulation, or refused by a std::runtime_error, nothing else. Files they name are relative to config/scenes.
+// Scenes that can be read: made into a simulation, or refused by a std::runtime_error, nothing else. Files they name
+// are relative to config/scenes.
 #include <cstdint>
 #include <stdexcept>
 
@@ -9,8 +10,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 {
   try
   {
-    slender::SceneConfig config =
-      slender::parseScene(std::string(reinterpret_cast<const char*>(data), size), "fuzz", {}, SLENDER_SOURCE_DIR "/config/scenes");
+    slender::SceneConfig config = slender::parseScene(std::string(reinterpret_cast<const char*>(data), size), "fuzz",
+                                                      {}, SLENDER_SOURCE_DIR "/config/scenes");
     config.start = {};   // an equilibrium may take its time
     slender::Simulation(std::move(config));
   }

@@ -1,4 +1,5 @@
-// Saved states: loaded or refused with std::runtime_error, and what was loaded steps or refuses to. The header is made to fit, or nothing would pass it.
+// Saved states: loaded or refused with std::runtime_error, and what was loaded steps or refuses to. The header is made
+// to fit, or nothing would pass it.
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -21,7 +22,7 @@ cloths: [{name: flag, grid: {corner: [0, 0, 1], sides: [[0.1, 0, 0], [0, 0.1, 0]
 tracked: [{guide: {cloth: flag}, mesh: {subdivide: 1}, test_functions: {basis: subdivision, vertices: [2, 3]}}]
 )";
 
-}  // namespace
+}   // namespace
 
 using namespace slender;
 

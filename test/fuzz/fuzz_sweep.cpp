@@ -8,7 +8,8 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
 {
   static slender::test::MemoryFile scene("scene.yaml"), plan("plan.yaml");
-  static const std::string text = "rods: [{centerline: {straight: {from: [0, 0, 1], to: [1, 0, 1], edges: 4}}, grasps: {left: {edges: [0]}}}]\n";
+  static const std::string text =
+      "rods: [{centerline: {straight: {from: [0, 0, 1], to: [1, 0, 1], edges: 4}}, grasps: {left: {edges: [0]}}}]\n";
   scene.write(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
   plan.write(data, size);
   try

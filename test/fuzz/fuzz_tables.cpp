@@ -1,4 +1,5 @@
-// Tables of timed poses (first byte even) and of points (odd): read or refused with SceneError. What was read can be evaluated.
+// Tables of timed poses (first byte even) and of points (odd): read or refused with SceneError. What was read can be
+// evaluated.
 #include <cstdlib>
 
 #include "memory_file.h"
@@ -24,7 +25,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       for (const double share : {-1.0, 0.0, 0.3, 1.0, 2.0})
       {
         slender::Twist velocity;
-        const slender::Pose pose = body.poses.evaluate(body.poses.firstTime() * (1 - share) + body.poses.lastTime() * share, &velocity);
+        const slender::Pose pose =
+            body.poses.evaluate(body.poses.firstTime() * (1 - share) + body.poses.lastTime() * share, &velocity);
         if (!(std::abs(pose.orientation.norm() - 1.0) < 1e-6))
           std::abort();
       }

@@ -45,4 +45,4 @@ private:
   std::string path_;
 };
 
-}  // namespace slender::test
+}   // namespace slender::test

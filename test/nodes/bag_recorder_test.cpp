@@ -70,5 +70,5 @@ TEST_F(BagFile, LeavesFifosAndTheirLinksAlone)
   EXPECT_FALSE(fs::exists(path("fifo.active")));
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

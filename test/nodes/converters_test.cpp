@@ -83,16 +83,20 @@ TEST(Converters, PointsWhoseLayoutReachesOutOfTheDataAreRefused)
   };
   constexpr std::uint32_t top = 0xFFFFFFFF;   // sums and products with it wrap in 32 bits
   for (const std::uint32_t offset : {9u, top - 7, top - 3, top})
-    EXPECT_EQ(refused([offset](auto& cloud) { cloud.fields[2].offset = offset; }), "a field reaches beyond point_step") << offset;
-  EXPECT_EQ(refused([](auto& cloud) { cloud.fields[0] = cloud.fields[1]; }), "it must have the fields x, y and z, float32 or float64");
+    EXPECT_EQ(refused([offset](auto& cloud) { cloud.fields[2].offset = offset; }), "a field reaches beyond point_step")
+        << offset;
+  EXPECT_EQ(refused([](auto& cloud) { cloud.fields[0] = cloud.fields[1]; }),
+            "it must have the fields x, y and z, float32 or float64");
   const std::string shorter = "data is shorter than width, height and steps say";
   EXPECT_EQ(refused([](auto& cloud) { cloud.data.pop_back(); }), shorter);
   EXPECT_EQ(refused([](auto& cloud) { cloud.row_step = 23; }), shorter);
   EXPECT_EQ(refused([](auto& cloud) { cloud.row_step = top; }), shorter);
   EXPECT_EQ(refused([](auto& cloud) { cloud.point_step = top; }), shorter);
-  EXPECT_EQ(refused([](auto& cloud) { cloud.point_step = 0x80000000; }), shorter);           // twice that is 2^32
-  EXPECT_EQ(refused([](auto& cloud) { cloud.width = 0x15555556; }), shorter);                // 12 times that is 2^32 + 8
-  EXPECT_EQ(refused([](auto& cloud) { cloud.height = 0x20000000; }), shorter);               // 24 times that is 3 * 2^32
+  EXPECT_EQ(refused([](auto& cloud) { cloud.point_step = 0x80000000; }), shorter);   // twice that is 2^32
+  // 12 times that is 2^32 + 8
+  EXPECT_EQ(refused([](auto& cloud) { cloud.width = 0x15555556; }), shorter);
+  // 24 times that is 3 * 2^32
+  EXPECT_EQ(refused([](auto& cloud) { cloud.height = 0x20000000; }), shorter);
   EXPECT_EQ(refused([](auto& cloud) { cloud.width = cloud.height = top; }), shorter);
   EXPECT_EQ(refused([](auto& cloud) { cloud.width = 0; }), "");
   EXPECT_EQ(points.cols(), 0);
@@ -156,5 +160,5 @@ TEST(SimClock, StampsDoNotDrift)
   EXPECT_EQ(clock.ticks(), 3000003u);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

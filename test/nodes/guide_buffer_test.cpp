@@ -17,7 +17,8 @@ GuideBuffer::Options options(double delay)
 
 Pose turned(double x, double angle)
 {
-  return {Eigen::Vector3d(x, 0.3 * x, -x), Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, -1).normalized()))};
+  return {Eigen::Vector3d(x, 0.3 * x, -x),
+          Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, -1).normalized()))};
 }
 
 double angleBetween(const Pose& a, const Pose& b) { return a.orientation.angularDistance(b.orientation); }
@@ -41,7 +42,8 @@ struct Follower
         worst_velocity_jump = std::max(worst_velocity_jump, (now.velocity->linear - last.velocity->linear).norm());
         // the velocity must be the derivative of the position: trapezoidal rule over one step
         const Eigen::Vector3d mean = 0.5 * (now.velocity->linear + last.velocity->linear);
-        worst_slope_error = std::max(worst_slope_error, ((now.X_WG.position - last.X_WG.position) / step - mean).norm());
+        worst_slope_error =
+            std::max(worst_slope_error, ((now.X_WG.position - last.X_WG.position) / step - mean).norm());
         const Eigen::AngleAxisd turn(now.X_WG.orientation * last.X_WG.orientation.conjugate());
         const Eigen::Vector3d spin = 0.5 * (now.velocity->angular + last.velocity->angular);
         worst_spin_error = std::max(worst_spin_error, (turn.angle() / step * turn.axis() - spin).norm());
@@ -79,7 +81,8 @@ TEST(GuideBuffer, RefusesBadOptions)
   EXPECT_THROW(GuideBuffer(o, Attach::section, Pose()), std::invalid_argument);
 }
 
-// A smooth motion sampled at 30 Hz, sent in time: the grasp follows it one delay behind, to the error of cubic interpolation.
+// A smooth motion sampled at 30 Hz, sent in time: the grasp follows it one delay behind, to the error of cubic
+// interpolation.
 TEST(GuideBuffer, InterpolatesTimelyInput)
 {
   const double delay = 0.1, rate = 30.0;
@@ -98,13 +101,16 @@ TEST(GuideBuffer, InterpolatesTimelyInput)
     follower.to(t);
     if (t > 0.5)
     {
-      worst = std::max(worst, (follower.last.X_WG.position - motion(follower.time - follower.step - delay).position).norm());
-      worst_angle = std::max(worst_angle, angleBetween(follower.last.X_WG, motion(follower.time - follower.step - delay)));
+      worst = std::max(worst,
+                       (follower.last.X_WG.position - motion(follower.time - follower.step - delay).position).norm());
+      worst_angle =
+          std::max(worst_angle, angleBetween(follower.last.X_WG, motion(follower.time - follower.step - delay)));
     }
   }
-  EXPECT_LT(worst, 2e-4);         // 0.2 m * (2 rad/s / 30 Hz)^3 / 12, and a margin
+  EXPECT_LT(worst, 2e-4);   // 0.2 m * (2 rad/s / 30 Hz)^3 / 12, and a margin
   EXPECT_LT(worst_angle, 1e-3);
-  EXPECT_LT(follower.worst_velocity_jump, 0.01);   // accelerations up to 1.2 m/s^2, so 1.2 mm/s per step; the cubic adds some
+  // accelerations up to 1.2 m/s^2, so 1.2 mm/s per step; the cubic adds some
+  EXPECT_LT(follower.worst_velocity_jump, 0.01);
   EXPECT_LT(follower.worst_slope_error, 1e-3);
   EXPECT_LT(follower.worst_spin_error, 1e-3);
 }
@@ -119,7 +125,8 @@ TEST(GuideBuffer, HoldsAndCatchesUpSmoothly)
   follower.to(1.5);
   EXPECT_LT((follower.last.X_WG.position - turned(0.4, 0).position).norm(), 1e-9);
   EXPECT_EQ(follower.last.velocity->linear.norm(), 0.0);
-  // the last sample is the place to rest, so the last interval brakes from v to 0: a cubic does so at 4 v / 0.02 s at most
+  // the last sample is the place to rest, so the last interval brakes from v to 0: a cubic does so at 4 v / 0.02 s at
+  // most
   EXPECT_LT(follower.worst_velocity_jump, 1.05 * 1e-3 * 4 * 1.45 / 0.02);
   follower.worst_velocity_jump = 0.0;
   for (int k = 0; k < 50; ++k)   // comes back 0.5 m further on, with 1 m/s
@@ -152,7 +159,8 @@ TEST(GuideBuffer, LateInputDoesNotJump)
 
 TEST(GuideBuffer, DoesNotRunTheOtherWayAfterAPause)
 {
-  // silence from 0.3 s to 0.6 s, then 10 m away: the way is long, the speed that is left of the race through the gap dies out within catch_up_time
+  // silence from 0.3 s to 0.6 s, then 10 m away: the way is long, the speed that is left of the race through the gap
+  // dies out within catch_up_time
   GuideBuffer::Options o = options(0.05);
   o.catch_up_time = 0.2;
   GuideBuffer buffer(o, Attach::section, Pose());
@@ -163,15 +171,14 @@ TEST(GuideBuffer, DoesNotRunTheOtherWayAfterAPause)
     for (; 0.03 * sent <= time; ++sent)
       if (0.03 * sent <= 0.3 || 0.03 * sent >= 0.6)
       {
-        EXPECT_TRUE(buffer.push(0.03 * sent, {Eigen::Vector3d(0, 0, 0.03 * sent < 0.5 ? 0.0 : 10.0), Eigen::Quaterniond::Identity()}));
+        EXPECT_TRUE(buffer.push(
+            0.03 * sent, {Eigen::Vector3d(0, 0, 0.03 * sent < 0.5 ? 0.0 : 10.0), Eigen::Quaterniond::Identity()}));
       }
     const double z = buffer.target(time).X_WG.position.z();
     lowest = std::min(lowest, z);
     highest = std::max(highest, z);
     if (time > 1.0)   // what is left goes at catch_up_speed on average, 1.5 times that at most
-    {
       EXPECT_LT(std::abs(z - before) / 1e-3, 1.6) << time;
-    }
     before = z;
   }
   EXPECT_GT(lowest, -0.1);
@@ -206,5 +213,5 @@ TEST(GuideBuffer, AttachingWhileRunningKeepsTheNewPlace)
   EXPECT_LT((buffer.target(9).X_WG.position - turned(3, 0).position).norm(), 1e-12);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -1,4 +1,5 @@
-// What a guide's recording lacks. (Not in step_gaps_test.cpp: two headers of the package call different things BagReader.)
+// What a guide's recording lacks. (Not in step_gaps_test.cpp: two headers of the package call different things
+// BagReader.)
 #include <filesystem>
 
 #include <gtest/gtest.h>
@@ -41,5 +42,5 @@ TEST(GuideBag, TellsOfGaps)
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

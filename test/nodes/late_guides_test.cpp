@@ -25,7 +25,11 @@ struct Command
     const double s = std::clamp(t / 1.5, 0.0, 1.0);
     return reach * s * s * s * (10.0 + s * (6.0 * s - 15.0)) * std::sin(2.0 * M_PI * frequency * t);
   }
-  Pose pose(double t) const { return {Eigen::Vector3d(at(t), 0.0, 0.0), Eigen::Quaterniond(Eigen::AngleAxisd(3.0 * at(t), Eigen::Vector3d::UnitZ()))}; }
+  Pose pose(double t) const
+  {
+    return {Eigen::Vector3d(at(t), 0.0, 0.0),
+            Eigen::Quaterniond(Eigen::AngleAxisd(3.0 * at(t), Eigen::Vector3d::UnitZ()))};
+  }
 };
 
 double secondDifference(double a, double b, double c) { return (a - 2.0 * b + c) / (kStep * kStep); }
@@ -93,8 +97,9 @@ GuideBuffer::Options options(bool live, bool automatic = false)
   return o;
 }
 
-// Poses that all come equally late. The bound on acceleration is the bar of the issue; what is measured is at most 1.06. The
-// extremes of the swing of 2 Hz lie in the middle between two samples, which are therefore equal without being a pause.
+// Poses that all come equally late. The bound on acceleration is the bar of the issue; what is measured is at
+// most 1.06. The extremes of the swing of 2 Hz lie in the middle between two samples, which are therefore equal without
+// being a pause.
 TEST(LateGuides, ConstantlyLate)
 {
   for (const double frequency : {0.5, 1.0, 2.0})
@@ -106,14 +111,14 @@ TEST(LateGuides, ConstantlyLate)
         const Result result = follow(command, options(live), 6.0, [&](int) { return late; });
         EXPECT_LE(result.acceleration, 1.5 * most) << ms << " ms, " << frequency << " Hz" << (live ? ", live" : "");
         EXPECT_LE(result.turning, 1.5 * 3.0 * most) << ms << " ms, " << frequency << " Hz" << (live ? ", live" : "");
-        EXPECT_LE(result.error, 1e-4) << ms;   // the motion is late but follows the command's path, up to the error of cubics through 100 poses a second
-        // two intervals and the transport, which is found out with the resolution of a step; and 10 % more; the delay where that is enough
+        // the motion is late but follows the command's path, up to the error of cubics through 100 poses a second
+        EXPECT_LE(result.error, 1e-4) << ms;
+        // two intervals and the transport, which is found out with the resolution of a step; and 10 % more; the delay
+        // where that is enough
         EXPECT_LE(result.lag, std::max(0.05, 1.1 * (late + 2.0 * kInterval + kStep)) + 1e-6) << ms;
         EXPECT_GE(result.lag, std::max(0.05, late + 2.0 * kInterval - kStep) - 1e-9) << ms;
         if (std::abs(late + 2.0 * kInterval - 0.05) > 1e-9)   // there round-off decides
-        {
           EXPECT_EQ(result.excess > 0.0, late + 2.0 * kInterval > 0.05) << ms;
-        }
       }
 }
 
@@ -142,12 +147,14 @@ TEST(LateGuides, Jitter)
         std::mt19937 random(3);
         std::uniform_real_distribution<double> late(0.0, most_late);
         const Result result = follow(command, options(live), 8.0, [&](int) { return late(random); });
-        EXPECT_LE(result.acceleration, 1.5 * commanded(command, 8.0)) << most_late << " s, " << frequency << " Hz" << (live ? ", live" : "");
+        EXPECT_LE(result.acceleration, 1.5 * commanded(command, 8.0))
+            << most_late << " s, " << frequency << " Hz" << (live ? ", live" : "");
         EXPECT_LE(result.error, 1e-4);
       }
 }
 
-// One pose of a live stream is held up, and all behind it: nobody can know, so the motion brakes, and goes on in the same way.
+// One pose of a live stream is held up, and all behind it: nobody can know, so the motion brakes, and goes on in the
+// same way.
 TEST(LateGuides, Hiccup)
 {
   const Command command;
@@ -191,9 +198,7 @@ TEST(LateGuides, Points)
       for (int n = 1; n * kStep < 6.0; ++n)
       {
         for (; sent * kInterval + late <= (n - 1) * kStep + 1e-9; ++sent)
-        {
           EXPECT_TRUE(buffer.push(sent * kInterval, points(sent * kInterval)));
-        }
         x0 = x1, x1 = x2, x2 = buffer.target(n * kStep)(1, 0);
         worst = std::max(worst, std::abs(secondDifference(x0, x1, x2)));
       }
@@ -230,5 +235,5 @@ TEST(LateGuides, SkippedTime)
   EXPECT_NEAR(before.x(), command.at(time + skipped - buffer.timing().lag()), 1e-4);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -19,7 +19,8 @@ double volumeOf(const Marker& marker)
   double volume = 0;
   for (std::size_t k = 0; k + 2 < marker.points.size(); k += 3)
   {
-    const Eigen::Vector3d a = fromMessage(marker.points[k]), b = fromMessage(marker.points[k + 1]), c = fromMessage(marker.points[k + 2]);
+    const Eigen::Vector3d a = fromMessage(marker.points[k]), b = fromMessage(marker.points[k + 1]),
+                          c = fromMessage(marker.points[k + 2]);
     volume += a.dot(b.cross(c)) / 6;
   }
   return volume;
@@ -38,7 +39,8 @@ obstacles:
 bodies:
   - {name: point, mass: 1, inertia: [1, 1, 1]}
   - {name: cube, density: 1, shape: {mesh: {file: cube.obj}}, pose: {position: [5, 0, 0]}}
-)", "scene", {}, std::string(SLENDER_SOURCE_DIR) + "/test/unit/data"));
+)",
+                                         "scene", {}, std::string(SLENDER_SOURCE_DIR) + "/test/unit/data"));
   std::map<std::pair<std::string, int>, Marker> markers;
   for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header(), {MarkerStyle::line}).markers)
     markers[{marker.ns, marker.id}] = marker;
@@ -73,7 +75,8 @@ bodies:
 
 TEST(Markers, threadsAreTubesOrLinesOfBoundedSize)
 {
-  const std::string thread = "centerline: {straight: {to: [0.1, 0, 0], edges: 3000}}, radius: 0.002, ends: {oldest: held}}";
+  const std::string thread =
+      "centerline: {straight: {to: [0.1, 0, 0], edges: 3000}}, radius: 0.002, ends: {oldest: held}}";
   const Simulation simulation(parseScene("threads:\n  - {name: a, " + thread + "\n  - {name: b, " + thread, "scene"));
   int erased = 0, tubes = 0;
   std::size_t triangles = 0;
@@ -85,7 +88,8 @@ TEST(Markers, threadsAreTubesOrLinesOfBoundedSize)
       continue;
     ++tubes;
     triangles += marker.points.size() / 3;
-    EXPECT_NEAR(volumeOf(marker), M_PI * 4e-6 * 0.1, 0.11 * M_PI * 4e-6 * 0.1);   // an octagon has 0.9 of a circle's area
+    // an octagon has 0.9 of a circle's area
+    EXPECT_NEAR(volumeOf(marker), M_PI * 4e-6 * 0.1, 0.11 * M_PI * 4e-6 * 0.1);
   }
   EXPECT_EQ(markers.front().action, Marker::DELETEALL);   // rviz takes all away then, whatever the namespace
   EXPECT_EQ(erased, 1);
@@ -120,7 +124,9 @@ MarkerOptions colored(MarkerColor color, double range, MarkerStyle style = Marke
 /// A quarter of a circle of radius 0.5 m: its curvature is 2 per metre.
 TEST(Markers, coloursShowCurvature)
 {
-  const Simulation bent(parseScene("rods: [{name: arc, centerline: {arc: {start: [0.5, 0, 0], axis: [0, 0, 1], angle: 1.5707963, edges: 40}}}]", "scene"));
+  const Simulation bent(parseScene(
+      "rods: [{name: arc, centerline: {arc: {start: [0.5, 0, 0], axis: [0, 0, 1], angle: 1.5707963, edges: 40}}}]",
+      "scene"));
   const auto at = [&](double range, MarkerStyle style = MarkerStyle::line) -> Marker {
     return find(sceneMarkers(bent, std_msgs::Header(), colored(MarkerColor::curvature, range, style)), "rods/arc");
   };
@@ -141,21 +147,28 @@ TEST(Markers, coloursShowStrainOfRodsAndCloths)
 {
   const std::string folder = testing::TempDir();
   const auto square = [&](const std::string& name, double width) {
-    std::ofstream(folder + "/" + name) << "v 0 0 0\nv " << width << " 0 0\nv " << width << " 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+    std::ofstream(folder + "/" + name) << "v 0 0 0\nv " << width << " 0 0\nv " << width
+                                       << " 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
   };
   square("rest.obj", 1.0);
   square("wide.obj", 1.1);
   square("narrow.obj", 0.9);
   const auto first = [&](const std::string& start) {
-    const Simulation simulation(parseScene("cloths: [{name: c, mesh: {file: rest.obj}, bending: {model: none}, start: {file: " + start + "}}]", "scene", {}, folder));
-    return find(sceneMarkers(simulation, std_msgs::Header(), colored(MarkerColor::strain, 0.1, MarkerStyle::tube)), "cloths/c").colors.front();
+    const Simulation simulation(
+        parseScene("cloths: [{name: c, mesh: {file: rest.obj}, bending: {model: none}, start: {file: " + start + "}}]",
+                   "scene", {}, folder));
+    return find(sceneMarkers(simulation, std_msgs::Header(), colored(MarkerColor::strain, 0.1, MarkerStyle::tube)),
+                "cloths/c")
+        .colors.front();
   };
   const auto red = first("wide.obj"), blue = first("narrow.obj"), none = first("rest.obj");
   EXPECT_GT(red.r, 4 * red.g);
   EXPECT_GT(blue.b, 4 * blue.r);
   EXPECT_NEAR(none.r, none.b, 0.03 * none.r);
 
-  const Simulation rod(parseScene("rods: [{name: r, centerline: {straight: {to: [1, 0, 0], edges: 4}}, initial: {straight: {to: [1.05, 0, 0]}}}]", "scene"));
+  const Simulation rod(parseScene(
+      "rods: [{name: r, centerline: {straight: {to: [1, 0, 0], edges: 4}}, initial: {straight: {to: [1.05, 0, 0]}}}]",
+      "scene"));
   const Marker line = find(sceneMarkers(rod, std_msgs::Header(), colored(MarkerColor::strain, 0.05)), "rods/r");
   for (const auto& c : line.colors)
     EXPECT_NEAR(c.g, 0.14, 0.01);
@@ -173,7 +186,8 @@ rods:
     cross_section: {radius: 0.01}
     material: {youngs_modulus: 1.0e6}
     grasps: {left: {edges: [0], motion: fixed}, right: {edges: [-1], motion: fixed}}
-)", "scene"));
+)",
+                                   "scene"));
   for (int k = 0; k < 3; ++k)
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
   MarkerOptions options;
@@ -201,7 +215,8 @@ cloths:
     material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 1.0e6}
     contact: {thickness: 0.002}
 obstacles: [{name: table, shape: {plane: {}}}]
-)", "scene"));
+)",
+                                   "scene"));
   for (int k = 0; k < 50; ++k)
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
   MarkerOptions options;
@@ -219,7 +234,8 @@ TEST(Markers, gripperIsALitBoxAboutTheSection)
 {
   const Simulation simulation(parseScene(R"(
 rods: [{name: r, centerline: {straight: {to: [1, 0, 0], edges: 10}}, cross_section: {radius: 0.01}, grasps: {left: {edges: [0]}, pin: {nodes: [5], hold: position}}}]
-)", "scene"));
+)",
+                                         "scene"));
   const auto markers = sceneMarkers(simulation, std_msgs::Header());
   const Marker& left = find(markers, "grasps", 0);
   EXPECT_EQ(left.type, Marker::TRIANGLE_LIST);
@@ -245,5 +261,5 @@ TEST(Markers, legendSaysWhatColoursAndArrowsMean)
   EXPECT_GT(legend.pose.position.z, 0.0);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -1,4 +1,5 @@
-// The nodelets, loaded into this program: they come and go, say why they cannot, and hand over messages without copying them.
+// The nodelets, loaded into this program: they come and go, say why they cannot, and hand over messages without copying
+// them.
 #include <atomic>
 #include <cstdlib>
 #include <filesystem>
@@ -20,10 +21,10 @@
 
 namespace {
 
-std::atomic<std::uint64_t> allocated_by_all{0};       // bytes since the start
+std::atomic<std::uint64_t> allocated_by_all{0};   // bytes since the start
 thread_local std::uint64_t allocated_here = 0;
 
-}  // namespace
+}   // namespace
 
 __attribute__((noinline)) void* operator new(std::size_t size)
 {
@@ -107,8 +108,11 @@ tracked:
     nh.setParam("record_bag", bag);
     // topics beside the private ones, or the nodelets would share theirs
     return loader_.load(name, std::string("slender_sim/") + kind.type,
-                        {{ros::names::resolve("state"), name + "/state"}, {ros::names::resolve("points"), name + "/points"},
-                         {ros::names::resolve("poses"), name + "/poses"}, {ros::names::resolve("markers"), name + "/markers"}}, {});
+                        {{ros::names::resolve("state"), name + "/state"},
+                         {ros::names::resolve("points"), name + "/points"},
+                         {ros::names::resolve("poses"), name + "/poses"},
+                         {ros::names::resolve("markers"), name + "/markers"}},
+                        {});
   }
 
   /// Calls what has come until `enough`; false when that takes more than 20 s.
@@ -144,8 +148,10 @@ tracked:
         end_all = allocated_by_all, end_here = allocated_here;
     });
     ASSERT_TRUE(serve([&] { return count > kWarm + kMessages; })) << topic << ": " << count << " messages";
-    const double here = static_cast<double>(end_here - start_here) / kMessages, all = static_cast<double>(end_all - start_all) / kMessages;
-    std::cout << topic << ": messages of " << bytes << " bytes, allocated per message where they arrive " << here << ", in the whole process " << all << " bytes" << std::endl;
+    const double here = static_cast<double>(end_here - start_here) / kMessages,
+                 all = static_cast<double>(end_all - start_all) / kMessages;
+    std::cout << topic << ": messages of " << bytes << " bytes, allocated per message where they arrive " << here
+              << ", in the whole process " << all << " bytes" << std::endl;
     EXPECT_GT(bytes, 15000u);
     EXPECT_LT(here, 2000.0) << topic;
     if (pooled)
@@ -163,16 +169,18 @@ TEST_F(Nodelets, comeAndGo)
   for (const Kind& kind : kinds())
     for (int round = 0; round < 2; ++round)
     {
-      const std::string name = "/visitor" + std::to_string(n++), bag = (folder_ / (std::to_string(n) + ".bag")).string();
+      const std::string name = "/visitor" + std::to_string(n++),
+                        bag = (folder_ / (std::to_string(n) + ".bag")).string();
       std::uint64_t first = 0, last = 0, count = 0;
       const auto take = [&](const auto& message) {
         first = count++ == 0 ? message->step : first;
         last = message->step;
       };
       const std::string type = kind.type;
-      const ros::Subscriber subscriber = type == "rod_node"      ? listen<slender_sim::RodState>(name + "/state", take)
-                                         : type == "thread_node" ? listen<slender_sim::ThreadState>(name + "/state", take)
-                                                                 : listen<slender_sim::ClothState>(name + "/state", take);
+      const ros::Subscriber subscriber = type == "rod_node" ? listen<slender_sim::RodState>(name + "/state", take)
+                                         : type == "thread_node"
+                                             ? listen<slender_sim::ThreadState>(name + "/state", take)
+                                             : listen<slender_sim::ClothState>(name + "/state", take);
       ASSERT_TRUE(load(kind, name, "wall", bag)) << type;
       EXPECT_TRUE(serve([&] { return last > 5; })) << type;
       EXPECT_LT(first, 200u);
@@ -223,11 +231,12 @@ TEST_F(Nodelets, whatIsHeldDoesNotChange)
   std::vector<boost::shared_ptr<const slender_sim::RodState>> held;
   std::vector<slender_sim::RodState> copies;
   std::uint64_t last = 0;
-  const ros::Subscriber subscriber = listen<slender_sim::RodState>("/ropes/state", [&](const boost::shared_ptr<const slender_sim::RodState>& message) {
-    last = message->step;
-    if (held.size() < 20)
-      held.push_back(message), copies.push_back(*message);
-  });
+  const ros::Subscriber subscriber =
+      listen<slender_sim::RodState>("/ropes/state", [&](const boost::shared_ptr<const slender_sim::RodState>& message) {
+        last = message->step;
+        if (held.size() < 20)
+          held.push_back(message), copies.push_back(*message);
+      });
   ASSERT_TRUE(load(kinds()[0], "/ropes"));
   ASSERT_TRUE(serve([&] { return held.size() == 20 && last > held.back()->step + 40; }));
   for (std::size_t k = 0; k < held.size(); ++k)
@@ -256,8 +265,8 @@ TEST(SharedMessage, isUsedAgainWhenNobodyHoldsIt)
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender
 
 int main(int argc, char** argv)
 {

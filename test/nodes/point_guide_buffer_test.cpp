@@ -85,16 +85,13 @@ TEST(PointGuideBuffer, DoesNotRunTheOtherWayAfterAPause)
   {
     const double time = 0.03 * k;
     if (time <= 0.3 || time >= 0.6)
-    {
       EXPECT_TRUE(buffer.push(time, pointsAt(time < 0.5 ? 0.0 : 10.0)));
-    }
     follower.to(time + 0.03);
     lowest = std::min(lowest, follower.x(2, 0));
     highest = std::max(highest, follower.x(2, 0));
-    if (time > 1.0)   // what is left goes at catch_up_speed on average, 1.5 times that at most; point 1 goes twice as far as point 0
-    {
+    if (time > 1.0)   // what is left goes at catch_up_speed on average, 1.5 times that at most; point 1 goes twice as
+                      // far as point 0
       EXPECT_LT(std::abs(follower.v(2, 1)), 1.6) << time;
-    }
   }
   EXPECT_GT(lowest, -0.1);   // the cubic through the gap overshoots, by 1 % of its height
   EXPECT_LT(highest, 10.0 + 1e-9);
@@ -137,5 +134,5 @@ TEST(PointGuideBuffer, BeginsElsewhereAndRestarts)
   EXPECT_FALSE(buffer.lastTime().has_value());
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -31,8 +31,9 @@ TEST(StepGaps, LostInstants)
   for (std::uint64_t step = 0; step < 100; ++step)
     if (step != 20 && step != 50 && step != 51)
       gaps.add(0, step, 0.005 * static_cast<double>(step));
-  EXPECT_EQ(gaps.text(0.005),
-            "3 recorded instants are missing in 2 places, first after 0.095 s; a node's own bag (~record_bag) lacks none.");
+  EXPECT_EQ(
+      gaps.text(0.005),
+      "3 recorded instants are missing in 2 places, first after 0.095 s; a node's own bag (~record_bag) lacks none.");
 }
 
 TEST(StepGaps, SkippedTimeIsNoLostInstant)
@@ -41,7 +42,9 @@ TEST(StepGaps, SkippedTimeIsNoLostInstant)
   for (std::uint64_t step = 0; step < 100; ++step)
     gaps.add(0, step, 0.005 * static_cast<double>(step) + (step > 40 ? 1.2 : 0.0));
   for (const double step_length : {0.005, 0.0})
-    EXPECT_EQ(gaps.text(step_length), "The stamps skip up to 1.2 s between two steps, after 0.2 s: the node was paused, or fell behind (~max_lag).");
+    EXPECT_EQ(
+        gaps.text(step_length),
+        "The stamps skip up to 1.2 s between two steps, after 0.2 s: the node was paused, or fell behind (~max_lag).");
 }
 
 TEST(IntervalGaps, OnlyLongOnes)
@@ -56,8 +59,10 @@ TEST(IntervalGaps, OnlyLongOnes)
   }
   EXPECT_EQ(steady.text(), "");
   EXPECT_EQ(jittery.text(), "");
-  EXPECT_EQ(gappy.text(), "1 intervals between its messages are longer than 2.5 times the usual 0.01 s, the first one 0.12 s after 0.29 s; the motion "
-                          "is interpolated over them.");
+  EXPECT_EQ(gappy.text(),
+            "1 intervals between its messages are longer than 2.5 times the usual 0.01 s, the first one 0.12 s after "
+            "0.29 s; the motion "
+            "is interpolated over them.");
 }
 
 /// A bag of 50 steps of a rod, some of them left out.
@@ -94,11 +99,13 @@ TEST(StepGaps, ReadersOfBagsTell)
     SceneSnapshot instant;
     while (bag.next(instant))
       continue;
-    EXPECT_EQ(bag.gaps().find("3 recorded instants are missing in 1 places, first after 0.19 s") != std::string::npos, !whole) << bag.gaps();
+    EXPECT_EQ(bag.gaps().find("3 recorded instants are missing in 1 places, first after 0.19 s") != std::string::npos,
+              !whole)
+        << bag.gaps();
     EXPECT_EQ(bag.gaps().empty(), whole) << bag.gaps();
     std::filesystem::remove(path);
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -11,7 +11,8 @@
 
 #include "test/support/shell.h"
 
-/// What a failed run says: the object, where it is farthest from a solution, and what is near, each figure with its unit.
+/// What a failed run says: the object, where it is farthest from a solution, and what is near, each figure with its
+/// unit.
 namespace {
 
 namespace fs = std::filesystem;
@@ -39,8 +40,10 @@ double numberIn(const std::string& text, const std::string& expression)
 }
 
 /// Steps that cannot be done: one iteration of Newton's method does not solve anything that moves.
-const std::string hopeless = "time: {step: 0.01, duration: 1, integrator: implicit_euler, newton: {max_iterations: 1, max_cuts: 0}}\n";
-const std::string ball = "obstacles:\n  - {name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0.5, 0, 0.5]}}\n";
+const std::string hopeless =
+    "time: {step: 0.01, duration: 1, integrator: implicit_euler, newton: {max_iterations: 1, max_cuts: 0}}\n";
+const std::string ball =
+    "obstacles:\n  - {name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0.5, 0, 0.5]}}\n";
 
 const std::string place = R"(at \(([-0-9.e]+), ([-0-9.e]+), ([-0-9.e]+)\) m)";
 
@@ -82,20 +85,27 @@ rods:
   EXPECT_NEAR(at.x, 0.05 * node, rounding);   // as the step began the rope lay straight
   EXPECT_GE(numberIn(text, "largest stretch strain is ([-0-9.e+]+), in edge [0-9]+"), 0.0);
   const bool left = at.x < 0.5;
-  EXPECT_NEAR(numberIn(text, std::string("nearest grasp is '") + (left ? "left" : "right") + "', ([-0-9.e+]+) m away"), std::min(at.x, 1.0 - at.x), rounding);
-  EXPECT_NEAR(numberIn(text, "nearest contact partner is obstacle 'ball', ([-0-9.e+]+) m away"), at.from(0.5, 0, 0.5) - 0.1 - 0.01, rounding);
+  EXPECT_NEAR(numberIn(text, std::string("nearest grasp is '") + (left ? "left" : "right") + "', ([-0-9.e+]+) m away"),
+              std::min(at.x, 1.0 - at.x), rounding);
+  EXPECT_NEAR(numberIn(text, "nearest contact partner is obstacle 'ball', ([-0-9.e+]+) m away"),
+              at.from(0.5, 0, 0.5) - 0.1 - 0.01, rounding);
 }
 
 // Of several rods that are solved together the message names the one that fails, not the first one.
 TEST(Failures, ofSeveralRodsNameTheRightOne)
 {
   const auto rod = [](const std::string& name, double y, const std::string& motion) {
-    return "  - name: " + name + "\n    centerline: {straight: {from: [0, " + std::to_string(y) + ", 1], to: [1, " + std::to_string(y) +
-           ", 1], edges: 20}}\n    cross_section: {radius: 0.01}\n    material: {density: 1100, youngs_modulus: 1.0e6}\n    contact: {friction: 0.3}\n"
-           "    grasps: {start_of_" + name + ": {edges: [0]}, end_of_" + name + ": {edges: [-1]" + motion + "}}\n";
+    return "  - name: " + name + "\n    centerline: {straight: {from: [0, " + std::to_string(y) + ", 1], to: [1, " +
+           std::to_string(y) +
+           ", 1], edges: 20}}\n    cross_section: {radius: 0.01}\n    material: {density: 1100, youngs_modulus: "
+           "1.0e6}\n    contact: {friction: 0.3}\n"
+           "    grasps: {start_of_" +
+           name + ": {edges: [0]}, end_of_" + name + ": {edges: [-1]" + motion + "}}\n";
   };
-  const std::string fast = ", attach: initial, motion: {table: [[0, 1, 0.1, 1, 0, 0, 0, 1], [0.01, 1.3, 0.1, 1, 0, 0, 0, 1]]}";
-  const std::string text = failureOf(hopeless + "gravity: [0, 0, 0]\nrods:\n" + rod("still", 0.0, "") + rod("pulled", 0.1, fast));
+  const std::string fast =
+      ", attach: initial, motion: {table: [[0, 1, 0.1, 1, 0, 0, 0, 1], [0.01, 1.3, 0.1, 1, 0, 0, 0, 1]]}";
+  const std::string text =
+      failureOf(hopeless + "gravity: [0, 0, 0]\nrods:\n" + rod("still", 0.0, "") + rod("pulled", 0.1, fast));
   EXPECT_NE(text.find("rod 'pulled'"), std::string::npos) << text;
   EXPECT_NE(text.find("nearest grasp is 'end_of_pulled'"), std::string::npos) << text;
   EXPECT_NEAR(numberIn(text, "nearest contact partner is rod 'still', ([-0-9.e+]+) m away"), 0.1 - 0.02, rounding);
@@ -116,7 +126,8 @@ rods:
       pulled: {edges: [-1], motion: {table: [[0, 0, 0.1, 1, 0, 0, 0, 1], [0.01, -0.2, 0.1, 1, 0, 0, 0, 1]]}, attach: initial}
 )");
   EXPECT_NE(text.find("nearest grasp is 'pulled'"), std::string::npos) << text;
-  EXPECT_NEAR(numberIn(text, "nearest contact partner is the rod itself at edge [0-9]+, ([-0-9.e+]+) m away"), 0.1 - 0.01, rounding);
+  EXPECT_NEAR(numberIn(text, "nearest contact partner is the rod itself at edge [0-9]+, ([-0-9.e+]+) m away"),
+              0.1 - 0.01, rounding);
 }
 
 TEST(Failures, ofExplicitStepsNameTheFastestNode)
@@ -149,7 +160,8 @@ cloths:
   const Place at(text);
   EXPECT_GT(numberIn(text, "largest unbalanced force is ([-0-9.e+]+) N, on vertex [0-9]+"), 0.0);
   EXPECT_NEAR(numberIn(text, "nearest grasp is 'corner', ([-0-9.e+]+) m away"), at.from(0, 1, 1), rounding);
-  EXPECT_NEAR(numberIn(text, "nearest contact partner is obstacle 'ball', ([-0-9.e+]+) m away"), at.from(0.5, 0, 0.5) - 0.1, rounding);
+  EXPECT_NEAR(numberIn(text, "nearest contact partner is obstacle 'ball', ([-0-9.e+]+) m away"),
+              at.from(0.5, 0, 0.5) - 0.1, rounding);
 }
 
 TEST(Failures, ofAThreadNameTheNodeAndTheNozzle)
@@ -164,19 +176,21 @@ threads:
 )");
   EXPECT_NE(text.find("thread 'honey'"), std::string::npos) << text;
   EXPECT_GT(numberIn(text, "largest unbalanced force is ([-0-9.e+]+) N, on node [0-9]+ of [0-9]+"), 0.0);
-  EXPECT_NEAR(numberIn(text, "nearest grasp is the nozzle, ([-0-9.e+]+) m away"), Place(text).from(0, 0, 0.1), rounding);
+  EXPECT_NEAR(numberIn(text, "nearest grasp is the nozzle, ([-0-9.e+]+) m away"), Place(text).from(0, 0, 0.1),
+              rounding);
   EXPECT_GT(numberIn(text, "nearest contact partner is the floor, ([-0-9.e+]+) m away"), 0.05);
 }
 
 TEST(Failures, summariesHaveUnits)
 {
-  const Result result = slender::test::shell(std::string(SLENDER_SIMULATE) + " " + SLENDER_SOURCE_DIR + "/config/scenes/cantilever.yaml --duration 0.05");
+  const Result result = slender::test::shell(std::string(SLENDER_SIMULATE) + " " + SLENDER_SOURCE_DIR +
+                                             "/config/scenes/cantilever.yaml --duration 0.05");
   ASSERT_EQ(result.status, 0) << result.output;
-  for (const char* line : {R"(simulated +[-0-9.e+]+ s\n)", R"(wall +[-0-9.e+]+ s\n)", R"(real-time factor +[-0-9.e+]+ \(simulated over wall time\)\n)",
-                           R"(worst residual +[-0-9.e+]+ of the largest force\n)", R"(moduli .* N, bend .* N m\^2, twist .* N m\^2)"})
-  {
+  for (const char* line :
+       {R"(simulated +[-0-9.e+]+ s\n)", R"(wall +[-0-9.e+]+ s\n)",
+        R"(real-time factor +[-0-9.e+]+ \(simulated over wall time\)\n)",
+        R"(worst residual +[-0-9.e+]+ of the largest force\n)", R"(moduli .* N, bend .* N m\^2, twist .* N m\^2)"})
     EXPECT_TRUE(std::regex_search(result.output, std::regex(line))) << line << "\n" << result.output;
-  }
 }
 
-}  // namespace
+}   // namespace

@@ -34,7 +34,10 @@ protected:
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  Result run(const std::string& arguments) { return slender::test::shell("cd " + folder_ + " && " + SLENDER_FAIR_MESH + " " + arguments); }
+  Result run(const std::string& arguments)
+  {
+    return slender::test::shell("cd " + folder_ + " && " + SLENDER_FAIR_MESH + " " + arguments);
+  }
 
   /// A sphere without the faces above `height`.
   void writeCup(const std::string& name, double height)
@@ -42,7 +45,8 @@ protected:
     TriangleMesh mesh = slender::icosphere(1.0, 2);
     Eigen::Index kept = 0;
     for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
-      if (mesh.vertices(2, mesh.triangles(0, f)) < height && mesh.vertices(2, mesh.triangles(1, f)) < height && mesh.vertices(2, mesh.triangles(2, f)) < height)
+      if (mesh.vertices(2, mesh.triangles(0, f)) < height && mesh.vertices(2, mesh.triangles(1, f)) < height &&
+          mesh.vertices(2, mesh.triangles(2, f)) < height)
         mesh.triangles.col(kept++) = mesh.triangles.col(f).eval();
     // vertices that are left over would be defects
     TriangleMesh cup;
@@ -115,10 +119,17 @@ TEST_F(FairMesh, RefusesBadInputByName)
   writeCup("cup.obj", 0.6);
   std::ofstream(folder_ + "/fin.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 2 1 4\nf 1 2 5\n";
   const std::pair<const char*, const char*> cases[] = {
-    {"", "usage"}, {"cup.obj", "usage"}, {"none.obj out.obj", "none.obj: cannot be opened"}, {"cup.obj out.stl", "out.stl"},
-    {"fin.obj out.obj", "fin.obj: the edge between vertices 0 and 1"}, {"cup.obj out.obj --steps 1.5", "--steps 1.5"},
-    {"cup.obj out.obj --smoothing 0", "--smoothing 0"}, {"cup.obj out.obj --region 1,2,3", "--region 1,2,3"},
-    {"cup.obj out.obj --region 9,9,9,1", "no vertex may move"}, {"cup.obj out.obj --turbo", "--turbo"}, {"cup.obj out.obj --steps", "value is missing"}};
+      {"", "usage"},
+      {"cup.obj", "usage"},
+      {"none.obj out.obj", "none.obj: cannot be opened"},
+      {"cup.obj out.stl", "out.stl"},
+      {"fin.obj out.obj", "fin.obj: the edge between vertices 0 and 1"},
+      {"cup.obj out.obj --steps 1.5", "--steps 1.5"},
+      {"cup.obj out.obj --smoothing 0", "--smoothing 0"},
+      {"cup.obj out.obj --region 1,2,3", "--region 1,2,3"},
+      {"cup.obj out.obj --region 9,9,9,1", "no vertex may move"},
+      {"cup.obj out.obj --turbo", "--turbo"},
+      {"cup.obj out.obj --steps", "value is missing"}};
   for (const auto& [arguments, expected] : cases)
   {
     const Result result = run(arguments);
@@ -139,4 +150,4 @@ TEST_F(FairMesh, FailuresExitWith3AndWriteNothing)
   EXPECT_FALSE(fs::exists(folder_ + "/out.obj"));
 }
 
-}  // namespace
+}   // namespace

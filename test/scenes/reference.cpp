@@ -31,7 +31,7 @@ TEST(SceneReference, IsUpToDate)
   std::ostringstream text;
   text << file.rdbuf();
   EXPECT_EQ(text.str(), sceneReference(keys()))
-    << "run scene_reference config/scenes/*.yaml test/scenes/every_key.yaml > docs/scene_reference.md";
+      << "run scene_reference config/scenes/*.yaml test/scenes/every_key.yaml > docs/scene_reference.md";
 }
 
 TEST(SceneReference, NamesRangesAndUnits)
@@ -56,7 +56,6 @@ TEST(Documents, ShowScenesThatAreRead)
     std::string scene;
     bool inside = false;
     for (std::string line; std::getline(file, line);)
-    {
       if (inside && line == "```")
       {
         EXPECT_NO_THROW(parseScene(scene, name)) << scene;
@@ -68,12 +67,11 @@ TEST(Documents, ShowScenesThatAreRead)
         inside = true;
       else if (inside)
         scene += line + "\n";
-    }
   }
   EXPECT_GE(scenes, 5);
 }
 
 TEST(SceneReference, SaysWhichFileIsNotThere) { EXPECT_THROW(sceneKeys({kSource + "/none.yaml"}), SceneError); }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

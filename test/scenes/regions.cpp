@@ -31,7 +31,8 @@ protected:
 
   int run(const std::string& arguments)
   {
-    const slender::test::Result result = slender::test::shell("cd " + folder_ + " && " + SLENDER_REGIONS + " " + arguments);
+    const slender::test::Result result =
+        slender::test::shell("cd " + folder_ + " && " + SLENDER_REGIONS + " " + arguments);
     output_ = result.output;
     return result.status;
   }
@@ -71,11 +72,16 @@ TEST_F(Regions, SaysWhatIsWrong)
 {
   slender::writeObj(folder_ + "/ball.obj", slender::icosphere(1.0, 0));
   const std::pair<const char*, const char*> cases[] = {
-    {"ball.obj", "needs IN and OUT"},        {"ball.obj a.stl --count 3", ".obj or .ply"},   {"ball.obj a.ply --count 0", "must be a whole number in [1"},
-    {"ball.obj a.ply", "ball.obj: is a mesh; say into how many regions"},
-    {"ball.obj a.ply --seed 3", "--count"},  {"none.obj a.ply --count 3", "none.obj"},       {"ball.obj a.ply --count 30", "number of faces, 20"},
-    {"ball.obj a.ply --count 3 --compactness 2", "[0, 1]"}, {"ball.obj a.ply --count 3 --frames 'x*.obj'", "no such file"},
-    {"ball.obj a.ply --colour", "no such option"},
+      {"ball.obj", "needs IN and OUT"},
+      {"ball.obj a.stl --count 3", ".obj or .ply"},
+      {"ball.obj a.ply --count 0", "must be a whole number in [1"},
+      {"ball.obj a.ply", "ball.obj: is a mesh; say into how many regions"},
+      {"ball.obj a.ply --seed 3", "--count"},
+      {"none.obj a.ply --count 3", "none.obj"},
+      {"ball.obj a.ply --count 30", "number of faces, 20"},
+      {"ball.obj a.ply --count 3 --compactness 2", "[0, 1]"},
+      {"ball.obj a.ply --count 3 --frames 'x*.obj'", "no such file"},
+      {"ball.obj a.ply --colour", "no such option"},
   };
   for (const auto& [arguments, words] : cases)
   {
@@ -85,4 +91,4 @@ TEST_F(Regions, SaysWhatIsWrong)
   EXPECT_FALSE(fs::exists(folder_ + "/a.ply"));
 }
 
-}  // namespace
+}   // namespace

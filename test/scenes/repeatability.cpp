@@ -58,11 +58,15 @@ protected:
 // Replays promise it. Fresh memory holds other bytes in the second process, and there are more threads.
 TEST_P(ShippedScene, isTheSameTwiceToTheBit)
 {
-  const std::string file = scenes + GetParam() + ".yaml", reduced = GetParam() == "hair" ? " --set generate.0.hair.strands=60" : "";
+  const std::string file = scenes + GetParam() + ".yaml",
+                    reduced = GetParam() == "hair" ? " --set generate.0.hair.strands=60" : "";
   std::ostringstream command;
-  command << SLENDER_SIMULATE << " " << file << reduced << " --quiet --duration " << 3.0 * slender::readScene(file).time.step << " --state " << folder_ << "/";
-  const Result first = slender::test::shell("MALLOC_PERTURB_=128 OMP_NUM_THREADS=1 " + command.str() + "first --threads 1");
-  const Result second = slender::test::shell("MALLOC_PERTURB_=1 MALLOC_MMAP_THRESHOLD_=1073741824 OMP_NUM_THREADS=3 " + command.str() + "second --threads 3");
+  command << SLENDER_SIMULATE << " " << file << reduced << " --quiet --duration "
+          << 3.0 * slender::readScene(file).time.step << " --state " << folder_ << "/";
+  const Result first =
+      slender::test::shell("MALLOC_PERTURB_=128 OMP_NUM_THREADS=1 " + command.str() + "first --threads 1");
+  const Result second = slender::test::shell("MALLOC_PERTURB_=1 MALLOC_MMAP_THRESHOLD_=1073741824 OMP_NUM_THREADS=3 " +
+                                             command.str() + "second --threads 3");
   ASSERT_EQ(first.status, 0) << first.output;
   EXPECT_EQ(second.status, 0) << second.output;
   EXPECT_EQ(first.output, second.output);
@@ -73,7 +77,8 @@ TEST_P(ShippedScene, isTheSameTwiceToTheBit)
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedScene, testing::ValuesIn(allScenes()));
 
-/// Runs `simulate` with the arguments, sends it the signal when it has recorded something, and returns its exit status, 1000 and more: a signal ended it.
+/// Runs `simulate` with the arguments, sends it the signal when it has recorded something, and returns its exit status,
+/// 1000 and more: a signal ended it.
 int statusAfter(int signal, const std::vector<std::string>& arguments, const std::string& shows_that_it_runs)
 {
   std::vector<const char*> words = {SLENDER_SIMULATE};
@@ -100,18 +105,21 @@ TEST(Signals, endAStepAndSaveWhatWasReached)
   const std::string folder = testing::TempDir() + "/slender_sim_signals_" + std::to_string(getpid());
   fs::create_directories(folder);
   const std::string scene = folder + "/sheet.yaml";
-  std::ofstream(scene) << "name: sheet\ntime: {step: 0.01, duration: 100}\ncloths:\n  - grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 100}\n"
-                          "    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 1.0e6, poissons_ratio: 0.3}\n"
-                          "    grasps: {left: {corner: upper_left}}\n";
+  std::ofstream(scene)
+      << "name: sheet\ntime: {step: 0.01, duration: 100}\ncloths:\n  - grid: {corner: [0, 0, 0], sides: [[1, 0, 0], "
+         "[0, 1, 0]], cells: 100}\n"
+         "    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 1.0e6, poissons_ratio: 0.3}\n"
+         "    grasps: {left: {corner: upper_left}}\n";
   for (const int signal : {SIGTERM, SIGINT})
   {
     fs::remove_all(folder + "/csv");
     fs::remove(folder + "/state");
-    const int status = statusAfter(signal, {scene, "--quiet", "--csv", folder + "/csv", "--state", folder + "/state"}, folder + "/csv/nodes.csv");
+    const int status = statusAfter(signal, {scene, "--quiet", "--csv", folder + "/csv", "--state", folder + "/state"},
+                                   folder + "/csv/nodes.csv");
     EXPECT_EQ(status, 128 + signal);
     EXPECT_GT(bytesOf(folder + "/state").size(), 100u);
   }
   fs::remove_all(folder);
 }
 
-}  // namespace
+}   // namespace

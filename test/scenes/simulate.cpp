@@ -20,7 +20,10 @@ namespace fs = std::filesystem;
 
 using slender::test::Result;
 
-Result simulate(const std::string& arguments) { return slender::test::shell(std::string(SLENDER_SIMULATE) + " " + arguments); }
+Result simulate(const std::string& arguments)
+{
+  return slender::test::shell(std::string(SLENDER_SIMULATE) + " " + arguments);
+}
 
 const std::string scenes = std::string(SLENDER_SOURCE_DIR) + "/config/scenes/";
 const std::string cantilever = scenes + "cantilever.yaml";
@@ -41,17 +44,14 @@ std::vector<std::string> allScenes()
 {
   std::vector<std::string> names;
   for (const auto& entry : fs::directory_iterator(scenes))
-  {
     if (entry.path().extension() == ".yaml")
-    {
       names.push_back(entry.path().filename().string());
-    }
-  }
   std::sort(names.begin(), names.end());
   return names;
 }
 
-class Scene : public testing::TestWithParam<std::string> {};
+class Scene : public testing::TestWithParam<std::string>
+{};
 
 /// A smaller scene of the same kind, where the whole one takes long.
 std::string reduced(const std::string& name) { return name == "hair.yaml" ? " --set generate.0.hair.strands=60" : ""; }
@@ -68,9 +68,12 @@ INSTANTIATE_TEST_SUITE_P(All, Scene, testing::ValuesIn(allScenes()));
 /// What hangs from a nozzle whose flow stops becomes thinner and thinner, and parts.
 TEST_F(Simulate, aThreadWhoseFlowStopsDrainsAndParts)
 {
-  const Result result = simulate(scenes + "honey_robot.yaml --duration 5.5 --set threads.0.nozzle.motion=fixed"
-                                          " --set 'threads.0.nozzle.flow={table: [[0, 6e-7], [4, 6e-7], [4.000001, 0]]}'"
-                                          " --set 'threads.0.floor.belt={x: {table: [[0, 0.03], [2, 0.03], [2.000001, -0.03]]}, y: 0}' --csv " + folder_);
+  const Result result =
+      simulate(scenes +
+               "honey_robot.yaml --duration 5.5 --set threads.0.nozzle.motion=fixed"
+               " --set 'threads.0.nozzle.flow={table: [[0, 6e-7], [4, 6e-7], [4.000001, 0]]}'"
+               " --set 'threads.0.floor.belt={x: {table: [[0, 0.03], [2, 0.03], [2.000001, -0.03]]}, y: 0}' --csv " +
+               folder_);
   EXPECT_EQ(result.status, 0) << result.output;
   std::ifstream table(folder_ + "/threads.csv");
   std::string line, last;
@@ -83,17 +86,17 @@ TEST_F(Simulate, printsASummary)
 {
   const Result result = simulate(cantilever + " --duration 0.1");
   EXPECT_EQ(result.status, 0);
-  for (const char* word : {"steps             20\n", "simulated         0.1 s", "wall", "real-time factor", "worst residual", "iterations",
-                           "cut steps", "moduli            rod beam: stretch "})
-  {
+  for (const char* word : {"steps             20\n", "simulated         0.1 s", "wall", "real-time factor",
+                           "worst residual", "iterations", "cut steps", "moduli            rod beam: stretch "})
     EXPECT_NE(result.output.find(word), std::string::npos) << word << " not in\n" << result.output;
-  }
   EXPECT_EQ(simulate(cantilever + " --duration 0.1 --quiet").output, "");
 }
 
 TEST_F(Simulate, warnsEvenWhenItIsQuiet)
 {
-  const Result result = simulate(cantilever + " --duration 0.01 --quiet --set 'rods.0.cross_section={ellipse: [0.02, 0.01]}' --set 'rods.0.contact={}'");
+  const Result result = simulate(
+      cantilever +
+      " --duration 0.01 --quiet --set 'rods.0.cross_section={ellipse: [0.02, 0.01]}' --set 'rods.0.contact={}'");
   EXPECT_EQ(result.status, 0) << result.output;
   EXPECT_EQ(result.output.rfind("simulate: warning: ", 0), 0u) << result.output;
   EXPECT_NE(result.output.find("half-axes 0.02 m and 0.01 m"), std::string::npos) << result.output;
@@ -108,9 +111,10 @@ TEST_F(Simulate, badInputIsStatus2)
     EXPECT_EQ(result.status, 2) << arguments;
     EXPECT_NE(result.output, "") << arguments;
   }
-  for (const char* options : {"--duration 0", "--duration x", "--duration nan", "--duration 1e8", "--threads 0", "--threads 1.5", "--set",
-                              "--set time.step", "--set time.step=-1", "--set colour=red", "--csv /proc/nowhere", "--obj /proc/nowhere",
-                              "--duration 0.1 --bag /proc/nowhere/file.bag", "--csv a --csv b", "--quiet --quiet"})
+  for (const char* options :
+       {"--duration 0", "--duration x", "--duration nan", "--duration 1e8", "--threads 0", "--threads 1.5", "--set",
+        "--set time.step", "--set time.step=-1", "--set colour=red", "--csv /proc/nowhere", "--obj /proc/nowhere",
+        "--duration 0.1 --bag /proc/nowhere/file.bag", "--csv a --csv b", "--quiet --quiet"})
   {
     const Result result = simulate(cantilever + " " + options);
     EXPECT_EQ(result.status, 2) << options << "\n" << result.output;
@@ -123,16 +127,19 @@ TEST_F(Simulate, namesFileLineKeyValueAndRange)
   std::ofstream(scene) << "rods:\n  - name: rope\n    cross_section: {radius: -1}\n";
   const Result result = simulate(scene);
   EXPECT_EQ(result.status, 2);
-  EXPECT_EQ(result.output, "simulate: " + scene + ":3: rods.0.cross_section.radius = -1: is out of range; must be a number in (0, 10] m\n");
+  EXPECT_EQ(
+      result.output,
+      "simulate: " + scene + ":3: rods.0.cross_section.radius = -1: is out of range; must be a number in (0, 10] m\n");
 }
 
 TEST_F(Simulate, refusesBadMeshesByName)
 {
   const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
   const std::pair<std::string, const char*> cases[] = {
-    {square + "v 2 0 0\nf 1 2 3\nf 1 3 4\nf 1 2 5\n", "face 2 (vertices 0, 1 and 4, from 0) has (nearly) no area"},
-    {square + "v 0.5 0.5 1\nf 1 2 3\nf 1 3 4\nf 1 3 5\n", "the edge between vertices 0 and 2 (from 0) has 3 faces: 0, 1 and 2"},
-    {square + "v 1 1 0\nf 1 2 3\nf 1 5 4\n", "vertices 2 and 4 (from 0) lie at the same place"},
+      {square + "v 2 0 0\nf 1 2 3\nf 1 3 4\nf 1 2 5\n", "face 2 (vertices 0, 1 and 4, from 0) has (nearly) no area"},
+      {square + "v 0.5 0.5 1\nf 1 2 3\nf 1 3 4\nf 1 3 5\n",
+       "the edge between vertices 0 and 2 (from 0) has 3 faces: 0, 1 and 2"},
+      {square + "v 1 1 0\nf 1 2 3\nf 1 5 4\n", "vertices 2 and 4 (from 0) lie at the same place"},
   };
   for (const auto& [obj, expected] : cases)
   {
@@ -140,24 +147,25 @@ TEST_F(Simulate, refusesBadMeshesByName)
     std::ofstream(folder_ + "/bad.yaml") << "name: bad\ncloths:\n  - mesh: {file: bad.obj}\n";
     const Result result = simulate(folder_ + "/bad.yaml");
     EXPECT_EQ(result.status, 2) << result.output;
-    for (const std::string& word : {std::string("bad.yaml:3: cloths.0.mesh.file = bad.obj: bad.obj: "), std::string(expected)})
-    {
+    for (const std::string& word :
+         {std::string("bad.yaml:3: cloths.0.mesh.file = bad.obj: bad.obj: "), std::string(expected)})
       EXPECT_NE(result.output.find(word), std::string::npos) << word << " not in\n" << result.output;
-    }
   }
 }
 
 /// A limit on the size of files acts like a full disk.
 TEST_F(Simulate, aFullDiskIsStatus3AndNamesWhatIsLeft)
 {
-  std::vector<std::pair<std::string, std::string>> outputs = {{"--csv", "/csv are cut off"}, {"--obj", " whole files are before it"}};
+  std::vector<std::pair<std::string, std::string>> outputs = {{"--csv", "/csv are cut off"},
+                                                              {"--obj", " whole files are before it"}};
   if (SLENDER_HAS_BAG)
     outputs.emplace_back("--bag", ".active (rosbag reindex reads it)");
   for (const auto& [option, says] : outputs)
   {
     const std::string out = folder_ + "/" + option.substr(2), blocks = option == "--obj" ? "1" : "64";
-    const Result result = slender::test::shell("bash -c \"trap '' XFSZ; ulimit -f " + blocks + "; " SLENDER_SIMULATE " " + cantilever +
-                                               " --duration 2 --quiet " + option + " " + out + "\"");
+    const Result result =
+        slender::test::shell("bash -c \"trap '' XFSZ; ulimit -f " + blocks + "; " SLENDER_SIMULATE " " + cantilever +
+                             " --duration 2 --quiet " + option + " " + out + "\"");
     EXPECT_EQ(result.status, 3) << result.output;
     EXPECT_NE(result.output.find(says), std::string::npos) << result.output;
     EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
@@ -168,8 +176,9 @@ TEST_F(Simulate, aFullDiskIsStatus3AndNamesWhatIsLeft)
 TEST_F(Simulate, aFailingSimulationIsStatus3)
 {
   // Explicit steps far above the stability limit, and no step cutting to save them.
-  const Result result = simulate(cantilever + " --set time.integrator=symplectic_euler --set time.step=0.05 --set time.newton.max_cuts=0" +
-                                 " --set time.min_step=0.05 --duration 100 --csv " + folder_ + "/csv");
+  const Result result = simulate(
+      cantilever + " --set time.integrator=symplectic_euler --set time.step=0.05 --set time.newton.max_cuts=0" +
+      " --set time.min_step=0.05 --duration 100 --csv " + folder_ + "/csv");
   EXPECT_EQ(result.status, 3) << result.output;
   EXPECT_NE(result.output.find("step "), std::string::npos) << result.output;
   EXPECT_NE(result.output.find("rod 'beam'"), std::string::npos) << result.output;
@@ -185,7 +194,8 @@ TEST_F(Simulate, aTenLineSceneRuns)
 
 TEST_F(Simulate, writesTables)
 {
-  const Result result = simulate(cantilever + " --duration 0.1 --set record.every=5 --set rods.0.centerline.straight.edges=10 --csv " + folder_);
+  const Result result = simulate(
+      cantilever + " --duration 0.1 --set record.every=5 --set rods.0.centerline.straight.edges=10 --csv " + folder_);
   ASSERT_EQ(result.status, 0) << result.output;
   std::ifstream nodes(folder_ + "/nodes.csv");
   std::string line;
@@ -203,16 +213,15 @@ TEST_F(Simulate, writesTables)
   std::ifstream grasps(folder_ + "/grasps.csv");
   rows = 0;
   while (std::getline(grasps, line))
-  {
     ++rows;
-  }
   EXPECT_EQ(rows, 1 + 5);
 }
 
 TEST_F(Simulate, writesATableOfBodies)
 {
-  const Result result = simulate(scenes + "torsional_pendulum.yaml --duration 0.1 --set record.every=10 --csv " + folder_ +
-                                 " --set \"obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, -2]}}]\"");
+  const Result result =
+      simulate(scenes + "torsional_pendulum.yaml --duration 0.1 --set record.every=10 --csv " + folder_ +
+               " --set \"obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, -2]}}]\"");
   ASSERT_EQ(result.status, 0) << result.output;
   std::ifstream file(folder_ + "/bodies.csv");
   std::string header, line;
@@ -248,7 +257,8 @@ TEST_F(Simulate, writesObjFiles)
 TEST_F(Simulate, runsIntoOneFolderAreNotMixed)
 {
   const std::string csv = " --csv " + folder_ + "/csv", obj = " --obj " + folder_ + "/obj";
-  ASSERT_EQ(simulate(scenes + "torsional_pendulum.yaml --duration 0.1 --set record.fields=[energy]" + csv + obj).status, 0);
+  ASSERT_EQ(simulate(scenes + "torsional_pendulum.yaml --duration 0.1 --set record.fields=[energy]" + csv + obj).status,
+            0);
   EXPECT_TRUE(fs::exists(folder_ + "/csv/bodies.csv"));
   EXPECT_TRUE(fs::exists(folder_ + "/csv/energies.csv"));
   EXPECT_TRUE(fs::exists(folder_ + "/obj/frame_000010.obj"));
@@ -269,7 +279,9 @@ TEST_F(Simulate, runsIntoOneFolderAreNotMixed)
 TEST_F(Simulate, threadsDoNotChangeTheTables)
 {
   const auto table = [&](const std::string& threads) {
-    EXPECT_EQ(simulate(scenes + "grass.yaml --duration 0.2 --csv " + folder_ + "/" + threads + " --threads " + threads).status, 0);
+    EXPECT_EQ(simulate(scenes + "grass.yaml --duration 0.2 --csv " + folder_ + "/" + threads + " --threads " + threads)
+                  .status,
+              0);
     std::ifstream file(folder_ + "/" + threads + "/nodes.csv");
     std::ostringstream text;
     text << file.rdbuf();
@@ -295,4 +307,4 @@ TEST_F(Simulate, bagsNeedRos)
   }
 }
 
-}  // namespace
+}   // namespace

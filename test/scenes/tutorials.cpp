@@ -14,8 +14,8 @@
 
 #include "test/support/shell.h"
 
-/// The tutorials word by word: their scenes and their `simulate` commands are taken from the text, and what the text says of the results is looked for in
-/// them. Their parts with ROS are not run here.
+/// The tutorials word by word: their scenes and their `simulate` commands are taken from the text, and what the text
+/// says of the results is looked for in them. Their parts with ROS are not run here.
 namespace {
 
 namespace fs = std::filesystem;
@@ -96,7 +96,8 @@ protected:
     ASSERT_EQ(lines.size(), commands);
     for (const std::string& line : lines)
     {
-      const slender::test::Result result = slender::test::shell("cd " + folder_ + " && " + SLENDER_SIMULATE + " " + line);
+      const slender::test::Result result =
+          slender::test::shell("cd " + folder_ + " && " + SLENDER_SIMULATE + " " + line);
       ASSERT_EQ(result.status, 0) << line << "\n" << result.output;
     }
   }
@@ -130,7 +131,8 @@ TEST_F(Tutorials, theHoneyCoils)
   double turned = 0.0;
   for (std::size_t k = 2; k < line.size(); ++k)
   {
-    const double ax = line[k - 1][0] - line[k - 2][0], ay = line[k - 1][1] - line[k - 2][1], bx = line[k][0] - line[k - 1][0], by = line[k][1] - line[k - 1][1];
+    const double ax = line[k - 1][0] - line[k - 2][0], ay = line[k - 1][1] - line[k - 2][1],
+                 bx = line[k][0] - line[k - 1][0], by = line[k][1] - line[k - 1][1];
     turned += std::atan2(ax * by - ay * bx, ax * bx + ay * by);
   }
   EXPECT_GT(std::abs(turned), 2 * M_PI);
@@ -168,4 +170,4 @@ TEST_F(Tutorials, PosesArePublishedWithNewStamps)
     EXPECT_NE(line.find(" -s "), std::string::npos) << line;   // else `now` is substituted once only
 }
 
-}  // namespace
+}   // namespace

@@ -51,4 +51,4 @@ TEST(TwoTones, NeedAnOscillation)
   EXPECT_THROW(fitTwoTones(beating(1.5, 1.6, 0.15, 0.01), 0.01), std::runtime_error);   // two periods
 }
 
-}  // namespace
+}   // namespace

@@ -17,7 +17,8 @@ TEST(Profile, pathsAreOfThePackageWhereverItWasBuilt)
 {
   EXPECT_EQ(packagePath(sources, sources + "/src/contact/ccd.cpp"), "src/contact/ccd.cpp");
   EXPECT_EQ(packagePath(sources, "../src/contact/ccd.cpp"), "src/contact/ccd.cpp");
-  EXPECT_EQ(packagePath(sources, "elsewhere/src/checkout/include/slender_sim/contact/ccd.h"), "include/slender_sim/contact/ccd.h");
+  EXPECT_EQ(packagePath(sources, "elsewhere/src/checkout/include/slender_sim/contact/ccd.h"),
+            "include/slender_sim/contact/ccd.h");
   EXPECT_EQ(packagePath(sources, "/usr/src/linux/fork.c"), "/usr/src/linux/fork.c");
   EXPECT_EQ(packagePath(sources, "???"), "???");
 }
@@ -71,4 +72,4 @@ TEST(Profile, allocationsWithTheirStacks)
   EXPECT_THROW(readDhat("{}", sources), std::runtime_error);
 }
 
-}  // namespace
+}   // namespace

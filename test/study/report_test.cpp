@@ -48,7 +48,8 @@ protected:
 
   Result report(const std::string& arguments, const std::string& environment = "") const
   {
-    return slender::test::shell(environment + " " SLENDER_STUDY " report --quick --out " + folder_ + "/out " + arguments);
+    return slender::test::shell(environment + " " SLENDER_STUDY " report --quick --out " + folder_ + "/out " +
+                                arguments);
   }
   std::string page() const { return contents(folder_ + "/out/report.html"); }
 
@@ -82,13 +83,16 @@ TEST_F(Report, isOnePageWithFiguresAndTablesThatLoadsNothing)
   // nothing is loaded: what refers to anything refers to the page itself
   const std::regex reference("(src|href)=(\"[^\"]{0,40}|[^\" >]{1,40})");
   for (auto match = std::sregex_iterator(html.begin(), html.end(), reference); match != std::sregex_iterator(); ++match)
-    EXPECT_TRUE((*match)[2].str().rfind("\"data:image/png", 0) == 0 || (*match)[2].str().rfind("\"#", 0) == 0) << match->str();
+    EXPECT_TRUE((*match)[2].str().rfind("\"data:image/png", 0) == 0 || (*match)[2].str().rfind("\"#", 0) == 0)
+        << match->str();
   for (const char* loads : {"<link", "<script", "@import", "url("})
     EXPECT_EQ(html.find(loads), std::string::npos) << loads;
   // links lead somewhere
   const std::regex inside("href=\"#([^\"]*)\"");
   for (auto match = std::sregex_iterator(html.begin(), html.end(), inside); match != std::sregex_iterator(); ++match)
-    EXPECT_TRUE(html.find("id=\"" + (*match)[1].str() + "\"") != std::string::npos || html.find("id=" + (*match)[1].str() + ">") != std::string::npos) << match->str();
+    EXPECT_TRUE(html.find("id=\"" + (*match)[1].str() + "\"") != std::string::npos ||
+                html.find("id=" + (*match)[1].str() + ">") != std::string::npos)
+        << match->str();
 }
 
 TEST_F(Report, goesOnWhereItWasStopped)
@@ -96,7 +100,9 @@ TEST_F(Report, goesOnWhereItWasStopped)
   ASSERT_EQ(report("trouton").status, 0);
   const fs::path result = folder_ + "/out/data/trouton/result.json";
   // A result that no run would give: if the study ran again it would be gone.
-  const std::string mark = "{\"studies\": [{\"name\": \"trouton\", \"metrics\": {\"mark_of_the_test\": 42.5}, \"rows\": [], \"wall_seconds\": 1}]}\n";
+  const std::string mark =
+      "{\"studies\": [{\"name\": \"trouton\", \"metrics\": {\"mark_of_the_test\": 42.5}, \"rows\": [], "
+      "\"wall_seconds\": 1}]}\n";
   std::ofstream(result) << mark;
   const Result more = report("trouton elastica");
   ASSERT_EQ(more.status, 0) << more.output;
@@ -123,7 +129,8 @@ TEST_F(Report, tellsWhichStudiesFailedAndWhy)
   EXPECT_NE(html.find("<a href=\"#lean\">lean</a></td><td colspan=4 class=bad>failed</td>"), std::string::npos);
   EXPECT_NE(html.find("<p class=bad>failed: valgrind is missing"), std::string::npos);
   EXPECT_EQ(countOf(html, "class=bad>failed"), 2u) << "the other one has not failed";
-  EXPECT_NE(html.find("<td class=n>at most 1</td><td class=good>met</td>"), std::string::npos) << "the bar of trouton's errors";
+  EXPECT_NE(html.find("<td class=n>at most 1</td><td class=good>met</td>"), std::string::npos)
+      << "the bar of trouton's errors";
 }
 
 TEST_F(Report, mixesNothingAndKnowsItsStudies)
@@ -137,4 +144,4 @@ TEST_F(Report, mixesNothingAndKnowsItsStudies)
   EXPECT_NE(unknown.output.find("elastika"), std::string::npos) << unknown.output;
 }
 
-}  // namespace
+}   // namespace

@@ -15,7 +15,8 @@ using namespace slender::study;
 
 namespace {
 
-class QuickStudy : public testing::TestWithParam<const char*> {};
+class QuickStudy : public testing::TestWithParam<const char*>
+{};
 
 /// Studies of shapes in contact: their checks hold in the short form too, and there is something to draw.
 TEST_P(QuickStudy, checksHold)
@@ -33,7 +34,8 @@ TEST_P(QuickStudy, checksHold)
       continue;
     ++checks;
     const Row::Value* quantity = row.find("quantity");
-    EXPECT_NEAR(std::get<double>(*measured), std::get<double>(*expected), std::get<double>(*bound)) << (quantity ? std::get<std::string>(*quantity) : "");
+    EXPECT_NEAR(std::get<double>(*measured), std::get<double>(*expected), std::get<double>(*bound))
+        << (quantity ? std::get<std::string>(*quantity) : "");
   }
   EXPECT_GT(checks, 1);
   ASSERT_FALSE(context.plots().empty());
@@ -66,4 +68,4 @@ TEST(StudyPlots, aPointThatIsNoNumberBreaksTheLine)
   EXPECT_NE(text.str().find("0 0\n1 1\n\n2 2\n3 3\nEOD"), std::string::npos) << text.str();
 }
 
-}  // namespace
+}   // namespace

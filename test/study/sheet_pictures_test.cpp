@@ -21,7 +21,7 @@ TriangleMesh triangleAt(double depth, double size)
   return mesh;
 }
 
-}  // namespace
+}   // namespace
 
 TEST(SurfaceScript, DrawsFarFacesFirst)
 {

@@ -50,7 +50,10 @@ TEST(Stability, nothingUnsoundPasses)
   EXPECT_TRUE(unsound([](StabilityCell& c) { c.took(done(), false, false); })) << "not finite";
   EXPECT_TRUE(unsound([](StabilityCell& c) { c.took(done(1.0), true, false); })) << "unbalanced";
   EXPECT_TRUE(unsound([](StabilityCell& c) { c.took(done(std::nan("")), true, false); }));
-  EXPECT_FALSE(unsound([](StabilityCell& c) { c.linear_steps = true; c.took(done(1.0), true, false); }));
+  EXPECT_FALSE(unsound([](StabilityCell& c) {
+    c.linear_steps = true;
+    c.took(done(1.0), true, false);
+  }));
   EXPECT_TRUE(unsound([](StabilityCell& c) { c.energyIs(0.2, 0.1); }));
   EXPECT_TRUE(unsound([](StabilityCell& c) { c.energyIs(std::nan(""), 0.1); }));
   EXPECT_FALSE(unsound([](StabilityCell& c) { c.energyIs(-5, 0.1); }));
@@ -83,8 +86,10 @@ TEST(Stability, whatGoesAnotherWayIsUnsound)
 /// A rod that falls is done, one whose scene is nonsense refused.
 TEST(Stability, scenesAreJudged)
 {
-  const char* const rod = "rods:\n  - centerline: {straight: {from: [0, 0, 0], to: [1, 0, 0], edges: 10}}\n    cross_section: {radius: 0.01}\n"
-                          "    material: {density: 1000, youngs_modulus: 1.0e7}\n    grasps: {left: {edges: [0]}}\n";
+  const char* const rod =
+      "rods:\n  - centerline: {straight: {from: [0, 0, 0], to: [1, 0, 0], edges: 10}}\n    cross_section: {radius: "
+      "0.01}\n"
+      "    material: {density: 1000, youngs_modulus: 1.0e7}\n    grasps: {left: {edges: [0]}}\n";
   const StabilityCell cell = runScene({rod, {}}, 0.01, 5);
   EXPECT_EQ(cell.outcome(), Outcome::done) << cell.complaint << cell.reason;
   EXPECT_EQ(cell.steps, 5);
@@ -95,4 +100,4 @@ TEST(Stability, scenesAreJudged)
   EXPECT_NE(nonsense.reason.find("colour"), std::string::npos) << nonsense.reason;
 }
 
-}  // namespace
+}   // namespace

@@ -140,7 +140,8 @@ TEST(StudyFrame, everyStudyCanBeFound)
   EXPECT_EQ(findStudy("no such study"), nullptr);
 }
 
-// The small-load and large-load limits of the heavy cantilever, exact to the next order in Gamma (Gamma^2) and Gamma^(-1/2).
+// The small-load and large-load limits of the heavy cantilever, exact to the next order in Gamma (Gamma^2) and
+// Gamma^(-1/2).
 TEST(References, heavyCantileverLimits)
 {
   const CantileverTip light = heavyCantilever(1e-3), heavy = heavyCantilever(1e5);
@@ -155,7 +156,8 @@ TEST(References, heavyCantileverStretches)
   EXPECT_NEAR(soft.drop - stiff.drop, 0.005, 1e-4);
 }
 
-// pi^2 and 4 pi^2: Euler's loads, 1 + compression/2 of them shortly after buckling (Taylor series of the elliptic integrals).
+// pi^2 and 4 pi^2: Euler's loads, 1 + compression/2 of them shortly after buckling (Taylor series of the elliptic
+// integrals).
 TEST(References, bucklingLoads)
 {
   EXPECT_NEAR(bucklingElastica(1e-3, false).load / (M_PI * M_PI), 1 + 0.5e-3, 1e-6);
@@ -179,8 +181,9 @@ TEST(References, cantileverRoots)
   {
     EXPECT_NEAR(std::abs(cantileverMode(mode, 1.0)), 2.0, 1e-6);
     const double h = 1e-5;
-    EXPECT_NEAR(cantileverModeSlope(mode, 0.7), (cantileverMode(mode, 0.7 + h) - cantileverMode(mode, 0.7 - h)) / (2 * h), 1e-5);
+    EXPECT_NEAR(cantileverModeSlope(mode, 0.7),
+                (cantileverMode(mode, 0.7 + h) - cantileverMode(mode, 0.7 - h)) / (2 * h), 1e-5);
   }
 }
 
-}  // namespace
+}   // namespace

@@ -42,7 +42,8 @@ TEST(BeltPattern, knowsDrawnCurves)
   const double belt = 1.0;
   const auto pair = [](double a, double b) { return std::make_pair(a, b); };
   EXPECT_EQ(traceOf([&](double t) { return pair(belt * t, 1e-3 * std::sin(3 * t)); }, belt).pattern, "straight");
-  const BeltTrace meander = traceOf([&](double t) { return pair(belt * t + 0.05 * std::sin(6 * t), 0.2 * std::sin(3 * t)); }, belt);
+  const BeltTrace meander =
+      traceOf([&](double t) { return pair(belt * t + 0.05 * std::sin(6 * t), 0.2 * std::sin(3 * t)); }, belt);
   EXPECT_EQ(meander.pattern, "meanders");
   EXPECT_NEAR(meander.frequency_y, 3.0, 0.2);
   EXPECT_NEAR(meander.frequency_x, 6.0, 0.4);
@@ -59,8 +60,10 @@ protected:
   {
     folder_ = testing::TempDir() + "/slender_sim_sweep_" + std::to_string(getpid());
     fs::create_directories(folder_);
-    write("scene.yaml", "gravity: [0, 0, -9.81]\ntime: {step: 0.002, duration: 0.4}\nrods:\n  - centerline: {straight: {from: [0, 0, 0], to: [1, 0, 0], edges: 30}}\n"
-                        "    grasps: {left: {edges: [0]}}\n");
+    write("scene.yaml",
+          "gravity: [0, 0, -9.81]\ntime: {step: 0.002, duration: 0.4}\nrods:\n  - centerline: {straight: {from: [0, 0, "
+          "0], to: [1, 0, 0], edges: 30}}\n"
+          "    grasps: {left: {edges: [0]}}\n");
   }
   void TearDown() override { fs::remove_all(folder_); }
 
@@ -71,7 +74,10 @@ protected:
     text << std::ifstream(folder_ + "/" + name).rdbuf();
     return text.str();
   }
-  void writePlan(const std::string& axes) const { write("plan.yaml", "name: test\nscene: scene.yaml\nmeasures: [extents, loads]\naxes:\n" + axes); }
+  void writePlan(const std::string& axes) const
+  {
+    write("plan.yaml", "name: test\nscene: scene.yaml\nmeasures: [extents, loads]\naxes:\n" + axes);
+  }
 
   pid_t start(const std::string& out, const std::string& engine = "local") const
   {
@@ -81,8 +87,8 @@ protected:
       setpgid(0, 0);
       freopen("/dev/null", "w", stderr);
       freopen("/dev/null", "w", stdout);
-      execl(SLENDER_SWEEP, SLENDER_SWEEP, (folder_ + "/plan.yaml").c_str(), "--out", (folder_ + "/" + out).c_str(), "--jobs", "2",
-            "--engine", engine.c_str(), nullptr);
+      execl(SLENDER_SWEEP, SLENDER_SWEEP, (folder_ + "/plan.yaml").c_str(), "--out", (folder_ + "/" + out).c_str(),
+            "--jobs", "2", "--engine", engine.c_str(), nullptr);
       _exit(127);
     }
     return pid;
@@ -107,7 +113,8 @@ protected:
 
 TEST_F(Sweep, combinesAxesTheLastOneFastest)
 {
-  writePlan("  time.step: [0.001, 0.002]\n  rods.0.material.youngs_modulus: {from: 1.0e5, to: 1.0e7, count: 3, log: true}\n");
+  writePlan(
+      "  time.step: [0.001, 0.002]\n  rods.0.material.youngs_modulus: {from: 1.0e5, to: 1.0e7, count: 3, log: true}\n");
   const SweepPlan plan = readSweepPlan(folder_ + "/plan.yaml");
   ASSERT_EQ(plan.points(), 6);
   EXPECT_EQ(plan.overrides(4), (std::vector<std::string>{"time.step=0.002", "rods.0.material.youngs_modulus=1000000"}));
@@ -124,7 +131,8 @@ TEST_F(Sweep, refusesValuesThatTheSceneRefuses)
 
 TEST_F(Sweep, killedHalfWayAndResumedGivesTheSameTable)
 {
-  writePlan("  gravity.2: {from: -12, to: -8, count: 5}\n  rods.0.material.youngs_modulus: [1.0e5, 1.0e6, 1.0e7, 1.0e8]\n");
+  writePlan(
+      "  gravity.2: {from: -12, to: -8, count: 5}\n  rods.0.material.youngs_modulus: [1.0e5, 1.0e6, 1.0e7, 1.0e8]\n");
   ASSERT_EQ(wait(start("whole")), 0);
   const pid_t pid = start("killed");
   while (done("killed") < 5)
@@ -167,4 +175,4 @@ TEST_F(Sweep, doesNotMixPlans)
   EXPECT_EQ(wait(start("out")), 2);
 }
 
-}  // namespace
+}   // namespace

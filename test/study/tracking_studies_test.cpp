@@ -26,7 +26,7 @@ double metricOf(const char* name, const std::string& key)
   throw std::out_of_range(key);
 }
 
-}  // namespace
+}   // namespace
 
 TEST(TrackingStudies, AveragesDoNotTug)
 {
@@ -69,9 +69,7 @@ TEST(TrackingStudies, HuesTellRegionsApart)
     for (int g = 0; g < mesh.triangles.cols(); ++g)
       for (const int v : mesh.triangles.col(f))
         if ((mesh.triangles.col(g).array() == v).any())
-        {
           EXPECT_EQ(hues[f] == hues[g], region[f] == region[g]);
-        }
 }
 
 TEST(TrackingStudies, FineScaleLeavesOutWhatTheGuideHas)
@@ -86,5 +84,6 @@ TEST(TrackingStudies, FineScaleLeavesOutWhatTheGuideHas)
   EXPECT_LT(fine.of(coarse).cwiseAbs().maxCoeff(), 1e-12);
   Eigen::Matrix3Xd bump = coarse;
   bump(2, bump.cols() - 1) += 1.0;
-  EXPECT_GT(fine.kineticEnergy(bump), 0.1 * 0.5 * 0.5 * hatMassMatrix(c.fine.mesh).coeff(bump.cols() - 1, bump.cols() - 1));
+  EXPECT_GT(fine.kineticEnergy(bump),
+            0.1 * 0.5 * 0.5 * hatMassMatrix(c.fine.mesh).coeff(bump.cols() - 1, bump.cols() - 1));
 }

@@ -69,7 +69,8 @@ inline Eigen::MatrixXd periodicBand(const Eigen::VectorXd& diagonal, Random& ran
 /// Size of the residual against what one rounding of A x would give.
 inline double backwardError(const Eigen::MatrixXd& a, const Eigen::VectorXd& x, const Eigen::VectorXd& b)
 {
-  return (a * x - b).lpNorm<Eigen::Infinity>() / (a.cwiseAbs().rowwise().sum().maxCoeff() * x.lpNorm<Eigen::Infinity>() + b.lpNorm<Eigen::Infinity>());
+  return (a * x - b).lpNorm<Eigen::Infinity>() /
+         (a.cwiseAbs().rowwise().sum().maxCoeff() * x.lpNorm<Eigen::Infinity>() + b.lpNorm<Eigen::Infinity>());
 }
 
-}  // namespace slender::test
+}   // namespace slender::test

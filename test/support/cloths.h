@@ -55,7 +55,13 @@ struct Derivatives
   BlockMatrix matrix;
   std::vector<int> slots;
 
-  Derivatives(const Energy& e, int points, const Eigen::MatrixXi& of) : energy(e), elements(of), matrix(points, {of}), slots(e.slotsIn(matrix)) {}
+  Derivatives(const Energy& e, int points, const Eigen::MatrixXi& of)
+    : energy(e),
+      elements(of),
+      matrix(points, {of}),
+      slots(e.slotsIn(matrix))
+  {
+  }
 
   Matrix3Xd gradient(const Matrix3Xd& x)
   {
@@ -94,8 +100,11 @@ MatrixXd differences(const Matrix3Xd& x, double h, Function f)
   return rows;
 }
 
-inline double smallestEigenvalue(const MatrixXd& a) { return Eigen::SelfAdjointEigenSolver<MatrixXd>(a).eigenvalues()[0]; }
+inline double smallestEigenvalue(const MatrixXd& a)
+{
+  return Eigen::SelfAdjointEigenSolver<MatrixXd>(a).eigenvalues()[0];
+}
 
 inline VectorXd flattened(const Matrix3Xd& x) { return Eigen::Map<const VectorXd>(x.data(), x.size()); }
 
-}  // namespace slender::test
+}   // namespace slender::test

@@ -9,10 +9,11 @@
 namespace slender::test {
 
 /// Appends a polyline as an object of a contact surface; x grows by its nodes.
-inline void addCurve(ContactSurface& surface, Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& nodes, double radius, double friction = 0.0,
-                     bool closed = false)
+inline void addCurve(ContactSurface& surface, Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& nodes, double radius,
+                     double friction = 0.0, bool closed = false)
 {
-  const int first = surface.points, n = static_cast<int>(nodes.cols()), object = static_cast<int>(surface.objects.size());
+  const int first = surface.points, n = static_cast<int>(nodes.cols()),
+            object = static_cast<int>(surface.objects.size());
   x.conservativeResize(3, first + n);
   x.rightCols(n) = nodes;
   surface.points += n;
@@ -42,7 +43,8 @@ inline Eigen::Matrix3Xd gradient(const ContactPotential& potential, Eigen::Index
   return g;
 }
 
-/// Second derivative from the terms and rows with the solids at rest, 3 points x 3 points; `whole`: with what may be negative.
+/// Second derivative from the terms and rows with the solids at rest, 3 points x 3 points; `whole`: with what may be
+/// negative.
 inline Eigen::MatrixXd hessian(const ContactPotential& potential, Eigen::Index points, bool whole)
 {
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(3 * points, 3 * points);
@@ -73,4 +75,4 @@ inline Pose moved(const Pose& pose, const Eigen::Vector3d& shift, const Eigen::V
   return {pose.position + shift, fromRotationVector(turn) * pose.orientation};
 }
 
-}  // namespace slender::test
+}   // namespace slender::test

@@ -68,7 +68,8 @@ struct Group
     {
       const RigidBodyState& s = state.bodies[b];
       const Eigen::Matrix3d r = s.X_WB.orientation.toRotationMatrix();
-      sum += model.bodies[b].mass * s.X_WB.position.cross(s.velocity.linear) + r * model.bodies[b].inertia * r.transpose() * s.velocity.angular;
+      sum += model.bodies[b].mass * s.X_WB.position.cross(s.velocity.linear) +
+             r * model.bodies[b].inertia * r.transpose() * s.velocity.angular;
     }
     return sum;
   }
@@ -92,7 +93,8 @@ inline Group tee()
   Twist spin;
   spin.linear << 0.1, -0.2, 0.3;
   spin.angular << 1.0, 2.0, 3.0;
-  const int body = g.addBody(bodyOf(0.02, {2e-5, 3e-5, 4e-5}), {Vector3d(0.002, 0.001, 0), Eigen::Quaterniond(0.9, 0.1, 0.2, 0.3).normalized()}, spin);
+  const int body = g.addBody(bodyOf(0.02, {2e-5, 3e-5, 4e-5}),
+                             {Vector3d(0.002, 0.001, 0), Eigen::Quaterniond(0.9, 0.1, 0.2, 0.3).normalized()}, spin);
   int inner = 0;
   for (const Vector3d& end : ends)
   {
@@ -111,4 +113,4 @@ inline Group tee()
   return g;
 }
 
-}  // namespace slender::test
+}   // namespace slender::test

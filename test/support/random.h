@@ -35,4 +35,4 @@ private:
   std::mt19937 engine_;
 };
 
-}  // namespace slender::test
+}   // namespace slender::test

@@ -14,7 +14,8 @@ namespace slender::test {
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 
-inline Matrix3Xd straightNodes(int n, double length, const Vector3d& from = Vector3d::Zero(), const Vector3d& along = Vector3d::UnitX())
+inline Matrix3Xd straightNodes(int n, double length, const Vector3d& from = Vector3d::Zero(),
+                               const Vector3d& along = Vector3d::UnitX())
 {
   Matrix3Xd x(3, n);
   for (int i = 0; i < n; ++i)
@@ -51,11 +52,17 @@ inline Matrix3Xd wigglyNodes(int n, bool closed, Random& random)
   return x;
 }
 
-/// Circular section of radius r [m]: moduli from Young's modulus E [Pa], Poisson's ratio 0.3 and density rho [kg/m^3] (thesis 4.2.4).
+/// Circular section of radius r [m]: moduli from Young's modulus E [Pa], Poisson's ratio 0.3 and density rho [kg/m^3]
+/// (thesis 4.2.4).
 inline RodSection roundSection(double r, double youngs, double density)
 {
   const double area = M_PI * r * r, inertia = 0.25 * area * r * r;
-  return {r, r, density * area, youngs * area, Eigen::Matrix2d(youngs * inertia * Eigen::Matrix2d::Identity()), youngs / 2.6 * 2 * inertia};
+  return {r,
+          r,
+          density * area,
+          youngs * area,
+          Eigen::Matrix2d(youngs * inertia * Eigen::Matrix2d::Identity()),
+          youngs / 2.6 * 2 * inertia};
 }
 
 /// Sections by moduli, isotropic.
@@ -73,7 +80,10 @@ inline RodSection oddSection(Random& random)
   return {0.1, 0.1, random.uniform(0.5, 1.5), random.uniform(2.0, 4.0), b, random.uniform(0.5, 1.0)};
 }
 
-inline std::vector<RodSection> uniformSections(const RodSection& section, int edges) { return std::vector<RodSection>(edges, section); }
+inline std::vector<RodSection> uniformSections(const RodSection& section, int edges)
+{
+  return std::vector<RodSection>(edges, section);
+}
 
 inline std::vector<RodSection> oddSections(int edges, Random& random)
 {
@@ -85,7 +95,8 @@ inline std::vector<RodSection> oddSections(int edges, Random& random)
 
 inline RodModel openRod(const Matrix3Xd& nodes, const RodSection& section, bool straight = false)
 {
-  return buildRod("rod", nodes, false, uniformSections(section, static_cast<int>(nodes.cols()) - 1), Vector3d::Zero(), straight);
+  return buildRod("rod", nodes, false, uniformSections(section, static_cast<int>(nodes.cols()) - 1), Vector3d::Zero(),
+                  straight);
 }
 
 /// A model, its state and inputs that hold every grasp where it is.
@@ -95,7 +106,11 @@ struct Rod
   RodState state;
   RodInputs inputs;
 
-  Rod(const RodModel& m, const Matrix3Xd& nodes, double twist = 0.0) : model(std::make_shared<RodModel>(m)), state(makeRodState(m, nodes, Vector3d::Zero(), twist)) {}
+  Rod(const RodModel& m, const Matrix3Xd& nodes, double twist = 0.0)
+    : model(std::make_shared<RodModel>(m)),
+      state(makeRodState(m, nodes, Vector3d::Zero(), twist))
+  {
+  }
 
   /// Grasps nodes first..last; returns the index of the grasp.
   int hold(int first, int last, bool frame = true)
@@ -133,8 +148,8 @@ inline TimeConfig withIntegrator(Integrator integrator)
 
 inline const std::vector<Integrator>& implicitIntegrators()
 {
-  static const std::vector<Integrator> all = {Integrator::implicit_euler, Integrator::bdf2, Integrator::tr_bdf2, Integrator::implicit_midpoint,
-                                              Integrator::generalized_alpha};
+  static const std::vector<Integrator> all = {Integrator::implicit_euler, Integrator::bdf2, Integrator::tr_bdf2,
+                                              Integrator::implicit_midpoint, Integrator::generalized_alpha};
   return all;
 }
 
@@ -151,20 +166,24 @@ inline const std::vector<Integrator>& allIntegrators()
 /// Every number of two states the same, to the last bit.
 inline bool bitEqual(const RodState& a, const RodState& b)
 {
-  const auto same = [](const auto& p, const auto& q) { return p.rows() == q.rows() && p.cols() == q.cols() && (p.array() == q.array()).all(); };
+  const auto same = [](const auto& p, const auto& q) {
+    return p.rows() == q.rows() && p.cols() == q.cols() && (p.array() == q.array()).all();
+  };
   if (a.grasps.size() != b.grasps.size())
     return false;
   for (std::size_t k = 0; k < a.grasps.size(); ++k)
   {
     const GraspState &g = a.grasps[k], &h = b.grasps[k];
-    if (g.active != h.active || g.X_WG.position != h.X_WG.position || g.X_WG.orientation.coeffs() != h.X_WG.orientation.coeffs() ||
-        g.velocity.linear != h.velocity.linear || g.velocity.angular != h.velocity.angular || g.section_twist[0] != h.section_twist[0] ||
+    if (g.active != h.active || g.X_WG.position != h.X_WG.position ||
+        g.X_WG.orientation.coeffs() != h.X_WG.orientation.coeffs() || g.velocity.linear != h.velocity.linear ||
+        g.velocity.angular != h.velocity.angular || g.section_twist[0] != h.section_twist[0] ||
         g.section_twist[1] != h.section_twist[1])
       return false;
   }
-  return same(a.x, b.x) && same(a.v, b.v) && same(a.d1, b.d1) && same(a.twist, b.twist) && a.last_step == b.last_step && a.next_step == b.next_step && same(a.a, b.a) &&
-         same(a.x_previous, b.x_previous) && same(a.v_previous, b.v_previous) && same(a.strain_rate, b.strain_rate) &&
+  return same(a.x, b.x) && same(a.v, b.v) && same(a.d1, b.d1) && same(a.twist, b.twist) && a.last_step == b.last_step &&
+         a.next_step == b.next_step && same(a.a, b.a) && same(a.x_previous, b.x_previous) &&
+         same(a.v_previous, b.v_previous) && same(a.strain_rate, b.strain_rate) &&
          same(a.strain_rate_previous, b.strain_rate_previous) && same(a.strain_previous, b.strain_previous);
 }
 
-}  // namespace slender::test
+}   // namespace slender::test

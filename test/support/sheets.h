@@ -20,7 +20,8 @@ struct Sheets
   Eigen::Vector3d gravity{0, 0, 0};
 
   /// A grid of (nu + 1)(nv + 1) points on corner + [0, 1] u + [0, 1] v; returns its first point.
-  int add(int nu, int nv, const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& w, double thickness = 4e-3, double friction = 0.3)
+  int add(int nu, int nv, const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& w,
+          double thickness = 4e-3, double friction = 0.3)
   {
     const int first = static_cast<int>(x.cols()), count = (nu + 1) * (nv + 1);
     x.conservativeResize(3, first + count);
@@ -73,7 +74,8 @@ struct Sheets
             const double length = e.norm(), w = inverse_mass[a] + inverse_mass[b];
             if (!(w > 0.0) || !(length > 0.0))
               continue;
-            const Eigen::Vector3d move = 0.5 * (1.0 - (surface.rest.col(b) - surface.rest.col(a)).norm() / length) / w * e;
+            const Eigen::Vector3d move =
+                0.5 * (1.0 - (surface.rest.col(b) - surface.rest.col(a)).norm() / length) / w * e;
             y.col(a) += inverse_mass[a] * move;
             y.col(b) -= inverse_mass[b] * move;
           }
@@ -117,4 +119,4 @@ struct Sheets
   }
 };
 
-}  // namespace slender::test
+}   // namespace slender::test

@@ -29,4 +29,4 @@ inline Result shell(const std::string& command)
   return result;
 }
 
-}  // namespace slender::test
+}   // namespace slender::test

@@ -68,8 +68,9 @@ struct Thread
 
 inline bool sameThread(const ThreadState& a, const ThreadState& b)
 {
-  return a.x == b.x && a.v == b.v && a.d1 == b.d1 && a.twist == b.twist && a.spin == b.spin && a.volume == b.volume && a.id == b.id &&
-         a.deposited == b.deposited && a.next_id == b.next_id && a.fed_volume == b.fed_volume && a.dropped_volume == b.dropped_volume && a.left_volume == b.left_volume &&
+  return a.x == b.x && a.v == b.v && a.d1 == b.d1 && a.twist == b.twist && a.spin == b.spin && a.volume == b.volume &&
+         a.id == b.id && a.deposited == b.deposited && a.next_id == b.next_id && a.fed_volume == b.fed_volume &&
+         a.dropped_volume == b.dropped_volume && a.left_volume == b.left_volume &&
          a.ends[1].X_WE.position == b.ends[1].X_WE.position;
 }
 
@@ -82,4 +83,4 @@ inline Eigen::Vector3d momentumOf(const ThreadState& s)
   return sum;
 }
 
-}  // namespace slender::test
+}   // namespace slender::test

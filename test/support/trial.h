@@ -7,7 +7,8 @@
 namespace slender::test {
 
 /// Trial := state moved by q; held parts are put where the grasps are. Frames are transported from the state.
-inline RodEvaluation evaluateAt(RodSystem& system, const RodState& state, const Eigen::VectorXd& q, bool with_hessian = false)
+inline RodEvaluation evaluateAt(RodSystem& system, const RodState& state, const Eigen::VectorXd& q,
+                                bool with_hessian = false)
 {
   const int n = system.model().nodes(), edges = system.model().edges();
   const RodArrays& a = system.arrays();
@@ -69,4 +70,4 @@ inline Eigen::VectorXd newtonDirection(RodSystem& system)
   return d;
 }
 
-}  // namespace slender::test
+}   // namespace slender::test

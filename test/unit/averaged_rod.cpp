@@ -26,10 +26,12 @@ protected:
     for (int i = 0; i < kNodes; ++i)
     {
       const double s = static_cast<double>(i) / (closed ? kNodes : kNodes - 1);
-      nodes_.col(i) = closed ? Vector3d(0.2 * std::cos(2 * M_PI * s), 0.2 * std::sin(2 * M_PI * s), 0) : Vector3d(s, 0, 0);
+      nodes_.col(i) =
+          closed ? Vector3d(0.2 * std::cos(2 * M_PI * s), 0.2 * std::sin(2 * M_PI * s), 0) : Vector3d(s, 0, 0);
     }
     const RodSection section{0.005, 0.005, 0.1, 200.0, 1e-3 * Eigen::Matrix2d::Identity(), 1e-3};
-    RodModel model = buildRod("rod", nodes_, closed, std::vector<RodSection>(closed ? kNodes : kNodes - 1, section), Vector3d::UnitZ(), !closed);
+    RodModel model = buildRod("rod", nodes_, closed, std::vector<RodSection>(closed ? kNodes : kNodes - 1, section),
+                              Vector3d::UnitZ(), !closed);
     model.mass_damping = 2.0;
     model_ = std::make_shared<const RodModel>(std::move(model));
     std::vector<PaintedRegion> regions;
@@ -49,7 +51,10 @@ protected:
     inputs_ = RodInputs{};
   }
 
-  double error(const Matrix3Xd& targets) const { return (state_.x * averages_->transpose() - targets).colwise().norm().maxCoeff(); }
+  double error(const Matrix3Xd& targets) const
+  {
+    return (state_.x * averages_->transpose() - targets).colwise().norm().maxCoeff();
+  }
 
   Matrix3Xd nodes_;
   std::shared_ptr<const RodModel> model_;
@@ -71,14 +76,16 @@ TEST_F(AveragedRodTest, HasItsAveragesAndIsCarriedByThem)
     {
       const double t = std::min(0.01 * k, 5.0);
       for (int r = 0; r < kSegments; ++r)
-        targets.col(r) = start.col(r) + Vector3d(0, 0.05 * std::sin(2 * t + r) * std::min(t, 1.0), 0.1 * std::min(t, 1.0));
+        targets.col(r) =
+            start.col(r) + Vector3d(0, 0.05 * std::sin(2 * t + r) * std::min(t, 1.0), 0.1 * std::min(t, 1.0));
       const StepReport report = rod.step(state_, inputs_, targets, 0.01);
       ASSERT_TRUE(report.ok) << closed << " " << k << ": " << report.message;
       ASSERT_LT(error(targets), 1e-13) << closed << " " << k;
     }
     // at rest, averages carry the weight
     EXPECT_LT(state_.v.cwiseAbs().maxCoeff(), 1e-4);
-    EXPECT_LT((rod.averageForces().rowwise().sum() + model_->totalMass() * inputs_.gravity).norm(), 1e-3 * 9.81 * model_->totalMass());
+    EXPECT_LT((rod.averageForces().rowwise().sum() + model_->totalMass() * inputs_.gravity).norm(),
+              1e-3 * 9.81 * model_->totalMass());
     EXPECT_GT((state_.x.row(2).array() - 0.1).abs().maxCoeff(), 1e-4);   // and it sags between them
   }
 }
@@ -134,11 +141,12 @@ TEST_F(AveragedRodTest, RefusesWithAReason)
   AveragedRod::Averages other = *averages_;
   other *= 2.0;
   EXPECT_THROW(AveragedRod(model_, std::make_shared<const AveragedRod::Averages>(other), time_), std::invalid_argument);
-  EXPECT_THROW(AveragedRod(model_, std::make_shared<const AveragedRod::Averages>(4, kNodes - 1), time_), std::invalid_argument);
+  EXPECT_THROW(AveragedRod(model_, std::make_shared<const AveragedRod::Averages>(4, kNodes - 1), time_),
+               std::invalid_argument);
   EXPECT_THROW(AveragedRod(model_, nullptr, time_), std::invalid_argument);
   time_.integrator = Integrator::tr_bdf2;
   EXPECT_THROW(AveragedRod(model_, averages_, time_), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -92,7 +92,8 @@ TEST(BandedLdlt, EliminatesByPieces)
   for (int from = 0, to; from < blocks; from = to)
   {
     to = std::min(from + 1 + from % 4, blocks);
-    AlignedVector<RodPanel> assembled(panels.begin() + from, panels.begin() + to);   // assembled elsewhere, piece by piece
+    // assembled elsewhere, piece by piece
+    AlignedVector<RodPanel> assembled(panels.begin() + from, panels.begin() + to);
     pieces.eliminate(assembled.data(), from, to, y.data(), carry);
   }
   pieces.substitute(y.data());
@@ -147,7 +148,8 @@ TEST(CyclicBandedLdlt, SolvesClosedBands)
   for (int blocks : {5, 6, 7, 8, 9, 12, 33})
     for (double negative : {0.0, 0.3, 1.0})
     {
-      // diagonally dominant (rows have at most 21 other entries below 1), so that every leading block is well conditioned
+      // diagonally dominant (rows have at most 21 other entries below 1), so that every leading block is well
+      // conditioned
       const Eigen::VectorXd d = 16.0 * signedPivots(4 * blocks, negative, random).array().sign().matrix();
       const Eigen::MatrixXd a = periodicBand(d, random);
       CyclicBandedLdlt solver;
@@ -225,5 +227,5 @@ TEST(CyclicBandedLdlt, RefusesTooFewBlocks)
   EXPECT_NO_THROW(solver.resize(3, false));
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -24,8 +24,10 @@ struct Tracked
     const TriangleMesh coarse = gridMesh(1.0, 1.0, 4, 4, GridPattern::alternating);
     fine = subdivide(coarse, levels);
     guide = coarse.vertices;
-    constraints = std::make_unique<WeakConstraints>(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
-    model = std::make_shared<ClothModel>(buildCloth("tracked", fine.mesh, 0.2, orthotropicMembrane(500, 500, 0.3, 190)));
+    constraints =
+        std::make_unique<WeakConstraints>(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
+    model =
+        std::make_shared<ClothModel>(buildCloth("tracked", fine.mesh, 0.2, orthotropicMembrane(500, 500, 0.3, 190)));
     model->bending = bending;
     model->bending_modulus = 1e-4;
     model->stiffness_damping = 1e-3;
@@ -76,7 +78,8 @@ TEST(ClothAverages, AreExactWhateverTheGuideDoes)
 
 TEST(ClothAverages, CarryTheClothWithTheForcesOfMechanics)
 {
-  // a guide that is moved rigidly with constant acceleration carries the cloth rigidly; forces are m (a - g), of each its share
+  // a guide that is moved rigidly with constant acceleration carries the cloth rigidly; forces are m (a - g), of each
+  // its share
   Tracked t;
   ClothStepper stepper(t.model, options(false));
   const Vector3d a(3, -2, 1);
@@ -89,14 +92,16 @@ TEST(ClothAverages, CarryTheClothWithTheForcesOfMechanics)
     ASSERT_TRUE(report.ok) << report.message;
   }
   const Matrix3Xd expected = t.fine.mesh.vertices.colwise() + Vector3d(0.5 * h * h * 20 * 21 * a);
-  EXPECT_LT((t.state.x - expected).cwiseAbs().maxCoeff(), 2e-5);   // hats' weights are not those of the mass: it bends a little
+  // hats' weights are not those of the mass: it bends a little
+  EXPECT_LT((t.state.x - expected).cwiseAbs().maxCoeff(), 2e-5);
   const Vector3d total = stepper.averageForces().rowwise().sum(), law = t.model->totalMass() * (a - t.inputs.gravity);
   EXPECT_LT((total - law).norm(), 1e-4 * law.norm());
 }
 
 TEST(ClothAverages, HoldersBearTheirShare)
 {
-  // at rest, with vertices held that averages are taken over, guide and grippers bear the weight together; also where forces are at their bounds
+  // at rest, with vertices held that averages are taken over, guide and grippers bear the weight together; also where
+  // forces are at their bounds
   for (const bool bounded : {false, true})
   {
     Tracked t;
@@ -119,13 +124,15 @@ TEST(ClothAverages, HoldersBearTheirShare)
     EXPECT_EQ(bounded, !t.state.at_bound.empty());
     EXPECT_LT(t.state.v.colwise().norm().maxCoeff(), 1e-3);
     const Vector3d borne = stepper.pinForces().rowwise().sum() - stepper.averageForces().rowwise().sum();
-    EXPECT_LT((borne - weight).norm(), 1e-3 * weight.norm()) << bounded;   // without the share of the two held vertices 0.005
+    // without the share of the two held vertices 0.005
+    EXPECT_LT((borne - weight).norm(), 1e-3 * weight.norm()) << bounded;
   }
 }
 
 TEST(ClothAverages, AreStationaryUnderTheConstraints)
 {
-  // gradient of the step's energy = C^T forces: checked by an independent energy, by differences along random directions with C d = 0
+  // gradient of the step's energy = C^T forces: checked by an independent energy, by differences along random
+  // directions with C d = 0
   Tracked t(BendingModel::hinge, 1);
   t.model->stiffness_damping = 0.0;
   ClothOptions o = options(false);
@@ -162,7 +169,8 @@ TEST(ClothAverages, AreStationaryUnderTheConstraints)
 
 TEST(ClothAverages, StayExactWhereTheyTearAtTheCloth)
 {
-  // two functions that differ at one vertex only are to be where two parts of the guide are: the cloth there is strained hundredfold
+  // two functions that differ at one vertex only are to be where two parts of the guide are: the cloth there is
+  // strained hundredfold
   const TriangleMesh coarse = gridMesh(0.4, 0.4, 3, 3, GridPattern::alternating);
   const Subdivision fine = subdivide(coarse, 2);
   TestFunctions apart = subdivisionBasis(fine, {5, 10});
@@ -214,8 +222,8 @@ std::shared_ptr<ClothModel> quarteredSheet(BendingModel bending)
 
 TEST(ClothAverages, SweepsSolveTheSameSteps)
 {
-  // few averages of many vertices, a gripper, air and bending of both kinds: sweeps, which are taken for them, and conjugate gradients among motions that
-  // leave the averages alone
+  // few averages of many vertices, a gripper, air and bending of both kinds: sweeps, which are taken for them, and
+  // conjugate gradients among motions that leave the averages alone
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
   {
     const auto model = quarteredSheet(bending);
@@ -230,7 +238,8 @@ TEST(ClothAverages, SweepsSolveTheSameSteps)
       o.linear_tolerance = tolerance;
       return ClothStepper(model, o);
     };
-    ClothStepper exact = solverOf(ClothSolver::conjugate_gradients, 1e-10), fine = solverOf(ClothSolver::automatic, 1e-10);
+    ClothStepper exact = solverOf(ClothSolver::conjugate_gradients, 1e-10),
+                 fine = solverOf(ClothSolver::automatic, 1e-10);
     ClothStepper swept = solverOf(ClothSolver::automatic, 5e-3);
     double error = 0.0, motion = 0.0;
     int iterations = 0;
@@ -239,7 +248,8 @@ TEST(ClothAverages, SweepsSolveTheSameSteps)
     {
       inputs.averages = rest;
       for (int i = 0; i < 4; ++i)
-        inputs.averages.col(i) += 72.0 * Vector3d(0.002 * k, 0.0, 0.05 * std::sin(0.3 * k + i));   // times the vertices of an average
+        // times the vertices of an average
+        inputs.averages.col(i) += 72.0 * Vector3d(0.002 * k, 0.0, 0.05 * std::sin(0.3 * k + i));
       ClothState a = state, b = state, c = state;
       ASSERT_TRUE(exact.step(a, inputs, 0.01).ok);
       ASSERT_TRUE(fine.step(b, inputs, 0.01).ok);
@@ -247,14 +257,17 @@ TEST(ClothAverages, SweepsSolveTheSameSteps)
       ASSERT_TRUE(report.ok);
       iterations += report.linear_iterations;
       for (const ClothState* each : {&a, &b, &c})
-        EXPECT_LT((each->x * quarters->transpose() - inputs.averages).cwiseAbs().maxCoeff(), 1e-13 * inputs.averages.cwiseAbs().maxCoeff());
-      EXPECT_LT((b.x - a.x).norm(), 1e-7 * (a.x - state.x).norm()) << k;   // tolerances in norms that differ by the root of the condition number
+        EXPECT_LT((each->x * quarters->transpose() - inputs.averages).cwiseAbs().maxCoeff(),
+                  1e-13 * inputs.averages.cwiseAbs().maxCoeff());
+      // tolerances in norms that differ by the root of the condition number
+      EXPECT_LT((b.x - a.x).norm(), 1e-7 * (a.x - state.x).norm()) << k;
       EXPECT_LT((swept.averageForces() - exact.averageForces()).norm(), 0.2 * exact.averageForces().norm()) << k;
       error += (c.x - a.x).squaredNorm();
       motion += (a.x - state.x).squaredNorm();
       state = a;
     }
-    EXPECT_LT(std::sqrt(error), 0.02 * std::sqrt(motion));   // free cloth of this size, by sweeps: 0.03 of a step's fall
+    // free cloth of this size, by sweeps: 0.03 of a step's fall
+    EXPECT_LT(std::sqrt(error), 0.02 * std::sqrt(motion));
     EXPECT_LT(iterations, 20 * 40);
   }
 }
@@ -266,7 +279,8 @@ TEST(ClothAverages, AreExactWhereTheyNearlyDependOnEachOther)
   mix.setIdentity();
   mix.coeffRef(1, 1) = 1e-4;
   mix.coeffRef(1, 0) = 1.0 - 1e-4;
-  model->averages = {{std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(mix * *model->averages[0].weights), {}}};
+  model->averages = {
+      {std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(mix * *model->averages[0].weights), {}}};
   const auto& weights = *model->averages[0].weights;
   ClothStepper stepper(model, options(true));
   ClothState state = makeClothState(*model, model->rest.vertices);
@@ -278,7 +292,9 @@ TEST(ClothAverages, AreExactWhereTheyNearlyDependOnEachOther)
     inputs.averages.col(2) += Vector3d(0.0, 0.0, 1.0 * k);
     const StepReport report = stepper.step(state, inputs, 0.01);
     ASSERT_TRUE(report.ok) << report.message;
-    EXPECT_LT((state.x * weights.transpose() - inputs.averages).cwiseAbs().maxCoeff(), 1e-13 * inputs.averages.cwiseAbs().maxCoeff()) << k;
+    EXPECT_LT((state.x * weights.transpose() - inputs.averages).cwiseAbs().maxCoeff(),
+              1e-13 * inputs.averages.cwiseAbs().maxCoeff())
+        << k;
   }
 }
 
@@ -314,7 +330,8 @@ TEST(ClothAverages, RefuseWhatCannotBe)
   Tracked held;
   pinVertices(held.state, [&] {
     std::vector<int> all;
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*held.model->averages[0].weights, 0); entry; ++entry)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(*held.model->averages[0].weights, 0); entry;
+         ++entry)
       all.push_back(static_cast<int>(entry.col()));
     return all;
   }());
@@ -333,5 +350,5 @@ TEST(ClothAverages, RefuseWhatCannotBe)
   EXPECT_TRUE(t.state.x == before.x);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -22,7 +22,8 @@ struct Bounded
 
   explicit Bounded(double traction, double youngs_modulus = 2e5)
   {
-    model = std::make_shared<ClothModel>(buildCloth("bounded", fine.mesh, 0.2, isotropicMembrane(youngs_modulus, 0.3, 5e-4)));
+    model = std::make_shared<ClothModel>(
+        buildCloth("bounded", fine.mesh, 0.2, isotropicMembrane(youngs_modulus, 0.3, 5e-4)));
     model->bending = BendingModel::hinge;
     model->bending_modulus = 1e-4;
     model->stiffness_damping = 1e-3;
@@ -49,7 +50,8 @@ struct Bounded
 
   double greatestForce(const ClothStepper& stepper) const   // over its bound
   {
-    return (stepper.averageForces().colwise().norm().transpose().array() / model->averages[0].bounds.array()).maxCoeff();
+    return (stepper.averageForces().colwise().norm().transpose().array() / model->averages[0].bounds.array())
+        .maxCoeff();
   }
 
   /// Of the averages that are met [m]; at the others the force must be that of the bound, and point at the target.
@@ -65,7 +67,9 @@ struct Bounded
         continue;
       }
       const Vector3d gap = inputs.averages.col(i) - state.x * Eigen::VectorXd(constraints.matrix().row(i).transpose());
-      EXPECT_LT((stepper.averageForces().col(i) - model->averages[0].bounds[i] * gap.normalized()).norm(), 0.01 * model->averages[0].bounds[i]) << i;
+      EXPECT_LT((stepper.averageForces().col(i) - model->averages[0].bounds[i] * gap.normalized()).norm(),
+                0.01 * model->averages[0].bounds[i])
+          << i;
     }
     return met;
   }
@@ -73,7 +77,8 @@ struct Bounded
 
 TEST(BoundedAverages, MoveAFreeBodyByTheBoundAlone)
 {
-  // one function over all of a sheet whose guide is far away: it falls towards it with the bound's acceleration, and stays there
+  // one function over all of a sheet whose guide is far away: it falls towards it with the bound's acceleration, and
+  // stays there
   const TriangleMesh coarse = gridMesh(0.5, 0.5, 4, 4, GridPattern::alternating);
   std::vector<int> all(coarse.vertices.cols());
   for (std::size_t i = 0; i < all.size(); ++i)
@@ -101,7 +106,8 @@ TEST(BoundedAverages, MoveAFreeBodyByTheBoundAlone)
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_EQ(state.at_bound, std::vector<int>{0});
     EXPECT_LT((stepper.averageForces().col(0) - 0.4 * way.normalized()).norm(), 1e-5);
-    const Vector3d moved = (state.x - fine.mesh.vertices).rowwise().mean(), expected = 0.5 * h * h * (k + 1) * (k + 2) * a;
+    const Vector3d moved = (state.x - fine.mesh.vertices).rowwise().mean(),
+                   expected = 0.5 * h * h * (k + 1) * (k + 2) * a;
     EXPECT_LT((moved - expected).norm(), 1e-5 * expected.norm() + 1e-9) << k;   // implicit Euler's parabola
   }
   // it comes back and forth, less each time, until the force needed to hold it is less than the bound
@@ -165,19 +171,19 @@ TEST(BoundedAverages, LetTheMaterialRefuseToStretch)
     EXPECT_LT(t.constraints.error(t.inputs.averages, t.state.x), 1e-14);
     EXPECT_EQ(most > 10, with);
     if (with)
-    {
       EXPECT_GT(refused, 0.3);   // half of the way
-    }
   }
   EXPECT_GT(strain[0], 1.9);
   EXPECT_LT(strain[1], 0.3);
-  // coming back is no jolt: where the guide meets what hung behind, forces are bounded, too (200 Pa on 0.2 kg/m^2 are 1000 m/s^2)
+  // coming back is no jolt: where the guide meets what hung behind, forces are bounded, too (200 Pa on 0.2 kg/m^2 are
+  // 1000 m/s^2)
   EXPECT_LT(acceleration, 100.0);
 }
 
 TEST(BoundedAverages, AreGivenUpWhereCollisionsForbidThem)
 {
-  // a floor above which no average can be met: a hundred and more rounds of collisions against averages would come to nothing, as sixteen do
+  // a floor above which no average can be met: a hundred and more rounds of collisions against averages would come to
+  // nothing, as sixteen do
   for (const double traction : {0.0, 20.0})
   {
     Bounded t(traction);
@@ -219,15 +225,11 @@ TEST(BoundedAverages, ConvergeForStiffCloth)
       ASSERT_TRUE(report.ok) << report.message;
       EXPECT_EQ(report.cut_steps, 0);
       if (r > 0)
-      {
         EXPECT_LT(t.check(stepper), 1e-13);
-      }
       EXPECT_LT(t.greatestForce(stepper), 1.0 + 1e-9);
       EXPECT_LT(report.max_strain, 1e-3);
       if (r < 2)
-      {
         EXPECT_LT(report.linear_iterations, 500) << k;
-      }
     }
     EXPECT_GT(t.state.at_bound.size(), 10u);
     ends[r] = t.state.x;
@@ -274,7 +276,9 @@ TEST(BoundedAverages, HoldInContactWhateverTheTolerance)
       const StepReport report = group.step(state, inputs, 0.01);
       ASSERT_TRUE(report.ok) << report.message;
       contacts += report.repulsions;
-      greatest = std::max(greatest, (group.averageForces(0).colwise().norm().transpose().array() / t.model->averages[0].bounds.array()).maxCoeff());
+      greatest = std::max(
+          greatest, (group.averageForces(0).colwise().norm().transpose().array() / t.model->averages[0].bounds.array())
+                        .maxCoeff());
     }
     EXPECT_GT(greatest, 0.99) << tolerance;
     EXPECT_LT(greatest, 1.0011) << tolerance;
@@ -321,5 +325,5 @@ TEST(BoundedAverages, DoNotDependOnWhatWasAtItsBoundBefore)
   EXPECT_FALSE(a.state.at_bound.empty());
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -12,7 +12,8 @@ namespace {
 using Eigen::Vector3d;
 
 /// Steps that all succeed and leave no intersection.
-void expectClean(Sheets& s, int steps, double h, const std::function<void(int)>& drive = [](int) {})
+void expectClean(
+    Sheets& s, int steps, double h, const std::function<void(int)>& drive = [](int) {})
 {
   SurfaceCollider collider(s.surface);
   ASSERT_EQ(s.intersectionCount(), 0u);
@@ -56,7 +57,8 @@ TEST(ClothCollisions, HeapOfSheets)
   for (int k = 0; k < 3; ++k)
   {
     const double a = 0.5 * k;
-    s.add(8, 8, {-0.2 * k, -0.1 * k, 0.1 + 0.08 * k}, {std::cos(a), std::sin(a), 0.05}, {-std::sin(a), std::cos(a), 0.02});
+    s.add(8, 8, {-0.2 * k, -0.1 * k, 0.1 + 0.08 * k}, {std::cos(a), std::sin(a), 0.05},
+          {-std::sin(a), std::cos(a), 0.02});
   }
   s.addSolid(Plane{}, {}, 0.5);
   s.addSolid(Sphere{0.15}, {{0.3, 0.3, -0.06}, Eigen::Quaterniond::Identity()});
@@ -71,11 +73,12 @@ TEST(ClothCollisions, EdgesCornersAndNeedles)
   cone->vertices << 0, 0.02, -0.02, 0, 0, 0.02, 0.02, -0.02, 0.3, 0, 0, 0;
   cone->triangles.resize(3, 4);
   cone->triangles << 0, 0, 0, 1, 1, 2, 3, 3, 2, 3, 1, 2;
-  const std::vector<std::pair<Shape, Pose>> solids{{Box{{0.3, 0.3, 0.3}}, {{0.02, 0.01, 0}, corner}},
-                                                   {Capsule{0.003, 0.4}, {{0.01, 0.02, 0}, Eigen::Quaterniond::Identity()}},
-                                                   {Cylinder{0.03, 0.4}, {{0.01, 0.02, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX()))}},
-                                                   {cone, {{0.03, 0.02, 0}, Eigen::Quaterniond::Identity()}},
-                                                   {Sphere{0.2}, {}}};
+  const std::vector<std::pair<Shape, Pose>> solids{
+      {Box{{0.3, 0.3, 0.3}}, {{0.02, 0.01, 0}, corner}},
+      {Capsule{0.003, 0.4}, {{0.01, 0.02, 0}, Eigen::Quaterniond::Identity()}},
+      {Cylinder{0.03, 0.4}, {{0.01, 0.02, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX()))}},
+      {cone, {{0.03, 0.02, 0}, Eigen::Quaterniond::Identity()}},
+      {Sphere{0.2}, {}}};
   for (const auto& [shape, pose] : solids)
   {
     Sheets s;
@@ -104,7 +107,8 @@ TEST(ClothCollisions, TwistedSheet)
       {
         const double side = i <= n ? 1 : -1, angle = side * 2 * M_PI * (k + 1) / steps;
         const Vector3d rest = s.surface.rest.col(i) - Vector3d(0.25, 0.25, 0);
-        const Vector3d to = Eigen::AngleAxisd(angle, Vector3d::UnitX()) * rest + Vector3d(0.25 + side * 0.05 * (k + 1) / steps, 0.25, 0);
+        const Vector3d to = Eigen::AngleAxisd(angle, Vector3d::UnitX()) * rest +
+                            Vector3d(0.25 + side * 0.05 * (k + 1) / steps, 0.25, 0);
         s.v.col(i) = (to - s.x.col(i)) / h;
       }
   });
@@ -227,7 +231,8 @@ TEST(ClothCollisions, FrictionOnAnIncline)
     Sheets s;
     const double slope = std::atan(0.45), h = 0.005;
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(slope, Vector3d::UnitY()));
-    s.add(4, 4, turn * Vector3d(-0.2, -0.2, 1.9e-3), turn * Vector3d(0.4, 0, 0), turn * Vector3d(0, 0.4, 0), 4e-3, friction);
+    s.add(4, 4, turn * Vector3d(-0.2, -0.2, 1.9e-3), turn * Vector3d(0.4, 0, 0), turn * Vector3d(0, 0.4, 0), 4e-3,
+          friction);
     s.addSolid(Plane{}, {{0, 0, 0}, turn});
     s.gravity = {0, 0, -9.81};
     SurfaceCollider collider(s.surface);
@@ -362,5 +367,5 @@ TEST(ClothCollisions, RefusesBadSurfaces)
   refused([](CollisionSurface& s) { s.solids.push_back({Sphere{-1.0}, -1.0, {}}); }, "radius");
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

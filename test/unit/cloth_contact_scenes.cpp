@@ -105,16 +105,16 @@ StepReport run(Simulation& simulation, int steps)
     EXPECT_EQ(intersectionsOf(simulation), 0u) << "step " << simulation.state().steps;
     total.merge(report);
     if (!report.ok)
-    {
       break;
-    }
   }
   return total;
 }
 
 TEST(ClothContact, ReadsItsKeys)
 {
-  const auto contact = [](const std::string& text) { return parseScene(one, "t", {"cloths.0.contact=" + text}).cloths[0].contact; };
+  const auto contact = [](const std::string& text) {
+    return parseScene(one, "t", {"cloths.0.contact=" + text}).cloths[0].contact;
+  };
   ASSERT_TRUE(contact("{}"));
   EXPECT_TRUE(contact("{}")->self && contact("{}")->cloths && contact("{}")->obstacles);
   EXPECT_EQ(contact("{}")->thickness, 1e-3);
@@ -125,18 +125,23 @@ TEST(ClothContact, ReadsItsKeys)
   EXPECT_FALSE(parseScene("cloths: [{grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2}}]", "t").cloths[0].contact);
 
   const std::pair<const char*, const char*> cases[] = {
-    {"cloths.0.contact.thickness=0", "cloths.0.contact.thickness = 0: is out of range; must be a number in (0, 1] m"},
-    {"cloths.0.contact.friction=-1", "cloths.0.contact.friction = -1"},
-    {"cloths.0.contact.rods=true", "unknown key"},
-    {"cloths.0.contact.self=maybe", "cloths.0.contact.self = maybe"},
-    {"contact={gap: 0.001}", "says its thickness instead of a gap"},
-    {"bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], shape: {sphere: {radius: 0.1}}, pose: {position: [0, 0, 9]}}]", "t:9: cloths.0.contact: body ball is simulated"},
+      {"cloths.0.contact.thickness=0", "cloths.0.contact.thickness = 0: is out of range; must be a number in (0, 1] m"},
+      {"cloths.0.contact.friction=-1", "cloths.0.contact.friction = -1"},
+      {"cloths.0.contact.rods=true", "unknown key"},
+      {"cloths.0.contact.self=maybe", "cloths.0.contact.self = maybe"},
+      {"contact={gap: 0.001}", "says its thickness instead of a gap"},
+      {"bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], shape: {sphere: {radius: 0.1}}, pose: {position: [0, 0, "
+       "9]}}]",
+       "t:9: cloths.0.contact: body ball is simulated"},
   };
   for (const auto& [assignment, expected] : cases)
   {
-    EXPECT_NE(problemOf(one, {assignment}).find(expected), std::string::npos) << assignment << "\ngave: " << problemOf(one, {assignment});
+    EXPECT_NE(problemOf(one, {assignment}).find(expected), std::string::npos)
+        << assignment << "\ngave: " << problemOf(one, {assignment});
   }
-  const char* const body = "bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], shape: {sphere: {radius: 0.1}}, pose: {position: [0, 0, 9]}, contact: false}]";
+  const char* const body =
+      "bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], shape: {sphere: {radius: 0.1}}, pose: {position: [0, 0, 9]}, "
+      "contact: false}]";
   EXPECT_EQ(problemOf(one, {body}), "");
 }
 
@@ -156,13 +161,14 @@ TEST(ClothContact, WithoutItClothTouchesNothing)
 
 TEST(ClothContact, RestsOnEveryShape)
 {
-  const std::pair<const char*, double> shapes[] = {   // and how high its top is
-    {"{plane: {}}", 0.0},
-    {"{sphere: {radius: 0.05}}", 0.05},
-    {"{box: {size: [0.1, 0.1, 0.1]}}", 0.05},
-    {"{cylinder: {radius: 0.05, length: 0.1}}", 0.05},
-    {"{capsule: {radius: 0.03, length: 0.04}}", 0.05},
-    {"{mesh: {file: " SLENDER_SOURCE_DIR "/config/meshes/ring.obj}}", 0.012},
+  const std::pair<const char*, double> shapes[] = {
+      // and how high its top is
+      {"{plane: {}}", 0.0},
+      {"{sphere: {radius: 0.05}}", 0.05},
+      {"{box: {size: [0.1, 0.1, 0.1]}}", 0.05},
+      {"{cylinder: {radius: 0.05, length: 0.1}}", 0.05},
+      {"{capsule: {radius: 0.03, length: 0.04}}", 0.05},
+      {"{mesh: {file: " SLENDER_SOURCE_DIR "/config/meshes/ring.obj}}", 0.012},
   };
   for (const auto& [shape, top] : shapes)
   {
@@ -204,8 +210,9 @@ TEST(ClothContact, ClothsTouchEachOther)
 TEST(ClothContact, SolidsPushCloth)
 {
   const std::vector<std::string> hanging{"gravity=[0, 0, 0]", "cloths.0.grasps={a: {edge: left}, b: {edge: right}}"};
-  for (const char* mover : {"obstacles=[{name: fist, shape: {sphere: {radius: 0.03}}, motion: {table: [[0, 0, 0, 0], [0.4, 0, 0, 0.1]]}}]",
-                            "obstacles=[{name: fist, shape: {sphere: {radius: 0.03}}, motion: topic}]"})
+  for (const char* mover :
+       {"obstacles=[{name: fist, shape: {sphere: {radius: 0.03}}, motion: {table: [[0, 0, 0, 0], [0.4, 0, 0, 0.1]]}}]",
+        "obstacles=[{name: fist, shape: {sphere: {radius: 0.03}}, motion: topic}]"})
   {
     SCOPED_TRACE(mover);
     std::vector<std::string> overrides = hanging;
@@ -215,9 +222,7 @@ TEST(ClothContact, SolidsPushCloth)
     {
       SceneInputs inputs = simulation.defaultInputs();
       if (std::holds_alternative<TopicMotion>(simulation.config().obstacles[0].motion))
-      {
         inputs.obstacles[0].X_WG.position.z() = 0.0025 * k;
-      }
       ASSERT_TRUE(simulation.step(inputs).ok);
       ASSERT_EQ(intersectionsOf(simulation), 0u);
     }
@@ -226,7 +231,9 @@ TEST(ClothContact, SolidsPushCloth)
     EXPECT_GT(simulation.wrench(0).force.z(), 1e-3);   // the cloth pulls the grasps along
   }
   std::vector<std::string> overrides = hanging;
-  overrides.push_back("bodies=[{name: arm, shape: {box: {size: [0.03, 0.4, 0.03]}}, motion: {table: [[0, 0, 0, -0.1], [0.4, 0, 0, 0.1]]}}]");
+  overrides.push_back(
+      "bodies=[{name: arm, shape: {box: {size: [0.03, 0.4, 0.03]}}, motion: {table: [[0, 0, 0, -0.1], [0.4, 0, 0, "
+      "0.1]]}}]");
   overrides.push_back("obstacles=[]");
   Simulation simulation(parseScene(one, "t", overrides));
   run(simulation, 40);
@@ -243,12 +250,15 @@ TEST(ClothContact, IntersectionsAtTheStartAreRefusedByName)
   const std::string crossing = problemOf(two, {"cloths.1.grid.sides=[[0.2, 0, 0], [0, 0.2, -0.015]]"});
   EXPECT_NE(crossing.find("cloth 'upper' at vertex "), std::string::npos) << crossing;
   EXPECT_NE(crossing.find(" meets cloth 'lower'"), std::string::npos) << crossing;
-  const std::string mesh = problemOf(one, {"obstacles.0.shape={mesh: {file: " SLENDER_SOURCE_DIR "/config/meshes/ring.obj}}", "cloths.0.grid.corner=[-0.1, -0.1, 0]"});
+  const std::string mesh =
+      problemOf(one, {"obstacles.0.shape={mesh: {file: " SLENDER_SOURCE_DIR "/config/meshes/ring.obj}}",
+                      "cloths.0.grid.corner=[-0.1, -0.1, 0]"});
   EXPECT_NE(mesh.find("cloth 'sheet' at vertex "), std::string::npos) << mesh;
   EXPECT_NE(mesh.find("'thing'"), std::string::npos) << mesh;
   // outside a cylinder, but within the prism that stands for it
-  const std::string prism = problemOf(one, {"obstacles.0.shape={cylinder: {radius: 0.05, length: 0.4}}", "obstacles.0.pose={rpy: [1.5707963267948966, 0, 0]}",
-                                            "cloths.0.grid.corner=[-0.1, -0.1, 0.05000001]"});
+  const std::string prism = problemOf(
+      one, {"obstacles.0.shape={cylinder: {radius: 0.05, length: 0.4}}",
+            "obstacles.0.pose={rpy: [1.5707963267948966, 0, 0]}", "cloths.0.grid.corner=[-0.1, -0.1, 0.05000001]"});
   EXPECT_NE(prism.find("the prism that stands for it"), std::string::npos) << prism;
   EXPECT_NE(prism.find("'thing'"), std::string::npos) << prism;
 }
@@ -257,14 +267,18 @@ class ClothStateFiles : public ::testing::Test
 {
 protected:
   void TearDown() override { std::remove(path_.c_str()); }
-  const std::string path_ = (std::filesystem::temp_directory_path() / ("slender_cloth_contact_" + std::to_string(::getpid()))).string();
+  const std::string path_ =
+      (std::filesystem::temp_directory_path() / ("slender_cloth_contact_" + std::to_string(::getpid()))).string();
 };
 
 TEST_F(ClothStateFiles, RestartsBitEqualInTheMiddleOfContact)
 {
-  const std::vector<std::string> moving{"cloths.0.grasps={left: {edge: left}}",
-                                        "obstacles=[{name: floor, shape: {plane: {}}}, {name: fist, shape: {sphere: {radius: 0.02}}, motion: {table: [[0, 0.15, 0.1, 0.06], [0.3, 0.1, 0.1, 0.03]]}}]",
-                                        "bodies=[{name: arm, shape: {capsule: {radius: 0.02, length: 0.1}}, motion: {table: [[0, 0.3, 0.1, 0.03], [0.3, 0.2, 0.1, 0.03]]}}]"};
+  const std::vector<std::string> moving{
+      "cloths.0.grasps={left: {edge: left}}",
+      "obstacles=[{name: floor, shape: {plane: {}}}, {name: fist, shape: {sphere: {radius: 0.02}}, motion: {table: "
+      "[[0, 0.15, 0.1, 0.06], [0.3, 0.1, 0.1, 0.03]]}}]",
+      "bodies=[{name: arm, shape: {capsule: {radius: 0.02, length: 0.1}}, motion: {table: [[0, 0.3, 0.1, 0.03], [0.3, "
+      "0.2, 0.1, 0.03]]}}]"};
   Simulation simulation(parseScene(two, "t", moving));
   run(simulation, 15);
   simulation.save(path_);
@@ -280,7 +294,8 @@ TEST_F(ClothStateFiles, RestartsBitEqualInTheMiddleOfContact)
   }
   EXPECT_EQ(again.wrench(0).force, simulation.wrench(0).force);
   EXPECT_EQ(again.wrench(0).torque, simulation.wrench(0).torque);
-  for (const char* other : {"cloths.1.contact.thickness=0.003", "cloths.1.contact.friction=0.2", "cloths.1.contact.self=false"})
+  for (const char* other :
+       {"cloths.1.contact.thickness=0.003", "cloths.1.contact.friction=0.2", "cloths.1.contact.self=false"})
   {
     std::vector<std::string> overrides = moving;
     overrides.push_back(other);
@@ -310,24 +325,27 @@ TEST_F(ClothStateFiles, StatesWithIntersectionsAreRefused)
   run(larger, 30);
 }
 
-/// A sheet on a slippery slope hangs from its upper edge: on the average over time the grasp carries the weight along the slope; and of what
-/// presses on the slope those vertices' own part.
+/// A sheet on a slippery slope hangs from its upper edge: on the average over time the grasp carries the weight along
+/// the slope; and of what presses on the slope those vertices' own part.
 TEST(ClothContact, WrenchesHoldWhatTheSlopeDoesNotCarry)
 {
   for (const char* shape : {"{plane: {normal: [-0.5, 0, 0.8660254037844386]}}", "{box: {size: [1, 1, 0.1]}}"})
   {
     SCOPED_TRACE(shape);
     const bool plane = shape[1] == 'p';
-    std::vector<std::string> slope{"cloths.0.grid={corner: [0.1732050808, 0, 0.1], sides: [[-0.1732050808, 0, -0.1], [0, -0.2, 0]], cells: 8, pattern: alternating}",
-                                   "cloths.0.grasps={top: {edge: left}}", "cloths.0.contact.friction=0", "cloths.0.damping.mass=4",
-                                   "obstacles.0.shape=" + std::string(shape)};
+    std::vector<std::string> slope{
+        "cloths.0.grid={corner: [0.1732050808, 0, 0.1], sides: [[-0.1732050808, 0, -0.1], [0, -0.2, 0]], cells: 8, "
+        "pattern: alternating}",
+        "cloths.0.grasps={top: {edge: left}}", "cloths.0.contact.friction=0", "cloths.0.damping.mass=4",
+        "obstacles.0.shape=" + std::string(shape)};
     if (plane)
     {
       slope.push_back("cloths.0.grid.corner=[0.1732050808, 0, 0.1023094]");
     }
     else
     {
-      slope.push_back("obstacles.0.pose={position: [0.025, 0, -0.0456], rpy: [0, -0.5235987755982988, 0]}");   // 2 mm below
+      // 2 mm below
+      slope.push_back("obstacles.0.pose={position: [0.025, 0, -0.0456], rpy: [0, -0.5235987755982988, 0]}");
     }
     Simulation simulation(parseScene(one, "t", slope));
     run(simulation, 300);
@@ -378,21 +396,18 @@ TEST(ClothContact, ScenesOfFabricStretchLikeFabric)
         for (int c = 0; c < 3; ++c)
         {
           const int a = mesh.triangles(c, f), b = mesh.triangles((c + 1) % 3, f);
-          most = std::max(most, (x.col(b) - x.col(a)).norm() / (mesh.vertices.col(b) - mesh.vertices.col(a)).norm() - 1.0);
+          most =
+              std::max(most, (x.col(b) - x.col(a)).norm() / (mesh.vertices.col(b) - mesh.vertices.col(a)).norm() - 1.0);
         }
       if (k % 20 == 0)
-      {
         ASSERT_EQ(intersectionsOf(simulation), 0u) << k;
-      }
     }
     EXPECT_LT(most, 0.1);
     EXPECT_GT(touching, 1000);
     if (!simulation.config().obstacles.empty())
-    {
       EXPECT_LT(x.row(2).maxCoeff(), -0.0288);   // all of it below the ring
-    }
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -16,7 +16,8 @@ struct Hung
   /// Held at two corners, flat; membrane in N/m.
   Hung(double membrane, BendingModel bending)
   {
-    model = std::make_shared<ClothModel>(buildCloth("sheet", gridMesh(0.5, 0.5, 8, 8, GridPattern::alternating), 0.15, isotropicMembrane(1e3 * membrane, 0.3, 1e-3)));
+    model = std::make_shared<ClothModel>(buildCloth("sheet", gridMesh(0.5, 0.5, 8, 8, GridPattern::alternating), 0.15,
+                                                    isotropicMembrane(1e3 * membrane, 0.3, 1e-3)));
     model->bending = bending;
     model->bending_modulus = 1e-4;
     state = makeClothState(*model, model->rest.vertices);
@@ -34,8 +35,8 @@ ClothOptions oneStep(Integrator integrator, int cuts)
   return o;
 }
 
-/// The energy never exceeds that at the start by a hundredth (of tr_bdf2, which damps less, a tenth) of what a fall through the sheet's size gives, where
-/// it was up to 1e7 times that: steps are cut, or refused.
+/// The energy never exceeds that at the start by a hundredth (of tr_bdf2, which damps less, a tenth) of what a fall
+/// through the sheet's size gives, where it was up to 1e7 times that: steps are cut, or refused.
 TEST(ClothCreatedEnergy, NoneAppears)
 {
   int done = 0;
@@ -46,7 +47,8 @@ TEST(ClothCreatedEnergy, NoneAppears)
         {
           Hung cloth(membrane, bending);
           ClothStepper stepper(cloth.model, oneStep(integrator, 10));
-          const double fall = cloth.model->totalMass() * 9.81 * 0.7, start = stepper.energies(cloth.state, cloth.inputs.gravity).total();
+          const double fall = cloth.model->totalMass() * 9.81 * 0.7,
+                       start = stepper.energies(cloth.state, cloth.inputs.gravity).total();
           for (int k = 0; k < 5; ++k)
           {
             const StepReport report = stepper.step(cloth.state, cloth.inputs, h);
@@ -56,8 +58,9 @@ TEST(ClothCreatedEnergy, NoneAppears)
               break;
             }
             done += k == 4;
-            EXPECT_LT(stepper.energies(cloth.state, cloth.inputs.gravity).total() - start, (integrator == Integrator::implicit_euler ? 0.01 : 0.1) * fall)
-              << toString(integrator) << " " << toString(bending) << " " << membrane << " N/m, " << h << " s";
+            EXPECT_LT(stepper.energies(cloth.state, cloth.inputs.gravity).total() - start,
+                      (integrator == Integrator::implicit_euler ? 0.01 : 0.1) * fall)
+                << toString(integrator) << " " << toString(bending) << " " << membrane << " N/m, " << h << " s";
           }
         }
   EXPECT_GE(done, 12);   // of 24: those with soft membranes, or short steps
@@ -113,7 +116,8 @@ TEST(ClothCreatedEnergy, SoundStepsAreNotCut)
       }
 }
 
-/// Viscous forces change how elastic energy is counted within a step, most where the damping's time is long beside the step.
+/// Viscous forces change how elastic energy is counted within a step, most where the damping's time is long beside the
+/// step.
 TEST(ClothCreatedEnergy, SoundStepsOfDampedClothAreNotCut)
 {
   for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
@@ -140,5 +144,5 @@ TEST(ClothCreatedEnergy, SoundStepsOfDampedClothAreNotCut)
     }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -1,4 +1,5 @@
-// Derivatives of hinges and membrane against differences; invariances; reference 3f (one triangle of St. Venant-Kirchhoff).
+// Derivatives of hinges and membrane against differences; invariances; reference 3f (one triangle of St.
+// Venant-Kirchhoff).
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -16,7 +17,11 @@ struct Sheet
   TriangleMesh mesh;
   MeshTopology topology;
 
-  explicit Sheet(GridPattern pattern, int cells = 3) : mesh(gridMesh(cells, cells, cells, cells, pattern)), topology(meshTopology(mesh)) {}
+  explicit Sheet(GridPattern pattern, int cells = 3)
+    : mesh(gridMesh(cells, cells, cells, cells, pattern)),
+      topology(meshTopology(mesh))
+  {
+  }
   int points() const { return static_cast<int>(mesh.vertices.cols()); }
   Matrix3Xd shaken(Random& random, double size) const
   {
@@ -35,7 +40,8 @@ template <class Energy>
 void check(Derivatives<Energy>& d, const Matrix3Xd& x, double h, double tolerance)
 {
   const Matrix3Xd g = d.gradient(x);
-  const MatrixXd slope = differences(x, h, [&](const Matrix3Xd& y) { return VectorXd::Constant(1, energyOf(d.energy, y)); });
+  const MatrixXd slope =
+      differences(x, h, [&](const Matrix3Xd& y) { return VectorXd::Constant(1, energyOf(d.energy, y)); });
   EXPECT_LT((flattened(g) - slope.col(0)).norm(), tolerance * g.norm());
   const MatrixXd exact = d.hessian(x, HessianKind::exact);
   const MatrixXd curvature = differences(x, h, [&](const Matrix3Xd& y) { return flattened(d.gradient(y)); });
@@ -48,7 +54,8 @@ void check(Derivatives<Energy>& d, const Matrix3Xd& x, double h, double toleranc
 
 HingeBending hingesOf(const Sheet& s, Random& random, double rest)
 {
-  return HingeBending(s.topology.hinges, hingeStiffness(s.mesh, s.topology, 0.7), random.numbers(s.topology.hingeCount(), rest));
+  return HingeBending(s.topology.hinges, hingeStiffness(s.mesh, s.topology, 0.7),
+                      random.numbers(s.topology.hingeCount(), rest));
 }
 
 TEST(HingeBending, DerivativesMatchDifferences)
@@ -68,9 +75,9 @@ TEST(HingeBending, DerivativesMatchDifferences)
 Matrix3Xd flap(double angle, double left, double right)
 {
   Matrix3Xd x(3, 4);
-  x << 0, 1.3, 0.4, 0.7,   //
-    0, 0, left, -right * std::cos(angle),   //
-    0, 0, 0, -right * std::sin(angle);
+  x << 0, 1.3, 0.4, 0.7,                      //
+      0, 0, left, -right * std::cos(angle),   //
+      0, 0, 0, -right * std::sin(angle);
   return x;
 }
 
@@ -188,7 +195,8 @@ TEST(Membrane, TakesItsAxesAlongTheWarp)
   const double g = 1e-4, area = 16;
   const auto stretched = [&](const Vector3d& d, double along, double across) {
     const Vector3d c = Vector3d::UnitZ().cross(d);
-    const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + (std::sqrt(1 + 2 * along) - 1) * d * d.transpose() + (std::sqrt(1 + 2 * across) - 1) * c * c.transpose();
+    const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + (std::sqrt(1 + 2 * along) - 1) * d * d.transpose() +
+                              (std::sqrt(1 + 2 * across) - 1) * c * c.transpose();
     return energyOf(membrane, Matrix3Xd(F * s.mesh.vertices));
   };
   EXPECT_NEAR(stretched(warp, g, -0.3 * g) / (0.5 * area * 100 * g * g), 1.0, 1e-6);
@@ -206,9 +214,7 @@ TEST(Membrane, PatchTest)
   const Matrix3Xd g = d.gradient(F * s.mesh.vertices);
   for (int i = 0; i < s.points(); ++i)
     if (!s.topology.on_boundary[i])
-    {
       EXPECT_LT(g.col(i).norm(), 1e-12 * g.norm());
-    }
 }
 
 /// Reference 3f, 15 digits (reference/rod_plate/stvk_triangle.csv).
@@ -233,7 +239,8 @@ TEST(Membrane, OneTriangleOfStVenantKirchhoff)
     std::vector<double> v;
     while (std::getline(cells, cell, ','))
       v.push_back(std::stod(cell));
-    const Matrix3Xd x = Eigen::Map<const Matrix3Xd>(v.data() + 1, 3, 3), force = Eigen::Map<const Matrix3Xd>(v.data() + 10, 3, 3);
+    const Matrix3Xd x = Eigen::Map<const Matrix3Xd>(v.data() + 1, 3, 3),
+                    force = Eigen::Map<const Matrix3Xd>(v.data() + 10, 3, 3);
     Derivatives<MembraneEnergy> d(membrane, 3, rest.triangles);
     EXPECT_NEAR(energyOf(membrane, x), v[0], 1e-13) << name;   // forces of order 1 N, energies of order 0.1 J
     EXPECT_LT((d.gradient(x) + force).norm(), 1e-12) << name;
@@ -255,5 +262,5 @@ TEST(Membrane, RefusesBadModuli)
   EXPECT_NEAR(a.c33, b.c33, 1e-12);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

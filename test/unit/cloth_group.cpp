@@ -19,7 +19,8 @@ struct Cloths
 
   void add(const std::string& name, int n, double size, const Vector3d& corner, double friction = 0.3)
   {
-    ClothModel cloth = buildCloth(name, gridMesh(size, size, n, n, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 5e-4));
+    ClothModel cloth =
+        buildCloth(name, gridMesh(size, size, n, n, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 5e-4));
     cloth.bending_modulus = 1e-6;
     cloth.stiffness_damping = 1e-3;
     model.cloths.push_back(std::make_shared<ClothModel>(cloth));
@@ -40,7 +41,8 @@ struct Cloths
 
 TEST(ClothGroup, ContactForcesBalanceMomentum)
 {
-  // two cloths that fall onto a ball and onto each other, one of them held: the forces of every step are its change of momentum
+  // two cloths that fall onto a ball and onto each other, one of them held: the forces of every step are its change of
+  // momentum
   Cloths c;
   c.add("upper", 6, 0.3, {-0.15, -0.15, 0.112});
   c.add("lower", 6, 0.3, {-0.14, -0.15, 0.106});
@@ -67,7 +69,8 @@ TEST(ClothGroup, ContactForcesBalanceMomentum)
         most = std::max(most, group.contactForces(i).col(v).norm());
         supported += group.contactForces(i)(2, v) / 60;
       }
-      EXPECT_LT((change - forces).norm(), 1e-3 * model.totalMass() * 9.81) << k << " " << i;   // answers to contacts are solved to that
+      // answers to contacts are solved to that
+      EXPECT_LT((change - forces).norm(), 1e-3 * model.totalMass() * 9.81) << k << " " << i;
     }
   }
   EXPECT_GT(group.collisions().repulsions, 0);
@@ -157,7 +160,8 @@ TEST(ClothGroup, HalvesStepsWhereNeeded)
   EXPECT_GT(c.state.cloths[0].x.row(2).minCoeff(), 0.02);
 }
 
-/// Whatever solves them: a load shared by the inertia of an integrator's stage would be worth something else in each cloth.
+/// Whatever solves them: a load shared by the inertia of an integrator's stage would be worth something else in each
+/// cloth.
 TEST(ClothGroup, ContactKeepsMomentumAcrossIntegrators)
 {
   ClothOptions euler, second, controlled;
@@ -184,7 +188,8 @@ TEST(ClothGroup, ContactKeepsMomentumAcrossIntegrators)
       const StepReport report = group.step(c.state, c.inputs, 2e-3);
       ASSERT_TRUE(report.ok) << report.message;
     }
-    EXPECT_LT((momentum() - before).norm(), 1e-3 * c.model.cloths[0]->totalMass());   // of 1 m/s; what the linear solver leaves
+    // of 1 m/s; what the linear solver leaves
+    EXPECT_LT((momentum() - before).norm(), 1e-3 * c.model.cloths[0]->totalMass());
     EXPECT_LT(std::abs(c.state.cloths[0].v.row(2).mean()), 0.5);   // they have met
   }
 }
@@ -213,11 +218,13 @@ double largestGain(Integrator integrator, bool one_newton_step, double error_tol
   return largest / (c.model.cloths[0]->totalMass() * 9.81 * 0.05);
 }
 
-/// Contact holds stiff cloth away from its balance, which steps by tr_bdf2 would answer with five times the speed that takes it back.
+/// Contact holds stiff cloth away from its balance, which steps by tr_bdf2 would answer with five times the speed that
+/// takes it back.
 TEST(ClothGroup, ContactAddsNoEnergyToStepsOfSecondOrder)
 {
   for (const bool one_newton_step : {false, true})
-    EXPECT_LT(largestGain(Integrator::tr_bdf2, one_newton_step, 0.0), 0.01) << one_newton_step;   // tr_bdf2 throughout: 0.2 to 0.3
+    // tr_bdf2 throughout: 0.2 to 0.3
+    EXPECT_LT(largestGain(Integrator::tr_bdf2, one_newton_step, 0.0), 0.01) << one_newton_step;
 }
 
 /// Parts of a step would let go with as many times that speed: no more than the same steps undivided.
@@ -230,7 +237,8 @@ TEST(ClothGroup, ContactAddsNoEnergyToControlledSteps)
     for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
       for (const double tolerance : {1e-4, 1e-5})
         // rounding decides which vertices touch first, and moves either by a quarter
-        EXPECT_LT(largestGain(integrator, one_newton_step, tolerance), 1.25 * undivided) << toString(integrator) << " " << tolerance;
+        EXPECT_LT(largestGain(integrator, one_newton_step, tolerance), 1.25 * undivided)
+            << toString(integrator) << " " << tolerance;
   }
 }
 
@@ -375,5 +383,5 @@ TEST(ClothGroup, ErrorControlDoesNotStartBelowItsShortestStep)
   EXPECT_EQ(milliseconds(2.5e-9), "2.5e-06 ms");
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -14,7 +14,11 @@ struct Cloth
   ClothState state;
   ClothInputs inputs;
 
-  explicit Cloth(ClothModel m) : model(std::make_shared<ClothModel>(std::move(m))), state(makeClothState(*model, model->rest.vertices)) {}
+  explicit Cloth(ClothModel m)
+    : model(std::make_shared<ClothModel>(std::move(m))),
+      state(makeClothState(*model, model->rest.vertices))
+  {
+  }
   void pin(const std::vector<int>& vertices)
   {
     pinVertices(state, vertices);
@@ -27,7 +31,8 @@ struct Cloth
 /// Soft enough for its ripples to be resolved; everything at work. Swings from two corners.
 Cloth swinging(BendingModel bending)
 {
-  ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.5, 5, 5, GridPattern::alternating), 0.2, isotropicMembrane(3e3, 0.3, 1e-3));
+  ClothModel model =
+      buildCloth("sheet", gridMesh(0.5, 0.5, 5, 5, GridPattern::alternating), 0.2, isotropicMembrane(3e3, 0.3, 1e-3));
   model.bending = bending;
   model.bending_modulus = 1e-4;
   model.mass_damping = 0.3;
@@ -36,7 +41,8 @@ Cloth swinging(BendingModel bending)
   Cloth cloth(std::move(model));
   cloth.pin({0, 5});
   cloth.inputs.wind = Vector3d(0.3, 0.5, 1);
-  for (Eigen::Index i = 0; i < cloth.state.x.cols(); ++i)   // from rest it would start with a jump of the acceleration at the pins
+  for (Eigen::Index i = 0; i < cloth.state.x.cols();
+       ++i)   // from rest it would start with a jump of the acceleration at the pins
     cloth.state.v.col(i) = Vector3d(0, 0, 0.8 * cloth.state.x(1, i) * cloth.state.x(1, i));
   return cloth;
 }
@@ -67,7 +73,9 @@ TEST(ClothIntegrators, HaveTheirOrder)
   {
     const double end = 0.16;
     const Matrix3Xd fine = run(swinging(bending), with(Integrator::tr_bdf2), end, 640);
-    const auto error = [&](const ClothOptions& o, int steps) { return (run(swinging(bending), o, end, steps) - fine).norm(); };
+    const auto error = [&](const ClothOptions& o, int steps) {
+      return (run(swinging(bending), o, end, steps) - fine).norm();
+    };
     for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
       for (const bool one_newton_step : {false, true})
       {
@@ -89,7 +97,8 @@ TEST(ClothIntegrators, TrBdf2FallsExactly)
   for (const BendingModel bending : {BendingModel::none, BendingModel::hinge, BendingModel::isometric_conforming})
     for (const bool one_newton_step : {false, true})
     {
-      ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.4, 8, 0, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 1e-3));
+      ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.4, 8, 0, GridPattern::alternating), 0.2,
+                                    isotropicMembrane(1e6, 0.3, 1e-3));
       model.bending = bending;
       model.bending_modulus = 1e-4;
       model.stiffness_damping = 1e-3;
@@ -116,7 +125,8 @@ TEST(ClothIntegrators, TrBdf2FallsExactly)
 TEST(ClothIntegrators, TrBdf2KeepsTheEnergyOfWhatItResolves)
 {
   const auto lost = [](Integrator integrator) {
-    ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.5, 5, 5, GridPattern::alternating), 0.2, isotropicMembrane(1e5, 0.3, 1e-3));
+    ClothModel model =
+        buildCloth("sheet", gridMesh(0.5, 0.5, 5, 5, GridPattern::alternating), 0.2, isotropicMembrane(1e5, 0.3, 1e-3));
     model.bending_modulus = 1e-4;
     Cloth cloth(std::move(model));
     cloth.inputs.gravity.setZero();
@@ -152,16 +162,19 @@ TEST(ClothIntegrators, PinsCarryTheWeight)
     for (int k = 0; k < static_cast<int>(6 / h); ++k)
       ASSERT_TRUE(stepper.step(cloth.state, cloth.inputs, h).ok);
     const double weight = 9.81 * cloth.model->totalMass();
-    EXPECT_LT((stepper.pinForces().rowwise().sum() - Vector3d(0, 0, -weight)).norm(), 1e-4 * weight) << toString(integrator);
+    EXPECT_LT((stepper.pinForces().rowwise().sum() - Vector3d(0, 0, -weight)).norm(), 1e-4 * weight)
+        << toString(integrator);
   }
 }
 
 /// All vertices held and accelerated: the pins feel the weight and the inertia, whatever the integrator.
 TEST(ClothIntegrators, PinsFeelTheInertiaOfWhatTheyMove)
 {
-  for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2, Integrator::imex, Integrator::symplectic_euler})
+  for (const Integrator integrator :
+       {Integrator::implicit_euler, Integrator::tr_bdf2, Integrator::imex, Integrator::symplectic_euler})
   {
-    Cloth cloth(buildCloth("sheet", gridMesh(0.3, 0.3, 4, 4, GridPattern::alternating), 0.2, isotropicMembrane(1e5, 0.3, 1e-3)));
+    Cloth cloth(buildCloth("sheet", gridMesh(0.3, 0.3, 4, 4, GridPattern::alternating), 0.2,
+                           isotropicMembrane(1e5, 0.3, 1e-3)));
     std::vector<int> all;
     for (int i = 0; i < cloth.model->vertices(); ++i)
       all.push_back(i);
@@ -241,12 +254,14 @@ TEST(ClothIntegrators, KeepTheErrorAsked)
   }
 }
 
-/// A strip that hardly has a membrane: bending of any stiffness does not limit the step; the explicit step blows up at once.
+/// A strip that hardly has a membrane: bending of any stiffness does not limit the step; the explicit step blows up at
+/// once.
 TEST(ClothIntegrators, ImexBendingIsUnconditionallyStable)
 {
   for (const double modulus : {1e-3, 1.0, 1e3})
   {
-    ClothModel model = buildCloth("strip", gridMesh(1.0, 0.1, 20, 2, GridPattern::alternating), 0.2, isotropicMembrane(1.0, 0.3, 1e-3));
+    ClothModel model = buildCloth("strip", gridMesh(1.0, 0.1, 20, 2, GridPattern::alternating), 0.2,
+                                  isotropicMembrane(1.0, 0.3, 1e-3));
     model.bending_modulus = modulus;
     for (const Integrator integrator : {Integrator::imex, Integrator::symplectic_euler})
     {
@@ -259,7 +274,8 @@ TEST(ClothIntegrators, ImexBendingIsUnconditionallyStable)
       const double start = stepper.energies(cloth.state, Vector3d::Zero()).total();
       bool good = true;
       for (int k = 0; k < 200 && good; ++k)
-        good = stepper.step(cloth.state, cloth.inputs, 0.02).ok && stepper.energies(cloth.state, Vector3d::Zero()).total() < 1.01 * start;
+        good = stepper.step(cloth.state, cloth.inputs, 0.02).ok &&
+               stepper.energies(cloth.state, Vector3d::Zero()).total() < 1.01 * start;
       EXPECT_EQ(good, integrator == Integrator::imex) << modulus;
     }
   }
@@ -268,7 +284,8 @@ TEST(ClothIntegrators, ImexBendingIsUnconditionallyStable)
 /// One free vertex mode: a step of imex is (m/h^2 + k) d = m v/h - k x for the bending's own modes.
 TEST(ClothIntegrators, ImexStepIsItsFormula)
 {
-  ClothModel model = buildCloth("strip", gridMesh(0.5, 0.2, 5, 2, GridPattern::alternating), 0.2, isotropicMembrane(1e-9, 0.3, 1e-3));
+  ClothModel model =
+      buildCloth("strip", gridMesh(0.5, 0.2, 5, 2, GridPattern::alternating), 0.2, isotropicMembrane(1e-9, 0.3, 1e-3));
   model.bending_modulus = 2e-3;
   model.mass_damping = 0.7;
   model.stiffness_damping = 3e-3;
@@ -287,11 +304,14 @@ TEST(ClothIntegrators, ImexStepIsItsFormula)
   ClothStepper stepper(cloth.model, with(Integrator::imex));
   ASSERT_TRUE(stepper.step(cloth.state, cloth.inputs, h).ok);
   const auto element = IsometricElement::nonconforming;
-  const MatrixXd k = MatrixXd(isometricBending(model.rest, model.topology, element,
-                                               2e-3 * bendingCalibration(model.rest, model.topology, element, model.warp)).toEigen());
+  const MatrixXd k =
+      MatrixXd(isometricBending(model.rest, model.topology, element,
+                                2e-3 * bendingCalibration(model.rest, model.topology, element, model.warp))
+                   .toEigen());
   const MatrixXd m = model.mass.asDiagonal();
   const Matrix3Xd d = cloth.state.x - before.x;
-  Matrix3Xd residual = d * (m * (1 / (h * h) + 0.7 / h) + (1 + 3e-3 / h) * k) - before.v * m / h + before.x * k - cloth.inputs.gravity * model.mass.transpose();
+  Matrix3Xd residual = d * (m * (1 / (h * h) + 0.7 / h) + (1 + 3e-3 / h) * k) - before.v * m / h + before.x * k -
+                       cloth.inputs.gravity * model.mass.transpose();
   EXPECT_LT((stepper.pinForces().col(0) + residual.col(0)).norm(), 1e-9 * residual.col(0).norm());
   residual.col(0).setZero();
   EXPECT_LT(residual.norm(), 1e-8 * (before.v * m / h).norm());
@@ -307,5 +327,5 @@ TEST(ClothIntegrators, RefuseWhatTheyCannot)
   EXPECT_THROW(ClothStepper(hinged.model, o), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -13,7 +13,8 @@ constexpr double kYield = 2.0;   // [1/m]
 /// Equilateral triangles with edges along x.
 ClothModel strip(const Plasticity& plasticity, int cells = 4)
 {
-  ClothModel model = buildCloth("strip", gridMesh(0.1, 0.3, cells, 0, GridPattern::equilateral), 0.2, isotropicMembrane(1e6, 0.3, 1e-3));
+  ClothModel model = buildCloth("strip", gridMesh(0.1, 0.3, cells, 0, GridPattern::equilateral), 0.2,
+                                isotropicMembrane(1e6, 0.3, 1e-3));
   model.bending = BendingModel::hinge;
   model.bending_modulus = 1e-3;
   model.plasticity = plasticity;
@@ -50,7 +51,9 @@ VectorXd widthsOf(const ClothModel& model)
   {
     const int edge = model.topology.hinge_edges[h];
     widths[h] = 2 * (areas[model.topology.edge_faces(0, edge)] + areas[model.topology.edge_faces(1, edge)]) /
-                (model.rest.vertices.col(model.topology.edges(0, edge)) - model.rest.vertices.col(model.topology.edges(1, edge))).norm();
+                (model.rest.vertices.col(model.topology.edges(0, edge)) -
+                 model.rest.vertices.col(model.topology.edges(1, edge)))
+                    .norm();
   }
   return widths;
 }
@@ -60,7 +63,8 @@ std::vector<int> creases(const ClothModel& model)
 {
   std::vector<int> found;
   for (int h = 0; h < model.topology.hingeCount(); ++h)
-    if (std::abs(model.rest.vertices(1, model.topology.hinges(0, h)) - model.rest.vertices(1, model.topology.hinges(1, h))) < 1e-9)
+    if (std::abs(model.rest.vertices(1, model.topology.hinges(0, h)) -
+                 model.rest.vertices(1, model.topology.hinges(1, h))) < 1e-9)
       found.push_back(h);
   return found;
 }
@@ -150,14 +154,20 @@ TEST(ClothPlasticity, HardensAndSoftens)
       {
         const double flowed = std::abs(bent[h]) / width[h] - kYield;
         EXPECT_NEAR(state.stiffening[h], std::exp(hardening * flowed), 1e-9);
-        work += 0.5 * hingeStiffness(model->rest, model->topology, model->bending_modulus * bendingCalibration(model->rest, model->topology, IsometricElement::nonconforming, model->warp))[h] *
+        work += 0.5 *
+                hingeStiffness(
+                    model->rest, model->topology,
+                    model->bending_modulus * bendingCalibration(model->rest, model->topology,
+                                                                IsometricElement::nonconforming, model->warp))[h] *
                 state.stiffening[h] * std::pow(kYield * width[h], 2);
       }
-      EXPECT_NEAR(stepper.energies(state, Vector3d::Zero()).bending, work, 1e-6 * work);   // energies know the stiffening
+      // energies know the stiffening
+      EXPECT_NEAR(stepper.energies(state, Vector3d::Zero()).bending, work, 1e-6 * work);
     }
 }
 
-/// Mean curvature yields where edges lie along the axis; across them hinges carry two thirds of that, for small triangles.
+/// Mean curvature yields where edges lie along the axis; across them hinges carry two thirds of that, for small
+/// triangles.
 TEST(ClothPlasticity, YieldDependsOnTheMeshsDirection)
 {
   const ClothModel model = strip({kYield, 0.0, 0.0}, 24);
@@ -224,7 +234,8 @@ TEST(ClothPlasticity, FlowOnlyTakesEnergy)
           plastic.flow(state, 0.01);
           EXPECT_LT(stepper.energies(state, Vector3d::Zero()).bending, before * (1 + 1e-12)) << hardening;
           EXPECT_NE(state.rest_angles, rest);
-          EXPECT_TRUE(state.stiffening.allFinite() && state.stiffening.minCoeff() >= 1e-3 && state.stiffening.maxCoeff() <= 1e3);
+          EXPECT_TRUE(state.stiffening.allFinite() && state.stiffening.minCoeff() >= 1e-3 &&
+                      state.stiffening.maxCoeff() <= 1e3);
         }
       }
 }
@@ -290,7 +301,8 @@ TEST(ClothPlasticity, RefusesWhatIsNotValid)
   ClothModel flat = strip({kYield, 0, 0});
   flat.bending = BendingModel::isometric_nonconforming;
   EXPECT_THROW(PlasticFlow{flat}, std::invalid_argument);
-  for (const Plasticity& bad : {Plasticity{-1, 0, 0}, Plasticity{NAN, 0, 0}, Plasticity{1, INFINITY, 0}, Plasticity{1, 0, -1}})
+  for (const Plasticity& bad :
+       {Plasticity{-1, 0, 0}, Plasticity{NAN, 0, 0}, Plasticity{1, INFINITY, 0}, Plasticity{1, 0, -1}})
     EXPECT_THROW(PlasticFlow(strip(bad)), std::invalid_argument);
   auto model = std::make_shared<ClothModel>(strip({kYield, 0, 0}));
   ClothState state = makeClothState(*model, model->rest.vertices);
@@ -302,5 +314,5 @@ TEST(ClothPlasticity, RefusesWhatIsNotValid)
   EXPECT_THROW(makeClothState(wrong, wrong.rest.vertices), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -52,9 +52,7 @@ TEST(ClothStaticsScene, aClampHoldsTheSlopeOfAnEdge)
   // Steps from there stay there.
   const double start = tip(simulation);
   for (int k = 0; k < 20; ++k)
-  {
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-  }
   EXPECT_NEAR(tip(simulation), start, 1e-4 * start);   // Newton's tolerance over 20 steps
   EXPECT_NE(problemsOf({"cloths.0.grasps.wall.clamp=maybe"}).find("clamp"), std::string::npos);
 }
@@ -75,20 +73,24 @@ TEST(ClothStaticsScene, pointLoadsActOnEachVertexInStaticsAndInDynamics)
 
 TEST(ClothStaticsScene, loadFactorsScaleGravityAndLoads)
 {
-  Simulation simulation(parseScene(strip, "t", {"statics={factors: [1, 2]}", "cloths.0.loads=[{edge: upper, force: [0, 0, -1.0e-5]}]"}), false);
+  Simulation simulation(
+      parseScene(strip, "t", {"statics={factors: [1, 2]}", "cloths.0.loads=[{edge: upper, force: [0, 0, -1.0e-5]}]"}),
+      false);
   const StaticsRun run = simulation.runStatics();
   ASSERT_TRUE(run.end.ok) << run.end.message;
   ASSERT_EQ(run.rows.size(), 2u);
   EXPECT_TRUE(run.rows[0].report.stable);
   EXPECT_GT(run.rows[0].displacement, 1e-3 / 8);
-  EXPECT_NEAR(run.rows[1].displacement / run.rows[0].displacement, 2.0, 1e-5);   // deflections of 1e-4 of the length are linear
+  // deflections of 1e-4 of the length are linear
+  EXPECT_NEAR(run.rows[1].displacement / run.rows[0].displacement, 2.0, 1e-5);
 }
 
 TEST(ClothStaticsScene, whatHasNoStaticsIsRefused)
 {
   EXPECT_NE(problemsOf({"cloths.0.contact={}"}).find("has contact"), std::string::npos);
-  EXPECT_NE(problemsOf({"cloths.0.bending={model: conforming, modulus: 1}"}).find("leave out clamp"), std::string::npos);
+  EXPECT_NE(problemsOf({"cloths.0.bending={model: conforming, modulus: 1}"}).find("leave out clamp"),
+            std::string::npos);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -8,7 +8,8 @@
 namespace slender::test {
 namespace {
 
-constexpr BendingModel kBendings[] = {BendingModel::none, BendingModel::hinge, BendingModel::isometric_nonconforming, BendingModel::isometric_conforming};
+constexpr BendingModel kBendings[] = {BendingModel::none, BendingModel::hinge, BendingModel::isometric_nonconforming,
+                                      BendingModel::isometric_conforming};
 
 ClothModel sheet(BendingModel bending, int cells = 8, GridPattern pattern = GridPattern::alternating)
 {
@@ -24,7 +25,11 @@ struct Cloth
   ClothState state;
   ClothInputs inputs;
 
-  explicit Cloth(ClothModel m) : model(std::make_shared<ClothModel>(std::move(m))), state(makeClothState(*model, model->rest.vertices)) {}
+  explicit Cloth(ClothModel m)
+    : model(std::make_shared<ClothModel>(std::move(m))),
+      state(makeClothState(*model, model->rest.vertices))
+  {
+  }
   void pin(const std::vector<int>& vertices)
   {
     pinVertices(state, vertices);
@@ -82,7 +87,8 @@ TEST(ClothStepper, FallsFreely)
 TEST(ClothStepper, BalancesForcesWhateverActs)
 {
   for (const BendingModel bending : kBendings)
-    for (const ClothSolver solver : {ClothSolver::cholesky, ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
+    for (const ClothSolver solver :
+         {ClothSolver::cholesky, ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
     {
       Cloth cloth = busy(bending);
       ClothStepper stepper(cloth.model, options(solver));
@@ -139,8 +145,11 @@ TEST(ClothStepper, MethodsConverge)
     };
     const Matrix3Xd reference = run(Integrator::symplectic_euler, false, 8000);
     const double size = (reference - sheet(bending).rest.vertices).norm();
-    const auto error = [&](Integrator integrator, bool one, int steps) { return (run(integrator, one, steps) - reference).norm() / size; };
-    const double coarse = error(Integrator::implicit_euler, false, 40), fine = error(Integrator::implicit_euler, false, 160);
+    const auto error = [&](Integrator integrator, bool one, int steps) {
+      return (run(integrator, one, steps) - reference).norm() / size;
+    };
+    const double coarse = error(Integrator::implicit_euler, false, 40),
+                 fine = error(Integrator::implicit_euler, false, 160);
     EXPECT_LT(fine, 0.02);
     EXPECT_LT(fine, 0.4 * coarse);
     EXPECT_LT(error(Integrator::implicit_euler, true, 160), 0.03);
@@ -159,7 +168,8 @@ TEST(ClothStepper, PinsCarryTheWeight)
     for (int k = 0; k < 200; ++k)
       ASSERT_TRUE(stepper.step(cloth.state, cloth.inputs, 0.05).ok);
     const double weight = 9.81 * cloth.model->totalMass();
-    EXPECT_LT((stepper.pinForces().rowwise().sum() - Vector3d(0, 0, -weight)).norm(), 1e-6 * weight) << toString(bending);
+    EXPECT_LT((stepper.pinForces().rowwise().sum() - Vector3d(0, 0, -weight)).norm(), 1e-6 * weight)
+        << toString(bending);
   }
 }
 
@@ -228,7 +238,8 @@ TEST(ClothStepper, KeepsItsRestAngles)
   // a quarter of a cylinder at rest stays one
   TriangleMesh mesh = gridMesh(1.0, 0.5, 12, 6, GridPattern::irregular);
   for (Eigen::Index i = 0; i < mesh.vertices.cols(); ++i)
-    mesh.vertices.col(i) << std::sin(1.5 * mesh.vertices(0, i)), mesh.vertices(1, i), std::cos(1.5 * mesh.vertices(0, i));
+    mesh.vertices.col(i) << std::sin(1.5 * mesh.vertices(0, i)), mesh.vertices(1, i),
+        std::cos(1.5 * mesh.vertices(0, i));
   ClothModel model = buildCloth("shell", mesh, 0.2, isotropicMembrane(1e6, 0.3, 1e-3));
   model.bending = BendingModel::hinge;
   model.bending_modulus = 0.1;
@@ -248,7 +259,8 @@ TEST(ClothStepper, RoughStartsGiveNoNaN)
       for (const double modulus : {1e-1, 1e4, 1e9})
         for (int kind = 0; kind < 4; ++kind)
         {
-          ClothModel model = buildCloth("c", gridMesh(0.5, 0.5, 5, 5, GridPattern::alternating), 0.2, isotropicMembrane(modulus, 0.3, 1e-3));
+          ClothModel model = buildCloth("c", gridMesh(0.5, 0.5, 5, 5, GridPattern::alternating), 0.2,
+                                        isotropicMembrane(modulus, 0.3, 1e-3));
           model.bending = bending;
           model.bending_modulus = 1e-4;
           Cloth cloth(model);
@@ -331,7 +343,8 @@ TEST(ClothStepper, RefusesBadInputAndLeavesTheStateAlone)
 
 TEST(ClothPreconditioner, SaysWhenItsConstantPartCannotBeFactored)
 {
-  const ClothModel model = buildCloth("cloth", gridMesh(0.1, 0.1, 4, 4, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 5e-4));
+  const ClothModel model =
+      buildCloth("cloth", gridMesh(0.1, 0.1, 4, 4, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 5e-4));
   const BlockMatrix pattern(model.vertices(), {model.rest.triangles});
   ClothPreconditioner preconditioner(model, PointMatrix(), pattern, false);
   const std::vector<char> held(model.vertices(), 0);
@@ -339,5 +352,5 @@ TEST(ClothPreconditioner, SaysWhenItsConstantPartCannotBeFactored)
   EXPECT_FALSE(preconditioner.setConstant(std::vector<double>(model.vertices(), -1e9), 1.0, held));
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -12,7 +12,8 @@ const double kArea = 0.5 * 0.4;
 
 ClothModel flat(double drag, double lift)
 {
-  ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.4, 4, 4, GridPattern::irregular), 0.2, isotropicMembrane(1e4, 0.3, 1e-3));
+  ClothModel model =
+      buildCloth("sheet", gridMesh(0.5, 0.4, 4, 4, GridPattern::irregular), 0.2, isotropicMembrane(1e4, 0.3, 1e-3));
   model.aerodynamics = {kRho, drag, lift};
   return model;
 }
@@ -25,7 +26,10 @@ Matrix3Xd forces(const ClothModel& model, const Matrix3Xd& v, const Vector3d& wi
   return matrixOf(force);
 }
 
-Vector3d total(const ClothModel& model, const Vector3d& wind) { return forces(model, Matrix3Xd::Zero(3, model.vertices()), wind).rowwise().sum(); }
+Vector3d total(const ClothModel& model, const Vector3d& wind)
+{
+  return forces(model, Matrix3Xd::Zero(3, model.vertices()), wind).rowwise().sum();
+}
 
 TEST(ClothWind, PlatesAtAnAngleFeelDragAndLift)
 {
@@ -33,20 +37,22 @@ TEST(ClothWind, PlatesAtAnAngleFeelDragAndLift)
     for (const double speed : {0.3, 20.0})
     {
       const double angle = degrees * M_PI / 180, pressure = 0.5 * kRho * speed * speed * kArea;
-      const Vector3d along(std::cos(angle), 0, std::sin(angle));                        // the sheet lies in z = 0
+      const Vector3d along(std::cos(angle), 0, std::sin(angle));   // the sheet lies in z = 0
       const double c = std::abs(along.z()), side = along.z() > 0 ? 1 : -1;
       const Vector3d drag = total(flat(kDrag, 0), speed * along), lift = total(flat(0, kLift), speed * along);
       EXPECT_LT((drag - pressure * kDrag * c * along).norm(), 1e-12 * pressure) << degrees;
       EXPECT_NEAR(lift.dot(along), 0.0, 1e-12 * pressure);
-      const Vector3d across = (side * Vector3d::UnitZ() - c * along);                   // of length sqrt(1 - c^2), towards the lee side
+      // of length sqrt(1 - c^2), towards the lee side
+      const Vector3d across = (side * Vector3d::UnitZ() - c * along);
       EXPECT_LT((lift - pressure * kLift * c * across).norm(), 1e-12 * pressure) << degrees;
       EXPECT_LT((total(flat(kDrag, kLift), speed * along) - drag - lift).norm(), 1e-12 * pressure);
     }
-  EXPECT_EQ(total(flat(kDrag, kLift), Vector3d(7, 3, 0)), Vector3d(0, 0, 0));           // along the sheet
+  EXPECT_EQ(total(flat(kDrag, kLift), Vector3d(7, 3, 0)), Vector3d(0, 0, 0));   // along the sheet
   EXPECT_EQ(total(flat(kDrag, kLift), Vector3d(0, 0, 0)), Vector3d(0, 0, 0));
 }
 
-/// What an implicit step takes: the force at the start's velocities exactly, and of the derivative a positive semidefinite part.
+/// What an implicit step takes: the force at the start's velocities exactly, and of the derivative a positive
+/// semidefinite part.
 TEST(ClothWind, LinearisedForcesTouchTheTrueOnes)
 {
   Random random(5);
@@ -82,9 +88,10 @@ TEST(ClothWind, LinearisedForcesTouchTheTrueOnes)
     const MatrixXd d = h * denseOf(matrix);
     EXPECT_GE(smallestEigenvalue(d), -1e-14);
     const MatrixXd slope = differences(v, 1e-4, [&](const Matrix3Xd& at) { return flattened(linearised(at)); });
-    EXPECT_LT((slope + d).norm(), 1e-9 * d.norm());                                     // Hessian and gradient agree
-    const MatrixXd truth = differences(v, 1e-4, [&](const Matrix3Xd& at) { return flattened(forces(model, at, wind)); });
-    for (int i = 0; i < n; ++i)                                                         // along the normal
+    EXPECT_LT((slope + d).norm(), 1e-9 * d.norm());   // Hessian and gradient agree
+    const MatrixXd truth =
+        differences(v, 1e-4, [&](const Matrix3Xd& at) { return flattened(forces(model, at, wind)); });
+    for (int i = 0; i < n; ++i)   // along the normal
       if (normal_flow)
         EXPECT_NEAR(truth(3 * i + 2, 3 * i + 2), -d(3 * i + 2, 3 * i + 2), 1e-8 * d.norm());
       else
@@ -164,7 +171,8 @@ TEST(ClothWind, StormsAndLongStepsStayFinite)
         ASSERT_TRUE(report.ok) << report.message;
         fastest = std::max(fastest, state.v.colwise().norm().maxCoeff());
       }
-      EXPECT_LT(fastest, lift > kDrag ? 300.0 : 30.0) << lift << " " << h;   // lift beyond the drag makes it flutter, however short the step
+      // lift beyond the drag makes it flutter, however short the step
+      EXPECT_LT(fastest, lift > kDrag ? 300.0 : 30.0) << lift << " " << h;
       EXPECT_LT(state.x.norm(), 20.0);
     }
 }
@@ -176,5 +184,5 @@ TEST(ClothWind, RefusesBadCoefficients)
   EXPECT_FALSE(WindLoad(flat(0, 0)).active());
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

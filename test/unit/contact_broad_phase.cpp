@@ -61,8 +61,8 @@ TEST(BroadPhase, NeighboursAreMeasuredAlongTheCurve)
   EXPECT_FALSE(contactNeighbours(segment(0.0), segment(0.98 - 1.01 * reach), ring, 0.002));
 }
 
-/// A bundle that is shaken, sometimes violently, as far as stepLimit() lets it: whatever the history of calls, energy and terms depend on
-/// the configuration only, and nothing ever meets.
+/// A bundle that is shaken, sometimes violently, as far as stepLimit() lets it: whatever the history of calls, energy
+/// and terms depend on the configuration only, and nothing ever meets.
 TEST(BroadPhase, CandidatesKeptFromEarlierCallsChangeNothing)
 {
   Random random(2);
@@ -135,5 +135,5 @@ TEST(BroadPhase, CandidatesKeptFromEarlierCallsChangeNothing)
   EXPECT_EQ(kept.stepLimit(x, x, poses, poses), 0.0);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

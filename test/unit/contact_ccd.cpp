@@ -12,8 +12,8 @@ using Vector = Eigen::Vector3d;
 constexpr double kThickness = 0.1, kReach = 0.02, kKept = 0.2;
 constexpr int kSamples = 2000;
 
-/// Checks a share of a motion against distances sampled along it; returns the smallest gap up to the share, over what had to be kept.
-/// `gap` gives the gap at a time.
+/// Checks a share of a motion against distances sampled along it; returns the smallest gap up to the share, over what
+/// had to be kept. `gap` gives the gap at a time.
 template <class Gap>
 double checkShare(double share, Gap gap)
 {
@@ -29,11 +29,13 @@ double checkShare(double share, Gap gap)
     least = std::min(least, gap(share * i / kSamples));
   EXPECT_GE(least, keep * (1 - 1e-9) - 1e-14);
   // not timid: it ends at the end, or near the kept gap
-  EXPECT_TRUE(share == 1.0 || gap(share) <= 1.2 * keep) << "share " << share << " leaves " << gap(share) << " of " << start;
+  EXPECT_TRUE(share == 1.0 || gap(share) <= 1.2 * keep)
+      << "share " << share << " leaves " << gap(share) << " of " << start;
   return least / keep;
 }
 
-/// Points and motions: general, without motion, common translation, grazing at about the thickness, parallel, starting just outside it.
+/// Points and motions: general, without motion, common translation, grazing at about the thickness, parallel, starting
+/// just outside it.
 struct Draw
 {
   Vector from[4], to[4];
@@ -84,7 +86,8 @@ TEST(ContinuousCollision, SegmentsKeepTheirGap)
     const Draw d = draw(random, k % kKinds);
     const double share = segmentsLimit(d.point(0), d.point(1), d.point(2), d.point(3), limit);
     stopped += share < 1.0;
-    checkShare(share, [&](double t) { return segmentDistance(d.at(0, t), d.at(1, t), d.at(2, t), d.at(3, t)) - kThickness; });
+    checkShare(share,
+               [&](double t) { return segmentDistance(d.at(0, t), d.at(1, t), d.at(2, t), d.at(3, t)) - kThickness; });
     ASSERT_FALSE(HasFailure()) << "case " << k << " kind " << k % kKinds;
   }
   EXPECT_GT(stopped, 300);
@@ -98,10 +101,13 @@ TEST(ContinuousCollision, PointsKeepTheirGapFromSegmentsAndTriangles)
   {
     const Draw d = draw(random, k % kKinds);
     const double segment = pointSegmentLimit(d.point(2), d.point(0), d.point(1), limit);
-    checkShare(segment, [&](double t) { return pointSegmentDistance(d.at(2, t), d.at(0, t), d.at(1, t)) - kThickness; });
+    checkShare(segment,
+               [&](double t) { return pointSegmentDistance(d.at(2, t), d.at(0, t), d.at(1, t)) - kThickness; });
     ASSERT_FALSE(HasFailure()) << "case " << k << " kind " << k % kKinds;
     const double triangle = pointTriangleLimit(d.point(2), d.point(0), d.point(1), d.point(3), limit);
-    checkShare(triangle, [&](double t) { return pointTriangleDistance(d.at(2, t), d.at(0, t), d.at(1, t), d.at(3, t)) - kThickness; });
+    checkShare(triangle, [&](double t) {
+      return pointTriangleDistance(d.at(2, t), d.at(0, t), d.at(1, t), d.at(3, t)) - kThickness;
+    });
     ASSERT_FALSE(HasFailure()) << "case " << k << " kind " << k % kKinds;
     stopped += segment < 1.0 || triangle < 1.0;
   }
@@ -118,13 +124,11 @@ TEST(ContinuousCollision, NothingTunnels)
     const Vector e = random.direction(), f = random.direction(), v = 100.0 * random.direction(), w = random.vector();
     const double s = random.uniform(-0.45, 0.45), t = random.uniform(-0.45, 0.45), when = random.uniform(0.1, 0.9);
     const Vector a = -s * e - when * v, b = -t * f - when * w;
-    const MovingPoint a0{a - 0.5 * e, a - 0.5 * e + v}, a1{a + 0.5 * e, a + 0.5 * e + v}, b0{b - 0.5 * f, b - 0.5 * f + w},
-      b1{b + 0.5 * f, b + 0.5 * f + w};
+    const MovingPoint a0{a - 0.5 * e, a - 0.5 * e + v}, a1{a + 0.5 * e, a + 0.5 * e + v},
+        b0{b - 0.5 * f, b - 0.5 * f + w}, b1{b + 0.5 * f, b + 0.5 * f + w};
     const ApproachLimit thin{1e-4, 1e-5, 0.2};
     if (segmentDistance(a0.from, a1.from, b0.from, b1.from) > 1e-3)
-    {
       EXPECT_LT(segmentsLimit(a0, a1, b0, b1, thin), when);
-    }
   }
 }
 
@@ -132,18 +136,22 @@ TEST(ContinuousCollision, TurningSolidsKeepTheirGap)
 {
   Random random(4);
   const Triangle triangle{Vector(-0.3, -0.2, 0.1), Vector(0.4, -0.1, 0.0), Vector(0.0, 0.5, -0.1)};
-  const std::vector<ConvexPiece> pieces{Plane{}, Sphere{0.3}, Box{{0.4, 0.3, 0.6}}, Cylinder{0.3, 0.5}, Capsule{0.02, 0.5}, triangle};
+  const std::vector<ConvexPiece> pieces{
+      Plane{}, Sphere{0.3}, Box{{0.4, 0.3, 0.6}}, Cylinder{0.3, 0.5}, Capsule{0.02, 0.5}, triangle};
   int stopped = 0;
   for (std::size_t shape = 0; shape < pieces.size(); ++shape)
     for (int k = 0; k < 300; ++k)
     {
       const Vector a = random.vector(1.5), b = random.vector(1.5);
       const bool still = k % 4 == 0, rigid = k % 4 == 1;
-      const MovingPoint ma{a, rigid ? a : Vector(a + random.vector(2.0))}, mb{b, rigid ? b : Vector(b + random.vector(2.0))};
+      const MovingPoint ma{a, rigid ? a : Vector(a + random.vector(2.0))},
+          mb{b, rigid ? b : Vector(b + random.vector(2.0))};
       const Pose from{random.vector(0.3), random.rotation()};
       const Pose to = still ? from : Pose{random.vector(), random.rotation()};
       const RigidMotion motion(from, to);
-      EXPECT_LT((motion.at(1.0).position - to.position).norm() + motion.at(1.0).orientation.angularDistance(to.orientation), 1e-7);
+      EXPECT_LT(
+          (motion.at(1.0).position - to.position).norm() + motion.at(1.0).orientation.angularDistance(to.orientation),
+          1e-7);
       const double share = segmentSolidLimit(ma, mb, pieces[shape], motion, limit);
       stopped += share > 0.0 && share < 1.0;
       const auto gap = [&](double t) {
@@ -167,10 +175,11 @@ TEST(ContinuousCollision, TurningSolidsKeepTheirGap)
       const double keep = kKept * std::min(start, kReach);
       for (int i = 0; i <= 100; ++i)
         ASSERT_GE(gap(share * i / 100), keep * (1 - 1e-9) - 1e-12) << "shape " << shape << " case " << k;
-      ASSERT_TRUE(share == 1.0 || gap(share) <= 1.2 * keep) << "shape " << shape << " case " << k << " share " << share << " leaves " << gap(share);
+      ASSERT_TRUE(share == 1.0 || gap(share) <= 1.2 * keep)
+          << "shape " << shape << " case " << k << " share " << share << " leaves " << gap(share);
     }
   EXPECT_GT(stopped, 200);   // many draws start inside each other
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -11,7 +11,8 @@ namespace {
 
 using Vector = Eigen::Vector3d;
 
-/// Two segments in a position that a case number picks: general, parallel, nearly parallel, collinear, crossing, without length.
+/// Two segments in a position that a case number picks: general, parallel, nearly parallel, collinear, crossing,
+/// without length.
 struct Segments
 {
   Vector a0, a1, b0, b1;
@@ -19,13 +20,19 @@ struct Segments
 Segments segments(Random& random, int kind)
 {
   const Vector a0 = random.vector(), e = random.vector();
-  const Vector f = kind == 1 ? Vector(random.uniform() * e) : kind == 2 ? Vector(e + 1e-7 * random.vector()) : kind == 3 ? Vector(2.0 * e)
-                   : kind == 5 ? Vector(Vector::Zero()) : random.vector();
-  const Vector b0 = kind == 3 ? Vector(a0 + random.uniform(-3, 3) * e) : kind == 4 ? Vector(a0 + 0.3 * e - 0.6 * f) : random.vector();
+  const Vector f = kind == 1   ? Vector(random.uniform() * e)
+                   : kind == 2 ? Vector(e + 1e-7 * random.vector())
+                   : kind == 3 ? Vector(2.0 * e)
+                   : kind == 5 ? Vector(Vector::Zero())
+                               : random.vector();
+  const Vector b0 = kind == 3   ? Vector(a0 + random.uniform(-3, 3) * e)
+                    : kind == 4 ? Vector(a0 + 0.3 * e - 0.6 * f)
+                                : random.vector();
   return {a0, kind == 5 && random.uniform() > 0 ? a0 : Vector(a0 + e), b0, b0 + f};
 }
 
-/// Stationarity over a box of parameters is enough for a convex function: no small move in either parameter, nor in both, comes nearer.
+/// Stationarity over a box of parameters is enough for a convex function: no small move in either parameter, nor in
+/// both, comes nearer.
 TEST(Distance, SegmentsAreNearestWhereTheySay)
 {
   Random random(1);
@@ -78,7 +85,8 @@ TEST(Distance, SolidsKnowTheirNormalsAndCurvatures)
 {
   Random random(3);
   const Triangle triangle{Vector(-0.3, -0.2, 0.1), Vector(0.4, -0.1, 0.0), Vector(0.0, 0.5, -0.1)};
-  const std::vector<ConvexPiece> pieces{Plane{}, Sphere{0.3}, Box{{0.4, 0.3, 0.6}}, Cylinder{0.3, 0.5}, Capsule{0.2, 0.5}, triangle};
+  const std::vector<ConvexPiece> pieces{Plane{},           Sphere{0.3}, Box{{0.4, 0.3, 0.6}}, Cylinder{0.3, 0.5},
+                                        Capsule{0.2, 0.5}, triangle};
   for (const ConvexPiece& piece : pieces)
     for (int k = 0; k < 2000; ++k)
     {
@@ -90,11 +98,10 @@ TEST(Distance, SolidsKnowTheirNormalsAndCurvatures)
       const auto d = [&](double s) { return pieceDistance(piece, p + s * e, e); };
       EXPECT_NEAR((d(kStep).distance - d(-kStep).distance) / (2 * kStep), at.normal.dot(e), 1e-7) << piece.index();
       // skipped where features of the surface change within the step
-      const double forward = (d(kStep).normal.dot(e) - at.normal.dot(e)) / kStep, backward = (at.normal.dot(e) - d(-kStep).normal.dot(e)) / kStep;
+      const double forward = (d(kStep).normal.dot(e) - at.normal.dot(e)) / kStep,
+                   backward = (at.normal.dot(e) - d(-kStep).normal.dot(e)) / kStep;
       if (std::abs(forward - backward) < 1e-2 * (1.0 + std::abs(forward)))
-      {
         EXPECT_NEAR(0.5 * (forward + backward), at.curvature, 1e-2 * (1.0 + at.curvature)) << piece.index();
-      }
       EXPECT_NEAR(pieceDistance(piece, p - at.distance * at.normal, e).distance, 0.0, 1e-14) << piece.index();
     }
 }
@@ -120,10 +127,11 @@ TEST(Friction, IsSmooth)
   {
     const double h = 1e-8;
     EXPECT_NEAR((law.energy(y + h) - law.energy(y - h)) / (2 * h), y * law.forceOverSlip(y), 1e-6);
-    EXPECT_NEAR(((y + h) * law.forceOverSlip(y + h) - (y - h) * law.forceOverSlip(y - h)) / (2 * h), law.slope(y), 1e-6);
+    EXPECT_NEAR(((y + h) * law.forceOverSlip(y + h) - (y - h) * law.forceOverSlip(y - h)) / (2 * h), law.slope(y),
+                1e-6);
   }
   EXPECT_EQ(law.forceOverSlip(0.3) * 0.3, 1.0);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

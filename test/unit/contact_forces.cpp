@@ -72,7 +72,8 @@ void expectContinuous(const std::function<Rods(double)>& motion)
 TEST(ContactForces, DoNotJumpAsRodsBecomeParallel)
 {
   static constexpr double kHeight = 2 * kRadius + 0.006;
-  // turning in the plane of contact, through parallel; tilting, so that the contact runs from one end to the other; both, off centre
+  // turning in the plane of contact, through parallel; tilting, so that the contact runs from one end to the other;
+  // both, off centre
   expectContinuous([](double s) {
     const double angle = 0.4 * (s - 0.5);
     return stacked({0.05, 0, kHeight}, {std::cos(angle), std::sin(angle), 0});
@@ -89,8 +90,8 @@ TEST(ContactForces, DoNotJumpAsRodsSlide)
     });
 }
 
-/// Rods do not feel each other's nodes: under a constant load the height of a rod that slides across another, over edges and over nodes,
-/// changes by a small share of the gap. (Steps in it act like teeth.)
+/// Rods do not feel each other's nodes: under a constant load the height of a rod that slides across another, over
+/// edges and over nodes, changes by a small share of the gap. (Steps in it act like teeth.)
 TEST(ContactForces, HardlyShowTheNodes)
 {
   for (double load : {2.0, 5.0, 15.0})   // gaps of about a third to a twelfth of the reach
@@ -105,7 +106,8 @@ TEST(ContactForces, HardlyShowTheNodes)
           {
             const double gap = 0.5 * (low + high);
             const Eigen::Vector3d along(std::cos(angle), std::sin(angle), 0);
-            Rods rods = stacked(Eigen::Vector3d(0.3 * k / 40.0 - 0.15, 0, 2 * kRadius + gap) + across * along, 0.8 * along);
+            Rods rods =
+                stacked(Eigen::Vector3d(0.3 * k / 40.0 - 0.15, 0, 2 * kRadius + gap) + across * along, 0.8 * along);
             ContactPotential potential(rods.surface, options());
             potential.setStiffness(1.0);
             const double energy = potential.evaluate(rods.x, {}, false);
@@ -144,13 +146,15 @@ TEST(ContactForces, StiffnessIsTheDerivativeOfTheForce)
       change = 0.5 * (change - gradient(potential, n));
       const Eigen::VectorXd predicted = h * Eigen::Map<const Eigen::VectorXd>(step.data(), step.size());
       // differences of forces over 1e-7 m; rows of less than a thousandth of a pair's stiffness are left out
-      EXPECT_LT((Eigen::Map<const Eigen::MatrixXd>(predicted.data(), 3, n) - change).norm(), 1e-3 * change.norm()) << angle;
+      EXPECT_LT((Eigen::Map<const Eigen::MatrixXd>(predicted.data(), 3, n) - change).norm(), 1e-3 * change.norm())
+          << angle;
     }
   }
 }
 
-/// Newton's method with these terms and a strict line search: a rod pressed on another by weights. Both are held as in an implicit step, by
-/// springs that alone would let the upper one sink 3 cm, and resist changes of their edges' vectors.
+/// Newton's method with these terms and a strict line search: a rod pressed on another by weights. Both are held as in
+/// an implicit step, by springs that alone would let the upper one sink 3 cm, and resist changes of their edges'
+/// vectors.
 TEST(ContactForces, NewtonConverges)
 {
   for (double angle : {0.0, 0.01, 0.2, 1.4})
@@ -192,7 +196,8 @@ TEST(ContactForces, NewtonConverges)
         const Eigen::Map<const Eigen::MatrixXd> move(direction.data(), 3, n);
         double share = potential.stepLimit(rods.x, rods.x + move, {}, {});
         ASSERT_GT(share, 0.0);
-        while (total(rods.x + share * move, false) > energy + 1e-4 * share * residual.dot(direction) + 1e-13 * std::abs(energy))
+        while (total(rods.x + share * move, false) >
+               energy + 1e-4 * share * residual.dot(direction) + 1e-13 * std::abs(energy))
         {
           share *= 0.5;
           ASSERT_GT(share, 1e-6) << "angle " << angle << " weight " << weight << " residual " << residual.norm();
@@ -228,14 +233,15 @@ TEST(ContactFriction, SticksAndSlipsAsCoulombSays)
     potential.evaluate(there, solids, true);
     const Eigen::Vector3d force = potential.terms().back().force;
     EXPECT_LE(force.norm(), kFriction * normal * (1 + 1e-12));
-    EXPECT_NEAR(force.dot(side), slip < full ? -kFriction * normal * 0.19 : -kFriction * normal, 1e-9 * normal);   // slips are 1e-7 m of coordinates of 0.1 m
+    // slips are 1e-7 m of coordinates of 0.1 m
+    EXPECT_NEAR(force.dot(side), slip < full ? -kFriction * normal * 0.19 : -kFriction * normal, 1e-9 * normal);
     EXPECT_GE(potential.terms().back().stiffness.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-9);
     const double h = 1e-3 * full;
-    const double slope = (potential.evaluate(there.colwise() + h * side, solids, false) - potential.evaluate(there.colwise() - h * side, solids, false)) / (2 * h);
+    const double slope = (potential.evaluate(there.colwise() + h * side, solids, false) -
+                          potential.evaluate(there.colwise() - h * side, solids, false)) /
+                         (2 * h);
     if (slip != full)
-    {
       EXPECT_NEAR(slope, -force.dot(side), 1e-6 * normal);
-    }
   }
   // a solid that moves along drags: no slip, no force
   std::vector<Pose> along = solids;
@@ -264,9 +270,10 @@ TEST(ContactForces, FrictionBetweenRodsIsTheGradient)
     Eigen::Matrix3Xd plus = rods.x, minus = rods.x;
     plus(i) += kStep;
     minus(i) -= kStep;
-    EXPECT_NEAR((potential.evaluate(plus, {}, false) - potential.evaluate(minus, {}, false)) / (2 * kStep), g(i), 2e-5 * g.norm());
+    EXPECT_NEAR((potential.evaluate(plus, {}, false) - potential.evaluate(minus, {}, false)) / (2 * kStep), g(i),
+                2e-5 * g.norm());
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -10,16 +10,19 @@ namespace {
 /// Against counting random points inside: 4e5 points know a volume to about 0.2 % and second moments to 0.5 %.
 TEST(MassProperties, AgreeWithRandomPoints)
 {
-  for (const Shape& shape : {Shape(Sphere{0.3}), Shape(Box{{0.4, 0.3, 0.6}}), Shape(Cylinder{0.3, 0.5}), Shape(Capsule{0.2, 0.3})})
+  for (const Shape& shape :
+       {Shape(Sphere{0.3}), Shape(Box{{0.4, 0.3, 0.6}}), Shape(Cylinder{0.3, 0.5}), Shape(Capsule{0.2, 0.3})})
   {
     Random random(1);
     const MassProperties mass = massProperties(shape);
-    const ConvexPiece piece = std::visit([](const auto& s) -> ConvexPiece {
-      if constexpr (std::is_constructible_v<ConvexPiece, decltype(s)>)
-        return s;
-      else
-        return Plane{};
-    }, shape);
+    const ConvexPiece piece = std::visit(
+        [](const auto& s) -> ConvexPiece {
+          if constexpr (std::is_constructible_v<ConvexPiece, decltype(s)>)
+            return s;
+          else
+            return Plane{};
+        },
+        shape);
     constexpr int kPoints = 400000;
     constexpr double kHalf = 0.4;
     int inside = 0;
@@ -44,12 +47,14 @@ TEST(MassProperties, OfAMeshAreThoseOfTheBoxItIs)
   auto mesh = std::make_shared<TriangleMesh>();
   mesh->vertices.resize(3, 8);
   for (int i = 0; i < 8; ++i)
-    mesh->vertices.col(i) = at + 0.5 * Eigen::Vector3d(i & 1 ? size.x() : -size.x(), i & 2 ? size.y() : -size.y(), i & 4 ? size.z() : -size.z());
+    mesh->vertices.col(i) = at + 0.5 * Eigen::Vector3d(i & 1 ? size.x() : -size.x(), i & 2 ? size.y() : -size.y(),
+                                                       i & 4 ? size.z() : -size.z());
   mesh->triangles.resize(3, 12);
   mesh->triangles << 0, 0, 4, 4, 0, 0, 2, 2, 0, 0, 1, 1,   //
-    2, 3, 5, 7, 1, 5, 6, 7, 4, 6, 3, 7,                     //
-    3, 1, 7, 6, 5, 4, 7, 3, 6, 2, 7, 5;
-  const MassProperties mass = massProperties(Shape(std::shared_ptr<const TriangleMesh>(mesh))), box = massProperties(Box{size});
+      2, 3, 5, 7, 1, 5, 6, 7, 4, 6, 3, 7,                  //
+      3, 1, 7, 6, 5, 4, 7, 3, 6, 2, 7, 5;
+  const MassProperties mass = massProperties(Shape(std::shared_ptr<const TriangleMesh>(mesh))),
+                       box = massProperties(Box{size});
   EXPECT_NEAR(mass.volume, box.volume, 1e-14);
   EXPECT_LT((mass.center - at).norm(), 1e-13);
   EXPECT_LT((mass.unit_inertia - box.unit_inertia).norm(), 1e-14);
@@ -115,11 +120,9 @@ TEST(ContactPotential, AdaptsItsStiffnessToTheLoad)
     EXPECT_GE(potential.stiffness(), options.least_stiffness);
     EXPECT_GT(gap, options.gap / 20);
     if (load > options.least_stiffness)
-    {
       EXPECT_LT(gap, options.gap / 1.9);
-    }
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

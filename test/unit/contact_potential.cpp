@@ -32,7 +32,8 @@ struct Case
   }
 };
 
-/// Largest error of the gradient by central differences over the largest force, over points and, if any, the solids' poses.
+/// Largest error of the gradient by central differences over the largest force, over points and, if any, the solids'
+/// poses.
 double gradientError(const Case& c, ContactPotential& potential)
 {
   constexpr double kStep = 1e-7;
@@ -45,7 +46,8 @@ double gradientError(const Case& c, ContactPotential& potential)
     Eigen::Matrix3Xd plus = c.x, minus = c.x;
     plus(i) += kStep;
     minus(i) -= kStep;
-    const double slope = (potential.evaluate(plus, c.solids, false) - potential.evaluate(minus, c.solids, false)) / (2 * kStep);
+    const double slope =
+        (potential.evaluate(plus, c.solids, false) - potential.evaluate(minus, c.solids, false)) / (2 * kStep);
     error = std::max(error, std::abs(slope - g(i)));
   }
   for (std::size_t k = 0; k < c.solids.size(); ++k)
@@ -72,14 +74,16 @@ double gradientError(const Case& c, ContactPotential& potential)
   return error / largest;
 }
 
-// Central differences over 1e-7 m where the barrier's third derivative is at most 1e8 N/m^2 at forces of some newtons: 1e-6.
+// Central differences over 1e-7 m where the barrier's third derivative is at most 1e8 N/m^2 at forces of some newtons:
+// 1e-6.
 constexpr double kDifferences = 2e-6;
 
 Case twoRods(const Eigen::Vector3d& offset, double angle, double tilt, double height)
 {
   Case c;
   addCurve(c.surface, c.x, line({-0.5, 0, 0}, {0.5, 0, 0}, 3), kRadius);
-  const Eigen::Vector3d along(std::cos(angle), std::sin(angle), tilt), middle = offset + Eigen::Vector3d(0, 0, 2 * kRadius + height);
+  const Eigen::Vector3d along(std::cos(angle), std::sin(angle), tilt),
+      middle = offset + Eigen::Vector3d(0, 0, 2 * kRadius + height);
   addCurve(c.surface, c.x, line(middle - 0.5 * along, middle + 0.5 * along, 3), kRadius);
   return c;
 }
@@ -104,7 +108,8 @@ TEST(ContactPotential, ForceOfSolidsIsTheGradient)
   mesh->vertices << -0.3, 0.3, 0.0, 0.0, -0.2, -0.2, 0.4, 0.0, 0.0, 0.0, 0.0, 0.3;
   mesh->triangles.resize(3, 4);
   mesh->triangles << 0, 0, 1, 2, 2, 1, 2, 0, 1, 3, 3, 3;
-  const std::vector<Shape> shapes{Plane{}, Sphere{0.2}, Box{{0.4, 0.3, 0.2}}, Cylinder{0.1, 0.5}, Capsule{0.1, 0.3}, mesh};
+  const std::vector<Shape> shapes{Plane{},           Sphere{0.2}, Box{{0.4, 0.3, 0.2}}, Cylinder{0.1, 0.5},
+                                  Capsule{0.1, 0.3}, mesh};
   Random random(3);
   for (const Shape& shape : shapes)
   {
@@ -135,5 +140,5 @@ TEST(ContactPotential, ForceOfSolidsIsTheGradient)
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -17,7 +17,10 @@ struct Pair
 Pair pairAt(Random& random, int kind, double thickness, double gap)
 {
   const Vector e = random.direction(), n = e.cross(random.direction()).normalized(), side = n.cross(e);
-  const double angle = kind == 0 ? random.uniform(-1.5, 1.5) : kind == 1 ? 0.0 : kind == 2 ? 1e-5 * random.uniform() : random.uniform(-0.3, 0.3);
+  const double angle = kind == 0   ? random.uniform(-1.5, 1.5)
+                       : kind == 1 ? 0.0
+                       : kind == 2 ? 1e-5 * random.uniform()
+                                   : random.uniform(-0.3, 0.3);
   const double length = kind == 3 ? 0.01 : 1.0, tilt = kind == 2 ? random.uniform() * gap : 0.0;
   const Vector f = length * (std::cos(angle) * e + std::sin(angle) * side) + tilt * n;
   const Vector middle = random.uniform(-0.7, 0.7) * e + random.uniform(0.0, 0.3) * side;
@@ -46,9 +49,11 @@ TEST(SoftGap, IsTheOnlyMinimum)
         const double sharp = segmentDistance(p.a0, p.a1, p.b0, p.b1) - thickness;
         const double noise = 1e-15;
         ASSERT_GE(soft.gap, sharp * (1 - 1e-12) - noise);
-        ASSERT_LE(soft.gap, sharp / std::pow(1 - kSoftness, 2) * (1 + 1e-12) + noise) << "kind " << k % 4 << " gap " << gap;
+        ASSERT_LE(soft.gap, sharp / std::pow(1 - kSoftness, 2) * (1 + 1e-12) + noise)
+            << "kind " << k % 4 << " gap " << gap;
         const auto value = [&](double s, double t) {
-          const double q = 1.0 / ((1.0 - kSoftness * std::pow(2 * s - 1, 2)) * (1.0 - kSoftness * std::pow(2 * t - 1, 2)));
+          const double q =
+              1.0 / ((1.0 - kSoftness * std::pow(2 * s - 1, 2)) * (1.0 - kSoftness * std::pow(2 * t - 1, 2)));
           return q * ((p.a0 + s * (p.a1 - p.a0) - p.b0 - t * (p.b1 - p.b0)).norm() - thickness);
         };
         for (double reach : {1.0, 0.1, 1e-3})
@@ -56,18 +61,21 @@ TEST(SoftGap, IsTheOnlyMinimum)
             for (int j = 0; j <= 8; ++j)
             {
               const double s = soft.s + reach * (i / 8.0 - soft.s), t = soft.t + reach * (j / 8.0 - soft.t);
-              ASSERT_GE(value(s, t), soft.gap - noise) << "kind " << k % 4 << " gap " << gap << " at " << soft.s << " " << soft.t;
+              ASSERT_GE(value(s, t), soft.gap - noise)
+                  << "kind " << k % 4 << " gap " << gap << " at " << soft.s << " " << soft.t;
             }
         // the slopes vanish but for a last step of 1e-12 and the rounding of the normal
         const Vector u = p.a0 + soft.s * (p.a1 - p.a0) - p.b0 - soft.t * (p.b1 - p.b0);
         const double g = u.norm() - thickness;
         if (soft.s > 0 && soft.s < 1)
         {
-          ASSERT_NEAR(soft.weight * soft.normal.dot(p.a1 - p.a0) + soft.weight_s * g, 0.0, 2e-12 * soft.hss + 1e-14) << "kind " << k % 4 << " gap " << gap;
+          ASSERT_NEAR(soft.weight * soft.normal.dot(p.a1 - p.a0) + soft.weight_s * g, 0.0, 2e-12 * soft.hss + 1e-14)
+              << "kind " << k % 4 << " gap " << gap;
         }
         if (soft.t > 0 && soft.t < 1)
         {
-          ASSERT_NEAR(-soft.weight * soft.normal.dot(p.b1 - p.b0) + soft.weight_t * g, 0.0, 2e-12 * soft.htt + 1e-14) << "kind " << k % 4 << " gap " << gap;
+          ASSERT_NEAR(-soft.weight * soft.normal.dot(p.b1 - p.b0) + soft.weight_t * g, 0.0, 2e-12 * soft.htt + 1e-14)
+              << "kind " << k % 4 << " gap " << gap;
         }
       }
 }
@@ -76,7 +84,8 @@ TEST(SoftGap, OfSolidsIsTheOnlyMinimum)
 {
   Random random(2);
   const Triangle triangle{Vector(-0.3, -0.2, 0.1), Vector(0.4, -0.1, 0.0), Vector(0.0, 0.5, -0.1)};
-  const std::vector<ConvexPiece> pieces{Plane{}, Sphere{0.3}, Box{{0.4, 0.3, 0.6}}, Cylinder{0.3, 0.5}, Capsule{0.02, 0.5}, triangle};
+  const std::vector<ConvexPiece> pieces{
+      Plane{}, Sphere{0.3}, Box{{0.4, 0.3, 0.6}}, Cylinder{0.3, 0.5}, Capsule{0.02, 0.5}, triangle};
   constexpr double kRadius = 0.03;
   int met = 0, free = 0;
   for (const ConvexPiece& piece : pieces)
@@ -87,7 +96,8 @@ TEST(SoftGap, OfSolidsIsTheOnlyMinimum)
         b = a + 0.4 * random.uniform() * Vector::Unit(k / 3 % 3);
       const SoftGap soft = softGap(a, b, kRadius, piece);
       const auto value = [&](double t) {
-        return (pieceDistance(piece, a + t * (b - a), b - a).distance - kRadius) / (1.0 - kSoftness * std::pow(2 * t - 1, 2));
+        return (pieceDistance(piece, a + t * (b - a), b - a).distance - kRadius) /
+               (1.0 - kSoftness * std::pow(2 * t - 1, 2));
       };
       double least = 1e9;
       for (int i = 0; i <= 400; ++i)
@@ -107,5 +117,5 @@ TEST(SoftGap, OfSolidsIsTheOnlyMinimum)
   EXPECT_GT(free, 1000);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -33,7 +33,9 @@ TriangleMesh halfCylinder()
 TriangleMesh tiltedSheet()
 {
   TriangleMesh mesh = gridMesh(0.4, 0.3, 12, 0, GridPattern::irregular);
-  mesh.vertices = (Eigen::AngleAxisd(0.8, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix() * mesh.vertices).colwise() + Vector3d(1, 2, 3);
+  mesh.vertices =
+      (Eigen::AngleAxisd(0.8, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix() * mesh.vertices).colwise() +
+      Vector3d(1, 2, 3);
   return mesh;
 }
 
@@ -116,7 +118,8 @@ TEST(CurvedRest, RatiosOfBendingReachAllSolvers)
     return state.x;
   };
   const Matrix3Xd direct = bent(ClothSolver::cholesky, true);
-  EXPECT_LT((bent(ClothSolver::gauss_seidel, true) - direct).cwiseAbs().maxCoeff(), 1e-7);   // Newton's tolerance: 5e-8 m
+  // Newton's tolerance: 5e-8 m
+  EXPECT_LT((bent(ClothSolver::gauss_seidel, true) - direct).cwiseAbs().maxCoeff(), 1e-7);
   EXPECT_LT((bent(ClothSolver::conjugate_gradients, true) - direct).cwiseAbs().maxCoeff(), 1e-7);
   EXPECT_GT((bent(ClothSolver::cholesky, false) - direct).cwiseAbs().maxCoeff(), 1e-4);
 }
@@ -136,7 +139,8 @@ protected:
 
   Simulation scene(const std::string& cloth, const std::string& rest = "", const std::string& kind = "cloths")
   {
-    return Simulation(parseScene("gravity: [0, 0, 0]\n" + rest + kind + ": [{" + cloth + "}]", "t", {}, folder_.string()));
+    return Simulation(
+        parseScene("gravity: [0, 0, 0]\n" + rest + kind + ": [{" + cloth + "}]", "t", {}, folder_.string()));
   }
   std::string problem(const std::string& cloth, const std::string& rest = "")
   {
@@ -160,21 +164,24 @@ TEST_F(CurvedScenes, AHalfCylinderStaysOneAndTheSceneSaysHowItBends)
   for (const char* kind : {"cloths", "tracked"})
   {
     const std::string tracked = "guide: {mesh: {file: roll.obj}, motion: fixed}, mesh: {subdivide: 1}, ";
-    Simulation simulation = scene(std::string(*kind == 't' ? tracked : "mesh: {file: roll.obj}, ") + "bending: {modulus: 0.001}", "", kind);
+    Simulation simulation =
+        scene(std::string(*kind == 't' ? tracked : "mesh: {file: roll.obj}, ") + "bending: {modulus: 0.001}", "", kind);
     ASSERT_EQ(simulation.config().warnings.size(), 1u) << kind;
     EXPECT_NE(simulation.config().warnings[0].find("so it bends by hinges"), std::string::npos);
     const Matrix3Xd start = simulation.state().cloths[0].cloth.x;
     ASSERT_NEAR(widthOf(start), 0.4, 1e-3);
     for (int k = 0; k < 50; ++k)
       ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-    EXPECT_LT((simulation.state().cloths[0].cloth.x - start).cwiseAbs().maxCoeff(), 1e-10) << kind;   // the issue: 1e-9 of its size
+    // the issue: 1e-9 of its size
+    EXPECT_LT((simulation.state().cloths[0].cloth.x - start).cwiseAbs().maxCoeff(), 1e-10) << kind;
   }
 }
 
 TEST_F(CurvedScenes, WhatIsChosenIsWhatHingesDo)
 {
   Simulation chosen = scene("mesh: {file: flat.obj}, undeformed: {file: roll.obj}, bending: {modulus: 0.001}");
-  Simulation asked = scene("mesh: {file: flat.obj}, undeformed: {file: roll.obj}, bending: {model: hinge, modulus: 0.001}");
+  Simulation asked =
+      scene("mesh: {file: flat.obj}, undeformed: {file: roll.obj}, bending: {model: hinge, modulus: 0.001}");
   EXPECT_EQ(chosen.config().warnings.size(), 1u);
   EXPECT_EQ(asked.config().warnings.size(), 0u);
   for (int k = 0; k < 10; ++k)
@@ -188,9 +195,10 @@ TEST_F(CurvedScenes, WhatIsChosenIsWhatHingesDo)
 
 TEST_F(CurvedScenes, FlatShapesKeepTheirMatrix)
 {
-  for (const char* cloth : {"mesh: {file: tilted.obj}", "mesh: {file: flat.obj}", "mesh: {file: roll.obj}, undeformed: {file: flat.obj}",
-                            "mesh: {file: roll.obj}, bending: {model: none}", "mesh: {file: roll.obj}, bending: {modulus: 0}",
-                            "mesh: {file: flat.obj}, bending: {poissons_ratio: 0.35}"})
+  for (const char* cloth :
+       {"mesh: {file: tilted.obj}", "mesh: {file: flat.obj}", "mesh: {file: roll.obj}, undeformed: {file: flat.obj}",
+        "mesh: {file: roll.obj}, bending: {model: none}", "mesh: {file: roll.obj}, bending: {modulus: 0}",
+        "mesh: {file: flat.obj}, bending: {poissons_ratio: 0.35}"})
   {
     const Simulation simulation = scene(cloth);
     EXPECT_TRUE(simulation.config().warnings.empty()) << cloth;
@@ -200,10 +208,16 @@ TEST_F(CurvedScenes, FlatShapesKeepTheirMatrix)
 
 TEST_F(CurvedScenes, OthersAreRefusedWithTheFix)
 {
-  EXPECT_NE(problem("mesh: {file: roll.obj}, bending: {model: conforming}").find("use bending: {model: hinge}"), std::string::npos);
-  EXPECT_NE(problem("mesh: {file: roll.obj}, bending: {model: conforming}, contact: {thickness: 0.001}").find("use bending: {model: hinge}"), std::string::npos);
-  EXPECT_NE(problem("mesh: {file: roll.obj}", "time: {integrator: imex}\n").find("only isometric bending of a flat rest shape has"), std::string::npos);
-  EXPECT_NE(problem("mesh: {file: roll.obj}, bending: {poissons_ratio: 0.3}").find("its shape at rest is curved"), std::string::npos);
+  EXPECT_NE(problem("mesh: {file: roll.obj}, bending: {model: conforming}").find("use bending: {model: hinge}"),
+            std::string::npos);
+  EXPECT_NE(problem("mesh: {file: roll.obj}, bending: {model: conforming}, contact: {thickness: 0.001}")
+                .find("use bending: {model: hinge}"),
+            std::string::npos);
+  EXPECT_NE(problem("mesh: {file: roll.obj}", "time: {integrator: imex}\n")
+                .find("only isometric bending of a flat rest shape has"),
+            std::string::npos);
+  EXPECT_NE(problem("mesh: {file: roll.obj}, bending: {poissons_ratio: 0.3}").find("its shape at rest is curved"),
+            std::string::npos);
 }
 
 TEST_F(CurvedScenes, MeshesOnWhichARatioIsInexactAreWarnedOf)
@@ -217,12 +231,17 @@ TEST_F(CurvedScenes, MeshesOnWhichARatioIsInexactAreWarnedOf)
 TEST_F(CurvedScenes, TheModulusComesWithTheRatioOfBending)
 {
   const auto modulus = [&](const std::string& bending) {
-    return parseScene("cloths: [{mesh: {file: flat.obj}, material: {youngs_modulus: 1e6, thickness: 0.001, poissons_ratio: 0.3}" + bending + "}]", "t", {},
-                      folder_.string()).cloths[0].bending_modulus;
+    return parseScene(
+               "cloths: [{mesh: {file: flat.obj}, material: {youngs_modulus: 1e6, thickness: 0.001, poissons_ratio: "
+               "0.3}" +
+                   bending + "}]",
+               "t", {}, folder_.string())
+        .cloths[0]
+        .bending_modulus;
   };
   EXPECT_NEAR(modulus(""), 1e-3 / (12 * (1 - 0.09)), 1e-12);
   EXPECT_NEAR(modulus(", bending: {poissons_ratio: 0.5}"), 1e-3 / (12 * 0.75), 1e-12);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -24,9 +24,7 @@ TEST(Curves, arcStaysOnItsCircle)
 {
   const auto nodes = arcCurve({1, 0, 0}, {1, 2, 0}, {0, 0, 3}, -M_PI, 40);
   for (int i = 0; i <= 40; ++i)
-  {
     EXPECT_NEAR((nodes.col(i) - Vector3d(1, 0, 0)).norm(), 2.0, 1e-14);
-  }
   EXPECT_LT((nodes.col(40) - Vector3d(1, -2, 0)).norm(), 1e-14);
   EXPECT_GT(nodes(0, 20), 2.9);   // negative about z: from +y over +x
 }
@@ -114,5 +112,5 @@ TEST(Curves, refuseBadArguments)
   EXPECT_THROW(resampleCurve(Eigen::Matrix3Xd::Zero(3, 4), false, 3), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -1,5 +1,5 @@
-// A step or substep that fails leaves nothing behind in its stepper. After the failure the stepper computes the same states,
-// bit by bit, as a new stepper that starts from the same state.
+// A step or substep that fails leaves nothing behind in its stepper. After the failure the stepper computes the same
+// states, bit by bit, as a new stepper that starts from the same state.
 #include <cmath>
 #include <functional>
 #include <string>
@@ -52,11 +52,12 @@ std::string bytesOf(const RodGroupState& s)
   return stateBytes(scene);
 }
 
-/// Expects that a step whose first substep fails, and whose two halves succeed, ends like two steps of half its length of a
-/// new stepper. The step length (at most `longest` [s]) and the limit of Newton iterations are varied until such a step is
-/// found. `make(newton)` returns a stepper, and `step(stepper, state, h)` takes one step with it.
+/// Expects that a step whose first substep fails, and whose two halves succeed, ends like two steps of half its length
+/// of a new stepper. The step length (at most `longest` [s]) and the limit of Newton iterations are varied until such a
+/// step is found. `make(newton)` returns a stepper, and `step(stepper, state, h)` takes one step with it.
 template <class State, class Make, class Step>
-void expectHalvesLikeFresh(const std::string& what, const State& start, double longest, const Make& make, const Step& step)
+void expectHalvesLikeFresh(const std::string& what, const State& start, double longest, const Make& make,
+                           const Step& step)
 {
   constexpr int kMost = 24;   // iterations
   int found = 0;
@@ -76,18 +77,19 @@ void expectHalvesLikeFresh(const std::string& what, const State& start, double l
     for (int half = 0; half < 2; ++half)
     {
       const StepReport own = step(fresh, expected, 0.5 * h);
-      EXPECT_TRUE(own.ok && own.cut_steps == 0) << what << ", at most " << newton.max_iterations << " iterations: " << own.message;
+      EXPECT_TRUE(own.ok && own.cut_steps == 0)
+          << what << ", at most " << newton.max_iterations << " iterations: " << own.message;
     }
     EXPECT_TRUE(bytesOf(state) == bytesOf(expected)) << what << ", at most " << newton.max_iterations << " iterations";
   }
   EXPECT_GT(found, 0) << what << ": no first substep failed whose halves succeeded";
 }
 
-/// Expects that the step with the inputs `spoilt` is refused and does not change the state, and that the next three steps
-/// equal those of a new stepper.
+/// Expects that the step with the inputs `spoilt` is refused and does not change the state, and that the next three
+/// steps equal those of a new stepper.
 template <class State, class Inputs, class Stepper>
-void expectRefusalLeavesNothing(const std::string& what, const State& start, const Inputs& inputs, const Inputs& spoilt, double h,
-                                const std::function<Stepper()>& make)
+void expectRefusalLeavesNothing(const std::string& what, const State& start, const Inputs& inputs, const Inputs& spoilt,
+                                double h, const std::function<Stepper()>& make)
 {
   Stepper refused = make(), fresh = make();
   State state = start, expected = start;
@@ -168,8 +170,9 @@ TEST(FailedSteps, HalvesOfARodAreThoseOfAFreshOne)
         time.newton = newton;
         return RodStepper(rod.model, time);
       };
-      expectHalvesLikeFresh(named(damped ? "damped rod" : "rod", integrator), rod.state, 2 * kPart, make,
-                            [&](RodStepper& stepper, RodState& state, double h) { return stepper.step(state, rod.inputs, h); });
+      expectHalvesLikeFresh(
+          named(damped ? "damped rod" : "rod", integrator), rod.state, 2 * kPart, make,
+          [&](RodStepper& stepper, RodState& state, double h) { return stepper.step(state, rod.inputs, h); });
     }
 }
 
@@ -181,15 +184,17 @@ void expectGroupHalves(const std::string& what, const Group& g, Integrator integ
     time.newton = newton;
     return RodGroup(g.model, time);
   };
-  expectHalvesLikeFresh(what, g.state, h, make,
-                        [&](RodGroup& group, RodGroupState& state, double length) { return group.step(state, g.inputs, length); });
+  expectHalvesLikeFresh(what, g.state, h, make, [&](RodGroup& group, RodGroupState& state, double length) {
+    return group.step(state, g.inputs, length);
+  });
 }
 
 TEST(FailedSteps, HalvesOfRodsWithBodiesAreThoseOfFreshOnes)
 {
   for (const bool damped : {false, true})
     for (const Integrator integrator : implicitIntegrators())
-      expectGroupHalves(named(damped ? "damped, tumbling" : "tumbling", integrator), tumbling(damped), integrator, kPart);
+      expectGroupHalves(named(damped ? "damped, tumbling" : "tumbling", integrator), tumbling(damped), integrator,
+                        kPart);
 }
 
 TEST(FailedSteps, HalvesOfRodsInContactAreThoseOfFreshOnes)
@@ -200,7 +205,8 @@ TEST(FailedSteps, HalvesOfRodsInContactAreThoseOfFreshOnes)
 // A step of 10 ms was refused after ten halvings, while one of 1 ms passed at once.
 TEST(FailedSteps, AFirstStepWithADampedRodAndABodyCanBeHalved)
 {
-  for (const Integrator integrator : {Integrator::tr_bdf2, Integrator::generalized_alpha, Integrator::implicit_midpoint})
+  for (const Integrator integrator :
+       {Integrator::tr_bdf2, Integrator::generalized_alpha, Integrator::implicit_midpoint})
   {
     Group g = tumbling(true);
     TimeConfig time = withIntegrator(integrator);
@@ -217,7 +223,8 @@ TEST(FailedSteps, HalvesOfAClothAreThoseOfAFreshOne)
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
     for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
     {
-      ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.4, 8, 0, GridPattern::alternating), 0.2, isotropicMembrane(1e5, 0.3, 1e-3));
+      ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.4, 8, 0, GridPattern::alternating), 0.2,
+                                    isotropicMembrane(1e5, 0.3, 1e-3));
       model.bending = bending;
       model.bending_modulus = 1e-4;
       model.stiffness_damping = 1e-3;
@@ -237,8 +244,9 @@ TEST(FailedSteps, HalvesOfAClothAreThoseOfAFreshOne)
         options.linear_tolerance = 1e-6;
         return ClothStepper(shared, options);
       };
-      expectHalvesLikeFresh(named(bending == BendingModel::hinge ? "cloth with hinges" : "isometric cloth", integrator), start, kPart, make,
-                            [&](ClothStepper& stepper, ClothState& state, double h) { return stepper.step(state, inputs, h); });
+      expectHalvesLikeFresh(
+          named(bending == BendingModel::hinge ? "cloth with hinges" : "isometric cloth", integrator), start, kPart,
+          make, [&](ClothStepper& stepper, ClothState& state, double h) { return stepper.step(state, inputs, h); });
     }
 }
 
@@ -253,8 +261,9 @@ TEST(FailedSteps, HalvesOfAThreadAreThoseOfAFreshOne)
   const ThreadState start = wigglyThread(14, random);
   const auto shared = std::make_shared<ThreadModel>(model);
   const ThreadInputs inputs;
-  expectHalvesLikeFresh("thread", start, 16 * kPart, [&](const NewtonConfig& newton) { return ThreadStepper(shared, newton); },
-                        [&](ThreadStepper& stepper, ThreadState& state, double h) { return stepper.step(state, inputs, h); });
+  expectHalvesLikeFresh(
+      "thread", start, 16 * kPart, [&](const NewtonConfig& newton) { return ThreadStepper(shared, newton); },
+      [&](ThreadStepper& stepper, ThreadState& state, double h) { return stepper.step(state, inputs, h); });
 }
 
 TEST(FailedSteps, RefusalsOfRodsLeaveNothing)
@@ -268,7 +277,8 @@ TEST(FailedSteps, RefusalsOfRodsLeaveNothing)
       spoilt.forces.col(10) << 0, 1e300, -1e300;   // this is finite, but the accelerations overflow
       TimeConfig time = withIntegrator(integrator);
       const double h = integrator == Integrator::symplectic_euler ? 1e-5 : 2e-3;
-      expectRefusalLeavesNothing<RodState, RodInputs, RodStepper>(named(damped ? "damped rod" : "rod", integrator), rod.state, rod.inputs, spoilt, h,
+      expectRefusalLeavesNothing<RodState, RodInputs, RodStepper>(named(damped ? "damped rod" : "rod", integrator),
+                                                                  rod.state, rod.inputs, spoilt, h,
                                                                   [&] { return RodStepper(rod.model, time); });
     }
 }
@@ -284,8 +294,9 @@ TEST(FailedSteps, RefusalsOfRodsWithBodiesLeaveNothing)
       spoilt.rods[1].forces.col(5) << 0, 1e300, -1e300;
       TimeConfig time = withIntegrator(integrator);
       const double h = integrator == Integrator::symplectic_euler ? 1e-5 : 2e-3;
-      expectRefusalLeavesNothing<RodGroupState, RodGroupInputs, RodGroup>(named(damped ? "damped, tumbling" : "tumbling", integrator), g.state, g.inputs,
-                                                                          spoilt, h, [&] { return RodGroup(g.model, time); });
+      expectRefusalLeavesNothing<RodGroupState, RodGroupInputs, RodGroup>(
+          named(damped ? "damped, tumbling" : "tumbling", integrator), g.state, g.inputs, spoilt, h,
+          [&] { return RodGroup(g.model, time); });
     }
 }
 
@@ -304,7 +315,8 @@ TEST(FailedSteps, RefusalsOfRodsInContactLeaveNothing)
       for (const double force : {1e9, 1e300})
       {
         spoilt.rods[0].forces.col(7) << 0, force, -force;
-        expectRefusalLeavesNothing<RodGroupState, RodGroupInputs, RodGroup>(named("landing", integrator), g.state, g.inputs, spoilt, time.step,
+        expectRefusalLeavesNothing<RodGroupState, RodGroupInputs, RodGroup>(named("landing", integrator), g.state,
+                                                                            g.inputs, spoilt, time.step,
                                                                             [&] { return RodGroup(g.model, time); });
       }
       ASSERT_TRUE(first.step(g.state, g.inputs, time.step).ok);
@@ -323,8 +335,9 @@ TEST(FailedSteps, RefusalsOfThreadsLeaveNothing)
     spoilt.ends[1].position.x() += 1e160;   // this is finite, but its square overflows
     const double h = integrator == Integrator::symplectic_euler ? 1e-6 : 0.01;
     const auto shared = std::make_shared<ThreadModel>(t.model);
-    expectRefusalLeavesNothing<ThreadState, ThreadInputs, ThreadStepper>(named("thread", integrator), t.state, t.inputs, spoilt, h,
-                                                                         [&] { return ThreadStepper(shared, NewtonConfig{}, integrator); });
+    expectRefusalLeavesNothing<ThreadState, ThreadInputs, ThreadStepper>(
+        named("thread", integrator), t.state, t.inputs, spoilt, h,
+        [&] { return ThreadStepper(shared, NewtonConfig{}, integrator); });
   }
 }
 
@@ -353,21 +366,24 @@ TEST(FailedSteps, RefusalsOfThreadsInContactLeaveNothing)
   }
   TouchingInputs spoilt = inputs;
   spoilt.threads[1].gravity = {1e200, 0, -1e300};
-  expectRefusalLeavesNothing<TouchingState, TouchingInputs, TouchingThreads>("threads in contact", state, inputs, spoilt, 2e-3,
-                                                                             [&] { return TouchingThreads(model, NewtonConfig{}); });
+  expectRefusalLeavesNothing<TouchingState, TouchingInputs, TouchingThreads>(
+      "threads in contact", state, inputs, spoilt, 2e-3, [&] { return TouchingThreads(model, NewtonConfig{}); });
 }
 
 TEST(FailedSteps, RefusalsOfClothsLeaveNothing)
 {
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
-    for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2, Integrator::imex, Integrator::symplectic_euler})
-      for (const ClothSolver solver : {ClothSolver::cholesky, ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
+    for (const Integrator integrator :
+         {Integrator::implicit_euler, Integrator::tr_bdf2, Integrator::imex, Integrator::symplectic_euler})
+      for (const ClothSolver solver :
+           {ClothSolver::cholesky, ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
         for (const bool one_newton_step : {false, true})
           for (const bool touching : {false, true})
           {
             if (integrator == Integrator::imex && bending == BendingModel::hinge)
               continue;
-            ClothModel model = buildCloth("sheet", gridMesh(0.3, 0.3, 6, 0, GridPattern::alternating), 0.2, isotropicMembrane(1e4, 0.3, 1e-3));
+            ClothModel model = buildCloth("sheet", gridMesh(0.3, 0.3, 6, 0, GridPattern::alternating), 0.2,
+                                          isotropicMembrane(1e4, 0.3, 1e-3));
             model.bending = bending;
             model.bending_modulus = 1e-5;
             model.stiffness_damping = 1e-4;
@@ -385,13 +401,14 @@ TEST(FailedSteps, RefusalsOfClothsLeaveNothing)
             options.solver = solver;
             const bool is_explicit = integrator == Integrator::imex || integrator == Integrator::symplectic_euler;
             const double h = is_explicit ? 1e-4 : 5e-3;
-            const std::string what = named(bending == BendingModel::hinge ? "cloth with hinges" : "isometric cloth", integrator) + ", solver " +
-                                     std::to_string(static_cast<int>(solver)) + (one_newton_step ? ", one Newton step" : "") +
-                                     (touching ? ", with contact" : "");
+            const std::string what =
+                named(bending == BendingModel::hinge ? "cloth with hinges" : "isometric cloth", integrator) +
+                ", solver " + std::to_string(static_cast<int>(solver)) + (one_newton_step ? ", one Newton step" : "") +
+                (touching ? ", with contact" : "");
             if (!touching)
             {
-              expectRefusalLeavesNothing<ClothState, ClothInputs, ClothStepper>(what, state, inputs, spoilt, h,
-                                                                                [&] { return ClothStepper(shared, options); });
+              expectRefusalLeavesNothing<ClothState, ClothInputs, ClothStepper>(
+                  what, state, inputs, spoilt, h, [&] { return ClothStepper(shared, options); });
               continue;
             }
             ClothGroupModel group;
@@ -407,8 +424,8 @@ TEST(FailedSteps, RefusalsOfClothsLeaveNothing)
             group_inputs.solids = group_state.solids;
             group_spoilt = group_inputs;
             group_spoilt.cloths[0] = spoilt;
-            expectRefusalLeavesNothing<ClothGroupState, ClothGroupInputs, ClothGroup>(what, group_state, group_inputs, group_spoilt, h,
-                                                                                      [&] { return ClothGroup(group, options); });
+            expectRefusalLeavesNothing<ClothGroupState, ClothGroupInputs, ClothGroup>(
+                what, group_state, group_inputs, group_spoilt, h, [&] { return ClothGroup(group, options); });
           }
 }
 
@@ -448,5 +465,5 @@ TEST(FailedSteps, RefusalsOfRodsWithAveragesLeaveNothing)
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

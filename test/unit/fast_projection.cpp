@@ -87,7 +87,8 @@ struct Case
       const ProjectedBody body = const_cast<FastProjection&>(projection).body(b);
       const Eigen::Matrix3d r = body.pose.orientation.toRotationMatrix();
       p += body.mass * body.velocity.linear;
-      l += body.mass * body.pose.position.cross(body.velocity.linear) + r * body.inertia * r.transpose() * body.velocity.angular;
+      l += body.mass * body.pose.position.cross(body.velocity.linear) +
+           r * body.inertia * r.transpose() * body.velocity.angular;
     }
     Eigen::Matrix<double, 6, 1> m;
     m << p, l;
@@ -98,7 +99,9 @@ struct Case
     const int n = static_cast<int>(x.cols());
     double error = 0;
     for (int j = 0; j < (closed ? n : n - 1); ++j)
-      error = std::max(error, std::abs((x.col((j + 1) % n) - x.col(j)).squaredNorm() / (start[chain].col((j + 1) % n) - start[chain].col(j)).squaredNorm() - 1));
+      error = std::max(error, std::abs((x.col((j + 1) % n) - x.col(j)).squaredNorm() /
+                                           (start[chain].col((j + 1) % n) - start[chain].col(j)).squaredNorm() -
+                                       1));
     return error;
   }
 };
@@ -118,7 +121,8 @@ TEST(FastProjection, RestoresLengthsOfOpenAndClosedChainsAndKeepsMomenta)
       EXPECT_NEAR(report.constraint_error, c.worst(0, c.trial[0], closed), 1e-14);
       EXPECT_GE(report.iterations, 2);
       EXPECT_LE(report.iterations, 5);
-      EXPECT_LT((c.momentum(0) - before).norm(), 1e-11 * n * before.norm()) << n;   // round-off of displacements, divided by the step
+      // round-off of displacements, divided by the step
+      EXPECT_LT((c.momentum(0) - before).norm(), 1e-11 * n * before.norm()) << n;
     }
 }
 
@@ -141,7 +145,8 @@ TEST(FastProjection, HeldNodesStayAndForcesBalance)
       if (c.free[0][i])
       {
         change += c.mass[0][i] * (c.v[0].col(i) - v.col(i)) / c.h;
-        EXPECT_LT((c.mass[0][i] * (c.v[0].col(i) - v.col(i)) / c.h - c.projection.force(0, i)).norm(), 1e-6 * c.projection.force(0, i).norm() + 1e-6);
+        EXPECT_LT((c.mass[0][i] * (c.v[0].col(i) - v.col(i)) / c.h - c.projection.force(0, i)).norm(),
+                  1e-6 * c.projection.force(0, i).norm() + 1e-6);
       }
       else
       {
@@ -237,7 +242,8 @@ TEST(FastProjection, ABodyAtAGripperSwingsAboutIt)
 
 TEST(FastProjection, StraightChainsThatOnlyBodiesCanRelieve)
 {
-  // exactly straight between two nodes that are not free: the chain's own system is singular, that with the bodies is not
+  // exactly straight between two nodes that are not free: the chain's own system is singular, that with the bodies is
+  // not
   for (int n : {3, 4, 5, 12})
     for (int kind = 0; kind < 4; ++kind)
     {
@@ -278,9 +284,7 @@ TEST(FastProjection, StraightChainsThatOnlyBodiesCanRelieve)
       EXPECT_LE(report.iterations, 7) << n << " " << kind;
       EXPECT_LE(c.worst(0, c.trial[0], closed), 1e-8) << n << " " << kind;
       if (kind >= 2)
-      {
         EXPECT_LT((c.momentum(2) - before).norm(), 1e-9 * before.norm()) << n << " " << kind;
-      }
     }
 }
 
@@ -301,7 +305,7 @@ TEST(FastProjection, ConvergesQuadratically)
     error[k++] = c.projection.project(c.h).constraint_error;
   }
   EXPECT_GT(std::log(error[2] / error[1]) / std::log(error[1] / error[0]), 1.8);   // observed order
-  EXPECT_GT(error[2], 1e-13);   // not round-off
+  EXPECT_GT(error[2], 1e-13);                                                      // not round-off
 }
 
 TEST(FastProjection, NamesGripsThatAreTooFarApart)
@@ -331,5 +335,5 @@ TEST(FastProjection, NamesGripsThatAreTooFarApart)
   EXPECT_EQ(report.chain, -1);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -64,11 +64,13 @@ protected:
 
 TEST_F(FileLimits, plyFacesNameVerticesByWholeNumbers)
 {
-  const std::string head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
-                           "property list uchar float vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+      "property list uchar float vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
   EXPECT_EQ(refusalOfPly(head + "3 0 1 2\n"), "");
   for (const char* face : {"3 1 nan 2\n", "3 0 1 1.5\n", "3 0 1 -1\n", "3 0 1 inf\n"})
-    EXPECT_NE(refusalOfPly(head + face).find("names a vertex that the file does not have"), std::string::npos) << face << refusalOfPly(head + face);
+    EXPECT_NE(refusalOfPly(head + face).find("names a vertex that the file does not have"), std::string::npos)
+        << face << refusalOfPly(head + face);
   EXPECT_NE(refusalOfPly(head + "3.5 0 1 2\n").find("list of bad length"), std::string::npos);
 }
 
@@ -97,13 +99,16 @@ TEST_F(FileLimits, scenesHaveAsManyNodesAsFitIntoMemory)
 {
   for (const char* scene : {"generate: [{hair: {strands: 100000, edges: 10000}}]\n",
                             "generate: [{chain: {links: 10000, edges: 10000, cross_section: {radius: 0.001}}}]\n",
-                            "rods: [{name: a, centerline: &c {straight: {edges: 1000000}}, initial: *c}, {name: b, centerline: *c, initial: *c},\n"
-                            "       {name: c, centerline: *c, initial: *c}, {name: d, centerline: *c, initial: *c}, {name: e, centerline: *c, initial: *c},\n"
+                            "rods: [{name: a, centerline: &c {straight: {edges: 1000000}}, initial: *c}, {name: b, "
+                            "centerline: *c, initial: *c},\n"
+                            "       {name: c, centerline: *c, initial: *c}, {name: d, centerline: *c, initial: *c}, "
+                            "{name: e, centerline: *c, initial: *c},\n"
                             "       {name: f, centerline: *c}]\n",
                             "generate: [{hair: {strands: 1000, edges: 9990}}]\n"
                             "cloths: [{grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: [100, 100]}}]\n"})
-    EXPECT_NE(refusal([&] { parseScene(scene); }).find("all its rods and cloths together may have 10000000"), std::string::npos)
-      << scene << refusal([&] { parseScene(scene); });
+    EXPECT_NE(refusal([&] { parseScene(scene); }).find("all its rods and cloths together may have 10000000"),
+              std::string::npos)
+        << scene << refusal([&] { parseScene(scene); });
 }
 
 TEST_F(FileLimits, treesAreCountedBeforeTheyGrow)
@@ -137,10 +142,12 @@ TEST_F(FileLimits, guidesWhoseBodiesAreMissingAreNotEvaluated)
 {
   std::ofstream(path_) << "0,here,0,0,0,0,0,0,1\n";
   const std::string text = refusal([&] {
-    parseScene("tracked: [{guide: {grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2, pattern: one_diagonal}, motion: {bodies: " + path_ +
-               ", groups: {here: [0..2], there: [3..8]}}}, test_functions: {basis: subdivision}}]\n");
+    parseScene(
+        "tracked: [{guide: {grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2, pattern: one_diagonal}, motion: {bodies: " +
+        path_ + ", groups: {here: [0..2], there: [3..8]}}}, test_functions: {basis: subdivision}}]\n");
   });
-  EXPECT_NE(text.find("has no body there"), std::string::npos) << text;   // and nothing is read past the poses that there are, which AddressSanitizer sees
+  // and nothing is read past the poses that there are, which AddressSanitizer sees
+  EXPECT_NE(text.find("has no body there"), std::string::npos) << text;
 }
 
 TEST_F(FileLimits, statesOfOneSceneFitItWhateverTheirChecksumSays)
@@ -150,21 +157,26 @@ TEST_F(FileLimits, statesOfOneSceneFitItWhateverTheirChecksumSays)
   const std::string good = contents();
   constexpr std::size_t header = 5 * 8, nodes = 5, edges = 4;
   constexpr std::size_t x = header + 3 * 8 + 2 * 8;   // time, steps, number of rods; rows and columns
-  constexpr std::size_t grasp = header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + (2 * 8 + edges * 24) + (2 * 8 + nodes * 8) + (2 * 8 + 24) + 8;
+  constexpr std::size_t grasp =
+      header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + (2 * 8 + edges * 24) + (2 * 8 + nodes * 8) + (2 * 8 + 24) + 8;
   EXPECT_EQ(refusalWith(held, good, x, 0.25), "");
   EXPECT_NE(refusalWith(held, good, x, std::nan("")).find("not finite"), std::string::npos);
   EXPECT_EQ(refusalWith(held, good, grasp, char{0}), "");   // released
   EXPECT_NE(refusalWith(held, good, grasp, char{2}).find("neither yes nor no"), std::string::npos);
-  EXPECT_NE(refusalWith(held, good, grasp + 5, int{1}).find("does not fit together"), std::string::npos);    // last node: of one more than it holds
-  EXPECT_NE(refusalWith(held, good, grasp + 10, int{7}).find("does not fit together"), std::string::npos);   // carried by a body that is not there
+  // last node: of one more than it holds
+  EXPECT_NE(refusalWith(held, good, grasp + 5, int{1}).find("does not fit together"), std::string::npos);
+  // carried by a body that is not there
+  EXPECT_NE(refusalWith(held, good, grasp + 10, int{7}).find("does not fit together"), std::string::npos);
 
-  Simulation bare(parseScene("time: {step: 1e-4, integrator: symplectic_euler}\nrods: [{centerline: {straight: {edges: 4}}}]\n"));
+  Simulation bare(
+      parseScene("time: {step: 1e-4, integrator: symplectic_euler}\nrods: [{centerline: {straight: {edges: 4}}}]\n"));
   bare.save(path_);
   const std::string frameless = contents();
-  constexpr std::size_t director = header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + 3 * 2 * 8;   // after frames and twists, which are not there
+  // after frames and twists, which are not there
+  constexpr std::size_t director = header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + 3 * 2 * 8;
   EXPECT_EQ(refusalWith(bare, frameless, director + 8, 0.0), "");
   EXPECT_NE(refusalWith(bare, frameless, director + 16, 0.5).find("do not fit it"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -59,7 +59,10 @@ TEST_F(FilePaths, onlyRegularFilesAreReplaced)
   EXPECT_EQ(replaceablePath("no/such/folder/file"), "no/such/folder/file");
   EXPECT_EQ(replaceablePath(path("file")), path("file"));
   EXPECT_EQ(replaceablePath(path("link")), path("file"));
-  for (const auto& [name, says] : {std::pair("fifo", "no regular file"), {"link_to_fifo", "no regular file"}, {"folder", "is a directory"}, {"link_to_nothing", "leads nowhere"}})
+  for (const auto& [name, says] : {std::pair("fifo", "no regular file"),
+                                   {"link_to_fifo", "no regular file"},
+                                   {"folder", "is a directory"},
+                                   {"link_to_nothing", "leads nowhere"}})
   {
     const std::string file = path(name);
     const std::string text = refusal([&] { replaceablePath(file); });
@@ -77,7 +80,8 @@ TEST_F(FilePaths, savedStatesLeaveOthersAlone)
     const fs::file_status before = fs::symlink_status(file);
     EXPECT_NE(refusal([&] { simulation.save(file); }), "") << name;
     EXPECT_EQ(fs::symlink_status(file).type(), before.type()) << name;
-    EXPECT_NE(refusal([&] { simulation.load(file); }), "") << name;   // does not wait for somebody who writes into the FIFO
+    // does not wait for somebody who writes into the FIFO
+    EXPECT_NE(refusal([&] { simulation.load(file); }), "") << name;
   }
   simulation.save(path("link"));
   EXPECT_TRUE(fs::is_symlink(path("link")));
@@ -88,11 +92,15 @@ TEST_F(FilePaths, savedStatesLeaveOthersAlone)
 TEST_F(FilePaths, whatScenesNameIsReadFromRegularFilesOnly)   // others wait for ever, or have no end
 {
   ASSERT_EQ(::mkfifo(path("mesh.obj").c_str(), 0600), 0);
-  const auto says = [&](const std::string& scene) { return refusal([&] { parseScene(scene, "scene", {}, folder_.string()); }); };
-  for (const char* scene : {"rods: [{centerline: {file: {path: fifo}}}]\n", "rods: [{grasps: {left: {edges: [0], motion: {file: fifo, body: b}}}}]\n",
-                            "rods: [{name: r}]\nobstacles: [{shape: {mesh: {file: mesh.obj}}}]\n", "cloths: [{mesh: {file: mesh.obj}}]\n",
-                            "tracked: [{guide: {grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {frames: \"me*.obj\", rate: 30}}, "
-                            "test_functions: {basis: subdivision}}]\n"})
+  const auto says = [&](const std::string& scene) {
+    return refusal([&] { parseScene(scene, "scene", {}, folder_.string()); });
+  };
+  for (const char* scene :
+       {"rods: [{centerline: {file: {path: fifo}}}]\n",
+        "rods: [{grasps: {left: {edges: [0], motion: {file: fifo, body: b}}}}]\n",
+        "rods: [{name: r}]\nobstacles: [{shape: {mesh: {file: mesh.obj}}}]\n", "cloths: [{mesh: {file: mesh.obj}}]\n",
+        "tracked: [{guide: {grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {frames: \"me*.obj\", rate: 30}}, "
+        "test_functions: {basis: subdivision}}]\n"})
   {
     if (fs::exists(path("mesh.obj")) && std::string(scene).find("frames") != std::string::npos)
       fs::rename(path("mesh.obj"), path("me1.obj"));
@@ -100,5 +108,5 @@ TEST_F(FilePaths, whatScenesNameIsReadFromRegularFilesOnly)   // others wait for
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -133,7 +133,8 @@ TEST(FramedCurve, SpaceAndTimeParallelFramesShowOneMaterialFrame)
     {
       Matrix3Xd x = start;
       for (int i = 0; i < x.cols(); ++i)
-        x.col(i) += 0.3 * Vector3d(std::sin(0.2 * step + i), std::cos(0.23 * step + 2 * i) - 1, std::sin(0.17 * step - i));
+        x.col(i) +=
+            0.3 * Vector3d(std::sin(0.2 * step + i), std::cos(0.23 * step + 2 * i) - 1, std::sin(0.17 * step - i));
       curve.moveTo(x);
     }
     FramedCurve space = curve;
@@ -142,7 +143,7 @@ TEST(FramedCurve, SpaceAndTimeParallelFramesShowOneMaterialFrame)
       EXPECT_LT((space.d1(j) - curve.d1(j)).norm(), 1e-12);   // 30 moves of round-off
     for (int i = 0; i < curve.nodes(); ++i)
     {
-      EXPECT_NEAR(space.twist(i), curve.twist(i), 1e-11);     // unwrapped twists, tens of radians
+      EXPECT_NEAR(space.twist(i), curve.twist(i), 1e-11);   // unwrapped twists, tens of radians
       EXPECT_TRUE((closed && i == 0) || space.referenceTwist()[i] == 0.0);
     }
     EXPECT_GT(curve.referenceTwist().norm(), 0.1);   // the motion did twist the time-parallel frame
@@ -161,16 +162,17 @@ Matrix3Xd coneNodes(double phi, double around)
 
 TEST(FramedCurve, ReferenceTwistCountsHolonomyOverManyTurns)
 {
-  // A frame carried in time once round a closed path of tangents comes back turned by the enclosed area of the unit sphere, while
-  // the frame transported in space from the cone's axis follows the tangent without turning. So a turn round the cone changes the
-  // twist by the area of its cap, 2 pi (1 - cos phi) (thesis 3.5).
+  // A frame carried in time once round a closed path of tangents comes back turned by the enclosed area of the unit
+  // sphere, while the frame transported in space from the cone's axis follows the tangent without turning. So a turn
+  // round the cone changes the twist by the area of its cap, 2 pi (1 - cos phi) (thesis 3.5).
   const double phi = 0.8;
   const int steps = 2000, turns = 50;
   FramedCurve curve(coneNodes(phi, 0.0), false);
   for (int k = 1; k <= turns * steps; ++k)
     curve.moveTo(coneNodes(phi, 2 * M_PI * k / steps));
   const double area = 2 * M_PI * (1 - std::cos(phi));
-  // great-circle moves between steps enclose less than the circle by order (2 pi / steps)^2: sin^2 phi cos phi pi (2 pi/steps)^2 / 6 a turn
+  // great-circle moves between steps enclose less than the circle by order (2 pi / steps)^2: sin^2 phi cos phi pi (2
+  // pi/steps)^2 / 6 a turn
   const double polygon = M_PI * std::sin(phi) * std::sin(phi) * std::cos(phi) * std::pow(2 * M_PI / steps, 2) / 6;
   EXPECT_NEAR(std::abs(curve.twist(1)), turns * area, 2 * turns * polygon + 1e-9);
   EXPECT_LT(polygon * turns, 1e-3);
@@ -189,7 +191,8 @@ TEST(FramedCurve, GradientOfTwist)
     const Vector3d kb = base.curvatureBinormal(i);
     ASSERT_GT(kb.norm(), 0.05);
     // (3.22)
-    const Vector3d first = -kb / (2 * (x.col(i) - x.col(before)).norm()), last = kb / (2 * (x.col(after) - x.col(i)).norm());
+    const Vector3d first = -kb / (2 * (x.col(i) - x.col(before)).norm()),
+                   last = kb / (2 * (x.col(after) - x.col(i)).norm());
     const Vector3d expected[3] = {first, -first - last, last};
     const int nodes[3] = {before, i, after};
     for (int k = 0; k < 3; ++k)
@@ -259,5 +262,5 @@ TEST(FramedCurve, RefusesBadInput)
   EXPECT_NO_THROW(curve.moveTo(good));
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -119,7 +119,8 @@ RodEvaluation sweep(const RodKernels& table, Curvature curvature, const RodArray
   for (int done = 0; done < a.nodes;)
   {
     const int before = done;
-    done = table.advance[static_cast<int>(curvature)](a, sweep, panels, 0, a.closed ? a.nodes : std::min(done + piece, a.nodes));
+    done = table.advance[static_cast<int>(curvature)](a, sweep, panels, 0,
+                                                      a.closed ? a.nodes : std::min(done + piece, a.nodes));
     if (done <= before)
     {
       ADD_FAILURE() << "the sweep stands still at node " << done;
@@ -144,17 +145,18 @@ Output evaluate(const RodKernels& table, const RodSystem& system, int piece)
   out.gradient = Eigen::Map<Eigen::VectorXd>(a.gradient, 4 * n);
   out.frames.resize(6 * edges);
   for (int k = 0; k < 3; ++k)
-    out.frames.segment(2 * k * edges, 2 * edges) << Eigen::Map<Eigen::VectorXd>(a.t[k], edges), Eigen::Map<Eigen::VectorXd>(a.d1[k], edges);
+    out.frames.segment(2 * k * edges, 2 * edges) << Eigen::Map<Eigen::VectorXd>(a.t[k], edges),
+        Eigen::Map<Eigen::VectorXd>(a.d1[k], edges);
   out.strains.resize(3 * n + edges);
-  out.strains << Eigen::Map<Eigen::VectorXd>(a.kappa1, n), Eigen::Map<Eigen::VectorXd>(a.kappa2, n), Eigen::Map<Eigen::VectorXd>(a.twist, n),
-      Eigen::Map<Eigen::VectorXd>(a.strain, edges);
-  out.hessian = Eigen::Map<Eigen::VectorXd>(reinterpret_cast<double*>(panels.data()), n * sizeof(RodPanel) / sizeof(double));
+  out.strains << Eigen::Map<Eigen::VectorXd>(a.kappa1, n), Eigen::Map<Eigen::VectorXd>(a.kappa2, n),
+      Eigen::Map<Eigen::VectorXd>(a.twist, n), Eigen::Map<Eigen::VectorXd>(a.strain, edges);
+  out.hessian =
+      Eigen::Map<Eigen::VectorXd>(reinterpret_cast<double*>(panels.data()), n * sizeof(RodPanel) / sizeof(double));
   return out;
 }
 
 class RodKernelTables : public ::testing::TestWithParam<std::tuple<bool, Curvature>>
-{
-};
+{};
 
 TEST_P(RodKernelTables, Agree)
 {
@@ -165,8 +167,10 @@ TEST_P(RodKernelTables, Agree)
     if (closed && n < 5)
       continue;
     const Matrix3Xd nodes = wigglyNodes(n, closed, random);
-    const RodModel model = buildRod("r", nodes, closed, oddSections(closed ? n : n - 1, random), Vector3d::Zero(), false, {curvature, false});
-    const RodState state = makeRodState(model, nodes, Vector3d::Zero(), 2 * M_PI * n);   // several turns per joint: the unwrapping must agree too
+    const RodModel model = buildRod("r", nodes, closed, oddSections(closed ? n : n - 1, random), Vector3d::Zero(),
+                                    false, {curvature, false});
+    // several turns per joint: the unwrapping must agree too
+    const RodState state = makeRodState(model, nodes, Vector3d::Zero(), 2 * M_PI * n);
     RodSystem system(model);
     system.load(state);
     for (int i = 0; i < n; ++i)
@@ -194,13 +198,16 @@ TEST_P(RodKernelTables, Agree)
     EXPECT_EQ(reference.with.energy(), reference.without.energy());
     // Towards opposite directors the compensated strain is the quotient of two small numbers.
     const auto twists = Eigen::Map<Eigen::VectorXd>(system.arrays().twist, n).array();
-    const double conditioning = curvature == Curvature::tangent ? 1.0 : (0.5 * twists).cos().square().inverse().maxCoeff();
+    const double conditioning =
+        curvature == Curvature::tangent ? 1.0 : (0.5 * twists).cos().square().inverse().maxCoeff();
     for (const auto& [name, table] : rodTables())
     {
       const Output out = evaluate(*table, system, 1 + n / 2);
-      const auto near = [&, conditioning, name = name](const Eigen::VectorXd& a, const Eigen::VectorXd& b, const char* what) {
+      const auto near = [&, conditioning, name = name](const Eigen::VectorXd& a, const Eigen::VectorXd& b,
+                                                       const char* what) {
         // some tens of roundings each, relative to the largest entry
-        EXPECT_LT((a - b).lpNorm<Eigen::Infinity>(), 1e-13 * conditioning * (1 + b.lpNorm<Eigen::Infinity>())) << what << " " << name << " n " << n;
+        EXPECT_LT((a - b).lpNorm<Eigen::Infinity>(), 1e-13 * conditioning * (1 + b.lpNorm<Eigen::Infinity>()))
+            << what << " " << name << " n " << n;
       };
       near(out.frames, reference.frames, "frames");
       near(out.strains, reference.strains, "strains");
@@ -223,7 +230,8 @@ TEST_P(RodKernelTables, ReportNanInAnyNode)
   Random random(13);
   const int n = 19;
   const Matrix3Xd nodes = wigglyNodes(n, closed, random);
-  const RodModel model = buildRod("r", nodes, closed, oddSections(closed ? n : n - 1, random), Vector3d::Zero(), false, {curvature, false});
+  const RodModel model = buildRod("r", nodes, closed, oddSections(closed ? n : n - 1, random), Vector3d::Zero(), false,
+                                  {curvature, false});
   const RodState state = makeRodState(model, nodes, Vector3d::Zero());
   auto tables = rodTables();
   tables.push_back({"baseline", &baseline::rod_kernels});
@@ -233,12 +241,14 @@ TEST_P(RodKernelTables, ReportNanInAnyNode)
       RodSystem system(model);
       system.load(state);
       system.setPosition(bad, Vector3d(0, std::nan(""), 0));
-      EXPECT_FALSE(std::isfinite(sweep(*table, curvature, system.arrays(), nullptr, n).energy())) << name << " node " << bad;
+      EXPECT_FALSE(std::isfinite(sweep(*table, curvature, system.arrays(), nullptr, n).energy()))
+          << name << " node " << bad;
     }
 }
 
 INSTANTIATE_TEST_SUITE_P(OpenAndClosed, RodKernelTables,
-                         ::testing::Combine(::testing::Bool(), ::testing::Values(Curvature::tangent, Curvature::compensated)));
+                         ::testing::Combine(::testing::Bool(),
+                                            ::testing::Values(Curvature::tangent, Curvature::compensated)));
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

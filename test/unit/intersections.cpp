@@ -14,12 +14,15 @@ using Eigen::Vector3d;
 
 int exactSign(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d)   // of whole numbers
 {
-  const auto difference = [&](const Vector3d& p, int k) { return static_cast<long long>(p[k]) - static_cast<long long>(d[k]); };
+  const auto difference = [&](const Vector3d& p, int k) {
+    return static_cast<long long>(p[k]) - static_cast<long long>(d[k]);
+  };
   __int128 volume = 0;
   for (int k = 0; k < 3; ++k)
   {
     const int l = (k + 1) % 3, m = (k + 2) % 3;
-    volume += static_cast<__int128>(difference(a, k)) * (static_cast<__int128>(difference(b, l)) * difference(c, m) - static_cast<__int128>(difference(b, m)) * difference(c, l));
+    volume += static_cast<__int128>(difference(a, k)) * (static_cast<__int128>(difference(b, l)) * difference(c, m) -
+                                                         static_cast<__int128>(difference(b, m)) * difference(c, l));
   }
   return volume > 0 ? 1 : volume < 0 ? -1 : 0;
 }
@@ -58,13 +61,13 @@ TEST(Intersections, SegmentsAndTriangles)
   EXPECT_TRUE(meets({0.2, 0.2, 1}, {0.3, 0.3, -1}));
   EXPECT_FALSE(meets({0.2, 0.2, 1}, {0.3, 0.3, 1e-300}));
   EXPECT_TRUE(meets({0.2, 0.2, 1}, {0.3, 0.3, 0}));
-  EXPECT_TRUE(meets({0.5, 0.5, 1}, {0.5, 0.5, -1}));          // through a side
-  EXPECT_TRUE(meets({0, 0, 1}, {0, 0, -1}));                  // through a corner
+  EXPECT_TRUE(meets({0.5, 0.5, 1}, {0.5, 0.5, -1}));   // through a side
+  EXPECT_TRUE(meets({0, 0, 1}, {0, 0, -1}));           // through a corner
   EXPECT_FALSE(meets({0.6, 0.6, 1}, {0.6, 0.6, -1}));
-  EXPECT_TRUE(meets({-1, 0.2, 0}, {2, 0.2, 0}));              // in its plane
+  EXPECT_TRUE(meets({-1, 0.2, 0}, {2, 0.2, 0}));   // in its plane
   EXPECT_TRUE(meets({0.2, 0.2, 0}, {0.3, 0.2, 0}));
   EXPECT_FALSE(meets({-1, 1.5, 0}, {2, 1.2, 0}));
-  EXPECT_FALSE(meets({2, 0, 0}, {3, 0, 0}));                  // in the line of a side
+  EXPECT_FALSE(meets({2, 0, 0}, {3, 0, 0}));   // in the line of a side
   EXPECT_TRUE(meets({1, 0, 0}, {3, 0, 0}));
   EXPECT_FALSE(segmentMeetsTriangle({0, 0, 1}, {0, 0, 2}, {0, 0, 0}, {1, 1, 0}, {2, 2, 0}));   // without area
   EXPECT_TRUE(segmentMeetsTriangle({0.5, 0.5, 1}, {0.5, 0.5, -2}, {0, 0, 0}, {1, 1, 0}, {2, 2, 0}));
@@ -75,9 +78,9 @@ TEST(Intersections, SheetsAndSolids)
 {
   CollisionSurface surface;
   surface.rest.resize(3, 6);
-  surface.rest << 0, 1, 0, 0.2, 0.3, 5,  //
-                  0, 0, 1, 0.2, 0.3, 5,  //
-                  0, 0, 0, -1, 1, 5;
+  surface.rest << 0, 1, 0, 0.2, 0.3, 5,   //
+      0, 0, 1, 0.2, 0.3, 5,               //
+      0, 0, 0, -1, 1, 5;
   CollisionSheet sheet;
   sheet.triangles.resize(3, 2);
   sheet.triangles << 0, 3, 1, 4, 2, 5;
@@ -91,7 +94,8 @@ TEST(Intersections, SheetsAndSolids)
   pin->vertices.row(2) << -1, 1, 1;
   pin->triangles.resize(3, 1);
   pin->triangles << 0, 1, 2;
-  for (const Shape& shape : {Shape(Capsule{0.01, 2}), Shape(Cylinder{0.01, 2}), Shape(Box{{0.01, 0.01, 2}}), Shape(Sphere{0.05}), Shape(pin)})
+  for (const Shape& shape : {Shape(Capsule{0.01, 2}), Shape(Cylinder{0.01, 2}), Shape(Box{{0.01, 0.01, 2}}),
+                             Shape(Sphere{0.05}), Shape(pin)})
   {
     surface.solids = {{shape, -1.0, {}}};
     Pose pose;
@@ -131,7 +135,8 @@ TEST(KdopTree, FindsAllPairs)
       active[i] = size > 0.2 || random.uniform() > 0;
     }
     KdopTree tree;
-    const std::vector<char> touching = size > 0.2 ? std::vector<char>{1, 1, 1, 1, 1, 1, 1, 1, 1} : std::vector<char>{1, 0, 1, 0, 0, 1, 1, 1, 1};
+    const std::vector<char> touching =
+        size > 0.2 ? std::vector<char>{1, 1, 1, 1, 1, 1, 1, 1, 1} : std::vector<char>{1, 0, 1, 0, 0, 1, 1, 1, 1};
     tree.build(centers, groups, touching, 3);
     tree.refit(volumes, active);
     std::vector<KdopTree::Pair> found;
@@ -155,5 +160,5 @@ TEST(KdopTree, FindsAllPairs)
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

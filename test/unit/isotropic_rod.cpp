@@ -83,8 +83,10 @@ TEST_P(Isotropic, GradientIsTheEnergysDerivative)
     {
       if (held(i))
         continue;
-      const double up = isotropic_->evaluate(moved(i, k, h)).energy(), down = isotropic_->evaluate(moved(i, k, -h)).energy();
-      EXPECT_NEAR(gradient[i][k], (up - down) / (2 * h), 1e-7) << i << " " << k;   // h^2 times third derivatives of about 100
+      const double up = isotropic_->evaluate(moved(i, k, h)).energy(),
+                   down = isotropic_->evaluate(moved(i, k, -h)).energy();
+      // h^2 times third derivatives of about 100
+      EXPECT_NEAR(gradient[i][k], (up - down) / (2 * h), 1e-7) << i << " " << k;
     }
 }
 
@@ -133,7 +135,8 @@ TEST_P(Isotropic, FramesHaveTheTwists)
 
 TEST_P(Isotropic, AgreesWithTheGeneralFormulation)
 {
-  // Where nothing twists both are the same energy; the general one's mean curvature loses cos^2(m/2) when a joint twists by m.
+  // Where nothing twists both are the same energy; the general one's mean curvature loses cos^2(m/2) when a joint
+  // twists by m.
   if (GetParam().twist != 0 || GetParam().closed)
     return;
   rod_->state = moved(0, 0, 0.0);
@@ -162,7 +165,8 @@ const Case kCases[] = {
     {"ring_held_once", true, 33, {{5, 6}}, 3.0},
     {"ring_held_twice", true, 20, {{0, 0}, {9, 11}}, 5.0},
 };
-INSTANTIATE_TEST_SUITE_P(Rods, Isotropic, ::testing::ValuesIn(kCases), [](const auto& info) { return std::string(info.param.name); });
+INSTANTIATE_TEST_SUITE_P(Rods, Isotropic, ::testing::ValuesIn(kCases),
+                         [](const auto& info) { return std::string(info.param.name); });
 
 /// A wiggly rod pinned at its first node, with and without material frames, in explicit steps.
 class FramelessRod : public ::testing::Test
@@ -197,7 +201,8 @@ protected:
     std::vector<Eigen::Matrix3d> frames;
     forEachFrame(*bare_->model, bare_->state, [&](int, const Eigen::Matrix3d& axes) { frames.push_back(axes); });
     double worst = 0;
-    forEachFrame(*framed_->model, framed_->state, [&](int j, const Eigen::Matrix3d& axes) { worst = std::max(worst, (axes - frames[j]).norm()); });
+    forEachFrame(*framed_->model, framed_->state,
+                 [&](int j, const Eigen::Matrix3d& axes) { worst = std::max(worst, (axes - frames[j]).norm()); });
     return worst;
   }
   Matrix3Xd nodes_;
@@ -240,7 +245,8 @@ TEST_F(FramelessRod, NodesThatMeetAreRefusedAndTheStateKept)
   {
     const int a = rod->hold(9, 9, false), b = rod->hold(10, 10, false);
     const GraspTarget back = rod->inputs.grasps[b];
-    rod->inputs.grasps[b].X_WG.position = rod->inputs.grasps[a].X_WG.position;   // one edge of no length, and so without a tangent
+    // one edge of no length, and so without a tangent
+    rod->inputs.grasps[b].X_WG.position = rod->inputs.grasps[a].X_WG.position;
     RodStepper stepper(rod->model, withIntegrator(Integrator::symplectic_euler));
     const RodState before = rod->state;
     EXPECT_FALSE(stepper.step(rod->state, rod->inputs, 1e-3).ok);
@@ -255,7 +261,9 @@ TEST_F(FramelessRod, StatesThatDoNotFitAreRefused)
   const RodState good = bare_->state;
   const auto refusal = [&](const RodState& state) {
     bare_->state = state;
-    return RodStepper(bare_->model, withIntegrator(Integrator::symplectic_euler)).step(bare_->state, bare_->inputs, 1e-3).message;
+    return RodStepper(bare_->model, withIntegrator(Integrator::symplectic_euler))
+        .step(bare_->state, bare_->inputs, 1e-3)
+        .message;
   };
   EXPECT_EQ(refusal(good), "");
   RodState along = good, twisted = good;
@@ -283,5 +291,5 @@ TEST_F(FramelessRod, OthersHaveFrames)
   EXPECT_TRUE(bare_->state.framed());
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -1,4 +1,5 @@
-// Gradient and Hessian of one joint against differences of its energy, in extended precision so that only the formulas are tested.
+// Gradient and Hessian of one joint against differences of its energy, in extended precision so that only the formulas
+// are tested.
 #include <array>
 #include <cmath>
 
@@ -24,7 +25,8 @@ V transport(const V& v, const V& a, const V& b)
   return v * dot(a, b) + c * (dot(c, v) / (1 + dot(a, b))) + cross(c, v);
 }
 
-/// One joint, displaced by coordinates q = (de, df, dtheta_e, dtheta_f) from its base; frames are transported from there.
+/// One joint, displaced by coordinates q = (de, df, dtheta_e, dtheta_f) from its base; frames are transported from
+/// there.
 struct Joint
 {
   V e, f, d1e, d1f;
@@ -38,7 +40,8 @@ struct Joint
     const V e1 = e + V{q[0], q[1], q[2]}, f1 = f + V{q[3], q[4], q[5]};
     const V te = normalized(e1), tf = normalized(f1);
     const V ue = transport(d1e, normalized(e), te), uf = transport(d1f, normalized(f), tf);
-    const V de = ue * std::cos(q[6]) + cross(te, ue) * std::sin(q[6]), df = uf * std::cos(q[7]) + cross(tf, uf) * std::sin(q[7]);
+    const V de = ue * std::cos(q[6]) + cross(te, ue) * std::sin(q[6]),
+            df = uf * std::cos(q[7]) + cross(tf, uf) * std::sin(q[7]);
     return {te, de, cross(te, de), tf, df, cross(tf, df), 1 / norm(e1), 1 / norm(f1)};
   }
 
@@ -49,19 +52,24 @@ struct Joint
     return angle + 2 * pi * std::nearbyint((near - angle) / (2 * pi));
   }
 
-  JointResponse<Real> response(const JointFrames<Real>& s, const JointStrains<Real>& k, Real m, Real* kappa = nullptr) const
+  JointResponse<Real> response(const JointFrames<Real>& s, const JointStrains<Real>& k, Real m,
+                               Real* kappa = nullptr) const
   {
     Real strain[2] = {k.kappa1, k.kappa2};
-    const JointResponse<Real> r = compensated
-        ? compensatedResponse(k, m, material, {coupling, std::sqrt((1 + dot(s.te, s.tf)) / 2), std::sin(m / 2), std::cos(m / 2)}, strain[0], strain[1])
-        : tangentResponse(k, m, material);
+    const JointResponse<Real> r =
+        compensated
+            ? compensatedResponse(k, m, material,
+                                  {coupling, std::sqrt((1 + dot(s.te, s.tf)) / 2), std::sin(m / 2), std::cos(m / 2)},
+                                  strain[0], strain[1])
+            : tangentResponse(k, m, material);
     if (kappa)
       std::copy_n(strain, 2, kappa);
     return r;
   }
 
   template <bool WithHessian = false>
-  Real energy(const std::array<Real, 8>& q, JointGradient<Real>* gradient = nullptr, JointHessian<Real>* hessian = nullptr) const
+  Real energy(const std::array<Real, 8>& q, JointGradient<Real>* gradient = nullptr,
+              JointHessian<Real>* hessian = nullptr) const
   {
     const JointFrames<Real> s = frames(q);
     JointGradient<Real> g{};
@@ -81,7 +89,10 @@ struct Joint
 };
 
 /// What the tests vary: the turn, and how the curvature is measured (coupling < 0: the thesis's way).
-struct Variant { double turn, coupling; };
+struct Variant
+{
+  double turn, coupling;
+};
 
 Joint randomJoint(Random& random, const Variant& variant)
 {
@@ -131,8 +142,7 @@ Dense dense(const JointHessian<Real>& h)
 }
 
 class JointTurn : public ::testing::TestWithParam<Variant>
-{
-};
+{};
 
 TEST_P(JointTurn, GradientAndHessianAreDerivativesOfTheEnergy)
 {
@@ -173,7 +183,8 @@ TEST_P(JointTurn, GradientAndHessianAreDerivativesOfTheEnergy)
           std::array<Real, 8> pp = up, pm = up, mp = down, mm = down;
           pp[b] = mp[b] = step;
           pm[b] = mm[b] = -step;
-          const Real second = (joint.energy(pp) - joint.energy(pm) - joint.energy(mp) + joint.energy(mm)) / (4 * step * step);
+          const Real second =
+              (joint.energy(pp) - joint.energy(pm) - joint.energy(mp) + joint.energy(mm)) / (4 * step * step);
           hessian_error[k] = std::max(hessian_error[k], std::abs(second - hessian[a][b]));
         }
       }
@@ -184,7 +195,8 @@ TEST_P(JointTurn, GradientAndHessianAreDerivativesOfTheEnergy)
       EXPECT_NEAR(std::log10(gradient_error[k] / gradient_error[k + 1]), 2.0, 0.2);
       EXPECT_NEAR(std::log10(hessian_error[k] / hessian_error[k + 1]), 2.0, 0.2);
     }
-    // ... down to step^2 = 1e-10 times the fourth derivatives, which grow with the turn as 1 / (1 + cos)^2; round-off 1e-19/step^2 is 1e-9
+    // ... down to step^2 = 1e-10 times the fourth derivatives, which grow with the turn as 1 / (1 + cos)^2; round-off
+    // 1e-19/step^2 is 1e-9
     EXPECT_LT(gradient_error[4], 1e-7 * scale);
     EXPECT_LT(hessian_error[4], 1e-6 * scale);
   }
@@ -208,9 +220,11 @@ TEST_P(JointTurn, ForcesBalance)
   const Joint joint = randomJoint(random, GetParam());
   JointGradient<Real> g;
   joint.energy({}, &g);
-  const V moment = cross(joint.e, g.e) + cross(joint.f, g.f) + normalized(joint.e) * g.theta_e + normalized(joint.f) * g.theta_f;
+  const V moment =
+      cross(joint.e, g.e) + cross(joint.f, g.f) + normalized(joint.e) * g.theta_e + normalized(joint.f) * g.theta_f;
   EXPECT_LT(norm(moment), 1e-16L * (1 + norm(g.e)));
-  EXPECT_LT(std::abs(dot(joint.e, g.e)), 1e-16L * (1 + norm(g.e)));   // stretching an edge does not change bending or twist
+  // stretching an edge does not change bending or twist
+  EXPECT_LT(std::abs(dot(joint.e, g.e)), 1e-16L * (1 + norm(g.e)));
   EXPECT_GT(norm(g.e), 1e-2L);
 }
 
@@ -251,5 +265,5 @@ std::vector<Variant> variants()
 }
 INSTANTIATE_TEST_SUITE_P(Turns, JointTurn, ::testing::ValuesIn(variants()));
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

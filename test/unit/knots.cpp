@@ -14,14 +14,20 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// |Alexander polynomial at -1| of a closed polyline, by its crossings seen along a direction: 1 for the unknot, 3 for the trefoil. Each
-/// stretch from one crossing under to the next is an arc; at a crossing twice the arc over it equals the sum of the two arcs below it.
+/// |Alexander polynomial at -1| of a closed polyline, by its crossings seen along a direction: 1 for the unknot, 3 for
+/// the trefoil. Each stretch from one crossing under to the next is an arc; at a crossing twice the arc over it equals
+/// the sum of the two arcs below it.
 long knotDeterminant(const Eigen::Matrix3Xd& nodes, const Vector3d& view)
 {
   const Vector3d e3 = view.normalized(), e1 = e3.unitOrthogonal(), e2 = e3.cross(e1);
   const int n = static_cast<int>(nodes.cols());
-  const auto point = [&](int i) { return Vector3d(e1.dot(nodes.col(i % n)), e2.dot(nodes.col(i % n)), e3.dot(nodes.col(i % n))); };
-  struct Crossing { double under, over; };   // positions along the curve
+  const auto point = [&](int i) {
+    return Vector3d(e1.dot(nodes.col(i % n)), e2.dot(nodes.col(i % n)), e3.dot(nodes.col(i % n)));
+  };
+  struct Crossing
+  {
+    double under, over;
+  };   // positions along the curve
   std::vector<Crossing> crossings;
   for (int i = 0; i < n; ++i)
   {
@@ -31,9 +37,7 @@ long knotDeterminant(const Eigen::Matrix3Xd& nodes, const Vector3d& view)
       const double w = b.x() * d.y() - b.y() * d.x();
       const double s = (r.x() * d.y() - r.y() * d.x()) / w, t = (r.x() * b.y() - r.y() * b.x()) / w;
       if ((i == 0 && j == n - 1) || !(s >= 0 && s < 1 && t >= 0 && t < 1))
-      {
         continue;
-      }
       const bool i_is_over = a.z() + s * b.z() > c.z() + t * d.z();
       crossings.push_back(i_is_over ? Crossing{j + t, i + s} : Crossing{i + s, j + t});
     }
@@ -45,9 +49,7 @@ long knotDeterminant(const Eigen::Matrix3Xd& nodes, const Vector3d& view)
   {
     int over = 0;
     while (over < count && crossings[over].under < crossings[k].over)
-    {
       ++over;
-    }
     equations(k, over % count) += 2;
     equations(k, k) -= 1;
     equations(k, (k + 1) % count) -= 1;
@@ -61,12 +63,8 @@ double ownDistance(const Eigen::Matrix3Xd& nodes, double apart)
   const double length = edgeLengths(nodes, false).sum(), edge = length / static_cast<double>(nodes.cols() - 1);
   double least = std::numeric_limits<double>::infinity();
   for (Eigen::Index i = 0; i < nodes.cols(); ++i)
-  {
     for (Eigen::Index j = i + static_cast<Eigen::Index>(apart / edge); j < nodes.cols(); ++j)
-    {
       least = std::min(least, (nodes.col(i) - nodes.col(j)).norm());
-    }
-  }
   return least;
 }
 
@@ -110,9 +108,7 @@ TEST(Knots, trefoilIsKnottedBetweenStraightTails)
     // Tails of one line through the centre, the ends equally far from it.
     EXPECT_LT((nodes.col(0) + nodes.col(400) - 2 * center).norm(), 1e-12);
     for (int i : {0, 10, 400})
-    {
       EXPECT_LT((nodes.col(i) - center).cross(axis).norm(), 1e-12);
-    }
     const auto lengths = edgeLengths(nodes, false);
     EXPECT_NEAR(lengths.sum(), 1.5, 1e-3);   // chords
     EXPECT_GT(lengths.minCoeff(), 0.99 * lengths.maxCoeff());
@@ -129,7 +125,8 @@ TEST(Knots, trefoilDoesNotTouchItself)
 {
   for (double separation : {0.004, 0.0125, 0.025})
   {
-    EXPECT_GT(ownDistance(trefoilCurve({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.1, separation, 1.5, false, 4000), 0.2), 0.8 * separation);
+    EXPECT_GT(ownDistance(trefoilCurve({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 0.1, separation, 1.5, false, 4000), 0.2),
+              0.8 * separation);
   }
 }
 
@@ -160,5 +157,5 @@ TEST(Knots, veeHasItsTipAndAngle)
   EXPECT_THROW(veeCurve({0, 0, 0}, {1, 0, 0}, {1, 0, 0}, 1, 1, 20), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

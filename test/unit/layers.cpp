@@ -13,9 +13,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::map<std::string, int> level{
-  {"linalg", 0}, {"geometry", 0}, {"energy", 1},  {"dynamics", 1}, {"contact", 1}, {"rod", 2},   {"thread", 2}, {"cloth", 2},
-  {"tracking", 2}, {"fairing", 2}, {"scene", 3},  {"node", 4},     {"study", 4},   {"nodes", 5}, {"tools", 5}};
+const std::map<std::string, int> level{{"linalg", 0}, {"geometry", 0}, {"energy", 1}, {"dynamics", 1}, {"contact", 1},
+                                       {"rod", 2},    {"thread", 2},   {"cloth", 2},  {"tracking", 2}, {"fairing", 2},
+                                       {"scene", 3},  {"node", 4},     {"study", 4},  {"nodes", 5},    {"tools", 5}};
 
 struct Include
 {
@@ -28,14 +28,10 @@ std::string includedHeader(const std::string& line)
 {
   const auto hash = line.find_first_not_of(" \t");
   if (hash == std::string::npos || line[hash] != '#')
-  {
     return "";
-  }
   const auto word = line.find_first_not_of(" \t", hash + 1);
   if (word == std::string::npos || line.compare(word, 7, "include") != 0)
-  {
     return "";
-  }
   const auto open = line.find_first_of("<\"", word + 7);
   const auto close = open == std::string::npos ? open : line.find_first_of(">\"", open + 1);
   return close == std::string::npos ? "" : line.substr(open + 1, close - open - 1);
@@ -43,8 +39,18 @@ std::string includedHeader(const std::string& line)
 
 bool isRos(const std::string& header)
 {
-  static const std::set<std::string> packages{"ros", "rosbag", "tf", "tf2", "tf2_ros", "std_srvs", "nodelet", "pluginlib",
-                                              "diagnostic_updater", "interactive_markers", "rosconsole", "xmlrpcpp"};
+  static const std::set<std::string> packages{"ros",
+                                              "rosbag",
+                                              "tf",
+                                              "tf2",
+                                              "tf2_ros",
+                                              "std_srvs",
+                                              "nodelet",
+                                              "pluginlib",
+                                              "diagnostic_updater",
+                                              "interactive_markers",
+                                              "rosconsole",
+                                              "xmlrpcpp"};
   const auto slash = header.find('/');
   const std::string package = header.substr(0, slash);
   const bool messages = package.size() > 5 && package.compare(package.size() - 5, 5, "_msgs") == 0;
@@ -61,9 +67,7 @@ std::vector<Include> allIncludes()
     {
       const std::string suffix = entry.path().extension().string();
       if (!entry.is_regular_file() || (suffix != ".h" && suffix != ".cpp" && suffix != ".hpp" && suffix != ".inc"))
-      {
         continue;
-      }
       const fs::path relative = fs::relative(entry.path(), root);
       std::ifstream file(entry.path());
       std::string text;
@@ -71,9 +75,7 @@ std::vector<Include> allIncludes()
       {
         const std::string header = includedHeader(text);
         if (!header.empty())
-        {
           includes.push_back({(fs::path(top) / relative).string(), relative.begin()->string(), header, line});
-        }
       }
     }
   }
@@ -84,9 +86,7 @@ std::string roomOf(const std::string& header)
 {
   const std::string prefix = "slender_sim/";
   if (header.compare(0, prefix.size(), prefix) != 0)
-  {
     return "";
-  }
   const auto slash = header.find('/', prefix.size());
   return slash == std::string::npos ? "" : header.substr(prefix.size(), slash - prefix.size());
 }
@@ -94,9 +94,7 @@ std::string roomOf(const std::string& header)
 TEST(Layers, everyFolderIsARoom)
 {
   for (const Include& include : allIncludes())
-  {
     EXPECT_TRUE(level.count(include.room)) << include.file << ": " << include.room << " is no room of DESIGN 1";
-  }
 }
 
 TEST(Layers, dependenciesPointDown)
@@ -106,14 +104,13 @@ TEST(Layers, dependenciesPointDown)
   {
     const auto from = level.find(include.room), to = level.find(roomOf(include.header));
     if (from == level.end() || to == level.end() || from->first == to->first)
-    {
       continue;
-    }
     ++checked;
-    // Rooms of one level may use each other (energy and dynamics; geometry and linalg) except the solvers and node/study.
+    // Rooms of one level may use each other (energy and dynamics; geometry and linalg) except the solvers and
+    // node/study.
     const bool siblings_allowed = from->second <= 1;
     EXPECT_TRUE(to->second < from->second || (siblings_allowed && to->second == from->second))
-      << include.file << ":" << include.line << ": " << from->first << " must not include " << include.header;
+        << include.file << ":" << include.line << ": " << from->first << " must not include " << include.header;
   }
   EXPECT_GT(checked, 10);   // the walk found the sources
 }
@@ -123,9 +120,7 @@ TEST(Layers, onlyNodesKnowRos)
   for (const Include& include : allIncludes())
   {
     if (include.room == "node" || include.room == "nodes")
-    {
       continue;
-    }
     EXPECT_FALSE(isRos(include.header)) << include.file << ":" << include.line << ": " << include.header;
   }
 }
@@ -136,7 +131,8 @@ TEST(Layers, onlyContactKnowsFclAndOnlySceneKnowsYaml)
   {
     EXPECT_FALSE(include.room != "contact" && include.header.compare(0, 4, "fcl/") == 0) << include.file;
     const bool yaml = include.header.compare(0, 9, "yaml-cpp/") == 0;
-    EXPECT_FALSE(yaml && include.file.compare(0, 10, "src/scene/") != 0) << include.file << " must not include " << include.header;
+    EXPECT_FALSE(yaml && include.file.compare(0, 10, "src/scene/") != 0)
+        << include.file << " must not include " << include.header;
   }
 }
 
@@ -147,25 +143,19 @@ TEST(Layers, noFileIsTooLong)
   {
     const fs::path root = fs::path(SLENDER_SOURCE_DIR) / folder;
     if (!fs::exists(root))
-    {
       continue;
-    }
     for (const auto& entry : fs::recursive_directory_iterator(root))
     {
       if (!entry.is_regular_file())
-      {
         continue;
-      }
       std::ifstream file(entry.path());
       std::string line;
       int count = 0;
       while (std::getline(file, line))
-      {
         ++count;
-      }
       EXPECT_LE(count, 550) << entry.path();
     }
   }
 }
 
-}  // namespace
+}   // namespace

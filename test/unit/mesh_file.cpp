@@ -56,7 +56,8 @@ TEST_F(MeshFile, readsPolygonsAndKeepsTheOrderOfVertices)
 
 TEST_F(MeshFile, readsGroupsByTheirFaces)
 {
-  std::ofstream(path_) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\ng foot left\nf 2 1 4\ng left\nf 1 3 4\ng default\nf 2 4 3\n";
+  std::ofstream(path_)
+      << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\ng foot left\nf 2 1 4\ng left\nf 1 3 4\ng default\nf 2 4 3\n";
   const std::vector<VertexGroup> groups = readObjGroups(path_);
   ASSERT_EQ(groups.size(), 2u);
   EXPECT_EQ(groups[0].name, "foot");
@@ -76,13 +77,16 @@ TEST_F(MeshFile, namesFileLineAndReason)
   EXPECT_EQ(problemOf(three + "f 1 2\n"), ":4: face with 2 vertices; must have at least 3");
   EXPECT_EQ(problemOf(three + "f 1 2 2\n"), ":4: face with vertex 2 twice");
   EXPECT_EQ(problemOf(three + "f 1 2 4\n"), ":4: face vertex 4; the file has 3 vertices");
-  EXPECT_EQ(problemOf(three + "f 0 1 2\n"), ":4: face vertex '0'; must be a whole number from 1, or negative and then at least -3");
-  EXPECT_EQ(problemOf(three + "f 1 2 -4\n"), ":4: face vertex '-4'; must be a whole number from 1, or negative and then at least -3");
-  EXPECT_EQ(problemOf(three + "f a b c\n"), ":4: face vertex 'a'; must be a whole number from 1, or negative and then at least -3");
+  EXPECT_EQ(problemOf(three + "f 0 1 2\n"),
+            ":4: face vertex '0'; must be a whole number from 1, or negative and then at least -3");
+  EXPECT_EQ(problemOf(three + "f 1 2 -4\n"),
+            ":4: face vertex '-4'; must be a whole number from 1, or negative and then at least -3");
+  EXPECT_EQ(problemOf(three + "f a b c\n"),
+            ":4: face vertex 'a'; must be a whole number from 1, or negative and then at least -3");
   EXPECT_EQ(problemOf("f 1 2 3\n" + three), "");   // vertices may come later
   std::remove(path_.c_str());
   EXPECT_THROW(readObj(path_), std::runtime_error);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -29,7 +29,8 @@ TriangleMesh made(std::initializer_list<Eigen::Vector3d> vertices, std::initiali
   return mesh;
 }
 
-const GridPattern kPatterns[] = {GridPattern::one_diagonal, GridPattern::alternating, GridPattern::equilateral, GridPattern::irregular};
+const GridPattern kPatterns[] = {GridPattern::one_diagonal, GridPattern::alternating, GridPattern::equilateral,
+                                 GridPattern::irregular};
 
 TEST(MeshShapes, GridsCoverTheirRectangleWithSoundFaces)
 {
@@ -52,14 +53,16 @@ TEST(MeshShapes, GridsCoverTheirRectangleWithSoundFaces)
     }
   EXPECT_EQ(gridMesh(1, 1, 159, 159, GridPattern::one_diagonal).vertices.cols(), 25600);
   const TriangleMesh regular = gridMesh(1, 0.866, 10, 0, GridPattern::equilateral);
-  EXPECT_NEAR((regular.vertices.col(0) - regular.vertices.col(12)).norm(), 0.1, 1e-4);   // row 1 begins on the side, then half a cell in
+  // row 1 begins on the side, then half a cell in
+  EXPECT_NEAR((regular.vertices.col(0) - regular.vertices.col(12)).norm(), 0.1, 1e-4);
   EXPECT_THROW(gridMesh(0, 1, 3, 3, GridPattern::alternating), std::invalid_argument);
   EXPECT_THROW(gridMesh(1, 1, 0, 3, GridPattern::alternating), std::invalid_argument);
 }
 
 TEST(MeshShapes, IrregularIsDelaunayAndRepeats)
 {
-  const TriangleMesh a = gridMesh(1, 1, 20, 0, GridPattern::irregular, 5), b = gridMesh(1, 1, 20, 0, GridPattern::irregular, 5);
+  const TriangleMesh a = gridMesh(1, 1, 20, 0, GridPattern::irregular, 5),
+                     b = gridMesh(1, 1, 20, 0, GridPattern::irregular, 5);
   EXPECT_EQ(a.vertices, b.vertices);
   EXPECT_EQ(a.triangles, b.triangles);
   EXPECT_NE(a.vertices, gridMesh(1, 1, 20, 0, GridPattern::irregular, 6).vertices);
@@ -67,7 +70,8 @@ TEST(MeshShapes, IrregularIsDelaunayAndRepeats)
   for (Eigen::Index h = 0; h < t.hinges.cols(); ++h)
   {
     const auto angle = [&](int at) {
-      const Eigen::Vector3d u = a.vertices.col(t.hinges(0, h)) - a.vertices.col(at), v = a.vertices.col(t.hinges(1, h)) - a.vertices.col(at);
+      const Eigen::Vector3d u = a.vertices.col(t.hinges(0, h)) - a.vertices.col(at),
+                            v = a.vertices.col(t.hinges(1, h)) - a.vertices.col(at);
       return std::atan2(u.cross(v).norm(), u.dot(v));
     };
     EXPECT_LT(angle(t.hinges(2, h)) + angle(t.hinges(3, h)), M_PI + 1e-6);
@@ -121,7 +125,8 @@ TEST(MeshTopology, HingesFaceEachOther)
   double area = 0;   // counter-clockwise, once around
   for (std::size_t k = 0; k < 14; ++k)
   {
-    const Eigen::Vector3d a = mesh.vertices.col(t.boundaries[0][k]), b = mesh.vertices.col(t.boundaries[0][(k + 1) % 14]);
+    const Eigen::Vector3d a = mesh.vertices.col(t.boundaries[0][k]),
+                          b = mesh.vertices.col(t.boundaries[0][(k + 1) % 14]);
     EXPECT_LT((a - b).norm(), 0.34);
     area += 0.5 * a.cross(b).z();
   }
@@ -179,27 +184,32 @@ TEST(MeshDefects, AreNamed)
   EXPECT_EQ(meshDefects(TriangleMesh()).size(), 1u);   // nothing at all
   EXPECT_EQ(meshDefects(TriangleMesh())[0].kind, MeshDefect::empty);
 
-  const auto degenerate = defectsOf(made({a, b, c, {0.5, 1e-9, 0}}, {{0, 1, 2}, {1, 0, 3}}), MeshDefect::degenerate_face);
+  const auto degenerate =
+      defectsOf(made({a, b, c, {0.5, 1e-9, 0}}, {{0, 1, 2}, {1, 0, 3}}), MeshDefect::degenerate_face);
   ASSERT_EQ(degenerate.size(), 1u);
-  EXPECT_EQ(degenerate[0].message, "face 1 (vertices 1, 0 and 3, from 0) has (nearly) no area; merge its vertices or remove it");
+  EXPECT_EQ(degenerate[0].message,
+            "face 1 (vertices 1, 0 and 3, from 0) has (nearly) no area; merge its vertices or remove it");
 
   const TriangleMesh book = made({a, b, c, d, e}, {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}});
   const auto spine = defectsOf(book, MeshDefect::non_manifold_edge);
   ASSERT_EQ(spine.size(), 1u);
   EXPECT_EQ(spine[0].vertices, (std::vector<int>{0, 1}));
   EXPECT_EQ(spine[0].faces, (std::vector<int>{0, 1, 2}));
-  EXPECT_NE(spine[0].message.find("vertices 0 and 1 (from 0) has 3 faces: 0, 1 and 2"), std::string::npos) << spine[0].message;
+  EXPECT_NE(spine[0].message.find("vertices 0 and 1 (from 0) has 3 faces: 0, 1 and 2"), std::string::npos)
+      << spine[0].message;
   EXPECT_THROW(meshTopology(book), std::invalid_argument);
 
   const auto opposed = defectsOf(made({a, b, c, d}, {{0, 1, 2}, {1, 2, 3}}), MeshDefect::opposed_faces);
   ASSERT_EQ(opposed.size(), 1u);
   EXPECT_EQ(opposed[0].faces, (std::vector<int>{0, 1}));
 
-  const auto touch = defectsOf(made({a, b, c, {-1, 0, 0}, {0, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}), MeshDefect::non_manifold_vertex);
+  const auto touch =
+      defectsOf(made({a, b, c, {-1, 0, 0}, {0, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}), MeshDefect::non_manifold_vertex);
   ASSERT_EQ(touch.size(), 1u);
   EXPECT_EQ(touch[0].vertices, std::vector<int>{0});
 
-  const auto twins = defectsOf(made({a, b, c, d, b + Eigen::Vector3d(1e-11, 0, 0), c}, {{0, 1, 2}, {5, 4, 3}}), MeshDefect::duplicate_vertices);
+  const auto twins = defectsOf(made({a, b, c, d, b + Eigen::Vector3d(1e-11, 0, 0), c}, {{0, 1, 2}, {5, 4, 3}}),
+                               MeshDefect::duplicate_vertices);
   ASSERT_EQ(twins.size(), 2u);
   EXPECT_EQ(twins[0].vertices, (std::vector<int>{1, 4}));
   EXPECT_EQ(twins[1].vertices, (std::vector<int>{2, 5}));
@@ -261,9 +271,11 @@ TEST_F(MeshFiles, RoundTripsToTheBit)
   EXPECT_THROW(readMesh("shirt.stl"), std::runtime_error);
 }
 
-const std::string kHead = "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 4\nproperty float x\nproperty uchar red\nproperty float y\n"
-                          "property float z\nelement edge 1\nproperty int a\nelement face 1\nproperty list uchar float weights\n"
-                          "property list uchar int vertex_index\nend_header\n";
+const std::string kHead =
+    "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 4\nproperty float x\nproperty uchar red\nproperty "
+    "float y\n"
+    "property float z\nelement edge 1\nproperty int a\nelement face 1\nproperty list uchar float weights\n"
+    "property list uchar int vertex_index\nend_header\n";
 
 TEST_F(MeshFiles, ReadsAsciiPlyWithForeignProperties)
 {
@@ -278,8 +290,10 @@ TEST_F(MeshFiles, ReadsBinaryPlyOfEitherOrder)
 {
   for (const bool big : {false, true})
   {
-    std::string text = std::string("ply\r\nformat binary_") + (big ? "big" : "little") + "_endian 1.0\r\nelement vertex 3\r\nproperty float x\r\n" +
-                       "property double y\r\nproperty short z\r\nelement face 1\r\nproperty list uchar uint vertex_indices\r\nend_header\r\n";
+    std::string text = std::string("ply\r\nformat binary_") + (big ? "big" : "little") +
+                       "_endian 1.0\r\nelement vertex 3\r\nproperty float x\r\n" +
+                       "property double y\r\nproperty short z\r\nelement face 1\r\nproperty list uchar uint "
+                       "vertex_indices\r\nend_header\r\n";
     const auto put = [&](const void* value, int bytes) {
       const char* b = static_cast<const char*>(value);
       for (int k = 0; k < bytes; ++k)
@@ -333,5 +347,5 @@ TEST_F(MeshFiles, NamesWhatIsWrongWithPly)
   EXPECT_EQ(problem(), "header: format 'utf8'; must be ascii, binary_little_endian or binary_big_endian");
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -37,5 +37,5 @@ TEST(NumberTable, BadTablesAreRefused)
   EXPECT_THROW(NumberTable({{std::nan(""), 1}}), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

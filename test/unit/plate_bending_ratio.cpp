@@ -43,7 +43,8 @@ TEST(PlateBendingRatio, MatrixIsTheHessianOfTheEnergyOfAngles)
       const MeshTopology t = meshTopology(mesh);
       const auto triangles = plateTriangles(mesh, t, nu, 0.8);
       const MatrixXd K = plateBending(mesh, t, nu, 0.8).toEigen();
-      // second differences along random normal displacements: the energy is a quadratic form of them to fourth order in their size
+      // second differences along random normal displacements: the energy is a quadratic form of them to fourth order in
+      // their size
       for (int k = 0; k < 5; ++k)
       {
         const VectorXd w = random.numbers(static_cast<int>(mesh.vertices.cols()), 1.0);
@@ -52,14 +53,16 @@ TEST(PlateBendingRatio, MatrixIsTheHessianOfTheEnergyOfAngles)
         up.row(2) += h * w.transpose();
         const double expected = 0.5 * w.dot(K * w), energy = energyOfAngles(triangles, t, up) / (h * h);
         ASSERT_GT(expected, 1e-3);
-        EXPECT_NEAR(energy / expected, 1.0, 1e-6) << toString(pattern) << " " << nu;   // the angles' own cubic terms are of order h^2 = 1e-8
+        // the angles' own cubic terms are of order h^2 = 1e-8
+        EXPECT_NEAR(energy / expected, 1.0, 1e-6) << toString(pattern) << " " << nu;
       }
     }
 }
 
 TEST(PlateBendingRatio, IsSemidefiniteAndLeavesAffineMapsAloneButNothingElse)
 {
-  for (const GridPattern pattern : {GridPattern::equilateral, GridPattern::one_diagonal, GridPattern::alternating, GridPattern::irregular})
+  for (const GridPattern pattern :
+       {GridPattern::equilateral, GridPattern::one_diagonal, GridPattern::alternating, GridPattern::irregular})
     for (const double nu : kRatios)
     {
       const TriangleMesh mesh = gridMesh(1.0, 1.2, 6, 0, pattern);
@@ -75,7 +78,8 @@ TEST(PlateBendingRatio, IsSemidefiniteAndLeavesAffineMapsAloneButNothingElse)
     }
 }
 
-/// In triangles without a vertex on the boundary (equilateral grids end in halves of triangles), of the surface z = (a x^2 + 2 b x y + c y^2) / 2.
+/// In triangles without a vertex on the boundary (equilateral grids end in halves of triangles), of the surface z = (a
+/// x^2 + 2 b x y + c y^2) / 2.
 TEST(PlateBendingRatio, EnergyOfQuadraticSurfacesIsExactOnLattices)
 {
   for (const GridPattern pattern : {GridPattern::equilateral, GridPattern::one_diagonal})
@@ -84,8 +88,11 @@ TEST(PlateBendingRatio, EnergyOfQuadraticSurfacesIsExactOnLattices)
       {
         const TriangleMesh mesh = latticeOf(pattern, 12);
         const MeshTopology t = meshTopology(mesh);
-        const VectorXd z = 0.5 * (q[0] * mesh.vertices.row(0).array().square() + 2 * q[1] * mesh.vertices.row(0).array() * mesh.vertices.row(1).array() +
-                                  q[2] * mesh.vertices.row(1).array().square()).matrix().transpose();
+        const VectorXd z = 0.5 * (q[0] * mesh.vertices.row(0).array().square() +
+                                  2 * q[1] * mesh.vertices.row(0).array() * mesh.vertices.row(1).array() +
+                                  q[2] * mesh.vertices.row(1).array().square())
+                                     .matrix()
+                                     .transpose();
         const double expected = 0.5 * (std::pow(q[0] + q[2], 2) - 2 * (1 - nu) * (q[0] * q[2] - q[1] * q[1]));
         double energy = 0, area = 0;
         for (const PlateTriangle& triangle : plateTriangles(mesh, t, nu, 1.0))
@@ -107,7 +114,8 @@ TEST(PlateBendingRatio, EnergyOfQuadraticSurfacesIsExactOnLattices)
           area += pattern == GridPattern::equilateral ? std::sqrt(0.1875) : 0.5;
         }
         ASSERT_GT(area, 50.0);
-        EXPECT_NEAR(energy / area, expected, 1e-10) << toString(pattern) << " " << nu;   // round-off of heights up to 100
+        // round-off of heights up to 100
+        EXPECT_NEAR(energy / area, expected, 1e-10) << toString(pattern) << " " << nu;
       }
 }
 
@@ -136,5 +144,5 @@ TEST(PlateBendingRatio, RefusesRatiosOutOfRange)
     EXPECT_THROW(plateBending(mesh, meshTopology(mesh), bad, 1.0), std::invalid_argument) << bad;
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -27,7 +27,8 @@ struct System
     Matrix3Xd x = mesh.vertices;
     for (int i = 0; i < points(); ++i)
       x.col(i) += random.vector(0.02);
-    membrane.addHessian(HessianKind::semidefinite, pointsOf(x).data(), membrane.slotsIn(blocks), gradient.data(), blocks.values());
+    membrane.addHessian(HessianKind::semidefinite, pointsOf(x).data(), membrane.slotsIn(blocks), gradient.data(),
+                        blocks.values());
     blocks.add(1.0, bending, blocks.mapOf(bending));
     std::vector<Eigen::Triplet<double>> mass;
     for (int i = 0; i < points(); ++i)
@@ -70,17 +71,18 @@ TEST(SymmetricSweeps, SolveWithAndWithoutAMatrixOfPoints)
     plain.resize(s.points());
     PointVector y = x;
     const LinearResult slow = plain.solve(
-      b, y, 1e-12, 2000,
-      [&](const PointVector& p, PointVector& ap) {
-        const VectorXd product = A * flattened(matrixOf(p));
-        ap = pointsOf(Eigen::Map<const Matrix3Xd>(product.data(), 3, s.points()));
-      },
-      [&](const PointVector& r, PointVector& z) {
-        for (int i = 0; i < s.points(); ++i)
-          point(z, i) = A.block<3, 3>(3 * i, 3 * i).inverse() * point(r, i);
-      });
+        b, y, 1e-12, 2000,
+        [&](const PointVector& p, PointVector& ap) {
+          const VectorXd product = A * flattened(matrixOf(p));
+          ap = pointsOf(Eigen::Map<const Matrix3Xd>(product.data(), 3, s.points()));
+        },
+        [&](const PointVector& r, PointVector& z) {
+          for (int i = 0; i < s.points(); ++i)
+            point(z, i) = A.block<3, 3>(3 * i, 3 * i).inverse() * point(r, i);
+        });
     EXPECT_LT(result.iterations, 0.6 * slow.iterations);   // a model problem's halve
-    EXPECT_LT((flattened(matrixOf(x)) - expected).norm(), 1e-10 * expected.norm()) << with;   // the condition number times the tolerance
+    // the condition number times the tolerance
+    EXPECT_LT((flattened(matrixOf(x)) - expected).norm(), 1e-10 * expected.norm()) << with;
     EXPECT_EQ(x[3], 0.0);
     EXPECT_EQ(point(x, 17).norm(), 0.0);
   }
@@ -175,5 +177,5 @@ TEST(PointCholesky, SolvesThreeCoordinatesAtATime)
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -9,7 +9,8 @@
 namespace slender {
 namespace {
 
-/// An uneven, noisy motion with samples as they come from a network: jitter of the stamps, random signs of the quaternions.
+/// An uneven, noisy motion with samples as they come from a network: jitter of the stamps, random signs of the
+/// quaternions.
 PoseTrajectory jittery(int samples, unsigned seed)
 {
   std::mt19937 random(seed);
@@ -23,9 +24,7 @@ PoseTrajectory jittery(int samples, unsigned seed)
     q = q * Eigen::AngleAxisd(1.2 * uniform(random), Eigen::Vector3d(uniform(random), uniform(random), 1).normalized());
     Eigen::Quaterniond signed_q = q;
     if (uniform(random) < 0)
-    {
       signed_q.coeffs() *= -1;
-    }
     poses.push_back({Eigen::Vector3d(uniform(random), uniform(random), uniform(random)), signed_q});
   }
   return PoseTrajectory(times, poses);
@@ -39,7 +38,8 @@ TEST(PoseTrajectory, passesThroughItsSamples)
   std::vector<Pose> poses;
   for (double t : times)
   {
-    poses.push_back({Eigen::Vector3d(t, t * t, 1), Eigen::Quaterniond(Eigen::AngleAxisd(5 * t, Eigen::Vector3d::UnitY()))});
+    poses.push_back(
+        {Eigen::Vector3d(t, t * t, 1), Eigen::Quaterniond(Eigen::AngleAxisd(5 * t, Eigen::Vector3d::UnitY()))});
   }
   const PoseTrajectory trajectory(times, poses);
   for (std::size_t k = 0; k < times.size(); ++k)
@@ -63,7 +63,8 @@ TEST(PoseTrajectory, velocityIsTheDerivative)
     const Eigen::Vector3d linear = (after.position - before.position) / (2 * h);
     const Eigen::AngleAxisd turn(after.orientation * before.orientation.conjugate());
     const double angle = turn.angle() > M_PI ? turn.angle() - 2 * M_PI : turn.angle();
-    // Central differences: truncation h^2 f''' ~ 1e-12 * 1e6, round-off 1e-16 / h; a sample inside the stencil adds h f'' ~ 1e-2.
+    // Central differences: truncation h^2 f''' ~ 1e-12 * 1e6, round-off 1e-16 / h; a sample inside the stencil adds h
+    // f'' ~ 1e-2.
     EXPECT_LT((velocity.linear - linear).norm(), 2e-2) << t;
     EXPECT_LT((velocity.angular - turn.axis() * angle / (2 * h)).norm(), 2e-2) << t;
     fastest = std::max(fastest, velocity.angular.norm());
@@ -97,7 +98,8 @@ TEST(PoseTrajectory, poseAndVelocityAreContinuousAtTheSamples)
 TEST(PoseTrajectory, holdsItsEndsAtRest)
 {
   const PoseTrajectory trajectory = jittery(5, 2);
-  for (double t : {trajectory.firstTime() - 1, trajectory.firstTime(), trajectory.lastTime(), trajectory.lastTime() + 1})
+  for (double t :
+       {trajectory.firstTime() - 1, trajectory.firstTime(), trajectory.lastTime(), trajectory.lastTime() + 1})
   {
     Twist velocity{Eigen::Vector3d::Ones(), Eigen::Vector3d::Ones()};
     const Pose pose = trajectory.evaluate(t, &velocity);
@@ -112,7 +114,8 @@ TEST(PoseTrajectory, signOfAQuaternionDoesNotMatter)
 {
   const Eigen::Quaterniond q(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()));
   const Eigen::Quaterniond minus_q(-q.w(), -q.x(), -q.y(), -q.z());
-  const PoseTrajectory trajectory({0, 1, 2, 3}, {{{0, 0, 0}, q}, {{1, 0, 0}, minus_q}, {{2, 0, 0}, q}, {{3, 0, 0}, minus_q}});
+  const PoseTrajectory trajectory({0, 1, 2, 3},
+                                  {{{0, 0, 0}, q}, {{1, 0, 0}, minus_q}, {{2, 0, 0}, q}, {{3, 0, 0}, minus_q}});
   for (double t = 0; t < 3; t += 0.1)
   {
     Twist velocity;
@@ -127,9 +130,7 @@ TEST(PoseTrajectory, isExactForUniformMotionAwayFromTheEnds)
   std::vector<double> times{0, 0.1, 0.23, 0.3, 0.41, 0.5};
   std::vector<Pose> poses;
   for (double t : times)
-  {
     poses.push_back({Eigen::Vector3d(t, 2 * t - t * t, 0), Eigen::Quaterniond(Eigen::AngleAxisd(8 * t, axis))});
-  }
   const PoseTrajectory trajectory(times, poses);
   for (double t = 0.11; t < 0.4; t += 0.01)
   {
@@ -144,14 +145,14 @@ TEST(PoseTrajectory, isExactForUniformMotionAwayFromTheEnds)
 TEST(PoseTrajectory, aPauseStaysAPause)
 {
   const Eigen::Quaterniond identity = Eigen::Quaterniond::Identity();
-  const PoseTrajectory trajectory({0, 1, 2, 3}, {{{0, 0, 0}, identity}, {{0, 0, 0}, identity}, {{1, 0, 0}, identity}, {{2, 0, 0}, identity}});
+  const PoseTrajectory trajectory(
+      {0, 1, 2, 3}, {{{0, 0, 0}, identity}, {{0, 0, 0}, identity}, {{1, 0, 0}, identity}, {{2, 0, 0}, identity}});
   for (double t = 0; t <= 1; t += 0.05)
-  {
     EXPECT_EQ(trajectory.evaluate(t).position.norm(), 0.0);
-  }
 }
 
-/// Greatest acceleration [m/s^2] along x, or about z [rad/s^2], by differences of the velocity over steps of a millisecond.
+/// Greatest acceleration [m/s^2] along x, or about z [rad/s^2], by differences of the velocity over steps of a
+/// millisecond.
 double greatestAcceleration(const PoseTrajectory& trajectory, bool angular)
 {
   constexpr double step = 1e-3;
@@ -168,8 +169,9 @@ double greatestAcceleration(const PoseTrajectory& trajectory, bool angular)
 
 TEST(PoseTrajectory, aSwingDoesNotPauseAtItsPeaks)
 {
-  // 100 samples a second. Where the peak lies in the middle between two samples, these are equal: at 2 Hz without a phase every peak does. Each sample
-  // is the nearest float, as messages from elsewhere often are, so that equal samples are equal to the last bit.
+  // 100 samples a second. Where the peak lies in the middle between two samples, these are equal: at 2 Hz without a
+  // phase every peak does. Each sample is the nearest float, as messages from elsewhere often are, so that equal
+  // samples are equal to the last bit.
   double worst = 0.0;
   int equal = 0;
   for (const double frequency : {0.5, 1.0, 1.5, 2.0, 2.5, 3.0})
@@ -184,11 +186,13 @@ TEST(PoseTrajectory, aSwingDoesNotPauseAtItsPeaks)
         times.push_back(0.01 * k);
         const double x = static_cast<float>(0.2 * std::sin(omega * (0.01 * k + shift)));
         equal += !poses.empty() && poses.back().position.x() == x;
-        poses.push_back({Eigen::Vector3d(x, 0, 0), Eigen::Quaterniond(Eigen::AngleAxisd(3.0 * x, Eigen::Vector3d::UnitZ()))});
+        poses.push_back(
+            {Eigen::Vector3d(x, 0, 0), Eigen::Quaterniond(Eigen::AngleAxisd(3.0 * x, Eigen::Vector3d::UnitZ()))});
       }
       const PoseTrajectory trajectory(times, poses);
       const double commanded = 0.2 * omega * omega;
-      worst = std::max({worst, greatestAcceleration(trajectory, false) / commanded, greatestAcceleration(trajectory, true) / (3.0 * commanded)});
+      worst = std::max({worst, greatestAcceleration(trajectory, false) / commanded,
+                        greatestAcceleration(trajectory, true) / (3.0 * commanded)});
     }
   }
   EXPECT_GT(equal, 20);
@@ -197,10 +201,17 @@ TEST(PoseTrajectory, aSwingDoesNotPauseAtItsPeaks)
 
 TEST(PoseTrajectory, pausesDoNotOvershoot)
 {
-  // Waypoints with a hold of two samples or more, ways into it at constant speed, braking steadily until a sample and in between, and smoothly.
-  const std::vector<std::vector<double>> ways{
-    {0, 1, 1, 0},           {0, 1, 2, 2, 1, 0},           {0, 1, 2, 3, 3, 4, 5},          {-4.5, -2, -0.5, 0, 0, 0, -1}, {-4, -2.5, -1, -0.25, 0, 0, -0.5, -3},
-    {-8, -1, 0, 0, -1, -8}, {-5, -3, -1, 0, 0, 0, -1, -3}, {-6, -3, -1, 0, 0, 0.5, 0.5, 3}, {-6, -3, -1, 0, 0}};
+  // Waypoints with a hold of two samples or more, ways into it at constant speed, braking steadily until a sample and
+  // in between, and smoothly.
+  const std::vector<std::vector<double>> ways{{0, 1, 1, 0},
+                                              {0, 1, 2, 2, 1, 0},
+                                              {0, 1, 2, 3, 3, 4, 5},
+                                              {-4.5, -2, -0.5, 0, 0, 0, -1},
+                                              {-4, -2.5, -1, -0.25, 0, 0, -0.5, -3},
+                                              {-8, -1, 0, 0, -1, -8},
+                                              {-5, -3, -1, 0, 0, 0, -1, -3},
+                                              {-6, -3, -1, 0, 0, 0.5, 0.5, 3},
+                                              {-6, -3, -1, 0, 0}};
   for (const std::vector<double>& way : ways)
   {
     std::vector<double> times;
@@ -208,7 +219,8 @@ TEST(PoseTrajectory, pausesDoNotOvershoot)
     for (std::size_t k = 0; k < way.size(); ++k)
     {
       times.push_back(0.1 * static_cast<double>(k));
-      poses.push_back({Eigen::Vector3d(way[k], 0, 0), Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * way[k], Eigen::Vector3d::UnitZ()))});
+      poses.push_back({Eigen::Vector3d(way[k], 0, 0),
+                       Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * way[k], Eigen::Vector3d::UnitZ()))});
     }
     const PoseTrajectory trajectory(times, poses);
     for (std::size_t k = 0; k + 1 < way.size(); ++k)
@@ -225,15 +237,14 @@ TEST(PoseTrajectory, pausesDoNotOvershoot)
 
 TEST(PoseTrajectory, aBurstOfSamplesDoesNotThrowThePoseAway)
 {
-  // Two samples 0.1 ms apart with 1 mm of noise between them would give a three-point slope of 10 m/s, and so an overshoot of
-  // decimetres in the next 0.1 s.
+  // Two samples 0.1 ms apart with 1 mm of noise between them would give a three-point slope of 10 m/s, and so an
+  // overshoot of decimetres in the next 0.1 s.
   const Eigen::Quaterniond identity = Eigen::Quaterniond::Identity();
-  const PoseTrajectory trajectory({0, 0.1, 0.1001, 0.2}, {{{0, 0, 0}, identity}, {{0.01, 0, 0}, identity}, {{0.011, 0, 0}, identity},
-                                                         {{0.02, 0, 0}, identity}});
+  const PoseTrajectory trajectory(
+      {0, 0.1, 0.1001, 0.2},
+      {{{0, 0, 0}, identity}, {{0.01, 0, 0}, identity}, {{0.011, 0, 0}, identity}, {{0.02, 0, 0}, identity}});
   for (double t = 0; t <= 0.2; t += 0.001)
-  {
     EXPECT_NEAR(trajectory.evaluate(t).position.x(), 0.1 * t, 0.004) << t;
-  }
 }
 
 TEST(PoseTrajectory, forgettingDoesNotChangeLaterPoses)
@@ -271,5 +282,5 @@ TEST(PoseTrajectory, refusesBadSamples)
   EXPECT_EQ(trajectory.size(), 2u);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -34,7 +34,10 @@ protected:
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  SceneConfig parse(const std::string& cloth, const std::string& rest = "") { return parseScene(rest + "cloths: [{" + cloth + "}]", "t", {}, folder_.string()); }
+  SceneConfig parse(const std::string& cloth, const std::string& rest = "")
+  {
+    return parseScene(rest + "cloths: [{" + cloth + "}]", "t", {}, folder_.string());
+  }
   std::string problem(const std::string& cloth)
   {
     try
@@ -55,8 +58,11 @@ protected:
 
 TEST_F(ClothMaterial, ReadsAirAndPlasticity)
 {
-  const ClothConfig c = parse("mesh: {file: flat.obj}, bending: {model: hinge}, aerodynamics: {air_density: 1.3, drag: 1.1, lift: 0.4}, "
-                              "plasticity: {yield_curvature: 5, hardening: 0.2, creep_time: 0.1}").cloths[0];
+  const ClothConfig c =
+      parse(
+          "mesh: {file: flat.obj}, bending: {model: hinge}, aerodynamics: {air_density: 1.3, drag: 1.1, lift: 0.4}, "
+          "plasticity: {yield_curvature: 5, hardening: 0.2, creep_time: 0.1}")
+          .cloths[0];
   EXPECT_EQ(c.aerodynamics.air_density, 1.3);
   EXPECT_EQ(c.aerodynamics.drag, 1.1);
   EXPECT_EQ(c.aerodynamics.lift, 0.4);
@@ -82,32 +88,36 @@ TEST_F(ClothMaterial, NamesWhatIsWrong)
   fewer.triangles.conservativeResize(3, flat_.triangles.cols() - 1);
   writeMesh((folder_ / "fewer.obj").string(), fewer);
   TriangleMesh needle = flat_;
-  needle.vertices.col(needle.triangles(0, 0)) = 0.5 * (needle.vertices.col(needle.triangles(1, 0)) + needle.vertices.col(needle.triangles(2, 0)));
+  needle.vertices.col(needle.triangles(0, 0)) =
+      0.5 * (needle.vertices.col(needle.triangles(1, 0)) + needle.vertices.col(needle.triangles(2, 0)));
   writeMesh((folder_ / "needle.obj").string(), needle);
   const std::pair<std::string, const char*> cases[] = {
-    {flat + "plasticity: {yield_curvature: 5}", "cloths.0.plasticity: needs rest angles that can flow, which only bending: {model: hinge} has"},
-    {hinge + "plasticity: {hardening: 5}", "yield_curvature"},
-    {hinge + "plasticity: {yield_curvature: -1}", "cloths.0.plasticity.yield_curvature = -1"},
-    {hinge + "plasticity: {yield_curvature: 1, creep_time: -1}", "cloths.0.plasticity.creep_time = -1"},
-    {hinge + "plasticity: {yield: 1, yield_curvature: 1}", "unknown key"},
-    {flat + "aerodynamics: {drag: -1}", "cloths.0.aerodynamics.drag = -1"},
-    {flat + "aerodynamics: {air_density: 0}", "cloths.0.aerodynamics.air_density = 0"},
-    {flat + "bending: {model: conforming}, undeformed: {file: roll.obj}", "cloths.0.undeformed: gives angles at rest, which this bending model does not have"},
-    {flat + "bending: {model: none}, undeformed: {file: roll.obj}", "cloths.0.undeformed: gives angles at rest, which this bending model does not have"},
-    {hinge.substr(0, hinge.size() - 3) + ", poissons_ratio: 0.3}", "cloths.0.bending.poissons_ratio = 0.3: is for bending: {model: isometric}"},
-    {flat + "bending: {poissons_ratio: 1}", "cloths.0.bending.poissons_ratio = 1: is out of range; must be a number in (-1, 1)"},
-    {hinge + "undeformed: {file: small.obj}", "cloths.0.undeformed.file = small.obj: small.obj has"},
-    {hinge + "undeformed: {file: small.obj}", "vertices, the cloth's mesh has"},
-    {hinge + "start: {file: fewer.obj}", "triangles, the cloth's mesh has"},
-    {hinge + "start: {file: turned.obj}", "turned.obj: triangle 3 has the vertices"},
-    {hinge + "start: {file: needle.obj}", "no area"},
-    {hinge + "start: {file: nowhere.obj}", "nowhere.obj: cannot"},
-    {hinge + "start: {file: flat.obj, scale: 1e6, pose: {position: [1e6, 0, 0]}}", "has coordinates beyond"},
+      {flat + "plasticity: {yield_curvature: 5}",
+       "cloths.0.plasticity: needs rest angles that can flow, which only bending: {model: hinge} has"},
+      {hinge + "plasticity: {hardening: 5}", "yield_curvature"},
+      {hinge + "plasticity: {yield_curvature: -1}", "cloths.0.plasticity.yield_curvature = -1"},
+      {hinge + "plasticity: {yield_curvature: 1, creep_time: -1}", "cloths.0.plasticity.creep_time = -1"},
+      {hinge + "plasticity: {yield: 1, yield_curvature: 1}", "unknown key"},
+      {flat + "aerodynamics: {drag: -1}", "cloths.0.aerodynamics.drag = -1"},
+      {flat + "aerodynamics: {air_density: 0}", "cloths.0.aerodynamics.air_density = 0"},
+      {flat + "bending: {model: conforming}, undeformed: {file: roll.obj}",
+       "cloths.0.undeformed: gives angles at rest, which this bending model does not have"},
+      {flat + "bending: {model: none}, undeformed: {file: roll.obj}",
+       "cloths.0.undeformed: gives angles at rest, which this bending model does not have"},
+      {hinge.substr(0, hinge.size() - 3) + ", poissons_ratio: 0.3}",
+       "cloths.0.bending.poissons_ratio = 0.3: is for bending: {model: isometric}"},
+      {flat + "bending: {poissons_ratio: 1}",
+       "cloths.0.bending.poissons_ratio = 1: is out of range; must be a number in (-1, 1)"},
+      {hinge + "undeformed: {file: small.obj}", "cloths.0.undeformed.file = small.obj: small.obj has"},
+      {hinge + "undeformed: {file: small.obj}", "vertices, the cloth's mesh has"},
+      {hinge + "start: {file: fewer.obj}", "triangles, the cloth's mesh has"},
+      {hinge + "start: {file: turned.obj}", "turned.obj: triangle 3 has the vertices"},
+      {hinge + "start: {file: needle.obj}", "no area"},
+      {hinge + "start: {file: nowhere.obj}", "nowhere.obj: cannot"},
+      {hinge + "start: {file: flat.obj, scale: 1e6, pose: {position: [1e6, 0, 0]}}", "has coordinates beyond"},
   };
   for (const auto& [cloth, expected] : cases)
-  {
     EXPECT_NE(problem(cloth).find(expected), std::string::npos) << cloth << "\ngave: " << problem(cloth);
-  }
 }
 
 /// Least squares [m]: radius of the circle through the (y, z) of the vertices.
@@ -122,8 +132,10 @@ double radiusOf(const Eigen::Matrix3Xd& x)
 
 TEST_F(ClothMaterial, CurlsToItsUndeformedShape)
 {
-  Simulation simulation(parse("mesh: {file: flat.obj}, undeformed: {file: roll.obj}, bending: {model: hinge, modulus: 1e-3}, damping: {mass: 10, stiffness: 0.002}",
-                              "gravity: [0, 0, 0]\ntime: {step: 0.02, duration: 1}\n"));
+  Simulation simulation(
+      parse("mesh: {file: flat.obj}, undeformed: {file: roll.obj}, bending: {model: hinge, modulus: 1e-3}, damping: "
+            "{mass: 10, stiffness: 0.002}",
+            "gravity: [0, 0, 0]\ntime: {step: 0.02, duration: 1}\n"));
   const double bent = simulation.clothEnergies(0).bending;
   for (int k = 0; k < 1000; ++k)
   {
@@ -140,8 +152,10 @@ TEST_F(ClothMaterial, CurlsToItsUndeformedShape)
 
 TEST_F(ClothMaterial, StartsFromAnotherShape)
 {
-  const SceneConfig scene = parse("mesh: {file: flat.obj}, start: {file: roll.obj, pose: {position: [1, 2, 3]}}, grasps: {g: {near: {point: [1, 2, 3]}}}",
-                                  "gravity: [0, 0, 0]\n");
+  const SceneConfig scene = parse(
+      "mesh: {file: flat.obj}, start: {file: roll.obj, pose: {position: [1, 2, 3]}}, grasps: {g: {near: {point: [1, 2, "
+      "3]}}}",
+      "gravity: [0, 0, 0]\n");
   Simulation simulation(scene);
   const Eigen::Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
   EXPECT_LT((x.col(0) - Vector3d(1, 2, 3)).norm(), 1e-12);
@@ -154,8 +168,10 @@ TEST_F(ClothMaterial, StartsFromAnotherShape)
 
 TEST_F(ClothMaterial, PlasticFlowRestartsBitEqual)
 {
-  const std::string cloth = "mesh: {file: flat.obj}, start: {file: roll.obj}, bending: {model: hinge, modulus: 1e-4}, aerodynamics: {drag: 1, lift: 0.5}, "
-                            "plasticity: {yield_curvature: 1, hardening: 0.1, creep_time: 0.2}, grasps: {g: {vertices: [0, 1]}}";
+  const std::string cloth =
+      "mesh: {file: flat.obj}, start: {file: roll.obj}, bending: {model: hinge, modulus: 1e-4}, aerodynamics: {drag: "
+      "1, lift: 0.5}, "
+      "plasticity: {yield_curvature: 1, hardening: 0.1, creep_time: 0.2}, grasps: {g: {vertices: [0, 1]}}";
   const std::string wind = "wind: {velocity: [0, 1, 4]}\n", path = (folder_ / "state").string();
   Simulation simulation(parse(cloth, wind));
   for (int k = 0; k < 8; ++k)
@@ -175,9 +191,11 @@ TEST_F(ClothMaterial, PlasticFlowRestartsBitEqual)
   EXPECT_EQ(a.stiffening, b.stiffening);
   EXPECT_NE(a.rest_angles, saved.rest_angles);
   EXPECT_GT(a.stiffening.maxCoeff(), 1.01);
-  Simulation other(parse(cloth.substr(0, cloth.find("hardening")) + "hardening: 0.2, creep_time: 0.2}, grasps: {g: {vertices: [0, 1]}}", wind));
+  Simulation other(parse(
+      cloth.substr(0, cloth.find("hardening")) + "hardening: 0.2, creep_time: 0.2}, grasps: {g: {vertices: [0, 1]}}",
+      wind));
   EXPECT_THROW(other.load(path), std::runtime_error);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

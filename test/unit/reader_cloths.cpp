@@ -70,8 +70,10 @@ TEST(ClothReader, FindsCornersAndEdges)
   {
     const auto held = [&](const std::string& grasp) {
       const SceneConfig scene =
-        parseScene(towel, "t", {"cloths.0.grid={corner: [1, 2, 3], sides: [[0, 0.6, 0.8], [0.5, 0, 0]], cells: 10, pattern: " + std::string(pattern) + "}",
-                                "cloths.0.grasps={g: " + grasp + "}"});
+          parseScene(towel, "t",
+                     {"cloths.0.grid={corner: [1, 2, 3], sides: [[0, 0.6, 0.8], [0.5, 0, 0]], cells: 10, pattern: " +
+                          std::string(pattern) + "}",
+                      "cloths.0.grasps={g: " + grasp + "}"});
       Eigen::Matrix3Xd points(3, 0);
       for (const int v : scene.cloths[0].grasps[0].vertices)
       {
@@ -107,40 +109,47 @@ TEST(ClothReader, FindsCornersAndEdges)
 TEST(ClothReader, NamesWhatIsWrong)
 {
   const std::pair<const char*, const char*> cases[] = {
-    {"cloths.0.material.density=-1", "cloths.0.material.density = -1: is out of range; must be a number in (0, 1000000] kg/m^3"},
-    {"cloths.0.material.area_density=0.2", "there is an area_density as well"},
-    {"cloths.0.material.thickness=0", "cloths.0.material.thickness = 0"},
-    {"cloths.0.material.poissons_ratio=0.6", "must be a number in (-1, 0.5]"},
-    {"cloths.0.bending.model=stiff", "cloths.0.bending.model = stiff"},
-    {"cloths.0.bending.modulus=-1", "must be a number in [0, 1000000000] N m"},
-    {"cloths.0.membrane={warp: 300, weft: 200, shear: 50}", "there is a membrane as well"},
-    {"cloths.0.membrane={warp: 1, weft: 200, poissons_ratio: 0.9, shear: 50}", "cloths.0.membrane"},
-    {"cloths.0.grid.sides=[[1, 0, 0], [1, 1, 0]]", "must be at right angles"},
-    {"cloths.0.grid.sides=[[1, 0, 0], [0, 0, 0]]", "has no length"},
-    {"cloths.0.grid.cells=0", "must be a number in [1, 2000]"},
-    {"cloths.0.grid.seed=3", "is for pattern: irregular"},
-    {"cloths.0.mesh={file: a.obj}", "must have either grid"},
-    {"cloths.0.damping.drag=-1", "cloths.0.damping.drag = -1"},
-    {"cloths.0.solver.linear=gauss", "cloths.0.solver.linear = gauss"},
-    {"cloths.0.solver.tolerance=1", "must be a number in (0, 1)"},
-    {"cloths.0.grasps.left={corner: top}", "cloths.0.grasps.left.corner = top"},
-    {"cloths.0.grasps.left={corner: upper_left, edge: upper}", "must have one of vertices"},
-    {"cloths.0.grasps.left={vertices: [63]}", "must be a number in [-63, 62]"},
-    {"cloths.0.grasps.left={vertices: [1, 1]}", "names vertex 1 twice"},
-    {"cloths.0.grasps.left={vertices: [8]}", "which grasp"},
-    {"cloths.0.grasps.left={near: {point: [9, 9, 9], radius: 0.1}}", "reaches no vertex; the nearest, 62"},
-    {"cloths.0.grasps.left={corner: upper_left, attach: frame, motion: {table: [[0, 0, 0, 1]]}}", "must be [t, x, y, z, qx, qy, qz, qw]"},
-    {"cloths.0.stiff=1", "unknown key"},
-    {"time.integrator=bdf2", "is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler"},
-    {"time.spectral_radius=0.5", "is for generalized_alpha, which cloth does not have"},
-    {"wind={velocity: [2000, 0, 0]}", "wind.velocity"},
+      {"cloths.0.material.density=-1",
+       "cloths.0.material.density = -1: is out of range; must be a number in (0, 1000000] kg/m^3"},
+      {"cloths.0.material.area_density=0.2", "there is an area_density as well"},
+      {"cloths.0.material.thickness=0", "cloths.0.material.thickness = 0"},
+      {"cloths.0.material.poissons_ratio=0.6", "must be a number in (-1, 0.5]"},
+      {"cloths.0.bending.model=stiff", "cloths.0.bending.model = stiff"},
+      {"cloths.0.bending.modulus=-1", "must be a number in [0, 1000000000] N m"},
+      {"cloths.0.membrane={warp: 300, weft: 200, shear: 50}", "there is a membrane as well"},
+      {"cloths.0.membrane={warp: 1, weft: 200, poissons_ratio: 0.9, shear: 50}", "cloths.0.membrane"},
+      {"cloths.0.grid.sides=[[1, 0, 0], [1, 1, 0]]", "must be at right angles"},
+      {"cloths.0.grid.sides=[[1, 0, 0], [0, 0, 0]]", "has no length"},
+      {"cloths.0.grid.cells=0", "must be a number in [1, 2000]"},
+      {"cloths.0.grid.seed=3", "is for pattern: irregular"},
+      {"cloths.0.mesh={file: a.obj}", "must have either grid"},
+      {"cloths.0.damping.drag=-1", "cloths.0.damping.drag = -1"},
+      {"cloths.0.solver.linear=gauss", "cloths.0.solver.linear = gauss"},
+      {"cloths.0.solver.tolerance=1", "must be a number in (0, 1)"},
+      {"cloths.0.grasps.left={corner: top}", "cloths.0.grasps.left.corner = top"},
+      {"cloths.0.grasps.left={corner: upper_left, edge: upper}", "must have one of vertices"},
+      {"cloths.0.grasps.left={vertices: [63]}", "must be a number in [-63, 62]"},
+      {"cloths.0.grasps.left={vertices: [1, 1]}", "names vertex 1 twice"},
+      {"cloths.0.grasps.left={vertices: [8]}", "which grasp"},
+      {"cloths.0.grasps.left={near: {point: [9, 9, 9], radius: 0.1}}", "reaches no vertex; the nearest, 62"},
+      {"cloths.0.grasps.left={corner: upper_left, attach: frame, motion: {table: [[0, 0, 0, 1]]}}",
+       "must be [t, x, y, z, qx, qy, qz, qw]"},
+      {"cloths.0.stiff=1", "unknown key"},
+      {"time.integrator=bdf2", "is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler"},
+      {"time.spectral_radius=0.5", "is for generalized_alpha, which cloth does not have"},
+      {"wind={velocity: [2000, 0, 0]}", "wind.velocity"},
   };
   for (const auto& [assignment, expected] : cases)
   {
-    EXPECT_NE(problemsOf({assignment}).find(expected), std::string::npos) << assignment << "\ngave: " << problemsOf({assignment});
+    EXPECT_NE(problemsOf({assignment}).find(expected), std::string::npos)
+        << assignment << "\ngave: " << problemsOf({assignment});
   }
-  EXPECT_NE(problemsOf({"rods=[{grasps: {left: {edges: [0]}}}]"}).find("same name as a grasp of rod"), std::string::npos);
-  EXPECT_NE(problemsOf({"bodies=[{name: hand, mass: 1, inertia: [1, 1, 1]}]", "cloths.0.grasps.left.motion={body: hand}"}).find("is simulated"), std::string::npos);
+  EXPECT_NE(problemsOf({"rods=[{grasps: {left: {edges: [0]}}}]"}).find("same name as a grasp of rod"),
+            std::string::npos);
+  EXPECT_NE(
+      problemsOf({"bodies=[{name: hand, mass: 1, inertia: [1, 1, 1]}]", "cloths.0.grasps.left.motion={body: hand}"})
+          .find("is simulated"),
+      std::string::npos);
 }
 
 class ClothFiles : public ::testing::Test
@@ -176,8 +185,10 @@ protected:
 TEST_F(ClothFiles, ReadsAndPlacesMeshes)
 {
   write("quad.obj", "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nf 1 2 3 4\n");
-  const SceneConfig scene = parseScene("cloths: [{mesh: {file: quad.obj, scale: 0.01, pose: {position: [0, 0, 2], rpy: [1.5707963267948966, 0, 0]}}, grasps: {a: {near: {point: [0, 0, 3]}}}}]",
-                                       "t", {}, folder_.string());
+  const SceneConfig scene = parseScene(
+      "cloths: [{mesh: {file: quad.obj, scale: 0.01, pose: {position: [0, 0, 2], rpy: [1.5707963267948966, 0, 0]}}, "
+      "grasps: {a: {near: {point: [0, 0, 3]}}}}]",
+      "t", {}, folder_.string());
   const ClothConfig& c = scene.cloths[0];
   EXPECT_EQ(c.mesh.triangles.cols(), 2);
   EXPECT_LT((c.mesh.vertices.col(2) - Vector3d(1, 0, 3)).norm(), 1e-12);
@@ -188,11 +199,11 @@ TEST_F(ClothFiles, ReportsDefectsByNameWithTheFile)
 {
   const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
   const std::pair<std::string, const char*> cases[] = {
-    {square + "v 2 0 0\nf 1 2 3\nf 1 3 4\nf 1 2 5\n", "no area"},
-    {square + "v 0.5 0.5 1\nf 1 2 3\nf 1 3 4\nf 1 3 5\n", "edge"},
-    {square + "v 1 1 0\nf 1 2 3\nf 1 5 4\n", "same place"},
-    {square + "v 5 5 5\nf 1 2 3\nf 1 3 4\n", "no face"},
-    {square + "f 1 2 3\nf 1 4 3\n", "direction"},
+      {square + "v 2 0 0\nf 1 2 3\nf 1 3 4\nf 1 2 5\n", "no area"},
+      {square + "v 0.5 0.5 1\nf 1 2 3\nf 1 3 4\nf 1 3 5\n", "edge"},
+      {square + "v 1 1 0\nf 1 2 3\nf 1 5 4\n", "same place"},
+      {square + "v 5 5 5\nf 1 2 3\nf 1 3 4\n", "no face"},
+      {square + "f 1 2 3\nf 1 4 3\n", "direction"},
   };
   for (const auto& [obj, expected] : cases)
   {
@@ -218,28 +229,31 @@ StepReport run(Simulation& simulation, int steps)
 {
   StepReport total;
   for (int k = 0; k < steps && total.ok; ++k)
-  {
     total.merge(simulation.step(simulation.defaultInputs()));
-  }
   return total;
 }
 
-/// Two grippers lift the cloth: at rest they carry it, and each wrench's moment about the other end of the balance is that of the weight.
+/// Two grippers lift the cloth: at rest they carry it, and each wrench's moment about the other end of the balance is
+/// that of the weight.
 TEST(ClothScene, WrenchesCarryTheWeight)
 {
-  Simulation simulation(parseScene(towel, "t", {"cloths.0.grasps={left: {edge: left}, right: {near: {point: [0.4, 0, 1], radius: 0.12}, "
-                                               "motion: {table: [[0, 5, 5, 5], [0.5, 4.9, 5, 5.05]]}}}",
-                                               "cloths.0.damping.mass=8"}));
+  Simulation simulation(
+      parseScene(towel, "t",
+                 {"cloths.0.grasps={left: {edge: left}, right: {near: {point: [0.4, 0, 1], radius: 0.12}, "
+                  "motion: {table: [[0, 5, 5, 5], [0.5, 4.9, 5, 5.05]]}}}",
+                  "cloths.0.damping.mass=8"}));
   const Pose before = simulation.graspPose(1);
   const StepReport report = run(simulation, 600);
   ASSERT_TRUE(report.ok) << report.message;
-  EXPECT_LT((simulation.graspPose(1).position - before.position - Vector3d(-0.1, 0, 0.05)).norm(), 1e-12);   // attach: initial
+  // attach: initial
+  EXPECT_LT((simulation.graspPose(1).position - before.position - Vector3d(-0.1, 0, 0.05)).norm(), 1e-12);
   const Wrench &left = simulation.wrench(0), &right = simulation.wrench(1);
   EXPECT_LT((left.force + right.force + Vector3d(0, 0, weight(simulation))).norm(), 1e-3 * weight(simulation));
   const ClothState& cloth = simulation.state().cloths[0].cloth;
   const Vector3d centre = cloth.x * simulation.clothModel(0).mass / simulation.clothModel(0).totalMass();
   const Vector3d moment = left.torque + right.torque + simulation.graspPose(0).position.cross(left.force) +
-                          simulation.graspPose(1).position.cross(right.force) + centre.cross(Vector3d(0, 0, weight(simulation)));
+                          simulation.graspPose(1).position.cross(right.force) +
+                          centre.cross(Vector3d(0, 0, weight(simulation)));
   EXPECT_LT(moment.norm(), 1e-3 * weight(simulation));
   EXPECT_GT(left.torque.norm(), 1e-4);
   EXPECT_LT(simulation.clothEnergies(0).kinetic, 1e-6);
@@ -248,8 +262,10 @@ TEST(ClothScene, WrenchesCarryTheWeight)
 /// The held set turns rigidly with its motion.
 TEST(ClothScene, GraspsTurnTheirVertices)
 {
-  Simulation simulation(parseScene(towel, "t", {"cloths.0.grasps={g: {vertices: [0, 1, 2, 9, 10], attach: frame, "
-                                               "motion: {table: [[0, 0, 0, 0, 0, 0, 0, 1], [0.2, 0.1, 0, 0.1, 0.7071067811865476, 0, 0, 0.7071067811865476]]}}}"}));
+  Simulation simulation(parseScene(towel, "t",
+                                   {"cloths.0.grasps={g: {vertices: [0, 1, 2, 9, 10], attach: frame, "
+                                    "motion: {table: [[0, 0, 0, 0, 0, 0, 0, 1], [0.2, 0.1, 0, 0.1, 0.7071067811865476, "
+                                    "0, 0, 0.7071067811865476]]}}}"}));
   const Eigen::Matrix3Xd points = simulation.state().cloths[0].grasps[0].points_G;
   const StepReport report = run(simulation, 25);
   ASSERT_TRUE(report.ok) << report.message;
@@ -263,7 +279,8 @@ TEST(ClothScene, GraspsTurnTheirVertices)
 
 TEST(ClothScene, WindCarriesThemAlong)
 {
-  Simulation simulation(parseScene(towel, "t", {"cloths.0.grasps={top: {edge: upper}}", "wind={velocity: [0, 0, 4]}", "gravity=[0, 0, 0]"}));
+  Simulation simulation(parseScene(
+      towel, "t", {"cloths.0.grasps={top: {edge: upper}}", "wind={velocity: [0, 0, 4]}", "gravity=[0, 0, 0]"}));
   ASSERT_TRUE(run(simulation, 20).ok);
   EXPECT_GT(simulation.wrench(0).force.z(), 0.01);
   EXPECT_GT(simulation.state().cloths[0].cloth.x.row(2).mean(), 1.01);
@@ -271,9 +288,11 @@ TEST(ClothScene, WindCarriesThemAlong)
 
 TEST(ClothScene, RestartsBitEqual)
 {
-  const std::string path = (std::filesystem::temp_directory_path() / ("slender_cloth_state_" + std::to_string(::getpid()))).string();
-  const std::vector<std::string> moving{"cloths.0.grasps.right.motion={table: [[0, 0.3, 0, 1, 0, 0, 0, 1], [1, 0.3, 0, 1.2, 0, 0, 0, 1]]}",
-                                        "wind={velocity: [0, 3, 0]}"};
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("slender_cloth_state_" + std::to_string(::getpid()))).string();
+  const std::vector<std::string> moving{
+      "cloths.0.grasps.right.motion={table: [[0, 0.3, 0, 1, 0, 0, 0, 1], [1, 0.3, 0, 1.2, 0, 0, 0, 1]]}",
+      "wind={velocity: [0, 3, 0]}"};
   Simulation simulation(parseScene(towel, "t", moving));
   ASSERT_TRUE(run(simulation, 12).ok);
   simulation.release(0);
@@ -327,5 +346,5 @@ TEST(ClothScene, FailsWithoutTrace)
   EXPECT_TRUE(run(simulation, 3).ok);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -11,15 +11,16 @@
 namespace slender {
 namespace {
 
-Eigen::Matrix3Xd nodesOf(const RodConfig& rod) { return initialNodes(rod, restNodes(rod, {0, 0, -9.81}), {0, 0, -9.81}); }
+Eigen::Matrix3Xd nodesOf(const RodConfig& rod)
+{
+  return initialNodes(rod, restNodes(rod, {0, 0, -9.81}), {0, 0, -9.81});
+}
 
 double distance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b)
 {
   double least = 1e300;
   for (Eigen::Index i = 0; i < a.cols(); ++i)
-  {
     least = std::min(least, (b.colwise() - a.col(i)).colwise().norm().minCoeff());
-  }
   return least;
 }
 
@@ -116,20 +117,17 @@ TEST(Generate, treeHasItsVerticesAndJoints)
     const Eigen::Vector3d ends = nodes[parent.rod].col(parent.first_node) + nodes[parent.rod].col(parent.last_node);
     EXPECT_LT((0.5 * ends - body.pose.position).norm(), 1e-12);
     for (const WeldConfig& weld : body.welds)
-    {
       for (int node = weld.first_node; node <= weld.last_node; ++node)
-      {
         EXPECT_TRUE(held.emplace(weld.rod, node).second);   // nothing is held twice
-      }
-    }
   }
 }
 
 TEST(Generate, weldsOfTreesCountTheRodsBefore)
 {
-  const SceneConfig scene = parseScene("rods: [{}, {}]\ngenerate:\n  - tree: {levels: 2, children: 2, vertices: 60}\n"
-                                       "  - tree: {name: b, levels: 2, children: 1, vertices: 40}\n"
-                                       "bodies: [{mass: 1, inertia: [1, 1, 1], welds: [{rod: tree_0, edge: -1}]}]");
+  const SceneConfig scene = parseScene(
+      "rods: [{}, {}]\ngenerate:\n  - tree: {levels: 2, children: 2, vertices: 60}\n"
+      "  - tree: {name: b, levels: 2, children: 1, vertices: 40}\n"
+      "bodies: [{mass: 1, inertia: [1, 1, 1], welds: [{rod: tree_0, edge: -1}]}]");
   ASSERT_EQ(scene.rods.size(), 7u);
   EXPECT_EQ(scene.bodies[0].welds[0].rod, 2);
   EXPECT_EQ(scene.bodies[1].name, "tree_1_joint");
@@ -142,7 +140,9 @@ TEST(Generate, weldsOfTreesCountTheRodsBefore)
 TEST(Generate, seedsDecide)
 {
   const auto tip = [](const std::string& seed) {
-    return nodesOf(parseScene("generate: [{tree: {}}]", "t", {"generate.0.tree.seed=" + seed}).rods[40]).rightCols<1>().eval();
+    return nodesOf(parseScene("generate: [{tree: {}}]", "t", {"generate.0.tree.seed=" + seed}).rods[40])
+        .rightCols<1>()
+        .eval();
   };
   EXPECT_EQ(tip("1"), tip("1"));
   EXPECT_GT((tip("1") - tip("2")).norm(), 0.01);
@@ -150,8 +150,9 @@ TEST(Generate, seedsDecide)
 
 TEST(Generate, hairGrowsOutOfItsHead)
 {
-  const SceneConfig scene = parseScene("generate: [{hair: {strands: 60, edges: 20, length: 0.2, length_variation: 0.5, contact: {}, "
-                                       "head: {center: [1, 2, 3], radius: 0.09, motion: {topic: true}}}}]");
+  const SceneConfig scene = parseScene(
+      "generate: [{hair: {strands: 60, edges: 20, length: 0.2, length_variation: 0.5, contact: {}, "
+      "head: {center: [1, 2, 3], radius: 0.09, motion: {topic: true}}}}]");
   ASSERT_EQ(scene.rods.size(), 60u);
   ASSERT_EQ(scene.obstacles.size(), 1u);
   EXPECT_EQ(scene.obstacles[0].name, "head");
@@ -174,17 +175,14 @@ TEST(Generate, hairGrowsOutOfItsHead)
     EXPECT_EQ(rod.grasps[0].last_node, 0);
   }
   for (std::size_t k = 1; k < nodes.size(); ++k)
-  {
     for (std::size_t j = 0; j < k; ++j)
-    {
       EXPECT_GT(distance(nodes[j], nodes[k]), 0.005);   // roots are spread evenly: 60 on half a ball of 9 cm
-    }
-  }
 }
 
 TEST(Generate, curlIsNaturalOnly)
 {
-  const SceneConfig scene = parseScene("generate: [{hair: {strands: 3, edges: 200, length: 0.2, curl: {radius: 0.005, pitch: 0.02}}}]");
+  const SceneConfig scene =
+      parseScene("generate: [{hair: {strands: 3, edges: 200, length: 0.2, curl: {radius: 0.005, pitch: 0.02}}}]");
   for (const RodConfig& rod : scene.rods)
   {
     const Eigen::Matrix3Xd rest = restNodes(rod, {0, 0, -9.81}), initial = nodesOf(rod);
@@ -205,7 +203,8 @@ struct Case
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.text; }
 
-class BadGenerator : public testing::TestWithParam<Case> {};
+class BadGenerator : public testing::TestWithParam<Case>
+{};
 
 TEST_P(BadGenerator, isRefusedWithPathAndRange)
 {
@@ -223,33 +222,39 @@ TEST_P(BadGenerator, isRefusedWithPathAndRange)
   EXPECT_EQ(message.find("test.yaml:1: "), 0u) << message;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, BadGenerator, testing::Values(
-  Case{"generate: {chain: {}}", "generate: is a map; must be a list"},
-  Case{"generate: [{}]", "generate.0: must be one of {chain: {...}}, {tree: {...}}, {hair: {...}}"},
-  Case{"generate: [{chain: {}, tree: {}}]", "must be one of"},
-  Case{"generate: [{bush: {}}]", "bush: unknown key"},
-  Case{"generate: [{chain: {links: 0}}]", "generate.0.chain.links = 0: is out of range; must be a number in [1, 10000]"},
-  Case{"generate: [{chain: {spacing: 0.05}}]", "spacing = 0.05: is out of range; must be a number in (0.055, 0.09) m"},
-  Case{"generate: [{chain: {cross_section: {radius: 0.02}}}]", "the wire is too thick: its radius 0.02 m must be less than a fifth"},
-  Case{"generate: [{chain: {up: [1, 0, 0]}}]", "up = [1, 0, 0]: is along direction"},
-  Case{"generate: [{chain: {opening: 2}}]", "in [0, 1.570796327] rad"},
-  Case{"generate: [{chain: {length: 2}}]", "length = 2: unknown key"},
-  Case{"generate: [{chain: {}}, {chain: {}}]", "generate.1.chain: makes a rod chain_0, whose name is taken; give the generator another name"},
-  Case{"{rods: [{name: chain_1}], generate: [{chain: {}}]}", "makes a rod chain_1, whose name is taken"},
-  Case{"generate: [{tree: {vertices: 200}}]", "vertices = 200: is too few for 57 branches; must be at least 285"},
-  Case{"generate: [{tree: {vertices: 290}}]", "vertices = 290: gives tree_0 too few (6) for its 7 children"},
-  Case{"generate: [{tree: {angle: 2}}]", "rad"},
-  Case{"generate: [{tree: {direction: [0, 0, 0]}}]", "must not be zero"},
-  Case{"generate: [{tree: {cross_section: {radius: 1}}}]", "unknown key"},
-  Case{"generate: [{hair: {strands: 0}}]", "in [1, 100000]"},
-  Case{"generate: [{hair: {head: {motion: free}}}]", "must be one of: fixed, topic"},
-  Case{"generate: [{hair: {head: {size: 3}}}]", "unknown key"},
-  Case{"generate: [{hair: {curl: {radius: 0}}}]", "in (0, 1000000] m"},
-  Case{"{generate: [{hair: {}}], obstacles: [{name: head, shape: {sphere: {}}}]}",
-       "generate.0.hair: makes head, which is also the name of obstacles.0"},
-  Case{"{generate: [{hair: {}}], bodies: [{mass: 1, shape: {sphere: {}}, welds: [{rod: hair_0, edge: 0}]}]}",
-       "grasp hair_0_root holds nodes 0 to 0"},
-  Case{"{}", "rods: is missing"}));
+INSTANTIATE_TEST_SUITE_P(
+    All, BadGenerator,
+    testing::Values(
+        Case{"generate: {chain: {}}", "generate: is a map; must be a list"},
+        Case{"generate: [{}]", "generate.0: must be one of {chain: {...}}, {tree: {...}}, {hair: {...}}"},
+        Case{"generate: [{chain: {}, tree: {}}]", "must be one of"},
+        Case{"generate: [{bush: {}}]", "bush: unknown key"},
+        Case{"generate: [{chain: {links: 0}}]",
+             "generate.0.chain.links = 0: is out of range; must be a number in [1, 10000]"},
+        Case{"generate: [{chain: {spacing: 0.05}}]",
+             "spacing = 0.05: is out of range; must be a number in (0.055, 0.09) m"},
+        Case{"generate: [{chain: {cross_section: {radius: 0.02}}}]",
+             "the wire is too thick: its radius 0.02 m must be less than a fifth"},
+        Case{"generate: [{chain: {up: [1, 0, 0]}}]", "up = [1, 0, 0]: is along direction"},
+        Case{"generate: [{chain: {opening: 2}}]", "in [0, 1.570796327] rad"},
+        Case{"generate: [{chain: {length: 2}}]", "length = 2: unknown key"},
+        Case{"generate: [{chain: {}}, {chain: {}}]",
+             "generate.1.chain: makes a rod chain_0, whose name is taken; give the generator another name"},
+        Case{"{rods: [{name: chain_1}], generate: [{chain: {}}]}", "makes a rod chain_1, whose name is taken"},
+        Case{"generate: [{tree: {vertices: 200}}]", "vertices = 200: is too few for 57 branches; must be at least 285"},
+        Case{"generate: [{tree: {vertices: 290}}]", "vertices = 290: gives tree_0 too few (6) for its 7 children"},
+        Case{"generate: [{tree: {angle: 2}}]", "rad"},
+        Case{"generate: [{tree: {direction: [0, 0, 0]}}]", "must not be zero"},
+        Case{"generate: [{tree: {cross_section: {radius: 1}}}]", "unknown key"},
+        Case{"generate: [{hair: {strands: 0}}]", "in [1, 100000]"},
+        Case{"generate: [{hair: {head: {motion: free}}}]", "must be one of: fixed, topic"},
+        Case{"generate: [{hair: {head: {size: 3}}}]", "unknown key"},
+        Case{"generate: [{hair: {curl: {radius: 0}}}]", "in (0, 1000000] m"},
+        Case{"{generate: [{hair: {}}], obstacles: [{name: head, shape: {sphere: {}}}]}",
+             "generate.0.hair: makes head, which is also the name of obstacles.0"},
+        Case{"{generate: [{hair: {}}], bodies: [{mass: 1, shape: {sphere: {}}, welds: [{rod: hair_0, edge: 0}]}]}",
+             "grasp hair_0_root holds nodes 0 to 0"},
+        Case{"{}", "rods: is missing"}));
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

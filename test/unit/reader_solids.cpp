@@ -63,7 +63,8 @@ TEST(ReaderSolids, readsContact)
   EXPECT_TRUE(scene.rods[0].contact->self && scene.rods[0].contact->rods && scene.rods[0].contact->obstacles);
   EXPECT_EQ(scene.rods[0].contact->friction, 0.5);
   EXPECT_FALSE(scene.rods[1].contact);
-  const SceneConfig other = parseScene(good_scene, "t", {"rods.1.contact={self: false, rods: no}", "contact.gap=0.003"});
+  const SceneConfig other =
+      parseScene(good_scene, "t", {"rods.1.contact={self: false, rods: no}", "contact.gap=0.003"});
   EXPECT_EQ(other.contact.gap, 0.003);
   ASSERT_TRUE(other.rods[1].contact);
   EXPECT_FALSE(other.rods[1].contact->self || other.rods[1].contact->rods);
@@ -76,7 +77,8 @@ TEST(ReaderSolids, readsObstacles)
 {
   const SceneConfig scene = parseScene(good_scene);
   ASSERT_EQ(scene.obstacles.size(), 4u);
-  const auto& [floor, pin, door, hand] = std::tie(scene.obstacles[0], scene.obstacles[1], scene.obstacles[2], scene.obstacles[3]);
+  const auto& [floor, pin, door, hand] =
+      std::tie(scene.obstacles[0], scene.obstacles[1], scene.obstacles[2], scene.obstacles[3]);
   EXPECT_TRUE(std::holds_alternative<Plane>(floor.shape));
   EXPECT_LT((floor.pose * Eigen::Vector3d(0, 0, 1) - Eigen::Vector3d(0, 1, -1)).norm(), 1e-12);
   EXPECT_EQ(floor.friction, 0.7);
@@ -132,7 +134,9 @@ TEST(ReaderSolids, readsBodies)
 
 TEST(ReaderSolids, aBodyIsFreeUnlessItsMotionIsGiven)
 {
-  const auto motion = [](const std::string& value) { return parseScene(good_scene, "t", {"bodies.1.motion=" + value}).bodies[1].motion; };
+  const auto motion = [](const std::string& value) {
+    return parseScene(good_scene, "t", {"bodies.1.motion=" + value}).bodies[1].motion;
+  };
   EXPECT_FALSE(motion("free"));
   ASSERT_TRUE(motion("fixed"));
   EXPECT_TRUE(std::holds_alternative<FixedMotion>(*motion("fixed")));
@@ -140,10 +144,12 @@ TEST(ReaderSolids, aBodyIsFreeUnlessItsMotionIsGiven)
   EXPECT_TRUE(std::holds_alternative<TableMotion>(*motion("{table: [[0, 0, 0, 0]]}")));
 }
 
-/// A mesh's own frame may be anywhere; a simulated body's frame sits at its centre of mass. The mesh stays where it was put.
+/// A mesh's own frame may be anywhere; a simulated body's frame sits at its centre of mass. The mesh stays where it was
+/// put.
 TEST(ReaderSolids, meshesAreCentredWhenSimulated)
 {
-  const std::string mesh = "{mesh: {file: " + std::string(SLENDER_SOURCE_DIR) + "/test/unit/data/cube.obj, scale: 0.1}}";
+  const std::string mesh =
+      "{mesh: {file: " + std::string(SLENDER_SOURCE_DIR) + "/test/unit/data/cube.obj, scale: 0.1}}";
   const std::string pose = "bodies.1.pose={position: [1, 0, 0], rpy: [0, 0, 1.5707963267948966]}";
   const auto read = [&](const std::vector<std::string>& more) {
     std::vector<std::string> all{"bodies.1.shape=" + mesh, pose};
@@ -168,90 +174,98 @@ struct Case
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.override_text; }
 
-class BadSolid : public testing::TestWithParam<Case> {};
+class BadSolid : public testing::TestWithParam<Case>
+{};
 
 TEST_P(BadSolid, isRefusedWithPathAndRange)
 {
   const std::string message = problemsOf({GetParam().override_text});
   EXPECT_NE(message.find(GetParam().expected), std::string::npos) << GetParam().override_text << "\ngave: " << message;
   EXPECT_EQ(message.find('\n'), std::string::npos) << "more than one problem:\n" << message;
-  EXPECT_TRUE(message.find("--set " + std::string(GetParam().override_text)) == 0 || message.find("test.yaml:") == 0) << message;
+  EXPECT_TRUE(message.find("--set " + std::string(GetParam().override_text)) == 0 || message.find("test.yaml:") == 0)
+      << message;
 }
 
-INSTANTIATE_TEST_SUITE_P(Contact, BadSolid, testing::Values(
-  Case{"contact.gap=0", "contact.gap = 0: is out of range; must be a number in (0, 1] m"},
-  Case{"contact.slip_speed=0", "in (0, 10] m/s"},
-  Case{"contact.self=true", "unknown key; known here: gap, slip_speed"},
-  Case{"rods.0.contact.self=maybe", "must be true or false"},
-  Case{"rods.0.contact.friction=-0.1", "rods.0.contact.friction = -0.1: is out of range; must be a number in [0, 100]"},
-  Case{"rods.0.contact.bodies=true", "unknown key; known here: self, rods, obstacles, friction"},
-  Case{"time.integrator=symplectic_euler", "time.integrator = symplectic_euler: takes no contact"},
-  Case{"rods.0.contact=true", "must be a map"}));
+INSTANTIATE_TEST_SUITE_P(
+    Contact, BadSolid,
+    testing::Values(Case{"contact.gap=0", "contact.gap = 0: is out of range; must be a number in (0, 1] m"},
+                    Case{"contact.slip_speed=0", "in (0, 10] m/s"},
+                    Case{"contact.self=true", "unknown key; known here: gap, slip_speed"},
+                    Case{"rods.0.contact.self=maybe", "must be true or false"},
+                    Case{"rods.0.contact.friction=-0.1",
+                         "rods.0.contact.friction = -0.1: is out of range; must be a number in [0, 100]"},
+                    Case{"rods.0.contact.bodies=true", "unknown key; known here: self, rods, obstacles, friction"},
+                    Case{"time.integrator=symplectic_euler", "time.integrator = symplectic_euler: takes no contact"},
+                    Case{"rods.0.contact=true", "must be a map"}));
 
-INSTANTIATE_TEST_SUITE_P(Obstacle, BadSolid, testing::Values(
-  Case{"obstacles=3", "must be a list"},
-  Case{"obstacles.0.shape=plane", "obstacles.0.shape = plane: must be a map with one shape and its measures, e.g. {plane: {}}"},
-  Case{"obstacles.0.name=the floor", "is not a name"},
-  Case{"obstacles.0.name=pin", "is also the name of obstacles.0"},
-  Case{"obstacles.0.name=bob", "bodies.0.name = bob: is also the name of obstacles.0; names of bodies and obstacles must differ"},
-  Case{"obstacles.0.mass=1", "unknown key; known here: name, pose, shape, friction, motion"},
-  Case{"obstacles.0.shape={}", "names 0 shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh"},
-  Case{"obstacles.0.shape={sphere: {}, box: {}}", "names 2 shapes"},
-  Case{"obstacles.0.shape={ball: {}}", "unknown key"},
-  Case{"obstacles.0.shape.plane.normal=[0, 0, 0]", "must not be zero"},
-  Case{"obstacles.0.pose={position: [0, 0, 0]}", "there is a pose as well"},
-  Case{"obstacles.0.friction=-1", "in [0, 100]"},
-  Case{"obstacles.0.motion=free", "must be one of: fixed, topic"},
-  Case{"obstacles.0.motion={body: bob}", "must be fixed or one of {topic: true}, {table: [...]}, {file: PATH, body: NAME}"},
-  Case{"obstacles.0.motion={topic: false}", "must be true"},
-  Case{"obstacles.0.motion={file: nowhere.csv}", "must be fixed or one of"},
-  Case{"obstacles.2.pose={}", "there is a table of poses as well; the obstacle starts at its first"},
-  Case{"obstacles.2.motion={table: [[0, 1, 2]]}", "has 3 numbers; must be [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z]"},
-  Case{"obstacles.1.shape.cylinder.radius=0", "in (0, 1000000] m"},
-  Case{"obstacles.1.shape.cylinder.height=1", "unknown key; known here: radius, length"},
-  Case{"obstacles.1.shape={box: {size: 1}}", "must be a list [x, y, z]"},
-  Case{"obstacles.1.shape={box: {size: [1, 0, 1]}}", "size.1 = 0"},
-  Case{"obstacles.1.shape={mesh: {}}", "file: is missing"},
-  Case{"obstacles.1.shape={mesh: {file: nowhere.obj}}", "nowhere.obj: cannot be opened"},
-  Case{"obstacles.1.pose.orientation=[0, 0, 0, 1]", "must have either orientation: [x, y, z, w] or rpy: [roll, pitch, yaw]"},
-  Case{"obstacles.1.pose={orientation: [0, 0, 1]}", "has 3 entries; must be a unit quaternion [x, y, z, w]"},
-  Case{"obstacles.1.pose={orientation: [0, 0, 1, 1]}", "quaternion's length is 1.41421"},
-  Case{"obstacles.1.pose.rpy=[0, 1]", "has 2 entries"},
-  Case{"obstacles.1.pose.angle=1", "unknown key"}));
+INSTANTIATE_TEST_SUITE_P(
+    Obstacle, BadSolid,
+    testing::Values(
+        Case{"obstacles=3", "must be a list"},
+        Case{"obstacles.0.shape=plane",
+             "obstacles.0.shape = plane: must be a map with one shape and its measures, e.g. {plane: {}}"},
+        Case{"obstacles.0.name=the floor", "is not a name"},
+        Case{"obstacles.0.name=pin", "is also the name of obstacles.0"},
+        Case{"obstacles.0.name=bob",
+             "bodies.0.name = bob: is also the name of obstacles.0; names of bodies and obstacles must differ"},
+        Case{"obstacles.0.mass=1", "unknown key; known here: name, pose, shape, friction, motion"},
+        Case{"obstacles.0.shape={}", "names 0 shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh"},
+        Case{"obstacles.0.shape={sphere: {}, box: {}}", "names 2 shapes"},
+        Case{"obstacles.0.shape={ball: {}}", "unknown key"},
+        Case{"obstacles.0.shape.plane.normal=[0, 0, 0]", "must not be zero"},
+        Case{"obstacles.0.pose={position: [0, 0, 0]}", "there is a pose as well"},
+        Case{"obstacles.0.friction=-1", "in [0, 100]"}, Case{"obstacles.0.motion=free", "must be one of: fixed, topic"},
+        Case{"obstacles.0.motion={body: bob}",
+             "must be fixed or one of {topic: true}, {table: [...]}, {file: PATH, body: NAME}"},
+        Case{"obstacles.0.motion={topic: false}", "must be true"},
+        Case{"obstacles.0.motion={file: nowhere.csv}", "must be fixed or one of"},
+        Case{"obstacles.2.pose={}", "there is a table of poses as well; the obstacle starts at its first"},
+        Case{"obstacles.2.motion={table: [[0, 1, 2]]}",
+             "has 3 numbers; must be [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z]"},
+        Case{"obstacles.1.shape.cylinder.radius=0", "in (0, 1000000] m"},
+        Case{"obstacles.1.shape.cylinder.height=1", "unknown key; known here: radius, length"},
+        Case{"obstacles.1.shape={box: {size: 1}}", "must be a list [x, y, z]"},
+        Case{"obstacles.1.shape={box: {size: [1, 0, 1]}}", "size.1 = 0"},
+        Case{"obstacles.1.shape={mesh: {}}", "file: is missing"},
+        Case{"obstacles.1.shape={mesh: {file: nowhere.obj}}", "nowhere.obj: cannot be opened"},
+        Case{"obstacles.1.pose.orientation=[0, 0, 0, 1]",
+             "must have either orientation: [x, y, z, w] or rpy: [roll, pitch, yaw]"},
+        Case{"obstacles.1.pose={orientation: [0, 0, 1]}", "has 3 entries; must be a unit quaternion [x, y, z, w]"},
+        Case{"obstacles.1.pose={orientation: [0, 0, 1, 1]}", "quaternion's length is 1.41421"},
+        Case{"obstacles.1.pose.rpy=[0, 1]", "has 2 entries"}, Case{"obstacles.1.pose.angle=1", "unknown key"}));
 
-INSTANTIATE_TEST_SUITE_P(Body, BadSolid, testing::Values(
-  Case{"bodies.1.name=bob", "is also the name of bodies.0"},
-  Case{"bodies.1.mass=1", "must have either mass or density"},
-  Case{"bodies.1.density=0", "in (0, 1000000] kg/m^3"},
-  Case{"bodies.0.mass=-2", "in (0, 1000000000] kg"},
-  Case{"bodies.2={name: point}", "must have a mass, or a density and a shape"},
-  Case{"bodies.2={name: point, mass: 1}", "inertia: is missing; a body without a shape needs [Ixx, Iyy, Izz]"},
-  Case{"bodies.2={name: point, density: 1, inertia: [1, 1, 1]}", "density = 1: needs a shape"},
-  Case{"bodies.2.inertia=[1, 2, 4]", "bodies.2.inertia = [1, 2, 4]: body point: principal moments"},
-  Case{"bodies.2.inertia=[1, 2, 0]", "inertia.2 = 0"},
-  Case{"bodies.2.inertia=[1, 2]", "has 2 entries"},
-  Case{"bodies.2.inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]", "must be symmetric"},
-  Case{"bodies.1.shape={plane: {}}", "mass of a plane"},
-  Case{"bodies.1.shape={sphere: {radius: -1}}", "in (0, 1000000] m"},
-  Case{"bodies.0.motion=fixed", "the body's motion is given; only free bodies start with a velocity"},
-  Case{"bodies.1.motion=moving", "must be one of: fixed, topic, free"},
-  Case{"bodies.1.motion={}", "must be free, fixed or one of"},
-  Case{"bodies.0.velocity.linear=1", "must be a list [x, y, z]"},
-  Case{"bodies.0.velocity.speed=1", "unknown key"},
-  Case{"bodies.0.damping.linear=-1", "in [0, 1000000] 1/s"},
-  Case{"bodies.0.gravity=[0, 0, 1]", "must be true or false"},
-  Case{"bodies.0.colour=red", "unknown key; known here: name"},
-  Case{"bodies.0.welds=rope", "must be a list"},
-  Case{"bodies.0.welds.0.rod=rop", "welds.0.rod = rop: is no rod of the scene (did you mean rope?); it has: rope, ring"},
-  Case{"bodies.0.welds.0={edge: 3}", "rod: is missing"},
-  Case{"bodies.0.welds.0.edge=10", "in [-10, 9]"},
-  Case{"bodies.0.welds.0={rod: rope}", "edge: is missing"},
-  Case{"bodies.0.welds.0.edge=0", "holds nodes 0 to 0 of rod rope; grasp left holds nodes 0 to 0"},
-  Case{"bodies.0.welds.0.edge=4", "holds nodes 4 to 5 of rod rope; grasp middle holds nodes 5 to 5"},
-  Case{"bodies.0.welds.1={rod: rope, edge: 9}", "a weld of body bob holds nodes 10 to 10"},
-  Case{"bodies.3.welds.0={rod: ring, edge: 2}", "holds nodes 2 to 3 of rod ring; a weld of body bob holds nodes 3 to 4"},
-  Case{"bodies.0.welds.1.edge=-1", "holds the edge that joins the last node to the first"},
-  Case{"rods.0.grasps.middle.motion.body=bob", "body bob is simulated; weld the rod to it instead"}));
+INSTANTIATE_TEST_SUITE_P(
+    Body, BadSolid,
+    testing::Values(
+        Case{"bodies.1.name=bob", "is also the name of bodies.0"},
+        Case{"bodies.1.mass=1", "must have either mass or density"},
+        Case{"bodies.1.density=0", "in (0, 1000000] kg/m^3"}, Case{"bodies.0.mass=-2", "in (0, 1000000000] kg"},
+        Case{"bodies.2={name: point}", "must have a mass, or a density and a shape"},
+        Case{"bodies.2={name: point, mass: 1}", "inertia: is missing; a body without a shape needs [Ixx, Iyy, Izz]"},
+        Case{"bodies.2={name: point, density: 1, inertia: [1, 1, 1]}", "density = 1: needs a shape"},
+        Case{"bodies.2.inertia=[1, 2, 4]", "bodies.2.inertia = [1, 2, 4]: body point: principal moments"},
+        Case{"bodies.2.inertia=[1, 2, 0]", "inertia.2 = 0"}, Case{"bodies.2.inertia=[1, 2]", "has 2 entries"},
+        Case{"bodies.2.inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]", "must be symmetric"},
+        Case{"bodies.1.shape={plane: {}}", "mass of a plane"},
+        Case{"bodies.1.shape={sphere: {radius: -1}}", "in (0, 1000000] m"},
+        Case{"bodies.0.motion=fixed", "the body's motion is given; only free bodies start with a velocity"},
+        Case{"bodies.1.motion=moving", "must be one of: fixed, topic, free"},
+        Case{"bodies.1.motion={}", "must be free, fixed or one of"},
+        Case{"bodies.0.velocity.linear=1", "must be a list [x, y, z]"},
+        Case{"bodies.0.velocity.speed=1", "unknown key"}, Case{"bodies.0.damping.linear=-1", "in [0, 1000000] 1/s"},
+        Case{"bodies.0.gravity=[0, 0, 1]", "must be true or false"},
+        Case{"bodies.0.colour=red", "unknown key; known here: name"}, Case{"bodies.0.welds=rope", "must be a list"},
+        Case{"bodies.0.welds.0.rod=rop",
+             "welds.0.rod = rop: is no rod of the scene (did you mean rope?); it has: rope, ring"},
+        Case{"bodies.0.welds.0={edge: 3}", "rod: is missing"}, Case{"bodies.0.welds.0.edge=10", "in [-10, 9]"},
+        Case{"bodies.0.welds.0={rod: rope}", "edge: is missing"},
+        Case{"bodies.0.welds.0.edge=0", "holds nodes 0 to 0 of rod rope; grasp left holds nodes 0 to 0"},
+        Case{"bodies.0.welds.0.edge=4", "holds nodes 4 to 5 of rod rope; grasp middle holds nodes 5 to 5"},
+        Case{"bodies.0.welds.1={rod: rope, edge: 9}", "a weld of body bob holds nodes 10 to 10"},
+        Case{"bodies.3.welds.0={rod: ring, edge: 2}",
+             "holds nodes 2 to 3 of rod ring; a weld of body bob holds nodes 3 to 4"},
+        Case{"bodies.0.welds.1.edge=-1", "holds the edge that joins the last node to the first"},
+        Case{"rods.0.grasps.middle.motion.body=bob", "body bob is simulated; weld the rod to it instead"}));
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

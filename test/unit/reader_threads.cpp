@@ -42,7 +42,8 @@ TEST(ThreadReader, ReadsEverything)
   EXPECT_EQ(t.viscosity, 20);
   EXPECT_EQ(t.surface_tension, 0.05);
   ASSERT_TRUE(t.nozzle && t.floor && t.region);
-  EXPECT_LT((t.nozzle->pose.orientation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0.02, 0, -1).normalized()).norm(), 1e-12);
+  EXPECT_LT((t.nozzle->pose.orientation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0.02, 0, -1).normalized()).norm(),
+            1e-12);
   EXPECT_DOUBLE_EQ(t.nozzle->flow.table.at(-1), 3e-7);
   EXPECT_DOUBLE_EQ(t.nozzle->flow.table.at(0.25), 6e-7);
   EXPECT_DOUBLE_EQ(t.nozzle->flow.table.at(9), 9e-7);
@@ -57,12 +58,14 @@ TEST(ThreadReader, ReadsEverything)
 TEST(ThreadReader, NamesWhatIsWrong)
 {
   const std::pair<const char*, const char*> cases[] = {
-      {"threads.0.fluid.viscosity=-1", "threads.0.fluid.viscosity = -1: is out of range; must be a number in (0, 1e+12] Pa s"},
+      {"threads.0.fluid.viscosity=-1",
+       "threads.0.fluid.viscosity = -1: is out of range; must be a number in (0, 1e+12] Pa s"},
       {"threads.0.nozzle.diameter=0", "threads.0.nozzle.diameter = 0"},
       {"threads.0.nozzle.flow=-1e-7", "threads.0.nozzle.flow = -1e-7"},
       {"threads.0.nozzle.flow={topic: false}", "must be true"},
       {"threads.0.nozzle.flow={table: [[1, 0], [1, 2]]}", "times must rise"},
-      {"threads.0.nozzle.flow=1", "is too much: over a thousand edges would leave the nozzle in one step; must be at most 0.0098"},
+      {"threads.0.nozzle.flow=1",
+       "is too much: over a thousand edges would leave the nozzle in one step; must be at most 0.0098"},
       {"threads.0.nozzle.flow={table: [[0, 0], [1, 1]]}", "is too much"},
       {"threads.0.nozzle.flow={topic: true, initial: 1}", "is too much"},
       {"threads.0.nozzle.spin=1", "unknown key"},
@@ -72,11 +75,13 @@ TEST(ThreadReader, NamesWhatIsWrong)
       {"threads.0.edges.shortest=0.0019", "0.4 of edges.longest"},
       {"threads.0.region={from: [0, 0, 0], to: [1, 0, 1]}", "must be greater than region.from"},
       {"threads.0.breakup_radius=0.0025", "must be less than the nozzle's radius 0.0025 m"},
-      {"time.integrator=symplectic_euler", "time.integrator = symplectic_euler: is not for threads; must be implicit_euler"},
+      {"time.integrator=symplectic_euler",
+       "time.integrator = symplectic_euler: is not for threads; must be implicit_euler"},
       {"start=equilibrium", "is not for threads"},
   };
   for (const auto& [assignment, expected] : cases)
-    EXPECT_NE(problemsOf(assignment).find(expected), std::string::npos) << assignment << "\ngave: " << problemsOf(assignment);
+    EXPECT_NE(problemsOf(assignment).find(expected), std::string::npos)
+        << assignment << "\ngave: " << problemsOf(assignment);
 }
 
 TEST(ThreadScene, FeedsWhatTheTableSays)
@@ -108,7 +113,8 @@ TEST(ThreadScene, RestartsBitByBit)
   run(a, 200);
   run(b, 200);
   const ThreadState &s = a.state().threads[0].threads[0], &r = b.state().threads[0].threads[0];
-  EXPECT_TRUE(s.x == r.x && s.v == r.v && s.d1 == r.d1 && s.twist == r.twist && s.volume == r.volume && s.id == r.id && s.deposited == r.deposited);
+  EXPECT_TRUE(s.x == r.x && s.v == r.v && s.d1 == r.d1 && s.twist == r.twist && s.volume == r.volume && s.id == r.id &&
+              s.deposited == r.deposited);
   EXPECT_EQ(a.endLoads(0)[1].force, b.endLoads(0)[1].force);
   Simulation other(parseScene(honey, "t", {"threads.0.fluid.viscosity=21"}));
   EXPECT_THROW(other.load(file), std::runtime_error);
@@ -244,14 +250,17 @@ TEST(ThreadContactReader, NamesWhatIsWrong)
       {"threads.0.floor.centreline_on_surface=true", "is for floors that the thread sticks to"},
       {"threads.0.contact.obstacles=false", "makes the floor an obstacle"},
       {"contact.gap=0", "contact.gap = 0"},
-      {"threads.1.centerline.straight={from: [-0.05, 0, -0.0145], to: [0.05, 0, -0.0145], edges: 40}", "touch or cross"},
+      {"threads.1.centerline.straight={from: [-0.05, 0, -0.0145], to: [0.05, 0, -0.0145], edges: 40}",
+       "touch or cross"},
   };
   for (const auto& [assignment, expected] : cases)
-    EXPECT_NE(problemsOfTouching(assignment).find(expected), std::string::npos) << assignment << "\ngave: " << problemsOfTouching(assignment);
+    EXPECT_NE(problemsOfTouching(assignment).find(expected), std::string::npos)
+        << assignment << "\ngave: " << problemsOfTouching(assignment);
   EXPECT_EQ(problemsOfTouching("name=touching"), "");
   // merging without anything that touches
   std::string text = touching;
-  text.erase(text.find("    contact: {friction: 0.4"), std::string("    contact: {friction: 0.4, threads: true}\n").size());
+  text.erase(text.find("    contact: {friction: 0.4"),
+             std::string("    contact: {friction: 0.4, threads: true}\n").size());
   text.erase(text.find(", friction: 0.2"), std::string(", friction: 0.2").size());
   try
   {
@@ -299,5 +308,5 @@ TEST(ThreadContactScene, AThreadFallsOnAnotherAndOnATrayAndARestartIsExact)
   EXPECT_EQ(simulation.state().thread_contact_stiffness, 0.0);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

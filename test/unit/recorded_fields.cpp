@@ -17,7 +17,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-Simulation make(const std::string& yaml, const std::vector<std::string>& overrides = {}) { return Simulation(parseScene(yaml, "t", overrides)); }
+Simulation make(const std::string& yaml, const std::vector<std::string>& overrides = {})
+{
+  return Simulation(parseScene(yaml, "t", overrides));
+}
 
 RodSections sections(const Simulation& simulation, int rod = 0)
 {
@@ -57,7 +60,8 @@ TEST(RecordedFields, TensionOfAHangingRodIsTheWeightBelow)
   const RodModel& model = simulation.rodModel(0);
   const std::vector<FieldTable> tables = fieldTablesOf(simulation);
   ASSERT_EQ(tables.size(), 1u);
-  const Eigen::VectorXd tension = column(tables[0], "tension [N]"), fz = column(tables[0], "fz [N]"), strain = column(tables[0], "strain");
+  const Eigen::VectorXd tension = column(tables[0], "tension [N]"), fz = column(tables[0], "fz [N]"),
+                        strain = column(tables[0], "strain");
   for (int j = 0; j < model.edges(); ++j)
   {
     const double weight = 9.81 * model.mass.tail(model.nodes() - 1 - j).sum();
@@ -112,12 +116,15 @@ TEST(RecordedFields, MomentOfACantileverIsThatOfTheWeightBeyond)
 
 TEST(RecordedFields, BendModulusComesInTheOrderTowardsD1TowardsD2)
 {
-  // B1 resists bending towards d1, which turns about d2: with d1 up the weight bends about d2 and B1 counts, with d1 level B2 does.
-  const std::vector<std::string> moduli = {"rods.0.material.bend_modulus=[0.1, 0.4]", "rods.0.material.stretch_modulus=1e4",
-                                           "rods.0.material.twist_modulus=0.1", "rods.0.material.linear_density=0.02"};
+  // B1 resists bending towards d1, which turns about d2: with d1 up the weight bends about d2 and B1 counts, with d1
+  // level B2 does.
+  const std::vector<std::string> moduli = {"rods.0.material.bend_modulus=[0.1, 0.4]",
+                                           "rods.0.material.stretch_modulus=1e4", "rods.0.material.twist_modulus=0.1",
+                                           "rods.0.material.linear_density=0.02"};
   std::vector<std::string> level = moduli;
   level.push_back("rods.0.director=[0, 1, 0]");
-  const double up_sag = -make(cantilever, moduli).state().rods[0].x(2, 40), level_sag = -make(cantilever, level).state().rods[0].x(2, 40);
+  const double up_sag = -make(cantilever, moduli).state().rods[0].x(2, 40),
+               level_sag = -make(cantilever, level).state().rods[0].x(2, 40);
   EXPECT_NEAR(up_sag, 0.02 * 9.81 / (8 * 0.1), 0.05 * up_sag);   // q L^4 / (8 B), small deflection
   EXPECT_NEAR(level_sag, 0.02 * 9.81 / (8 * 0.4), 0.02 * level_sag);
   EXPECT_NEAR(sections(make(cantilever, level)).curvature.row(0).norm(), 0.0, 1e-9);
@@ -174,7 +181,8 @@ rods:
 
 TEST(RecordedFields, CurvatureOfAHelixIsItsOwnToSecondOrder)
 {
-  // Chords of a helix of radius R and rise c per radian, whose nodes are a rad apart, have the length l and turn by phi:
+  // Chords of a helix of radius R and rise c per radian, whose nodes are a rad apart, have the length l and turn by
+  // phi:
   //   l^2 = 4 R^2 sin^2(a/2) + c^2 a^2,   l^2 cos(phi) = 4 R^2 sin^2(a/2) cos(a) + c^2 a^2.
   // The curvature of a joint is 2 tan(phi/2) / l (tangent) or phi / l (compensated).
   constexpr double kRadius = 0.1, kRise = 0.1 / (2 * M_PI), kTurns = 3;
@@ -185,23 +193,29 @@ TEST(RecordedFields, CurvatureOfAHelixIsItsOwnToSecondOrder)
     for (int fine : {0, 1})
     {
       const int edges = fine ? 180 : 90;
-      const Simulation simulation = make(R"(
+      const Simulation simulation = make(
+          R"(
 gravity: [0, 0, 0]
 rods:
   - name: helix
     centerline: {helix: {radius: 0.1, pitch: 0.1, turns: 3, edges: 90}}
-)", {"rods.0.centerline.helix.edges=" + std::to_string(edges), std::string("rods.0.curvature=") + curvature});
+)",
+          {"rods.0.centerline.helix.edges=" + std::to_string(edges), std::string("rods.0.curvature=") + curvature});
       const RodSections s = sections(simulation);
-      const double a = 2 * M_PI * kTurns / edges, across = std::pow(2 * kRadius * std::sin(0.5 * a), 2), along = std::pow(kRise * a, 2);
-      const double length = std::sqrt(across + along), turn = std::acos((across * std::cos(a) + along) / (across + along));
+      const double a = 2 * M_PI * kTurns / edges, across = std::pow(2 * kRadius * std::sin(0.5 * a), 2),
+                   along = std::pow(kRise * a, 2);
+      const double length = std::sqrt(across + along),
+                   turn = std::acos((across * std::cos(a) + along) / (across + along));
       const double expected = (curvature[0] == 't' ? 2 * std::tan(0.5 * turn) : turn) / length;
       for (int i = 2; i + 2 < simulation.rodModel(0).nodes(); ++i)
-        EXPECT_NEAR(s.curvature.col(i).norm(), expected, 1e-9 * expected) << i;   // acos loses half of the digits at small turns
+        // acos loses half of the digits at small turns
+        EXPECT_NEAR(s.curvature.col(i).norm(), expected, 1e-9 * expected) << i;
       error[fine] = std::abs(s.curvature.col(edges / 2).norm() / smooth - 1);
       EXPECT_LT(s.moment.cwiseAbs().maxCoeff(), 1e-12);   // at rest
       EXPECT_LT(s.force.cwiseAbs().maxCoeff(), 1e-9);
     }
-    EXPECT_NEAR(error[0] / error[1], 4.0, 0.2) << curvature;   // halving the edges quarters the error of a method of second order
+    // halving the edges quarters the error of a method of second order
+    EXPECT_NEAR(error[0] / error[1], 4.0, 0.2) << curvature;
   }
 }
 
@@ -219,12 +233,14 @@ rods:
   const RodSections s = sections(simulation);
   for (int i = 0; i < simulation.rodModel(0).nodes(); ++i)
   {
-    EXPECT_NEAR(s.moment(2, i), 0.01 / 0.2, 0.01 * 0.01 / 0.2) << i;   // B / R; polygon of 80 edges, of which one is 4 % longer
+    // B / R; polygon of 80 edges, of which one is 4 % longer
+    EXPECT_NEAR(s.moment(2, i), 0.01 / 0.2, 0.01 * 0.01 / 0.2) << i;
     EXPECT_NEAR(s.moment.col(i).head<2>().norm(), 0.0, 1e-10);
   }
 }
 
-/// Newton's law for every free node, with the force that implicit Euler balances at the end of the step: the recorded force is the solver's own.
+/// Newton's law for every free node, with the force that implicit Euler balances at the end of the step: the recorded
+/// force is the solver's own.
 TEST(RecordedFields, ForcesAreThoseThatAccelerateTheNodes)
 {
   Simulation simulation = make(R"(
@@ -317,19 +333,23 @@ TEST(RecordedFields, AreWrittenOnlyWhenAskedFor)
     return folder + "/" + name;
   };
   const std::string plain = record("plain", {});
-  const std::string full = record("full", {"record.fields=[curvature, twist, strain, force, moment, energy, contact_force]", "rods.0.grasps.top.edges=[0, 1]"});
+  const std::string full =
+      record("full", {"record.fields=[curvature, twist, strain, force, moment, energy, contact_force]",
+                      "rods.0.grasps.top.edges=[0, 1]"});
   EXPECT_FALSE(std::filesystem::exists(plain + "/rod_fields.csv"));
   EXPECT_FALSE(std::filesystem::exists(plain + "/energies.csv"));
   EXPECT_TRUE(snapshotOf(make(hanging)).fields.empty());
   const std::string fields = fileText(full + "/rod_fields.csv");
   EXPECT_EQ(fields.substr(0, fields.find('\n')),
-            "t [s],object,index,kappa1 [1/m],kappa2 [1/m],twist_rate [rad/m],strain,tension [N],fx [N],fy [N],fz [N],moment_t [N m],moment_d1 [N m],"
+            "t [s],object,index,kappa1 [1/m],kappa2 [1/m],twist_rate [rad/m],strain,tension [N],fx [N],fy [N],fz "
+            "[N],moment_t [N m],moment_d1 [N m],"
             "moment_d2 [N m],mx [N m],my [N m],mz [N m],contact_fx [N],contact_fy [N],contact_fz [N]");
   EXPECT_EQ(std::count(fields.begin(), fields.end(), '\n'), 22);
   EXPECT_EQ(fields.find("nan"), std::string::npos);
   EXPECT_NE(fields.find(",,,,"), std::string::npos);   // the force of the edge that is held as a whole
   const std::string energies = fileText(full + "/energies.csv");
-  EXPECT_EQ(energies.substr(0, energies.find('\n')), "t [s],object,stretch [J],bend [J],twist [J],kinetic [J],gravity [J]");
+  EXPECT_EQ(energies.substr(0, energies.find('\n')),
+            "t [s],object,stretch [J],bend [J],twist [J],kinetic [J],gravity [J]");
 }
 
 std::string complaint(const std::vector<std::string>& overrides, const std::string& scene = hanging)
@@ -347,10 +367,13 @@ std::string complaint(const std::vector<std::string>& overrides, const std::stri
 
 TEST(RecordedFields, ThatNothingHasAreRefused)
 {
-  EXPECT_NE(complaint({"record.fields=[curvatur]"}).find("must be one of: curvature"), std::string::npos) << complaint({"record.fields=[curvatur]"});
+  EXPECT_NE(complaint({"record.fields=[curvatur]"}).find("must be one of: curvature"), std::string::npos)
+      << complaint({"record.fields=[curvatur]"});
   EXPECT_NE(complaint({"record.fields=[twist, twist]"}).find("named twice"), std::string::npos);
-  EXPECT_NE(complaint({"record.fields=[force]", "rods.0.stretching=projected", "rods.0.formulation=isotropic", "time.integrator=symplectic_euler", "start=as_given"})
-              .find("stretching: projected"), std::string::npos);
+  EXPECT_NE(complaint({"record.fields=[force]", "rods.0.stretching=projected", "rods.0.formulation=isotropic",
+                       "time.integrator=symplectic_euler", "start=as_given"})
+                .find("stretching: projected"),
+            std::string::npos);
   const std::string cloth = R"(
 cloths:
   - {name: c, grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, material: {youngs_modulus: 1e5, thickness: 1e-3, area_density: 0.1}, bending: {modulus: 1e-5}}
@@ -379,15 +402,19 @@ threads:
   EXPECT_EQ(tables[0].table, "thread_fields");
   EXPECT_EQ(tables[0].object, "pitch");
   const ThreadState& thread = simulation.state().threads[0].threads[0];
-  const Eigen::VectorXd tension = column(tables[0], "tension [N]"), rate = column(tables[0], "stretch_rate [1/s]"), radius = column(tables[0], "radius [m]");
-  const Eigen::VectorXd flux = column(tables[0], "flux [m^3/s]"), kappa = column(tables[0], "curvature [1/m]"), id = column(tables[0], "id");
+  const Eigen::VectorXd tension = column(tables[0], "tension [N]"), rate = column(tables[0], "stretch_rate [1/s]"),
+                        radius = column(tables[0], "radius [m]");
+  const Eigen::VectorXd flux = column(tables[0], "flux [m^3/s]"), kappa = column(tables[0], "curvature [1/m]"),
+                        id = column(tables[0], "id");
   ASSERT_EQ(tension.size(), thread.nodes());
   double below = 0.0;
   for (int j = 0; j < thread.edges(); ++j)
   {
-    // the balance of node j: what hangs below it is whole edges and half of its own on either side; surface tension of the free end pulls up
+    // the balance of node j: what hangs below it is whole edges and half of its own on either side; surface tension of
+    // the free end pulls up
     below += 9.81 * 1000 * 0.5 * (thread.volume[j] + (j > 0 ? thread.volume[j - 1] : 0.0));
-    EXPECT_NEAR(tension[j], below, 2e-3 * 9.81 * 1000 * thread.totalVolume()) << j;   // the rates are those of a step that ends here: first order in time
+    // the rates are those of a step that ends here: first order in time
+    EXPECT_NEAR(tension[j], below, 2e-3 * 9.81 * 1000 * thread.totalVolume()) << j;
     EXPECT_NEAR(radius[j], thread.radius(j), 1e-15);
     EXPECT_NEAR(tension[j], 3 * 1e5 * M_PI * radius[j] * radius[j] * rate[j] + M_PI * 0.05 * radius[j], 1e-12);
     EXPECT_NEAR(id[j], static_cast<double>(thread.id[j]), 0.0);
@@ -431,9 +458,10 @@ threads:
   EXPECT_EQ(kappa[0], 0.0);   // free ends carry none
   for (Eigen::Index i = 1; i + 1 < kappa.size(); ++i)
   {
-    EXPECT_NEAR(kappa[i], 5.0, 5.0 * 1e-3);   // on chords that turn by 1/20 rad, 2 tan(turn/2) / chord exceeds 1/R by the factor 1 + turn^2/8
+    // on chords that turn by 1/20 rad, 2 tan(turn/2) / chord exceeds 1/R by the factor 1 + turn^2/8
+    EXPECT_NEAR(kappa[i], 5.0, 5.0 * 1e-3);
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

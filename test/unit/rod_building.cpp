@@ -52,7 +52,8 @@ TEST(BuildRod, LumpsMassAndMeansStiffness)
 TEST(BuildRod, ClosedRodSharesItsLastEdge)
 {
   const int n = 9;
-  const RodModel m = buildRod("r", ringNodes(n, 1.0), true, uniformSections(modulusSection(1, 1, 1, 2.0), n), Vector3d::UnitZ(), false);
+  const RodModel m = buildRod("r", ringNodes(n, 1.0), true, uniformSections(modulusSection(1, 1, 1, 2.0), n),
+                              Vector3d::UnitZ(), false);
   EXPECT_EQ(m.edges(), n);
   const double h = 2 * std::sin(M_PI / n);
   for (int i = 0; i < n; ++i)
@@ -70,14 +71,15 @@ TEST(BuildRod, RestCurvatureOfAnArcAndAHelix)
   const int n = 33;
   const double radius = 0.7, phi = M_PI / (n - 1);
   const Matrix3Xd arc = helixNodes(n, radius, 0.0, 0.5);
-  const RodModel m = buildRod("arc", arc, false, uniformSections(modulusSection(1, 1, 1, 1), n - 1), -arc.col(0), false);
+  const RodModel m =
+      buildRod("arc", arc, false, uniformSections(modulusSection(1, 1, 1, 1), n - 1), -arc.col(0), false);
   for (int i = 1; i + 1 < n; ++i)
   {
     EXPECT_NEAR(m.rest_curvature(0, i), 2 * std::tan(phi / 2), 1e-13);
     EXPECT_NEAR(m.rest_curvature(1, i), 0.0, 1e-13);
   }
-  const RodModel turns = buildRod("arc", arc, false, uniformSections(modulusSection(1, 1, 1, 1), n - 1), -arc.col(0), false,
-                                  {Curvature::compensated, false});
+  const RodModel turns = buildRod("arc", arc, false, uniformSections(modulusSection(1, 1, 1, 1), n - 1), -arc.col(0),
+                                  false, {Curvature::compensated, false});
   EXPECT_NEAR(turns.rest_curvature(0, n / 2), phi, 1e-13);
   EXPECT_NEAR(m.rest_curvature(0, 0), std::tan(phi / 2), 1e-13);   // half an edge at the ends
   EXPECT_NEAR(m.rest_curvature(0, n - 1), std::tan(phi / 2), 1e-13);
@@ -86,11 +88,14 @@ TEST(BuildRod, RestCurvatureOfAnArcAndAHelix)
   const double pitch = 0.3, c = pitch / (2 * M_PI);
   const int edges = 400;
   const Matrix3Xd helix = helixNodes(edges + 1, radius, pitch, 3.0);
-  const RodModel h = buildRod("helix", helix, false, uniformSections(modulusSection(1, 1, 1, 1), edges), Vector3d::Zero(), false);
+  const RodModel h =
+      buildRod("helix", helix, false, uniformSections(modulusSection(1, 1, 1, 1), edges), Vector3d::Zero(), false);
   const double length = h.rest_length.sum() / edges, expected = radius / (radius * radius + c * c);
   EXPECT_NEAR(h.rest_curvature.col(200).norm() / length, expected, expected * std::pow(2 * M_PI * 3 / edges, 2));
-  EXPECT_EQ(h.rest_twist.norm(), 0.0);   // frames of the rest shape are parallel; the torsion turns the curvature among them
-  const RodModel straight = buildRod("helix", helix, false, uniformSections(modulusSection(1, 1, 1, 1), edges), Vector3d::Zero(), true);
+  // frames of the rest shape are parallel; the torsion turns the curvature among them
+  EXPECT_EQ(h.rest_twist.norm(), 0.0);
+  const RodModel straight =
+      buildRod("helix", helix, false, uniformSections(modulusSection(1, 1, 1, 1), edges), Vector3d::Zero(), true);
   EXPECT_EQ(straight.rest_curvature.norm(), 0.0);
 }
 
@@ -106,7 +111,8 @@ double energyAtRest(const RodModel& m, const Matrix3Xd& nodes, const std::functi
 TEST(BuildRod, RestShapeHasNoEnergyHoweverItIsHeld)
 {
   Random random(61);
-  const JointOptions options[] = {{}, {Curvature::compensated, false}, {Curvature::tangent, true}, {Curvature::compensated, true}};
+  const JointOptions options[] = {
+      {}, {Curvature::compensated, false}, {Curvature::tangent, true}, {Curvature::compensated, true}};
   for (int run = 0; run < 16; ++run)
   {
     const bool closed = run % 2 == 1, uneven = run / 2 % 2 == 1;
@@ -115,24 +121,33 @@ TEST(BuildRod, RestShapeHasNoEnergyHoweverItIsHeld)
     Matrix3Xd nodes = closed ? ringNodes(n, 1.0) : helixNodes(n, 1.0, 0.5, 0.8);
     if (uneven)
       nodes = wigglyNodes(n, closed, random);
-    const RodModel m = buildRod("r", nodes, closed, oddSections(closed ? n : n - 1, random), Vector3d::Zero(), false, options[run / 4]);
+    const RodModel m = buildRod("r", nodes, closed, oddSections(closed ? n : n - 1, random), Vector3d::Zero(), false,
+                                options[run / 4]);
     const std::vector<std::function<void(Rod&)>> holds = {
         [](Rod&) {},
         [](Rod& r) { r.hold(0, 0); },
-        [n](Rod& r) { r.hold(0, 0); r.hold(n - 1, n - 1); },
+        [n](Rod& r) {
+          r.hold(0, 0);
+          r.hold(n - 1, n - 1);
+        },
         [](Rod& r) { r.hold(5, 5); },
-        [](Rod& r) { r.hold(0, 3); r.hold(7, 8); r.hold(12, 12, false); },
+        [](Rod& r) {
+          r.hold(0, 3);
+          r.hold(7, 8);
+          r.hold(12, 12, false);
+        },
     };
     for (std::size_t k = 0; k < holds.size(); ++k)
       // strains of round-off size, squared; anything wrong in the share of the curvature shows at 1e-6 and above
-      EXPECT_LT(energyAtRest(m, nodes, holds[k]), 1e-25) << (closed ? "closed " : "open ") << (uneven ? "uneven" : "even") << " options " << run / 4 << " hold " << k;
+      EXPECT_LT(energyAtRest(m, nodes, holds[k]), 1e-25)
+          << (closed ? "closed " : "open ") << (uneven ? "uneven" : "even") << " options " << run / 4 << " hold " << k;
   }
 }
 
 TEST(BuildRod, JointsMatchedToArcsAreAsStiffAsThese)
 {
-  // Two edges of one arc. Its ends turned against each other, the arc's energy is that of the change of its rotation's logarithm, which
-  // is spread evenly over its length: 1/2 d^T diag(beta, B) d / length.
+  // Two edges of one arc. Its ends turned against each other, the arc's energy is that of the change of its rotation's
+  // logarithm, which is spread evenly over its length: 1/2 d^T diag(beta, B) d / length.
   Random random(62);
   const double h = 0.5;
   for (const Curvature curvature : {Curvature::tangent, Curvature::compensated})
@@ -146,7 +161,8 @@ TEST(BuildRod, JointsMatchedToArcsAreAsStiffAsThese)
       double worst[2] = {0, 0};
       for (int matched = 0; matched < 2; ++matched)
       {
-        const RodModel m = buildRod("arc", nodes, false, uniformSections(section, 2), director, false, {curvature, matched == 1});
+        const RodModel m =
+            buildRod("arc", nodes, false, uniformSections(section, 2), director, false, {curvature, matched == 1});
         for (int sample = 0; sample < 6; ++sample)
         {
           Rod rod(m, nodes);
@@ -166,29 +182,33 @@ TEST(BuildRod, JointsMatchedToArcsAreAsStiffAsThese)
           const Eigen::Matrix3d turned = Eigen::AngleAxisd(1e-5, random.direction()) * frame(1);
           rod.state.x.col(2) = rod.state.x.col(1) + h * turned.col(0);
           rod.state.d1.col(1) = turned.col(1);
-          const Vector3d t = frame(0).col(0), transported = parallelTransport(Vector3d(rod.state.d1.col(0)), t, Vector3d(turned.col(0)));
+          const Vector3d t = frame(0).col(0),
+                         transported = parallelTransport(Vector3d(rod.state.d1.col(0)), t, Vector3d(turned.col(0)));
           rod.state.twist[1] = signedAngle(transported, Vector3d(turned.col(1)), Vector3d(turned.col(0)));
           const Vector3d d = logarithm() - before;
           const Eigen::Vector2d kappa(d[2], -d[1]);   // kappa1 turns about d2, kappa2 about -d1
           const double arc = h * (turn / 2) / std::sin(turn / 2);
-          const double expected = 0.5 * (section.twist_modulus * d[0] * d[0] + kappa.dot(section.bend_modulus * kappa)) / arc;
+          const double expected =
+              0.5 * (section.twist_modulus * d[0] * d[0] + kappa.dot(section.bend_modulus * kappa)) / arc;
           RodSystem system(m);
           system.load(rod.state);
           const double energy = evaluateAt(system, rod.state, Eigen::VectorXd::Zero(12)).bend_twist;
           worst[matched] = std::max(worst[matched], std::abs(energy / expected - 1));
         }
       }
-      EXPECT_LT(worst[1], 1e-4) << turn;                          // 1e-5: terms of third order in the small turn
+      EXPECT_LT(worst[1], 1e-4) << turn;                    // 1e-5: terms of third order in the small turn
       EXPECT_GT(worst[0], 0.1 * turn * turn / 4) << turn;   // of second order in the joint's turn without
     }
-  EXPECT_THROW(buildRod("r", unevenNodes(), false, uniformSections(modulusSection(1, 1, 1, 1), 4), Vector3d::UnitY(), true, {Curvature::tangent, true}),
+  EXPECT_THROW(buildRod("r", unevenNodes(), false, uniformSections(modulusSection(1, 1, 1, 1), 4), Vector3d::UnitY(),
+                        true, {Curvature::tangent, true}),
                std::invalid_argument);
 }
 
 TEST(BuildRod, HoldingAUniformlyBentRodKeepsItsEnergy)
 {
-  // A straight rod bent to an arc, with unequal edges: a grasp in the middle splits a joint into two halves whose bending energies
-  // must sum to nearly that of the joint (they integrate the same curvature; equal strain per length on both sides).
+  // A straight rod bent to an arc, with unequal edges: a grasp in the middle splits a joint into two halves whose
+  // bending energies must sum to nearly that of the joint (they integrate the same curvature; equal strain per length
+  // on both sides).
   const int n = 21;
   Matrix3Xd arc(3, n), straight(3, n);
   for (int i = 0; i < n; ++i)
@@ -204,7 +224,8 @@ TEST(BuildRod, HoldingAUniformlyBentRodKeepsItsEnergy)
   ASSERT_NEAR(all, 0.5, 0.05);   // 1/2 B kappa^2 L
   for (int node : {9, 10})
   {
-    // half cells with Gregory's weights change the sum by at most a twelfth of an edge's energy: 1/12 * 2 sides / n of the whole
+    // half cells with Gregory's weights change the sum by at most a twelfth of an edge's energy: 1/12 * 2 sides / n of
+    // the whole
     EXPECT_NEAR(energyAtRest(m, arc, [node](Rod& r) { r.hold(node, node); }), all, all * 0.3 / n) << node;
   }
 }
@@ -240,9 +261,10 @@ TEST(BuildRod, RefusesEachBadValueByName)
     expectRefused("bend modulus", [&] { build([bad](RodSection& s) { s.bend_modulus(0, 0) = bad; }); });
     expectRefused("bend modulus", [&] { build([bad](RodSection& s) { s.bend_modulus(1, 1) = bad; }); });
   }
-  expectRefused("bend modulus", [&] { build([](RodSection& s) { s.bend_modulus << 1, 2, 2, 1; }); });     // indefinite
+  expectRefused("bend modulus", [&] { build([](RodSection& s) { s.bend_modulus << 1, 2, 2, 1; }); });   // indefinite
   expectRefused("bend modulus", [&] { build([](RodSection& s) { s.bend_modulus << 1, kNan, kNan, 1; }); });
-  expectRefused("bend modulus", [&] { build([](RodSection& s) { s.bend_modulus << 1, 0.5, 0.1, 1; }); });   // not symmetric
+  // not symmetric
+  expectRefused("bend modulus", [&] { build([](RodSection& s) { s.bend_modulus << 1, 0.5, 0.1, 1; }); });
 
   const auto shape = [](const Matrix3Xd& x, bool closed, int sections) {
     buildRod("rope", x, closed, uniformSections(modulusSection(1, 1, 1, 1), sections), Vector3d::Zero(), false);
@@ -263,8 +285,12 @@ TEST(BuildRod, RefusesEachBadValueByName)
   Matrix3Xd folded = unevenNodes();
   folded.col(3) = folded.col(1);
   expectRefused("node 2", [&] { shape(folded, false, 4); });
-  expectRefused("director", [] { buildRod("r", unevenNodes(), false, uniformSections(modulusSection(1, 1, 1, 1), 4), Vector3d::UnitX(), true); });
-  expectRefused("director", [] { buildRod("r", unevenNodes(), false, uniformSections(modulusSection(1, 1, 1, 1), 4), Vector3d(0, kNan, 0), true); });
+  expectRefused("director", [] {
+    buildRod("r", unevenNodes(), false, uniformSections(modulusSection(1, 1, 1, 1), 4), Vector3d::UnitX(), true);
+  });
+  expectRefused("director", [] {
+    buildRod("r", unevenNodes(), false, uniformSections(modulusSection(1, 1, 1, 1), 4), Vector3d(0, kNan, 0), true);
+  });
 }
 
 TEST(MakeRodState, SpreadsTwistAndRefusesBadInput)
@@ -279,7 +305,8 @@ TEST(MakeRodState, SpreadsTwistAndRefusesBadInput)
   EXPECT_LT((s.d1.col(2) - rotateAbout(Vector3d::UnitY(), Vector3d::UnitX(), 4.0)).norm(), 1e-14);
   EXPECT_EQ(s.v.norm(), 0.0);
   const int n = 8;
-  const RodModel ring = buildRod("ring", ringNodes(n, 1.0), true, uniformSections(modulusSection(1, 1, 1, 1), n), Vector3d::Zero(), false);
+  const RodModel ring = buildRod("ring", ringNodes(n, 1.0), true, uniformSections(modulusSection(1, 1, 1, 1), n),
+                                 Vector3d::Zero(), false);
   const RodState r = makeRodState(ring, ringNodes(n, 1.0), Vector3d::Zero(), 2 * M_PI);
   for (int i = 0; i < n; ++i)
     EXPECT_NEAR(r.twist[i], 2 * M_PI / n, 1e-13);
@@ -296,9 +323,11 @@ TEST(MakeGrasp, TakesHoldAndRefusesBadNodes)
 {
   const RodModel m = openRod(unevenNodes(), modulusSection(1, 1, 1, 1), true);
   const RodState s = makeRodState(m, unevenNodes(), Vector3d::UnitY());
-  const GraspState one = makeGrasp(m, s, 1, 1, true), pair = makeGrasp(m, s, 1, 2, true), three = makeGrasp(m, s, 1, 3, true);
+  const GraspState one = makeGrasp(m, s, 1, 1, true), pair = makeGrasp(m, s, 1, 2, true),
+                   three = makeGrasp(m, s, 1, 3, true);
   EXPECT_EQ(one.X_WG.position, s.x.col(1));
-  EXPECT_LT((one.X_WG.orientation * Vector3d::UnitX() - Vector3d::UnitX()).norm(), 1e-14);   // x along the tangent, y along d1
+  // x along the tangent, y along d1
+  EXPECT_LT((one.X_WG.orientation * Vector3d::UnitX() - Vector3d::UnitX()).norm(), 1e-14);
   EXPECT_LT((one.X_WG.orientation * Vector3d::UnitY() - Vector3d::UnitY()).norm(), 1e-14);
   EXPECT_LT((pair.X_WG.position - Vector3d(1.25, 0, 0)).norm(), 1e-15);
   EXPECT_EQ(three.X_WG.position, s.x.col(2));
@@ -311,5 +340,5 @@ TEST(MakeGrasp, TakesHoldAndRefusesBadNodes)
   expectRefused("pin", [&] { makeGrasp(m, s, 1, 2, false); });
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

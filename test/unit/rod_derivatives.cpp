@@ -1,4 +1,5 @@
-// Gradient and Hessian of whole rods, with their clamps, pins, loads and viscous response, against differences of the energy.
+// Gradient and Hessian of whole rods, with their clamps, pins, loads and viscous response, against differences of the
+// energy.
 #include <algorithm>
 #include <functional>
 
@@ -40,8 +41,10 @@ struct LoadedRod
       system.setResponse(c.viscous_ratio, &viscous_strain);
     }
     for (int i = 0; i < n; ++i)
-      system.setInertia(i, system.isFree(i) ? random.uniform(4.0, 6.0) : 0.0, rod.state.x.col(i) + random.vector(0.2), random.vector());
-    // Only held frames balance torques. Where nothing holds them Newton's direction would be mostly spin, in which differences lose digits.
+      system.setInertia(i, system.isFree(i) ? random.uniform(4.0, 6.0) : 0.0, rod.state.x.col(i) + random.vector(0.2),
+                        random.vector());
+    // Only held frames balance torques. Where nothing holds them Newton's direction would be mostly spin, in which
+    // differences lose digits.
     Eigen::VectorXd torques(rod.model->edges());
     for (int j = 0; j < torques.size(); ++j)
       torques[j] = 0.5 * std::sin(1.0 + 2.0 * j);
@@ -54,7 +57,8 @@ struct LoadedRod
   {
     const Matrix3Xd rest = wigglyNodes(n, c.closed, random);
     const int edges = c.closed ? n : n - 1;
-    const auto sections = c.straight ? uniformSections(modulusSection(1.0, 1.0, 50.0, 2.5), edges) : oddSections(edges, random);
+    const auto sections =
+        c.straight ? uniformSections(modulusSection(1.0, 1.0, 50.0, 2.5), edges) : oddSections(edges, random);
     const RodModel model = buildRod("r", rest, c.closed, sections, Vector3d::Zero(), c.straight, {c.curvature, false});
     Matrix3Xd nodes = rest;
     for (int i = 0; i < n; ++i)
@@ -65,8 +69,9 @@ struct LoadedRod
   }
 };
 
-/// The solver gives d = -K^-1 g for the gradient g, so d^T K d must be -g.d; second differences of the energy along d must say the
-/// same. (Differences of the gradient would not: its frames move on, by holonomy.) Random loads turn d into every direction.
+/// The solver gives d = -K^-1 g for the gradient g, so d^T K d must be -g.d; second differences of the energy along d
+/// must say the same. (Differences of the gradient would not: its frames move on, by holonomy.) Random loads turn d
+/// into every direction.
 void checkHessian(LoadedRod& s, Random& random, int samples, double tolerance)
 {
   const int n = s.rod.model->nodes();
@@ -83,7 +88,10 @@ void checkHessian(LoadedRod& s, Random& random, int samples, double tolerance)
     for (double size : {1e-1, 3e-2, 1e-2, 3e-3})
     {
       const double h = size / d.lpNorm<Eigen::Infinity>();
-      const auto even = [&](double f) { return evaluateAt(s.system, s.rod.state, f * h * d).energy() + evaluateAt(s.system, s.rod.state, -f * h * d).energy() - 2 * base.energy(); };
+      const auto even = [&](double f) {
+        return evaluateAt(s.system, s.rod.state, f * h * d).energy() +
+               evaluateAt(s.system, s.rod.state, -f * h * d).energy() - 2 * base.energy();
+      };
       // fourth order: truncation h^4, round-off 1e-16 E / h^2 (E up to 1e3)
       best = std::min(best, std::abs((16 * even(1) - even(2)) / (12 * h * h) - expected) / std::abs(expected));
     }
@@ -92,8 +100,7 @@ void checkHessian(LoadedRod& s, Random& random, int samples, double tolerance)
 }
 
 class RodDerivatives : public ::testing::TestWithParam<Case>
-{
-};
+{};
 
 TEST_P(RodDerivatives, Gradient)
 {
@@ -112,7 +119,10 @@ TEST_P(RodDerivatives, Gradient)
       for (int k = 0; k < 4; ++k)
       {
         const double h = std::pow(10.0, -2 - k);
-        error[k] = std::abs((evaluateAt(s.system, s.rod.state, h * d).energy() - evaluateAt(s.system, s.rod.state, -h * d).energy()) / (2 * h) - gradient.dot(d));
+        error[k] = std::abs(
+            (evaluateAt(s.system, s.rod.state, h * d).energy() - evaluateAt(s.system, s.rod.state, -h * d).energy()) /
+                (2 * h) -
+            gradient.dot(d));
       }
       EXPECT_NEAR(std::log10(error[0] / error[1]), 2.0, 0.3);
       // h = 1e-5: truncation 1e-10 and round-off 1e-15 * 100 J / 1e-5 = 1e-8, over forces of order ten
@@ -127,7 +137,8 @@ TEST_P(RodDerivatives, Hessian)
   for (int n : {9, 17})
   {
     LoadedRod s(GetParam(), n, random);
-    // truncation and round-off meet near 1e-6; where no frame is held the solver adds 1e-8 of the twist stiffness, seen in soft spins
+    // truncation and round-off meet near 1e-6; where no frame is held the solver adds 1e-8 of the twist stiffness, seen
+    // in soft spins
     checkHessian(s, random, 12, 1e-4);
   }
 }
@@ -145,7 +156,8 @@ TEST_P(RodDerivatives, HessianOfALongRodAssembledByPieces)
         r.hold(node, node);
   };
   LoadedRod s(c, n, random);
-  checkHessian(s, random, 3, 3e-4);   // one entry missing at a seam is 1e-3 and more; round-off of sixty times the energy 1e-4
+  // one entry missing at a seam is 1e-3 and more; round-off of sixty times the energy 1e-4
+  checkHessian(s, random, 3, 3e-4);
 }
 
 TEST_P(RodDerivatives, ViscousResponseIsElasticPlusRatioTimesRate)
@@ -175,22 +187,74 @@ TEST_P(RodDerivatives, ViscousResponseIsElasticPlusRatioTimesRate)
 const std::vector<Case> kCases = {
     {"open", false, [](Rod&) {}, 0.0},
     {"closed", true, [](Rod&) {}, 0.0},
-    {"clamped_ends", false, [](Rod& r) { r.hold(0, 0); r.hold(r.model->nodes() - 1, r.model->nodes() - 1); }, 0.0},
+    {"clamped_ends", false,
+     [](Rod& r) {
+       r.hold(0, 0);
+       r.hold(r.model->nodes() - 1, r.model->nodes() - 1);
+     },
+     0.0},
     {"clamped_middle", false, [](Rod& r) { r.hold(4, 4); }, 0.0},
-    {"held_edges", false, [](Rod& r) { r.hold(0, 2); r.hold(5, 6); }, 0.0},
-    {"neighbouring_clamps", false, [](Rod& r) { r.hold(0, 0); r.hold(2, 2); r.hold(3, 3); }, 0.0},
-    {"pinned", false, [](Rod& r) { r.hold(0, 0, false); r.hold(5, 5, false); }, 0.0},
-    {"closed_clamped", true, [](Rod& r) { r.hold(0, 0); r.hold(4, 5); }, 0.0},
-    {"closed_clamped_last", true, [](Rod& r) { r.hold(r.model->nodes() - 1, r.model->nodes() - 1); r.hold(3, 3, false); }, 0.0},
-    {"viscous_open", false, [](Rod& r) { r.hold(0, 0); r.hold(5, 6); }, 1.7},
+    {"held_edges", false,
+     [](Rod& r) {
+       r.hold(0, 2);
+       r.hold(5, 6);
+     },
+     0.0},
+    {"neighbouring_clamps", false,
+     [](Rod& r) {
+       r.hold(0, 0);
+       r.hold(2, 2);
+       r.hold(3, 3);
+     },
+     0.0},
+    {"pinned", false,
+     [](Rod& r) {
+       r.hold(0, 0, false);
+       r.hold(5, 5, false);
+     },
+     0.0},
+    {"closed_clamped", true,
+     [](Rod& r) {
+       r.hold(0, 0);
+       r.hold(4, 5);
+     },
+     0.0},
+    {"closed_clamped_last", true,
+     [](Rod& r) {
+       r.hold(r.model->nodes() - 1, r.model->nodes() - 1);
+       r.hold(3, 3, false);
+     },
+     0.0},
+    {"viscous_open", false,
+     [](Rod& r) {
+       r.hold(0, 0);
+       r.hold(5, 6);
+     },
+     1.7},
     {"viscous_closed", true, [](Rod& r) { r.hold(2, 2); }, 0.6},
-    {"compensated", false, [](Rod& r) { r.hold(0, 2); r.hold(5, 5); }, 0.0, Curvature::compensated},
+    {"compensated", false,
+     [](Rod& r) {
+       r.hold(0, 2);
+       r.hold(5, 5);
+     },
+     0.0, Curvature::compensated},
     {"compensated_closed", true, [](Rod&) {}, 0.0, Curvature::compensated},
-    {"compensated_viscous", false, [](Rod& r) { r.hold(0, 0); r.hold(5, 6); }, 1.7, Curvature::compensated},
-    {"compensated_straight", false, [](Rod& r) { r.hold(0, 0); r.hold(4, 4); }, 0.0, Curvature::compensated, true},
+    {"compensated_viscous", false,
+     [](Rod& r) {
+       r.hold(0, 0);
+       r.hold(5, 6);
+     },
+     1.7, Curvature::compensated},
+    {"compensated_straight", false,
+     [](Rod& r) {
+       r.hold(0, 0);
+       r.hold(4, 4);
+     },
+     0.0, Curvature::compensated, true},
     {"compensated_straight_closed", true, [](Rod& r) { r.hold(3, 3); }, 0.0, Curvature::compensated, true},
 };
-INSTANTIATE_TEST_SUITE_P(Kinds, RodDerivatives, ::testing::ValuesIn(kCases), [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Kinds, RodDerivatives, ::testing::ValuesIn(kCases),
+                         [](const auto& info) { return info.param.name; });
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

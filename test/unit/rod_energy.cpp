@@ -53,7 +53,10 @@ TEST_P(RodEnergy, EqualsTheFormulaOnTheFramedCurve)
         const double l = 0.5 * (m.rest_length[(i + m.edges() - 1) % m.edges()] + m.rest_length[i]);
         const Eigen::Vector2d k = curve.materialCurvature(i) - m.rest_curvature.col(i);
         const double twisted = curve.twist(i) + (closed() && i == 0 ? turns : 0.0) - m.rest_twist[i];
-        bend += 0.5 * (m.bend_modulus(0, i) * k[0] * k[0] + 2 * m.bend_modulus(1, i) * k[0] * k[1] + m.bend_modulus(2, i) * k[1] * k[1]) / l;
+        bend += 0.5 *
+                (m.bend_modulus(0, i) * k[0] * k[0] + 2 * m.bend_modulus(1, i) * k[0] * k[1] +
+                 m.bend_modulus(2, i) * k[1] * k[1]) /
+                l;
         twist += 0.5 * m.twist_modulus[i] * twisted * twisted / l;
       }
     EXPECT_GT(stretch, 1e-2);
@@ -122,8 +125,9 @@ TEST_P(RodEnergy, UnchangedByRigidMotion)
 
 TEST_P(RodEnergy, RigidMotionOfTheTrialIsFollowedByTheFrames)
 {
-  // The same rotation reached from the unrotated base: frames come by transport in time and need a turn about each tangent to
-  // follow rigidly. The total is the rigidly rotated energy only if relaxing finds that turn: compare the minima over the frames.
+  // The same rotation reached from the unrotated base: frames come by transport in time and need a turn about each
+  // tangent to follow rigidly. The total is the rigidly rotated energy only if relaxing finds that turn: compare the
+  // minima over the frames.
   Random random(54);
   const int n = 9;
   const Matrix3Xd rest = wigglyNodes(n, closed(), random), x = displaced(rest, 0.1, random);
@@ -191,5 +195,5 @@ TEST(StretchEnergy, UniformStretchIsExact)
   EXPECT_NEAR(system.nodeGradient(5).norm(), 0.0, 1e-11);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -1,4 +1,5 @@
-// What a step promises whatever the physics: refusals leave the state alone, equal inputs give equal bits, reasons are given.
+// What a step promises whatever the physics: refusals leave the state alone, equal inputs give equal bits, reasons are
+// given.
 #include <cstring>
 #include <functional>
 #include <limits>
@@ -40,8 +41,7 @@ TimeConfig configOf(Integrator integrator, double tolerance = 0.0)
 }
 
 class EveryIntegrator : public ::testing::TestWithParam<Integrator>
-{
-};
+{};
 
 TEST_P(EveryIntegrator, RefusesNonFiniteInputAndKeepsTheState)
 {
@@ -50,11 +50,21 @@ TEST_P(EveryIntegrator, RefusesNonFiniteInputAndKeepsTheState)
   const std::vector<std::pair<std::string, std::function<void(Rod&, double)>>> spoils = {
       {"gravity", [](Rod& r, double bad) { r.inputs.gravity[1] = bad; }},
       {"wind", [](Rod& r, double bad) { r.inputs.wind[2] = bad; }},
-      {"force", [](Rod& r, double bad) { r.inputs.forces.setZero(3, 24); r.inputs.forces(1, 7) = bad; }},
+      {"force",
+       [](Rod& r, double bad) {
+         r.inputs.forces.setZero(3, 24);
+         r.inputs.forces(1, 7) = bad;
+       }},
       {"pose of grasp 1", [](Rod& r, double bad) { r.inputs.grasps[1].X_WG.position[0] = bad; }},
       {"pose of grasp 0", [](Rod& r, double bad) { r.inputs.grasps[0].X_WG.orientation.x() = bad; }},
-      {"velocity of grasp 0", [](Rod& r, double bad) { r.inputs.grasps[0].velocity = Twist{Vector3d(0, bad, 0), Vector3d::Zero()}; }},
-      {"velocity of grasp 0", [](Rod& r, double bad) { r.inputs.grasps[0].velocity = Twist{Vector3d::Zero(), Vector3d(0, bad, 0)}; }},
+      {"velocity of grasp 0",
+       [](Rod& r, double bad) {
+         r.inputs.grasps[0].velocity = Twist{Vector3d(0, bad, 0), Vector3d::Zero()};
+       }},
+      {"velocity of grasp 0",
+       [](Rod& r, double bad) {
+         r.inputs.grasps[0].velocity = Twist{Vector3d::Zero(), Vector3d(0, bad, 0)};
+       }},
       {"state", [](Rod& r, double bad) { r.state.x(1, 3) = bad; }},
       {"state", [](Rod& r, double bad) { r.state.v(1, 3) = bad; }},
       {"state", [](Rod& r, double bad) { r.state.d1(1, 3) = bad; }},
@@ -70,7 +80,8 @@ TEST_P(EveryIntegrator, RefusesNonFiniteInputAndKeepsTheState)
       for (bool statics : {false, true})
       {
         RodState state = spoilt.state;
-        const StepReport report = statics ? stepper.solveEquilibrium(state, spoilt.inputs) : stepper.step(state, spoilt.inputs, time.step);
+        const StepReport report =
+            statics ? stepper.solveEquilibrium(state, spoilt.inputs) : stepper.step(state, spoilt.inputs, time.step);
         EXPECT_FALSE(report.ok) << name;
         EXPECT_EQ(report.failure, StepFailure::input_not_finite) << name;
         EXPECT_NE(report.message.find(name), std::string::npos) << report.message;
@@ -172,7 +183,8 @@ TEST_P(EveryIntegrator, RefusesAFoldedRodWithReason)
 
 TEST_P(EveryIntegrator, TeleportingGraspIsFollowedOrRefused)
 {
-  // Everything from a jump of a rod's length to one of a million: done (perhaps in cut steps) or refused with a reason, and finite.
+  // Everything from a jump of a rod's length to one of a million: done (perhaps in cut steps) or refused with a reason,
+  // and finite.
   for (double jump : {0.3, 1.0, 30.0, 1e6})
     for (bool frame : {true, false})
     {
@@ -183,11 +195,13 @@ TEST_P(EveryIntegrator, TeleportingGraspIsFollowedOrRefused)
       stepper.step(rod.state, rod.inputs, time.step);
       const RodState before = rod.state;
       rod.inputs.grasps[0].X_WG.position += jump * Vector3d(-0.3, 0.8, 0.5);
-      rod.inputs.grasps[0].X_WG.orientation = Eigen::AngleAxisd(3.0, Vector3d(0.2, 0.9, 0.3).normalized()) * rod.inputs.grasps[0].X_WG.orientation;
+      rod.inputs.grasps[0].X_WG.orientation =
+          Eigen::AngleAxisd(3.0, Vector3d(0.2, 0.9, 0.3).normalized()) * rod.inputs.grasps[0].X_WG.orientation;
       const StepReport report = stepper.step(rod.state, rod.inputs, time.step);
       if (report.ok)
       {
-        EXPECT_TRUE(rod.state.x.allFinite() && rod.state.v.allFinite() && rod.state.d1.allFinite() && rod.state.twist.allFinite());
+        EXPECT_TRUE(rod.state.x.allFinite() && rod.state.v.allFinite() && rod.state.d1.allFinite() &&
+                    rod.state.twist.allFinite());
         EXPECT_LT((rod.state.x.col(0) - rod.inputs.grasps[0].X_WG.position).norm(), 1e-12 * jump + 1e-14);
       }
       else
@@ -220,14 +234,17 @@ TEST_P(EveryIntegrator, HeldNodesFollowTheirGraspExactly)
     {
       EXPECT_LT((rod.state.x.col(i) - pose * g.nodes_G[i - 22]).norm(), 1e-14);
       // velocity of the rigid motion; uniform inside the step
-      const Vector3d v = k == 0 ? Vector3d(rod.state.v.col(i)) : Vector3d(Vector3d(-0.1, 0.2, 0.3) + omega * Vector3d::UnitZ().cross(pose.orientation * g.nodes_G[i - 22]));
+      const Vector3d v = k == 0 ? Vector3d(rod.state.v.col(i))
+                                : Vector3d(Vector3d(-0.1, 0.2, 0.3) +
+                                           omega * Vector3d::UnitZ().cross(pose.orientation * g.nodes_G[i - 22]));
       EXPECT_LT((rod.state.v.col(i) - v).norm(), 1e-10);   // quotients of 1e-16 by the step
     }
     EXPECT_LT((rod.state.d1.col(22) - pose.orientation * g.directors_G[0]).norm(), 1e-13);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, EveryIntegrator, ::testing::ValuesIn(allIntegrators()), [](const auto& info) { return toString(info.param); });
+INSTANTIATE_TEST_SUITE_P(All, EveryIntegrator, ::testing::ValuesIn(allIntegrators()),
+                         [](const auto& info) { return toString(info.param); });
 
 TEST(StepCutting, CutsAndSaysSo)
 {
@@ -297,5 +314,5 @@ TEST(StepReport, Merges)
   EXPECT_FALSE(a.stable);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -19,7 +19,8 @@ const Eigen::Vector3d gravity(0, 0, -9.81);
 
 TEST(Shapes, aFullCircleClosesWithoutADoubleNode)
 {
-  const auto nodes = restNodes(rodOf("{closed: true, centerline: {arc: {angle: 6.283185307179586, edges: 20}}}"), gravity);
+  const auto nodes =
+      restNodes(rodOf("{closed: true, centerline: {arc: {angle: 6.283185307179586, edges: 20}}}"), gravity);
   ASSERT_EQ(nodes.cols(), 20);
   const auto lengths = edgeLengths(nodes, true);
   EXPECT_NEAR(lengths.maxCoeff(), lengths.minCoeff(), 1e-14);
@@ -27,8 +28,9 @@ TEST(Shapes, aFullCircleClosesWithoutADoubleNode)
 
 TEST(Shapes, initialShapeGetsTheRestSpacing)
 {
-  const RodConfig rod = rodOf("{centerline: {polyline: {points: [[0, 0, 0], [0.1, 0, 0], [0.4, 0, 0], [1, 0, 0]]}},"
-                              " initial: {straight: {from: [0, 0, 0], to: [0, 0, 2]}}}");
+  const RodConfig rod = rodOf(
+      "{centerline: {polyline: {points: [[0, 0, 0], [0.1, 0, 0], [0.4, 0, 0], [1, 0, 0]]}},"
+      " initial: {straight: {from: [0, 0, 0], to: [0, 0, 2]}}}");
   const auto rest = restNodes(rod, gravity);
   const auto initial = initialNodes(rod, rest, gravity);
   ASSERT_EQ(initial.cols(), 4);
@@ -38,14 +40,16 @@ TEST(Shapes, initialShapeGetsTheRestSpacing)
 
 TEST(Shapes, initialPointsOfTheRightNumberAreKept)
 {
-  const RodConfig rod = rodOf("{centerline: {straight: {edges: 2}}, initial: {polyline: {points: [[0, 0, 0], [0.4, 0.1, 0], [0.9, 0, 0]]}}}");
+  const RodConfig rod = rodOf(
+      "{centerline: {straight: {edges: 2}}, initial: {polyline: {points: [[0, 0, 0], [0.4, 0.1, 0], [0.9, 0, 0]]}}}");
   EXPECT_EQ(initialNodes(rod, restNodes(rod, gravity), gravity).col(1), Eigen::Vector3d(0.4, 0.1, 0));
 }
 
 TEST(Shapes, initialShapeOfALoop)
 {
-  const RodConfig rod = rodOf("{closed: true, centerline: {arc: {angle: 6.283185307179586, edges: 12}},"
-                              " initial: {polyline: {points: [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]}}}");
+  const RodConfig rod = rodOf(
+      "{closed: true, centerline: {arc: {angle: 6.283185307179586, edges: 12}},"
+      " initial: {polyline: {points: [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]}}}");
   const auto initial = initialNodes(rod, restNodes(rod, gravity), gravity);
   ASSERT_EQ(initial.cols(), 12);
   EXPECT_LT((initial.col(3) - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
@@ -90,7 +94,8 @@ TEST(Shapes, aCircleTwistsAlikeEitherWay)
 
 TEST(Shapes, givenModuliTakeThePlaceOfDerivedOnes)
 {
-  const RodConfig rod = rodOf("{material: {linear_density: 0.1, stretch_modulus: 2, bend_modulus: [3, 4], twist_modulus: 5}}");
+  const RodConfig rod =
+      rodOf("{material: {linear_density: 0.1, stretch_modulus: 2, bend_modulus: [3, 4], twist_modulus: 5}}");
   const RodSection s = rodSections(rod, 50)[0];
   EXPECT_EQ(s.linear_density, 0.1);
   EXPECT_EQ(s.stretch_modulus, 2);
@@ -134,8 +139,9 @@ protected:
 
 TEST_F(PoseFile, readsBodiesInOrder)
 {
-  const auto bodies = readPoseFile(write("# units\nt,body,x,y,z,qx,qy,qz,qw\n0,b,1,2,3,0,0,0,1\n0,a,0,0,0,0,0,0,1\n\n"
-                                         "0.5, b, 2,2,3, 0,0,0,-1\r\n"));
+  const auto bodies =
+      readPoseFile(write("# units\nt,body,x,y,z,qx,qy,qz,qw\n0,b,1,2,3,0,0,0,1\n0,a,0,0,0,0,0,0,1\n\n"
+                         "0.5, b, 2,2,3, 0,0,0,-1\r\n"));
   ASSERT_EQ(bodies.size(), 2u);
   EXPECT_EQ(bodies[0].body, "b");
   EXPECT_EQ(bodies[0].poses.size(), 2u);
@@ -171,5 +177,5 @@ TEST_F(PoseFile, drivesAGrasp)
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -27,7 +27,10 @@ rods:
     grasps: {b_left: {nodes: [3], hold: position}}
 )";
 
-Simulation make(const std::vector<std::string>& overrides = {}) { return Simulation(parseScene(two_rods, "t", overrides)); }
+Simulation make(const std::vector<std::string>& overrides = {})
+{
+  return Simulation(parseScene(two_rods, "t", overrides));
+}
 
 void run(Simulation& simulation, int steps)
 {
@@ -60,7 +63,7 @@ void expectSameBits(const SceneState& a, const SceneState& b)
 TEST(StepsUntil, CountsWholeStepsAndHasAnEnd)
 {
   EXPECT_EQ(stepsUntil(1.0, 0.005), 200);
-  EXPECT_EQ(stepsUntil(0.3, 0.1), 3);        // 0.3 / 0.1 is less than 3, 0.7 / 0.1 less than 7
+  EXPECT_EQ(stepsUntil(0.3, 0.1), 3);   // 0.3 / 0.1 is less than 3, 0.7 / 0.1 less than 7
   EXPECT_EQ(stepsUntil(0.7, 0.1), 7);
   EXPECT_EQ(stepsUntil(0.7001, 0.1), 8);
   EXPECT_EQ(stepsUntil(0.001, 0.1), 1);
@@ -111,7 +114,8 @@ TEST(Simulation, offsetsCarryTheVelocityOfTheirLever)
   const GraspTarget target = simulation.targetOf(1, X_WM, Twist{{0.1, 0, 0}, {0, 0, 2}});
   EXPECT_LT((target.X_WG.position - (X_WM.position + X_WM.orientation * Eigen::Vector3d(0, -1, 0))).norm(), 1e-14);
   const Eigen::Vector3d arm = target.X_WG.position - X_WM.position;
-  EXPECT_LT((target.velocity->linear - (Eigen::Vector3d(0.1, 0, 0) + Eigen::Vector3d(0, 0, 2).cross(arm))).norm(), 1e-14);
+  EXPECT_LT((target.velocity->linear - (Eigen::Vector3d(0.1, 0, 0) + Eigen::Vector3d(0, 0, 2).cross(arm))).norm(),
+            1e-14);
   EXPECT_EQ(simulation.targetOf(0, X_WM).X_WG.position, X_WM.position);   // attach: section
 }
 
@@ -191,7 +195,8 @@ TEST(Simulation, refusesToAttachWhatCannotBeHeld)
 
 TEST(Simulation, equilibriumHangsStill)
 {
-  Simulation simulation = make({"start=equilibrium", "rods.1.grasps.b_left={edges: [0]}", "rods.0.grasps.right.motion=fixed"});
+  Simulation simulation =
+      make({"start=equilibrium", "rods.1.grasps.b_left={edges: [0]}", "rods.0.grasps.right.motion=fixed"});
   const Eigen::Matrix3Xd start = simulation.state().rods[1].x;
   EXPECT_LT(start(2, 30), -0.1);
   EXPECT_NEAR(simulation.wrench(2).force.z(), -simulation.rodModel(1).totalMass() * 9.81, 1e-6);
@@ -219,8 +224,8 @@ class SavedState : public testing::TestWithParam<const char*>
 protected:
   void SetUp() override
   {
-    path_ = testing::TempDir() + "/slender_sim_state_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) +
-            GetParam();
+    path_ = testing::TempDir() + "/slender_sim_state_" +
+            std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + GetParam();
   }
   void TearDown() override { std::remove(path_.c_str()); }
 
@@ -238,8 +243,9 @@ protected:
 
 TEST_P(SavedState, loadAndStepIsBitEqual)
 {
-  const std::vector<std::string> settings{std::string("time.integrator=") + GetParam(), "rods.0.damping.stiffness=0.001",
-                                          std::string("time.step=") + (std::string(GetParam()) == "symplectic_euler" ? "1e-5" : "0.01")};
+  const std::vector<std::string> settings{
+      std::string("time.integrator=") + GetParam(), "rods.0.damping.stiffness=0.001",
+      std::string("time.step=") + (std::string(GetParam()) == "symplectic_euler" ? "1e-5" : "0.01")};
   Simulation through = make(settings);
   run(through, 25);
   through.save(path_);
@@ -278,7 +284,8 @@ TEST_P(SavedState, refusesWhatDoesNotFit)
   const std::string good = read();
   EXPECT_EQ(refusal(simulation), "");
 
-  for (std::size_t size : {std::size_t{0}, std::size_t{5}, std::size_t{20}, std::size_t{40}, good.size() / 2, good.size() - 1})
+  for (std::size_t size :
+       {std::size_t{0}, std::size_t{5}, std::size_t{20}, std::size_t{40}, good.size() / 2, good.size() - 1})
   {
     write(good.substr(0, size));
     EXPECT_NE(refusal(simulation), "") << "cut to " << size << " bytes";
@@ -296,8 +303,8 @@ TEST_P(SavedState, refusesWhatDoesNotFit)
   EXPECT_NE(refusal(simulation).find("is not a saved state"), std::string::npos);
 
   write(good);
-  for (const char* change : {"rods.0.material.youngs_modulus=2e6", "rods.1.centerline.straight.edges=31", "time.step=0.02",
-                             "gravity=[0, 0, -1]", "rods.1.name=c"})
+  for (const char* change : {"rods.0.material.youngs_modulus=2e6", "rods.1.centerline.straight.edges=31",
+                             "time.step=0.02", "gravity=[0, 0, -1]", "rods.1.name=c"})
   {
     Simulation other = make({std::string("time.integrator=") + GetParam(), change});
     EXPECT_NE(refusal(other).find("belongs to another scene"), std::string::npos) << change;
@@ -318,9 +325,7 @@ TEST(SavedStateFile, belongsToTheFormulationToo)
   };
   scene("formulation: isotropic").save(path);
   for (const char* other : {"formulation: general", "stretching: projected"})
-  {
     EXPECT_THROW(scene(other).load(path), std::runtime_error) << other;
-  }
   EXPECT_NO_THROW(scene("formulation: auto").load(path));
   std::remove(path.c_str());
 }
@@ -329,7 +334,9 @@ TEST(SavedStateFile, restartsRodsWithoutFramesBitEqual)
 {
   const std::string path = testing::TempDir() + "/slender_sim_frameless";
   const auto scene = [] {
-    return Simulation(parseScene("time: {step: 1e-4, integrator: symplectic_euler}\nrods: [{name: rope, grasps: {pin: {nodes: [0], hold: position}}}]\n"));
+    return Simulation(
+        parseScene("time: {step: 1e-4, integrator: symplectic_euler}\nrods: [{name: rope, grasps: {pin: {nodes: [0], "
+                   "hold: position}}}]\n"));
   };
   Simulation through = scene(), again = scene();
   run(through, 25);
@@ -393,7 +400,8 @@ TEST(Simulation, NothingJumpsWhenAGraspIsAttachedElsewhere)
     Simulation simulation(parseScene(R"(
 time: {step: 0.01}
 bodies: [{name: hand, pose: {position: [1, 0, 0]}, motion: {topic: true}}]
-rods: [{centerline: {straight: {edges: 20}}, grasps: {left: {edges: [0]}, right: {edges: [-1], motion: )" + motion + "}}}]\n"));
+rods: [{centerline: {straight: {edges: 20}}, grasps: {left: {edges: [0]}, right: {edges: [-1], motion: )" +
+                                     motion + "}}}]\n"));
     run(simulation, 2);
     EXPECT_EQ(simulation.state().rods[0].x(0, 20), 1.0);
     simulation.release(1);
@@ -422,19 +430,27 @@ TEST(Simulation, SaysWhereInTheFileARodCannotBeComposed)
     }
     return "accepted";
   };
-  EXPECT_EQ(refusal({"rods.1.stretching=projected"}).find("two.yaml:9: rods.1 (b): stretching: projected takes explicit steps"), 0u)
-    << refusal({"rods.1.stretching=projected"});
-  EXPECT_EQ(refusal({"rods.0.formulation=isotropic"}).find("two.yaml:4: rods.0 (a): formulation: isotropic does not apply"), 0u);
-  const std::string touching = refusal({"rods.0.contact={}", "rods.1.contact={}", "rods.1.centerline.straight={from: [0.5, -1, 0], to: [0.5, 1, 0]}"});
+  EXPECT_EQ(refusal({"rods.1.stretching=projected"})
+                .find("two.yaml:9: rods.1 (b): stretching: projected takes explicit steps"),
+            0u)
+      << refusal({"rods.1.stretching=projected"});
+  EXPECT_EQ(
+      refusal({"rods.0.formulation=isotropic"}).find("two.yaml:4: rods.0 (a): formulation: isotropic does not apply"),
+      0u);
+  const std::string touching = refusal(
+      {"rods.0.contact={}", "rods.1.contact={}", "rods.1.centerline.straight={from: [0.5, -1, 0], to: [0.5, 1, 0]}"});
   EXPECT_EQ(touching.find("two.yaml: rods, bodies or obstacles with contact touch or cross"), 0u) << touching;
 }
 
 TEST(Simulation, FormulationIsChosenWhereItApplies)
 {
-  const auto build = [](const std::vector<std::string>& overrides) { return Simulation(parseScene(R"(
+  const auto build = [](const std::vector<std::string>& overrides) {
+    return Simulation(parseScene(R"(
 time: {step: 1e-4, integrator: symplectic_euler}
 rods: [{centerline: {straight: {edges: 20}}, material: {bend_modulus: 1e-4, twist_modulus: 1e-4, stretch_modulus: 10}, grasps: {a: {edges: [0]}}}]
-)", "t", overrides)); };
+)",
+                                 "t", overrides));
+  };
   const auto refusal = [&](const std::vector<std::string>& overrides) {
     try
     {
@@ -454,9 +470,13 @@ rods: [{centerline: {straight: {edges: 20}}, material: {bend_modulus: 1e-4, twis
   EXPECT_FALSE(build({"rods.0.curvature=compensated"}).rodModel(0).isotropic);
   EXPECT_EQ(build({"rods.0.curvature=compensated"}).rodModel(0).curvature, Curvature::compensated);
   EXPECT_TRUE(build({"rods.0.stretching=projected"}).rodModel(0).inextensible);
-  EXPECT_NE(refusal({"rods.0.formulation=isotropic", "rods.0.material.bend_modulus=[1e-4, 2e-4]"}).find("depends on the direction"), std::string::npos);
-  EXPECT_NE(refusal({"rods.0.formulation=isotropic", "time.integrator=bdf2"}).find("symplectic_euler"), std::string::npos);
-  EXPECT_NE(refusal({"rods.0.stretching=projected", "time.integrator=bdf2"}).find("material.inextensible"), std::string::npos);
+  EXPECT_NE(refusal({"rods.0.formulation=isotropic", "rods.0.material.bend_modulus=[1e-4, 2e-4]"})
+                .find("depends on the direction"),
+            std::string::npos);
+  EXPECT_NE(refusal({"rods.0.formulation=isotropic", "time.integrator=bdf2"}).find("symplectic_euler"),
+            std::string::npos);
+  EXPECT_NE(refusal({"rods.0.stretching=projected", "time.integrator=bdf2"}).find("material.inextensible"),
+            std::string::npos);
 
   // and a projected run holds its lengths, also after saving and loading
   Simulation a = build({"rods.0.stretching=projected"}), b = build({"rods.0.stretching=projected"});
@@ -472,5 +492,5 @@ rods: [{centerline: {straight: {edges: 20}}, material: {bend_modulus: 1e-4, twis
   EXPECT_THROW(general.load(file), std::runtime_error);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

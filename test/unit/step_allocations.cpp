@@ -1,4 +1,5 @@
-// A warm step takes no memory from the heap: malloc and its kin are counted, so Eigen's and operator new's requests both show.
+// A warm step takes no memory from the heap: malloc and its kin are counted, so Eigen's and operator new's requests
+// both show.
 #include <atomic>
 #include <cstddef>
 #include <string>
@@ -28,11 +29,31 @@ void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
 void* __libc_memalign(std::size_t, std::size_t);
-void* malloc(std::size_t n) { ++allocations; return __libc_malloc(n); }
-void* calloc(std::size_t n, std::size_t size) { ++allocations; return __libc_calloc(n, size); }
-void* realloc(void* p, std::size_t n) { ++allocations; return __libc_realloc(p, n); }
-void* memalign(std::size_t alignment, std::size_t n) { ++allocations; return __libc_memalign(alignment, n); }
-void* aligned_alloc(std::size_t alignment, std::size_t n) { ++allocations; return __libc_memalign(alignment, n); }
+void* malloc(std::size_t n)
+{
+  ++allocations;
+  return __libc_malloc(n);
+}
+void* calloc(std::size_t n, std::size_t size)
+{
+  ++allocations;
+  return __libc_calloc(n, size);
+}
+void* realloc(void* p, std::size_t n)
+{
+  ++allocations;
+  return __libc_realloc(p, n);
+}
+void* memalign(std::size_t alignment, std::size_t n)
+{
+  ++allocations;
+  return __libc_memalign(alignment, n);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t n)
+{
+  ++allocations;
+  return __libc_memalign(alignment, n);
+}
 int posix_memalign(void** p, std::size_t alignment, std::size_t n)
 {
   ++allocations;
@@ -58,8 +79,7 @@ TEST(Allocations, AreCounted)
 }
 
 class Allocations : public ::testing::TestWithParam<Integrator>
-{
-};
+{};
 
 TEST_P(Allocations, AWarmStepMakesNone)
 {
@@ -69,7 +89,9 @@ TEST_P(Allocations, AWarmStepMakesNone)
       {
         const int n = 30;
         const Matrix3Xd nodes = closed ? ringNodes(n, 0.2) : straightNodes(n, 1.0);
-        RodModel model = buildRod("r", nodes, closed, uniformSections(roundSection(0.005, 1e6, 1000), closed ? n : n - 1), Vector3d::Zero(), false);
+        RodModel model =
+            buildRod("r", nodes, closed, uniformSections(roundSection(0.005, 1e6, 1000), closed ? n : n - 1),
+                     Vector3d::Zero(), false);
         model.stiffness_damping = viscous ? 1e-4 : 0.0;
         model.mass_damping = 0.1;
         Rod rod(model, nodes);
@@ -89,7 +111,8 @@ TEST_P(Allocations, AWarmStepMakesNone)
         bool ok = true;
         for (int k = 0; k < 20; ++k)
           ok = advance() && ok;
-        EXPECT_EQ(allocations - before, 0) << (closed ? "closed" : "open") << (viscous ? " viscous" : "") << " tolerance " << tolerance;
+        EXPECT_EQ(allocations - before, 0)
+            << (closed ? "closed" : "open") << (viscous ? " viscous" : "") << " tolerance " << tolerance;
         EXPECT_TRUE(ok);
       }
 }
@@ -150,8 +173,12 @@ TEST(TrackedRodAllocations, AWarmStepMakesNone)
 {
   for (const char* functions : {"{basis: hats}", "{segments: 4}"})
   {
-    Simulation simulation(parseScene(std::string("time: {step: 0.005}\nrods: [{centerline: {straight: {edges: 60}}, damping: {stiffness: 0.001}, grasps: {end: {edges: [0]}}, "
-                                                 "track: {guide: {nodes: 8, motion: {topic: points}}, test_functions: ") + functions + "}}]", "t"));
+    Simulation simulation(
+        parseScene(std::string("time: {step: 0.005}\nrods: [{centerline: {straight: {edges: 60}}, damping: {stiffness: "
+                               "0.001}, grasps: {end: {edges: [0]}}, "
+                               "track: {guide: {nodes: 8, motion: {topic: points}}, test_functions: ") +
+                       functions + "}}]",
+                   "t"));
     SceneInputs inputs;
     bool ok = true;
     const auto advance = [&] {
@@ -216,8 +243,8 @@ struct ClothCase
   }
   std::shared_ptr<const ClothModel> model() const
   {
-    auto model = std::make_shared<ClothModel>(
-      buildCloth("c", gridMesh(0.5, 0.5, 8, 8, GridPattern::alternating), 0.2, isotropicMembrane(isExplicit() ? 1e6 : 1e4, 0.3, 1e-3)));
+    auto model = std::make_shared<ClothModel>(buildCloth("c", gridMesh(0.5, 0.5, 8, 8, GridPattern::alternating), 0.2,
+                                                         isotropicMembrane(isExplicit() ? 1e6 : 1e4, 0.3, 1e-3)));
     model->bending = bending;
     model->bending_modulus = 1e-4;
     model->stiffness_damping = 1e-4;
@@ -235,7 +262,8 @@ std::vector<ClothCase> clothCases()
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
   {
     for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
-      for (const ClothSolver solver : {ClothSolver::gauss_seidel, ClothSolver::conjugate_gradients, ClothSolver::cholesky})
+      for (const ClothSolver solver :
+           {ClothSolver::gauss_seidel, ClothSolver::conjugate_gradients, ClothSolver::cholesky})
         for (const bool one_newton_step : {true, false})
           for (const double tolerance : {0.0, 1e-4})
             cases.push_back({bending, integrator, solver, one_newton_step, tolerance});
@@ -282,7 +310,8 @@ TEST_P(ClothAllocations, AWarmStepMakesNone)
   expectNone(advance, 5);
 }
 
-/// On a ball: with collisions, and the second solve that touching cloth needs. Lists of contacts grow until they were once as long as they get.
+/// On a ball: with collisions, and the second solve that touching cloth needs. Lists of contacts grow until they were
+/// once as long as they get.
 TEST_P(ClothAllocations, AWarmStepInContactMakesNone)
 {
   ClothGroupModel model;
@@ -326,7 +355,9 @@ TEST(AverageAllocations, AWarmStepMakesNone)
       {
         if (bounded && !one_newton_step)
           continue;
-        auto model = std::make_shared<ClothModel>(*ClothCase{BendingModel::hinge, Integrator::implicit_euler, ClothSolver::automatic, one_newton_step, 0.0}.model());
+        auto model = std::make_shared<ClothModel>(
+            *ClothCase{BendingModel::hinge, Integrator::implicit_euler, ClothSolver::automatic, one_newton_step, 0.0}
+                 .model());
         model->averages = {averagesOver(*model, 2), averagesOver(*model, 9)};
         for (PrescribedAverages& set : model->averages)
           if (bounded)
@@ -368,7 +399,10 @@ TEST(AverageAllocations, AWarmStepMakesNone)
 
 INSTANTIATE_TEST_SUITE_P(Cases, ClothAllocations, ::testing::ValuesIn(clothCases()), [](const auto& info) {
   const ClothCase& c = info.param;
-  return std::string(toString(c.bending)) + "_" + toString(c.integrator) + (c.solver == ClothSolver::cholesky ? "_cholesky" : c.solver == ClothSolver::gauss_seidel ? "_sweeps" : "") +
+  return std::string(toString(c.bending)) + "_" + toString(c.integrator) +
+         (c.solver == ClothSolver::cholesky       ? "_cholesky"
+          : c.solver == ClothSolver::gauss_seidel ? "_sweeps"
+                                                  : "") +
          (c.one_newton_step ? "_one" : "_full") + (c.error_tolerance > 0 ? "_controlled" : "");
 });
 
@@ -383,7 +417,9 @@ tracked:
     material: {area_density: 0.12, thickness: 0.0003, youngs_modulus: 2.0e4, poissons_ratio: 0.3}
     solver: {one_newton_step: true}
 )";
-  for (const char* more : {"", "    test_functions: [{name: a, basis: subdivision}, {name: b, regions: {all: {guide: [0..15]}}}]\n", "    contact: {friction: 0.2}\n"})
+  for (const char* more :
+       {"", "    test_functions: [{name: a, basis: subdivision}, {name: b, regions: {all: {guide: [0..15]}}}]\n",
+        "    contact: {friction: 0.2}\n"})
   {
     Simulation simulation(parseScene(scene + more));
     ASSERT_TRUE(simulation.config().cloths[0].tracking);
@@ -481,9 +517,10 @@ TEST(WillmoreAllocations, AWarmStepMakesNone)
   EXPECT_GT(report.iterations, 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Integrators, Allocations, ::testing::ValuesIn(allIntegrators()), [](const auto& info) { return toString(info.param); });
+INSTANTIATE_TEST_SUITE_P(Integrators, Allocations, ::testing::ValuesIn(allIntegrators()),
+                         [](const auto& info) { return toString(info.param); });
 
 #endif
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

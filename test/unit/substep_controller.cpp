@@ -14,11 +14,11 @@ namespace {
 class Scripted : public SubstepEquations
 {
 public:
-  double solvable = 1e9;        ///< longest substep that succeeds [s]
-  double hard_until = 1e9;      ///< after this instant every substep succeeds [s]
-  double error_per_second = 0;  ///< error estimate of a substep over its length [m/s]
-  bool helpless = false;        ///< no shorter substep would help
-  int mends = 0;                ///< how often the state can be mended
+  double solvable = 1e9;         ///< longest substep that succeeds [s]
+  double hard_until = 1e9;       ///< after this instant every substep succeeds [s]
+  double error_per_second = 0;   ///< error estimate of a substep over its length [m/s]
+  bool helpless = false;         ///< no shorter substep would help
+  int mends = 0;                 ///< how often the state can be mended
   std::vector<Substep> tried, accepted;
   std::vector<StepFailure> refusals;
   double refused_length = 0;
@@ -198,5 +198,5 @@ TEST(SubstepController, anInterruptedStepIsRefused)
   EXPECT_TRUE(equations.accepted.empty());
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

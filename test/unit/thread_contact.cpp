@@ -1,4 +1,5 @@
-// Threads that touch: merging against differences and its rate, what is conserved, and that nothing passes through anything.
+// Threads that touch: merging against differences and its rate, what is conserved, and that nothing passes through
+// anything.
 #include <algorithm>
 #include <cmath>
 
@@ -75,7 +76,8 @@ TEST(Merging, WorkIsTheIntegralOfItsForce)
     {
       const double e = 1e-5;
       const auto rho = [&](double s) { return std::sqrt(std::max(0.0, r * r - 0.25 * s * s)); };
-      EXPECT_NEAR((mergingWork(r, d0, d + e) - mergingWork(r, d0, d - e)) / (2 * e), rho(d) * (d - d0), 1e-8) << d0 << " " << d;
+      EXPECT_NEAR((mergingWork(r, d0, d + e) - mergingWork(r, d0, d - e)) / (2 * e), rho(d) * (d - d0), 1e-8)
+          << d0 << " " << d;
     }
   // closed form: -(4/3) rho^3 - d0 r^2 (a + sin a cos a), s = 2 r sin a
   const auto whole = [&](double d0, double s) {
@@ -163,8 +165,8 @@ struct Pair : Touching
   double distance() const { return (state.threads[1].threads[0].x[10] - state.threads[0].threads[0].x[10]).norm(); }
 };
 
-/// The model's distance: 2 pi gamma r = mu (4 pi/3) rho |d'|, while surface tension thickens the threads by r' = gamma/(6 mu). Runge-Kutta
-/// for the cube of a in d = 2 r cos(a), which begins smoothly.
+/// The model's distance: 2 pi gamma r = mu (4 pi/3) rho |d'|, while surface tension thickens the threads by r' =
+/// gamma/(6 mu). Runge-Kutta for the cube of a in d = 2 r cos(a), which begins smoothly.
 double modelDistance(double r0, double gamma, double mu, double time)
 {
   const auto rate = [&](double t, double cube) {
@@ -176,8 +178,8 @@ double modelDistance(double r0, double gamma, double mu, double time)
   double u = 0.0;
   for (int k = 0; k < steps; ++k)
   {
-    const double k1 = rate(k * h, u), k2 = rate((k + 0.5) * h, u + 0.5 * h * k1), k3 = rate((k + 0.5) * h, u + 0.5 * h * k2),
-                 k4 = rate((k + 1) * h, u + h * k3);
+    const double k1 = rate(k * h, u), k2 = rate((k + 0.5) * h, u + 0.5 * h * k1),
+                 k3 = rate((k + 0.5) * h, u + 0.5 * h * k2), k4 = rate((k + 1) * h, u + h * k3);
     u += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
   }
   return 2 * (r0 + gamma * time / (6 * mu)) * std::cos(std::cbrt(u));
@@ -200,7 +202,8 @@ TEST(TouchingThreads, ParallelThreadsMergeAtTheRateOfTheModel)
     }
     EXPECT_NEAR(pair.state.threads[0].volumeBalance(), volume, 1e-13 * volume);
     error[fine] = pair.distance() / modelDistance(pair.r, gamma, mu, end) - 1;
-    const Vector3d momentum = momentumOf(pair.state.threads[0].threads[0]) + momentumOf(pair.state.threads[1].threads[0]);
+    const Vector3d momentum =
+        momentumOf(pair.state.threads[0].threads[0]) + momentumOf(pair.state.threads[1].threads[0]);
     EXPECT_LT(momentum.norm(), 1e-6 * volume * pair.r / end);
   }
   EXPECT_LT(std::abs(error[1]), 0.01);
@@ -252,11 +255,17 @@ TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
   }
 }
 
-/// Smallest distance of centrelines over the sum of radii, of all parts that are no neighbours and do not both lie on the floor. The floor, to which
-/// lying parts stick, lets them pass through each other.
+/// Smallest distance of centrelines over the sum of radii, of all parts that are no neighbours and do not both lie on
+/// the floor. The floor, to which lying parts stick, lets them pass through each other.
 double closest(const TouchingState& state)
 {
-  struct Piece { Vector3d a, b; double r, start, length; int thread; bool lies; };
+  struct Piece
+  {
+    Vector3d a, b;
+    double r, start, length;
+    int thread;
+    bool lies;
+  };
   std::vector<Piece> pieces;
   int thread = 0;
   for (const ThreadGroupState& group : state.threads)
@@ -266,7 +275,8 @@ double closest(const TouchingState& state)
       for (int j = 0; j < s.edges(); ++j)
       {
         const double length = s.edge(j).norm();
-        pieces.push_back({s.x[j], s.x[j + 1], s.radius(j), start, length, thread, s.deposited[j] && s.deposited[j + 1]});
+        pieces.push_back(
+            {s.x[j], s.x[j + 1], s.radius(j), start, length, thread, s.deposited[j] && s.deposited[j + 1]});
         start += length;
       }
       ++thread;
@@ -333,7 +343,8 @@ TEST(TouchingThreads, ACoilPilesUpAndNothingPassesThrough)
     EXPECT_GT(least, merging ? 0.6 : 1.0);
     EXPECT_LT(least, merging ? 0.9 : 1.1);
     EXPECT_GT(most, merging ? 1u : 8u);
-    const bool piled = std::any_of(s.x.begin(), s.x.begin() + s.nodes() / 2, [](const Vector3d& x) { return x.z() > 0.012; });
+    const bool piled =
+        std::any_of(s.x.begin(), s.x.begin() + s.nodes() / 2, [](const Vector3d& x) { return x.z() > 0.012; });
     EXPECT_TRUE(piled);
   }
 }
@@ -349,13 +360,16 @@ TEST(TouchingThreads, ContactConservesMomentum)
     if (k)
       for (auto& x : s.x)
         x = Vector3d(x.y() + 1e-3, x.x(), x.z());
-    s = k ? makeThread(Eigen::Map<Eigen::Matrix3Xd>(s.x[0].data(), 3, s.nodes()), Eigen::VectorXd::Constant(15, 1e-3)) : s;
+    s = k ? makeThread(Eigen::Map<Eigen::Matrix3Xd>(s.x[0].data(), 3, s.nodes()), Eigen::VectorXd::Constant(15, 1e-3))
+          : s;
     for (auto& v : s.v)
       v.z() = k ? -0.5 : 0.7;
     cross.add(m, s, weightless(), ThreadTouch{});
   }
   TouchingThreads threads(cross.model, NewtonConfig{});
-  const auto momentum = [&] { return Vector3d(momentumOf(cross.state.threads[0].threads[0]) + momentumOf(cross.state.threads[1].threads[0])); };
+  const auto momentum = [&] {
+    return Vector3d(momentumOf(cross.state.threads[0].threads[0]) + momentumOf(cross.state.threads[1].threads[0]));
+  };
   const Vector3d before = momentum();
   std::size_t most = 0;
   for (int k = 0; k < 100; ++k)
@@ -393,7 +407,8 @@ TEST(TouchingThreads, AThreadSagsOverAMovingObstacle)
   EXPECT_NEAR((s.x[20] - over.state.obstacles[0].position).norm(), 0.0135, 3e-4);
 }
 
-/// On a tilted plane it slides with g (sin a - friction cos a), or stays; on a belt that slips it is drawn along at g friction.
+/// On a tilted plane it slides with g (sin a - friction cos a), or stays; on a belt that slips it is drawn along at g
+/// friction.
 TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
 {
   const double tilt = 0.4, h = 1e-3;
@@ -407,7 +422,8 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
     ThreadTouch touch;
     touch.friction = 1.0;
     slope.add(m, straight(0.02, 10, 1e-3, 1.01e-3 * normal), ThreadInputs{}, touch);
-    slope.addObstacle(Plane{}, {Vector3d::Zero(), Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal)}, friction * friction);
+    slope.addObstacle(Plane{}, {Vector3d::Zero(), Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal)},
+                      friction * friction);
     TouchingThreads threads(slope.model, NewtonConfig{});
     for (int k = 0; k < 200; ++k)
     {
@@ -435,12 +451,12 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
     const StepReport report = threads.step(belt.state, belt.inputs, h);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
     if (k == 100)
-    {
       EXPECT_NEAR(belt.state.threads[0].threads[0].v[5].y(), 0.25 * 9.81 * k * h, 0.01);
-    }
   }
   EXPECT_NEAR(belt.state.threads[0].threads[0].v[5].y(), 0.5, 1e-3);
-  EXPECT_EQ(std::count(belt.state.threads[0].threads[0].deposited.begin(), belt.state.threads[0].threads[0].deposited.end(), 1), 0);
+  EXPECT_EQ(std::count(belt.state.threads[0].threads[0].deposited.begin(),
+                       belt.state.threads[0].threads[0].deposited.end(), 1),
+            0);
 }
 
 TEST(TouchingThreads, RefusesWhatDoesNotFit)
@@ -463,5 +479,5 @@ TEST(TouchingThreads, RefusesWhatDoesNotFit)
   EXPECT_TRUE(sameThread(bad.state.threads[0].threads[0], before));
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -95,8 +95,10 @@ TEST(ThreadVolume, AccountsForWhatIsDroppedAndWhatLeaves)
 /// Thin oil that drips: before, everything but the youngest piece on the floor was taken away.
 TEST(ThreadVolume, NothingVanishesFromAThreadThatBreaks)
 {
-  Simulation simulation(parseScene(plain, "t", {"threads.0.fluid.viscosity=0.5", "threads.0.breakup_radius=2e-4", "threads.0.edges={feed: 0.002, longest: 0.004, shortest: 0.0008}",
-                                                "threads.0.nozzle.position=[0, 0, 0.15]"}));
+  Simulation simulation(parseScene(
+      plain, "t",
+      {"threads.0.fluid.viscosity=0.5", "threads.0.breakup_radius=2e-4",
+       "threads.0.edges={feed: 0.002, longest: 0.004, shortest: 0.0008}", "threads.0.nozzle.position=[0, 0, 0.15]"}));
   std::size_t most = 0;
   for (int k = 0; k < 900; ++k)
   {
@@ -116,8 +118,9 @@ TEST(ThreadVolume, NothingVanishesFromAThreadThatBreaks)
 TEST(ThreadFlow, LandingIsThatOfTheReferenceCoils)
 {
   // height, speed and coil radius of stable coils (coiling_grid.csv), thesis units
-  const double coils[][3] = {{0.507201, 0.547944, 0.122618}, {2.02881, 0.618819, 0.394542}, {5.07201, 0.693318, 0.518066},
-                             {10.144, 0.928499, 0.419419}, {25.3601, 2.271, 0.438022}, {50.7201, 5.993, 0.280522}};
+  const double coils[][3] = {{0.507201, 0.547944, 0.122618}, {2.02881, 0.618819, 0.394542},
+                             {5.07201, 0.693318, 0.518066},  {10.144, 0.928499, 0.419419},
+                             {25.3601, 2.271, 0.438022},     {50.7201, 5.993, 0.280522}};
   const double area = 0.25 * M_PI * 0.09 * 0.09;
   for (const auto& coil : coils)
   {
@@ -130,7 +133,8 @@ TEST(ThreadFlow, LandingIsThatOfTheReferenceCoils)
 
 TEST(ThreadFlow, WithoutGravityTheThreadKeepsItsSpeed)
 {
-  const Landing landing = estimateLanding({1000, 1e4, 0.0, 0.01, 1e-6, 0.1});   // so viscous that inertia does not matter
+  // so viscous that inertia does not matter
+  const Landing landing = estimateLanding({1000, 1e4, 0.0, 0.01, 1e-6, 0.1});
   EXPECT_NEAR(landing.speed, 1e-6 / (0.25 * M_PI * 1e-4), 1e-8);
   EXPECT_NEAR(landing.coil_radius, 0.24 * 0.1, 1e-3);   // the viscous law
 }
@@ -147,24 +151,30 @@ TEST(ThreadFlow, ThinFluidsDripFromSlowNozzles)
 {
   // water from 3 mm: B = 0.613, We = 1.065
   EXPECT_NEAR(leastJettingSpeed({1000, 1e-3, 9.81, 0.003, 1e-6, 0.1}, 0.072), 0.1599, 1e-4);
-  EXPECT_NEAR(leastJettingSpeed({1000, 1e-3, 0.0, 0.003, 1e-6, 0.1}, 0.072), std::sqrt(4 * 0.072 / (1000 * 0.003)), 1e-12);   // We = 4
+  // We = 4
+  EXPECT_NEAR(leastJettingSpeed({1000, 1e-3, 0.0, 0.003, 1e-6, 0.1}, 0.072), std::sqrt(4 * 0.072 / (1000 * 0.003)),
+              1e-12);
   EXPECT_EQ(leastJettingSpeed({1400, 10, 9.81, 0.003, 1e-6, 0.1}, 0.05), 0.0);
 }
 
 TEST(ThreadDefaults, WhatDripsIsRefused)
 {
-  const std::string slow = problemsOf(plain, {"threads.0.fluid={density: 1000, viscosity: 0.001, surface_tension: 0.072}"});
+  const std::string slow =
+      problemsOf(plain, {"threads.0.fluid={density: 1000, viscosity: 0.001, surface_tension: 0.072}"});
   EXPECT_TRUE(contains(slow, "threads.0.nozzle.flow")) << slow;
   EXPECT_TRUE(contains(slow, "drips")) << slow;
   EXPECT_TRUE(contains(slow, "Must be at least 1.62")) << slow;
-  EXPECT_EQ(problemsOf(plain, {"threads.0.fluid={density: 1000, viscosity: 0.001, surface_tension: 0.072}", "threads.0.nozzle.flow=3e-6"}), "");
+  EXPECT_EQ(problemsOf(plain, {"threads.0.fluid={density: 1000, viscosity: 0.001, surface_tension: 0.072}",
+                               "threads.0.nozzle.flow=3e-6"}),
+            "");
 }
 
 TEST(ThreadDefaults, EdgesResolveTheCoilThatForms)
 {
   for (const double height : {0.02, 0.07, 0.122, 0.3})
   {
-    const SceneConfig scene = parseScene(plain, "t", {"threads.0.nozzle.position=[0, 0, " + std::to_string(height) + "]"});
+    const SceneConfig scene =
+        parseScene(plain, "t", {"threads.0.nozzle.position=[0, 0, " + std::to_string(height) + "]"});
     const ThreadConfig& thread = scene.threads[0];
     const Landing landing = estimateLanding({1400, 20, 9.81, 0.005, 3e-7, height});
     EXPECT_GE(edgesPerTurn(landing, thread.longest_edge), 19.9) << height;
@@ -187,12 +197,17 @@ TEST(ThreadDefaults, WhatIsTooCoarseForTheCoilIsSaid)
 
 TEST(ThreadDefaults, WhatIsNoThreadIsSaid)
 {
-  EXPECT_TRUE(contains(warningsOf(plain, {"threads.0.fluid.viscosity=0.001", "threads.0.fluid.surface_tension=0"}), "which is no thread"));
-  EXPECT_TRUE(contains(warningsOf(plain, {"threads.0.nozzle.position=[0, 0, 0.008]"}), "less than two of its diameters"));
+  EXPECT_TRUE(contains(warningsOf(plain, {"threads.0.fluid.viscosity=0.001", "threads.0.fluid.surface_tension=0"}),
+                       "which is no thread"));
+  EXPECT_TRUE(
+      contains(warningsOf(plain, {"threads.0.nozzle.position=[0, 0, 0.008]"}), "less than two of its diameters"));
   for (const char* height : {"0.002", "0", "-0.01"})
-    EXPECT_TRUE(contains(problemsOf(plain, {std::string("threads.0.nozzle.position=[0, 0, ") + height + "]"}), "must be more than its radius 2.5 mm")) << height;
+    EXPECT_TRUE(contains(problemsOf(plain, {std::string("threads.0.nozzle.position=[0, 0, ") + height + "]"}),
+                         "must be more than its radius 2.5 mm"))
+        << height;
   EXPECT_TRUE(contains(problemsOf(plain, {"threads.0.edges={feed: 0.08}"}), "is more than half of the fall of 70 mm"));
-  EXPECT_TRUE(contains(problemsOf(plain, {"threads.0.nozzle={diameter: 0.005, flow: 1e-7, motion: {table: [[0, 0, 0, 0.05, 0, 0.7071067811865476, 0, 0.7071067811865476], "
+  EXPECT_TRUE(contains(problemsOf(plain, {"threads.0.nozzle={diameter: 0.005, flow: 1e-7, motion: {table: [[0, 0, 0, "
+                                          "0.05, 0, 0.7071067811865476, 0, 0.7071067811865476], "
                                           "[1, 0, 0, -0.01, 0, 0.7071067811865476, 0, 0.7071067811865476]]}}"}),
                        "threads.0.nozzle.motion"));
 }
@@ -211,7 +226,8 @@ threads:
 
 TEST(ThreadDefaults, WhatThreadsIgnoreIsRefusedOrSaid)
 {
-  EXPECT_TRUE(contains(problemsOf(plain, {"time.error_tolerance=1e-5"}), "time.error_tolerance = 1e-5: is not for threads"));
+  EXPECT_TRUE(
+      contains(problemsOf(plain, {"time.error_tolerance=1e-5"}), "time.error_tolerance = 1e-5: is not for threads"));
   EXPECT_TRUE(contains(warningsOf(plain, {"wind={velocity: [1, 0, 0]}"}), "does not act on threads"));
   const std::string mixed = std::string(plain) + "rods: [{grasps: {left: {edges: [0]}}}]\n";
   EXPECT_EQ(problemsOf(mixed, {"time.error_tolerance=1e-5", "time.integrator=bdf2", "start=equilibrium"}), "");
@@ -292,7 +308,8 @@ TEST(ThreadDefaults, AThreadStartsWithoutAPlaneOfSymmetry)
   {
     const Simulation simulation(parseScene(plain, "t", {std::string("threads.0.nozzle.direction=") + direction}));
     const ThreadState& thread = simulation.state().threads[0].threads[0];
-    const Eigen::Vector3d edge = thread.edge(0), v = thread.v[0], down(0, 0, -1), axis = thread.ends[1].X_WE.orientation * Eigen::Vector3d::UnitX();
+    const Eigen::Vector3d edge = thread.edge(0), v = thread.v[0], down(0, 0, -1),
+                          axis = thread.ends[1].X_WE.orientation * Eigen::Vector3d::UnitX();
     EXPECT_GT(std::abs(edge.cross(v).dot(axis)), 1e-4 * edge.norm() * v.norm()) << direction;
   }
 }
@@ -310,8 +327,9 @@ TEST(ThreadDefaults, ASwirlIsACircleThatEndsWhereTheNozzleStands)
   EXPECT_NEAR(most, radius, 1e-9);
   EXPECT_LT((table->poses.poses().front().position - place).norm(), 1e-12);
   EXPECT_LT((table->poses.poses().back().position - place).norm(), 1e-12);
-  EXPECT_TRUE(contains(problemsOf(plain, {"threads.0.nozzle.swirl=0.3", "threads.0.nozzle.motion={topic: true}"}), "is for nozzles that stand"));
+  EXPECT_TRUE(contains(problemsOf(plain, {"threads.0.nozzle.swirl=0.3", "threads.0.nozzle.motion={topic: true}"}),
+                       "is for nozzles that stand"));
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

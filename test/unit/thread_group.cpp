@@ -137,5 +137,5 @@ TEST(ThreadGroup, APieceThatComesToRestKeepsTheNodesThatMayLie)
   EXPECT_NEAR(d.state.volumeBalance(), start, 1e-14 * start);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

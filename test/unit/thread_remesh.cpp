@@ -130,7 +130,8 @@ TEST(ThreadRemesh, FramesAndTwistsStayTogether)
   removeNode(s, 4);
   EXPECT_NEAR(twistSum(s), sum, 1e-12);
   for (int i = 1; i + 1 < s.nodes(); ++i)
-    EXPECT_NEAR(std::remainder(shownTwist(s, i) - s.twist[i], 2 * M_PI), 0.0, 0.12) << i;   // up to the holonomy of the new corners
+    // up to the holonomy of the new corners
+    EXPECT_NEAR(std::remainder(shownTwist(s, i) - s.twist[i], 2 * M_PI), 0.0, 0.12) << i;
 }
 
 TEST(ThreadRemesh, FoldsAreTakenOut)
@@ -225,5 +226,5 @@ TEST(ThreadRemesh, ADividedEdgeMayStayStraight)
   EXPECT_LT((momentumOf(s) - momentum).norm(), 1e-14);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -42,7 +42,8 @@ TEST(ThreadStepper, AModelThatIsNotValidIsRefused)
   EXPECT_TRUE(refused([](ThreadModel& m) { m.density = -1; }, "density"));
   EXPECT_TRUE(refused([](ThreadModel& m) { m.surface_tension = std::nan(""); }, "surface_tension"));
   EXPECT_TRUE(refused([](ThreadModel& m) { m.feed_length = 0; }, "feed_length"));
-  EXPECT_TRUE(refused([](ThreadModel& m) { m.limits.min_edge_length = 1, m.limits.max_edge_length = 2; }, "min_edge_length"));
+  EXPECT_TRUE(
+      refused([](ThreadModel& m) { m.limits.min_edge_length = 1, m.limits.max_edge_length = 2; }, "min_edge_length"));
 }
 
 TEST(ThreadStepper, BadInputsAreRefusedAndTheStateStays)
@@ -90,7 +91,8 @@ TEST(ThreadStepper, ExplicitAndImplicitStepsAgree)
   t.model.viscosity = 2;
   t.model.surface_tension = 0.05;
   Thread u = t;
-  ThreadStepper implicit = t.stepper(), explicitly(std::make_shared<ThreadModel>(t.model), NewtonConfig{}, Integrator::symplectic_euler);
+  ThreadStepper implicit = t.stepper(),
+                explicitly(std::make_shared<ThreadModel>(t.model), NewtonConfig{}, Integrator::symplectic_euler);
   for (int k = 0; k < 3000; ++k)   // the thread has reached the floor
   {
     ASSERT_TRUE(implicit.step(t.state, t.inputs, 5e-5).ok);
@@ -110,7 +112,8 @@ TEST(ThreadStepper, ExplicitAndImplicitStepsAgree)
   }
   EXPECT_FALSE(report.ok);
   EXPECT_NE(report.message.find("implicit_euler"), std::string::npos);
-  EXPECT_THROW(ThreadStepper(std::make_shared<ThreadModel>(t.model), NewtonConfig{}, Integrator::bdf2), std::invalid_argument);
+  EXPECT_THROW(ThreadStepper(std::make_shared<ThreadModel>(t.model), NewtonConfig{}, Integrator::bdf2),
+               std::invalid_argument);
 }
 
 TEST(ThreadStepper, AThreadFallsFreely)
@@ -123,7 +126,8 @@ TEST(ThreadStepper, AThreadFallsFreely)
   const Vector3d momentum = momentumOf(t.state);
   for (int k = 0; k < 10; ++k)
     ASSERT_TRUE(stepper.step(t.state, t.inputs, 0.01).ok);
-  EXPECT_LT((momentumOf(t.state) - momentum - 0.1 * t.state.totalVolume() * t.inputs.gravity).norm(), 1e-9 * t.state.totalVolume());
+  EXPECT_LT((momentumOf(t.state) - momentum - 0.1 * t.state.totalVolume() * t.inputs.gravity).norm(),
+            1e-9 * t.state.totalVolume());
 }
 
 TEST(ThreadStepper, ASolidMotionMeetsNoResistance)
@@ -159,7 +163,8 @@ TEST(ThreadStepper, TheNozzleFeedsAPlug)
     EXPECT_NEAR(t.state.radius(j), 0.005, 1e-8);
   EXPECT_GT(t.state.nodes(), 20);
   for (int i = 1; i < t.state.nodes(); ++i)
-    EXPECT_EQ(t.state.id[i] > t.state.id[i - 1], i + 1 < t.state.nodes()) << i;   // the node at the nozzle came first of all
+    // the node at the nozzle came first of all
+    EXPECT_EQ(t.state.id[i] > t.state.id[i - 1], i + 1 < t.state.nodes()) << i;
 }
 
 TEST(ThreadStepper, AStepMayFeedManyEdges)
@@ -237,7 +242,7 @@ TEST(ThreadStepper, AThreadThatIsDrawnOutKeepsItsAngularMomentum)
     ThreadStepper stepper(std::make_shared<ThreadModel>(t.model), NewtonConfig{}, integrator);
     for (int k = 0; k < 100; ++k)
       ASSERT_TRUE(stepper.step(t.state, t.inputs, 0.01).ok) << k;
-    ASSERT_GT(t.state.edges(), 10);                // divided on its way
+    ASSERT_GT(t.state.edges(), 10);   // divided on its way
     EXPECT_NEAR(t.state.edge(5).norm() * (t.state.edges() / 10.0), 0.2, 0.05);
     EXPECT_NEAR(momentum(), start, 1e-6 * start);
     EXPECT_NEAR(t.state.spin[3], 4.0, 0.05);
@@ -259,7 +264,8 @@ TEST(ThreadStepper, TheFlowMayStopAndTheNozzleMove)
   EXPECT_LT(std::abs(volumeDrift(t, start)), 1e-13);
 }
 
-/// Lying neighbours hold the node between them up. It is deposited when it is nearer to the floor than a small share of the radius, and not before.
+/// Lying neighbours hold the node between them up. It is deposited when it is nearer to the floor than a small share of
+/// the radius, and not before.
 TEST(ThreadStepper, ANodeBetweenTwoThatLieIsDeposited)
 {
   const double radius = 0.002;
@@ -278,9 +284,7 @@ TEST(ThreadStepper, ANodeBetweenTwoThatLieIsDeposited)
     EXPECT_EQ(static_cast<bool>(t.state.deposited[1]), above < 0.05 * radius) << above;
     EXPECT_NEAR(t.state.x[1].z(), radius + above, 0.05 * above) << above;
     if (t.state.deposited[1])
-    {
       EXPECT_EQ(t.state.v[1], t.inputs.belt_velocity);
-    }
   }
 }
 
@@ -340,5 +344,5 @@ TEST(ThreadStepper, LongEdgesAreDivided)
   EXPECT_LT(std::abs(volumeDrift(t, start)), 1e-13);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -14,7 +14,8 @@ TEST(SurfaceTension, AConeHasItsArea)
 {
   // radii 1 and 2 over a height of 3 (half of each length)
   const double L1 = 2.5, L2 = 3.5;
-  EXPECT_NEAR(surfaceArea(SurfaceShape::cone, L1, M_PI * L1, L2, 4 * M_PI * L2).value, M_PI * 3 * std::sqrt(9.0 + 1.0), 1e-12);
+  EXPECT_NEAR(surfaceArea(SurfaceShape::cone, L1, M_PI * L1, L2, 4 * M_PI * L2).value, M_PI * 3 * std::sqrt(9.0 + 1.0),
+              1e-12);
   EXPECT_NEAR(surfaceArea(SurfaceShape::cylinder, L1, M_PI * L1, L2, 4 * M_PI * L2).value, M_PI * 3 * 3, 1e-12);
   EXPECT_NEAR(endArea(2.0, M_PI * 2.0).value, M_PI * 2.0, 1e-12);
 }
@@ -26,7 +27,8 @@ TEST(SurfaceTension, DerivativesMatchDifferences)
   {
     const SurfaceShape shape = k % 2 ? SurfaceShape::cone : SurfaceShape::cylinder;
     const auto area = [&](double l1, double v1, double l2, double v2) { return surfaceArea(shape, l1, v1, l2, v2); };
-    const double L1 = random.uniform(0.5, 2), L2 = random.uniform(0.5, 2), V1 = random.uniform(0.1, 3), V2 = random.uniform(0.1, 3), d = 1e-5;
+    const double L1 = random.uniform(0.5, 2), L2 = random.uniform(0.5, 2), V1 = random.uniform(0.1, 3),
+                 V2 = random.uniform(0.1, 3), d = 1e-5;
     const LengthFunction f = area(L1, V1, L2, V2), p1 = area(L1 + d, V1, L2, V2), m1 = area(L1 - d, V1, L2, V2),
                          p2 = area(L1, V1, L2 + d, V2), m2 = area(L1, V1, L2 - d, V2);
     EXPECT_NEAR(f.d1, (p1.value - m1.value) / (2 * d), 1e-8);
@@ -95,10 +97,10 @@ struct Equations
 };
 
 class ThreadEquations : public ::testing::TestWithParam<double>
-{
-};
+{};
 
-/// K d = -g, so the energy along d begins with the slope g.d and the curvature -g.d; differences of the energy must say the same.
+/// K d = -g, so the energy along d begins with the slope g.d and the curvature -g.d; differences of the energy must say
+/// the same.
 TEST_P(ThreadEquations, GradientAndHessianMatchDifferences)
 {
   for (unsigned seed = 1; seed <= 30; ++seed)
@@ -112,9 +114,11 @@ TEST_P(ThreadEquations, GradientAndHessianMatchDifferences)
     double first = 1e9, second = 1e9;
     for (const double h : {3e-2, 1e-2, 3e-3, 1e-3})
     {
-      const double p1 = e.energy(h), m1 = e.energy(-h), p2 = e.energy(2 * h), m2 = e.energy(-2 * h), middle = base.energy();
+      const double p1 = e.energy(h), m1 = e.energy(-h), p2 = e.energy(2 * h), m2 = e.energy(-2 * h),
+                   middle = base.energy();
       first = std::min(first, std::abs((8 * (p1 - m1) - (p2 - m2)) / (12 * h) / slope - 1));
-      second = std::min(second, std::abs((16 * (p1 + m1 - 2 * middle) - (p2 + m2 - 2 * middle)) / (12 * h * h) / slope + 1));
+      second =
+          std::min(second, std::abs((16 * (p1 + m1 - 2 * middle) - (p2 + m2 - 2 * middle)) / (12 * h * h) / slope + 1));
     }
     EXPECT_LT(first, 1e-8) << "seed " << seed;
     EXPECT_LT(second, 1e-6) << "seed " << seed;
@@ -141,5 +145,5 @@ TEST_P(ThreadEquations, HeldUnknownsStay)
 
 INSTANTIATE_TEST_SUITE_P(SurfaceTensions, ThreadEquations, ::testing::Values(0.0, 0.5));
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -85,14 +85,16 @@ protected:
   static double away(const Simulation& simulation, int set)
   {
     const SceneCloth& held = simulation.state().cloths[0];
-    const WeakConstraints& functions = *simulation.config().cloths[0].tracking->sets[static_cast<std::size_t>(set)].constraints;
+    const WeakConstraints& functions =
+        *simulation.config().cloths[0].tracking->sets[static_cast<std::size_t>(set)].constraints;
     return functions.error(functions.averages(held.guide), held.cloth.x);
   }
 
   /// Velocities of the averages of the second set.
   static Matrix3Xd rates(const Simulation& simulation)
   {
-    return simulation.state().cloths[0].cloth.v * simulation.config().cloths[0].tracking->sets[1].constraints->matrix().transpose();
+    return simulation.state().cloths[0].cloth.v *
+           simulation.config().cloths[0].tracking->sets[1].constraints->matrix().transpose();
   }
 
   std::string folder_;
@@ -116,9 +118,7 @@ TEST_F(TrackedFunctions, AreExactAfterTheBlend)
     const Simulation::TrackingError error = simulation.trackingError(0);
     EXPECT_NEAR(error.blend, away(simulation, 1), 1e-13) << k;
     if (k > 20)   // the rate's part is over
-    {
       EXPECT_LT(error.blend, before) << k;
-    }
     EXPECT_LT(error.blend, 1.5 * gap) << k;
     before = error.blend;
     EXPECT_EQ(simulation.functions(0).name, "fine");
@@ -154,9 +154,7 @@ TEST_F(TrackedFunctions, TakeOverWithoutAJump)
     shift[blended] = (simulation.state().cloths[0].cloth.x - x).colwise().norm().maxCoeff();
     EXPECT_EQ(simulation.functions(0).name, "fine");
     if (!blended)
-    {
       EXPECT_LT(away(simulation, 1), 1e-14);   // at once
-    }
   }
   RecordProperty("jump_blended_mm_s", std::to_string(1e3 * jump[1]));
   RecordProperty("jump_at_once_mm_s", std::to_string(1e3 * jump[0]));
@@ -184,7 +182,8 @@ TEST_F(TrackedFunctions, VelocitiesJumpLessTheShorterTheStep)
 
 TEST_F(TrackedFunctions, RestartExactlyInTheMiddleOfABlend)
 {
-  for (const std::vector<std::string>& set : {std::vector<std::string>{}, {"tracked.0.max_traction=2"}, {"tracked.0.contact={thickness: 0.002}"}})
+  for (const std::vector<std::string>& set :
+       {std::vector<std::string>{}, {"tracked.0.max_traction=2"}, {"tracked.0.contact={thickness: 0.002}"}})
   {
     Simulation one(scene(set)), two(scene(set));
     run(one, 150);
@@ -243,7 +242,8 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
   for (Simulation* each : {&simulation, &same})
     run(*each, 10);
   EXPECT_LT((simulation.state().cloths[0].cloth.x - same.state().cloths[0].cloth.x).cwiseAbs().maxCoeff(), 1e-5);
-  EXPECT_LT(same.trackingError(0).blend, 1e-5);   // a blend of rounding errors, and of what velocities are not differences of positions
+  // a blend of rounding errors, and of what velocities are not differences of positions
+  EXPECT_LT(same.trackingError(0).blend, 1e-5);
 
   const auto refused = [](Simulation& s, const std::string& set, std::optional<double> blend) -> std::string {
     const SceneState before = s.state();
@@ -258,7 +258,8 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
     }
     return "";
   };
-  EXPECT_NE(refused(simulation, "finer", {}).find("no test functions \"finer\"; cloth sheet has: coarse fine middle"), std::string::npos);
+  EXPECT_NE(refused(simulation, "finer", {}).find("no test functions \"finer\"; cloth sheet has: coarse fine middle"),
+            std::string::npos);
   EXPECT_NE(refused(simulation, "fine", -1.0).find("0 or more"), std::string::npos);
   EXPECT_NE(refused(simulation, "fine", NAN).find("0 or more"), std::string::npos);
   Simulation one(scene({"tracked.0.test_functions={basis: subdivision}"}));
@@ -285,7 +286,8 @@ TEST_F(TrackedFunctions, OfSeveralThatAreDueInAStepTheLatestActs)
 
 TEST_F(TrackedFunctions, OneSetOfAListIsAsWithoutList)
 {
-  Simulation one(scene({"tracked.0.test_functions={basis: subdivision}"})), two(scene({"tracked.0.test_functions=[{name: only, basis: subdivision}]"}));
+  Simulation one(scene({"tracked.0.test_functions={basis: subdivision}"})),
+      two(scene({"tracked.0.test_functions=[{name: only, basis: subdivision}]"}));
   run(one, 60);
   run(two, 60);
   EXPECT_TRUE(one.state().cloths[0].cloth.x == two.state().cloths[0].cloth.x);
@@ -312,7 +314,8 @@ TEST_F(TrackedFunctions, FailedStepsLeaveTheSetAsItIs)
 TEST_F(TrackedFunctions, KeepTheirBoundsAndTouchThings)
 {
   // a floor in the way of the waves, and forces that are not to be more than so much
-  Simulation bounded(scene({"tracked.0.max_traction=3", "tracked.0.contact={thickness: 0.002}", "obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, -0.1]}}]"}));
+  Simulation bounded(scene({"tracked.0.max_traction=3", "tracked.0.contact={thickness: 0.002}",
+                            "obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, -0.1]}}]"}));
   int most = 0;
   for (int k = 0; k < 240; ++k)
   {
@@ -321,7 +324,8 @@ TEST_F(TrackedFunctions, KeepTheirBoundsAndTouchThings)
     EXPECT_LT(report.tracking_error, 1e-11) << k;
     most = std::max(most, report.forces_at_bound);
     const FunctionSet& set = bounded.functions(0);
-    const Eigen::VectorXd over = bounded.state().cloths[0].guide_forces.colwise().norm().transpose().array() / set.bounds.array();
+    const Eigen::VectorXd over =
+        bounded.state().cloths[0].guide_forces.colwise().norm().transpose().array() / set.bounds.array();
     EXPECT_LT(over.maxCoeff(), 1.0011) << k;   // contact may go over by a thousandth
   }
   EXPECT_GT(most, 0);
@@ -330,19 +334,26 @@ TEST_F(TrackedFunctions, KeepTheirBoundsAndTouchThings)
 TEST_F(TrackedFunctions, SayWhatIsWrong)
 {
   const std::string f = "tracked.0.test_functions";
-  const struct { std::string set; const char* expected; } cases[] = {
-    {f + "=[]", "must have 1 to 100"},
-    {f + "=[{basis: subdivision}]", "name: is missing"},
-    {f + "=[{name: a, basis: subdivision}, {name: a, vertices: [1]}]", "names must differ"},
-    {f + "=[{name: a, basis: subdivision}, {name: b, vertices: [1], from: 1}, {name: c, vertices: [2], from: 1}]", "times must differ"},
-    {f + ".1.from=0", "(0, 10000000] s"},
-    {f + ".1.blend=-1", "[0, 10000000] s"},
-    {f + ".1.colour=red", "colour"},
-    {f + "={name: a, basis: subdivision}", "name"},
-    {f + "=[{name: a, basis: subdivision}, {name: b, regions: {l: {guide: [0, 1]}, m: {guide: [0, 1]}}}]", "test_functions.1"},
-    {f + "=[{name: a, basis: subdivision}, {name: b, regions: {l: {guide: [0, 1]}, m: {guide: [0, 1]}}}]", "'m' depends on 'l'"},
-    {f + "=[{name: a, basis: subdivision}, {name: b, regions: {l: {guide: []}}}]", "test_functions.1"},
-    {"tracked.0.max_traction={top: 3}", "not there"},
+  const struct
+  {
+    std::string set;
+    const char* expected;
+  } cases[] = {
+      {f + "=[]", "must have 1 to 100"},
+      {f + "=[{basis: subdivision}]", "name: is missing"},
+      {f + "=[{name: a, basis: subdivision}, {name: a, vertices: [1]}]", "names must differ"},
+      {f + "=[{name: a, basis: subdivision}, {name: b, vertices: [1], from: 1}, {name: c, vertices: [2], from: 1}]",
+       "times must differ"},
+      {f + ".1.from=0", "(0, 10000000] s"},
+      {f + ".1.blend=-1", "[0, 10000000] s"},
+      {f + ".1.colour=red", "colour"},
+      {f + "={name: a, basis: subdivision}", "name"},
+      {f + "=[{name: a, basis: subdivision}, {name: b, regions: {l: {guide: [0, 1]}, m: {guide: [0, 1]}}}]",
+       "test_functions.1"},
+      {f + "=[{name: a, basis: subdivision}, {name: b, regions: {l: {guide: [0, 1]}, m: {guide: [0, 1]}}}]",
+       "'m' depends on 'l'"},
+      {f + "=[{name: a, basis: subdivision}, {name: b, regions: {l: {guide: []}}}]", "test_functions.1"},
+      {"tracked.0.max_traction={top: 3}", "not there"},
   };
   for (const auto& c : cases)
   {
@@ -377,5 +388,5 @@ TEST_F(TrackedFunctions, AreNamedInWhatIsRecorded)
   EXPECT_EQ(text.str().find("\n0.605,sheet,coarse/"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -21,14 +21,18 @@ using Eigen::Vector3d;
 /// A sheet that falls from where one corner is held, and a finer one that does as it does.
 std::string previewed(const std::string& contact = "", const std::string& more = "")
 {
-  const std::string traits = "    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 2.0e5}\n    bending: {model: hinge}\n    solver: {one_newton_step: true}\n" +
-                             (contact.empty() ? "" : "    contact: " + contact + "\n");
+  const std::string traits =
+      "    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 2.0e5}\n    bending: {model: hinge}\n    "
+      "solver: {one_newton_step: true}\n" +
+      (contact.empty() ? "" : "    contact: " + contact + "\n");
   return "name: previewed\ntime: {step: 0.01, duration: 1}\ncloths:\n  - name: coarse\n"
-         "    grid: {corner: [0, 0, 0.3], sides: [[0.4, 0, 0], [0, 0.4, 0]], cells: [2, 2], pattern: alternating}\n    grasps: {corner: {vertices: [0]}}\n" +
+         "    grid: {corner: [0, 0, 0.3], sides: [[0.4, 0, 0], [0, 0.4, 0]], cells: [2, 2], pattern: alternating}\n    "
+         "grasps: {corner: {vertices: [0]}}\n" +
          traits + "tracked:\n  - name: fine\n    guide: {cloth: coarse}\n    mesh: {subdivide: 2}\n" + traits + more;
 }
 
-const char* const kBall = "obstacles: [{name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0.25, 0.25, 0.15]}}]\n";
+const char* const kBall =
+    "obstacles: [{name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0.25, 0.25, 0.15]}}]\n";
 
 class TrackedPreviews : public testing::Test
 {
@@ -79,7 +83,8 @@ TEST_F(TrackedPreviews, FollowTheClothOfTheSameInstant)
       EXPECT_TRUE(state.cloths[0].cloth.x == alone.state().cloths[0].cloth.x) << k;
     }
     EXPECT_LT(state.cloths[0].cloth.x(2, 8), 0.25);   // it fell
-    EXPECT_GT((state.cloths[1].cloth.x.leftCols(9) - state.cloths[0].cloth.x).cwiseAbs().maxCoeff(), 1e-4);   // averages are followed, not points
+    // averages are followed, not points
+    EXPECT_GT((state.cloths[1].cloth.x.leftCols(9) - state.cloths[0].cloth.x).cwiseAbs().maxCoeff(), 1e-4);
   }
 }
 
@@ -88,9 +93,7 @@ TEST_F(TrackedPreviews, RestartExactly)
   const std::string text = previewed("{thickness: 0.004}", kBall);
   Simulation one(parseScene(text, "t")), two(parseScene(text, "t"));
   for (int k = 0; k < 25; ++k)
-  {
     ASSERT_TRUE(one.step(one.defaultInputs()).ok);
-  }
   one.save(folder_ + "/state");
   two.load(folder_ + "/state");
   for (int k = 0; k < 15; ++k)
@@ -118,9 +121,7 @@ TEST_F(TrackedPreviews, StayWhereTheyWereWhenAStepFails)
   inputs.grasps[0].X_WG.position.x() = NAN;
   EXPECT_FALSE(simulation.step(inputs).ok);
   for (int c = 0; c < 2; ++c)
-  {
     EXPECT_TRUE(simulation.state().cloths[c].cloth.x == before.cloths[c].cloth.x);
-  }
   EXPECT_TRUE(simulation.state().cloths[1].guide == before.cloths[1].guide);
 }
 
@@ -135,8 +136,10 @@ TEST_F(TrackedPreviews, SayWhatIsWrong)
   EXPECT_NE(problems(with("{cloth: coarse, motion: fixed}")).find("does not go with cloth"), std::string::npos);
   EXPECT_NE(problems(with("{}")).find("cloth: NAME"), std::string::npos);
   EXPECT_NE(problems("tracked:\n  - {guide: {cloth: coarse}}\n").find("the scene has no cloths"), std::string::npos);
-  EXPECT_NE(problems(with("{grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {bag: none.bag}}")).find("a program that reads bags"),
-            std::string::npos);
+  EXPECT_NE(
+      problems(with("{grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {bag: none.bag}}"))
+          .find("a program that reads bags"),
+      std::string::npos);
 }
 
 TEST_F(TrackedPreviews, FramesAreTheNumberedOnes)
@@ -144,7 +147,8 @@ TEST_F(TrackedPreviews, FramesAreTheNumberedOnes)
   const TriangleMesh mesh = gridMesh(0.4, 0.4, 2, 2, GridPattern::alternating);
   const auto frame = [&](const std::string& name) { writeObj(folder_ + "/" + name, mesh); };
   const auto scene = [](const std::string& pattern) {
-    return "tracked:\n  - guide: {mesh: {file: rest.obj}, motion: {frames: \"" + pattern + "\", rate: 20}}\n    mesh: {subdivide: 1}\n";
+    return "tracked:\n  - guide: {mesh: {file: rest.obj}, motion: {frames: \"" + pattern +
+           "\", rate: 20}}\n    mesh: {subdivide: 1}\n";
   };
   frame("rest.obj");
   frame("f_08.obj");
@@ -152,11 +156,13 @@ TEST_F(TrackedPreviews, FramesAreTheNumberedOnes)
   frame("f_10.obj");
   EXPECT_EQ(problems(scene("f_*.obj")), "");
   frame("f_12.obj");
-  EXPECT_NE(problems(scene("f_*.obj")).find("frame 11 is missing between"), std::string::npos) << problems(scene("f_*.obj"));
+  EXPECT_NE(problems(scene("f_*.obj")).find("frame 11 is missing between"), std::string::npos)
+      << problems(scene("f_*.obj"));
   std::filesystem::remove(folder_ + "/f_09.obj");
   EXPECT_EQ(problems(scene("f_*.obj")), "");   // every second one
   frame("f_11.obj");
-  EXPECT_NE(problems(scene("f_*.obj")).find("frame 9 is missing between"), std::string::npos) << problems(scene("f_*.obj"));
+  EXPECT_NE(problems(scene("f_*.obj")).find("frame 9 is missing between"), std::string::npos)
+      << problems(scene("f_*.obj"));
   std::filesystem::remove(folder_ + "/f_11.obj");
   frame("f_8.obj");
   EXPECT_NE(problems(scene("f_*.obj")).find("are the same frame"), std::string::npos);
@@ -165,21 +171,23 @@ TEST_F(TrackedPreviews, FramesAreTheNumberedOnes)
   EXPECT_NE(problems(scene("f_*.obj")).find("f_old.obj matches, but has no frame's number"), std::string::npos);
   EXPECT_NE(problems(scene("nowhere/f_*.obj")).find("there is no folder"), std::string::npos);
   std::ofstream(folder_ + "/loose.obj") << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 5 5 5\nf 1 2 3\n";
-  EXPECT_NE(problems("tracked:\n  - guide: {mesh: {file: loose.obj}}\n    mesh: {subdivide: 1}\n").find("loose.obj"), std::string::npos);
+  EXPECT_NE(problems("tracked:\n  - guide: {mesh: {file: loose.obj}}\n    mesh: {subdivide: 1}\n").find("loose.obj"),
+            std::string::npos);
 }
 
 TEST_F(TrackedPreviews, UndeformedShapesAreMadeFromTheMesh)
 {
   const auto undeformed = [this](const std::string& shape) {
-    const std::string text = "cloths:\n  - grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 20, pattern: alternating}\n    bending: {model: hinge, modulus: 1e-4}\n"
-                             "    undeformed: " + shape + "\n";
+    const std::string text =
+        "cloths:\n  - grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 20, pattern: alternating}\n    "
+        "bending: {model: hinge, modulus: 1e-4}\n"
+        "    undeformed: " +
+        shape + "\n";
     return parseScene(text, "t", {}, folder_).cloths[0];
   };
   const ClothConfig folds = undeformed("{folds: {along: [1, 0, 0], wavelength: 0.5, height: 0.02}}");
   for (Eigen::Index i = 0; i < folds.mesh.vertices.cols(); ++i)
-  {
     EXPECT_NEAR(folds.undeformed(2, i), 0.02 * std::sin(4 * M_PI * folds.mesh.vertices(0, i)), 1e-12);
-  }
   const ClothConfig ridges = undeformed("{ridges: {axis: [0, 0, 1], count: 4, height: 0.01}}");
   for (Eigen::Index i = 0; i < ridges.mesh.vertices.cols(); ++i)   // a quarter turn about the centre is one ridge
   {
@@ -187,9 +195,7 @@ TEST_F(TrackedPreviews, UndeformedShapesAreMadeFromTheMesh)
     Eigen::Index j;
     ASSERT_LT((ridges.mesh.vertices.colwise() - turned).colwise().norm().minCoeff(&j), 1e-9);
     if ((p - Vector3d(0.5, 0.5, 0)).norm() > 0.01)
-    {
       EXPECT_NEAR(ridges.undeformed(2, i), ridges.undeformed(2, j), 1e-9);
-    }
   }
   EXPECT_GT(ridges.undeformed.row(2).maxCoeff(), 0.0099);
   const ClothConfig crinkles = undeformed("{crinkles: {height: 0.03, seed: 5}}");
@@ -213,12 +219,17 @@ TEST_F(TrackedPreviews, UndeformedShapesAreMadeFromTheMesh)
   };
   // edges of 0.05 and 0.05 sqrt(2) m, 0.057 on average
   EXPECT_NE(refused("{folds: {wavelength: 0.5, height: 0.1}}").find("along"), std::string::npos);
-  EXPECT_NE(refused("{folds: {along: [0, 0, 1], wavelength: 0.5, height: 0.1}}").find("gets no folds; take a direction within the cloth"), std::string::npos);
-  EXPECT_NE(refused("{folds: {along: [1, 0, 0], wavelength: 0.22, height: 0.1}}").find("undeformed.folds.wavelength = 0.22: is less than 4 edges"), std::string::npos)
-    << refused("{folds: {along: [1, 0, 0], wavelength: 0.22, height: 0.1}}");
+  EXPECT_NE(refused("{folds: {along: [0, 0, 1], wavelength: 0.5, height: 0.1}}")
+                .find("gets no folds; take a direction within the cloth"),
+            std::string::npos);
+  EXPECT_NE(refused("{folds: {along: [1, 0, 0], wavelength: 0.22, height: 0.1}}")
+                .find("undeformed.folds.wavelength = 0.22: is less than 4 edges"),
+            std::string::npos)
+      << refused("{folds: {along: [1, 0, 0], wavelength: 0.22, height: 0.1}}");
   EXPECT_EQ(refused("{folds: {along: [1, 0, 0], wavelength: 0.23, height: 0.1}}"), "");
   const std::string ridged = refused("{ridges: {count: 12, height: 0.01}}");
-  EXPECT_NE(ridged.find("undeformed.ridges.count = 12: makes ridges of less than 4 edges"), std::string::npos) << ridged;
+  EXPECT_NE(ridged.find("undeformed.ridges.count = 12: makes ridges of less than 4 edges"), std::string::npos)
+      << ridged;
   EXPECT_NE(ridged.find("take 11 or fewer"), std::string::npos) << ridged;
   EXPECT_EQ(refused("{ridges: {count: 11, height: 0.01}}"), "");
   EXPECT_THROW(undeformed("{folds: {wavelength: 0.5}}"), SceneError);
@@ -226,5 +237,5 @@ TEST_F(TrackedPreviews, UndeformedShapesAreMadeFromTheMesh)
   EXPECT_THROW(undeformed("{folds: {wavelength: 0.5, height: 0.1}, crinkles: {height: 0.1}}"), SceneError);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -12,8 +12,10 @@ namespace {
 
 using Eigen::Matrix3Xd;
 
-/// Errors of conjugate gradients, which count from a load that the guide holds for ever, must not keep a shell in motion.
-class TrackedRest : public testing::TestWithParam<const char*> {};
+/// Errors of conjugate gradients, which count from a load that the guide holds for ever, must not keep a shell in
+/// motion.
+class TrackedRest : public testing::TestWithParam<const char*>
+{};
 
 TEST_P(TrackedRest, ClothsComeToRestWithTheirGuides)
 {
@@ -42,10 +44,12 @@ tracked:
     residual = report.residual;
   }
   EXPECT_LT(residual, 1e-3);
-  EXPECT_LT(simulation.state().cloths[0].cloth.v.colwise().norm().maxCoeff(), 1e-5);   // [m/s]; 2e-3 where the tolerance counts from the load alone
+  // [m/s]; 2e-3 where the tolerance counts from the load alone
+  EXPECT_LT(simulation.state().cloths[0].cloth.v.colwise().norm().maxCoeff(), 1e-5);
 }
 
-INSTANTIATE_TEST_SUITE_P(Loads, TrackedRest, testing::Values("", "gravity: [0, 0, 0]\n"), [](const auto& info) { return info.index == 0 ? "Weight" : "NoWeight"; });
+INSTANTIATE_TEST_SUITE_P(Loads, TrackedRest, testing::Values("", "gravity: [0, 0, 0]\n"),
+                         [](const auto& info) { return info.index == 0 ? "Weight" : "NoWeight"; });
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -31,7 +31,8 @@ rods:
     track: {guide: {nodes: 5, motion: {topic: points}}}
 )";
 
-constexpr double kExact = 1e-12;   // of the rod's length: linear constraints are met to rounding (1e-16 per metre), of 200 summands here
+// of the rod's length: linear constraints are met to rounding (1e-16 per metre), of 200 summands here
+constexpr double kExact = 1e-12;
 
 class TrackedRods : public testing::Test
 {
@@ -58,7 +59,10 @@ protected:
     return "";
   }
 
-  static Simulation make(const std::vector<std::string>& overrides = {}, const std::string& folder = ".") { return Simulation(parseScene(rope, "t", overrides, folder)); }
+  static Simulation make(const std::vector<std::string>& overrides = {}, const std::string& folder = ".")
+  {
+    return Simulation(parseScene(rope, "t", overrides, folder));
+  }
 
   /// One step with the guide there.
   static StepReport step(Simulation& simulation, const Matrix3Xd& guide)
@@ -92,8 +96,9 @@ TEST_F(TrackedRods, AreReadWithDefaults)
   for (int k = 0; k < 5; ++k)
     EXPECT_LT((tracking.guide.mesh.vertices.col(k) - Vector3d(0.3 * k, 0, 1)).norm(), 1e-12);
   // a straight rope that lies on its guide has its averages, wherever the nodes are
-  for (const char* track : {"{guide: {nodes: 5}}", "{guide: {nodes: 8}}", "{guide: {nodes: 7}, test_functions: {segments: 4}}",
-                            "{guide: {points: [[0, 0, 1], [0.1234, 0, 1], [0.99, 0, 1], [1.2, 0, 1]]}, test_functions: {segments: 7}}"})
+  for (const char* track :
+       {"{guide: {nodes: 5}}", "{guide: {nodes: 8}}", "{guide: {nodes: 7}, test_functions: {segments: 4}}",
+        "{guide: {points: [[0, 0, 1], [0.1234, 0, 1], [0.99, 0, 1], [1.2, 0, 1]]}, test_functions: {segments: 7}}"})
   {
     const Simulation simulation = make({std::string("rods.0.track=") + track});
     EXPECT_LT(simulation.rodTrackingError(0), 1e-15) << track;
@@ -106,55 +111,67 @@ TEST_F(TrackedRods, SayWhatIsWrong)
   write("few.csv", "x,y,z\n0,0,1\n");
   write("short.csv", "t,x0,y0,z0\n0,0,0,1\n");
   const std::string t = "rods.0.track", g = t + ".guide=", m = t + ".guide.motion=";
-  const struct { std::vector<std::string> set; const char* expected; } cases[] = {
-    {{t + "={}"}, "track.guide: is missing"},
-    {{g + "{motion: fixed}"}, "must have one of nodes"},
-    {{g + "{nodes: 5, points: [[0, 0, 0], [1, 0, 0]]}"}, "must have one of nodes"},
-    {{g + "{nodes: 1}"}, "[2, 61] nodes of the rod"},
-    {{g + "{nodes: 62}"}, "[2, 61] nodes of the rod"},
-    {{g + "{points: [[0, 0, 0]]}"}, "at least 2"},
-    {{g + "{points: [[0, 0, 0], [0, 0, 0], [1, 0, 0]]}"}, "points 0 and 1 are at the same place"},
-    {{g + "{file: none.csv}"}, "none.csv"},
-    {{g + "{file: few.csv}"}, "has 1 points"},
-    {{m + "slow"}, "fixed"},
-    {{m + "{}"}, "must be fixed or one of {table"},
-    {{m + "{topic: bodies}"}, "points"},
-    {{m + "{table: [[0, 1, 2]]}"}, "the guide's 5 nodes"},
-    {{m + "{file: short.csv}"}, "must have 16: t, x0"},
-    {{m + "{file: short.csv, late: hold}"}, "is for guides by topic"},
-    {{t + ".test_functions={}"}, "one of {basis: hats}"},
-    {{t + ".test_functions={basis: wavelet}"}, "hats"},
-    {{t + ".test_functions={segments: 0}"}, "[1, 61] segments"},
-    {{t + ".colour=red"}, "colour"},
-    // what does not go together
-    {{"time.integrator=tr_bdf2"}, "time.integrator = tr_bdf2: is not for rods that track a guide; must be implicit_euler"},
-    {{"time.error_tolerance=1e-5"}, "time.error_tolerance = 1e-5: is not for rods that track a guide"},
-    {{"start=equilibrium"}, "start = equilibrium: is not for rods that track a guide"},
-    {{"rods.0.contact={self: true}"}, "leave out contact or track"},
-    {{"rods.0.stretching=projected"}, "stretching must be stiff"},
-    {{"bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], welds: [{rod: rope, edge: 0}]}]"}, "leave out the weld, or track"},
-    {{"rods.0.centerline.straight.edges=4000", g + "{nodes: 3000}"}, "makes 3000 test functions"},
-    // test functions that depend on each other, on nothing, or on what is held
-    {{g + "{points: [[0, 0, 1], [0.001, 0, 1], [0.002, 0, 1], [1.2, 0, 1]]}"}, "'node 1'"},
-    {{"rods.0.grasps={all: {nodes: [0..60]}}"}, "'node 0' acts on held vertices only"},
-    {{"rods.0.grasps={most: {nodes: [0..57]}}"}, "'node 0' acts on held vertices only"},
+  const struct
+  {
+    std::vector<std::string> set;
+    const char* expected;
+  } cases[] = {
+      {{t + "={}"}, "track.guide: is missing"},
+      {{g + "{motion: fixed}"}, "must have one of nodes"},
+      {{g + "{nodes: 5, points: [[0, 0, 0], [1, 0, 0]]}"}, "must have one of nodes"},
+      {{g + "{nodes: 1}"}, "[2, 61] nodes of the rod"},
+      {{g + "{nodes: 62}"}, "[2, 61] nodes of the rod"},
+      {{g + "{points: [[0, 0, 0]]}"}, "at least 2"},
+      {{g + "{points: [[0, 0, 0], [0, 0, 0], [1, 0, 0]]}"}, "points 0 and 1 are at the same place"},
+      {{g + "{file: none.csv}"}, "none.csv"},
+      {{g + "{file: few.csv}"}, "has 1 points"},
+      {{m + "slow"}, "fixed"},
+      {{m + "{}"}, "must be fixed or one of {table"},
+      {{m + "{topic: bodies}"}, "points"},
+      {{m + "{table: [[0, 1, 2]]}"}, "the guide's 5 nodes"},
+      {{m + "{file: short.csv}"}, "must have 16: t, x0"},
+      {{m + "{file: short.csv, late: hold}"}, "is for guides by topic"},
+      {{t + ".test_functions={}"}, "one of {basis: hats}"},
+      {{t + ".test_functions={basis: wavelet}"}, "hats"},
+      {{t + ".test_functions={segments: 0}"}, "[1, 61] segments"},
+      {{t + ".colour=red"}, "colour"},
+      // what does not go together
+      {{"time.integrator=tr_bdf2"},
+       "time.integrator = tr_bdf2: is not for rods that track a guide; must be implicit_euler"},
+      {{"time.error_tolerance=1e-5"}, "time.error_tolerance = 1e-5: is not for rods that track a guide"},
+      {{"start=equilibrium"}, "start = equilibrium: is not for rods that track a guide"},
+      {{"rods.0.contact={self: true}"}, "leave out contact or track"},
+      {{"rods.0.stretching=projected"}, "stretching must be stiff"},
+      {{"bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], welds: [{rod: rope, edge: 0}]}]"},
+       "leave out the weld, or track"},
+      {{"rods.0.centerline.straight.edges=4000", g + "{nodes: 3000}"}, "makes 3000 test functions"},
+      // test functions that depend on each other, on nothing, or on what is held
+      {{g + "{points: [[0, 0, 1], [0.001, 0, 1], [0.002, 0, 1], [1.2, 0, 1]]}"}, "'node 1'"},
+      {{"rods.0.grasps={all: {nodes: [0..60]}}"}, "'node 0' acts on held vertices only"},
+      {{"rods.0.grasps={most: {nodes: [0..57]}}"}, "'node 0' acts on held vertices only"},
   };
   for (const auto& c : cases)
   {
     const std::string text = problems(c.set);
     EXPECT_NE(text.find(c.expected), std::string::npos) << c.set.back() << "\n -> " << text;
   }
-  EXPECT_NE(problems({"bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], welds: [{rod: rope, edge: 0}]}]"}).find("t:5: rods.0 (rope)"), std::string::npos);
+  EXPECT_NE(problems({"bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], welds: [{rod: rope, edge: 0}]}]"})
+                .find("t:5: rods.0 (rope)"),
+            std::string::npos);
   EXPECT_EQ(problems({"rods.0.grasps={end: {edges: [0]}}"}), "");
 }
 
 TEST_F(TrackedRods, HaveTheGuidesAveragesAfterEveryStep)
 {
-  for (const char* change : {"name=hats", "rods.0.track.test_functions={segments: 6}", "rods.0.grasps={end: {edges: [0]}}", "rods.0.closed=true", "rods.0.damping.stiffness=0.002"})
+  for (const char* change :
+       {"name=hats", "rods.0.track.test_functions={segments: 6}", "rods.0.grasps={end: {edges: [0]}}",
+        "rods.0.closed=true", "rods.0.damping.stiffness=0.002"})
   {
     std::vector<std::string> set{change};
     if (std::string(change) == "rods.0.closed=true")
-      set.push_back("rods.0.centerline={arc: {center: [0, 0, 1], start: [0.2, 0, 1], axis: [0, 0, 1], angle: 6.283185307179586, edges: 60}}");
+      set.push_back(
+          "rods.0.centerline={arc: {center: [0, 0, 1], start: [0.2, 0, 1], axis: [0, 0, 1], angle: 6.283185307179586, "
+          "edges: 60}}");
     Simulation simulation = make(set);
     EXPECT_LT(simulation.rodTrackingError(0), kExact) << change;
     const Matrix3Xd rest = simulation.state().rod_guides[0].nodes;
@@ -186,7 +203,8 @@ TEST_F(TrackedRods, FollowTablesFromTheirVelocity)
   {
     const double t = 0.05 * k;
     char row[200];
-    std::snprintf(row, sizeof row, "%.17g,%.17g,0,1,%.17g,0,%.17g,%.17g,0,1", t, 2 * t, 0.6 + 2 * t, 1 + 0.1 * t * t, 1.2 + 2 * t);
+    std::snprintf(row, sizeof row, "%.17g,%.17g,0,1,%.17g,0,%.17g,%.17g,0,1", t, 2 * t, 0.6 + 2 * t, 1 + 0.1 * t * t,
+                  1.2 + 2 * t);
     csv += std::string(row) + "\n";
     table += std::string(k ? ", [" : "[") + row + "]";
   }
@@ -213,9 +231,13 @@ TEST_F(TrackedRods, FollowTablesFromTheirVelocity)
 /// Elsewhere than its guide, a rod starts moved there by as little as its averages need.
 TEST_F(TrackedRods, StartOnTheirGuide)
 {
-  Simulation simulation = make({"rods.0.centerline={arc: {center: [0, 0, 1], start: [0.3, 0, 1], axis: [0, 1, 0], angle: 2.5, edges: 60}}", "gravity=[0, 0, 0]"});
+  Simulation simulation =
+      make({"rods.0.centerline={arc: {center: [0, 0, 1], start: [0.3, 0, 1], axis: [0, 1, 0], angle: 2.5, edges: 60}}",
+            "gravity=[0, 0, 0]"});
   EXPECT_LT(simulation.rodTrackingError(0), kExact);
-  SceneConfig config = parseScene(rope, "t", {"rods.0.centerline={arc: {center: [0, 0, 1], start: [0.3, 0, 1], axis: [0, 1, 0], angle: 2.5, edges: 60}}"});
+  SceneConfig config = parseScene(
+      rope, "t",
+      {"rods.0.centerline={arc: {center: [0, 0, 1], start: [0.3, 0, 1], axis: [0, 1, 0], angle: 2.5, edges: 60}}"});
   config.rods[0].tracking = nullptr;
   const Matrix3Xd free = Simulation(config).state().rods[0].x;
   const double moved = (simulation.state().rods[0].x - free).colwise().norm().maxCoeff();
@@ -224,7 +246,8 @@ TEST_F(TrackedRods, StartOnTheirGuide)
   // so that nothing is thrown: the averages rest
   ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
   const WeakConstraints& constraints = *simulation.config().rods[0].tracking->sets[0].constraints;
-  EXPECT_LT((simulation.state().rods[0].v * constraints.matrix().transpose()).colwise().norm().maxCoeff(), 1e-9);   // 1e-12 m within 0.01 s, and some
+  // 1e-12 m within 0.01 s, and some
+  EXPECT_LT((simulation.state().rods[0].v * constraints.matrix().transpose()).colwise().norm().maxCoeff(), 1e-9);
 }
 
 TEST_F(TrackedRods, StandGuidesThatJump)
@@ -246,13 +269,15 @@ TEST_F(TrackedRods, StandGuidesThatJump)
   }
   SceneInputs inputs = simulation.defaultInputs();
   const SceneState before = simulation.state();
-  inputs.rod_guides[0] = guide.rowwise().reverse();   // end for end: on the straight way there all averages meet in one point
+  // end for end: on the straight way there all averages meet in one point
+  inputs.rod_guides[0] = guide.rowwise().reverse();
   const StepReport folded = simulation.step(inputs);
   EXPECT_FALSE(folded.ok);
   EXPECT_NE(folded.message.find("slower motion"), std::string::npos) << folded.message;
   inputs.rod_guides[0](1, 3) = NAN;
   EXPECT_FALSE(simulation.step(inputs).ok);
-  EXPECT_TRUE(simulation.state().rods[0].x == before.rods[0].x && simulation.state().rod_guides[0].nodes == before.rod_guides[0].nodes);
+  EXPECT_TRUE(simulation.state().rods[0].x == before.rods[0].x &&
+              simulation.state().rod_guides[0].nodes == before.rod_guides[0].nodes);
   inputs.rod_guides[0].resize(3, 4);
   EXPECT_THROW(simulation.step(inputs), std::invalid_argument);
   inputs.rod_guides.clear();
@@ -276,14 +301,17 @@ TEST_F(TrackedRods, RestartBitIdentically)
   {
     ASSERT_TRUE(step(one, wave(rest, 0.01 * k)).ok);
     ASSERT_TRUE(step(other, wave(rest, 0.01 * k)).ok);
-    ASSERT_TRUE(one.state().rods[0].x == other.state().rods[0].x && one.state().rods[0].v == other.state().rods[0].v && one.state().rods[0].d1 == other.state().rods[0].d1) << k;
+    ASSERT_TRUE(one.state().rods[0].x == other.state().rods[0].x && one.state().rods[0].v == other.state().rods[0].v &&
+                one.state().rods[0].d1 == other.state().rods[0].d1)
+        << k;
     ASSERT_TRUE(one.state().rod_guides[0].forces == other.state().rod_guides[0].forces) << k;
     ASSERT_TRUE(one.wrench(0).force == other.wrench(0).force) << k;
   }
   one.reset();
   EXPECT_TRUE(one.state().rod_guides[0].nodes == rest);
   // of other test functions
-  for (const char* change : {"rods.0.track.test_functions={segments: 5}", "rods.0.track.guide={nodes: 6}", "rods.0.track.guide={points: [[0, 0, 1], [1.2, 0, 1]]}"})
+  for (const char* change : {"rods.0.track.test_functions={segments: 5}", "rods.0.track.guide={nodes: 6}",
+                             "rods.0.track.guide={points: [[0, 0, 1], [1.2, 0, 1]]}"})
   {
     std::vector<std::string> changed = set;
     changed.push_back(change);
@@ -295,8 +323,11 @@ TEST_F(TrackedRods, RestartBitIdentically)
 TEST_F(TrackedRods, StandBesideOthersAndAreRecorded)
 {
   // several rods in parallel, of which two track
-  Simulation simulation(parseScene(std::string(rope) + "  - {name: free, centerline: {straight: {from: [0, 1, 1], to: [1, 1, 1], edges: 20}}, grasps: {left: {edges: [0]}}}\n" +
-                                     "  - {name: band, centerline: {straight: {from: [0, 2, 1], to: [1, 2, 1], edges: 20}}, track: {guide: {nodes: 3}, test_functions: {segments: 2}}}\n",
+  Simulation simulation(parseScene(std::string(rope) +
+                                       "  - {name: free, centerline: {straight: {from: [0, 1, 1], to: [1, 1, 1], "
+                                       "edges: 20}}, grasps: {left: {edges: [0]}}}\n" +
+                                       "  - {name: band, centerline: {straight: {from: [0, 2, 1], to: [1, 2, 1], "
+                                       "edges: 20}}, track: {guide: {nodes: 3}, test_functions: {segments: 2}}}\n",
                                    "t"));
   Simulation alone = make();
   for (int k = 0; k < 20; ++k)
@@ -354,7 +385,8 @@ TEST(CurveFunctions, BelongToTheCurvesLength)
     {
       const Eigen::VectorXd at = Eigen::VectorXd::LinSpaced(13, 0, 1);
       const Eigen::MatrixXd values = curveSegments(count, at, closed).tracked;
-      EXPECT_LT((values.colwise().sum().array() - 1.0).abs().maxCoeff(), 1e-15) << closed << count;   // a partition of unity
+      // a partition of unity
+      EXPECT_LT((values.colwise().sum().array() - 1.0).abs().maxCoeff(), 1e-15) << closed << count;
       EXPECT_EQ(values.cols(), closed ? 12 : 13);
     }
   const Eigen::MatrixXd thirds = curveSegments(3, Eigen::VectorXd::LinSpaced(13, 0, 1), true).tracked;
@@ -363,12 +395,13 @@ TEST(CurveFunctions, BelongToTheCurvesLength)
   EXPECT_EQ(thirds(0, 4), 0.5);
   EXPECT_EQ(thirds(1, 4), 0.5);
   EXPECT_EQ(thirds(0, 2), 1.0);
-  const MassMatrix loop = polylineWeights(Eigen::VectorXd::LinSpaced(4, 0, 1), Eigen::VectorXd::LinSpaced(7, 0, 1), true);
+  const MassMatrix loop =
+      polylineWeights(Eigen::VectorXd::LinSpaced(4, 0, 1), Eigen::VectorXd::LinSpaced(7, 0, 1), true);
   EXPECT_EQ(loop.rows(), 6);
   EXPECT_EQ(loop.cols(), 3);
   EXPECT_NEAR(loop.coeff(5, 2), 0.5, 1e-15);
   EXPECT_NEAR(loop.coeff(5, 0), 0.5, 1e-15);   // back to the first
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -53,7 +53,8 @@ protected:
     for (int k = 0; k < count; ++k)
     {
       mesh.vertices = wave(rest, k / 20.0);
-      writeObj(folder_ + "/frame_" + std::to_string(k) + ".obj", mesh);   // not in the order of their names: 10 comes after 9
+      // not in the order of their names: 10 comes after 9
+      writeObj(folder_ + "/frame_" + std::to_string(k) + ".obj", mesh);
     }
     mesh.vertices = rest;
     return mesh;
@@ -108,32 +109,37 @@ TEST_F(TrackedScenes, SayWhatIsWrong)
   writeObj(folder_ + "/mixed_0.obj", gridMesh(0.4, 0.4, 2, 2, GridPattern::alternating));
   writeObj(folder_ + "/mixed_1.obj", other);
   const std::string t = "tracked.0.", m = t + "guide.motion=";
-  const struct { std::vector<std::string> set; const char* expected; } cases[] = {
-    {{t + "guide={mesh: {file: none.obj}, motion: fixed}"}, "none.obj"},
-    {{t + "guide={motion: fixed}"}, "must have one of mesh"},
-    {{m + "{frames: \"frame_*.obj\"}"}, "motion.rate: is missing"},
-    {{m + "{frames: \"none_*.obj\", rate: 30}"}, "no such file"},
-    {{m + "{frames: frame.obj, rate: 30}"}, "must have one *"},
-    {{m + "{frames: \"mixed_*.obj\", rate: 30}"}, "the guide's mesh has 9"},
-    {{m + "{frames: \"frame_*.obj\", rate: 0}"}, "(0, 1000000] Hz"},
-    {{m + "{bodies: poses.csv, groups: {hand: [0, 1, 2]}}"}, "vertex 3 is carried by no body"},
-    {{m + "{bodies: poses.csv, groups: {foot: [0..8]}}"}, "has no body foot"},
-    {{m + "{bodies: poses.csv}"}, "groups"},
-    {{m + "{bodies: poses.csv, groups: obj}"}, "needs a mesh from an OBJ file"},
-    {{m + "{topic: clouds}"}, "one of: points, bodies"},
-    {{m + "{frames: \"frame_*.obj\", rate: 30, late: hold}"}, "is for guides by topic"},
-    {{t + "mesh={subdivide: 0}"}, "[1, 10] levels"},
-    {{t + "mesh={subdivide: 10}"}, "more than 1000000 vertices"},
-    {{t + "mesh={file: other.obj}"}, "regions: {NAME"},
-    {{t + "mesh={file: other.obj}", t + "test_functions={regions: {a: {guide: [0]}}}"}, "tracked"},
-    {{t + "test_functions={basis: wavelet}"}, "one of: subdivision"},
-    {{t + "test_functions={clusters: {count: 3}}"}, "take mesh: same"},
-    {{t + "mesh=same", t + "test_functions={clusters: {count: 90}}"}, "number of faces"},
-    {{t + "test_functions={regions: {left: {guide: [0, 1]}, again: {guide: [0, 1]}}}"}, "'again' depends on 'left'"},
-    {{t + "test_functions={regions: {far: {guide: [77]}}}"}, "[-9, 8]"},
-    {{t + "mesh=same", t + "grasps={all: {edge: left}}"}, "(on the vertices that are not held)"},
-    {{t + "colour=red"}, "colour"},
-    {{"cloths=[{name: flap, grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}}]"}, "names must differ"},
+  const struct
+  {
+    std::vector<std::string> set;
+    const char* expected;
+  } cases[] = {
+      {{t + "guide={mesh: {file: none.obj}, motion: fixed}"}, "none.obj"},
+      {{t + "guide={motion: fixed}"}, "must have one of mesh"},
+      {{m + "{frames: \"frame_*.obj\"}"}, "motion.rate: is missing"},
+      {{m + "{frames: \"none_*.obj\", rate: 30}"}, "no such file"},
+      {{m + "{frames: frame.obj, rate: 30}"}, "must have one *"},
+      {{m + "{frames: \"mixed_*.obj\", rate: 30}"}, "the guide's mesh has 9"},
+      {{m + "{frames: \"frame_*.obj\", rate: 0}"}, "(0, 1000000] Hz"},
+      {{m + "{bodies: poses.csv, groups: {hand: [0, 1, 2]}}"}, "vertex 3 is carried by no body"},
+      {{m + "{bodies: poses.csv, groups: {foot: [0..8]}}"}, "has no body foot"},
+      {{m + "{bodies: poses.csv}"}, "groups"},
+      {{m + "{bodies: poses.csv, groups: obj}"}, "needs a mesh from an OBJ file"},
+      {{m + "{topic: clouds}"}, "one of: points, bodies"},
+      {{m + "{frames: \"frame_*.obj\", rate: 30, late: hold}"}, "is for guides by topic"},
+      {{t + "mesh={subdivide: 0}"}, "[1, 10] levels"},
+      {{t + "mesh={subdivide: 10}"}, "more than 1000000 vertices"},
+      {{t + "mesh={file: other.obj}"}, "regions: {NAME"},
+      {{t + "mesh={file: other.obj}", t + "test_functions={regions: {a: {guide: [0]}}}"}, "tracked"},
+      {{t + "test_functions={basis: wavelet}"}, "one of: subdivision"},
+      {{t + "test_functions={clusters: {count: 3}}"}, "take mesh: same"},
+      {{t + "mesh=same", t + "test_functions={clusters: {count: 90}}"}, "number of faces"},
+      {{t + "test_functions={regions: {left: {guide: [0, 1]}, again: {guide: [0, 1]}}}"}, "'again' depends on 'left'"},
+      {{t + "test_functions={regions: {far: {guide: [77]}}}"}, "[-9, 8]"},
+      {{t + "mesh=same", t + "grasps={all: {edge: left}}"}, "(on the vertices that are not held)"},
+      {{t + "colour=red"}, "colour"},
+      {{"cloths=[{name: flap, grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}}]"},
+       "names must differ"},
   };
   for (const auto& c : cases)
   {
@@ -160,18 +166,21 @@ TEST_F(TrackedScenes, SayWhatIsWrong)
 TEST_F(TrackedScenes, FollowFramesFromTheGuidesShapeAndVelocity)
 {
   const TriangleMesh rest = writeFrames(21);
-  const std::string motion = "tracked.0.guide={mesh: {file: rest.obj, scale: 2, pose: {position: [1, 0, 0]}}, motion: {frames: \"frame_*.obj\", rate: 20, begin: -0.3}}";
+  const std::string motion =
+      "tracked.0.guide={mesh: {file: rest.obj, scale: 2, pose: {position: [1, 0, 0]}}, motion: {frames: "
+      "\"frame_*.obj\", rate: 20, begin: -0.3}}";
   Simulation simulation(parseScene(flap, "t", {motion}, folder_));
   const GuideConfig& guide = simulation.config().cloths[0].tracking->guide;
   Matrix3Xd x, v, before, after;
   guide.evaluate(0.0, x, &v);
-  EXPECT_LT((x - (2.0 * wave(rest.vertices, 0.3)).colwise().operator+(Vector3d(1, 0, 0))).cwiseAbs().maxCoeff(), 1e-12);   // begins in its seventh frame
+  // begins in its seventh frame
+  EXPECT_LT((x - (2.0 * wave(rest.vertices, 0.3)).colwise().operator+(Vector3d(1, 0, 0))).cwiseAbs().maxCoeff(), 1e-12);
   guide.evaluate(-1e-5, before);
   guide.evaluate(1e-5, after);
   EXPECT_LT((v - (after - before) / 2e-5).cwiseAbs().maxCoeff(), 1e-4);
   EXPECT_GT(v.cwiseAbs().maxCoeff(), 0.3);
   const SceneCloth& start = simulation.state().cloths[0];
-  EXPECT_TRUE(start.cloth.x.leftCols(9) == x);        // the subdivision keeps the guide's vertices
+  EXPECT_TRUE(start.cloth.x.leftCols(9) == x);   // the subdivision keeps the guide's vertices
   EXPECT_TRUE(start.cloth.v.leftCols(9) == v);
   EXPECT_LT(simulation.trackingError(0).met, 1e-14);
   double travelled = 0.0;
@@ -188,7 +197,8 @@ TEST_F(TrackedScenes, FollowFramesFromTheGuidesShapeAndVelocity)
   for (int k = 0; k < 400; ++k)
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
   const Vector3d total = simulation.state().cloths[0].guide_forces.rowwise().sum();
-  EXPECT_NEAR(total.z(), 9.81 * simulation.clothModel(0).totalMass(), 0.02 * 9.81 * simulation.clothModel(0).totalMass());
+  EXPECT_NEAR(total.z(), 9.81 * simulation.clothModel(0).totalMass(),
+              0.02 * 9.81 * simulation.clothModel(0).totalMass());
 }
 
 TEST_F(TrackedScenes, FollowBodies)
@@ -199,14 +209,16 @@ TEST_F(TrackedScenes, FollowBodies)
   {
     const double angle = 0.05 * k;
     for (const char* body : {"a", "b"})
-      csv += std::to_string(0.05 * k) + "," + body + ",0.3," + std::to_string(0.02 * k) + ",0.1," + std::to_string(std::sin(angle / 2)) + ",0,0," +
-             std::to_string(std::cos(angle / 2)) + "\n";
+      csv += std::to_string(0.05 * k) + "," + body + ",0.3," + std::to_string(0.02 * k) + ",0.1," +
+             std::to_string(std::sin(angle / 2)) + ",0,0," + std::to_string(std::cos(angle / 2)) + "\n";
   }
   write("poses.csv", csv);
   const Matrix3Xd rest = gridMesh(0.4, 0.4, 2, 2, GridPattern::alternating).vertices;
   for (const bool initial : {true, false})
   {
-    const std::string motion = std::string("tracked.0.guide.motion={bodies: poses.csv, groups: {a: [0..5], b: [3..8]}, attach: ") + (initial ? "initial" : "frame") + "}";
+    const std::string motion =
+        std::string("tracked.0.guide.motion={bodies: poses.csv, groups: {a: [0..5], b: [3..8]}, attach: ") +
+        (initial ? "initial" : "frame") + "}";
     Simulation simulation(parseScene(flap, "t", {motion}, folder_));
     const auto pose = [&](double t) {
       return Pose{{0.3, 0.4 * t, 0.1}, Eigen::Quaterniond(Eigen::AngleAxisd(t, Vector3d::UnitX()))};
@@ -219,7 +231,8 @@ TEST_F(TrackedScenes, FollowBodies)
     }
     const Pose X = initial ? pose(0.5) * pose(0.0).inverse() : pose(0.5);
     for (Eigen::Index i = 0; i < rest.cols(); ++i)
-      EXPECT_LT((simulation.state().cloths[0].guide.col(i) - X * Vector3d(rest.col(i))).norm(), 2e-6) << initial << " " << i;
+      EXPECT_LT((simulation.state().cloths[0].guide.col(i) - X * Vector3d(rest.col(i))).norm(), 2e-6)
+          << initial << " " << i;
     Matrix3Xd x, v, before, after;
     const GuideConfig& guide = simulation.config().cloths[0].tracking->guide;
     guide.evaluate(0.52, x, &v);
@@ -239,7 +252,8 @@ TEST_F(TrackedScenes, StartAsFastAsTheirFrames)
     writeObj(folder_ + "/frame_" + std::to_string(k) + ".obj", mesh);
   }
   const auto guide = [](const char* begin) {
-    return std::string("tracked.0.guide={mesh: {file: rest.obj}, motion: {frames: \"frame_*.obj\", rate: 20, begin: ") + begin + "}}";
+    return std::string("tracked.0.guide={mesh: {file: rest.obj}, motion: {frames: \"frame_*.obj\", rate: 20, begin: ") +
+           begin + "}}";
   };
   Simulation simulation(parseScene(flap, "t", {guide("0"), "gravity=[0, 0, 0]"}, folder_));
   const Matrix3Xd start = simulation.state().cloths[0].cloth.x;
@@ -263,8 +277,10 @@ TEST_F(TrackedScenes, LieOnTheirGuidesWhateverTheirLengthsAtRest)
   // crumpled, of no stiffness and without weight: where the guide is their averages are the guide's, and they stay
   for (const char* step : {"0.01", "0.001"})
   {
-    Simulation simulation(parseScene(flap, "t", {"tracked.0.undeformed={crinkles: {height: 0.015}, lengths: true}", "tracked.0.material.youngs_modulus=1",
-                                                 std::string("time.step=") + step, "gravity=[0, 0, 0]"}));
+    Simulation simulation(
+        parseScene(flap, "t",
+                   {"tracked.0.undeformed={crinkles: {height: 0.015}, lengths: true}",
+                    "tracked.0.material.youngs_modulus=1", std::string("time.step=") + step, "gravity=[0, 0, 0]"}));
     const SceneCloth& cloth = simulation.state().cloths[0];
     const Matrix3Xd start = cloth.cloth.x;
     const WeakConstraints& constraints = *simulation.config().cloths[0].tracking->sets[0].constraints;
@@ -276,12 +292,15 @@ TEST_F(TrackedScenes, LieOnTheirGuidesWhateverTheirLengthsAtRest)
 
 TEST_F(TrackedScenes, TakeGroupsOfFiles)
 {
-  write("cross.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\ng left\nf 1 2 3\nf 1 3 4\ng right\nf 2 5 6\nf 2 6 3\n");
-  const SceneConfig scene = parseScene(flap, "t", {"tracked.0.guide={mesh: {file: cross.obj}}", "tracked.0.test_functions={regions: obj}"}, folder_);
+  write("cross.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\ng left\nf 1 2 3\nf 1 3 4\ng right\nf 2 5 6\nf 2 6 3\n");
+  const SceneConfig scene = parseScene(
+      flap, "t", {"tracked.0.guide={mesh: {file: cross.obj}}", "tracked.0.test_functions={regions: obj}"}, folder_);
   const TestFunctions& f = scene.cloths[0].tracking->sets[0].functions;
   ASSERT_EQ(f.names, (std::vector<std::string>{"left", "right"}));
   // prolonged: the left function is 1 over its faces and falls to 0 within the right ones
-  EXPECT_TRUE(Eigen::MatrixXd(f.guide).row(0) == Eigen::RowVectorXd(Eigen::Map<const Eigen::RowVectorXd>(std::vector<double>{1, 1, 1, 1, 0, 0}.data(), 6)));
+  EXPECT_TRUE(Eigen::MatrixXd(f.guide).row(0) == Eigen::RowVectorXd(Eigen::Map<const Eigen::RowVectorXd>(
+                                                     std::vector<double>{1, 1, 1, 1, 0, 0}.data(), 6)));
   const Matrix3Xd& x = scene.cloths[0].mesh.vertices;
   for (Eigen::Index i = 0; i < x.cols(); ++i)
     EXPECT_NEAR(f.tracked.coeff(0, i), x(0, i) <= 1 ? 1.0 : 2.0 - x(0, i), 1e-12);
@@ -289,10 +308,14 @@ TEST_F(TrackedScenes, TakeGroupsOfFiles)
 
 TEST_F(TrackedScenes, ClusterReproducibly)
 {
-  const std::vector<std::string> set{"tracked.0.guide.grid.cells=[12, 12]", "tracked.0.mesh=same", "tracked.0.test_functions={clusters: {count: 7, seed: 4}}"};
+  const std::vector<std::string> set{"tracked.0.guide.grid.cells=[12, 12]", "tracked.0.mesh=same",
+                                     "tracked.0.test_functions={clusters: {count: 7, seed: 4}}"};
   const SceneConfig a = parseScene(flap, "t", set), b = parseScene(flap, "t", set);
   EXPECT_EQ(a.cloths[0].tracking->sets[0].functions.count(), 7);
-  EXPECT_EQ(Eigen::MatrixXd(a.cloths[0].tracking->sets[0].functions.guide - b.cloths[0].tracking->sets[0].functions.guide).norm(), 0.0);
+  EXPECT_EQ(
+      Eigen::MatrixXd(a.cloths[0].tracking->sets[0].functions.guide - b.cloths[0].tracking->sets[0].functions.guide)
+          .norm(),
+      0.0);
   Simulation simulation(a);
   for (int k = 0; k < 10; ++k)
   {
@@ -319,16 +342,18 @@ TEST_F(TrackedScenes, RestartExactly)
     ASSERT_TRUE(two.step(two.defaultInputs()).ok);
     ASSERT_TRUE(one.state().cloths[0].cloth.x == two.state().cloths[0].cloth.x);
   }
-  Simulation other(parseScene(flap, "t", {motion, "tracked.0.test_functions={basis: subdivision, vertices: [0..4]}"}, folder_));
+  Simulation other(
+      parseScene(flap, "t", {motion, "tracked.0.test_functions={basis: subdivision, vertices: [0..4]}"}, folder_));
   EXPECT_THROW(other.load(folder_ + "/state"), std::runtime_error);
 }
 
 TEST_F(TrackedScenes, KeepTheirAveragesInContact)
 {
   // pressed through a ball by its guide, free and held at one side
-  const std::vector<std::string> set{"tracked.0.guide.motion={bodies: poses.csv, groups: {all: [0..8]}}", "tracked.0.contact={thickness: 0.004}",
-                                     "tracked.0.test_functions={regions: {near: {guide: [0, 1, 2]}, far: {guide: [6, 7, 8]}}}",
-                                     "obstacles=[{name: ball, shape: {sphere: {radius: 0.05}}, pose: {position: [0.2, 0.2, -0.06]}, motion: fixed}]"};
+  const std::vector<std::string> set{
+      "tracked.0.guide.motion={bodies: poses.csv, groups: {all: [0..8]}}", "tracked.0.contact={thickness: 0.004}",
+      "tracked.0.test_functions={regions: {near: {guide: [0, 1, 2]}, far: {guide: [6, 7, 8]}}}",
+      "obstacles=[{name: ball, shape: {sphere: {radius: 0.05}}, pose: {position: [0.2, 0.2, -0.06]}, motion: fixed}]"};
   write("poses.csv", "t,body,x,y,z,qx,qy,qz,qw\n0,all,0,0,0,0,0,0,1\n0.3,all,0,0,-0.05,0,0,0,1\n");
   for (const bool held : {false, true})
   {
@@ -357,18 +382,20 @@ TEST_F(TrackedScenes, KeepTheirAveragesInContact)
     const double weight = 9.81 * simulation.clothModel(0).totalMass();
     EXPECT_LT(-down, 1.01 * weight) << held;   // the ball does not pull
     if (held)
-    {
-      EXPECT_GT(down, weight);                 // and the guide presses against it
-    }
+      EXPECT_GT(down, weight);   // and the guide presses against it
   }
 }
 
 TEST_F(TrackedScenes, LieOnAFloorThatTheirGuidesGoThrough)
 {
-  // all of the shell is pressed at a floor, which no average can be met against: collisions have the last word, and bounded forces are at their bounds
-  const std::vector<std::string> set{"tracked.0.guide.motion={bodies: poses.csv, groups: {all: [0..8]}}", "tracked.0.contact={thickness: 0.004}",
+  // all of the shell is pressed at a floor, which no average can be met against: collisions have the last word, and
+  // bounded forces are at their bounds
+  const std::vector<std::string> set{"tracked.0.guide.motion={bodies: poses.csv, groups: {all: [0..8]}}",
+                                     "tracked.0.contact={thickness: 0.004}",
                                      "obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, -0.02]}}]"};
-  write("poses.csv", "t,body,x,y,z,qx,qy,qz,qw\n0,all,0,0,0,0,0,0,1\n0.3,all,0,0,-0.05,0,0,0,1\n0.6,all,0,0,-0.05,0,0,0,1\n0.9,all,0,0,0,0,0,0,1\n");
+  write("poses.csv",
+        "t,body,x,y,z,qx,qy,qz,qw\n0,all,0,0,0,0,0,0,1\n0.3,all,0,0,-0.05,0,0,0,1\n0.6,all,0,0,-0.05,0,0,0,1\n0.9,all,"
+        "0,0,0,0,0,0,1\n");
   for (const double traction : {0.0, 5.0, 50.0})
   {
     std::vector<std::string> all = set;
@@ -382,9 +409,7 @@ TEST_F(TrackedScenes, LieOnAFloorThatTheirGuidesGoThrough)
       ASSERT_TRUE(report.ok) << traction << " step " << k << ": " << report.message;
       ASSERT_GT(held.cloth.x.row(2).minCoeff(), -0.0181) << traction << " step " << k;
       if (k < 12 || k > 79 || traction > 0)
-      {
         EXPECT_LT(report.tracking_error, 1e-12) << traction << " step " << k;
-      }
       if (traction > 0 && k == 60)
       {
         EXPECT_EQ(report.forces_at_bound, 9);
@@ -399,7 +424,8 @@ TEST_F(TrackedScenes, LieOnAFloorThatTheirGuidesGoThrough)
 
 TEST_F(TrackedScenes, BoundForcesByRegion)
 {
-  // a stiff flap whose guide stretches: one side is followed exactly, the other as far as the force allows, as often as it is restarted
+  // a stiff flap whose guide stretches: one side is followed exactly, the other as far as the force allows, as often as
+  // it is restarted
   TriangleMesh mesh = writeFrames(1);
   for (int k = 0; k < 3; ++k)
   {
@@ -407,9 +433,11 @@ TEST_F(TrackedScenes, BoundForcesByRegion)
     frame.vertices.row(1) *= k == 1 ? 3.0 : 1.0;
     writeObj(folder_ + "/pull_" + std::to_string(k) + ".obj", frame);
   }
-  const std::vector<std::string> set{"tracked.0.guide={mesh: {file: rest.obj}, motion: {frames: \"pull_*.obj\", rate: 2}}", "tracked.0.material.youngs_modulus=1.0e7",
-                                     "tracked.0.test_functions={regions: {left: {guide: [0, 1, 2]}, right: {guide: [6, 7, 8]}}}",
-                                     "tracked.0.max_traction={right: 200}"};
+  const std::vector<std::string> set{
+      "tracked.0.guide={mesh: {file: rest.obj}, motion: {frames: \"pull_*.obj\", rate: 2}}",
+      "tracked.0.material.youngs_modulus=1.0e7",
+      "tracked.0.test_functions={regions: {left: {guide: [0, 1, 2]}, right: {guide: [6, 7, 8]}}}",
+      "tracked.0.max_traction={right: 200}"};
   Simulation one(parseScene(flap, "t", set, folder_)), two(parseScene(flap, "t", set, folder_));
   const TrackingConfig& tracking = *one.config().cloths[0].tracking;
   EXPECT_TRUE(std::isinf(tracking.sets[0].bounds[0]));
@@ -442,7 +470,9 @@ TEST_F(TrackedScenes, BoundForcesByRegion)
   EXPECT_LT(one.trackingError(0).met, 1e-14);
   EXPECT_NE(problems({"tracked.0.max_traction={top: 30}"}).find("test function that is not there"), std::string::npos);
   EXPECT_NE(problems({"tracked.0.max_traction=0"}).find("Pa"), std::string::npos);
-  EXPECT_THROW(Simulation(parseScene(flap, "t", {"tracked.0.max_traction=10", "tracked.0.solver={one_newton_step: false}"})), SceneError);
+  EXPECT_THROW(
+      Simulation(parseScene(flap, "t", {"tracked.0.max_traction=10", "tracked.0.solver={one_newton_step: false}"})),
+      SceneError);
   Simulation other(parseScene(flap, "t", {set[0], set[1], set[2]}, folder_));
   EXPECT_THROW(other.load(folder_ + "/state"), std::runtime_error);
 }
@@ -493,5 +523,5 @@ TEST_F(TrackedScenes, StayWithGuidesByTopicUntilTheyMove)
   EXPECT_THROW(simulation.step(inputs), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -72,7 +72,8 @@ TEST_F(WildGuides, AreRefusedWithinTheBudgetAndTheRunGoesOn)
     ASSERT_FALSE(report.ok);
     EXPECT_EQ(report.failure, StepFailure::work_exceeded) << report.message;
     EXPECT_NE(report.message.find("cloth 'sheet'"), std::string::npos) << report.message;
-    EXPECT_NE(report.message.find("use a shorter step, or a guide that moves by less at once"), std::string::npos) << report.message;
+    EXPECT_NE(report.message.find("use a shorter step, or a guide that moves by less at once"), std::string::npos)
+        << report.message;
     EXPECT_GT(report.work, most);
     EXPECT_LT(report.work, most + most / 20);   // beyond it by what is counted at once: a sweep, or a solve
     EXPECT_TRUE(k == 0 || report.work == work) << "not reproducible";
@@ -112,5 +113,5 @@ TEST(WorkBudget, IsSpentByCounts)
   EXPECT_EQ(WorkBudget::ofStep(3000), 2 * WorkBudget::ofStep(1500));
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -85,34 +85,51 @@ TEST(WeakConstraints, NamesEmptyAndDependentFunctions)
     (mesh.vertices(0, v) < 0.4 ? left : right).push_back(v);
   const auto paint = [&](std::vector<PaintedRegion> r) { return WeakConstraints(paintedRegions(r, n, n), mass, mass); };
   EXPECT_EQ(messageOf([&] { paint({{"left", left, left}, {"right", right, right}}).requireIndependent({}); }), "");
-  const std::string dependent = messageOf([&] { paint({{"left", left, left}, {"right", right, right}, {"all", all, all}}).requireIndependent({}); });
+  const std::string dependent = messageOf([&] {
+    paint({{"left", left, left}, {"right", right, right}, {"all", all, all}}).requireIndependent({});
+  });
   EXPECT_NE(dependent.find("'all' depends on 'left', 'right'"), std::string::npos) << dependent;
-  EXPECT_NE(messageOf([&] { paint({{"left", left, {}}}); }).find("'left': has no vertices on the tracked mesh"), std::string::npos);
-  EXPECT_NE(messageOf([&] { paint({{"left", {99}, left}}); }).find("vertex 99 is not on the guide mesh"), std::string::npos);
+  EXPECT_NE(messageOf([&] {
+              paint({{"left", left, {}}});
+            }).find("'left': has no vertices on the tracked mesh"),
+            std::string::npos);
+  EXPECT_NE(messageOf([&] {
+              paint({{"left", {99}, left}});
+            }).find("vertex 99 is not on the guide mesh"),
+            std::string::npos);
   // whatever order they come in: all but a corner, all, the corner
   std::vector<int> most = all;
   most.pop_back();
-  const std::string corner = messageOf([&] { paint({{"most", most, most}, {"all", all, all}, {"corner", {n - 1}, {n - 1}}}).requireIndependent({}); });
+  const std::string corner = messageOf([&] {
+    paint({{"most", most, most}, {"all", all, all}, {"corner", {n - 1}, {n - 1}}}).requireIndependent({});
+  });
   EXPECT_NE(corner.find("'corner' depends on 'most', 'all'"), std::string::npos) << corner;
   // among thousands, too: in time that grows with the overlaps, not with all pairs
   const TriangleMesh large = gridMesh(1.0, 1.0, 60, 60, GridPattern::alternating);
   TestFunctions hats = subdivisionBasis(subdivide(large, 0));
-  EXPECT_EQ(messageOf([&] { WeakConstraints(hats, hatMassMatrix(large), hatMassMatrix(large)).requireIndependent({}); }), "");
+  EXPECT_EQ(
+      messageOf([&] { WeakConstraints(hats, hatMassMatrix(large), hatMassMatrix(large)).requireIndependent({}); }), "");
   for (TestFunctions::Values* values : {&hats.guide, &hats.tracked})
     values->row(7) = TestFunctions::Values(values->row(8));
-  const std::string among = messageOf([&] { WeakConstraints(hats, hatMassMatrix(large), hatMassMatrix(large)).requireIndependent({}); });
+  const std::string among =
+      messageOf([&] { WeakConstraints(hats, hatMassMatrix(large), hatMassMatrix(large)).requireIndependent({}); });
   EXPECT_NE(among.find("'" + hats.names[8] + "' depends on '" + hats.names[7] + "':"), std::string::npos) << among;
   // held vertices leave nothing to act on
   std::vector<char> held(n, 0);
   for (const int v : all)
     held[v] = mesh.vertices(0, v) < 0.6;
-  EXPECT_NE(messageOf([&] { paint({{"left", left, left}}).requireIndependent(held); }).find("'left' acts on held vertices only"), std::string::npos);
+  EXPECT_NE(messageOf([&] {
+              paint({{"left", left, left}}).requireIndependent(held);
+            }).find("'left' acts on held vertices only"),
+            std::string::npos);
   // an empty one: a vertex in no face
   TriangleMesh loose = mesh;
   loose.vertices.conservativeResize(3, n + 1);
   loose.vertices.col(n).setZero();
   const MassMatrix with_loose = hatMassMatrix(loose);
-  EXPECT_NE(messageOf([&] { WeakConstraints(paintedRegions({{"speck", {n}, {n}}}, n + 1, n + 1), with_loose, with_loose); }).find("'speck' is empty"),
+  EXPECT_NE(messageOf([&] {
+              WeakConstraints(paintedRegions({{"speck", {n}, {n}}}, n + 1, n + 1), with_loose, with_loose);
+            }).find("'speck' is empty"),
             std::string::npos);
 }
 
@@ -124,7 +141,8 @@ TEST(ConstrainedCholesky, SolvesTheSaddlePointSystem)
   const WeakConstraints constraints(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
   const int m = constraints.count();
   std::vector<Eigen::Triplet<double>> entries;
-  const PointMatrix bending = isometricBending(fine.mesh, meshTopology(fine.mesh), IsometricElement::nonconforming, 1e-3);
+  const PointMatrix bending =
+      isometricBending(fine.mesh, meshTopology(fine.mesh), IsometricElement::nonconforming, 1e-3);
   for (int i = 0; i < n; ++i)
     for (int k = bending.starts()[i]; k < bending.starts()[i + 1]; ++k)
       entries.emplace_back(i, bending.column(k), bending.values()[k]);
@@ -169,7 +187,8 @@ TEST(ConstrainedCholesky, SolvesTheSaddlePointSystem)
     // what it is for: the constraints hold to rounding
     EXPECT_LT((dense.bottomLeftCorner(m, n) * solution.topRows(n) - right.bottomRows(m)).cwiseAbs().maxCoeff(), 1e-12);
     // S^-1, as the constraints' stiffness and their norm
-    const MatrixXd c = dense.bottomLeftCorner(m, n), ct = dense.topRightCorner(n, m), s = c * dense.topLeftCorner(n, n).partialPivLu().solve(ct);
+    const MatrixXd c = dense.bottomLeftCorner(m, n), ct = dense.topRightCorner(n, m),
+                   s = c * dense.topLeftCorner(n, n).partialPivLu().solve(ct);
     const MatrixXd along = s.llt().solve(c * matrixOf(z).transpose());
     PointVector stiff = r;
     saddle.addStiffness(0.7, z.data(), stiff.data());
@@ -193,7 +212,8 @@ TEST(ConstrainedCholesky, MeetsManyConstraintsInRounds)
   const WeakConstraints constraints(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
   const int m = constraints.count();
   std::vector<Eigen::Triplet<double>> entries;
-  const PointMatrix bending = isometricBending(fine.mesh, meshTopology(fine.mesh), IsometricElement::nonconforming, 1e-3);
+  const PointMatrix bending =
+      isometricBending(fine.mesh, meshTopology(fine.mesh), IsometricElement::nonconforming, 1e-3);
   for (int i = 0; i < n; ++i)
     for (int k = bending.starts()[i]; k < bending.starts()[i + 1]; ++k)
       entries.emplace_back(i, bending.column(k), bending.values()[k]);
@@ -235,8 +255,8 @@ TEST(ConstrainedCholesky, MeetsManyConstraintsInRounds)
     Eigen::SparseMatrix<double> kkt(n + m, n + m);
     kkt.setFromTriplets(whole.begin(), whole.end());
     const Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(kkt);
-    const auto expect = [&](const PointVector& load, const PointVector& gap, const PointVector& point_answer, const PointVector& multipliers,
-                            double tolerance) {
+    const auto expect = [&](const PointVector& load, const PointVector& gap, const PointVector& point_answer,
+                            const PointVector& multipliers, double tolerance) {
       MatrixXd right(n + m, 3), solution(n + m, 3);
       right << matrixOf(load).transpose(), matrixOf(gap).transpose();
       solution << matrixOf(point_answer).transpose(), matrixOf(multipliers).transpose();
@@ -257,7 +277,8 @@ TEST(ConstrainedCholesky, MeetsManyConstraintsInRounds)
     const double square = -(matrixOf(g).array() * matrixOf(gap_alone).array()).sum();
     EXPECT_NEAR(saddle.norm(g.data()), std::sqrt(square), 1e-9 * std::sqrt(square));
     factor.solvePoints(r.data(), image.data());
-    EXPECT_NEAR(norms.load, std::sqrt(square + (matrixOf(r).array() * matrixOf(image).array()).sum()), 1e-9 * norms.load);
+    EXPECT_NEAR(norms.load, std::sqrt(square + (matrixOf(r).array() * matrixOf(image).array()).sum()),
+                1e-9 * norms.load);
     z = r;   // in its own place, in two rounds, as conjugate gradients do
     saddle.solve(z.data(), nullptr, z.data(), mu.data());
     const MatrixXd within = expect(r, none, z, mu, 1e-8);
@@ -334,7 +355,8 @@ TEST(Clustering, FindsTheSeamOfAnAnimationOnly)
   ClusteringOptions options;
   options.regions = 6;
   options.compactness = 0.3;
-  const Clustering moving = clusterFaces(mesh.triangles, frames, options), still = clusterFaces(mesh.triangles, {frames[0]}, options);
+  const Clustering moving = clusterFaces(mesh.triangles, frames, options),
+                   still = clusterFaces(mesh.triangles, {frames[0]}, options);
   EXPECT_EQ(moving.frames.size(), 20u);
   EXPECT_EQ(across(moving.region), 0);
   EXPECT_GT(across(still.region), 20);
@@ -344,7 +366,10 @@ TEST(Clustering, FindsTheSeamOfAnAnimationOnly)
     EXPECT_LT(c.iterations, options.max_iterations);
     // functions of the regions sum to 1 and are independent
     const TestFunctions functions = regionBasis(mesh, c.region);
-    EXPECT_LT((Eigen::RowVectorXd::Ones(6) * functions.tracked - Eigen::RowVectorXd::Ones(mesh.vertices.cols())).cwiseAbs().maxCoeff(), 1e-14);
+    EXPECT_LT((Eigen::RowVectorXd::Ones(6) * functions.tracked - Eigen::RowVectorXd::Ones(mesh.vertices.cols()))
+                  .cwiseAbs()
+                  .maxCoeff(),
+              1e-14);
     WeakConstraints(functions, hatMassMatrix(mesh), hatMassMatrix(mesh)).requireIndependent({});
   }
   EXPECT_EQ(clusterFaces(mesh.triangles, frames, options).region, moving.region);
@@ -357,10 +382,14 @@ TEST(Clustering, RefusesWithReason)
   const TriangleMesh mesh = plate();
   ClusteringOptions options;
   options.regions = 0;
-  EXPECT_NE(messageOf([&] { clusterFaces(mesh.triangles, {mesh.vertices}, options); }).find("regions must be from 1"), std::string::npos);
+  EXPECT_NE(messageOf([&] { clusterFaces(mesh.triangles, {mesh.vertices}, options); }).find("regions must be from 1"),
+            std::string::npos);
   options.regions = 4;
-  EXPECT_NE(messageOf([&] { clusterFaces(mesh.triangles, {}, options); }).find("at least one frame"), std::string::npos);
-  EXPECT_NE(messageOf([&] { clusterFaces(mesh.triangles, {mesh.vertices, mesh.vertices.leftCols(5)}, options); }).find("frame 1 has 5 vertices"),
+  EXPECT_NE(messageOf([&] { clusterFaces(mesh.triangles, {}, options); }).find("at least one frame"),
+            std::string::npos);
+  EXPECT_NE(messageOf([&] {
+              clusterFaces(mesh.triangles, {mesh.vertices, mesh.vertices.leftCols(5)}, options);
+            }).find("frame 1 has 5 vertices"),
             std::string::npos);
   TriangleMesh two = mesh;
   two.vertices.conservativeResize(3, 2 * mesh.vertices.cols());
@@ -368,11 +397,12 @@ TEST(Clustering, RefusesWithReason)
   two.triangles.conservativeResize(3, 2 * mesh.triangles.cols());
   two.triangles.rightCols(mesh.triangles.cols()) = mesh.triangles.array() + mesh.vertices.cols();
   options.regions = 1;
-  EXPECT_NE(messageOf([&] { clusterFaces(two.triangles, {two.vertices}, options); }).find("2 connected parts"), std::string::npos);
+  EXPECT_NE(messageOf([&] { clusterFaces(two.triangles, {two.vertices}, options); }).find("2 connected parts"),
+            std::string::npos);
   options.regions = 2;
   const Clustering c = clusterFaces(two.triangles, {two.vertices}, options);
   EXPECT_NE(c.region.front(), c.region.back());
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

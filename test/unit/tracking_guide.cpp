@@ -35,12 +35,15 @@ TEST(Trajectories, CoastWhenNothingComes)
     points.evaluate(t, x, &v);
     Twist twist;
     const Pose pose = poses.evaluate(t, &twist);
-    const double after = std::clamp(t - 0.3, 0.0, 0.4), way = std::min(t, 0.3) + after - after * after / 0.8, speed = 1.0 - after / 0.4;
+    const double after = std::clamp(t - 0.3, 0.0, 0.4), way = std::min(t, 0.3) + after - after * after / 0.8,
+                 speed = 1.0 - after / 0.4;
     EXPECT_NEAR(x(0, 0), 2 * way, 1e-12) << t;
     EXPECT_NEAR(v(0, 0), 2 * speed, 1e-12) << t;
     EXPECT_NEAR(pose.position.x(), 2 * way, 1e-12) << t;
     EXPECT_NEAR(twist.linear.x(), 2 * speed, 1e-12) << t;
-    EXPECT_NEAR(pose.orientation.angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * way, Vector3d::UnitZ()))), 0.0, 1e-7) << t;
+    EXPECT_NEAR(pose.orientation.angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * way, Vector3d::UnitZ()))),
+                0.0, 1e-7)
+        << t;
     EXPECT_NEAR(twist.angular.z(), 0.5 * speed, 1e-9) << t;
   }
 }
@@ -108,7 +111,8 @@ TEST(PointTrajectory, MovesEachPointAsThePositionsOfPoses)
   trajectory.forgetBefore(0.5);
   trajectory.evaluate(0.5, after);
   EXPECT_EQ(before, after);
-  EXPECT_EQ(trajectory.times().size(), 5u);   // three samples before that of the segment, which tell a pause from a turning point
+  // three samples before that of the segment, which tell a pause from a turning point
+  EXPECT_EQ(trajectory.times().size(), 5u);
   trajectory.forgetBefore(0.8);
   EXPECT_EQ(trajectory.times().size(), 4u);
   EXPECT_THROW(trajectory.append(0.7, frames[0]), std::invalid_argument);
@@ -134,11 +138,12 @@ TEST(GuideBinding, CarriesGroupsRigidlyAndBlends)
   EXPECT_LT((placed - rest).cwiseAbs().maxCoeff(), 1e-15);
   binding.place(end, placed);
   EXPECT_NEAR((placed.col(0) - placed.col(1)).norm(), (rest.col(0) - rest.col(1)).norm(), 1e-15);
-  const Vector3d a = end[0] * (start[0].inverse() * Vector3d(rest.col(3))), b = end[1] * (start[1].inverse() * Vector3d(rest.col(3)));
+  const Vector3d a = end[0] * (start[0].inverse() * Vector3d(rest.col(3))),
+                 b = end[1] * (start[1].inverse() * Vector3d(rest.col(3)));
   EXPECT_LT((placed.col(3) - (0.25 * a + 0.75 * b)).norm(), 1e-15);
   EXPECT_THROW(GuideBinding(rest, start, {{0, 0, 1}, {1, 0, 1}, {2, 1, 1}}), std::invalid_argument);
   EXPECT_THROW(GuideBinding(rest, start, {{0, 2, 1}}), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

@@ -42,7 +42,8 @@ double polygonShare(int sides) { return sides / (2 * M_PI) * std::sin(2 * M_PI /
 
 FramedLine straight(int edges, double length, double a, double b)
 {
-  FramedLine line{false, Eigen::Matrix3Xd::Zero(3, edges + 1), Eigen::Matrix3Xd::Zero(3, edges), Eigen::Matrix2Xd(2, edges)};
+  FramedLine line{false, Eigen::Matrix3Xd::Zero(3, edges + 1), Eigen::Matrix3Xd::Zero(3, edges),
+                  Eigen::Matrix2Xd(2, edges)};
   line.x.row(2).setLinSpaced(0, length);
   line.d1.row(1).setOnes();
   line.semi_axes.row(0).setConstant(a);
@@ -55,7 +56,8 @@ TEST(TubeMesh, ellipticTubeHasItsVolumeAndAxesAlongTheFrame)
   const TriangleMesh mesh = tubeMesh(tubeSections(straight(7, 2.0, 0.3, 0.1), 100), 16, false);
   expectWatertight(mesh);
   EXPECT_NEAR(volumeOf(mesh), M_PI * 0.3 * 0.1 * 2.0 * polygonShare(16), 1e-12);
-  EXPECT_NEAR(mesh.vertices.row(1).maxCoeff(), 0.3 * std::cos(M_PI / 16), 1e-12);   // d1 is y, and points at a side's middle
+  // d1 is y, and points at a side's middle
+  EXPECT_NEAR(mesh.vertices.row(1).maxCoeff(), 0.3 * std::cos(M_PI / 16), 1e-12);
   EXPECT_NEAR(mesh.vertices.row(0).maxCoeff(), 0.1 * std::cos(M_PI / 16), 1e-12);
   EXPECT_EQ(mesh.vertices.row(2).maxCoeff(), 2.0);
 }
@@ -65,7 +67,8 @@ TEST(TubeMesh, closedTubeIsATorusAlsoWithTurningFrames)
   const int edges = 60;
   for (const int turns : {0, 2})
   {
-    FramedLine line{true, Eigen::Matrix3Xd(3, edges), Eigen::Matrix3Xd(3, edges), Eigen::Matrix2Xd::Constant(2, edges, 0.1)};
+    FramedLine line{true, Eigen::Matrix3Xd(3, edges), Eigen::Matrix3Xd(3, edges),
+                    Eigen::Matrix2Xd::Constant(2, edges, 0.1)};
     for (int j = 0; j < edges; ++j)
     {
       const double angle = 2 * M_PI * j / edges, middle = angle + M_PI / edges, roll = turns * middle;
@@ -78,7 +81,8 @@ TEST(TubeMesh, closedTubeIsATorusAlsoWithTurningFrames)
     const TriangleMesh mesh = tubeMesh(sections, 24, true);
     expectWatertight(mesh);
     const double exact = 2 * M_PI * M_PI * 0.01 * polygonShare(24);
-    EXPECT_NEAR(volumeOf(mesh), exact, (turns == 0 ? 2e-3 : 1e-2) * exact);   // sides that wind are not flat: their diagonals add a little
+    // sides that wind are not flat: their diagonals add a little
+    EXPECT_NEAR(volumeOf(mesh), exact, (turns == 0 ? 2e-3 : 1e-2) * exact);
   }
 }
 
@@ -140,7 +144,7 @@ TEST(CornerNormals, creasesStaySharpAndRoundSidesAreSmooth)
   ASSERT_EQ(flat.cols(), box.triangles.size());
   for (Eigen::Index c = 0; c < flat.cols(); ++c)
   {
-    EXPECT_NEAR(flat.col(c).cwiseAbs().maxCoeff(), 1.0, 1e-12);   // along an axis
+    EXPECT_NEAR(flat.col(c).cwiseAbs().maxCoeff(), 1.0, 1e-12);                   // along an axis
     EXPECT_GT(flat.col(c).dot(box.vertices.col(box.triangles.data()[c])), 0.0);   // outwards
   }
   const TriangleMesh drum = shapeMesh(Cylinder{0.5, 1.0});
@@ -150,10 +154,11 @@ TEST(CornerNormals, creasesStaySharpAndRoundSidesAreSmooth)
     const Eigen::Vector3d x = drum.vertices.col(drum.triangles.data()[c]);
     if (std::abs(round(2, c)) > 0.5)
       EXPECT_NEAR(round.col(c).dot(Eigen::Vector3d(0, 0, x.z() > 0 ? 1 : -1)), 1.0, 1e-12);
-    else   // radial but for the two triangles per side, which weigh unequally at a corner: at most a third of the 15 degrees of a side
+    else   // radial but for the two triangles per side, which weigh unequally at a corner: at most a third of the 15
+           // degrees of a side
       EXPECT_GT(round.col(c).dot(Eigen::Vector3d(x.x(), x.y(), 0).normalized()), std::cos(5.1 * M_PI / 180));
   }
 }
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -54,7 +54,9 @@ TriangleMesh cutSphere(int levels, double height)
   TriangleMesh mesh = icosphere(1.0, levels);
   std::vector<int> faces, number(mesh.vertices.cols(), -1), vertices;
   for (int f = 0; f < mesh.triangles.cols(); ++f)
-    if (mesh.vertices(2, mesh.triangles(0, f)) + mesh.vertices(2, mesh.triangles(1, f)) + mesh.vertices(2, mesh.triangles(2, f)) < 3 * height)
+    if (mesh.vertices(2, mesh.triangles(0, f)) + mesh.vertices(2, mesh.triangles(1, f)) +
+            mesh.vertices(2, mesh.triangles(2, f)) <
+        3 * height)
       faces.push_back(f);
   TriangleMesh cut;
   cut.triangles.resize(3, static_cast<Eigen::Index>(faces.size()));
@@ -80,7 +82,8 @@ TEST(WillmoreEnergy, GradientIsTheDerivative)
   for (const TriangleMesh& mesh : {roughSphere(1, 0.2, 1), roughSheet(4, 0.1, 2)})
   {
     WillmoreEnergy energy(mesh.triangles, innerVertices(mesh));
-    const MatrixXd expected = differences(mesh.vertices, 1e-4, [&](const Matrix3Xd& x) { return VectorXd::Constant(1, energyOf(energy, x)); });
+    const MatrixXd expected = differences(
+        mesh.vertices, 1e-4, [&](const Matrix3Xd& x) { return VectorXd::Constant(1, energyOf(energy, x)); });
     const Matrix3Xd gradient = gradientOf(energy, mesh.vertices);
     // fourth order: (1e-4 / edge)^4, round-off 1e-16 E / 1e-4
     EXPECT_LT((flattened(gradient) - expected.col(0)).norm(), 1e-8 * expected.norm());
@@ -116,7 +119,8 @@ TEST(WillmoreEnergy, IsInfiniteWithoutAreaAndAddsNothing)
 {
   TriangleMesh mesh = roughSphere(1, 0.1, 6);
   WillmoreEnergy energy(mesh.triangles, innerVertices(mesh));
-  mesh.vertices.col(mesh.triangles(0, 0)) = 0.5 * (mesh.vertices.col(mesh.triangles(1, 0)) + mesh.vertices.col(mesh.triangles(2, 0)));
+  mesh.vertices.col(mesh.triangles(0, 0)) =
+      0.5 * (mesh.vertices.col(mesh.triangles(1, 0)) + mesh.vertices.col(mesh.triangles(2, 0)));
   EXPECT_EQ(energyOf(energy, mesh.vertices), kInfinity);
   EXPECT_EQ(gradientOf(energy, mesh.vertices).norm(), 0.0);
   mesh.vertices(0, 3) = std::nan("");
@@ -364,5 +368,5 @@ TEST(HoleFilling, RoughRimsGiveFiniteSoundPatches)
   }
 }
 
-}  // namespace
-}  // namespace slender::test
+}   // namespace
+}   // namespace slender::test

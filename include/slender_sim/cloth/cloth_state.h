@@ -19,4 +19,4 @@ struct ClothState
   double next_step = 0;          ///< [s] of adaptive steps; 0: try the whole step
 };
 
-}  // namespace slender
+}   // namespace slender

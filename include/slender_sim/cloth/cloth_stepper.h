@@ -12,8 +12,11 @@ namespace slender {
 /// Inputs of one cloth, latched once per step.
 struct ClothInputs
 {
-  Eigen::Matrix3Xd pins;                  ///< where each pin shall be at the end of the step, 3 x pins; the motion inside it is uniform
-  Eigen::Matrix3Xd averages;              ///< what the averages of the state's set shall be at the end of the step, 3 x count; in between their motion is uniform
+  /// where each pin shall be at the end of the step, 3 x pins; the motion inside it is uniform
+  Eigen::Matrix3Xd pins;
+  /// what the averages of the state's set shall be at the end of the step, 3 x count; in between their motion is
+  /// uniform
+  Eigen::Matrix3Xd averages;
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
   Eigen::Matrix3Xd forces;                ///< extra forces on the vertices, 3 x n [N], or empty
@@ -27,35 +30,41 @@ struct ClothEnergies
 
 enum class ClothSolver
 {
-  /// gauss_seidel up to 3,000 vertices without averages, else conjugate_gradients (measured: studies implicit_step, cloth_accuracy). Steps with
-  /// one_newton_step and averages without bounds, up to 3,000 vertices and no more than one average per 50 of them, are swept as well, but for plates (tracking_overhead).
+  /// gauss_seidel up to 3,000 vertices without averages, else conjugate_gradients (measured: studies implicit_step,
+  /// cloth_accuracy). Steps with one_newton_step and averages without bounds, up to 3,000 vertices and no more than one
+  /// average per 50 of them, are swept as well, but for plates (tracking_overhead).
   automatic,
-  cholesky,              ///< factorisation of the whole matrix
-  conjugate_gradients,   ///< preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the normals
-  gauss_seidel           ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps; no prescribed averages
+  cholesky,   ///< factorisation of the whole matrix
+              /// preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the
+              /// normals
+  conjugate_gradients,
+  gauss_seidel   ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps; no prescribed averages
 };
 
 /// How a cloth is advanced.
 ///  - implicit_euler: first order; damps what the step does not resolve.
 ///  - tr_bdf2: second order, likewise damping; two stages, each at about the price of a step of implicit Euler.
-///  - imex: first order; bending and its damping, and mass damping, are implicit, the membrane, its damping and the wind explicit (thesis 2.5.2).
-///    The matrix is constant, n x n, and factored once, so that a step costs one back-solve. Bending never limits the step, the membrane does as in
-///    explicit steps: h < 2 / omega, omega^2 the largest eigenvalue of M^-1 K of the membrane, about 0.5 edge sqrt(area density / modulus) [s].
-///    Isometric bending (or none) only.
+///  - imex: first order; bending and its damping, and mass damping, are implicit, the membrane, its damping and the
+///  wind explicit (thesis 2.5.2).
+///    The matrix is constant, n x n, and factored once, so that a step costs one back-solve. Bending never limits the
+///    step, the membrane does as in explicit steps: h < 2 / omega, omega^2 the largest eigenvalue of M^-1 K of the
+///    membrane, about 0.5 edge sqrt(area density / modulus) [s]. Isometric bending (or none) only.
 ///  - symplectic_euler: first order, explicit; bending limits the step as well.
 struct ClothOptions
 {
   Integrator integrator = Integrator::implicit_euler;   ///< one of the above
-  bool one_newton_step = false;          ///< implicit stages: linearised about their start [Baraff & Witkin 1998]
+  bool one_newton_step = false;   ///< implicit stages: linearised about their start [Baraff & Witkin 1998]
   ClothSolver solver = ClothSolver::automatic;
-  /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged velocity.
-  /// With averages and one_newton_step it is that of the same cloth without them, and of what it takes to move them, unless strains are so large that
-  /// these say nothing about motions. Where steps with averages are swept, it is that of the same cloth without them (or of a tenth of what it takes to move
-  /// them), in the sweeps' norm, before the averages are met: positions are as good as those of the same cloth without averages, averages exact, their forces
-  /// often less so than by conjugate_gradients.
+  /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of
+  /// unchanged velocity. With averages and one_newton_step it is that of the same cloth without them, and of what it
+  /// takes to move them, unless strains are so large that these say nothing about motions. Where steps with averages
+  /// are swept, it is that of the same cloth without them (or of a tenth of what it takes to move them), in the sweeps'
+  /// norm, before the averages are met: positions are as good as those of the same cloth without averages, averages
+  /// exact, their forces often less so than by conjugate_gradients.
   double linear_tolerance = 5e-3;
-  double error_tolerance = 0.0;          ///< [m] local error per substep, implicit_euler and tr_bdf2 only; 0: fixed steps
-  double min_step = 1e-7;                ///< [s] adaptive steps never get shorter
+  /// [m] local error per substep, implicit_euler and tr_bdf2 only; 0: fixed steps
+  double error_tolerance = 0.0;
+  double min_step = 1e-7;   ///< [s] adaptive steps never get shorter
   NewtonConfig newton;
 };
 
@@ -72,32 +81,38 @@ public:
   void useBudget(std::shared_ptr<WorkBudget> budget);
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
-  /// The same by one step of implicit Euler, for tr_bdf2 and controlled steps; it is cut only where it cannot be solved.
+  /// The same by one step of implicit Euler, for tr_bdf2 and controlled steps; it is cut only where it cannot be
+  /// solved.
   StepReport stepUndivided(ClothState& state, const ClothInputs& inputs, double duration);
 
-  /// Static equilibrium under gravity, forces and pins (velocities become zero), with elastic forces alone: damping does not act, and neither does air at rest.
-  /// An unstable equilibrium is left along its mode of negative curvature, until a stable one is found or every way was tried; then
-  /// report.stable is false. `leave_saddles` false: it is kept. Refuses wind, plasticity and prescribed averages.
+  /// Static equilibrium under gravity, forces and pins (velocities become zero), with elastic forces alone: damping
+  /// does not act, and neither does air at rest. An unstable equilibrium is left along its mode of negative curvature,
+  /// until a stable one is found or every way was tried; then report.stable is false. `leave_saddles` false: it is
+  /// kept. Refuses wind, plasticity and prescribed averages.
   StepReport solveEquilibrium(ClothState& state, const ClothInputs& inputs, bool leave_saddles = true);
   /// Residual, energy, lowest eigenvalue and stability of a state that is an equilibrium under the inputs already.
   StepReport assessEquilibrium(const ClothState& state, const ClothInputs& inputs);
-  /// Mode of the lowest eigenvalue of the last equilibrium: displacement of each vertex (3 x n [m]), scaled so that the edge that turns most turns by 1 rad.
+  /// Mode of the lowest eigenvalue of the last equilibrium: displacement of each vertex (3 x n [m]), scaled so that the
+  /// edge that turns most turns by 1 rad.
   const Eigen::Matrix3Xd& lowestMode() const;
 
-  /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step, and by how much the pins' forces
-  /// and those of the averages, which stay, change [N]: linear, with the stiffness of its last Newton iteration and the inertia of a step of implicit
-  /// Euler of `duration` [s], whatever the stages and substeps were, so that responses of several cloths go together; after explicit steps that of the
-  /// masses alone. Returns false if the matrix cannot be used.
-  bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& pin_forces_change,
-               Eigen::Matrix3Xd& average_forces_change);
-  /// Of explicit integrators: the longest step for which the cloth at rest is stable [s], by the largest eigenvalue of M^-1 K (power iteration);
-  /// damping by stiffness makes it shorter. Infinite for implicit ones. Not cheap: for messages.
+  /// Displacement of the vertices by additional forces, both 3 x n [m, N], at the end of the last successful step, and
+  /// by how much the pins' forces and those of the averages, which stay, change [N]: linear, with the stiffness of its
+  /// last Newton iteration and the inertia of a step of implicit Euler of `duration` [s], whatever the stages and
+  /// substeps were, so that responses of several cloths go together; after explicit steps that of the masses alone.
+  /// Returns false if the matrix cannot be used.
+  bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement,
+               Eigen::Matrix3Xd& pin_forces_change, Eigen::Matrix3Xd& average_forces_change);
+  /// Of explicit integrators: the longest step for which the cloth at rest is stable [s], by the largest eigenvalue of
+  /// M^-1 K (power iteration); damping by stiffness makes it shorter. Infinite for implicit ones. Not cheap: for
+  /// messages.
   double stableStep() const;
   /// Force of the cloth on each pin [N], 3 x pins, at the end of the last successful step or in the last equilibrium.
   const Eigen::Matrix3Xd& pinForces() const;
 
-  /// Force [N] with which each prescribed average acts on the cloth (3 x count), spread over its vertices by their weights: the Lagrange multipliers at the end
-  /// of the last successful step; with bounds those of its linear equations, which keep them.
+  /// Force [N] with which each prescribed average acts on the cloth (3 x count), spread over its vertices by their
+  /// weights: the Lagrange multipliers at the end of the last successful step; with bounds those of its linear
+  /// equations, which keep them.
   const Eigen::Matrix3Xd& averageForces() const;
 
   ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;
@@ -110,4 +125,4 @@ private:
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace slender
+}   // namespace slender

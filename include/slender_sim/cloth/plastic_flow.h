@@ -7,11 +7,12 @@
 
 namespace slender {
 
-/// Plastic flow of a cloth's hinges (thesis 6.4.4). A hinge of rest length e between triangles of area A together has the curvature deviation
-/// dk = e / (2A) (theta - rest angle); on a cylinder of radius R with edges along its axis that is its mean curvature, 1/(2R). Where |dk| exceeds the yield
-/// curvature, the rest angle moves towards theta until it does no more, and the stiffness grows by exp(eta * flow), flow being what |dk| lost. It
-/// grows by less where the hinge's energy would rise otherwise, which takes eta * yield > 2 or a jump far beyond the yield, and within a thousandth and
-/// a thousand times the original.
+/// Plastic flow of a cloth's hinges (thesis 6.4.4). A hinge of rest length e between triangles of area A together has
+/// the curvature deviation dk = e / (2A) (theta - rest angle); on a cylinder of radius R with edges along its axis that
+/// is its mean curvature, 1/(2R). Where |dk| exceeds the yield curvature, the rest angle moves towards theta until it
+/// does no more, and the stiffness grows by exp(eta * flow), flow being what |dk| lost. It grows by less where the
+/// hinge's energy would rise otherwise, which takes eta * yield > 2 or a jump far beyond the yield, and within a
+/// thousandth and a thousand times the original.
 class PlasticFlow
 {
 public:
@@ -31,4 +32,4 @@ private:
   AlignedVector<double> angles_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -11,16 +11,17 @@ namespace slender {
 struct BoundingBox
 {
   Eigen::Vector3d low, high;
-  bool overlaps(const BoundingBox& b) const   // without branches: most boxes of a grid cell do not, and nobody can predict which
+  bool overlaps(
+      const BoundingBox& b) const   // without branches: most boxes of a grid cell do not, and nobody can predict which
   {
-    return (low.x() <= b.high.x()) & (b.low.x() <= high.x()) & (low.y() <= b.high.y()) & (b.low.y() <= high.y()) & (low.z() <= b.high.z()) &
-           (b.low.z() <= high.z());
+    return (low.x() <= b.high.x()) & (b.low.x() <= high.x()) & (low.y() <= b.high.y()) & (b.low.y() <= high.y()) &
+           (low.z() <= b.high.z()) & (b.low.z() <= high.z());
   }
 };
 
-/// Pairs of overlapping boxes through a hashed uniform grid. Time and memory are linear in boxes and pairs when boxes are of similar
-/// size; memory is reused from call to call. For 2,000 (50,000) segments of hair 0.16 (12) ms, against 0.35 (17) ms of FCL's dynamic AABB tree
-/// and 0.21 (130) ms of sort and sweep (bench/contact_benchmark.cpp).
+/// Pairs of overlapping boxes through a hashed uniform grid. Time and memory are linear in boxes and pairs when boxes
+/// are of similar size; memory is reused from call to call. For 2,000 (50,000) segments of hair 0.16 (12) ms, against
+/// 0.35 (17) ms of FCL's dynamic AABB tree and 0.21 (130) ms of sort and sweep (bench/contact_benchmark.cpp).
 class GridPairs
 {
 public:
@@ -46,4 +47,4 @@ private:
   std::vector<int> first_start_;
 };
 
-}  // namespace slender
+}   // namespace slender

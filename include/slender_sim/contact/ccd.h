@@ -5,10 +5,10 @@
 #include "slender_sim/contact/solids.h"
 #include "slender_sim/geometry/pose.h"
 
-/// Continuous collision by additive advancement [Li et al., Codimensional IPC, 2021, section 5.3], with bounds along the separating
-/// direction, so that pieces which slide past each other cost few steps.
-/// Each returns a share alpha in [0, 1] of the motion such that the gap (distance minus `thickness`) never falls below
-/// kept * min(present gap, reach) until alpha; alpha = 1 unless the gap comes near that. Zero if the gap is not positive to begin with.
+/// Continuous collision by additive advancement [Li et al., Codimensional IPC, 2021, section 5.3], with bounds along
+/// the separating direction, so that pieces which slide past each other cost few steps. Each returns a share alpha in
+/// [0, 1] of the motion such that the gap (distance minus `thickness`) never falls below kept * min(present gap, reach)
+/// until alpha; alpha = 1 unless the gap comes near that. Zero if the gap is not positive to begin with.
 namespace slender {
 
 struct ApproachLimit
@@ -23,11 +23,14 @@ struct MovingPoint
   Eigen::Vector3d from, to;   ///< [m]
 };
 
-double segmentsLimit(const MovingPoint& a0, const MovingPoint& a1, const MovingPoint& b0, const MovingPoint& b1, const ApproachLimit& limit);
+double segmentsLimit(const MovingPoint& a0, const MovingPoint& a1, const MovingPoint& b0, const MovingPoint& b1,
+                     const ApproachLimit& limit);
 double pointSegmentLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const ApproachLimit& limit);
-double pointTriangleLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const MovingPoint& c, const ApproachLimit& limit);
+double pointTriangleLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const MovingPoint& c,
+                          const ApproachLimit& limit);
 
-/// A rigid motion: the frame's origin goes along a straight line while the frame turns uniformly about it, by the smaller angle.
+/// A rigid motion: the frame's origin goes along a straight line while the frame turns uniformly about it, by the
+/// smaller angle.
 struct RigidMotion
 {
   RigidMotion(const Pose& from, const Pose& to);
@@ -38,7 +41,7 @@ struct RigidMotion
 };
 
 /// A segment against a convex piece of a solid that moves rigidly.
-double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const ConvexPiece& piece, const RigidMotion& motion,
-                         const ApproachLimit& limit);
+double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const ConvexPiece& piece,
+                         const RigidMotion& motion, const ApproachLimit& limit);
 
-}  // namespace slender
+}   // namespace slender

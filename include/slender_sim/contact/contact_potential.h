@@ -15,35 +15,35 @@ namespace slender {
 /// A straight piece of a tube between two points.
 struct ContactSegment
 {
-  int a = 0, b = 0;        ///< points
-  double radius = 0.0;     ///< [m]
+  int a = 0, b = 0;      ///< points
+  double radius = 0.0;   ///< [m]
   int object = 0;
-  double start = 0.0;      ///< arc length of a along the object's curve [m]; b is at start + length
-  double length = 0.0;     ///< at rest [m]
-  double core = 1.0;       ///< share of the radius that other segments may not enter (fluid parts merge down to it)
-  bool driven = false;     ///< moves as prescribed: passes through what does so, too, solids included
+  double start = 0.0;    ///< arc length of a along the object's curve [m]; b is at start + length
+  double length = 0.0;   ///< at rest [m]
+  double core = 1.0;     ///< share of the radius that other segments may not enter (fluid parts merge down to it)
+  bool driven = false;   ///< moves as prescribed: passes through what does so, too, solids included
 
   double coreRadius() const { return core * radius; }
 };
 
-/// What a curve (later: a surface) touches. Pieces of one curve that are closer along it than about a quarter of a turn at its
-/// tightest are neighbours and never a pair.
+/// What a curve (later: a surface) touches. Pieces of one curve that are closer along it than about a quarter of a turn
+/// at its tightest are neighbours and never a pair.
 struct ContactObject
 {
   double curve_length = 0.0;   ///< [m]
   bool closed = false;
   bool self = true, others = true, solids = true;
-  double friction = 0.0;       ///< Coulomb [-]
-  int owner = 0;               ///< see ContactSolid::only
+  double friction = 0.0;   ///< Coulomb [-]
+  int owner = 0;           ///< see ContactSolid::only
 };
 
 /// An obstacle or a rigid body: a shape that moves rigidly.
 struct ContactSolid
 {
   Shape shape;
-  double friction = -1.0;      ///< negative: that of whatever touches it; otherwise the geometric mean of both counts
-  std::vector<int> ignores;    ///< objects it never touches
-  int only = -1;               ///< touches nothing but the objects of this owner; -1: those of all
+  double friction = -1.0;     ///< negative: that of whatever touches it; otherwise the geometric mean of both counts
+  std::vector<int> ignores;   ///< objects it never touches
+  int only = -1;              ///< touches nothing but the objects of this owner; -1: those of all
 };
 
 struct ContactSurface
@@ -56,31 +56,34 @@ struct ContactSurface
 
 struct ContactOptions
 {
-  double gap = 0.0;            ///< distance between surfaces below which they repel [m] > 0
-  double slip_speed = 1e-4;    ///< friction sticks below it [m/s] > 0
-  double least_stiffness = 1e-6;   ///< [N] > 0: stiffness() never falls below it; a good choice is the weight of a piece
+  double gap = 0.0;           ///< distance between surfaces below which they repel [m] > 0
+  double slip_speed = 1e-4;   ///< friction sticks below it [m/s] > 0
+  /// [N] > 0: stiffness() never falls below it; a good choice is the weight of a piece
+  double least_stiffness = 1e-6;
 };
 
-/// Whether two segments of one curve are neighbours, which never count as a pair: their rest distance along the curve, the shorter way
-/// around a closed one, is less than half a turn of the tightest bend that does not touch itself, (pi/2) (r1 + r2), plus the gap.
+/// Whether two segments of one curve are neighbours, which never count as a pair: their rest distance along the curve,
+/// the shorter way around a closed one, is less than half a turn of the tightest bend that does not touch itself,
+/// (pi/2) (r1 + r2), plus the gap.
 bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap);
 
-/// Part of a touching pair's potential. With the relative displacement u = sum_i weight[i] x[point[i]] minus, if there is a solid, that of its
-/// material point at `position`, the potential has the gradient dE/du = -force and the second derivative stiffness + `geometric`, of which the
-/// first is semidefinite and the second, from the turning of a normal under its force, is not. A pair gives one term with its normal
-/// force; with friction, one more.
+/// Part of a touching pair's potential. With the relative displacement u = sum_i weight[i] x[point[i]] minus, if there
+/// is a solid, that of its material point at `position`, the potential has the gradient dE/du = -force and the second
+/// derivative stiffness + `geometric`, of which the first is semidefinite and the second, from the turning of a normal
+/// under its force, is not. A pair gives one term with its normal force; with friction, one more.
 struct ContactTerm
 {
   int point[4] = {-1, -1, -1, -1};   ///< -1: unused
   double weight[4] = {0, 0, 0, 0};
-  int solid = -1;                    ///< that is touched, -1: none
-  Eigen::Vector3d position{0, 0, 0}; ///< of the contact, world
-  Eigen::Vector3d force{0, 0, 0};    ///< on u [N], friction included
+  int solid = -1;                      ///< that is touched, -1: none
+  Eigen::Vector3d position{0, 0, 0};   ///< of the contact, world
+  Eigen::Vector3d force{0, 0, 0};      ///< on u [N], friction included
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero(), geometric = Eigen::Matrix3d::Zero();
 };
 
-/// What a pair's second derivative contains besides, because the place of contact runs along the segments: stiffness r r^T over the points, with
-/// r_i = along[i] normal + across[i] turning. Without `turning` the parts that make up for `geometric` are left out.
+/// What a pair's second derivative contains besides, because the place of contact runs along the segments: stiffness r
+/// r^T over the points, with r_i = along[i] normal + across[i] turning. Without `turning` the parts that make up for
+/// `geometric` are left out.
 struct ContactRow
 {
   int point[4] = {-1, -1, -1, -1};
@@ -89,8 +92,8 @@ struct ContactRow
   double stiffness = 0.0;
 };
 
-/// When to factor with contacts' whole second derivatives, which Newton's method wants where curves run along each other but which may leave
-/// the matrix indefinite: after a failure not for the next 1, 3, 7, 15 factorisations.
+/// When to factor with contacts' whole second derivatives, which Newton's method wants where curves run along each
+/// other but which may leave the matrix indefinite: after a failure not for the next 1, 3, 7, 15 factorisations.
 class WholeStiffness
 {
 public:
@@ -106,8 +109,8 @@ private:
 };
 
 /// Barrier potential of surfaces that may not touch, with Coulomb friction by lagged normal forces
-/// [Li et al., Incremental Potential Contact, SIGGRAPH 2020; Codimensional IPC, 2021]. Infinite where surfaces meet; with stepLimit() the
-/// iterates of a minimisation never get there. Memory is reused from step to step.
+/// [Li et al., Incremental Potential Contact, SIGGRAPH 2020; Codimensional IPC, 2021]. Infinite where surfaces meet;
+/// with stepLimit() the iterates of a minimisation never get there. Memory is reused from step to step.
 class ContactPotential
 {
 public:
@@ -115,34 +118,42 @@ public:
   ~ContactPotential();
   ContactPotential(ContactPotential&&) noexcept;
 
-  /// Other points, segments and objects (sound ones) from now on; the solids stay. For curves that are fed and divided while they move.
+  /// Other points, segments and objects (sound ones) from now on; the solids stay. For curves that are fed and divided
+  /// while they move.
   void setCurves(int points, const std::vector<ContactSegment>& segments, const std::vector<ContactObject>& objects);
-  /// Thins segments where others, or solids, are nearer than a twentieth of the gap, or overlap: to a sixteenth of it. What was brought together by
-  /// something else than motion (a division, growing radii) can so begin a step. False: two centrelines, or one and a solid, meet.
+  /// Thins segments where others, or solids, are nearer than a twentieth of the gap, or overlap: to a sixteenth of it.
+  /// What was brought together by something else than motion (a division, growing radii) can so begin a step. False:
+  /// two centrelines, or one and a solid, meet.
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const std::vector<ContactSegment>& segments() const;
-  /// Segments that thinToFit() found near each other: all those within the gap, and more. First and second are in order.
+  /// Segments that thinToFit() found near each other: all those within the gap, and more. First and second are in
+  /// order.
   const std::vector<GridPairs::Pair>& nearPairs() const;
 
-  /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less: they meet. Shares no
-  /// search structure and no minimisation with the rest of this class. The surface of a mesh is touched from both sides.
+  /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less:
+  /// they meet. Shares no search structure and no minimisation with the rest of this class. The surface of a mesh is
+  /// touched from both sides.
   double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
 
-  /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its normal forces and
-  /// tangent planes are those of friction until lagFriction(). Nothing else is carried over from earlier steps but stiffness().
+  /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its
+  /// normal forces and tangent planes are those of friction until lagFriction(). Nothing else is carried over from
+  /// earlier steps but stiffness().
   void begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h);
-  /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change of a contact's
-  /// force over the largest force.
+  /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change
+  /// of a contact's force over the largest force.
   double lagFriction();
 
-  /// The largest share alpha <= 1 of the motion from (x, solids) to (x_end, solids_end) that leaves of each distance between surfaces at least
-  /// a fifth, or a fifth of the gap. Points go along straight lines; solids' origins too, while they turn uniformly by the smaller angle.
-  /// Conservative [Li et al. 2021, additive CCD]: misses nothing. 0 if surfaces meet at x.
-  double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
+  /// The largest share alpha <= 1 of the motion from (x, solids) to (x_end, solids_end) that leaves of each distance
+  /// between surfaces at least a fifth, or a fifth of the gap. Points go along straight lines; solids' origins too,
+  /// while they turn uniformly by the smaller angle. Conservative [Li et al. 2021, additive CCD]: misses nothing. 0 if
+  /// surfaces meet at x.
+  double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
+                   const std::vector<Pose>& solids_end);
 
-  /// Potential [J] at a configuration; infinite where surfaces meet or x is not finite. Fills terms(), in an order that depends on x and
-  /// solids only; their stiffness and rows() only on request. The second derivative is exact for pairs of segments; of solids, what their
-  /// own curvature and turning add to it is left out, and friction's is that of the secant where it slips back and forth.
+  /// Potential [J] at a configuration; infinite where surfaces meet or x is not finite. Fills terms(), in an order that
+  /// depends on x and solids only; their stiffness and rows() only on request. The second derivative is exact for pairs
+  /// of segments; of solids, what their own curvature and turning add to it is left out, and friction's is that of the
+  /// secant where it slips back and forth.
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   const std::vector<ContactTerm>& terms() const;
   const std::vector<ContactRow>& rows() const;
@@ -151,15 +162,18 @@ public:
   double largestForce() const;
   double smallestGap() const;
 
-  /// Force [N] of the barrier at half the gap. adaptStiffness(), after a step, follows the largest normal force of the last evaluate(): it
-  /// aims at a smallest gap of a fifth and acts outside a twelfth to a half. Part of a simulation's state.
+  /// Force [N] of the barrier at half the gap. adaptStiffness(), after a step, follows the largest normal force of the
+  /// last evaluate(): it aims at a smallest gap of a fifth and acts outside a twelfth to a half. Part of a simulation's
+  /// state.
   double stiffness() const;
   void setStiffness(double force);
   void adaptStiffness();
-  /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. Below a twelfth of the gap it is made
-  /// stiffer, as adaptStiffness() would where a solution has `converged`, fourfold where forces mean nothing yet. True: it was.
+  /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. Below a twelfth
+  /// of the gap it is made stiffer, as adaptStiffness() would where a solution has `converged`, fourfold where forces
+  /// mean nothing yet. True: it was.
   bool stiffen(bool converged);
-  /// From now on the stiffness stays below this [N]; no less than what it is to be set to. At first there is no such bound.
+  /// From now on the stiffness stays below this [N]; no less than what it is to be set to. At first there is no such
+  /// bound.
   void setMostStiffness(double force);
 
 private:
@@ -167,4 +181,4 @@ private:
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace slender
+}   // namespace slender

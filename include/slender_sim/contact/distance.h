@@ -16,15 +16,19 @@ struct SegmentPair
 };
 
 /// Where two segments are nearest to each other; one of many places when they are parallel.
-SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0, const Eigen::Vector3d& b1);
+SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
+                              const Eigen::Vector3d& b1);
 
-/// Barycentric coordinates of the point of a triangle nearest to p; exactly zero for the corners that it does not depend on
-/// [Ericson, Real-Time Collision Detection, 5.1.5].
-Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+/// Barycentric coordinates of the point of a triangle nearest to p; exactly zero for the corners that it does not
+/// depend on [Ericson, Real-Time Collision Detection, 5.1.5].
+Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                  const Eigen::Vector3d& c);
 
 /// Distance [m] of the points that the functions above find.
 double pointSegmentDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
-double segmentDistance(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0, const Eigen::Vector3d& b1);
-double pointTriangleDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+double segmentDistance(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
+                       const Eigen::Vector3d& b1);
+double pointTriangleDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                             const Eigen::Vector3d& c);
 
-}  // namespace slender
+}   // namespace slender

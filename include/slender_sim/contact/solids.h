@@ -16,26 +16,29 @@ using Triangle = std::array<Eigen::Vector3d, 3>;
 /// A convex shape in its own frame. Meshes are taken triangle by triangle.
 using ConvexPiece = std::variant<Plane, Sphere, Box, Cylinder, Capsule, Triangle>;
 
-/// Distance from a convex piece along a line through a point. Closed formulas: FCL's GJK gives a capsule's distance to 1e-10 m, but in 2 to 5 us
-/// instead of 0.3 us for a whole softened contact, and without the curvature and the unique place that smooth forces need (see
-/// bench/contact_benchmark.cpp). Outside it is once continuously differentiable and convex in the point.
+/// Distance from a convex piece along a line through a point. Closed formulas: FCL's GJK gives a capsule's distance to
+/// 1e-10 m, but in 2 to 5 us instead of 0.3 us for a whole softened contact, and without the curvature and the unique
+/// place that smooth forces need (see bench/contact_benchmark.cpp). Outside it is once continuously differentiable and
+/// convex in the point.
 struct PieceDistance
 {
-  double distance = 0.0;        ///< [m] negative inside (a triangle has no inside)
-  Eigen::Vector3d normal;       ///< its gradient, unit
-  double curvature = 0.0;       ///< second derivative along `direction` (not normalised)
+  double distance = 0.0;    ///< [m] negative inside (a triangle has no inside)
+  Eigen::Vector3d normal;   ///< its gradient, unit
+  double curvature = 0.0;   ///< second derivative along `direction` (not normalised)
 };
 
 /// p, direction: in the piece's frame [m].
 PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& direction);
 
-/// Throws std::invalid_argument naming what is wrong with a shape: sizes that are not positive, indices out of range, no triangles.
+/// Throws std::invalid_argument naming what is wrong with a shape: sizes that are not positive, indices out of range,
+/// no triangles.
 void checkShape(const Shape& shape);
 
 /// Radius [m] of a ball about the frame's origin that holds the shape; infinite for a plane.
 double boundingRadius(const Shape& shape);
 
-/// Distance [m] of a segment from a shape, by places along the segment: enough to tell which of several shapes is nearest.
+/// Distance [m] of a segment from a shape, by places along the segment: enough to tell which of several shapes is
+/// nearest.
 double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-}  // namespace slender
+}   // namespace slender

@@ -1,7 +1,8 @@
 #pragma once
 
-/// Structure-of-arrays view of the constraints c_j = (|e_j|^2 - L_j^2) / (2 L_j) = 0 of one chain, for the hot loops of FastProjection.
-/// Edge j runs from node j to j+1. Every array is readable from index -kHalo to nodes + kHalo; of a closed chain the halo repeats it.
+/// Structure-of-arrays view of the constraints c_j = (|e_j|^2 - L_j^2) / (2 L_j) = 0 of one chain, for the hot loops of
+/// FastProjection. Edge j runs from node j to j+1. Every array is readable from index -kHalo to nodes + kHalo; of a
+/// closed chain the halo repeats it.
 namespace slender {
 
 struct ChainArrays
@@ -10,15 +11,17 @@ struct ChainArrays
 
   int nodes = 0, edges = 0;
   bool closed = false;
-  double* x[3];            ///< nodes [m]
-  double* direction[3];    ///< edges at the start of the step over their rest lengths; zero beyond the ends of an open chain
-  double* s[3];            ///< present edges over their rest lengths; likewise
-  double* inverse_mass;    ///< per node [1/kg], 0: held, or carried by a body
+  double* x[3];   ///< nodes [m]
+  /// edges at the start of the step over their rest lengths; zero beyond the ends of an open chain
+  double* direction[3];
+  double* s[3];           ///< present edges over their rest lengths; likewise
+  double* inverse_mass;   ///< per node [1/kg], 0: held, or carried by a body
   double *rest_length, *inverse_rest;
-  double* active;          ///< per edge 1, or 0: no end can move on its own
-  double *c, *diagonal, *upper, *lower;   ///< tridiagonal system of the multipliers; upper[j] couples edge j to j+1, lower[j] to j-1
-  double *pivot, *factor;  ///< of its elimination: inverse pivots and multipliers
-  double *lambda, *total;  ///< [N s^2], last correction and sum
+  double* active;   ///< per edge 1, or 0: no end can move on its own
+  /// tridiagonal system of the multipliers; upper[j] couples edge j to j+1, lower[j] to j-1
+  double *c, *diagonal, *upper, *lower;
+  double *pivot, *factor;   ///< of its elimination: inverse pivots and multipliers
+  double *lambda, *total;   ///< [N s^2], last correction and sum
 };
 
 struct ChainKernels
@@ -35,11 +38,17 @@ struct ChainKernels
   void (*apply)(const ChainArrays& chain);
 };
 
-namespace baseline { extern const ChainKernels chain_kernels; }
-namespace avx2 { extern const ChainKernels chain_kernels; }
-namespace avx512 { extern const ChainKernels chain_kernels; }
+namespace baseline {
+extern const ChainKernels chain_kernels;
+}
+namespace avx2 {
+extern const ChainKernels chain_kernels;
+}
+namespace avx512 {
+extern const ChainKernels chain_kernels;
+}
 
 /// The table for this machine.
 const ChainKernels& chainKernels();
 
-}  // namespace slender
+}   // namespace slender

@@ -11,22 +11,23 @@ namespace slender {
 /// What the second derivative of the energy says of a stationary configuration.
 struct EquilibriumStability
 {
-  bool stable = true;         ///< no eigenvalue lies below the neutral band
-  double lowest = 0.0;        ///< lowest eigenvalue [1/s^2], see StepReport::lowest_eigenvalue
-  double energy = 0.0;        ///< elastic energy and that of the loads [J]
-  double energy_noise = 0.0;  ///< differences of energies below it are round-off [J]
-  double work = 0.0;          ///< work of loads without a potential since the search began [J]
+  bool stable = true;          ///< no eigenvalue lies below the neutral band
+  double lowest = 0.0;         ///< lowest eigenvalue [1/s^2], see StepReport::lowest_eigenvalue
+  double energy = 0.0;         ///< elastic energy and that of the loads [J]
+  double energy_noise = 0.0;   ///< differences of energies below it are round-off [J]
+  double work = 0.0;           ///< work of loads without a potential since the search began [J]
   /// The search goes down this: the energy without what those loads have done.
   double balance() const { return energy - work; }
 };
 
-/// Largest unbalanced force over the largest force at an equilibrium. Newton's increments of 1e-8 of an edge leave 1e-7. Where nothing balances a
-/// load, as much as the load is left.
+/// Largest unbalanced force over the largest force at an equilibrium. Newton's increments of 1e-8 of an edge leave
+/// 1e-7. Where nothing balances a load, as much as the load is left.
 constexpr double kMostUnbalanced = 1e-4;
 
-/// Leaves the saddle at which the search is, along its mode of negative curvature: to both sides, and less and less far, until the search settles
-/// at a stationary configuration of lower energy. By symmetry both sides are usually equal; the one that the sign of the mode gives comes first.
-/// Returns false, with the search at the saddle, when no attempt ends lower. `System` as for settleStably().
+/// Leaves the saddle at which the search is, along its mode of negative curvature: to both sides, and less and less
+/// far, until the search settles at a stationary configuration of lower energy. By symmetry both sides are usually
+/// equal; the one that the sign of the mode gives comes first. Returns false, with the search at the saddle, when no
+/// attempt ends lower. `System` as for settleStably().
 template <class System>
 bool leaveSaddle(System& system, const EquilibriumStability& at)
 {
@@ -34,21 +35,24 @@ bool leaveSaddle(System& system, const EquilibriumStability& at)
   for (const double turn : {0.1, -0.1, 0.01, -0.01, 1e-3, -1e-3})   // [rad] of the edge that the mode turns most
   {
     system.restore(saddle);
-    if (system.displace(turn) && system.settleFrom(at.lowest) && system.assess(false).balance() < at.balance() - at.energy_noise)
+    if (system.displace(turn) && system.settleFrom(at.lowest) &&
+        system.assess(false).balance() < at.balance() - at.energy_noise)
       return true;
   }
   system.restore(saddle);
   return false;
 }
 
-/// Goes on from the stationary configuration at which `system` is until the equilibrium is stable or every way down from a saddle was tried. With
-/// `leave_saddles` false it only assesses. The report gets stability, lowest eigenvalue, energy and the number of saddles that were left.
+/// Goes on from the stationary configuration at which `system` is until the equilibrium is stable or every way down
+/// from a saddle was tried. With `leave_saddles` false it only assesses. The report gets stability, lowest eigenvalue,
+/// energy and the number of saddles that were left.
 ///
 /// System offers
-///   assess(spectrum)               the EquilibriumStability of the present configuration; with `spectrum` also its eigenvalue and mode,
-///   configuration(), restore(c)    the present configuration, and the way back to it,
-///   displace(turn)                 moves along the mode of the last assess(true); returns false where that is not possible,
-///   settleFrom(lowest)             minimises the energy from a displaced saddle with this lowest eigenvalue; returns false if it does not settle.
+///   assess(spectrum)               the EquilibriumStability of the present configuration; with `spectrum` also its
+///   eigenvalue and mode, configuration(), restore(c)    the present configuration, and the way back to it,
+///   displace(turn)                 moves along the mode of the last assess(true); returns false where that is not
+///   possible, settleFrom(lowest)             minimises the energy from a displaced saddle with this lowest eigenvalue;
+///   returns false if it does not settle.
 template <class System>
 void settleStably(System& system, bool leave_saddles, StepReport& report)
 {
@@ -65,24 +69,27 @@ void settleStably(System& system, bool leave_saddles, StepReport& report)
   }
 }
 
-/// Static equilibrium by continuation: what is prescribed is carried to its targets in small moves, and at each the energy is minimised with a
-/// proximal term 1/2 w |x - x_k|^2 about the last configuration. Its weight falls to zero as the iteration settles. What it settles at is
-/// stationary. The inertia of the Hessian says whether it is a minimum; from a saddle the search goes on (settleStably()).
+/// Static equilibrium by continuation: what is prescribed is carried to its targets in small moves, and at each the
+/// energy is minimised with a proximal term 1/2 w |x - x_k|^2 about the last configuration. Its weight falls to zero as
+/// the iteration settles. What it settles at is stationary. The inertia of the Hessian says whether it is a minimum;
+/// from a saddle the search goes on (settleStably()).
 ///
 /// System offers, besides what settleStably() needs except settleFrom(),
-///   round(fraction, weight)   minimises with what is prescribed at this fraction of its way, and a proximal weight in units of its own. The result
+///   round(fraction, weight)   minimises with what is prescribed at this fraction of its way, and a proximal weight in
+///   units of its own. The result
 ///                             becomes the present configuration on success,
 ///   shift()                   the largest displacement of the last round over the size of the system,
 ///   takeBase()                makes what a round that did not converge came to the present configuration,
-///   weightOf(rate)            the proximal weight whose term has this eigenvalue [1/s^2]; it may be infinite or not a number.
+///   weightOf(rate)            the proximal weight whose term has this eigenvalue [1/s^2]; it may be infinite or not a
+///   number.
 template <class System>
 class EquilibriumSearch
 {
 public:
   EquilibriumSearch(System& system, StepReport& report) : system_(system), report_(report) {}
 
-  /// Carries what is prescribed to its targets in at least `moves` moves. With none (0) nothing is done. Returns false when the system cannot
-  /// follow; failure() says why.
+  /// Carries what is prescribed to its targets in at least `moves` moves. With none (0) nothing is done. Returns false
+  /// when the system cannot follow; failure() says why.
   bool carry(double moves)
   {
     constexpr int kMostFailures = 40;
@@ -108,7 +115,8 @@ public:
     return true;
   }
 
-  /// Minimises the energy from the present configuration on. Returns false when that does not settle; failure() says why.
+  /// Minimises the energy from the present configuration on. Returns false when that does not settle; failure() says
+  /// why.
   bool settle()
   {
     constexpr int kMostRounds = 1000, kMostFailures = 40;
@@ -122,7 +130,8 @@ public:
         if (failure_ == StepFailure::newton_diverged && weight > 0)
           system_.takeBase();   // Newton did not arrive but came further down: the next round begins there
         weight_ = std::max(10.0 * weight_, 1e-6);
-        ease = std::sqrt(ease);   // The weight falls more slowly now, so that the search does not come back here at once.
+        // The weight falls more slowly now, so that the search does not come back here at once.
+        ease = std::sqrt(ease);
         if (++failures > kMostFailures || failure_ == StepFailure::interrupted)
           return false;
         continue;
@@ -138,7 +147,8 @@ public:
     return false;
   }
 
-  /// Settles, then leaves saddles (with `leave_saddles`) until the equilibrium is stable or no way leads down. Returns false if nothing settled.
+  /// Settles, then leaves saddles (with `leave_saddles`) until the equilibrium is stable or no way leads down. Returns
+  /// false if nothing settled.
   bool settleStably(bool leave_saddles)
   {
     if (!settle())
@@ -154,7 +164,10 @@ public:
   EquilibriumStability assess(bool spectrum) { return system_.assess(spectrum); }
   auto configuration() const { return system_.configuration(); }
   template <class Configuration>
-  void restore(const Configuration& configuration) { system_.restore(configuration); }
+  void restore(const Configuration& configuration)
+  {
+    system_.restore(configuration);
+  }
   bool displace(double turn) { return system_.displace(turn); }
   bool settleFrom(double lowest)
   {
@@ -183,4 +196,4 @@ private:
   double weight_ = 1.0;   ///< of the proximal term, in the system's own unit
 };
 
-}  // namespace slender
+}   // namespace slender

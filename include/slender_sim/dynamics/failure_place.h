@@ -9,14 +9,21 @@ namespace slender {
 /// The node of a failed step that is farthest from a solution. Simulation::step() names what is near it.
 struct FailurePlace
 {
-  enum class Kind { none, rod, thread, cloth };
+  enum class Kind
+  {
+    none,
+    rod,
+    thread,
+    cloth
+  };
   Kind kind = Kind::none;
   std::string name;                    ///< of the rod, thread or cloth
   int node = -1;                       ///< node of the rod or thread, vertex of the cloth
   Eigen::Vector3d position{0, 0, 0};   ///< [m] of the node as the step began: trial positions may be anywhere
 };
 
-/// The largest of the values that were added, and where it is. A value that is not finite counts as larger than all others; of several the first is kept.
+/// The largest of the values that were added, and where it is. A value that is not finite counts as larger than all
+/// others; of several the first is kept.
 class Largest
 {
 public:
@@ -35,4 +42,4 @@ private:
 /// "(0.1, -2, 0.3) m", for messages.
 std::string metres(const Eigen::Vector3d& position);
 
-}  // namespace slender
+}   // namespace slender

@@ -16,7 +16,8 @@ struct ProjectionReport
   bool ok = true;
   int iterations = 0;              ///< linear solves
   double constraint_error = 0.0;   ///< largest | |e|^2/L^2 - 1 | left
-  int chain = -1, first_node = 0, last_node = 0;   ///< not ok: held nodes that are further apart than the chain between them is long; -1: other reasons
+  /// not ok: held nodes that are further apart than the chain between them is long; -1: other reasons
+  int chain = -1, first_node = 0, last_node = 0;
 };
 
 /// A rigid body in a projection. Its origin is the centre of mass.
@@ -24,24 +25,30 @@ struct ProjectedBody
 {
   double mass = 1.0;                                       ///< [kg]
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();   ///< about the centre of mass, body axes [kg m^2]
-  Pose start;              ///< at the start of the step
-  Pose pose;               ///< in: where an unconstrained step would take it; out: projected
-  Twist velocity;          ///< likewise; world axes
+  Pose start;                                              ///< at the start of the step
+  Pose pose;        ///< in: where an unconstrained step would take it; out: projected
+  Twist velocity;   ///< likewise; world axes
 };
 
-/// Fast manifold projection (thesis 4.5.2; Goldenthal et al. 2007): after an unconstrained step, moves chains of nodes and the bodies
-/// that carry some of them to where all edges have their rest lengths, by the least displacement in the metric of the masses.
+/// Fast manifold projection (thesis 4.5.2; Goldenthal et al. 2007): after an unconstrained step, moves chains of nodes
+/// and the bodies that carry some of them to where all edges have their rest lengths, by the least displacement in the
+/// metric of the masses.
 ///
-/// Constraint forces act along the edges as they lie at the start of the step (SHAKE [Ryckaert et al. 1977]) instead of at the last
-/// iterate: that conserves linear and angular momentum exactly, and with symplectic Euler it is a symplectic method. A body's turn is
-/// described by the rotation vector phi from its start, in the metric of its inertia there, so that its angular momentum changes by just
-/// the impulses' moments. Each iteration is a Newton step: tridiagonal solves along the chains, and a sparse system for the bodies.
+/// Constraint forces act along the edges as they lie at the start of the step (SHAKE [Ryckaert et al. 1977]) instead of
+/// at the last iterate: that conserves linear and angular momentum exactly, and with symplectic Euler it is a
+/// symplectic method. A body's turn is described by the rotation vector phi from its start, in the metric of its
+/// inertia there, so that its angular momentum changes by just the impulses' moments. Each iteration is a Newton step:
+/// tridiagonal solves along the chains, and a sparse system for the bodies.
 class FastProjection
 {
 public:
   /// Returns the chain's number. Lengths [m] per edge, masses [kg] per node.
   int addChain(const Eigen::VectorXd& rest_length, const Eigen::VectorXd& mass, bool closed);
-  int addBody() { bodies_.emplace_back(); return static_cast<int>(bodies_.size()) - 1; }
+  int addBody()
+  {
+    bodies_.emplace_back();
+    return static_cast<int>(bodies_.size()) - 1;
+  }
   ProjectedBody& body(int b) { return bodies_[b]; }
 
   /// Held nodes stay where the trial has them.
@@ -51,8 +58,8 @@ public:
   /// The node goes rigidly with a body, at r_B in its axes [m]; its own mass is not counted: add it to the body's.
   void weld(int chain, int node, int body, const Eigen::Vector3d& r_B);
 
-  /// Nodes at the start of the step (welded ones where their bodies have them), and after the unconstrained step (held ones where they
-  /// shall be; welded ones do not matter).
+  /// Nodes at the start of the step (welded ones where their bodies have them), and after the unconstrained step (held
+  /// ones where they shall be; welded ones do not matter).
   void setStart(int chain, const Eigen::Matrix3Xd& x);
   void setTrial(int chain, const Eigen::Matrix3Xd& x);
 
@@ -79,30 +86,32 @@ private:
     ChainArrays a;
     std::vector<AlignedVector<double>> storage;
     std::vector<double> mass;
-    std::vector<int> owner;                    ///< per node: kFree, kHeld or a body
-    std::vector<Eigen::Vector3d> r_B;          ///< of welded nodes
-    std::vector<Eigen::Vector3d> start, trial; ///< nodes; trial ones of welded nodes are not used
-    AlignedVector<double> corner;              ///< closed: column of the corners' rank-one part, solved
+    std::vector<int> owner;                      ///< per node: kFree, kHeld or a body
+    std::vector<Eigen::Vector3d> r_B;            ///< of welded nodes
+    std::vector<Eigen::Vector3d> start, trial;   ///< nodes; trial ones of welded nodes are not used
+    AlignedVector<double> corner;                ///< closed: column of the corners' rank-one part, solved
     double corner_factor = 0, corner_row = 0;
   };
   /// One end of an edge that is a welded node.
   struct Touch
   {
     int chain, edge, body;
-    double sign;           ///< +1: the edge ends at the welded node, -1: it begins there
+    double sign;   ///< +1: the edge ends at the welded node, -1: it begins there
     int node;
     int special;           ///< index of the edge among the special ones, -1: another
     int run;               ///< of edges that free nodes connect: touches of one run feel each other
     Vector6 row, column;   ///< d(edge's length)/d(body), impulse on the body per multiplier
   };
 
-  /// An edge whose multiplier is an unknown beside the bodies' displacements: one that only bodies can move, or the last of a run between
-  /// two nodes that are not free. Without it such a run has a loose end; a straight one between two fixed nodes has a singular system.
+  /// An edge whose multiplier is an unknown beside the bodies' displacements: one that only bodies can move, or the
+  /// last of a run between two nodes that are not free. Without it such a run has a loose end; a straight one between
+  /// two fixed nodes has a singular system.
   struct Special
   {
     int chain, edge, run;
-    int before;            ///< the edge that a free node connects it to, -1: none
-    double c = 0;          ///< right-hand side, and entries of the chain's system: (before, edge), (edge, before), (edge, edge)
+    int before;   ///< the edge that a free node connects it to, -1: none
+    /// right-hand side, and entries of the chain's system: (before, edge), (edge, before), (edge, edge)
+    double c = 0;
     double to_before = 0, from_before = 0, own = 0;
   };
 
@@ -126,11 +135,12 @@ private:
 
   std::vector<Touch> touches_;
   std::vector<Special> specials_;
-  std::vector<Vector6> impulse_;           ///< per body, sum so far
-  std::vector<Eigen::Vector3d> turn_;      ///< per body, rotation vector from its start
-  SparseLu matrix_;                        ///< of the bodies' displacements, six each, then of the special edges' multipliers
+  std::vector<Vector6> impulse_;        ///< per body, sum so far
+  std::vector<Eigen::Vector3d> turn_;   ///< per body, rotation vector from its start
+  /// of the bodies' displacements, six each, then of the special edges' multipliers
+  SparseLu matrix_;
   Eigen::VectorXd solution_;
-  AlignedVector<double> column_;           ///< work space
+  AlignedVector<double> column_;   ///< work space
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -8,7 +8,17 @@
 namespace slender {
 
 /// Known quantities that a stage combines: state at the start of the step, one step before it, and the first stage.
-enum History { kQ, kV, kA, kQPrevious, kVPrevious, kQStage, kVStage, kHistoryCount };
+enum History
+{
+  kQ,
+  kV,
+  kA,
+  kQPrevious,
+  kVPrevious,
+  kQStage,
+  kVStage,
+  kHistoryCount
+};
 using Combination = std::array<double, kHistoryCount>;
 
 /// One implicit stage of a time step, for M q'' = F(q, q'): find q with
@@ -17,12 +27,13 @@ using Combination = std::array<double, kHistoryCount>;
 /// (q - qTilde) / tau_v of the strain gives viscous forces of the same order (thesis 5.3.1).
 struct Stage
 {
-  double time;             ///< of the inputs, as a fraction of the step
-  double tau_a, tau_v;     ///< [s]
+  double time;           ///< of the inputs, as a fraction of the step
+  double tau_a, tau_v;   ///< [s]
   Combination q_hat, q_tilde;
 };
 
-/// How the stages of one step of length h end: q1 = q0 + (q - q0) / fraction, likewise v; a1 = a0 + (a - a0) / a_fraction.
+/// How the stages of one step of length h end: q1 = q0 + (q - q0) / fraction, likewise v; a1 = a0 + (a - a0) /
+/// a_fraction.
 struct StepPlan
 {
   std::vector<Stage> stages;
@@ -34,12 +45,15 @@ struct StepPlan
 /// then start with implicit Euler). Not for symplectic_euler and imex. Reuses the memory of `plan`.
 ///  - implicit_euler: first order, L-stable.
 ///  - bdf2: variable-step second order, L-stable [Hairer & Wanner, Solving ODEs II, V.1].
-///  - tr_bdf2: trapezoid to gamma h, then BDF2, gamma = 2 - sqrt 2; second order, L-stable [Bank et al. 1985; Hosea & Shampine 1996].
+///  - tr_bdf2: trapezoid to gamma h, then BDF2, gamma = 2 - sqrt 2; second order, L-stable [Bank et al. 1985; Hosea &
+///  Shampine 1996].
 ///  - implicit_midpoint: second order, symplectic, no damping at infinite frequency.
-///  - generalized_alpha: second order, damping at infinite frequency by spectral_radius (1: midpoint-like, 0: most) [Chung & Hulbert 1993].
+///  - generalized_alpha: second order, damping at infinite frequency by spectral_radius (1: midpoint-like, 0: most)
+///  [Chung & Hulbert 1993].
 void planStep(Integrator integrator, double spectral_radius, double h, double previous_step, StepPlan& plan);
 
-/// Steps from 0 s to `end` [s], at least 1: a time that is a whole number of steps but for round-off takes no more. At most 1e15, whose end nobody sees.
+/// Steps from 0 s to `end` [s], at least 1: a time that is a whole number of steps but for round-off takes no more. At
+/// most 1e15, whose end nobody sees.
 long stepsUntil(double end, double step);
 
 /// Constant C in the local position error C h^2 |a1 - a0| (second order) or C h^2 |a1| (implicit Euler).
@@ -48,4 +62,4 @@ double errorConstant(Integrator integrator);
 /// Order of convergence.
 int order(Integrator integrator);
 
-}  // namespace slender
+}   // namespace slender

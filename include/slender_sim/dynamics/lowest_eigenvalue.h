@@ -12,14 +12,16 @@ struct LowestEigenvalue
   double shift = 0.0;   ///< K + shift M is positive definite, and close to singular: what inverse iteration factors
 };
 
-/// Finds the lowest eigenvalue by bisection. `definite(s)` factors K + s M and returns whether it is positive definite; s may be negative. By
-/// Sylvester's law of inertia K + s M is definite exactly when the lowest eigenvalue is above -s, so that no start vector can miss a mode.
-/// Eigenvalues of size `neutral` (> 0) or less count as zero. Returns minus infinity when no shift makes the matrix definite.
+/// Finds the lowest eigenvalue by bisection. `definite(s)` factors K + s M and returns whether it is positive definite;
+/// s may be negative. By Sylvester's law of inertia K + s M is definite exactly when the lowest eigenvalue is above -s,
+/// so that no start vector can miss a mode. Eigenvalues of size `neutral` (> 0) or less count as zero. Returns minus
+/// infinity when no shift makes the matrix definite.
 template <class Definite>
 LowestEigenvalue lowestEigenvalue(Definite&& definite, double neutral)
 {
   constexpr double kGrowth = 8.0, kRelative = 1.001, kMost = 1e36;
-  double near = neutral, far = kGrowth * neutral;   // sizes of the eigenvalue, of which the first is too small and the second too large
+  // sizes of the eigenvalue, of which the first is too small and the second too large
+  double near = neutral, far = kGrowth * neutral;
   const bool negative = !definite(neutral);
   if (!negative && !definite(-neutral))
   {
@@ -43,4 +45,4 @@ LowestEigenvalue lowestEigenvalue(Definite&& definite, double neutral)
   return {(negative ? -1.0 : 1.0) * std::sqrt(near * far), shift};
 }
 
-}  // namespace slender
+}   // namespace slender

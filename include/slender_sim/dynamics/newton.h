@@ -15,9 +15,9 @@ struct NewtonResult
 {
   StepFailure failure = StepFailure::none;
   int iterations = 0, factorizations = 0;
-  double residual = 0.0;     ///< unbalanced force over the force scale [-]
+  double residual = 0.0;   ///< unbalanced force over the force scale [-]
   double max_strain = 0.0;
-  bool definite = true;      ///< the last Hessian was positive definite without a shift
+  bool definite = true;   ///< the last Hessian was positive definite without a shift
   bool ok() const { return failure == StepFailure::none; }
 };
 
@@ -28,11 +28,11 @@ constexpr double kFoldedChi = 1.5e-3;
 /// Minimises a system's energy by Newton's method from its trial configuration.
 ///
 /// System offers evaluate(with_hessian, shift), solve(), moveAlong(alpha), accept(), saveBase(), restoreBase() and
-/// the measures used below (see RodSystem and CoupledSystem). A Hessian with negative eigenvalues (known from the inertia of its LDL^T) is
-/// shifted by a positive diagonal until it is definite, so that the direction descends.
-/// Steps are accepted by a watchdog [Nocedal & Wright, Numerical Optimization, 15.6]: nearly inextensible bodies gain a little
-/// stretching energy in every full step that turns them, and a strict line search would creep. Full steps may raise
-/// the energy a few times; if it does not then fall below its best, the search returns there and becomes strict.
+/// the measures used below (see RodSystem and CoupledSystem). A Hessian with negative eigenvalues (known from the
+/// inertia of its LDL^T) is shifted by a positive diagonal until it is definite, so that the direction descends. Steps
+/// are accepted by a watchdog [Nocedal & Wright, Numerical Optimization, 15.6]: nearly inextensible bodies gain a
+/// little stretching energy in every full step that turns them, and a strict line search would creep. Full steps may
+/// raise the energy a few times; if it does not then fall below its best, the search returns there and becomes strict.
 template <class System>
 NewtonResult minimize(System& system, const NewtonConfig& config)
 {
@@ -79,13 +79,16 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     if (!std::isfinite(increment))
       return fail(StepFailure::state_not_finite);
     double alpha = system.stepLimit();
-    // A shifted Hessian shortens the increment, so a saddle (a step's equation may well have one) must show by its residual.
+    // A shifted Hessian shortens the increment, so a saddle (a step's equation may well have one) must show by its
+    // residual.
     bool converged = alpha == 1.0 && increment <= config.tolerance && shift.none();
     if (!converged && alpha == 1.0 && increment < 1e-2)
     {
       const double residual = system.residual();
-      converged = residual <= system.noiseLevel() || (increment <= config.tolerance && residual < 1e-9 * system.forceScale()) ||
-                  (shift.position == 0.0 && increment <= 1e-3 * config.tolerance && system.anglesMayKeepShift());   // they shorten it no more than tenfold
+      converged = residual <= system.noiseLevel() ||
+                  (increment <= config.tolerance && residual < 1e-9 * system.forceScale()) ||
+                  // they shorten it no more than tenfold
+                  (shift.position == 0.0 && increment <= 1e-3 * config.tolerance && system.anglesMayKeepShift());
     }
     if (converged)
     {
@@ -137,4 +140,4 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -20,9 +20,11 @@ enum class StepFailure
   squeezed,             ///< contact: prescribed motions leave no room for what lies between them
   energy_grew,          ///< energy out of nothing: implicit_midpoint, generalized_alpha; cloth with one Newton step
   overstretched,        ///< projection: the edges cannot all keep their lengths
-  turned_too_far,       ///< isotropic formulation: the twist changed by about half a turn in one step, and could not be counted
-  work_exceeded,        ///< cloth: more work than a step is given; the guide, or what holds it, moves too far at once or presses it too hard
-  interrupted,          ///< the process was asked to end (interruptSteps()); nothing is wrong with the step
+  /// isotropic formulation: the twist changed by about half a turn in one step, and could not be counted
+  turned_too_far,
+  /// cloth: more work than a step is given; the guide, or what holds it, moves too far at once or presses it too hard
+  work_exceeded,
+  interrupted,   ///< the process was asked to end (interruptSteps()); nothing is wrong with the step
 };
 
 /// What one call of step() did. Sums and maxima run over all its substeps.
@@ -30,31 +32,36 @@ struct StepReport
 {
   bool ok = true;
   StepFailure failure = StepFailure::none;
-  std::string message;            ///< empty when ok; otherwise the reason and what to change
-  FailurePlace place;             ///< of a failure: the node that it is about, where that is known
-  int substeps = 0;               ///< steps actually taken (1 unless the step was cut or adapted)
-  int cut_steps = 0;              ///< how often a step was halved because it could not be done
-  int iterations = 0;             ///< Newton iterations
-  int linear_iterations = 0;      ///< of conjugate gradients (cloth)
-  int factorizations = 0;         ///< banded factorisations (more than iterations when a Hessian was shifted)
-  double residual = 0.0;          ///< largest unbalanced nodal force over the largest force on any node [-]
-  double max_strain = 0.0;        ///< largest |stretch strain| over all edges [-]
-  long repulsions = 0;            ///< cloth: pairs of pieces nearer than the thickness, or about to be
-  long impulses = 0;              ///< cloth: collisions found and stopped
-  long zones = 0;                 ///< cloth: pieces that could only be kept apart by moving them rigidly
-  int mended_folds = 0;           ///< threads: sharp folds that were taken out because the step could not be done with them
-  bool stable = true;             ///< statics: no small motion lowers the energy (false: stationary only, a saddle)
-  double energy = 0.0;            ///< statics: elastic energy and that of gravity and forces [J]; torques about tangents have none
-  /// Statics: the lowest eigenvalue of the energy's second derivative against the masses [1/s^2]; negative: unstable. It is the square of the
-  /// lowest angular frequency. 0: a motion that costs nothing. Infinite: not computed.
+  std::string message;         ///< empty when ok; otherwise the reason and what to change
+  FailurePlace place;          ///< of a failure: the node that it is about, where that is known
+  int substeps = 0;            ///< steps actually taken (1 unless the step was cut or adapted)
+  int cut_steps = 0;           ///< how often a step was halved because it could not be done
+  int iterations = 0;          ///< Newton iterations
+  int linear_iterations = 0;   ///< of conjugate gradients (cloth)
+  int factorizations = 0;      ///< banded factorisations (more than iterations when a Hessian was shifted)
+  double residual = 0.0;       ///< largest unbalanced nodal force over the largest force on any node [-]
+  double max_strain = 0.0;     ///< largest |stretch strain| over all edges [-]
+  long repulsions = 0;         ///< cloth: pairs of pieces nearer than the thickness, or about to be
+  long impulses = 0;           ///< cloth: collisions found and stopped
+  long zones = 0;              ///< cloth: pieces that could only be kept apart by moving them rigidly
+  /// threads: sharp folds that were taken out because the step could not be done with them
+  int mended_folds = 0;
+  bool stable = true;   ///< statics: no small motion lowers the energy (false: stationary only, a saddle)
+  /// statics: elastic energy and that of gravity and forces [J]; torques about tangents have none
+  double energy = 0.0;
+  /// Statics: the lowest eigenvalue of the energy's second derivative against the masses [1/s^2]; negative: unstable.
+  /// It is the square of the lowest angular frequency. 0: a motion that costs nothing. Infinite: not computed.
   double lowest_eigenvalue = std::numeric_limits<double>::infinity();
-  int escapes = 0;                ///< statics: unstable equilibria that were left on the way
-  int projection_iterations = 0;  ///< of fast projection (explicit steps of inextensible rods), the most in a step
-  double constraint_error = 0.0;  ///< largest | |e|^2/L^2 - 1 | that it left [-]
-  double tracking_error = 0.0;    ///< greatest distance of an average of a tracked cloth or rod from that of its guide, over the guide's size [-]; of those that are met
-  int forces_at_bound = 0;        ///< averages of tracked cloths whose forces are at their bounds, and which are therefore not met
-  double error_estimate = 0.0;    ///< adaptive steps only: estimated local error [m]
-  long work = 0;                  ///< cloth: what the step did, in counts of a WorkBudget
+  int escapes = 0;                 ///< statics: unstable equilibria that were left on the way
+  int projection_iterations = 0;   ///< of fast projection (explicit steps of inextensible rods), the most in a step
+  double constraint_error = 0.0;   ///< largest | |e|^2/L^2 - 1 | that it left [-]
+  /// greatest distance of an average of a tracked cloth or rod from that of its guide, over the guide's size [-]; of
+  /// those that are met
+  double tracking_error = 0.0;
+  /// averages of tracked cloths whose forces are at their bounds, and which are therefore not met
+  int forces_at_bound = 0;
+  double error_estimate = 0.0;   ///< adaptive steps only: estimated local error [m]
+  long work = 0;                 ///< cloth: what the step did, in counts of a WorkBudget
 
   /// Takes the other report into this one (sums, maxima, first failure wins).
   void merge(const StepReport& other);
@@ -64,4 +71,4 @@ const char* toString(StepFailure failure);
 /// "2.5 ms", for messages: three digits however short the time [s] is.
 std::string milliseconds(double seconds);
 
-}  // namespace slender
+}   // namespace slender

@@ -29,7 +29,8 @@ class SubstepEquations
 public:
   virtual ~SubstepEquations() = default;
 
-  /// Solves one substep from the present state, which stays as it is until accept(). The report gets counts, maxima and error_estimate.
+  /// Solves one substep from the present state, which stays as it is until accept(). The report gets counts, maxima and
+  /// error_estimate.
   virtual StepFailure attempt(const Substep& substep, StepReport& report) = 0;
 
   /// Takes the end of the last attempt as the present state.
@@ -38,15 +39,17 @@ public:
   /// Whether a shorter substep may succeed where the last attempt failed.
   virtual bool shorterMayHelp(StepFailure) const { return true; }
 
-  /// Called when the shortest substep has failed. Returns true if the present state was changed so that longer substeps may succeed.
+  /// Called when the shortest substep has failed. Returns true if the present state was changed so that longer substeps
+  /// may succeed.
   virtual bool mend(StepReport&) { return false; }
 
   /// Completes the report of a step that is refused: failure, message and place. `substep` is the last attempt.
   virtual void refuse(const Substep& substep, StepFailure failure, StepReport& report) = 0;
 };
 
-/// Divides a step into substeps: halves those that fail, lengthens them again after success, and follows the estimated error if the rule asks
-/// for it. Every stepper uses this class, so that max_cuts, min_step and error_tolerance mean the same for all of them.
+/// Divides a step into substeps: halves those that fail, lengthens them again after success, and follows the estimated
+/// error if the rule asks for it. Every stepper uses this class, so that max_cuts, min_step and error_tolerance mean
+/// the same for all of them.
 class SubstepController
 {
 public:
@@ -66,4 +69,4 @@ private:
   double next_length_ = 0.0;
 };
 
-}  // namespace slender
+}   // namespace slender

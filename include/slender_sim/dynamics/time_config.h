@@ -2,26 +2,35 @@
 
 namespace slender {
 
-enum class Integrator { implicit_euler, bdf2, tr_bdf2, implicit_midpoint, generalized_alpha, symplectic_euler, imex };
+enum class Integrator
+{
+  implicit_euler,
+  bdf2,
+  tr_bdf2,
+  implicit_midpoint,
+  generalized_alpha,
+  symplectic_euler,
+  imex
+};
 
 const char* toString(Integrator integrator);
 
 struct NewtonConfig
 {
-  double tolerance = 1e-6;       ///< largest accepted last increment, as a fraction of the shortest edge (1e-14, 1e-1)
-  int max_iterations = 30;       ///< [1, 1000]
-  int max_cuts = 10;             ///< how often a failing step is halved [0, 30]
+  double tolerance = 1e-6;   ///< largest accepted last increment, as a fraction of the shortest edge (1e-14, 1e-1)
+  int max_iterations = 30;   ///< [1, 1000]
+  int max_cuts = 10;         ///< how often a failing step is halved [0, 30]
 };
 
 struct TimeConfig
 {
-  double step = 0.005;                                ///< [s] (0, 10]
-  double duration = 10.0;                             ///< [s] (0, 1e7]; used by `simulate`
+  double step = 0.005;      ///< [s] (0, 10]
+  double duration = 10.0;   ///< [s] (0, 1e7]; used by `simulate`
   Integrator integrator = Integrator::tr_bdf2;
-  double spectral_radius = 0.8;                       ///< generalised-alpha only: at infinite frequency [0, 1]
-  double error_tolerance = 0.0;                       ///< [m] local error per step; 0 = fixed step
-  double min_step = 1e-7;                             ///< [s] adaptive or cut steps never get shorter
+  double spectral_radius = 0.8;   ///< generalised-alpha only: at infinite frequency [0, 1]
+  double error_tolerance = 0.0;   ///< [m] local error per step; 0 = fixed step
+  double min_step = 1e-7;         ///< [s] adaptive or cut steps never get shorter
   NewtonConfig newton;
 };
 
-}  // namespace slender
+}   // namespace slender

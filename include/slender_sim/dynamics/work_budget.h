@@ -5,8 +5,8 @@
 
 namespace slender {
 
-/// What a step may do, in counts that stand for about a tenth of a microsecond each, so that one that gets out of hand ends. Counts and no times: what is
-/// refused is the same on every machine and in every run.
+/// What a step may do, in counts that stand for about a tenth of a microsecond each, so that one that gets out of hand
+/// ends. Counts and no times: what is refused is the same on every machine and in every run.
 class WorkBudget
 {
 public:
@@ -39,4 +39,4 @@ private:
   long done_ = 0, most_ = kUnbounded;
 };
 
-}  // namespace slender
+}   // namespace slender

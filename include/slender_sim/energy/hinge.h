@@ -15,9 +15,10 @@ enum class HessianKind
   semidefinite   ///< positive semidefinite and not below the exact one, so that a Newton step descends
 };
 
-/// Bending energy of Discrete Shells [Grinspun et al. 2003], E = sum over inner edges 1/2 k (theta - rest)^2 with the angle theta in (-pi, pi]
-/// between the normals of their faces, positive where the surface is convex seen from outside. Its derivatives are closed forms [cf. Tamstorf &
-/// Grinspun 2013]. A deviation from rest is taken the shorter way round. Faces without height give finite numbers.
+/// Bending energy of Discrete Shells [Grinspun et al. 2003], E = sum over inner edges 1/2 k (theta - rest)^2 with the
+/// angle theta in (-pi, pi] between the normals of their faces, positive where the surface is convex seen from outside.
+/// Its derivatives are closed forms [cf. Tamstorf & Grinspun 2013]. A deviation from rest is taken the shorter way
+/// round. Faces without height give finite numbers.
 class HingeBending
 {
 public:
@@ -31,17 +32,21 @@ public:
   void setStiffness(int hinge, double stiffness) { stiffness_[hinge] = response_stiffness_[hinge] = stiffness; }
   void setRestAngle(int hinge, double angle) { rest_angle_[hinge] = response_rest_[hinge] = angle; }
 
-  /// Elastic response; with ratio > 0 a viscous one as well, of moment ratio k (theta - viscous_angle): the one of stiffness
-  /// (1 + ratio) k about the weighted mean of both angles.
+  /// Elastic response; with ratio > 0 a viscous one as well, of moment ratio k (theta - viscous_angle): the one of
+  /// stiffness (1 + ratio) k about the weighted mean of both angles.
   void setResponse(double ratio, const double* viscous_angles);
 
   /// One per hinge, then padding: room for paddedCount().
   void angles(const double* x, double* angles) const { hingeKernels().angles(arrays(), x, angles); }
   int paddedCount() const { return static_cast<int>(stiffness_.size()); }
   double energy(const double* x) const { return count() ? hingeKernels().energy(arrays(), x) : 0.0; }
-  double addGradient(const double* x, double* gradient) const { return count() ? hingeKernels().gradient(arrays(), x, gradient) : 0.0; }
+  double addGradient(const double* x, double* gradient) const
+  {
+    return count() ? hingeKernels().gradient(arrays(), x, gradient) : 0.0;
+  }
   /// `slots` from slotsIn().
-  double addHessian(HessianKind kind, const double* x, const std::vector<int>& slots, double* gradient, double* values) const;
+  double addHessian(HessianKind kind, const double* x, const std::vector<int>& slots, double* gradient,
+                    double* values) const;
   std::vector<int> slotsIn(const BlockMatrix& matrix) const;
 
 private:
@@ -52,4 +57,4 @@ private:
   AlignedVector<double> stiffness_, rest_angle_, response_stiffness_, response_rest_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -6,8 +6,9 @@
 ///
 ///   U = 1/2 (kappa - kappaBar)^T B/l (kappa - kappaBar) + 1/2 beta/l (m - mBar)^2                [J]
 ///
-/// Derivatives are taken with respect to the edge vectors e, f and the edge angles theta_e, theta_f, with material frames
-/// that move by parallel transport from the point of evaluation, so the Hessian is exact there. T is double or a SIMD pack.
+/// Derivatives are taken with respect to the edge vectors e, f and the edge angles theta_e, theta_f, with material
+/// frames that move by parallel transport from the point of evaluation, so the Hessian is exact there. T is double or a
+/// SIMD pack.
 namespace slender {
 
 template <class T>
@@ -36,16 +37,16 @@ struct JointStrains
 template <class T>
 struct JointGradient
 {
-  Vec3<T> e, f;       ///< dU/de, dU/df [N]
-  T theta_e, theta_f; ///< [N m]
+  Vec3<T> e, f;         ///< dU/de, dU/df [N]
+  T theta_e, theta_f;   ///< [N m]
 };
 
 template <class T>
 struct JointHessian
 {
   Sym3<T> ee, ff;
-  Mat3<T> ef;                      ///< rows e, columns f
-  Vec3<T> e_te, e_tf, f_te, f_tf;  ///< mixed with theta_e (te) and theta_f (tf)
+  Mat3<T> ef;                       ///< rows e, columns f
+  Vec3<T> e_te, e_tf, f_te, f_tf;   ///< mixed with theta_e (te) and theta_f (tf)
   T te_te, te_tf, tf_tf;
 };
 
@@ -57,14 +58,15 @@ SLENDER_INLINE JointStrains<T> jointStrains(const JointFrames<T>& s)
   return {0.5 * dot(s.d2e + s.d2f, kb), -0.5 * dot(s.d1e + s.d1f, kb), kb, inverse_chi};
 }
 
-/// Energy of a joint as a function of (kappa1, kappa2, m) with its derivatives: moments m_i and second derivatives w_ij.
+/// Energy of a joint as a function of (kappa1, kappa2, m) with its derivatives: moments m_i and second derivatives
+/// w_ij.
 template <class T>
 struct JointResponse
 {
-  T energy;             ///< [J]
-  T m1, m2, m3;         ///< [N m]
+  T energy;       ///< [J]
+  T m1, m2, m3;   ///< [N m]
   T w11, w12, w22, w33;
-  T w13, w23;           ///< only of a response that couples bending and twisting
+  T w13, w23;   ///< only of a response that couples bending and twisting
 };
 
 /// The thesis's energy (4.2.2, 4.2.3).
@@ -76,11 +78,11 @@ SLENDER_INLINE JointResponse<T> tangentResponse(const JointStrains<T>& k, const 
   return {0.5 * (m1 * q1 + m2 * q2 + m3 * q3), m1, m2, m3, p.b11, p.b12, p.b22, p.twist, T{}, T{}};
 }
 
-/// Gradient in `g` (overwritten) and, when WithHessian, the second derivatives in `h` of a joint with response `r`; without them only
-/// the angles' block of `h`. Coupled: w13, w23 are not zero.
+/// Gradient in `g` (overwritten) and, when WithHessian, the second derivatives in `h` of a joint with response `r`;
+/// without them only the angles' block of `h`. Coupled: w13, w23 are not zero.
 template <bool WithHessian, bool Coupled, class T>
-SLENDER_INLINE void jointDerivatives(const JointFrames<T>& s, const JointStrains<T>& k, const JointResponse<T>& r, JointGradient<T>& g,
-                                     JointHessian<T>& h)
+SLENDER_INLINE void jointDerivatives(const JointFrames<T>& s, const JointStrains<T>& k, const JointResponse<T>& r,
+                                     JointGradient<T>& g, JointHessian<T>& h)
 {
   const T m1 = r.m1, m2 = r.m2, m3 = r.m3;
   const T ie = s.inverse_e, jf = s.inverse_f;
@@ -140,16 +142,12 @@ SLENDER_INLINE void jointDerivatives(const JointFrames<T>& s, const JointStrains
     }
 
     const T half = T{} + 0.5;   // symmetricOuter counts u v^T and v u^T
-    h.ee = symmetricOuter(b1_e * half, k1_e) + symmetricOuter(b2_e * half, k2_e)
-         + symmetricOuter(b3_e * half, m_e)
-         + symmetricOuter(tt * ie2, tt * K - a)
-         + symmetricOuter(k.kb * (0.25 * ie2), De - (s.te + tt) * m3)
-         + normalProjector(-K * k.inverse_chi * ie2, s.te);
-    h.ff = symmetricOuter(b1_f * half, k1_f) + symmetricOuter(b2_f * half, k2_f)
-         + symmetricOuter(b3_f * half, m_f)
-         + symmetricOuter(tt * jf2, tt * K + b)
-         + symmetricOuter(k.kb * (0.25 * jf2), Df - (s.tf + tt) * m3)
-         + normalProjector(-K * k.inverse_chi * jf2, s.tf);
+    h.ee = symmetricOuter(b1_e * half, k1_e) + symmetricOuter(b2_e * half, k2_e) + symmetricOuter(b3_e * half, m_e) +
+           symmetricOuter(tt * ie2, tt * K - a) + symmetricOuter(k.kb * (0.25 * ie2), De - (s.te + tt) * m3) +
+           normalProjector(-K * k.inverse_chi * ie2, s.te);
+    h.ff = symmetricOuter(b1_f * half, k1_f) + symmetricOuter(b2_f * half, k2_f) + symmetricOuter(b3_f * half, m_f) +
+           symmetricOuter(tt * jf2, tt * K + b) + symmetricOuter(k.kb * (0.25 * jf2), Df - (s.tf + tt) * m3) +
+           normalProjector(-K * k.inverse_chi * jf2, s.tf);
 
     // rows e, columns f: the transpose of the block printed in the thesis for the curvature, as printed for the twist
     const T diagonal = -K * k.inverse_chi * ij;
@@ -173,4 +171,4 @@ SLENDER_INLINE void jointDerivatives(const JointFrames<T>& s, const JointStrains
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -11,28 +11,31 @@
 
 namespace slender {
 
-/// Stiffness of a membrane per width in material axes, warp first: S11 = c11 G11 + c12 G22, S22 = c12 G11 + c22 G22, S12 = 2 c33 G12 [N/m].
+/// Stiffness of a membrane per width in material axes, warp first: S11 = c11 G11 + c12 G22, S22 = c12 G11 + c22 G22,
+/// S12 = 2 c33 G12 [N/m].
 struct MembraneModuli
 {
   double c11 = 0, c12 = 0, c22 = 0, c33 = 0;
 };
 
-/// Plane stress of a sheet of the given thickness [m]; modulus E [Pa]. Throws std::invalid_argument naming the bad value: modulus or thickness not
-/// positive, Poisson's ratio outside (-1, 0.5].
+/// Plane stress of a sheet of the given thickness [m]; modulus E [Pa]. Throws std::invalid_argument naming the bad
+/// value: modulus or thickness not positive, Poisson's ratio outside (-1, 0.5].
 MembraneModuli isotropicMembrane(double youngs_modulus, double poissons_ratio, double thickness);
 
-/// Along warp and weft the moduli [N/m] (per width), Poisson's ratio of the weft's contraction under tension along the warp, and the shear
-/// modulus [N/m]. Throws std::invalid_argument naming the bad value; the energy must be positive: ratio^2 < warp / weft.
+/// Along warp and weft the moduli [N/m] (per width), Poisson's ratio of the weft's contraction under tension along the
+/// warp, and the shear modulus [N/m]. Throws std::invalid_argument naming the bad value; the energy must be positive:
+/// ratio^2 < warp / weft.
 MembraneModuli orthotropicMembrane(double warp, double weft, double poissons_ratio, double shear);
 
-/// Constant-strain triangles with St. Venant-Kirchhoff's energy, area/2 (c11 G11^2 + 2 c12 G11 G22 + c22 G22^2 + 4 c33 G12^2) each, G Green's strain
-/// in material axes.
+/// Constant-strain triangles with St. Venant-Kirchhoff's energy, area/2 (c11 G11^2 + 2 c12 G11 G22 + c22 G22^2 + 4 c33
+/// G12^2) each, G Green's strain in material axes.
 class MembraneEnergy
 {
 public:
-  /// `warp` is a direction in space, projected onto each face of the rest mesh; on faces that it is normal to, any direction is taken.
-  /// Throws std::invalid_argument naming a face without area.
-  MembraneEnergy(const TriangleMesh& rest, const MembraneModuli& moduli, const Eigen::Vector3d& warp = Eigen::Vector3d::UnitX());
+  /// `warp` is a direction in space, projected onto each face of the rest mesh; on faces that it is normal to, any
+  /// direction is taken. Throws std::invalid_argument naming a face without area.
+  MembraneEnergy(const TriangleMesh& rest, const MembraneModuli& moduli,
+                 const Eigen::Vector3d& warp = Eigen::Vector3d::UnitX());
 
   int count() const { return static_cast<int>(triangles_.cols()); }
   int paddedCount() const { return static_cast<int>(area_.size()); }
@@ -40,8 +43,8 @@ public:
   const MembraneModuli& moduli() const { return moduli_; }
   double area(int triangle) const { return area_[triangle]; }
 
-  /// Elastic response; with ratio > 0 a viscous one as well, of stress ratio C (G - viscous_strains): the one of moduli (1 + ratio) C about
-  /// the weighted mean of both. From strains(); the elastic response needs none.
+  /// Elastic response; with ratio > 0 a viscous one as well, of stress ratio C (G - viscous_strains): the one of moduli
+  /// (1 + ratio) C about the weighted mean of both. From strains(); the elastic response needs none.
   void setResponse(double ratio, const double* const* viscous_strains);
 
   /// G11, G22, 2 G12: three arrays with room for paddedCount() each.
@@ -49,7 +52,8 @@ public:
   MembraneSums energy(const double* x) const;
   MembraneSums addGradient(const double* x, double* gradient) const;
   /// `slots` from slotsIn().
-  MembraneSums addHessian(HessianKind kind, const double* x, const std::vector<int>& slots, double* gradient, double* values) const;
+  MembraneSums addHessian(HessianKind kind, const double* x, const std::vector<int>& slots, double* gradient,
+                          double* values) const;
   std::vector<int> slotsIn(const BlockMatrix& matrix) const;
 
 private:
@@ -62,4 +66,4 @@ private:
   AlignedVector<double> inverse_[4], area_, rest_strain_[3];
 };
 
-}  // namespace slender
+}   // namespace slender

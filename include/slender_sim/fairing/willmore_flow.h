@@ -16,29 +16,33 @@ struct FairingReport
   bool stationary = false;   ///< no step is left that the energy would notice; the mesh is untouched
   std::string message;       ///< empty when ok; otherwise the reason and what to change
   int iterations = 0;
-  int cuts = 0;              ///< how often an iteration's step was halved
+  int cuts = 0;                               ///< how often an iteration's step was halved
   double energy_before = 0.0, energy = 0.0;   ///< 1/2 int H^2 of the part that moves and the ring around it [-]
-  double decrement = 0.0;    ///< energy that the first iteration promised to first order [-]
-  double largest_move = 0.0; ///< of a vertex [m]
+  double decrement = 0.0;                     ///< energy that the first iteration promised to first order [-]
+  double largest_move = 0.0;                  ///< of a vertex [m]
 };
 
-/// Willmore flow x' = -M^-1 dE/dx of 1/2 int H^2 (thesis 2.5.3) by the implicit Euler method. Its equation is solved by Newton-like iterations with the
-/// true nonlinear gradient and a constant matrix, M/h + K of the isometric bending model on the mesh given at first, factorised once. One
-/// iteration is the semi-implicit step: enough on the way to a stationary surface. Steps that smooth a rough mesh should be iterated: the roughness pushes
-/// the surface outwards, and one iteration does so for all of h though the roughness is gone much sooner.
+/// Willmore flow x' = -M^-1 dE/dx of 1/2 int H^2 (thesis 2.5.3) by the implicit Euler method. Its equation is solved by
+/// Newton-like iterations with the true nonlinear gradient and a constant matrix, M/h + K of the isometric bending
+/// model on the mesh given at first, factorised once. One iteration is the semi-implicit step: enough on the way to a
+/// stationary surface. Steps that smooth a rough mesh should be iterated: the roughness pushes the surface outwards,
+/// and one iteration does so for all of h though the roughness is gone much sooner.
 ///
-/// The boundary of what moves is smooth up to first order (G1): a boundary of the mesh and the vertices next to it keep their places, and the
-/// curvature of held vertices beside moving ones counts.
+/// The boundary of what moves is smooth up to first order (G1): a boundary of the mesh and the vertices next to it keep
+/// their places, and the curvature of held vertices beside moving ones counts.
 class WillmoreFlow
 {
 public:
-  /// `time_step` h [m^4]; one step halves bumps of wavelength 2 pi h^(1/4), longer ones less. infinity: Newton-like steps to the stationary surface,
-  /// if anything is held. `iterations`: at most that many in a step. `selected`: vertices that may move; empty: all. Throws std::invalid_argument for a time step that is not positive, sizes
-  /// that do not fit, faces without area, nothing that may move.
-  WillmoreFlow(const TriangleMesh& mesh, const MeshTopology& topology, double time_step, int iterations = 1, const std::vector<char>& selected = {});
+  /// `time_step` h [m^4]; one step halves bumps of wavelength 2 pi h^(1/4), longer ones less. infinity: Newton-like
+  /// steps to the stationary surface, if anything is held. `iterations`: at most that many in a step. `selected`:
+  /// vertices that may move; empty: all. Throws std::invalid_argument for a time step that is not positive, sizes that
+  /// do not fit, faces without area, nothing that may move.
+  WillmoreFlow(const TriangleMesh& mesh, const MeshTopology& topology, double time_step, int iterations = 1,
+               const std::vector<char>& selected = {});
 
-  /// Advances the vertices (3 x n, of the mesh given at first). The energy does not rise: a step that would raise it, fold a face over or
-  /// leave finite numbers is halved; where that does not help it is refused, with the vertices untouched. Warm steps take no memory.
+  /// Advances the vertices (3 x n, of the mesh given at first). The energy does not rise: a step that would raise it,
+  /// fold a face over or leave finite numbers is halved; where that does not help it is refused, with the vertices
+  /// untouched. Warm steps take no memory.
   FairingReport step(Eigen::Matrix3Xd& vertices);
 
   /// 1/2 int H^2 of the part that moves and the ring around it [-]; infinite where a face has no area.
@@ -63,4 +67,4 @@ private:
   PointVector x_, start_, gradient_, direction_, trial_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -4,12 +4,13 @@
 
 namespace slender {
 
-/// First director of the first edge of a curve that framed curves can begin with: `director` across the edge, or any normal if it is zero.
-/// x: 3 x n node positions [m]. Throws std::invalid_argument on too few or repeated nodes, an edge folded back, a director along the edge.
+/// First director of the first edge of a curve that framed curves can begin with: `director` across the edge, or any
+/// normal if it is zero. x: 3 x n node positions [m]. Throws std::invalid_argument on too few or repeated nodes, an
+/// edge folded back, a director along the edge.
 Eigen::Vector3d firstDirector(const Eigen::Matrix3Xd& x, bool closed, const Eigen::Vector3d& director);
 
-/// Discrete adapted framed curve in the curve-angle representation (thesis 3.2.2, 3.4): positions, one reference frame per
-/// edge, and one angle per edge that turns the reference frame into the material frame.
+/// Discrete adapted framed curve in the curve-angle representation (thesis 3.2.2, 3.4): positions, one reference frame
+/// per edge, and one angle per edge that turns the reference frame into the material frame.
 ///
 /// Edge j runs from node j to node j+1 (mod n when closed), joint i sits at node i. Per-joint arrays have one entry per
 /// node; those of the ends of an open curve are zero.
@@ -28,11 +29,13 @@ public:
   const Eigen::Matrix3Xd& referenceDirectors() const { return u_; }   ///< first directors; the second is t x u
 
   /// Moves the nodes; reference frames follow by parallel transport in time (3.17) and the reference twist accumulates,
-  /// unwrapped, so that any number of full turns survives. Throws std::invalid_argument when a tangent turns over; the curve then stays.
+  /// unwrapped, so that any number of full turns survives. Throws std::invalid_argument when a tangent turns over; the
+  /// curve then stays.
   void moveTo(const Eigen::Matrix3Xd& x);
 
   /// Replaces the reference frames by the space-parallel (Bishop) ones (3.18), starting from the present one at edge 0.
-  /// Angles are changed so that material frames stay. The reference twist becomes zero (closed: its holonomy stays at node 0).
+  /// Angles are changed so that material frames stay. The reference twist becomes zero (closed: its holonomy stays at
+  /// node 0).
   void makeSpaceParallel();
 
   /// Angles theta^j from reference to material frame, per edge [rad].
@@ -60,4 +63,4 @@ private:
   Eigen::VectorXd reference_twist_;
 };
 
-}  // namespace slender
+}   // namespace slender

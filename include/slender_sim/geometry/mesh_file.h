@@ -7,10 +7,11 @@
 
 namespace slender {
 
-/// Reads the vertices and faces of a Wavefront OBJ file [m]. Vertices keep the file's order, used or not; a polygon becomes the fan of
-/// triangles about its first vertex; texture coordinates, normals, groups, materials, lines and points are passed over. Throws
-/// std::runtime_error "FILE:LINE: reason": not readable, not a number or not finite, a face with fewer than three vertices, with
-/// one twice, or with one that the file does not have (later vertices may be named only by absolute indices), no faces at all.
+/// Reads the vertices and faces of a Wavefront OBJ file [m]. Vertices keep the file's order, used or not; a polygon
+/// becomes the fan of triangles about its first vertex; texture coordinates, normals, groups, materials, lines and
+/// points are passed over. Throws std::runtime_error "FILE:LINE: reason": not readable, not a number or not finite, a
+/// face with fewer than three vertices, with one twice, or with one that the file does not have (later vertices may be
+/// named only by absolute indices), no faces at all.
 TriangleMesh readObj(const std::string& path);
 
 struct VertexGroup
@@ -19,21 +20,21 @@ struct VertexGroup
   std::vector<int> vertices;   ///< from 0, ascending
 };
 
-/// The vertices of the faces of each group (`g NAME ...`) of an OBJ file, in the order in which the names first occur; faces before the first
-/// one, and those of "default", are in none. Throws as readObj.
+/// The vertices of the faces of each group (`g NAME ...`) of an OBJ file, in the order in which the names first occur;
+/// faces before the first one, and those of "default", are in none. Throws as readObj.
 std::vector<VertexGroup> readObjGroups(const std::string& path);
 
-/// Reads x, y, z of the element "vertex" and the list vertex_indices (or vertex_index) of the element "face" of a Stanford PLY file [m]:
-/// ascii, binary_little_endian or binary_big_endian; order of vertices and polygons as in readObj, other elements and properties are
-/// passed over. Throws std::runtime_error "FILE: reason": not readable, a header that is not PLY's or lacks these, the
-/// file ends early, and what readObj says of numbers and faces.
+/// Reads x, y, z of the element "vertex" and the list vertex_indices (or vertex_index) of the element "face" of a
+/// Stanford PLY file [m]: ascii, binary_little_endian or binary_big_endian; order of vertices and polygons as in
+/// readObj, other elements and properties are passed over. Throws std::runtime_error "FILE: reason": not readable, a
+/// header that is not PLY's or lacks these, the file ends early, and what readObj says of numbers and faces.
 TriangleMesh readPly(const std::string& path);
 
 /// By the end of the name: .obj or .ply, in small or capital letters. Throws std::runtime_error for another.
 TriangleMesh readMesh(const std::string& path);
 
-/// Write all vertices in order, with enough digits to read the same doubles back (PLY: binary_little_endian, double). Throw
-/// std::runtime_error "FILE: cannot be written".
+/// Write all vertices in order, with enough digits to read the same doubles back (PLY: binary_little_endian, double).
+/// Throw std::runtime_error "FILE: cannot be written".
 void writeObj(const std::string& path, const TriangleMesh& mesh);
 void writePly(const std::string& path, const TriangleMesh& mesh);
 
@@ -48,8 +49,8 @@ struct ObjObject
 /// Several objects in one file, after a line of comment (line breaks in it become blanks). Digits and errors as above.
 void writeObj(const std::string& path, const std::string& comment, const std::vector<ObjObject>& objects);
 
-/// With a colour per vertex (3 x n: red, green, blue in [0, 1]): PLY with uchar red, green, blue, OBJ with three more numbers per vertex.
-/// By the end of the name; throws likewise.
+/// With a colour per vertex (3 x n: red, green, blue in [0, 1]): PLY with uchar red, green, blue, OBJ with three more
+/// numbers per vertex. By the end of the name; throws likewise.
 void writeColoredMesh(const std::string& path, const TriangleMesh& mesh, const Eigen::Matrix3Xd& colors);
 
 /// Throws what writeMesh would for the end of the name.
@@ -58,4 +59,4 @@ void requireMeshName(const std::string& path);
 /// By the end of the name, as readMesh.
 void writeMesh(const std::string& path, const TriangleMesh& mesh);
 
-}  // namespace slender
+}   // namespace slender

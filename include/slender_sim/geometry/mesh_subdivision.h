@@ -8,12 +8,14 @@ namespace slender {
 
 struct Subdivision
 {
-  TriangleMesh mesh;                                       ///< its first vertices are those of the coarse mesh, in their order
-  Eigen::SparseMatrix<double, Eigen::RowMajor> weights;    ///< fine x coarse vertices: fine = coarse * weights^T, rows sum to 1
+  /// its first vertices are those of the coarse mesh, in their order
+  TriangleMesh mesh;
+  /// fine x coarse vertices: fine = coarse * weights^T, rows sum to 1
+  Eigen::SparseMatrix<double, Eigen::RowMajor> weights;
 };
 
-/// Divides each face into four plane ones through the middles of its edges, `levels` times (>= 0). Column j of the weights is the coarse
-/// mesh's hat function of vertex j at the fine vertices.
+/// Divides each face into four plane ones through the middles of its edges, `levels` times (>= 0). Column j of the
+/// weights is the coarse mesh's hat function of vertex j at the fine vertices.
 Subdivision subdivide(const TriangleMesh& mesh, int levels);
 
-}  // namespace slender
+}   // namespace slender

@@ -19,11 +19,12 @@ public:
   double at(double time) const;
   double greatest() const;
   const std::vector<Entry>& entries() const { return entries_; }
-  /// Mean over a step from `start` to `end` [s], start < end: of a flow rate: with it as ThreadInputs::flow_rate exactly the tabled volume flows.
+  /// Mean over a step from `start` to `end` [s], start < end: of a flow rate: with it as ThreadInputs::flow_rate
+  /// exactly the tabled volume flows.
   double mean(double start, double end) const;
 
 private:
   std::vector<Entry> entries_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -7,8 +7,8 @@ namespace slender {
 /// Rigid pose X_AB: a point p_B in frame B has the coordinates position + orientation * p_B in frame A.
 struct Pose
 {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();                     ///< [m]
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();       ///< unit
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();                ///< [m]
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();   ///< unit
 
   Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return position + orientation * p; }
   Pose operator*(const Pose& other) const
@@ -29,4 +29,4 @@ struct Twist
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();   ///< [rad/s]
 };
 
-}  // namespace slender
+}   // namespace slender

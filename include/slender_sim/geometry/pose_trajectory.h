@@ -11,14 +11,14 @@ namespace slender {
 ///
 /// Positions: cubic Hermite segments whose slopes are the three-point (non-uniform) finite differences of the samples.
 /// Orientations: the same on rotation vectors, each segment R(t) = R_k exp(phi(t)), with phi cubic Hermite from 0 to
-/// log(R_k^T R_{k+1}) and angular velocities at the samples by the three-point difference. Outside the samples the end pose
-/// is held with zero velocity, so the slopes of the first and last sample are zero. Sparse (10..60 Hz) and jittery input so
-/// reaches the rod without jumps of velocity. Two exceptions to the three-point slope: beside a sample with the same value it
-/// is zero, so that a pause stays a pause, and where one interval is under a quarter of the other (a burst of late messages) it is
-/// the chord over both, whose noise does not grow with the shortness of the interval. Two equal samples are no pause when they lie on both
-/// sides of the turning point of a swing: the acceleration before, at and after them is then the same to within a third.
-/// q and -q are the same orientation; between samples the turn is the shorter one, so turns must be sampled more often than
-/// every half turn.
+/// log(R_k^T R_{k+1}) and angular velocities at the samples by the three-point difference. Outside the samples the end
+/// pose is held with zero velocity, so the slopes of the first and last sample are zero. Sparse (10..60 Hz) and jittery
+/// input so reaches the rod without jumps of velocity. Two exceptions to the three-point slope: beside a sample with
+/// the same value it is zero, so that a pause stays a pause, and where one interval is under a quarter of the other (a
+/// burst of late messages) it is the chord over both, whose noise does not grow with the shortness of the interval. Two
+/// equal samples are no pause when they lie on both sides of the turning point of a swing: the acceleration before, at
+/// and after them is then the same to within a third. q and -q are the same orientation; between samples the turn is
+/// the shorter one, so turns must be sampled more often than every half turn.
 class PoseTrajectory
 {
 public:
@@ -29,9 +29,11 @@ public:
 
   /// Appends a later sample; throws std::invalid_argument when time is not after the last one.
   void append(double time, const Pose& pose);
-  /// After the last sample the motion goes on with the mean velocity since the one before, which dies out linearly within `duration` [s] (>= 0; 0: held).
+  /// After the last sample the motion goes on with the mean velocity since the one before, which dies out linearly
+  /// within `duration` [s] (>= 0; 0: held).
   void coast(double duration) { coast_ = duration; }
-  /// From now on more samples may come: two equal ones at the end may be the turning point of a swing, and are no pause yet.
+  /// From now on more samples may come: two equal ones at the end may be the turning point of a swing, and are no pause
+  /// yet.
   void expectMore() { growing_ = true; }
   /// Forgets samples that no query at or after `time` needs.
   void forgetBefore(double time);
@@ -57,4 +59,4 @@ private:
   bool growing_ = false;   ///< see expectMore()
 };
 
-}  // namespace slender
+}   // namespace slender

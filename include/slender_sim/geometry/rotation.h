@@ -46,7 +46,8 @@ inline Eigen::Vector3d rotationVector(const Eigen::Quaterniond& q)
 {
   const double sign = q.w() < 0 ? -1.0 : 1.0;
   const double s = q.vec().norm();
-  return s < 1e-12 ? Eigen::Vector3d(2.0 * sign * q.vec()) : Eigen::Vector3d(q.vec() * (sign * 2.0 * std::atan2(s, sign * q.w()) / s));
+  return s < 1e-12 ? Eigen::Vector3d(2.0 * sign * q.vec())
+                   : Eigen::Vector3d(q.vec() * (sign * 2.0 * std::atan2(s, sign * q.w()) / s));
 }
 
 /// Inverse of rotationVector.
@@ -57,7 +58,8 @@ inline Eigen::Quaterniond fromRotationVector(const Eigen::Vector3d& w)
   return Eigen::Quaterniond(std::cos(0.5 * angle), scale * w.x(), scale * w.y(), scale * w.z()).normalized();
 }
 
-/// Angular velocity of the rotation exp(r(t)), axes fixed in space: rotationRate(r) r'. In body axes it is rotationRate(-r) r'.
+/// Angular velocity of the rotation exp(r(t)), axes fixed in space: rotationRate(r) r'. In body axes it is
+/// rotationRate(-r) r'.
 inline Eigen::Matrix3d rotationRate(const Eigen::Vector3d& r)
 {
   const double a2 = r.squaredNorm(), a = std::sqrt(a2);
@@ -68,4 +70,4 @@ inline Eigen::Matrix3d rotationRate(const Eigen::Vector3d& r)
   return Eigen::Matrix3d::Identity() + f * c + g * c * c;
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -6,8 +6,8 @@ namespace slender {
 
 struct TriangleMesh
 {
-  Eigen::Matrix3Xd vertices;     ///< 3 x n [m]
-  Eigen::Matrix3Xi triangles;    ///< 3 x m, counter-clockwise seen from outside
+  Eigen::Matrix3Xd vertices;    ///< 3 x n [m]
+  Eigen::Matrix3Xi triangles;   ///< 3 x m, counter-clockwise seen from outside
 };
 
 /// Area of each face [m^2].
@@ -19,4 +19,4 @@ Eigen::VectorXd vertexAreas(const TriangleMesh& mesh);
 /// Voronoi cells [m^2], in obtuse triangles replaced by halves and quarters [Meyer et al. 2003, mixed area].
 Eigen::VectorXd voronoiAreas(const TriangleMesh& mesh);
 
-}  // namespace slender
+}   // namespace slender

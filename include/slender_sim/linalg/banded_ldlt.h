@@ -15,13 +15,21 @@ struct AlignedAllocator
   static constexpr std::align_val_t alignment{64};
   AlignedAllocator() = default;
   template <class U>
-  AlignedAllocator(const AlignedAllocator<U>&) {}
+  AlignedAllocator(const AlignedAllocator<U>&)
+  {
+  }
   T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), alignment)); }
   void deallocate(T* p, std::size_t) { ::operator delete(p, alignment); }
   template <class U>
-  bool operator==(const AlignedAllocator<U>&) const { return true; }
+  bool operator==(const AlignedAllocator<U>&) const
+  {
+    return true;
+  }
   template <class U>
-  bool operator!=(const AlignedAllocator<U>&) const { return false; }
+  bool operator!=(const AlignedAllocator<U>&) const
+  {
+    return false;
+  }
 };
 template <class T>
 using AlignedVector = std::vector<T, AlignedAllocator<T>>;
@@ -38,7 +46,7 @@ struct Inertia
 template <int HalfBandwidth, int Block>
 struct BandPanel
 {
-  static constexpr int kBelow = HalfBandwidth + 1 - Block;        ///< rows below the diagonal block
+  static constexpr int kBelow = HalfBandwidth + 1 - Block;   ///< rows below the diagonal block
   static constexpr int kStride = (kBelow + 7) / 8 * 8;
   double below[Block][kStride];   ///< below[c][r]: row (Block + r), column c, counted from the block's first unknown
   double diag[Block][Block];      ///< diag[c][r], r >= c
@@ -53,12 +61,13 @@ struct BandCarry
   int negative = 0, zero = 0;
 };
 
-/// Symmetric band matrix with LDL^T factorisation in place, no pivoting [Golub & Van Loan, Matrix Computations, 4.1, 4.3].
+/// Symmetric band matrix with LDL^T factorisation in place, no pivoting [Golub & Van Loan, Matrix
+/// Computations, 4.1, 4.3].
 ///
-/// Column j of block b = j / Block reaches down to row b*Block + HalfBandwidth, so no entry is further than HalfBandwidth
-/// from the diagonal. For rods (positions and edge angle of a node form a block of four) HalfBandwidth is 10.
-/// Without pivoting the factorisation is backward stable for definite matrices; an indefinite one is reported by its
-/// inertia so that the caller can shift it.
+/// Column j of block b = j / Block reaches down to row b*Block + HalfBandwidth, so no entry is further than
+/// HalfBandwidth from the diagonal. For rods (positions and edge angle of a node form a block of four) HalfBandwidth
+/// is 10. Without pivoting the factorisation is backward stable for definite matrices; an indefinite one is reported by
+/// its inertia so that the caller can shift it.
 template <int HalfBandwidth, int Block>
 class BandedLdlt
 {
@@ -76,9 +85,9 @@ public:
   /// A pivot that is zero or not finite counts as `zero` and stops the factorisation.
   Inertia factor(int count = -1);
 
-  /// The same by pieces, for callers that assemble block after block: factors blocks from..to-1, and when x is given takes
-  /// its rows to L^-1 x on the way. All entries of these blocks must be there; later ones need not. `assembled` is the panel
-  /// of block `from`, in panels() or in memory of the caller's that is smaller and stays in the cache.
+  /// The same by pieces, for callers that assemble block after block: factors blocks from..to-1, and when x is given
+  /// takes its rows to L^-1 x on the way. All entries of these blocks must be there; later ones need not. `assembled`
+  /// is the panel of block `from`, in panels() or in memory of the caller's that is smaller and stays in the cache.
   void eliminate(Panel* assembled, int from, int to, double* x, BandCarry& carry);
   /// x := L^-T D^-1 x, which completes a solution begun by eliminate().
   void substitute(double* x) const;
@@ -97,4 +106,4 @@ private:
 using RodPanel = BandPanel<10, 4>;
 extern template class BandedLdlt<10, 4>;
 
-}  // namespace slender
+}   // namespace slender

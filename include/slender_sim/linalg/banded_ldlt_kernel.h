@@ -16,8 +16,14 @@ struct BandKernels
   void (*solve8)(const BandPanel<10, 4>* panels, int blocks, double* x);
 };
 
-namespace baseline { extern const BandKernels band_kernels; }
-namespace avx2 { extern const BandKernels band_kernels; }
-namespace avx512 { extern const BandKernels band_kernels; }
+namespace baseline {
+extern const BandKernels band_kernels;
+}
+namespace avx2 {
+extern const BandKernels band_kernels;
+}
+namespace avx512 {
+extern const BandKernels band_kernels;
+}
 
-}  // namespace slender
+}   // namespace slender

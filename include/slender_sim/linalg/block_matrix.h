@@ -8,8 +8,8 @@
 
 namespace slender {
 
-/// Sparse symmetric matrix of 3 x 3 blocks, one row of blocks per point, whose pattern is fixed: the pairs of points that share an element.
-/// Lower triangle by columns, the diagonal block first; blocks are stored by columns.
+/// Sparse symmetric matrix of 3 x 3 blocks, one row of blocks per point, whose pattern is fixed: the pairs of points
+/// that share an element. Lower triangle by columns, the diagonal block first; blocks are stored by columns.
 class BlockMatrix
 {
 public:
@@ -26,14 +26,15 @@ public:
 
   /// Number of the block with these points; -1: not in the pattern.
   int block(int a, int b) const;
-  /// Where the blocks of an element go: for its points p >= q in the order (0,0) (1,0) (1,1) (2,0) ... twice the block's number, plus 1 where
-  /// the block to add must be transposed.
+  /// Where the blocks of an element go: for its points p >= q in the order (0,0) (1,0) (1,1) (2,0) ... twice the
+  /// block's number, plus 1 where the block to add must be transposed.
   std::vector<int> slots(const Eigen::MatrixXi& elements) const;
 
   void setZero();
   /// += factor A for each coordinate; the pattern must hold that of A. map: from mapOf(A).
   void add(double factor, const PointMatrix& matrix, const std::vector<int>& map);
-  /// Block of each entry of A on or below the diagonal, -1 above. Throws std::invalid_argument if the pattern lacks one.
+  /// Block of each entry of A on or below the diagonal, -1 above. Throws std::invalid_argument if the pattern lacks
+  /// one.
   std::vector<int> mapOf(const PointMatrix& matrix) const;
   /// y += A x (4 doubles per point).
   void addProduct(const double* x, double* y) const;
@@ -43,4 +44,4 @@ private:
   AlignedVector<double> values_;   ///< four more than blocks, for wide loads
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -11,9 +11,10 @@ namespace slender {
 struct LinearResult
 {
   int iterations = 0;
-  double residual = 0.0;   ///< over the right-hand side's (or the reference), in the preconditioner's norm sqrt(r . P r)
-  double scale = 0.0;      ///< that norm: of the right-hand side, or the reference
-  bool definite = true;    ///< no direction of negative curvature was met
+  /// over the right-hand side's (or the reference), in the preconditioner's norm sqrt(r . P r)
+  double residual = 0.0;
+  double scale = 0.0;     ///< that norm: of the right-hand side, or the reference
+  bool definite = true;   ///< no direction of negative curvature was met
 };
 
 /// Preconditioned conjugate gradients for points, with memory of its own.
@@ -29,10 +30,11 @@ public:
 
   /// Solves A x = b from x = 0. apply(p, ap) writes A p, precondition(r, z) writes P r and may take out of r what no
   /// direction of the search sees; both leave fixed points zero. Stops when the residual is the
-  /// tolerance times that of b, or times `reference` if that is positive; after max_iterations; or at negative curvature with the x so far.
+  /// tolerance times that of b, or times `reference` if that is positive; after max_iterations; or at negative
+  /// curvature with the x so far.
   template <class Apply, class Precondition>
-  LinearResult solve(const PointVector& b, PointVector& x, double tolerance, int max_iterations, Apply apply, Precondition precondition,
-                     double reference = 0.0)
+  LinearResult solve(const PointVector& b, PointVector& x, double tolerance, int max_iterations, Apply apply,
+                     Precondition precondition, double reference = 0.0)
   {
     const PointKernels& k = pointKernels();
     LinearResult result;
@@ -81,4 +83,4 @@ private:
   PointVector r_, z_, p_, ap_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -8,9 +8,9 @@ namespace slender {
 
 /// Band matrix of a rod, open or closed. In a closed rod the last panels wrap around to the first blocks.
 ///
-/// Closed: the last two blocks are a separator. The rest is an open band A; with B its coupling to the separator and C the
-/// separator's own block, Schur's complement S = C - B^T A^-1 B is 8 x 8. The eight columns of A^-1 B are solved together,
-/// one SIMD lane each, so a loop costs about twice an open rod.
+/// Closed: the last two blocks are a separator. The rest is an open band A; with B its coupling to the separator and C
+/// the separator's own block, Schur's complement S = C - B^T A^-1 B is 8 x 8. The eight columns of A^-1 B are solved
+/// together, one SIMD lane each, so a loop costs about twice an open rod.
 class CyclicBandedLdlt
 {
 public:
@@ -32,11 +32,11 @@ private:
   using Border = Eigen::Matrix<double, kBorder, kBorder>;
 
   bool closed_ = false;
-  int inner_ = 0;                    ///< blocks before the separator
+  int inner_ = 0;   ///< blocks before the separator
   BandedLdlt<10, 4> band_;
   AlignedVector<double> coupling_;   ///< B, row-major, eight columns
   AlignedVector<double> reduced_;    ///< A^-1 B
   Border schur_;                     ///< its L D L^T
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -3,8 +3,9 @@
 namespace slender {
 namespace {
 
-/// Treats denormal numbers as zero while it lives. In a long band round-off couplings decay geometrically along the rod until
-/// they are denormal, and from there on every operation on them would trap to microcode (20 times slower at 10^5 nodes).
+/// Treats denormal numbers as zero while it lives. In a long band round-off couplings decay geometrically along the rod
+/// until they are denormal, and from there on every operation on them would trap to microcode (20 times slower at 10^5
+/// nodes).
 class FlushDenormals
 {
 public:
@@ -19,5 +20,5 @@ private:
 #endif
 };
 
-}  // namespace
-}  // namespace slender
+}   // namespace
+}   // namespace slender

@@ -2,9 +2,15 @@
 
 namespace slender {
 
-enum class Isa { baseline, avx2, avx512 };
+enum class Isa
+{
+  baseline,
+  avx2,
+  avx512
+};
 
-/// Widest instruction set that both this machine and this build offer, and that SLENDER_ISA (baseline, avx2) in the environment does not forbid.
+/// Widest instruction set that both this machine and this build offer, and that SLENDER_ISA (baseline, avx2) in the
+/// environment does not forbid.
 Isa bestIsa();
 const char* toString(Isa isa);
 
@@ -20,4 +26,4 @@ const Table& pickKernels(const Table& baseline, const Table& avx2, const Table& 
   }
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -1,10 +1,12 @@
 #pragma once
 
-/// Products of the sparse matrices of points. Points have 4 doubles, the last of them unused; vectors are aligned to 64 bytes.
+/// Products of the sparse matrices of points. Points have 4 doubles, the last of them unused; vectors are aligned to 64
+/// bytes.
 namespace slender {
 
-/// L of a supernodal Cholesky factorisation as CHOLMOD keeps it: supernode s has the columns first[s] .. first[s + 1] - 1 and the rows
-/// rows[row_starts[s]] .. rows[row_starts[s + 1] - 1], those of its own columns first; values by columns from value_starts[s] on.
+/// L of a supernodal Cholesky factorisation as CHOLMOD keeps it: supernode s has the columns first[s] .. first[s + 1] -
+/// 1 and the rows rows[row_starts[s]] .. rows[row_starts[s + 1] - 1], those of its own columns first; values by columns
+/// from value_starts[s] on.
 struct SupernodalFactor
 {
   int supernodes = 0;
@@ -12,8 +14,8 @@ struct SupernodalFactor
   const double* values = nullptr;
 };
 
-/// A symmetric matrix D + L + L^T of points: blocks as for multiplyBlocks, and those of a matrix that acts on each coordinate alike, if any (full rows; what is
-/// right of the diagonal counts, from `right` on), times `factor`.
+/// A symmetric matrix D + L + L^T of points: blocks as for multiplyBlocks, and those of a matrix that acts on each
+/// coordinate alike, if any (full rows; what is right of the diagonal counts, from `right` on), times `factor`.
 struct SweptMatrix
 {
   int points = 0;
@@ -23,16 +25,20 @@ struct SweptMatrix
   const unsigned* offsets = nullptr;             ///< four times the columns
   const double* values = nullptr;
   double factor = 0;
-  const int* order = nullptr;                    ///< in which points are visited downwards: each after its neighbours of lower number
-  const double* inverse = nullptr;               ///< D^-1: per point three columns of four; zero keeps a point zero
+  /// in which points are visited downwards: each after its neighbours of lower number
+  const int* order = nullptr;
+  const double* inverse = nullptr;   ///< D^-1: per point three columns of four; zero keeps a point zero
 };
 
 struct PointKernels
 {
   /// y = A x (factor 0) or y += factor A x, full rows; offsets are four times the columns. Returns x . A x.
-  double (*multiply)(int rows, const int* starts, const unsigned* offsets, const double* values, double factor, const double* x, double* y);
-  /// y += A x for a symmetric matrix of 3 x 3 blocks: lower triangle by columns, the diagonal block first, blocks by columns.
-  void (*multiplyBlocks)(int columns, const int* starts, const int* rows, const double* values, const double* x, double* y);
+  double (*multiply)(int rows, const int* starts, const unsigned* offsets, const double* values, double factor,
+                     const double* x, double* y);
+  /// y += A x for a symmetric matrix of 3 x 3 blocks: lower triangle by columns, the diagonal block first, blocks by
+  /// columns.
+  void (*multiplyBlocks)(int columns, const int* starts, const int* rows, const double* values, const double* x,
+                         double* y);
   /// x := L^-1 x, and x := L^-T x, for each coordinate.
   void (*forwardSupernodal)(const SupernodalFactor& factor, double* x);
   void (*backwardSupernodal)(const SupernodalFactor& factor, double* x);
@@ -45,11 +51,17 @@ struct PointKernels
   double (*dot)(int points, const double* x, const double* y);
 };
 
-namespace baseline { extern const PointKernels point_kernels; }
-namespace avx2 { extern const PointKernels point_kernels; }
-namespace avx512 { extern const PointKernels point_kernels; }
+namespace baseline {
+extern const PointKernels point_kernels;
+}
+namespace avx2 {
+extern const PointKernels point_kernels;
+}
+namespace avx512 {
+extern const PointKernels point_kernels;
+}
 
 /// The table for this machine.
 const PointKernels& pointKernels();
 
-}  // namespace slender
+}   // namespace slender

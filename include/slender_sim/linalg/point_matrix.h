@@ -12,8 +12,14 @@ namespace slender {
 /// Vectors of n points for the hot loops: 4 doubles each (x, y, z, unused), so that a point is one aligned load.
 using PointVector = AlignedVector<double>;
 
-inline Eigen::Map<Eigen::Vector3d> point(PointVector& v, Eigen::Index i) { return Eigen::Map<Eigen::Vector3d>(v.data() + 4 * i); }
-inline Eigen::Map<const Eigen::Vector3d> point(const PointVector& v, Eigen::Index i) { return Eigen::Map<const Eigen::Vector3d>(v.data() + 4 * i); }
+inline Eigen::Map<Eigen::Vector3d> point(PointVector& v, Eigen::Index i)
+{
+  return Eigen::Map<Eigen::Vector3d>(v.data() + 4 * i);
+}
+inline Eigen::Map<const Eigen::Vector3d> point(const PointVector& v, Eigen::Index i)
+{
+  return Eigen::Map<const Eigen::Vector3d>(v.data() + 4 * i);
+}
 /// Takes memory only where `to` is shorter.
 void toPoints(const Eigen::Matrix3Xd& from, PointVector& to);
 void fromPoints(const PointVector& from, Eigen::Matrix3Xd& to);
@@ -23,7 +29,8 @@ class PointMatrix
 {
 public:
   PointMatrix() = default;
-  /// Entries of the whole matrix, which must be symmetric; equal indices are summed. Throws std::invalid_argument if it is not symmetric.
+  /// Entries of the whole matrix, which must be symmetric; equal indices are summed. Throws std::invalid_argument if it
+  /// is not symmetric.
   PointMatrix(int size, const std::vector<Eigen::Triplet<double>>& entries);
 
   int size() const { return static_cast<int>(starts_.size()) - 1; }
@@ -48,4 +55,4 @@ private:
   AlignedVector<double> values_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -11,29 +11,32 @@ namespace slender {
 class SparseCholesky
 {
 public:
-  /// `simplicial`: column by column, without BLAS; better for matrices that are nearly banded, whose dense blocks are too small for BLAS (and its
-  /// threads).
+  /// `simplicial`: column by column, without BLAS; better for matrices that are nearly banded, whose dense blocks are
+  /// too small for BLAS (and its threads).
   explicit SparseCholesky(bool simplicial = false);
   ~SparseCholesky();
   SparseCholesky(SparseCholesky&&) noexcept;
 
-  /// Lower triangle by columns: rows of column j are rows[starts[j]] .. rows[starts[j + 1] - 1], ascending, the diagonal among them.
-  /// Analyses the pattern (fill-reducing order); values() are zero afterwards.
+  /// Lower triangle by columns: rows of column j are rows[starts[j]] .. rows[starts[j + 1] - 1], ascending, the
+  /// diagonal among them. Analyses the pattern (fill-reducing order); values() are zero afterwards.
   void setPattern(int size, std::vector<int> starts, std::vector<int> rows);
 
-  /// Likewise for the matrices of points: 3 x 3 blocks, or one number for all three coordinates. The order is found by nested dissection of
-  /// the graph of points (METIS), with the unknowns of a point next to each other and supernodes wider than CHOLMOD's; factoring and solving take no memory.
-  /// values(), starts(), rows() and index() are then not to be used.
+  /// Likewise for the matrices of points: 3 x 3 blocks, or one number for all three coordinates. The order is found by
+  /// nested dissection of the graph of points (METIS), with the unknowns of a point next to each other and supernodes
+  /// wider than CHOLMOD's; factoring and solving take no memory. values(), starts(), rows() and index() are then not to
+  /// be used.
   void setPattern(const BlockMatrix& matrix);
   void setPattern(const PointMatrix& matrix);
-  /// As factor(), of a matrix with that pattern. Points with fixed[i] != 0 keep their place: their rows and columns are those of the identity.
+  /// As factor(), of a matrix with that pattern. Points with fixed[i] != 0 keep their place: their rows and columns are
+  /// those of the identity.
   bool factor(const BlockMatrix& matrix, const char* fixed);
   bool factor(const PointMatrix& matrix, const char* fixed);
   /// Likewise with other values in the matrix's pattern, one per entry; those above the diagonal are not read.
   bool factor(const PointMatrix& matrix, const double* values, const char* fixed);
   /// x = A^-1 b for points (4 doubles each; x may be b). Fixed points: x = b.
   void solvePoints(const double* b, double* x) const;
-  /// The two halves of solvePoints of a PointMatrix: y = L^-1 b, with y in the order of elimination and not b, and x = L^-T y, which overwrites y.
+  /// The two halves of solvePoints of a PointMatrix: y = L^-1 b, with y in the order of elimination and not b, and x =
+  /// L^-T y, which overwrites y.
   void forwardPoints(const double* b, double* y) const;
   void backwardPoints(double* y, double* x) const;
 
@@ -57,4 +60,4 @@ private:
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace slender
+}   // namespace slender

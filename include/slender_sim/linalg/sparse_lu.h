@@ -5,9 +5,10 @@
 
 namespace slender {
 
-/// LU factorisation of sparse matrices, symmetric or not, whose pattern stays while their values change (KLU of SuiteSparse). Pivots lie
-/// on the diagonal in an order that follows from the pattern alone, so what was factored before leaves no trace in a result. That suits
-/// matrices like [M, B; C, 0] with a nearly symmetric and positive M, full-ranked C and B near -C^T.
+/// LU factorisation of sparse matrices, symmetric or not, whose pattern stays while their values change (KLU of
+/// SuiteSparse). Pivots lie on the diagonal in an order that follows from the pattern alone, so what was factored
+/// before leaves no trace in a result. That suits matrices like [M, B; C, 0] with a nearly symmetric and positive M,
+/// full-ranked C and B near -C^T.
 class SparseLu
 {
 public:
@@ -35,4 +36,4 @@ private:
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace slender
+}   // namespace slender

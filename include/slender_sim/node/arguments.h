@@ -9,7 +9,8 @@ namespace slender {
 inline void requireNoArguments(int argc, char** argv)
 {
   if (argc > 1)
-    throw std::invalid_argument("unknown argument \"" + std::string(argv[1]) + "\"; parameters are given as _name:=value, topics remapped as from:=to");
+    throw std::invalid_argument("unknown argument \"" + std::string(argv[1]) +
+                                "\"; parameters are given as _name:=value, topics remapped as from:=to");
 }
 
-}  // namespace slender
+}   // namespace slender

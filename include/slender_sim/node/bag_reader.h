@@ -14,19 +14,22 @@ struct BagError : std::runtime_error
   using std::runtime_error::runtime_error;
 };
 
-/// Goes through what a node or `simulate` recorded, or `rosbag record` of their topics, one instant after the other. Needs no master.
+/// Goes through what a node or `simulate` recorded, or `rosbag record` of their topics, one instant after the other.
+/// Needs no master.
 class BagReader
 {
 public:
-  /// `topic_namespace`: before the topics, e.g. "/rod_node"; empty: the only one in the bag. `scene_folder`: where the files lie that
-  /// the recorded scene names. Throws BagError: missing, unfinished, cut off, damaged, without our topics, of several nodes.
+  /// `topic_namespace`: before the topics, e.g. "/rod_node"; empty: the only one in the bag. `scene_folder`: where the
+  /// files lie that the recorded scene names. Throws BagError: missing, unfinished, cut off, damaged, without our
+  /// topics, of several nodes.
   BagReader(const std::string& path, const std::string& topic_namespace = "", const std::string& scene_folder = ".");
   BagReader(BagReader&&) noexcept;
   ~BagReader();
 
   /// The next instant; false after the last one. Throws BagError.
   bool next(SceneSnapshot& out);
-  /// Of the instant that next() gave, since the first one in the bag [s]; unlike the scene's own time it grows through resets.
+  /// Of the instant that next() gave, since the first one in the bag [s]; unlike the scene's own time it grows through
+  /// resets.
   double seconds() const;
 
   /// The recorded scene; null when there is none or its files are not in `scene_folder` (sceneProblem() says which).
@@ -45,4 +48,4 @@ private:
   std::unique_ptr<Contents> contents_;
 };
 
-}  // namespace slender
+}   // namespace slender

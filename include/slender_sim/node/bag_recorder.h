@@ -12,13 +12,14 @@
 
 namespace slender {
 
-/// Writes a bag in-process: topics drop messages, this does not. Messages go in a fixed order with their own stamps and nothing
-/// of the machine or the hour, so that two equal runs leave files of equal bytes.
+/// Writes a bag in-process: topics drop messages, this does not. Messages go in a fixed order with their own stamps and
+/// nothing of the machine or the hour, so that two equal runs leave files of equal bytes.
 class BagRecorder
 {
 public:
-  /// Opens PATH.active, which close() renames to PATH, in place of an older bag; where PATH is a symbolic link, beside the file that it leads to.
-  /// `topic_namespace` precedes the topics, e.g. "/". Throws std::runtime_error when the file cannot be written, and when PATH is no regular file.
+  /// Opens PATH.active, which close() renames to PATH, in place of an older bag; where PATH is a symbolic link, beside
+  /// the file that it leads to. `topic_namespace` precedes the topics, e.g. "/". Throws std::runtime_error when the
+  /// file cannot be written, and when PATH is no regular file.
   BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names,
               const std::vector<std::string>& thread_prefixes);
   ~BagRecorder();
@@ -29,8 +30,9 @@ public:
   void recordMesh(const slender_sim::MeshStamped& mesh);
   /// What changed the run, on `inputs`.
   void recordInput(const slender_sim::Input& input);
-  /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies, `nozzle/wrench` per
-  /// thread, `grasp_states` and `obstacle_states` if there are any, and `fields` if the scene asks for them; the rest can be derived from these. These four throw WriteError.
+  /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies,
+  /// `nozzle/wrench` per thread, `grasp_states` and `obstacle_states` if there are any, and `fields` if the scene asks
+  /// for them; the rest can be derived from these. These four throw WriteError.
   void record(const SceneMessages& messages);
   /// Throws WriteError when the file cannot be completed.
   void close();
@@ -42,7 +44,8 @@ private:
   void write(const std::string& topic, const ros::Time& stamp, const Message& message);
   std::string remains() const;
 
-  std::string path_, state_topic_, scene_topic_, inputs_topic_, mesh_topic_, bodies_topic_, grasps_topic_, obstacles_topic_, fields_topic_;
+  std::string path_, state_topic_, scene_topic_, inputs_topic_, mesh_topic_, bodies_topic_, grasps_topic_,
+      obstacles_topic_, fields_topic_;
   std::vector<std::string> wrench_topics_, nozzle_topics_;
   std::unique_ptr<rosbag::Bag> bag_;
   bool open_ = false;
@@ -51,4 +54,4 @@ private:
 /// The same bag as rod_node writes with `~start_time: 1`, frame world and no namespace, for `simulate --bag`.
 std::unique_ptr<Recorder> makeBagRecorder(const std::string& path);
 
-}  // namespace slender
+}   // namespace slender

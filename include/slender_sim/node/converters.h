@@ -34,9 +34,15 @@ geometry_msgs::Twist toMessage(const Twist& twist);
 Eigen::Vector3d fromMessage(const geometry_msgs::Point& p);
 
 /// Why a pose from a message cannot be used.
-enum class PoseFault { none, not_finite, bad_quaternion };
+enum class PoseFault
+{
+  none,
+  not_finite,
+  bad_quaternion
+};
 
-/// Takes over a pose; its quaternion may be off unit length by 1 % (it is normalised), more is a fault and leaves `X` alone.
+/// Takes over a pose; its quaternion may be off unit length by 1 % (it is normalised), more is a fault and leaves `X`
+/// alone.
 PoseFault fromMessage(const geometry_msgs::Pose& message, Pose& X);
 PoseFault fromMessage(const geometry_msgs::Transform& message, Pose& X);
 bool isFinite(const geometry_msgs::Twist& twist);
@@ -51,11 +57,13 @@ void toMessage(const ThreadState& state, slender_sim::ThreadState& out);
 /// Appends a cloth. Fills everything but the header, epoch and step, and what it tracks.
 void append(const std::string& name, const ClothState& state, slender_sim::ClothState& out);
 /// Appends what the cloth that was appended last tracks; of one that tracks nothing, too.
-void appendTracking(double error, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces, slender_sim::ClothState& out);
+void appendTracking(double error, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
+                    slender_sim::ClothState& out);
 /// Appends a cloth's undeformed mesh.
 void append(const ClothModel& model, slender_sim::MeshStamped& out);
 
-/// Reads x, y, z (float32 or float64) of all points, in order; returns why not, empty when done. `out` may hold NaN as the message does.
+/// Reads x, y, z (float32 or float64) of all points, in order; returns why not, empty when done. `out` may hold NaN as
+/// the message does.
 std::string fromPoints(const sensor_msgs::PointCloud2& message, Eigen::Matrix3Xd& out);
 
 /// Vertices of all cloths as x, y, z in float32. Fills everything but the header.
@@ -72,4 +80,4 @@ bool isFinite(const RigidBodyState& state);
 bool isFinite(const ThreadState& state);
 bool isFinite(const ClothState& state);
 
-}  // namespace slender
+}   // namespace slender

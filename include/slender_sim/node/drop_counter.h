@@ -53,4 +53,4 @@ private:
   std::uint64_t received_ = 0;
 };
 
-}  // namespace slender
+}   // namespace slender

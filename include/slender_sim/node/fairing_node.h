@@ -20,4 +20,4 @@ private:
   ros::ServiceServer server_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -18,8 +18,8 @@ namespace slender {
 /// The trajectory can still change at the instant that was evaluated last: when input stopped during a motion and comes
 /// back, when a live stream runs dry, or when the first sample or a new attachment is elsewhere. The difference in pose
 /// and velocity between the last output and the changed trajectory then becomes an offset. A cubic Hermite polynomial
-/// takes the offset to zero within a blending time, so the grasp catches up with continuous velocity and a mean speed of
-/// about `catch_up_speed` at most. While samples come in time the offset is exactly zero.
+/// takes the offset to zero within a blending time, so the grasp catches up with continuous velocity and a mean speed
+/// of about `catch_up_speed` at most. While samples come in time the offset is exactly zero.
 class GuideBuffer : public GuideStream<PoseTrajectory>
 {
 public:
@@ -28,12 +28,13 @@ public:
     /// [s] >= 0. Two sample intervals plus the transport time are enough. With less, the grasp lags by what the samples
     /// need. With 0 there is no lag, and the velocity jumps.
     double delay = 0.05;
-    double catch_up_time = 0.1;     ///< [s] > 0, shortest blending time
-    double catch_up_speed = 1.0;    ///< [m/s] > 0, mean speed of catching up
-    double catch_up_turning = 3.0;  ///< [rad/s] > 0, mean speed of catching up in orientation
-    double coast = 0.0;             ///< [s] >= 0 in which the motion comes to rest when no sample comes; 0: the last sample is held
-    bool automatic = false;         ///< the lag is the one that the samples need, see GuideTiming
-    bool live = false;              ///< samples come in real time, see GuideTiming
+    double catch_up_time = 0.1;      ///< [s] > 0, shortest blending time
+    double catch_up_speed = 1.0;     ///< [m/s] > 0, mean speed of catching up
+    double catch_up_turning = 3.0;   ///< [rad/s] > 0, mean speed of catching up in orientation
+    /// [s] >= 0 in which the motion comes to rest when no sample comes; 0: the last sample is held
+    double coast = 0.0;
+    bool automatic = false;   ///< the lag is the one that the samples need, see GuideTiming
+    bool live = false;        ///< samples come in real time, see GuideTiming
 
     GuideTiming::Options timing() const { return {delay, automatic, live, coast}; }
   };
@@ -42,14 +43,15 @@ public:
   /// With Attach::initial the offset between gripper and section is kept that exists when the first pose takes effect.
   GuideBuffer(const Options& options, Attach attach, const Pose& X_WG);
 
-  /// Adds the gripper's pose in the world at `time` [s]; false when it is not later than the last one (nothing changes).
+  /// Adds the gripper's pose in the world at `time` [s]; false when it is not later than the last one (nothing
+  /// changes).
   bool push(double time, const Pose& X_WH);
 
   /// Pose and velocity of the grasp at simulated `time` [s]; times of successive calls do not decrease.
   GraspTarget target(double time);
 
-  /// The grasp has been moved to X_WG. With Attach::initial it keeps its new offset to the gripper; with Attach::section it
-  /// catches up with the gripper.
+  /// The grasp has been moved to X_WG. With Attach::initial it keeps its new offset to the gripper; with
+  /// Attach::section it catches up with the gripper.
   void attachAt(const Pose& X_WG);
   /// Forgets all samples and stays at X_WG.
   void restart(const Pose& X_WG);
@@ -75,17 +77,17 @@ private:
   void forgetPlain() override;
   void rejoin(double time) override;
   void output(double time) override;
-  bool passesHere() const;                   // the trajectory has not changed at query_, to the last bit
-  Motion followed(double query, double rate) const;      // motion of the grasp without an offset
+  bool passesHere() const;                            // the trajectory has not changed at query_, to the last bit
+  Motion followed(double query, double rate) const;   // motion of the grasp without an offset
   Motion blended(double time, const Motion& followed) const;
   void blendFrom(double time, const Motion& from, const Motion& to);
 
   Options options_;
   Attach attach_;
-  Pose X_HG_;                                // grasp in the gripper, known once samples have taken effect
-  Motion plain_;                             // motion without an offset at last_time_
-  Motion last_;                              // last output
+  Pose X_HG_;      // grasp in the gripper, known once samples have taken effect
+  Motion plain_;   // motion without an offset at last_time_
+  Motion last_;    // last output
   std::optional<Offset> offset_;
 };
 
-}  // namespace slender
+}   // namespace slender

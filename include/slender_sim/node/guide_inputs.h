@@ -29,10 +29,11 @@
 
 namespace slender {
 
-/// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`, `bodies`, `nozzle/pose`,
-/// through tf2 into the node's frame; and `nozzle/flow`, `belt/velocity` and `wind`, which hold from the next step on. Subscribes only to what the
-/// scene asks for. Guides of tracked cloths: TrackingInputs. Bad messages are dropped and counted; what they would have moved keeps its previous input.
-/// A stamp of zero means now, as everywhere in tf.
+/// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`,
+/// `bodies`, `nozzle/pose`, through tf2 into the node's frame; and `nozzle/flow`, `belt/velocity` and `wind`, which
+/// hold from the next step on. Subscribes only to what the scene asks for. Guides of tracked cloths: TrackingInputs.
+/// Bad messages are dropped and counted; what they would have moved keeps its previous input. A stamp of zero means
+/// now, as everywhere in tf.
 class GuideInputs
 {
 public:
@@ -62,8 +63,8 @@ public:
   /// The clock skipped so many seconds, during which everything stood still.
   void skip(double seconds);
 
-  /// What is driven by messages of its own may also be dragged by hand: TOPIC/feedback counts as poses of the present. Whoever drags should be
-  /// the only one who moves it.
+  /// What is driven by messages of its own may also be dragged by hand: TOPIC/feedback counts as poses of the present.
+  /// Whoever drags should be the only one who moves it.
   void listenToHand(ros::NodeHandle nh, const std::string& topic);
   /// Of what can be dragged, where it is now.
   std::vector<Handle> handles(const Simulation& simulation) const;
@@ -79,7 +80,10 @@ public:
   std::vector<Age> ages() const;
 
   /// Per flow, belt and wind driven from outside: the value by message.
-  struct Setting { std::string name, value; };
+  struct Setting
+  {
+    std::string name, value;
+  };
   std::vector<Setting> settings() const;
 
 private:
@@ -88,11 +92,20 @@ private:
   void takenPose(std::size_t guided, double time, const Pose& X_WH) const;
   void takenVector(std::uint8_t kind, std::size_t thread, const Eigen::Vector3d& v) const;
 
-  struct Guided { std::string name, body, topic; std::unique_ptr<GuideBuffer> buffer; };   // buffer: null when not driven from outside
-  struct Entry { int guided; Pose X_FH; };                // a gripper, body or obstacle in the frame of the message
+  // buffer: null when not driven from outside
+  struct Guided
+  {
+    std::string name, body, topic;
+    std::unique_ptr<GuideBuffer> buffer;
+  };
+  struct Entry
+  {
+    int guided;
+    Pose X_FH;
+  };   // a gripper, body or obstacle in the frame of the message
   struct Message
   {
-    int source;                                           // messages of one source keep their order
+    int source;   // messages of one source keep their order
     std::string what, frame;
     ros::Time stamp;
     std::vector<Entry> entries;
@@ -111,7 +124,8 @@ private:
   void onGuides(const geometry_msgs::PoseArray& message);
   void onBodies(const slender_sim::BodyStates& message);
   Pose poseOf(const Simulation& simulation, std::size_t guided) const;
-  bool addThreads(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options, const std::vector<std::string>& prefixes);
+  bool addThreads(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
+                  const std::vector<std::string>& prefixes);
   void subscribePose(ros::NodeHandle& nh);
   void addSolids(const Simulation& simulation, const GuideBuffer::Options& options);
   bool checkPose(const geometry_msgs::Pose& message, const std::string& what, const std::string& whose, Pose& X);
@@ -131,15 +145,19 @@ private:
   {
     bool flow_topic = false, belt_topic = false;
     double greatest_flow = 0.0;
-    std::optional<double> flow;                           // last values by message
+    std::optional<double> flow;   // last values by message
     std::optional<Eigen::Vector3d> belt;
   };
   std::vector<Driven> threads_;
   bool wind_topic_ = false;
-  std::optional<Eigen::Vector3d> wind_;                   // last by message
-  std::vector<std::string> prefixes_;                     // of their topics
-  struct Dragged { Pose X_FH; std::string frame; };
-  std::map<std::size_t, Dragged> hand_;                   // per guided, not taken yet
+  std::optional<Eigen::Vector3d> wind_;   // last by message
+  std::vector<std::string> prefixes_;     // of their topics
+  struct Dragged
+  {
+    Pose X_FH;
+    std::string frame;
+  };
+  std::map<std::size_t, Dragged> hand_;   // per guided, not taken yet
   PendingMessages<Message> pending_;
   DropCounter drops_;
   tf2_ros::Buffer tf_buffer_;
@@ -149,4 +167,4 @@ private:
   InputSink sink_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -7,9 +7,9 @@
 
 namespace slender {
 
-/// Follows a stream of stamped samples in simulated time: what GuideBuffer and PointGuideBuffer have in common. `Trajectory` joins the samples
-/// (PoseTrajectory, PointTrajectory). It is evaluated at instants that GuideTiming chooses. The derived class evaluates it and blends from the last
-/// output to a trajectory that has changed.
+/// Follows a stream of stamped samples in simulated time: what GuideBuffer and PointGuideBuffer have in common.
+/// `Trajectory` joins the samples (PoseTrajectory, PointTrajectory). It is evaluated at instants that GuideTiming
+/// chooses. The derived class evaluates it and blends from the last output to a trajectory that has changed.
 template <class Trajectory>
 class GuideStream
 {
@@ -27,7 +27,8 @@ protected:
   virtual void join(double start) = 0;
   /// What was evaluated last is not that of the trajectory at query_.
   virtual void forgetPlain() = 0;
-  /// The trajectory may have changed at query_. Starts a blend from the last output, given at simulated `time` [s], unless they agree.
+  /// The trajectory may have changed at query_. Starts a blend from the last output, given at simulated `time` [s],
+  /// unless they agree.
   virtual void rejoin(double time) = 0;
   /// Sets the output at simulated `time` [s] from the trajectory at query_, which passes at rate_.
   virtual void output(double time) = 0;
@@ -47,7 +48,8 @@ protected:
     changed_ = true;
   }
 
-  /// Goes on to simulated `time` [s], which does not decrease from call to call. Calls output() once a stream has taken effect.
+  /// Goes on to simulated `time` [s], which does not decrease from call to call. Calls output() once a stream has taken
+  /// effect.
   void advance(double time)
   {
     GuideTiming::Instant now = timing_.advance(time);
@@ -104,9 +106,9 @@ protected:
 
   GuideTiming timing_;
   Trajectory trajectory_;
-  bool following_ = false;                   // samples have taken effect
-  std::optional<double> last_time_;          // [s] simulated time of the last query
-  double query_ = 0.0, rate_ = 1.0;          // [s] instant of the trajectory at last_time_, and its rate
+  bool following_ = false;            // samples have taken effect
+  std::optional<double> last_time_;   // [s] simulated time of the last query
+  double query_ = 0.0, rate_ = 1.0;   // [s] instant of the trajectory at last_time_, and its rate
 
 private:
   /// Lets the newest stream take effect, which is the first one or one after a pause.
@@ -129,10 +131,10 @@ private:
   }
 
   double coast_;
-  std::optional<Trajectory> next_;           // of a new stream that has not taken effect yet
-  std::optional<double> last_stamp_;         // [s] of the last sample
-  bool changed_ = false;                     // the trajectory changed since the last query
-  bool open_ = false;                        // the end of the trajectory is extrapolated
+  std::optional<Trajectory> next_;     // of a new stream that has not taken effect yet
+  std::optional<double> last_stamp_;   // [s] of the last sample
+  bool changed_ = false;               // the trajectory changed since the last query
+  bool open_ = false;                  // the end of the trajectory is extrapolated
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -11,27 +11,28 @@ namespace slender {
 /// has arrived, because the slope at the segment's end depends on that sample. A stream therefore needs a lag of two
 /// sample intervals plus the transport time. The lag that is needed is measured whenever a sample arrives.
 ///
-/// While the needed lag is at most the given delay, the lag equals the delay exactly and does not depend on when samples
-/// arrive. When samples come later, the lag grows to the needed value. It shrinks again some seconds after samples come in
-/// time. The lag changes smoothly: the rate at which instants pass is 1 while the lag is constant, is continuous, changes
-/// by at most 1 within 0.2 s, and exceeds 1 by at most 10 %. The motion then passes through the same places a little
-/// slower or faster, without a jump of velocity. With the option `automatic` the lag is always the needed one plus 10 %
-/// and 1 ms.
+/// While the needed lag is at most the given delay, the lag equals the delay exactly and does not depend on when
+/// samples arrive. When samples come later, the lag grows to the needed value. It shrinks again some seconds after
+/// samples come in time. The lag changes smoothly: the rate at which instants pass is 1 while the lag is constant, is
+/// continuous, changes by at most 1 within 0.2 s, and exceeds 1 by at most 10 %. The motion then passes through the
+/// same places a little slower or faster, without a jump of velocity. With the option `automatic` the lag is always the
+/// needed one plus 10 % and 1 ms.
 ///
 /// When a live stream runs dry, the rate falls to zero within 0.15 s, and the caller extrapolates meanwhile
-/// (Instant::open). A stream ends when no sample has come for 0.4 s, or for 0.1 s while it has only two samples. A sample
-/// begins a new stream when it comes after a pause of more than 0.25 s in which the last sample was reached.
+/// (Instant::open). A stream ends when no sample has come for 0.4 s, or for 0.1 s while it has only two samples. A
+/// sample begins a new stream when it comes after a pause of more than 0.25 s in which the last sample was reached.
 class GuideTiming
 {
 public:
   struct Options
   {
-    /// [s] >= 0, the lag while samples come in time. With 0 there is never a lag, and late samples cause jumps of velocity.
+    /// [s] >= 0, the lag while samples come in time. With 0 there is never a lag, and late samples cause jumps of
+    /// velocity.
     double delay = 0.05;
     bool automatic = false;   ///< the lag is the needed one; `delay` is used until the needed lag is known
     bool live = false;        ///< samples come in real time, so a missing sample may still come
-    /// [s] >= 0 for which the caller moves on after the last sample. With more than 0 the rate does not fall when samples
-    /// are missing.
+    /// [s] >= 0 for which the caller moves on after the last sample. With more than 0 the rate does not fall when
+    /// samples are missing.
     double coast = 0.0;
   };
 
@@ -45,12 +46,12 @@ public:
   {
     bool following = false;   ///< the stream has taken effect; the other members are valid only then
     bool began = false;       ///< the stream takes effect now
-    /// The instant did not move on continuously. This happens when a stream ends after two samples: they are a step, not a
-    /// motion, and the instant jumps to the last one.
+    /// The instant did not move on continuously. This happens when a stream ends after two samples: they are a step,
+    /// not a motion, and the instant jumps to the last one.
     bool jumped = false;
-    bool open = false;        ///< the stream goes on, so the motion after its last sample is unknown and not at rest
-    double time = 0.0;        ///< [s] of the samples' stamps; never decreases within a stream
-    double rate = 1.0;        ///< d(instant)/d(simulated time), >= 0
+    bool open = false;   ///< the stream goes on, so the motion after its last sample is unknown and not at rest
+    double time = 0.0;   ///< [s] of the samples' stamps; never decreases within a stream
+    double rate = 1.0;   ///< d(instant)/d(simulated time), >= 0
   };
   /// Moves on to simulated `time` [s], which does not decrease.
   Instant advance(double time);
@@ -64,8 +65,8 @@ public:
   bool overran() const { return overran_; }
   /// The lag now [s].
   double lag() const;
-  /// By how much the needed lag exceeded the delay [s] during the last 2.5 to 5 seconds; 0 when it did not. The value is
-  /// always 0 with the option `automatic`.
+  /// By how much the needed lag exceeded the delay [s] during the last 2.5 to 5 seconds; 0 when it did not. The value
+  /// is always 0 with the option `automatic`.
   double excess() const;
 
 private:
@@ -81,14 +82,15 @@ private:
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
 
   Options options_;
-  int count_ = 0;                                  // number of samples of this stream, counted up to 3
+  int count_ = 0;                                      // number of samples of this stream, counted up to 3
   double first_ = 0.0, previous_ = 0.0, last_ = 0.0;   // [s] stamps: of the first sample, the last but one, the last
-  double arrival_ = kNever;                        // [s] simulated time at which the last sample arrived
-  std::optional<double> now_;                      // [s] of the last advance()
-  double peak_ = kNever, older_peak_ = kNever, peaks_since_ = kNever;   // [s] greatest needed lag in this period and in the one before, and the start of this period
+  double arrival_ = kNever;                            // [s] simulated time at which the last sample arrived
+  std::optional<double> now_;                          // [s] of the last advance()
+  // [s] greatest needed lag in this period and in the one before, and the start of this period
+  double peak_ = kNever, older_peak_ = kNever, peaks_since_ = kNever;
   bool following_ = false, overran_ = false, jumped_ = false;
   double query_ = 0.0, rate_ = 1.0;
-  std::optional<double> lag_;                      // [s] the lag while it is constant
+  std::optional<double> lag_;   // [s] the lag while it is constant
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -12,16 +12,16 @@ namespace slender {
 /// Something that can be dragged by hand.
 struct Handle
 {
-  std::string name;          ///< of its marker: `grasps/NAME`, `bodies/NAME`, `nozzle`
-  Pose X_WH;                 ///< where it is
-  double size = 0.1;         ///< [m] diameter of its rings
-  double ball = 0.03;        ///< [m] diameter of the ball in their middle
-  bool turns = true;         ///< false: only its position matters
+  std::string name;     ///< of its marker: `grasps/NAME`, `bodies/NAME`, `nozzle`
+  Pose X_WH;            ///< where it is
+  double size = 0.1;    ///< [m] diameter of its rings
+  double ball = 0.03;   ///< [m] diameter of the ball in their middle
+  bool turns = true;    ///< false: only its position matters
 };
 
-/// Shows handles in rviz (display InteractiveMarkers): arrows and rings of six degrees of freedom, and a ball to move in the view's plane.
-/// The server's own thread keeps the handles where the hand leaves them; what the hand does is published on TOPIC/feedback, to which GuideInputs
-/// listens.
+/// Shows handles in rviz (display InteractiveMarkers): arrows and rings of six degrees of freedom, and a ball to move
+/// in the view's plane. The server's own thread keeps the handles where the hand leaves them; what the hand does is
+/// published on TOPIC/feedback, to which GuideInputs listens.
 class HandMarkers
 {
 public:
@@ -36,4 +36,4 @@ private:
   interactive_markers::InteractiveMarkerServer server_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -18,7 +18,8 @@ using InputSink = std::function<void(slender_sim::Input)>;
 class InputReplay
 {
 public:
-  /// Reads the bag that a node wrote (~record_bag). Throws OptionError "~replay: PATH: reason": no such bag, no scene in it or several, stamps that go back.
+  /// Reads the bag that a node wrote (~record_bag). Throws OptionError "~replay: PATH: reason": no such bag, no scene
+  /// in it or several, stamps that go back.
   explicit InputReplay(const std::string& path);
 
   const std::string& path() const { return path_; }
@@ -39,4 +40,4 @@ private:
   std::size_t at_ = 0;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -12,26 +12,30 @@ namespace slender {
 
 /// Plays a table of timed poses (scene/pose_file.h) as a tracker or motion capture system would send them.
 ///
-/// Publishes each body of the table as a tf frame BODY in ~frame_id, and for each entry `BODY: GRASP` of ~bodies a PoseStamped on
-/// `grasps/GRASP/pose`, in the frame BODY itself (its pose there is the identity), so that the receiver has to ask tf.
+/// Publishes each body of the table as a tf frame BODY in ~frame_id, and for each entry `BODY: GRASP` of ~bodies a
+/// PoseStamped on `grasps/GRASP/pose`, in the frame BODY itself (its pose there is the identity), so that the receiver
+/// has to ask tf.
 ///
-/// Bodies that ~solids lists go into `bodies` messages, in ~frame_id: those that move obstacles and driven bodies of a scene.
+/// Bodies that ~solids lists go into `bodies` messages, in ~frame_id: those that move obstacles and driven bodies of a
+/// scene.
 ///
-/// Parameters: ~file (CSV); ~bodies (map); ~solids (list of names); ~frame_id ("world"); ~tf (true; false: poses in ~frame_id, no tf); ~rate [Hz] (0: at the
-/// table's own times, otherwise resampled); ~speed (1); ~loop (false; true: back and forth for ever, without a jump);
-/// ~wait [s] (30: how long to wait for subscribers at most); ~offset ([x, y, z], added to all positions [m]).
+/// Parameters: ~file (CSV); ~bodies (map); ~solids (list of names); ~frame_id ("world"); ~tf (true; false: poses in
+/// ~frame_id, no tf); ~rate [Hz] (0: at the table's own times, otherwise resampled); ~speed (1); ~loop (false; true:
+/// back and forth for ever, without a jump); ~wait [s] (30: how long to wait for subscribers at most); ~offset ([x, y,
+/// z], added to all positions [m]).
 class MotionPlayer
 {
 public:
   /// Throws std::runtime_error for parameters or a table that cannot be used.
   MotionPlayer(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv);
-  /// Until the table ends, or shut down. Stamps are start + t / speed in ROS time, so they jitter less than the messages.
+  /// Until the table ends, or shut down. Stamps are start + t / speed in ROS time, so they jitter less than the
+  /// messages.
   void spin();
 
 private:
   struct Instant
   {
-    double time;                            ///< [s] in the table
+    double time;   ///< [s] in the table
     std::map<std::string, Pose> bodies;
   };
 
@@ -51,4 +55,4 @@ private:
   std::map<std::string, ros::Publisher> pose_pubs_;   // by body
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -24,8 +24,19 @@ enum class Pace
   step,     ///< only when the step service is called
 };
 
-enum class MarkerStyle { tube, line, regions };
-enum class MarkerColor { none, strain, curvature, twist };
+enum class MarkerStyle
+{
+  tube,
+  line,
+  regions
+};
+enum class MarkerColor
+{
+  none,
+  strain,
+  curvature,
+  twist
+};
 
 /// What pictures show beside the shape.
 struct MarkerOptions
@@ -33,39 +44,47 @@ struct MarkerOptions
   MarkerStyle style = MarkerStyle::tube;   ///< ~marker_style: tube | line | regions (of tracked cloths)
   bool frames = false;                     ///< ~marker_frames: material frames
   MarkerColor color = MarkerColor::none;   ///< ~marker_color: none | strain | curvature | twist
-  double range = 0.0;                      ///< ~marker_range: magnitude of the full colour: strain [-], curvature [1/m], twist [rad/m]; 0: the picture's largest
-  double forces = 0.0;                     ///< ~marker_forces [m/N]: arrows of contacts' and holders' forces so long; 0: none
+  /// ~marker_range: magnitude of the full colour: strain [-], curvature [1/m], twist [rad/m]; 0: the picture's largest
+  double range = 0.0;
+  /// ~marker_forces [m/N]: arrows of contacts' and holders' forces so long; 0: none
+  double forces = 0.0;
 };
 
 /// Private parameters of rod_node, thread_node, cloth_node and tracking_node, with their defaults.
 struct NodeOptions
 {
-  std::string scene;                            ///< ~scene: path of the scene file, or its YAML text
-  std::vector<std::string> overrides;           ///< ~set: list of "path=value", or one such string
-  std::string frame_id = "world";               ///< ~frame_id of everything published
-  Pace pace = Pace::wall;                       ///< ~pace
-  std::optional<double> start_time;             ///< ~start_time [s] > 0; default: ROS time now (wall), first /clock (follow), else 1
-  double stop_after = 0.0;                      ///< ~stop_after [s] simulated, then the node ends; 0: never
-  double speed = 1.0;                           ///< ~speed > 0: simulated over wall time, with ~pace: wall
-  double max_lag = 1.0;                         ///< ~max_lag [s]: behind the wall clock by more than that, the clock skips to the present; 0: never
-  bool publish_clock = false;                   ///< ~publish_clock: /clock comes from here; needs /use_sim_time
-  bool paused = false;                          ///< ~paused: start paused
-  int state_every = 1;                          ///< ~state_every: steps between state, poses and wrench messages
-  std::string record_bag;                       ///< ~record_bag: path; empty: no bag
-  bool record_inputs = true;                    ///< ~record_inputs: into the same bag, for ~replay
-  std::string replay;                           ///< ~replay: path of a bag whose run is repeated; empty: none
-  double guide_delay = 0.05;                    ///< ~guide_delay [s] behind which grasps follow their guides
-  bool guide_delay_auto = false;                ///< ~guide_delay: auto
-  bool live_guides = true;                      ///< guides come in real time: with ~pace: wall (of a replay: of the run that it repeats)
-  double guide_timeout = 1.0;                   ///< ~guide_timeout [s]: older guides are stale; no guide for so long: WARN
-  double guide_ahead = 10.0;                    ///< ~guide_ahead [s]: guides stamped later than that after the simulated time are refused
-  double catch_up_time = 0.1;                   ///< ~catch_up_time [s] shortest time for closing a gap
-  double catch_up_speed = 1.0;                  ///< ~catch_up_speed [m/s] when closing a gap
-  double tf_timeout = 0.5;                      ///< ~tf_timeout [s] wall time that a message waits for its transform
-  double diagnostics_rate = 1.0;                ///< ~diagnostics_rate [Hz]
-  double marker_rate = 30.0;                    ///< ~marker_rate [Hz] at most, up to 30
-  MarkerOptions markers;                        ///< ~marker_style, ~marker_frames, ~marker_color, ~marker_range, ~marker_forces
-  bool interactive = false;                     ///< ~interactive: handles in rviz for what messages move
+  std::string scene;                    ///< ~scene: path of the scene file, or its YAML text
+  std::vector<std::string> overrides;   ///< ~set: list of "path=value", or one such string
+  std::string frame_id = "world";       ///< ~frame_id of everything published
+  Pace pace = Pace::wall;               ///< ~pace
+  /// ~start_time [s] > 0; default: ROS time now (wall), first /clock (follow), else 1
+  std::optional<double> start_time;
+  double stop_after = 0.0;   ///< ~stop_after [s] simulated, then the node ends; 0: never
+  double speed = 1.0;        ///< ~speed > 0: simulated over wall time, with ~pace: wall
+  /// ~max_lag [s]: behind the wall clock by more than that, the clock skips to the present; 0: never
+  double max_lag = 1.0;
+  bool publish_clock = false;      ///< ~publish_clock: /clock comes from here; needs /use_sim_time
+  bool paused = false;             ///< ~paused: start paused
+  int state_every = 1;             ///< ~state_every: steps between state, poses and wrench messages
+  std::string record_bag;          ///< ~record_bag: path; empty: no bag
+  bool record_inputs = true;       ///< ~record_inputs: into the same bag, for ~replay
+  std::string replay;              ///< ~replay: path of a bag whose run is repeated; empty: none
+  double guide_delay = 0.05;       ///< ~guide_delay [s] behind which grasps follow their guides
+  bool guide_delay_auto = false;   ///< ~guide_delay: auto
+  /// guides come in real time: with ~pace: wall (of a replay: of the run that it repeats)
+  bool live_guides = true;
+  /// ~guide_timeout [s]: older guides are stale; no guide for so long: WARN
+  double guide_timeout = 1.0;
+  /// ~guide_ahead [s]: guides stamped later than that after the simulated time are refused
+  double guide_ahead = 10.0;
+  double catch_up_time = 0.1;      ///< ~catch_up_time [s] shortest time for closing a gap
+  double catch_up_speed = 1.0;     ///< ~catch_up_speed [m/s] when closing a gap
+  double tf_timeout = 0.5;         ///< ~tf_timeout [s] wall time that a message waits for its transform
+  double diagnostics_rate = 1.0;   ///< ~diagnostics_rate [Hz]
+  double marker_rate = 30.0;       ///< ~marker_rate [Hz] at most, up to 30
+  /// ~marker_style, ~marker_frames, ~marker_color, ~marker_range, ~marker_forces
+  MarkerOptions markers;
+  bool interactive = false;   ///< ~interactive: handles in rviz for what messages move
 
   /// Reads and checks them all; throws OptionError on the first that does not fit, unknown names included.
   static NodeOptions read(const ros::NodeHandle& nh_priv);
@@ -73,4 +92,4 @@ struct NodeOptions
 
 const char* toString(Pace pace);
 
-}  // namespace slender
+}   // namespace slender

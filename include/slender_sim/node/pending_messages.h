@@ -10,14 +10,18 @@
 
 namespace slender {
 
-/// Messages that wait for their transforms. Those of one source and frame keep their order; others may overtake them, so that a frame that nobody knows
-/// holds back nothing else.
+/// Messages that wait for their transforms. Those of one source and frame keep their order; others may overtake them,
+/// so that a frame that nobody knows holds back nothing else.
 template <class Message>
 class PendingMessages
 {
 public:
   /// `most` may wait in all, a quarter of them of one source and frame, `patience` [s] each, of wall time.
-  PendingMessages(std::size_t most, double patience) : most_(most), patience_(std::chrono::microseconds(static_cast<std::int64_t>(1e6 * patience))) {}
+  PendingMessages(std::size_t most, double patience)
+    : most_(most),
+      patience_(std::chrono::microseconds(static_cast<std::int64_t>(1e6 * patience)))
+  {
+  }
 
   bool empty() const { return waiting_.empty(); }
   void clear() { waiting_.clear(); }
@@ -33,7 +37,8 @@ public:
     return true;
   }
 
-  /// deliver(message, why) is false while the transform is not known; expired(message, why) takes those that have waited too long.
+  /// deliver(message, why) is false while the transform is not known; expired(message, why) takes those that have
+  /// waited too long.
   template <class Deliver, class Expired>
   void process(const Deliver& deliver, const Expired& expired)
   {
@@ -67,7 +72,8 @@ private:
 
   std::size_t count(int source, const std::string& frame) const
   {
-    return static_cast<std::size_t>(std::count_if(waiting_.begin(), waiting_.end(), [&](const Entry& e) { return e.source == source && e.frame == frame; }));
+    return static_cast<std::size_t>(std::count_if(
+        waiting_.begin(), waiting_.end(), [&](const Entry& e) { return e.source == source && e.frame == frame; }));
   }
 
   std::size_t most_;
@@ -75,4 +81,4 @@ private:
   std::deque<Entry> waiting_;
 };
 
-}  // namespace slender
+}   // namespace slender

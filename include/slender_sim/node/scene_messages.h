@@ -22,31 +22,37 @@ namespace slender {
 /// std::invalid_argument for a rod, a cloth or a grasp whose name cannot be part of a topic.
 std::vector<std::string> graspTopicNames(const Simulation& simulation);
 
-/// Before the topics of a thread: nothing in a scene of one thread, else "threads/NAME/". Throws like graspTopicNames().
+/// Before the topics of a thread: nothing in a scene of one thread, else "threads/NAME/". Throws like
+/// graspTopicNames().
 std::vector<std::string> threadTopicPrefixes(const Simulation& simulation);
 
 /// The undeformed cloths.
 slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id);
 
-/// What is published and recorded of one instant, in scene order. What is large is shared: record first, then publish, and do not read it afterwards.
+/// What is published and recorded of one instant, in scene order. What is large is shared: record first, then publish,
+/// and do not read it afterwards.
 struct SceneMessages
 {
   std::vector<SharedMessage<slender_sim::RodState>> states;       ///< per rod
   std::vector<SharedMessage<slender_sim::ThreadState>> threads;   ///< per thread and piece of it
-  SharedMessage<slender_sim::ClothState> cloth_state;   ///< all of them in one message; none: not published
-  SharedMessage<geometry_msgs::PoseArray> edge_poses;   ///< the edges' frames at their middles, all rods and threads one after the other
+  SharedMessage<slender_sim::ClothState> cloth_state;             ///< all of them in one message; none: not published
+  /// the edges' frames at their middles, all rods and threads one after the other
+  SharedMessage<geometry_msgs::PoseArray> edge_poses;
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
-  std::vector<geometry_msgs::WrenchStamped> nozzles;    ///< per thread: what it does to its nozzle, about the outlet; zero without one
-  slender_sim::BodyStates bodies;                       ///< the scene's bodies, simulated and driven; none: not published
+  /// per thread: what it does to its nozzle, about the outlet; zero without one
+  std::vector<geometry_msgs::WrenchStamped> nozzles;
+  /// the scene's bodies, simulated and driven; none: not published
+  slender_sim::BodyStates bodies;
 
-  slender_sim::GraspStates grasps;                      ///< recorded only; none: not recorded
-  slender_sim::BodyStates obstacles;                    ///< likewise
+  slender_sim::GraspStates grasps;     ///< recorded only; none: not recorded
+  slender_sim::BodyStates obstacles;   ///< likewise
 
-  slender_sim::Fields fields;                           ///< see fillFields(); no tables: neither published nor recorded
+  slender_sim::Fields fields;   ///< see fillFields(); no tables: neither published nor recorded
 
   void fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch);
-  /// What `record.fields` of the scene asks for, of the instant of the last fill(). It is computed here, so call it only if somebody takes it.
+  /// What `record.fields` of the scene asks for, of the instant of the last fill(). It is computed here, so call it
+  /// only if somebody takes it.
   void fillFields(const Simulation& simulation);
 };
 
-}  // namespace slender
+}   // namespace slender

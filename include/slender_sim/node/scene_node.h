@@ -31,11 +31,18 @@
 namespace slender {
 
 /// What a node simulates, and its name in what it prints.
-enum class NodeKind { rods, threads, cloths, tracking };
+enum class NodeKind
+{
+  rods,
+  threads,
+  cloths,
+  tracking
+};
 const char* toString(NodeKind kind);
 
-/// Simulates a scene of rods and bodies, of viscous threads, of cloth, or of cloth or rods that track guides: poses of what moves them come in as messages, their motion goes out.
-/// README lists topics, services and parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
+/// Simulates a scene of rods and bodies, of viscous threads, of cloth, or of cloth or rods that track guides: poses of
+/// what moves them come in as messages, their motion goes out. README lists topics, services and parameters. Everything
+/// runs in the thread of spin(), so a callback never sees a half-taken step.
 class SceneNode
 {
 public:
@@ -44,13 +51,19 @@ public:
   SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, NodeKind kind);
   ~SceneNode();
 
-  /// Until shut down, stop(), or ~stop_after; closes the bag. Returns the exit status: 0, or 3 when it ends after a failed step.
+  /// Until shut down, stop(), or ~stop_after; closes the bag. Returns the exit status: 0, or 3 when it ends after a
+  /// failed step.
   int spin();
   /// Ends spin() after the step that it is at. From any thread.
   void stop() { stop_ = true; }
 
 private:
-  enum class Mode { running, paused, failed };
+  enum class Mode
+  {
+    running,
+    paused,
+    failed
+  };
   static constexpr double kBurst = 0.02;   // [s] longest run of steps between two looks at the callbacks
 
   // scene_node.cpp
@@ -60,7 +73,7 @@ private:
   void publishMesh();
   bool isStateFinite() const;
   bool ended() const { return !nh_.ok() || finished_ || stop_; }
-  bool advance();                        // one step with everything it publishes; false when it failed
+  bool advance();   // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
   void publishState();
   void broadcastFrame();
@@ -68,7 +81,7 @@ private:
   void showHandles();
   void publishMarkers();
   void work();
-  void tell();                           // markers and diagnostics, when they are due
+  void tell();   // markers and diagnostics, when they are due
   void waitForCallbacks();
   void recordingFailed(const std::string& reason);
   void summary() const;
@@ -76,13 +89,14 @@ private:
   // scene_node_clock.cpp
   void checkClock() const;
   std::optional<ros::Time> firstStamp();   // nothing while there is no /clock to follow
-  bool stampsAreOfTheWall() const;       // and so jump to the present after a pause
-  void anchor();                         // the present tick is due now
-  std::uint64_t jumped();                // the state was replaced: a new epoch begins, one tick later; returns the ticks skipped
-  std::uint64_t realign();               // time went on while the scene stood still; returns the ticks skipped
+  bool stampsAreOfTheWall() const;         // and so jump to the present after a pause
+  void anchor();                           // the present tick is due now
+  // the state was replaced: a new epoch begins, one tick later; returns the ticks skipped
+  std::uint64_t jumped();
+  std::uint64_t realign();   // time went on while the scene stood still; returns the ticks skipped
   void skip(std::uint64_t ticks);
-  double stampLag() const;               // [s]
-  void keepUp();                         // ~max_lag
+  double stampLag() const;   // [s]
+  void keepUp();             // ~max_lag
   ros::WallDuration untilDue() const;
 
   // scene_node_replay.cpp
@@ -90,11 +104,11 @@ private:
   void note(slender_sim::Input input, std::uint64_t tick);
   void noteJump(slender_sim::Input input, std::uint64_t tick, std::uint64_t skipped, bool failed);
   void noteGrasp(const slender_sim::SetGrasp::Request& request);
-  bool replayInputs();                   // those of the present tick; false when the run is over
+  bool replayInputs();   // those of the present tick; false when the run is over
   void repeat(const slender_sim::Input& input);
   void repeatJump(const slender_sim::Input& input);
   void repeatGrasp(const slender_sim::Input& input);
-  std::string refusesInput() const;      // why service calls must not change a run; empty: they may
+  std::string refusesInput() const;   // why service calls must not change a run; empty: they may
 
   // scene_node_services.cpp
   void advertiseServices();
@@ -107,17 +121,19 @@ private:
   bool onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
   void setGrasp(const slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response);
   void setFunctions(const slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response);
-  std::string attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response);
+  std::string attach(const slender_sim::SetGrasp::Request& request, int grasp,
+                     slender_sim::SetGrasp::Response& response);
 
   // scene_node_diagnostics.cpp
   void publishDiagnostics();
   static constexpr double kClockReminder = 10.0;   ///< [s] between complaints about /clock
-  std::string clockWentBack() const;   ///< empty: it did not
-  void remindOfBodies();               ///< that are followed, and that nobody has published yet
+  std::string clockWentBack() const;               ///< empty: it did not
+  void remindOfBodies();                           ///< that are followed, and that nobody has published yet
   diagnostic_msgs::DiagnosticStatus simulationStatus() const;
   diagnostic_msgs::DiagnosticStatus inputStatus();
 
-  ros::CallbackQueue queue_, services_queue_;   // of messages, of service calls: a long ~step answers those, and leaves messages for later
+  // of messages, of service calls: a long ~step answers those, and leaves messages for later
+  ros::CallbackQueue queue_, services_queue_;
   ros::NodeHandle nh_, nh_priv_;
   const NodeKind kind_;
   NodeOptions options_;
@@ -126,10 +142,10 @@ private:
   SimClock clock_;
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;
-  SceneInputs step_inputs_;              // of the last step, refilled
-  std::unique_ptr<InputReplay> replay_;  // only with ~replay
-  std::uint64_t inputs_noted_ = 0;       // in the bag
-  std::unique_ptr<HandMarkers> hands_;   // only with ~interactive
+  SceneInputs step_inputs_;               // of the last step, refilled
+  std::unique_ptr<InputReplay> replay_;   // only with ~replay
+  std::uint64_t inputs_noted_ = 0;        // in the bag
+  std::unique_ptr<HandMarkers> hands_;    // only with ~interactive
   std::unique_ptr<BagRecorder> bag_;
   SceneMessages messages_;
   SharedMessage<sensor_msgs::PointCloud2> points_;
@@ -137,17 +153,17 @@ private:
 
   Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
-  bool stepping_ = false;                // in ~step
-  std::string step_ended_;               // by what call; empty while it goes on
+  bool stepping_ = false;    // in ~step
+  std::string step_ended_;   // by what call; empty while it goes on
   std::atomic<bool> stop_{false};
   std::uint32_t epoch_ = 0;
   std::string failure_, bag_failure_;
   StepReport last_report_;
-  RunStatistics total_, recent_;         // since the start, since the last diagnostics
+  RunStatistics total_, recent_;   // since the start, since the last diagnostics
   std::uint64_t reported_drops_ = 0;
-  double inputs_since_ = 0.0;            // [s] of clock_: earlier ones were forgotten
+  double inputs_since_ = 0.0;   // [s] of clock_: earlier ones were forgotten
 
-  ros::WallTime wall_start_;             // when the tick wall_start_ticks_ was due
+  ros::WallTime wall_start_;   // when the tick wall_start_ticks_ was due
   ros::WallTime next_skip_warning_;
   std::uint64_t wall_start_ticks_ = 0;
   ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_, next_body_reminder_;
@@ -156,10 +172,10 @@ private:
   ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_, fields_pub_;   // only when the scene has any, like the next
   std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
   std::unique_ptr<tf2_ros::StaticTransformBroadcaster> frame_broadcaster_;   // tells rviz that ~frame_id is there
-  ros::Publisher points_pub_, mesh_pub_;   // cloth only; poses_pub_ is for the others
+  ros::Publisher points_pub_, mesh_pub_;                                     // cloth only; poses_pub_ is for the others
   ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
   std::vector<ros::Publisher> rod_poses_pubs_, wrench_pubs_, nozzle_pubs_;
   std::vector<ros::ServiceServer> services_;
 };
 
-}  // namespace slender
+}   // namespace slender

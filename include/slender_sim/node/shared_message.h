@@ -8,8 +8,9 @@
 
 namespace slender {
 
-/// A message that is published as a pointer: subscribers in the same process get it without a copy. Once published it is not touched, nor
-/// read, while one of them holds it (a sole subscriber may even change it); renew() then takes another, and uses again what nobody holds any more.
+/// A message that is published as a pointer: subscribers in the same process get it without a copy. Once published it
+/// is not touched, nor read, while one of them holds it (a sole subscriber may even change it); renew() then takes
+/// another, and uses again what nobody holds any more.
 template <typename Message>
 class SharedMessage
 {
@@ -50,4 +51,4 @@ private:
   std::size_t current_ = 0;
 };
 
-}  // namespace slender
+}   // namespace slender

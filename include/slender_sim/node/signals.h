@@ -8,8 +8,9 @@
 
 namespace slender {
 
-/// SIGINT and SIGTERM end the step that is being solved and ask for shutdown, which finishes the bag. A second one ends the process at once. Needs
-/// ros::init() with NoSigintHandler: roscpp would replace the first handler as the node starts.
+/// SIGINT and SIGTERM end the step that is being solved and ask for shutdown, which finishes the bag. A second one ends
+/// the process at once. Needs ros::init() with NoSigintHandler: roscpp would replace the first handler as the node
+/// starts.
 inline void stopOnSignals()
 {
   struct sigaction action = {};
@@ -22,4 +23,4 @@ inline void stopOnSignals()
     ::sigaction(signal, &action, nullptr);
 }
 
-}  // namespace slender
+}   // namespace slender

@@ -7,8 +7,8 @@
 
 namespace slender {
 
-/// Simulated time in ROS stamps: start + ticks * step, rounded once to integer nanoseconds, so that it never drifts and two runs
-/// with the same start stamp alike. Only moves forward: a reset of the scene does not turn it back.
+/// Simulated time in ROS stamps: start + ticks * step, rounded once to integer nanoseconds, so that it never drifts and
+/// two runs with the same start stamp alike. Only moves forward: a reset of the scene does not turn it back.
 class SimClock
 {
 public:
@@ -43,4 +43,4 @@ private:
   double step_ = 1.0;
 };
 
-}  // namespace slender
+}   // namespace slender

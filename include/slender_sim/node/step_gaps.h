@@ -14,13 +14,27 @@ class StepGaps
 public:
   /// The next recorded instant: its epoch and step, and its stamp in seconds since the first one.
   void add(std::uint32_t epoch, std::uint64_t step, double seconds);
-  /// What is missing, in one or two sentences; empty when nothing is. `step_length` [s] > 0 tells skipped time from lost steps; 0: not known.
+  /// What is missing, in one or two sentences; empty when nothing is. `step_length` [s] > 0 tells skipped time from
+  /// lost steps; 0: not known.
   std::string text(double step_length) const;
 
 private:
-  struct Instant { std::uint32_t epoch; std::uint64_t step; double seconds; };
-  struct Stride { std::uint64_t count = 0; double first = 0.0; };       // how often so many steps apart, and when first
-  struct Pace { double least = 0.0, most = 0.0, most_at = 0.0; };       // [s] per stride: shortest and longest time, and when that began
+  struct Instant
+  {
+    std::uint32_t epoch;
+    std::uint64_t step;
+    double seconds;
+  };
+  struct Stride
+  {
+    std::uint64_t count = 0;
+    double first = 0.0;
+  };   // how often so many steps apart, and when first
+  // [s] per stride: shortest and longest time, and when that began
+  struct Pace
+  {
+    double least = 0.0, most = 0.0, most_at = 0.0;
+  };
   std::optional<Instant> last_;
   std::map<std::uint64_t, Stride> strides_;
   std::map<std::uint64_t, Pace> paces_;
@@ -37,4 +51,4 @@ private:
   std::vector<double> times_;
 };
 
-}  // namespace slender
+}   // namespace slender

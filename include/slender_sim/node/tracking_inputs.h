@@ -21,14 +21,15 @@
 
 namespace slender {
 
-/// Guides of tracked cloths and rods by message: `guide/points` (the guide's vertices or nodes in their order) and `guide/bodies` (of the bodies that carry them),
-/// through tf2 into the node's frame; in scenes of several tracked objects `tracked/NAME/guide/points`. A message is taken or dropped as a whole.
+/// Guides of tracked cloths and rods by message: `guide/points` (the guide's vertices or nodes in their order) and
+/// `guide/bodies` (of the bodies that carry them), through tf2 into the node's frame; in scenes of several tracked
+/// objects `tracked/NAME/guide/points`. A message is taken or dropped as a whole.
 class TrackingInputs
 {
 public:
   /// Subscribes to what the scene asks for. The three must outlive it.
-  TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers, const Simulation& simulation,
-                 const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops);
+  TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers,
+                 const Simulation& simulation, const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops);
 
   bool any() const { return !guides_.empty(); }
   void processPending();
@@ -48,32 +49,39 @@ public:
   void stopListening() { subscribers_.clear(); }
   void repeat(const slender_sim::Input& input);
 
-  /// Of each guide by points, and of each body. `missing`: it has not spoken yet, though other bodies of its guide have. `lag`: behind which it is
-  /// followed [s]. `excess`: by how much that had to be more than ~guide_delay lately [s].
-  struct Age { std::string name; std::optional<double> seconds; bool missing; double lag, excess; };
+  /// Of each guide by points, and of each body. `missing`: it has not spoken yet, though other bodies of its guide
+  /// have. `lag`: behind which it is followed [s]. `excess`: by how much that had to be more than ~guide_delay lately
+  /// [s].
+  struct Age
+  {
+    std::string name;
+    std::optional<double> seconds;
+    bool missing;
+    double lag, excess;
+  };
   std::vector<Age> ages() const;
 
 private:
   struct Guide
   {
-    int index = 0;                                           // of a cloth or rod of the scene
+    int index = 0;   // of a cloth or rod of the scene
     bool of_rod = false;
     std::string topic;
-    std::unique_ptr<PointGuideBuffer> points;               // by points
-    const CarriedGuide* carried = nullptr;                   // by bodies, one buffer each:
+    std::unique_ptr<PointGuideBuffer> points;   // by points
+    const CarriedGuide* carried = nullptr;      // by bodies, one buffer each:
     std::vector<GuideBuffer> bodies;
     std::vector<Pose> poses;
-    bool catches_up = true;                                  // from `held` at the next apply()
-    Eigen::Matrix3Xd held, gap;                              // by bodies: where it was, and what of the way is left
+    bool catches_up = true;       // from `held` at the next apply()
+    Eigen::Matrix3Xd held, gap;   // by bodies: where it was, and what of the way is left
     double gap_start = 0.0, gap_duration = 0.0;
-    bool heard() const;                                      // from any body
+    bool heard() const;   // from any body
   };
   struct Message
   {
     int guide;
     std::string frame;
     ros::Time stamp;
-    Eigen::Matrix3Xd points;                                 // in the message's frame
+    Eigen::Matrix3Xd points;   // in the message's frame
     std::vector<std::pair<int, Pose>> bodies;
   };
 
@@ -98,4 +106,4 @@ private:
   InputSink sink_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -7,7 +7,8 @@
 
 namespace slender {
 
-/// The least displacements of nodes, by the sum of mass times distance squared, that change weighted averages of them by given amounts.
+/// The least displacements of nodes, by the sum of mass times distance squared, that change weighted averages of them
+/// by given amounts.
 class AverageProjection
 {
 public:
@@ -15,7 +16,12 @@ public:
 
   /// c: averages x nodes; must outlive it.
   explicit AverageProjection(const Averages& c)
-    : c_(c), weighted_(c.rows(), c.cols()), gram_(c.rows(), c.rows()), factor_(c.rows()), pull_(c.rows()), moved_(c.cols())
+    : c_(c),
+      weighted_(c.rows(), c.cols()),
+      gram_(c.rows(), c.rows()),
+      factor_(c.rows()),
+      pull_(c.rows()),
+      moved_(c.cols())
   {
   }
 
@@ -38,7 +44,8 @@ public:
     return true;
   }
 
-  /// One coordinate of the displacements (per node, 0 where held), for changes of the averages; valid until the next call.
+  /// One coordinate of the displacements (per node, 0 where held), for changes of the averages; valid until the next
+  /// call.
   template <class Changes>
   const Eigen::VectorXd& displacements(const Changes& changes)
   {
@@ -57,4 +64,4 @@ private:
   Eigen::VectorXd pull_, moved_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -12,9 +12,10 @@ namespace slender {
 struct RigidBodyModel
 {
   std::string name;
-  bool simulated = true;        ///< false: its motion is given from outside, mass and loads do not matter
-  double mass = 1.0;            ///< [kg] > 0
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();   ///< about the centre of mass, body axes [kg m^2], positive definite and physical
+  bool simulated = true;   ///< false: its motion is given from outside, mass and loads do not matter
+  double mass = 1.0;       ///< [kg] > 0
+  /// about the centre of mass, body axes [kg m^2], positive definite and physical
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();
   bool gravity = true;
   Eigen::Vector3d force{0, 0, 0};    ///< constant, world axes, at the centre of mass [N]
   Eigen::Vector3d torque{0, 0, 0};   ///< constant, world axes [N m]
@@ -22,8 +23,8 @@ struct RigidBodyModel
   double angular_damping = 0.0;      ///< torque -c I omega, about [1/s]
 };
 
-/// Throws std::invalid_argument naming what is wrong: mass or inertia not positive, an inertia that no distribution of mass has (the
-/// sum of two principal moments less than the third), numbers not finite.
+/// Throws std::invalid_argument naming what is wrong: mass or inertia not positive, an inertia that no distribution of
+/// mass has (the sum of two principal moments less than the third), numbers not finite.
 void checkBody(const RigidBodyModel& body);
 
 /// Everything that changes while a body moves.
@@ -46,4 +47,4 @@ struct Weld
   Pose X_BG;   ///< the grasp's frame in the body's
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -9,12 +9,28 @@
 
 namespace slender {
 
-/// What may touch in a group. Points of the contact surface are the nodes of the rods named here, one rod after the other.
+/// What may touch in a group. Points of the contact surface are the nodes of the rods named here, one rod after the
+/// other.
 struct GroupContact
 {
-  struct Rod { int rod = 0; bool self = true, others = true, solids = true; double friction = 0.3; };
-  struct Obstacle { Shape shape; double friction = -1.0; };               ///< negative: that of what touches it
-  struct Body { int body = 0; Shape shape; Pose X_BS; double friction = -1.0; };
+  struct Rod
+  {
+    int rod = 0;
+    bool self = true, others = true, solids = true;
+    double friction = 0.3;
+  };
+  struct Obstacle
+  {
+    Shape shape;
+    double friction = -1.0;
+  };   ///< negative: that of what touches it
+  struct Body
+  {
+    int body = 0;
+    Shape shape;
+    Pose X_BS;
+    double friction = -1.0;
+  };
   std::vector<Rod> rods;
   std::vector<Obstacle> obstacles;
   std::vector<Body> bodies;
@@ -43,12 +59,13 @@ struct RodGroupState
 struct RodGroupInputs
 {
   std::vector<RodInputs> rods;
-  std::vector<GraspTarget> bodies;      ///< where driven bodies are at the end of the step
+  std::vector<GraspTarget> bodies;   ///< where driven bodies are at the end of the step
   std::vector<GraspTarget> obstacles;
   Eigen::Vector3d gravity{0, 0, -9.81};
 };
 
-/// Welds a rod's section or edges, as they lie now, to a body: appends the grasp to the rod's state and returns the weld.
+/// Welds a rod's section or edges, as they lie now, to a body: appends the grasp to the rod's state and returns the
+/// weld.
 Weld makeWeld(RodGroupModel& model, RodGroupState& state, int rod, int first_node, int last_node, int body);
 
 /// Advances a group: one implicit system for rods, bodies and contact, or explicit steps with projection.
@@ -63,9 +80,9 @@ public:
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(RodGroupState& state, const RodGroupInputs& inputs, double duration);
 
-  /// Equilibrium under the inputs, without friction: implicit Euler steps that grow, from rest each time. Velocities become zero. An unstable
-  /// equilibrium is left along its mode of negative curvature, until a stable one is found or every way was tried; then report.stable is false.
-  /// `leave_saddles` false: it is kept.
+  /// Equilibrium under the inputs, without friction: implicit Euler steps that grow, from rest each time. Velocities
+  /// become zero. An unstable equilibrium is left along its mode of negative curvature, until a stable one is found or
+  /// every way was tried; then report.stable is false. `leave_saddles` false: it is kept.
   StepReport solveEquilibrium(RodGroupState& state, const RodGroupInputs& inputs, bool leave_saddles = true);
 
   /// Throws std::invalid_argument when something touches or crosses in this state, naming what.
@@ -85,4 +102,4 @@ private:
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace slender
+}   // namespace slender

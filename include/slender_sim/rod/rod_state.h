@@ -13,10 +13,11 @@ namespace slender {
 struct GraspState
 {
   bool active = true;
-  int first_node = 0, last_node = 0;          ///< held nodes, first <= last; equal: a single section
-  bool holds_frame = true;                    ///< false: a point pin (first == last)
-  int body = -1;                              ///< simulated body that carries it (see Weld), -1: its pose is an input
-  Pose X_WG;                                  ///< the grasp frame: origin at the (middle of the) held part, x along its tangent, y along d1
+  int first_node = 0, last_node = 0;   ///< held nodes, first <= last; equal: a single section
+  bool holds_frame = true;             ///< false: a point pin (first == last)
+  int body = -1;                       ///< simulated body that carries it (see Weld), -1: its pose is an input
+  /// the grasp frame: origin at the (middle of the) held part, x along its tangent, y along d1
+  Pose X_WG;
   Twist velocity;                             ///< of X_WG
   std::vector<Eigen::Vector3d> nodes_G;       ///< held nodes in the grasp frame
   std::vector<Eigen::Vector3d> directors_G;   ///< d1 of the held edges between them, in the grasp frame
@@ -29,23 +30,27 @@ struct GraspState
 /// Everything that changes while a rod moves; saving and restoring it restarts bit-equal.
 struct RodState
 {
-  Eigen::Matrix3Xd x;         ///< node positions [m], 3 x n
-  Eigen::Matrix3Xd v;         ///< node velocities [m/s], 3 x n
-  Eigen::Matrix3Xd d1;        ///< first material director of each edge, 3 x edges
-  Eigen::VectorXd twist;      ///< integrated material twist m_i at each node [rad], unwrapped; zero at the ends of an open rod
-  /// An isotropic rod of which no frame is held (see makeRodState) has no twist, and d1 and twist are empty: this is d1 of its first
-  /// edge, and the others follow by parallel transport along it (see forEachFrame). Of other rods without meaning.
+  Eigen::Matrix3Xd x;    ///< node positions [m], 3 x n
+  Eigen::Matrix3Xd v;    ///< node velocities [m/s], 3 x n
+  Eigen::Matrix3Xd d1;   ///< first material director of each edge, 3 x edges
+  /// integrated material twist m_i at each node [rad], unwrapped; zero at the ends of an open rod
+  Eigen::VectorXd twist;
+  /// An isotropic rod of which no frame is held (see makeRodState) has no twist, and d1 and twist are empty: this is d1
+  /// of its first edge, and the others follow by parallel transport along it (see forEachFrame). Of other rods without
+  /// meaning.
   Eigen::Vector3d director{0, 0, 0};
   std::vector<GraspState> grasps;
 
   /// Integrator memory (empty when the integrator has none, or has not stepped yet).
-  double last_step = 0.0;                       ///< [s]
-  double next_step = 0.0;                       ///< [s] where the error control left off, 0 = nowhere
-  Eigen::Matrix3Xd a;                           ///< accelerations
-  Eigen::Matrix3Xd x_previous, v_previous;      ///< multistep methods
-  /// With Rayleigh stiffness damping only: per node, then two per grasp, (stretch of the edge after the node, kappa1, kappa2, twist).
+  double last_step = 0.0;                    ///< [s]
+  double next_step = 0.0;                    ///< [s] where the error control left off, 0 = nowhere
+  Eigen::Matrix3Xd a;                        ///< accelerations
+  Eigen::Matrix3Xd x_previous, v_previous;   ///< multistep methods
+  /// With Rayleigh stiffness damping only: per node, then two per grasp, (stretch of the edge after the node, kappa1,
+  /// kappa2, twist).
   Eigen::Matrix4Xd strain_rate, strain_rate_previous;   ///< [1/s]
-  Eigen::Matrix4Xd strain_previous;   ///< multistep methods: one step ago; a stage inside the step: its strain less the step's chord
+  /// multistep methods: one step ago; a stage inside the step: its strain less the step's chord
+  Eigen::Matrix4Xd strain_previous;
 
   bool framed() const { return d1.cols() > 0; }
   double twistAt(int node) const { return framed() ? twist[node] : 0.0; }
@@ -61,4 +66,4 @@ struct RodState
   }
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -18,15 +18,17 @@ struct GraspTarget
   std::optional<Twist> velocity;
 };
 
-/// Inputs of one rod, latched once per step. `grasps` is as long as RodState::grasps (entries of inactive grasps are ignored).
+/// Inputs of one rod, latched once per step. `grasps` is as long as RodState::grasps (entries of inactive grasps are
+/// ignored).
 struct RodInputs
 {
   std::vector<GraspTarget> grasps;
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
   Eigen::Matrix3Xd forces;                ///< extra nodal forces, 3 x n [N], or empty
-  /// Torques about the tangents of the edges [N m], one per edge, or empty. They turn the material frames and go along where a tangent turns. Implicit
-  /// midpoint and generalised alpha refuse them, since their check of the energy does not know the work of such a torque.
+  /// Torques about the tangents of the edges [N m], one per edge, or empty. They turn the material frames and go along
+  /// where a tangent turns. Implicit midpoint and generalised alpha refuse them, since their check of the energy does
+  /// not know the work of such a torque.
   Eigen::VectorXd torques;
 };
 
@@ -54,17 +56,19 @@ public:
   /// Advances by `duration` [s]. On failure the state is untouched and the report says why.
   StepReport step(RodState& state, const RodInputs& inputs, double duration);
 
-  /// Static equilibrium under the inputs, reached by continuation; velocities become zero. An unstable equilibrium is left along its mode of
-  /// negative curvature, until a stable one is found or every way was tried; then report.stable is false. `leave_saddles` false: it is kept.
+  /// Static equilibrium under the inputs, reached by continuation; velocities become zero. An unstable equilibrium is
+  /// left along its mode of negative curvature, until a stable one is found or every way was tried; then report.stable
+  /// is false. `leave_saddles` false: it is kept.
   StepReport solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles = true);
   /// Residual, energy, lowest eigenvalue and stability of a state that is an equilibrium under the inputs already.
   StepReport assessEquilibrium(const RodState& state, const RodInputs& inputs);
-  /// Mode of the lowest eigenvalue of the last equilibrium: displacement of each node and turn of the edge after it (4 x n, [m] and [rad]), scaled
-  /// so that the edge that turns most turns by 1 rad.
+  /// Mode of the lowest eigenvalue of the last equilibrium: displacement of each node and turn of the edge after it (4
+  /// x n, [m] and [rad]), scaled so that the edge that turns most turns by 1 rad.
   Eigen::Map<const Eigen::Matrix4Xd> lowestMode() const;
 
-  /// Of the last successful step() or solveEquilibrium(); one per grasp, zero for inactive ones. They belong to the instant at which
-  /// the step balances forces: its end, but its middle for implicit_midpoint and 1 / (1 + spectral_radius) of it for generalized_alpha.
+  /// Of the last successful step() or solveEquilibrium(); one per grasp, zero for inactive ones. They belong to the
+  /// instant at which the step balances forces: its end, but its middle for implicit_midpoint and 1 / (1 +
+  /// spectral_radius) of it for generalized_alpha.
   const std::vector<Wrench>& wrenches() const;
 
   RodEnergies energies(const RodState& state, const Eigen::Vector3d& gravity) const;
@@ -78,4 +82,4 @@ private:
   std::unique_ptr<class StepLoop> loop_;
 };
 
-}  // namespace slender
+}   // namespace slender

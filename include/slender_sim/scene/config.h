@@ -29,12 +29,45 @@ constexpr double max_belt_speed = 1e3;   ///< [m/s] of each component
 constexpr double max_wind_speed = 1e3;   ///< [m/s] of each component
 
 /// A curve as the scene file states it. Exactly one alternative.
-struct StraightCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; int edges = 50; double grading = 1; };   ///< last edge length over the first
-struct PolylineCurve { std::vector<Eigen::Vector3d> points; std::optional<int> edges; };       ///< resampled when edges is given
-struct ArcCurve      { Eigen::Vector3d center{0, 0, 0}, start{1, 0, 0}, axis{0, 0, 1}; double angle = 1.0; int edges = 50; };
-struct HelixCurve    { Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1}; double radius = 0.1, pitch = 0.05, turns = 3; int edges = 150; };
-struct CatenaryCurve { Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0}; double length = 1.2; int edges = 50; };  ///< hangs along gravity (or -z)
-struct FileCurve     { std::string path; std::vector<Eigen::Vector3d> points; std::optional<int> edges; };   ///< CSV: x,y,z per line
+/// last edge length over the first
+struct StraightCurve
+{
+  Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0};
+  int edges = 50;
+  double grading = 1;
+};
+/// resampled when edges is given
+struct PolylineCurve
+{
+  std::vector<Eigen::Vector3d> points;
+  std::optional<int> edges;
+};
+struct ArcCurve
+{
+  Eigen::Vector3d center{0, 0, 0}, start{1, 0, 0}, axis{0, 0, 1};
+  double angle = 1.0;
+  int edges = 50;
+};
+struct HelixCurve
+{
+  Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1};
+  double radius = 0.1, pitch = 0.05, turns = 3;
+  int edges = 150;
+};
+/// hangs along gravity (or -z)
+struct CatenaryCurve
+{
+  Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0};
+  double length = 1.2;
+  int edges = 50;
+};
+/// CSV: x,y,z per line
+struct FileCurve
+{
+  std::string path;
+  std::vector<Eigen::Vector3d> points;
+  std::optional<int> edges;
+};
 /// See geometry/curves.h for the next three.
 struct TrefoilCurve
 {
@@ -56,8 +89,8 @@ struct VeeCurve
   double arm = 0.5, angle = M_PI / 2;
   int edges = 50;
 };
-using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, TrefoilCurve, TorusKnotCurve, VeeCurve,
-                           FileCurve>;
+using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, TrefoilCurve,
+                           TorusKnotCurve, VeeCurve, FileCurve>;
 
 /// Radii [m]; a vector has one entry per edge, or two (linear taper from the first to the last edge), or one.
 struct CrossSection
@@ -66,20 +99,25 @@ struct CrossSection
   std::vector<double> b;   ///< semi-axis along d2
 };
 
-enum class Torsion { polar, saint_venant };
+enum class Torsion
+{
+  polar,
+  saint_venant
+};
 
 /// Either by (youngs_modulus, poissons_ratio) or directly by moduli; density always.
 struct Material
 {
-  double density = 1000.0;                         ///< [kg/m^3] > 0
-  double youngs_modulus = 1e6;                     ///< E [Pa] > 0
-  double poissons_ratio = 0.5;                     ///< (-1, 0.5]
-  Torsion torsion = Torsion::polar;                ///< G A (a^2+b^2)/4, or the exact ellipse G pi a^3 b^3/(a^2+b^2)
-  std::optional<double> linear_density;            ///< [kg/m] instead of density times area
-  std::optional<double> stretch_modulus;           ///< k_s [N]
-  bool inextensible = false;                       ///< k_s raised until the rod's own weight stretches it by at most 1e-5
-  std::optional<Eigen::Matrix2d> bend_modulus;     ///< B [N m^2]; scalar alpha or [B1, B2] or 2x2 in the file
-  std::optional<double> twist_modulus;             ///< beta [N m^2]
+  double density = 1000.0;                 ///< [kg/m^3] > 0
+  double youngs_modulus = 1e6;             ///< E [Pa] > 0
+  double poissons_ratio = 0.5;             ///< (-1, 0.5]
+  Torsion torsion = Torsion::polar;        ///< G A (a^2+b^2)/4, or the exact ellipse G pi a^3 b^3/(a^2+b^2)
+  std::optional<double> linear_density;    ///< [kg/m] instead of density times area
+  std::optional<double> stretch_modulus;   ///< k_s [N]
+  /// k_s raised until the rod's own weight stretches it by at most 1e-5
+  bool inextensible = false;
+  std::optional<Eigen::Matrix2d> bend_modulus;   ///< B [N m^2]; scalar alpha or [B1, B2] or 2x2 in the file
+  std::optional<double> twist_modulus;           ///< beta [N m^2]
 };
 
 struct Damping
@@ -89,22 +127,36 @@ struct Damping
   double drag = 0.0;        ///< linear drag, force -drag * (v - wind) per length [N s/m^2] >= 0
 };
 
-struct FixedMotion {};
-struct TopicMotion {};                                    ///< driven by `grasps/NAME/pose` or `guides`; fixed without a node
-/// Rigidly follows a body: an obstacle or a driven body of the scene, or else one that only the `bodies` topic knows. The scene's
-/// bodies have a pose from the start, so that `attach: initial` takes its offset then.
-struct BodyMotion  { std::string body; };
-struct TableMotion { PoseTrajectory poses; };             ///< timed poses, from the scene or a CSV file
+struct FixedMotion
+{};
+/// driven by `grasps/NAME/pose` or `guides`; fixed without a node
+struct TopicMotion
+{};
+/// Rigidly follows a body: an obstacle or a driven body of the scene, or else one that only the `bodies` topic knows.
+/// The scene's bodies have a pose from the start, so that `attach: initial` takes its offset then.
+struct BodyMotion
+{
+  std::string body;
+};
+struct TableMotion
+{
+  PoseTrajectory poses;
+};   ///< timed poses, from the scene or a CSV file
 using Motion = std::variant<FixedMotion, TopicMotion, BodyMotion, TableMotion>;
 /// Motion of obstacles and driven bodies. Topic: the entry of the same name in `bodies` messages.
 using GivenMotion = std::variant<FixedMotion, TopicMotion, TableMotion>;
 
-enum class Hold { frame, position };                      ///< clamp (position and material frame) or point pin
+enum class Hold
+{
+  frame,
+  position
+};   ///< clamp (position and material frame) or point pin
 
 /// Where the gripper sits relative to its motion's poses.
 enum class Attach
 {
-  section,   ///< poses are those of the held section itself: x along the tangent, y along d1; of a cloth's grasp: of its frame
+  /// poses are those of the held section itself: x along the tangent, y along d1; of a cloth's grasp: of its frame
+  section,
   initial,   ///< keep the offset between the first pose and the section as the scene starts (or as it is at attaching)
 };
 
@@ -112,96 +164,119 @@ struct GraspConfig
 {
   std::string name;
   /// Held nodes, first..last (resolved by the reader: negative indices counted from the end).
-  /// `edges: [0]` (or [-1]) of an open rod is the end section: first == last == the end node. More edges hold all their nodes.
+  /// `edges: [0]` (or [-1]) of an open rod is the end section: first == last == the end node. More edges hold all their
+  /// nodes.
   int first_node = 0, last_node = 0;
   std::vector<int> vertices;   ///< of a cloth, instead of nodes: ascending
-  bool clamp = false;          ///< of a cloth: the faces within the vertices are clamped (see ClothModel::clamped_faces)
+  /// of a cloth: the faces within the vertices are clamped (see ClothModel::clamped_faces)
+  bool clamp = false;
   Hold hold = Hold::frame;
   Motion motion = FixedMotion{};
   Attach attach = Attach::section;
-  /// Of a rod: unit tangent and unit first material axis of the held section, in world axes, for motions whose poses have no orientation. Zero: not
-  /// given. The director need not be normal to the tangent; its normal part counts.
+  /// Of a rod: unit tangent and unit first material axis of the held section, in world axes, for motions whose poses
+  /// have no orientation. Zero: not given. The director need not be normal to the tangent; its normal part counts.
   Eigen::Vector3d direction{0, 0, 0}, director{0, 0, 0};
 };
 
-/// Selects the equations of a rod. `automatic` takes the isotropic form for explicit steps of naturally straight rods that bend
-/// alike in all directions, and the general form otherwise.
-enum class Formulation { automatic, isotropic, general };
-enum class Stretching { stiff, projected };
+/// Selects the equations of a rod. `automatic` takes the isotropic form for explicit steps of naturally straight rods
+/// that bend alike in all directions, and the general form otherwise.
+enum class Formulation
+{
+  automatic,
+  isotropic,
+  general
+};
+enum class Stretching
+{
+  stiff,
+  projected
+};
 
 /// What a rod touches.
 struct RodContact
 {
   bool self = true;
-  bool rods = true;          ///< other rods that have this set, too
-  bool obstacles = true;     ///< obstacles and bodies
-  double friction = 0.3;     ///< Coulomb [-] >= 0
+  bool rods = true;        ///< other rods that have this set, too
+  bool obstacles = true;   ///< obstacles and bodies
+  double friction = 0.3;   ///< Coulomb [-] >= 0
 };
 
 struct RodConfig
 {
   std::string name;
-  std::string place;                           ///< "FILE:LINE: PATH" for messages; empty when not read from a file
-  Curve centerline = StraightCurve{};          ///< rest (natural) shape, also the initial one unless `initial` is given
-  std::optional<Curve> initial;                ///< initial shape; its edges are resampled to those of the centerline
-  bool closed = false;                         ///< loop: the last node is joined to the first by one more edge
-  bool naturally_straight = false;             ///< rest curvature zero whatever the centerline's shape
-  JointOptions joints;                         ///< `curvature`, `matched_to_arcs`
-  bool automatic_curvature = true;             ///< joints.curvature is chosen when the rod is built: see `curvature` in the README
-  std::vector<double> rest_twist;              ///< natural twist [rad]: of the whole rod, or of each joint; empty: none
-  std::vector<Eigen::Vector2d> natural_curvature;   ///< about d2, -d1 [1/m]: of all joints, or of each; empty: that of the centreline
+  std::string place;                    ///< "FILE:LINE: PATH" for messages; empty when not read from a file
+  Curve centerline = StraightCurve{};   ///< rest (natural) shape, also the initial one unless `initial` is given
+  std::optional<Curve> initial;         ///< initial shape; its edges are resampled to those of the centerline
+  bool closed = false;                  ///< loop: the last node is joined to the first by one more edge
+  bool naturally_straight = false;      ///< rest curvature zero whatever the centerline's shape
+  JointOptions joints;                  ///< `curvature`, `matched_to_arcs`
+  /// joints.curvature is chosen when the rod is built: see `curvature` in the README
+  bool automatic_curvature = true;
+  std::vector<double> rest_twist;   ///< natural twist [rad]: of the whole rod, or of each joint; empty: none
+  /// about d2, -d1 [1/m]: of all joints, or of each; empty: that of the centreline
+  std::vector<Eigen::Vector2d> natural_curvature;
   Formulation formulation = Formulation::automatic;
   Stretching stretching = Stretching::stiff;
-  double initial_twist = 0.0;                  ///< total twist [rad], spread evenly, of the initial shape
-  Eigen::Vector3d director{0, 0, 0};           ///< d1 at the first edge (projected); zero: chosen automatically
+  double initial_twist = 0.0;          ///< total twist [rad], spread evenly, of the initial shape
+  Eigen::Vector3d director{0, 0, 0};   ///< d1 at the first edge (projected); zero: chosen automatically
   CrossSection cross_section{{0.005}, {0.005}};
   Material material;
   Damping damping;
   std::vector<GraspConfig> grasps;
-  std::vector<RodLoadConfig> loads;            ///< dead point loads, in statics and in dynamics
-  std::optional<RodContact> contact;           ///< nothing: touches nothing
-  std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`track`), with one set of test functions; null: nothing
+  std::vector<RodLoadConfig> loads;    ///< dead point loads, in statics and in dynamics
+  std::optional<RodContact> contact;   ///< nothing: touches nothing
+  /// what it follows (`track`), with one set of test functions; null: nothing
+  std::shared_ptr<const TrackingConfig> tracking;
 };
 
 struct ContactConfig
 {
-  double gap = 0.0;            ///< distance at which surfaces begin to repel [m]; the reader's default: a tenth of the smallest
-                               ///< radius that takes part (of a nozzle: a quarter of its radius), 0 when nothing does
-  double slip_speed = 1e-4;    ///< friction sticks below it [m/s] > 0
+  /// distance at which surfaces begin to repel [m]; the reader's default: a tenth of the smallest radius that takes
+  /// part (of a nozzle: a quarter of its radius), 0 when nothing does
+  double gap = 0.0;
+  double slip_speed = 1e-4;   ///< friction sticks below it [m/s] > 0
 };
 
 struct ObstacleConfig
 {
   std::string name;
   Shape shape = Plane{};
-  Pose pose;                              ///< of the shape, where the scene starts
-  std::optional<double> friction;         ///< [-]; nothing: that of the rod
+  Pose pose;                        ///< of the shape, where the scene starts
+  std::optional<double> friction;   ///< [-]; nothing: that of the rod
   GivenMotion motion = FixedMotion{};
 };
 
-/// Nodes of a rod that a body carries, as GraspConfig's. They keep the place and orientation that they have in the body at the start.
-struct WeldConfig { int rod = 0, first_node = 0, last_node = 0; };
+/// Nodes of a rod that a body carries, as GraspConfig's. They keep the place and orientation that they have in the body
+/// at the start.
+struct WeldConfig
+{
+  int rod = 0, first_node = 0, last_node = 0;
+};
 
 struct BodyConfig
 {
   std::string name;
-  double mass = 1.0;                                         ///< [kg]; no matter unless simulated, like inertia and loads
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();     ///< about the centre of mass, body axes [kg m^2]
+  /// [kg]; no matter unless simulated, like inertia and loads
+  double mass = 1.0;
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();   ///< about the centre of mass, body axes [kg m^2]
   std::optional<Shape> shape;
-  Pose X_BS;                                                 ///< the shape in the body's frame
-  Pose pose;                                                 ///< of the body's frame at the start; simulated: centre of mass
-  Twist velocity;                                            ///< at the start
+  Pose X_BS;   ///< the shape in the body's frame
+  /// of the body's frame at the start; simulated: centre of mass
+  Pose pose;
+  Twist velocity;   ///< at the start
   bool gravity = true;
-  Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};           ///< constant, world axes, at the centre of mass [N], [N m]
-  double linear_damping = 0.0, angular_damping = 0.0;        ///< [1/s]
-  std::optional<GivenMotion> motion;                         ///< nothing: simulated
-  bool contact = true;                                       ///< its shape touches rods (bodies and obstacles pass through each other)
-  std::optional<double> friction;                            ///< [-]; nothing: that of the rod
+  Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};      ///< constant, world axes, at the centre of mass [N], [N m]
+  double linear_damping = 0.0, angular_damping = 0.0;   ///< [1/s]
+  std::optional<GivenMotion> motion;                    ///< nothing: simulated
+  /// its shape touches rods (bodies and obstacles pass through each other)
+  bool contact = true;
+  std::optional<double> friction;   ///< [-]; nothing: that of the rod
   bool broadcast_tf = false;
   std::vector<WeldConfig> welds;
 };
 
-/// A number that the scene gives: constant (one entry), or over time; or set by messages, until the first of which it holds.
+/// A number that the scene gives: constant (one entry), or over time; or set by messages, until the first of which it
+/// holds.
 struct TimedNumber
 {
   NumberTable table{{{0.0, 0.0}}};
@@ -210,55 +285,60 @@ struct TimedNumber
 
 struct NozzleConfig
 {
-  Pose pose;                               ///< where the scene starts: origin at the outlet, x along the flow
-  double diameter = 0.005;                 ///< [m]
-  TimedNumber flow;                        ///< [m^3/s]
-  GivenMotion motion = FixedMotion{};      ///< topic: `nozzle/pose`
+  Pose pose;                            ///< where the scene starts: origin at the outlet, x along the flow
+  double diameter = 0.005;              ///< [m]
+  TimedNumber flow;                     ///< [m^3/s]
+  GivenMotion motion = FixedMotion{};   ///< topic: `nozzle/pose`
 };
 
 /// A horizontal floor that the thread sticks to or slips on, or a belt.
 struct FloorConfig
 {
-  double height = 0.0;                     ///< [m]
-  TimedNumber belt_x, belt_y;              ///< velocity [m/s]; topic: `belt/velocity`
-  bool on_surface = false;                 ///< the centreline comes to lie on the surface instead of one radius above
-  std::optional<double> friction;          ///< it slips with this coefficient of Coulomb [-]; nothing: it sticks
+  double height = 0.0;              ///< [m]
+  TimedNumber belt_x, belt_y;       ///< velocity [m/s]; topic: `belt/velocity`
+  bool on_surface = false;          ///< the centreline comes to lie on the surface instead of one radius above
+  std::optional<double> friction;   ///< it slips with this coefficient of Coulomb [-]; nothing: it sticks
 };
 
 /// What a thread touches.
 struct ThreadContactConfig
 {
   bool self = true;
-  bool threads = true;       ///< other threads that have this set, too, and parts that broke off
+  bool threads = true;   ///< other threads that have this set, too, and parts that broke off
   bool obstacles = true;
-  double friction = 0.3;     ///< Coulomb [-] >= 0
+  double friction = 0.3;   ///< Coulomb [-] >= 0
 };
 
 /// A thread that leaves a nozzle, or one that is there from the start: one of `nozzle` and `centerline`.
 struct ThreadConfig
 {
   std::string name;
-  double density = 1000.0;                 ///< [kg/m^3]
-  double viscosity = 1.0;                  ///< dynamic [Pa s]
-  double surface_tension = 0.0;            ///< [N/m]
+  double density = 1000.0;        ///< [kg/m^3]
+  double viscosity = 1.0;         ///< dynamic [Pa s]
+  double surface_tension = 0.0;   ///< [N/m]
   std::optional<NozzleConfig> nozzle;
-  std::optional<Curve> centerline;         ///< from its oldest to its newest end
-  std::vector<double> radius;              ///< of its edges [m]: one, two (a taper) or one per edge
-  std::array<bool, 2> held{false, false};  ///< its ends are clamped where they are
+  std::optional<Curve> centerline;          ///< from its oldest to its newest end
+  std::vector<double> radius;               ///< of its edges [m]: one, two (a taper) or one per edge
+  std::array<bool, 2> held{false, false};   ///< its ends are clamped where they are
   std::optional<FloorConfig> floor;
-  double feed_length = 0.0;                ///< of the edges that leave the nozzle [m]
+  double feed_length = 0.0;                         ///< of the edges that leave the nozzle [m]
   double longest_edge = 0.0, shortest_edge = 0.0;   ///< [m] 0: edges are neither divided nor joined
-  double highest_edge = 0.0;               ///< [m] edges grow up to it with their height above the floor; 0: longest_edge holds everywhere
-  double longest_step = 0.0;               ///< [s] longer steps are taken in several; 0: they are not
-  double swirl = 0.0;                      ///< radius of the circle in which the nozzle starts, over that of the coil; 0: it stands
-  double breakup_radius = 0.0;             ///< the thread parts where it is thinner [m]; 0: never; the reader chooses it from the flow unless the scene gives it
-  int most_deposited = 0;                  ///< nodes on the floor; 0: all are kept
+  /// [m] edges grow up to it with their height above the floor; 0: longest_edge holds everywhere
+  double highest_edge = 0.0;
+  double longest_step = 0.0;   ///< [s] longer steps are taken in several; 0: they are not
+  /// radius of the circle in which the nozzle starts, over that of the coil; 0: it stands
+  double swirl = 0.0;
+  /// the thread parts where it is thinner [m]; 0: never; the reader chooses it from the flow unless the scene gives it
+  double breakup_radius = 0.0;
+  int most_deposited = 0;                                 ///< nodes on the floor; 0: all are kept
   std::optional<std::array<Eigen::Vector3d, 2>> region;   ///< corners; what lies outside is dropped, oldest first
-  std::optional<ThreadContactConfig> contact;  ///< nothing: touches nothing but the floor
-  double merging = 0.0;                    ///< parts in touch are drawn together down to this share of the sum of their radii; 0: never
+  std::optional<ThreadContactConfig> contact;             ///< nothing: touches nothing but the floor
+  /// parts in touch are drawn together down to this share of the sum of their radii; 0: never
+  double merging = 0.0;
 };
 
-/// [m^3/s] At this flow a nozzle feeds a thousand edges per step of `step` [s]; more is a mistaken unit, and one step would take for ever.
+/// [m^3/s] At this flow a nozzle feeds a thousand edges per step of `step` [s]; more is a mistaken unit, and one step
+/// would take for ever.
 inline double greatestFlow(const ThreadConfig& thread, double step)
 {
   const double diameter = thread.nozzle ? thread.nozzle->diameter : 0.0;
@@ -269,8 +349,9 @@ inline double greatestFlow(const ThreadConfig& thread, double step)
 /// A rectangle of cloth as the scene file states it; see geometry/mesh_shapes.h.
 struct ClothGrid
 {
-  Eigen::Vector3d corner{0, 0, 0};                                    ///< lower left [m]
-  std::array<Eigen::Vector3d, 2> sides{Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)};   ///< to the lower right, to the upper left; at right angles
+  Eigen::Vector3d corner{0, 0, 0};   ///< lower left [m]
+  /// to the lower right, to the upper left; at right angles
+  std::array<Eigen::Vector3d, 2> sides{Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)};
 };
 
 /// What a cloth touches.
@@ -283,72 +364,76 @@ struct ClothContactConfig
   double thickness = 1e-3;   ///< distance of two layers in contact [m] > 0; half of it from an obstacle
 };
 
-/// A grasp's frame has its origin at the mean of the held vertices and the world's axes when it takes hold; then it moves with its motion,
-/// and the vertices rigidly with it.
+/// A grasp's frame has its origin at the mean of the held vertices and the world's axes when it takes hold; then it
+/// moves with its motion, and the vertices rigidly with it.
 struct ClothConfig
 {
   std::string name;
-  std::string place;                           ///< "FILE:LINE: PATH" for messages; empty when not read from a file
-  TriangleMesh mesh;                           ///< undeformed [m]
-  Eigen::Matrix3Xd start;                      ///< vertices where the scene starts [m]; empty: those of the mesh
-  Eigen::Matrix3Xd start_velocity;             ///< of the vertices [m/s]; empty: at rest
-  Eigen::Matrix3Xd undeformed;                 ///< vertices of the shape whose bend angles are those at rest; empty: those of the mesh
-  std::optional<ClothGrid> grid;               ///< that the mesh was made from
-  double area_density = 0.15;                  ///< [kg/m^2]
+  std::string place;                 ///< "FILE:LINE: PATH" for messages; empty when not read from a file
+  TriangleMesh mesh;                 ///< undeformed [m]
+  Eigen::Matrix3Xd start;            ///< vertices where the scene starts [m]; empty: those of the mesh
+  Eigen::Matrix3Xd start_velocity;   ///< of the vertices [m/s]; empty: at rest
+  /// vertices of the shape whose bend angles are those at rest; empty: those of the mesh
+  Eigen::Matrix3Xd undeformed;
+  std::optional<ClothGrid> grid;   ///< that the mesh was made from
+  double area_density = 0.15;      ///< [kg/m^2]
   MembraneModuli membrane;
-  Eigen::Vector3d warp{1, 0, 0};               ///< direction in the undeformed shape; of a grid the first side
+  Eigen::Vector3d warp{1, 0, 0};   ///< direction in the undeformed shape; of a grid the first side
   BendingModel bending = BendingModel::isometric_nonconforming;
-  double bending_modulus = 0.0;                ///< D [N m]
+  double bending_modulus = 0.0;                   ///< D [N m]
   std::optional<double> bending_poissons_ratio;   ///< of bending, in (-1, 1); empty: that of the discretisation
   Plasticity plasticity;
-  double mass_damping = 0.0;                   ///< [1/s]
-  double stiffness_damping = 0.0;              ///< [s]
+  double mass_damping = 0.0;        ///< [1/s]
+  double stiffness_damping = 0.0;   ///< [s]
   Aerodynamics aerodynamics;
-  double drag = 0.0;                           ///< pressure per velocity along the normal, against the air [N s/m^3]
+  double drag = 0.0;   ///< pressure per velocity along the normal, against the air [N s/m^3]
   ClothSolver solver = ClothSolver::automatic;
   bool one_newton_step = false;
   double linear_tolerance = 5e-3;
   std::vector<GraspConfig> grasps;
-  std::vector<ClothLoadConfig> loads;          ///< dead loads on vertices, in statics and in dynamics
+  std::vector<ClothLoadConfig> loads;               ///< dead loads on vertices, in statics and in dynamics
   std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`tracked`); null: nothing
-  std::optional<ClothContactConfig> contact;   ///< nothing: touches nothing
+  std::optional<ClothContactConfig> contact;        ///< nothing: touches nothing
 };
 
 /// How a scene starts.
 struct StartConfig
 {
-  bool equilibrium = false;                    ///< the static solver runs first
-  bool keep_velocities = false;                ///< simulated bodies have their given velocities at the equilibrium; otherwise they are at rest
-  bool accept_unstable = false;                ///< an unstable equilibrium is a warning; otherwise the scene is refused
+  bool equilibrium = false;   ///< the static solver runs first
+  /// simulated bodies have their given velocities at the equilibrium; otherwise they are at rest
+  bool keep_velocities = false;
+  bool accept_unstable = false;   ///< an unstable equilibrium is a warning; otherwise the scene is refused
 };
 
 struct RecordConfig
 {
-  int every = 1;                               ///< record every n-th step (`simulate`)
-  std::vector<RecordField> fields;             ///< what is computed and recorded besides, each once (see field_tables.h)
+  int every = 1;   ///< record every n-th step (`simulate`)
+  /// what is computed and recorded besides, each once (see field_tables.h)
+  std::vector<RecordField> fields;
 };
 
 struct SceneConfig
 {
   std::string name = "scene";
-  std::string file;                            ///< that it was read from, for messages; may be empty
-  std::string source;                          ///< the YAML text after --set overrides (what `scene` publishes)
-  /// What the user should know although the scene runs, one sentence or two each. The reader adds to them (YamlCursor::warning), then
-  /// the constructor of Simulation. simulate prints them to stderr, nodes log them as ROS warnings.
+  std::string file;     ///< that it was read from, for messages; may be empty
+  std::string source;   ///< the YAML text after --set overrides (what `scene` publishes)
+  /// What the user should know although the scene runs, one sentence or two each. The reader adds to them
+  /// (YamlCursor::warning), then the constructor of Simulation. simulate prints them to stderr, nodes log them as ROS
+  /// warnings.
   std::vector<std::string> warnings;
-  Eigen::Vector3d gravity{0, 0, -9.81};        ///< [m/s^2]
-  Eigen::Vector3d wind{0, 0, 0};               ///< [m/s]
-  bool wind_topic = false;                     ///< `wind` messages set it; until the first one it is as above
+  Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
+  Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
+  bool wind_topic = false;                ///< `wind` messages set it; until the first one it is as above
   StartConfig start;
-  std::optional<StaticsConfig> statics;        ///< what `simulate --statics` does besides one equilibrium
+  std::optional<StaticsConfig> statics;   ///< what `simulate --statics` does besides one equilibrium
   TimeConfig time;
   RecordConfig record;
   ContactConfig contact;
   std::vector<RodConfig> rods;
   std::vector<ThreadConfig> threads;
-  std::vector<ClothConfig> cloths;             ///< and then those that are tracked
+  std::vector<ClothConfig> cloths;   ///< and then those that are tracked
   std::vector<ObstacleConfig> obstacles;
-  std::vector<BodyConfig> bodies;              ///< names differ from each other and from the obstacles'
+  std::vector<BodyConfig> bodies;   ///< names differ from each other and from the obstacles'
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -12,13 +12,16 @@ class Simulation;
 /// Fields of one object at one instant; one row per node, vertex, or for `energies` one in all.
 struct FieldTable
 {
-  std::string table;                  ///< name of the table that the rows belong to: rod_fields, cloth_fields or energies
+  /// name of the table that the rows belong to: rod_fields, cloth_fields or energies
+  std::string table;
   std::string object;
   std::vector<std::string> columns;   ///< names with units, e.g. "tension [N]"
-  Eigen::MatrixXd values;             ///< rows x columns; NaN: the state does not determine the value, the cell stays empty
+  /// rows x columns; NaN: the state does not determine the value, the cell stays empty
+  Eigen::MatrixXd values;
 };
 
-/// What `record.fields` of the scene asks for, at the present instant. Empty, and nothing is computed, when it asks for nothing.
+/// What `record.fields` of the scene asks for, at the present instant. Empty, and nothing is computed, when it asks for
+/// nothing.
 std::vector<FieldTable> fieldTablesOf(const Simulation& simulation);
 
-}  // namespace slender
+}   // namespace slender

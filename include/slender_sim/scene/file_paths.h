@@ -12,15 +12,16 @@ public:
   using std::runtime_error::runtime_error;
 };
 
-/// The file that a result written under `path` may replace: the path itself if nothing is there yet or a regular file, and what a symbolic link leads to,
-/// so that the link stays. Throws std::runtime_error for everything else: a directory, a device, a FIFO, a link that leads nowhere.
+/// The file that a result written under `path` may replace: the path itself if nothing is there yet or a regular file,
+/// and what a symbolic link leads to, so that the link stays. Throws std::runtime_error for everything else: a
+/// directory, a device, a FIFO, a link that leads nowhere.
 std::string replaceablePath(const std::string& path);
 
 /// With all folders above it. Throws std::runtime_error.
 void makeFolder(const std::string& folder);
 
-/// Throws std::runtime_error when something is at `path` that is neither a regular file nor a link to one: reading a FIFO would wait for ever, and a
-/// device might have no end.
+/// Throws std::runtime_error when something is at `path` that is neither a regular file nor a link to one: reading a
+/// FIFO would wait for ever, and a device might have no end.
 void requireRegularFile(const std::string& path);
 
-}  // namespace slender
+}   // namespace slender

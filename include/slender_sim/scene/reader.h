@@ -20,7 +20,7 @@ public:
 SceneConfig readScene(const std::string& path, const std::vector<std::string>& overrides = {});
 
 /// The same for text; `name` stands for the file in messages.
-SceneConfig parseScene(const std::string& text, const std::string& name = "scene", const std::vector<std::string>& overrides = {},
-                       const std::string& directory = ".");
+SceneConfig parseScene(const std::string& text, const std::string& name = "scene",
+                       const std::vector<std::string>& overrides = {}, const std::string& directory = ".");
 
-}  // namespace slender
+}   // namespace slender

@@ -21,4 +21,4 @@ enum class RecordField
 /// Every field under its name in scene files.
 const std::vector<std::pair<std::string, RecordField>>& recordFieldNames();
 
-}  // namespace slender
+}   // namespace slender

@@ -36,4 +36,4 @@ using BagReader = std::function<RecordedGuide(const BagSource&)>;
 /// How scenes that are read from now on read bags, which takes ROS (node/guide_bag.h).
 void setBagReader(BagReader reader);
 
-}  // namespace slender
+}   // namespace slender

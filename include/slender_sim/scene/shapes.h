@@ -7,14 +7,16 @@
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/scene/config.h"
 
-/// From a rod's configuration to the numbers buildRod() takes. All throw std::invalid_argument with name, value and range.
+/// From a rod's configuration to the numbers buildRod() takes. All throw std::invalid_argument with name, value and
+/// range.
 namespace slender {
 
-/// Nodes of the rest shape [m]. `gravity` tells a catenary where down is. A closed rod whose curve ends where it began (a full
-/// circle) keeps one of the two coinciding nodes.
+/// Nodes of the rest shape [m]. `gravity` tells a catenary where down is. A closed rod whose curve ends where it began
+/// (a full circle) keeps one of the two coinciding nodes.
 Eigen::Matrix3Xd restNodes(const RodConfig& rod, const Eigen::Vector3d& gravity);
 
-/// Nodes of the initial shape: `rest` itself unless the rod has `initial`, whose curve then gets as many nodes, spaced as in `rest`.
+/// Nodes of the initial shape: `rest` itself unless the rod has `initial`, whose curve then gets as many nodes, spaced
+/// as in `rest`.
 Eigen::Matrix3Xd initialNodes(const RodConfig& rod, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& gravity);
 
 /// Nodes of an open curve as it stands [m].
@@ -28,4 +30,4 @@ std::vector<double> perEdge(const std::vector<double>& values, int edges, const 
 /// G = E / (2 (1 + nu)). Moduli given directly take their place.
 std::vector<RodSection> rodSections(const RodConfig& rod, int edges);
 
-}  // namespace slender
+}   // namespace slender

@@ -23,45 +23,48 @@ namespace slender {
 struct ClothGrasp
 {
   bool active = true;
-  std::vector<int> vertices;    ///< ascending; no other active grasp of the cloth holds them
-  Eigen::Matrix3Xd points_G;    ///< where they are in the grasp's frame [m]
+  std::vector<int> vertices;   ///< ascending; no other active grasp of the cloth holds them
+  Eigen::Matrix3Xd points_G;   ///< where they are in the grasp's frame [m]
   Pose X_WG;
 };
 
 struct SceneCloth
 {
   ClothState cloth;
-  std::vector<ClothGrasp> grasps;   ///< those of the scene; cloth.pins are what the active ones hold
-  Eigen::Matrix3Xd guide;           ///< of a tracked cloth: vertices of its guide now [m]
-  Eigen::Matrix3Xd guide_velocity;  ///< of these over the last step [m/s], with several sets of test functions only
-  Eigen::Matrix3Xd guide_forces;    ///< with which it acted in the last step, per test function [N] (ClothStepper::averageForces)
-  FunctionBlend blend;              ///< of the set in force, cloth.average_set
+  std::vector<ClothGrasp> grasps;    ///< those of the scene; cloth.pins are what the active ones hold
+  Eigen::Matrix3Xd guide;            ///< of a tracked cloth: vertices of its guide now [m]
+  Eigen::Matrix3Xd guide_velocity;   ///< of these over the last step [m/s], with several sets of test functions only
+  /// with which it acted in the last step, per test function [N] (ClothStepper::averageForces)
+  Eigen::Matrix3Xd guide_forces;
+  FunctionBlend blend;   ///< of the set in force, cloth.average_set
 };
 
 /// What a rod tracks.
 struct RodGuide
 {
-  Eigen::Matrix3Xd nodes;           ///< of its guide now [m]; of a rod that tracks nothing none
-  Eigen::Matrix3Xd forces;          ///< with which it acted in the last step, per test function [N] (AveragedRod::averageForces)
+  Eigen::Matrix3Xd nodes;   ///< of its guide now [m]; of a rod that tracks nothing none
+  /// with which it acted in the last step, per test function [N] (AveragedRod::averageForces)
+  Eigen::Matrix3Xd forces;
 };
 
 /// State of all objects of a scene at one instant.
 struct SceneState
 {
-  double time = 0.0;          ///< simulated [s] = steps * step length
+  double time = 0.0;   ///< simulated [s] = steps * step length
   std::uint64_t steps = 0;
-  std::vector<RodState> rods;          ///< grasps of the scene first, then welds
-  std::vector<RodGuide> rod_guides;    ///< per rod; none where no rod tracks anything
+  std::vector<RodState> rods;              ///< grasps of the scene first, then welds
+  std::vector<RodGuide> rod_guides;        ///< per rod; none where no rod tracks anything
   std::vector<ThreadGroupState> threads;   ///< per thread of the scene: it and what has broken off it
   std::vector<SceneCloth> cloths;
-  std::vector<RigidBodyState> bodies;  ///< per body of the scene, driven ones included
+  std::vector<RigidBodyState> bodies;   ///< per body of the scene, driven ones included
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
-  double contact_stiffness = 0.0;      ///< of the barrier [N]
+  double contact_stiffness = 0.0;          ///< of the barrier [N]
   double thread_contact_stiffness = 0.0;   ///< of that between threads [N]
-  /// Per grasp of the scene: the held section seen from the pose that drives it; with `attach: section` identity until attach().
+  /// Per grasp of the scene: the held section seen from the pose that drives it; with `attach: section` identity until
+  /// attach().
   std::vector<Pose> grasp_offsets;
-  std::vector<Wrench> wrenches;   ///< per grasp of the scene, of the last step
+  std::vector<Wrench> wrenches;                    ///< per grasp of the scene, of the last step
   std::vector<std::array<EndLoad, 2>> end_loads;   ///< per thread of the scene, of the last step
 };
 
@@ -86,22 +89,31 @@ struct SceneInputs
   std::vector<GraspTarget> grasps;
   std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
   std::vector<ThreadDrive> threads;             ///< per thread of the scene
-  std::vector<Eigen::Matrix3Xd> guides;         ///< per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]), ignored when it is a cloth;
-                                                  ///< of others empty, and none where no cloth tracks anything
-  std::vector<Eigen::Matrix3Xd> rod_guides;     ///< per rod of the scene: its guide's nodes likewise; none where no rod tracks anything
+  /// per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]), ignored when it is a cloth; of
+  /// others empty, and none where no cloth tracks anything
+  std::vector<Eigen::Matrix3Xd> guides;
+  /// per rod of the scene: its guide's nodes likewise; none where no rod tracks anything
+  std::vector<Eigen::Matrix3Xd> rod_guides;
   Eigen::Vector3d wind{0, 0, 0};
 };
 
 /// A grasp of the scene: of which rod or cloth (the other is -1), which of its grasps, and its configuration.
-struct GraspRef { int rod; int index; const GraspConfig* config; int cloth = -1; };
+struct GraspRef
+{
+  int rod;
+  int index;
+  const GraspConfig* config;
+  int cloth = -1;
+};
 
 /// The scene composed once from its checked configuration: models, steppers, initial state.
 class Simulation
 {
 public:
-  /// Throws SceneError (scene/reader.h) when the configuration cannot be built. With `start: equilibrium` it solves for it, and
-  /// throws SimulationError when there is none to be found, or only an unstable one (unless `accept_unstable` makes a warning of it). With `solve_start`
-  /// false it starts as given all the same, and leaves the search for equilibria to runStatics().
+  /// Throws SceneError (scene/reader.h) when the configuration cannot be built. With `start: equilibrium` it solves for
+  /// it, and throws SimulationError when there is none to be found, or only an unstable one (unless `accept_unstable`
+  /// makes a warning of it). With `solve_start` false it starts as given all the same, and leaves the search for
+  /// equilibria to runStatics().
   explicit Simulation(SceneConfig config, bool solve_start = true);
 
   const SceneConfig& config() const { return config_; }
@@ -120,26 +132,28 @@ public:
   /// Name of the rod or cloth that it holds.
   const std::string& heldObject(int grasp) const;
 
-  /// Inputs as the scene itself defines them at the end of the coming step: tables evaluated, everything else held where it is.
+  /// Inputs as the scene itself defines them at the end of the coming step: tables evaluated, everything else held
+  /// where it is.
   SceneInputs defaultInputs() const;
   /// The same into those of an earlier step, which takes no memory.
   void defaultInputs(SceneInputs& inputs) const;
 
-  /// The pose of the held section when the driving frame M of a grasp (a gripper, a body) is at X_WM: X_WM and the offset that was
-  /// taken as the scene began (none with `attach: section`), or last by attach() or setOffset().
+  /// The pose of the held section when the driving frame M of a grasp (a gripper, a body) is at X_WM: X_WM and the
+  /// offset that was taken as the scene began (none with `attach: section`), or last by attach() or setOffset().
   GraspTarget targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity = std::nullopt) const;
   /// Takes the offset between the driving frame now at X_WM and the held section.
   void setOffset(int grasp, const Pose& X_WM);
 
-  /// One step of config().time.step. On failure the state is untouched. Throws std::invalid_argument unless there is one grasp
-  /// target per grasp of the scene.
+  /// One step of config().time.step. On failure the state is untouched. Throws std::invalid_argument unless there is
+  /// one grasp target per grasp of the scene.
   StepReport step(const SceneInputs& inputs);
 
   /// Of the equilibrium from which the scene starts; nothing when it starts as given.
   const std::optional<StepReport>& startReport() const { return start_report_; }
-  /// What `statics` of the scene asks for, from the present state on; without the key one equilibrium. The state becomes the last equilibrium, at rest
-  /// (with start.keep_velocities bodies keep their velocities). Throws SceneError for objects that have no statics: cloth, rods that track a guide, or
-  /// nothing but threads. Equilibria that were not found are told by StaticsRun::end.
+  /// What `statics` of the scene asks for, from the present state on; without the key one equilibrium. The state
+  /// becomes the last equilibrium, at rest (with start.keep_velocities bodies keep their velocities). Throws SceneError
+  /// for objects that have no statics: cloth, rods that track a guide, or nothing but threads. Equilibria that were not
+  /// found are told by StaticsRun::end.
   StaticsRun runStatics();
 
   /// Threads for scenes of several rods (at least 1; default: what OpenMP offers). Results do not depend on it.
@@ -148,11 +162,13 @@ public:
   /// Back to the initial state.
   void reset();
 
-  /// Takes hold of nodes first..last of a rod as they are now, under the name of an existing grasp of that rod. Nothing jumps: the
-  /// offset from a table, or from a body or obstacle of the scene, is taken anew, whatever `attach` says of the scene's start.
-  /// Throws std::invalid_argument: no such grasp or nodes, overlap with another active grasp, several nodes held by position.
+  /// Takes hold of nodes first..last of a rod as they are now, under the name of an existing grasp of that rod. Nothing
+  /// jumps: the offset from a table, or from a body or obstacle of the scene, is taken anew, whatever `attach` says of
+  /// the scene's start. Throws std::invalid_argument: no such grasp or nodes, overlap with another active grasp,
+  /// several nodes held by position.
   void attach(int grasp, int first_node, int last_node, Hold hold);
-  /// Likewise of vertices of a cloth, in any order. Throws std::invalid_argument: no such vertices, none, held by another grasp.
+  /// Likewise of vertices of a cloth, in any order. Throws std::invalid_argument: no such vertices, none, held by
+  /// another grasp.
   void attachVertices(int grasp, std::vector<int> vertices);
   void release(int grasp);
 
@@ -175,14 +191,16 @@ public:
   double rodTrackingError(int rod) const;
   /// Test functions in force of a tracked cloth.
   const FunctionSet& functions(int cloth) const;
-  /// Has another set of test functions act from the next step on. What its averages are away from the guide's goes within `blend` [s] (none: that of the
-  /// scene), without a jump in position or velocity; 0: in one step. Throws std::invalid_argument: not a tracked cloth, no set of this name, not a
-  /// time, functions that depend on each other on the vertices that are free.
+  /// Has another set of test functions act from the next step on. What its averages are away from the guide's goes
+  /// within `blend` [s] (none: that of the scene), without a jump in position or velocity; 0: in one step. Throws
+  /// std::invalid_argument: not a tracked cloth, no set of this name, not a time, functions that depend on each other
+  /// on the vertices that are free.
   void setFunctions(int cloth, const std::string& set, std::optional<double> blend = std::nullopt);
 
-  /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit or could
-  /// not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a shortened one is refused
-  /// and the state stays as it is. An older file is replaced, of a symbolic link what it leads to; neither touches what is no regular file.
+  /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit
+  /// or could not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a
+  /// shortened one is refused and the state stays as it is. An older file is replaced, of a symbolic link what it leads
+  /// to; neither touches what is no regular file.
   void save(const std::string& path) const;
   void load(const std::string& path);
 
@@ -283,42 +301,49 @@ private:
   SceneConfig config_;
   SceneState state_, initial_;
   std::vector<std::shared_ptr<const RodModel>> models_;
-  std::vector<std::optional<RodStepper>> steppers_;   ///< per rod; none for those of the group, and those that track a guide
+  /// per rod; none for those of the group, and those that track a guide
+  std::vector<std::optional<RodStepper>> steppers_;
   struct TrackedRod
   {
     AveragedRod stepper;
-    Eigen::Matrix3Xd targets;                         ///< of its averages at the end of the step [m]
+    Eigen::Matrix3Xd targets;   ///< of its averages at the end of the step [m]
   };
   std::vector<std::unique_ptr<TrackedRod>> tracked_rods_;   ///< per rod; null for others
   std::vector<std::shared_ptr<const ThreadModel>> thread_models_;
   std::vector<std::optional<ThreadGroup>> thread_steppers_;   ///< per thread; none for those with contact
   std::optional<TouchingThreads> touching_;
-  std::vector<int> touching_index_;                   ///< per thread: in touching_, -1: on its own; empty when all are
+  std::vector<int> touching_index_;   ///< per thread: in touching_, -1: on its own; empty when all are
   TouchingState touching_state_;
   TouchingInputs touching_inputs_;
   std::vector<std::shared_ptr<const ClothModel>> cloth_models_;
   std::vector<std::optional<ClothStepper>> cloth_steppers_;   ///< per cloth; none for those with contact
   std::deque<TouchingCloths> touching_cloths_;
-  struct ClothPlace { int group = -1, index = 0; };   // group -1: on its own
-  std::vector<ClothPlace> cloth_places_;              ///< per cloth: in touching_cloths_; empty when all are on their own
-  bool tracks_ = false;                               ///< any cloth follows a guide
-  std::vector<char> leads_;                           ///< per cloth: it is the guide of another
-  std::vector<int> cloth_bodies_;                     ///< of the scene, that these meet, beside all obstacles
+  struct ClothPlace
+  {
+    int group = -1, index = 0;
+  };   // group -1: on its own
+  /// per cloth: in touching_cloths_; empty when all are on their own
+  std::vector<ClothPlace> cloth_places_;
+  bool tracks_ = false;             ///< any cloth follows a guide
+  std::vector<char> leads_;         ///< per cloth: it is the guide of another
+  std::vector<int> cloth_bodies_;   ///< of the scene, that these meet, beside all obstacles
   std::vector<ClothInputs> cloth_inputs_;
-  std::vector<Pose> cloth_targets_;                   ///< per grasp of the scene
+  std::vector<Pose> cloth_targets_;   ///< per grasp of the scene
   std::optional<RodGroup> group_;
-  std::vector<int> group_rods_, group_bodies_;        ///< what of the scene is in the group
-  std::vector<int> group_index_;                      ///< per rod: in the group, -1: on its own
+  std::vector<int> group_rods_, group_bodies_;   ///< what of the scene is in the group
+  std::vector<int> group_index_;                 ///< per rod: in the group, -1: on its own
   RodGroupState group_state_;
   RodGroupInputs group_inputs_;
   std::vector<RodInputs> rod_inputs_;
-  SceneInputs static_inputs_;                         ///< of statics, at time 0
-  std::vector<RodInputs> rod_loads_;                  ///< per rod: gravity, forces and torques of the scene; no grasps
-  Eigen::Vector3d gravity_{0, 0, 0};                  ///< that acts now: that of the scene, while runStatics() times the factor
-  Eigen::Matrix3Xd imperfection_;                     ///< forces on the nodes of the only rod [N], while runStatics() uses them
+  SceneInputs static_inputs_;          ///< of statics, at time 0
+  std::vector<RodInputs> rod_loads_;   ///< per rod: gravity, forces and torques of the scene; no grasps
+  /// that acts now: that of the scene, while runStatics() times the factor
+  Eigen::Vector3d gravity_{0, 0, 0};
+  /// forces on the nodes of the only rod [N], while runStatics() uses them
+  Eigen::Matrix3Xd imperfection_;
   std::optional<StepReport> start_report_;
   std::vector<GraspRef> grasps_;
   int threads_ = 0;   // 0: as OpenMP says
 };
 
-}  // namespace slender
+}   // namespace slender

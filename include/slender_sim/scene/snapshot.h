@@ -49,7 +49,7 @@ struct GraspSnapshot
   {
     std::string object;   ///< rod or cloth
     bool active = false;
-    Pose X_WG;            ///< of the held section, or of the frame that holds a cloth's vertices
+    Pose X_WG;   ///< of the held section, or of the frame that holds a cloth's vertices
   };
   std::string name;
   std::optional<Held> held;   ///< nothing: not recorded
@@ -90,13 +90,14 @@ RodSnapshot snapshotOf(const RodModel& model, const RodState& state);
 ThreadSnapshot snapshotOf(const std::string& name, const ThreadState& state);
 SceneSnapshot snapshotOf(const Simulation& simulation);
 
-/// The averages over the guide, vertices 3 x n [m], by the functions in force of a tracked cloth or rod and the forces, 3 x functions [N], appended to `out`;
-/// functions of a named set as SET/NAME.
-void appendFunctions(const std::string& object, const FunctionSet& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
-                     std::vector<FunctionSnapshot>& out);
+/// The averages over the guide, vertices 3 x n [m], by the functions in force of a tracked cloth or rod and the forces,
+/// 3 x functions [N], appended to `out`; functions of a named set as SET/NAME.
+void appendFunctions(const std::string& object, const FunctionSet& set, const Eigen::Matrix3Xd& guide,
+                     const Eigen::Matrix3Xd& forces, std::vector<FunctionSnapshot>& out);
 
-/// The same of a rod or cloth and a set by their names; false, and nothing, when the scene has none such that tracks a guide of this size.
-bool appendFunctions(const SceneConfig& scene, const std::string& object, const std::string& set, const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces,
-                     std::vector<FunctionSnapshot>& out);
+/// The same of a rod or cloth and a set by their names; false, and nothing, when the scene has none such that tracks a
+/// guide of this size.
+bool appendFunctions(const SceneConfig& scene, const std::string& object, const std::string& set,
+                     const Eigen::Matrix3Xd& guide, const Eigen::Matrix3Xd& forces, std::vector<FunctionSnapshot>& out);
 
-}  // namespace slender
+}   // namespace slender

@@ -13,7 +13,8 @@ std::string stateBytes(const ThreadGroupState& state);
 std::string stateBytes(const ClothState& state);
 std::string stateBytes(const SceneState& state);
 
-/// Throws std::runtime_error when the bytes end too early or late, or hold a size that cannot be, or numbers that are not finite.
+/// Throws std::runtime_error when the bytes end too early or late, or hold a size that cannot be, or numbers that are
+/// not finite.
 SceneState stateOfBytes(const char* bytes, std::size_t size);
 
-}  // namespace slender
+}   // namespace slender

@@ -15,32 +15,40 @@
 /// Plain structs: what a tracked cloth or rod follows, as checked by the reader.
 namespace slender {
 
-struct FixedGuide {};
+struct FixedGuide
+{};
 /// Through timed frames, held before the first and after the last.
-struct FrameGuide { PointTrajectory points; };
+struct FrameGuide
+{
+  PointTrajectory points;
+};
 /// Vertices carried by rigid bodies; the binding's own poses are identities.
 struct CarriedGuide
 {
   std::vector<std::string> bodies;
   GuideBinding binding;
-  bool keeps_offset = true;             ///< bodies carry the mesh from where it and they are at first; else vertices are in the bodies' frames
-  std::vector<PoseTrajectory> poses;    ///< per body; none: by `guide/bodies`
+  /// bodies carry the mesh from where it and they are at first; else vertices are in the bodies' frames
+  bool keeps_offset = true;
+  std::vector<PoseTrajectory> poses;   ///< per body; none: by `guide/bodies`
 };
 /// By `guide/points`.
-struct TopicGuide {};
+struct TopicGuide
+{};
 /// A cloth of the scene, simulated beside what tracks it, and ahead of it in each step.
 struct ClothGuide
 {
-  int cloth = 0;                        ///< in the scene; not a tracked one
-  Eigen::Matrix3Xd start, velocity;     ///< its vertices where the scene starts [m], [m/s]
+  int cloth = 0;                      ///< in the scene; not a tracked one
+  Eigen::Matrix3Xd start, velocity;   ///< its vertices where the scene starts [m], [m/s]
 };
 using GuideMotion = std::variant<FixedGuide, FrameGuide, CarriedGuide, TopicGuide, ClothGuide>;
 
 struct GuideConfig
 {
-  TriangleMesh mesh;                    ///< reference shape [m], over which averages are taken; of a rod's guide: nodes of a polyline, no triangles
+  /// reference shape [m], over which averages are taken; of a rod's guide: nodes of a polyline, no triangles
+  TriangleMesh mesh;
   GuideMotion motion;
-  double coast = 0.0;                   ///< [s] within which the speed of a guide by topic dies out when no message comes; 0: it is held
+  /// [s] within which the speed of a guide by topic dies out when no message comes; 0: it is held
+  double coast = 0.0;
 
   bool byTopic() const;
   /// Vertices at `time` [s] (3 x n [m]) and their velocities [m/s]; of a guide by topic those of the mesh, at rest;
@@ -51,19 +59,20 @@ struct GuideConfig
 /// Test functions that act together.
 struct FunctionSet
 {
-  std::string name;                     ///< empty: of the only set, which needs none
+  std::string name;   ///< empty: of the only set, which needs none
   TestFunctions functions;
   std::shared_ptr<const WeakConstraints> constraints;
-  Eigen::VectorXd bounds;               ///< of the force of each [N], infinite without; empty: of none, in all sets
-  std::optional<double> from;           ///< simulated time at which they take over [s] > 0; none: when asked to
-  double blend = 0.0;                   ///< time within which the averages then become the guide's [s]
+  Eigen::VectorXd bounds;       ///< of the force of each [N], infinite without; empty: of none, in all sets
+  std::optional<double> from;   ///< simulated time at which they take over [s] > 0; none: when asked to
+  double blend = 0.0;           ///< time within which the averages then become the guide's [s]
 };
 
 struct TrackingConfig
 {
   GuideConfig guide;
-  std::vector<FunctionSet> sets;        ///< the first acts where the scene starts
-  double size = 1.0;                    ///< diagonal of the box around the guide's mesh [m] (of a rod: its length): what errors are measured by
+  std::vector<FunctionSet> sets;   ///< the first acts where the scene starts
+  /// diagonal of the box around the guide's mesh [m] (of a rod: its length): what errors are measured by
+  double size = 1.0;
 };
 
-}  // namespace slender
+}   // namespace slender

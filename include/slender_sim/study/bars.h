@@ -10,11 +10,23 @@ namespace slender::study {
 /// A limit that a metric of a study has to meet.
 struct Bar
 {
-  enum class Sense { at_most, at_least };
+  enum class Sense
+  {
+    at_most,
+    at_least
+  };
   /// Timings depend on the machine and its load. Reports show timings beside their bars, but tests do not judge them.
-  enum class Kind { result, timing };
+  enum class Kind
+  {
+    result,
+    timing
+  };
   /// Some limits belong to the full form only, because the quick form is too coarse to meet them.
-  enum class Form { both, full };
+  enum class Form
+  {
+    both,
+    full
+  };
 
   std::string study;    ///< empty: every study that has this metric
   std::string metric;   ///< a `*` at the end stands for any ending
@@ -35,8 +47,9 @@ const std::vector<Bar>& bars();
 /// Returns the bar of this metric, or nullptr if the metric has none.
 const Bar* findBar(const std::string& study, const std::string& metric);
 
-/// Judges a finished study: all rows with a check must be within their bounds, and all metrics with a bar must meet it, timings
-/// excepted. Returns one sentence per failure. A study in which nothing can fail, or that lacks a metric with a bar of its own, fails.
+/// Judges a finished study: all rows with a check must be within their bounds, and all metrics with a bar must meet it,
+/// timings excepted. Returns one sentence per failure. A study in which nothing can fail, or that lacks a metric with a
+/// bar of its own, fails.
 std::vector<std::string> judge(const StudyContext& context);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -12,4 +12,4 @@ inline double threadSeconds()
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -33,4 +33,4 @@ const std::vector<MeasureKind>& measureKinds();
 /// nullptr when there is none of this name.
 const MeasureKind* findMeasure(const std::string& name);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -11,9 +11,9 @@ struct TwoTones
   double misfit;   ///< what the fit leaves, over the signals' own spread [-]
 };
 
-/// Fits every signal by a constant and two undamped sinusoids whose frequencies all share (least squares, each signal scaled by its
-/// spread). Samples `interval` [s] apart, over four periods or more, at most ten beats.
-/// Throws std::runtime_error for fewer periods, or a signal that is constant.
+/// Fits every signal by a constant and two undamped sinusoids whose frequencies all share (least squares, each signal
+/// scaled by its spread). Samples `interval` [s] apart, over four periods or more, at most ten beats. Throws
+/// std::runtime_error for fewer periods, or a signal that is constant.
 TwoTones fitTwoTones(const std::vector<std::vector<double>>& signals, double interval);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -27,11 +27,12 @@ void writeCsv(std::ostream& out, const StudyContext& context);
 
 /// As in writeCsv: quoted where need be; a row's value as text, empty when it has none.
 std::string csvCell(const std::string& text);
-std::vector<std::string> csvCells(const std::string& line);   ///< the other way, of a line without line breaks in its cells
+/// the other way, of a line without line breaks in its cells
+std::vector<std::string> csvCells(const std::string& line);
 std::string valueText(const Row& row, const std::string& key);
 
 /// Writes DIR/NAME.gp for every plot and lets gnuplot turn it into DIR/NAME.png.
 /// Returns an empty string, or why there are no pictures (the scripts are kept).
 std::string writePlots(const std::string& directory, const StudyContext& context);
 
-}  // namespace slender::study
+}   // namespace slender::study

@@ -24,7 +24,8 @@ public:
   Row& set(const std::string& key, const std::string& value);
   Row& set(const std::string& key, const char* value) { return set(key, std::string(value)); }
 
-  /// Marks the row as a check: |measured - expected| <= bound (bound > 0, same unit), `source` says where it comes from.
+  /// Marks the row as a check: |measured - expected| <= bound (bound > 0, same unit), `source` says where it comes
+  /// from.
   Row& check(double measured, double expected, double bound, const std::string& source);
 
   const Value* find(const std::string& key) const;
@@ -45,12 +46,12 @@ struct Series
 /// A plot with units in its axis labels; series in order of the legend. Logarithmic axes unless told otherwise.
 struct Plot
 {
-  std::string name;      ///< file name without ending
+  std::string name;   ///< file name without ending
   std::string title;
   std::string x_label, y_label;
   bool log_x = true, log_y = true;
-  bool lines = true;     ///< false: points only
-  bool markers = true;   ///< false: lines only
+  bool lines = true;         ///< false: points only
+  bool markers = true;       ///< false: lines only
   bool equal_axes = false;   ///< pictures of shapes
   std::deque<Series> series;
 
@@ -65,7 +66,7 @@ struct SurfacePicture
   struct Surface
   {
     TriangleMesh mesh;
-    bool cloth = true;   ///< else something that stands behind: grey
+    bool cloth = true;        ///< else something that stands behind: grey
     Eigen::VectorXi hues{};   ///< of each face, 0 ... kHues - 1; empty: all of cloth's colour
   };
   struct Panel
@@ -74,10 +75,10 @@ struct SurfacePicture
     std::vector<Surface> surfaces;
   };
 
-  std::string name;      ///< file name without ending
+  std::string name;   ///< file name without ending
   std::string title;
   Eigen::Vector3d view{0, 1, 0}, up{0, 0, 1};
-  int columns = 2;       ///< panels in a row
+  int columns = 2;   ///< panels in a row
   std::vector<Panel> panels;
 };
 
@@ -96,14 +97,15 @@ public:
   void progress(int done, int total, const std::string& what);
   void clearProgress();
 
-  Row& row();                                             ///< appends an empty row; the reference stays valid
-  void metric(const std::string& key, double value);     ///< sets or replaces
+  Row& row();                                                      ///< appends an empty row; the reference stays valid
+  void metric(const std::string& key, double value);               ///< sets or replaces
   void note(const std::string& text) { notes_.push_back(text); }   ///< one line below the table
   Plot& plot(const std::string& name, const std::string& title, const std::string& x_label, const std::string& y_label);
 
   SurfacePicture& picture(const std::string& name, const std::string& title);
 
-  /// Adds worst_error_over_bound = max |measured - expected| / bound over all check rows (NaN if any is NaN), if there are any.
+  /// Adds worst_error_over_bound = max |measured - expected| / bound over all check rows (NaN if any is NaN), if there
+  /// are any.
   void finish();
 
   const std::string& name() const { return name_; }
@@ -137,4 +139,4 @@ const std::vector<Study>& studies();
 /// nullptr when there is none of this name.
 const Study* findStudy(const std::string& name);
 
-}  // namespace slender::study
+}   // namespace slender::study

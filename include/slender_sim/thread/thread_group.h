@@ -9,11 +9,12 @@ namespace slender {
 /// The threads into which one thread has broken. Ids of nodes and threads are unique over all of them.
 struct ThreadGroupState
 {
-  std::vector<ThreadState> threads;   ///< the one that hangs on the nozzle (or the newest part) first, then the others by age, youngest first
+  /// the one that hangs on the nozzle (or the newest part) first, then the others by age, youngest first
+  std::vector<ThreadState> threads;
   std::uint64_t next_thread_id = 1;
-  double dropped_volume = 0.0;        ///< [m^3] of whole threads taken away because too many lay on the floor
-  double left_volume = 0.0;           ///< [m^3] of whole threads that had left the region
-  double start_volume = 0.0;          ///< [m^3] that was there at the start
+  double dropped_volume = 0.0;   ///< [m^3] of whole threads taken away because too many lay on the floor
+  double left_volume = 0.0;      ///< [m^3] of whole threads that had left the region
+  double start_volume = 0.0;     ///< [m^3] that was there at the start
 
   /// Fluid that is there, was dropped or has left, less what was fed [m^3]: constant.
   double volumeBalance() const;
@@ -29,14 +30,15 @@ struct ThreadVolumes
   double dropped = 0.0;   ///< was taken away because more nodes lay on the floor than `edges.deposited` allows
 
   void add(const ThreadGroupState& state);
-  /// Fluid that is not accounted for, over all that there ever was [-]. Round-off makes it about 1e-13 after an hour of steps.
+  /// Fluid that is not accounted for, over all that there ever was [-]. Round-off makes it about 1e-13 after an hour of
+  /// steps.
   double missing() const;
   /// A larger difference than this is a defect, not round-off.
   static constexpr double kMostMissing = 1e-9;
 };
 
-/// Breaks threads where they are thinner than ThreadLimits::min_radius; and takes away whole ones that have left the scene, and the oldest of
-/// those that only lie about.
+/// Breaks threads where they are thinner than ThreadLimits::min_radius; and takes away whole ones that have left the
+/// scene, and the oldest of those that only lie about.
 void breakThreads(ThreadGroupState& state, const ThreadLimits& limits);
 void dropThreads(ThreadGroupState& state, const ThreadLimits& limits);
 
@@ -45,10 +47,12 @@ class ThreadGroup
 {
 public:
   /// Throws std::invalid_argument for a model that is not valid.
-  ThreadGroup(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton) : stepper_(std::move(model), newton) {}
+  ThreadGroup(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton) : stepper_(std::move(model), newton)
+  {
+  }
 
-  /// Advances all threads by `duration` [s]; the inputs are common, held ends and the flow concern the thread that has them. On failure
-  /// the state is untouched and the report says why.
+  /// Advances all threads by `duration` [s]; the inputs are common, held ends and the flow concern the thread that has
+  /// them. On failure the state is untouched and the report says why.
   StepReport step(ThreadGroupState& state, const ThreadInputs& inputs, double duration);
 
   /// On the holders of the ends, as of the last successful step.
@@ -60,4 +64,4 @@ private:
   std::array<EndLoad, 2> loads_;
 };
 
-}  // namespace slender
+}   // namespace slender

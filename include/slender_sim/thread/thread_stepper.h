@@ -13,10 +13,10 @@ namespace slender {
 /// Inputs of one thread, latched once per step.
 struct ThreadInputs
 {
-  Eigen::Vector3d gravity{0, 0, -9.81};                     ///< [m/s^2]
-  std::array<Pose, 2> ends;                                 ///< where the held ends shall be at the end of the step
-  double flow_rate = 0.0;                                   ///< [m^3/s] out of the nozzle during the step, >= 0
-  Eigen::Vector3d belt_velocity = Eigen::Vector3d::Zero();  ///< [m/s] of the floor; what has landed moves with it
+  Eigen::Vector3d gravity{0, 0, -9.81};                      ///< [m/s^2]
+  std::array<Pose, 2> ends;                                  ///< where the held ends shall be at the end of the step
+  double flow_rate = 0.0;                                    ///< [m^3/s] out of the nozzle during the step, >= 0
+  Eigen::Vector3d belt_velocity = Eigen::Vector3d::Zero();   ///< [m/s] of the floor; what has landed moves with it
 };
 
 /// What the thread exerts on the holder of an end, about the end node, in world axes.
@@ -26,13 +26,15 @@ struct EndLoad
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
 };
 
-/// Advances one viscous thread (thesis 5.3): the rod's energies with viscous stiffnesses, their rest strains those at the start of the step.
-/// implicit_euler for use; symplectic_euler, stable only for steps of about rho l^2 / (6 mu) at the shortest edge l, for comparison.
+/// Advances one viscous thread (thesis 5.3): the rod's energies with viscous stiffnesses, their rest strains those at
+/// the start of the step. implicit_euler for use; symplectic_euler, stable only for steps of about rho l^2 / (6 mu) at
+/// the shortest edge l, for comparison.
 class ThreadStepper
 {
 public:
   /// Throws std::invalid_argument for a model that is not valid, or another integrator.
-  ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton, Integrator integrator = Integrator::implicit_euler);
+  ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton,
+                Integrator integrator = Integrator::implicit_euler);
   ~ThreadStepper();
   ThreadStepper(ThreadStepper&&) noexcept;
   ThreadStepper& operator=(ThreadStepper&&) noexcept;
@@ -51,4 +53,4 @@ private:
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -12,11 +12,11 @@
 
 namespace slender {
 
-/// Equations of one step of a thread, for minimize(): the rod's kernel with viscous stiffnesses, surface tension, inertia of positions
-/// and of the edges' spin. Nodes, edges and joints are numbered as in RodArrays.
+/// Equations of one step of a thread, for minimize(): the rod's kernel with viscous stiffnesses, surface tension,
+/// inertia of positions and of the edges' spin. Nodes, edges and joints are numbered as in RodArrays.
 ///
-/// Set-up of a step: resize, setNode and setFrame at its start, takeRestStrains, then the stiffnesses, inertia and what is held; last the trial
-/// configuration by setNode.
+/// Set-up of a step: resize, setNode and setFrame at its start, takeRestStrains, then the stiffnesses, inertia and what
+/// is held; last the trial configuration by setNode.
 class ThreadSystem
 {
 public:
@@ -68,8 +68,8 @@ public:
   /// Joint of the last trial with the sharpest turn beyond a right angle, -1: none.
   int sharpestJoint() const;
 
-  /// For systems of several threads that touch: energy, gradient() and panels() of all unknowns, held ones included, without factoring.
-  /// closeGradient() then keeps the held ones' entries as reactions and clears them.
+  /// For systems of several threads that touch: energy, gradient() and panels() of all unknowns, held ones included,
+  /// without factoring. closeGradient() then keeps the held ones' entries as reactions and clears them.
   RodEvaluation evaluateWhole(bool with_hessian);
   void closeGradient();
   const RodPanel* panels() { return matrix_.panels(); }
@@ -92,7 +92,8 @@ public:
   double incrementSize() const;
   static constexpr bool anglesMayKeepShift() { return false; }
   double slope() const;
-  /// Residual over force scale beyond which a step is not solved, however small the increment: inertia of very short steps leaves nothing else to see.
+  /// Residual over force scale beyond which a step is not solved, however small the increment: inertia of very short
+  /// steps leaves nothing else to see.
   static constexpr double mostUnbalanced() { return 0.1; }
   double residual() const;
   double forceScale() const;
@@ -124,4 +125,4 @@ private:
   double max_modulus_ = 0, min_rest_length_ = 0, shift_x_ = 0, shift_theta_ = 0;
 };
 
-}  // namespace slender
+}   // namespace slender

@@ -14,17 +14,24 @@ struct ThreadTouch
 {
   bool self = true, others = true, solids = true;
   double friction = 0.3;   ///< Coulomb [-]
-  /// Surface tension draws parts that touch into each other (thesis 5.4.3), until the distance of their centrelines is this share of the sum
-  /// of their radii; there they touch. 0: they do not merge. Half discs of one round section have their centroids at 0.6.
+  /// Surface tension draws parts that touch into each other (thesis 5.4.3), until the distance of their centrelines is
+  /// this share of the sum of their radii; there they touch. 0: they do not merge. Half discs of one round section have
+  /// their centroids at 0.6.
   double merging = 0.0;
 };
 
 /// Threads that may touch each other, themselves or obstacles, and so are stepped together.
 struct TouchingModel
 {
-  struct Obstacle { Shape shape; double friction = -1.0; std::string name = {}; };   ///< friction negative: that of the thread
-  std::vector<std::shared_ptr<const ThreadModel>> threads;    ///< floors may slip here
-  std::vector<ThreadTouch> touches;                           ///< per thread
+  /// friction negative: that of the thread
+  struct Obstacle
+  {
+    Shape shape;
+    double friction = -1.0;
+    std::string name = {};
+  };
+  std::vector<std::shared_ptr<const ThreadModel>> threads;   ///< floors may slip here
+  std::vector<ThreadTouch> touches;                          ///< per thread
   std::vector<Obstacle> obstacles;
   ContactOptions options;
 };
@@ -39,11 +46,12 @@ struct TouchingState
 struct TouchingInputs
 {
   std::vector<ThreadInputs> threads;
-  std::vector<Pose> obstacles;      ///< at the end of the step
+  std::vector<Pose> obstacles;   ///< at the end of the step
 };
 
-/// Steps threads with contact: one implicit system with the barrier potential of the contact room and the merging potential. Parts that
-/// lie on a floor that they stick to move as prescribed and pass through obstacles and other such parts.
+/// Steps threads with contact: one implicit system with the barrier potential of the contact room and the merging
+/// potential. Parts that lie on a floor that they stick to move as prescribed and pass through obstacles and other such
+/// parts.
 class TouchingThreads
 {
 public:
@@ -57,7 +65,8 @@ public:
 
   /// Throws std::invalid_argument when something touches or crosses in this state.
   void checkClearance(const TouchingState& state);
-  /// Smallest distance between surfaces [m], up to the gap at which they repel; between parts that merge, of what may not be entered.
+  /// Smallest distance between surfaces [m], up to the gap at which they repel; between parts that merge, of what may
+  /// not be entered.
   double clearance(const TouchingState& state);
 
   /// On the holders of a thread's ends, as of the last successful step.
@@ -70,4 +79,4 @@ private:
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace slender
+}   // namespace slender

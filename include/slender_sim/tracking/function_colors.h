@@ -4,8 +4,8 @@
 
 namespace slender {
 
-/// Colours (3 x vertices: red, green, blue in [0, 1]) that show test functions by their values at the vertices: one colour per function, mixed where
-/// they overlap; light grey where there is none.
+/// Colours (3 x vertices: red, green, blue in [0, 1]) that show test functions by their values at the vertices: one
+/// colour per function, mixed where they overlap; light grey where there is none.
 Eigen::Matrix3Xd functionColors(const TestFunctions::Values& values);
 
-}  // namespace slender
+}   // namespace slender

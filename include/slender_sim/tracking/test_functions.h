@@ -27,18 +27,21 @@ struct PaintedRegion
   std::vector<int> guide, tracked;
 };
 
-/// One function per region: 1 at its vertices, 0 elsewhere. Throws std::invalid_argument naming a region with a vertex that is not there,
-/// or without any.
+/// One function per region: 1 at its vertices, 0 elsewhere. Throws std::invalid_argument naming a region with a vertex
+/// that is not there, or without any.
 TestFunctions paintedRegions(const std::vector<PaintedRegion>& regions, int guide_vertices, int tracked_vertices);
 
-/// Likewise on a linear subdivision of the guide, where a region without tracked vertices has the guide's function, prolonged.
+/// Likewise on a linear subdivision of the guide, where a region without tracked vertices has the guide's function,
+/// prolonged.
 TestFunctions paintedRegions(const std::vector<PaintedRegion>& regions, const Subdivision& subdivision);
 
-/// The guide's hat functions, one per vertex, prolonged to its linear subdivision. With `vertices` only those of these guide vertices.
+/// The guide's hat functions, one per vertex, prolonged to its linear subdivision. With `vertices` only those of these
+/// guide vertices.
 TestFunctions subdivisionBasis(const Subdivision& subdivision, const std::vector<int>& vertices = {});
 
-/// One function per region of faces (0 ... regions - 1), for a guide that is the tracked mesh: at a vertex the share of the area around it that
-/// belongs to the region, so that all functions sum to 1. Throws std::invalid_argument naming a region without faces.
+/// One function per region of faces (0 ... regions - 1), for a guide that is the tracked mesh: at a vertex the share of
+/// the area around it that belongs to the region, so that all functions sum to 1. Throws std::invalid_argument naming a
+/// region without faces.
 TestFunctions regionBasis(const TriangleMesh& mesh, const std::vector<int>& region_of_face);
 
-}  // namespace slender
+}   // namespace slender
