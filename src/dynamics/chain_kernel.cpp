@@ -144,8 +144,8 @@ void apply(const ChainArrays& r)
 
 }   // namespace
 
-extern const ChainKernels chain_kernels;
-const ChainKernels chain_kernels = {takeDirections, constraints, factor, solve, apply};
+extern const ChainKernels kChainKernels;
+const ChainKernels kChainKernels = {takeDirections, constraints, factor, solve, apply};
 
 }   // namespace SLENDER_ISA
 }   // namespace slender

@@ -6,10 +6,10 @@ namespace slender {
 const ChainKernels& chainKernels()
 {
 #ifdef SLENDER_X86_KERNELS
-  static const ChainKernels& table = pickKernels(baseline::chain_kernels, avx2::chain_kernels, avx512::chain_kernels);
+  static const ChainKernels& table = pickKernels(baseline::kChainKernels, avx2::kChainKernels, avx512::kChainKernels);
   return table;
 #else
-  return baseline::chain_kernels;
+  return baseline::kChainKernels;
 #endif
 }
 

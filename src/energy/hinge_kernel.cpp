@@ -275,8 +275,8 @@ double semidefiniteHessian(const HingeArrays& h, const double* x, const int* slo
 
 }   // namespace
 
-extern const HingeKernels hinge_kernels;
-const HingeKernels hinge_kernels = {angles, energy, gradient, hessian, semidefiniteHessian};
+extern const HingeKernels kHingeKernels;
+const HingeKernels kHingeKernels = {angles, energy, gradient, hessian, semidefiniteHessian};
 
 }   // namespace SLENDER_ISA
 }   // namespace slender

@@ -6,10 +6,10 @@ namespace slender {
 const HingeKernels& hingeKernels()
 {
 #ifdef SLENDER_X86_KERNELS
-  static const HingeKernels& table = pickKernels(baseline::hinge_kernels, avx2::hinge_kernels, avx512::hinge_kernels);
+  static const HingeKernels& table = pickKernels(baseline::kHingeKernels, avx2::kHingeKernels, avx512::kHingeKernels);
   return table;
 #else
-  return baseline::hinge_kernels;
+  return baseline::kHingeKernels;
 #endif
 }
 

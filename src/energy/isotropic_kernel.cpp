@@ -160,8 +160,8 @@ void turn(const IsotropicArrays& r, int from, int to)
 
 }   // namespace
 
-extern const IsotropicKernels isotropic_kernels;
-const IsotropicKernels isotropic_kernels = {tangents, forces, transport, turn};
+extern const IsotropicKernels kIsotropicKernels;
+const IsotropicKernels kIsotropicKernels = {tangents, forces, transport, turn};
 
 }   // namespace SLENDER_ISA
 }   // namespace slender

@@ -7,10 +7,10 @@ const IsotropicKernels& isotropicKernels()
 {
 #ifdef SLENDER_X86_KERNELS
   static const IsotropicKernels& table =
-      pickKernels(baseline::isotropic_kernels, avx2::isotropic_kernels, avx512::isotropic_kernels);
+      pickKernels(baseline::kIsotropicKernels, avx2::kIsotropicKernels, avx512::kIsotropicKernels);
   return table;
 #else
-  return baseline::isotropic_kernels;
+  return baseline::kIsotropicKernels;
 #endif
 }
 

@@ -185,8 +185,8 @@ void semidefiniteHessian(const MembraneArrays& m, const double* x, const int* sl
 
 }   // namespace
 
-extern const MembraneKernels membrane_kernels;
-const MembraneKernels membrane_kernels = {strains, energy, gradient, hessian, semidefiniteHessian};
+extern const MembraneKernels kMembraneKernels;
+const MembraneKernels kMembraneKernels = {strains, energy, gradient, hessian, semidefiniteHessian};
 
 }   // namespace SLENDER_ISA
 }   // namespace slender

@@ -7,10 +7,10 @@ const MembraneKernels& membraneKernels()
 {
 #ifdef SLENDER_X86_KERNELS
   static const MembraneKernels& table =
-      pickKernels(baseline::membrane_kernels, avx2::membrane_kernels, avx512::membrane_kernels);
+      pickKernels(baseline::kMembraneKernels, avx2::kMembraneKernels, avx512::kMembraneKernels);
   return table;
 #else
-  return baseline::membrane_kernels;
+  return baseline::kMembraneKernels;
 #endif
 }
 

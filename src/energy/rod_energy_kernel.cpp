@@ -366,8 +366,8 @@ RodEvaluation endSweep(const RodSweep& sweep)
 
 }   // namespace
 
-extern const RodKernels rod_kernels;
-const RodKernels rod_kernels = {
+extern const RodKernels kRodKernels;
+const RodKernels kRodKernels = {
     beginSweep, {advanceSweep<Curvature::tangent>, advanceSweep<Curvature::compensated>}, endSweep};
 
 }   // namespace SLENDER_ISA

@@ -6,10 +6,10 @@ namespace slender {
 const RodKernels& rodKernels()
 {
 #ifdef SLENDER_X86_KERNELS
-  static const RodKernels& table = pickKernels(baseline::rod_kernels, avx2::rod_kernels, avx512::rod_kernels);
+  static const RodKernels& table = pickKernels(baseline::kRodKernels, avx2::kRodKernels, avx512::kRodKernels);
   return table;
 #else
-  return baseline::rod_kernels;
+  return baseline::kRodKernels;
 #endif
 }
 

@@ -10,10 +10,10 @@ namespace {
 const BandKernels& kernels()
 {
 #ifdef SLENDER_X86_KERNELS
-  static const BandKernels& table = pickKernels(baseline::band_kernels, avx2::band_kernels, avx512::band_kernels);
+  static const BandKernels& table = pickKernels(baseline::kBandKernels, avx2::kBandKernels, avx512::kBandKernels);
   return table;
 #else
-  return baseline::band_kernels;
+  return baseline::kBandKernels;
 #endif
 }
 

@@ -221,8 +221,8 @@ void solveBand8(const RodPanel* panels, int blocks, double* x)
 
 }   // namespace
 
-extern const BandKernels band_kernels;
-const BandKernels band_kernels = {eliminateBand, substituteBand, solveBand, solveBand8};
+extern const BandKernels kBandKernels;
+const BandKernels kBandKernels = {eliminateBand, substituteBand, solveBand, solveBand8};
 
 }   // namespace SLENDER_ISA
 }   // namespace slender

@@ -235,8 +235,8 @@ double dot(int points, const double* x, const double* y)
 
 }   // namespace
 
-extern const PointKernels point_kernels;
-const PointKernels point_kernels = {multiply,  multiplyBlocks, forwardSupernodal, backwardSupernodal,
+extern const PointKernels kPointKernels;
+const PointKernels kPointKernels = {multiply,  multiplyBlocks, forwardSupernodal, backwardSupernodal,
                                     sweepDown, sweepUp,        multiplyDiagonal,  dot};
 
 }   // namespace SLENDER_ISA

@@ -6,10 +6,10 @@ namespace slender {
 const PointKernels& pointKernels()
 {
 #ifdef SLENDER_X86_KERNELS
-  static const PointKernels& table = pickKernels(baseline::point_kernels, avx2::point_kernels, avx512::point_kernels);
+  static const PointKernels& table = pickKernels(baseline::kPointKernels, avx2::kPointKernels, avx512::kPointKernels);
   return table;
 #else
-  return baseline::point_kernels;
+  return baseline::kPointKernels;
 #endif
 }
 

@@ -166,7 +166,7 @@ RecordedGuide read(const BagSource& source)
     if (!points.allFinite())
       throw std::runtime_error("at " + std::to_string(time) + " s: all points must be finite");
     guide.points.append(time, points);
-    if (guide.points.times().size() * static_cast<std::size_t>(points.size()) > max_guide_numbers)
+    if (guide.points.times().size() * static_cast<std::size_t>(points.size()) > kMaxGuideNumbers)
       throw std::runtime_error("has too many frames for memory; record fewer");
   }
   if (guide.points.empty() && bodies.empty())

@@ -306,10 +306,10 @@ bool GuideInputs::deliver(const Message& message, std::string* why)
     }
   }
   for (const Entry& entry : message.entries)
-    if (!((X_WF * entry.X_FH).position.cwiseAbs().maxCoeff() <= max_coordinate))
+    if (!((X_WF * entry.X_FH).position.cwiseAbs().maxCoeff() <= kMaxCoordinate))
     {
       drops_.drop(Drop::out_of_range, message.what,
-                  "coordinates must be within " + std::to_string(static_cast<long>(max_coordinate)) + " m");
+                  "coordinates must be within " + std::to_string(static_cast<long>(kMaxCoordinate)) + " m");
       return true;
     }
   const double time = clock_.secondsAt(message.stamp);

@@ -83,8 +83,8 @@ void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped
   const std::optional<Eigen::Vector3d> velocity = velocityOf(message, what);
   if (!velocity)
     return;
-  if (!(velocity->head<2>().cwiseAbs().maxCoeff() <= max_belt_speed))
-    return drops_.drop(Drop::out_of_range, what, "components must be within " + text(max_belt_speed) + " m/s");
+  if (!(velocity->head<2>().cwiseAbs().maxCoeff() <= kMaxBeltSpeed))
+    return drops_.drop(Drop::out_of_range, what, "components must be within " + text(kMaxBeltSpeed) + " m/s");
   threads_[thread].belt = Eigen::Vector3d(velocity->x(), velocity->y(), 0.0);
   takenVector(slender_sim::Input::BELT, thread, *threads_[thread].belt);
 }
@@ -95,8 +95,8 @@ void GuideInputs::onWind(const geometry_msgs::Vector3Stamped& message)
   const std::optional<Eigen::Vector3d> velocity = velocityOf(message, "wind");
   if (!velocity)
     return;
-  if (!(velocity->cwiseAbs().maxCoeff() <= max_wind_speed))
-    return drops_.drop(Drop::out_of_range, "wind", "components must be within " + text(max_wind_speed) + " m/s");
+  if (!(velocity->cwiseAbs().maxCoeff() <= kMaxWindSpeed))
+    return drops_.drop(Drop::out_of_range, "wind", "components must be within " + text(kMaxWindSpeed) + " m/s");
   wind_ = velocity;
   takenVector(slender_sim::Input::WIND, 0, *wind_);
 }

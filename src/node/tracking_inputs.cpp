@@ -14,7 +14,7 @@ constexpr std::size_t kMaxPending = 300;
 
 bool withinReach(const Eigen::Matrix3Xd& points)
 {
-  return points.cols() == 0 || points.cwiseAbs().maxCoeff() <= max_coordinate;
+  return points.cols() == 0 || points.cwiseAbs().maxCoeff() <= kMaxCoordinate;
 }
 
 const Eigen::Matrix3Xd& guideNow(const Simulation& simulation, int index, bool of_rod)
@@ -190,11 +190,11 @@ bool TrackingInputs::deliver(const Message& message, std::string* why)
       points.col(i) = X_WF * Eigen::Vector3d(points.col(i));
   bool good = withinReach(points);
   for (const auto& [body, pose] : message.bodies)
-    good = good && (X_WF * pose.position).cwiseAbs().maxCoeff() <= max_coordinate;
+    good = good && (X_WF * pose.position).cwiseAbs().maxCoeff() <= kMaxCoordinate;
   if (!good)
   {
     drops_.drop(Drop::out_of_range, guide.topic,
-                "coordinates must be within " + std::to_string(static_cast<long>(max_coordinate)) + " m");
+                "coordinates must be within " + std::to_string(static_cast<long>(kMaxCoordinate)) + " m");
     return true;
   }
   bool late = false;

@@ -16,11 +16,11 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
   YamlMap map(at);
   const std::string name = map.get("name").name().value_or("chain");
   const int links = map.get("links").integer(1, 10'000).value_or(7);
-  const double radius = map.get("radius").number(generator_length).value_or(0.05);
+  const double radius = map.get("radius").number(kGeneratorLength).value_or(0.05);
   const YamlCursor at_opening = map.get("opening"), at_spacing = map.get("spacing"), at_up = map.get("up");
   const double opening = at_opening.number(Range::closed(0, 0.5 * M_PI, "rad")).value_or(0.0);
   const int edges = map.get("edges").integer(3, 10'000).value_or(30);
-  const Eigen::Vector3d from = map.get("from").vector3(generator_position).value_or(Eigen::Vector3d::Zero());
+  const Eigen::Vector3d from = map.get("from").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
   const Eigen::Vector3d along = readDirection(map.get("direction"), Eigen::Vector3d::UnitX());
   const Eigen::Vector3d up = readDirection(at_up, Eigen::Vector3d::UnitZ());
   RodConfig rod;

@@ -19,7 +19,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   Dice dice(map.get("seed").integer(0, 1'000'000'000).value_or(1));
   const int strands = map.get("strands").integer(1, 100'000).value_or(100);
   const int edges = map.get("edges").integer(2, 10'000).value_or(49);
-  const double length = map.get("length").number(generator_length).value_or(0.15);
+  const double length = map.get("length").number(kGeneratorLength).value_or(0.15);
   const double variation = map.get("length_variation").number(Range::closed(0, 0.9)).value_or(0.0);
   const double cap = map.get("cap").number(Range::above(0, M_PI, "rad")).value_or(0.5 * M_PI);
   const Eigen::Vector3d up = readDirection(map.get("up"), Eigen::Vector3d::UnitZ());
@@ -27,8 +27,8 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   YamlMap head_map(map.get("head"));
   ObstacleConfig head;
   head.name = head_map.get("name").name().value_or("head");
-  head.pose.position = head_map.get("center").vector3(generator_position).value_or(Eigen::Vector3d::Zero());
-  const double head_radius = head_map.get("radius").number(generator_length).value_or(0.1);
+  head.pose.position = head_map.get("center").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
+  const double head_radius = head_map.get("radius").number(kGeneratorLength).value_or(0.1);
   head.shape = Sphere{head_radius};
   head.friction = head_map.get("friction").number(Range::closed(0, 100));
   const YamlCursor motion = head_map.get("motion");
@@ -39,8 +39,8 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
 
   const YamlCursor at_curl = map.get("curl");
   YamlMap curl(at_curl);
-  const double curl_radius = curl.get("radius").number(generator_length).value_or(0.004);
-  const double curl_pitch = curl.get("pitch").number(generator_length).value_or(0.02);
+  const double curl_radius = curl.get("radius").number(kGeneratorLength).value_or(0.004);
+  const double curl_pitch = curl.get("pitch").number(kGeneratorLength).value_or(0.02);
   curl.finish();
 
   RodConfig rod;
@@ -62,7 +62,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
     // Evenly over the cap (a spiral of equal areas), a little stirred.
     const double z = 1 - (1 - std::cos(cap)) * (k + dice.between(0.3, 0.7)) / strands;
     const double rho = std::sqrt(std::max(0.0, 1 - z * z));
-    const double azimuth = golden_angle * k;
+    const double azimuth = kGoldenAngle * k;
     const Eigen::Vector3d out_W =
         head.pose.orientation * (rho * (std::cos(azimuth) * e1 + std::sin(azimuth) * e2) + z * up);
     const Eigen::Vector3d root = head.pose.position + root_distance * out_W;

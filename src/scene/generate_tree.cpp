@@ -42,7 +42,7 @@ std::vector<Branch> grow(const TreeShape& shape, Dice& dice)
       child.parent = static_cast<int>(b);
       child.level = parent.level + 1;
       child.at = 0.3 + 0.65 * (c + dice.between(0.25, 0.75)) / shape.children;
-      child.azimuth = golden_angle * c + dice.between(-0.4, 0.4);
+      child.azimuth = kGoldenAngle * c + dice.between(-0.4, 0.4);
       child.incline = shape.incline * dice.between(0.8, 1.2);
       child.length = parent.length * shape.length_ratio * (1.2 - 0.5 * child.at) * dice.between(0.9, 1.1);
       child.radius = parent.radius * shape.radius_ratio;
@@ -87,14 +87,14 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   shape.vertices = at_vertices.integer(least_nodes, max_edges).value_or(2158);
   shape.levels = map.get("levels").integer(1, 6).value_or(3);
   shape.children = map.get("children").integer(1, 30).value_or(7);
-  shape.length = map.get("length").number(generator_length).value_or(3.0);
+  shape.length = map.get("length").number(kGeneratorLength).value_or(3.0);
   shape.radius = map.get("radius").number(Range::above(0, 10, "m")).value_or(0.05);
   const Range ratio = Range::above(0, 1);
   shape.length_ratio = map.get("length_ratio").number(ratio).value_or(0.5);
   shape.radius_ratio = map.get("radius_ratio").number(ratio).value_or(0.45);
   shape.incline = map.get("angle").number(Range::between(0, 0.5 * M_PI, "rad")).value_or(0.9);
   const double taper = map.get("taper").number(ratio).value_or(0.4);
-  const Eigen::Vector3d root = map.get("root").vector3(generator_position).value_or(Eigen::Vector3d::Zero());
+  const Eigen::Vector3d root = map.get("root").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
   const Eigen::Vector3d up = readDirection(map.get("direction"), Eigen::Vector3d::UnitZ());
   RodConfig rod;
   rod.material.density = 700;

@@ -26,12 +26,12 @@ private:
   std::mt19937_64 engine_;
 };
 
-inline const Range generator_length = Range::above(0, max_coordinate, "m");
-inline const Range generator_position = Range::closed(-max_coordinate, max_coordinate, "m");
+inline const Range kGeneratorLength = Range::above(0, kMaxCoordinate, "m");
+inline const Range kGeneratorPosition = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 
 /// A direction of the scene file as a unit vector.
 Eigen::Vector3d readDirection(const YamlCursor& at, const Eigen::Vector3d& otherwise);
 
-constexpr double golden_angle = 2.399963229728653;   // [rad] successive turns by it never line up
+constexpr double kGoldenAngle = 2.399963229728653;   // [rad] successive turns by it never line up
 
 }   // namespace slender

@@ -11,7 +11,7 @@ namespace slender {
 
 namespace {
 
-const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
+const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
 {
   if (!at.present())
@@ -130,7 +130,7 @@ std::vector<int> readNear(const YamlCursor& at, const Eigen::Matrix3Xd& vertices
 {
   YamlMap map(at);
   const auto point = map.require("point").vector3(coordinate);
-  const auto radius = map.get("radius").number(Range::above(0, max_coordinate, "m"));
+  const auto radius = map.get("radius").number(Range::above(0, kMaxCoordinate, "m"));
   map.finish();
   if (!point)
     return {};

@@ -12,7 +12,7 @@ namespace slender {
 
 namespace {
 
-const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
+const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 constexpr int max_cells = 2000;   // per side of a grid
 
 }   // namespace
@@ -47,9 +47,9 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
     return std::nullopt;
   }
   read.place(read.mesh.vertices);
-  if (!(read.mesh.vertices.cwiseAbs().maxCoeff() <= max_coordinate))
+  if (!(read.mesh.vertices.cwiseAbs().maxCoeff() <= kMaxCoordinate))
   {
-    file.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m after scale and pose");
+    file.problem("has coordinates beyond " + shortNumber(kMaxCoordinate) + " m after scale and pose");
     return std::nullopt;
   }
   return read;

@@ -10,8 +10,8 @@ namespace slender {
 
 namespace {
 
-const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
-const Range positive = Range::above(0, max_coordinate, "m");
+const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
+const Range positive = Range::above(0, kMaxCoordinate, "m");
 
 std::optional<int> readEdges(YamlMap& map) { return map.get("edges").integer(1, max_edges); }
 

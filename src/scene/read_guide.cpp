@@ -92,7 +92,7 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
     return std::nullopt;
   }
   const TriangleMesh& mesh = source.config.mesh;
-  if (3 * static_cast<std::size_t>(mesh.vertices.cols()) * files.size() > max_guide_numbers)
+  if (3 * static_cast<std::size_t>(mesh.vertices.cols()) * files.size() > kMaxGuideNumbers)
   {
     at.problem("has " + std::to_string(files.size()) +
                " frames, too many for memory; leave out some and lower the rate");
@@ -115,9 +115,9 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
       }
       if (source.file)
         source.file->place(frame.vertices);
-      if (!(frame.vertices.cwiseAbs().maxCoeff() <= max_coordinate))
+      if (!(frame.vertices.cwiseAbs().maxCoeff() <= kMaxCoordinate))
       {
-        at.problem(files[k] + " has coordinates beyond " + shortNumber(max_coordinate) + " m");
+        at.problem(files[k] + " has coordinates beyond " + shortNumber(kMaxCoordinate) + " m");
         return std::nullopt;
       }
       guide.points.append(begin + static_cast<double>(k) / rate, frame.vertices);

@@ -75,9 +75,9 @@ void readBagPoints(const YamlCursor& at, const ReadContext& context, double begi
   }
   for (const Eigen::Matrix3Xd& frame : recorded->points.frames())
   {
-    if (!(frame.cwiseAbs().maxCoeff() <= max_coordinate))
+    if (!(frame.cwiseAbs().maxCoeff() <= kMaxCoordinate))
     {
-      at.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m");
+      at.problem("has coordinates beyond " + shortNumber(kMaxCoordinate) + " m");
       return;
     }
   }

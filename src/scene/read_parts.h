@@ -11,10 +11,10 @@ namespace slender {
 
 #ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION   // scenes that are read in a millisecond
 constexpr int max_edges = 1000;
-constexpr double max_scene_nodes = 1000;
+constexpr double kMaxSceneNodes = 1000;
 #else
 constexpr int max_edges = 1'000'000;
-constexpr double max_scene_nodes = 1e7;
+constexpr double kMaxSceneNodes = 1e7;
 #endif
 
 /// What the parts need to know of the scene around them.

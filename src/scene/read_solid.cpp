@@ -14,8 +14,8 @@ namespace slender {
 
 namespace {
 
-const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
-const Range size = Range::above(0, max_coordinate, "m");
+const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
+const Range size = Range::above(0, kMaxCoordinate, "m");
 const Range friction = Range::closed(0, 100);
 
 Eigen::Quaterniond fromRpy(const Eigen::Vector3d& rpy)

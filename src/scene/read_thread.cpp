@@ -11,7 +11,7 @@ namespace slender {
 
 namespace {
 
-const Range length = Range::above(0, max_coordinate, "m");
+const Range length = Range::above(0, kMaxCoordinate, "m");
 
 /// A number, {table: [[t, value], ...]} or {topic: true, initial: value}.
 TimedNumber readTimed(const YamlCursor& at, const Range& range)
@@ -70,7 +70,7 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double
   YamlMap map(at);
   assign(nozzle.diameter, map.require("diameter").number(Range::above(0, 10, "m")));
   const YamlCursor position = map.get("position"), direction = map.get("direction");
-  assign(nozzle.pose.position, position.vector3(Range::closed(-max_coordinate, max_coordinate, "m")));
+  assign(nozzle.pose.position, position.vector3(Range::closed(-kMaxCoordinate, kMaxCoordinate, "m")));
   const Eigen::Vector3d along = readDirection(direction, -Eigen::Vector3d::UnitZ());
   nozzle.pose.orientation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), along);
   const YamlCursor flow = map.get("flow");
@@ -97,9 +97,9 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double
 FloorConfig readFloor(const YamlCursor& at)
 {
   FloorConfig floor;
-  const Range speed = Range::closed(-max_belt_speed, max_belt_speed, "m/s");
+  const Range speed = Range::closed(-kMaxBeltSpeed, kMaxBeltSpeed, "m/s");
   YamlMap map(at);
-  assign(floor.height, map.get("height").number(Range::closed(-max_coordinate, max_coordinate, "m")));
+  assign(floor.height, map.get("height").number(Range::closed(-kMaxCoordinate, kMaxCoordinate, "m")));
   const YamlCursor belt = map.get("belt");
   if (belt.isMap())
   {
@@ -247,7 +247,7 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
             "friction out, then it sticks");
   }
   readEdges(map.get("edges"), thread);
-  assign(thread.breakup_radius, map.get("breakup_radius").number(Range::closed(0, max_coordinate, "m")));
+  assign(thread.breakup_radius, map.get("breakup_radius").number(Range::closed(0, kMaxCoordinate, "m")));
   const YamlCursor region = map.get("region");
   if (region.present())
   {

@@ -16,7 +16,7 @@ namespace slender {
 namespace {
 
 constexpr int most_functions = 2000;   // their equations are dense
-const Range coordinate = Range::closed(-max_coordinate, max_coordinate, "m");
+const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 
 /// The rod beside which a guide is read; without nodes when it could not be.
 struct TrackedCurve
@@ -42,9 +42,9 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& points, const YamlCurs
       out = readPointFile(context.resolve(*path));
       for (const Eigen::Vector3d& point : out)
       {
-        if (!(point.cwiseAbs().maxCoeff() <= max_coordinate))
+        if (!(point.cwiseAbs().maxCoeff() <= kMaxCoordinate))
         {
-          file.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m");
+          file.problem("has coordinates beyond " + shortNumber(kMaxCoordinate) + " m");
           return {};
         }
       }
@@ -157,9 +157,9 @@ std::optional<PointTrajectory> readMotionFile(const YamlCursor& at, const ReadCo
     PointTrajectory points = readPointMotion(context.resolve(*path), nodes);
     for (const Eigen::Matrix3Xd& frame : points.frames())
     {
-      if (!(frame.cwiseAbs().maxCoeff() <= max_coordinate))
+      if (!(frame.cwiseAbs().maxCoeff() <= kMaxCoordinate))
       {
-        at.problem("has coordinates beyond " + shortNumber(max_coordinate) + " m");
+        at.problem("has coordinates beyond " + shortNumber(kMaxCoordinate) + " m");
         return std::nullopt;
       }
     }
@@ -279,7 +279,7 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
   map.finish();
   checkTraits(at, config);
   if (set.functions.count() > most_functions ||
-      12.0 * set.functions.count() * static_cast<double>(rod.rest.cols()) > max_guide_numbers)
+      12.0 * set.functions.count() * static_cast<double>(rod.rest.cols()) > kMaxGuideNumbers)
   {
     (at_functions.present() ? at_functions : at)
         .problem("makes " + std::to_string(set.functions.count()) + " test functions of " +

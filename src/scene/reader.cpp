@@ -324,7 +324,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   YamlMap map(root);
   // The largest acceleration serves scaled problems, whose lengths, masses and moduli are of order one.
   const Range acceleration = Range::closed(-1e9, 1e9, "m/s^2"),
-              speed = Range::closed(-max_wind_speed, max_wind_speed, "m/s");
+              speed = Range::closed(-kMaxWindSpeed, kMaxWindSpeed, "m/s");
   assign(scene.name, map.get("name").text());
   assign(scene.gravity, map.get("gravity").vector3(acceleration));
   const YamlCursor wind = map.get("wind");
@@ -423,10 +423,10 @@ std::string fileText(const std::string& path)
 bool ReadContext::claim(const YamlCursor& at, double more) const
 {
   nodes += more;
-  if (nodes <= max_scene_nodes)
+  if (nodes <= kMaxSceneNodes)
     return true;
   at.problem("makes " + shortNumber(more) + " nodes, with which the scene has " + shortNumber(nodes) +
-             "; all its rods and cloths together may have " + shortNumber(max_scene_nodes));
+             "; all its rods and cloths together may have " + shortNumber(kMaxSceneNodes));
   nodes -= more;   // what comes after may still fit
   return false;
 }

@@ -41,7 +41,7 @@ std::vector<Named<Table>> wideTables([[maybe_unused]] const Table* avx2, [[maybe
 std::vector<Named<BandKernels>> bandTables()
 {
 #if defined(__x86_64__)
-  return wideTables(&avx2::band_kernels, &avx512::band_kernels);
+  return wideTables(&avx2::kBandKernels, &avx512::kBandKernels);
 #else
   return {};
 #endif
@@ -49,7 +49,7 @@ std::vector<Named<BandKernels>> bandTables()
 std::vector<Named<RodKernels>> rodTables()
 {
 #if defined(__x86_64__)
-  return wideTables(&avx2::rod_kernels, &avx512::rod_kernels);
+  return wideTables(&avx2::kRodKernels, &avx512::kRodKernels);
 #else
   return {};
 #endif
@@ -75,12 +75,12 @@ TEST(InstructionSets, BandKernelsAgree)
     AlignedVector<RodPanel> reference = original;
     BandCarry carry;
     Eigen::VectorXd x = b, x8 = b8, by_pieces = b;
-    baseline::band_kernels.eliminate(reference.data(), reference.data(), 0, blocks, by_pieces.data(), carry);
-    baseline::band_kernels.substitute(reference.data(), blocks, by_pieces.data());
+    baseline::kBandKernels.eliminate(reference.data(), reference.data(), 0, blocks, by_pieces.data(), carry);
+    baseline::kBandKernels.substitute(reference.data(), blocks, by_pieces.data());
     EXPECT_EQ(carry.negative, (d.array() < 0).count());
     EXPECT_EQ(carry.zero, 0);
-    baseline::band_kernels.solve(reference.data(), blocks, x.data());
-    baseline::band_kernels.solve8(reference.data(), blocks, x8.data());
+    baseline::kBandKernels.solve(reference.data(), blocks, x.data());
+    baseline::kBandKernels.solve8(reference.data(), blocks, x8.data());
     for (const auto& [name, table] : bandTables())
     {
       AlignedVector<RodPanel> panels = original;
@@ -187,9 +187,9 @@ TEST_P(RodKernelTables, Agree)
         system.arrays().turn[n - 1 + i] = system.arrays().turn[(i - 1) % n];
       }
     }
-    const Output reference = evaluate(baseline::rod_kernels, system, n);
+    const Output reference = evaluate(baseline::kRodKernels, system, n);
     // a sweep by pieces adds the same numbers in the same order
-    const Output pieces = evaluate(baseline::rod_kernels, system, 1 + n / 3);
+    const Output pieces = evaluate(baseline::kRodKernels, system, 1 + n / 3);
     EXPECT_EQ(pieces.gradient, reference.gradient);
     EXPECT_EQ(pieces.hessian, reference.hessian);
     EXPECT_EQ(pieces.with.energy(), reference.with.energy());
@@ -234,7 +234,7 @@ TEST_P(RodKernelTables, ReportNanInAnyNode)
                                   {curvature, false});
   const RodState state = makeRodState(model, nodes, Vector3d::Zero());
   auto tables = rodTables();
-  tables.push_back({"baseline", &baseline::rod_kernels});
+  tables.push_back({"baseline", &baseline::kRodKernels});
   for (const auto& [name, table] : tables)
     for (int bad = 0; bad < n; ++bad)
     {

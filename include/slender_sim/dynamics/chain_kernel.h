@@ -39,13 +39,13 @@ struct ChainKernels
 };
 
 namespace baseline {
-extern const ChainKernels chain_kernels;
+extern const ChainKernels kChainKernels;
 }
 namespace avx2 {
-extern const ChainKernels chain_kernels;
+extern const ChainKernels kChainKernels;
 }
 namespace avx512 {
-extern const ChainKernels chain_kernels;
+extern const ChainKernels kChainKernels;
 }
 
 /// The table for this machine.

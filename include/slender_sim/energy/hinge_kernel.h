@@ -28,13 +28,13 @@ struct HingeKernels
 };
 
 namespace baseline {
-extern const HingeKernels hinge_kernels;
+extern const HingeKernels kHingeKernels;
 }
 namespace avx2 {
-extern const HingeKernels hinge_kernels;
+extern const HingeKernels kHingeKernels;
 }
 namespace avx512 {
-extern const HingeKernels hinge_kernels;
+extern const HingeKernels kHingeKernels;
 }
 
 /// The table for this machine.

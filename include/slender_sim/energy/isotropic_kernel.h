@@ -46,13 +46,13 @@ struct IsotropicKernels
 };
 
 namespace baseline {
-extern const IsotropicKernels isotropic_kernels;
+extern const IsotropicKernels kIsotropicKernels;
 }
 namespace avx2 {
-extern const IsotropicKernels isotropic_kernels;
+extern const IsotropicKernels kIsotropicKernels;
 }
 namespace avx512 {
-extern const IsotropicKernels isotropic_kernels;
+extern const IsotropicKernels kIsotropicKernels;
 }
 
 /// The table for this machine.

@@ -40,13 +40,13 @@ struct MembraneKernels
 };
 
 namespace baseline {
-extern const MembraneKernels membrane_kernels;
+extern const MembraneKernels kMembraneKernels;
 }
 namespace avx2 {
-extern const MembraneKernels membrane_kernels;
+extern const MembraneKernels kMembraneKernels;
 }
 namespace avx512 {
-extern const MembraneKernels membrane_kernels;
+extern const MembraneKernels kMembraneKernels;
 }
 
 /// The table for this machine.

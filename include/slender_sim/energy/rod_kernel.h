@@ -76,13 +76,13 @@ struct RodKernels
 };
 
 namespace baseline {
-extern const RodKernels rod_kernels;
+extern const RodKernels kRodKernels;
 }
 namespace avx2 {
-extern const RodKernels rod_kernels;
+extern const RodKernels kRodKernels;
 }
 namespace avx512 {
-extern const RodKernels rod_kernels;
+extern const RodKernels kRodKernels;
 }
 
 /// The table for this machine.

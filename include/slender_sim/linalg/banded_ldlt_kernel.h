@@ -17,13 +17,13 @@ struct BandKernels
 };
 
 namespace baseline {
-extern const BandKernels band_kernels;
+extern const BandKernels kBandKernels;
 }
 namespace avx2 {
-extern const BandKernels band_kernels;
+extern const BandKernels kBandKernels;
 }
 namespace avx512 {
-extern const BandKernels band_kernels;
+extern const BandKernels kBandKernels;
 }
 
 }   // namespace slender

@@ -52,13 +52,13 @@ struct PointKernels
 };
 
 namespace baseline {
-extern const PointKernels point_kernels;
+extern const PointKernels kPointKernels;
 }
 namespace avx2 {
-extern const PointKernels point_kernels;
+extern const PointKernels kPointKernels;
 }
 namespace avx512 {
-extern const PointKernels point_kernels;
+extern const PointKernels kPointKernels;
 }
 
 /// The table for this machine.

@@ -24,9 +24,9 @@
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
 namespace slender {
 
-constexpr double max_coordinate = 1e6;   ///< [m] of what a scene or a message places
-constexpr double max_belt_speed = 1e3;   ///< [m/s] of each component
-constexpr double max_wind_speed = 1e3;   ///< [m/s] of each component
+constexpr double kMaxCoordinate = 1e6;   ///< [m] of what a scene or a message places
+constexpr double kMaxBeltSpeed = 1e3;    ///< [m/s] of each component
+constexpr double kMaxWindSpeed = 1e3;    ///< [m/s] of each component
 
 /// A curve as the scene file states it. Exactly one alternative.
 /// last edge length over the first

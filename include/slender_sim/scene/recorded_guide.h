@@ -10,7 +10,7 @@
 
 namespace slender {
 
-constexpr std::size_t max_guide_numbers = 200'000'000;   ///< of all frames of a guide together: 1.6 GB
+constexpr std::size_t kMaxGuideNumbers = 200'000'000;   ///< of all frames of a guide together: 1.6 GB
 
 /// Where in a bag a guide's motion is.
 struct BagSource
