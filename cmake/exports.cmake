@@ -1,5 +1,5 @@
 # Programs that turn recorded bags into tables, meshes and videos; only with ROS.
-add_library(slender_sim_exports STATIC src/tools/export_program.cpp src/tools/holder_meshes.cpp src/tools/picture.cpp src/tools/video_file.cpp src/study/processes.cpp)
+add_library(slender_sim_exports STATIC src/tools/export_program.cpp src/tools/holder_meshes.cpp src/tools/picture.cpp src/tools/video_file.cpp src/study/framework/processes.cpp)
 target_include_directories(slender_sim_exports PUBLIC ${PROJECT_SOURCE_DIR}/src/tools)
 target_link_libraries(slender_sim_exports PUBLIC slender_sim_node)
 find_package(TinyGLTF CONFIG QUIET)

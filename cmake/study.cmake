@@ -1,5 +1,5 @@
 # The study program: experiments behind the package's claims, without ROS.
-file(GLOB STUDY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/study/*.cpp)
+file(GLOB STUDY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/study/*/*.cpp)
 # Scenes that studies run, and what they refer to, are built in: `study` finds them wherever it is installed, and they are those of the package.
 foreach(path scenes/backflip.yaml scenes/chain.yaml scenes/cloth_on_branch.yaml scenes/hair.yaml scenes/helical_buckling.yaml scenes/knot_twist.yaml scenes/plectoneme.yaml scenes/tree.yaml
         meshes/bag.obj motion/backflip_keys.csv)
@@ -9,15 +9,16 @@ foreach(path scenes/backflip.yaml scenes/chain.yaml scenes/cloth_on_branch.yaml 
   set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${package_file})
 endforeach()
 configure_file(${CMAKE_CURRENT_LIST_DIR}/package_scenes.cpp.in ${PROJECT_BINARY_DIR}/package_scenes.cpp @ONLY)
-add_library(slender_sim_studies STATIC ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)
-target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include PRIVATE ${PROJECT_SOURCE_DIR})
+# Object files, because a linker would leave out what only registers itself.
+add_library(slender_sim_studies OBJECT ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)
+target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include PRIVATE ${PROJECT_SOURCE_DIR}/src)
 target_link_libraries(slender_sim_studies PUBLIC slender_sim)
 # Most of the time of compiling a study goes into these headers.
 target_precompile_headers(slender_sim_studies PRIVATE
   <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h> <slender_sim/study/study.h>)
 # lean tells instructions apart by the lines that they come from; repeatability runs the scenes of the package.
-set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/repeatability.cpp PROPERTY COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/repeatability.cpp
+set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/performance/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/performance/repeatability.cpp PROPERTY COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/performance/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/performance/repeatability.cpp
   PROPERTY SKIP_PRECOMPILE_HEADERS ON)   # their definitions differ
 
 # `study` is too common a name for a target in a shared catkin workspace.

@@ -9,8 +9,8 @@
 #include <map>
 #include <sstream>
 
-#include "../scene/yaml_tree.h"
-#include "../study/whole_file.h"
+#include "../scene/reader/yaml_tree.h"
+#include "../study/framework/whole_file.h"
 #include "markup.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/study/bars.h"

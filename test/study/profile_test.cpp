@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "src/study/profile.h"
+#include "src/study/framework/profile.h"
 
 using namespace slender;
 using namespace slender::study;
@@ -59,7 +59,7 @@ TEST(Profile, allocationsWithTheirStacks)
   const std::vector<Allocation> all = readDhat(R"dhat({"dhatFileVersion":2,"mode":"heap",
     "pps":[{"tb":96,"tbk":2,"tl":5,"mb":48,"fs":[1,2,3]}],
     "ftbl":["[root]","0x48: operator new(unsigned long) (in /usr/lib/x.so)",
-            "0x4B: slender::Simulation::step(slender::SceneInputs const&) (work/src/scene/simulation.cpp:120)","0x11: main (work/src/tools/simulate.cpp:5)"]})dhat",
+            "0x4B: slender::Simulation::step(slender::SceneInputs const&) (work/src/scene/simulation/simulation.cpp:120)","0x11: main (work/src/tools/simulate.cpp:5)"]})dhat",
                                                sources);
   ASSERT_EQ(all.size(), 1u);
   EXPECT_EQ(all[0].bytes, 96u);
@@ -67,7 +67,7 @@ TEST(Profile, allocationsWithTheirStacks)
   ASSERT_EQ(all[0].stack.size(), 3u);
   EXPECT_EQ(all[0].functions[0], "operator new(unsigned long)");
   EXPECT_EQ(all[0].stack[0].line, 0);
-  EXPECT_EQ(all[0].stack[1].file, "src/scene/simulation.cpp");
+  EXPECT_EQ(all[0].stack[1].file, "src/scene/simulation/simulation.cpp");
   EXPECT_EQ(all[0].stack[1].line, 120);
   EXPECT_THROW(readDhat("{}", sources), std::runtime_error);
 }

@@ -4,9 +4,9 @@
 
 #include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/study/study.h"
-#include "src/study/biped.h"
-#include "src/study/region_cases.h"
-#include "src/study/guided_cloth.h"
+#include "src/study/tracking/biped.h"
+#include "src/study/tracking/region_cases.h"
+#include "src/study/tracking/guided_cloth.h"
 
 using namespace slender;
 using namespace slender::study;

@@ -133,7 +133,13 @@ struct Study
   std::function<void(StudyContext&)> run;
 };
 
-/// All studies, in the order of `study list`.
+/// Makes a study known to studies(). Each study has one object of this class beside its function.
+struct StudyRegistration
+{
+  StudyRegistration(const char* name, const char* description, void (*run)(StudyContext&));
+};
+
+/// All studies, sorted by name.
 const std::vector<Study>& studies();
 
 /// nullptr when there is none of this name.
