@@ -47,7 +47,7 @@ if(BUILD_TESTING)
   find_package(GTest REQUIRED)
   file(GLOB STUDY_TESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/study/*.cpp)
   add_executable(study_tests ${STUDY_TESTS})
-  target_include_directories(study_tests PRIVATE ${PROJECT_SOURCE_DIR})
+  target_include_directories(study_tests PRIVATE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/src)
   target_compile_definitions(study_tests PRIVATE SLENDER_SWEEP="$<TARGET_FILE:slender_sim_sweep_program>" SLENDER_STUDY="$<TARGET_FILE:slender_sim_study_program>"
     SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_link_libraries(study_tests PRIVATE slender_sim_studies GTest::gtest GTest::gtest_main)
