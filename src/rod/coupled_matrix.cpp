@@ -412,6 +412,8 @@ void CoupledSystem::assemble(const HessianShift& shift, bool whole)
   }
   for (const ContactRow& row : contact_->rows())
   {
+    if (!partOf(row.point[0]).coupled)   // of its own contact with a solid
+      continue;
     contactColumns(row, whole, rows[0]);
     addSquare(rows[0], row.stiffness);
   }

@@ -262,8 +262,6 @@ NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, doub
   if (!contact_)
     return minimize(*this, newton);
   whole_ = {};
-  for (RodPart& part : parts_)
-    part.whole = {};
   // friction sticks below a speed over the whole step: in cut steps that range would become too narrow to find
   contact_->begin(points_base_, solids_base_, duration_);
   if (s == 0)

@@ -76,79 +76,73 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
 /// Whether a contact couples no more than two neighbouring nodes of a rod: a segment touches what moves as prescribed.
 bool CoupledSystem::isOwn(const ContactTerm& term) const
 {
-  if (exact_ || term.solid < 0 || term.point[2] >= 0 || term.point[3] >= 0)
+  if (exact_ || term.solid < 0)
     return false;
   const int obstacles = static_cast<int>(obstacles_.size());
   return term.solid < obstacles || simulated_[model_.contact.bodies[term.solid - obstacles].body] < 0;
 }
 
+/// Sorts contacts with solids by rods, for rods with band matrices of their own.
 void CoupledSystem::findOwnTerms()
 {
   for (RodPart& part : parts_)
+  {
     part.own_terms.clear();
+    part.own_rows.clear();
+  }
   const std::vector<ContactTerm>& terms = contact_->terms();
   for (std::size_t k = 0; k < terms.size(); ++k)
     if (isOwn(terms[k]))
       parts_[point_part_[terms[k].point[0]]].own_terms.push_back(static_cast<int>(k));
+  const std::vector<ContactRow>& rows = contact_->rows();
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (rows[k].point[2] < 0)   // of a segment and a solid
+      parts_[point_part_[rows[k].point[0]]].own_rows.push_back(static_cast<int>(k));
 }
 
-/// Force and stiffness of a contact to the rod's own gradient and band matrix.
-void CoupledSystem::addOwn(RodPart& part, const ContactTerm& term, bool with_hessian, bool whole)
-{
-  RodSystem& system = part.rod->system;
-  const int n = part.rod->model->nodes();
-  int count = 0, node[2];
-  double weight[2];
-  for (int p = 0; p < 2; ++p)
-    if (term.point[p] >= 0)
-    {
-      node[count] = term.point[p] - part.point;
-      weight[count++] = term.weight[p];
-    }
-  if (count == 2 && node[1] != (node[0] + 1) % n)   // the node that comes first has the panel with both
-  {
-    std::swap(node[0], node[1]);
-    std::swap(weight[0], weight[1]);
-  }
-  for (int p = 0; p < count; ++p)
-    for (int c = 0; c < 3; ++c)
-      system.gradient()[4 * node[p] + c] -= weight[p] * term.force[c];
-  if (!with_hessian)
-    return;
-  const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
-  for (int p = 0; p < count; ++p)
-    for (int c = 0; c < 3; ++c)
-      for (int r = c; r < 3; ++r)
-        system.panels()[node[p]].diag[c][r] += weight[p] * weight[p] * stiffness(r, c);
-  for (int c = 0; c < 3 && count == 2; ++c)
-    for (int r = 0; r < 3; ++r)
-      system.panels()[node[0]].below[c][r] += weight[0] * weight[1] * stiffness(r, c);
-}
-
-/// Of a rod with its own band matrix and contacts that couple nothing.
+/// Of a rod with its own band matrix and contacts that couple nothing. A segment's second node follows its first one,
+/// so that the first one's panel has room for both. Contacts with solids have no indefinite second derivatives.
 RodEvaluation CoupledSystem::evaluateWithOwn(RodPart& part, bool with_hessian, const HessianShift& shift)
 {
   RodSystem& system = part.rod->system;
-  const std::vector<ContactTerm>& terms = contact_->terms();
-  const auto attempt = [&](bool whole) {
-    RodEvaluation e = system.evaluateWhole(with_hessian);
-    for (const int k : part.own_terms)
-      addOwn(part, terms[k], with_hessian, whole);
-    if (with_hessian)
-      e.inertia = system.factorWhole(shift);
-    else
-      system.closeGradient();
-    return e;
+  RodEvaluation e = system.evaluateWhole(with_hessian);
+  const int n = part.rod->model->nodes();
+  const auto add = [&](int point, const double(&weight)[4], const Eigen::Matrix3d& stiffness) {
+    const int first = point - part.point, second = (first + 1) % n;
+    RodPanel& a = system.panels()[first];
+    RodPanel& b = system.panels()[second];
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r)
+      {
+        if (r >= c)
+        {
+          a.diag[c][r] += weight[0] * weight[0] * stiffness(r, c);
+          b.diag[c][r] += weight[1] * weight[1] * stiffness(r, c);
+        }
+        a.below[c][r] += weight[0] * weight[1] * stiffness(r, c);
+      }
   };
-  const auto turns = [&](int k) { return !terms[k].geometric.isZero(0.0); };
-  if (with_hessian && std::any_of(part.own_terms.begin(), part.own_terms.end(), turns) && part.whole.due())
+  for (const int k : part.own_terms)
   {
-    const RodEvaluation e = attempt(true);
-    part.whole.tried(e.inertia.positiveDefinite());
-    if (e.inertia.positiveDefinite())
-      return e;
+    const ContactTerm& term = contact_->terms()[k];
+    for (int p = 0; p < 2; ++p)
+      for (int c = 0; c < 3; ++c)
+        system.gradient()[4 * (term.point[p] - part.point) + c] -= term.weight[p] * term.force[c];
+    if (with_hessian)
+      add(term.point[0], term.weight, term.stiffness);
   }
-  return attempt(false);
+  if (!with_hessian)
+  {
+    system.closeGradient();
+    return e;
+  }
+  for (const int k : part.own_rows)
+  {
+    const ContactRow& row = contact_->rows()[k];
+    add(row.point[0], row.along, row.stiffness * row.normal * row.normal.transpose());
+  }
+  e.inertia = system.factorWhole(shift);
+  return e;
 }
 
 bool CoupledSystem::factor(const HessianShift& shift)

@@ -87,7 +87,7 @@ private:
     bool welded = false, touched = false;
     bool coupled = false;         ///< has its unknowns in the matrix
     std::vector<int> own_terms;   ///< of the present contacts: those that couple nothing, see isOwn()
-    WholeStiffness whole;         ///< of the rod's own matrix with own_terms
+    std::vector<int> own_rows;    ///< likewise of the contacts' rows
     int offset = 0, unknowns = 0;
     std::vector<int> dof;   ///< own number, kPrescribed, or carried by grasp k: -2 - k
     /// where the entries of its panels go: index of a matrix value, -1: nowhere or not simply
@@ -127,7 +127,6 @@ private:
   bool isOwn(const ContactTerm& term) const;
   void findOwnTerms();
   RodEvaluation evaluateWithOwn(RodPart& part, bool with_hessian, const HessianShift& shift);
-  void addOwn(RodPart& part, const ContactTerm& term, bool with_hessian, bool whole);
   void spread();   ///< solution of the matrix to the rods' directions
   void mapUnknowns(RodPart& part);
   void reduceGradient();
