@@ -225,7 +225,8 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   }
   inputs_ = &inputs;
   duration_ = duration;
-  SubstepController controller({duration, state.next_step, options.error_tolerance, options.min_step,
+  const bool adaptive = options.error_tolerance > 0;
+  SubstepController controller({duration, adaptive ? state.next_step : 0.0, options.error_tolerance, options.min_step,
                                 order(options.integrator), options.newton.max_cuts});
   controller.run(*this, duration, report);
   if (!report.ok)
