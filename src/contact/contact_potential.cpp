@@ -165,6 +165,7 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
   const Eigen::Vector3d foot = a + gap.t * (b - a) - (gap.gap / gap.weight + s.radius) * gap.normal;
   gap.normal = pose.orientation * gap.normal;
   const double own = surface.objects[s.object].friction;
+  const double coefficient = own > 0.0 && solid.friction >= 0.0 ? std::sqrt(own * solid.friction) : own;
   // behind the pairs of segments
   Contact contact{static_cast<std::int64_t>(surface.segments.size()) + on.solid,
                   (static_cast<std::int64_t>(on.segment) << 32) + on.piece,
@@ -174,7 +175,7 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
                   foot,
                   pose * foot,
                   Eigen::Vector3d::Zero(),
-                  solid.friction < 0.0 ? own : std::sqrt(own * solid.friction)};
+                  coefficient};
   return addContact(gap, contact, with_stiffness);
 }
 
