@@ -65,6 +65,17 @@ std::string tracked(const std::string& contact, const std::string& functions)
          "\n" + "    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 1.0e5}\n" + contact;
 }
 
+/// A rope that falls from 0.05 m by tr_bdf2 bounces up to 0.36 m for some heights of fall.
+TEST(IgnoredInputs, secondOrderIntegratorsOfRodsInContactAreWarnedOf)
+{
+  const std::string touching = rod + "    contact: {friction: 0.3}\n" + post;
+  for (const char* integrator : {"bdf2", "tr_bdf2"})
+    EXPECT_EQ(count(warningsOf(std::string("time: {integrator: ") + integrator + "}\n" + touching), {"may bounce"}), 1);
+  EXPECT_EQ(count(warningsOf("time: {integrator: implicit_euler}\n" + touching), {"may bounce"}), 0);
+  EXPECT_EQ(count(warningsOf(touching), {"may bounce"}), 0);
+  EXPECT_EQ(count(warningsOf("time: {integrator: tr_bdf2}\n" + rod), {"may bounce"}), 0);
+}
+
 TEST(IgnoredInputs, clustersOfAGuideWhoseMotionIsNotKnownAreWarnedOf)
 {
   EXPECT_EQ(count(warningsOf(tracked("", "{clusters: {count: 2}}")), {"test_functions.clusters", "first shape alone"}),

@@ -354,6 +354,15 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
     // methods of second order carry an impact's velocity on and bounce
     scene.time.integrator = Integrator::implicit_euler;
   }
+  else if (touches && scene.time.integrator != Integrator::implicit_euler &&
+           scene.time.integrator != Integrator::symplectic_euler)
+  {
+    YamlMap(time)
+        .get("integrator")
+        .warning(
+            "of second order carries the velocity before an impact beyond it, so that a rod may bounce higher than it "
+            "fell: use implicit_euler, the default with contact, where rods hit something");
+  }
   if (touches && scene.time.integrator == Integrator::symplectic_euler)
   {
     YamlMap(time)
