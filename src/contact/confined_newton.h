@@ -22,9 +22,8 @@ enum class Approach
 /// shortest edge. The solution is left as the trial.
 ///
 /// System offers what minimize() needs, and:
-/// - approach(from, to, reached): from the base towards the present trial, as far as nothing touches; that becomes the
-/// base, where all that is
-///   prescribed stands at the fraction `reached`;
+/// - approach(from, to, reached): goes from the base towards the present trial, as far as nothing touches. That
+///   becomes the base, where all that is prescribed stands at the fraction `reached`;
 /// - placeHeld(to): what is held or driven, in the trial, where it is at `to`;
 /// - resolve(tolerance, gap_tolerance): how incrementSize() measures, over the shortest edge and over the smallest gap;
 /// - contact(): the ContactPotential.

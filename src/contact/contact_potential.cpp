@@ -275,8 +275,9 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   if (with_stiffness)
   {
     term.stiffness = most * over_slip * (Eigen::Matrix3d::Identity() - n * n.transpose());
-    // Newton's method leaps over the narrow range in which a contact sticks, from slip to slip the other way, for ever.
-    // The secant's stiffness bounds the energy from above and leads there.
+    // Newton's method may jump across the narrow range in which a contact sticks, from slip in one direction to slip in
+    // the other, without end. The secant stiffness gives an upper bound of the energy, whose minimum lies in that
+    // range.
     if (y > law.e)
     {
       contact.reversed = contact.reversed || contact.last_slip.dot(slip) < 0.0;

@@ -346,7 +346,7 @@ TEST(Paths, goThroughTheFoldOfAShallowArch)
       EXPECT_LT(row.factor, run.critical->beyond);
   }
   EXPECT_TRUE(fell);
-  EXPECT_GE(unstable, 4);                   // the falling load, in steps of at most a fiftieth of the length
+  EXPECT_GE(unstable, 4);                   // the load falls in steps of at most 1/50 of the path's length
   EXPECT_LT(lowest_after, 0.6 * highest);   // 16 after 33: followed down to the lower fold
   EXPECT_TRUE(run.critical->fold);
   EXPECT_LE(highest, run.critical->beyond);

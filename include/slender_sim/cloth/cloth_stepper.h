@@ -44,11 +44,11 @@ enum class ClothSolver
 /// How a cloth is advanced.
 ///  - implicit_euler: first order; damps what the step does not resolve.
 ///  - tr_bdf2: second order, likewise damping; two stages, each at about the price of a step of implicit Euler.
-///  - imex: first order; bending and its damping, and mass damping, are implicit, the membrane, its damping and the
-///  wind explicit (thesis 2.5.2).
-///    The matrix is constant, n x n, and factored once, so that a step costs one back-solve. Bending never limits the
-///    step, the membrane does as in explicit steps: h < 2 / omega, omega^2 the largest eigenvalue of M^-1 K of the
-///    membrane, about 0.5 edge sqrt(area density / modulus) [s]. Isometric bending (or none) only.
+///  - imex: first order; bending and its damping, and mass damping, are implicit, the membrane, its damping and
+///    the wind explicit (thesis 2.5.2). The matrix is constant, n x n, and factored once, so that a step costs one
+///    back-solve. Bending never limits the step, the membrane does as in explicit steps: h < 2 / omega, omega^2 the
+///    largest eigenvalue of M^-1 K of the membrane, about 0.5 edge sqrt(area density / modulus) [s]. Isometric bending
+///    (or none) only.
 ///  - symplectic_euler: first order, explicit; bending limits the step as well.
 struct ClothOptions
 {

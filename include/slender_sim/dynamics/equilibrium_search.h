@@ -75,13 +75,12 @@ void settleStably(System& system, bool leave_saddles, StepReport& report)
 /// from a saddle the search goes on (settleStably()).
 ///
 /// System offers, besides what settleStably() needs except settleFrom(),
-///   round(fraction, weight)   minimises with what is prescribed at this fraction of its way, and a proximal weight in
-///   units of its own. The result
-///                             becomes the present configuration on success,
-///   shift()                   the largest displacement of the last round over the size of the system,
-///   takeBase()                makes what a round that did not converge came to the present configuration,
-///   weightOf(rate)            the proximal weight whose term has this eigenvalue [1/s^2]; it may be infinite or not a
-///   number.
+/// - round(fraction, weight): minimises with what is prescribed at this fraction of its way, and a proximal weight
+///   in units of its own. The result becomes the present configuration on success;
+/// - shift(): returns the largest displacement of the last round over the size of the system;
+/// - takeBase(): takes the last configuration of a round that did not converge as the present one;
+/// - weightOf(rate): returns the proximal weight whose term has this eigenvalue [1/s^2]. The weight may be infinite
+///   or not a number.
 template <class System>
 class EquilibriumSearch
 {

@@ -198,9 +198,9 @@ public:
   void setFunctions(int cloth, const std::string& set, std::optional<double> blend = std::nullopt);
 
   /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit
-  /// or could not be written. A file of another scene (other rods, moduli, step or integrator), a damaged or a
-  /// shortened one is refused and the state stays as it is. An older file is replaced, of a symbolic link what it leads
-  /// to; neither touches what is no regular file.
+  /// or could not be written. A file of another scene (other rods, moduli, step or integrator) and a damaged
+  /// file are refused, and the state stays as it is. save() replaces an older file; if the path is a symbolic link, it
+  /// replaces the file to which the link leads. Neither function touches a path that is not a regular file.
   void save(const std::string& path) const;
   void load(const std::string& path);
 

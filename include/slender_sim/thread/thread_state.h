@@ -36,8 +36,8 @@ struct ThreadState
   std::uint64_t next_id = 0;
   std::uint64_t thread_id = 0;
   double fed_volume = 0.0;       ///< [m^3] that came out of the nozzle since the start
-  double dropped_volume = 0.0;   ///< [m^3] of edges taken away because too many lay on the floor
-  double left_volume = 0.0;      ///< [m^3] of edges taken away because they had left the region
+  double dropped_volume = 0.0;   ///< [m^3] of edges that were removed because too many lay on the floor
+  double left_volume = 0.0;      ///< [m^3] of edges that were removed because they had left the region
 
   int nodes() const { return static_cast<int>(x.size()); }
   int edges() const { return static_cast<int>(volume.size()); }

@@ -19,10 +19,10 @@ enum class Contact
   undecided
 };
 
-/// Whether the pieces touch at a time in [from, to]. Times are divided until over a piece of time a fixed direction
-/// separates all corners at both ends, hence between them (their offsets are linear in time), by more than the rounding
-/// of long doubles; or the pieces are seen to touch. Undecided: closer than rounding (1e-15 of the extent) lets see, or
-/// not decided after 2^40.
+/// Whether the pieces touch at a time in [from, to]. The interval is divided until, in each part, either a fixed
+/// direction separates all corners at both ends by more than the rounding errors of long doubles, or the pieces touch.
+/// A direction that separates at both ends separates in between, because offsets are linear in time. The result is
+/// undecided if the pieces are nearer than rounding errors (1e-15 of the extent), or after 2^40 divisions.
 Contact referenceContact(const MovingPair& pair, double from, double to);
 
 /// The usual test: roots of the cubic of coplanarity in doubles, then the distance there against a tolerance (1e-6 of

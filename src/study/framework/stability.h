@@ -10,11 +10,10 @@
 
 /// One definition of stable for all solvers. A run is sound when after every step
 ///  - the state is finite,
-///  - the energy has not grown beyond its bound (energyGrowth(); of cloth's single Newton steps 1e-2; not asked of
-///  threads, nor while something is still being moved),
-///  - a step reported as done has met its equations: the residual is below its bound (not asked of explicit steps and
-///  of cloth's single
-///    Newton step, which solve linear equations),
+///  - the energy has not grown beyond its bound (energyGrowth(); of cloth's single Newton steps 1e-2; not asked
+///    of threads, nor while something is still being moved),
+///  - a step reported as done has met its equations: the residual is below its bound (not asked of explicit
+///    steps and of cloth's single Newton step, which solve linear equations),
 ///  - a refusal says why, and the state is as before the step, bit for bit.
 /// A cell that is done must also not be silently wrong: after each of its steps a run with a quarter of the step is
 /// nearer to it than half as far as that run ever moves (a hundredth of the object's size allowed besides). One that
