@@ -10,17 +10,6 @@
 
 namespace slender {
 
-namespace {
-
-Eigen::Matrix3d cross(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-}   // namespace
-
 void checkBody(const RigidBodyModel& b)
 {
   const auto refuse = [&](const std::string& why) { throw std::invalid_argument("body " + b.name + ": " + why); };
@@ -104,7 +93,7 @@ void BodySystem::beginStage(const StepPlan& plan, std::size_t index, double h, c
   const double square = stage.tau_a * stage.tau_a;
   const auto rotation = [&](const Eigen::Vector3d& r) { return (fromRotationVector(r) * start_).toRotationMatrix(); };
   inertia_target_ = hat.x;
-  inertia_rotation_ = rotation(hat.r) - square * cross(w) * cross(w) * pose.orientation.toRotationMatrix();
+  inertia_rotation_ = rotation(hat.r) - square * skew(w) * skew(w) * pose.orientation.toRotationMatrix();
   damping_target_ = tilde.x;
   damping_rotation_ = rotation(tilde.r);
   const double inertia = 1.0 / square, linear = model_.linear_damping / stage.tau_v,

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "coupled_system.h"
+#include "slender_sim/geometry/rotation.h"
 
 namespace slender {
 
@@ -9,13 +10,6 @@ namespace {
 
 constexpr int kPrescribed = -1;
 constexpr int kRows = 11;   // of a panel: its own block, the next, and the positions after that
-
-Eigen::Matrix3d cross(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 double entry(const RodPanel& p, int column, int row)
 {
@@ -334,10 +328,10 @@ void CoupledSystem::addClamps(const RodPart& part)
     const int j = c.edge, next = (j + 1) % arrays.nodes;
     const Eigen::Vector3d t(arrays.t[0][j], arrays.t[1][j], arrays.t[2][j]), e = t / arrays.inverse_length[j];
     const Eigen::Matrix3d by_edge =
-        -cross(c.gradient_e) + cross(e) * c.hessian_ee + t * c.hessian_et.transpose() +
+        -skew(c.gradient_e) + skew(e) * c.hessian_ee + t * c.hessian_et.transpose() +
         c.gradient_t * arrays.inverse_length[j] * (Eigen::Matrix3d::Identity() - t * t.transpose());
     const Eigen::Vector3d by_angle = e.cross(c.hessian_et) + c.hessian_tt * t;
-    Eigen::Matrix3d turn = cross(c.torque) - by_edge * cross(e) + by_angle * t.transpose();
+    Eigen::Matrix3d turn = skew(c.torque) - by_edge * skew(e) + by_angle * t.transpose();
     turn = (0.5 * (turn + turn.transpose())).eval();
     const int base = bodyUnknown(body) + 3;
     Columns row, column;

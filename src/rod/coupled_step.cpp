@@ -11,13 +11,6 @@ namespace slender {
 
 namespace {
 
-Eigen::Matrix3d cross(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 ContactSurface contactSurface(const RodGroupModel& model)
 {
   ContactSurface surface;
@@ -204,9 +197,9 @@ void CoupledSystem::startAccelerations()
       wrench[b].head<3>() += force;
       wrench[b].tail<3>() += r.cross(force);
       inertia[b].topLeftCorner<3, 3>() += m * Eigen::Matrix3d::Identity();
-      inertia[b].topRightCorner<3, 3>() -= m * cross(r);
-      inertia[b].bottomLeftCorner<3, 3>() += m * cross(r);
-      inertia[b].bottomRightCorner<3, 3>() -= m * cross(r) * cross(r);
+      inertia[b].topRightCorner<3, 3>() -= m * skew(r);
+      inertia[b].bottomLeftCorner<3, 3>() += m * skew(r);
+      inertia[b].bottomRightCorner<3, 3>() -= m * skew(r) * skew(r);
     }
   });
   std::vector<BodySystem::Vector6> acceleration(bodies_.size());

@@ -17,13 +17,6 @@ Eigen::Matrix3d pointInertia(double mass, const Eigen::Vector3d& r)
   return mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
 }
 
-Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v)
-{
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 /// Angular velocity of a body with this angular momentum.
 Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q, const Eigen::Vector3d& momentum)
 {
@@ -132,7 +125,7 @@ void ExplicitSystem::predictBody(Body& body, double h)
   {
     // damping of the body alone, about its own centre, by the velocity at the end; the nodes have their own
     const double k = h * m.linear_damping * m.mass;
-    const Eigen::Matrix3d r = q.toRotationMatrix(), arm = crossMatrix(now.X_WB.position - body.start.position);
+    const Eigen::Matrix3d r = q.toRotationMatrix(), arm = skew(now.X_WB.position - body.start.position);
     const Eigen::Matrix3d own = h * m.angular_damping * (r * m.inertia * r.transpose()) - k * arm * arm;
     Eigen::Matrix<double, 6, 6> matrix;
     matrix << (body.mass + k) * Eigen::Matrix3d::Identity(), -k * arm, k * arm, r * body.inertia * r.transpose() + own;

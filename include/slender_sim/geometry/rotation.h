@@ -14,6 +14,14 @@ inline Eigen::Vector3d parallelTransport(const Eigen::Vector3d& v, const Eigen::
   return d * v + c * (c.dot(v) / (1.0 + d)) + c.cross(v);
 }
 
+/// The matrix of the cross product: skew(v) * w = v x w.
+inline Eigen::Matrix3d skew(const Eigen::Vector3d& v)
+{
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
 /// v turned about the unit axis by `angle` [rad].
 inline Eigen::Vector3d rotateAbout(const Eigen::Vector3d& v, const Eigen::Vector3d& axis, double angle)
 {
