@@ -5,12 +5,8 @@ namespace slender {
 
 const ChainKernels& chainKernels()
 {
-#ifdef SLENDER_X86_KERNELS
-  static const ChainKernels& table = pickKernels(baseline::kChainKernels, avx2::kChainKernels, avx512::kChainKernels);
+  static const ChainKernels& table = SLENDER_PICK_KERNELS(kChainKernels);
   return table;
-#else
-  return baseline::kChainKernels;
-#endif
 }
 
 }   // namespace slender

@@ -5,12 +5,8 @@ namespace slender {
 
 const HingeKernels& hingeKernels()
 {
-#ifdef SLENDER_X86_KERNELS
-  static const HingeKernels& table = pickKernels(baseline::kHingeKernels, avx2::kHingeKernels, avx512::kHingeKernels);
+  static const HingeKernels& table = SLENDER_PICK_KERNELS(kHingeKernels);
   return table;
-#else
-  return baseline::kHingeKernels;
-#endif
 }
 
 }   // namespace slender

@@ -5,13 +5,8 @@ namespace slender {
 
 const IsotropicKernels& isotropicKernels()
 {
-#ifdef SLENDER_X86_KERNELS
-  static const IsotropicKernels& table =
-      pickKernels(baseline::kIsotropicKernels, avx2::kIsotropicKernels, avx512::kIsotropicKernels);
+  static const IsotropicKernels& table = SLENDER_PICK_KERNELS(kIsotropicKernels);
   return table;
-#else
-  return baseline::kIsotropicKernels;
-#endif
 }
 
 }   // namespace slender

@@ -5,13 +5,8 @@ namespace slender {
 
 const MembraneKernels& membraneKernels()
 {
-#ifdef SLENDER_X86_KERNELS
-  static const MembraneKernels& table =
-      pickKernels(baseline::kMembraneKernels, avx2::kMembraneKernels, avx512::kMembraneKernels);
+  static const MembraneKernels& table = SLENDER_PICK_KERNELS(kMembraneKernels);
   return table;
-#else
-  return baseline::kMembraneKernels;
-#endif
 }
 
 }   // namespace slender

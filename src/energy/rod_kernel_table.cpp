@@ -5,12 +5,8 @@ namespace slender {
 
 const RodKernels& rodKernels()
 {
-#ifdef SLENDER_X86_KERNELS
-  static const RodKernels& table = pickKernels(baseline::kRodKernels, avx2::kRodKernels, avx512::kRodKernels);
+  static const RodKernels& table = SLENDER_PICK_KERNELS(kRodKernels);
   return table;
-#else
-  return baseline::kRodKernels;
-#endif
 }
 
 }   // namespace slender

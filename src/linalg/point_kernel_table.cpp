@@ -5,12 +5,8 @@ namespace slender {
 
 const PointKernels& pointKernels()
 {
-#ifdef SLENDER_X86_KERNELS
-  static const PointKernels& table = pickKernels(baseline::kPointKernels, avx2::kPointKernels, avx512::kPointKernels);
+  static const PointKernels& table = SLENDER_PICK_KERNELS(kPointKernels);
   return table;
-#else
-  return baseline::kPointKernels;
-#endif
 }
 
 }   // namespace slender

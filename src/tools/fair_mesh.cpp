@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "arguments.h"
+#include "program_main.h"
 #include "slender_sim/fairing/fair_mesh.h"
 #include "slender_sim/geometry/mesh_file.h"
 
@@ -17,8 +18,6 @@ namespace {
 
 using slender::BadInput, slender::parseCount, slender::parseNumber, slender::parsePositive;
 using Clock = std::chrono::steady_clock;
-
-constexpr int exit_done = 0, exit_bad_input = 2, exit_failed = 3;
 
 const char* const usage =
     "usage: fair_mesh IN OUT [options]\n"
@@ -144,11 +143,11 @@ int run(const Options& options)
   if (!summary.ok)
   {
     std::fprintf(stderr, "fair_mesh: %s\n", summary.message.c_str());
-    return exit_failed;
+    return slender::kFailed;
   }
   slender::writeMesh(out, mesh);
   if (options.quiet)
-    return exit_done;
+    return slender::kDone;
   std::printf("mesh              %s, %ld vertices, %ld faces\n", out.c_str(), static_cast<long>(mesh.vertices.cols()),
               static_cast<long>(mesh.triangles.cols()));
   if (fills)
@@ -159,26 +158,9 @@ int run(const Options& options)
                 summary.steps, summary.stationary ? " (stationary)" : "", summary.cuts, summary.energy,
                 summary.energy_before);
   std::printf("wall              %.4g s\n", std::chrono::duration<double>(Clock::now() - start).count());
-  return exit_done;
+  return slender::kDone;
 }
 
 }   // namespace
 
-int main(int argc, char** argv)
-{
-  try
-  {
-    const Options options = parseOptions(argc, argv);
-    if (options.help)
-    {
-      std::fputs(usage, stdout);
-      return exit_done;
-    }
-    return run(options);
-  }
-  catch (const std::exception& error)   // BadInput, a mesh with defects, a file that cannot be read or written
-  {
-    std::fprintf(stderr, "fair_mesh: %s\n", error.what());
-    return exit_bad_input;
-  }
-}
+int main(int argc, char** argv) { return slender::programMain("fair_mesh", usage, argc, argv, parseOptions, run); }

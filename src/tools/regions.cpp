@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "arguments.h"
+#include "program_main.h"
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/tracking/function_colors.h"
@@ -15,8 +16,6 @@
 namespace {
 
 using slender::BadInput, slender::parseCount, slender::parseNumber;
-
-constexpr int exit_done = 0, exit_bad_input = 2;
 
 const char* const usage =
     "usage: regions SCENE.yaml OUT [options]    test functions of a scene's tracked cloth\n"
@@ -146,7 +145,7 @@ int run(const Options& options)
   const slender::TriangleMesh& mesh = options.guide ? tracking.guide.mesh : cloth->mesh;
   slender::writeColoredMesh(options.files[1], mesh, slender::functionColors(values));
   if (options.quiet)
-    return exit_done;
+    return slender::kDone;
   Eigen::Index fewest = values.cols(), most = 0;
   for (Eigen::Index i = 0; i < values.rows(); ++i)
   {
@@ -160,26 +159,9 @@ int run(const Options& options)
               static_cast<long>(most));
   std::printf("wall              %.3g s\n",
               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  return exit_done;
+  return slender::kDone;
 }
 
 }   // namespace
 
-int main(int argc, char** argv)
-{
-  try
-  {
-    const Options options = parseOptions(argc, argv);
-    if (options.help)
-    {
-      std::fputs(usage, stdout);
-      return exit_done;
-    }
-    return run(options);
-  }
-  catch (const std::exception& error)
-  {
-    std::fprintf(stderr, "regions: %s\n", error.what());
-    return exit_bad_input;
-  }
-}
+int main(int argc, char** argv) { return slender::programMain("regions", usage, argc, argv, parseOptions, run); }

@@ -13,6 +13,7 @@
 
 #include "arguments.h"
 #include "moduli.h"
+#include "program_main.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/linalg/interruption.h"
 #include "slender_sim/scene/file_paths.h"
@@ -34,8 +35,6 @@ using slender::Recorder;
 using slender::Simulation;
 using slender::StepReport;
 using Clock = std::chrono::steady_clock;
-
-constexpr int exit_done = 0, exit_bad_input = 2, exit_failed = 3;
 
 const char* const usage =
     "usage: simulate SCENE.yaml [options]\n"
@@ -292,7 +291,7 @@ int runStatics(const Options& options, Simulation& simulation, Clock::time_point
     saveState(simulation, options.state);
   if (!options.quiet)
     printStatics(simulation, found, std::chrono::duration<double>(Clock::now() - start).count());
-  return slender::reportStatics(simulation.config(), found) ? exit_done : exit_failed;
+  return slender::reportStatics(simulation.config(), found) ? slender::kDone : slender::kFailed;
 }
 
 int run(const Options& options)
@@ -368,36 +367,9 @@ int run(const Options& options)
   if (!options.quiet)
     printSummary(simulation, total, std::chrono::duration<double>(Clock::now() - start).count());
   const bool balanced = checkVolumes(simulation);
-  return stopped_by != 0 && !ok ? 128 + stopped_by : balanced && ok ? exit_done : exit_failed;
+  return stopped_by != 0 && !ok ? 128 + stopped_by : balanced && ok ? slender::kDone : slender::kFailed;
 }
 
 }   // namespace
 
-int main(int argc, char** argv)
-{
-  try
-  {
-    const Options options = parseOptions(argc, argv);
-    if (options.help)
-    {
-      std::fputs(usage, stdout);
-      return exit_done;
-    }
-    return run(options);
-  }
-  catch (const slender::SimulationError& error)
-  {
-    std::fprintf(stderr, "simulate: %s\n", error.what());
-    return exit_failed;
-  }
-  catch (const slender::WriteError& error)
-  {
-    std::fprintf(stderr, "simulate: %s\n", error.what());
-    return exit_failed;
-  }
-  catch (const std::exception& error)   // SceneError, BadInput, a recorder that cannot begin
-  {
-    std::fprintf(stderr, "simulate: %s\n", error.what());
-    return exit_bad_input;
-  }
-}
+int main(int argc, char** argv) { return slender::programMain("simulate", usage, argc, argv, parseOptions, run); }

@@ -14,7 +14,7 @@ enum class Isa
 Isa bestIsa();
 const char* toString(Isa isa);
 
-/// Picks among the per-instruction-set tables of a kernel.
+/// Picks among the tables of a kernel, one per instruction set.
 template <class Table>
 const Table& pickKernels(const Table& baseline, const Table& avx2, const Table& avx512)
 {
@@ -27,3 +27,11 @@ const Table& pickKernels(const Table& baseline, const Table& avx2, const Table& 
 }
 
 }   // namespace slender
+
+/// The table `kernels` for this processor. Each file *_kernel.cpp is compiled once per instruction set and defines a
+/// table of this name in the namespace of that set; without x86 there is only the baseline.
+#ifdef SLENDER_X86_KERNELS
+#define SLENDER_PICK_KERNELS(kernels) ::slender::pickKernels(baseline::kernels, avx2::kernels, avx512::kernels)
+#else
+#define SLENDER_PICK_KERNELS(kernels) baseline::kernels
+#endif

@@ -9,7 +9,7 @@
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/linalg/point_matrix.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 // OpenBLAS starts a thread per processor; the clock here sees one. Absent from other BLAS libraries.
 extern "C" __attribute__((weak)) void openblas_set_num_threads(int);

@@ -8,7 +8,7 @@
 #include "collision_pairs.h"
 #include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/geometry/mesh_shapes.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 

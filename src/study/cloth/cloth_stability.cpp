@@ -222,16 +222,7 @@ cloths:
                   thickness, youngs_modulus);
     return MapScene{text, {}};
   };
-  const std::vector<double> map_steps =
-      context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
-  const int map_length = context.quick() ? 5 : 15;
-  stabilityMap(
-      context, tally, "cloth_stability_stiffness", "Young's modulus [Pa]",
-      context.quick() ? std::vector<double>{1e4, 1e8} : std::vector<double>{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10},
-      map_steps, map_length, [&](double modulus) { return hanging(modulus, 5e-4); });
-  stabilityMap(context, tally, "cloth_stability_slenderness", "thickness over side",
-               context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1},
-               map_steps, map_length, [&](double slenderness) { return hanging(1e6, 0.5 * slenderness); });
+  sheetMaps(context, tally, "cloth_stability", 0.5, hanging);
   context.metric("not_recovered", not_recovered);
   context.metric("cases", static_cast<double>(context.rows().size()));
   context.note(

@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "slender_sim/contact/distance.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 

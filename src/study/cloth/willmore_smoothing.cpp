@@ -7,7 +7,7 @@
 
 #include "mesh_cases.h"
 #include "slender_sim/fairing/willmore_flow.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 namespace {

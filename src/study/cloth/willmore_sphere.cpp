@@ -8,7 +8,7 @@
 #include "slender_sim/fairing/willmore_flow.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/geometry/mesh_subdivision.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 namespace {

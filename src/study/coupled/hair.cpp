@@ -6,7 +6,7 @@
 
 #include "study/framework/scene_cases.h"
 #include "slender_sim/geometry/rotation.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 

@@ -6,7 +6,7 @@
 
 #include "study/rod/group_cases.h"
 #include "slender_sim/geometry/rotation.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "study/framework/scene_cases.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 namespace {

@@ -9,7 +9,7 @@
 #include "study/framework/shape_cases.h"
 #include "slender_sim/geometry/curves.h"
 #include "slender_sim/geometry/rotation.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/oscillation.h"
 #include "slender_sim/study/study.h"
 
@@ -195,12 +195,10 @@ void runWilberforce(StudyContext& context)
           draw(context, s, r);
       }
   context.note(
-      "Nodes on the coil; joints as of the scene keys matched_to_arcs and curvature: compensated ones do not replace "
-      "matching, and are");
-  context.note("shown, not checked (beats amplify errors of the frequencies by f / (f2 - f1)). Start: 3 mm upwards,");
-  context.note(
-      "everything else at rest. Frequencies: two tones fitted to height and angle of 2.2 beats; tr_bdf2, 60 steps a "
-      "period.");
+      "Nodes on the coil; joints as of the scene keys matched_to_arcs and curvature. Compensated joints do not replace "
+      "matching: their rows are shown, not checked, since beats amplify errors of the frequencies by f / (f2 - f1). "
+      "Start: 3 mm upwards, everything else at rest. Frequencies: two tones fitted to height and angle of 2.2 beats; "
+      "tr_bdf2, 60 steps a period.");
 }
 
 const StudyRegistration kWilberforceRegistration{

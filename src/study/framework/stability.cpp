@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "slender_sim/scene/reader.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/scene/state_bytes.h"
 
 namespace slender::study {
@@ -318,6 +318,21 @@ void stabilityMap(StudyContext& context, StabilityTally& tally, const std::strin
       series.x.push_back(value);
       series.y.push_back(step);
     }
+}
+
+void sheetMaps(StudyContext& context, StabilityTally& tally, const std::string& study, double side,
+               const std::function<MapScene(double youngs_modulus, double thickness)>& scene)
+{
+  using Values = std::vector<double>;
+  const bool quick = context.quick();
+  const Values step_lengths = quick ? Values{1e-3, 1.0 / 30} : Values{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
+  const int steps = quick ? 5 : 15;
+  stabilityMap(context, tally, study + "_stiffness", "Young's modulus [Pa]",
+               quick ? Values{1e4, 1e8} : Values{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10}, step_lengths, steps,
+               [&](double modulus) { return scene(modulus, 5e-4); });
+  stabilityMap(context, tally, study + "_slenderness", "thickness over side",
+               quick ? Values{1e-4, 1e-2} : Values{1e-5, 1e-4, 1e-3, 1e-2, 0.1}, step_lengths, steps,
+               [&](double slenderness) { return scene(1e6, slenderness * side); });
 }
 
 }   // namespace slender::study

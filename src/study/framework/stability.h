@@ -113,4 +113,9 @@ void stabilityMap(StudyContext& context, StabilityTally& tally, const std::strin
                   const std::vector<double>& values, const std::vector<double>& step_lengths, int steps,
                   const std::function<MapScene(double)>& scene);
 
+/// The two maps of a sheet whose scene follows from its Young's modulus [Pa] and thickness [m]: over the modulus, and
+/// over thickness by `side` [m]. Their names begin with that of the study.
+void sheetMaps(StudyContext& context, StabilityTally& tally, const std::string& study, double side,
+               const std::function<MapScene(double youngs_modulus, double thickness)>& scene);
+
 }   // namespace slender::study

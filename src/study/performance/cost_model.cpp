@@ -17,7 +17,7 @@
 #include "study/rod/rod_cases.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {

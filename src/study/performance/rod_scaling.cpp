@@ -9,7 +9,7 @@
 #include "study/rod/rod_cases.h"
 #include "slender_sim/linalg/banded_ldlt.h"
 #include "slender_sim/rod/rod_system.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {

@@ -10,7 +10,7 @@
 #include "slender_sim/rod/rod_system.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {

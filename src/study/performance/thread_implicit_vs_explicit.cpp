@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "study/rod/rod_cases.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "study/thread/thread_cases.h"
 
 namespace slender::study {

@@ -6,7 +6,7 @@
 
 #include "slender_sim/scene/reader.h"
 #include "study/framework/scene_cases.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {

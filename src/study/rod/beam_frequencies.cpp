@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "rod_cases.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/reference.h"
 #include "slender_sim/study/study.h"
 

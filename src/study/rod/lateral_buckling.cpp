@@ -7,7 +7,7 @@
 
 #include "study/framework/shape_cases.h"
 #include "slender_sim/geometry/curves.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {

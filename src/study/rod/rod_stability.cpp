@@ -8,7 +8,7 @@
 #include "rod_cases.h"
 #include "study/framework/stability.h"
 #include "slender_sim/scene/state_bytes.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {

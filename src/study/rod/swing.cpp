@@ -5,7 +5,7 @@
 #include <string>
 
 #include "rod_cases.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 #include "study/framework/work_precision.h"
 

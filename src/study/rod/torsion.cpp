@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "rod_cases.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {

@@ -19,28 +19,29 @@ struct Point
 };
 
 /// Rows `thread` of the reference (bending, vertical clamped nozzle, no inertia), every tenth of the length.
-const std::vector<Point> kNoSurfaceTension = {{0, 3, 0.06},
-                                              {0.01438076, 2.595828, 0.1127951},
-                                              {0.07825042, 2.19656, 0.177465},
-                                              {0.1799894, 1.805055, 0.2497164},
-                                              {0.3084207, 1.421477, 0.3251751},
-                                              {0.470274, 1.050872, 0.3997248},
-                                              {0.6774262, 0.7037547, 0.4699576},
-                                              {0.9410097, 0.3976945, 0.5337534},
-                                              {1.267775, 0.1611389, 0.5910452},
-                                              {1.648193, 0.02804899, 0.6446511},
-                                              {2.051164, 0, 0.7}};
-const std::vector<Point> kSurfaceTension10 = {{0, 3, 0.06},
-                                              {0.03031502, 2.553635, 0.1108463},
-                                              {0.1491785, 2.122216, 0.1730725},
-                                              {0.3176674, 1.707189, 0.2421377},
-                                              {0.5209551, 1.30813, 0.3139036},
-                                              {0.769758, 0.9359228, 0.3847472},
-                                              {1.070091, 0.6040781, 0.452133},
-                                              {1.422842, 0.3289028, 0.5151485},
-                                              {1.823333, 0.1299488, 0.5749393},
-                                              {2.257466, 0.02287093, 0.6348531},
-                                              {2.704545, 0, 0.7}};
+struct ReferenceRow
+{
+  Point without, with;   ///< surface tension: 0, 10
+};
+constexpr ReferenceRow kReference[] = {{{0, 3, 0.06}, {0, 3, 0.06}},
+                                       {{0.01438076, 2.595828, 0.1127951}, {0.03031502, 2.553635, 0.1108463}},
+                                       {{0.07825042, 2.19656, 0.177465}, {0.1491785, 2.122216, 0.1730725}},
+                                       {{0.1799894, 1.805055, 0.2497164}, {0.3176674, 1.707189, 0.2421377}},
+                                       {{0.3084207, 1.421477, 0.3251751}, {0.5209551, 1.30813, 0.3139036}},
+                                       {{0.470274, 1.050872, 0.3997248}, {0.769758, 0.9359228, 0.3847472}},
+                                       {{0.6774262, 0.7037547, 0.4699576}, {1.070091, 0.6040781, 0.452133}},
+                                       {{0.9410097, 0.3976945, 0.5337534}, {1.422842, 0.3289028, 0.5151485}},
+                                       {{1.267775, 0.1611389, 0.5910452}, {1.823333, 0.1299488, 0.5749393}},
+                                       {{1.648193, 0.02804899, 0.6446511}, {2.257466, 0.02287093, 0.6348531}},
+                                       {{2.051164, 0, 0.7}, {2.704545, 0, 0.7}}};
+
+std::vector<Point> referenceOf(double gamma)
+{
+  std::vector<Point> points;
+  for (const ReferenceRow& row : kReference)
+    points.push_back(gamma > 0 ? row.with : row.without);
+  return points;
+}
 
 ThreadSetup draggedThread(double gamma, double feed)
 {
@@ -127,7 +128,7 @@ void runDraggedCatenary(StudyContext& context)
   plot.equal_axes = true;
   for (const double gamma : {0.0, 10.0})
   {
-    const std::vector<Point>& reference = gamma > 0 ? kSurfaceTension10 : kNoSurfaceTension;
+    const std::vector<Point> reference = referenceOf(gamma);
     const std::string test = "gamma " + std::to_string(static_cast<int>(gamma));
     context.progress(gamma > 0, 2, test);
     const Outcome seen = drag(gamma, feed, h, reference);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "study/rod/rod_cases.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "thread_cases.h"
 #include "study/framework/work_precision.h"
 

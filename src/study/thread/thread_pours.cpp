@@ -10,7 +10,7 @@
 #include "coil_cases.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/thread/thread_group.h"
 
 namespace slender::study {

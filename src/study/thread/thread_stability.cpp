@@ -9,7 +9,7 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/state_bytes.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/thread/thread_group.h"
 #include "study/framework/stability.h"
 #include "thread_cases.h"

@@ -11,7 +11,7 @@
 #include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/geometry/mesh_subdivision.h"
 #include "slender_sim/geometry/mesh_topology.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 

@@ -9,7 +9,7 @@
 #include "study/framework/scene_cases.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/geometry/mesh_subdivision.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 

@@ -9,7 +9,7 @@
 
 #include "study/framework/scene_cases.h"
 #include "slender_sim/rod/averaged_rod.h"
-#include "slender_sim/study/cpu_clock.h"
+#include "study/framework/cpu_clock.h"
 #include "slender_sim/tracking/weak_constraints.h"
 
 namespace slender::study {

@@ -392,17 +392,7 @@ tracked:
                   thickness, youngs_modulus);
     return MapScene{text, rolled};
   };
-  const std::vector<double> map_steps =
-      context.quick() ? std::vector<double>{1e-3, 1.0 / 30} : std::vector<double>{1e-4, 1e-3, 1e-2, 1.0 / 30, 0.1};
-  const int map_length = context.quick() ? 5 : 15;
-  stabilityMap(
-      context, tally, "tracking_stability_stiffness", "Young's modulus [Pa]",
-      context.quick() ? std::vector<double>{1e4, 1e8} : std::vector<double>{1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e10},
-      map_steps, map_length, [&](double modulus) { return rolled_up(modulus, 5e-4); });
-  stabilityMap(context, tally, "tracking_stability_slenderness", "thickness over side",
-               context.quick() ? std::vector<double>{1e-4, 1e-2} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1},
-               map_steps, map_length, [&](double slenderness) { return rolled_up(1e6, 0.4 * slenderness); });
-
+  sheetMaps(context, tally, "tracking_stability", 0.4, rolled_up);
   context.metric("not_recovered", not_recovered);
   context.metric("unfinished", unfinished);
   context.metric("cells", static_cast<double>(context.rows().size()));
