@@ -64,7 +64,7 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
   for (const GridPairs::Pair& pair : candidates->pairs())
   {
     const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
-    limit.thickness = a.coreRadius() + b.coreRadius();
+    limit.thickness = thicknessOf(pair);
     share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
   }
   int solid = -1;
@@ -75,49 +75,55 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
       rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
     solid = on.solid;
     const ContactSegment& s = surface.segments[on.segment];
-    limit.thickness = s.radius;
+    limit.thickness = thicknessOf(on);
     share =
         std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids[on.solid].pieces[on.piece], rigid, limit));
   }
   return share;
 }
 
+double ContactPotential::Impl::thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key,
+                                       double thickness)
+{
+  const auto at = std::lower_bound(list.begin(), list.end(), Thinned{key, 0.0});
+  return at != list.end() && at->key == key ? at->thickness : thickness;
+}
+
 bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
 {
   check(x, poses);
   near_.build(surface, solids, {x, x, poses, poses}, options.gap, margin_, 0.0);
+  thin_pairs_.clear();
+  thin_on_solids_.clear();
   // Less than the twelfth at which the barrier is made stiffer: a step under load then ends with more room than it
   // began with, and parts that something else than motion brought together come apart again.
   const double least = options.gap / 20, opened = options.gap / 16;
-  // never thinner than what leaves half of the distance between centrelines
-  const auto room = [&](double distance) { return distance - std::min(opened, 0.5 * distance); };
+  // Thins what is nearer than that, but never to less than half of the distance between centrelines. False: they meet.
+  const auto fit = [&](std::vector<Thinned>& list, const std::array<int, 3>& key, double distance, double thickness) {
+    if (distance - thickness < least)
+      list.push_back({key, distance - std::min(opened, 0.5 * distance)});
+    return distance - thickness >= least || distance > 1e-3 * thickness;
+  };
   for (const GridPairs::Pair& pair : near_.pairs())
   {
-    ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
-    const double distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)),
-                 thickness = a.coreRadius() + b.coreRadius();
-    if (distance - thickness >= least)
-      continue;
-    if (!(distance > 1e-3 * thickness))
+    const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
+    const double distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b));
+    if (!fit(thin_pairs_, {pair.first, pair.second, 0}, distance, a.coreRadius() + b.coreRadius()))
       return false;
-    const double share = room(distance) / thickness;
-    a.radius *= share;
-    b.radius *= share;
   }
   for (const Candidates::OnSolid& on : near_.onSolids())
   {
-    ContactSegment& s = surface.segments[on.segment];
+    const ContactSegment& s = surface.segments[on.segment];
     const Pose to_solid = poses[on.solid].inverse();
     const double distance =
         segmentPieceDistance(solids[on.solid].pieces[on.piece], to_solid * Eigen::Vector3d(x.col(s.a)),
                              to_solid * Eigen::Vector3d(x.col(s.b)))
             .distance;
-    if (distance - s.radius >= least)
-      continue;
-    if (!(distance > 1e-3 * s.radius))
+    if (!fit(thin_on_solids_, {on.solid, on.segment, on.piece}, distance, s.radius))
       return false;
-    s.radius = room(distance);
   }
+  std::sort(thin_pairs_.begin(), thin_pairs_.end());
+  std::sort(thin_on_solids_.begin(), thin_on_solids_.end());
   return true;
 }
 

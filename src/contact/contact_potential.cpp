@@ -129,7 +129,7 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
 {
   const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
   const Eigen::Vector3d a0 = x.col(a.a), a1 = x.col(a.b), b0 = x.col(b.a), b1 = x.col(b.b);
-  const double thickness = a.coreRadius() + b.coreRadius(), range = thickness + options.gap;
+  const double thickness = thicknessOf(pair), range = thickness + options.gap;
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0;
   const double middles2 = 0.25 * (a0 + a1 - b0 - b1).squaredNorm();
   // half the lengths and the range, squared: (p + q + r)^2 <= 3 (p^2 + q^2 + r^2)
@@ -137,13 +137,14 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
       segmentDistance(a0, a1, b0, b1) >= range)
     return 0.0;
   const SoftGap gap = softGap(a0, a1, b0, b1, thickness);
+  const double share = b.coreRadius() / (a.coreRadius() + b.coreRadius());
   Contact contact{pair.first,
                   pair.second,
                   {a.a, a.b, b.a, b.b},
                   {1.0 - gap.s, gap.s, gap.t - 1.0, -gap.t},
                   -1,
                   Eigen::Vector3d::Zero(),
-                  b0 + gap.t * f + (b.coreRadius() + 0.5 * gap.gap / gap.weight) * gap.normal,
+                  b0 + gap.t * f + (share * thickness + 0.5 * gap.gap / gap.weight) * gap.normal,
                   Eigen::Vector3d::Zero(),
                   std::sqrt(surface.objects[a.object].friction * surface.objects[b.object].friction)};
   return addContact(gap, contact, with_stiffness);
@@ -159,10 +160,11 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
   const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a) - pose.position),
                         b = to_solid * Eigen::Vector3d(x.col(s.b) - pose.position);
   const double middle = pieceDistance(piece, 0.5 * (a + b), Eigen::Vector3d::Zero()).distance;
-  if (middle > 0.5 * (b - a).norm() + s.radius + options.gap)
+  const double radius = thicknessOf(on);
+  if (middle > 0.5 * (b - a).norm() + radius + options.gap)
     return 0.0;
-  SoftGap gap = softGap(a, b, s.radius, piece);
-  const Eigen::Vector3d foot = a + gap.t * (b - a) - (gap.gap / gap.weight + s.radius) * gap.normal;
+  SoftGap gap = softGap(a, b, radius, piece);
+  const Eigen::Vector3d foot = a + gap.t * (b - a) - (gap.gap / gap.weight + radius) * gap.normal;
   gap.normal = pose.orientation * gap.normal;
   const double own = surface.objects[s.object].friction;
   const double coefficient = own > 0.0 && solid.friction >= 0.0 ? std::sqrt(own * solid.friction) : own;

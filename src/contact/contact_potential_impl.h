@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -37,10 +38,13 @@ public:
   double lagFriction();
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
+  /// What was found or thinned with other curves.
   void forgetCandidates()
   {
     near_.clear();
     swept_.clear();
+    thin_pairs_.clear();
+    thin_on_solids_.clear();
   }
   void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
 
@@ -66,6 +70,28 @@ private:
   double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact, bool with_stiffness);
   double restart();
 
+  /// What thinToFit() made room for, and the distance [m] that remains forbidden there. Only this pair is thinner: a
+  /// segment that overlaps one neighbour keeps its distance from all others.
+  struct Thinned
+  {
+    std::array<int, 3> key;   ///< two segments; or a solid, a segment and a piece
+    double thickness;
+    bool operator<(const Thinned& other) const { return key < other.key; }
+  };
+  static double thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key, double thickness);
+  /// Distances of centrelines [m] at which pairs touch.
+  double thicknessOf(const GridPairs::Pair& pair) const
+  {
+    const double full = surface.segments[pair.first].coreRadius() + surface.segments[pair.second].coreRadius();
+    return thin_pairs_.empty() ? full : thinned(thin_pairs_, {pair.first, pair.second, 0}, full);
+  }
+  double thicknessOf(const Candidates::OnSolid& on) const
+  {
+    const double full = surface.segments[on.segment].radius;
+    return thin_on_solids_.empty() ? full : thinned(thin_on_solids_, {on.solid, on.segment, on.piece}, full);
+  }
+
+  std::vector<Thinned> thin_pairs_, thin_on_solids_;   ///< sorted
   Candidates near_, swept_;
   double margin_;
   std::vector<int> order_;   ///< for clearance()

@@ -1,9 +1,25 @@
 // Surface tension (thesis 5.4.2): from derivatives by edge lengths to those by node positions.
+#include "slender_sim/thread/thread_surface.h"
+
 #include <Eigen/Dense>
 
+#include "slender_sim/energy/end_cap.h"
 #include "slender_sim/thread/thread_system.h"
 
 namespace slender {
+
+double surfaceArea(const ThreadState& state, SurfaceShape shape)
+{
+  const auto length = [&](int j) { return state.edge(j).norm(); };
+  const auto end = [&](bool held, int j) {
+    return (held ? endArea(length(j), state.volume[j]) : freeEndArea(shape, length(j), state.volume[j])).value;
+  };
+  const int last = state.edges() - 1;
+  double area = end(state.ends[0].held, 0) + end(state.ends[1].held, last);
+  for (int j = 0; j < last; ++j)
+    area += surfaceArea(shape, length(j), state.volume[j], length(j + 1), state.volume[j + 1]).value;
+  return area;
+}
 
 double ThreadSystem::addSurface(bool with_hessian)
 {
@@ -13,17 +29,22 @@ double ThreadSystem::addSurface(bool with_hessian)
     area += f.value;
     addEdgePair(joint, f, with_hessian);
   };
-  // An edge without volume is the inside of a holder. It has no surface, and the thread ends before it.
+  // An edge without volume is the inside of a holder, or lies on the floor. It has no surface, and what moves ends
+  // before it. Only the ends of the system itself are free ends, which have caps. An end that lies on the floor keeps
+  // its cap, as lying edges keep their whole surface: the fluid does not wet the floor.
+  const auto end = [&](int j, bool free) {
+    return free ? freeEndArea(shape_, length(j), volume_[j]) : endArea(length(j), volume_[j]);
+  };
   for (int i = 0; i < a_.nodes; ++i)
   {
     const bool before = i > 0 && volume_[i - 1] > 0, after = i < a_.edges && volume_[i] > 0;
     if (before && after)
       add(i, surfaceArea(shape_, length(i - 1), volume_[i - 1], length(i), volume_[i]));
     else if (before)
-      add(i, endArea(length(i - 1), volume_[i - 1]));
+      add(i, end(i - 1, i == a_.edges));
     else if (after)
     {
-      const LengthFunction f = endArea(length(i), volume_[i]);
+      const LengthFunction f = end(i, i == 0);
       add(i, {f.value, 0, f.d1, 0, 0, f.d11});
     }
   }

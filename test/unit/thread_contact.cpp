@@ -293,6 +293,24 @@ double closest(const TouchingState& state)
   return least;
 }
 
+/// Ends that are thinner than the rest. When all pairs of a segment thinned it one after the other, the threads were
+/// drawn into each other from there on, down to 0.46. Radii grow by a fifth of a gap in a step. The barrier needs some
+/// steps to follow, so it may lag behind by a part of the gap.
+TEST(TouchingThreads, MergedThreadsOfUnequalRadiiStayAtTheDistanceAskedFor)
+{
+  Pair pair(0.6, 0.3);
+  for (ThreadGroupState& group : pair.state.threads)
+    for (const int j : {0, 19})
+      group.threads[0].volume[j] *= 0.98;
+  TouchingThreads threads(pair.model, NewtonConfig{});
+  for (int k = 0; k < 80; ++k)
+  {
+    const StepReport report = threads.step(pair.state, pair.inputs, 2e-3);
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+    EXPECT_GT(closest(pair.state), 0.6 - pair.model.options.gap / (2 * pair.r)) << k;
+  }
+}
+
 /// Honey that coils on a plate.
 struct Coil : Touching
 {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/energy/surface_tension.h"
+#include "slender_sim/energy/end_cap.h"
 #include "slender_sim/thread/thread_system.h"
 #include "test/support/threads.h"
 
@@ -18,6 +18,28 @@ TEST(SurfaceTension, AConeHasItsArea)
               1e-12);
   EXPECT_NEAR(surfaceArea(SurfaceShape::cylinder, L1, M_PI * L1, L2, 4 * M_PI * L2).value, M_PI * 3 * 3, 1e-12);
   EXPECT_NEAR(endArea(2.0, M_PI * 2.0).value, M_PI * 2.0, 1e-12);
+}
+
+TEST(SurfaceTension, AFreeEndHasACapWhereSlopesCount)
+{
+  const double L = 2.0, r = 0.5, V = M_PI * r * r * L;
+  EXPECT_NEAR(freeEndArea(SurfaceShape::cone, L, V).value, M_PI * r * L + M_PI * r * r, 1e-12);
+  EXPECT_NEAR(freeEndArea(SurfaceShape::cylinder, L, V).value, M_PI * r * L, 1e-12);
+  EXPECT_NEAR(freeEndArea(SurfaceShape::cylinder, L, V).d1, endArea(L, V).d1, 1e-12);
+  // the cone that narrows to nothing over no length has the area of the cap
+  const double tip = 1e-9;
+  EXPECT_NEAR(surfaceArea(SurfaceShape::cone, tip, M_PI * r * r * tip, tip, M_PI * 1e-18 * tip).value, M_PI * r * r,
+              1e-7);
+}
+
+TEST(SurfaceTension, AnEdgeIsAtRestAsLongAsItIsWide)
+{
+  for (const double r : {0.1, 3.0})
+  {
+    const double L = 2 * r, V = M_PI * r * r * L;
+    EXPECT_NEAR(freeEndArea(SurfaceShape::cone, L, V).d1, 0.0, 1e-14);
+    EXPECT_GT(freeEndArea(SurfaceShape::cone, L, V).d11, 0.0);
+  }
 }
 
 TEST(SurfaceTension, DerivativesMatchDifferences)
@@ -40,6 +62,9 @@ TEST(SurfaceTension, DerivativesMatchDifferences)
     const LengthFunction e = endArea(L1, V1), ep = endArea(L1 + d, V1), em = endArea(L1 - d, V1);
     EXPECT_NEAR(e.d1, (ep.value - em.value) / (2 * d), 1e-8);
     EXPECT_NEAR(e.d11, (ep.d1 - em.d1) / (2 * d), 1e-7);
+    const auto free = [&](double l) { return freeEndArea(shape, l, V1); };
+    EXPECT_NEAR(free(L1).d1, (free(L1 + d).value - free(L1 - d).value) / (2 * d), 1e-7);
+    EXPECT_NEAR(free(L1).d11, (free(L1 + d).d1 - free(L1 - d).d1) / (2 * d), 1e-6);
   }
 }
 
@@ -50,6 +75,47 @@ TEST(SurfaceTension, AUniformThreadPullsWithPiGammaRadius)
   const LengthFunction cone = surfaceArea(SurfaceShape::cone, L, V, L, V);
   EXPECT_NEAR(cone.d1 + cone.d2, M_PI * r, 1e-12);
   EXPECT_NEAR(2 * endArea(L, V).d1, M_PI * r, 1e-12);
+}
+
+/// A straight thread of equal edges along x with surface tension alone. The first node is a free end. With `held` the
+/// last edge is the inside of a holder.
+void setUniform(ThreadSystem& system, int edges, double length, double radius, double gamma, bool held)
+{
+  system.resize(edges + 1);
+  for (int i = 0; i <= edges; ++i)
+    system.setNode(i, {length * i, 0, 0});
+  for (int j = 0; j < edges; ++j)
+    system.setFrame(j, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY());
+  system.takeRestStrains();
+  system.setSurfaceTension(gamma, SurfaceShape::cone);
+  for (int j = 0; j < edges - held; ++j)
+    system.setEdge(j, 1.0, M_PI * radius * radius * length);
+}
+
+/// At a cut the surface pulls with 2 pi r gamma and the pressure gamma / r pushes with pi r gamma: pi r gamma is left,
+/// wherever the cut is. The cap only shares this force out between the nodes of the tip.
+TEST(SurfaceTension, TheTipOfAThreadIsPulledWithPiGammaRadius)
+{
+  const double gamma = 0.7, r = 0.3, L = 0.5;
+  ThreadSystem system;
+  setUniform(system, 12, L, r, gamma, false);
+  system.evaluate(false);
+  double pull = 0.0;
+  for (int i = 0; i < 11; ++i)
+  {
+    pull -= system.reaction(i)[0];
+    EXPECT_NEAR(pull, M_PI * gamma * r * (i == 0 ? 1.0 - r / L : 1.0), 1e-12) << i;
+  }
+}
+
+TEST(SurfaceTension, AHeldEndHasNoCap)
+{
+  const double gamma = 0.7, r = 0.3, L = 0.5, side = 2.0 * M_PI * r * L, cap = M_PI * r * r;
+  ThreadSystem system;
+  setUniform(system, 5, L, r, gamma, false);
+  EXPECT_NEAR(system.evaluate(false).energy(), gamma * (5 * side + 2 * cap), 1e-12);
+  setUniform(system, 6, L, r, gamma, true);
+  EXPECT_NEAR(system.evaluate(false).energy(), gamma * (5 * side + cap), 1e-12);
 }
 
 /// A thread's step with every part of its energy at work, at a strained base. The last edge is the inside of a holder.

@@ -172,8 +172,7 @@ void checkHeight(const Falls& falls, const ThreadConfig& thread, const YamlCurso
   }
 }
 
-/// Thin fluid that comes out slowly does not form a thread: it hangs as a drop until its weight tears it off. Slender
-/// theory has no end cap that would keep such a drop round.
+/// Thin fluid that comes out slowly does not form a thread: it hangs as a drop until its weight tears it off.
 void checkDripping(const ThreadConfig& thread, const YamlCursor& at, double gravity)
 {
   const NozzleConfig& nozzle = *thread.nozzle;

@@ -8,6 +8,7 @@
 #include "slender_sim/scene/reader.h"
 #include "study/framework/cpu_clock.h"
 #include "slender_sim/scene/state_bytes.h"
+#include "slender_sim/thread/thread_surface.h"
 
 namespace slender::study {
 
@@ -192,14 +193,16 @@ Energy energyOf(const Simulation& simulation)
   // A thread stores none but by its motion, weight and surface.
   Energy e;
   for (const ThreadState& t : state.threads[0].threads)
+  {
+    e.now += config.threads[0].surface_tension * surfaceArea(t);
     for (int j = 0; j < t.edges(); ++j)
     {
-      const double mass = config.threads[0].density * t.volume[j], length = (t.x[j + 1] - t.x[j]).norm();
+      const double mass = config.threads[0].density * t.volume[j];
       e.mass += mass;
       for (const int i : {j, j + 1})
         e.now += 0.5 * mass * (0.5 * t.v[i].squaredNorm() - config.gravity.dot(t.x[i]));
-      e.now += config.threads[0].surface_tension * 2.0 * std::sqrt(M_PI * t.volume[j] * length);
     }
+  }
   return e;
 }
 

@@ -12,6 +12,7 @@
 #include "slender_sim/scene/simulation.h"
 #include "study/framework/cpu_clock.h"
 #include "slender_sim/thread/thread_group.h"
+#include "slender_sim/thread/thread_surface.h"
 
 namespace slender::study {
 
@@ -143,7 +144,7 @@ private:
     return "";
   }
 
-  /// Kinetic and potential energy, and that of the lateral surface [J].
+  /// Kinetic and potential energy, and that of the surface [J].
   double energyOf(const ThreadGroupState& group) const
   {
     double energy = 0.0;
@@ -151,8 +152,7 @@ private:
     {
       for (int i = 0; i < t.nodes(); ++i)
         energy += fluid_.density * nodeVolume(t, i) * (0.5 * t.v[i].squaredNorm() + kPourGravity * t.x[i].z());
-      for (int j = 0; j < t.edges(); ++j)
-        energy += fluid_.surface_tension * 2.0 * M_PI * t.radius(j) * t.edge(j).norm();
+      energy += fluid_.surface_tension * surfaceArea(t);
     }
     return energy;
   }

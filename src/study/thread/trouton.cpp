@@ -59,6 +59,7 @@ Hanging hang(double gamma, int edges, double h, double time)
   t.model.viscosity = kMu;
   t.model.density = 1.0;
   t.model.surface_tension = gamma;
+  t.model.surface_shape = SurfaceShape::cylinder;   // the formula is slender theory's
   t.inputs.gravity = {981.0, 0, 0};
   t.hold(0);
   ThreadStepper stepper = makeStepper(t);
