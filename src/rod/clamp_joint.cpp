@@ -1,10 +1,12 @@
 // The half joint between a clamped section and the free edge beyond it: the same stencil as every other joint, with the
 // section in the place of the missing edge.
+#include "slender_sim/rod/clamp_joint.h"
+
+#include <algorithm>
 #include <cmath>
 
 #include "slender_sim/energy/compensated_response.h"
 #include "slender_sim/geometry/rotation.h"
-#include "slender_sim/rod/rod_system.h"
 
 namespace slender {
 
@@ -13,12 +15,33 @@ Vec3<double> vec(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Vec3<double> at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
 }   // namespace
 
-void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& sum)
+void ClampJoints::add(const ChainRange& range, RodEvaluation& sum)
 {
-  const int j = c.edge, next = j + 1 < a_.nodes ? j + 1 : 0;
+  const int n = range.arrays.nodes;
+  for (ClampJoint& c : joints)
+    if (const int newest = std::max(c.edge, (c.edge + 1) % n); newest >= range.from && newest < range.to)
+      evaluate(c, range, sum);
+}
+
+void ClampJoints::accept()
+{
+  for (ClampJoint& c : joints)
+  {
+    c.base_t = c.t;
+    c.base_d1 = c.d1;
+    c.base_twist = c.twist;
+    c.turn = 0.0;
+  }
+}
+
+void ClampJoints::evaluate(ClampJoint& c, const ChainRange& range, RodEvaluation& sum) const
+{
+  const RodArrays& a = range.arrays;
+  const bool with_hessian = range.panels;
+  const int j = c.edge, next = j + 1 < a.nodes ? j + 1 : 0;
   const Vec3<double> section_t = vec(c.t), section_d1 = vec(c.d1), section_d2 = vec(c.t.cross(c.d1));
-  const Vec3<double> edge_t = at(a_.t, j), edge_d1 = at(a_.d1, j), edge_d2 = cross(edge_t, edge_d1);
-  const double inverse = a_.inverse_length[j];
+  const Vec3<double> edge_t = at(a.t, j), edge_d1 = at(a.d1, j), edge_d2 = cross(edge_t, edge_d1);
+  const double inverse = a.inverse_length[j];
   const bool section_first = c.side == 1;
   const JointFrames<double> frames =
       section_first
@@ -28,7 +51,7 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   const Eigen::Vector3d te(edge_t.x, edge_t.y, edge_t.z), de(edge_d1.x, edge_d1.y, edge_d1.z);
   const double angle = section_first ? signedAngle(parallelTransport(c.d1, c.t, te), de, te)
                                      : signedAngle(parallelTransport(de, te, c.t), c.d1, c.t);
-  const double turned = section_first ? a_.turn[j] - c.turn : c.turn - a_.turn[j];
+  const double turned = section_first ? a.turn[j] - c.turn : c.turn - a.turn[j];
   c.twist = unwrapNear(angle, c.base_twist + turned);
 
   const JointStrains<double> strains = jointStrains(frames);
@@ -39,7 +62,7 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   JointGradient<double> g;
   JointHessian<double> h;
   JointResponse<double> response;
-  if (model_.curvature == Curvature::compensated)
+  if (curvature_ == Curvature::compensated)
   {
     const JointCompensation<double> compensation = {c.scale * c.scale * c.coupling,
                                                     std::sqrt(0.5 / strains.inverse_chi), std::sin(0.5 * c.twist),
@@ -67,10 +90,10 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   const double force[3] = {ge.x, ge.y, ge.z};
   for (int k = 0; k < 3; ++k)
   {
-    gradient_[4 * j + k] -= force[k];
-    gradient_[4 * next + k] += force[k];
+    a.gradient[4 * j + k] -= force[k];
+    a.gradient[4 * next + k] += force[k];
   }
-  gradient_[4 * j + 3] += gt;
+  a.gradient[4 * j + 3] += gt;
   c.gradient_e << ge.x, ge.y, ge.z;
   c.gradient_t = gt;
   c.torque = (1.0 / inverse) * te.cross(c.gradient_e) + gt * te;
@@ -84,8 +107,8 @@ void RodSystem::evaluateClamp(ClampJoint& c, bool with_hessian, RodEvaluation& s
   c.hessian_ee << s.xx, s.xy, s.xz, s.xy, s.yy, s.yz, s.xz, s.yz, s.zz;
   c.hessian_et << m.x, m.y, m.z;
   c.hessian_tt = section_first ? h.tf_tf : h.te_te;
-  RodPanel& p = panel(j);
-  RodPanel& q = panel(next);
+  RodPanel& p = range.panel(j);
+  RodPanel& q = range.panel(next);
   for (int col = 0; col < 3; ++col)
   {
     for (int row = 0; row < 3; ++row)

@@ -9,19 +9,7 @@ namespace slender {
 namespace {
 
 constexpr int kPrescribed = -1;
-constexpr int kRows = 11;   // of a panel: its own block, the next, and the positions after that
-
-double entry(const RodPanel& p, int column, int row)
-{
-  return row < 4 ? p.diag[column][row] : p.below[column][row - 4];
-}
-
-/// The unknown that row `row` of node i's panel belongs to, -1 beyond the end of an open rod.
-int panelDof(const RodModel& model, int node, int row)
-{
-  const int n = model.nodes(), at = node + row / 4;
-  return at < n ? 4 * at + row % 4 : model.closed ? 4 * (at - n) + row % 4 : -1;
-}
+constexpr int kRows = ChainSystem::kPanelRows;
 
 }   // namespace
 
@@ -185,13 +173,13 @@ void CoupledSystem::buildPattern()
   {
     if (!part.coupled)
       continue;
-    const RodModel& model = *part.rod->model;
+    const RodSystem& system = part.rod->system;
     part.carried_entries.clear();
-    for (int i = 0; i < model.nodes(); ++i)
+    for (int i = 0; i < system.nodes(); ++i)
       for (int c = 0; c < 4; ++c)
         for (int r = c; r < kRows; ++r)
         {
-          const int a = 4 * i + c, b = panelDof(model, i, r);
+          const int a = 4 * i + c, b = system.panelUnknown(i, r);
           if (b < 0 || part.dof[a] == kPrescribed || part.dof[b] == kPrescribed)
             continue;
           if (part.dof[a] >= 0 && part.dof[b] >= 0)
@@ -205,11 +193,11 @@ void CoupledSystem::buildPattern()
           mapDof(part, b, 1.0, cb);
           notePairs(ca, cb);
         }
-    for (const ClampJoint& clamp : part.rod->system.clamps())
+    for (const ClampJoint& clamp : system.clamps())
       if (const int body = part.rod->work.grasps[clamp.grasp].body; body >= 0)
       {
         Columns edge, turn;
-        const int next = (clamp.edge + 1) % model.nodes();
+        const int next = (clamp.edge + 1) % system.nodes();
         for (int c = 0; c < 3; ++c)
         {
           mapDof(part, 4 * clamp.edge + c, 1.0, edge);
@@ -245,12 +233,12 @@ void CoupledSystem::buildPattern()
     part.slots.clear();
     if (!part.coupled)
       continue;
-    const RodModel& model = *part.rod->model;
-    for (int i = 0; i < model.nodes(); ++i)
+    const RodSystem& system = part.rod->system;
+    for (int i = 0; i < system.nodes(); ++i)
       for (int c = 0; c < 4; ++c)
         for (int r = c; r < kRows; ++r)
         {
-          const int a = part.dof[4 * i + c], at = panelDof(model, i, r), b = at < 0 ? kPrescribed : part.dof[at];
+          const int a = part.dof[4 * i + c], at = system.panelUnknown(i, r), b = at < 0 ? kPrescribed : part.dof[at];
           part.slots.push_back(
               a >= 0 && b >= 0 ? matrix_.index(part.offset + std::max(a, b), part.offset + std::min(a, b)) : -1);
         }
@@ -287,8 +275,8 @@ void CoupledSystem::addCarried(const RodPart& part)
   Columns a, b;
   for (const auto& [node, column, row] : part.carried_entries)
   {
-    const double value = entry(panels[node], column, row);
-    const int dof = panelDof(*part.rod->model, node, row);
+    const double value = ChainSystem::panelEntry(panels[node], column, row);
+    const int dof = system.panelUnknown(node, row);
     a.count = b.count = 0;
     mapDof(part, 4 * node + column, 1.0, a);
     if (dof == 4 * node + column)
@@ -367,13 +355,13 @@ void CoupledSystem::assemble(const HessianShift& shift, bool whole)
     const RodPanel* panels = system.panels();
     const int* slot = part.slots.data();
     double* values = matrix_.values();
-    for (int i = 0; i < part.rod->model->nodes(); ++i)
+    for (int i = 0; i < system.nodes(); ++i)
     {
       const auto shifts = system.diagonalShift(i, shift);
       for (int c = 0; c < 4; ++c)
         for (int r = c; r < kRows; ++r, ++slot)
           if (*slot >= 0)
-            values[*slot] += entry(panels[i], c, r) + (r == c ? shifts[c == 3] : 0.0);
+            values[*slot] += ChainSystem::panelEntry(panels[i], c, r) + (r == c ? shifts[c == 3] : 0.0);
     }
     if (part.welded)
     {

@@ -26,7 +26,7 @@ void RodSystem::compose(const RodState& state)
     return a.active == b.active && a.first_node == b.first_node && a.last_node == b.last_node &&
            a.holds_frame == b.holds_frame && a.body == b.body;
   };
-  const bool unchanged = !held_.empty() && grasps_.size() == state.grasps.size() &&
+  const bool unchanged = composition_ > 0 && grasps_.size() == state.grasps.size() &&
                          std::equal(grasps_.begin(), grasps_.end(), state.grasps.begin(), same);
   grasps_ = state.grasps;
   if (unchanged)
@@ -34,10 +34,8 @@ void RodSystem::compose(const RodState& state)
   ++composition_;
 
   const int n = a_.nodes, edges = a_.edges;
-  held_.assign(n, 0);
+  releaseAll();
   carried_.assign(n, 0);
-  held_nodes_.clear();
-  held_angles_.clear();
   std::vector<char> jointless(n, 0);
   if (!model_.closed)
     jointless[0] = jointless[n - 1] = 1;
@@ -45,23 +43,20 @@ void RodSystem::compose(const RodState& state)
     if (g.active)
       for (int i = g.first_node; i <= g.last_node; ++i)
       {
-        held_nodes_.push_back(i);
-        held_[i] = static_cast<int>(held_nodes_.size());
+        hold(i);
         carried_[i] = g.body >= 0;
         if (g.holds_frame)
           jointless[i] = 1;
         if (i < g.last_node)
-          held_angles_.push_back(i);
+          holdTurn(i);
       }
-  reactions_.assign(held_nodes_.size(), Eigen::Vector4d::Zero());
-  angle_reactions_.assign(held_angles_.size(), 0.0);
 
   // Voronoi lengths of the joints that remain, with the half cells of the clamps next to them
   std::vector<double> length(n, 0.0);
   for (int i = 0; i < n; ++i)
     if (!jointless[i])
       length[i] = 0.5 * (model_.rest_length[before(i)] + model_.rest_length[i]);
-  clamps_.clear();
+  clamps_.joints.clear();
   for (int g = 0; g < static_cast<int>(grasps_.size()); ++g)
     if (grasps_[g].active && grasps_[g].holds_frame)
       for (int side = 0; side < 2; ++side)
@@ -109,7 +104,7 @@ void RodSystem::compose(const RodState& state)
         c.rest_kappa2 = half[1];
         c.rest_twist = share * m;
         c.coupling = couplingOf(model_, node);
-        clamps_.push_back(c);
+        clamps_.joints.push_back(c);
       }
 
   const auto resize = [n](AlignedVector<double>& v) { v.assign(n, 0.0); };
@@ -137,8 +132,9 @@ void RodSystem::compose(const RodState& state)
   shift_x_ = 1e-2 * bend;
   shift_theta_ = twist;
   // A rod whose frames nobody holds can spin about itself without energy (if isotropic): keep its matrix definite.
-  spin_ = clamps_.empty() && held_angles_.empty() ? 1e-8 * twist : 0.0;
-  if (!storage_.empty())
+  spin_ = clamps_.joints.empty() && heldTurns().empty() ? 1e-8 * twist : 0.0;
+  listTerms();
+  if (allocated())
     setResponse(0.0, nullptr);
 }
 
@@ -153,15 +149,14 @@ void RodSystem::placeGrasps(const std::vector<Pose>& X_WG)
       setPosition(i, X_WG[k] * g.nodes_G[i - g.first_node]);
     for (int j = g.first_node; j < g.last_node; ++j)
     {
-      const Eigen::Vector3d t0(a_.base_t[0][j], a_.base_t[1][j], a_.base_t[2][j]),
-          d0(a_.base_d1[0][j], a_.base_d1[1][j], a_.base_d1[2][j]);
+      const Eigen::Vector3d t0 = get(a_.base_t, j), d0 = get(a_.base_d1, j);
       const Eigen::Vector3d t = (position(j + 1) - position(j)).normalized();
       const Eigen::Vector3d d = X_WG[k].orientation * g.directors_G[j - g.first_node];
       a_.turn[j] = signedAngle(parallelTransport(d0, t0, t), d, t);
     }
   }
   wrapHalo(a_.turn, a_.edges);
-  for (ClampJoint& c : clamps_)
+  for (ClampJoint& c : clamps_.joints)
   {
     const Eigen::Matrix3d section = X_WG[c.grasp].orientation.toRotationMatrix() * grasps_[c.grasp].section_G[c.side];
     c.t = section.col(0);
@@ -199,7 +194,10 @@ void RodSystem::setResponse(double r, const Eigen::Matrix4Xd* strain)
       a_.coupling[i] = scale * scale * coupling_[i];
     wrapHalo(a_.coupling, n);
   }
-  for (ClampJoint& c : clamps_)
+  // A joint's bending is stiffer than an edge's stretching where edges are shorter than the rod is thick.
+  const double h = min_rest_length_;
+  node_stiffness_ = scale * ((no_stretching_ ? 0.0 : stretch_modulus_ / h) + bend_modulus_ / (h * h * h));
+  for (ClampJoint& c : clamps_.joints)
   {
     const int column = n + 2 * c.grasp + c.side;
     c.scale = scale;

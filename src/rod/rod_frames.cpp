@@ -15,9 +15,9 @@ double RodSystem::solveFrames()
   double* off = a_.theta_off;   // off[j] couples edges j and j+1
   for (int j = 0; j < edges; ++j)
     d[j] += spin_;
-  for (ClampJoint& c : clamps_)
+  for (ClampJoint& c : clamps_.joints)
     d[c.edge] += c.beta * c.scale;
-  for (int edge : held_angles_)
+  for (int edge : heldTurns())
   {
     d[edge] = 1.0;
     off[edge] = 0.0;
@@ -94,12 +94,12 @@ void RodSystem::storeTurned(RodState& state) const
   const double* turn = reduced_.data();
   for (int j = 0; j < a_.edges; ++j)
   {
-    const Eigen::Vector3d t(a_.t[0][j], a_.t[1][j], a_.t[2][j]), d = state.d1.col(j);
+    const Eigen::Vector3d t = get(a_.t, j), d = state.d1.col(j);
     state.d1.col(j) = (std::cos(turn[j]) * d + std::sin(turn[j]) * t.cross(d)).normalized();
   }
   for (int i = model_.closed ? 0 : 1; i < (model_.closed ? a_.nodes : a_.nodes - 1); ++i)
     state.twist[i] += turn[i] - turn[before(i)];
-  for (const ClampJoint& c : clamps_)
+  for (const ClampJoint& c : clamps_.joints)
     state.grasps[c.grasp].section_twist[c.side] += c.side == 1 ? turn[c.edge] : -turn[c.edge];
 }
 

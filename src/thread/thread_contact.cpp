@@ -6,17 +6,6 @@
 
 namespace slender {
 
-namespace {
-
-constexpr int kRows = 11;   // of a panel: its own block, the next, and the positions after that
-
-double entry(const RodPanel& p, int column, int row)
-{
-  return row < 4 ? p.diag[column][row] : p.below[column][row - 4];
-}
-
-}   // namespace
-
 int ThreadContact::dofOf(int point) const
 {
   const Part& part = parts_[point_part_[point]];
@@ -30,7 +19,7 @@ void ThreadContact::mapUnknowns()
   for (std::size_t p = 0; p < part_count_; ++p)
   {
     Part& part = parts_[p];
-    const ThreadSystem& system = part.thread->system;
+    const ChainSystem& system = part.thread->system;
     const int count = 4 * system.nodes();
     bool same = static_cast<int>(part.dof.size()) == count;
     part.dof.resize(count);
@@ -88,12 +77,12 @@ void ThreadContact::buildPattern()
     columns_[u].clear();
   const auto note = [&](int a, int b) { columns_[std::min(a, b)].push_back(std::max(a, b)); };
   const auto forPanels = [&](const Part& part, auto&& f) {
-    const int n = systemOf(part).nodes();
-    for (int i = 0; i < n; ++i)
+    const ChainSystem& system = systemOf(part);
+    for (int i = 0; i < system.nodes(); ++i)
       for (int c = 0; c < 4; ++c)
-        for (int r = c; r < kRows; ++r)
+        for (int r = c; r < ChainSystem::kPanelRows; ++r)
         {
-          const int a = part.dof[4 * i + c], b = i + r / 4 < n ? part.dof[4 * i + r] : -1;
+          const int a = part.dof[4 * i + c], at = system.panelUnknown(i, r), b = at < 0 ? -1 : part.dof[at];
           f(a < 0 || b < 0 ? -1 : part.offset + a, part.offset + b);
         }
   };
@@ -149,16 +138,16 @@ void ThreadContact::assemble(const HessianShift& shift, bool whole)
     const Part& part = parts_[p];
     if (!part.touched)
       continue;
-    ThreadSystem& system = part.thread->system;
+    ChainSystem& system = part.thread->system;
     const RodPanel* panels = system.panels();
     const int* slot = part.slots.data();
     for (int i = 0; i < system.nodes(); ++i)
     {
       const auto shifts = system.diagonalShift(i, shift);
       for (int c = 0; c < 4; ++c)
-        for (int r = c; r < kRows; ++r, ++slot)
+        for (int r = c; r < ChainSystem::kPanelRows; ++r, ++slot)
           if (*slot >= 0)
-            values[*slot] += entry(panels[i], c, r) + (r == c ? shifts[c == 3] : 0.0);
+            values[*slot] += ChainSystem::panelEntry(panels[i], c, r) + (r == c ? shifts[c == 3] : 0.0);
     }
   }
   // of four points, block(i, j) for i, j
@@ -224,7 +213,7 @@ RodEvaluation ThreadContact::evaluate(bool with_hessian, const HessianShift& shi
   for (std::size_t p = 0; p < part_count_; ++p)
   {
     Part& part = parts_[p];
-    ThreadSystem& system = part.thread->system;
+    ChainSystem& system = part.thread->system;
     const RodEvaluation e = part.touched ? system.evaluateWhole(with_hessian) : system.evaluate(with_hessian, shift);
     sum.stretch += e.stretch;
     sum.bend_twist += e.bend_twist;

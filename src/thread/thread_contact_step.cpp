@@ -103,7 +103,7 @@ void ThreadContact::gather(Eigen::Matrix3Xd& x) const
     const Part& part = parts_[p];
     for (int i = 0; i < part.thread->work.nodes(); ++i)
       if (const int k = part.thread->inSystem(i); k >= 0)
-        x.col(part.point + i) = part.thread->system.node(k);
+        x.col(part.point + i) = part.thread->system.position(k);
   }
 }
 
@@ -237,7 +237,7 @@ Approach ThreadContact::approach(double from, double to, double& reached)
         const int point = parts_[p].point + i, k = parts_[p].thread->inSystem(i);
         if (k >= 0)
           parts_[p].thread->placeNode(i, points_.col(point));
-        if ((k < 0 || systemOf(parts_[p]).nodeHeld(k)) && points_.col(point) != points_target_.col(point))
+        if ((k < 0 || !systemOf(parts_[p]).isFree(k)) && points_.col(point) != points_target_.col(point))
           driven = true;
       }
     const RodEvaluation trial = evaluate(false);
@@ -257,7 +257,7 @@ void ThreadContact::placeHeld(double /*to*/)
 {
   for (std::size_t p = 0; p < part_count_; ++p)
     for (int i = 0; i < parts_[p].thread->work.nodes(); ++i)
-      if (const int n = parts_[p].thread->inSystem(i); n >= 0 && systemOf(parts_[p]).nodeHeld(n))
+      if (const int n = parts_[p].thread->inSystem(i); n >= 0 && !systemOf(parts_[p]).isFree(n))
         parts_[p].thread->placeNode(i, points_target_.col(parts_[p].point + i));
 }
 

@@ -152,7 +152,7 @@ Largest ThreadStepper::Impl::unbalancedForce() const
   Largest force;
   for (int i = std::max(first_, 0); i < work.nodes(); ++i)
     if (const int k = inSystem(i); k >= 0 && k < system.nodes() && !isHeld(i))
-      force.add(i, system.reaction(k).head<3>().norm());
+      force.add(i, system.nodeGradient(k).norm());
   return force;
 }
 

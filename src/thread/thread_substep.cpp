@@ -23,7 +23,7 @@ bool ThreadStepper::Impl::loadSystem(double h)
   system.resize(last + 1 + (work.ends[1].held ? 1 : 0));
   for (int i = first_; i < n; ++i)
   {
-    system.setNode(inSystem(i), work.x[i]);
+    system.setPosition(inSystem(i), work.x[i]);
     system.setTwist(inSystem(i), work.twist[i]);
   }
   for (int j = first_; j + 1 < n; ++j)
@@ -32,7 +32,7 @@ bool ThreadStepper::Impl::loadSystem(double h)
   if (offset_)
   {
     const Eigen::Matrix3d section = work.ends[0].X_WE.orientation.toRotationMatrix();
-    system.setNode(0, work.x[0] - section.col(0) * work.edge(0).norm());
+    system.setPosition(0, work.x[0] - section.col(0) * work.edge(0).norm());
     system.setFrame(0, section.col(0), section.col(1));
   }
   if (work.ends[1].held)
@@ -49,8 +49,8 @@ bool ThreadStepper::Impl::loadSystem(double h)
       system.setTwist(last, work.twist[n - 1] - shed);
       system.setTwist(last - 1, work.twist[n - 2] + shed);
     }
-    system.setNode(last, end);
-    system.setNode(last + 1, end - section.col(0) * (length + advance));
+    system.setPosition(last, end);
+    system.setPosition(last + 1, end - section.col(0) * (length + advance));
     system.setFrame(last, -section.col(0), section.col(1));
   }
   return system.takeRestStrains().min_chi > kFoldedChi;
@@ -86,7 +86,7 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
       const double length = system.restLength(k);
       volume_after = volume(i, h);
       if (isSolid(i))
-        system.holdAngle(k);
+        system.holdTurn(k);
       else
       {
         const double area = volume_after / length, share = deformingShare(i);
@@ -110,20 +110,20 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
     const bool held = work.deposited[i] || endHeld(i);
     system.setInertia(k, held ? 0.0 : mass / (h * h), work.x[i] + h * work.v[i], mass * inputs.gravity);
     if (held)
-      system.holdNode(k);
+      system.hold(k);
     length_before = length_after;
     radius_before = radius_after;
     volume_before = volume_after;
   }
   if (offset_)
   {
-    system.holdNode(0);
-    system.holdAngle(0);
+    system.hold(0);
+    system.holdTurn(0);
   }
   if (work.ends[1].held)
   {
-    system.holdNode(lastInSystem() + 1);
-    system.holdAngle(lastInSystem());
+    system.hold(lastInSystem() + 1);
+    system.holdTurn(lastInSystem());
   }
 }
 
@@ -132,19 +132,19 @@ void ThreadStepper::Impl::setTrial(const ThreadInputs& inputs, double h)
 {
   const int n = work.nodes(), last = lastInSystem();
   for (int i = first_; i < n; ++i)
-    system.setNode(inSystem(i), work.x[i] + h * (work.deposited[i] ? inputs.belt_velocity : work.v[i]));
+    system.setPosition(inSystem(i), work.x[i] + h * (work.deposited[i] ? inputs.belt_velocity : work.v[i]));
   if (offset_)
   {
     const Eigen::Matrix3d section = end_poses[0].orientation.toRotationMatrix();
-    system.setNode(1, end_poses[0].position);
-    system.setNode(0, end_poses[0].position - section.col(0) * system.restLength(0));
+    system.setPosition(1, end_poses[0].position);
+    system.setPosition(0, end_poses[0].position - section.col(0) * system.restLength(0));
     system.setFrame(0, section.col(0), section.col(1));
   }
   if (work.ends[1].held)
   {
     const Eigen::Matrix3d section = end_poses[1].orientation.toRotationMatrix();
-    system.setNode(last, end_poses[1].position);
-    system.setNode(last + 1, end_poses[1].position - section.col(0) * system.restLength(last));
+    system.setPosition(last, end_poses[1].position);
+    system.setPosition(last + 1, end_poses[1].position - section.col(0) * system.restLength(last));
     system.setFrame(last, -section.col(0), section.col(1));
   }
 }
@@ -186,9 +186,10 @@ void ThreadStepper::Impl::push(double h)
   {
     const int k = inSystem(i);
     if (!work.deposited[i] && !endHeld(i))
-      work.v[i] -= system.reaction(k).head<3>() / (h * a.weight[k]);
+      work.v[i] -= system.nodeGradient(k) / (h * a.weight[k]);
     if (i + 1 < work.nodes() && system.spinWeight(k) > 0)
-      work.spin[i] -= system.reaction(k)[3] / (h * system.spinWeight(k)) * (work.edge(i).norm() / system.restLength(k));
+      work.spin[i] -=
+          system.angleGradient(k) / (h * system.spinWeight(k)) * (work.edge(i).norm() / system.restLength(k));
   }
 }
 
@@ -205,7 +206,8 @@ bool ThreadStepper::Impl::meetsFloor(int i, double& when) const
 {
   if (work.deposited[i] || landed[i] || endHeld(i))
     return false;
-  const double height = restingHeight(i), above = work.x[i].z() - height, after = system.node(inSystem(i)).z() - height;
+  const double height = restingHeight(i), above = work.x[i].z() - height,
+               after = system.position(inSystem(i)).z() - height;
   if (after >= 0)
     return false;
   when = above > 0 ? above / (above - after) : 0.0;
@@ -230,9 +232,9 @@ void ThreadStepper::Impl::stopLanding(double h, double earliest)
     if (meetsFloor(i, when) && when <= earliest + kTogether)
     {
       const int k = inSystem(i);
-      const Eigen::Vector3d x = work.x[i] + when * (system.node(k) - work.x[i]);
-      system.setNode(k, x + (1.0 - when) * h * inputs_->belt_velocity);
-      system.holdNode(k);
+      const Eigen::Vector3d x = work.x[i] + when * (system.position(k) - work.x[i]);
+      system.setPosition(k, x + (1.0 - when) * h * inputs_->belt_velocity);
+      system.hold(k);
       landed[i] = 1;
     }
 }
@@ -256,8 +258,8 @@ void ThreadStepper::Impl::placeNode(int node, const Eigen::Vector3d& x)
   const int k = inSystem(node);
   const int inside = node == 0 && offset_ ? 0 : node + 1 == work.nodes() && work.ends[1].held ? k + 1 : -1;
   if (inside >= 0)
-    system.setNode(inside, system.node(inside) + x - system.node(k));
-  system.setNode(k, x);
+    system.setPosition(inside, system.position(inside) + x - system.position(k));
+  system.setPosition(k, x);
 }
 
 /// Two neighbours that lie on the floor hold up a node between them. It would creep down for ever, and until it has
@@ -293,7 +295,7 @@ void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
       work.v[i] = inputs.belt_velocity;
       continue;
     }
-    const Eigen::Vector3d x = system.node(inSystem(i));
+    const Eigen::Vector3d x = system.position(inSystem(i));
     work.v[i] = landed[i] ? inputs.belt_velocity : Eigen::Vector3d((x - work.x[i]) / h);
     work.x[i] = x;
     work.deposited[i] = landed[i];
@@ -325,12 +327,12 @@ void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
 EndLoad ThreadStepper::Impl::endLoad(int end) const
 {
   const int node = end ? lastInSystem() : 1, inside = end ? node + 1 : 0, edge = end ? node : 0;
-  const Eigen::Vector4d at = system.reaction(node), beyond = system.reaction(inside);
-  const Eigen::Vector3d arm = system.node(inside) - system.node(node);
+  const Eigen::Vector3d at = system.nodeGradient(node), beyond = system.nodeGradient(inside);
+  const Eigen::Vector3d arm = system.position(inside) - system.position(node);
   const Eigen::Vector3d tangent = (end ? -1.0 : 1.0) * (end_poses[end].orientation * Eigen::Vector3d::UnitX());
   EndLoad load;
-  load.force = -(at + beyond).head<3>();
-  load.torque = -arm.cross(beyond.head<3>()) - system.reaction(edge)[3] * tangent;
+  load.force = -(at + beyond);
+  load.torque = -arm.cross(beyond) - system.angleGradient(edge) * tangent;
   return load;
 }
 

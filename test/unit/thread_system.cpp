@@ -83,7 +83,7 @@ void setUniform(ThreadSystem& system, int edges, double length, double radius, d
 {
   system.resize(edges + 1);
   for (int i = 0; i <= edges; ++i)
-    system.setNode(i, {length * i, 0, 0});
+    system.setPosition(i, {length * i, 0, 0});
   for (int j = 0; j < edges; ++j)
     system.setFrame(j, Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY());
   system.takeRestStrains();
@@ -103,7 +103,7 @@ TEST(SurfaceTension, TheTipOfAThreadIsPulledWithPiGammaRadius)
   double pull = 0.0;
   for (int i = 0; i < 11; ++i)
   {
-    pull -= system.reaction(i)[0];
+    pull -= system.nodeGradient(i)[0];
     EXPECT_NEAR(pull, M_PI * gamma * r * (i == 0 ? 1.0 - r / L : 1.0), 1e-12) << i;
   }
 }
@@ -131,7 +131,7 @@ struct Equations
     system.resize(n);
     for (int i = 0; i < n; ++i)
     {
-      system.setNode(i, state.x[i]);
+      system.setPosition(i, state.x[i]);
       system.setTwist(i, state.twist[i]);
     }
     for (int j = 0; j + 1 < n; ++j)
@@ -151,7 +151,7 @@ struct Equations
       }
     }
     for (int i = 0; i < n; ++i)
-      system.setNode(i, state.x[i] + random.vector(0.1));
+      system.setPosition(i, state.x[i] + random.vector(0.1));
     system.evaluate(false);
     system.accept();
   }
@@ -194,19 +194,19 @@ TEST_P(ThreadEquations, GradientAndHessianMatchDifferences)
 TEST_P(ThreadEquations, HeldUnknownsStay)
 {
   Equations e(GetParam(), 5);
-  e.system.holdNode(3);
-  e.system.holdAngle(6);
+  e.system.hold(3);
+  e.system.holdTurn(6);
   e.system.moveAlong(0.0);
   e.system.evaluate(true);
-  const Eigen::Vector3d before = e.system.node(3), other = e.system.node(4);
+  const Eigen::Vector3d before = e.system.position(3), other = e.system.position(4);
   const double turn = e.system.turn(6);
   e.system.solve();
   e.system.moveAlong(1.0);
-  EXPECT_EQ(e.system.node(3), before);
+  EXPECT_EQ(e.system.position(3), before);
   EXPECT_EQ(e.system.turn(6), turn);
-  EXPECT_NE(e.system.node(4), other);
+  EXPECT_NE(e.system.position(4), other);
   e.system.evaluate(false);
-  EXPECT_GT(e.system.reaction(3).head<3>().norm(), 1e-3);
+  EXPECT_GT(e.system.nodeGradient(3).norm(), 1e-3);
 }
 
 INSTANTIATE_TEST_SUITE_P(SurfaceTensions, ThreadEquations, ::testing::Values(0.0, 0.5));
