@@ -262,20 +262,28 @@ void ThreadStepper::Impl::placeNode(int node, const Eigen::Vector3d& x)
   system.setPosition(k, x);
 }
 
-/// Two neighbours that lie on the floor hold up a node between them. It would creep down for ever, and until it has
-/// landed every younger node has to stay in the system. Such a node is deposited where it is, as soon as it is nearer
-/// to the floor than a small share of the radius.
+/// Two nodes that lie on the floor hold up an arch of nodes between them. The arch would creep down for ever, and until
+/// it has landed every younger node has to stay in the system. Its nodes are deposited where they are, as soon as all
+/// of them are nearer to the floor than a small share of the radius.
 void ThreadStepper::Impl::restBetweenLying(const Eigen::Vector3d& belt_velocity)
 {
   constexpr double kNear = 0.05;   // share of the radius, far below what matters for the place of a section
   if (!model->floor.sticks())
     return;
-  for (int i = std::max(1, first_); i + 1 < work.nodes(); ++i)
-    if (!work.deposited[i] && work.deposited[i - 1] && work.deposited[i + 1] &&
-        work.x[i].z() - restingHeight(i) < kNear * std::min(work.radius(i - 1), work.radius(i)))
+  int lying = -1;      // the last node that lies, before an arch
+  bool near = false;   // there is one, and all nodes since then are near the floor
+  for (int i = first_; i + 1 < work.nodes(); ++i)
+    if (!work.deposited[i])
+      near = near && work.x[i].z() - restingHeight(i) < kNear * std::min(work.radius(i - 1), work.radius(i));
+    else
     {
-      work.deposited[i] = 1;
-      work.v[i] = belt_velocity;
+      for (int k = lying + 1; near && k < i; ++k)
+      {
+        work.deposited[k] = 1;
+        work.v[k] = belt_velocity;
+      }
+      lying = i;
+      near = true;
     }
 }
 

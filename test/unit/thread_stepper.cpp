@@ -288,6 +288,36 @@ TEST(ThreadStepper, ANodeBetweenTwoThatLieIsDeposited)
   }
 }
 
+/// The same for an arch of several nodes. It is deposited as a whole. A part that hangs from the nozzle is no arch.
+TEST(ThreadStepper, AnArchBetweenTwoThatLieIsDeposited)
+{
+  const double radius = 0.002, low = 0.02 * radius;
+  for (const double middle : {0.03 * radius, 0.5 * radius})
+    for (const bool arch : {true, false})
+    {
+      ThreadModel m = honey();
+      m.floor.present = true;
+      Eigen::Matrix3Xd x = Eigen::Matrix3Xd::Zero(3, 7);
+      x.row(0).setLinSpaced(0, 0.06);
+      x.row(2) << radius, radius + low, radius + middle, radius + low, radius, radius + low, 0.01;
+      Thread t{m, makeThread(x, Eigen::VectorXd::Constant(6, radius)), {}};
+      t.state.deposited = {1, 0, 0, 0, static_cast<char>(arch), 0, 0};
+      t.state.x[4].z() += arch ? 0.0 : low;
+      t.inputs.gravity.setZero();
+      t.inputs.belt_velocity = {0.1, 0, 0};
+      ThreadStepper stepper(std::make_shared<ThreadModel>(m), NewtonConfig{});
+      ASSERT_TRUE(stepper.step(t.state, t.inputs, 1e-4).ok);
+      for (int i = 1; i < 4; ++i)
+      {
+        EXPECT_EQ(static_cast<bool>(t.state.deposited[i]), arch && middle < 0.05 * radius) << i;
+        EXPECT_NEAR(t.state.x[i].z(), x(2, i), 0.1 * middle) << i;
+        if (t.state.deposited[i])
+          EXPECT_EQ(t.state.v[i], t.inputs.belt_velocity) << i;
+      }
+      EXPECT_FALSE(t.state.deposited[5]);
+    }
+}
+
 TEST(ThreadStepper, WhatTouchesTheFloorStaysThere)
 {
   Thread t = pouring(0.1);
