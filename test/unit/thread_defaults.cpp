@@ -147,6 +147,32 @@ TEST(ThreadFlow, AThinFluidFallsFreely)
   EXPECT_FALSE(landing.slender());
 }
 
+/// The fall of thesis 5.5 with its lengths and times scaled by those of another fluid: coils without surface tension
+/// are similar then.
+ThreadFall coilingFall(double height, double density = 5e-4, double viscosity = 0.2)
+{
+  const double time = std::cbrt(viscosity / density / 400.0), length = time * time;
+  return {density,
+          viscosity,
+          9.81,
+          0.09 * length,
+          0.615 * 0.25 * M_PI * 0.09 * 0.09 * length * length * length / time,
+          height * length};
+}
+
+TEST(ThreadFlow, SeveralCoilsExistBetweenTheFoldsOfTheReference)
+{
+  // coiling.csv: branches 2 and 3 begin at 8.11, branches 5 and 6 end at 18.54. The stable coils next to this range and
+  // to the gap that follows it are those at 7.61 and 21.56.
+  for (const double height : {0.507201, 5.07201, 7.60802, 21.5561, 25.3601, 50.7201})
+    EXPECT_FALSE(estimateLanding(coilingFall(height)).several_coils) << height;
+  for (const double height : {8.11, 8.87602, 10.144, 13.4408, 15.7232, 18.54, 20.2881})
+    EXPECT_TRUE(estimateLanding(coilingFall(height)).several_coils) << height;
+  EXPECT_FALSE(estimateLanding(coilingFall(7.60802, 1400, 10)).several_coils);
+  EXPECT_TRUE(estimateLanding(coilingFall(15.7232, 1400, 10)).several_coils);
+  EXPECT_FALSE(estimateLanding({1000, 1e4, 0.0, 0.01, 1e-6, 0.1}).several_coils);   // no pendulum without gravity
+}
+
 TEST(ThreadFlow, ThinFluidsDripFromSlowNozzles)
 {
   // water from 3 mm: B = 0.613, We = 1.065
@@ -183,6 +209,56 @@ TEST(ThreadDefaults, EdgesResolveTheCoilThatForms)
     EXPECT_LT(thread.breakup_radius, 0.1 * landing.radius);
     EXPECT_TRUE(scene.warnings.empty()) << scene.warnings.front();
   }
+}
+
+std::string coilingScene(double height, const std::string& motion)
+{
+  const ThreadFall fall = coilingFall(height);
+  return "time: {step: 0.05, duration: 100}\nthreads:\n  - fluid: {density: " + std::to_string(fall.density) +
+         ", viscosity: " + std::to_string(fall.viscosity) +
+         ", surface_tension: 0}\n    nozzle: {diameter: " + std::to_string(fall.diameter) +
+         ", flow: " + std::to_string(fall.flow) + ", " + motion + "}\n    floor: {height: 0}\n";
+}
+
+ThreadConfig standingNozzle(double height)
+{
+  return parseScene(coilingScene(height, "position: [0, 0, " + std::to_string(height) + "]"), "t").threads[0];
+}
+
+/// With edges of 0.7 or steps of 0.35 of the usual length the coil at 15.72, 1 % below the end of its branch, is lost.
+TEST(ThreadDefaults, EdgesAndStepsAreFinerWhereSeveralCoilsExist)
+{
+  for (const double height : {10.144, 15.7232})
+  {
+    const ThreadConfig thread = standingNozzle(height);
+    const Landing landing = estimateLanding(coilingFall(height));
+    EXPECT_GE(edgesPerTurn(landing, thread.longest_edge), 39.9) << height;
+    EXPECT_LE(landing.frequency * thread.longest_step, 0.01201) << height;
+    EXPECT_LE(thread.feed_length, height / 49.9) << height;
+    EXPECT_LE(thread.highest_edge, height / 49.9) << height;
+    EXPECT_LE(thread.shortest_edge, 0.2001 * thread.longest_edge) << height;
+  }
+  for (const double height : {7.60802, 21.5561})
+  {
+    const ThreadConfig thread = standingNozzle(height);
+    const Landing landing = estimateLanding(coilingFall(height));
+    EXPECT_NEAR(edgesPerTurn(landing, thread.longest_edge), 20.0, 0.1) << height;
+    EXPECT_NEAR(landing.frequency * thread.longest_step, 0.06, 1e-4) << height;
+    EXPECT_NEAR(thread.feed_length, height / 25.0, 1e-3 * height) << height;
+  }
+}
+
+/// At neither end of its way several coils exist, in between they do.
+TEST(ThreadDefaults, ANozzleThatRisesGetsTheFinestOfAllItsHeights)
+{
+  const std::string down = "0, 0.7071067811865476, 0, 0.7071067811865476]";
+  const ThreadConfig rising =
+      parseScene(coilingScene(25.0, "motion: {table: [[0, 0, 0, 5, " + down + ", [100, 0, 0, 25, " + down + "]}"), "t")
+          .threads[0];
+  const Landing middle = estimateLanding(coilingFall(15.7232));
+  EXPECT_GE(edgesPerTurn(middle, rising.longest_edge), 39.9);
+  EXPECT_LE(middle.frequency * rising.longest_step, 0.01201);
+  EXPECT_LT(rising.longest_step, 0.5 * standingNozzle(25.0).longest_step);
 }
 
 TEST(ThreadDefaults, WhatIsTooCoarseForTheCoilIsSaid)

@@ -89,10 +89,16 @@ Falls fallsOf(const SceneConfig& scene, const ThreadConfig& thread)
     if (height > 0 && std::isfinite(height))
       falls.heights.push_back(height);
   }
-  if (falls.heights.size() > 2)
+  if (!falls.heights.empty())
   {
-    const auto [low, high] = std::minmax_element(falls.heights.begin(), falls.heights.end());
-    falls.heights = {*low, *high};
+    // Several coils may exist at heights between the lowest and the highest only. The limits of their range differ by a
+    // factor of 1.3 (thin fluids) to 2.5, so heights that differ by less find it.
+    constexpr int kIntervals = 16;
+    const auto [lowest, highest] = std::minmax_element(falls.heights.begin(), falls.heights.end());
+    const double low = *lowest, ratio = *highest / low;
+    falls.heights.assign(1, low);
+    for (int k = 1; k <= kIntervals && ratio > 1.0; ++k)
+      falls.heights.push_back(low * std::pow(ratio, static_cast<double>(k) / kIntervals));
   }
   double least = kUnknown;
   for (const auto& [time, flow] : nozzle.flow.table.entries())
@@ -126,13 +132,13 @@ Needs needsOf(const Falls& falls, const ThreadConfig& thread, double gravity)
     for (const double flow : falls.flows)
     {
       const ThreadFall fall{thread.density, thread.viscosity, gravity, thread.nozzle->diameter, flow, height};
-      const EdgeChoice edges = chooseEdges(fall);
+      const Landing landing = estimateLanding(fall);
+      const EdgeChoice edges = chooseEdges(fall, landing);
       needs.edges.feed = std::min(needs.edges.feed, edges.feed);
       needs.edges.longest = std::min(needs.edges.longest, edges.longest);
       needs.edges.highest = std::min(needs.edges.highest, edges.highest);
       needs.edges.shortest = std::min(needs.edges.shortest, edges.shortest);
       needs.edges.longest_step = std::min(needs.edges.longest_step, edges.longest_step);
-      const Landing landing = estimateLanding(fall);
       if (landing.coil_radius < needs.tightest.coil_radius)
         needs.tightest = landing;
       needs.thinnest = std::min(needs.thinnest, landing.radius);

@@ -87,8 +87,6 @@ const std::vector<Bar>& bars()
       {"thread_defaults", "wrong_states_overlooked", at_most, 0},
       {"thread_defaults", "stopped_without_advice", at_most, 0},
       {"thread_defaults", "coils_not_steady", at_most, 0},
-      {"thread_defaults", "coils_with_finer_edges", at_most, 1},   // one height at the end of a branch, see kStarts
-      {"thread_defaults", "worst_error_with_finer_edges", at_most, 0.05, result, full},
       {"thread_defaults", "scenes", at_least, 100, result, full},
       {"thread_defaults", "worst_frequency_error", at_most, 0.05},
       {"thread_defaults", "worst_radius_error", at_most, 0.05},

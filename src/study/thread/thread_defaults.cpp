@@ -15,7 +15,8 @@
 namespace slender::study {
 namespace {
 
-constexpr double kCoilBound = 0.05;   // of frequency and radius
+constexpr double kCoilBound = 0.05;     // of frequency and radius
+constexpr double kNearFold = 15.7232;   // its branch of coils ends at 15.9, where small errors decide
 
 /// The coils of the reference in the units of some fluid: lengths and times of coils without surface tension scale with
 /// its kinematic viscosity.
@@ -41,17 +42,14 @@ struct Start
   double stands_at = 0.0;                      ///< time at which the nozzle stands in the middle
   double from_height = 0.0;                    ///< the nozzle stays there at first
   double rise_begins = 0.0, rise_ends = 0.0;   ///< times; between them the nozzle rises to its height
-  double finer_edges = 1.0,
-         finer_steps = 1.0;   ///< factors of the lengths and of the longest step that the defaults choose
 };
 
-/// At 15.2 the default swirl turns faster than the coil and ends in folding to and fro; a circle as slow as the coil
-/// reaches it. At 15.7 the steady coil of the default resolution is not stable: its branch ends at 15.9, and with
-/// default steps it ends earlier. At 50.7 circles of the nozzle end in folding; a rise from a height at which the
-/// thread coils reaches the coil.
+/// At 15.2 and 15.7 the default swirl turns faster than the coil and ends in folding to and fro; a circle as slow as
+/// the coil reaches it. At 50.7 circles of the nozzle end in folding; a rise from a height at which the thread coils
+/// reaches the coil.
 const std::vector<Start> kStarts = {{},
                                     {15.216, 2.05, 0.118, 35, 15.216, 0, 0},
-                                    {15.7232, 2.05, 0.118, 35, 15.7232, 0, 0, 0.5, 0.25},
+                                    {kNearFold, 2.05, 0.118, 35, kNearFold, 0, 0},
                                     {50.7201, 16, 0.07, 17, 38.0401, 40, 80}};
 
 const Start& startOf(double height)
@@ -87,19 +85,15 @@ TableMotion motionOf(const Start& start, double height, const Scaled& fluid, con
 SceneConfig coilScene(const Scaled& fluid, double height)
 {
   const Start& start = startOf(height);
-  SceneConfig scene =
-      parseScene(pouredScene(fluid.fluid(), fluid.outlet(height), 0.05 * start.finer_steps * fluid.time(),
-                             start.at > 0 ? "" : ", swirl: 0.3", ", centreline_on_surface: true"),
-                 "coil");
+  SceneConfig scene = parseScene(pouredScene(fluid.fluid(), fluid.outlet(height), 0.05 * fluid.time(),
+                                             start.at > 0 ? "" : ", swirl: 0.3", ", centreline_on_surface: true"),
+                                 "coil");
   ThreadConfig& thread = scene.threads[0];
   if (start.at > 0)
   {
     thread.nozzle->motion = motionOf(start, height, fluid, thread.nozzle->pose);
     thread.nozzle->pose = std::get<TableMotion>(thread.nozzle->motion).poses.evaluate(0.0);
   }
-  for (double* length : {&thread.feed_length, &thread.longest_edge, &thread.shortest_edge, &thread.highest_edge})
-    *length *= start.finer_edges;
-  thread.longest_step *= start.finer_steps;
   return scene;
 }
 
@@ -118,11 +112,11 @@ CoilTrace watch(Simulation& simulation, double duration, const char* what)
   return CoilTrace(landings);
 }
 
-/// Largest errors of the coils that the defaults resolve, and of those that were resolved more finely.
+/// Largest errors of all coils, and how many of them are steady.
 struct CoilErrors
 {
-  double frequency = 0.0, radius = 0.0, finer = 0.0;
-  int steady = 0, unsteady = 0, refined = 0;
+  double frequency = 0.0, radius = 0.0;
+  int steady = 0, unsteady = 0;
 };
 
 /// Waits for a steady coil and measures it.
@@ -157,12 +151,11 @@ void coil(StudyContext& context, const Scaled& fluid, double height, CoilErrors&
   }
   const ThreadState& thread = simulation.state().threads[0].threads[0];
   const double frequency = trace.frequency() * fluid.time(), radius = trace.radius() / fluid.length();
-  const bool refined = start.finer_edges < 1 || start.finer_steps < 1;
   Row& row = context.row();
   row.set("fluid", fluid.name)
       .set("H", height)
       .set("start", start.at > 0 ? "motion of the nozzle" : "swirl")
-      .set("edges", refined ? "finer" : "default");
+      .set("several_coils", landing.several_coils ? "yes" : "no");
   row.set("Omega", frequency)
       .set("R", radius)
       .set("unsteadiness", trace.unsteadiness())
@@ -173,20 +166,14 @@ void coil(StudyContext& context, const Scaled& fluid, double height, CoilErrors&
   row.set("nodes", thread.nodes()).set("seconds", threadSeconds() - begin);
   errors.steady += steady >= 2;
   errors.unsteady += steady < 2;
-  errors.refined += refined;
   const SteadyCoil* reference = nearestStableCoil(height, frequency);
   if (!reference)
     return;
   const double frequency_error = frequency / reference->frequency - 1, radius_error = radius / reference->radius - 1;
   row.set("branch", reference->branch).set("Omega_error", frequency_error).set("R_error", radius_error);
   row.check(frequency, reference->frequency, kCoilBound * reference->frequency, "steady coils, coiling_grid.csv");
-  if (refined)
-    errors.finer = std::max({errors.finer, std::abs(frequency_error), std::abs(radius_error)});
-  else
-  {
-    errors.frequency = std::max(errors.frequency, std::abs(frequency_error));
-    errors.radius = std::max(errors.radius, std::abs(radius_error));
-  }
+  errors.frequency = std::max(errors.frequency, std::abs(frequency_error));
+  errors.radius = std::max(errors.radius, std::abs(radius_error));
 }
 
 void coilAll(StudyContext& context)
@@ -197,8 +184,11 @@ void coilAll(StudyContext& context)
   double last = 0.0;
   int done = 0;
   if (context.quick())
+  {
     for (std::size_t k = 0; k < others.size(); ++k)
       coil(context, others[k], steadyCoils()[4 * k + 4].height, errors);
+    coil(context, thesis, kNearFold, errors);
+  }
   else
     for (const SteadyCoil& c : steadyCoils())
       if (c.stable && c.height > 1.0001 * last)
@@ -209,11 +199,8 @@ void coilAll(StudyContext& context)
       }
   context.metric("steady_coils", errors.steady);
   context.metric("coils_not_steady", errors.unsteady);
-  context.metric("coils_with_finer_edges", errors.refined);
   context.metric("worst_frequency_error", errors.frequency);
   context.metric("worst_radius_error", errors.radius);
-  if (errors.refined > 0)
-    context.metric("worst_error_with_finer_edges", errors.finer);
 }
 
 }   // namespace
