@@ -98,7 +98,9 @@ StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, 
 {
   report.ok = false;
   report.failure = failure;
-  report.message = "thread '" + model->name + "': " + message;
+  report.message = "thread '" + model->name + "'" +
+                   (work.thread_id > 0 ? ", piece " + std::to_string(work.thread_id) + " that broke off" : "") + ": " +
+                   message;
   return report;
 }
 
@@ -147,6 +149,29 @@ std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double leng
   }
 }
 
+/// What is known of a disc, an edge that is wider in radius than long, next to a node: slender theory does not hold
+/// there, so a shorter step helps little. Empty: there is none.
+std::string ThreadStepper::Impl::explainDisc(int node) const
+{
+  constexpr int kNear = 2;   // edges on each side: the whole stencil of the node's equations
+  int disc = -1;
+  for (int j = std::max(0, node - kNear); j < std::min(work.edges(), node + kNear); ++j)
+    if (work.radius(j) > work.edge(j).norm() &&
+        (disc < 0 || work.radius(j) / work.edge(j).norm() > work.radius(disc) / work.edge(disc).norm()))
+      disc = j;
+  if (disc < 0)
+    return "";
+  const double radius = work.radius(disc), low = std::min(work.x[disc].z(), work.x[disc + 1].z());
+  const bool puddle = work.deposited[disc] || work.deposited[disc + 1] ||
+                      (model->floor.present && low - model->floor.height < 2.0 * radius);
+  return ". Edge " + std::to_string(disc) + " beside it is a disc, " + millimetres(radius) + " wide in radius and " +
+         millimetres(work.edge(disc).norm()) + " long, " +
+         (puddle ? "in a puddle on the floor, which is no thread: use a more viscous fluid, or less flow or height, or "
+                   "a longer edges.shortest, by which short edges are joined"
+                 : "which is no thread: use a longer edges.shortest, by which short edges are joined, or a larger "
+                   "breakup_radius");
+}
+
 Largest ThreadStepper::Impl::unbalancedForce() const
 {
   Largest force;
@@ -168,7 +193,7 @@ StepReport ThreadStepper::Impl::refuseUnsolved(StepReport& report, StepFailure f
     text += grown >= 0 ? ". The edge begins"
                        : ". The largest unbalanced force is " + force.text("N") + ", on node " + std::to_string(node) +
                              " of " + std::to_string(work.nodes()) + ", which was";
-    text += " at " + metres(report.place.position) + (grown >= 0 ? "" : " as the step began");
+    text += " at " + metres(report.place.position) + (grown >= 0 ? "" : " as the step began" + explainDisc(node));
   }
   return refuse(report, failure, text);
 }

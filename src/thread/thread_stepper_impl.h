@@ -47,6 +47,7 @@ public:
   int overgrownEdge() const;
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
   std::string explainFailure(StepFailure failure, double length) const;
+  std::string explainDisc(int node) const;
   /// Largest unbalanced force [N] on a free node in the last evaluation, by the thread's numbers of nodes.
   Largest unbalancedForce() const;
   /// Refuses a step of `length` seconds that could not be solved. The message says why and where the thread was
@@ -103,6 +104,7 @@ private:
   Pose endPose(int end, const ThreadInputs& inputs, double fraction) const;
   double restingHeight(int node) const;
   double deformingShare(int j) const;
+  double spinWithFed(int j, double area, double h) const;
   double longestEdge(int j) const;
 
   const ThreadInputs* inputs_ = nullptr;

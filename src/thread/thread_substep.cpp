@@ -69,6 +69,22 @@ double ThreadStepper::Impl::deformingShare(int j) const
   return below > 0 && above > 0 ? std::max(above / (above + below), kLeast) : 1.0;
 }
 
+/// Spin of edge j [rad/s] that has the section `area` [m^2] with what flows in. Fluid in the nozzle turns with the
+/// nozzle. The angular momenta of both add up. If the fluid came with the spin of the edge, a jet of thin fluid that is
+/// drawn out below its nozzle would spin faster and faster.
+double ThreadStepper::Impl::spinWithFed(int j, double area, double h) const
+{
+  if (flow_speed_ == 0.0 || j + 2 < work.nodes() || !work.ends[1].held)
+    return work.spin[j];
+  const Eigen::Matrix3d from = work.ends[1].X_WE.orientation.toRotationMatrix(),
+                        to = end_poses[1].orientation.toRotationMatrix();
+  const Eigen::Vector3d t0 = -from.col(0), t = -to.col(0);
+  const double nozzle = signedAngle(parallelTransport(from.col(1), t0, t), to.col(1), t) / h;
+  // a moment of inertia is half the mass times r^2, and r^2 is the area over pi
+  const double own = work.volume[j] * work.volume[j] / work.edge(j).norm(), fed = fedVolume(h) * model->nozzleArea();
+  return (own * work.spin[j] + fed * nozzle) / (volume(j, h) * area);
+}
+
 /// Viscous stiffnesses over the step (thesis 5.3.2), surface tension, inertia and loads; and what is held.
 void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
 {
@@ -95,7 +111,7 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
         volume_after *= share;
         radius_after = std::sqrt(area / M_PI);
         system.setSpin(k, 0.5 * model->density * volume_after * radius_after * radius_after / (h * h),
-                       h * work.spin[i]);
+                       h * spinWithFed(i, area, h));
       }
     }
     const bool has_joint = (i > first_ || offset_) && (i + 1 < n || work.ends[1].held);
