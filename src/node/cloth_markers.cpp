@@ -82,7 +82,7 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
   for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
   {
     const ClothModel& model = simulation.clothModel(static_cast<int>(k));
-    const Eigen::Matrix3Xd& x = simulation.state().cloths[k].cloth.x;
+    const Eigen::Matrix3Xd& x = simulation.state().cloths[k].x;
     spacing.push_back(std::sqrt(faceAreas(model.rest).mean() * 4.0 / std::sqrt(3.0)));
     const bool lines = style == MarkerStyle::line;
     Marker marker = makeMarker(header, "cloths/" + model.name, 0, lines ? Marker::LINE_LIST : Marker::TRIANGLE_LIST);
@@ -115,7 +115,7 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
       Marker guide = makeMarker(header, "guides/" + model.name, 0, Marker::LINE_LIST);
       guide.scale.x = 0.08 * spacing.back();
       guide.color = color(0.15, 0.15, 0.18, 0.8);
-      addEdges(meshTopology(tracking->guide.mesh), simulation.state().cloths[k].guide, guide);
+      addEdges(meshTopology(tracking->guide.mesh), simulation.state().cloth_guides[k].points, guide);
       out.markers.push_back(std::move(guide));
     }
   }
@@ -125,13 +125,13 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
     if (ref.cloth < 0)
       continue;
     Marker marker = makeMarker(header, "grasps", static_cast<int>(g), Marker::SPHERE_LIST);
-    const SceneCloth& held = simulation.state().cloths[ref.cloth];
-    const ClothGrasp& grasp = held.grasps[ref.index];
+    const Eigen::Matrix3Xd& x = simulation.state().cloths[ref.cloth].x;
+    const ClothGrasp& grasp = simulation.state().cloth_grasps[ref.cloth][ref.index];
     marker.scale.x = marker.scale.y = marker.scale.z = 0.4 * spacing[ref.cloth];
     marker.color =
         std::holds_alternative<FixedMotion>(ref.config->motion) ? color(0.35, 0.37, 0.40) : color(0.22, 0.27, 0.33);
     for (const int vertex : grasp.vertices)
-      marker.points.push_back(toPoint(held.cloth.x.col(vertex)));
+      marker.points.push_back(toPoint(x.col(vertex)));
     if (!grasp.active)
       marker.action = Marker::DELETE;
     out.markers.push_back(std::move(marker));

@@ -164,17 +164,17 @@ void toMessage(const RodModel& model, const RodState& state, slender_sim::RodSta
   out.guide_forces.clear();
 }
 
-void toTracking(const RodConfig& rod, const RodGuide& guide, const RodState& state, slender_sim::RodState& out)
+void toTracking(const RodConfig& rod, const GuideState& guide, const RodState& state, slender_sim::RodState& out)
 {
   const WeakConstraints& constraints = *rod.tracking->sets.front().constraints;
-  const Eigen::Matrix3Xd targets = constraints.averages(guide.nodes);
+  const Eigen::Matrix3Xd targets = constraints.averages(guide.points);
   for (int i = 0; i < constraints.count(); ++i)
   {
     out.constraint_errors.push_back(constraints.distance(i, targets, state.x));
     out.guide_forces.push_back(toVector3(guide.forces.col(i)));
   }
-  for (Eigen::Index k = 0; k < guide.nodes.cols(); ++k)
-    out.guide_nodes.push_back(toPoint(guide.nodes.col(k)));
+  for (Eigen::Index k = 0; k < guide.points.cols(); ++k)
+    out.guide_nodes.push_back(toPoint(guide.points.col(k)));
 }
 
 void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out)
@@ -185,18 +185,6 @@ void appendPoses(const RodModel& model, const RodState& state, std::vector<geome
     pose.orientation = toQuaternion(Eigen::Quaterniond(axes).normalized());
     out.push_back(pose);
   });
-}
-
-bool isFinite(const RodState& state)
-{
-  return state.x.allFinite() && state.v.allFinite() && state.d1.allFinite() && state.twist.allFinite() &&
-         state.director.allFinite();
-}
-
-bool isFinite(const RigidBodyState& state)
-{
-  return state.X_WB.position.allFinite() && state.X_WB.orientation.coeffs().allFinite() &&
-         state.velocity.linear.allFinite() && state.velocity.angular.allFinite();
 }
 
 void toMessage(const ThreadState& state, slender_sim::ThreadState& out)
@@ -282,20 +270,6 @@ void toPoints(const slender_sim::ClothState& state, sensor_msgs::PointCloud2& ou
     to[2] = static_cast<float>(p.z);
     ++to;
   }
-}
-
-bool isFinite(const ClothState& state) { return state.x.allFinite() && state.v.allFinite(); }
-
-bool isFinite(const ThreadState& state)
-{
-  const auto finite = [](const std::vector<Eigen::Vector3d>& values) {
-    return std::all_of(values.begin(), values.end(), [](const Eigen::Vector3d& v) { return v.allFinite(); });
-  };
-  const auto numbers = [](const std::vector<double>& values) {
-    return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-  };
-  return finite(state.x) && finite(state.v) && finite(state.d1) && numbers(state.twist) && numbers(state.spin) &&
-         numbers(state.volume);
 }
 
 }   // namespace slender

@@ -61,13 +61,13 @@ void addForceMarkers(const Simulation& simulation, const std_msgs::Header& heade
     ++count;
     addArrow(at, along, contacts);
   };
-  for (const ContactTerm& contact : simulation.contacts())
+  for (const ContactTerm& contact : simulation.world().contacts())
     add(contact.position, contact.force);
   for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
   {
-    const Eigen::Matrix3Xd forces = simulation.contactForces(static_cast<int>(k));
+    const Eigen::Matrix3Xd forces = simulation.world().contactForces(static_cast<int>(k));
     for (Eigen::Index i = 0; i < forces.cols(); ++i)
-      add(simulation.state().cloths[k].cloth.x.col(i), forces.col(i));
+      add(simulation.state().cloths[k].x.col(i), forces.col(i));
   }
   contacts.scale.x = count > 0 ? 0.04 * sum / static_cast<double>(count) : 0.0;
   contacts.color = touch;
@@ -77,8 +77,8 @@ void addForceMarkers(const Simulation& simulation, const std_msgs::Header& heade
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {
     const int grasp = static_cast<int>(g);
-    const Wrench wrench = simulation.isActive(grasp) ? simulation.wrench(grasp) : Wrench();
-    const Vector3d at = simulation.graspPose(grasp).position;
+    const Wrench wrench = simulation.grasps().isActive(grasp) ? simulation.grasps().wrench(grasp) : Wrench();
+    const Vector3d at = simulation.grasps().pose(grasp).position;
     out.markers.push_back(arrowMarker(header, "wrenches", 2 * grasp, at, scale * wrench.force, force));
     out.markers.push_back(arrowMarker(header, "wrenches", 2 * grasp + 1, at, scale / kLever * wrench.torque, torque));
   }
@@ -86,7 +86,7 @@ void addForceMarkers(const Simulation& simulation, const std_msgs::Header& heade
     if (simulation.config().threads[k].nozzle)
       out.markers.push_back(arrowMarker(header, "nozzle_forces", static_cast<int>(k),
                                         simulation.state().threads[k].threads.front().ends[1].X_WE.position,
-                                        scale * simulation.endLoads(static_cast<int>(k))[1].force, force));
+                                        scale * simulation.state().end_loads[static_cast<int>(k)][1].force, force));
 }
 
 }   // namespace slender

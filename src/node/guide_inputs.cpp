@@ -55,8 +55,8 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
       guided.body = body->body;
     const bool topic = std::holds_alternative<TopicMotion>(ref.config->motion);
     if (topic || !guided.body.empty())
-      guided.buffer =
-          std::make_unique<GuideBuffer>(buffer_options, ref.config->attach, simulation.graspPose(static_cast<int>(g)));
+      guided.buffer = std::make_unique<GuideBuffer>(buffer_options, ref.config->attach,
+                                                    simulation.grasps().pose(static_cast<int>(g)));
     guided_.push_back(std::move(guided));
     if (topic)
     {
@@ -372,7 +372,7 @@ Pose GuideInputs::poseOf(const Simulation& simulation, std::size_t guided) const
 {
   const std::size_t solid = guided - grasps_;
   if (guided < grasps_)
-    return simulation.graspPose(static_cast<int>(guided));
+    return simulation.grasps().pose(static_cast<int>(guided));
   if (solid < bodies_)
     return simulation.state().bodies[solid].X_WB;
   if (solid < bodies_ + obstacles_)

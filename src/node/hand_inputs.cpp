@@ -17,7 +17,7 @@ void sizeGraspHandle(const Simulation& simulation, const GraspRef& ref, Handle& 
 {
   if (ref.cloth >= 0)
   {
-    const Eigen::Matrix3Xd& x = simulation.state().cloths[ref.cloth].cloth.x;
+    const Eigen::Matrix3Xd& x = simulation.state().cloths[ref.cloth].x;
     const double size = diagonal(Eigen::AlignedBox3d(x.rowwise().minCoeff(), x.rowwise().maxCoeff()));
     handle.size = 0.12 * size;
     handle.ball = 0.03 * size;
@@ -74,7 +74,7 @@ std::vector<Handle> GuideInputs::handles(const Simulation& simulation) const
   const SceneConfig& scene = simulation.config();
   for (std::size_t g = 0; g < guided_.size(); ++g)
   {
-    if (!isDraggable(g) || (g < grasps_ && !simulation.isActive(static_cast<int>(g))))
+    if (!isDraggable(g) || (g < grasps_ && !simulation.grasps().isActive(static_cast<int>(g))))
       continue;
     Handle handle{handleName(g), poseOf(simulation, g)};
     if (g < grasps_)

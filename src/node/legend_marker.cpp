@@ -33,8 +33,8 @@ Eigen::AlignedBox3d sceneBox(const SceneState& state)
     for (const ThreadState& thread : group.threads)
       for (const Eigen::Vector3d& x : thread.x)
         box.extend(x);
-  for (const SceneCloth& held : state.cloths)
-    extend(held.cloth.x);
+  for (const ClothState& cloth : state.cloths)
+    extend(cloth.x);
   return box;
 }
 

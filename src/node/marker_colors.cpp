@@ -152,8 +152,7 @@ double shownRange(const Simulation& simulation, const MarkerOptions& options)
     for (const ThreadState& thread : group.threads)
       range = largest(range, shownValues(thread, options.color));
   for (std::size_t k = 0; k < state.cloths.size(); ++k)
-    range =
-        largest(range, shownValues(simulation.clothModel(static_cast<int>(k)), state.cloths[k].cloth.x, options.color));
+    range = largest(range, shownValues(simulation.clothModel(static_cast<int>(k)), state.cloths[k].x, options.color));
   return std::max(range, 1e-9);
 }
 

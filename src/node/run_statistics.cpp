@@ -28,9 +28,9 @@ void RunStatistics::add(const StepReport& report, const Simulation& simulation, 
   max_torque.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < max_force.size(); ++g)
   {
-    if (!simulation.isActive(static_cast<int>(g)))
+    if (!simulation.grasps().isActive(static_cast<int>(g)))
       continue;
-    const Wrench& wrench = simulation.wrench(static_cast<int>(g));
+    const Wrench& wrench = simulation.grasps().wrench(static_cast<int>(g));
     max_force[g] = std::max(max_force[g], wrench.force.norm());
     max_torque[g] = std::max(max_torque[g], wrench.torque.norm());
   }

@@ -216,7 +216,7 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
                                       2.0 * model.radius_a.mean()));
     if (simulation.config().rods[r].tracking)
     {
-      const Eigen::Matrix3Xd& nodes = simulation.state().rod_guides[r].nodes;
+      const Eigen::Matrix3Xd& nodes = simulation.state().rod_guides[r].points;
       Marker guide = makeMarker(header, "guides/" + model.name, 0, Marker::LINE_STRIP);
       guide.scale.x = 0.6 * model.radius_a.mean();
       guide.color = color(0.15, 0.15, 0.18, 0.8);

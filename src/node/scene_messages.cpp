@@ -101,7 +101,7 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
       message.name = simulation.threadModel(static_cast<int>(k)).name;
       appendPoses(thread, poses.poses);
     }
-    const EndLoad& load = simulation.endLoads(static_cast<int>(k))[1];
+    const EndLoad& load = simulation.state().end_loads[static_cast<int>(k)][1];
     nozzles[k].header = poses.header;
     nozzles[k].wrench.force = toVector3(load.force);
     nozzles[k].wrench.torque = toVector3(load.torque);
@@ -123,12 +123,14 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
   cloths.bound_distances.clear();
   cloths.function_sets.clear();
   cloths.blend_distances.clear();
+  static const GuideState no_guide;
   for (std::size_t k = 0; k < scene.cloths.size(); ++k)
   {
-    append(simulation.config().cloths[k].name, scene.cloths[k].cloth, cloths);
-    const Simulation::TrackingError error = simulation.trackingError(static_cast<int>(k));
-    appendTracking(error.met, scene.cloths[k].guide, scene.cloths[k].guide_forces, cloths);
-    cloths.forces_at_bound.push_back(static_cast<std::uint32_t>(scene.cloths[k].cloth.at_bound.size()));
+    append(simulation.config().cloths[k].name, scene.cloths[k], cloths);
+    const TrackingError error = simulation.trackingError(static_cast<int>(k));
+    const GuideState& guide = scene.cloth_guides.empty() ? no_guide : scene.cloth_guides[k];
+    appendTracking(error.met, guide.points, guide.forces, cloths);
+    cloths.forces_at_bound.push_back(static_cast<std::uint32_t>(scene.cloths[k].at_bound.size()));
     cloths.bound_distances.push_back(error.at_bound);
     cloths.function_sets.push_back(
         simulation.config().cloths[k].tracking ? simulation.functions(static_cast<int>(k)).name : std::string());
@@ -139,7 +141,8 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
   {
     const int grasp = static_cast<int>(g);
     wrenches[g].header = poses.header;
-    wrenches[g].wrench = simulation.isActive(grasp) ? toMessage(simulation.wrench(grasp)) : geometry_msgs::Wrench();
+    wrenches[g].wrench =
+        simulation.grasps().isActive(grasp) ? toMessage(simulation.grasps().wrench(grasp)) : geometry_msgs::Wrench();
   }
   grasps.header = poses.header;
   grasps.name.resize(wrenches.size());
@@ -150,9 +153,9 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
   {
     const int grasp = static_cast<int>(g);
     grasps.name[g] = simulation.grasps()[g].config->name;
-    grasps.object[g] = simulation.heldObject(grasp);
-    grasps.active[g] = simulation.isActive(grasp);
-    grasps.pose[g] = toMessage(simulation.graspPose(grasp));
+    grasps.object[g] = simulation.grasps().heldObject(grasp);
+    grasps.active[g] = simulation.grasps().isActive(grasp);
+    grasps.pose[g] = toMessage(simulation.grasps().pose(grasp));
   }
   const std::vector<BodyConfig>& configs = simulation.config().bodies;
   bodies.header = poses.header;

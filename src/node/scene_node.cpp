@@ -21,6 +21,7 @@
 #include "slender_sim/node/guide_bag.h"
 #include "slender_sim/node/scene_markers.h"
 #include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/state_bytes.h"
 
 namespace slender {
 namespace {
@@ -195,7 +196,7 @@ void SceneNode::advertise()
   const std::vector<BodyConfig>& bodies = simulation_->config().bodies;
   if (!bodies.empty())
     bodies_pub_ = nh_.advertise<slender_sim::BodyStates>("body_states", 1000);
-  if (!simulation_->grasps().empty())
+  if (simulation_->grasps().size() > 0)
     grasps_pub_ = nh_.advertise<slender_sim::GraspStates>("grasp_states", 1000);
   if (!simulation_->config().obstacles.empty())
     obstacles_pub_ = nh_.advertise<slender_sim::BodyStates>("obstacle_states", 1000);
@@ -211,20 +212,7 @@ void SceneNode::advertise()
     clock_pub_ = nh_.advertise<rosgraph_msgs::Clock>("/clock", 100, true);
 }
 
-bool SceneNode::isStateFinite() const
-{
-  const SceneState& state = simulation_->state();
-  const auto all = [](const auto& parts, const auto& finite) {
-    return std::all_of(parts.begin(), parts.end(), finite);
-  };
-  return all(state.rods, [](const RodState& rod) { return isFinite(rod); }) &&
-         all(state.threads,
-             [&](const ThreadGroupState& group) {
-               return all(group.threads, [](const ThreadState& thread) { return isFinite(thread); });
-             }) &&
-         all(state.cloths, [](const SceneCloth& held) { return isFinite(held.cloth); }) &&
-         all(state.bodies, [](const RigidBodyState& body) { return isFinite(body); });
-}
+bool SceneNode::isStateFinite() const { return allFinite(simulation_->state()); }
 
 bool SceneNode::advance()
 {

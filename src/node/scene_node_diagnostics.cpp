@@ -73,7 +73,7 @@ void addFunctions(const Simulation& simulation, int cloth, DiagnosticStatus& sta
   const ClothConfig& config = simulation.config().cloths[cloth];
   if (!config.tracking || config.tracking->sets.size() < 2)
     return;
-  const SceneCloth& held = simulation.state().cloths[cloth];
+  const GuideState& held = simulation.state().cloth_guides[cloth];
   const double time = simulation.state().time;
   add(status, "test functions of " + config.name, simulation.functions(cloth).name);
   add(status, "blend of " + config.name + " goes on for [s]",
@@ -188,12 +188,12 @@ DiagnosticStatus SceneNode::simulationStatus() const
   if (kind_ == NodeKind::tracking)
   {
     double error = 0.0, force = 0.0, refused = 0.0;
-    for (std::size_t k = 0; k < simulation_->state().cloths.size(); ++k)
+    for (std::size_t k = 0; k < simulation_->state().cloth_guides.size(); ++k)
     {
-      const Simulation::TrackingError now = simulation_->trackingError(static_cast<int>(k));
+      const TrackingError now = simulation_->trackingError(static_cast<int>(k));
       error = std::max(error, now.met);
       refused = std::max(refused, now.at_bound);
-      const Eigen::Matrix3Xd& forces = simulation_->state().cloths[k].guide_forces;
+      const Eigen::Matrix3Xd& forces = simulation_->state().cloth_guides[k].forces;
       force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
     }
     for (std::size_t r = 0; r < simulation_->state().rod_guides.size(); ++r)
@@ -219,8 +219,8 @@ DiagnosticStatus SceneNode::simulationStatus() const
   if (hasCloths())
   {
     std::uint64_t vertices = 0;
-    for (const SceneCloth& held : simulation_->state().cloths)
-      vertices += static_cast<std::uint64_t>(held.cloth.x.cols());
+    for (const ClothState& cloth : simulation_->state().cloths)
+      vertices += static_cast<std::uint64_t>(cloth.x.cols());
     add(status, "vertices", vertices);
     const auto& cloths = simulation_->config().cloths;
     if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.contact.has_value(); }))

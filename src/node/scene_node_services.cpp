@@ -139,14 +139,14 @@ void SceneNode::setGrasp(const slender_sim::SetGrasp::Request& request, slender_
     return;
   }
   const int g = static_cast<int>(found - grasp_names_.begin());
-  const bool active = simulation_->isActive(g);
+  const bool active = simulation_->grasps().isActive(g);
   if (request.action == slender_sim::SetGrasp::Request::RELEASE)
   {
     if (!active)
       response.message = request.name + " holds nothing";
     else
     {
-      simulation_->release(g);
+      simulation_->grasps().release(g);
       showHandles();
     }
     response.success = active;
@@ -214,8 +214,7 @@ std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int
 {
   const GraspRef& ref = simulation_->grasps()[grasp];
   const bool cloth = ref.cloth >= 0;
-  const Eigen::Matrix3Xd& x =
-      cloth ? simulation_->state().cloths[ref.cloth].cloth.x : simulation_->state().rods[ref.rod].x;
+  const Eigen::Matrix3Xd& x = cloth ? simulation_->state().cloths[ref.cloth].x : simulation_->state().rods[ref.rod].x;
   const int nodes = static_cast<int>(x.cols());
   std::vector<int> within;
   int first = request.first_node, last = request.last_node;
@@ -255,15 +254,15 @@ std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int
   try
   {
     if (!within.empty())
-      simulation_->attachVertices(grasp, within);
+      simulation_->grasps().attachVertices(grasp, within);
     else
-      simulation_->attach(grasp, first, last, request.position_only ? Hold::position : Hold::frame);
+      simulation_->grasps().attach(grasp, first, last, request.position_only ? Hold::position : Hold::frame);
   }
   catch (const std::exception& e)
   {
     return e.what();
   }
-  inputs_->attachAt(grasp, simulation_->graspPose(grasp));
+  inputs_->attachAt(grasp, simulation_->grasps().pose(grasp));
   showHandles();
   response.first_node = first;
   response.last_node = last;

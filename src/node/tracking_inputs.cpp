@@ -19,7 +19,7 @@ bool withinReach(const Eigen::Matrix3Xd& points)
 
 const Eigen::Matrix3Xd& guideNow(const Simulation& simulation, int index, bool of_rod)
 {
-  return of_rod ? simulation.state().rod_guides[index].nodes : simulation.state().cloths[index].guide;
+  return of_rod ? simulation.state().rod_guides[index].points : simulation.state().cloth_guides[index].points;
 }
 
 }   // namespace

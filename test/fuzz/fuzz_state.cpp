@@ -52,7 +52,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   {
     simulation.load(file.path());
     simulation.step(simulation.defaultInputs());
-    if (!simulation.state().rods[0].x.allFinite() || !simulation.state().cloths[0].cloth.x.allFinite())
+    if (!simulation.state().rods[0].x.allFinite() || !simulation.state().cloths[0].x.allFinite())
       std::abort();
   }
   catch (const std::runtime_error&)

@@ -198,7 +198,7 @@ rods:
   const auto markers = sceneMarkers(simulation, std_msgs::Header(), options);
   const Marker& left = find(markers, "wrenches", 0);
   ASSERT_EQ(left.points.size(), 2u);
-  EXPECT_NEAR(left.points[1].x - left.points[0].x, 0.02 * simulation.wrench(0).force.x(), 1e-12);
+  EXPECT_NEAR(left.points[1].x - left.points[0].x, 0.02 * simulation.grasps().wrench(0).force.x(), 1e-12);
   EXPECT_GT(left.points[1].x, left.points[0].x + 0.1);   // about 0.02 * 15.7 N: inwards
   EXPECT_LT(find(markers, "wrenches", 2).points[1].x, find(markers, "wrenches", 2).points[0].x - 0.1);
   EXPECT_EQ(find(markers, "contacts").action, Marker::DELETE);

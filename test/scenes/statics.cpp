@@ -196,7 +196,7 @@ TEST(PointLoads, actBetweenNodesWithTheirMoment)
   // the force at 0.43 of an edge and its shares at the two nodes have the same sum and the same moment about the clamp
   const std::string held = "grasps: {foot: {edges: [0]}}\n    loads: ";
   Simulation between(parseScene(rodScene(10, held + "[{at: 0.543, force: [0, 0, -0.01]}]", "start: equilibrium")));
-  const Wrench w = between.wrench(0);
+  const Wrench w = between.grasps().wrench(0);
   EXPECT_NEAR(w.force.z(), -0.01, 1e-9);
   EXPECT_NEAR(w.torque.y(), 0.01 * 0.543, 1e-6);   // the rod droops by 1e-3: of second order in the lever
   Simulation shares(parseScene(rodScene(
@@ -261,7 +261,7 @@ TEST(PointLoads, aTorqueAboutTheTangentTwistsTheRod)
     }
     const Eigen::Vector3d d1 = simulation.state().rods[0].d1.col(19);
     EXPECT_NEAR(std::atan2(d1.z(), d1.y()), expected, 1e-6) << scene;   // d1 is y at the clamp, and turns about x
-    EXPECT_LT((simulation.wrench(0).torque - Eigen::Vector3d(torque, 0, 0)).norm(), 1e-6) << scene;
+    EXPECT_LT((simulation.grasps().wrench(0).torque - Eigen::Vector3d(torque, 0, 0)).norm(), 1e-6) << scene;
   }
 }
 
@@ -364,7 +364,7 @@ TEST(Paths, gravityOrLoadsAloneAreScaledOnRequest)
                                      {"gravity=[0, 0, -0.01]"}),
                           false);
     EXPECT_TRUE(simulation.runStatics().end.ok);
-    return -simulation.wrench(0).force.z();
+    return -simulation.grasps().wrench(0).force.z();
   };
   EXPECT_NEAR(root("all"), 0.06, 1e-8);   // 2 (0.01 + 0.02)
   EXPECT_NEAR(root("gravity"), 0.04, 1e-8);
@@ -431,17 +431,18 @@ TEST(GraspFrames, aDirectionStandsInForTheQuaternion)
   Simulation by_direction(parseScene(scene("direction: [0, 0, -3], motion: {table: [[0, 0.8, 0, -0.2]]}")));
   Simulation by_quaternion(parseScene(scene("motion: {table: [[0, 0.8, 0, -0.2, 0, " + half + ", 0, " + half + "]]}")));
   EXPECT_LT((by_direction.state().rods[0].x - by_quaternion.state().rods[0].x).cwiseAbs().maxCoeff(), 1e-12);
-  EXPECT_LT((by_direction.graspPose(1).orientation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0, 0, -1)).norm(),
+  EXPECT_LT((by_direction.grasps().pose(1).orientation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0, 0, -1)).norm(),
             1e-12);
-  EXPECT_LT((by_direction.graspPose(1).orientation * Eigen::Vector3d::UnitY() - Eigen::Vector3d(0, 1, 0)).norm(),
+  EXPECT_LT((by_direction.grasps().pose(1).orientation * Eigen::Vector3d::UnitY() - Eigen::Vector3d(0, 1, 0)).norm(),
             1e-12);
 
   // fixed where it is, and turned about its own tangent by a director, whose normal part counts
   Simulation turned(parseScene(scene("director: [5, 2, 2]")));
-  EXPECT_LT((turned.graspPose(1).position - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
-  EXPECT_LT((turned.graspPose(1).orientation * Eigen::Vector3d::UnitY() - Eigen::Vector3d(0, 1, 1).normalized()).norm(),
-            1e-12);
-  EXPECT_NEAR(turned.wrench(0).torque.x(), 0.8 * M_PI / 4, 1e-6);   // beta times the turn over the length
+  EXPECT_LT((turned.grasps().pose(1).position - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT(
+      (turned.grasps().pose(1).orientation * Eigen::Vector3d::UnitY() - Eigen::Vector3d(0, 1, 1).normalized()).norm(),
+      1e-12);
+  EXPECT_NEAR(turned.grasps().wrench(0).torque.x(), 0.8 * M_PI / 4, 1e-6);   // beta times the turn over the length
 
   // without statics the section would turn within one step
   const Simulation jumps(parseScene(scene("direction: [0, 0, -1]"), "t", {"start=as_given"}));

@@ -74,7 +74,7 @@ std::size_t intersectionsOf(const Simulation& simulation)
     surface.rest.conservativeResize(3, first + count);
     surface.rest.rightCols(count) = mesh.vertices;
     x.conservativeResize(3, first + count);
-    x.rightCols(count) = simulation.state().cloths[k].cloth.x;
+    x.rightCols(count) = simulation.state().cloths[k].x;
   }
   std::vector<Pose> poses;
   for (std::size_t k = 0; k < simulation.config().obstacles.size(); ++k)
@@ -156,7 +156,7 @@ TEST(ClothContact, WithoutItClothTouchesNothing)
     ASSERT_TRUE(report.ok);
     EXPECT_EQ(report.repulsions + report.impulses, 0);
   }
-  EXPECT_LT(simulation.state().cloths[0].cloth.x.row(2).maxCoeff(), -0.1);
+  EXPECT_LT(simulation.state().cloths[0].x.row(2).maxCoeff(), -0.1);
 }
 
 TEST(ClothContact, RestsOnEveryShape)
@@ -176,7 +176,7 @@ TEST(ClothContact, RestsOnEveryShape)
     Simulation simulation(parseScene(one, "t", {"obstacles.0.shape=" + std::string(shape)}));
     const StepReport report = run(simulation, 40);
     EXPECT_GT(report.repulsions, 0);
-    const Eigen::Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
+    const Eigen::Matrix3Xd& x = simulation.state().cloths[0].x;
     EXPECT_GT(x.row(2).maxCoeff(), top + 1e-4);
     EXPECT_LT(x.row(2).maxCoeff(), top + 0.02);   // folds
   }
@@ -187,7 +187,7 @@ TEST(ClothContact, ClothsTouchEachOther)
   Simulation simulation(parseScene(two, "t"));
   const StepReport report = run(simulation, 100);
   EXPECT_GT(report.repulsions, 0);
-  const auto height = [&](int k) { return simulation.state().cloths[k].cloth.x.row(2).mean(); };
+  const auto height = [&](int k) { return simulation.state().cloths[k].x.row(2).mean(); };
   EXPECT_NEAR(height(0), 2e-3, 5e-4);
   EXPECT_GT(height(1), height(0) + 2e-3);
 
@@ -201,9 +201,9 @@ TEST(ClothContact, ClothsTouchEachOther)
     ASSERT_TRUE(apart.step(apart.defaultInputs()).ok);
     ASSERT_TRUE(ghost.step(ghost.defaultInputs()).ok);
   }
-  EXPECT_NEAR(apart.state().cloths[1].cloth.x.row(2).mean(), 2e-3, 5e-4);
-  EXPECT_LT(ghost.state().cloths[1].cloth.x.row(2).maxCoeff(), -0.5);
-  EXPECT_NEAR(ghost.state().cloths[0].cloth.x.row(2).mean(), 2e-3, 5e-4);
+  EXPECT_NEAR(apart.state().cloths[1].x.row(2).mean(), 2e-3, 5e-4);
+  EXPECT_LT(ghost.state().cloths[1].x.row(2).maxCoeff(), -0.5);
+  EXPECT_NEAR(ghost.state().cloths[0].x.row(2).mean(), 2e-3, 5e-4);
 }
 
 /// Of what moves by a table, by inputs, and as a body.
@@ -227,8 +227,8 @@ TEST(ClothContact, SolidsPushCloth)
       ASSERT_EQ(intersectionsOf(simulation), 0u);
     }
     EXPECT_NEAR(simulation.state().obstacles[0].position.z(), 0.1, 1e-12);
-    EXPECT_GT(simulation.state().cloths[0].cloth.x.row(2).maxCoeff(), 0.1 + 0.03);
-    EXPECT_GT(simulation.wrench(0).force.z(), 1e-3);   // the cloth pulls the grasps along
+    EXPECT_GT(simulation.state().cloths[0].x.row(2).maxCoeff(), 0.1 + 0.03);
+    EXPECT_GT(simulation.grasps().wrench(0).force.z(), 1e-3);   // the cloth pulls the grasps along
   }
   std::vector<std::string> overrides = hanging;
   overrides.push_back(
@@ -237,7 +237,7 @@ TEST(ClothContact, SolidsPushCloth)
   overrides.push_back("obstacles=[]");
   Simulation simulation(parseScene(one, "t", overrides));
   run(simulation, 40);
-  EXPECT_GT(simulation.state().cloths[0].cloth.x.row(2).maxCoeff(), 0.1 + 0.015);
+  EXPECT_GT(simulation.state().cloths[0].x.row(2).maxCoeff(), 0.1 + 0.015);
 }
 
 TEST(ClothContact, IntersectionsAtTheStartAreRefusedByName)
@@ -289,11 +289,11 @@ TEST_F(ClothStateFiles, RestartsBitEqualInTheMiddleOfContact)
   run(again, 15);
   for (int k = 0; k < 2; ++k)
   {
-    EXPECT_EQ(again.state().cloths[k].cloth.x, simulation.state().cloths[k].cloth.x);
-    EXPECT_EQ(again.state().cloths[k].cloth.v, simulation.state().cloths[k].cloth.v);
+    EXPECT_EQ(again.state().cloths[k].x, simulation.state().cloths[k].x);
+    EXPECT_EQ(again.state().cloths[k].v, simulation.state().cloths[k].v);
   }
-  EXPECT_EQ(again.wrench(0).force, simulation.wrench(0).force);
-  EXPECT_EQ(again.wrench(0).torque, simulation.wrench(0).torque);
+  EXPECT_EQ(again.grasps().wrench(0).force, simulation.grasps().wrench(0).force);
+  EXPECT_EQ(again.grasps().wrench(0).torque, simulation.grasps().wrench(0).torque);
   for (const char* other :
        {"cloths.1.contact.thickness=0.003", "cloths.1.contact.friction=0.2", "cloths.1.contact.self=false"})
   {
@@ -311,7 +311,7 @@ TEST_F(ClothStateFiles, StatesWithIntersectionsAreRefused)
   run(simulation, 30);
   simulation.save(path_);
   Simulation larger(parseScene(one, "t", {"obstacles.0.shape.sphere.radius=0.055"}));
-  const Eigen::Matrix3Xd before = larger.state().cloths[0].cloth.x;
+  const Eigen::Matrix3Xd before = larger.state().cloths[0].x;
   try
   {
     larger.load(path_);
@@ -321,7 +321,7 @@ TEST_F(ClothStateFiles, StatesWithIntersectionsAreRefused)
   {
     EXPECT_NE(std::string(error.what()).find("meets 'thing'"), std::string::npos) << error.what();
   }
-  EXPECT_EQ(larger.state().cloths[0].cloth.x, before);
+  EXPECT_EQ(larger.state().cloths[0].x, before);
   run(larger, 30);
 }
 
@@ -357,8 +357,8 @@ TEST(ClothContact, WrenchesHoldWhatTheSlopeDoesNotCarry)
     for (int k = 0; k < steps; ++k)
     {
       ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-      mean += simulation.wrench(0).force / steps;
-      most = std::max(most, std::abs(simulation.wrench(0).force.dot(along) + 0.5 * weight));
+      mean += simulation.grasps().wrench(0).force / steps;
+      most = std::max(most, std::abs(simulation.grasps().wrench(0).force.dot(along) + 0.5 * weight));
     }
     EXPECT_NEAR(mean.dot(along), -0.5 * weight, 2e-3 * weight);
     EXPECT_LT(most, 0.05 * weight);
@@ -383,7 +383,7 @@ TEST(ClothContact, ScenesOfFabricStretchLikeFabric)
     SCOPED_TRACE(name);
     Simulation simulation(readScene(std::string(SLENDER_SOURCE_DIR) + "/config/scenes/" + name + ".yaml"));
     const TriangleMesh& mesh = simulation.config().cloths[0].mesh;
-    const Eigen::Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
+    const Eigen::Matrix3Xd& x = simulation.state().cloths[0].x;
     const int steps = static_cast<int>(std::lround(simulation.config().time.duration / simulation.config().time.step));
     double most = 0.0;
     long touching = 0;

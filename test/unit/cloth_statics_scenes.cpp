@@ -36,7 +36,7 @@ std::string problemsOf(const std::vector<std::string>& overrides)
   return "";
 }
 
-double tip(const Simulation& simulation) { return -simulation.state().cloths[0].cloth.x.row(2).minCoeff(); }
+double tip(const Simulation& simulation) { return -simulation.state().cloths[0].x.row(2).minCoeff(); }
 
 TEST(ClothStaticsScene, aClampHoldsTheSlopeOfAnEdge)
 {

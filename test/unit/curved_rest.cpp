@@ -168,12 +168,12 @@ TEST_F(CurvedScenes, AHalfCylinderStaysOneAndTheSceneSaysHowItBends)
         scene(std::string(*kind == 't' ? tracked : "mesh: {file: roll.obj}, ") + "bending: {modulus: 0.001}", "", kind);
     ASSERT_EQ(simulation.config().warnings.size(), 1u) << kind;
     EXPECT_NE(simulation.config().warnings[0].find("so it bends by hinges"), std::string::npos);
-    const Matrix3Xd start = simulation.state().cloths[0].cloth.x;
+    const Matrix3Xd start = simulation.state().cloths[0].x;
     ASSERT_NEAR(widthOf(start), 0.4, 1e-3);
     for (int k = 0; k < 50; ++k)
       ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
     // the issue: 1e-9 of its size
-    EXPECT_LT((simulation.state().cloths[0].cloth.x - start).cwiseAbs().maxCoeff(), 1e-10) << kind;
+    EXPECT_LT((simulation.state().cloths[0].x - start).cwiseAbs().maxCoeff(), 1e-10) << kind;
   }
 }
 
@@ -189,8 +189,8 @@ TEST_F(CurvedScenes, WhatIsChosenIsWhatHingesDo)
     ASSERT_TRUE(chosen.step(chosen.defaultInputs()).ok);
     ASSERT_TRUE(asked.step(asked.defaultInputs()).ok);
   }
-  EXPECT_EQ(chosen.state().cloths[0].cloth.x, asked.state().cloths[0].cloth.x);
-  EXPECT_LT(widthOf(chosen.state().cloths[0].cloth.x), 0.625);   // it has begun to curl, from 0.628
+  EXPECT_EQ(chosen.state().cloths[0].x, asked.state().cloths[0].x);
+  EXPECT_LT(widthOf(chosen.state().cloths[0].x), 0.625);   // it has begun to curl, from 0.628
 }
 
 TEST_F(CurvedScenes, FlatShapesKeepTheirMatrix)
@@ -202,7 +202,7 @@ TEST_F(CurvedScenes, FlatShapesKeepTheirMatrix)
   {
     const Simulation simulation = scene(cloth);
     EXPECT_TRUE(simulation.config().warnings.empty()) << cloth;
-    EXPECT_EQ(simulation.state().cloths[0].cloth.rest_angles.size(), 0) << cloth;   // hinges have them
+    EXPECT_EQ(simulation.state().cloths[0].rest_angles.size(), 0) << cloth;   // hinges have them
   }
 }
 

@@ -142,7 +142,7 @@ TEST_F(ClothMaterial, CurlsToItsUndeformedShape)
     const StepReport report = simulation.step(simulation.defaultInputs());
     ASSERT_TRUE(report.ok) << report.message;
   }
-  const Eigen::Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
+  const Eigen::Matrix3Xd& x = simulation.state().cloths[0].x;
   EXPECT_LT(simulation.clothEnergies(0).bending, 1e-4 * bent);
   // lengths are those of the flat mesh: rows become chords, not arcs, of height h with the angle h / R between them
   const double h = 0.3 / 9;
@@ -157,13 +157,13 @@ TEST_F(ClothMaterial, StartsFromAnotherShape)
       "3]}}}",
       "gravity: [0, 0, 0]\n");
   Simulation simulation(scene);
-  const Eigen::Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
+  const Eigen::Matrix3Xd& x = simulation.state().cloths[0].x;
   EXPECT_LT((x.col(0) - Vector3d(1, 2, 3)).norm(), 1e-12);
   EXPECT_EQ(scene.cloths[0].grasps[0].vertices, std::vector<int>{0});
   EXPECT_EQ(simulation.clothModel(0).rest.vertices, flat_.vertices);
   EXPECT_GT(simulation.clothEnergies(0).bending, 0.0);   // it was bent
   ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-  EXPECT_GT(simulation.state().cloths[0].cloth.v.norm(), 1e-3);
+  EXPECT_GT(simulation.state().cloths[0].v.norm(), 1e-3);
 }
 
 TEST_F(ClothMaterial, PlasticFlowRestartsBitEqual)
@@ -177,15 +177,15 @@ TEST_F(ClothMaterial, PlasticFlowRestartsBitEqual)
   for (int k = 0; k < 8; ++k)
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
   simulation.save(path);
-  const ClothState saved = simulation.state().cloths[0].cloth;
+  const ClothState saved = simulation.state().cloths[0];
   for (int k = 0; k < 8; ++k)
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
   Simulation again(parse(cloth, wind));
   again.load(path);
-  EXPECT_EQ(again.state().cloths[0].cloth.stiffening, saved.stiffening);
+  EXPECT_EQ(again.state().cloths[0].stiffening, saved.stiffening);
   for (int k = 0; k < 8; ++k)
     ASSERT_TRUE(again.step(again.defaultInputs()).ok);
-  const ClothState &a = simulation.state().cloths[0].cloth, &b = again.state().cloths[0].cloth;
+  const ClothState &a = simulation.state().cloths[0], &b = again.state().cloths[0];
   EXPECT_EQ(a.x, b.x);
   EXPECT_EQ(a.rest_angles, b.rest_angles);
   EXPECT_EQ(a.stiffening, b.stiffening);

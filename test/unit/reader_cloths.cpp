@@ -242,17 +242,17 @@ TEST(ClothScene, WrenchesCarryTheWeight)
                  {"cloths.0.grasps={left: {edge: left}, right: {near: {point: [0.4, 0, 1], radius: 0.12}, "
                   "motion: {table: [[0, 5, 5, 5], [0.5, 4.9, 5, 5.05]]}}}",
                   "cloths.0.damping.mass=8"}));
-  const Pose before = simulation.graspPose(1);
+  const Pose before = simulation.grasps().pose(1);
   const StepReport report = run(simulation, 600);
   ASSERT_TRUE(report.ok) << report.message;
   // attach: initial
-  EXPECT_LT((simulation.graspPose(1).position - before.position - Vector3d(-0.1, 0, 0.05)).norm(), 1e-12);
-  const Wrench &left = simulation.wrench(0), &right = simulation.wrench(1);
+  EXPECT_LT((simulation.grasps().pose(1).position - before.position - Vector3d(-0.1, 0, 0.05)).norm(), 1e-12);
+  const Wrench &left = simulation.grasps().wrench(0), &right = simulation.grasps().wrench(1);
   EXPECT_LT((left.force + right.force + Vector3d(0, 0, weight(simulation))).norm(), 1e-3 * weight(simulation));
-  const ClothState& cloth = simulation.state().cloths[0].cloth;
+  const ClothState& cloth = simulation.state().cloths[0];
   const Vector3d centre = cloth.x * simulation.clothModel(0).mass / simulation.clothModel(0).totalMass();
-  const Vector3d moment = left.torque + right.torque + simulation.graspPose(0).position.cross(left.force) +
-                          simulation.graspPose(1).position.cross(right.force) +
+  const Vector3d moment = left.torque + right.torque + simulation.grasps().pose(0).position.cross(left.force) +
+                          simulation.grasps().pose(1).position.cross(right.force) +
                           centre.cross(Vector3d(0, 0, weight(simulation)));
   EXPECT_LT(moment.norm(), 1e-3 * weight(simulation));
   EXPECT_GT(left.torque.norm(), 1e-4);
@@ -266,14 +266,15 @@ TEST(ClothScene, GraspsTurnTheirVertices)
                                    {"cloths.0.grasps={g: {vertices: [0, 1, 2, 9, 10], attach: frame, "
                                     "motion: {table: [[0, 0, 0, 0, 0, 0, 0, 1], [0.2, 0.1, 0, 0.1, 0.7071067811865476, "
                                     "0, 0, 0.7071067811865476]]}}}"}));
-  const Eigen::Matrix3Xd points = simulation.state().cloths[0].grasps[0].points_G;
+  const Eigen::Matrix3Xd points = simulation.state().cloth_grasps[0][0].points_G;
   const StepReport report = run(simulation, 25);
   ASSERT_TRUE(report.ok) << report.message;
-  const SceneCloth& held = simulation.state().cloths[0];
+  const ClothState& held = simulation.state().cloths[0];
+  const ClothGrasp& grasp = simulation.state().cloth_grasps[0][0];
   for (int k = 0; k < 5; ++k)
   {
     const Vector3d turned(points(0, k), -points(2, k), points(1, k));   // a quarter turn about x
-    EXPECT_LT((held.cloth.x.col(held.grasps[0].vertices[k]) - Vector3d(0.1, 0, 0.1) - turned).norm(), 1e-12);
+    EXPECT_LT((held.x.col(grasp.vertices[k]) - Vector3d(0.1, 0, 0.1) - turned).norm(), 1e-12);
   }
 }
 
@@ -282,8 +283,8 @@ TEST(ClothScene, WindCarriesThemAlong)
   Simulation simulation(parseScene(
       towel, "t", {"cloths.0.grasps={top: {edge: upper}}", "wind={velocity: [0, 0, 4]}", "gravity=[0, 0, 0]"}));
   ASSERT_TRUE(run(simulation, 20).ok);
-  EXPECT_GT(simulation.wrench(0).force.z(), 0.01);
-  EXPECT_GT(simulation.state().cloths[0].cloth.x.row(2).mean(), 1.01);
+  EXPECT_GT(simulation.grasps().wrench(0).force.z(), 0.01);
+  EXPECT_GT(simulation.state().cloths[0].x.row(2).mean(), 1.01);
 }
 
 TEST(ClothScene, RestartsBitEqual)
@@ -295,17 +296,17 @@ TEST(ClothScene, RestartsBitEqual)
       "wind={velocity: [0, 3, 0]}"};
   Simulation simulation(parseScene(towel, "t", moving));
   ASSERT_TRUE(run(simulation, 12).ok);
-  simulation.release(0);
+  simulation.grasps().release(0);
   ASSERT_TRUE(run(simulation, 3).ok);
   simulation.save(path);
   ASSERT_TRUE(run(simulation, 10).ok);
   Simulation again(parseScene(towel, "t", moving));
   again.load(path);
-  EXPECT_FALSE(again.isActive(0));
+  EXPECT_FALSE(again.grasps().isActive(0));
   ASSERT_TRUE(run(again, 10).ok);
-  EXPECT_EQ(again.state().cloths[0].cloth.x, simulation.state().cloths[0].cloth.x);
-  EXPECT_EQ(again.state().cloths[0].cloth.v, simulation.state().cloths[0].cloth.v);
-  EXPECT_EQ(again.wrench(1).torque, simulation.wrench(1).torque);
+  EXPECT_EQ(again.state().cloths[0].x, simulation.state().cloths[0].x);
+  EXPECT_EQ(again.state().cloths[0].v, simulation.state().cloths[0].v);
+  EXPECT_EQ(again.grasps().wrench(1).torque, simulation.grasps().wrench(1).torque);
   Simulation other(parseScene(towel, "t", {"cloths.0.material.youngs_modulus=3e5"}));
   EXPECT_THROW(other.load(path), std::runtime_error);
   std::remove(path.c_str());
@@ -315,19 +316,19 @@ TEST(ClothScene, TakesHoldAndLetsGo)
 {
   Simulation simulation(parseScene(towel, "t"));
   ASSERT_TRUE(run(simulation, 5).ok);
-  simulation.release(0);
-  EXPECT_EQ(simulation.state().cloths[0].cloth.pins, (std::vector<int>{8, 17, 18, 62}));
-  EXPECT_EQ(simulation.wrench(0).force, Vector3d(0, 0, 0));
+  simulation.grasps().release(0);
+  EXPECT_EQ(simulation.state().cloths[0].pins, (std::vector<int>{8, 17, 18, 62}));
+  EXPECT_EQ(simulation.grasps().wrench(0).force, Vector3d(0, 0, 0));
   ASSERT_TRUE(run(simulation, 5).ok);
-  EXPECT_THROW(simulation.attachVertices(0, {17}), std::invalid_argument);
-  EXPECT_THROW(simulation.attachVertices(0, {}), std::invalid_argument);
-  EXPECT_THROW(simulation.attach(0, -1, 3, Hold::frame), std::invalid_argument);
-  const Vector3d held = simulation.state().cloths[0].cloth.x.col(40);
-  simulation.attachVertices(0, {41, 40, 40});
+  EXPECT_THROW(simulation.grasps().attachVertices(0, {17}), std::invalid_argument);
+  EXPECT_THROW(simulation.grasps().attachVertices(0, {}), std::invalid_argument);
+  EXPECT_THROW(simulation.grasps().attach(0, -1, 3, Hold::frame), std::invalid_argument);
+  const Vector3d held = simulation.state().cloths[0].x.col(40);
+  simulation.grasps().attachVertices(0, {41, 40, 40});
   ASSERT_TRUE(run(simulation, 5).ok);
-  EXPECT_LT((simulation.state().cloths[0].cloth.x.col(40) - held).norm(), 1e-15);
+  EXPECT_LT((simulation.state().cloths[0].x.col(40) - held).norm(), 1e-15);
   simulation.reset();
-  EXPECT_EQ(simulation.state().cloths[0].grasps[0].vertices, std::vector<int>{54});
+  EXPECT_EQ(simulation.state().cloth_grasps[0][0].vertices, std::vector<int>{54});
 }
 
 /// A step that fails leaves everything where it was.
@@ -335,14 +336,14 @@ TEST(ClothScene, FailsWithoutTrace)
 {
   Simulation simulation(parseScene(towel, "t"));
   ASSERT_TRUE(run(simulation, 3).ok);
-  const Eigen::Matrix3Xd before = simulation.state().cloths[0].cloth.x;
+  const Eigen::Matrix3Xd before = simulation.state().cloths[0].x;
   SceneInputs inputs = simulation.defaultInputs();
   inputs.grasps[1].X_WG.position.x() = std::nan("");
   const StepReport report = simulation.step(inputs);
   EXPECT_FALSE(report.ok);
   EXPECT_NE(report.message.find("pin positions"), std::string::npos) << report.message;
-  EXPECT_EQ(simulation.state().cloths[0].cloth.x, before);
-  EXPECT_TRUE(simulation.graspPose(1).position.allFinite());
+  EXPECT_EQ(simulation.state().cloths[0].x, before);
+  EXPECT_TRUE(simulation.grasps().pose(1).position.allFinite());
   EXPECT_TRUE(run(simulation, 3).ok);
 }
 

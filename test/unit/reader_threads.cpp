@@ -95,8 +95,8 @@ TEST(ThreadScene, FeedsWhatTheTableSays)
   const ThreadGroupState& state = simulation.state().threads[0];
   // trapezoid to 0.5 s, then constant; means over steps add up exactly
   EXPECT_NEAR(state.threads.front().fed_volume, 0.5 * 6e-7 + 0.3 * 9e-7, 1e-12 * 6e-7);
-  EXPECT_NEAR(simulation.endLoads(0)[1].force.z(), 0.0, 1.0);
-  EXPECT_LT(simulation.endLoads(0)[1].force.z(), 0.0);
+  EXPECT_NEAR(simulation.state().end_loads[0][1].force.z(), 0.0, 1.0);
+  EXPECT_LT(simulation.state().end_loads[0][1].force.z(), 0.0);
 }
 
 TEST(ThreadScene, RestartsBitByBit)
@@ -115,16 +115,16 @@ TEST(ThreadScene, RestartsBitByBit)
   const ThreadState &s = a.state().threads[0].threads[0], &r = b.state().threads[0].threads[0];
   EXPECT_TRUE(s.x == r.x && s.v == r.v && s.d1 == r.d1 && s.twist == r.twist && s.volume == r.volume && s.id == r.id &&
               s.deposited == r.deposited);
-  EXPECT_EQ(a.endLoads(0)[1].force, b.endLoads(0)[1].force);
+  EXPECT_EQ(a.state().end_loads[0][1].force, b.state().end_loads[0][1].force);
   Simulation other(parseScene(honey, "t", {"threads.0.fluid.viscosity=21"}));
   EXPECT_THROW(other.load(file), std::runtime_error);
-  EXPECT_NE(a.endLoads(0)[1].force.z(), 0.0);
+  EXPECT_NE(a.state().end_loads[0][1].force.z(), 0.0);
   a.load(file);   // what was told of the last step comes back, too
   run(b, 1);
   b.load(file);
-  EXPECT_EQ(a.endLoads(0)[1].force, b.endLoads(0)[1].force);
+  EXPECT_EQ(a.state().end_loads[0][1].force, b.state().end_loads[0][1].force);
   b.reset();
-  EXPECT_EQ(b.endLoads(0)[1].force.norm(), 0.0);
+  EXPECT_EQ(b.state().end_loads[0][1].force.norm(), 0.0);
   std::remove(file.c_str());
 }
 
@@ -181,7 +181,8 @@ threads:
   EXPECT_NEAR(simulation.state().threads[0].volumeBalance(), before, 1e-12 * before);
   // Newton's law: what the holders carry is the weight less what the fluid gains in momentum
   const double weight = 9.81 * 1000 * before, expected = -weight - (momentum() - last) / 0.01;
-  EXPECT_NEAR(simulation.endLoads(0)[0].force.z() + simulation.endLoads(0)[1].force.z(), expected, 1e-6 * weight);
+  EXPECT_NEAR(simulation.state().end_loads[0][0].force.z() + simulation.state().end_loads[0][1].force.z(), expected,
+              1e-6 * weight);
 }
 
 const char* const touching = R"(
@@ -286,7 +287,7 @@ TEST(ThreadContactScene, AThreadFallsOnAnotherAndOnATrayAndARestartIsExact)
   const double sag = simulation.state().threads[1].threads[0].x[20].z();
   advance(simulation, 250);
   EXPECT_GT(simulation.state().thread_contact_stiffness, 0.0);
-  EXPECT_FALSE(simulation.contacts().empty());
+  EXPECT_FALSE(simulation.world().contacts().empty());
   const std::string file = ::testing::TempDir() + "touching.state";
   simulation.save(file);
   Simulation other(parseScene(touching, "t"));

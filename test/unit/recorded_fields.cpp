@@ -175,8 +175,8 @@ rods:
   const RodSections s = sections(simulation);
   for (int i = 0; i < simulation.rodModel(0).nodes(); ++i)
     EXPECT_NEAR(s.material_moment(0, i), beta * 2.0 / 0.8, 1e-6 * beta) << i;   // 2 rad over 0.8 m
-  EXPECT_NEAR(simulation.wrench(0).torque.x(), s.material_moment(0, 0), 1e-9 * beta);
-  EXPECT_NEAR(simulation.wrench(1).torque.x(), -s.material_moment(0, 32), 1e-9 * beta);
+  EXPECT_NEAR(simulation.grasps().wrench(0).torque.x(), s.material_moment(0, 0), 1e-9 * beta);
+  EXPECT_NEAR(simulation.grasps().wrench(1).torque.x(), -s.material_moment(0, 32), 1e-9 * beta);
 }
 
 TEST(RecordedFields, CurvatureOfAHelixIsItsOwnToSecondOrder)
@@ -254,7 +254,7 @@ rods:
     grasps: {hand: {edges: [0]}, middle: {nodes: [8, 9, 10]}}
 )");
   run(simulation, 20);
-  simulation.release(1);
+  simulation.grasps().release(1);
   run(simulation, 10);
   const RodState before = simulation.state().rods[0];
   run(simulation, 1);

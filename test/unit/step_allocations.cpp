@@ -196,6 +196,28 @@ TEST(TrackedRodAllocations, AWarmStepMakesNone)
   }
 }
 
+/// Of several islands the state is kept until all have made their step.
+TEST(SceneAllocations, AWarmStepOfSeveralIslandsMakesNone)
+{
+  Simulation simulation(parseScene(R"(
+rods: [{name: a, grasps: {end: {edges: [0]}}}, {name: b, centerline: {straight: {from: [0, 1, 0], to: [1, 1, 0]}}}]
+cloths:
+  - grid: {corner: [0, 3, 0], sides: [[0.2, 0, 0], [0, 0.2, 0]], cells: [4, 4]}
+    material: {density: 500, thickness: 0.0004, youngs_modulus: 2.0e5}
+    grasps: {held: {vertices: [0, 4]}}
+)",
+                                   "t"));
+  SceneInputs inputs;
+  long before = 0;
+  for (int k = 0; k < 40; ++k)
+  {
+    before = k == 20 ? allocations.load() : before;
+    simulation.defaultInputs(inputs);
+    ASSERT_TRUE(simulation.step(inputs).ok);
+  }
+  EXPECT_EQ(allocations - before, 0);
+}
+
 TEST(ThreadAllocations, AWarmStepMakesNone)
 {
   ThreadModel model = honey();

@@ -84,16 +84,16 @@ protected:
   /// Greatest distance of an average of these functions from the guide's.
   static double away(const Simulation& simulation, int set)
   {
-    const SceneCloth& held = simulation.state().cloths[0];
+    const SceneState& state = simulation.state();
     const WeakConstraints& functions =
         *simulation.config().cloths[0].tracking->sets[static_cast<std::size_t>(set)].constraints;
-    return functions.error(functions.averages(held.guide), held.cloth.x);
+    return functions.error(functions.averages(state.cloth_guides[0].points), state.cloths[0].x);
   }
 
   /// Velocities of the averages of the second set.
   static Matrix3Xd rates(const Simulation& simulation)
   {
-    return simulation.state().cloths[0].cloth.v *
+    return simulation.state().cloths[0].v *
            simulation.config().cloths[0].tracking->sets[1].constraints->matrix().transpose();
   }
 
@@ -108,21 +108,21 @@ TEST_F(TrackedFunctions, AreExactAfterTheBlend)
   EXPECT_LT(away(simulation, 0), 1e-14);
   const double gap = away(simulation, 1);
   EXPECT_GT(gap, 0.005);   // they do differ
-  EXPECT_EQ(simulation.state().cloths[0].guide_forces.cols(), 4);
+  EXPECT_EQ(simulation.state().cloth_guides[0].forces.cols(), 4);
   double before = gap;
   for (int k = 1; k <= 60; ++k)
   {
     const StepReport report = simulation.step(simulation.defaultInputs());
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_LT(report.tracking_error, 1e-13) << k;   // of what the blend leaves to do
-    const Simulation::TrackingError error = simulation.trackingError(0);
+    const TrackingError error = simulation.trackingError(0);
     EXPECT_NEAR(error.blend, away(simulation, 1), 1e-13) << k;
     if (k > 20)   // the rate's part is over
       EXPECT_LT(error.blend, before) << k;
     EXPECT_LT(error.blend, 1.5 * gap) << k;
     before = error.blend;
     EXPECT_EQ(simulation.functions(0).name, "fine");
-    EXPECT_EQ(simulation.state().cloths[0].blend.gap.cols(), k < 60 ? 25 : 0) << k;
+    EXPECT_EQ(simulation.state().cloth_guides[0].blend.gap.cols(), k < 60 ? 25 : 0) << k;
   }
   EXPECT_EQ(before, 0.0);
   for (int k = 0; k < 60; ++k)
@@ -141,17 +141,17 @@ TEST_F(TrackedFunctions, TakeOverWithoutAJump)
     Matrix3Xd x, v;
     for (int k = 1; k <= 121; ++k)
     {
-      x = simulation.state().cloths[0].cloth.x;
+      x = simulation.state().cloths[0].x;
       v = rates(simulation);
       run(simulation, 1);
       if (blended && k > 100 && k <= 120)
       {
         usual = std::max(usual, (rates(simulation) - v).colwise().norm().maxCoeff());
-        moved = std::max(moved, (simulation.state().cloths[0].cloth.x - x).colwise().norm().maxCoeff());
+        moved = std::max(moved, (simulation.state().cloths[0].x - x).colwise().norm().maxCoeff());
       }
     }
     jump[blended] = (rates(simulation) - v).colwise().norm().maxCoeff();
-    shift[blended] = (simulation.state().cloths[0].cloth.x - x).colwise().norm().maxCoeff();
+    shift[blended] = (simulation.state().cloths[0].x - x).colwise().norm().maxCoeff();
     EXPECT_EQ(simulation.functions(0).name, "fine");
     if (!blended)
       EXPECT_LT(away(simulation, 1), 1e-14);   // at once
@@ -195,9 +195,9 @@ TEST_F(TrackedFunctions, RestartExactlyInTheMiddleOfABlend)
     {
       run(one, 1);
       run(two, 1);
-      const SceneCloth &a = one.state().cloths[0], &b = two.state().cloths[0];
-      ASSERT_TRUE(a.cloth.x == b.cloth.x && a.cloth.v == b.cloth.v && a.cloth.at_bound == b.cloth.at_bound) << k;
-      ASSERT_TRUE(a.guide_forces == b.guide_forces) << k;
+      const ClothState &a = one.state().cloths[0], &b = two.state().cloths[0];
+      ASSERT_TRUE(a.x == b.x && a.v == b.v && a.at_bound == b.at_bound) << k;
+      ASSERT_TRUE(one.state().cloth_guides[0].forces == two.state().cloth_guides[0].forces) << k;
     }
     two.reset();
     EXPECT_EQ(two.functions(0).name, "coarse");
@@ -205,7 +205,7 @@ TEST_F(TrackedFunctions, RestartExactlyInTheMiddleOfABlend)
     run(two, 125);   // past the switch again
     run(fresh, 125);
     EXPECT_EQ(two.functions(0).name, "fine");
-    EXPECT_TRUE(two.state().cloths[0].cloth.x == fresh.state().cloths[0].cloth.x);
+    EXPECT_TRUE(two.state().cloths[0].x == fresh.state().cloths[0].x);
   }
   // another blend is another scene
   Simulation one(scene()), other(scene({"tracked.0.test_functions.1.blend=0.2"}));
@@ -225,7 +225,7 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
   EXPECT_GT(away(simulation, 1), 1e-4);
   // within a blend, to one function, and back
   simulation.setFunctions(0, "middle");
-  EXPECT_EQ(simulation.state().cloths[0].guide_forces.cols(), 1);
+  EXPECT_EQ(simulation.state().cloth_guides[0].forces.cols(), 1);
   run(simulation, 40);   // the default blend of 0.2 s
   EXPECT_LT(away(simulation, 2), 1e-14);
   EXPECT_GT(away(simulation, 0), 1e-4);
@@ -241,7 +241,7 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
   same.setFunctions(0, "coarse");
   for (Simulation* each : {&simulation, &same})
     run(*each, 10);
-  EXPECT_LT((simulation.state().cloths[0].cloth.x - same.state().cloths[0].cloth.x).cwiseAbs().maxCoeff(), 1e-5);
+  EXPECT_LT((simulation.state().cloths[0].x - same.state().cloths[0].x).cwiseAbs().maxCoeff(), 1e-5);
   // a blend of rounding errors, and of what velocities are not differences of positions
   EXPECT_LT(same.trackingError(0).blend, 1e-5);
 
@@ -253,7 +253,7 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
     }
     catch (const std::invalid_argument& error)
     {
-      EXPECT_EQ(s.state().cloths[0].cloth.average_set, before.cloths[0].cloth.average_set);
+      EXPECT_EQ(s.state().cloths[0].average_set, before.cloths[0].average_set);
       return error.what();
     }
     return "";
@@ -269,9 +269,9 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
   std::vector<int> all(81);
   for (int i = 0; i < 81; ++i)
     all[static_cast<std::size_t>(i)] = i;
-  held.release(0);
+  held.grasps().release(0);
   all.pop_back();
-  held.attachVertices(0, all);
+  held.grasps().attachVertices(0, all);
   EXPECT_NE(refused(held, "fine", {}).find("held"), std::string::npos);
 }
 
@@ -290,23 +290,23 @@ TEST_F(TrackedFunctions, OneSetOfAListIsAsWithoutList)
       two(scene({"tracked.0.test_functions=[{name: only, basis: subdivision}]"}));
   run(one, 60);
   run(two, 60);
-  EXPECT_TRUE(one.state().cloths[0].cloth.x == two.state().cloths[0].cloth.x);
+  EXPECT_TRUE(one.state().cloths[0].x == two.state().cloths[0].x);
   // and sets that do not act change nothing
   Simulation three(scene({"tracked.0.test_functions=[{name: all, basis: subdivision}, {name: one, vertices: [12]}]"}));
   run(three, 60);
-  EXPECT_TRUE(one.state().cloths[0].cloth.x == three.state().cloths[0].cloth.x);
+  EXPECT_TRUE(one.state().cloths[0].x == three.state().cloths[0].x);
 }
 
 TEST_F(TrackedFunctions, FailedStepsLeaveTheSetAsItIs)
 {
   Simulation simulation(scene());
   run(simulation, 120);
-  const Matrix3Xd x = simulation.state().cloths[0].cloth.x, forces = simulation.state().cloths[0].guide_forces;
+  const Matrix3Xd x = simulation.state().cloths[0].x, forces = simulation.state().cloth_guides[0].forces;
   SceneInputs bad = simulation.defaultInputs();
   bad.guides[0](1, 3) = NAN;
   EXPECT_FALSE(simulation.step(bad).ok);   // in which they were to change
   EXPECT_EQ(simulation.functions(0).name, "coarse");
-  EXPECT_TRUE(simulation.state().cloths[0].cloth.x == x && simulation.state().cloths[0].guide_forces == forces);
+  EXPECT_TRUE(simulation.state().cloths[0].x == x && simulation.state().cloth_guides[0].forces == forces);
   run(simulation, 1);
   EXPECT_EQ(simulation.functions(0).name, "fine");
 }
@@ -325,7 +325,7 @@ TEST_F(TrackedFunctions, KeepTheirBoundsAndTouchThings)
     most = std::max(most, report.forces_at_bound);
     const FunctionSet& set = bounded.functions(0);
     const Eigen::VectorXd over =
-        bounded.state().cloths[0].guide_forces.colwise().norm().transpose().array() / set.bounds.array();
+        bounded.state().cloth_guides[0].forces.colwise().norm().transpose().array() / set.bounds.array();
     EXPECT_LT(over.maxCoeff(), 1.0011) << k;   // contact may go over by a thousandth
   }
   EXPECT_GT(most, 0);

@@ -67,9 +67,9 @@ TEST_F(TrackedPreviews, FollowTheClothOfTheSameInstant)
     const std::string text = contact ? previewed("{thickness: 0.004, cloths: true}", kBall) : previewed();
     Simulation simulation(parseScene(text, "t"));
     const SceneState& state = simulation.state();
-    ASSERT_EQ(state.cloths[1].cloth.x.cols(), 81);
+    ASSERT_EQ(state.cloths[1].x.cols(), 81);
     EXPECT_FALSE(simulation.config().cloths[1].tracking->guide.byTopic());
-    EXPECT_TRUE(state.cloths[1].guide == state.cloths[0].cloth.x);
+    EXPECT_TRUE(state.cloth_guides[1].points == state.cloths[0].x);
     // the preview is as it is alone: what tracks it does not touch it
     const std::string alone_text = text.substr(0, text.find("tracked:")) + (contact ? kBall : "");
     Simulation alone(parseScene(alone_text, "t"));
@@ -79,12 +79,12 @@ TEST_F(TrackedPreviews, FollowTheClothOfTheSameInstant)
       ASSERT_TRUE(report.ok) << report.message;
       ASSERT_TRUE(alone.step(alone.defaultInputs()).ok);
       EXPECT_LT(report.tracking_error, contact ? 2e-12 : 1e-13) << k;
-      EXPECT_TRUE(state.cloths[1].guide == state.cloths[0].cloth.x) << k;
-      EXPECT_TRUE(state.cloths[0].cloth.x == alone.state().cloths[0].cloth.x) << k;
+      EXPECT_TRUE(state.cloth_guides[1].points == state.cloths[0].x) << k;
+      EXPECT_TRUE(state.cloths[0].x == alone.state().cloths[0].x) << k;
     }
-    EXPECT_LT(state.cloths[0].cloth.x(2, 8), 0.25);   // it fell
+    EXPECT_LT(state.cloths[0].x(2, 8), 0.25);   // it fell
     // averages are followed, not points
-    EXPECT_GT((state.cloths[1].cloth.x.leftCols(9) - state.cloths[0].cloth.x).cwiseAbs().maxCoeff(), 1e-4);
+    EXPECT_GT((state.cloths[1].x.leftCols(9) - state.cloths[0].x).cwiseAbs().maxCoeff(), 1e-4);
   }
 }
 
@@ -102,14 +102,14 @@ TEST_F(TrackedPreviews, RestartExactly)
     ASSERT_TRUE(two.step(two.defaultInputs()).ok);
     for (int c = 0; c < 2; ++c)
     {
-      ASSERT_TRUE(one.state().cloths[c].cloth.x == two.state().cloths[c].cloth.x) << k;
-      ASSERT_TRUE(one.state().cloths[c].cloth.v == two.state().cloths[c].cloth.v) << k;
+      ASSERT_TRUE(one.state().cloths[c].x == two.state().cloths[c].x) << k;
+      ASSERT_TRUE(one.state().cloths[c].v == two.state().cloths[c].v) << k;
     }
-    ASSERT_TRUE(one.state().cloths[1].guide == two.state().cloths[1].guide);
-    ASSERT_TRUE(one.state().cloths[1].guide_forces == two.state().cloths[1].guide_forces);
+    ASSERT_TRUE(one.state().cloth_guides[1].points == two.state().cloth_guides[1].points);
+    ASSERT_TRUE(one.state().cloth_guides[1].forces == two.state().cloth_guides[1].forces);
   }
   one.reset();
-  EXPECT_TRUE(one.state().cloths[1].guide == one.state().cloths[0].cloth.x);
+  EXPECT_TRUE(one.state().cloth_guides[1].points == one.state().cloths[0].x);
 }
 
 TEST_F(TrackedPreviews, StayWhereTheyWereWhenAStepFails)
@@ -121,8 +121,8 @@ TEST_F(TrackedPreviews, StayWhereTheyWereWhenAStepFails)
   inputs.grasps[0].X_WG.position.x() = NAN;
   EXPECT_FALSE(simulation.step(inputs).ok);
   for (int c = 0; c < 2; ++c)
-    EXPECT_TRUE(simulation.state().cloths[c].cloth.x == before.cloths[c].cloth.x);
-  EXPECT_TRUE(simulation.state().cloths[1].guide == before.cloths[1].guide);
+    EXPECT_TRUE(simulation.state().cloths[c].x == before.cloths[c].x);
+  EXPECT_TRUE(simulation.state().cloth_guides[1].points == before.cloth_guides[1].points);
 }
 
 TEST_F(TrackedPreviews, SayWhatIsWrong)

@@ -174,7 +174,7 @@ TEST_F(TrackedRods, HaveTheGuidesAveragesAfterEveryStep)
           "edges: 60}}");
     Simulation simulation = make(set);
     EXPECT_LT(simulation.rodTrackingError(0), kExact) << change;
-    const Matrix3Xd rest = simulation.state().rod_guides[0].nodes;
+    const Matrix3Xd rest = simulation.state().rod_guides[0].points;
     for (int k = 1; k <= 150; ++k)
     {
       const Matrix3Xd guide = wave(rest, 0.01 * k);
@@ -182,7 +182,7 @@ TEST_F(TrackedRods, HaveTheGuidesAveragesAfterEveryStep)
       ASSERT_TRUE(report.ok) << change << " " << k << ": " << report.message;
       ASSERT_LT(report.tracking_error, kExact) << change << " " << k;
       ASSERT_LT(simulation.rodTrackingError(0), kExact * 1.3) << change;
-      ASSERT_TRUE(simulation.state().rod_guides[0].nodes == guide);
+      ASSERT_TRUE(simulation.state().rod_guides[0].points == guide);
     }
     // the guide is held when nobody moves it, and its forces then carry what hangs from it
     for (int k = 0; k < 1500; ++k)
@@ -190,7 +190,7 @@ TEST_F(TrackedRods, HaveTheGuidesAveragesAfterEveryStep)
     const double weight = 9.81 * simulation.rodModel(0).totalMass();
     double carried = simulation.state().rod_guides[0].forces.row(2).sum();
     for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
-      carried -= simulation.wrench(static_cast<int>(g)).force.z();
+      carried -= simulation.grasps().wrench(static_cast<int>(g)).force.z();
     EXPECT_NEAR(carried, weight, 0.02 * weight) << change;   // it still sways a little
   }
 }
@@ -222,7 +222,7 @@ TEST_F(TrackedRods, FollowTablesFromTheirVelocity)
       ASSERT_TRUE(report.ok) << report.message;
       ASSERT_LT(report.tracking_error, kExact);
       guide.evaluate(0.01 * k, x);
-      ASSERT_TRUE(simulation.state().rod_guides[0].nodes == x);
+      ASSERT_TRUE(simulation.state().rod_guides[0].points == x);
     }
     EXPECT_NEAR(x(0, 0), 1.8, 1e-9);
   }
@@ -253,7 +253,7 @@ TEST_F(TrackedRods, StartOnTheirGuide)
 TEST_F(TrackedRods, StandGuidesThatJump)
 {
   Simulation simulation = make();
-  Matrix3Xd guide = simulation.state().rod_guides[0].nodes;
+  Matrix3Xd guide = simulation.state().rod_guides[0].points;
   for (int k = 0; k < 60; ++k)
   {
     if (k == 10)
@@ -277,7 +277,7 @@ TEST_F(TrackedRods, StandGuidesThatJump)
   inputs.rod_guides[0](1, 3) = NAN;
   EXPECT_FALSE(simulation.step(inputs).ok);
   EXPECT_TRUE(simulation.state().rods[0].x == before.rods[0].x &&
-              simulation.state().rod_guides[0].nodes == before.rod_guides[0].nodes);
+              simulation.state().rod_guides[0].points == before.rod_guides[0].points);
   inputs.rod_guides[0].resize(3, 4);
   EXPECT_THROW(simulation.step(inputs), std::invalid_argument);
   inputs.rod_guides.clear();
@@ -288,13 +288,13 @@ TEST_F(TrackedRods, RestartBitIdentically)
 {
   const std::vector<std::string> set{"rods.0.grasps={end: {edges: [0]}}", "rods.0.damping.stiffness=0.001"};
   Simulation one = make(set);
-  const Matrix3Xd rest = one.state().rod_guides[0].nodes;
+  const Matrix3Xd rest = one.state().rod_guides[0].points;
   for (int k = 1; k <= 30; ++k)
     ASSERT_TRUE(step(one, wave(rest, 0.01 * k)).ok);
   one.save(folder_ + "/state");
   Simulation other = make(set);
   other.load(folder_ + "/state");
-  EXPECT_TRUE(other.state().rod_guides[0].nodes == one.state().rod_guides[0].nodes);
+  EXPECT_TRUE(other.state().rod_guides[0].points == one.state().rod_guides[0].points);
   EXPECT_TRUE(other.state().rod_guides[0].forces == one.state().rod_guides[0].forces);
   EXPECT_GT(one.state().rod_guides[0].forces.norm(), 0.1);
   for (int k = 31; k <= 60; ++k)
@@ -305,10 +305,10 @@ TEST_F(TrackedRods, RestartBitIdentically)
                 one.state().rods[0].d1 == other.state().rods[0].d1)
         << k;
     ASSERT_TRUE(one.state().rod_guides[0].forces == other.state().rod_guides[0].forces) << k;
-    ASSERT_TRUE(one.wrench(0).force == other.wrench(0).force) << k;
+    ASSERT_TRUE(one.grasps().wrench(0).force == other.grasps().wrench(0).force) << k;
   }
   one.reset();
-  EXPECT_TRUE(one.state().rod_guides[0].nodes == rest);
+  EXPECT_TRUE(one.state().rod_guides[0].points == rest);
   // of other test functions
   for (const char* change : {"rods.0.track.test_functions={segments: 5}", "rods.0.track.guide={nodes: 6}",
                              "rods.0.track.guide={points: [[0, 0, 1], [1.2, 0, 1]]}"})
@@ -336,7 +336,7 @@ TEST_F(TrackedRods, StandBesideOthersAndAreRecorded)
     ASSERT_TRUE(alone.step(alone.defaultInputs()).ok);
   }
   EXPECT_TRUE(simulation.state().rods[0].x == alone.state().rods[0].x);
-  EXPECT_EQ(simulation.state().rod_guides[1].nodes.cols(), 0);
+  EXPECT_EQ(simulation.state().rod_guides[1].points.cols(), 0);
   EXPECT_EQ(simulation.rodTrackingError(1), 0.0);
   EXPECT_LT(simulation.rodTrackingError(2), kExact);
   const SceneSnapshot snapshot = snapshotOf(simulation);
@@ -355,7 +355,7 @@ TEST_F(TrackedRods, RefuseGraspsThatLeaveTooLittle)
   const Matrix3Xd before = simulation.state().rods[0].x;
   try
   {
-    simulation.attach(0, 2, 60, Hold::frame);
+    simulation.grasps().attach(0, 2, 60, Hold::frame);
     ADD_FAILURE();
   }
   catch (const std::invalid_argument& error)
@@ -363,8 +363,8 @@ TEST_F(TrackedRods, RefuseGraspsThatLeaveTooLittle)
     EXPECT_NE(std::string(error.what()).find("test function"), std::string::npos) << error.what();
   }
   EXPECT_EQ(simulation.state().rods[0].grasps[0].last_node, 0);
-  simulation.attach(0, 20, 25, Hold::frame);
-  simulation.release(0);
+  simulation.grasps().attach(0, 20, 25, Hold::frame);
+  simulation.grasps().release(0);
   ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
   EXPECT_LT(simulation.rodTrackingError(0), kExact);
 }

@@ -179,9 +179,9 @@ TEST_F(TrackedScenes, FollowFramesFromTheGuidesShapeAndVelocity)
   guide.evaluate(1e-5, after);
   EXPECT_LT((v - (after - before) / 2e-5).cwiseAbs().maxCoeff(), 1e-4);
   EXPECT_GT(v.cwiseAbs().maxCoeff(), 0.3);
-  const SceneCloth& start = simulation.state().cloths[0];
-  EXPECT_TRUE(start.cloth.x.leftCols(9) == x);   // the subdivision keeps the guide's vertices
-  EXPECT_TRUE(start.cloth.v.leftCols(9) == v);
+  const ClothState& start = simulation.state().cloths[0];
+  EXPECT_TRUE(start.x.leftCols(9) == x);   // the subdivision keeps the guide's vertices
+  EXPECT_TRUE(start.v.leftCols(9) == v);
   EXPECT_LT(simulation.trackingError(0).met, 1e-14);
   double travelled = 0.0;
   for (int k = 1; k <= 60; ++k)
@@ -190,13 +190,13 @@ TEST_F(TrackedScenes, FollowFramesFromTheGuidesShapeAndVelocity)
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_LT(report.tracking_error, 1e-13) << k;
     guide.evaluate(0.01 * k, x);
-    EXPECT_LT((simulation.state().cloths[0].guide - x).cwiseAbs().maxCoeff(), 1e-12);
-    travelled = std::max(travelled, (simulation.state().cloths[0].cloth.x - start.cloth.x).cwiseAbs().maxCoeff());
+    EXPECT_LT((simulation.state().cloth_guides[0].points - x).cwiseAbs().maxCoeff(), 1e-12);
+    travelled = std::max(travelled, (simulation.state().cloths[0].x - start.x).cwiseAbs().maxCoeff());
   }
   // the guide rests: its forces carry the weight
   for (int k = 0; k < 400; ++k)
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-  const Vector3d total = simulation.state().cloths[0].guide_forces.rowwise().sum();
+  const Vector3d total = simulation.state().cloth_guides[0].forces.rowwise().sum();
   EXPECT_NEAR(total.z(), 9.81 * simulation.clothModel(0).totalMass(),
               0.02 * 9.81 * simulation.clothModel(0).totalMass());
 }
@@ -231,7 +231,7 @@ TEST_F(TrackedScenes, FollowBodies)
     }
     const Pose X = initial ? pose(0.5) * pose(0.0).inverse() : pose(0.5);
     for (Eigen::Index i = 0; i < rest.cols(); ++i)
-      EXPECT_LT((simulation.state().cloths[0].guide.col(i) - X * Vector3d(rest.col(i))).norm(), 2e-6)
+      EXPECT_LT((simulation.state().cloth_guides[0].points.col(i) - X * Vector3d(rest.col(i))).norm(), 2e-6)
           << initial << " " << i;
     Matrix3Xd x, v, before, after;
     const GuideConfig& guide = simulation.config().cloths[0].tracking->guide;
@@ -256,13 +256,13 @@ TEST_F(TrackedScenes, StartAsFastAsTheirFrames)
            begin + "}}";
   };
   Simulation simulation(parseScene(flap, "t", {guide("0"), "gravity=[0, 0, 0]"}, folder_));
-  const Matrix3Xd start = simulation.state().cloths[0].cloth.x;
-  EXPECT_LT((simulation.state().cloths[0].cloth.v.colwise() - Vector3d(0.4, 0, 0)).cwiseAbs().maxCoeff(), 1e-12);
+  const Matrix3Xd start = simulation.state().cloths[0].x;
+  EXPECT_LT((simulation.state().cloths[0].v.colwise() - Vector3d(0.4, 0, 0)).cwiseAbs().maxCoeff(), 1e-12);
   for (int k = 1; k <= 30; ++k)   // carried along, as if at rest
   {
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-    ASSERT_LT((simulation.state().cloths[0].cloth.x - start).colwise().norm().maxCoeff(), 0.004 * k + 1e-9) << k;
-    ASSERT_LT(simulation.state().cloths[0].guide_forces.norm(), 1e-9) << k;
+    ASSERT_LT((simulation.state().cloths[0].x - start).colwise().norm().maxCoeff(), 0.004 * k + 1e-9) << k;
+    ASSERT_LT(simulation.state().cloth_guides[0].forces.norm(), 1e-9) << k;
   }
   // a guide that begins later stands still until then
   const SceneConfig late = parseScene(flap, "t", {guide("0.1")}, folder_);
@@ -281,12 +281,12 @@ TEST_F(TrackedScenes, LieOnTheirGuidesWhateverTheirLengthsAtRest)
         parseScene(flap, "t",
                    {"tracked.0.undeformed={crinkles: {height: 0.015}, lengths: true}",
                     "tracked.0.material.youngs_modulus=1", std::string("time.step=") + step, "gravity=[0, 0, 0]"}));
-    const SceneCloth& cloth = simulation.state().cloths[0];
-    const Matrix3Xd start = cloth.cloth.x;
+    const ClothState& cloth = simulation.state().cloths[0];
+    const Matrix3Xd start = cloth.x;
     const WeakConstraints& constraints = *simulation.config().cloths[0].tracking->sets[0].constraints;
-    EXPECT_LT(constraints.error(constraints.averages(cloth.guide), start), 1e-15);
+    EXPECT_LT(constraints.error(constraints.averages(simulation.state().cloth_guides[0].points), start), 1e-15);
     ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-    EXPECT_LT((cloth.cloth.x - start).cwiseAbs().maxCoeff(), 1e-4) << step;
+    EXPECT_LT((cloth.x - start).cwiseAbs().maxCoeff(), 1e-4) << step;
   }
 }
 
@@ -334,13 +334,13 @@ TEST_F(TrackedScenes, RestartExactly)
     ASSERT_TRUE(one.step(one.defaultInputs()).ok);
   one.save(folder_ + "/state");
   two.load(folder_ + "/state");
-  EXPECT_TRUE(two.state().cloths[0].guide == one.state().cloths[0].guide);
-  EXPECT_TRUE(two.state().cloths[0].guide_forces == one.state().cloths[0].guide_forces);
+  EXPECT_TRUE(two.state().cloth_guides[0].points == one.state().cloth_guides[0].points);
+  EXPECT_TRUE(two.state().cloth_guides[0].forces == one.state().cloth_guides[0].forces);
   for (int k = 0; k < 10; ++k)
   {
     ASSERT_TRUE(one.step(one.defaultInputs()).ok);
     ASSERT_TRUE(two.step(two.defaultInputs()).ok);
-    ASSERT_TRUE(one.state().cloths[0].cloth.x == two.state().cloths[0].cloth.x);
+    ASSERT_TRUE(one.state().cloths[0].x == two.state().cloths[0].x);
   }
   Simulation other(
       parseScene(flap, "t", {motion, "tracked.0.test_functions={basis: subdivision, vertices: [0..4]}"}, folder_));
@@ -370,14 +370,14 @@ TEST_F(TrackedScenes, KeepTheirAveragesInContact)
       ASSERT_LT(report.tracking_error, 2e-12) << held << " step " << k;
     }
     EXPECT_GT(contacts, 100);
-    const Matrix3Xd& x = simulation.state().cloths[0].cloth.x;
+    const Matrix3Xd& x = simulation.state().cloths[0].x;
     EXPECT_GT((x.colwise() - Vector3d(0.2, 0.2, -0.06)).colwise().norm().minCoeff(), 0.05);
     // ball, guide and holder bear it together
     double down = 0.0;
     for (int k = 0; k < 20; ++k)
     {
       ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-      down -= simulation.state().cloths[0].guide_forces.row(2).sum() / 20;
+      down -= simulation.state().cloth_guides[0].forces.row(2).sum() / 20;
     }
     const double weight = 9.81 * simulation.clothModel(0).totalMass();
     EXPECT_LT(-down, 1.01 * weight) << held;   // the ball does not pull
@@ -402,22 +402,23 @@ TEST_F(TrackedScenes, LieOnAFloorThatTheirGuidesGoThrough)
     if (traction > 0)
       all.push_back("tracked.0.max_traction=" + std::to_string(traction));
     Simulation simulation(parseScene(flap, "t", all, folder_));
-    const SceneCloth& held = simulation.state().cloths[0];
+    const ClothState& held = simulation.state().cloths[0];
     for (int k = 1; k <= 100; ++k)
     {
       const StepReport report = simulation.step(simulation.defaultInputs());
       ASSERT_TRUE(report.ok) << traction << " step " << k << ": " << report.message;
-      ASSERT_GT(held.cloth.x.row(2).minCoeff(), -0.0181) << traction << " step " << k;
+      ASSERT_GT(held.x.row(2).minCoeff(), -0.0181) << traction << " step " << k;
       if (k < 12 || k > 79 || traction > 0)
         EXPECT_LT(report.tracking_error, 1e-12) << traction << " step " << k;
       if (traction > 0 && k == 60)
       {
         EXPECT_EQ(report.forces_at_bound, 9);
         EXPECT_NEAR(simulation.trackingError(0).at_bound, 0.032, 1e-6);
-        EXPECT_NEAR(held.guide_forces.row(2).sum(), -0.16 * traction, 1e-9);   // traction times area
+        EXPECT_NEAR(simulation.state().cloth_guides[0].forces.row(2).sum(), -0.16 * traction,
+                    1e-9);   // traction times area
       }
     }
-    EXPECT_TRUE(held.cloth.at_bound.empty());
+    EXPECT_TRUE(held.at_bound.empty());
     EXPECT_LT(simulation.trackingError(0).met, 1e-13);
   }
 }
@@ -448,25 +449,25 @@ TEST_F(TrackedScenes, BoundForcesByRegion)
     StepReport report = one.step(one.defaultInputs());
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_LT(report.tracking_error, 1e-13) << k;
-    EXPECT_LE(one.state().cloths[0].guide_forces.col(1).norm(), tracking.sets[0].bounds[1] * (1 + 1e-9)) << k;
+    EXPECT_LE(one.state().cloth_guides[0].forces.col(1).norm(), tracking.sets[0].bounds[1] * (1 + 1e-9)) << k;
     furthest = std::max(furthest, one.trackingError(0).at_bound);
     strain = std::max(strain, report.max_strain);
     if (k == 50)
     {
-      EXPECT_EQ(one.state().cloths[0].cloth.at_bound, std::vector<int>{1});
+      EXPECT_EQ(one.state().cloths[0].at_bound, std::vector<int>{1});
       one.save(folder_ + "/state");
       two.load(folder_ + "/state");
-      EXPECT_EQ(two.state().cloths[0].cloth.at_bound, std::vector<int>{1});
+      EXPECT_EQ(two.state().cloths[0].at_bound, std::vector<int>{1});
     }
     if (k > 50 && k < 70)
     {
       ASSERT_TRUE(two.step(two.defaultInputs()).ok);
-      ASSERT_TRUE(one.state().cloths[0].cloth.x == two.state().cloths[0].cloth.x) << k;
+      ASSERT_TRUE(one.state().cloths[0].x == two.state().cloths[0].x) << k;
     }
   }
   EXPECT_GT(furthest, 0.3);
   EXPECT_LT(strain, 0.05);
-  EXPECT_TRUE(one.state().cloths[0].cloth.at_bound.empty());
+  EXPECT_TRUE(one.state().cloths[0].at_bound.empty());
   EXPECT_LT(one.trackingError(0).met, 1e-14);
   EXPECT_NE(problems({"tracked.0.max_traction={top: 30}"}).find("test function that is not there"), std::string::npos);
   EXPECT_NE(problems({"tracked.0.max_traction=0"}).find("Pa"), std::string::npos);
@@ -517,8 +518,8 @@ TEST_F(TrackedScenes, StayWithGuidesByTopicUntilTheyMove)
   report = simulation.step(inputs);
   EXPECT_FALSE(report.ok);
   EXPECT_EQ(report.failure, StepFailure::input_not_finite);
-  EXPECT_TRUE(simulation.state().cloths[0].cloth.x == before.cloths[0].cloth.x);
-  EXPECT_TRUE(simulation.state().cloths[0].guide == before.cloths[0].guide);
+  EXPECT_TRUE(simulation.state().cloths[0].x == before.cloths[0].x);
+  EXPECT_TRUE(simulation.state().cloth_guides[0].points == before.cloth_guides[0].points);
   inputs.guides[0].resize(3, 4);
   EXPECT_THROW(simulation.step(inputs), std::invalid_argument);
 }

@@ -50,7 +50,7 @@ protected:
 
   Simulation simulation{parseScene(kSheet, "sheet.yaml", {})};
   const Matrix3Xd rest = simulation.config().cloths[0].tracking->guide.mesh.vertices;
-  const ClothState& cloth = simulation.state().cloths[0].cloth;
+  const ClothState& cloth = simulation.state().cloths[0];
   const long most = WorkBudget::ofStep(cloth.x.cols());
 };
 
@@ -94,7 +94,7 @@ TEST_F(WildGuides, AreRefusedWithinTheBudgetAndTheRunGoesOn)
   Simulation calm(parseScene(kSheet, "sheet.yaml", {}));
   for (int k = 0; k < 8; ++k)
     ASSERT_TRUE(calm.step(calm.defaultInputs()).ok);
-  EXPECT_TRUE(calm.state().cloths[0].cloth.x == cloth.x && calm.state().cloths[0].cloth.v == cloth.v);
+  EXPECT_TRUE(calm.state().cloths[0].x == cloth.x && calm.state().cloths[0].v == cloth.v);
 }
 
 TEST(WorkBudget, IsSpentByCounts)

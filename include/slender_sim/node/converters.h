@@ -50,7 +50,7 @@ bool isFinite(const geometry_msgs::Twist& twist);
 /// Fills everything but header, epoch and step. `out` may hold an earlier message: its memory is reused.
 void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out);
 /// Then, what the rod tracks.
-void toTracking(const RodConfig& rod, const RodGuide& guide, const RodState& state, slender_sim::RodState& out);
+void toTracking(const RodConfig& rod, const GuideState& guide, const RodState& state, slender_sim::RodState& out);
 
 void toMessage(const ThreadState& state, slender_sim::ThreadState& out);
 
@@ -73,11 +73,5 @@ void toPoints(const slender_sim::ClothState& state, sensor_msgs::PointCloud2& ou
 void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out);
 
 void appendPoses(const ThreadState& state, std::vector<geometry_msgs::Pose>& out);
-
-/// False when any position, velocity, director or twist is NaN or infinite.
-bool isFinite(const RodState& state);
-bool isFinite(const RigidBodyState& state);
-bool isFinite(const ThreadState& state);
-bool isFinite(const ClothState& state);
 
 }   // namespace slender

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -9,8 +8,8 @@
 #include "slender_sim/geometry/point_trajectory.h"
 #include "slender_sim/geometry/pose_trajectory.h"
 #include "slender_sim/geometry/triangle_mesh.h"
+#include "slender_sim/tracking/function_set.h"
 #include "slender_sim/tracking/guide_binding.h"
-#include "slender_sim/tracking/weak_constraints.h"
 
 /// Plain structs: what a tracked cloth or rod follows, as checked by the reader.
 namespace slender {
@@ -54,17 +53,6 @@ struct GuideConfig
   /// Vertices at `time` [s] (3 x n [m]) and their velocities [m/s]; of a guide by topic those of the mesh, at rest;
   /// of a cloth those that the scene starts with.
   void evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matrix3Xd* velocities = nullptr) const;
-};
-
-/// Test functions that act together.
-struct FunctionSet
-{
-  std::string name;   ///< empty: of the only set, which needs none
-  TestFunctions functions;
-  std::shared_ptr<const WeakConstraints> constraints;
-  Eigen::VectorXd bounds;       ///< of the force of each [N], infinite without; empty: of none, in all sets
-  std::optional<double> from;   ///< simulated time at which they take over [s] > 0; none: when asked to
-  double blend = 0.0;           ///< time within which the averages then become the guide's [s]
 };
 
 struct TrackingConfig

@@ -75,7 +75,7 @@ std::vector<Eigen::Matrix3Xd> rodContactForces(const Simulation& simulation)
   }
   if (places.empty())
     return forces;
-  for (const ContactTerm& term : simulation.contacts())
+  for (const ContactTerm& term : simulation.world().contacts())
     for (int k = 0; k < 4; ++k)
       if (term.point[k] >= 0)
       {
@@ -123,9 +123,9 @@ void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordF
 {
   if (!asks(fields, RecordField::contact_force))
     return;
-  const Eigen::Index vertices = simulation.state().cloths[static_cast<std::size_t>(cloth)].cloth.x.cols();
+  const Eigen::Index vertices = simulation.state().cloths[static_cast<std::size_t>(cloth)].x.cols();
   Columns columns("cloth_fields", simulation.clothModel(cloth).name, vertices);
-  Eigen::Matrix3Xd forces = simulation.contactForces(cloth);
+  Eigen::Matrix3Xd forces = simulation.world().contactForces(cloth);
   if (forces.cols() != vertices)
     forces.setZero(3, vertices);   // it touches nothing, or has not been stepped yet
   columns.add(contact_columns, forces);
@@ -211,7 +211,7 @@ void addEnergies(const Simulation& simulation, std::vector<FieldTable>& out)
     add(scene.cloths[k].name, e.membrane, e.bending, empty_cell, e.kinetic, e.gravity);
   }
   for (std::size_t b = 0; b < state.bodies.size(); ++b)
-    if (simulation.isSimulated(static_cast<int>(b)))
+    if (!simulation.config().bodies[b].motion)
     {
       const BodyConfig& body = scene.bodies[b];
       const RigidBodyState& s = state.bodies[b];

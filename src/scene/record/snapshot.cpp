@@ -86,28 +86,31 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
   {
     out.rods.push_back(snapshotOf(simulation.rodModel(static_cast<int>(r)), state.rods[r]));
     if (const auto& tracking = scene.rods[r].tracking)
-      appendFunctions(scene.rods[r].name, tracking->sets.front(), state.rod_guides[r].nodes, state.rod_guides[r].forces,
-                      out.functions);
+      appendFunctions(scene.rods[r].name, tracking->sets.front(), state.rod_guides[r].points,
+                      state.rod_guides[r].forces, out.functions);
   }
   for (std::size_t k = 0; k < state.threads.size(); ++k)
     for (const ThreadState& thread : state.threads[k].threads)
       out.threads.push_back(snapshotOf(simulation.threadModel(static_cast<int>(k)).name, thread));
   for (std::size_t k = 0; k < state.cloths.size(); ++k)
   {
-    const SceneCloth& cloth = state.cloths[k];
+    const ClothState& cloth = state.cloths[k];
     const ClothModel& model = simulation.clothModel(static_cast<int>(k));
-    out.cloths.push_back({model.name, cloth.cloth.x, cloth.cloth.v, model.rest.triangles});
+    out.cloths.push_back({model.name, cloth.x, cloth.v, model.rest.triangles});
     if (scene.cloths[k].tracking)
-      appendFunctions(model.name, simulation.functions(static_cast<int>(k)), cloth.guide, cloth.guide_forces,
-                      out.functions);
+    {
+      const GuideState& guide = state.cloth_guides[k];
+      appendFunctions(model.name, simulation.functions(static_cast<int>(k)), guide.points, guide.forces, out.functions);
+    }
   }
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {
     const int grasp = static_cast<int>(g);
-    const bool active = simulation.isActive(grasp);
-    out.grasps.push_back({simulation.grasps()[g].config->name,
-                          GraspSnapshot::Held{simulation.heldObject(grasp), active, simulation.graspPose(grasp)},
-                          active ? simulation.wrench(grasp) : Wrench{}});
+    const bool active = simulation.grasps().isActive(grasp);
+    out.grasps.push_back(
+        {simulation.grasps()[g].config->name,
+         GraspSnapshot::Held{simulation.grasps().heldObject(grasp), active, simulation.grasps().pose(grasp)},
+         active ? simulation.grasps().wrench(grasp) : Wrench{}});
   }
   for (std::size_t b = 0; b < state.bodies.size(); ++b)
     out.bodies.push_back({scene.bodies[b].name, state.bodies[b].X_WB, state.bodies[b].velocity});

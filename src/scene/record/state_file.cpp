@@ -12,6 +12,7 @@
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/scene/state_bytes.h"
+#include "state_fingerprint.h"
 
 /// Saving and loading of a simulation's state. The file: magic, version, fingerprint of the scene, size and checksum of
 /// the payload, payload; numbers as this machine keeps them (the magic number tells the byte order).
@@ -20,7 +21,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 14;
+constexpr std::uint64_t version = 15;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 std::string errorText(const std::string& path, const std::string& what)
@@ -100,29 +101,71 @@ bool fits(const ThreadState& thread)
          thread.spin.size() == edges;
 }
 
-/// Likewise of a cloth: the stepper checks the rest.
-bool fits(const SceneCloth& held, const SceneCloth& now, const ClothModel& model)
+/// Likewise of cloth number k: the stepper checks the rest.
+bool fits(const SceneState& loaded, const SceneState& now, std::size_t k, const ClothModel& model)
 {
-  const PrescribedAverages* averages = model.averagesOf(held.cloth);
-  const Eigen::Index count = averages ? averages->count() : 0;
-  const bool blends = held.blend.gap.cols() > 0;
-  bool good = held.cloth.x.cols() == now.cloth.x.cols() && held.cloth.v.cols() == now.cloth.v.cols() &&
-              held.cloth.rest_angles.size() == now.cloth.rest_angles.size() &&
-              held.cloth.stiffening.size() == now.cloth.stiffening.size() && held.grasps.size() == now.grasps.size() &&
-              held.guide.cols() == now.guide.cols() && held.guide_velocity.cols() == now.guide_velocity.cols() &&
-              held.guide_forces.cols() == count && (averages || held.cloth.average_set == 0) &&
-              held.blend.gap.cols() == (blends ? count : 0) && held.blend.rate.cols() == held.blend.gap.cols() &&
-              (held.blend.duration > 0) == blends;
-  const auto there = [&held](int vertex) { return vertex >= 0 && vertex < held.cloth.x.cols(); };
-  good = good && std::all_of(held.cloth.pins.begin(), held.cloth.pins.end(), there);
+  const ClothState &cloth = loaded.cloths[k], &cloth_now = now.cloths[k];
+  const std::vector<ClothGrasp>& grasps = loaded.cloth_grasps[k];
+  const PrescribedAverages* averages = model.averagesOf(cloth);
+  bool good = cloth.x.cols() == cloth_now.x.cols() && cloth.v.cols() == cloth_now.v.cols() &&
+              cloth.rest_angles.size() == cloth_now.rest_angles.size() &&
+              cloth.stiffening.size() == cloth_now.stiffening.size() && grasps.size() == now.cloth_grasps[k].size() &&
+              (averages || cloth.average_set == 0);
+  if (!now.cloth_guides.empty())
+  {
+    const GuideState &guide = loaded.cloth_guides[k], &guide_now = now.cloth_guides[k];
+    const Eigen::Index count = averages ? averages->count() : 0;
+    const bool blends = guide.blend.gap.cols() > 0;
+    good = good && guide.points.cols() == guide_now.points.cols() &&
+           guide.velocity.cols() == guide_now.velocity.cols() && guide.forces.cols() == count &&
+           guide.blend.gap.cols() == (blends ? count : 0) && guide.blend.rate.cols() == guide.blend.gap.cols() &&
+           (guide.blend.duration > 0) == blends;
+  }
+  const auto there = [&cloth](int vertex) { return vertex >= 0 && vertex < cloth.x.cols(); };
+  good = good && std::all_of(cloth.pins.begin(), cloth.pins.end(), there);
   std::size_t pins = 0;
-  for (const ClothGrasp& grasp : held.grasps)
+  for (const ClothGrasp& grasp : grasps)
   {
     good = good && static_cast<std::size_t>(grasp.points_G.cols()) == grasp.vertices.size() &&
            std::all_of(grasp.vertices.begin(), grasp.vertices.end(), there);
     pins += grasp.active ? grasp.vertices.size() : 0;
   }
-  return good && pins == held.cloth.pins.size();
+  return good && pins == cloth.pins.size();
+}
+
+/// What does not fit between a loaded state and the scene, whose state is `now`; empty when all does.
+std::string misfit(const SceneState& loaded, const SceneState& now, const WorldModel& world)
+{
+  if (loaded.rods.size() != now.rods.size() || loaded.rod_guides.size() != now.rod_guides.size() ||
+      loaded.threads.size() != now.threads.size() || loaded.end_loads.size() != now.end_loads.size() ||
+      loaded.cloths.size() != now.cloths.size() || loaded.cloth_guides.size() != now.cloth_guides.size() ||
+      loaded.cloth_grasps.size() != now.cloth_grasps.size() || loaded.bodies.size() != now.bodies.size() ||
+      loaded.obstacles.size() != now.obstacles.size() ||
+      loaded.obstacle_velocities.size() != now.obstacle_velocities.size() ||
+      loaded.grasp_offsets.size() != now.grasp_offsets.size() || loaded.wrenches.size() != now.wrenches.size())
+    return "has another number of rods, threads, cloths, bodies, obstacles or grasps";
+  std::string problem;
+  for (std::size_t r = 0; problem.empty() && r < now.rods.size(); ++r)
+    problem = misfit(loaded.rods[r], *world.rods[r].model, now.rods[r]);
+  for (std::size_t r = 0; problem.empty() && r < now.rod_guides.size(); ++r)
+  {
+    const GuideState &guide = loaded.rod_guides[r], &guide_now = now.rod_guides[r];
+    if (guide.points.cols() != guide_now.points.cols() || guide.forces.cols() != guide_now.forces.cols())
+      problem = "the guide of rod " + world.rods[r].model->name + " has another size";
+  }
+  for (std::size_t k = 0; problem.empty() && k < now.threads.size(); ++k)
+  {
+    const auto& threads = loaded.threads[k].threads;
+    const ThreadModel& model = *world.threads[k].model;
+    // a thread that nothing holds may have left its region
+    const bool gone = threads.empty() && model.nozzle_diameter > 0;
+    if (gone || !std::all_of(threads.begin(), threads.end(), [](const ThreadState& thread) { return fits(thread); }))
+      problem = "thread " + model.name + " does not fit together";
+  }
+  for (std::size_t k = 0; problem.empty() && k < now.cloths.size(); ++k)
+    if (!fits(loaded, now, k, *world.cloths[k].model))
+      problem = "cloth " + world.cloths[k].model->name + " does not fit together";
+  return problem;
 }
 
 }   // namespace
@@ -133,8 +176,8 @@ void Simulation::save(const std::string& path) const
   Checksum checksum;
   checksum.add(payload.data(), payload.size());
   ByteWriter file;
-  for (std::uint64_t word :
-       {magic, version, fingerprint(), static_cast<std::uint64_t>(payload.size()), checksum.value()})
+  for (std::uint64_t word : {magic, version, stateFingerprint(config_, world_->model()),
+                             static_cast<std::uint64_t>(payload.size()), checksum.value()})
     file(word);
   writeDurably(path, file.bytes() + payload);
 }
@@ -175,7 +218,7 @@ void Simulation::load(const std::string& path)
   checksum.add(bytes.data() + header_size, bytes.size() - header_size);
   if (header[4] != checksum.value())
     throw std::runtime_error(path + ": is damaged (its checksum does not fit)");
-  if (header[2] != fingerprint())
+  if (header[2] != stateFingerprint(config_, world_->model()))
   {
     throw std::runtime_error(path +
                              ": belongs to another scene (rods, moduli, grasps, threads, cloths, gravity, step and "
@@ -191,35 +234,12 @@ void Simulation::load(const std::string& path)
   {
     throw std::runtime_error(path + ": " + error.what());
   }
-  std::string problem;
-  if (loaded.rods.size() != models_.size() || loaded.rod_guides.size() != state_.rod_guides.size() ||
-      loaded.threads.size() != thread_models_.size() || loaded.cloths.size() != cloth_models_.size() ||
-      loaded.bodies.size() != config_.bodies.size() || loaded.obstacles.size() != config_.obstacles.size() ||
-      loaded.obstacle_velocities.size() != loaded.obstacles.size() || loaded.grasp_offsets.size() != grasps_.size() ||
-      loaded.wrenches.size() != grasps_.size() || loaded.end_loads.size() != thread_models_.size())
-    problem = "has another number of rods, threads, cloths, bodies, obstacles or grasps";
-  for (std::size_t r = 0; problem.empty() && r < models_.size(); ++r)
-    problem = misfit(loaded.rods[r], *models_[r], state_.rods[r]);
-  for (std::size_t r = 0; problem.empty() && r < state_.rod_guides.size(); ++r)
-    if (loaded.rod_guides[r].nodes.cols() != state_.rod_guides[r].nodes.cols() ||
-        loaded.rod_guides[r].forces.cols() != state_.rod_guides[r].forces.cols())
-      problem = "the guide of rod " + models_[r]->name + " has another size";
-  for (std::size_t k = 0; problem.empty() && k < thread_models_.size(); ++k)
-  {
-    const auto& threads = loaded.threads[k].threads;
-    // a thread that nothing holds may have left its region
-    const bool gone = threads.empty() && config_.threads[k].nozzle;
-    if (gone || !std::all_of(threads.begin(), threads.end(), [](const ThreadState& thread) { return fits(thread); }))
-      problem = "thread " + thread_models_[k]->name + " does not fit together";
-  }
-  for (std::size_t k = 0; problem.empty() && k < cloth_models_.size(); ++k)
-    if (!fits(loaded.cloths[k], state_.cloths[k], *cloth_models_[k]))
-      problem = "cloth " + cloth_models_[k]->name + " does not fit together";
+  const std::string problem = misfit(loaded, state_, world_->model());
   if (!problem.empty())
     throw std::runtime_error(path + ": " + problem);
   try
   {
-    checkTouchingCloths(loaded);
+    world_->checkCloths(loaded);
   }
   catch (const std::invalid_argument& error)
   {

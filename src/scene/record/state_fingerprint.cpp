@@ -1,10 +1,10 @@
-#include "byte_archive.h"
-#include "slender_sim/scene/simulation.h"
+#include "state_fingerprint.h"
 
-/// What a saved state must have in common with the scene that takes it up again.
+#include "byte_archive.h"
+
 namespace slender {
 
-std::uint64_t Simulation::fingerprint() const
+std::uint64_t stateFingerprint(const SceneConfig& config, const WorldModel& world)
 {
   ByteWriter out;
   const auto text = [&out](const std::string& word) {
@@ -36,8 +36,8 @@ std::uint64_t Simulation::fingerprint() const
       }
     }
   };
-  out(config_.gravity);
-  const TimeConfig& time = config_.time;
+  out(config.gravity);
+  const TimeConfig& time = config.time;
   out(time.step);
   out(static_cast<int>(time.integrator));
   out(time.spectral_radius);
@@ -46,9 +46,9 @@ std::uint64_t Simulation::fingerprint() const
   out(time.newton.tolerance);
   out(time.newton.max_iterations);
   out(time.newton.max_cuts);
-  for (std::size_t r = 0; r < models_.size(); ++r)
+  for (std::size_t r = 0; r < world.rods.size(); ++r)
   {
-    const RodModel& model = *models_[r];
+    const RodModel& model = *world.rods[r].model;
     text(model.name);
     out(model.closed);
     out(model.isotropic);
@@ -63,29 +63,30 @@ std::uint64_t Simulation::fingerprint() const
     out(model.stiffness_damping);
     out(model.isotropic);
     out(model.inextensible);
-    for (const GraspConfig& grasp : config_.rods[r].grasps)
+    for (const GraspConfig& grasp : config.rods[r].grasps)
     {
       text(grasp.name);
       out(static_cast<int>(grasp.attach));
     }
-    for (const RodLoadConfig& load : config_.rods[r].loads)
+    for (const RodLoadConfig& load : config.rods[r].loads)
     {
       out(load.node);
       out(load.arc_length);
       out(load.force);
       out(load.torque);
     }
-    if (const auto& tracking = config_.rods[r].tracking)
+    if (const auto& tracking = config.rods[r].tracking)
       tracked(*tracking);
-    const RodContact touch = config_.rods[r].contact.value_or(RodContact{});
-    out(config_.rods[r].contact.has_value());
+    const RodContact touch = config.rods[r].contact.value_or(RodContact{});
+    out(config.rods[r].contact.has_value());
     out(touch.self);
     out(touch.rods);
     out(touch.obstacles);
     out(touch.friction);
   }
-  for (const auto& model : thread_models_)
+  for (const WorldModel::Thread& thread : world.threads)
   {
+    const auto& model = thread.model;
     text(model->name);
     for (const double value :
          {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
@@ -96,7 +97,7 @@ std::uint64_t Simulation::fingerprint() const
     out(model->floor.friction);
     out(model->limits.max_deposited);
   }
-  for (const ThreadConfig& thread : config_.threads)
+  for (const ThreadConfig& thread : config.threads)
   {
     const ThreadContactConfig touch = thread.contact.value_or(ThreadContactConfig{});
     out(thread.contact.has_value());
@@ -106,9 +107,9 @@ std::uint64_t Simulation::fingerprint() const
     out(touch.friction);
     out(thread.merging);
   }
-  for (std::size_t k = 0; k < cloth_models_.size(); ++k)
+  for (std::size_t k = 0; k < world.cloths.size(); ++k)
   {
-    const ClothModel& model = *cloth_models_[k];
+    const ClothModel& model = *world.cloths[k].model;
     text(model.name);
     out(model.rest.vertices);
     out(static_cast<std::uint64_t>(model.rest.triangles.cols()));
@@ -122,37 +123,37 @@ std::uint64_t Simulation::fingerprint() const
          {model.membrane.c11, model.membrane.c12, model.membrane.c22, model.membrane.c33, model.bending_modulus,
           model.mass_damping, model.stiffness_damping, model.wind_coefficient, model.aerodynamics.air_density,
           model.aerodynamics.drag, model.aerodynamics.lift, model.plasticity.yield_curvature,
-          model.plasticity.hardening, model.plasticity.creep_time, config_.cloths[k].linear_tolerance})
+          model.plasticity.hardening, model.plasticity.creep_time, config.cloths[k].linear_tolerance})
       out(value);
     out(static_cast<int>(model.bending));
     if (model.bending_poissons_ratio)
       out(*model.bending_poissons_ratio);
-    out(static_cast<int>(config_.cloths[k].solver));
-    out(config_.cloths[k].one_newton_step);
-    if (const auto& tracking = config_.cloths[k].tracking)
+    out(static_cast<int>(config.cloths[k].solver));
+    out(config.cloths[k].one_newton_step);
+    if (const auto& tracking = config.cloths[k].tracking)
       tracked(*tracking);
-    const ClothContactConfig touch = config_.cloths[k].contact.value_or(ClothContactConfig{});
-    out(config_.cloths[k].contact.has_value());
+    const ClothContactConfig touch = config.cloths[k].contact.value_or(ClothContactConfig{});
+    out(config.cloths[k].contact.has_value());
     out(touch.self);
     out(touch.cloths);
     out(touch.obstacles);
     out(touch.friction);
     out(touch.thickness);
-    for (const GraspConfig& grasp : config_.cloths[k].grasps)
+    for (const GraspConfig& grasp : config.cloths[k].grasps)
     {
       text(grasp.name);
       out(static_cast<int>(grasp.attach));
     }
     for (const char face : model.clamped_faces)
       out(static_cast<int>(face));
-    for (const ClothLoadConfig& load : config_.cloths[k].loads)
+    for (const ClothLoadConfig& load : config.cloths[k].loads)
     {
       for (const int vertex : load.vertices)
         out(vertex);
       out(load.force);
     }
   }
-  for (const BodyConfig& body : config_.bodies)
+  for (const BodyConfig& body : config.bodies)
   {
     text(body.name);
     out(body.motion.has_value());
@@ -160,9 +161,9 @@ std::uint64_t Simulation::fingerprint() const
     out(body.inertia);
     out(static_cast<std::uint64_t>(body.welds.size()));
   }
-  for (const ObstacleConfig& obstacle : config_.obstacles)
+  for (const ObstacleConfig& obstacle : config.obstacles)
     text(obstacle.name);
-  out(config_.contact.gap);
+  out(config.contact.gap);
   Checksum checksum;
   checksum.add(out.bytes().data(), out.bytes().size());
   return checksum.value();

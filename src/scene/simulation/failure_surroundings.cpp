@@ -79,9 +79,9 @@ private:
     for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
     {
       const GraspRef& ref = simulation_.grasps()[g];
-      if (!simulation_.isActive(static_cast<int>(g)) || (place_.kind == Kind::rod     ? ref.rod
-                                                         : place_.kind == Kind::cloth ? ref.cloth
-                                                                                      : -1) != object_)
+      if (!simulation_.grasps().isActive(static_cast<int>(g)) || (place_.kind == Kind::rod     ? ref.rod
+                                                                  : place_.kind == Kind::cloth ? ref.cloth
+                                                                                               : -1) != object_)
         continue;
       const std::string name = "'" + ref.config->name + "'";
       if (place_.kind == Kind::rod)
@@ -91,8 +91,8 @@ private:
       }
       else
       {
-        for (const int vertex : state.cloths[object_].grasps[ref.index].vertices)
-          holder_.add((state.cloths[object_].cloth.x.col(vertex) - place_.position).norm(), name);
+        for (const int vertex : state.cloth_grasps[object_][ref.index].vertices)
+          holder_.add((state.cloths[object_].x.col(vertex) - place_.position).norm(), name);
       }
     }
     for (const BodyConfig& body : config_.bodies)
@@ -251,7 +251,7 @@ private:
       if (k == object_ || !contact->cloths || !config_.cloths[k].contact || !config_.cloths[k].contact->cloths)
         continue;
       const Eigen::Matrix3Xi& faces = config_.cloths[k].mesh.triangles;
-      const Eigen::Matrix3Xd& x = simulation_.state().cloths[k].cloth.x;
+      const Eigen::Matrix3Xd& x = simulation_.state().cloths[k].x;
       for (Eigen::Index f = 0; f < faces.cols(); ++f)
       {
         partner_.add(pointTriangleDistance(place_.position, x.col(faces(0, f)), x.col(faces(1, f)), x.col(faces(2, f))),

@@ -163,7 +163,7 @@ SceneConfig sceneOf(const RestShape& shape, BendingModel bending, const Setting&
 /// Largest distance of a vertex from where it started, within `seconds`, over the size of the shape.
 double creep(Simulation& simulation, double seconds)
 {
-  const Eigen::Matrix3Xd start = simulation.state().cloths[0].cloth.x;
+  const Eigen::Matrix3Xd start = simulation.state().cloths[0].x;
   TriangleMesh shape;
   shape.vertices = start;
   const int steps = static_cast<int>(std::lround(seconds / simulation.config().time.step));
@@ -172,7 +172,7 @@ double creep(Simulation& simulation, double seconds)
   {
     if (!simulation.step(simulation.defaultInputs()).ok)
       return std::numeric_limits<double>::quiet_NaN();
-    worst = std::max(worst, (simulation.state().cloths[0].cloth.x - start).colwise().norm().maxCoeff());
+    worst = std::max(worst, (simulation.state().cloths[0].x - start).colwise().norm().maxCoeff());
   }
   return worst / sizeOf(shape);
 }

@@ -96,10 +96,11 @@ void cutChain(StudyContext& context, int links, int edges, double way, Plot& pic
     return context.row().set("case", "closed links, one cut").set("n", edges).set("quantity", quantity);
   };
   row("hooked pairs when drawn taut")
-      .set("tension", -scene.wrench(1).force.x())
+      .set("tension", -scene.grasps().wrench(1).force.x())
       .check(hooked(g.state.rods), links - 1, 0.5, "as built: no link has passed through another");
   row("weight on the ends [N]")
-      .check(-scene.wrench(0).force.z() - scene.wrench(1).force.z(), weight, 0.01 * weight, "rho A l g");
+      .check(-scene.grasps().wrench(0).force.z() - scene.grasps().wrench(1).force.z(), weight, 0.01 * weight,
+             "rho A l g");
 
   const int middle = links / 2;
   cut(g, middle);
@@ -124,7 +125,7 @@ void cutChain(StudyContext& context, int links, int edges, double way, Plot& pic
       .check(std::min(left, right), 0, 0.5, "the chain parts there");
   row("hooked pairs elsewhere").check(hooked(g.state.rods) - left - right, links - 3, 0.5, "all others hold");
   row("largest penetration [m]").check(std::max(0.0, penetration), 0, 1e-9, "all pairs, brute force");
-  context.metric("tension_when_cut", -scene.wrench(1).force.x());
+  context.metric("tension_when_cut", -scene.grasps().wrench(1).force.x());
   context.metric("parted_after", parted);
 }
 
@@ -143,7 +144,7 @@ void openChain(StudyContext& context, Plot& picture)
   {
     context.progress(static_cast<int>(1e3 * scene.state().time), 4000, "open links");
     require(scene.step(scene.defaultInputs()), "open links");
-    strongest = std::max(strongest, -scene.wrench(1).force.x());
+    strongest = std::max(strongest, -scene.grasps().wrench(1).force.x());
     if (scene.state().steps % 20 == 0)
       penetration = std::max(penetration, -bruteForceClearance(groupOf(scene)));
     if (broke == 0 && hooked(scene.state().rods) < links - 1)

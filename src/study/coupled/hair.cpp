@@ -45,7 +45,7 @@ void runHair(StudyContext& context)
     seconds += took;
     slowest = std::max(slowest, took);
     iterations += report.iterations;
-    contacts = std::max(contacts, scene.contacts().size());
+    contacts = std::max(contacts, scene.world().contacts().size());
     for (const RodState& rod : scene.state().rods)
       fastest = std::max(fastest, isFinite(rod) ? fastestNode(rod) : std::numeric_limits<double>::infinity());
     if (k % looks == 0)

@@ -71,7 +71,7 @@ void runTree(StudyContext& context)
   const auto row = [&](const char* quantity) -> Row& {
     return context.row().set("vertices", verticesOf(bent)).set("quantity", quantity);
   };
-  const Wrench load = loadOn(bent), root = bent.wrench(0);
+  const Wrench load = loadOn(bent), root = bent.grasps().wrench(0);
   row("force on the root less weight and wind [N]")
       .set("size", load.force.norm())
       .check((root.force - load.force).norm(), 0, 1e-4 * load.force.norm(),

@@ -57,7 +57,7 @@ public:
   {
     for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
     {
-      const Wrench& wrench = simulation.wrench(static_cast<int>(g));
+      const Wrench& wrench = simulation.grasps().wrench(static_cast<int>(g));
       force_ = std::max(force_, wrench.force.norm());
       torque_ = std::max(torque_, wrench.torque.norm());
     }

@@ -152,29 +152,15 @@ void StabilityTally::record(Row& row, const StabilityCell& cell)
 
 namespace {
 
-/// Nodes or vertices of the scene's object; whether they and their velocities are finite.
+/// Nodes or vertices of the scene's object.
 Matrix3Xd positions(const SceneState& state)
 {
   if (!state.rods.empty())
     return state.rods[0].x;
   if (!state.cloths.empty())
-    return state.cloths[0].cloth.x;
+    return state.cloths[0].x;
   const ThreadState& t = state.threads[0].threads[0];
   return Eigen::Map<const Matrix3Xd>(t.x[0].data(), 3, t.nodes());
-}
-
-bool isFinite(const SceneState& state)
-{
-  bool finite = positions(state).allFinite();
-  for (const RodState& rod : state.rods)
-    finite = finite && rod.v.allFinite();
-  for (const SceneCloth& cloth : state.cloths)
-    finite = finite && cloth.cloth.v.allFinite();
-  for (const ThreadGroupState& group : state.threads)
-    for (const ThreadState& thread : group.threads)
-      for (const Vector3d& v : thread.v)
-        finite = finite && v.allFinite();
-  return finite;
 }
 
 struct Energy
@@ -259,13 +245,13 @@ Run run(const MapScene& scene, double step, int steps, const Run* along = nullpt
     const StepReport report = simulation->step(inputs);
     const SceneState& state = simulation->state();
     const Energy now = energyOf(*simulation);
-    if (!r.cell.took(report, isFinite(state) && std::isfinite(now.now), stateBytes(before) == stateBytes(state)))
+    if (!r.cell.took(report, allFinite(state) && std::isfinite(now.now), stateBytes(before) == stateBytes(state)))
       break;
     r.path->x.push_back(positions(state));
     if (tracking)
     {
-      const Matrix3Xd reached = simulation->functions(0).constraints->averages(state.cloths[0].guide);
-      const double given = (reached - averages).cwiseProduct(state.cloths[0].guide_forces).sum();
+      const Matrix3Xd reached = simulation->functions(0).constraints->averages(state.cloth_guides[0].points);
+      const double given = (reached - averages).cwiseProduct(state.cloth_guides[0].forces).sum();
       averages = reached;
       work += given;
       scale += std::abs(given);

@@ -262,7 +262,7 @@ Poured pour(const Fluid& fluid, const Outlet& outlet, double turns, const Budget
       p.says = report.message;
       break;
     }
-    p.absurd = physics.look(group, simulation.endLoads(0)[1].force, simulation.state().time - before);
+    p.absurd = physics.look(group, simulation.state().end_loads[0][1].force, simulation.state().time - before);
     if (!p.absurd.empty())
       break;
     landings.look(group.threads[0], simulation.state().time);

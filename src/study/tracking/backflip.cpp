@@ -138,25 +138,26 @@ void runBackflip(StudyContext& context)
         throw std::runtime_error("backflip, " + look.name + ", step " + std::to_string(k) + ": " + report.message);
       error = std::max(error, report.tracking_error);
       cuts += report.cut_steps;
-      const SceneCloth& held = scene.state().cloths.front();
+      const ClothState& held = scene.state().cloths.front();
+      const Matrix3Xd& guide = scene.state().cloth_guides.front().points;
       if (k == shown)
       {
         if (picture.panels.empty())
-          picture.panels.push_back({"guide", {{{held.guide, cloth.tracking->guide.mesh.triangles}}}});
-        picture.panels.push_back({look.name, {{{held.cloth.x, mesh.triangles}}}});
+          picture.panels.push_back({"guide", {{{guide, cloth.tracking->guide.mesh.triangles}}}});
+        picture.panels.push_back({look.name, {{{held.x, mesh.triangles}}}});
       }
       if (k % every != 0)
         continue;
-      now.cloths[0] = held.cloth;
+      now.cloths[0] = held;
       own += checker.intersections(now);
-      const Matrix3Xd smooth = held.guide * subdivide(cloth.tracking->guide.mesh, 2).weights.transpose();
+      const Matrix3Xd smooth = guide * subdivide(cloth.tracking->guide.mesh, 2).weights.transpose();
       now.cloths[0].x = smooth;
       guide_meetings += checker.intersections(now);
-      const double bent = bending(topology, mesh, held.cloth.x);
+      const double bent = bending(topology, mesh, held.x);
       folds += bent;
-      stretch += strain(topology, mesh.vertices, held.cloth.x);
-      away += rms(held.cloth.x, smooth);
-      course.frames.push_back(held.cloth.x);
+      stretch += strain(topology, mesh.vertices, held.x);
+      away += rms(held.x, smooth);
+      course.frames.push_back(held.x);
       plot.at(look.name).x.push_back(k * step);
       plot.at(look.name).y.push_back(bent);
       ++kept;

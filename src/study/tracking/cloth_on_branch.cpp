@@ -71,7 +71,7 @@ void runClothOnBranch(StudyContext& context)
   const TrackingConfig& tracking = *config.cloths[tracked].tracking;
   const std::vector<int> order = orderAs(config.cloths[tracked].mesh.vertices, config.cloths[free].mesh.vertices);
   const auto vertices = [&](int cloth) -> Matrix3Xd {
-    const Matrix3Xd& x = scene.state().cloths[cloth].cloth.x;
+    const Matrix3Xd& x = scene.state().cloths[cloth].x;
     return cloth == free ? Matrix3Xd(x(Eigen::all, order)) : x;
   };
   const auto fromPreview = [&](int cloth) {
@@ -93,8 +93,7 @@ void runClothOnBranch(StudyContext& context)
   const auto draw = [&](int cloth, const std::string& label) {
     const Subdivision fine = subdivide(config.cloths[cloth].mesh, cloth == preview ? 4 : 0);
     picture.panels.push_back(
-        {label,
-         {{{scene.state().cloths[cloth].cloth.x * fine.weights.transpose(), fine.mesh.triangles}}, {branch, false}}});
+        {label, {{{scene.state().cloths[cloth].x * fine.weights.transpose(), fine.mesh.triangles}}, {branch, false}}});
   };
   const double step = config.time.step;
   const int steps = static_cast<int>(std::lround(config.time.duration / step));
@@ -129,7 +128,7 @@ void runClothOnBranch(StudyContext& context)
   const double size = tracking.size, away = fromPreview(free);
   context.metric("tracked_from_preview_over_size", worst / size);
   context.metric("free_from_preview_over_size", away / size);
-  context.metric("free_speed", scene.state().cloths[free].cloth.v.colwise().norm().maxCoeff());
+  context.metric("free_speed", scene.state().cloths[free].v.colwise().norm().maxCoeff());
   context.metric("seconds_per_step", seconds / steps);
   context.note(
       "from_preview: greatest distance of the average of a quarter from the preview's; of the tracked one the worst "

@@ -136,12 +136,6 @@ struct Verdict
   double worst = 0, fastest = 0;   ///< of |c| over the shell's size; largest velocity at the end [m/s]
 };
 
-bool isFinite(const SceneCloth& s)
-{
-  return s.cloth.x.allFinite() && s.cloth.v.allFinite() && s.cloth.rest_angles.allFinite() && s.guide.allFinite() &&
-         s.guide_forces.allFinite();
-}
-
 /// A refusal must say why and leave the state as it was; the run goes on with the next guide. After ten refusals, or
 /// `budget` of CPU time [s], it ends.
 Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double budget)
@@ -171,10 +165,10 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
       report.ok = false;
       report.message = error.what();
     }
-    const SceneCloth& now = simulation.state().cloths[0];
-    if (v.cell.took(report, isFinite(now), stateBytes(before) == stateBytes(simulation.state())))
+    const ClothState& now = simulation.state().cloths[0];
+    if (v.cell.took(report, allFinite(simulation.state()), stateBytes(before) == stateBytes(simulation.state())))
     {
-      const Matrix3Xd& x = now.cloth.x;
+      const Matrix3Xd& x = now.x;
       const double reach = x.cwiseAbs().maxCoeff(), size = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm();
       v.worst = std::max(v.worst, simulation.trackingError(0).met / (size + 1e-3 * reach + 0.4));
       // Once the guide is still, nothing puts energy in; what is strained then is what there is to give.
@@ -193,7 +187,7 @@ Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double bu
       break;
     ++v.refused;
   }
-  v.fastest = simulation.state().cloths[0].cloth.v.cwiseAbs().maxCoeff();
+  v.fastest = simulation.state().cloths[0].v.cwiseAbs().maxCoeff();
   v.cell.cpu_seconds = threadSeconds() - begin;
   return v;
 }

@@ -1,12 +1,13 @@
-// Statics of a scene: the equilibrium from which it starts, equilibria under growing loads, and the load at which they
-// cease to be stable.
+// Equilibria under growing loads, and the load at which they cease to be stable.
+#include "statics_runner.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
+#include "scene_parts.h"
 #include "slender_sim/rod/rod_path.h"
 #include "slender_sim/scene/reader.h"
-#include "slender_sim/scene/simulation.h"
 
 namespace slender {
 
@@ -45,40 +46,10 @@ double sumOfLoads(const RodModel& model, const RodInputs& loads)
   return sum + loads.torques.cwiseAbs().sum() / model.rest_length.sum();
 }
 
-}   // namespace
-
-void Simulation::findEquilibrium()
+void requireStatics(const SceneConfig& config)
 {
-  checkHasStatics();
-  takeStaticInputs();
-  const StepReport report = solveStatics(1.0);
-  if (!report.ok)
-  {
-    throw SimulationError("start: equilibrium: " + report.message +
-                          " (start: as_given starts from the shape in the scene)");
-  }
-  if (!report.stable)
-  {
-    const std::string unstable = "start: equilibrium: the equilibrium is unstable (lowest eigenvalue " +
-                                 shortText(report.lowest_eigenvalue) + " 1/s^2), and no stable one was reached from it";
-    if (!config_.start.accept_unstable)
-    {
-      throw SimulationError(
-          unstable +
-          ": start from a shape that is nearer to the stable equilibrium (initial), or hold what drifts by a grasp "
-          "(start: as_given starts from the shape in the scene; start: {equilibrium: true, accept_unstable: true} "
-          "starts from the unstable equilibrium)");
-    }
-    config_.warnings.push_back(unstable + ": start.accept_unstable starts from it all the same");
-  }
-  start_report_ = report;
-  takeWrenches();
-}
-
-void Simulation::checkHasStatics() const
-{
-  const std::string where = config_.file.empty() ? "scene " + config_.name : config_.file;
-  for (const ClothConfig& cloth : config_.cloths)
+  const std::string where = placeOf(config, FailurePlace::Kind::none, -1);
+  for (const ClothConfig& cloth : config.cloths)
   {
     if (cloth.tracking || cloth.contact)
     {
@@ -87,126 +58,112 @@ void Simulation::checkHasStatics() const
                        " does; let it settle by time stepping with damping");
     }
   }
-  for (const RodConfig& rod : config_.rods)
+  for (const RodConfig& rod : config.rods)
     if (rod.tracking)
       throw SceneError(where + ": statics is not for rods that track a guide, as rod " + rod.name + " does");
-  if (config_.rods.empty() && config_.cloths.empty() && !group_)
+  const bool simulated = std::any_of(config.bodies.begin(), config.bodies.end(),
+                                     [](const BodyConfig& body) { return !body.motion.has_value(); });
+  if (config.rods.empty() && config.cloths.empty() && !simulated)
   {
     throw SceneError(where +
                      ": statics needs a rod, a cloth or a simulated body; threads flow, and have no equilibrium");
   }
 }
 
-/// Grasps, bodies and obstacles as their motions have them at time 0.
-void Simulation::takeStaticInputs()
+}   // namespace
+
+StaticsRunner::StaticsRunner(const SceneConfig& config, const SceneState& start, WorldInputs inputs, World& world,
+                             SceneGrasps& grasps, SceneState& state)
+  : config_(config),
+    start_(start),
+    inputs_(std::move(inputs)),
+    world_(world),
+    grasps_(grasps),
+    state_(state),
+    scales_(config.statics ? config.statics->scales : FactorScales::all)
 {
-  inputsAt(0.0, static_inputs_);
-  fillRodInputs(static_inputs_);
-  fillClothInputs(static_inputs_);
+  requireStatics(config);
 }
 
-Eigen::Vector3d Simulation::gravityAt(double factor) const
+RodStepper& StaticsRunner::stepper()
 {
-  const bool scaled = !config_.statics || config_.statics->scales != FactorScales::loads;
-  return (scaled ? factor : 1.0) * config_.gravity;
+  RodStepper* stepper = world_.rodStepper(0);
+  if (!stepper)
+    throw SceneError(placeOf(config_, FailurePlace::Kind::none, -1) + ": statics: the rod is not on its own");
+  return *stepper;
 }
 
-/// All inputs of a rod at a load factor, with the imperfection; takeStaticInputs() comes before.
-RodInputs Simulation::loadsAt(int rod, double factor) const
+Eigen::Vector3d StaticsRunner::gravityAt(double factor) const
 {
-  const bool scaled = !config_.statics || config_.statics->scales != FactorScales::gravity;
-  RodInputs inputs = rod_inputs_[rod];
+  return (scales_ != FactorScales::loads ? factor : 1.0) * config_.gravity;
+}
+
+RodInputs StaticsRunner::loadsAt(int rod, double factor) const
+{
+  const double scale = scales_ != FactorScales::gravity ? factor : 1.0;
+  RodInputs inputs = inputs_.rods[rod];
   inputs.gravity = gravityAt(factor);
-  inputs.forces = (scaled ? factor : 1.0) * rod_loads_[rod].forces;
-  inputs.torques = (scaled ? factor : 1.0) * rod_loads_[rod].torques;
+  inputs.forces *= scale;
+  inputs.torques *= scale;
   if (imperfection_.cols() > 0)
     inputs.forces = inputs.forces.cols() > 0 ? Eigen::Matrix3Xd(inputs.forces + imperfection_) : imperfection_;
   return inputs;
 }
 
-/// What the load factor multiplies, times `factor`.
-RodInputs Simulation::loadsPerFactor(int rod, double factor) const
+RodInputs StaticsRunner::loadsPerFactor(int rod, double factor) const
 {
-  const FactorScales scales = config_.statics ? config_.statics->scales : FactorScales::all;
   RodInputs inputs;
-  inputs.gravity = scales == FactorScales::loads ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(factor * config_.gravity);
-  if (scales != FactorScales::gravity)
+  inputs.gravity =
+      scales_ == FactorScales::loads ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(factor * config_.gravity);
+  if (scales_ != FactorScales::gravity)
   {
-    inputs.forces = factor * rod_loads_[rod].forces;
-    inputs.torques = factor * rod_loads_[rod].torques;
+    inputs.forces = factor * inputs_.rods[rod].forces;
+    inputs.torques = factor * inputs_.rods[rod].torques;
   }
   return inputs;
 }
 
-/// The stable equilibrium that is reached from the present state under loads of this factor.
-StepReport Simulation::solveStatics(double factor)
+StepReport StaticsRunner::solve(double factor)
 {
-  std::vector<Twist> velocities;
-  for (const RigidBodyState& body : state_.bodies)
-    velocities.push_back(body.velocity);
-  gravity_ = gravityAt(factor);
-  StepReport report;
-  for (std::size_t r = 0; r < steppers_.size() && report.ok; ++r)
+  const std::vector<RigidBodyState> before = state_.bodies;
+  WorldInputs loads = inputs_;
+  loads.gravity = gravityAt(factor);
+  for (std::size_t r = 0; r < loads.rods.size(); ++r)
+    loads.rods[r] = loadsAt(static_cast<int>(r), factor);
+  for (ClothInputs& cloth : loads.cloths)
   {
-    const RodInputs loads = loadsAt(static_cast<int>(r), factor);
-    if (steppers_[r])
-      report.merge(steppers_[r]->solveEquilibrium(state_.rods[r], loads));
-    else
-      rod_inputs_[r] = loads;   // the group takes them from here
+    cloth.gravity = loads.gravity;
+    cloth.forces *= scales_ != FactorScales::gravity ? factor : 1.0;
   }
-  if (report.ok && group_)
-    report.merge(stepGroup(static_inputs_, true));
-  if (report.ok)
-    report.merge(solveCloths(factor));
-  gravity_ = config_.gravity;
-  if (config_.start.keep_velocities)
-    for (std::size_t b = 0; b < velocities.size(); ++b)
-      state_.bodies[b].velocity = velocities[b];
+  const StepReport report = world_.solveEquilibrium(state_, loads);
+  if (!report.ok)
+    return report;
+  grasps_.takeWrenches(world_);
+  for (std::size_t b = 0; config_.start.keep_velocities && b < before.size(); ++b)
+    state_.bodies[b].velocity = before[b].velocity;
   return report;
 }
 
-/// The stable equilibria of all cloths under loads of this factor; the state is where the search begins.
-/// fillClothInputs() comes before.
-StepReport Simulation::solveCloths(double factor)
-{
-  StepReport total;
-  const bool scaled = !config_.statics || config_.statics->scales != FactorScales::gravity;
-  for (std::size_t k = 0; k < cloth_steppers_.size() && total.ok; ++k)
-  {
-    ClothInputs loads = cloth_inputs_[k];
-    loads.gravity = gravityAt(factor);
-    loads.forces *= scaled ? factor : 1.0;
-    total.merge(cloth_steppers_[k]->solveEquilibrium(state_.cloths[k].cloth, loads));
-  }
-  if (total.ok)
-    takeClothWrenches();
-  return total;
-}
-
 /// The present state as a row.
-StaticsRow Simulation::rowAt(double factor, const StepReport& report) const
+StaticsRow StaticsRunner::rowAt(double factor, const StepReport& report)
 {
   StaticsRow row;
   row.factor = factor;
   row.report = report;
-  for (std::size_t r = 0; r < steppers_.size(); ++r)
+  for (std::size_t r = 0; r < state_.rods.size(); ++r)
   {
     row.nodes.push_back(state_.rods[r].x);
-    row.modes.push_back(steppers_[r] ? Eigen::Matrix4Xd(steppers_[r]->lowestMode()) : Eigen::Matrix4Xd(4, 0));
-    row.displacement = std::max(row.displacement, largestDistance(state_.rods[r].x, initial_.rods[r].x));
+    const RodStepper* stepper = world_.rodStepper(static_cast<int>(r));
+    row.modes.push_back(stepper ? Eigen::Matrix4Xd(stepper->lowestMode()) : Eigen::Matrix4Xd(4, 0));
+    row.displacement = std::max(row.displacement, largestDistance(state_.rods[r].x, start_.rods[r].x));
   }
   for (std::size_t k = 0; k < state_.cloths.size(); ++k)
-  {
-    row.displacement =
-        std::max(row.displacement, largestDistance(state_.cloths[k].cloth.x, initial_.cloths[k].cloth.x));
-  }
+    row.displacement = std::max(row.displacement, largestDistance(state_.cloths[k].x, start_.cloths[k].x));
   return row;
 }
 
-StaticsRun Simulation::runStatics()
+StaticsRun StaticsRunner::run()
 {
-  checkHasStatics();
-  takeStaticInputs();
   StaticsRun run;
   const StaticsConfig statics = config_.statics.value_or(StaticsConfig{});
   if (statics.buckling)
@@ -221,18 +178,18 @@ StaticsRun Simulation::runStatics()
     runFactors(factors, run);
   imperfection_.resize(3, 0);
   if (run.end.ok)
-    takeWrenches();
+    grasps_.takeWrenches(world_);
   return run;
 }
 
 /// Forces along the lowest mode of the equilibrium at the first factor, which need not be stable.
-void Simulation::perturb(double first_factor, StaticsRun& run)
+void StaticsRunner::perturb(double first_factor, StaticsRun& run)
 {
   RodState state = state_.rods[0];
-  run.end.merge(steppers_[0]->solveEquilibrium(state, loadsAt(0, first_factor), false));
+  run.end.merge(stepper().solveEquilibrium(state, loadsAt(0, first_factor), false));
   if (!run.end.ok)
     return;
-  const Eigen::Matrix3Xd mode = steppers_[0]->lowestMode().topRows<3>();
+  const Eigen::Matrix3Xd mode = stepper().lowestMode().topRows<3>();
   const double size = mode.colwise().norm().sum();
   if (!(size > 0))
   {
@@ -241,14 +198,15 @@ void Simulation::perturb(double first_factor, StaticsRun& run)
          "it; leave perturbation out");
     return;
   }
-  imperfection_ = config_.statics->perturbation * sumOfLoads(*models_[0], loadsPerFactor(0, 1.0)) / size * mode;
+  imperfection_ =
+      config_.statics->perturbation * sumOfLoads(*world_.model().rods[0].model, loadsPerFactor(0, 1.0)) / size * mode;
 }
 
-void Simulation::runFactors(const std::vector<double>& factors, StaticsRun& run)
+void StaticsRunner::runFactors(const std::vector<double>& factors, StaticsRun& run)
 {
   for (const double factor : factors)
   {
-    const StepReport report = solveStatics(factor);
+    const StepReport report = solve(factor);
     if (!report.ok)
     {
       run.end = report;
@@ -259,11 +217,11 @@ void Simulation::runFactors(const std::vector<double>& factors, StaticsRun& run)
   }
 }
 
-void Simulation::runPath(const PathConfig& path, StaticsRun& run)
+void StaticsRunner::runPath(const PathConfig& path, StaticsRun& run)
 {
   constexpr int kMostTimes = 20;   // longer paths than so many times their scale wander off, or go round in circles
   const double range = path.to - path.from;
-  RodStepper& stepper = *steppers_[0];
+  RodStepper& stepper = this->stepper();
   RodState& state = state_.rods[0];
   const StepReport first = stepper.solveEquilibrium(state, loadsAt(0, path.from), false);
   if (!first.ok)
@@ -273,7 +231,7 @@ void Simulation::runPath(const PathConfig& path, StaticsRun& run)
     return;
   }
   run.rows.push_back(rowAt(path.from, first));
-  RodPath walk(models_[0], state, loadsAt(0, path.from), loadsPerFactor(0, range), 1.0);
+  RodPath walk(world_.model().rods[0].model, state, loadsAt(0, path.from), loadsPerFactor(0, range), 1.0);
   for (int k = 0; k < kMostTimes * path.steps; ++k)
   {
     const StepReport moved = walk.advance(1.0 / path.steps);
@@ -298,13 +256,13 @@ void Simulation::runPath(const PathConfig& path, StaticsRun& run)
 }
 
 /// Follows the path from factor 0 until its equilibria are unstable, or the factor turns back; then bisects.
-void Simulation::findCritical(double up_to, StaticsRun& run)
+void StaticsRunner::findCritical(double up_to, StaticsRun& run)
 {
   constexpr int kMostSteps = 1000;
   // far below the mesh's error; the neutral band of eigenvalues is 1e-6 of a bending frequency squared
   constexpr double kRelative = 1e-7;
-  RodStepper& stepper = *steppers_[0];
-  const RodModel& model = *models_[0];
+  RodStepper& stepper = this->stepper();
+  const RodModel& model = *world_.model().rods[0].model;
   RodState safe = state_.rods[0];
   const StepReport first = stepper.solveEquilibrium(safe, loadsAt(0, 0.0), false);
   if (!first.ok || !first.stable)
@@ -318,7 +276,7 @@ void Simulation::findCritical(double up_to, StaticsRun& run)
                bend = std::max(model.bend_modulus.row(0).maxCoeff(), model.bend_modulus.row(2).maxCoeff());
   const double scale = std::min(up_to, 10.0 * bend / (length * length * sumOfLoads(model, unit)));
   double low = 0.0, before = 0.0, high = 0.0, share = 0.02;
-  RodPath walk(models_[0], safe, loadsAt(0, 0.0), unit, scale);
+  RodPath walk(world_.model().rods[0].model, safe, loadsAt(0, 0.0), unit, scale);
   for (int k = 0;; ++k, share *= 1.1)
   {
     const StepReport moved = walk.advance(share);
@@ -343,7 +301,7 @@ void Simulation::findCritical(double up_to, StaticsRun& run)
   while (high - low > kRelative * high)
   {
     const double middle = 0.5 * (low + high);
-    RodPath probe(models_[0], safe, loadsAt(0, low), unit, scale);
+    RodPath probe(world_.model().rods[0].model, safe, loadsAt(0, low), unit, scale);
     const bool near = probe.settleAt(middle - low).ok && largestDistance(probe.state().x, safe.x) <= reach;
     if (near && stepper.assessEquilibrium(probe.state(), loadsAt(0, middle)).stable)
     {

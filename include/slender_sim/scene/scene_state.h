@@ -1,0 +1,61 @@
+#pragma once
+
+#include <vector>
+
+#include "slender_sim/scene/config.h"
+#include "slender_sim/world/world_state.h"
+
+namespace slender {
+
+/// Vertices of a cloth that move as one rigid body.
+struct ClothGrasp
+{
+  bool active = true;
+  std::vector<int> vertices;   ///< ascending; no other active grasp of the cloth holds them
+  Eigen::Matrix3Xd points_G;   ///< where they are in the grasp's frame [m]
+  Pose X_WG;
+};
+
+/// State of all objects of a scene at one instant. The grasps of a rod in the scene come first in RodState::grasps.
+struct SceneState : WorldState
+{
+  /// per cloth: those of the scene; ClothState::pins are what the active ones hold
+  std::vector<std::vector<ClothGrasp>> cloth_grasps;
+  /// Per grasp of the scene: the held section seen from the pose that drives it; with `attach: section` identity until
+  /// attach().
+  std::vector<Pose> grasp_offsets;
+  std::vector<Wrench> wrenches;   ///< per grasp of the scene, of the last step
+};
+
+/// What drives one thread during a step.
+struct ThreadDrive
+{
+  Pose nozzle;                              ///< at the end of the step
+  double flow_rate = 0.0;                   ///< during it [m^3/s]
+  Eigen::Vector3d belt_velocity{0, 0, 0};   ///< [m/s]
+};
+
+/// Inputs of one step, latched before it. Indices follow the scene's order of grasps (over all rods, then all cloths).
+struct SceneInputs
+{
+  std::vector<GraspTarget> grasps;
+  std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
+  std::vector<ThreadDrive> threads;             ///< per thread of the scene
+  /// per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]), ignored when it is a cloth; of
+  /// others empty, and none where no cloth tracks anything
+  std::vector<Eigen::Matrix3Xd> guides;
+  /// per rod of the scene: its guide's nodes likewise; none where no rod tracks anything
+  std::vector<Eigen::Matrix3Xd> rod_guides;
+  Eigen::Vector3d wind{0, 0, 0};
+};
+
+/// A grasp of the scene: of which rod or cloth (the other is -1), which of its grasps, and its configuration.
+struct GraspRef
+{
+  int rod;
+  int index;
+  const GraspConfig* config;
+  int cloth = -1;
+};
+
+}   // namespace slender

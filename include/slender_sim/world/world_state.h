@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "slender_sim/cloth/cloth_state.h"
+#include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/rod/rigid_body.h"
+#include "slender_sim/rod/rod_state.h"
+#include "slender_sim/rod/rod_stepper.h"
+#include "slender_sim/thread/thread_group.h"
+#include "slender_sim/tracking/function_blend.h"
+
+namespace slender {
+
+/// The guide of a tracked rod or cloth at one instant; of other parts all of it is empty.
+struct GuideState
+{
+  Eigen::Matrix3Xd points;     ///< nodes or vertices of the guide [m]
+  Eigen::Matrix3Xd velocity;   ///< over the last step [m/s]; of cloths with several sets of test functions
+  Eigen::Matrix3Xd forces;     ///< with which the guide acted in the last step, per test function [N]
+  FunctionBlend blend;         ///< of the set in force, which ClothState::average_set names
+};
+
+/// Everything that changes while a world moves; saving and restoring it restarts bit-equal.
+struct WorldState
+{
+  double time = 0.0;   ///< simulated [s] = steps * step length
+  std::uint64_t steps = 0;
+  std::vector<RodState> rods;              ///< each with its own grasps first, then those of its welds
+  std::vector<GuideState> rod_guides;      ///< per rod; none where no rod tracks anything
+  std::vector<ThreadGroupState> threads;   ///< per thread: it and what has broken off it
+  std::vector<ClothState> cloths;
+  std::vector<GuideState> cloth_guides;   ///< per cloth; none where no cloth tracks anything
+  std::vector<RigidBodyState> bodies;     ///< driven ones included
+  std::vector<Pose> obstacles;
+  std::vector<Twist> obstacle_velocities;
+  double contact_stiffness = 0.0;                  ///< of the barrier between rods and what they touch [N]
+  double thread_contact_stiffness = 0.0;           ///< of the barrier between threads [N]
+  std::vector<std::array<EndLoad, 2>> end_loads;   ///< per thread, of the last step
+};
+
+/// Inputs of one step, latched before it. All lists are as long as those of the model, except where something else is
+/// said.
+struct WorldInputs
+{
+  Eigen::Vector3d gravity{0, 0, -9.81};   ///< of bodies [m/s^2]
+  std::vector<RodInputs> rods;            ///< grasps of welds are ignored
+  std::vector<ThreadInputs> threads;
+  std::vector<ClothInputs> cloths;   ///< averages are ignored: they follow from the guides
+  std::vector<GraspTarget> bodies;   ///< at the end of the step; simulated ones are ignored
+  std::vector<GraspTarget> obstacles;
+  /// Points of the guides at the end of the step (3 x n [m]). The lists are as long as those of the state. The guide of
+  /// a cloth that follows another cloth is ignored.
+  std::vector<Eigen::Matrix3Xd> rod_guides, cloth_guides;
+};
+
+}   // namespace slender

@@ -1,0 +1,185 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+#include "cloth_grasps.h"
+#include "scene_parts.h"
+#include "slender_sim/energy/plate_bending.h"
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+
+namespace {
+
+/// Isometric bending, the default, is for flat shapes at rest. Curved ones bend by hinges, which have the same
+/// small-angle limit.
+void chooseBending(ClothModel& model, std::vector<std::string>& warnings)
+{
+  if (model.bending != BendingModel::isometric_nonconforming || !(model.bending_modulus > 0) ||
+      model.bending_poissons_ratio || restsFlat(model))
+    return;
+  model.bending = BendingModel::hinge;
+  char angle[32];
+  std::snprintf(angle, sizeof angle, "%.3g", largestRestAngle(model) * 180 / M_PI);
+  warnings.push_back(
+      "cloth " + model.name + ": its shape at rest is curved (adjacent faces enclose up to " + angle +
+      " degrees), so it bends by hinges; "
+      "the isometric model is for flat shapes at rest. Give bending: {model: hinge} to choose that yourself.");
+}
+
+/// Bending with a Poisson's ratio of its own is exact on meshes of parallelograms only.
+void checkPlate(const ClothModel& model, std::vector<std::string>& warnings)
+{
+  constexpr double kNoticeable = 0.02;   // the bound of the study plate
+  if (!model.bending_poissons_ratio || model.bending != BendingModel::isometric_nonconforming ||
+      !(model.bending_modulus > 0) || !restsFlat(model))
+    return;
+  const double excess = plateStiffening(model.rest, model.topology, *model.bending_poissons_ratio) - 1.0;
+  if (excess > kNoticeable)
+  {
+    char percent[32];
+    std::snprintf(percent, sizeof percent, "%.0f", 100 * excess);
+    warnings.push_back("cloth " + model.name +
+                       ": with bending: {poissons_ratio} this mesh resists some curvatures by up to " + percent +
+                       " % more than the modulus says. Use a grid with pattern: equilateral or one_diagonal, or leave "
+                       "poissons_ratio out.");
+  }
+}
+
+ClothModel modelOf(const ClothConfig& config, std::vector<std::string>& warnings)
+{
+  ClothModel model = buildCloth(config.name, config.mesh, config.area_density, config.membrane, config.warp);
+  model.bending = config.bending;
+  model.bending_modulus = config.bending_modulus;
+  model.bending_poissons_ratio = config.bending_poissons_ratio;
+  model.mass_damping = config.mass_damping;
+  model.stiffness_damping = config.stiffness_damping;
+  model.wind_coefficient = config.drag;
+  model.aerodynamics = config.aerodynamics;
+  model.plasticity = config.plasticity;
+  model.undeformed = config.undeformed;
+  chooseBending(model, warnings);
+  checkPlate(model, warnings);
+  for (const GraspConfig& grasp : config.grasps)
+    if (grasp.clamp)
+      clampFaces(model, grasp.vertices);
+  for (std::size_t s = 0; config.tracking && s < config.tracking->sets.size(); ++s)
+  {
+    const FunctionSet& set = config.tracking->sets[s];
+    model.averages.push_back({{set.constraints, &set.constraints->matrix()}, set.bounds});
+  }
+  return model;
+}
+
+ClothOptions optionsOf(const ClothConfig& config, const TimeConfig& time)
+{
+  ClothOptions options;
+  options.integrator = time.integrator;
+  options.one_newton_step = config.one_newton_step;
+  options.solver = config.solver;
+  options.linear_tolerance = config.linear_tolerance;
+  options.newton = time.newton;
+  options.error_tolerance = time.error_tolerance;
+  options.min_step = time.min_step;
+  return options;
+}
+
+void addCloth(SceneConfig& scene, int k, SceneParts& parts)
+{
+  const ClothConfig& config = scene.cloths[k];
+  WorldModel::Cloth cloth;
+  cloth.model = std::make_shared<const ClothModel>(modelOf(config, scene.warnings));
+  cloth.options = optionsOf(config, scene.time);
+  if (const auto& contact = config.contact)
+    cloth.contact = {contact->thickness, contact->friction, contact->self, contact->cloths, contact->obstacles};
+  ClothState state = makeClothState(*cloth.model, config.start.cols() ? config.start : config.mesh.vertices);
+  if (config.start_velocity.cols())
+    state.v = config.start_velocity;
+  std::vector<ClothGrasp> grasps;
+  for (std::size_t g = 0; g < config.grasps.size(); ++g)
+  {
+    checkVertices(config.grasps[g].vertices, config, state, grasps, g);
+    grasps.push_back(clothGraspOf(state, config.grasps[g].vertices));
+    parts.grasps.push_back({-1, static_cast<int>(g), &config.grasps[g], k});
+  }
+  gatherPins(grasps, state);
+  if (config.tracking)
+  {
+    const TrackingConfig& tracking = *config.tracking;
+    cloth.tracked = {{config.tracking, &tracking.sets}, tracking.size, -1};
+    if (const auto* preview = std::get_if<ClothGuide>(&tracking.guide.motion))
+      cloth.tracked.leader = preview->cloth;
+    parts.state.cloth_guides.resize(scene.cloths.size());
+    GuideState& guide = parts.state.cloth_guides[k];
+    tracking.guide.evaluate(0.0, guide.points, tracking.sets.size() > 1 ? &guide.velocity : nullptr);
+    guide.forces.setZero(3, tracking.sets[0].constraints->count());
+  }
+  parts.model.cloths.push_back(std::move(cloth));
+  parts.state.cloths.push_back(std::move(state));
+  parts.state.cloth_grasps.push_back(std::move(grasps));
+}
+
+/// Loads that act all the time.
+ClothInputs loadsOf(const SceneConfig& scene, const ClothConfig& config)
+{
+  ClothInputs inputs;
+  inputs.gravity = scene.gravity;
+  if (!config.loads.empty())
+    inputs.forces.setZero(3, config.mesh.vertices.cols());
+  for (const ClothLoadConfig& load : config.loads)
+    for (const int vertex : load.vertices)
+      inputs.forces.col(vertex) += load.force;
+  return inputs;
+}
+
+/// Guides feel only each other: they are where they are before what tracks them is. Throws std::invalid_argument for
+/// bodies that cloth would have to push.
+void checkContact(SceneConfig& scene, const WorldModel& model)
+{
+  const auto meetsOthers = [&](bool leads) {
+    for (int k = 0; k < static_cast<int>(scene.cloths.size()); ++k)
+      if (scene.cloths[k].contact && scene.cloths[k].contact->cloths && model.leads(k) == leads)
+        return k;
+    return -1;
+  };
+  if (const int guide = meetsOthers(true), other = meetsOthers(false); guide >= 0 && other >= 0)
+  {
+    scene.warnings.push_back("cloth " + scene.cloths[guide].name +
+                             " is the guide of another cloth and is stepped ahead of it: it passes through cloth " +
+                             scene.cloths[other].name +
+                             " and all others that are no guides. Give both contact: {cloths: false} if that is meant");
+  }
+  const bool obstacles = std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
+    return cloth.contact && cloth.contact->obstacles;
+  });
+  for (const BodyConfig& body : scene.bodies)
+  {
+    if (obstacles && body.shape && body.contact && !body.motion)
+    {
+      throw SceneError(placeOf(scene, FailurePlace::Kind::none, -1) + ": body " + body.name +
+                       " is simulated, and cloth does not push bodies; give it a motion or contact: false");
+    }
+  }
+}
+
+}   // namespace
+
+void buildCloths(SceneConfig& scene, SceneParts& parts)
+{
+  for (int k = 0; k < static_cast<int>(scene.cloths.size()); ++k)
+  {
+    try
+    {
+      addCloth(scene, k, parts);
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw SceneError(placeOf(scene, FailurePlace::Kind::cloth, k) + ": " + error.what());
+    }
+    parts.inputs.cloths.push_back(loadsOf(scene, scene.cloths[k]));
+  }
+  checkContact(scene, parts.model);
+}
+
+}   // namespace slender

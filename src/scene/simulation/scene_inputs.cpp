@@ -1,0 +1,140 @@
+#include "scene_inputs.h"
+
+#include <stdexcept>
+#include <string>
+
+namespace slender {
+
+namespace {
+
+void addThreads(const SceneConfig& config, const SceneState& state, double time, SceneInputs& inputs)
+{
+  inputs.threads.clear();
+  for (std::size_t k = 0; k < config.threads.size(); ++k)
+  {
+    const ThreadConfig& thread = config.threads[k];
+    const double start = time - config.time.step;
+    ThreadDrive drive;
+    if (thread.nozzle)
+    {
+      const auto* table = std::get_if<TableMotion>(&thread.nozzle->motion);
+      drive.nozzle = table ? table->poses.evaluate(time) : state.threads[k].threads.front().ends[1].X_WE;
+      drive.flow_rate = thread.nozzle->flow.table.mean(start, time);
+    }
+    if (thread.floor)
+    {
+      drive.belt_velocity << thread.floor->belt_x.table.mean(start, time), thread.floor->belt_y.table.mean(start, time),
+          0.0;
+    }
+    inputs.threads.push_back(drive);
+  }
+}
+
+void addGuides(const SceneConfig& config, const SceneState& state, double time, SceneInputs& inputs)
+{
+  inputs.guides.resize(state.cloth_guides.size());
+  for (std::size_t k = 0; k < inputs.guides.size(); ++k)
+  {
+    const auto& tracking = config.cloths[k].tracking;
+    if (tracking && !tracking->guide.byTopic() && !std::holds_alternative<ClothGuide>(tracking->guide.motion))
+      tracking->guide.evaluate(time, inputs.guides[k]);
+    else
+      inputs.guides[k] = state.cloth_guides[k].points;
+  }
+  inputs.rod_guides.resize(state.rod_guides.size());
+  for (std::size_t r = 0; r < inputs.rod_guides.size(); ++r)
+  {
+    const auto& tracking = config.rods[r].tracking;
+    if (tracking && !tracking->guide.byTopic())
+      tracking->guide.evaluate(time, inputs.rod_guides[r]);
+    else
+      inputs.rod_guides[r] = state.rod_guides[r].points;
+  }
+}
+
+/// `name`: of the list of inputs; `parts`, `points`: what the entries are for, and what they consist of.
+template <class Configs>
+void checkGuides(const std::vector<Eigen::Matrix3Xd>& given, const std::vector<GuideState>& guides,
+                 const Configs& configs, const std::string& name, const std::string& part, const std::string& points)
+{
+  if (given.size() != guides.size())
+  {
+    throw std::invalid_argument("inputs." + name + " has " + std::to_string(given.size()) + " entries; must have " +
+                                std::to_string(guides.size()) + ", one per " + part +
+                                " of a scene where any tracks a guide");
+  }
+  for (std::size_t k = 0; k < given.size(); ++k)
+  {
+    if (given[k].cols() != guides[k].points.cols())
+    {
+      throw std::invalid_argument("inputs." + name + " of " + configs[k].name + " has " +
+                                  std::to_string(given[k].cols()) + " " + points + "; must have " +
+                                  std::to_string(guides[k].points.cols()));
+    }
+  }
+}
+
+}   // namespace
+
+void sceneInputsAt(const SceneConfig& config, const SceneState& state, double time, SceneInputs& inputs)
+{
+  inputs.wind = config.wind;
+  const auto given = [time](const GivenMotion& motion, const Pose& now) {
+    GraspTarget target{now, Twist{}};
+    if (const auto* table = std::get_if<TableMotion>(&motion))
+      target.X_WG = table->poses.evaluate(time, &*target.velocity);
+    return target;
+  };
+  inputs.bodies.clear();
+  for (std::size_t b = 0; b < config.bodies.size(); ++b)
+    inputs.bodies.push_back(given(config.bodies[b].motion.value_or(FixedMotion{}), state.bodies[b].X_WB));
+  inputs.obstacles.clear();
+  for (std::size_t k = 0; k < config.obstacles.size(); ++k)
+    inputs.obstacles.push_back(given(config.obstacles[k].motion, state.obstacles[k]));
+  addThreads(config, state, time, inputs);
+  addGuides(config, state, time, inputs);
+}
+
+void checkSceneInputs(const SceneConfig& config, const SceneState& state, std::size_t grasps, const SceneInputs& inputs)
+{
+  const auto check = [](const char* name, std::size_t given, std::size_t expected, const char* of) {
+    if (given != expected)
+      throw std::invalid_argument(std::string("inputs.") + name + " has " + std::to_string(given) +
+                                  " targets; must have " + std::to_string(expected) + ", one per " + of +
+                                  " of the scene");
+  };
+  check("grasps", inputs.grasps.size(), grasps, "grasp");
+  check("bodies", inputs.bodies.size(), config.bodies.size(), "body");
+  check("threads", inputs.threads.size(), config.threads.size(), "thread");
+  check("obstacles", inputs.obstacles.size(), config.obstacles.size(), "obstacle");
+  checkGuides(inputs.guides, state.cloth_guides, config.cloths, "guides", "cloth", "vertices");
+  checkGuides(inputs.rod_guides, state.rod_guides, config.rods, "rod_guides", "rod", "nodes");
+}
+
+void takeSceneInputs(const SceneConfig& config, const SceneState& initial, const SceneInputs& inputs,
+                     WorldInputs& world)
+{
+  world.bodies = inputs.bodies;
+  world.obstacles = inputs.obstacles;
+  world.cloth_guides = inputs.guides;
+  world.rod_guides = inputs.rod_guides;
+  for (RodInputs& rod : world.rods)
+    rod.wind = inputs.wind;
+  for (ClothInputs& cloth : world.cloths)
+    cloth.wind = inputs.wind;
+  for (std::size_t k = 0; k < world.threads.size(); ++k)
+  {
+    ThreadInputs& thread = world.threads[k];
+    thread.gravity = config.gravity;
+    for (int end = 0; end < 2; ++end)
+      thread.ends[end] = initial.threads[k].threads.front().ends[end].X_WE;
+    if (config.threads[k].nozzle)
+    {
+      thread.ends[1] = inputs.threads[k].nozzle;
+      thread.flow_rate = inputs.threads[k].flow_rate;
+    }
+    thread.belt_velocity = inputs.threads[k].belt_velocity;
+  }
+}
+
+}   // namespace slender

@@ -1,0 +1,79 @@
+#include "scene_parts.h"
+
+#include <algorithm>
+
+namespace slender {
+
+SceneParts buildParts(SceneConfig& scene)
+{
+  SceneParts parts;
+  parts.inputs.gravity = scene.gravity;
+  parts.model.time = scene.time;
+  parts.model.contact.gap = scene.contact.gap;
+  parts.model.contact.slip_speed = scene.contact.slip_speed;
+  buildRods(scene, parts);
+  buildThreads(scene, parts);
+  buildCloths(scene, parts);
+  buildBodies(scene, parts);
+  parts.state.grasp_offsets.resize(parts.grasps.size());
+  parts.state.wrenches.resize(parts.grasps.size());
+  return parts;
+}
+
+void buildBodies(const SceneConfig& scene, SceneParts& parts)
+{
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+  {
+    const BodyConfig& config = scene.bodies[b];
+    WorldModel::Body body;
+    body.body.name = config.name;
+    body.body.simulated = !config.motion.has_value();
+    body.body.mass = config.mass;
+    body.body.inertia = config.inertia;
+    body.body.gravity = config.gravity;
+    body.body.force = config.force;
+    body.body.torque = config.torque;
+    body.body.linear_damping = config.linear_damping;
+    body.body.angular_damping = config.angular_damping;
+    if (config.contact)
+      body.shape = config.shape;
+    body.X_BS = config.X_BS;
+    body.friction = config.friction.value_or(-1.0);
+    parts.model.bodies.push_back(std::move(body));
+    for (const WeldConfig& weld : config.welds)
+      parts.model.welds.push_back({weld.rod, weld.first_node, weld.last_node, static_cast<int>(b)});
+    RigidBodyState state;
+    state.X_WB = config.pose;
+    state.velocity = config.velocity;
+    parts.state.bodies.push_back(state);
+  }
+  for (const ObstacleConfig& obstacle : scene.obstacles)
+  {
+    parts.model.obstacles.push_back({obstacle.name, obstacle.shape, obstacle.friction.value_or(-1.0)});
+    parts.state.obstacles.push_back(obstacle.pose);
+    parts.state.obstacle_velocities.push_back({});
+  }
+}
+
+std::string placeOf(const SceneConfig& scene, FailurePlace::Kind kind, int index)
+{
+  const std::string number = std::to_string(index), name = "scene " + scene.name;
+  switch (kind)
+  {
+    case FailurePlace::Kind::rod:
+    {
+      const RodConfig& rod = scene.rods.at(index);
+      return (rod.place.empty() ? name + ": rods." + number : rod.place) + " (" + rod.name + ")";
+    }
+    case FailurePlace::Kind::thread: return name + ": threads." + number;
+    case FailurePlace::Kind::cloth:
+    {
+      const ClothConfig& cloth = scene.cloths.at(index);
+      return cloth.place.empty() ? name + ": cloths." + number : cloth.place;
+    }
+    case FailurePlace::Kind::none: break;
+  }
+  return scene.file.empty() ? name : scene.file;
+}
+
+}   // namespace slender

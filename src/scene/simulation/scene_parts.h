@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "slender_sim/scene/scene_state.h"
+#include "slender_sim/world/world.h"
+
+/// From the checked configuration of a scene to the model and the first state of its world.
+namespace slender {
+
+struct SceneParts
+{
+  WorldModel model;
+  SceneState state;               ///< without the grasps of welds, which the world adds
+  std::vector<GraspRef> grasps;   ///< over all rods, then all cloths; point into the configuration
+  WorldInputs inputs;             ///< gravity and the loads of rods and cloths, which act all the time
+};
+
+/// Builds all parts. Warnings, and the motions of grasps that turn their sections, go into the configuration. Throws
+/// SceneError.
+SceneParts buildParts(SceneConfig& scene);
+
+void buildRods(SceneConfig& scene, SceneParts& parts);
+void buildThreads(const SceneConfig& scene, SceneParts& parts);
+void buildCloths(SceneConfig& scene, SceneParts& parts);
+/// Bodies and obstacles.
+void buildBodies(const SceneConfig& scene, SceneParts& parts);
+
+/// Where a part is in the scene's file, for messages; kind none: the file.
+std::string placeOf(const SceneConfig& scene, FailurePlace::Kind kind, int index);
+
+}   // namespace slender

@@ -1,0 +1,171 @@
+#include "cloth_islands.h"
+
+#include <stdexcept>
+
+#include "tracked_parts.h"
+
+namespace slender {
+
+namespace {
+
+/// All inputs of a cloth but its averages, which keep their memory.
+void takeInputs(const ClothInputs& from, ClothInputs& to)
+{
+  to.pins = from.pins;
+  to.gravity = from.gravity;
+  to.wind = from.wind;
+  to.forces = from.forces;
+}
+
+class LoneCloth : public ClothIsland
+{
+public:
+  LoneCloth(const WorldModel& world, int cloth)
+    : world_(world),
+      cloth_(cloth),
+      stepper_(world.cloths[cloth].model, world.cloths[cloth].options)
+  {
+  }
+
+  StepReport step(WorldState& state, const WorldInputs& inputs) override
+  {
+    if (!tracks())
+      return stepper_.step(state.cloths[cloth_], inputs.cloths[cloth_], world_.time.step);
+    takeInputs(inputs.cloths[cloth_], tracked_inputs_);
+    clothTargets(world_, cloth_, state, inputs, tracked_inputs_.averages);
+    return stepper_.step(state.cloths[cloth_], tracked_inputs_, world_.time.step);
+  }
+  StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override
+  {
+    if (tracks())
+      throw std::invalid_argument("a cloth that tracks a guide has no statics");
+    return stepper_.solveEquilibrium(state.cloths[cloth_], inputs.cloths[cloth_]);
+  }
+  void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override
+  {
+    if (tracks())
+      takeClothGuide(world_, cloth_, tracked_inputs_.averages, stepper_.averageForces(), inputs, state, report);
+  }
+  const ClothStepper& stepper(int) const override { return stepper_; }
+  const Eigen::Matrix3Xd& pinForces(int) const override { return stepper_.pinForces(); }
+  Eigen::Matrix3Xd contactForces(int) const override { return Eigen::Matrix3Xd(3, 0); }
+
+private:
+  bool tracks() const { return world_.cloths[cloth_].tracked.sets != nullptr; }
+
+  const WorldModel& world_;
+  int cloth_;
+  ClothStepper stepper_;
+  ClothInputs tracked_inputs_;   ///< those of the world, with the averages
+};
+
+class TouchingCloths : public ClothIsland
+{
+public:
+  TouchingCloths(const WorldModel& world, std::vector<int> cloths) : world_(world), cloths_(std::move(cloths))
+  {
+    ClothGroupModel model;
+    for (int k : cloths_)
+    {
+      model.cloths.push_back(world.cloths[k].model);
+      model.contact.push_back(*world.cloths[k].contact);
+      model.options.push_back(world.cloths[k].options);
+    }
+    const auto add = [&model](const std::string& name, const Shape& shape, double friction) {
+      ContactSolid solid;
+      solid.shape = shape;
+      solid.friction = friction;
+      model.solids.push_back(std::move(solid));
+      model.solid_names.push_back(name);
+    };
+    for (const WorldModel::Obstacle& obstacle : world.obstacles)
+      add(obstacle.name, obstacle.shape, obstacle.friction);
+    for (std::size_t b = 0; b < world.bodies.size(); ++b)
+    {
+      const WorldModel::Body& body = world.bodies[b];
+      if (!body.shape || body.body.simulated)
+        continue;
+      bodies_.push_back(static_cast<int>(b));
+      add(body.body.name, *body.shape, body.friction);
+    }
+    const ClothOptions common = model.options.front();
+    group_ = std::make_unique<ClothGroup>(std::move(model), common);
+  }
+
+  StepReport step(WorldState& state, const WorldInputs& inputs) override
+  {
+    inputs_.cloths.resize(cloths_.size());
+    for (std::size_t k = 0; k < cloths_.size(); ++k)
+    {
+      takeInputs(inputs.cloths[cloths_[k]], inputs_.cloths[k]);
+      if (tracks(k))
+        clothTargets(world_, cloths_[k], state, inputs, inputs_.cloths[k].averages);
+    }
+    inputs_.solids.clear();
+    for (const GraspTarget& obstacle : inputs.obstacles)
+      inputs_.solids.push_back(normalized(obstacle.X_WG));
+    for (const int b : bodies_)
+      inputs_.solids.push_back(normalized(inputs.bodies[b].X_WG) * world_.bodies[b].X_BS);
+    const Loan<TouchingCloths> loan(*this, state);
+    return group_->step(state_, inputs_, world_.time.step);
+  }
+  StepReport solveEquilibrium(WorldState&, const WorldInputs&) override
+  {
+    throw std::invalid_argument("cloth with contact has no statics");
+  }
+  void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override
+  {
+    for (std::size_t k = 0; k < cloths_.size(); ++k)
+    {
+      if (tracks(k))
+      {
+        takeClothGuide(world_, cloths_[k], inputs_.cloths[k].averages, group_->averageForces(static_cast<int>(k)),
+                       inputs, state, report);
+      }
+    }
+  }
+  const ClothStepper& stepper(int cloth) const override { return group_->stepper(cloth); }
+  const Eigen::Matrix3Xd& pinForces(int cloth) const override { return group_->pinForces(cloth); }
+  Eigen::Matrix3Xd contactForces(int cloth) const override { return group_->contactForces(cloth); }
+  void check(WorldState& state) override
+  {
+    const Loan<TouchingCloths> loan(*this, state);
+    group_->checkIntersections(state_);
+  }
+
+private:
+  friend class Loan<TouchingCloths>;
+
+  bool tracks(std::size_t k) const { return world_.cloths[cloths_[k]].tracked.sets != nullptr; }
+
+  /// Obstacles and bodies are only read here: others move them.
+  void exchange(WorldState& state)
+  {
+    state_.cloths.resize(cloths_.size());
+    for (std::size_t k = 0; k < cloths_.size(); ++k)
+      std::swap(state_.cloths[k], state.cloths[cloths_[k]]);
+    state_.solids = state.obstacles;
+    for (const int b : bodies_)
+      state_.solids.push_back(state.bodies[b].X_WB * world_.bodies[b].X_BS);
+  }
+
+  const WorldModel& world_;
+  std::vector<int> cloths_, bodies_;   ///< of the world
+  std::unique_ptr<ClothGroup> group_;
+  ClothGroupState state_;
+  ClothGroupInputs inputs_;
+};
+
+}   // namespace
+
+std::unique_ptr<ClothIsland> makeLoneCloth(const WorldModel& world, int cloth)
+{
+  return std::make_unique<LoneCloth>(world, cloth);
+}
+
+std::unique_ptr<ClothIsland> makeTouchingCloths(const WorldModel& world, std::vector<int> cloths)
+{
+  return std::make_unique<TouchingCloths>(world, std::move(cloths));
+}
+
+}   // namespace slender

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <memory>
+
+#include "island.h"
+
+/// The islands that have rods or bodies. All throw std::invalid_argument for models that are not valid.
+namespace slender {
+
+/// A rod that nothing else meets. The model of the world outlives the island.
+std::unique_ptr<RodIsland> makeLoneRod(const WorldModel& world, int rod);
+/// A rod that nothing else meets and that tracks a guide.
+std::unique_ptr<RodIsland> makeTrackedRod(const WorldModel& world, int rod);
+/// Rods and bodies that contact or welds join, and the obstacles that they meet. Appends the grasps of the welds to the
+/// rods of the state. Throws when something touches or crosses there.
+std::unique_ptr<RodIsland> makeRodGroup(const WorldModel& world, std::vector<int> rods, std::vector<int> bodies,
+                                        WorldState& state);
+
+}   // namespace slender

@@ -1,0 +1,417 @@
+#include "slender_sim/world/world.h"
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+#include <utility>
+
+#include "cloth_islands.h"
+#include "rod_islands.h"
+#include "thread_islands.h"
+#include "tracked_parts.h"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+namespace slender {
+
+bool WorldModel::leads(int cloth) const
+{
+  return std::any_of(cloths.begin(), cloths.end(),
+                     [cloth](const Cloth& other) { return other.tracked.leader == cloth; });
+}
+
+namespace {
+
+using Kind = FailurePlace::Kind;
+
+/// Calls `make`; what it throws becomes an error of the part.
+template <class Make>
+auto built(Kind kind, int index, const Make& make)
+{
+  try
+  {
+    return make();
+  }
+  catch (const WorldError&)
+  {
+    throw;   // tells the part already
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw WorldError(kind, index, error.what());
+  }
+}
+
+}   // namespace
+
+class World::Impl
+{
+public:
+  Impl(WorldModel world, WorldState& state)
+    : model(std::move(world)),
+      rods(model.rods.size()),
+      cloths(model.cloths.size())
+  {
+    addThreads(state);
+    addCloths(true);
+    addCloths(false);
+    addRods(state);
+    checkCloths(state);
+    reports_.resize(lone_end_ - lone_begin_);
+    errors_.resize(reports_.size());
+  }
+
+  /// Calls `advance` on all islands until one fails, or throws. Then the state is as it was before.
+  template <class Advance>
+  StepReport advance(WorldState& state, bool restorable, const Advance& advance)
+  {
+    // An island that fails leaves its own part as it was. The others must not have moved either.
+    if (restorable)
+      before_ = state;
+    StepReport total;
+    try
+    {
+      total = advance();
+    }
+    catch (...)
+    {
+      if (restorable)
+        std::swap(state, before_);
+      throw;
+    }
+    if (!total.ok && restorable)
+      std::swap(state, before_);
+    return total;
+  }
+
+  StepReport step(WorldState& state, const WorldInputs& inputs)
+  {
+    StepReport total = advance(state, islands_.size() > 1 || functionsDue(model, state), [&] {
+      takeOverDue(model, state);
+      return stepIslands(state, inputs);
+    });
+    if (!total.ok)
+      return total;
+    moveGiven(inputs, state);
+    ++state.steps;
+    state.time = static_cast<double>(state.steps) * model.time.step;   // no sum of round-off
+    for (const auto& island : islands_)
+      island->finish(state, inputs, total);
+    return total;
+  }
+
+  StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs)
+  {
+    return advance(state, islands_.size() > 1, [&] {
+      StepReport total;
+      for (std::size_t i = 0; i < islands_.size() && total.ok; ++i)
+        total.merge(islands_[i]->solveEquilibrium(state, inputs));
+      return total;
+    });
+  }
+
+  void setThreads(int threads)
+  {
+    if (threads < 1)
+      throw std::invalid_argument("threads = " + std::to_string(threads) + "; must be at least 1");
+    threads_ = threads;
+    for (const auto& island : islands_)
+      island->setThreads(threads);
+  }
+
+  void checkCloths(WorldState& state)
+  {
+    for (const auto& place : cloths)
+      if (place.index == 0)
+        place.island->check(state);
+  }
+
+  const std::vector<ContactTerm>& contacts() const
+  {
+    static const std::vector<ContactTerm> none;
+    const std::vector<ContactTerm>* last = nullptr;   // rods come after threads
+    for (const auto& island : islands_)
+      if (const auto* terms = island->contacts())
+        last = terms;
+    return last ? *last : none;
+  }
+
+  const WorldModel model;
+
+  /// Where a part is.
+  template <class IslandType>
+  struct Place
+  {
+    IslandType* island = nullptr;
+    int index = 0;   ///< in the island
+  };
+  std::vector<Place<RodIsland>> rods;
+  std::vector<Place<ClothIsland>> cloths;
+
+private:
+  template <class IslandType>
+  IslandType* add(std::unique_ptr<IslandType> island)
+  {
+    IslandType* added = island.get();
+    islands_.push_back(std::move(island));
+    return added;
+  }
+
+  void addThreads(WorldState& state)
+  {
+    std::vector<int> touching;
+    for (int k = 0; k < static_cast<int>(model.threads.size()); ++k)
+    {
+      if (model.threads[k].contact)
+      {
+        built(Kind::thread, k, [&] { checkThreadModel(*model.threads[k].model); });
+        touching.push_back(k);
+      }
+      else
+      {
+        add(built(Kind::thread, k, [&] { return makeLoneThread(model, k); }));
+      }
+    }
+    if (!touching.empty())
+      add(built(Kind::none, -1, [&] { return makeTouchingThreads(model, touching, state); }));
+  }
+
+  /// Cloths that lead others, or those that do not. Leaders are stepped first, and feel only each other.
+  void addCloths(bool leaders)
+  {
+    std::vector<int> touching;
+    for (int k = 0; k < static_cast<int>(model.cloths.size()); ++k)
+    {
+      if (model.leads(k) != leaders)
+        continue;
+      if (model.cloths[k].contact)
+        touching.push_back(k);
+      else
+        cloths[k] = {add(built(Kind::cloth, k, [&] { return makeLoneCloth(model, k); })), 0};
+    }
+    if (touching.empty())
+      return;
+    ClothIsland* island = add(built(Kind::none, -1, [&] { return makeTouchingCloths(model, touching); }));
+    for (std::size_t k = 0; k < touching.size(); ++k)
+      cloths[touching[k]] = {island, static_cast<int>(k)};
+  }
+
+  void addRods(WorldState& state)
+  {
+    std::vector<char> joined(model.rods.size(), 0), welded(model.bodies.size(), 0);
+    for (std::size_t r = 0; r < model.rods.size(); ++r)
+      joined[r] = model.rods[r].contact.has_value();
+    for (const WorldModel::RodWeld& weld : model.welds)
+      joined[weld.rod] = welded[weld.body] = 1;
+    std::vector<int> group_rods, group_bodies;
+    bool simulated = false;
+    for (int b = 0; b < static_cast<int>(model.bodies.size()); ++b)
+    {
+      const WorldModel::Body& body = model.bodies[b];
+      simulated = simulated || body.body.simulated;
+      if (body.body.simulated || welded[b] || body.shape)
+        group_bodies.push_back(b);
+    }
+    lone_begin_ = islands_.size();
+    for (int r = 0; r < static_cast<int>(model.rods.size()); ++r)
+    {
+      if (joined[r])
+        group_rods.push_back(r);
+      else
+        addLoneRod(r);
+    }
+    lone_end_ = islands_.size();
+    const bool group = !group_rods.empty() || simulated;
+    if (!group)
+      group_bodies.clear();
+    for (int b = 0; b < static_cast<int>(model.bodies.size()); ++b)
+      if (!model.bodies[b].body.simulated && std::count(group_bodies.begin(), group_bodies.end(), b) == 0)
+        given_bodies_.push_back(b);
+    gives_obstacles_ = !group;
+    if (!group)
+      return;
+    RodIsland* island =
+        add(built(Kind::none, -1, [&] { return makeRodGroup(model, group_rods, group_bodies, state); }));
+    for (std::size_t k = 0; k < group_rods.size(); ++k)
+      rods[group_rods[k]] = {island, static_cast<int>(k)};
+  }
+
+  void addLoneRod(int r)
+  {
+    lone_nodes_ += model.rods[r].model->nodes();
+    rods[r] = {
+        add(built(Kind::rod, r,
+                  [&] { return model.rods[r].tracked.sets ? makeTrackedRod(model, r) : makeLoneRod(model, r); })),
+        0};
+  }
+
+  StepReport stepIslands(WorldState& state, const WorldInputs& inputs)
+  {
+    StepReport total;
+    for (std::size_t i = 0; i < lone_begin_ && total.ok; ++i)
+      total.merge(islands_[i]->step(state, inputs));
+    if (total.ok && lone_end_ > lone_begin_)
+      stepLoneRods(state, inputs, total);
+    for (std::size_t i = lone_end_; i < islands_.size() && total.ok; ++i)
+      total.merge(islands_[i]->step(state, inputs));
+    return total;
+  }
+
+  /// In parallel where that is worth it.
+  void stepLoneRods(WorldState& state, const WorldInputs& inputs, StepReport& total)
+  {
+    const int count = static_cast<int>(lone_end_ - lone_begin_);
+    if (count == 1)
+    {
+      total.merge(islands_[lone_begin_]->step(state, inputs));
+      return;
+    }
+    constexpr int kWorthThreads = 500;   // nodes; less is done before threads are awake
+    std::fill(errors_.begin(), errors_.end(), nullptr);
+    const auto stepOne = [&](int k) {
+      try
+      {
+        reports_[k] = islands_[lone_begin_ + k]->step(state, inputs);
+      }
+      catch (...)
+      {
+        errors_[k] = std::current_exception();   // must not leave the parallel region
+      }
+    };
+    if (threads_ == 1 || lone_nodes_ < kWorthThreads)
+    {
+      for (int k = 0; k < count; ++k)   // OpenMP would take memory for its one thread
+        stepOne(k);
+    }
+    else
+    {
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
+#endif
+      for (int k = 0; k < count; ++k)
+        stepOne(k);
+    }
+    for (const std::exception_ptr& error : errors_)
+      if (error)
+        std::rethrow_exception(error);
+    for (const StepReport& report : reports_)
+      total.merge(report);
+  }
+
+  /// Bodies and obstacles that are driven and that no rod in the group feels.
+  void moveGiven(const WorldInputs& inputs, WorldState& state) const
+  {
+    const auto move = [](const GraspTarget& target, Pose& pose, Twist& velocity) {
+      pose = normalized(target.X_WG);
+      velocity = target.velocity.value_or(Twist{});
+    };
+    for (const int b : given_bodies_)
+      move(inputs.bodies[b], state.bodies[b].X_WB, state.bodies[b].velocity);
+    for (std::size_t k = 0; gives_obstacles_ && k < state.obstacles.size(); ++k)
+      move(inputs.obstacles[k], state.obstacles[k], state.obstacle_velocities[k]);
+  }
+
+  /// In the order in which they step: threads, cloths that lead others, other cloths, lone rods, rods and bodies that
+  /// are joined.
+  std::vector<std::unique_ptr<Island>> islands_;
+  std::size_t lone_begin_ = 0, lone_end_ = 0;   ///< the lone rods among them
+  int lone_nodes_ = 0;
+  std::vector<StepReport> reports_;          ///< of lone rods
+  std::vector<std::exception_ptr> errors_;   ///< likewise
+  std::vector<int> given_bodies_;            ///< driven bodies that no island moves
+  bool gives_obstacles_ = true;              ///< no island moves them
+  WorldState before_;                        ///< a step that may fail in one of several islands
+  int threads_ = 0;                          ///< 0: as OpenMP says
+};
+
+World::World(WorldModel model, WorldState& state)
+{
+  impl_ = built(Kind::none, -1, [&] { return std::make_unique<Impl>(std::move(model), state); });
+}
+World::~World() = default;
+
+const WorldModel& World::model() const { return impl_->model; }
+StepReport World::step(WorldState& state, const WorldInputs& inputs) { return impl_->step(state, inputs); }
+StepReport World::solveEquilibrium(WorldState& state, const WorldInputs& inputs)
+{
+  return impl_->solveEquilibrium(state, inputs);
+}
+void World::setThreads(int threads) { impl_->setThreads(threads); }
+void World::checkCloths(WorldState& state) { impl_->checkCloths(state); }
+
+const std::vector<Wrench>& World::rodWrenches(int rod) const
+{
+  const auto& place = impl_->rods.at(rod);
+  return place.island->wrenches(place.index);
+}
+
+RodEnergies World::rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const
+{
+  const auto& place = impl_->rods.at(rod);
+  return place.island->energies(place.index, state, gravity);
+}
+
+RodStepper* World::rodStepper(int rod) { return impl_->rods.at(rod).island->stepper(); }
+
+const Eigen::Matrix3Xd& World::pinForces(int cloth) const
+{
+  const auto& place = impl_->cloths.at(cloth);
+  return place.island->pinForces(place.index);
+}
+
+Eigen::Matrix3Xd World::contactForces(int cloth) const
+{
+  const auto& place = impl_->cloths.at(cloth);
+  return place.island->contactForces(place.index);
+}
+
+ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const
+{
+  const auto& place = impl_->cloths.at(cloth);
+  return place.island->stepper(place.index).energies(state, gravity);
+}
+
+const std::vector<ContactTerm>& World::contacts() const { return impl_->contacts(); }
+
+const FunctionSet& World::functions(int cloth, const WorldState& state) const
+{
+  return functionsOf(impl_->model.cloths.at(cloth).tracked, state.cloths[cloth]);
+}
+
+void World::setFunctions(int cloth, std::size_t set, double blend, WorldState& state) const
+{
+  const TrackedGuide& tracked = impl_->model.cloths.at(cloth).tracked;
+  ClothState& held = state.cloths[cloth];
+  if (!held.pins.empty())   // without any they are as independent as when the model was made
+  {
+    std::vector<char> pinned(static_cast<std::size_t>(held.x.cols()), 0);
+    for (const int vertex : held.pins)
+      pinned[static_cast<std::size_t>(vertex)] = 1;
+    tracked.sets->at(set).constraints->requireIndependent(pinned);
+  }
+  takeOver(tracked, set, blend, state.time, held, state.cloth_guides[cloth]);
+}
+
+TrackingError World::clothTrackingError(int cloth, const WorldState& state) const
+{
+  const TrackedGuide& tracked = impl_->model.cloths.at(cloth).tracked;
+  if (!tracked.sets)
+    return TrackingError();
+  const GuideState& guide = state.cloth_guides[cloth];
+  Eigen::Matrix3Xd targets = functions(cloth, state).constraints->averages(guide.points);
+  guide.blend.apply(state.time, targets);
+  return errorOf(tracked, state.cloths[cloth], guide, state.time, targets);
+}
+
+double World::rodTrackingError(int rod, const WorldState& state) const
+{
+  const TrackedGuide& tracked = impl_->model.rods.at(rod).tracked;
+  if (!tracked.sets)
+    return 0.0;
+  const WeakConstraints& constraints = *tracked.sets->front().constraints;
+  return constraints.error(constraints.averages(state.rod_guides[rod].points), state.rods[rod].x);
+}
+
+}   // namespace slender
