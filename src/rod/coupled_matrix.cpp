@@ -6,13 +6,6 @@
 
 namespace slender {
 
-namespace {
-
-constexpr int kPrescribed = -1;
-constexpr int kRows = ChainSystem::kPanelRows;
-
-}   // namespace
-
 /// Numbers the unknowns of a rod whose grasps have changed.
 void CoupledSystem::mapUnknowns(RodPart& part)
 {
@@ -26,7 +19,7 @@ void CoupledSystem::mapUnknowns(RodPart& part)
   }
   if (same)
     return;
-  pattern_valid_ = false;
+  coupled_.invalidatePattern();
   part.holds.clear();
   part.dof.assign(4 * model.nodes(), 0);
   part.welded = false;
@@ -115,155 +108,82 @@ void CoupledSystem::contactColumns(const ContactRow& contact, bool whole, Column
   }
 }
 
-/// Makes room for the present contacts that couple unknowns; true when there was none for some of them.
-bool CoupledSystem::takeKeys()
+/// Whether a contact cannot be taken as one of points with unknowns of their own: a body carries one of them, or is
+/// touched.
+bool CoupledSystem::isCarried(const std::array<int, 4>& bases, int solid) const
 {
-  bool grown = false;
-  for (const ContactTerm& term : contact_->terms())
-  {
-    if (isOwn(term))
-      continue;
-    const std::array<int, 5> key{term.point[0], term.point[1], term.point[2], term.point[3], term.solid};
-    const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
-    if (at == keys_.end() || *at != key)
-    {
-      keys_.insert(at, key);
-      grown = true;
-    }
-  }
-  return grown;
+  return (solid >= 0 && coupled_.solid_moves[solid]) ||
+         std::any_of(bases.begin(), bases.end(), [](int base) { return base < kPrescribed; });
 }
 
 void CoupledSystem::buildPattern()
 {
-  // unknowns: the coupled rods, then the bodies
   for (RodPart& part : parts_)
-    part.touched = false;
-  for (const auto& key : keys_)
+    part.coupled = part.welded;
+  for (const CoupledChains::Key& key : coupled_.room())
     for (int p = 0; p < 4; ++p)
       if (key[p] >= 0)
-        parts_[point_part_[key[p]]].touched = true;
-  unknowns_ = 0;
-  for (RodPart& part : parts_)
-  {
-    part.coupled = part.welded || part.touched;
-    part.offset = unknowns_;
-    if (part.coupled)
-      unknowns_ += part.unknowns;
-  }
-  body_offset_ = unknowns_;
-  unknowns_ += 6 * static_cast<int>(bodies_.size());
-  rhs_.assign(unknowns_, 0.0);
-  pattern_valid_ = true;
-  if (unknowns_ == 0)
-    return;
-
-  std::vector<std::vector<int>> columns(unknowns_);
-  const auto note = [&](int a, int b) { columns[std::min(a, b)].push_back(std::max(a, b)); };
-  const auto notePairs = [&](const Columns& a, const Columns& b) {
-    for (int i = 0; i < a.count; ++i)
-      for (int j = 0; j < b.count; ++j)
-        note(a.index[i], b.index[j]);
-  };
+        coupled_.points[key[p]].chain->coupled = true;
+  coupled_.beginPattern(6 * static_cast<int>(bodies_.size()));
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j <= i; ++j)
-        note(body_offset_ + 6 * b + i, body_offset_ + 6 * b + j);
+        coupled_.note(coupled_.others() + 6 * b + i, coupled_.others() + 6 * b + j);
   for (RodPart& part : parts_)
-  {
-    if (!part.coupled)
-      continue;
-    const RodSystem& system = part.rod->system;
-    part.carried_entries.clear();
-    for (int i = 0; i < system.nodes(); ++i)
-      for (int c = 0; c < 4; ++c)
-        for (int r = c; r < kRows; ++r)
-        {
-          const int a = 4 * i + c, b = system.panelUnknown(i, r);
-          if (b < 0 || part.dof[a] == kPrescribed || part.dof[b] == kPrescribed)
-            continue;
-          if (part.dof[a] >= 0 && part.dof[b] >= 0)
-          {
-            note(part.offset + part.dof[a], part.offset + part.dof[b]);
-            continue;
-          }
-          part.carried_entries.push_back({i, c, r});
-          Columns ca, cb;
-          mapDof(part, a, 1.0, ca);
-          mapDof(part, b, 1.0, cb);
-          notePairs(ca, cb);
-        }
-    for (const ClampJoint& clamp : system.clamps())
-      if (const int body = part.rod->work.grasps[clamp.grasp].body; body >= 0)
-      {
-        Columns edge, turn;
-        const int next = (clamp.edge + 1) % system.nodes();
-        for (int c = 0; c < 3; ++c)
-        {
-          mapDof(part, 4 * clamp.edge + c, 1.0, edge);
-          mapDof(part, 4 * next + c, 1.0, edge);
-          turn.push(bodyUnknown(body) + 3 + c, 1.0);
-        }
-        mapDof(part, 4 * clamp.edge + 3, 1.0, edge);
-        notePairs(edge, turn);
-      }
-  }
-  for (const auto& key : keys_)
+    if (part.welded)
+      noteCarried(part);
+  for (const CoupledChains::Key& key : coupled_.room())
   {
     ContactTerm term;
     std::copy_n(key.begin(), 4, term.point);
     term.solid = key[4];
+    const std::array<int, 4> bases = coupled_.basesOf(term.point);
+    if (!isCarried(bases, term.solid))
+    {
+      coupled_.noteBases(bases);
+      continue;
+    }
     std::array<Columns, 3> rows;
     contactColumns(term, rows);
     for (const Columns& a : rows)
       for (const Columns& b : rows)
-        notePairs(a, b);
+        coupled_.notePairs(a, b);
   }
-  std::vector<int> starts{0}, rows;
-  for (auto& column : columns)
-  {
-    std::sort(column.begin(), column.end());
-    rows.insert(rows.end(), column.begin(), std::unique(column.begin(), column.end()));
-    starts.push_back(static_cast<int>(rows.size()));
-  }
-  matrix_.setPattern(unknowns_, std::move(starts), std::move(rows));
-
-  for (RodPart& part : parts_)
-  {
-    part.slots.clear();
-    if (!part.coupled)
-      continue;
-    const RodSystem& system = part.rod->system;
-    for (int i = 0; i < system.nodes(); ++i)
-      for (int c = 0; c < 4; ++c)
-        for (int r = c; r < kRows; ++r)
-        {
-          const int a = part.dof[4 * i + c], at = system.panelUnknown(i, r), b = at < 0 ? kPrescribed : part.dof[at];
-          part.slots.push_back(
-              a >= 0 && b >= 0 ? matrix_.index(part.offset + std::max(a, b), part.offset + std::min(a, b)) : -1);
-        }
-  }
+  coupled_.endPattern();
 }
 
-void CoupledSystem::add(int a, int b, double value)
+/// Of a rod that bodies carry: what its panels and clamps couple with these.
+void CoupledSystem::noteCarried(RodPart& part)
 {
-  matrix_.values()[matrix_.index(std::max(a, b), std::min(a, b))] += value;
-}
-
-/// The symmetric pair of entries (a, b) and (b, a) of rows of unknowns.
-void CoupledSystem::addPair(const Columns& a, const Columns& b, double value)
-{
-  for (int i = 0; i < a.count; ++i)
-    for (int j = 0; j < b.count; ++j)
-      add(a.index[i], b.index[j], (a.index[i] == b.index[j] ? 2.0 : 1.0) * a.value[i] * b.value[j] * value);
-}
-
-/// The diagonal entry (a, a).
-void CoupledSystem::addSquare(const Columns& a, double value)
-{
-  for (int i = 0; i < a.count; ++i)
-    for (int j = 0; j <= i; ++j)
-      add(a.index[i], a.index[j], (i != j && a.index[i] == a.index[j] ? 2.0 : 1.0) * a.value[i] * a.value[j] * value);
+  const RodSystem& system = part.rod->system;
+  part.carried_entries.clear();
+  for (int i = 0; i < system.nodes(); ++i)
+    for (int c = 0; c < 4; ++c)
+      for (int r = c; r < ChainSystem::kPanelRows; ++r)
+      {
+        const int a = 4 * i + c, b = system.panelUnknown(i, r);
+        if (b < 0 || part.dof[a] == kPrescribed || part.dof[b] == kPrescribed || (part.dof[a] >= 0 && part.dof[b] >= 0))
+          continue;
+        part.carried_entries.push_back({i, c, r});
+        Columns ca, cb;
+        mapDof(part, a, 1.0, ca);
+        mapDof(part, b, 1.0, cb);
+        coupled_.notePairs(ca, cb);
+      }
+  for (const ClampJoint& clamp : system.clamps())
+    if (const int body = part.rod->work.grasps[clamp.grasp].body; body >= 0)
+    {
+      Columns edge, turn;
+      const int next = (clamp.edge + 1) % system.nodes();
+      for (int c = 0; c < 3; ++c)
+      {
+        mapDof(part, 4 * clamp.edge + c, 1.0, edge);
+        mapDof(part, 4 * next + c, 1.0, edge);
+        turn.push(bodyUnknown(body) + 3 + c, 1.0);
+      }
+      mapDof(part, 4 * clamp.edge + 3, 1.0, edge);
+      coupled_.notePairs(edge, turn);
+    }
 }
 
 /// Entries of carried unknowns, and what the curvature of a rotation adds: for a point at r with gradient g, (g r^T + r
@@ -281,11 +201,11 @@ void CoupledSystem::addCarried(const RodPart& part)
     mapDof(part, 4 * node + column, 1.0, a);
     if (dof == 4 * node + column)
     {
-      addSquare(a, value);
+      coupled_.addSquare(a, value);
       continue;
     }
     mapDof(part, dof, 1.0, b);
-    addPair(a, b, value);
+    coupled_.addPair(a, b, value);
   }
   for (const GraspState& g : part.rod->work.grasps)
   {
@@ -298,7 +218,7 @@ void CoupledSystem::addCarried(const RodPart& part)
       const Eigen::Vector3d grad = Eigen::Map<const Eigen::Vector3d>(system.gradient() + 4 * i);
       for (int p = 0; p < 3; ++p)
         for (int q = 0; q <= p; ++q)
-          add(base + p, base + q, 0.5 * (grad[p] * r[q] + r[p] * grad[q]) - (p == q ? grad.dot(r) : 0.0));
+          coupled_.add(base + p, base + q, 0.5 * (grad[p] * r[q] + r[p] * grad[q]) - (p == q ? grad.dot(r) : 0.0));
     }
   }
 }
@@ -332,13 +252,13 @@ void CoupledSystem::addClamps(const RodPart& part)
         column.count = 0;
         mapDof(part, 4 * next + k, 1.0, column);
         mapDof(part, 4 * j + k, -1.0, column);
-        addPair(row, column, -by_edge(p, k));
+        coupled_.addPair(row, column, -by_edge(p, k));
       }
       column.count = 0;
       mapDof(part, 4 * j + 3, 1.0, column);
-      addPair(row, column, -by_angle[p]);
+      coupled_.addPair(row, column, -by_angle[p]);
       for (int q = 0; q <= p; ++q)
-        add(base + p, base + q, turn(p, q));
+        coupled_.add(base + p, base + q, turn(p, q));
     }
   }
 }
@@ -346,59 +266,47 @@ void CoupledSystem::addClamps(const RodPart& part)
 /// `whole`: with the part of the contacts' second derivatives that may be negative.
 void CoupledSystem::assemble(const HessianShift& shift, bool whole)
 {
-  std::fill_n(matrix_.values(), matrix_.rows().size(), 0.0);
+  coupled_.assemble(shift);
   for (const RodPart& part : parts_)
-  {
-    if (!part.coupled)
-      continue;
-    RodSystem& system = part.rod->system;
-    const RodPanel* panels = system.panels();
-    const int* slot = part.slots.data();
-    double* values = matrix_.values();
-    for (int i = 0; i < system.nodes(); ++i)
-    {
-      const auto shifts = system.diagonalShift(i, shift);
-      for (int c = 0; c < 4; ++c)
-        for (int r = c; r < kRows; ++r, ++slot)
-          if (*slot >= 0)
-            values[*slot] += ChainSystem::panelEntry(panels[i], c, r) + (r == c ? shifts[c == 3] : 0.0);
-    }
     if (part.welded)
     {
       addCarried(part);
       addClamps(part);
     }
-  }
   for (std::size_t b = 0; b < bodies_.size(); ++b)
   {
     bodies_[b].addShift(shift);
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j <= i; ++j)
-        add(body_offset_ + 6 * b + i, body_offset_ + 6 * b + j, bodies_[b].hessian(i, j));
+        coupled_.add(coupled_.others() + 6 * b + i, coupled_.others() + 6 * b + j, bodies_[b].hessian(i, j));
   }
-  if (!contact_)
-    return;
   std::array<Columns, 3> rows;
-  for (const ContactTerm& term : contact_->terms())
-  {
-    if (isOwn(term) && !partOf(term.point[0]).coupled)
-      continue;
+  coupled_.forTerms([&](const ContactTerm& term) {
+    const std::array<int, 4> bases = coupled_.basesOf(term.point);
+    if (!isCarried(bases, term.solid))
+    {
+      coupled_.addTerm(term, bases, whole);
+      return;
+    }
     contactColumns(term, rows);
     const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
     for (int c = 0; c < 3; ++c)
     {
-      addSquare(rows[c], stiffness(c, c));
+      coupled_.addSquare(rows[c], stiffness(c, c));
       for (int d = 0; d < c; ++d)
-        addPair(rows[c], rows[d], stiffness(c, d));
+        coupled_.addPair(rows[c], rows[d], stiffness(c, d));
     }
-  }
-  for (const ContactRow& row : contact_->rows())
-  {
-    if (!partOf(row.point[0]).coupled)   // of its own contact with a solid
-      continue;
+  });
+  coupled_.forRows([&](const ContactRow& row) {
+    const std::array<int, 4> bases = coupled_.basesOf(row.point);
+    if (!isCarried(bases, -1))
+    {
+      coupled_.addRow(row, bases, whole);
+      return;
+    }
     contactColumns(row, whole, rows[0]);
-    addSquare(rows[0], row.stiffness);
-  }
+    coupled_.addSquare(rows[0], row.stiffness);
+  });
 }
 
 }   // namespace slender

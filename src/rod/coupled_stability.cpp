@@ -11,7 +11,7 @@ namespace slender {
 void CoupledSystem::beginStability(const RodGroupState& state, const RodGroupInputs& inputs)
 {
   begin(state, inputs, 1.0);
-  exact_ = true;
+  coupled_.exact = true;
   for (RodPart& part : parts_)
   {
     part.rod->begin(state.rods[part.index]);
@@ -91,13 +91,13 @@ void CoupledSystem::findLowestMode()
   const auto start = [](std::size_t k) {
     return std::sin(1.0 + 1.7 * static_cast<double>(k)) + 0.5 * std::cos(0.3 * static_cast<double>(k));
   };
-  for (std::size_t k = 0; k < rhs_.size(); ++k)
-    rhs_[k] = start(k);
+  Eigen::Map<Eigen::VectorXd> shared(coupled_.solution(), coupled_.unknowns());
+  for (Eigen::Index k = 0; k < shared.size(); ++k)
+    shared[k] = start(static_cast<std::size_t>(k));
   for (RodPart& part : parts_)
     if (!part.coupled)
       for (std::size_t d = 0; d < part.dof.size(); ++d)
         part.rod->system.direction()[d] = part.dof[d] >= 0 ? start(d) : 0.0;
-  Eigen::Map<Eigen::VectorXd> shared(rhs_.data(), static_cast<Eigen::Index>(rhs_.size()));
   const auto own = [](RodPart& part) {
     return Eigen::Map<Eigen::VectorXd>(part.rod->system.direction(), static_cast<Eigen::Index>(part.dof.size()));
   };
@@ -108,8 +108,7 @@ void CoupledSystem::findLowestMode()
       square += part.coupled ? 0.0 : own(part).squaredNorm();
     const double scale = 1.0 / std::sqrt(std::max(square, 1e-300));
     shared *= scale;
-    if (unknowns_ > 0)
-      matrix_.solve(rhs_.data());
+    coupled_.solve();
     for (RodPart& part : parts_)
       if (!part.coupled)
       {
@@ -118,7 +117,7 @@ void CoupledSystem::findLowestMode()
       }
   }
   for (std::size_t b = 0; b < bodies_.size(); ++b)
-    body_direction_[b] = Eigen::Map<BodySystem::Vector6>(rhs_.data() + body_offset_ + 6 * b);
+    body_direction_[b] = bodySolution(b);
   spread();
   double turn = 0.0, move = 0.0, length = 0.0;
   for (RodPart& part : parts_)

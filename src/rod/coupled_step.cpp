@@ -63,6 +63,8 @@ CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodSt
   for (std::size_t r = 0; r < rods.size(); ++r)
   {
     parts_[r].rod = rods[r];
+    parts_[r].system = &rods[r]->system;
+    coupled_.chains.push_back(&parts_[r]);
     parts_[r].index = static_cast<int>(r);
     least_edge_ = std::min(least_edge_, rods[r]->model->rest_length.minCoeff());
   }
@@ -84,14 +86,18 @@ CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodSt
     return;
   for (const GroupContact::Rod& rod : model.contact.rods)
   {
-    parts_[rod.rod].point = static_cast<int>(point_part_.size());
-    point_part_.insert(point_part_.end(), model.rods[rod.rod]->nodes(), rod.rod);
+    parts_[rod.rod].point = static_cast<int>(coupled_.points.size());
+    for (int i = 0; i < model.rods[rod.rod]->nodes(); ++i)
+      coupled_.points.push_back({&parts_[rod.rod], i});
   }
   ContactOptions options = model.contact.options;
   options.least_stiffness = std::max(options.least_stiffness, leastStiffness(model, rods[0]->time.step));
   contact_ = std::make_unique<ContactPotential>(contactSurface(model), options);
   first_stiffness_ = contact_->stiffness();
-  points_.resize(3, point_part_.size());
+  coupled_.solid_moves.assign(obstacles_.size(), 0);
+  for (const GroupContact::Body& body : model.contact.bodies)
+    coupled_.solid_moves.push_back(simulated_[body.body] >= 0);
+  points_.resize(3, coupled_.points.size());
   points_base_ = points_end_ = points_;
   solids_.resize(obstacles_.size() + model.contact.bodies.size());
   solids_base_ = solids_end_ = solids_;
@@ -145,7 +151,7 @@ void CoupledSystem::gather(Eigen::Matrix3Xd& x, std::vector<Pose>& solids) const
 
 void CoupledSystem::beginStep(const StepPlan& plan, double t)
 {
-  exact_ = false;
+  coupled_.exact = false;
   for (RodPart& part : parts_)
     mapUnknowns(part);
   bool fresh = false;
@@ -254,18 +260,13 @@ NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, doub
   placeWelds();
   if (!contact_)
     return minimize(*this, newton);
-  whole_ = {};
+  coupled_.beginStage();
   // friction sticks below a speed over the whole step: in cut steps that range would become too narrow to find
   contact_->begin(points_base_, solids_base_, duration_);
   if (s == 0)
   {
     contact_->evaluate(points_base_, solids_base_, false);
-    // the pattern follows from the state alone, so that a run that was stopped goes on bit by bit
-    std::vector<std::array<int, 5>> before_keys;
-    before_keys.swap(keys_);
-    takeKeys();
-    if (keys_ != before_keys)
-      pattern_valid_ = false;
+    coupled_.takeFirst(contact_->terms(), nullptr, contact_->rows());
   }
   return minimizeConfined(*this, (t + before * h) / duration_, (t + now * h) / duration_, newton,
                           model_.contact.options.gap / least_edge_);

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "../contact/confined_newton.h"
+#include "../contact/coupled_chains.h"
 #include "body_system.h"
 #include "rod_stepper_impl.h"
-#include "slender_sim/linalg/sparse_cholesky.h"
 #include "slender_sim/rod/rod_group.h"
 
 namespace slender {
@@ -78,56 +78,35 @@ public:
   ContactPotential& contact() { return *contact_; }
 
 private:
-  /// One rod: how its unknowns (four per node) enter the matrix.
-  struct RodPart
+  using Columns = CoupledChains::Columns;
+  static constexpr int kPrescribed = CoupledChains::kPrescribed;
+  /// One rod; an unknown that grasp k carries has the number -2 - k.
+  struct RodPart : CoupledChains::Chain
   {
     RodStepper::Impl* rod = nullptr;
     int index = 0;    ///< in the group
     int point = -1;   ///< its first contact point, -1: it touches nothing
-    bool welded = false, touched = false;
-    bool coupled = false;         ///< has its unknowns in the matrix
-    std::vector<int> own_terms;   ///< of the present contacts: those that couple nothing, see isOwn()
-    std::vector<int> own_rows;    ///< likewise of the contacts' rows
-    int offset = 0, unknowns = 0;
-    std::vector<int> dof;   ///< own number, kPrescribed, or carried by grasp k: -2 - k
-    /// where the entries of its panels go: index of a matrix value, -1: nowhere or not simply
-    std::vector<int> slots;
+    bool welded = false;
     std::vector<std::array<int, 3>> carried_entries;   ///< node, column, row of those with a carried unknown
     std::vector<std::array<int, 4>> holds;             ///< grasps that dof was made for: active, first, last, body
-    RodEvaluation evaluation;
-  };
-  /// A row of unknowns with weights: what one component of a displacement depends on.
-  struct Columns
-  {
-    int count = 0;
-    static constexpr int kMost = 36;   // three for each component of four carried points
-    std::array<int, kMost> index;
-    std::array<double, kMost> value;
-    void push(int i, double v)
-    {
-      index[count] = i;
-      value[count++] = v;
-    }
   };
 
   // coupled_matrix.cpp
   void buildPattern();
+  void noteCarried(RodPart& part);
   void assemble(const HessianShift& shift, bool whole);
-  bool factor(const HessianShift& shift);
-  void add(int a, int b, double value);
-  void addPair(const Columns& a, const Columns& b, double value);
-  void addSquare(const Columns& a, double value);
   void mapDof(const RodPart& part, int dof, double weight, Columns& out) const;
+  bool isCarried(const std::array<int, 4>& bases, int solid) const;
   void addCarried(const RodPart& part);
   void addClamps(const RodPart& part);
   void contactColumns(const ContactTerm& term, std::array<Columns, 3>& rows) const;
   void contactColumns(const ContactRow& contact, bool whole, Columns& row) const;
-  bool takeKeys();
 
-  bool isOwn(const ContactTerm& term) const;
-  void findOwnTerms();
-  RodEvaluation evaluateWithOwn(RodPart& part, bool with_hessian, const HessianShift& shift);
-  void spread();   ///< solution of the matrix to the rods' directions
+  void spread();
+  Eigen::Map<BodySystem::Vector6> bodySolution(std::size_t body)
+  {
+    return Eigen::Map<BodySystem::Vector6>(coupled_.solution() + coupled_.others() + 6 * body);
+  }
   void mapUnknowns(RodPart& part);
   void reduceGradient();
   void placeWelds();
@@ -135,8 +114,8 @@ private:
   void gather(Eigen::Matrix3Xd& x, std::vector<Pose>& solids) const;
   void startAccelerations();
   void setCarriedInertia(const Stage& stage);
-  const RodPart& partOf(int point) const { return parts_[point_part_[point]]; }
-  int bodyUnknown(int body) const { return body_offset_ + 6 * simulated_[body]; }
+  const RodPart& partOf(int point) const { return static_cast<const RodPart&>(*coupled_.points[point].chain); }
+  int bodyUnknown(int body) const { return coupled_.others() + 6 * simulated_[body]; }
   template <class F>
   void forRods(F&& f);
 
@@ -148,7 +127,6 @@ private:
   std::vector<RigidBodyState> bodies_now_, bodies_next_;   ///< all
   /// driven bodies (a slot per body) and obstacles at the instant being solved for
   std::vector<Pose> driven_, obstacles_;
-  std::vector<int> point_part_;   ///< per contact point: its rod
   const RodGroupState* origin_ = nullptr;
   const RodGroupInputs* inputs_ = nullptr;
   double duration_ = 0, least_edge_ = std::numeric_limits<double>::infinity();
@@ -161,15 +139,7 @@ private:
   Eigen::Matrix3Xd points_, points_base_, points_end_;
   std::vector<Pose> solids_, solids_base_, solids_end_;
 
-  // matrix
-  SparseCholesky matrix_;
-  bool pattern_valid_ = false;
-  /// stability: the matrix must not be replaced by a positive definite one
-  bool exact_ = false;
-  WholeStiffness whole_;
-  int unknowns_ = 0, body_offset_ = 0;
-  std::vector<std::array<int, 5>> keys_;   ///< contacts (four points, a solid) the pattern has room for, sorted
-  std::vector<double> rhs_;
+  CoupledChains coupled_{false};
   std::vector<BodySystem::Vector6> body_direction_;
 };
 

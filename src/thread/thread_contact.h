@@ -6,15 +6,15 @@
 #include <vector>
 
 #include "../contact/confined_newton.h"
+#include "../contact/coupled_chains.h"
 #include "merging.h"
-#include "slender_sim/linalg/sparse_cholesky.h"
 #include "slender_sim/thread/touching_threads.h"
 #include "thread_loop.h"
 
 namespace slender {
 
 /// Equations of threads with contact and merging, for minimize(). Threads that nothing touches keep their own band
-/// matrices; the others share one sparse matrix.
+/// matrices; the others share one sparse matrix (CoupledChains).
 class ThreadContact : public RemeshGuard
 {
 public:
@@ -66,27 +66,14 @@ public:
   ContactPotential& contact() { return contact_; }
 
 private:
-  struct Part
+  struct Part : CoupledChains::Chain
   {
     ThreadStepper::Impl* thread = nullptr;
     int kind = 0;
-    int point = 0;          ///< its first contact point
-    bool touched = false;   ///< has its unknowns in the matrix
-    int offset = 0, unknowns = 0;
-    std::vector<int> dof;     ///< own number of every unknown of its system, -1: held
-    std::vector<int> slots;   ///< where the entries of its panels go, -1: nowhere
-    RodEvaluation evaluation;
+    int point = 0;   ///< its first contact point
   };
   const ThreadSystem& systemOf(const Part& part) const { return part.thread->system; }
-  template <class F>
-  void forTerms(F&& f) const
-  {
-    for (const auto* list : {&contact_.terms(), &merging_.terms()})
-      for (const ContactTerm& term : *list)
-        f(term);
-  }
-  /// Of a contact point: its unknowns' first number in its part, -1: held.
-  int dofOf(int point) const;
+  const std::vector<ContactTerm>* attractions() const { return merges_ ? &merging_.terms() : nullptr; }
 
   /// Calls f(other, j, core) for every edge that the edges first to last of `state` may touch; stops and returns false
   /// when f does.
@@ -97,10 +84,8 @@ private:
   void gather(Eigen::Matrix3Xd& x) const;
   void placeSolids(double fraction, std::vector<Pose>& solids) const;
   void mapUnknowns();
-  bool takeKeys();
   void buildPattern();
   void assemble(const HessianShift& shift, bool whole);
-  bool factor(const HessianShift& shift);
 
   const TouchingModel& model_;
   ContactPotential contact_;
@@ -117,18 +102,10 @@ private:
   std::vector<ContactObject> objects_;
   std::vector<MergingFluid> fluids_;   ///< per object
   std::vector<char> held_;             ///< per point
-  std::vector<int> point_part_;
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;
 
-  // matrix
-  SparseCholesky matrix_{true};
-  bool pattern_valid_ = false;
-  WholeStiffness whole_;
-  int unknowns_ = 0;
-  std::vector<std::array<int, 4>> keys_, keys_before_;   ///< points of terms that the pattern has room for, sorted
-  std::vector<std::vector<int>> columns_;
-  std::vector<double> rhs_;
+  CoupledChains coupled_{true};
 };
 
 }   // namespace slender

@@ -67,14 +67,18 @@ void ThreadContact::beginStep(const std::vector<Thread>& threads, const std::vec
                               const std::vector<Pose>& to, const std::vector<Eigen::Vector3d>& belts, double duration,
                               double stiffness)
 {
-  pattern_valid_ = pattern_valid_ && part_count_ == threads.size();
+  if (part_count_ != threads.size())
+    coupled_.invalidatePattern();
   part_count_ = threads.size();
   if (parts_.size() < part_count_)
     parts_.resize(part_count_);
+  coupled_.chains.clear();
   for (std::size_t p = 0; p < part_count_; ++p)
   {
     parts_[p].thread = threads[p].thread;
     parts_[p].kind = threads[p].kind;
+    parts_[p].system = &threads[p].thread->system;
+    coupled_.chains.push_back(&parts_[p]);
   }
   duration_ = duration;
   solids_from_ = from;
@@ -114,14 +118,12 @@ bool ThreadContact::load(double from, double h)
   objects_.clear();
   fluids_.clear();
   held_.clear();
-  point_part_.clear();
   least_edge_ = std::numeric_limits<double>::infinity();
   for (std::size_t p = 0; p < part_count_; ++p)
   {
     Part& part = parts_[p];
     part.point = static_cast<int>(held_.size());
     addCurve(part.thread->work, part.kind);
-    point_part_.resize(held_.size(), static_cast<int>(p));
     least_edge_ = std::min(least_edge_, systemOf(part).leastRestLength());
   }
   const int count = static_cast<int>(held_.size());
@@ -166,18 +168,17 @@ bool ThreadContact::load(double from, double h)
   constexpr double kLargest = std::numeric_limits<double>::max();
   contact_.setMostStiffness(std::min(std::max(most, least), kLargest));
   contact_.setStiffness(std::min(least, kLargest));
-  whole_ = {};
+  coupled_.beginStage();
   // friction sticks below a speed over the whole step, cut or not
   contact_.begin(points_base_, solids_base_, duration_);
 
+  coupled_.points.resize(count);
+  coupled_.solid_moves.assign(solids_.size(), 0);
   mapUnknowns();
-  keys_before_.swap(keys_);
-  keys_.clear();
   contact_.evaluate(points_base_, solids_base_, false);
   if (merges_)
     merging_.evaluate(points_base_, false);
-  takeKeys();
-  pattern_valid_ = pattern_valid_ && keys_ == keys_before_;
+  coupled_.takeFirst(contact_.terms(), attractions(), contact_.rows());
   return true;
 }
 
