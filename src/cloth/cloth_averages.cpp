@@ -162,10 +162,10 @@ bool ClothSystem::sweepsSuit(const PrescribedAverages& averages) const
 
 bool ClothSystem::bendsLittle(double viscosity) const
 {
-  for (int i = 0; i < bending_.size(); ++i)
-    for (int k = bending_.starts()[i]; k < bending_.starts()[i + 1]; ++k)
-      if (bending_.column(k) == i && (1.0 + viscosity) * bending_.values()[k] > kStiffestSwept * weight_[i])
-        return false;
+  const std::vector<double>& stiffness = preconditioner_->bendingDiagonal();
+  for (std::size_t i = 0; i < stiffness.size(); ++i)
+    if ((1.0 + viscosity) * stiffness[i] > kStiffestSwept * weight_[i])
+      return false;
   return true;
 }
 

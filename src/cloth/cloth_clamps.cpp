@@ -48,8 +48,8 @@ void ClothStepper::Impl::useConstantMatrix()
 {
   if (options.integrator != Integrator::imex)
     return;
-  constant_ = std::make_unique<ShiftedMatrix>(system->bending().size() > 0 ? system->bending()
-                                                                           : PointMatrix(model->vertices(), {}));
+  const PointMatrix* matrix = system->constantMatrix();
+  constant_ = std::make_unique<ShiftedMatrix>(matrix ? *matrix : PointMatrix(model->vertices(), {}));
   constant_weight_.assign(model->vertices(), 0.0);
   constant_h_ = 0.0;   // The matrix is not factored yet.
 }

@@ -12,7 +12,7 @@ StepReport ClothStepper::Impl::statics(ClothState& state, const ClothInputs& inp
   std::string what;
   if (!inputsFine(state, inputs, 1.0, what))
     return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
-  const bool blown = system->wind().active() && inputs.wind != Eigen::Vector3d::Zero();
+  const bool blown = !system->loads().empty() && inputs.wind != Eigen::Vector3d::Zero();
   if (!model->averages.empty() || plastic_.active() || blown)
     return refuse(report, StepFailure::input_not_finite,
                   "statics is for elastic cloth under gravity, loads and grasps: leave out " +

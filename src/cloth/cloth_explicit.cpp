@@ -8,13 +8,13 @@
 namespace slender {
 
 /// Elastic and viscous forces at (x_, v_), wind, gravity and extra forces into force_. Mass damping is left out.
-ClothEvaluation ClothStepper::Impl::addForces(const ClothInputs& inputs, bool with_bending)
+ClothEvaluation ClothStepper::Impl::addForces(const ClothInputs& inputs, bool with_constant)
 {
   std::fill(d_.begin(), d_.end(), 0.0);
-  const ClothEvaluation here = system->addInternal(x_, d_, with_bending);
+  const ClothEvaluation here = system->addInternal(x_, d_, with_constant);
   std::fill(force_.begin(), force_.end(), 0.0);
-  if (system->wind().active())
-    system->wind().addForces(x_, v_, inputs.wind, force_);
+  for (const auto& load : system->loads())
+    load->addForces(x_, v_, inputs.wind, force_);
   for (int i = 0; i < model->vertices(); ++i)
   {
     point(force_, i) += model->mass[i] * inputs.gravity - point(d_, i);
@@ -51,11 +51,11 @@ double ClothStepper::Impl::stableStep()
   if (!isExplicit())
     return std::numeric_limits<double>::infinity();
   const int n = model->vertices();
-  const bool with_bending = options.integrator == Integrator::symplectic_euler;
+  const bool with_constant = options.integrator == Integrator::symplectic_euler;
   PointVector rest, away(4 * n), up(4 * n), down(4 * n);
   toPoints(model->rest.vertices, rest);
   ClothState at_rest = makeClothState(*model, model->rest.vertices);
-  system->setHinges(at_rest);
+  system->usePlasticState(at_rest);
   system->setViscosity(0.0, rest);
   const double small = 1e-4 * shortest_edge_;
   PointVector mode(4 * n, 0.0);
@@ -71,11 +71,11 @@ double ClothStepper::Impl::stableStep()
       away[i] = rest[i] + mode[i];
     }
     std::fill(up.begin(), up.end(), 0.0);
-    system->addInternal(away, up, with_bending);
+    system->addInternal(away, up, with_constant);
     for (std::size_t i = 0; i < mode.size(); ++i)
       away[i] = rest[i] - mode[i];
     std::fill(down.begin(), down.end(), 0.0);
-    system->addInternal(away, down, with_bending);
+    system->addInternal(away, down, with_constant);
     double work = 0.0, inertia = 0.0;   // Rayleigh's quotient
     for (int i = 0; i < n; ++i)
     {
@@ -100,7 +100,7 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
   toPoints(work_.x, x_);
   toPoints(work_.v, v_);
   next_ = work_;
-  system->setHinges(work_);
+  system->usePlasticState(work_);
   if (model->stiffness_damping > 0)
   {
     for (std::size_t i = 0; i < x_.size(); ++i)
@@ -163,8 +163,8 @@ StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from,
   }
   const ClothEvaluation here = addForces(inputs, false);
   std::fill(trial_.begin(), trial_.end(), 0.0);
-  if (system->bending().size() > 0)
-    system->bending().addProduct(-1.0, x_.data(), trial_.data());
+  if (const PointMatrix* constant = system->constantMatrix())
+    constant->addProduct(-1.0, x_.data(), trial_.data());
   std::fill(d_.begin(), d_.end(), 0.0);
   for (int i = 0; i < n; ++i)
     point(force_, i) += point(trial_, i) + model->mass[i] / h * point(v_, i);

@@ -66,14 +66,14 @@ bool ClothStepper::Impl::createsEnergy(double energy_end, double average_work, d
   constexpr double kCreated = 0.1;
   const double strains = 1e-12 * (model->membrane.c11 + model->membrane.c22) *
                          static_cast<double>(model->rest.triangles.cols()) * shortest_edge_ * shortest_edge_;
-  double gain = energy_end - energy_start_ - average_work, loads = 0.0;
+  const double loads = system->loadWork(x_start_, x_);
+  double gain = energy_end - energy_start_ - average_work;
   double given = strains + elastic_start_ + std::abs(average_work);   // strains of a millionth: of a cloth at rest
   for (int i = 0; i < model->vertices(); ++i)
   {
     if (!system->held()[i])
     {
       const double before = 0.5 * model->mass[i] * work_.v.col(i).squaredNorm();
-      loads += system->loadWork(i, x_start_, x_);
       gain += 0.5 * model->mass[i] * next_.v.col(i).squaredNorm() - before;
       given += before;
     }

@@ -26,38 +26,32 @@ double largestDiagonal(const PointMatrix& matrix)
   return largest;
 }
 
-/// Cotangent stiffness of the rest mesh times a modulus: the membrane as if it acted on each coordinate alike.
-PointMatrix scalarMembrane(const ClothModel& model)
-{
-  std::vector<Eigen::Triplet<double>> entries;
-  const double modulus = 0.5 * (model.membrane.c11 + model.membrane.c22);
-  const Eigen::Matrix3Xd& x = model.rest.vertices;
-  for (Eigen::Index f = 0; f < model.rest.triangles.cols(); ++f)
-    for (int k = 0; k < 3; ++k)
-    {
-      const auto corner = [&](int c) { return model.rest.triangles((k + c) % 3, f); };
-      const int a = corner(1), b = corner(2);
-      const Eigen::Vector3d u = x.col(a) - x.col(corner(0)), v = x.col(b) - x.col(corner(0));
-      const double weight = 0.5 * modulus * u.dot(v) / u.cross(v).norm();
-      entries.emplace_back(a, a, weight);
-      entries.emplace_back(b, b, weight);
-      entries.emplace_back(a, b, -weight);
-      entries.emplace_back(b, a, -weight);
-    }
-  return PointMatrix(model.vertices(), entries);
-}
-
-/// Bending reaches farther than the membrane, so that its factor is twice as large: left out where it hardly matters.
-PointMatrix constantPart(const ClothModel& model, const PointMatrix& bending)
+/// Bending reaches farther than stretching, so that its factor is twice as large: left out where it hardly matters.
+PointMatrix constantPart(int points, const PointMatrix& bending, const PointMatrix& stretching)
 {
   constexpr double kSmall = 0.1;
-  const PointMatrix membrane = scalarMembrane(model);
-  if (bending.size() == 0 || largestDiagonal(bending) < kSmall * largestDiagonal(membrane))
-    return membrane;
+  if (bending.size() == 0 || largestDiagonal(bending) < kSmall * largestDiagonal(stretching))
+    return stretching;
   std::vector<Eigen::Triplet<double>> entries;
   addEntries(bending, entries);
-  addEntries(membrane, entries);
-  return PointMatrix(model.vertices(), entries);
+  addEntries(stretching, entries);
+  return PointMatrix(points, entries);
+}
+
+/// Sum of the matrices that stand in for the terms of an account; without rows if there are none.
+PointMatrix standIn(int points, const std::vector<ClothTerm>& terms, TermAccount account)
+{
+  std::vector<Eigen::Triplet<double>> entries;
+  bool any = false;
+  for (const ClothTerm& term : terms)
+  {
+    const PointMatrix* constant = term.energy->constantMatrix();
+    if (term.energy->account() != account || !(constant || term.stand_in))
+      continue;
+    addEntries(constant ? *constant : term.stand_in(), entries);
+    any = true;
+  }
+  return any ? PointMatrix(points, entries) : PointMatrix();
 }
 
 }   // namespace
@@ -98,13 +92,27 @@ void ShiftedMatrix::addProduct(const double* x, double* y) const
       y[4 * i + k] += weight_[i] * x[4 * i + k];
 }
 
-ClothPreconditioner::ClothPreconditioner(const ClothModel& model, const PointMatrix& bending,
-                                         const BlockMatrix& pattern, bool in_blocks)
+ClothPreconditioner::ClothPreconditioner(const ClothModel& model, const std::vector<ClothTerm>& terms,
+                                         const BlockMatrix& pattern)
+  : ClothPreconditioner(model, terms, pattern, standIn(model.vertices(), terms, TermAccount::bending))
+{
+}
+
+ClothPreconditioner::ClothPreconditioner(const ClothModel& model, const std::vector<ClothTerm>& terms,
+                                         const BlockMatrix& pattern, const PointMatrix& bending)
   : model_(model),
-    constant_(constantPart(model, bending))
+    constant_(constantPart(model.vertices(), bending, standIn(model.vertices(), terms, TermAccount::stretching)))
 {
   const int n = model.vertices();
-  const bool separate = bending.size() > 0 && !in_blocks;
+  bending_diagonal_.assign(static_cast<std::size_t>(n), 0.0);
+  for (int i = 0; i < bending.size(); ++i)
+    for (int k = bending.starts()[i]; k < bending.starts()[i + 1]; ++k)
+      if (bending.column(k) == i)
+        bending_diagonal_[static_cast<std::size_t>(i)] = bending.values()[k];
+  const PointMatrix* separate = nullptr;
+  for (const ClothTerm& term : terms)
+    if (term.energy->constantMatrix())
+      separate = term.energy->constantMatrix();
   std::vector<Eigen::Triplet<double>> entries;
   for (int j = 0; j < n; ++j)
     for (int k = pattern.starts()[j]; k < pattern.starts()[j + 1]; ++k)
@@ -114,11 +122,11 @@ ClothPreconditioner::ClothPreconditioner(const ClothModel& model, const PointMat
         entries.emplace_back(j, pattern.rows()[k], 1.0);
     }
   if (separate)
-    addEntries(bending, entries);
+    addEntries(*separate, entries);
   normal_pattern_ = PointMatrix(n, entries);
   Eigen::SparseMatrix<double> values(n, n);
   if (separate)
-    values = bending.toEigen();
+    values = separate->toEigen();
   for (int i = 0; i < n; ++i)
     for (int k = normal_pattern_.starts()[i]; k < normal_pattern_.starts()[i + 1]; ++k)
     {

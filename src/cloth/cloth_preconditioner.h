@@ -2,8 +2,7 @@
 
 #include <vector>
 
-#include "slender_sim/cloth/cloth_model.h"
-#include "slender_sim/linalg/block_matrix.h"
+#include "cloth_terms.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 namespace slender {
@@ -40,8 +39,9 @@ private:
 class ClothPreconditioner
 {
 public:
-  /// `bending`: of the model, or like it; empty without. `in_blocks`: what align() is given holds the bending.
-  ClothPreconditioner(const ClothModel& model, const PointMatrix& bending, const BlockMatrix& pattern, bool in_blocks);
+  /// `pattern`: that of the matrices for align(), which hold all terms but the one with a constant matrix. The model
+  /// must outlive this; the terms are read here only.
+  ClothPreconditioner(const ClothModel& model, const std::vector<ClothTerm>& terms, const BlockMatrix& pattern);
 
   /// Weights of inertia [n], factor of the stiffness. False: not positive definite, and not to be applied.
   bool setConstant(const std::vector<double>& weights, double factor, const std::vector<char>& held);
@@ -50,10 +50,16 @@ public:
   void useConstant() { aligned_ = false; }
   void apply(const PointVector& r, PointVector& z);
   const ShiftedMatrix& constant() const { return constant_; }
+  /// Diagonal of the bending at rest, per point [N/m].
+  const std::vector<double>& bendingDiagonal() const { return bending_diagonal_; }
 
 private:
+  ClothPreconditioner(const ClothModel& model, const std::vector<ClothTerm>& terms, const BlockMatrix& pattern,
+                      const PointMatrix& bending);
+
   const ClothModel& model_;
   ShiftedMatrix constant_;
+  std::vector<double> bending_diagonal_;
   double factor_ = 1.0;
   bool aligned_ = false;
   PointMatrix normal_pattern_;

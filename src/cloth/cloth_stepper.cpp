@@ -307,7 +307,7 @@ StepFailure ClothStepper::Impl::implicitStep(const ClothInputs& inputs, double f
       system->setViscosity(model->stiffness_damping / stage.tau_v, x_start_, stage.q_tilde[kV] != 0 ? &trial_ : nullptr,
                            stage.q_tilde[kQStage], &x_stage_);
     }
-    if (system->wind().active())
+    if (!system->loads().empty())
     {
       wind_v_ = work_.v;
       for (int i = 0; i < n && second_order; ++i)
@@ -345,7 +345,7 @@ StepFailure ClothStepper::Impl::finish(const Stage& stage, const ClothInputs& in
   double internal = 0.0, pin_work = 0.0, average_work = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
   {
-    const Eigen::Vector3d g = system->internalGradient(i, x_);
+    const Eigen::Vector3d g = system->internalGradient(i);
     internal = std::max(internal, g.norm());
     if (system->held()[i])
       pin_work += g.dot(point(x_, i) - point(x_start_, i));
@@ -504,7 +504,7 @@ ClothEnergies ClothStepper::energies(const ClothState& state, const Eigen::Vecto
   PointVector x;
   toPoints(state.x, x);
   PointVector unused(x.size(), 0.0);
-  system.setHinges(state);
+  system.usePlasticState(state);
   system.setViscosity(0.0, x);
   const ClothEvaluation e = system.addInternal(x, unused);
   result.membrane = e.membrane;

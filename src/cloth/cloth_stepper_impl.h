@@ -63,7 +63,7 @@ private:
   // cloth_explicit.cpp
   StepFailure explicitStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
   StepFailure imexStep(const ClothInputs& inputs, double from, double to, double duration, StepReport& report);
-  ClothEvaluation addForces(const ClothInputs& inputs, bool with_bending);
+  ClothEvaluation addForces(const ClothInputs& inputs, bool with_constant);
   ClothEvaluation acceleration(const ClothInputs& inputs, double delta);
 
   std::unique_ptr<ClothStatics> statics_;   ///< from the first equilibrium on

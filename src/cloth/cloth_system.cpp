@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include <Eigen/Geometry>
-
-#include "slender_sim/energy/plate_bending.h"
 
 namespace slender {
 
@@ -37,54 +36,30 @@ ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
 
 double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
 
+void ClothEvaluation::count(TermAccount account, const TermSums& sums)
+{
+  (account == TermAccount::stretching ? membrane : bending) += sums.energy;
+  max_strain = std::max(max_strain, sums.max_strain);
+}
+
 ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
   : model_(model),
     choose_(options.solver == ClothSolver::automatic && options.one_newton_step),
     solver_(chosen(model, options)),
     linear_tolerance_(options.linear_tolerance),
-    membrane_(model.rest, model.membrane, model.warp),
-    wind_(model)
+    terms_(clothTerms(model)),
+    loads_(clothLoads(model))
 {
   const int n = points();
   const bool direct = solver_ == ClothSolver::cholesky;
-  const MeshTopology& t = model.topology;
-  if (model.bending != BendingModel::none && model.bending_modulus > 0 && t.hingeCount() > 0)
-  {
-    const auto element = model.bending == BendingModel::isometric_conforming ? IsometricElement::conforming
-                                                                             : IsometricElement::nonconforming;
-    const double coefficient = model.bending_modulus * bendingCalibration(model.rest, t, element, model.warp);
-    constant_bending_ = model.bending != BendingModel::hinge;
-    if (!constant_bending_)
-      hinges_ =
-          std::make_unique<HingeBending>(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces),
-                                         Eigen::VectorXd::Zero(t.hingeCount()));
-    if (hinges_ && std::isfinite(model.plasticity.yield_curvature))
-      hinge_stiffness_ = hingeStiffness(model.rest, t, coefficient, model.clamped_faces);
-    if (constant_bending_ || solver_ == ClothSolver::conjugate_gradients)
-      bending_ =
-          model.bending_poissons_ratio
-              ? plateBending(model.rest, t, *model.bending_poissons_ratio, model.bending_modulus, model.clamped_faces)
-              : isometricBending(model.rest, t, element, coefficient, model.clamped_faces);
-  }
-  std::vector<Eigen::MatrixXi> elements{model.rest.triangles};
-  if (hinges_)
-    elements.emplace_back(t.hinges);
-  bending_in_blocks_ = constant_bending_ && direct;
-  if (bending_in_blocks_)
-    elements.push_back(pairsOf(bending_));
-  matrix_ = BlockMatrix(n, elements);
-  membrane_slots_ = membrane_.slotsIn(matrix_);
-  if (hinges_)
-    hinge_slots_ = hinges_->slotsIn(matrix_);
-  if (bending_in_blocks_)
-    bending_map_ = matrix_.mapOf(bending_);
+  usePattern(direct);
   if (direct)
     factor_.setPattern(matrix_);
   else if (solver_ == ClothSolver::gauss_seidel)
-    sweeps_ = SymmetricSweeps(matrix_, constant_bending_ ? &bending_ : nullptr);
+    sweeps_ = SymmetricSweeps(matrix_, constant_);
   else
   {
-    preconditioner_ = std::make_unique<ClothPreconditioner>(model, bending_, matrix_, !constant_bending_);
+    preconditioner_ = std::make_unique<ClothPreconditioner>(model, terms_, matrix_);
     cg_.resize(n);
     average_sets_.resize(model.averages.size());
     for (std::size_t s = 0; s < average_sets_.size(); ++s)
@@ -94,7 +69,7 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
       average_sets_[s].swept = sweepsSuit(model.averages[s]);
     }
     if (std::any_of(average_sets_.begin(), average_sets_.end(), [](const AverageSet& set) { return set.swept; }))
-      sweeps_ = SymmetricSweeps(matrix_, constant_bending_ ? &bending_ : nullptr);
+      sweeps_ = SymmetricSweeps(matrix_, constant_);
     if (!average_sets_.empty())
     {
       if (model.averages[0].bounds.size() > 0)
@@ -105,30 +80,43 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
       use(average_sets_[0]);
     }
   }
-  for (PointVector* v : {&start_, &target_, &force_, &gradient_, &product_, &right_, &correction_})
+  for (PointVector* v : {&start_, &target_, &force_, &gradient_, &load_gradient_, &product_, &right_, &correction_})
     v->assign(4 * n, 0.0);
   weight_.assign(n, 0.0);
   held_.assign(n, 0);
   if (model.stiffness_damping > 0)
-  {
-    viscous_start_.assign(4 * n, 0.0);
-    shifted_.assign(4 * n, 0.0);
-    for (int k = 0; k < 3; ++k)
-      for (auto* s : {&strains_[k], &other_strains_[k]})
-        s->assign(membrane_.paddedCount(), 0.0);
-    if (hinges_)
-      for (auto* a : {&angles_, &other_angles_, &start_angles_})
-        a->assign(hinges_->paddedCount(), 0.0);
-  }
+    for (PointVector* v : {&ahead_, &behind_})
+      v->assign(4 * n, 0.0);
 }
 
-void ClothSystem::setHinges(const ClothState& state)
+void ClothSystem::usePattern(bool direct)
 {
-  if (hinges_)
-    for (int h = 0; h < hinges_->count(); ++h)
-      hinges_->setRestAngle(h, state.rest_angles[h]);
-  for (Eigen::Index h = 0; h < hinge_stiffness_.size(); ++h)
-    hinges_->setStiffness(static_cast<int>(h), state.stiffening[h] * hinge_stiffness_[h]);
+  std::vector<Eigen::MatrixXi> elements;
+  for (const ClothTerm& term : terms_)
+  {
+    elements.push_back(term.energy->elements());
+    if (!term.energy->constantMatrix())
+      continue;
+    if (constant_)
+      throw std::logic_error("a cloth can have one term with a constant matrix: add the matrices");
+    constant_ = term.energy->constantMatrix();
+  }
+  constant_in_blocks_ = constant_ && direct;
+  if (constant_in_blocks_)
+    elements.push_back(pairsOf(*constant_));
+  matrix_ = BlockMatrix(points(), elements);
+  for (const ClothTerm& term : terms_)
+    term.energy->setPattern(matrix_);
+  for (const auto& load : loads_)
+    load->setPattern(matrix_);
+  if (constant_in_blocks_)
+    constant_map_ = matrix_.mapOf(*constant_);
+}
+
+void ClothSystem::usePlasticState(const ClothState& state)
+{
+  for (const ClothTerm& term : terms_)
+    term.energy->setPlasticState({state.rest_angles, state.stiffening});
 }
 
 void ClothSystem::setViscosity(double ratio, const PointVector& x) { setViscosity(ratio, x, nullptr, 0.0, nullptr); }
@@ -138,46 +126,22 @@ void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVe
 {
   if (ratio == 0.0 && ratio_ == 0.0)
     return;
-  double* strains[3] = {strains_[0].data(), strains_[1].data(), strains_[2].data()};
-  double* others[3] = {other_strains_[0].data(), other_strains_[1].data(), other_strains_[2].data()};
-  const auto add = [&](const PointVector& there, double part) {
-    membrane_.strains(there.data(), others);
-    for (int k = 0; k < 3; ++k)
-      for (std::size_t i = 0; i < strains_[k].size(); ++i)
-        strains[k][i] += part * others[k][i];
-    if (!hinges_)
-      return;
-    hinges_->angles(there.data(), other_angles_.data());
-    for (std::size_t i = 0; i < angles_.size(); ++i)   // the shorter way round
-      angles_[i] += part * std::remainder(other_angles_[i] - start_angles_[i], 2 * M_PI);
-  };
   if (ratio > 0)
   {
-    viscous_start_ = x;
-    membrane_.strains(x.data(), strains);
-    if (hinges_)
+    StrainReference at;
+    at.x = &x;
+    at.move = move;
+    at.ahead = &ahead_;
+    at.behind = &behind_;
+    at.share = share;
+    at.other = other;
+    for (std::size_t i = 0; move && i < x.size(); ++i)
     {
-      hinges_->angles(x.data(), angles_.data());
-      start_angles_ = angles_;
+      ahead_[i] = x[i] + (*move)[i];
+      behind_[i] = x[i] - (*move)[i];
     }
-    if (share != 0.0)
-    {
-      for (auto& array : strains_)
-        for (double& value : array)
-          value *= 1.0 - share;
-      add(*other, share);
-    }
-    for (const double side : {0.5, -0.5})
-      if (move)
-      {
-        for (std::size_t i = 0; i < x.size(); ++i)
-          shifted_[i] = x[i] + 2.0 * side * (*move)[i];
-        add(shifted_, side);
-      }
-    for (std::size_t i = 0; i < x.size(); ++i)
-      viscous_start_[i] += (move ? (*move)[i] : 0.0) + (share != 0.0 ? share * ((*other)[i] - x[i]) : 0.0);
-    if (constant_bending_)
-      viscous_form_ = bending_.multiply(viscous_start_.data(), product_.data());
+    for (const ClothTerm& term : terms_)
+      term.energy->takeStrains(at);
   }
   respond(ratio);
 }
@@ -185,21 +149,17 @@ void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVe
 void ClothSystem::respond(double ratio)
 {
   ratio_ = ratio;
-  const double* strains[3] = {strains_[0].data(), strains_[1].data(), strains_[2].data()};
-  membrane_.setResponse(ratio, strains);
-  if (hinges_)
-    hinges_->setResponse(ratio, angles_.data());
+  for (const ClothTerm& term : terms_)
+    term.energy->setResponse(ratio);
 }
 
 double ClothSystem::elasticEnergy(const PointVector& x)
 {
   const double ratio = ratio_;
   respond(0.0);
-  double result = membrane_.energy(x.data()).energy;
-  if (hinges_)
-    result += hinges_->energy(x.data());
-  else if (constant_bending_)
-    result += 0.5 * bending_.multiply(x.data(), product_.data());
+  double result = 0.0;
+  for (const ClothTerm& term : terms_)
+    result += term.energy->value(x.data()).energy;
   respond(ratio);
   return result;
 }
@@ -212,8 +172,8 @@ void ClothSystem::setWeights(double tau, double ratio)
   for (int i = 0; i < n; ++i)
     weight_[i] = rate(tau) * model_.mass[i];
   matrix_.setZero();
-  if (bending_in_blocks_)
-    matrix_.add(1.0 + ratio, bending_, bending_map_);
+  if (constant_in_blocks_)
+    matrix_.add(1.0 + ratio, *constant_, constant_map_);
   for (int i = 0; i < n; ++i)
     for (int k = 0; k < 3; ++k)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += weight_[i];
@@ -254,7 +214,7 @@ void ClothSystem::hold(const ClothState& state)
   std::fill(held_.begin(), held_.end(), 0);
   for (const int p : state.pins)
     held_[p] = 1;
-  setHinges(state);
+  usePlasticState(state);
 }
 
 void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
@@ -277,73 +237,53 @@ void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
     if (extra)
       point(force_, i) += inputs.forces.col(i);
   }
-  if (wind_.active())
-    wind_.begin(*stage.wind_at, *stage.q_tilde, *stage.velocity, inputs.wind, stage.tau, force_);
+  for (const auto& load : loads_)
+    load->begin(*stage.wind_at, *stage.q_tilde, *stage.velocity, inputs.wind, stage.tau, force_);
 }
 
-ClothEvaluation ClothSystem::addLoads(const PointVector& x, bool with_gradient)
+double ClothSystem::loadPotential(const PointVector& x) const
 {
-  ClothEvaluation result;
+  double potential = 0.0;
+  for (int i = 0; i < points(); ++i)
+    potential += 0.5 * weight_[i] * (point(x, i) - point(target_, i)).squaredNorm() -
+                 point(force_, i).dot(point(x, i) - point(start_, i));
+  for (const auto& load : loads_)
+    potential += load->value(x.data());
+  return potential;
+}
+
+double ClothSystem::addLoads(const PointVector& x)
+{
+  double potential = 0.0;
   for (int i = 0; i < points(); ++i)
   {
     const Eigen::Vector3d away = point(x, i) - point(target_, i);
-    Eigen::Vector3d slope = weight_[i] * away - point(force_, i);
-    result.potential += 0.5 * weight_[i] * away.squaredNorm() - point(force_, i).dot(point(x, i) - point(start_, i));
-    if (wind_.active())
-      result.potential += wind_.addGradient(i, point(x, i), slope);
-    if (with_gradient)
-      point(gradient_, i) += slope;
+    point(load_gradient_, i) = weight_[i] * away - point(force_, i);
+    potential += 0.5 * weight_[i] * away.squaredNorm() - point(force_, i).dot(point(x, i) - point(start_, i));
   }
-  return result;
+  for (const auto& load : loads_)
+    potential += load->addGradient(x.data(), load_gradient_.data());
+  for (std::size_t i = 0; i < gradient_.size(); ++i)
+    gradient_[i] += load_gradient_[i];
+  return potential;
 }
 
-ClothEvaluation ClothSystem::addInternal(const PointVector& x, PointVector& gradient, bool with_bending)
+ClothEvaluation ClothSystem::addInternal(const PointVector& x, PointVector& gradient, bool with_constant)
 {
   ClothEvaluation result;
-  const MembraneSums sums = membrane_.addGradient(x.data(), gradient.data());
-  result.membrane = sums.energy;
-  result.max_strain = std::max(sums.max_strain, -sums.min_strain);
-  if (!with_bending)
-    return result;
-  if (hinges_)
-    result.bending = hinges_->addGradient(x.data(), gradient.data());
-  else if (constant_bending_)
-    result.bending = addIsometric(x, gradient);
+  for (const ClothTerm& term : terms_)
+    if (with_constant || !term.energy->constantMatrix())
+      result.count(term.energy->account(), term.energy->addGradient(x.data(), gradient.data()));
   return result;
-}
-
-/// Viscous response: (1 + ratio) K about the mean of zero and the start of the step, weighted 1 : ratio.
-double ClothSystem::addIsometric(const PointVector& x, PointVector& gradient)
-{
-  double energy = 0.5 * (1.0 + ratio_) * bending_.addProduct(1.0 + ratio_, x.data(), gradient.data());
-  if (ratio_ > 0)
-  {
-    bending_.multiply(viscous_start_.data(), product_.data());
-    energy += ratio_ *
-              (0.5 * ratio_ / (1.0 + ratio_) * viscous_form_ - pointKernels().dot(points(), x.data(), product_.data()));
-    for (std::size_t i = 0; i < gradient.size(); ++i)
-      gradient[i] -= ratio_ * product_[i];
-  }
-  return energy;
 }
 
 ClothEvaluation ClothSystem::energy(const PointVector& x)
 {
   spend(kEnergyWork);
-  ClothEvaluation result = addLoads(x, false);
-  const MembraneSums sums = membrane_.energy(x.data());
-  result.membrane = sums.energy;
-  result.max_strain = std::max(sums.max_strain, -sums.min_strain);
-  if (hinges_)
-    result.bending = hinges_->energy(x.data());
-  else if (constant_bending_)
-  {
-    const double form = bending_.multiply(x.data(), product_.data());
-    result.bending = 0.5 * (1.0 + ratio_) * form;
-    if (ratio_ > 0)
-      result.bending += ratio_ * (0.5 * ratio_ / (1.0 + ratio_) * viscous_form_ -
-                                  pointKernels().dot(points(), viscous_start_.data(), product_.data()));
-  }
+  ClothEvaluation result;
+  result.potential = loadPotential(x);
+  for (const ClothTerm& term : terms_)
+    result.count(term.energy->account(), term.energy->value(x.data()));
   return result;
 }
 
@@ -352,7 +292,7 @@ ClothEvaluation ClothSystem::evaluate(const PointVector& x)
   spend(kEnergyWork);
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
   ClothEvaluation result = addInternal(x, gradient_);
-  result.potential = addLoads(x, true).potential;
+  result.potential = addLoads(x);
   return result;
 }
 
@@ -362,16 +302,12 @@ ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind k
   std::copy(base_.begin(), base_.end(), matrix_.values());
   matrix_tau_ = base_tau_;
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
-  ClothEvaluation result = addLoads(x, true);
-  const MembraneSums sums = membrane_.addHessian(kind, x.data(), membrane_slots_, gradient_.data(), matrix_.values());
-  result.membrane = sums.energy;
-  result.max_strain = std::max(sums.max_strain, -sums.min_strain);
-  if (hinges_)
-    result.bending = hinges_->addHessian(kind, x.data(), hinge_slots_, gradient_.data(), matrix_.values());
-  else if (constant_bending_)
-    result.bending = addIsometric(x, gradient_);
-  if (wind_.active())
-    wind_.addHessian(matrix_);
+  ClothEvaluation result;
+  result.potential = addLoads(x);
+  for (const ClothTerm& term : terms_)
+    result.count(term.energy->account(), term.energy->addHessian(kind, x.data(), gradient_.data(), matrix_.values()));
+  for (const auto& load : loads_)
+    load->addHessian(matrix_.values());
   return result;
 }
 
@@ -400,8 +336,8 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
 {
   std::fill(ap.begin(), ap.end(), 0.0);
   matrix_.addProduct(p.data(), ap.data());
-  if (constant_bending_ && !bending_in_blocks_)
-    bending_.addProduct(1.0 + ratio_, p.data(), ap.data());
+  if (constant_ && !constant_in_blocks_)
+    constant_->addProduct(1.0 + ratio_, p.data(), ap.data());
 }
 
 void ClothSystem::setRight(const PointVector& d)

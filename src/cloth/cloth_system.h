@@ -5,14 +5,12 @@
 #include <vector>
 
 #include "cloth_preconditioner.h"
+#include "cloth_terms.h"
 #include "slender_sim/cloth/cloth_stepper.h"
-#include "slender_sim/energy/hinge.h"
-#include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/constrained_cholesky.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 #include "slender_sim/linalg/symmetric_sweeps.h"
-#include "wind_load.h"
 
 namespace slender {
 
@@ -24,6 +22,7 @@ struct ClothEvaluation
   double max_strain = 0;   ///< largest |principal stretch - 1|
   double energy() const { return membrane + bending + potential; }
   double magnitude() const;
+  void count(TermAccount account, const TermSums& sums);
 };
 
 /// One implicit stage M (x - q_hat) / tau^2 = F(x, (x - q_tilde) / tau) of a step (see Stage).
@@ -46,8 +45,8 @@ enum class LinearOutcome
 
 /// Energy of one implicit stage of a cloth, with gradient and Hessian, and the solution of its Newton equations:
 ///   E(x) + sum 1/2 w |x - target|^2 + 1/2 (x - y)^T D (x - y) - f . x,
-/// w from mass and mass damping, D and y from the wind; stiffness damping makes E viscous (see
-/// HingeBending::setResponse).
+/// E from the terms (see clothTerms()), w from mass and mass damping, D and y from the loads (see clothLoads());
+/// stiffness damping makes E viscous (see PointTerm).
 class ClothSystem
 {
 public:
@@ -61,7 +60,7 @@ public:
   /// What solves and evaluations spend; must outlive this.
   void useBudget(WorkBudget& budget) { budget_ = &budget; }
 
-  /// What is held, and the hinges.
+  /// What is held, and the plastic variables.
   void hold(const ClothState& state);
   /// The set of averages that acts from now on.
   void useAverages(const ClothState& state);
@@ -69,7 +68,7 @@ public:
   int averageCount() const { return averages_ ? averages_->count() : 0; }
   /// After setViscosity(stiffness damping / tau, ...).
   void beginStage(const ClothStage& stage, const ClothInputs& inputs);
-  void setHinges(const ClothState& state);
+  void usePlasticState(const ClothState& state);
   /// Strains at x as those that viscous response of the given ratio starts from; 0: none.
   void setViscosity(double ratio, const PointVector& x);
   /// The same for strains that are combined like the points x + move + share (other - x), to second order in `move`;
@@ -96,8 +95,8 @@ public:
   void solveFactored(PointVector& v) const { factor_.solvePoints(v.data(), v.data()); }
   /// Makes the inertia in the matrix, and mass damping, that of a stage with this tau [s].
   void setInertia(double tau);
-  /// Elastic and viscous parts only, added.
-  ClothEvaluation addInternal(const PointVector& x, PointVector& gradient, bool with_bending = true);
+  /// Adds the elastic and viscous parts only. `with_constant`: also that of the term with a constant matrix.
+  ClothEvaluation addInternal(const PointVector& x, PointVector& gradient, bool with_constant = true);
   PointVector& gradient() { return gradient_; }
   const PointVector& gradient() const { return gradient_; }
   /// Solves H d = -gradient; `d` holds what held points move by, and for conjugate gradients the first guess of the
@@ -107,7 +106,7 @@ public:
   /// stage, get these.
   LinearOutcome solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations,
                       double tolerance = 0.0, const Eigen::Matrix3Xd* averages = nullptr);
-  /// The blocks of solve()'s matrix as last evaluated; those of isometric bending are among them only for Cholesky.
+  /// The blocks of solve()'s matrix as last evaluated; those of constantMatrix() are among them only for Cholesky.
   const BlockMatrix& matrix() const { return matrix_; }
   /// The matrix of solve() times p.
   void applyMatrix(const PointVector& p, PointVector& ap);
@@ -127,24 +126,24 @@ public:
   /// What they are at x.
   void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
 
-  /// Work of gravity, extra forces and air on a point that moved between two places, the air as at the end of the stage
-  /// [J].
-  double loadWork(int i, const PointVector& from, const PointVector& to) const;
-  /// Of the gradient at x, as last evaluated, what is elastic and viscous [N].
-  Eigen::Vector3d internalGradient(int i, const PointVector& x) const;
+  /// Work of gravity, extra forces and loads on the points that are not held, on the way between two configurations,
+  /// the loads as at the end of the stage [J].
+  double loadWork(const PointVector& from, const PointVector& to) const;
+  /// The elastic and viscous part of the gradient as last evaluated [N].
+  Eigen::Vector3d internalGradient(int i) const { return point(gradient_, i) - point(load_gradient_, i); }
 
   const PointVector& start() const { return start_; }
-  const PointMatrix& bending() const { return bending_; }
-  bool constantBending() const { return constant_bending_; }
+  /// Of the term that has one; nullptr without.
+  const PointMatrix* constantMatrix() const { return constant_; }
   const PointVector& target() const { return target_; }
   const std::vector<char>& held() const { return held_; }
-  const WindLoad& wind() const { return wind_; }
+  const std::vector<std::unique_ptr<PointLoad>>& loads() const { return loads_; }
 
 private:
   /// Weight of inertia per mass [1/s^2].
   double rate(double tau) const { return 1.0 / (tau * tau) + model_.mass_damping / tau; }
+  void usePattern(bool direct);
   void setWeights(double tau, double ratio);
-  double addIsometric(const PointVector& x, PointVector& gradient);
   void clearHeld(PointVector& v) const;
   /// Adds correction_, the solution of conjugate gradients, to d.
   LinearOutcome correct(PointVector& d, const LinearResult& result, double tolerance, int& linear_iterations);
@@ -168,7 +167,9 @@ private:
   void takeOutAverages(PointVector& r);
   struct AverageSet;
   void use(AverageSet& set);
-  ClothEvaluation addLoads(const PointVector& x, bool with_gradient);
+  double loadPotential(const PointVector& x) const;
+  /// Inertia and loads: adds their gradient to gradient_; returns their potential.
+  double addLoads(const PointVector& x);
 
   const ClothModel& model_;
   const bool choose_;   ///< the solver of steps with averages is ours to choose
@@ -176,16 +177,13 @@ private:
   const double linear_tolerance_;
   WorkBudget unbounded_;
   WorkBudget* budget_ = &unbounded_;
-  MembraneEnergy membrane_;
-  WindLoad wind_;
-  std::unique_ptr<HingeBending> hinges_;   ///< hinge bending only
-  Eigen::VectorXd hinge_stiffness_;        ///< without stiffening; with plasticity only
-  PointMatrix bending_;                    ///< isometric model, or for hinges what preconditions
-  bool constant_bending_ = false;          ///< bending_ is the model, not a stand-in
-  bool bending_in_blocks_ = false;
+  std::vector<ClothTerm> terms_;
+  std::vector<std::unique_ptr<PointLoad>> loads_;
+  const PointMatrix* constant_ = nullptr;   ///< of the term that has one
+  bool constant_in_blocks_ = false;
 
   BlockMatrix matrix_;
-  std::vector<int> membrane_slots_, hinge_slots_, bending_map_;
+  std::vector<int> constant_map_;
   std::vector<double> base_;   ///< constant part of matrix_
   double base_tau_ = 0, base_ratio_ = -1;
   double matrix_tau_ = 0;
@@ -234,13 +232,12 @@ private:
   void spend(int counts) { budget_->spend(static_cast<long>(counts) * points()); }
 
   double ratio_ = 0;
-  double viscous_form_ = 0;   ///< of isometric bending, at viscous_start_
-  double load_ = 0;           ///< with averages: on the cloth without them, as the tolerance counts it
-  double first_step_ = 0;     ///< of takeFirstStep(), in the preconditioner's norm
-  PointVector start_, viscous_start_, shifted_, target_, force_, gradient_, product_, right_, correction_;
+  double load_ = 0;         ///< with averages: on the cloth without them, as the tolerance counts it
+  double first_step_ = 0;   ///< of takeFirstStep(), in the preconditioner's norm
+  PointVector start_, target_, force_, gradient_, load_gradient_, product_, right_, correction_;
+  PointVector ahead_, behind_;   ///< with stiffness damping only
   std::vector<double> weight_;   ///< of inertia, per point
   std::vector<char> held_;
-  AlignedVector<double> strains_[3], angles_, other_strains_[3], other_angles_, start_angles_;
 };
 
 }   // namespace slender

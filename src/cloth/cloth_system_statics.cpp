@@ -3,21 +3,15 @@
 
 namespace slender {
 
-double ClothSystem::loadWork(int i, const PointVector& from, const PointVector& to) const
+double ClothSystem::loadWork(const PointVector& from, const PointVector& to) const
 {
-  double work = point(force_, i).dot(point(to, i) - point(from, i));
-  Eigen::Vector3d unused(0, 0, 0);
-  if (wind_.active())
-    work += wind_.addGradient(i, point(from, i), unused) - wind_.addGradient(i, point(to, i), unused);
+  double work = 0.0;
+  for (int i = 0; i < points(); ++i)
+    if (!held_[i])
+      work += point(force_, i).dot(point(to, i) - point(from, i));
+  for (const auto& load : loads_)
+    work += load->work(from, to, held_);
   return work;
-}
-
-Eigen::Vector3d ClothSystem::internalGradient(int i, const PointVector& x) const
-{
-  Eigen::Vector3d loads = weight_[i] * (point(x, i) - point(target_, i)) - point(force_, i);
-  if (wind_.active())
-    wind_.addGradient(i, point(x, i), loads);
-  return point(gradient_, i) - loads;
 }
 
 void ClothSystem::shiftMatrix(double factor)

@@ -51,7 +51,7 @@ WindLoad::WindLoad(const ClothModel& model)
   }
 }
 
-void WindLoad::begin(const PointVector& start, const PointVector& origin, const Eigen::Matrix3Xd& v,
+void WindLoad::begin(const PointVector& shape, const PointVector& origin, const Eigen::Matrix3Xd& v,
                      const Eigen::Vector3d& wind, double h, PointVector& force)
 {
   const bool plates = drag_factor_ > 0 || lift_factor_ > 0;
@@ -59,7 +59,7 @@ void WindLoad::begin(const PointVector& start, const PointVector& origin, const 
   for (Eigen::Index f = 0; f < model_.rest.triangles.cols(); ++f)
   {
     const Eigen::Vector3i t = model_.rest.triangles.col(f);
-    const Eigen::Vector3d area = areaVector(start, t);
+    const Eigen::Vector3d area = areaVector(shape, t);
     const double size = area.norm();
     if (!(size > 0))
       continue;
@@ -85,17 +85,52 @@ void WindLoad::begin(const PointVector& start, const PointVector& origin, const 
     point(target_, i) = point(origin, i) + h * wind;
 }
 
-double WindLoad::addGradient(int vertex, const Eigen::Vector3d& x, Eigen::Vector3d& slope) const
+void WindLoad::setPattern(const BlockMatrix& matrix)
 {
-  const Eigen::Vector3d past = x - point(target_, vertex), drag = drag_[vertex] * past;
-  slope += drag;
-  return 0.5 * past.dot(drag);
+  diagonal_.assign(matrix.starts().begin(), matrix.starts().end() - 1);
 }
 
-void WindLoad::addHessian(BlockMatrix& matrix) const
+double WindLoad::potential(std::size_t vertex, const double* x) const
+{
+  const Eigen::Vector3d past = Eigen::Map<const Eigen::Vector3d>(x) - point(target_, static_cast<Eigen::Index>(vertex));
+  return 0.5 * past.dot(drag_[vertex] * past);
+}
+
+double WindLoad::value(const double* x) const
+{
+  double sum = 0.0;
+  for (std::size_t i = 0; i < drag_.size(); ++i)
+    sum += potential(i, x + 4 * i);
+  return sum;
+}
+
+double WindLoad::addGradient(const double* x, double* gradient) const
+{
+  double sum = 0.0;
+  for (std::size_t i = 0; i < drag_.size(); ++i)
+  {
+    const Eigen::Vector3d past =
+        Eigen::Map<const Eigen::Vector3d>(x + 4 * i) - point(target_, static_cast<Eigen::Index>(i));
+    const Eigen::Vector3d drag = drag_[i] * past;
+    Eigen::Map<Eigen::Vector3d>(gradient + 4 * i) += drag;
+    sum += 0.5 * past.dot(drag);
+  }
+  return sum;
+}
+
+void WindLoad::addHessian(double* values) const
 {
   for (std::size_t i = 0; i < drag_.size(); ++i)
-    Eigen::Map<Eigen::Matrix3d>(matrix.values() + 9 * matrix.starts()[i]) += drag_[i];
+    Eigen::Map<Eigen::Matrix3d>(values + 9 * static_cast<std::size_t>(diagonal_[i])) += drag_[i];
+}
+
+double WindLoad::work(const PointVector& from, const PointVector& to, const std::vector<char>& held) const
+{
+  double sum = 0.0;
+  for (std::size_t i = 0; i < drag_.size(); ++i)
+    if (!held[i])
+      sum += potential(i, from.data() + 4 * i) - potential(i, to.data() + 4 * i);
+  return sum;
 }
 
 void WindLoad::addForces(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind,

@@ -346,7 +346,7 @@ TEST(ClothPreconditioner, SaysWhenItsConstantPartCannotBeFactored)
   const ClothModel model =
       buildCloth("cloth", gridMesh(0.1, 0.1, 4, 4, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 5e-4));
   const BlockMatrix pattern(model.vertices(), {model.rest.triangles});
-  ClothPreconditioner preconditioner(model, PointMatrix(), pattern, false);
+  ClothPreconditioner preconditioner(model, clothTerms(model), pattern);
   const std::vector<char> held(model.vertices(), 0);
   EXPECT_TRUE(preconditioner.setConstant(std::vector<double>(model.vertices(), 1.0), 1.0, held));
   EXPECT_FALSE(preconditioner.setConstant(std::vector<double>(model.vertices(), -1e9), 1.0, held));

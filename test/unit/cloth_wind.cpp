@@ -71,20 +71,16 @@ TEST(ClothWind, LinearisedForcesTouchTheTrueOnes)
     PointVector constant(4 * n, 0.0);
     wind_load.begin(start, start, v, wind, h, constant);
     const auto linearised = [&](const Matrix3Xd& velocities) {
-      Matrix3Xd force = matrixOf(constant);
-      for (int i = 0; i < n; ++i)
-      {
-        Vector3d slope = Vector3d::Zero();
-        wind_load.addGradient(i, model.rest.vertices.col(i) + h * velocities.col(i), slope);
-        force.col(i) -= slope;
-      }
-      return force;
+      PointVector slope(4 * n, 0.0);
+      wind_load.addGradient(pointsOf(model.rest.vertices + h * velocities).data(), slope.data());
+      return Matrix3Xd(matrixOf(constant) - matrixOf(slope));
     };
     const Matrix3Xd exact = forces(model, v, wind);
     EXPECT_LT((linearised(v) - exact).norm(), 1e-12 * exact.norm());
     BlockMatrix matrix(n, {model.rest.triangles});
     matrix.setZero();
-    wind_load.addHessian(matrix);
+    wind_load.setPattern(matrix);
+    wind_load.addHessian(matrix.values());
     const MatrixXd d = h * denseOf(matrix);
     EXPECT_GE(smallestEigenvalue(d), -1e-14);
     const MatrixXd slope = differences(v, 1e-4, [&](const Matrix3Xd& at) { return flattened(linearised(at)); });
