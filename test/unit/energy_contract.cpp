@@ -86,7 +86,7 @@ struct Isometric
   static Refused refused()
   {
     return {[](const Sheet& s) { QuadraticTerm(isometricBending(s.mesh, s.topology, element, NAN)); },
-            [](const Sheet&) { QuadraticTerm(PointMatrix()); }};
+            [](const Sheet&) { QuadraticTerm(PointMatrix{}); }};
   }
 };
 
