@@ -168,39 +168,26 @@ void CoupledChains::forPanels(const Chain& chain, F&& f)
 
 void CoupledChains::beginPattern(int others)
 {
-  unknowns_ = 0;
+  int unknowns = 0;
   for (Chain* chain : chains)
   {
-    chain->offset = unknowns_;
+    chain->offset = unknowns;
     if (chain->coupled)
-      unknowns_ += chain->unknowns;
+      unknowns += chain->unknowns;
   }
-  others_ = unknowns_;
-  unknowns_ += others;
-  solution_.assign(unknowns_, 0.0);
-  valid_ = true;
-  if (static_cast<int>(columns_.size()) < unknowns_)
-    columns_.resize(unknowns_);
-  for (int u = 0; u < unknowns_; ++u)
-    columns_[u].clear();
+  others_ = unknowns;
+  matrix.begin(unknowns + others);
   for (const Chain* chain : chains)
     if (chain->coupled)
       forPanels(*chain, [this](int a, int b) {
         if (a >= 0)
-          note(a, b);
+          matrix.note(a, b);
       });
 }
 
-void CoupledChains::notePairs(const Columns& a, const Columns& b)
+CouplingMatrix::Bases CoupledChains::basesOf(const int (&point)[4]) const
 {
-  for (int i = 0; i < a.count; ++i)
-    for (int j = 0; j < b.count; ++j)
-      note(a.index[i], b.index[j]);
-}
-
-std::array<int, 4> CoupledChains::basesOf(const int (&point)[4]) const
-{
-  std::array<int, 4> bases;
+  CouplingMatrix::Bases bases;
   for (int p = 0; p < 4; ++p)
   {
     bases[p] = kPrescribed;
@@ -215,35 +202,15 @@ std::array<int, 4> CoupledChains::basesOf(const int (&point)[4]) const
   return bases;
 }
 
-void CoupledChains::noteBases(const std::array<int, 4>& bases)
-{
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; j <= i; ++j)
-      if (bases[i] >= 0 && bases[j] >= 0)
-        for (int r = 0; r < 3; ++r)
-          for (int c = 0; c < 3; ++c)
-            note(bases[i] + r, bases[j] + c);
-}
-
 void CoupledChains::endPattern()
 {
-  std::vector<int> starts{0}, rows;
-  for (int u = 0; u < unknowns_; ++u)
-  {
-    std::vector<int>& column = columns_[u];
-    std::sort(column.begin(), column.end());
-    rows.insert(rows.end(), column.begin(), std::unique(column.begin(), column.end()));
-    starts.push_back(static_cast<int>(rows.size()));
-  }
-  if (unknowns_ > 0)
-    matrix_.setPattern(unknowns_, std::move(starts), std::move(rows));
+  matrix.finish();
+  valid_ = true;
   for (Chain* chain : chains)
   {
     chain->slots.clear();
     if (chain->coupled)
-      forPanels(*chain, [&](int a, int b) {
-        chain->slots.push_back(a < 0 ? -1 : matrix_.index(std::max(a, b), std::min(a, b)));
-      });
+      forPanels(*chain, [&](int a, int b) { chain->slots.push_back(a < 0 ? -1 : matrix.index(a, b)); });
   }
 }
 
@@ -251,8 +218,8 @@ void CoupledChains::endPattern()
 
 void CoupledChains::assemble(const HessianShift& shift)
 {
-  double* values = matrix_.values();
-  std::fill_n(values, matrix_.rows().size(), 0.0);
+  matrix.clear();
+  double* const values = matrix.values();
   for (const Chain* chain : chains)
   {
     if (!chain->coupled)
@@ -271,67 +238,20 @@ void CoupledChains::assemble(const HessianShift& shift)
   }
 }
 
-void CoupledChains::addPair(const Columns& a, const Columns& b, double value)
-{
-  for (int i = 0; i < a.count; ++i)
-    for (int j = 0; j < b.count; ++j)
-      add(a.index[i], b.index[j], (a.index[i] == b.index[j] ? 2.0 : 1.0) * a.value[i] * b.value[j] * value);
-}
-
-void CoupledChains::addSquare(const Columns& a, double value)
-{
-  for (int i = 0; i < a.count; ++i)
-    for (int j = 0; j <= i; ++j)
-      add(a.index[i], a.index[j], (i != j && a.index[i] == a.index[j] ? 2.0 : 1.0) * a.value[i] * a.value[j] * value);
-}
-
-/// block(i, j), 3 x 3, for the points i and j. A point's three rows follow each other.
-template <class Block>
-void CoupledChains::addBlocks(const std::array<int, 4>& bases, Block&& block)
-{
-  double* values = matrix_.values();
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; j < 4; ++j)
-      if (bases[i] >= bases[j] && bases[j] >= 0)
-      {
-        const Eigen::Matrix3d b = block(i, j);
-        for (int c = 0; c < 3; ++c)
-        {
-          const int first = i == j ? c : 0, at = matrix_.index(bases[i] + first, bases[j] + c);
-          for (int r = first; r < 3; ++r)
-            values[at + r - first] += b(r, c);
-        }
-      }
-}
-
-void CoupledChains::addTerm(const ContactTerm& term, const std::array<int, 4>& bases, bool whole)
-{
-  const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
-  addBlocks(bases, [&](int i, int j) { return Eigen::Matrix3d(term.weight[i] * term.weight[j] * stiffness); });
-}
-
-void CoupledChains::addRow(const ContactRow& row, const std::array<int, 4>& bases, bool whole)
-{
-  Eigen::Vector3d r[4];
-  for (int k = 0; k < 4; ++k)
-    r[k] = row.along[k] * row.normal + (whole ? row.across[k] : 0.0) * row.turning;
-  addBlocks(bases, [&](int i, int j) { return Eigen::Matrix3d(row.stiffness * r[i] * r[j].transpose()); });
-}
-
 void CoupledChains::takeGradients()
 {
   for (const Chain* chain : chains)
     if (chain->coupled)
       for (std::size_t u = 0; u < chain->dof.size(); ++u)
         if (chain->dof[u] >= 0)
-          solution_[chain->offset + chain->dof[u]] = -chain->system->gradient()[u];
+          matrix.solution()[chain->offset + chain->dof[u]] = -chain->system->gradient()[u];
 }
 
 void CoupledChains::spread(Chain& chain) const
 {
   double* const direction = chain.system->direction();
   for (std::size_t u = 0; u < chain.dof.size(); ++u)
-    direction[u] = chain.dof[u] < 0 ? 0.0 : solution_[chain.offset + chain.dof[u]];
+    direction[u] = chain.dof[u] < 0 ? 0.0 : matrix.solution()[chain.offset + chain.dof[u]];
 }
 
 }   // namespace slender

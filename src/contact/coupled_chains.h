@@ -4,9 +4,8 @@
 #include <array>
 #include <vector>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "coupling_matrix.h"
 #include "slender_sim/dynamics/chain_system.h"
-#include "slender_sim/linalg/sparse_cholesky.h"
 
 namespace slender {
 
@@ -14,8 +13,8 @@ namespace slender {
 /// matrices. So do those that touch only what moves as prescribed, since such contacts couple no more than neighbouring
 /// nodes. Other unknowns, those of bodies for example, come behind those of the chains.
 ///
-/// For one pattern: beginPattern(), then what else couples unknowns by note() and notePairs(), then endPattern(). For
-/// one matrix: factor() with a function that calls assemble() and adds what else there is.
+/// For one pattern: beginPattern(), then what else couples unknowns goes to `matrix`, then endPattern(). For one
+/// matrix: factor() with a function that calls assemble() and adds to `matrix` what else there is.
 class CoupledChains
 {
 public:
@@ -41,25 +40,13 @@ public:
     Chain* chain = nullptr;
     int node = -1;
   };
-  /// A row of unknowns with weights: what one component of a displacement depends on.
-  struct Columns
-  {
-    int count = 0;
-    static constexpr int kMost = 36;   // three for each component of four carried points
-    std::array<int, kMost> index;
-    std::array<double, kMost> value;
-    void push(int i, double v)
-    {
-      index[count] = i;
-      value[count++] = v;
-    }
-  };
   /// Four points and a solid.
   using Key = std::array<int, 5>;
 
   /// `simplicial`: see SparseCholesky.
-  explicit CoupledChains(bool simplicial) : matrix_(simplicial) {}
+  explicit CoupledChains(bool simplicial) : matrix(simplicial) {}
 
+  CouplingMatrix matrix;
   std::vector<Chain*> chains;
   std::vector<Point> points;
   /// Per solid of the contacts: it has unknowns of its own.
@@ -102,64 +89,27 @@ public:
   double largestMove(const std::vector<ContactTerm>& terms) const;
   void addForce(const ContactTerm& term);   ///< to the gradients of the chains
 
-  // ---- pattern
+  // ---- the matrix
   bool patternValid() const { return valid_; }
   void invalidatePattern() { valid_ = false; }
   /// Room for contacts that the pattern has: keys, sorted.
   const std::vector<Key>& room() const { return keys_; }
-  /// Numbers the unknowns of chains with coupled set, and `others` behind them.
+  /// Numbers the unknowns of chains with `coupled` set, and so many others behind them, and notes the chains' entries.
   void beginPattern(int others);
-  void note(int a, int b) { columns_[std::min(a, b)].push_back(std::max(a, b)); }
-  void notePairs(const Columns& a, const Columns& b);
-  /// The points' numbers in the matrix: of the first of three, kPrescribed, or less where the owner maps them.
-  std::array<int, 4> basesOf(const int (&point)[4]) const;
-  void noteBases(const std::array<int, 4>& bases);
   void endPattern();
-  int unknowns() const { return unknowns_; }
   int others() const { return others_; }   ///< number of the first unknown behind those of the chains
-
-  // ---- values
-  /// Factors what assemble(whole) makes: with the contacts' whole second derivatives (`whole`) where that is due and
-  /// leaves the matrix positive definite, else without those parts of them that may be negative. Returns whether it is.
+  /// Of four points; kPrescribed: prescribed, less: the owner maps its unknowns.
+  CouplingMatrix::Bases basesOf(const int (&point)[4]) const;
+  /// Clears the values and adds those of the chains.
+  void assemble(const HessianShift& shift);
+  /// CouplingMatrix::factor() with the contacts that there are.
   template <class Assemble>
   bool factor(Assemble&& assemble)
   {
-    if (exact)
-    {
-      assemble(true);
-      return matrix_.factor();
-    }
-    if (terms_[0] && !terms_[0]->empty() && whole_.due())
-    {
-      assemble(true);
-      const bool definite = matrix_.factor();
-      whole_.tried(definite);
-      if (definite)
-        return true;
-    }
-    assemble(false);
-    return matrix_.factor();
+    return exact ? matrix.factorExactly(assemble) : matrix.factor(terms_[0] && !terms_[0]->empty(), assemble);
   }
-  void beginStage() { whole_ = {}; }
-  /// Values of the chains alone.
-  void assemble(const HessianShift& shift);
-  void add(int a, int b, double value) { matrix_.values()[matrix_.index(std::max(a, b), std::min(a, b))] += value; }
-  /// The symmetric pair of entries (a, b) and (b, a) of rows of unknowns.
-  void addPair(const Columns& a, const Columns& b, double value);
-  /// The diagonal entry (a, a).
-  void addSquare(const Columns& a, double value);
-  /// Contacts of points with these bases.
-  void addTerm(const ContactTerm& term, const std::array<int, 4>& bases, bool whole);
-  void addRow(const ContactRow& row, const std::array<int, 4>& bases, bool whole);
-  /// Right-hand side, then solution: one per unknown.
-  double* solution() { return solution_.data(); }
   void takeGradients();   ///< right-hand side := minus the gradients of the coupled chains
-  void solve()
-  {
-    if (unknowns_ > 0)
-      matrix_.solve(solution_.data());
-  }
-  /// Directions of coupled chains := the solution; zero where the owner maps unknowns.
+  /// Direction of a coupled chain := the solution; zero where the owner maps unknowns.
   void spread(Chain& chain) const;
 
 private:
@@ -167,18 +117,12 @@ private:
   void makeRoom(const ContactTerm& term);
   template <class F>
   static void forPanels(const Chain& chain, F&& f);
-  template <class Block>
-  void addBlocks(const std::array<int, 4>& bases, Block&& block);
 
-  SparseCholesky matrix_;
   bool valid_ = false;
-  WholeStiffness whole_;
-  int unknowns_ = 0, others_ = 0;
+  int others_ = 0;
   std::vector<Key> keys_, keys_before_;
   std::array<const std::vector<ContactTerm>*, 2> terms_{};
   const std::vector<ContactRow>* rows_ = nullptr;
-  std::vector<std::vector<int>> columns_;
-  std::vector<double> solution_;
 };
 
 }   // namespace slender

@@ -110,7 +110,7 @@ void CoupledSystem::contactColumns(const ContactRow& contact, bool whole, Column
 
 /// Whether a contact cannot be taken as one of points with unknowns of their own: a body carries one of them, or is
 /// touched.
-bool CoupledSystem::isCarried(const std::array<int, 4>& bases, int solid) const
+bool CoupledSystem::isCarried(const CouplingMatrix::Bases& bases, int solid) const
 {
   return (solid >= 0 && coupled_.solid_moves[solid]) ||
          std::any_of(bases.begin(), bases.end(), [](int base) { return base < kPrescribed; });
@@ -128,7 +128,7 @@ void CoupledSystem::buildPattern()
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j <= i; ++j)
-        coupled_.note(coupled_.others() + 6 * b + i, coupled_.others() + 6 * b + j);
+        coupled_.matrix.note(coupled_.others() + 6 * b + i, coupled_.others() + 6 * b + j);
   for (RodPart& part : parts_)
     if (part.welded)
       noteCarried(part);
@@ -137,17 +137,17 @@ void CoupledSystem::buildPattern()
     ContactTerm term;
     std::copy_n(key.begin(), 4, term.point);
     term.solid = key[4];
-    const std::array<int, 4> bases = coupled_.basesOf(term.point);
+    const CouplingMatrix::Bases bases = coupled_.basesOf(term.point);
     if (!isCarried(bases, term.solid))
     {
-      coupled_.noteBases(bases);
+      coupled_.matrix.noteBases(bases);
       continue;
     }
     std::array<Columns, 3> rows;
     contactColumns(term, rows);
     for (const Columns& a : rows)
       for (const Columns& b : rows)
-        coupled_.notePairs(a, b);
+        coupled_.matrix.notePairs(a, b);
   }
   coupled_.endPattern();
 }
@@ -168,7 +168,7 @@ void CoupledSystem::noteCarried(RodPart& part)
         Columns ca, cb;
         mapDof(part, a, 1.0, ca);
         mapDof(part, b, 1.0, cb);
-        coupled_.notePairs(ca, cb);
+        coupled_.matrix.notePairs(ca, cb);
       }
   for (const ClampJoint& clamp : system.clamps())
     if (const int body = part.rod->work.grasps[clamp.grasp].body; body >= 0)
@@ -182,7 +182,7 @@ void CoupledSystem::noteCarried(RodPart& part)
         turn.push(bodyUnknown(body) + 3 + c, 1.0);
       }
       mapDof(part, 4 * clamp.edge + 3, 1.0, edge);
-      coupled_.notePairs(edge, turn);
+      coupled_.matrix.notePairs(edge, turn);
     }
 }
 
@@ -201,11 +201,11 @@ void CoupledSystem::addCarried(const RodPart& part)
     mapDof(part, 4 * node + column, 1.0, a);
     if (dof == 4 * node + column)
     {
-      coupled_.addSquare(a, value);
+      coupled_.matrix.addSquare(a, value);
       continue;
     }
     mapDof(part, dof, 1.0, b);
-    coupled_.addPair(a, b, value);
+    coupled_.matrix.addPair(a, b, value);
   }
   for (const GraspState& g : part.rod->work.grasps)
   {
@@ -218,7 +218,8 @@ void CoupledSystem::addCarried(const RodPart& part)
       const Eigen::Vector3d grad = Eigen::Map<const Eigen::Vector3d>(system.gradient() + 4 * i);
       for (int p = 0; p < 3; ++p)
         for (int q = 0; q <= p; ++q)
-          coupled_.add(base + p, base + q, 0.5 * (grad[p] * r[q] + r[p] * grad[q]) - (p == q ? grad.dot(r) : 0.0));
+          coupled_.matrix.add(base + p, base + q,
+                              0.5 * (grad[p] * r[q] + r[p] * grad[q]) - (p == q ? grad.dot(r) : 0.0));
     }
   }
 }
@@ -252,13 +253,13 @@ void CoupledSystem::addClamps(const RodPart& part)
         column.count = 0;
         mapDof(part, 4 * next + k, 1.0, column);
         mapDof(part, 4 * j + k, -1.0, column);
-        coupled_.addPair(row, column, -by_edge(p, k));
+        coupled_.matrix.addPair(row, column, -by_edge(p, k));
       }
       column.count = 0;
       mapDof(part, 4 * j + 3, 1.0, column);
-      coupled_.addPair(row, column, -by_angle[p]);
+      coupled_.matrix.addPair(row, column, -by_angle[p]);
       for (int q = 0; q <= p; ++q)
-        coupled_.add(base + p, base + q, turn(p, q));
+        coupled_.matrix.add(base + p, base + q, turn(p, q));
     }
   }
 }
@@ -278,34 +279,34 @@ void CoupledSystem::assemble(const HessianShift& shift, bool whole)
     bodies_[b].addShift(shift);
     for (int i = 0; i < 6; ++i)
       for (int j = 0; j <= i; ++j)
-        coupled_.add(coupled_.others() + 6 * b + i, coupled_.others() + 6 * b + j, bodies_[b].hessian(i, j));
+        coupled_.matrix.add(coupled_.others() + 6 * b + i, coupled_.others() + 6 * b + j, bodies_[b].hessian(i, j));
   }
   std::array<Columns, 3> rows;
   coupled_.forTerms([&](const ContactTerm& term) {
-    const std::array<int, 4> bases = coupled_.basesOf(term.point);
+    const CouplingMatrix::Bases bases = coupled_.basesOf(term.point);
     if (!isCarried(bases, term.solid))
     {
-      coupled_.addTerm(term, bases, whole);
+      coupled_.matrix.addTerm(term, bases, whole);
       return;
     }
     contactColumns(term, rows);
     const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
     for (int c = 0; c < 3; ++c)
     {
-      coupled_.addSquare(rows[c], stiffness(c, c));
+      coupled_.matrix.addSquare(rows[c], stiffness(c, c));
       for (int d = 0; d < c; ++d)
-        coupled_.addPair(rows[c], rows[d], stiffness(c, d));
+        coupled_.matrix.addPair(rows[c], rows[d], stiffness(c, d));
     }
   });
   coupled_.forRows([&](const ContactRow& row) {
-    const std::array<int, 4> bases = coupled_.basesOf(row.point);
+    const CouplingMatrix::Bases bases = coupled_.basesOf(row.point);
     if (!isCarried(bases, -1))
     {
-      coupled_.addRow(row, bases, whole);
+      coupled_.matrix.addRow(row, bases, whole);
       return;
     }
     contactColumns(row, whole, rows[0]);
-    coupled_.addSquare(rows[0], row.stiffness);
+    coupled_.matrix.addSquare(rows[0], row.stiffness);
   });
 }
 

@@ -91,7 +91,7 @@ void CoupledSystem::findLowestMode()
   const auto start = [](std::size_t k) {
     return std::sin(1.0 + 1.7 * static_cast<double>(k)) + 0.5 * std::cos(0.3 * static_cast<double>(k));
   };
-  Eigen::Map<Eigen::VectorXd> shared(coupled_.solution(), coupled_.unknowns());
+  Eigen::Map<Eigen::VectorXd> shared(coupled_.matrix.solution(), coupled_.matrix.unknowns());
   for (Eigen::Index k = 0; k < shared.size(); ++k)
     shared[k] = start(static_cast<std::size_t>(k));
   for (RodPart& part : parts_)
@@ -108,7 +108,7 @@ void CoupledSystem::findLowestMode()
       square += part.coupled ? 0.0 : own(part).squaredNorm();
     const double scale = 1.0 / std::sqrt(std::max(square, 1e-300));
     shared *= scale;
-    coupled_.solve();
+    coupled_.matrix.solve();
     for (RodPart& part : parts_)
       if (!part.coupled)
       {

@@ -260,7 +260,7 @@ NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, doub
   placeWelds();
   if (!contact_)
     return minimize(*this, newton);
-  coupled_.beginStage();
+  coupled_.matrix.beginStage();
   // friction sticks below a speed over the whole step: in cut steps that range would become too narrow to find
   contact_->begin(points_base_, solids_base_, duration_);
   if (s == 0)

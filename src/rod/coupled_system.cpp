@@ -43,7 +43,7 @@ RodEvaluation CoupledSystem::evaluate(bool with_hessian, const HessianShift& shi
     sum.potential += body.energy();
   }
   reduceGradient();
-  if (with_hessian && coupled_.unknowns() > 0)
+  if (with_hessian && coupled_.matrix.unknowns() > 0)
     sum.inertia.negative += !coupled_.factor([&](bool whole) { assemble(shift, whole); });
   coupled_.closeGradients();
   return sum;
@@ -93,7 +93,7 @@ void CoupledSystem::solve()
   coupled_.takeGradients();
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     bodySolution(b) = -bodies_[b].gradient;
-  coupled_.solve();
+  coupled_.matrix.solve();
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     body_direction_[b] = bodySolution(b);
   forRods([&](RodPart& part) {
@@ -119,7 +119,7 @@ void CoupledSystem::spread()
       mapDof(part, static_cast<int>(d), 1.0, row);
       double value = 0.0;
       for (int i = 0; i < row.count; ++i)
-        value += row.value[i] * coupled_.solution()[row.index[i]];
+        value += row.value[i] * coupled_.matrix.solution()[row.index[i]];
       part.rod->system.direction()[d] = value;
     }
   });

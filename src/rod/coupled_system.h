@@ -78,7 +78,7 @@ public:
   ContactPotential& contact() { return *contact_; }
 
 private:
-  using Columns = CoupledChains::Columns;
+  using Columns = CouplingMatrix::Columns;
   static constexpr int kPrescribed = CoupledChains::kPrescribed;
   /// One rod; an unknown that grasp k carries has the number -2 - k.
   struct RodPart : CoupledChains::Chain
@@ -96,7 +96,7 @@ private:
   void noteCarried(RodPart& part);
   void assemble(const HessianShift& shift, bool whole);
   void mapDof(const RodPart& part, int dof, double weight, Columns& out) const;
-  bool isCarried(const std::array<int, 4>& bases, int solid) const;
+  bool isCarried(const CouplingMatrix::Bases& bases, int solid) const;
   void addCarried(const RodPart& part);
   void addClamps(const RodPart& part);
   void contactColumns(const ContactTerm& term, std::array<Columns, 3>& rows) const;
@@ -105,7 +105,7 @@ private:
   void spread();
   Eigen::Map<BodySystem::Vector6> bodySolution(std::size_t body)
   {
-    return Eigen::Map<BodySystem::Vector6>(coupled_.solution() + coupled_.others() + 6 * body);
+    return Eigen::Map<BodySystem::Vector6>(coupled_.matrix.solution() + coupled_.others() + 6 * body);
   }
   void mapUnknowns(RodPart& part);
   void reduceGradient();

@@ -40,7 +40,7 @@ void ThreadContact::buildPattern()
         coupled_.points[key[k]].chain->coupled = true;
   coupled_.beginPattern(0);
   for (const CoupledChains::Key& key : coupled_.room())
-    coupled_.noteBases(coupled_.basesOf({key[0], key[1], key[2], key[3]}));
+    coupled_.matrix.noteBases(coupled_.basesOf({key[0], key[1], key[2], key[3]}));
   coupled_.endPattern();
 }
 
@@ -48,8 +48,9 @@ void ThreadContact::buildPattern()
 void ThreadContact::assemble(const HessianShift& shift, bool whole)
 {
   coupled_.assemble(shift);
-  coupled_.forTerms([&](const ContactTerm& term) { coupled_.addTerm(term, coupled_.basesOf(term.point), whole); });
-  coupled_.forRows([&](const ContactRow& row) { coupled_.addRow(row, coupled_.basesOf(row.point), whole); });
+  coupled_.forTerms(
+      [&](const ContactTerm& term) { coupled_.matrix.addTerm(term, coupled_.basesOf(term.point), whole); });
+  coupled_.forRows([&](const ContactRow& row) { coupled_.matrix.addRow(row, coupled_.basesOf(row.point), whole); });
 }
 
 RodEvaluation ThreadContact::evaluate(bool with_hessian, const HessianShift& shift)
@@ -68,7 +69,7 @@ RodEvaluation ThreadContact::evaluate(bool with_hessian, const HessianShift& shi
     coupled_.evaluate(parts_[p], with_hessian, shift);
   coupled_.addEvaluations(sum);
   coupled_.forTerms([&](const ContactTerm& term) { coupled_.addForce(term); });
-  if (with_hessian && coupled_.unknowns() > 0)
+  if (with_hessian && coupled_.matrix.unknowns() > 0)
     sum.inertia.negative += !coupled_.factor([&](bool whole) { assemble(shift, whole); });
   coupled_.closeGradients();
   return sum;
@@ -77,7 +78,7 @@ RodEvaluation ThreadContact::evaluate(bool with_hessian, const HessianShift& shi
 void ThreadContact::solve()
 {
   coupled_.takeGradients();
-  coupled_.solve();
+  coupled_.matrix.solve();
   for (std::size_t p = 0; p < part_count_; ++p)
     if (parts_[p].coupled)
       coupled_.spread(parts_[p]);

@@ -168,7 +168,7 @@ bool ThreadContact::load(double from, double h)
   constexpr double kLargest = std::numeric_limits<double>::max();
   contact_.setMostStiffness(std::min(std::max(most, least), kLargest));
   contact_.setStiffness(std::min(least, kLargest));
-  coupled_.beginStage();
+  coupled_.matrix.beginStage();
   // friction sticks below a speed over the whole step, cut or not
   contact_.begin(points_base_, solids_base_, duration_);
 
