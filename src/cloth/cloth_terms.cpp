@@ -67,8 +67,8 @@ std::vector<ClothTerm> clothTerms(const ClothModel& model)
 std::vector<std::unique_ptr<PointLoad>> clothLoads(const ClothModel& model)
 {
   std::vector<std::unique_ptr<PointLoad>> loads;
-  if (auto wind = std::make_unique<WindLoad>(model); wind->active())
-    loads.push_back(std::move(wind));
+  if (WindLoad::actsOn(model))
+    loads.push_back(std::make_unique<WindLoad>(model));
   return loads;
 }
 

@@ -35,20 +35,25 @@ struct PlateForce
 
 }   // namespace
 
+bool WindLoad::actsOn(const ClothModel& model)
+{
+  const Aerodynamics& air = model.aerodynamics;
+  const double drag = air.air_density * air.drag, lift = air.air_density * air.lift;
+  for (const double factor : {drag, lift})
+    if (!(factor >= 0) || !std::isfinite(factor))
+      throw std::invalid_argument("cloth '" + model.name +
+                                  "': air density, drag and lift coefficients must be zero or more");
+  return model.wind_coefficient > 0 || drag > 0 || lift > 0;
+}
+
 WindLoad::WindLoad(const ClothModel& model)
   : model_(model),
     drag_factor_(0.5 * model.aerodynamics.air_density * model.aerodynamics.drag),
     lift_factor_(0.5 * model.aerodynamics.air_density * model.aerodynamics.lift)
 {
-  for (const double factor : {drag_factor_, lift_factor_})
-    if (!(factor >= 0) || !std::isfinite(factor))
-      throw std::invalid_argument("cloth '" + model.name +
-                                  "': air density, drag and lift coefficients must be zero or more");
-  if (model.wind_coefficient > 0 || drag_factor_ > 0 || lift_factor_ > 0)
-  {
-    drag_.assign(model.vertices(), Eigen::Matrix3d::Zero());
-    target_.assign(4 * model.vertices(), 0.0);
-  }
+  actsOn(model);
+  drag_.assign(model.vertices(), Eigen::Matrix3d::Zero());
+  target_.assign(4 * model.vertices(), 0.0);
 }
 
 void WindLoad::begin(const PointVector& shape, const PointVector& origin, const Eigen::Matrix3Xd& v,

@@ -11,11 +11,11 @@ namespace slender {
 class WindLoad final : public PointLoad
 {
 public:
-  /// Throws std::invalid_argument for coefficients that are not valid.
-  explicit WindLoad(const ClothModel& model);
+  /// Whether the air acts on this cloth. Throws std::invalid_argument for coefficients that are not valid.
+  static bool actsOn(const ClothModel& model);
 
-  /// False: there is no force, and nothing else may be called.
-  bool active() const { return !drag_.empty(); }
+  /// Throws as actsOn() does.
+  explicit WindLoad(const ClothModel& model);
 
   void setPattern(const BlockMatrix& matrix) override;
   /// The faces at `shape` count. What depends linearly on the velocities at the end becomes the potential. Of drag and

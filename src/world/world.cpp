@@ -200,7 +200,8 @@ private:
 
   void addRods(WorldState& state)
   {
-    std::vector<char> joined(model.rods.size(), 0), welded(model.bodies.size(), 0);
+    std::vector<char> joined(model.rods.size(), 0);
+    std::vector<char> welded(model.bodies.size(), 0);
     for (std::size_t r = 0; r < model.rods.size(); ++r)
       joined[r] = model.rods[r].contact.has_value();
     for (const WorldModel::RodWeld& weld : model.welds)

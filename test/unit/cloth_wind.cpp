@@ -177,7 +177,7 @@ TEST(ClothWind, RefusesBadCoefficients)
 {
   EXPECT_THROW(WindLoad(flat(-1, 0)), std::invalid_argument);
   EXPECT_THROW(WindLoad(flat(0, NAN)), std::invalid_argument);
-  EXPECT_FALSE(WindLoad(flat(0, 0)).active());
+  EXPECT_FALSE(WindLoad::actsOn(flat(0, 0)));
 }
 
 }   // namespace
