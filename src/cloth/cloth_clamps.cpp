@@ -1,5 +1,5 @@
 // Clamped faces of a cloth that are held or released.
-#include "cloth_stepper_impl.h"
+#include "cloth_stages.h"
 #include "slender_sim/energy/isometric_bending.h"
 
 namespace slender {
@@ -17,7 +17,7 @@ std::vector<char> heldClamps(const ClothModel& model, const ClothState& state)
 
 }   // namespace
 
-void ClothStepper::Impl::followClamps(const ClothState& state)
+void ClothStages::followClamps(const ClothState& state)
 {
   if (model->clamped_faces.empty() || (clamps_known_ && state.pins == clamp_pins_))
     return;
@@ -33,25 +33,14 @@ void ClothStepper::Impl::followClamps(const ClothState& state)
     }
     // The bending stiffness of clamped edges is part of constant matrices and of their factors, so that the system is
     // built anew.
-    system = std::make_unique<ClothSystem>(next ? *next : *model, options);
+    buildSystem(next ? *next : *model);
     clamped_model_ = std::move(next);
     system->useBudget(*budget_);
-    statics_.reset();
-    useConstantMatrix();
+    linear->useBudget(*budget_);
+    systemChanged();
   }
   clamp_pins_ = state.pins;
   clamps_known_ = true;
-}
-
-/// The matrix of imex steps, with the bending of the system.
-void ClothStepper::Impl::useConstantMatrix()
-{
-  if (options.integrator != Integrator::imex)
-    return;
-  const PointMatrix* matrix = system->constantMatrix();
-  constant_ = std::make_unique<ShiftedMatrix>(matrix ? *matrix : PointMatrix(model->vertices(), {}));
-  constant_weight_.assign(model->vertices(), 0.0);
-  constant_h_ = 0.0;   // The matrix is not factored yet.
 }
 
 }   // namespace slender

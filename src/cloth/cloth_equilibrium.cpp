@@ -9,9 +9,8 @@ namespace slender {
 StepReport ClothStepper::Impl::statics(ClothState& state, const ClothInputs& inputs, bool search, bool leave_saddles)
 {
   StepReport report;
-  std::string what;
-  if (!inputsFine(state, inputs, 1.0, what))
-    return refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
+  if (!accepts(state, inputs, 1.0, report))
+    return report;
   const bool blown = !system->loads().empty() && inputs.wind != Eigen::Vector3d::Zero();
   if (!model->averages.empty() || plastic_.active() || blown)
     return refuse(report, StepFailure::input_not_finite,

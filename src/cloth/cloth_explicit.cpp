@@ -7,45 +7,19 @@
 
 namespace slender {
 
-/// Elastic and viscous forces at (x_, v_), wind, gravity and extra forces into force_. Mass damping is left out.
-ClothEvaluation ClothStepper::Impl::addForces(const ClothInputs& inputs, bool with_constant)
+/// The matrix of imex steps, with the bending of the system.
+void ClothStepper::Impl::useConstantMatrix()
 {
-  std::fill(d_.begin(), d_.end(), 0.0);
-  const ClothEvaluation here = system->addInternal(x_, d_, with_constant);
-  std::fill(force_.begin(), force_.end(), 0.0);
-  for (const auto& load : system->loads())
-    load->addForces(x_, v_, inputs.wind, force_);
-  for (int i = 0; i < model->vertices(); ++i)
-  {
-    point(force_, i) += model->mass[i] * inputs.gravity - point(d_, i);
-    if (inputs.forces.cols() > 0)
-      point(force_, i) += inputs.forces.col(i);
-  }
-  return here;
-}
-
-/// a_start_ = F(x, v) / m at the start of a step; `delta`: a time over which strain rates are found to second order
-/// [s].
-ClothEvaluation ClothStepper::Impl::acceleration(const ClothInputs& inputs, double delta)
-{
-  x_ = x_start_;
-  v_ = v_start_;
-  if (model->stiffness_damping > 0)
-  {
-    for (std::size_t i = 0; i < trial_.size(); ++i)
-      trial_[i] = -delta * v_[i];
-    system->setViscosity(model->stiffness_damping / delta, x_, &trial_, 0.0, nullptr);
-  }
-  const ClothEvaluation here = addForces(inputs, true);
-  for (int i = 0; i < model->vertices(); ++i)
-    point(a_start_, i) = system->held()[i]
-                             ? Eigen::Vector3d(0, 0, 0)
-                             : Eigen::Vector3d(point(force_, i) / model->mass[i] - model->mass_damping * point(v_, i));
-  return here;
+  if (options.integrator != Integrator::imex)
+    return;
+  const PointMatrix* matrix = system->constantMatrix();
+  constant_ = std::make_unique<ShiftedMatrix>(matrix ? *matrix : PointMatrix(model->vertices(), {}));
+  constant_weight_.assign(model->vertices(), 0.0);
+  constant_h_ = 0.0;   // The matrix is not factored yet.
 }
 
 /// h^2 w^2 + 2 b h w^2 < 4 with viscous forces from the strains one step ago, b the damping by stiffness.
-double ClothStepper::Impl::stableStep()
+double ClothStepper::Impl::stableStep() const
 {
   constexpr int kIterations = 60;
   if (!isExplicit())
@@ -92,22 +66,21 @@ double ClothStepper::Impl::stableStep()
 
 /// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step
 /// ago.
-StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double from, double to, double duration,
-                                             StepReport& report)
+StepFailure ClothStepper::Impl::explicitStep(double from, double to, StepReport& report)
 {
   const double h = to - from;
   const int n = model->vertices();
-  toPoints(work_.x, x_);
+  toPoints(work_.x, x);
   toPoints(work_.v, v_);
   next_ = work_;
   system->usePlasticState(work_);
   if (model->stiffness_damping > 0)
   {
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      trial_[i] = x_[i] - h * v_[i];
+    for (std::size_t i = 0; i < x.size(); ++i)
+      trial_[i] = x[i] - h * v_[i];
     system->setViscosity(model->stiffness_damping / h, trial_);
   }
-  const ClothEvaluation here = addForces(inputs, true);
+  const ClothEvaluation here = addForces(true);
   for (int i = 0; i < n; ++i)
   {
     point(force_, i) -= model->mass[i] * model->mass_damping * point(v_, i);
@@ -117,7 +90,7 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
   {
     const int p = work_.pins[k];
-    const Eigen::Vector3d v = (pinAt(inputs, k, to / duration) - work_.x.col(p)) / h;
+    const Eigen::Vector3d v = (pinAt(k, to / duration_) - work_.x.col(p)) / h;
     pin_forces.col(static_cast<Eigen::Index>(k)) = point(force_, p) - model->mass[p] * (v - work_.v.col(p)) / h;
     point(v_, p) = v;
   }
@@ -135,12 +108,11 @@ StepFailure ClothStepper::Impl::explicitStep(const ClothInputs& inputs, double f
 
 /// (M (1/h^2 + a/h) + (1 + b/h) K) d = M v/h + f - K x for the motion d of the step, with a and b of the damping, K of
 /// the bending, and f the membrane's forces (elastic and viscous) and the wind at the start, and the loads.
-StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from, double to, double duration,
-                                         StepReport& report)
+StepFailure ClothStepper::Impl::imexStep(double from, double to, StepReport& report)
 {
   const double h = to - from, viscous = 1.0 + model->stiffness_damping / h;
   const int n = model->vertices();
-  toPoints(work_.x, x_);
+  toPoints(work_.x, x);
   toPoints(work_.v, v_);
   next_ = work_;
   system->hold(work_);
@@ -157,19 +129,19 @@ StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from,
   }
   if (model->stiffness_damping > 0)
   {
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      trial_[i] = x_[i] - h * v_[i];
+    for (std::size_t i = 0; i < x.size(); ++i)
+      trial_[i] = x[i] - h * v_[i];
     system->setViscosity(model->stiffness_damping / h, trial_);
   }
-  const ClothEvaluation here = addForces(inputs, false);
+  const ClothEvaluation here = addForces(false);
   std::fill(trial_.begin(), trial_.end(), 0.0);
   if (const PointMatrix* constant = system->constantMatrix())
-    constant->addProduct(-1.0, x_.data(), trial_.data());
+    constant->addProduct(-1.0, x.data(), trial_.data());
   std::fill(d_.begin(), d_.end(), 0.0);
   for (int i = 0; i < n; ++i)
     point(force_, i) += point(trial_, i) + model->mass[i] / h * point(v_, i);
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
-    point(d_, work_.pins[k]) = pinAt(inputs, k, to / duration) - work_.x.col(work_.pins[k]);
+    point(d_, work_.pins[k]) = pinAt(k, to / duration_) - work_.x.col(work_.pins[k]);
   // what is held moves as given
   std::fill(trial_.begin(), trial_.end(), 0.0);
   constant_->addProduct(d_.data(), trial_.data());
@@ -190,7 +162,7 @@ StepFailure ClothStepper::Impl::imexStep(const ClothInputs& inputs, double from,
     fastest = std::max(fastest, next_.v.col(i).cwiseAbs().maxCoeff());
   }
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
-    next_.x.col(work_.pins[k]) = pinAt(inputs, k, to / duration);
+    next_.x.col(work_.pins[k]) = pinAt(k, to / duration_);
   report.max_strain = std::max(report.max_strain, here.max_strain);
   return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none
                                                                               : StepFailure::state_not_finite;

@@ -40,7 +40,7 @@ bool ClothTrial::Definiteness::positiveDefinite()
   ClothStatics& s = *statics;
   if (!s.factored_)
   {
-    s.definite_ = s.system_.factor();
+    s.definite_ = s.linear_.factor();
     s.factored_ = true;
     ++s.factorizations_;
   }
@@ -49,7 +49,8 @@ bool ClothTrial::Definiteness::positiveDefinite()
 
 ClothStatics::ClothStatics(const ClothModel& model, const NewtonConfig& newton)
   : model_(elasticPart(model)),
-    system_(model_, directOptions()),
+    system_(model_, true),
+    linear_(model_, directOptions(), system_),
     newton_(newton)
 {
   shortest_edge_ = std::numeric_limits<double>::infinity();
@@ -120,7 +121,7 @@ void ClothStatics::solve()
 {
   for (int i = 0; i < model_.vertices(); ++i)
     point(d_, i) = system_.held()[i] ? Eigen::Vector3d::Zero() : Eigen::Vector3d(-point(system_.gradient(), i));
-  system_.solveFactored(d_);
+  linear_.solveFactored(d_);
 }
 
 void ClothStatics::moveAlong(double alpha)
@@ -230,7 +231,7 @@ bool ClothStatics::definite(double rate)
   system_.evaluateHessian(trial_, HessianKind::exact);
   system_.addInertia(rate);
   ++factorizations_;
-  return system_.factor();
+  return linear_.factor();
 }
 
 /// Half width of the band of eigenvalues that count as zero [1/s^2].
@@ -263,7 +264,7 @@ void ClothStatics::findMode()
     }
     for (double& value : d_)
       value /= std::max(std::sqrt(square), 1e-300);
-    system_.solveFactored(d_);
+    linear_.solveFactored(d_);
   }
   for (int i = 0; i < n; ++i)
     if (system_.held()[i])

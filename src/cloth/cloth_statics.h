@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "cloth_system.h"
+#include "cloth_linear_solver.h"
 #include "slender_sim/dynamics/equilibrium_search.h"
 #include "slender_sim/dynamics/hessian_shift.h"
 #include "slender_sim/dynamics/newton.h"
@@ -84,6 +84,7 @@ private:
 
   ClothModel model_;
   ClothSystem system_;
+  ClothLinearSolver linear_;
   NewtonConfig newton_;
   double shortest_edge_ = 0, size_ = 0;   ///< [m]
   double unit_rate_ = 0;                  ///< scale of the proximal term [1/s^2]

@@ -21,16 +21,7 @@ Eigen::MatrixXi pairsOf(const PointMatrix& matrix)
 }
 
 // of a WorkBudget, per vertex; an iteration of conjugate gradients: 1
-constexpr int kEnergyWork = 2, kHessianWork = 8, kFactorWork = 60;
-constexpr double kBesideLoad = 1e-2;
-
-ClothSolver chosen(const ClothModel& model, const ClothOptions& options)
-{
-  if (options.solver != ClothSolver::automatic)
-    return options.solver;
-  return !model.averages.empty() || model.vertices() > ClothSystem::kMostSwept ? ClothSolver::conjugate_gradients
-                                                                               : ClothSolver::gauss_seidel;
-}
+constexpr int kEnergyWork = 2, kHessianWork = 8;
 
 }   // namespace
 
@@ -42,45 +33,15 @@ void ClothEvaluation::count(TermAccount account, const TermSums& sums)
   max_strain = std::max(max_strain, sums.max_strain);
 }
 
-ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
+ClothSystem::ClothSystem(const ClothModel& model, bool constant_in_blocks)
   : model_(model),
-    choose_(options.solver == ClothSolver::automatic && options.one_newton_step),
-    solver_(chosen(model, options)),
-    linear_tolerance_(options.linear_tolerance),
     terms_(clothTerms(model)),
-    loads_(clothLoads(model))
+    loads_(clothLoads(model)),
+    constant_in_blocks_(constant_in_blocks)
 {
   const int n = points();
-  const bool direct = solver_ == ClothSolver::cholesky;
-  usePattern(direct);
-  if (direct)
-    factor_.setPattern(matrix_);
-  else if (solver_ == ClothSolver::gauss_seidel)
-    sweeps_ = SymmetricSweeps(matrix_, constant_);
-  else
-  {
-    preconditioner_ = std::make_unique<ClothPreconditioner>(model, terms_, matrix_);
-    cg_.resize(n);
-    average_sets_.resize(model.averages.size());
-    for (std::size_t s = 0; s < average_sets_.size(); ++s)
-    {
-      average_sets_[s].prescribed = &model.averages[s];
-      average_sets_[s].solver.setConstraints(*model.averages[s].weights, model.averages[s].bounds.size() > 0);
-      average_sets_[s].swept = sweepsSuit(model.averages[s]);
-    }
-    if (std::any_of(average_sets_.begin(), average_sets_.end(), [](const AverageSet& set) { return set.swept; }))
-      sweeps_ = SymmetricSweeps(matrix_, constant_);
-    if (!average_sets_.empty())
-    {
-      if (model.averages[0].bounds.size() > 0)
-      {
-        bounds_ = std::make_unique<AverageBounds>();
-        bounds_->first_guess = bounds_->before = bounds_->image = bounds_->image_before = PointVector(4 * n, 0.0);
-      }
-      use(average_sets_[0]);
-    }
-  }
-  for (PointVector* v : {&start_, &target_, &force_, &gradient_, &load_gradient_, &product_, &right_, &correction_})
+  usePattern();
+  for (PointVector* v : {&start_, &target_, &force_, &gradient_, &load_gradient_})
     v->assign(4 * n, 0.0);
   weight_.assign(n, 0.0);
   held_.assign(n, 0);
@@ -89,7 +50,7 @@ ClothSystem::ClothSystem(const ClothModel& model, const ClothOptions& options)
       v->assign(4 * n, 0.0);
 }
 
-void ClothSystem::usePattern(bool direct)
+void ClothSystem::usePattern()
 {
   std::vector<Eigen::MatrixXi> elements;
   for (const ClothTerm& term : terms_)
@@ -101,7 +62,7 @@ void ClothSystem::usePattern(bool direct)
       throw std::logic_error("a cloth can have one term with a constant matrix: add the matrices");
     constant_ = term.energy->constantMatrix();
   }
-  constant_in_blocks_ = constant_ && direct;
+  constant_in_blocks_ = constant_in_blocks_ && constant_;
   if (constant_in_blocks_)
     elements.push_back(pairsOf(*constant_));
   matrix_ = BlockMatrix(points(), elements);
@@ -118,8 +79,6 @@ void ClothSystem::usePlasticState(const ClothState& state)
   for (const ClothTerm& term : terms_)
     term.energy->setPlasticState({state.rest_angles, state.stiffening});
 }
-
-void ClothSystem::setViscosity(double ratio, const PointVector& x) { setViscosity(ratio, x, nullptr, 0.0, nullptr); }
 
 void ClothSystem::setViscosity(double ratio, const PointVector& x, const PointVector* move, double share,
                                const PointVector* other)
@@ -178,35 +137,9 @@ void ClothSystem::setWeights(double tau, double ratio)
     for (int k = 0; k < 3; ++k)
       matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += weight_[i];
   base_.assign(matrix_.values(), matrix_.values() + 9 * matrix_.blocks());
-  preconditioned_ = !preconditioner_ || preconditioner_->setConstant(weight_, 1.0 + ratio, held_);
-  limp_ = !used_ || bendsLittle(ratio);
-  for (AverageSet& set : average_sets_)
-    set.ready = false;
   base_tau_ = tau;
   base_ratio_ = ratio;
   base_held_ = held_;
-}
-
-void ClothSystem::use(AverageSet& set)
-{
-  used_ = &set;
-  averages_ = &set.solver;
-  gap_.assign(4 * static_cast<std::size_t>(set.prescribed->count()), 0.0);
-  multipliers_ = gap_;
-  if (bounds_)
-  {
-    bounds_->at.clear();
-    bounds_->taken = bounds_->pulls = bounds_->wanted = bounds_->bounded = bounds_->response = gap_;
-    bounds_->stiffness = bounds_->weights = set.prescribed->bounds;
-    bounds_->at.reserve(static_cast<std::size_t>(set.prescribed->count()));
-    bounds_->forces.setZero(3, set.prescribed->count());
-  }
-}
-
-void ClothSystem::useAverages(const ClothState& state)
-{
-  if (used_ && used_ != &average_sets_[static_cast<std::size_t>(state.average_set)])
-    use(average_sets_[static_cast<std::size_t>(state.average_set)]);
 }
 
 void ClothSystem::hold(const ClothState& state)
@@ -222,12 +155,6 @@ void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
   const int n = points();
   start_ = *stage.start;
   setWeights(stage.tau, ratio_);
-  if (used_ && preconditioned_ && !used_->ready)
-  {
-    const ShiftedMatrix& p = preconditioner_->constant();
-    used_->independent = averages_->factor(p.pattern(), p.values(), p.factorization(), held_.data());
-    used_->ready = true;
-  }
   const bool extra = inputs.forces.cols() > 0;
   const double damping = model_.mass_damping * stage.tau;
   for (int i = 0; i < n; ++i)
@@ -311,12 +238,6 @@ ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind k
   return result;
 }
 
-bool ClothSystem::factor()
-{
-  spend(kFactorWork);
-  return factor_.factor(matrix_, held_.data());
-}
-
 void ClothSystem::setInertia(double tau)
 {
   if (tau == matrix_tau_)
@@ -325,14 +246,7 @@ void ClothSystem::setInertia(double tau)
   matrix_tau_ = tau;
 }
 
-void ClothSystem::clearHeld(PointVector& v) const
-{
-  for (int i = 0; i < points(); ++i)
-    if (held_[i])
-      point(v, i).setZero();
-}
-
-void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
+void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap) const
 {
   std::fill(ap.begin(), ap.end(), 0.0);
   matrix_.addProduct(p.data(), ap.data());
@@ -340,88 +254,29 @@ void ClothSystem::applyMatrix(const PointVector& p, PointVector& ap)
     constant_->addProduct(1.0 + ratio_, p.data(), ap.data());
 }
 
-void ClothSystem::setRight(const PointVector& d)
+double ClothSystem::loadWork(const PointVector& from, const PointVector& to) const
 {
-  for (std::size_t i = 0; i < right_.size(); ++i)
-    right_[i] = -gradient_[i];
-  if (std::any_of(d.begin(), d.end(), [](double x) { return x != 0.0; }))
-  {
-    applyMatrix(d, product_);
-    for (std::size_t i = 0; i < right_.size(); ++i)
-      right_[i] -= product_[i];
-  }
-  clearHeld(right_);
-}
-
-LinearOutcome ClothSystem::solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations,
-                                 double tolerance, const Eigen::Matrix3Xd* averages)
-{
-  if (!averagesIndependent())
-    return LinearOutcome::not_definite;
-  // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
-  for (int i = 0; i < points() && solver_ == ClothSolver::cholesky; ++i)
+  double work = 0.0;
+  for (int i = 0; i < points(); ++i)
     if (!held_[i])
-      point(d, i).setZero();
-  setRight(d);
-  if (solver_ == ClothSolver::cholesky)
-  {
-    for (int i = 0; i < points(); ++i)
-      if (held_[i])
-        point(right_, i) = point(d, i);
-    ++factorizations;
-    if (!factor())
-      return LinearOutcome::not_definite;
-    factor_.solvePoints(right_.data(), d.data());
-    return LinearOutcome::solved;
-  }
-  if (!preconditioned_)
-    return LinearOutcome::not_definite;
-  load_ = 0.0;
-  const double allowed = tolerance > 0 ? tolerance : linear_tolerance_;
-  if (solver_ == ClothSolver::gauss_seidel)
-  {
-    sweeps_.set(1.0 + ratio_, held_);
-    return correct(d, sweeps_.solve(right_, correction_, allowed, iterationsWithin(kMostIterations)), allowed,
-                   linear_iterations);
-  }
-  if (averages && used_->swept && limp_)
-  {
-    if (sweepWithAverages(d, *averages, allowed, linear_iterations) == LinearOutcome::solved)
-      return LinearOutcome::solved;
-    setRight(d);
-  }
-  if (at && !averages_)   // averages are met with the constant matrix
-    preconditioner_->align(*at, matrix_, held_);
-  else
-    preconditioner_->useConstant();
-  const double reference = averages_ ? takeFirstStep(d, averages, allowed) : 0.0;
-  const LinearResult result = cg_.solve(
-      right_, correction_, allowed, iterationsWithin(kMostIterations),
-      [&](const PointVector& p, PointVector& ap) {
-        applyMatrix(p, ap);
-        clearHeld(ap);
-      },
-      [&](PointVector& r, PointVector& z) {
-        if (averages_)
-          preconditionWithin(r, z);
-        else
-          preconditioner_->apply(r, z);
-      },
-      reference);
-  return correct(d, result, allowed, linear_iterations);
+      work += point(force_, i).dot(point(to, i) - point(from, i));
+  for (const auto& load : loads_)
+    work += load->work(from, to, held_);
+  return work;
 }
 
-LinearOutcome ClothSystem::correct(PointVector& d, const LinearResult& result, double tolerance, int& linear_iterations)
+void ClothSystem::shiftMatrix(double factor)
 {
-  linear_iterations += result.iterations;
-  spend(result.iterations + 1);
-  for (std::size_t i = 0; i < d.size(); ++i)
-    d[i] += correction_[i];
-  if (!result.definite)
-    return LinearOutcome::not_definite;
-  // of what is strained so much that little is left beside its load: far less of that than others are asked for
-  const bool beside_load = result.residual * result.scale <= kBesideLoad * tolerance * load_;
-  return result.residual <= tolerance || beside_load ? LinearOutcome::solved : LinearOutcome::not_converged;
+  for (int i = 0; i < points(); ++i)
+    for (int k = 0; k < 3; ++k)
+      matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += factor * weight_[i];
+}
+
+void ClothSystem::addInertia(double rate)
+{
+  for (int i = 0; i < points(); ++i)
+    for (int k = 0; k < 3; ++k)
+      matrix_.values()[9 * matrix_.starts()[i] + 4 * k] += rate * model_.mass[i];
 }
 
 }   // namespace slender

@@ -18,7 +18,7 @@
 #include "slender_sim/linalg/point_kernel.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 #include "slender_sim/study/study.h"
-#include "cloth/cloth_system.h"
+#include "cloth/cloth_linear_solver.h"
 
 namespace slender::study {
 
@@ -117,7 +117,8 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
   const int n = hinged.model->vertices();
   ClothOptions options = linearized();
   options.solver = ClothSolver::conjugate_gradients;
-  ClothSystem system(*hinged.model, options);
+  ClothSystem system(*hinged.model, false);
+  ClothLinearSolver solver(*hinged.model, options, system);
   PointVector x, ahead, rest, guess, right(4 * n, 0.0), product(4 * n, 0.0), correction(4 * n, 0.0), exact(4 * n, 0.0),
       away(4 * n, 0.0);
   toPoints(hinged.state.x, x);
@@ -130,6 +131,7 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
     point(guess, p).setZero();
   system.hold(hinged.state);
   system.beginStage({kImplicitStep, &ahead, &x, &x, &x, &hinged.state.v}, hinged.inputs);
+  solver.beginStage();
   const std::vector<char>& held = system.held();
   const auto clearHeld = [&](PointVector& v) {
     for (const int p : hinged.state.pins)
@@ -165,7 +167,7 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
   };
   PointVector moved = guess;
   int iterations = 0, factorizations = 0;
-  system.solve(moved, nullptr, iterations, factorizations);
+  solver.solve(moved, nullptr, iterations, factorizations);
   for (std::size_t i = 0; i < moved.size(); ++i)
     moved[i] -= guess[i];
   const double allowed = error(moved);

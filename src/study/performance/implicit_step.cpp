@@ -8,7 +8,7 @@
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 #include "slender_sim/study/study.h"
-#include "cloth/cloth_system.h"
+#include "cloth/cloth_linear_solver.h"
 
 namespace slender::study {
 
@@ -73,7 +73,8 @@ struct Parts
 
 Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budget)
 {
-  ClothSystem system(*cloth.model, options);
+  ClothSystem system(*cloth.model, options.solver == ClothSolver::cholesky);
+  ClothLinearSolver solver(*cloth.model, options, system);
   PointVector x, v, ahead, d;
   toPoints(cloth.state.x, x);
   toPoints(cloth.state.v, v);
@@ -82,6 +83,7 @@ Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budge
     ahead[i] += kStep * v[i];
   system.hold(cloth.state);
   system.beginStage({kStep, &ahead, &x, &x, &x, &cloth.state.v}, cloth.inputs);
+  solver.beginStage();
   Parts parts;
   parts.assembly = leastSeconds(budget, [&] { system.evaluateHessian(x, HessianKind::semidefinite); });
   int iterations = 0, factorizations = 0;
@@ -89,7 +91,7 @@ Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budge
     toPoints(kStep * cloth.state.v, d);
     for (const int p : cloth.state.pins)
       point(d, p).setZero();
-    system.solve(d, nullptr, iterations, factorizations);
+    solver.solve(d, nullptr, iterations, factorizations);
   });
   parts.evaluation = leastSeconds(budget, [&] { system.evaluate(x); });
   return parts;

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "cloth_preconditioner.h"
+#include "cloth_system.h"
+#include "slender_sim/linalg/conjugate_gradients.h"
+#include "slender_sim/linalg/sparse_cholesky.h"
+#include "slender_sim/linalg/symmetric_sweeps.h"
+
+namespace slender {
+
+/// What became of linear equations.
+enum class LinearOutcome
+{
+  solved,
+  not_definite,   ///< the matrix is not positive definite, or prescribed averages depend on each other
+  not_converged   ///< the most iterations that are taken did not reach the tolerance
+};
+
+/// The solver that the options mean for this cloth: never `automatic`.
+ClothSolver solverOf(const ClothModel& model, const ClothOptions& options);
+
+/// Solves the Newton equations H d = -gradient of a ClothSystem, with what is held moving as given. Without prescribed
+/// averages; AveragedClothSolver is for those.
+class ClothLinearSolver
+{
+public:
+  /// Measured (study implicit_step): sweeps are faster up to so many points, the constant factor above.
+  static constexpr int kMostSwept = 3000;
+
+  /// Model and system must outlive this. For ClothSolver::cholesky the blocks of the system contain its constant
+  /// matrix.
+  ClothLinearSolver(const ClothModel& model, const ClothOptions& options, ClothSystem& system);
+  virtual ~ClothLinearSolver() = default;
+
+  ClothSolver kind() const { return kind_; }
+  /// What solves spend; must outlive this.
+  void useBudget(WorkBudget& budget) { budget_ = &budget; }
+  /// Comes after beginStage() of the system.
+  virtual void beginStage();
+
+  /// Factors the matrix (Cholesky only). Returns false where it is not positive definite on what is not held.
+  bool factor();
+  /// v := matrix^-1 v after a factor() that returned true. Held points of v must be zero and stay so.
+  void solveFactored(PointVector& v) const { factor_.solvePoints(v.data(), v.data()); }
+  /// `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
+  /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant
+  /// matrix. `tolerance`: theirs, 0: that of the options. The numbers grow by what was needed.
+  virtual LinearOutcome solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations,
+                              double tolerance = 0.0);
+
+protected:
+  static constexpr int kMostLinearIterations = 2000;   ///< of conjugate gradients
+
+  int points() const { return system_.points(); }
+  /// Makes the constant part of the preconditioner that of the stage. Returns whether it has changed.
+  bool updatePreconditioner();
+  void clearHeld(PointVector& v) const;
+  /// right_: what d leaves of the equations, held points zero.
+  void setRight(const PointVector& d);
+  /// Adds correction_, the solution of conjugate gradients, to d. `load`: what is strained so much that little is left
+  /// beside this load is solved to a share of it.
+  LinearOutcome correct(PointVector& d, const LinearResult& result, double tolerance, double load,
+                        int& linear_iterations);
+  /// Of conjugate gradients: `most`, or what the budget has room for.
+  int iterationsWithin(int most) const
+  {
+    return static_cast<int>(std::min<long>(most, budget_->left() / points() + 1));
+  }
+  /// In counts per point.
+  void spend(int counts) { budget_->spend(static_cast<long>(counts) * points()); }
+
+  ClothSystem& system_;
+  const double linear_tolerance_;
+  WorkBudget unbounded_;
+  WorkBudget* budget_ = &unbounded_;
+  std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
+  bool preconditioned_ = true;                            ///< its constant part could be factored
+  ConjugateGradients cg_;
+  SymmetricSweeps sweeps_;
+  PointVector right_, product_, correction_;
+
+private:
+  const ClothSolver kind_;
+  SparseCholesky factor_;   ///< of the system's matrix
+  /// What the preconditioner was made for.
+  std::vector<double> weights_;
+  std::vector<char> held_;
+  double ratio_ = -1;
+};
+
+}   // namespace slender

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "averaged_cloth_solver.h"
+#include "slender_sim/cloth/plastic_flow.h"
+#include "slender_sim/dynamics/integrator.h"
+
+namespace slender {
+
+/// Largest forces at the end of a substep [N].
+struct ClothBalance
+{
+  double unbalanced = 0;   ///< on vertices that are not held
+  double force = 0;        ///< of all kinds
+};
+
+/// A step of one cloth in implicit stages, whose equations something else solves: ClothStepper for a cloth on its own,
+/// ClothPart in an island.
+///
+/// A step is begin(), substeps, end(). A substep is beginStep(); for each stage beginStage(), the solution of its
+/// equations in `x`, and endStage(), after the last one takeEnd() instead; then commitStep(), or the next attempt.
+class ClothStages
+{
+public:
+  /// Throws std::invalid_argument for a model or options that are not valid.
+  ClothStages(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
+  virtual ~ClothStages() = default;
+
+  /// Steps spend this from now on, which others start; null: one of their own.
+  void useBudget(std::shared_ptr<WorkBudget> budget);
+  /// Returns whether a step from this state with these inputs can begin. If not, the report says why.
+  bool accepts(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report) const;
+  /// Refuses a step of `length` seconds that could not be solved. The message says why and where the cloth was farthest
+  /// from a solution.
+  StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length);
+  /// Lets the clamped faces act that `state` holds, and no others. Comes before each use of the system with another
+  /// state.
+  void followClamps(const ClothState& state);
+
+  /// Takes a step of `duration` [s] from a state. The inputs must live until the end().
+  void begin(const ClothState& state, const ClothInputs& inputs, double duration);
+  void end(ClothState& state) { std::swap(state, work_); }
+  /// Of a substep between these times, counted from the start of the step [s]. The plan must live until its end.
+  void beginStep(const StepPlan& plan, double from, double to);
+  /// Sets inertia, loads, viscous response and what is held.
+  void beginStage(std::size_t stage);
+  /// x := the motion carried on; what is held stands where it is at the end of the stage.
+  void placeGuess();
+  /// Takes x as the end of a stage that is not the last.
+  void endStage(std::size_t stage);
+  /// Takes x as the end of the substep. The gradient of the system must be that at x, with all that acts there.
+  /// `internal`: largestInternal() there, before contact added to the gradient.
+  ClothBalance takeEnd(double internal, double max_strain, StepReport& report);
+  void commitStep() { std::swap(work_, next_); }
+
+  /// At the start of the substep.
+  const ClothState& present() const { return work_; }
+  /// Inputs of the step.
+  const ClothInputs& inputs() const { return *inputs_; }
+  /// Where pin k of the state is at a fraction of the step.
+  Eigen::Vector3d pinAt(std::size_t k, double fraction) const;
+  double shortestEdge() const { return shortest_edge_; }   ///< at rest [m]
+  /// Largest elastic and viscous force on a vertex in the last evaluation [N].
+  double largestInternal() const;
+  /// The force that Newton's tolerance leaves at most [N]: Newton's method stops by its increment, which says little
+  /// where stiffness has no bound, in bends of faces without area.
+  double resolvedForce() const;
+
+  std::shared_ptr<const ClothModel> model;
+  ClothOptions options;
+  std::unique_ptr<ClothSystem> system;
+  std::unique_ptr<ClothLinearSolver> linear;
+  AveragedClothSolver* averages = nullptr;   ///< the same, where averages are prescribed; else null
+  PointVector x;                             ///< present configuration: a guess, or the solution of a stage
+  Eigen::Matrix3Xd pin_forces;               ///< of the cloth on its pins at the end of the substep [N]
+
+protected:
+  /// Is called when the system is of another model, see followClamps().
+  virtual void systemChanged() {}
+  /// Says why steps of a length fail so, and what to change.
+  virtual std::string explain(StepFailure failure, double length) const;
+  StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
+  bool isExplicit() const
+  {
+    return options.integrator == Integrator::symplectic_euler || options.integrator == Integrator::imex;
+  }
+  /// Forces at (x, v_) without mass damping into force_.
+  ClothEvaluation addForces(bool with_constant);
+  ClothEvaluation acceleration(double delta);
+  long ownWork() const { return own_budget_ ? budget_->done() : 0; }   ///< others report their budgets themselves
+
+  /// what the system is of, where not all clamped faces of the model act; otherwise null
+  std::shared_ptr<const ClothModel> clamped_model_;
+  std::shared_ptr<WorkBudget> budget_;
+  bool own_budget_ = true;
+  PlasticFlow plastic_;
+  const ClothInputs* inputs_ = nullptr;   ///< of the present step
+  double duration_ = 0;                   ///< of the present step [s]
+  ClothState work_, next_;                ///< start of a substep, and its end
+  const StepPlan* plan_ = nullptr;        ///< of the present substep, with its times [s]
+  double from_ = 0, to_ = 0;
+  std::vector<int> at_bound_;
+  Eigen::Matrix3Xd averages_;   ///< that are prescribed at the end of the substep
+  PointVector trial_, d_, pin_motion_, v_, force_, guess_, x_start_;
+  double shortest_edge_ = 0;
+  /// At the start of an implicit step, as evaluate() counts it there, and the elastic energy itself [J]. Steps of one
+  /// stage count that of the end in the same way; steps of two, whose stages have viscous forces of their own, without
+  /// these.
+  double energy_start_ = 0, elastic_start_ = 0;
+
+private:
+  void buildSystem(const ClothModel& of);
+  bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
+  void combine(const Combination& c, PointVector& result) const;
+
+  std::vector<int> clamp_pins_;   ///< of the state whose clamped faces act; with clamped faces only
+  bool clamps_known_ = false;
+  Eigen::Matrix3Xd pins_start_, averages_start_, wind_v_;
+  PointVector v_start_, a_start_, x_stage_, v_stage_, q_hat_, q_tilde_;
+};
+
+}   // namespace slender
