@@ -1,6 +1,5 @@
 // A warm step takes no memory from the heap: malloc and its kin are counted, so Eigen's and operator new's requests
 // both show.
-#include <atomic>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -13,17 +12,16 @@
 #include "slender_sim/linalg/banded_ldlt.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
+#include "test/support/allocations.h"
 #include "test/support/contact.h"
 #include "test/support/groups.h"
 #include "test/support/rods.h"
 #include "test/support/sheets.h"
 #include "test/support/threads.h"
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
-#define SLENDER_COUNTS_ALLOCATIONS
-namespace {
-std::atomic<long> allocations{0};
-}
+#ifdef SLENDER_COUNTS_ALLOCATIONS
+std::atomic<long> slender::test::allocations{0};
+using slender::test::allocations;
 extern "C" {
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);

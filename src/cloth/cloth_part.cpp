@@ -1,0 +1,391 @@
+#include "cloth_part.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "slender_sim/linalg/interruption.h"
+
+namespace slender {
+
+namespace {
+
+constexpr double kNear = 0.1;           ///< increment, over the shortest edge, below which the exact Hessian is taken
+constexpr double kShiftOfAngle = 0.2;   ///< of the weight of inertia, per unit of a shift of angles
+constexpr double kMostTurn = 0.7;       ///< of an edge in an iteration [rad], as for edges of rods
+
+}   // namespace
+
+ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options)
+  : stages_(std::make_unique<ClothStages>(std::move(model), options)),
+    budget_(std::make_shared<WorkBudget>())
+{
+  const ClothModel& m = *stages_->model;
+  if (options.integrator != Integrator::implicit_euler)
+    throw std::invalid_argument("cloth '" + m.name +
+                                "': contact and joints with other objects need time.integrator: implicit_euler");
+  if (!m.averages.empty())
+    throw std::invalid_argument("cloth '" + m.name +
+                                "': a cloth that tracks a guide cannot touch, or be joined to, other objects than "
+                                "cloth and what moves as prescribed");
+  stages_->useBudget(budget_);
+  inverse_length_.resize(static_cast<std::size_t>(m.topology.edges.cols()));
+  for (std::size_t e = 0; e < inverse_length_.size(); ++e)
+  {
+    const auto edge = m.topology.edges.col(static_cast<Eigen::Index>(e));
+    inverse_length_[e] = 1.0 / (m.rest.vertices.col(edge[1]) - m.rest.vertices.col(edge[0])).norm();
+  }
+  for (PointVector* v : {&base_, &saved_, &direction_, &solution_})
+    v->assign(stages_->x.size(), 0.0);
+}
+
+// ---- a step
+
+void ClothPart::begin(const ClothState& state, const ClothInputs& inputs, double duration)
+{
+  budget_->start(WorkBudget::kUnbounded);
+  stages_->begin(state, inputs, duration);
+}
+
+StepFailure ClothPart::beginSubstep(const StepPlan& plan, const Substep& substep)
+{
+  stages_->beginStep(plan, substep.from, substep.to);
+  return StepFailure::none;
+}
+
+void ClothPart::beginStage(std::size_t stage)
+{
+  stages_->beginStage(stage);
+  stages_->placeGuess();
+  base_ = system().start();
+  near_ = indefinite_ = false;
+}
+
+void ClothPart::endStage(std::size_t stage, bool last, StepReport& report)
+{
+  if (last)
+    stages_->takeEnd(stages_->largestInternal(), evaluation.max_strain, report);
+  else
+    stages_->endStage(stage);
+}
+
+Largest ClothPart::unbalancedForce() const
+{
+  Largest largest;
+  for (int i = 0; i < points(); ++i)
+    if (isFree(i))
+      largest.add(i, vertex(system().gradient(), i).norm());
+  return largest;
+}
+
+// ---- unknowns and configurations
+
+bool ClothPart::numberUnknowns()
+{
+  if (!number_.empty() && system().held() == held_)
+    return true;
+  held_ = system().held();
+  number_.resize(held_.size());
+  unknowns_ = 0;
+  for (std::size_t i = 0; i < held_.size(); ++i)
+  {
+    number_[i] = held_[i] ? kPrescribed : unknowns_;
+    unknowns_ += held_[i] ? 0 : 3;
+  }
+  return false;
+}
+
+void ClothPart::moveAlong(double alpha)
+{
+  PointVector& x = stages_->x;
+  if (alpha == 0.0)   // whatever the direction is, which may be that of an attempt that overflowed
+  {
+    std::copy(base_.begin(), base_.end(), x.begin());
+    return;
+  }
+  for (std::size_t i = 0; i < x.size(); ++i)
+    x[i] = base_[i] + alpha * direction_[i];
+}
+
+void ClothPart::retreat(double share)
+{
+  for (int i = 0; i < points(); ++i)
+    if (isFree(i))
+      vertex(stages_->x, i) = vertex(base_, i) + share * (vertex(stages_->x, i) - vertex(base_, i));
+}
+
+void ClothPart::placeHeld(double fraction)
+{
+  const std::vector<int>& pins = stages_->present().pins;
+  for (std::size_t k = 0; k < pins.size(); ++k)
+    vertex(stages_->x, pins[k]) = stages_->pinAt(k, fraction);
+}
+
+bool ClothPart::heldMoves(double from, double to) const
+{
+  const std::vector<int>& pins = stages_->present().pins;
+  for (std::size_t k = 0; k < pins.size(); ++k)
+    if (from == to ? vertex(stages_->x, pins[k]) != vertex(base_, pins[k])
+                   : stages_->pinAt(k, from) != stages_->pinAt(k, to))
+      return true;
+  return false;
+}
+
+void ClothPart::retreatHeld(double share)
+{
+  for (const int p : stages_->present().pins)
+    vertex(stages_->x, p) = vertex(base_, p) + share * (vertex(stages_->x, p) - vertex(base_, p));
+}
+
+void ClothPart::gather(Eigen::Matrix3Xd& x) const
+{
+  for (int i = 0; i < points(); ++i)
+    x.col(first_point + i) = vertex(stages_->x, i);
+}
+
+void ClothPart::gatherStart(Eigen::Matrix3Xd& x) const { x.middleCols(first_point, points()) = stages_->present().x; }
+
+// ---- equations
+
+void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
+{
+  exact_ = near_ && shift.position == 0.0;
+  const ClothEvaluation e =
+      with_hessian ? system().evaluateHessian(stages_->x, exact_ ? HessianKind::exact : HessianKind::semidefinite)
+                   : system().evaluate(stages_->x);
+  evaluation = {};
+  evaluation.stretch = e.membrane;
+  evaluation.bend_twist = e.bending;
+  evaluation.potential = e.potential;
+  evaluation.max_strain = e.max_strain;
+  if (coupled)
+    return;
+  addOwnContacts(with_hessian);
+  if (with_hessian && std::isfinite(evaluation.energy()))
+    factor(shift);
+}
+
+/// In units of the weight of inertia. An island shifts all its parts; a cloth that is definite by itself, so far as
+/// that is known, does not need what edge angles of rods need.
+double ClothPart::inertiaShift(const HessianShift& shift) const
+{
+  return exact_ ? (coupled || indefinite_ ? kShiftOfAngle * shift.angle : 0.0) : shift.position;
+}
+
+/// A stiffness between points of one triangle. The blocks of the membrane have room for it.
+void ClothPart::addToBlocks(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness)
+{
+  BlockMatrix& matrix = system().matrix();
+  for (int p = 0; p < 4; ++p)
+    for (int q = 0; q <= p; ++q)
+      if (point[p] >= 0 && point[q] >= 0)
+        Eigen::Map<Eigen::Matrix3d>(matrix.values() + 9 * static_cast<std::size_t>(matrix.block(
+                                                              point[p] - first_point, point[q] - first_point))) +=
+            weight[p] * weight[q] * stiffness;
+}
+
+/// Contacts with solids have no indefinite second derivatives, so that the whole of them goes into the blocks.
+void ClothPart::addOwnContacts(bool with_hessian)
+{
+  for (const ContactTerm* term : own_terms)
+  {
+    for (int p = 0; p < 4; ++p)
+      if (term->point[p] >= 0)
+        addForce(term->point[p] - first_point, term->weight[p] * term->force);
+    if (with_hessian)
+      addToBlocks(term->point, term->weight, term->stiffness);
+  }
+  for (const ContactRow* row : own_rows)
+    if (with_hessian)
+      addToBlocks(row->point, row->along, row->stiffness * row->normal * row->normal.transpose());
+}
+
+/// Conjugate gradients find out only while they solve whether a matrix is definite, so that they solve here.
+void ClothPart::factor(const HessianShift& shift)
+{
+  const double added = inertiaShift(shift);
+  if (added > 0.0)
+    system().shiftMatrix(added);
+  ClothLinearSolver& linear = *stages_->linear;
+  bool definite = false;
+  if (linear.kind() == ClothSolver::cholesky)
+    definite = linear.factor();
+  else
+  {
+    int iterations = 0, factorizations = 0;
+    std::fill(solution_.begin(), solution_.end(), 0.0);
+    definite = linear.solve(solution_, &stages_->x, iterations, factorizations) == LinearOutcome::solved;
+  }
+  if (exact_ && added == 0.0)
+    indefinite_ = !definite;
+  evaluation.inertia.negative = !definite && !stepsInterrupted();   // minimize() ends when it is interrupted
+}
+
+void ClothPart::solve()
+{
+  if (stages_->linear->kind() == ClothSolver::cholesky)
+  {
+    for (int i = 0; i < points(); ++i)
+      vertex(direction_, i) = isFree(i) ? Eigen::Vector3d(-vertex(system().gradient(), i)) : Eigen::Vector3d::Zero();
+    stages_->linear->solveFactored(direction_);
+  }
+  else
+    std::swap(direction_, solution_);
+  near_ = incrementSize(0.0) < kNear;
+}
+
+// ---- the matrix of the island
+
+void ClothPart::notePattern(CouplingMatrix& matrix)
+{
+  const auto note = [&](int i, int j, bool whole) {
+    for (int c = 0; c < 3; ++c)
+      for (int r = whole ? 0 : c; r < (whole ? 3 : c + 1); ++r)
+        matrix.note(base(i) + r, base(j) + c);
+  };
+  const BlockMatrix& blocks = system().matrix();
+  for (int j = 0; j < points(); ++j)
+    for (int k = blocks.starts()[j]; k < blocks.starts()[j + 1]; ++k)
+      if (isFree(j) && isFree(blocks.rows()[k]))
+        note(blocks.rows()[k], j, true);
+  const PointMatrix* constant = system().constantInBlocks() ? nullptr : system().constantMatrix();
+  for (int i = 0; constant && i < points(); ++i)
+    for (int k = constant->starts()[i]; k < constant->starts()[i + 1] && constant->column(k) <= i; ++k)
+      if (isFree(i) && isFree(constant->column(k)))
+        note(i, constant->column(k), false);
+}
+
+void ClothPart::findEntries(const CouplingMatrix& matrix)
+{
+  const BlockMatrix& blocks = system().matrix();
+  block_entries_.assign(3 * static_cast<std::size_t>(blocks.blocks()), -1);
+  for (int j = 0; j < points(); ++j)
+    for (int k = blocks.starts()[j]; k < blocks.starts()[j + 1]; ++k)
+      if (const int i = blocks.rows()[k]; isFree(i) && isFree(j))
+        for (int c = 0; c < 3; ++c)
+          block_entries_[3 * k + c] = matrix.index(base(i) + (i == j ? c : 0), base(j) + c);
+  constant_entries_.clear();
+  const PointMatrix* constant = system().constantInBlocks() ? nullptr : system().constantMatrix();
+  for (int i = 0; constant && i < points(); ++i)
+    for (int k = constant->starts()[i]; k < constant->starts()[i + 1] && constant->column(k) <= i; ++k)
+      for (int c = 0, j = constant->column(k); c < 3; ++c)
+        constant_entries_.push_back(isFree(i) && isFree(j) ? matrix.index(base(i) + c, base(j) + c) : -1);
+}
+
+/// Rows of a point follow each other in the matrix, so that those of a block's column do.
+void ClothPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
+{
+  const BlockMatrix& blocks = system().matrix();
+  double* const values = matrix.values();
+  const double added = inertiaShift(shift);
+  for (int j = 0; j < points(); ++j)
+    for (int k = blocks.starts()[j]; k < blocks.starts()[j + 1]; ++k)
+    {
+      const bool diagonal = blocks.rows()[k] == j;
+      const double* block = blocks.values() + 9 * static_cast<std::size_t>(k);
+      for (int c = 0; c < 3 && block_entries_[3 * k + c] >= 0; ++c)
+      {
+        double* const to = values + block_entries_[3 * k + c] - (diagonal ? c : 0);
+        for (int r = diagonal ? c : 0; r < 3; ++r)
+          to[r] += block[3 * c + r] + (diagonal && r == c ? added * system().weights()[j] : 0.0);
+      }
+    }
+  const PointMatrix* constant = system().constantInBlocks() ? nullptr : system().constantMatrix();
+  const double factor = 1.0 + system().viscosity();
+  const int* entry = constant_entries_.data();
+  for (int i = 0; constant && i < points(); ++i)
+    for (int k = constant->starts()[i]; k < constant->starts()[i + 1] && constant->column(k) <= i; ++k)
+      for (int c = 0; c < 3; ++c, ++entry)
+        if (*entry >= 0)
+          values[*entry] += factor * constant->values()[k];
+}
+
+void ClothPart::takeGradient(double* right) const
+{
+  for (int i = 0; i < points(); ++i)
+    if (isFree(i))
+      Eigen::Map<Eigen::Vector3d>(right + base(i)) = -vertex(system().gradient(), i);
+}
+
+void ClothPart::takeDirection(const double* solution)
+{
+  for (int i = 0; i < points(); ++i)
+    if (isFree(i))
+      vertex(direction_, i) = Eigen::Map<const Eigen::Vector3d>(solution + base(i));
+    else
+      vertex(direction_, i).setZero();
+  near_ = incrementSize(0.0) < kNear;
+}
+
+void ClothPart::addColumns(int point, int component, double weight, Columns& row) const
+{
+  if (isFree(point))
+    row.push(base(point) + component, weight);
+}
+
+// ---- measures
+
+double ClothPart::stepLimit() const
+{
+  const auto& edges = stages_->model->topology.edges;
+  double turn = 0.0;
+  for (std::size_t e = 0; e < inverse_length_.size(); ++e)
+  {
+    const auto edge = edges.col(static_cast<Eigen::Index>(e));
+    turn = std::max(turn, (vertex(direction_, edge[1]) - vertex(direction_, edge[0])).norm() * inverse_length_[e]);
+  }
+  return turn > kMostTurn ? kMostTurn / turn : 1.0;
+}
+
+double ClothPart::incrementSize(double) const
+{
+  double square = 0.0;
+  for (int i = 0; i < points(); ++i)
+    square = std::max(square, vertex(direction_, i).squaredNorm());
+  return std::sqrt(square) / stages_->shortestEdge();
+}
+
+double ClothPart::slope() const
+{
+  double sum = 0.0;
+  for (int i = 0; i < points(); ++i)
+    sum += vertex(system().gradient(), i).dot(vertex(direction_, i));
+  return sum;
+}
+
+double ClothPart::residual() const
+{
+  double square = 0.0;
+  for (int i = 0; i < points(); ++i)
+    if (isFree(i))
+      square = std::max(square, vertex(system().gradient(), i).squaredNorm());
+  return std::sqrt(square);
+}
+
+/// Largest force of elasticity and viscosity, gravity, or a pin. A cloth at rest has none of them to compare with, only
+/// what Newton's tolerance leaves.
+double ClothPart::forceScale() const
+{
+  const ClothModel& m = *stages_->model;
+  double largest = std::max(stages_->resolvedForce(), stages_->largestInternal());
+  largest = std::max(largest, m.mass.maxCoeff() * stages_->inputs().gravity.norm());
+  for (const int p : stages_->present().pins)
+    largest = std::max(largest, vertex(system().gradient(), p).norm());
+  return largest;
+}
+
+/// Positions round to eps of the extent, so that forces round to this times what holds a vertex: the membrane, and
+/// inertia in short steps.
+double ClothPart::noiseLevel() const
+{
+  const ClothModel& m = *stages_->model;
+  double extent = 0.0;
+  for (const double x : stages_->x)
+    extent = std::max(extent, std::abs(x));
+  const std::vector<double>& weights = system().weights();
+  const double stiffness = m.membrane.c11 + m.membrane.c22 + *std::max_element(weights.begin(), weights.end());
+  return 4.0 * std::numeric_limits<double>::epsilon() * stiffness * extent;
+}
+
+}   // namespace slender

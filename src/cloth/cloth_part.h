@@ -1,0 +1,111 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "../contact/part.h"
+#include "cloth_stages.h"
+#include "slender_sim/dynamics/failure_place.h"
+#include "slender_sim/dynamics/substep_controller.h"
+
+namespace slender {
+
+/// A cloth as a part of an island. Its unknowns are three for each vertex that is not pinned, one vertex after the
+/// other; its surface points are its vertices. Its own matrix has 3 x 3 blocks, and the solver of its options solves
+/// with it.
+///
+/// Far from the minimum the Hessian is the one that is never indefinite, near it the exact one, as for a cloth on its
+/// own. There a shift of angles, which cloth does not have, adds a share of its inertia. With a shift of positions the
+/// Hessian is the semidefinite one again.
+class ClothPart final : public Part
+{
+public:
+  /// Throws std::invalid_argument for other integrators than implicit_euler, for prescribed averages, and for a model
+  /// or options that are not valid. The island minimises wholly, whether the options ask for one Newton step or not.
+  ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
+
+  /// State, inputs, forces on pins, and messages.
+  const ClothStages& stages() const { return *stages_; }
+  /// Whether a step from this state with these inputs can begin. If not, the report says why.
+  bool accepts(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report) const
+  {
+    return stages_->accepts(state, inputs, duration, report);
+  }
+
+  // ---- a step, substep by substep
+  /// Takes a step of `duration` [s] from a state. The inputs must live until the end().
+  void begin(const ClothState& state, const ClothInputs& inputs, double duration);
+  void end(ClothState& state) { stages_->end(state); }
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep);
+  void beginStage(std::size_t stage);
+  /// Takes over the solution of a stage, which is the trial as last evaluated.
+  void endStage(std::size_t stage, bool last, StepReport& report);
+  void acceptSubstep(const Substep&) { stages_->commitStep(); }
+  /// Largest unbalanced force in the last evaluation [N].
+  Largest unbalancedForce() const;
+  /// Completes the report of a step that is refused because of this part.
+  void refuse(StepFailure failure, double length, StepReport& report) const
+  {
+    stages_->refuseUnsolved(report, failure, length);
+  }
+
+private:
+  // An island knows the rest as a Part.
+  bool numberUnknowns() override;
+  int unknowns() const override { return unknowns_; }
+  void moveAlong(double alpha) override;
+  void accept() override { base_ = stages_->x; }
+  void saveBase() override { saved_ = base_; }
+  void restoreBase() override { base_ = saved_; }
+  void retreat(double share) override;
+  void placeHeld(double fraction) override;
+  bool heldMoves(double from, double to) const override;
+  void retreatHeld(double share) override;
+  int points() const override { return stages_->model->vertices(); }
+  void gather(Eigen::Matrix3Xd& x) const override;
+  void gatherStart(Eigen::Matrix3Xd& x) const override;
+  void evaluate(bool with_hessian, const HessianShift& shift) override;
+  /// Prescribed unknowns stay in the gradient, as the forces of the pins. Nothing else looks at them.
+  void closeGradient() override {}
+  void solve() override;
+  void notePattern(CouplingMatrix& matrix) override;
+  void findEntries(const CouplingMatrix& matrix) override;
+  void addHessian(CouplingMatrix& matrix, const HessianShift& shift) override;
+  void takeGradient(double* right) const override;
+  void takeDirection(const double* solution) override;
+  int base(int point) const override { return number_[point] < 0 ? kPrescribed : offset + number_[point]; }
+  void addColumns(int point, int component, double weight, Columns& row) const override;
+  void addForce(int point, const Eigen::Vector3d& force) override { vertex(system().gradient(), point) -= force; }
+  Eigen::Vector3d move(int point) const override { return vertex(direction_, point); }
+  double stepLimit() const override;
+  double incrementSize(double length) const override;
+  double slope() const override;
+  double residual() const override;
+  double forceScale() const override;
+  double noiseLevel() const override;
+
+  static Eigen::Map<Eigen::Vector3d> vertex(PointVector& v, int i) { return point(v, i); }
+  static Eigen::Map<const Eigen::Vector3d> vertex(const PointVector& v, int i) { return point(v, i); }
+  ClothSystem& system() const { return *stages_->system; }
+  bool isFree(int i) const { return number_[i] >= 0; }
+  double inertiaShift(const HessianShift& shift) const;
+  void addToBlocks(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness);
+  void addOwnContacts(bool with_hessian);
+  void factor(const HessianShift& shift);
+
+  std::unique_ptr<ClothStages> stages_;   ///< whose x is the trial
+  std::shared_ptr<WorkBudget> budget_;    ///< The island bounds the work, so that this one has no bound.
+  std::vector<double> inverse_length_;    ///< of edges at rest [1/m]
+  PointVector base_, saved_, direction_, solution_;
+  int unknowns_ = 0;
+  std::vector<int> number_;   ///< per vertex: of the first of its unknowns in the part, or kPrescribed
+  std::vector<char> held_;    ///< for which the vertices were numbered
+  /// Where the entries go in the matrix of the island: for each block, and for each entry of the constant matrix on or
+  /// below the diagonal, the indices of the values where its three columns begin. -1: it has none.
+  std::vector<int> block_entries_, constant_entries_;
+  bool near_ = false;         ///< the last increment was small
+  bool exact_ = false;        ///< the last Hessian is the exact one
+  bool indefinite_ = false;   ///< The last exact Hessian without a shift was not definite.
+};
+
+}   // namespace slender
