@@ -276,17 +276,31 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   term.force = -most * over_slip * slip;
   if (with_stiffness)
   {
-    term.stiffness = most * over_slip * (Eigen::Matrix3d::Identity() - n * n.transpose());
-    // Newton's method may jump across the narrow range in which a contact sticks, from slip in one direction to slip in
-    // the other, without end. The secant stiffness gives an upper bound of the energy, whose minimum lies in that
-    // range.
-    if (y > law.e)
+    // Where a contact slips, the tangent along the slip is zero: Newton's method may jump across the narrow range in
+    // which it sticks, from slip in one direction to slip in the other, without end. So the direction of the force is
+    // an unknown of its own, which follows from the linear equations: the stiffness along the slip is then that which
+    // stops a contact at the force it needs [Chan, Golub, Mulet, A nonlinear primal-dual method for total
+    // variation-based image restoration, SIAM J. Sci. Comput. 20, 1999]. It is never longer than 1, hence the stiffness
+    // semidefinite.
+    Eigen::Matrix3d unit = over_slip * (Eigen::Matrix3d::Identity() - n * n.transpose());
+    if (y > 0.0)
     {
-      contact.reversed = contact.reversed || contact.last_slip.dot(slip) < 0.0;
-      contact.last_slip = slip;
+      const Eigen::Vector3d along = slip / y;
+      Eigen::Vector3d direction = along;
+      if (y > law.e && contact.has_iterate)
+      {
+        direction = contact.last_force + contact.last_stiffness * (slip - contact.last_slip);
+        direction -= n.dot(direction) * n;
+        direction /= std::max(1.0, direction.norm());
+      }
+      const Eigen::Matrix3d both = direction * along.transpose();
+      unit += 0.5 * (law.slope(y) - over_slip) * (both + both.transpose());
     }
-    if (y > 0.0 && !contact.reversed)
-      term.stiffness += most * (law.slope(y) - over_slip) / (y * y) * slip * slip.transpose();
+    contact.has_iterate = true;
+    contact.last_slip = slip;
+    contact.last_force = over_slip * slip;
+    contact.last_stiffness = unit;
+    term.stiffness = most * unit;
   }
   return most * law.energy(y);
 }
@@ -298,7 +312,7 @@ double ContactPotential::Impl::lagFriction()
   };
   double change = 0.0, largest = 0.0;
   auto old = lagged.begin();
-  for (const Contact& contact : contacts)
+  for (Contact& contact : contacts)
   {
     for (; old != lagged.end() && before(*old, contact); ++old)
       change = std::max(change, old->force.norm());
@@ -306,7 +320,13 @@ double ContactPotential::Impl::lagFriction()
     change = std::max(change, (same ? Eigen::Vector3d(contact.force - old->force) : contact.force).norm());
     largest = std::max(largest, contact.force.norm());
     if (same)
+    {
+      contact.has_iterate = old->has_iterate;
+      contact.last_slip = old->last_slip;
+      contact.last_force = old->last_force;
+      contact.last_stiffness = old->last_stiffness;
       ++old;
+    }
   }
   for (; old != lagged.end(); ++old)
     change = std::max(change, old->force.norm());

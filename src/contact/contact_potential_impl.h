@@ -25,8 +25,10 @@ public:
     Eigen::Vector3d material;          ///< in the solid's frame
     Eigen::Vector3d position, force;   ///< normal force on u
     double friction;
-    Eigen::Vector3d last_slip = Eigen::Vector3d::Zero();
-    bool reversed = false;   ///< its slip has changed direction from one iterate to the next
+    /// Slip, force over the largest one, and its derivative at the iterate before. None before the first one.
+    bool has_iterate = false;
+    Eigen::Vector3d last_slip = Eigen::Vector3d::Zero(), last_force = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d last_stiffness = Eigen::Matrix3d::Zero();
   };
 
   Impl(ContactSurface surface, const ContactOptions& options);

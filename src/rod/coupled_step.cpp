@@ -264,10 +264,7 @@ NewtonResult CoupledSystem::solveStage(const StepPlan& plan, std::size_t s, doub
   // friction sticks below a speed over the whole step: in cut steps that range would become too narrow to find
   contact_->begin(points_base_, solids_base_, duration_);
   if (s == 0)
-  {
-    contact_->evaluate(points_base_, solids_base_, false);
     coupled_.takeFirst(contact_->terms(), nullptr, contact_->rows());
-  }
   return minimizeConfined(*this, (t + before * h) / duration_, (t + now * h) / duration_, newton,
                           model_.contact.options.gap / least_edge_);
 }

@@ -175,7 +175,6 @@ bool ThreadContact::load(double from, double h)
   coupled_.points.resize(count);
   coupled_.solid_moves.assign(solids_.size(), 0);
   mapUnknowns();
-  contact_.evaluate(points_base_, solids_base_, false);
   if (merges_)
     merging_.evaluate(points_base_, false);
   coupled_.takeFirst(contact_.terms(), attractions(), contact_.rows());

@@ -253,6 +253,38 @@ TEST(ContactFriction, SticksAndSlipsAsCoulombSays)
   EXPECT_GT(potential.lagFriction(), 0.1);
 }
 
+/// A contact that needs three quarters of the largest friction, from a slip that is far too large.
+TEST(ContactFriction, NewtonFindsTheNarrowRangeInWhichAContactSticks)
+{
+  constexpr double kStep = 0.01, kFriction = 0.4;
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;
+  addCurve(surface, x, line({0, 0, kRadius + 0.008}, {0.3, 0, 0}, 1), kRadius, kFriction);
+  surface.solids.push_back({Plane{}, kFriction, {}});
+  const std::vector<Pose> solids(1);
+  ContactPotential potential(surface, options());
+  potential.begin(x, solids, kStep);
+  potential.evaluate(x, solids, false);
+  const double most = kFriction * potential.terms()[0].force.norm(), full = options().slip_speed * kStep;
+  const double spring = most / (1e4 * full);   // a body that is easily moved
+  const Eigen::Vector3d side(0.6, 0.8, 0);
+  double slip = 50.0 * full, unbalanced = most;
+  int iterations = 0;
+  for (; iterations < 100; ++iterations)
+  {
+    potential.evaluate(x.colwise() + slip * side, solids, true);
+    const ContactTerm& term = potential.terms().back();
+    unbalanced = term.force.dot(side) + 0.75 * most - spring * slip;
+    if (std::abs(unbalanced) < 1e-6 * most)   // slips are 1e-6 m of coordinates of 0.1 m
+      break;
+    const Eigen::Matrix3d stiffness = term.stiffness.selfadjointView<Eigen::Lower>();
+    slip += unbalanced / (side.dot(stiffness * side) + spring);
+  }
+  EXPECT_LE(iterations, 10);   // with the secant after a jump 39
+  EXPECT_LT(std::abs(unbalanced), 1e-6 * most);
+  EXPECT_NEAR(slip, 0.5 * full, 1e-3 * full);   // the force of which is three quarters
+}
+
 TEST(ContactForces, FrictionBetweenRodsIsTheGradient)
 {
   Rods rods = stacked({0.05, 0.01, 2 * kRadius + 0.006}, {0.8, 0.3, 0.001}, 0.5);
