@@ -152,7 +152,7 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
   double t = 0.0, goal = 0.0;
   for (int k = 0; k < kMaxAdvances; ++k)
   {
-    const Pose pose = motion.at(t);
+    const Pose pose = k == 0 ? motion.from : motion.at(t);
     const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
     Eigen::Vector3d r[2], rate[2], z[2];
     double speed = 0.0, acceleration = 0.0;
@@ -164,6 +164,12 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
       z[i] = to_solid * r[i];
       speed = std::max({speed, rate[i].norm(), (v[i] - motion.turn.cross(r_end)).norm()});
       acceleration = std::max(acceleration, spin * (2.0 * v[i].norm() + spin * std::max(r[i].norm(), r_end.norm())));
+    }
+    if (k == 0)
+    {
+      const double least = leastDistance(piece, z[0], z[1]) - limit.thickness;
+      if (least > 0.0 && least - limit.kept * std::min(least, limit.reach) >= speed)
+        return 1.0;
     }
     const SegmentPieceDistance nearest = segmentPieceDistance(piece, z[0], z[1]);
     const double gap = nearest.distance - limit.thickness;

@@ -159,9 +159,8 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
   const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a) - pose.position),
                         b = to_solid * Eigen::Vector3d(x.col(s.b) - pose.position);
-  const double middle = pieceDistance(piece, 0.5 * (a + b), Eigen::Vector3d::Zero()).distance;
   const double radius = thicknessOf(on);
-  if (middle > 0.5 * (b - a).norm() + radius + options.gap)
+  if (leastDistance(piece, a, b) > radius + options.gap)
     return 0.0;
   SoftGap gap = softGap(a, b, radius, piece);
   const Eigen::Vector3d foot = a + gap.t * (b - a) - (gap.gap / gap.weight + radius) * gap.normal;

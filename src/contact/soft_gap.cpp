@@ -95,6 +95,12 @@ struct OnSegments
 
 }   // namespace
 
+double leastDistance(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b)
+{
+  const PieceDistance middle = pieceDistance(piece, 0.5 * (a + b), Eigen::Vector3d::Zero());
+  return middle.distance > 0.0 ? std::max(0.0, middle.distance - 0.5 * std::abs(middle.normal.dot(b - a))) : 0.0;
+}
+
 SegmentPieceDistance segmentPieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b)
 {
   const AlongSegment at = minimiseAlong(piece, a, b, 0.0, 0.0);

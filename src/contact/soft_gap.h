@@ -25,6 +25,10 @@ namespace slender {
 
 constexpr double kSoftness = 0.32;   ///< c
 
+/// A lower bound of the distance [m] of a segment from a convex piece, from the plane that separates the piece from the
+/// middle of the segment. 0 where the middle is inside.
+double leastDistance(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
 /// Where a segment's point a + t (b - a) is nearest to a convex piece.
 struct SegmentPieceDistance
 {

@@ -117,5 +117,24 @@ TEST(SoftGap, OfSolidsIsTheOnlyMinimum)
   EXPECT_GT(free, 1000);
 }
 
+TEST(SoftGap, LeastDistanceIsBelowTheDistance)
+{
+  const Triangle triangle{Vector(-0.3, -0.2, 0.1), Vector(0.4, -0.1, 0.0), Vector(0.0, 0.5, -0.1)};
+  const std::vector<ConvexPiece> pieces{
+      Plane{}, Sphere{0.3}, Box{{0.4, 0.3, 0.6}}, Cylinder{0.3, 0.5}, Capsule{0.02, 0.5}, triangle};
+  Random random(7);
+  int close = 0;
+  for (const ConvexPiece& piece : pieces)
+    for (int k = 0; k < 1000; ++k)
+    {
+      const Vector a = random.uniform(0.0, 1.5) * random.direction(), b = a + 0.2 * random.direction();
+      const double distance = segmentPieceDistance(piece, a, b).distance, least = leastDistance(piece, a, b);
+      EXPECT_GE(least, 0.0);
+      EXPECT_LE(least, std::max(0.0, distance) + 1e-12);
+      close += distance > 0.0 && least > 0.8 * distance;
+    }
+  EXPECT_GT(close, 2500);   // of 6000: it is of use
+}
+
 }   // namespace
 }   // namespace slender::test
