@@ -66,7 +66,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     if (approach == Approach::arrived)
       break;
     // what is in the way gives way, then on from there
-    system.contact().stiffen(solve(loose, 0.1));
+    system.contact()->stiffen(solve(loose, 0.1));
     system.accept();
     from = reached;
     system.placeHeld(to);
@@ -79,10 +79,10 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
       total.failure = StepFailure::interrupted;
       return total;
     }
-    const bool softer = system.contact().stiffen(good);
+    const bool softer = system.contact()->stiffen(good);
     if (!good && !(softer && ++failures <= kMaxFailures))
       return total;
-    if (good && !softer && (system.contact().lagFriction() < kLagTolerance || k >= kMaxSolutions))
+    if (good && !softer && (system.contact()->lagFriction() < kLagTolerance || k >= kMaxSolutions))
       return total;
     system.accept();
   }

@@ -342,6 +342,7 @@ ContactPotential::ContactPotential(ContactSurface surface, const ContactOptions&
 
 ContactPotential::~ContactPotential() = default;
 ContactPotential::ContactPotential(ContactPotential&&) noexcept = default;
+const ContactOptions& ContactPotential::options() const { return impl_->options; }
 
 void ContactPotential::setCurves(int points, const std::vector<ContactSegment>& segments,
                                  const std::vector<ContactObject>& objects)

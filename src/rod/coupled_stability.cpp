@@ -1,6 +1,7 @@
 // Whether an equilibrium of coupled rods, bodies and contact is stable.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "coupled_system.h"
@@ -11,60 +12,58 @@ namespace slender {
 void CoupledSystem::beginStability(const RodGroupState& state, const RodGroupInputs& inputs)
 {
   begin(state, inputs, 1.0);
-  coupled_.exact = true;
-  for (RodPart& part : parts_)
+  for (std::size_t r = 0; r < rods_.size(); ++r)
   {
-    part.rod->begin(state.rods[part.index]);
-    part.rod->system.leaveOutStretching(false);
-    part.rod->system.load(part.rod->work);
-    part.rod->system.setResponse(0.0, nullptr);
-    mapUnknowns(part);
-    part.rod->placeAt(inputs.rods[part.index], 1.0, 1.0);
+    RodStepper::Impl& rod = rods_[r]->rod();
+    rod.begin(state.rods[r]);
+    rod.system.leaveOutStretching(false);
+    rod.system.load(rod.work);
+    rod.system.setResponse(0.0, nullptr);
   }
   for (std::size_t b = 0; b < model_.bodies.size(); ++b)
-    if (simulated_[b] >= 0)
-      bodies_[simulated_[b]].load(state.bodies[b]);
-  placeDriven(1.0);
-  placeWelds();
-  if (contact_)
+    if (simulated_[b])
+      simulated_[b]->system.load(state.bodies[b]);
+  island_.place(1.0);
+  island_.beginSubstep(1.0);
+  island_.setExact(true);
+  if (hasContact())
   {
-    contact_->setStiffness(stiffness_now_);
-    gather(points_base_, solids_base_);
+    island_.contact()->setStiffness(stiffness_now_);
     // Friction sticks below its slip speed over the whole step. In a step without end nothing sticks.
     constexpr double kForever = 1e15;
-    contact_->begin(points_base_, solids_base_, kForever);
+    island_.contact()->begin(island_.startPoints(), island_.startSolids(), kForever);
   }
   energyAt(0.0);
-  accept();
+  island_.accept();
 }
 
 RodEvaluation CoupledSystem::energyAt(double s)
 {
-  for (RodPart& part : parts_)
+  for (const auto& part : rods_)
   {
-    RodSystem& system = part.rod->system;
-    for (int i = 0; i < part.rod->model->nodes(); ++i)
-      system.setInertia(i, system.isMoving(i) ? s * part.rod->model->mass[i] : 0.0, system.position(i),
-                        part.rod->load(inputs_->rods[part.index], i));
+    RodStepper::Impl& rod = part->rod();
+    for (int i = 0; i < rod.model->nodes(); ++i)
+      rod.system.setInertia(i, rod.system.isMoving(i) ? s * rod.model->mass[i] : 0.0, rod.system.position(i),
+                            rod.load(part->inputs(), i));
   }
-  for (BodySystem& body : bodies_)
-    body.hold(s, inputs_->gravity);
-  return evaluate(false);
+  for (const auto& body : bodies_)
+    body->system.hold(s, inputs_->gravity);
+  return island_.evaluate(false);
 }
 
 bool CoupledSystem::definite(double s)
 {
   energyAt(s);
-  return evaluate(true).inertia.positiveDefinite();
+  return island_.evaluate(true).inertia.positiveDefinite();
 }
 
 double CoupledSystem::neutralBand() const
 {
   double mass = 0.0, length = 0.0, stiffness = std::numeric_limits<double>::infinity(), rounding = 0.0,
          least_mass = stiffness;
-  for (const RodPart& part : parts_)
+  for (const auto& rod : model_.rods)
   {
-    const RodModel& m = *part.rod->model;
+    const RodModel& m = *rod;
     mass += m.totalMass();
     length = std::max(length, m.rest_length.sum());
     stiffness = std::min(
@@ -74,13 +73,12 @@ double CoupledSystem::neutralBand() const
           rounding, 4 * m.stretch_modulus[j] / (m.rest_length[j] * std::min(m.mass[j], m.mass[(j + 1) % m.nodes()])));
     least_mass = std::min(least_mass, m.mass.minCoeff());
   }
-  for (const BodySystem& body : bodies_)
-    mass += body.model().mass;
-  if (contact_)
-    for (const ContactTerm& term : contact_->terms())
-      rounding = std::max(rounding, 4 * term.stiffness.norm() / least_mass);
+  for (const auto& body : bodies_)
+    mass += body->system.model().mass;
+  for (const ContactTerm& term : contacts())
+    rounding = std::max(rounding, 4 * term.stiffness.norm() / least_mass);
   // as for a single rod: the bending stiffness of the longest rod, and rounding errors of the largest entries
-  const double bending = parts_.empty() ? 0.0 : stiffness / (mass * std::pow(length, 3));
+  const double bending = rods_.empty() ? 0.0 : stiffness / (mass * std::pow(length, 3));
   constexpr double kLeast = 1e-12;   // [1/s^2] of bodies on their own: a period of twelve days
   return std::max(kLeast, kNeutralShare * bending + 2.0 * std::numeric_limits<double>::epsilon() * rounding);
 }
@@ -91,81 +89,98 @@ void CoupledSystem::findLowestMode()
   const auto start = [](std::size_t k) {
     return std::sin(1.0 + 1.7 * static_cast<double>(k)) + 0.5 * std::cos(0.3 * static_cast<double>(k));
   };
-  Eigen::Map<Eigen::VectorXd> shared(coupled_.matrix.solution(), coupled_.matrix.unknowns());
+  CouplingMatrix& matrix = island_.matrix();
+  Eigen::Map<Eigen::VectorXd> shared(matrix.solution(), matrix.unknowns());
   for (Eigen::Index k = 0; k < shared.size(); ++k)
     shared[k] = start(static_cast<std::size_t>(k));
-  for (RodPart& part : parts_)
-    if (!part.coupled)
-      for (std::size_t d = 0; d < part.dof.size(); ++d)
-        part.rod->system.direction()[d] = part.dof[d] >= 0 ? start(d) : 0.0;
-  const auto own = [](RodPart& part) {
-    return Eigen::Map<Eigen::VectorXd>(part.rod->system.direction(), static_cast<Eigen::Index>(part.dof.size()));
-  };
+  std::vector<Eigen::Map<Eigen::VectorXd>> own;   // of the parts that solve on their own, each with
+  std::vector<std::function<void()>> solve;       // its solution
+  for (const auto& rod : rods_)
+    if (!rod->coupled)
+    {
+      RodSystem& system = rod->rod().system;
+      own.emplace_back(system.direction(), 4 * system.nodes());
+      for (int u = 0; u < 4 * system.nodes(); ++u)
+        own.back()[u] = rod->isUnknown(u) ? start(static_cast<std::size_t>(u)) : 0.0;
+      solve.emplace_back([&system] { system.solveFor(system.direction()); });
+    }
+  for (const auto& body : bodies_)
+    if (!body->coupled)
+    {
+      own.emplace_back(body->direction.data(), 6);
+      for (int u = 0; u < 6; ++u)
+        own.back()[u] = start(static_cast<std::size_t>(u));
+      solve.emplace_back([&body] { body->solveFor(body->direction); });
+    }
   for (int k = 0; k < 12; ++k)
   {
     double square = shared.squaredNorm();
-    for (RodPart& part : parts_)
-      square += part.coupled ? 0.0 : own(part).squaredNorm();
+    for (const auto& v : own)
+      square += v.squaredNorm();
     const double scale = 1.0 / std::sqrt(std::max(square, 1e-300));
     shared *= scale;
-    coupled_.matrix.solve();
-    for (RodPart& part : parts_)
-      if (!part.coupled)
-      {
-        own(part) *= scale;
-        part.rod->system.solveFor(part.rod->system.direction());
-      }
+    matrix.solve();
+    for (std::size_t p = 0; p < own.size(); ++p)
+    {
+      own[p] *= scale;
+      solve[p]();
+    }
   }
-  for (std::size_t b = 0; b < bodies_.size(); ++b)
-    body_direction_[b] = bodySolution(b);
-  spread();
+  island_.spread();
+  scaleMode();
+}
+
+/// Nothing turns by more than 1 rad. A mode that moves everything as a whole turns nothing.
+void CoupledSystem::scaleMode()
+{
   double turn = 0.0, move = 0.0, length = 0.0;
-  for (RodPart& part : parts_)
+  const auto directionOf = [](const RodPart& part) {
+    return Eigen::Map<Eigen::Matrix4Xd>(part.rod().system.direction(), 4, part.rod().model->nodes());
+  };
+  for (const auto& part : rods_)
   {
-    const Eigen::Map<Eigen::Matrix4Xd> v(part.rod->system.direction(), 4, part.rod->model->nodes());
-    const RodModel& m = *part.rod->model;
+    const Eigen::Map<Eigen::Matrix4Xd> v = directionOf(*part);
+    const RodModel& m = *part->rod().model;
     for (int j = 0; j < m.edges(); ++j)
       turn = std::max(
           {turn, (v.col((j + 1) % m.nodes()) - v.col(j)).head<3>().norm() / m.rest_length[j], std::abs(v(3, j))});
     move = std::max(move, v.topRows<3>().cwiseAbs().maxCoeff());
     length = std::max(length, m.rest_length.sum());
   }
-  for (const BodySystem::Vector6& d : body_direction_)
-    turn = std::max(turn, d.tail<3>().norm());
-  // a mode that moves everything as a whole turns nothing
+  for (const auto& body : bodies_)
+    turn = std::max(turn, body->direction.tail<3>().norm());
   const double scale = std::max({turn, length > 0 ? move / length : 0.0, 1e-300});
-  for (RodPart& part : parts_)
-    own(part) /= scale;
-  for (BodySystem::Vector6& d : body_direction_)
-    d /= scale;
+  for (const auto& part : rods_)
+    directionOf(*part) /= scale;
+  for (const auto& body : bodies_)
+    body->direction /= scale;
 }
 
 bool CoupledSystem::displaceAlongMode(double alpha, RodGroupState& state)
 {
-  moveAlong(alpha);
-  if (contact_)
+  island_.moveAlong(alpha);
+  if (hasContact())
   {
-    gather(points_end_, solids_end_);
-    const double room = contact_->stepLimit(points_base_, points_end_, solids_base_, solids_end_);
+    const double room = island_.roomToTrial();
     constexpr double kTooLittle = 1e-3;   // contact is in the way of this direction
     if (room < kTooLittle)
       return false;
-    moveAlong(room * alpha);
+    island_.moveAlong(room * alpha);
   }
-  const RodEvaluation at = evaluate(false);
+  const RodEvaluation at = island_.evaluate(false);
   if (!std::isfinite(at.energy()) || at.min_chi <= kFoldedChi)
     return false;
-  for (RodPart& part : parts_)
+  for (std::size_t r = 0; r < rods_.size(); ++r)
   {
-    RodState& rod = state.rods[part.index];
-    part.rod->system.store(rod);
+    RodState& rod = state.rods[r];
+    rods_[r]->rod().system.store(rod);
     for (std::size_t k = 0; k < rod.grasps.size(); ++k)
       if (rod.grasps[k].active)
-        rod.grasps[k].X_WG = part.rod->stage_poses[k];
+        rod.grasps[k].X_WG = rods_[r]->rod().stage_poses[k];
   }
   for (std::size_t b = 0; b < model_.bodies.size(); ++b)
-    if (simulated_[b] >= 0)
-      state.bodies[b].X_WB = bodies_[simulated_[b]].pose;
+    if (simulated_[b])
+      state.bodies[b].X_WB = simulated_[b]->pose();
   return true;
 }
 

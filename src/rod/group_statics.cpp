@@ -199,7 +199,7 @@ StepReport RodGroup::solveEquilibrium(RodGroupState& state, const RodGroupInputs
   time.newton.max_iterations = std::max(60, time.newton.max_iterations);
   time.newton.tolerance = std::min(1e-7, time.newton.tolerance);
   Impl settling(impl_->model, time);
-  settling.loop->coupled()->threads = impl_->threads;
+  settling.loop->coupled()->setThreads(impl_->threads);
   const StepReport report = settling.solveEquilibrium(state, inputs, leave_saddles);
   for (std::size_t r = 0; r < impl_->rods.size(); ++r)
     impl_->rods[r]->wrenches = settling.rods[r]->wrenches;

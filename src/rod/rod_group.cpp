@@ -50,6 +50,9 @@ Weld makeWeld(RodGroupModel& model, RodGroupState& state, int rod, int first_nod
 RodGroup::RodGroup(RodGroupModel model, const TimeConfig& time)
 {
   check(model, time.integrator);
+  // the points of contact are those of the rods, in their order
+  std::sort(model.contact.rods.begin(), model.contact.rods.end(),
+            [](const GroupContact::Rod& a, const GroupContact::Rod& b) { return a.rod < b.rod; });
   impl_ = std::make_unique<Impl>(std::move(model), time);
 }
 RodGroup::~RodGroup() = default;
@@ -139,7 +142,7 @@ void RodGroup::setThreads(int threads)
 {
   impl_->threads = threads;
   if (CoupledSystem* coupled = impl_->loop->coupled())
-    coupled->threads = threads;
+    coupled->setThreads(threads);
 }
 
 }   // namespace slender

@@ -14,11 +14,6 @@
 
 namespace slender {
 
-/// Pose (and velocity) at a fraction s of a motion from `start` to a target: uniform, or a cubic through both ends'
-/// velocities.
-Pose poseBetween(const Pose& start, const Twist& start_velocity, const GraspTarget& target, double duration, double s,
-                 Twist* velocity);
-
 /// One rod's part in a step and its work space, which is reused from step to step. StepLoop runs one or several of
 /// them.
 class RodStepper::Impl

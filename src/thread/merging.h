@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "../contact/island_system.h"
 
 namespace slender {
 
@@ -25,7 +25,7 @@ struct MergingFluid
 ///   W(d) = 2 pi gamma r d + (4 pi mu / 3 h) int_d0^d rho(s) (s - d0) ds,
 ///
 /// convex for all d < d0. The attraction sets in over the gap of the contact.
-class MergingPotential
+class MergingPotential : public SurfacePotential
 {
 public:
   /// Finds what merges in a step of h seconds. `radii`, of the segments as they are; `pairs` of segments near each
@@ -39,8 +39,8 @@ public:
     terms_.clear();
   }
   /// Potential [J] and terms(), as ContactPotential::evaluate().
-  double evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness);
-  const std::vector<ContactTerm>& terms() const { return terms_; }
+  double evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness) override;
+  const std::vector<ContactTerm>& terms() const override { return terms_; }
   double largestAttraction() const;   ///< of a place [N]
 
 private:

@@ -15,7 +15,7 @@ namespace {
 class ThreadSubsteps : public SubstepEquations
 {
 public:
-  ThreadSubsteps(const ThreadPart* parts, int count, double duration, ThreadContact* contact)
+  ThreadSubsteps(const SteppedThread* parts, int count, double duration, ThreadContact* contact)
     : parts_(parts),
       end_(parts + count),
       duration_(duration),
@@ -31,19 +31,19 @@ public:
   void refuse(const Substep& substep, StepFailure failure, StepReport& report) override;
 
 private:
-  const ThreadPart* farthestFromBalance() const;
+  const SteppedThread* farthestFromBalance() const;
 
-  const ThreadPart *parts_, *end_;
+  const SteppedThread *parts_, *end_;
   double duration_;
   ThreadContact* contact_;
-  const ThreadPart* failed_;   ///< part that the last failure is about
+  const SteppedThread* failed_;   ///< part that the last failure is about
 };
 
 /// The part on which the largest unbalanced force acts.
-const ThreadPart* ThreadSubsteps::farthestFromBalance() const
+const SteppedThread* ThreadSubsteps::farthestFromBalance() const
 {
   Largest force;
-  for (const ThreadPart* p = parts_; p != end_; ++p)
+  for (const SteppedThread* p = parts_; p != end_; ++p)
     if (const Largest own = p->thread->unbalancedForce(); own.any())
       force.add(static_cast<int>(p - parts_), own.value());
   return parts_ + std::max(force.index(), 0);
@@ -63,7 +63,7 @@ StepFailure ThreadSubsteps::attempt(const Substep& substep, StepReport& report)
     failed_ = farthestFromBalance();
     return failure;
   }
-  for (const ThreadPart* p = parts_; p != end_; ++p)
+  for (const SteppedThread* p = parts_; p != end_; ++p)
     p->thread->takeOver(h);
   for (failed_ = parts_; failed_ != end_; ++failed_)
   {
@@ -89,7 +89,7 @@ bool ThreadSubsteps::mend(StepReport& report)
   constexpr int kMostFolds = 20;   // in one step
   if (report.mended_folds >= kMostFolds)
     return false;
-  for (const ThreadPart* p = parts_; p != end_; ++p)
+  for (const SteppedThread* p = parts_; p != end_; ++p)
     if (const int fold = p->thread->foldedNode(); fold >= 0 && mendFold(p->thread->work, fold, contact_))
     {
       ++report.mended_folds;
@@ -109,12 +109,12 @@ void ThreadSubsteps::refuse(const Substep& substep, StepFailure failure, StepRep
 
 }   // namespace
 
-StepReport advanceThreads(const ThreadPart* parts, int count, double duration, ThreadContact* contact)
+StepReport advanceThreads(const SteppedThread* parts, int count, double duration, ThreadContact* contact)
 {
   StepReport report;
-  const ThreadPart* const end = parts + count;
+  const SteppedThread* const end = parts + count;
   double longest = duration;
-  for (const ThreadPart* p = parts; p != end; ++p)
+  for (const SteppedThread* p = parts; p != end; ++p)
   {
     if (!p->thread->begin(*p->state, *p->inputs, duration, report))
       return report;
@@ -127,7 +127,7 @@ StepReport advanceThreads(const ThreadPart* parts, int count, double duration, T
   SubstepController(rule).run(substeps, duration, report);
   if (!report.ok)
     return report;
-  for (const ThreadPart* p = parts; p != end; ++p)
+  for (const SteppedThread* p = parts; p != end; ++p)
     std::swap(*p->state, p->thread->work);
   return report;
 }

@@ -6,7 +6,8 @@ namespace slender {
 
 class ThreadContact;
 
-struct ThreadPart
+/// A thread in a step, its state and its inputs.
+struct SteppedThread
 {
   ThreadStepper::Impl* thread;
   ThreadState* state;
@@ -15,6 +16,6 @@ struct ThreadPart
 
 /// Advances threads together by `duration` [s], in substeps common to all. `contact` (null: a single thread that
 /// touches nothing) solves their equations. On failure the states are untouched and the report says why.
-StepReport advanceThreads(const ThreadPart* parts, int count, double duration, ThreadContact* contact);
+StepReport advanceThreads(const SteppedThread* parts, int count, double duration, ThreadContact* contact);
 
 }   // namespace slender

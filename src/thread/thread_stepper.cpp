@@ -54,7 +54,7 @@ ThreadStepper& ThreadStepper::operator=(ThreadStepper&&) noexcept = default;
 
 StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, double duration)
 {
-  const ThreadPart part{impl_.get(), &state, &inputs};
+  const SteppedThread part{impl_.get(), &state, &inputs};
   return advanceThreads(&part, 1, duration, nullptr);
 }
 const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return impl_->loads; }

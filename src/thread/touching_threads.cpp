@@ -23,7 +23,7 @@ public:
   ThreadContact contact;
   std::vector<std::vector<std::unique_ptr<ThreadStepper::Impl>>> pool;   ///< per thread of the model and part of it
   std::vector<ThreadContact::Thread> threads;
-  std::vector<ThreadPart> parts;
+  std::vector<SteppedThread> parts;
   std::vector<ThreadInputs> still;   ///< inputs without flow
   std::vector<Eigen::Vector3d> belts;
   std::vector<std::array<EndLoad, 2>> loads;

@@ -117,6 +117,7 @@ public:
   ContactPotential(ContactSurface surface, const ContactOptions& options);
   ~ContactPotential();
   ContactPotential(ContactPotential&&) noexcept;
+  const ContactOptions& options() const;
 
   /// Other points, segments and objects (sound ones) from now on; the solids stay. For curves that are fed and divided
   /// while they move.

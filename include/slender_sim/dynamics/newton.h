@@ -28,7 +28,7 @@ constexpr double kFoldedChi = 1.5e-3;
 /// Minimises a system's energy by Newton's method from its trial configuration.
 ///
 /// System offers evaluate(with_hessian, shift), solve(), moveAlong(alpha), accept(), saveBase(), restoreBase() and
-/// the measures used below (see RodSystem and CoupledSystem). A Hessian with negative eigenvalues (known from the
+/// the measures used below (see RodSystem and IslandSystem). A Hessian with negative eigenvalues (known from the
 /// inertia of its LDL^T) is shifted by a positive diagonal until it is definite, so that the direction descends. Steps
 /// are accepted by a watchdog [Nocedal & Wright, Numerical Optimization, 15.6]: nearly inextensible bodies gain a
 /// little stretching energy in every full step that turns them, and a strict line search would creep. Full steps may
@@ -97,7 +97,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       const double residual = system.residual();
       result.residual = residual / system.forceScale();
       result.max_strain = trial.max_strain;
-      const bool balanced = result.residual <= System::mostUnbalanced() || residual <= system.noiseLevel();
+      const bool balanced = result.residual <= system.mostUnbalanced() || residual <= system.noiseLevel();
       if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi && balanced)
         return result;
     }

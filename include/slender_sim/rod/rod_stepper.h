@@ -5,18 +5,12 @@
 #include <vector>
 
 #include "slender_sim/dynamics/step_report.h"
+#include "slender_sim/geometry/pose_motion.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/rod/rod_state.h"
 #include "slender_sim/dynamics/time_config.h"
 
 namespace slender {
-
-/// Where a grasp shall be at the end of the step. Without a velocity the motion inside the step is uniform.
-struct GraspTarget
-{
-  Pose X_WG;
-  std::optional<Twist> velocity;
-};
 
 /// Inputs of one rod, latched once per step. `grasps` is as long as RodState::grasps (entries of inactive grasps are
 /// ignored).

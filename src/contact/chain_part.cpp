@@ -1,0 +1,151 @@
+#include "chain_part.h"
+
+namespace slender {
+
+void ChainPart::numberFree()
+{
+  unknowns_ = 0;
+  for (int& number : dof_)
+    if (number >= 0)
+      number = unknowns_++;
+}
+
+void ChainPart::retreat(double share)
+{
+  for (int i = 0; i < system_.nodes(); ++i)
+    if (system_.isFree(i))
+    {
+      const Eigen::Vector3d base = system_.basePosition(i);
+      system_.setPosition(i, base + share * (system_.position(i) - base));
+    }
+}
+
+/// Adds a stiffness between a node and the next one to the panels. The panel of the first node has room for both.
+void ChainPart::addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness)
+{
+  const int node[2] = {nodeOf(point[0] - first_point), nodeOf(point[1] - first_point)};
+  RodPanel* const panels = system_.panels();
+  for (int p = 0; p < 2; ++p)
+    if (node[p] >= 0)
+      for (int c = 0; c < 3; ++c)
+        for (int r = c; r < 3; ++r)
+          panels[node[p]].diag[c][r] += weight[p] * weight[p] * stiffness(r, c);
+  if (node[0] >= 0 && node[1] >= 0)
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r)
+        panels[node[0]].below[c][r] += weight[0] * weight[1] * stiffness(r, c);
+}
+
+/// Contacts with solids have no indefinite second derivatives, so that the whole of them goes into the band.
+void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
+{
+  const bool alone = !coupled && own_terms.empty();
+  evaluation = alone ? system_.evaluate(with_hessian, shift) : system_.evaluateWhole(with_hessian);
+  if (alone || coupled)
+    return;
+  for (const ContactTerm* term : own_terms)
+  {
+    for (int p = 0; p < 2; ++p)
+      addForce(term->point[p] - first_point, term->weight[p] * term->force);
+    if (with_hessian)
+      addToPanels(term->point, term->weight, term->stiffness);
+  }
+  if (!with_hessian)
+  {
+    system_.closeGradient();
+    return;
+  }
+  for (const ContactRow* row : own_rows)
+    addToPanels(row->point, row->along, row->stiffness * row->normal * row->normal.transpose());
+  evaluation.inertia = system_.factorWhole(shift);
+}
+
+// ---- the matrix of the island
+
+/// Calls f(a, b) for every place of the panels, row after row of each column: with the numbers in the part of its two
+/// unknowns, or with kPrescribed twice where one of them has no number.
+template <class F>
+void ChainPart::forPanels(F&& f) const
+{
+  for (int i = 0; i < system_.nodes(); ++i)
+    for (int c = 0; c < 4; ++c)
+      for (int r = c; r < ChainSystem::kPanelRows; ++r)
+      {
+        const int a = dof_[4 * i + c], at = system_.panelUnknown(i, r), b = at < 0 ? kPrescribed : dof_[at];
+        a < 0 || b < 0 ? f(kPrescribed, kPrescribed) : f(a, b);
+      }
+}
+
+void ChainPart::notePattern(CouplingMatrix& matrix)
+{
+  forPanels([&](int a, int b) {
+    if (a >= 0)
+      matrix.note(offset + a, offset + b);
+  });
+}
+
+void ChainPart::findEntries(const CouplingMatrix& matrix)
+{
+  entries_.clear();
+  forPanels([&](int a, int b) { entries_.push_back(a < 0 ? -1 : matrix.index(offset + a, offset + b)); });
+}
+
+void ChainPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
+{
+  double* const values = matrix.values();
+  const RodPanel* panels = system_.panels();
+  const int* entry = entries_.data();
+  for (int i = 0; i < system_.nodes(); ++i)
+  {
+    const auto shifts = system_.diagonalShift(i, shift);
+    for (int c = 0; c < 4; ++c)
+      for (int r = c; r < ChainSystem::kPanelRows; ++r, ++entry)
+        if (*entry >= 0)
+          values[*entry] += ChainSystem::panelEntry(panels[i], c, r) + (r == c ? shifts[c == 3] : 0.0);
+  }
+}
+
+void ChainPart::takeGradient(double* right) const
+{
+  for (std::size_t u = 0; u < dof_.size(); ++u)
+    if (dof_[u] >= 0)
+      right[offset + dof_[u]] = -system_.gradient()[u];
+}
+
+void ChainPart::takeDirection(const double* solution)
+{
+  for (std::size_t u = 0; u < dof_.size(); ++u)
+    system_.direction()[u] = dof_[u] < 0 ? 0.0 : solution[offset + dof_[u]];
+}
+
+// ---- contact
+
+int ChainPart::base(int point) const
+{
+  const int node = nodeOf(point);
+  if (node < 0)
+    return kPrescribed;
+  const int number = dof_[4 * node];
+  return number < 0 ? number : offset + number;
+}
+
+void ChainPart::addColumns(int point, int component, double weight, Columns& row) const
+{
+  if (const int first = base(point); first >= 0)
+    row.push(first + component, weight);
+}
+
+void ChainPart::addForce(int point, const Eigen::Vector3d& force)
+{
+  if (const int node = nodeOf(point); node >= 0)
+    Eigen::Map<Eigen::Vector3d>(system_.gradient() + 4 * node) -= force;
+}
+
+Eigen::Vector3d ChainPart::move(int point) const
+{
+  const int node = nodeOf(point);
+  return node < 0 ? Eigen::Vector3d(Eigen::Vector3d::Zero())
+                  : Eigen::Vector3d(Eigen::Map<const Eigen::Vector3d>(system_.direction() + 4 * node));
+}
+
+}   // namespace slender

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <vector>
+
+#include "part.h"
+#include "slender_sim/dynamics/chain_system.h"
+
+namespace slender {
+
+/// A chain of nodes as a part of an island. Its own matrix is a band. What rods and threads do in different ways is left
+/// to the classes that derive from this one.
+class ChainPart : public Part
+{
+public:
+  explicit ChainPart(ChainSystem& system) : system_(system) {}
+
+  int unknowns() const override { return unknowns_; }
+
+  void moveAlong(double alpha) override { system_.moveAlong(alpha); }
+  void accept() override { system_.accept(); }
+  void saveBase() override { system_.saveBase(); }
+  void restoreBase() override { system_.restoreBase(); }
+  void retreat(double share) override;
+
+  void evaluate(bool with_hessian, const HessianShift& shift) override;
+  void closeGradient() override { system_.closeGradient(); }
+  void solve() override { system_.solve(); }
+
+  void notePattern(CouplingMatrix& matrix) override;
+  void findEntries(const CouplingMatrix& matrix) override;
+  void addHessian(CouplingMatrix& matrix, const HessianShift& shift) override;
+  void takeGradient(double* right) const override;
+  void takeDirection(const double* solution) override;
+
+  int base(int point) const override;
+  void addColumns(int point, int component, double weight, Columns& row) const override;
+  void addForce(int point, const Eigen::Vector3d& force) override;
+  Eigen::Vector3d move(int point) const override;
+
+  double stepLimit() const override { return system_.stepLimit(); }
+  double incrementSize(double) const override { return system_.incrementSize(); }
+  double slope() const override { return system_.slope(); }
+  double residual() const override { return system_.residual(); }
+  double forceScale() const override { return system_.forceScale(); }
+  double noiseLevel() const override { return system_.noiseLevel(); }
+
+protected:
+  /// The node of the chain that is a surface point; less than 0: the point is no unknown of the chain.
+  virtual int nodeOf(int point) const = 0;
+  /// Numbers the unknowns whose entry in dof_ is 0, one after the other.
+  void numberFree();
+
+  ChainSystem& system_;
+  /// Per unknown of the chain, four per node: its number within the part, kPrescribed, or less where something else
+  /// carries it.
+  std::vector<int> dof_;
+
+private:
+  template <class F>
+  void forPanels(F&& f) const;
+  void addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness);
+
+  int unknowns_ = 0;
+  /// For every place of the panels: the index of its entry among the values of the island's matrix. -1: the place has no
+  /// entry.
+  std::vector<int> entries_;
+};
+
+}   // namespace slender

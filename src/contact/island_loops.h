@@ -1,0 +1,35 @@
+#pragma once
+
+#include "island_system.h"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+/// Loops over the parts and the contacts of an island. Private to IslandSystem.
+namespace slender {
+
+template <class F>
+void IslandSystem::forParts(F&& f)
+{
+  const int count = static_cast<int>(parts_.size());
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic, 4) if (parallel_ && threads_ != 1) \
+    num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
+#endif
+  for (int k = 0; k < count; ++k)
+    f(*parts_[k]);
+}
+
+template <class F>
+void IslandSystem::forTerms(F&& f) const
+{
+  if (contact_)
+    for (const ContactTerm& term : contact_->terms())
+      f(term);
+  if (attraction_)
+    for (const ContactTerm& term : attraction_->terms())
+      f(term);
+}
+
+}   // namespace slender

@@ -1,0 +1,274 @@
+// Several parts and their contact as one system for Newton's method: forces, the shared matrix, and its solution.
+#include <algorithm>
+
+#include "island_loops.h"
+
+namespace slender {
+
+// ---- contacts of the present trial
+
+void IslandSystem::makeRoom(const ContactTerm& term)
+{
+  const Key key{term.point[0], term.point[1], term.point[2], term.point[3], term.solid};
+  const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
+  if (at != keys_.end() && *at == key)
+    return;
+  keys_.insert(at, key);
+  pattern_valid_ = false;
+}
+
+/// Sorts the contacts by parts, and makes room in the pattern for those that couple unknowns.
+void IslandSystem::take()
+{
+  for (Part* part : parts_)
+  {
+    part->own_terms.clear();
+    part->own_rows.clear();
+  }
+  forTerms([&](const ContactTerm& term) {
+    if (isOwn(term))
+      partOf(term.point[0]).own_terms.push_back(&term);
+    else
+      makeRoom(term);
+  });
+  for (const ContactRow& row : contact_->rows())
+    if (row.point[2] < 0)   // of a segment and a solid
+      partOf(row.point[0]).own_rows.push_back(&row);
+}
+
+/// The same for the first contacts of a substep. The pattern gets room for them alone, so that it follows from the state
+/// and not from the steps before.
+void IslandSystem::takeFirst()
+{
+  const bool valid = pattern_valid_;
+  keys_before_.swap(keys_);
+  keys_.clear();
+  take();
+  pattern_valid_ = valid && keys_ == keys_before_;
+}
+
+void IslandSystem::addForce(const ContactTerm& term)
+{
+  for (int p = 0; p < 4; ++p)
+    if (term.point[p] >= 0)
+    {
+      Part& part = partOf(term.point[p]);
+      part.addForce(term.point[p] - part.first_point, term.weight[p] * term.force);
+    }
+  if (RigidPart* body = bodyOf(term.solid))
+    body->addForceAt(term.position, -term.force);
+}
+
+// ---- the pattern of the matrix
+
+CouplingMatrix::Bases IslandSystem::basesOf(const int (&point)[4]) const
+{
+  CouplingMatrix::Bases bases;
+  for (int p = 0; p < 4; ++p)
+    bases[p] = point[p] < 0 ? Part::kPrescribed : partOf(point[p]).base(point[p] - partOf(point[p]).first_point);
+  return bases;
+}
+
+/// Whether a contact is one of points that do not have three unknowns each: a body carries one of them, or is touched.
+bool IslandSystem::isCarried(const CouplingMatrix::Bases& bases, int solid) const
+{
+  return bodyOf(solid) || std::any_of(bases.begin(), bases.end(), [](int base) { return base < Part::kPrescribed; });
+}
+
+/// Displacement of a contact's points against each other, one row per component.
+void IslandSystem::columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>& rows) const
+{
+  for (int c = 0; c < 3; ++c)
+  {
+    rows[c].count = 0;
+    for (int p = 0; p < 4; ++p)
+      if (term.point[p] >= 0)
+      {
+        const Part& part = partOf(term.point[p]);
+        part.addColumns(term.point[p] - part.first_point, c, term.weight[p], rows[c]);
+      }
+    if (const RigidPart* body = bodyOf(term.solid))
+      body->addColumnsAt(term.position, c, -1.0, rows[c]);
+  }
+}
+
+/// The gap of a pair as the place of contact runs along the pair.
+void IslandSystem::columnsOf(const ContactRow& contact, bool whole, Part::Columns& row) const
+{
+  row.count = 0;
+  for (int p = 0; p < 4; ++p)
+  {
+    if (contact.point[p] < 0)
+      continue;
+    const Part& part = partOf(contact.point[p]);
+    const Eigen::Vector3d weights =
+        contact.along[p] * contact.normal + (whole ? contact.across[p] : 0.0) * contact.turning;
+    for (int c = 0; c < 3; ++c)
+      part.addColumns(contact.point[p] - part.first_point, c, weights[c], row);
+  }
+}
+
+void IslandSystem::buildPattern()
+{
+  for (Part* part : parts_)
+    part->coupled = part->joined();
+  for (const Key& key : keys_)
+  {
+    for (int p = 0; p < 4; ++p)
+      if (key[p] >= 0)
+        partOf(key[p]).coupled = true;
+    if (RigidPart* body = bodyOf(key[4]))
+      body->coupled = true;
+  }
+  int unknowns = 0;
+  for (Part* part : parts_)
+  {
+    part->offset = unknowns;
+    unknowns += part->coupled ? part->unknowns() : 0;
+  }
+  matrix_.begin(unknowns);
+  for (Part* part : parts_)
+    if (part->coupled)
+      part->notePattern(matrix_);
+  for (const Key& key : keys_)
+  {
+    ContactTerm term;
+    std::copy_n(key.begin(), 4, term.point);
+    term.solid = key[4];
+    const CouplingMatrix::Bases bases = basesOf(term.point);
+    if (!isCarried(bases, term.solid))
+    {
+      matrix_.noteBases(bases);
+      continue;
+    }
+    std::array<Part::Columns, 3> rows;
+    columnsOf(term, rows);
+    for (const Part::Columns& a : rows)
+      for (const Part::Columns& b : rows)
+        matrix_.notePairs(a, b);
+  }
+  matrix_.finish();
+  pattern_valid_ = true;
+  for (Part* part : parts_)
+    if (part->coupled)
+      part->findEntries(matrix_);
+}
+
+// ---- the matrix
+
+/// `whole`: with the part of the contacts' second derivatives that may be negative.
+void IslandSystem::assemble(const HessianShift& shift, bool whole)
+{
+  matrix_.clear();
+  for (Part* part : parts_)
+    if (part->coupled)
+      part->addHessian(matrix_, shift);
+  if (!contact_)
+    return;
+  std::array<Part::Columns, 3> rows;
+  forTerms([&](const ContactTerm& term) {
+    if (!partOf(term.point[0]).coupled)
+      return;
+    const CouplingMatrix::Bases bases = basesOf(term.point);
+    if (!isCarried(bases, term.solid))
+    {
+      matrix_.addTerm(term, bases, whole);
+      return;
+    }
+    columnsOf(term, rows);
+    const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
+    for (int c = 0; c < 3; ++c)
+    {
+      matrix_.addSquare(rows[c], stiffness(c, c));
+      for (int d = 0; d < c; ++d)
+        matrix_.addPair(rows[c], rows[d], stiffness(c, d));
+    }
+  });
+  for (const ContactRow& row : contact_->rows())
+  {
+    if (!partOf(row.point[0]).coupled)
+      continue;
+    const CouplingMatrix::Bases bases = basesOf(row.point);
+    if (!isCarried(bases, -1))
+    {
+      matrix_.addRow(row, bases, whole);
+      continue;
+    }
+    columnsOf(row, whole, rows[0]);
+    matrix_.addSquare(rows[0], row.stiffness);
+  }
+}
+
+bool IslandSystem::factor(const HessianShift& shift)
+{
+  const auto assembled = [&](bool whole) { assemble(shift, whole); };
+  return exact_ ? matrix_.factorExactly(assembled)
+                : matrix_.factor(contact_ && !contact_->terms().empty(), assembled);
+}
+
+RodEvaluation IslandSystem::evaluate(bool with_hessian, const HessianShift& shift)
+{
+  RodEvaluation sum;
+  if (contact_)
+  {
+    gather(points_, poses_);
+    sum.potential = contact_->evaluate(points_, poses_, with_hessian);
+    if (!std::isfinite(sum.potential))
+      return sum;
+    if (attraction_)
+      sum.potential += attraction_->evaluate(points_, with_hessian);
+    take();
+  }
+  if (!pattern_valid_)
+    buildPattern();
+  forParts([&](Part& part) { part.evaluate(with_hessian, shift); });
+  for (const Part* part : parts_)
+  {
+    const RodEvaluation& e = part->evaluation;
+    sum.stretch += e.stretch;
+    sum.bend_twist += e.bend_twist;
+    sum.potential += e.potential;
+    sum.min_chi = std::min(sum.min_chi, e.min_chi);
+    sum.max_strain = std::max(sum.max_strain, e.max_strain);
+    if (!part->coupled)
+    {
+      sum.inertia.negative += e.inertia.negative;
+      sum.inertia.zero += e.inertia.zero;
+    }
+  }
+  forTerms([&](const ContactTerm& term) {
+    if (!isOwn(term) || partOf(term.point[0]).coupled)
+      addForce(term);
+  });
+  for (Part* part : parts_)
+    part->passGradient();
+  if (with_hessian && matrix_.unknowns() > 0)
+    sum.inertia.negative += !factor(shift);
+  for (Part* part : parts_)
+    if (part->coupled)
+      part->closeGradient();
+  return sum;
+}
+
+void IslandSystem::solve()
+{
+  for (const Part* part : parts_)
+    if (part->coupled)
+      part->takeGradient(matrix_.solution());
+  matrix_.solve();
+  forParts([](Part& part) {
+    if (!part.coupled)
+      part.solve();
+  });
+  spread();
+}
+
+void IslandSystem::spread()
+{
+  forParts([&](Part& part) {
+    if (part.coupled)
+      part.takeDirection(matrix_.solution());
+  });
+}
+
+}   // namespace slender

@@ -1,0 +1,270 @@
+// Several parts and their contact as one system for Newton's method: what it consists of, and its measures.
+#include "island_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "island_loops.h"
+
+namespace slender {
+
+// ---- what the island consists of
+
+void IslandSystem::setParts(const std::vector<Part*>& parts)
+{
+  pattern_valid_ = pattern_valid_ && parts == parts_;
+  parts_ = parts;
+}
+
+void IslandSystem::setContact(ContactSurface surface, const ContactOptions& options)
+{
+  contact_ = std::make_unique<ContactPotential>(std::move(surface), options);
+  for (auto* poses : {&prescribed_, &poses_, &poses_base_, &poses_end_})
+    poses->resize(solids.size());
+}
+
+void IslandSystem::setThreads(int threads, bool parallel)
+{
+  threads_ = threads;
+  parallel_ = parallel;
+}
+
+void IslandSystem::countPoints()
+{
+  part_of_point_.clear();
+  for (Part* part : parts_)
+  {
+    part->first_point = static_cast<int>(part_of_point_.size());
+    part_of_point_.insert(part_of_point_.end(), static_cast<std::size_t>(part->points()), part);
+  }
+  const auto count = static_cast<Eigen::Index>(part_of_point_.size());
+  for (auto* x : {&points_, &points_base_, &points_end_})
+    if (x->cols() != count)
+      x->resize(3, count);
+}
+
+void IslandSystem::numberUnknowns()
+{
+  for (Part* part : parts_)
+    pattern_valid_ = part->numberUnknowns() && pattern_valid_;
+}
+
+// ---- configurations
+
+void IslandSystem::placeSolids(double fraction, std::vector<Pose>& poses) const
+{
+  for (std::size_t k = 0; k < solids.size(); ++k)
+    if (const IslandSolid& s = solids[k]; !s.body)
+      poses[k] = poseBetween(s.start, s.start_velocity, s.target, duration_, fraction, nullptr) * s.X_BS;
+}
+
+void IslandSystem::gather(Eigen::Matrix3Xd& x, std::vector<Pose>& poses) const
+{
+  for (const Part* part : parts_)
+    part->gather(x);
+  gatherSolids(poses);
+}
+
+void IslandSystem::gatherSolids(std::vector<Pose>& poses) const
+{
+  for (std::size_t k = 0; k < solids.size(); ++k)
+    poses[k] = solids[k].body ? solids[k].body->pose() * solids[k].X_BS : prescribed_[k];
+}
+
+void IslandSystem::place(double fraction)
+{
+  if (contact_)
+    placeSolids(fraction, prescribed_);
+  for (Part* part : parts_)
+    part->placeHeld(fraction);
+  for (Part* part : parts_)
+    part->followJoints();
+}
+
+bool IslandSystem::solidsMove() const
+{
+  return std::any_of(solids.begin(), solids.end(), [](const IslandSolid& s) {
+    return !s.body && (s.start.position != s.target.X_WG.position ||
+                       s.start.orientation.coeffs() != s.target.X_WG.orientation.coeffs() || s.target.velocity);
+  });
+}
+
+// ---- a step
+
+void IslandSystem::beginSubstep(double fraction)
+{
+  exact_ = false;
+  countPoints();
+  numberUnknowns();
+  if (!contact_)
+    return;
+  placeSolids(fraction, prescribed_);
+  for (const Part* part : parts_)
+    part->gatherStart(points_base_);
+  gatherSolids(poses_base_);
+}
+
+void IslandSystem::beginStage(bool first)
+{
+  if (!contact_)
+    return;
+  matrix_.beginStage();
+  // Friction sticks below a speed over the whole step. In substeps that range would become too narrow to find.
+  contact_->begin(points_base_, poses_base_, duration_);
+  if (!first)
+    return;
+  contact_->evaluate(points_base_, poses_base_, false);
+  if (attraction_)
+    attraction_->evaluate(points_base_, false);
+  takeFirst();
+}
+
+NewtonResult IslandSystem::solve(double from, double to, const NewtonConfig& newton)
+{
+  if (!contact_)
+    return minimize(*this, newton);
+  placeSolids(to, prescribed_);
+  return minimizeConfined(*this, from, to, newton, contact_->options().gap / tolerances.least_edge);
+}
+
+void IslandSystem::endStage()
+{
+  points_base_ = points_;
+  poses_base_ = poses_;
+}
+
+/// Goes from the base towards the trial, as far as nothing touches. Where nothing moves as prescribed, the trial that
+/// was reached is the start of the solution. Otherwise what is prescribed has to wait there until all else gave way.
+Approach IslandSystem::approach(double from, double to, double& reached)
+{
+  gather(points_end_, poses_end_);
+  double alpha = contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
+  const bool held_moves =
+      std::any_of(parts_.begin(), parts_.end(), [&](const Part* part) { return part->heldMoves(from, to); });
+  const bool moving = held_moves || (from < to && solidsMove());
+  reached = to;
+  for (int attempt = 0; attempt < 20; ++attempt, alpha *= 0.5)
+  {
+    if (alpha < 1.0)
+    {
+      for (Part* part : parts_)
+        part->retreat(attempt == 0 ? alpha : 0.5);
+      if (moving)
+        reached = from + alpha * (to - from);
+      place(reached);
+      for (Part* part : parts_)
+        if (held_moves && from == to)
+          part->retreatHeld(alpha);
+    }
+    const RodEvaluation trial = evaluate(false);
+    if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
+    {
+      accept();
+      return moving && alpha < 1.0 ? Approach::partly : Approach::arrived;
+    }
+    if (alpha == 1.0 && trial.min_chi <= kFoldedChi && std::isfinite(trial.potential))
+      return Approach::arrived;   // Contact is not what is wrong. minimize() says so.
+  }
+  return Approach::squeezed;
+}
+
+double IslandSystem::roomToTrial()
+{
+  gather(points_end_, poses_end_);
+  return contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
+}
+
+void IslandSystem::moveAlong(double alpha)
+{
+  forParts([&](Part& part) { part.moveAlong(alpha); });
+  for (Part* part : parts_)
+    part->followJoints();
+}
+
+void IslandSystem::accept()
+{
+  forParts([](Part& part) { part.accept(); });
+  if (contact_)
+    endStage();
+}
+
+void IslandSystem::saveBase()
+{
+  for (Part* part : parts_)
+    part->saveBase();
+}
+
+void IslandSystem::restoreBase()
+{
+  for (Part* part : parts_)
+    part->restoreBase();
+}
+
+// ---- measures
+
+double IslandSystem::stepLimit()
+{
+  double alpha = 1.0;
+  for (const Part* part : parts_)
+    alpha = std::min(alpha, part->stepLimit());
+  if (!contact_)
+    return alpha;
+  moveAlong(alpha);
+  return alpha * roomToTrial();
+}
+
+double IslandSystem::incrementSize() const
+{
+  double largest = 0.0;
+  for (const Part* part : parts_)
+    largest = std::max(largest, part->incrementSize(tolerances.least_edge));
+  if (!contact_)
+    return largest;
+  double at_contact = 0.0;
+  for (const ContactTerm& term : contact_->terms())
+  {
+    Eigen::Vector3d u = Eigen::Vector3d::Zero();
+    for (int p = 0; p < 4; ++p)
+      if (term.point[p] >= 0)
+        u += term.weight[p] * partOf(term.point[p]).move(term.point[p] - partOf(term.point[p]).first_point);
+    at_contact = std::max(at_contact, u.norm());
+  }
+  // a barrier is resolved when its gaps are
+  return at_contact > 0.0 ? std::max(largest, tolerance_ * at_contact / (gap_tolerance_ * contact_->smallestGap()))
+                          : largest;
+}
+
+double IslandSystem::slope() const
+{
+  double sum = 0.0;
+  for (const Part* part : parts_)
+    sum += part->slope();
+  return sum;
+}
+
+double IslandSystem::residual() const
+{
+  double largest = 0.0;
+  for (const Part* part : parts_)
+    largest = std::max(largest, part->residual());
+  return largest;
+}
+
+double IslandSystem::forceScale() const
+{
+  double largest = 0.0;
+  for (const Part* part : parts_)
+    largest = std::max(largest, part->forceScale());
+  forTerms([&](const ContactTerm& term) { largest = std::max(largest, term.force.norm()); });
+  return largest;
+}
+
+double IslandSystem::noiseLevel() const
+{
+  double largest = 0.0;
+  for (const Part* part : parts_)
+    largest = std::max(largest, part->noiseLevel());
+  return largest;
+}
+
+}   // namespace slender

@@ -1,0 +1,164 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "confined_newton.h"
+#include "part.h"
+#include "slender_sim/geometry/pose_motion.h"
+
+namespace slender {
+
+/// A potential of surface points besides contact, for example the attraction of threads that merge.
+class SurfacePotential
+{
+public:
+  virtual ~SurfacePotential() = default;
+  /// Returns the potential [J] at points x and, on request, fills the stiffness of its terms.
+  virtual double evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness) = 0;
+  virtual const std::vector<ContactTerm>& terms() const = 0;
+};
+
+/// A solid that surface points may touch.
+struct IslandSolid
+{
+  RigidPart* body = nullptr;   ///< the part that carries the solid; null: it moves as prescribed
+  Pose X_BS;                   ///< the solid in the frame of the body, or of what moves as prescribed
+  Pose start;                  ///< of a prescribed frame, when the time step begins
+  Twist start_velocity;
+  GraspTarget target;   ///< of a prescribed frame, when it ends
+};
+
+/// How Newton's method ends, which differs by what the parts are.
+struct IslandTolerances
+{
+  double least_edge = std::numeric_limits<double>::infinity();   ///< shortest edge of all parts [m]
+  /// A stage may end at a saddle of the angles of kinked joints, when positions have arrived.
+  bool angles_may_keep_shift = false;
+  double most_unbalanced = std::numeric_limits<double>::infinity();   ///< force, over the largest one
+};
+
+/// The energy of several parts with contact as one system for minimize() and minimizeConfined(). Parts that are coupled
+/// share one sparse matrix. All other parts solve with their own matrices.
+class IslandSystem
+{
+public:
+  /// `simplicial`: see SparseCholesky.
+  explicit IslandSystem(bool simplicial) : matrix_(simplicial) {}
+
+  // ---- what the island consists of
+  void setParts(const std::vector<Part*>& parts);
+  std::vector<IslandSolid> solids;   ///< in the order of those of the contact
+  IslandTolerances tolerances;
+  /// Where the parts meet each other and solids. Without a call nothing touches.
+  void setContact(ContactSurface surface, const ContactOptions& options);
+  /// A potential of the surface points besides contact; null: none.
+  void setAttraction(SurfacePotential* attraction) { attraction_ = attraction; }
+  /// Threads that evaluate parts; 0: as OpenMP says. `parallel`: the parts are large enough to be worth it.
+  void setThreads(int threads, bool parallel);
+  ContactPotential* contact() { return contact_.get(); }   ///< null: nothing touches
+  const ContactPotential* contact() const { return contact_.get(); }
+
+  // ---- a step. Fractions are of this step.
+  void beginStep(double duration) { duration_ = duration; }   ///< [s]
+  /// A substep begins at this fraction: numbers unknowns and surface points, and takes the configuration where it
+  /// starts.
+  void beginSubstep(double fraction);
+  const Eigen::Matrix3Xd& startPoints() const { return points_base_; }
+  const std::vector<Pose>& startSolids() const { return poses_base_; }
+  /// A stage begins, with its inertia set. `first`: of a substep; then the pattern of the matrix gets room for the
+  /// contacts that there are.
+  void beginStage(bool first);
+  /// Finds the minimum of the stage, while what is prescribed moves from one fraction to the other.
+  NewtonResult solve(double from, double to, const NewtonConfig& newton);
+  /// Numbers the unknowns anew, when a part holds more than before.
+  void numberUnknowns();
+  /// The trial, at which a stage ended, becomes the start of the next one.
+  void endStage();
+  double forceScale() const;   ///< largest force [N]
+
+  // ---- for the stability of an equilibrium
+  /// From now on all contacts couple, and only the exact matrix is factored.
+  void setExact(bool exact) { exact_ = exact; }
+  /// Puts what is prescribed, and what follows it, where it is at this fraction.
+  void place(double fraction);
+  RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
+  void moveAlong(double alpha);
+  void accept();
+  CouplingMatrix& matrix() { return matrix_; }
+  /// The solution of the matrix becomes the directions of the coupled parts.
+  void spread();
+  /// The share of the way from the base to the trial that leaves surfaces apart.
+  double roomToTrial();
+
+private:
+  // the system of a stage, as these two need it
+  template <class System>
+  friend NewtonResult minimize(System&, const NewtonConfig&);
+  template <class System>
+  friend NewtonResult minimizeConfined(System&, double, double, const NewtonConfig&, double);
+  void solve();
+  void saveBase();
+  void restoreBase();
+  double stepLimit();
+  double incrementSize() const;
+  bool anglesMayKeepShift() const { return tolerances.angles_may_keep_shift; }
+  double mostUnbalanced() const { return tolerances.most_unbalanced; }
+  double slope() const;
+  double residual() const;
+  double noiseLevel() const;
+  Approach approach(double from, double to, double& reached);
+  void placeHeld(double to) { place(to); }
+  void resolve(double tolerance, double gap_tolerance) { tolerance_ = tolerance, gap_tolerance_ = gap_tolerance; }
+
+  /// Four points and a solid of a contact that couples unknowns.
+  using Key = std::array<int, 5>;
+
+  template <class F>
+  void forParts(F&& f);
+  /// Calls f for all present contacts, and for the terms of the attraction.
+  template <class F>
+  void forTerms(F&& f) const;
+  Part& partOf(int point) const { return *part_of_point_[point]; }
+  RigidPart* bodyOf(int solid) const { return solid < 0 ? nullptr : solids[solid].body; }
+  bool isOwn(const ContactTerm& term) const { return !exact_ && term.solid >= 0 && !bodyOf(term.solid); }
+
+  void countPoints();
+  void placeSolids(double fraction, std::vector<Pose>& poses) const;
+  void gather(Eigen::Matrix3Xd& x, std::vector<Pose>& poses) const;
+  void gatherSolids(std::vector<Pose>& poses) const;
+  bool solidsMove() const;
+  void take();
+  void takeFirst();
+  void makeRoom(const ContactTerm& term);
+  void buildPattern();
+  CouplingMatrix::Bases basesOf(const int (&point)[4]) const;
+  bool isCarried(const CouplingMatrix::Bases& bases, int solid) const;
+  void columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>& rows) const;
+  void columnsOf(const ContactRow& contact, bool whole, Part::Columns& row) const;
+  void addForce(const ContactTerm& term);
+  void assemble(const HessianShift& shift, bool whole);
+  bool factor(const HessianShift& shift);
+
+  std::vector<Part*> parts_;
+  int threads_ = 0;
+  bool parallel_ = false;
+  double duration_ = 1.0;
+
+  CouplingMatrix matrix_;
+  bool pattern_valid_ = false, exact_ = false;
+  std::vector<Key> keys_, keys_before_;   ///< room for contacts that the pattern has, sorted
+
+  std::unique_ptr<ContactPotential> contact_;
+  SurfacePotential* attraction_ = nullptr;
+  std::vector<Part*> part_of_point_;
+  std::vector<Pose> prescribed_;   ///< per solid that no part carries, at the instant being solved for
+  Eigen::Matrix3Xd points_, points_base_, points_end_;
+  std::vector<Pose> poses_, poses_base_, poses_end_;   ///< of solids
+  /// of increments: over the shortest edge, and at contacts over the smallest gap
+  double tolerance_ = 0, gap_tolerance_ = 0;
+};
+
+}   // namespace slender

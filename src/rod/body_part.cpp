@@ -1,0 +1,95 @@
+#include "body_part.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/geometry/rotation.h"
+
+namespace slender {
+
+void BodyPart::retreat(double share)
+{
+  const Pose &base = system.base(), &trial = system.pose;
+  BodySystem::Vector6 way;
+  way << trial.position - base.position, rotationVector(trial.orientation * base.orientation.conjugate());
+  system.moveAlong(way, share);
+}
+
+void BodyPart::evaluate(bool with_hessian, const HessianShift& shift)
+{
+  system.evaluate(with_hessian);
+  evaluation = {};
+  evaluation.potential = system.energy();
+  if (!with_hessian || coupled)
+    return;
+  system.addShift(shift);
+  factor_.compute(system.hessian);
+  evaluation.inertia.negative = factor_.info() != Eigen::Success;
+}
+
+void BodyPart::notePattern(CouplingMatrix& matrix)
+{
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j <= i; ++j)
+      matrix.note(offset + i, offset + j);
+}
+
+void BodyPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
+{
+  system.addShift(shift);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j <= i; ++j)
+      matrix.add(offset + i, offset + j, system.hessian(i, j));
+}
+
+void BodyPart::takeGradient(double* right) const
+{
+  Eigen::Map<BodySystem::Vector6>(right + offset) = -system.gradient;
+}
+
+void BodyPart::takeDirection(const double* solution)
+{
+  direction = Eigen::Map<const BodySystem::Vector6>(solution + offset);
+}
+
+void BodyPart::addColumnsAt(const Eigen::Vector3d& position, int component, double weight, Columns& row) const
+{
+  const Eigen::Vector3d r = position - system.pose.position;
+  // (turn x r)_c = turn_next r_after - turn_after r_next
+  const int next = (component + 1) % 3, after = (component + 2) % 3;
+  row.push(offset + component, weight);
+  row.push(offset + 3 + next, weight * r[after]);
+  row.push(offset + 3 + after, -weight * r[next]);
+}
+
+void BodyPart::addForceAt(const Eigen::Vector3d& position, const Eigen::Vector3d& force)
+{
+  system.gradient.head<3>() -= force;
+  system.gradient.tail<3>() -= (position - system.pose.position).cross(force);
+}
+
+double BodyPart::stepLimit() const
+{
+  constexpr double kMostTurn = 0.7;   // [rad] of a step of Newton's method, as of edges
+  return kMostTurn / std::max(kMostTurn, direction.tail<3>().norm());
+}
+
+double BodyPart::incrementSize(double length) const
+{
+  return std::max(direction.head<3>().lpNorm<Eigen::Infinity>() / length,
+                  direction.tail<3>().lpNorm<Eigen::Infinity>());
+}
+
+double BodyPart::residual() const
+{
+  const RigidBodyModel& m = system.model();
+  return std::max(system.gradient.head<3>().lpNorm<Eigen::Infinity>(),
+                  system.gradient.tail<3>().lpNorm<Eigen::Infinity>() * std::sqrt(m.mass / m.inertia.trace()));
+}
+
+double BodyPart::forceScale() const
+{
+  return system.model().mass * gravity.norm() + system.model().force.norm();
+}
+
+}   // namespace slender

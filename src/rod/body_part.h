@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+
+#include "../contact/part.h"
+#include "body_system.h"
+
+namespace slender {
+
+/// A simulated rigid body as a part of an island. Its unknowns are its displacement and its turn (world axes).
+class BodyPart : public RigidPart
+{
+public:
+  explicit BodyPart(const RigidBodyModel& model) : system(model) {}
+
+  BodySystem system;
+  Eigen::Vector3d gravity{0, 0, 0};   ///< of the present step [m/s^2]
+  BodySystem::Vector6 direction = BodySystem::Vector6::Zero();
+  bool welded = false;   ///< carries parts of rods
+
+  bool numberUnknowns() override { return true; }   // they never change
+  int unknowns() const override { return 6; }
+  bool joined() const override { return welded; }
+
+  void moveAlong(double alpha) override { system.moveAlong(direction, alpha); }
+  void accept() override { system.accept(); }
+  void saveBase() override { system.saveBase(); }
+  void restoreBase() override { system.restoreBase(); }
+  void retreat(double share) override;
+  void placeHeld(double) override {}
+  bool heldMoves(double, double) const override { return false; }
+
+  int points() const override { return 0; }
+  void gather(Eigen::Matrix3Xd&) const override {}
+
+  void evaluate(bool with_hessian, const HessianShift& shift) override;
+  void closeGradient() override {}
+  void solve() override { direction = -factor_.solve(system.gradient); }
+  /// v := matrix^-1 v with the matrix of the last evaluate(true), of a body that is not coupled.
+  void solveFor(BodySystem::Vector6& v) const { factor_.solveInPlace(v); }
+
+  void notePattern(CouplingMatrix& matrix) override;
+  void findEntries(const CouplingMatrix&) override {}
+  void addHessian(CouplingMatrix& matrix, const HessianShift& shift) override;
+  void takeGradient(double* right) const override;
+  void takeDirection(const double* solution) override;
+
+  int base(int) const override { return kPrescribed - 1; }
+  void addColumns(int, int, double, Columns&) const override {}
+  void addForce(int, const Eigen::Vector3d&) override {}
+  Eigen::Vector3d move(int) const override { return Eigen::Vector3d::Zero(); }
+
+  const Pose& pose() const override { return system.pose; }
+  void addColumnsAt(const Eigen::Vector3d& position, int component, double weight, Columns& row) const override;
+  void addForceAt(const Eigen::Vector3d& position, const Eigen::Vector3d& force) override;
+
+  double stepLimit() const override;
+  double incrementSize(double length) const override;
+  double slope() const override { return system.gradient.dot(direction); }
+  double residual() const override;
+  double forceScale() const override;
+  double noiseLevel() const override { return 0.0; }
+
+private:
+  Eigen::LLT<BodySystem::Matrix6> factor_;
+};
+
+}   // namespace slender

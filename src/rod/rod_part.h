@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "../contact/chain_part.h"
+#include "body_part.h"
+#include "rod_stepper_impl.h"
+
+namespace slender {
+
+/// A rod as a part of an island. Bodies may carry sections and edges of it; the unknowns there are those of the bodies.
+class RodPart : public ChainPart
+{
+public:
+  RodPart(RodStepper::Impl& rod, bool touches) : ChainPart(rod.system), rod_(rod), touches_(touches) {}
+
+  /// A grasp of the rod follows a simulated body; X_BG: the frame of the grasp in that of the body.
+  struct Weld
+  {
+    int grasp;
+    BodyPart* body;
+    Pose X_BG;
+  };
+  void addWeld(const Weld& weld);
+  const std::vector<Weld>& welds() const { return welds_; }
+  bool isActive(const Weld& weld) const;
+  RodStepper::Impl& rod() const { return rod_; }
+  /// Inputs of a step of `duration` seconds. They must live as long as the step.
+  void begin(const RodInputs& inputs, double duration) { inputs_ = &inputs, duration_ = duration; }
+  const RodInputs& inputs() const { return *inputs_; }
+  /// Whether an unknown has a number of its own, in the part that an inverse iteration acts on.
+  bool isUnknown(int unknown) const { return dof_[unknown] >= 0; }
+
+  /// Inertia of the nodes that bodies carry, as points of these, when a stage has begun.
+  void setCarriedInertia(const Stage& stage);
+  /// After a stage: poses and velocities of the grasps that bodies carry.
+  void takeCarriedMotion();
+
+  bool numberUnknowns() override;
+  bool joined() const override { return welded_; }
+  void placeHeld(double fraction) override { rod_.placeAt(*inputs_, duration_, fraction); }
+  bool heldMoves(double from, double to) const override;
+  void followJoints() override;
+  int points() const override { return touches_ ? system_.nodes() : 0; }
+  void gather(Eigen::Matrix3Xd& x) const override;
+  void passGradient() override;
+  void notePattern(CouplingMatrix& matrix) override;
+  void addHessian(CouplingMatrix& matrix, const HessianShift& shift) override;
+  void takeDirection(const double* solution) override;
+  void addColumns(int point, int component, double weight, Columns& row) const override;
+
+protected:
+  int nodeOf(int point) const override { return point; }
+
+private:
+  const RodSystem& system() const { return rod_.system; }
+  const BodyPart* carrier(int grasp) const;
+  void columnsOf(int unknown, double weight, Columns& row) const;
+  void addCarried(CouplingMatrix& matrix) const;
+  void addClamps(CouplingMatrix& matrix) const;
+
+  RodStepper::Impl& rod_;
+  const bool touches_;
+  std::vector<Weld> welds_;
+  const RodInputs* inputs_ = nullptr;
+  double duration_ = 1.0;
+  bool welded_ = false;
+  std::vector<std::array<int, 3>> carried_entries_;   ///< node, column, row of those with a carried unknown
+  std::vector<std::array<int, 4>> holds_;             ///< grasps that dof_ was made for: active, first, last, carried
+};
+
+}   // namespace slender
