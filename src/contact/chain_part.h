@@ -7,8 +7,8 @@
 
 namespace slender {
 
-/// A chain of nodes as a part of an island. Its own matrix is a band. What rods and threads do in different ways is left
-/// to the classes that derive from this one.
+/// A chain of nodes as a part of an island. Its own matrix is a band. What rods and threads do in different ways is
+/// left to the classes that derive from this one.
 class ChainPart : public Part
 {
 public:
@@ -61,8 +61,8 @@ private:
   void addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness);
 
   int unknowns_ = 0;
-  /// For every place of the panels: the index of its entry among the values of the island's matrix. -1: the place has no
-  /// entry.
+  /// For every place of the panels: the index of its entry among the values of the island's matrix. -1: the place has
+  /// no entry.
   std::vector<int> entries_;
 };
 

@@ -343,6 +343,7 @@ ContactPotential::ContactPotential(ContactSurface surface, const ContactOptions&
 ContactPotential::~ContactPotential() = default;
 ContactPotential::ContactPotential(ContactPotential&&) noexcept = default;
 const ContactOptions& ContactPotential::options() const { return impl_->options; }
+const ContactSolid& ContactPotential::solid(std::size_t number) const { return impl_->surface.solids[number]; }
 
 void ContactPotential::setCurves(int points, const std::vector<ContactSegment>& segments,
                                  const std::vector<ContactObject>& objects)

@@ -36,8 +36,8 @@ void IslandSystem::take()
       partOf(row.point[0]).own_rows.push_back(&row);
 }
 
-/// The same for the first contacts of a substep. The pattern gets room for them alone, so that it follows from the state
-/// and not from the steps before.
+/// The same for the first contacts of a substep. The pattern gets room for them alone, so that it follows from the
+/// state and not from the steps before.
 void IslandSystem::takeFirst()
 {
   const bool valid = pattern_valid_;
@@ -202,8 +202,7 @@ void IslandSystem::assemble(const HessianShift& shift, bool whole)
 bool IslandSystem::factor(const HessianShift& shift)
 {
   const auto assembled = [&](bool whole) { assemble(shift, whole); };
-  return exact_ ? matrix_.factorExactly(assembled)
-                : matrix_.factor(contact_ && !contact_->terms().empty(), assembled);
+  return exact_ ? matrix_.factorExactly(assembled) : matrix_.factor(contact_ && !contact_->terms().empty(), assembled);
 }
 
 RodEvaluation IslandSystem::evaluate(bool with_hessian, const HessianShift& shift)

@@ -30,9 +30,9 @@ public:
   virtual ~Part() = default;
 
   // ---- state of the part in the island, which IslandSystem sets
-  bool coupled = false;   ///< the matrix of the island has its unknowns
-  int offset = 0;         ///< number of its first unknown in that matrix
-  int first_point = 0;    ///< number of its first surface point among those of the island
+  bool coupled = false;                        ///< the matrix of the island has its unknowns
+  int offset = 0;                              ///< number of its first unknown in that matrix
+  int first_point = 0;                         ///< number of its first surface point among those of the island
   std::vector<const ContactTerm*> own_terms;   ///< present contacts that the part's own matrix has room for
   std::vector<const ContactRow*> own_rows;     ///< likewise
   RodEvaluation evaluation;                    ///< result of the last evaluate()
@@ -80,11 +80,11 @@ public:
   virtual void solve() = 0;
 
   // ---- the matrix of the island, of a coupled part
-  virtual void notePattern(CouplingMatrix& matrix) = 0;          ///< Notes what the part itself couples.
-  virtual void findEntries(const CouplingMatrix& matrix) = 0;    ///< Is called when the pattern is finished.
+  virtual void notePattern(CouplingMatrix& matrix) = 0;         ///< Notes what the part itself couples.
+  virtual void findEntries(const CouplingMatrix& matrix) = 0;   ///< Is called when the pattern is finished.
   virtual void addHessian(CouplingMatrix& matrix, const HessianShift& shift) = 0;
-  virtual void takeGradient(double* right) const = 0;            ///< right-hand side := minus its gradient
-  virtual void takeDirection(const double* solution) = 0;        ///< direction := its part of the solution
+  virtual void takeGradient(double* right) const = 0;       ///< right-hand side := minus its gradient
+  virtual void takeDirection(const double* solution) = 0;   ///< direction := its part of the solution
 
   // ---- contact. `point` counts from 0 in each part.
   /// Number of the first of a point's three unknowns in the matrix, or kPrescribed. Less than kPrescribed: its

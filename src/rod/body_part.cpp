@@ -42,10 +42,7 @@ void BodyPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
       matrix.add(offset + i, offset + j, system.hessian(i, j));
 }
 
-void BodyPart::takeGradient(double* right) const
-{
-  Eigen::Map<BodySystem::Vector6>(right + offset) = -system.gradient;
-}
+void BodyPart::takeGradient(double* right) const { Eigen::Map<BodySystem::Vector6>(right + offset) = -system.gradient; }
 
 void BodyPart::takeDirection(const double* solution)
 {
@@ -87,9 +84,71 @@ double BodyPart::residual() const
                   system.gradient.tail<3>().lpNorm<Eigen::Infinity>() * std::sqrt(m.mass / m.inertia.trace()));
 }
 
-double BodyPart::forceScale() const
+double BodyPart::forceScale() const { return system.model().mass * gravity.norm() + system.model().force.norm(); }
+
+// ---- steps
+
+void BodyPart::begin(const RigidBodyState& state, const Eigen::Vector3d& step_gravity)
 {
-  return system.model().mass * gravity.norm() + system.model().force.norm();
+  now_ = next_ = state;
+  gravity = step_gravity;
+}
+
+StepFailure BodyPart::beginSubstep(const StepPlan& plan, const Substep& substep)
+{
+  plan_ = &plan;
+  length_ = substep.length;
+  system.load(now_);
+  start_wrench_.setZero();
+  start_inertia_.setZero();
+  return StepFailure::none;
+}
+
+void BodyPart::addStartLoad(const BodySystem::Vector6& wrench, const BodySystem::Matrix6& inertia)
+{
+  start_wrench_ += wrench;
+  start_inertia_ += inertia;
+}
+
+void BodyPart::solveStartAcceleration()
+{
+  const RigidBodyModel& m = system.model();
+  start_wrench_.head<3>() += m.force - m.linear_damping * m.mass * system.velocity().linear;
+  if (m.gravity)
+    start_wrench_.head<3>() += m.mass * gravity;
+  start_acceleration_ = system.startAcceleration(start_wrench_, start_inertia_);
+}
+
+void BodyPart::beginStage(std::size_t stage) { system.beginStage(*plan_, stage, length_, gravity); }
+
+void BodyPart::endStage(std::size_t stage, bool last, StepReport&)
+{
+  system.accept();
+  system.endStage(plan_->stages[stage], last);
+  if (last)
+    system.finishStep(*plan_, next_);
+}
+
+double BodyPart::energyOf(const RigidBodyState& s) const
+{
+  const RigidBodyModel& m = system.model();
+  const Eigen::Vector3d w = s.X_WB.orientation.conjugate() * s.velocity.angular;
+  return 0.5 * m.mass * s.velocity.linear.squaredNorm() + 0.5 * w.dot(m.inertia * w) - m.force.dot(s.X_WB.position) -
+         (m.gravity ? m.mass * gravity.dot(s.X_WB.position) : 0.0);
+}
+
+double BodyPart::energyAtStart(double& allowance)
+{
+  const double energy = energyOf(now_);
+  allowance += 0.05 * std::abs(energy);
+  return energy;
+}
+
+void BodyPart::refuse(StepFailure failure, double, StepReport& report) const
+{
+  report.ok = false;
+  report.failure = failure;
+  report.message = "body '" + system.model().name + "': its motion was not found: use a shorter step";
 }
 
 }   // namespace slender

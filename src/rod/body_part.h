@@ -3,12 +3,13 @@
 #include <Eigen/Cholesky>
 
 #include "../contact/part.h"
+#include "../contact/part_steps.h"
 #include "body_system.h"
 
 namespace slender {
 
 /// A simulated rigid body as a part of an island. Its unknowns are its displacement and its turn (world axes).
-class BodyPart : public RigidPart
+class BodyPart : public RigidPart, public PartSteps
 {
 public:
   explicit BodyPart(const RigidBodyModel& model) : system(model) {}
@@ -61,8 +62,35 @@ public:
   double forceScale() const override;
   double noiseLevel() const override { return 0.0; }
 
+  // ---- steps
+  /// Begins a step from this state; gravity [m/s^2].
+  void begin(const RigidBodyState& state, const Eigen::Vector3d& step_gravity);
+  const RigidBodyState& state() const { return now_; }   ///< where the last accepted substep ended
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
+  bool startsFresh() const override { return !now_.has_history; }
+  /// What a rod at the start of a run exerts on the body, and the inertia that it adds.
+  void addStartLoad(const BodySystem::Vector6& wrench, const BodySystem::Matrix6& inertia);
+  void solveStartAcceleration() override;
+  const BodySystem::Vector6& startAcceleration() const { return start_acceleration_; }
+  void addSurface(ContactSurface&) const override {}
+  BarrierRange barrierRange(double) const override { return {}; }
+  void beginStage(std::size_t stage) override;
+  void endStage(std::size_t stage, bool last, StepReport&) override;
+  void acceptSubstep(const Substep&) override { std::swap(now_, next_); }
+  bool conserves() const override { return true; }
+  double energyAtStart(double& allowance) override;
+  double energyAtEnd() const override { return energyOf(next_); }
+  void refuse(StepFailure failure, double length, StepReport& report) const override;
+
 private:
+  double energyOf(const RigidBodyState& state) const;
+
   Eigen::LLT<BodySystem::Matrix6> factor_;
+  RigidBodyState now_, next_;
+  const StepPlan* plan_ = nullptr;
+  double length_ = 0.0;   ///< of the substep [s]
+  BodySystem::Vector6 start_wrench_, start_acceleration_;
+  BodySystem::Matrix6 start_inertia_;
 };
 
 }   // namespace slender

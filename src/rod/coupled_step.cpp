@@ -68,8 +68,7 @@ CoupledSystem::CoupledSystem(const RodGroupModel& model, const std::vector<RodSt
     rods_.push_back(std::make_unique<RodPart>(*rods[r], touches));
     parts.push_back(rods_.back().get());
     nodes += model.rods[r]->nodes();
-    island_.tolerances.least_edge =
-        std::min(island_.tolerances.least_edge, rods[r]->model->rest_length.minCoeff());
+    island_.tolerances.least_edge = std::min(island_.tolerances.least_edge, rods[r]->model->rest_length.minCoeff());
   }
   island_.tolerances.angles_may_keep_shift = true;
   for (const RigidBodyModel& body : model.bodies)
@@ -101,8 +100,7 @@ void CoupledSystem::addContact()
     island_.solids.back().X_BS = body.X_BS;
   }
   ContactOptions options = model_.contact.options;
-  options.least_stiffness =
-      std::max(options.least_stiffness, leastStiffness(model_, rods_[0]->rod().time.step));
+  options.least_stiffness = std::max(options.least_stiffness, leastStiffness(model_, rods_[0]->rod().time.step));
   island_.setContact(contactSurface(model_), options);
   first_stiffness_ = island_.contact()->stiffness();
 }

@@ -56,8 +56,8 @@ private:
   const RodGroupModel& model_;
   bool parallel_ = false;   ///< enough rods for the threads to be worth their synchronisation
   std::vector<std::unique_ptr<RodPart>> rods_;
-  std::vector<std::unique_ptr<BodyPart>> bodies_;   ///< simulated ones
-  std::vector<BodyPart*> simulated_;                ///< per body of the model; null: driven
+  std::vector<std::unique_ptr<BodyPart>> bodies_;          ///< simulated ones
+  std::vector<BodyPart*> simulated_;                       ///< per body of the model; null: driven
   std::vector<RigidBodyState> bodies_now_, bodies_next_;   ///< all
   const RodGroupInputs* inputs_ = nullptr;
   double duration_ = 0;

@@ -115,8 +115,8 @@ void RodPart::takeCarriedMotion()
     const BodySystem& body = weld.body->system;
     const Twist& v = body.velocity();
     rod_.stage_poses[weld.grasp] = body.pose * weld.X_BG;
-    rod_.carried_velocity[weld.grasp] = {
-        v.linear + v.angular.cross(body.pose.orientation * weld.X_BG.position), v.angular};
+    rod_.carried_velocity[weld.grasp] = {v.linear + v.angular.cross(body.pose.orientation * weld.X_BG.position),
+                                         v.angular};
   }
 }
 

@@ -1,19 +1,27 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "../contact/chain_part.h"
 #include "body_part.h"
 #include "rod_stepper_impl.h"
+#include "slender_sim/rod/rod_group.h"
 
 namespace slender {
 
 /// A rod as a part of an island. Bodies may carry sections and edges of it; the unknowns there are those of the bodies.
-class RodPart : public ChainPart
+class RodPart : public ChainPart, public PartSteps
 {
 public:
-  RodPart(RodStepper::Impl& rod, bool touches) : ChainPart(rod.system), rod_(rod), touches_(touches) {}
+  RodPart(RodStepper::Impl& rod, bool touches)
+    : ChainPart(rod.system),
+      rod_(rod),
+      touches_(touches),
+      shortest_edge_(rod.model->rest_length.minCoeff())
+  {
+  }
 
   /// A grasp of the rod follows a simulated body; X_BG: the frame of the grasp in that of the body.
   struct Weld
@@ -50,6 +58,25 @@ public:
   void takeDirection(const double* solution) override;
   void addColumns(int point, int component, double weight, Columns& row) const override;
 
+  // ---- steps
+  /// What the rod touches; without a call nothing.
+  void setContact(const GroupContact::Rod& contact) { contact_ = contact; }
+  double lastSubstep() const override { return rod_.work.last_step; }
+  double shortestEdge() const override { return shortest_edge_; }
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
+  void addStartLoads() override;
+  void takeStartAcceleration() override;
+  void addSurface(ContactSurface& surface) const override;
+  BarrierRange barrierRange(double gap) const override;
+  void beginStage(std::size_t stage) override;
+  void endStage(std::size_t stage, bool last, StepReport& report) override;
+  void acceptSubstep(const Substep& substep) override;
+  bool conserves() const override;
+  double energyAtStart(double& allowance) override;
+  double energyAtEnd() const override { return rod_.endEnergy(*inputs_); }
+  Largest unbalancedForce() const override { return rod_.unbalancedForce(); }
+  void refuse(StepFailure failure, double length, StepReport& report) const override;
+
 protected:
   int nodeOf(int point) const override { return point; }
 
@@ -62,6 +89,10 @@ private:
 
   RodStepper::Impl& rod_;
   const bool touches_;
+  const double shortest_edge_;   ///< at rest [m]
+  GroupContact::Rod contact_;
+  const StepPlan* plan_ = nullptr;
+  Substep substep_;
   std::vector<Weld> welds_;
   const RodInputs* inputs_ = nullptr;
   double duration_ = 1.0;

@@ -75,8 +75,8 @@ void ThreadContact::beginStep(const std::vector<Thread>& threads, const std::vec
   used_.clear();
   for (const Thread& thread : threads)
   {
-    const auto known = std::find_if(parts_.begin(), parts_.end(),
-                                    [&](const auto& part) { return &part->thread() == thread.thread; });
+    const auto known =
+        std::find_if(parts_.begin(), parts_.end(), [&](const auto& part) { return &part->thread() == thread.thread; });
     if (known != parts_.end())
     {
       used_.push_back(known->get());
@@ -173,8 +173,8 @@ StepFailure ThreadContact::solve(double from, double to, double h, StepReport& r
       return result.failure;
     report.residual = result.residual;
     report.max_strain = std::max(report.max_strain, result.max_strain);
-    const bool lands = std::any_of(threads_.begin(), threads_.end(),
-                                   [](const Thread& t) { return t.thread->firstLanding() <= 1.0; });
+    const bool lands =
+        std::any_of(threads_.begin(), threads_.end(), [](const Thread& t) { return t.thread->firstLanding() <= 1.0; });
     if (!lands)
       break;
     island_.accept();   // the next solution begins here

@@ -12,8 +12,8 @@ void ThreadPart::begin(double from, double to, double h)
   const ThreadState& work = thread_.work;
   end_.resize(work.x.size());
   for (int i = 0; i < work.nodes(); ++i)
-    end_[i] = nodeOf(i) < 0 ? Eigen::Vector3d(work.x[i] + h * thread_.inputs().belt_velocity)
-                            : system_.position(nodeOf(i));
+    end_[i] =
+        nodeOf(i) < 0 ? Eigen::Vector3d(work.x[i] + h * thread_.inputs().belt_velocity) : system_.position(nodeOf(i));
 }
 
 void ThreadPart::holdLanded()

@@ -3,13 +3,15 @@
 #include <vector>
 
 #include "../contact/chain_part.h"
+#include "../contact/part_steps.h"
+#include "slender_sim/thread/touching_threads.h"
 #include "thread_stepper_impl.h"
 
 namespace slender {
 
-/// A thread as a part of an island. All its nodes are surface points. Those that lie on a floor which they stick to move
-/// with that floor and have no unknowns.
-class ThreadPart : public ChainPart
+/// A thread as a part of an island. All its nodes are surface points. Those that lie on a floor which they stick to
+/// move with that floor and have no unknowns.
+class ThreadPart : public ChainPart, public PartSteps
 {
 public:
   explicit ThreadPart(ThreadStepper::Impl& thread) : ChainPart(thread.system), thread_(thread) {}
@@ -28,6 +30,31 @@ public:
   void gather(Eigen::Matrix3Xd& x) const override;
   void gatherStart(Eigen::Matrix3Xd& x) const override;
 
+  // ---- steps
+  /// What the thread touches; `owner` is the number of the thread of which it is a part.
+  void setContact(const ThreadTouch& contact, int owner) { contact_ = contact, owner_ = owner; }
+  const ThreadTouch& contact() const { return contact_; }
+  int owner() const { return owner_; }
+  /// In the steps below: what a change of shape may not come near (null: nothing).
+  void setGuard(const RemeshGuard* guard) { guard_ = guard; }
+  void setDuration(double duration) { duration_ = duration; }   ///< of the step [s]
+  double longestSubstep(double duration) const override { return thread_.longestSubstep(duration); }
+  double shortestEdge() const override { return system_.leastRestLength(); }
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
+  void addSurface(ContactSurface& surface) const override;
+  bool surfaceChanges() const override { return true; }
+  BarrierRange barrierRange(double gap) const override;
+  void beginStage(std::size_t) override {}
+  bool meetsMore() override { return thread_.firstLanding() <= 1.0; }
+  void holdMore() override;
+  void endStage(std::size_t, bool, StepReport&) override {}
+  StepFailure finishSubstep(StepReport& report) override;
+  void acceptSubstep(const Substep&) override {}   // finishSubstep() changed the present state
+  bool shorterMayHelp(StepFailure failure) const override;
+  bool mend() override;
+  Largest unbalancedForce() const override { return thread_.unbalancedForce(); }
+  void refuse(StepFailure failure, double length, StepReport& report) const override;
+
 protected:
   int nodeOf(int point) const override { return thread_.inSystem(point); }
 
@@ -36,9 +63,13 @@ private:
   Eigen::Vector3d lying(int node) const { return thread_.work.x[node] + share_ * (end_[node] - thread_.work.x[node]); }
 
   ThreadStepper::Impl& thread_;
+  ThreadTouch contact_;
+  int owner_ = 0;
+  const RemeshGuard* guard_ = nullptr;
+  double duration_ = 1.0, length_ = 0.0;   ///< of the step and the substep [s]
   double from_ = 0.0, to_ = 1.0;
-  double share_ = 1.0;                  ///< of the substep, at which what is held stands in the trial
-  std::vector<Eigen::Vector3d> end_;    ///< per node that is held or lies: its place at the end of the substep
+  double share_ = 1.0;                 ///< of the substep, at which what is held stands in the trial
+  std::vector<Eigen::Vector3d> end_;   ///< per node that is held or lies: its place at the end of the substep
 };
 
 }   // namespace slender

@@ -76,10 +76,10 @@ private:
   Eigen::Matrix3Xd targets_;   ///< of its averages at the end of the step [m]
 };
 
-class RodGroupIsland : public RodIsland
+class ExplicitRods : public RodIsland
 {
 public:
-  RodGroupIsland(const WorldModel& world, std::vector<int> rods, std::vector<int> bodies, WorldState& state)
+  ExplicitRods(const WorldModel& world, std::vector<int> rods, std::vector<int> bodies, WorldState& state)
     : world_(world),
       rods_(std::move(rods)),
       bodies_(std::move(bodies))
@@ -90,7 +90,7 @@ public:
     for (int b : bodies_)
       model.bodies.push_back(world.bodies[b].body);
     addContact(model);
-    const Loan<RodGroupIsland> loan(*this, state);
+    const Loan<ExplicitRods> loan(*this, state);
     for (const WorldModel::RodWeld& weld : world.welds)
       makeWeld(model, state_, placeOf(rods_, weld.rod), weld.first_node, weld.last_node, placeOf(bodies_, weld.body));
     group_ = std::make_unique<RodGroup>(std::move(model), world.time);
@@ -99,13 +99,13 @@ public:
 
   StepReport step(WorldState& state, const WorldInputs& inputs) override
   {
-    const Loan<RodGroupIsland> loan(*this, state);
+    const Loan<ExplicitRods> loan(*this, state);
     takeInputs(inputs);
     return group_->step(state_, inputs_, world_.time.step);
   }
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override
   {
-    const Loan<RodGroupIsland> loan(*this, state);
+    const Loan<ExplicitRods> loan(*this, state);
     takeInputs(inputs);
     return group_->solveEquilibrium(state_, inputs_);
   }
@@ -118,7 +118,7 @@ public:
   }
 
 private:
-  friend class Loan<RodGroupIsland>;
+  friend class Loan<ExplicitRods>;
 
   static int placeOf(const std::vector<int>& parts, int part)
   {
@@ -192,10 +192,10 @@ std::unique_ptr<RodIsland> makeTrackedRod(const WorldModel& world, int rod)
   return std::make_unique<TrackedRod>(world, rod);
 }
 
-std::unique_ptr<RodIsland> makeRodGroup(const WorldModel& world, std::vector<int> rods, std::vector<int> bodies,
-                                        WorldState& state)
+std::unique_ptr<RodIsland> makeExplicitRods(const WorldModel& world, std::vector<int> rods, std::vector<int> bodies,
+                                            WorldState& state)
 {
-  return std::make_unique<RodGroupIsland>(world, std::move(rods), std::move(bodies), state);
+  return std::make_unique<ExplicitRods>(world, std::move(rods), std::move(bodies), state);
 }
 
 }   // namespace slender

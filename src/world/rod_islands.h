@@ -11,9 +11,8 @@ namespace slender {
 std::unique_ptr<RodIsland> makeLoneRod(const WorldModel& world, int rod);
 /// A rod that nothing else meets and that tracks a guide.
 std::unique_ptr<RodIsland> makeTrackedRod(const WorldModel& world, int rod);
-/// Rods and bodies that contact or welds join, and the obstacles that they meet. Appends the grasps of the welds to the
-/// rods of the state. Throws when something touches or crosses there.
-std::unique_ptr<RodIsland> makeRodGroup(const WorldModel& world, std::vector<int> rods, std::vector<int> bodies,
-                                        WorldState& state);
+/// Rods and bodies that welds join, in explicit steps. Appends the grasps of the welds to the rods of the state.
+std::unique_ptr<RodIsland> makeExplicitRods(const WorldModel& world, std::vector<int> rods, std::vector<int> bodies,
+                                            WorldState& state);
 
 }   // namespace slender

@@ -9,7 +9,4 @@ namespace slender {
 
 /// A thread that touches nothing but its floor, and what has broken off it. The model of the world outlives the island.
 std::unique_ptr<Island> makeLoneThread(const WorldModel& world, int thread);
-/// The threads with contact, and the obstacles that they meet. Throws when something touches or crosses in the state.
-std::unique_ptr<Island> makeTouchingThreads(const WorldModel& world, std::vector<int> threads, WorldState& state);
-
 }   // namespace slender

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "cloth_islands.h"
+#include "joined_parts.h"
 #include "rod_islands.h"
 #include "thread_islands.h"
 #include "tracked_parts.h"
@@ -161,21 +162,27 @@ private:
 
   void addThreads(WorldState& state)
   {
-    std::vector<int> touching;
     for (int k = 0; k < static_cast<int>(model.threads.size()); ++k)
     {
       if (model.threads[k].contact)
       {
         built(Kind::thread, k, [&] { checkThreadModel(*model.threads[k].model); });
-        touching.push_back(k);
+        touching_threads_.push_back(k);
       }
       else
       {
         add(built(Kind::thread, k, [&] { return makeLoneThread(model, k); }));
       }
     }
-    if (!touching.empty())
-      add(built(Kind::none, -1, [&] { return makeTouchingThreads(model, touching, state); }));
+    const auto touches = [](const auto& part) { return part.contact.has_value(); };
+    const auto shown = [](const WorldModel::Body& body) { return body.shape.has_value(); };
+    if (touching_threads_.empty() || std::any_of(model.rods.begin(), model.rods.end(), touches) ||
+        std::any_of(model.bodies.begin(), model.bodies.end(), shown))
+      return;   // addRods() joins them with the others
+    add(built(Kind::none, -1, [&] {
+      return std::make_unique<JoinedParts>(model, IslandContent{{}, touching_threads_, {}}, state);
+    }));
+    touching_threads_.clear();
   }
 
   /// Cloths that lead others, or those that do not. Leaders are stepped first, and feel only each other.
@@ -224,17 +231,22 @@ private:
         addLoneRod(r);
     }
     lone_end_ = islands_.size();
-    const bool group = !group_rods.empty() || simulated;
+    const bool group = !group_rods.empty() || simulated || !touching_threads_.empty();
+    const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
     if (!group)
       group_bodies.clear();
     for (int b = 0; b < static_cast<int>(model.bodies.size()); ++b)
-      if (!model.bodies[b].body.simulated && std::count(group_bodies.begin(), group_bodies.end(), b) == 0)
+      if (!model.bodies[b].body.simulated &&
+          !(explicit_steps && std::count(group_bodies.begin(), group_bodies.end(), b) > 0))
         given_bodies_.push_back(b);
-    gives_obstacles_ = !group;
+    gives_obstacles_ = !(group && explicit_steps);
     if (!group)
       return;
-    RodIsland* island =
-        add(built(Kind::none, -1, [&] { return makeRodGroup(model, group_rods, group_bodies, state); }));
+    RodIsland* island = add(built(Kind::none, -1, [&]() -> std::unique_ptr<RodIsland> {
+      if (explicit_steps && touching_threads_.empty())
+        return makeExplicitRods(model, group_rods, group_bodies, state);
+      return std::make_unique<JoinedParts>(model, IslandContent{group_rods, touching_threads_, group_bodies}, state);
+    }));
     for (std::size_t k = 0; k < group_rods.size(); ++k)
       rods[group_rods[k]] = {island, static_cast<int>(k)};
   }
@@ -301,12 +313,13 @@ private:
       total.merge(report);
   }
 
-  /// Bodies and obstacles that are driven and that no rod in the group feels.
+  /// Bodies and obstacles that are driven, to where they are at the end of the step.
   void moveGiven(const WorldInputs& inputs, WorldState& state) const
   {
-    const auto move = [](const GraspTarget& target, Pose& pose, Twist& velocity) {
-      pose = normalized(target.X_WG);
-      velocity = target.velocity.value_or(Twist{});
+    const double duration = model.time.step;
+    const auto move = [duration](const GraspTarget& target, Pose& pose, Twist& velocity) {
+      const Twist start = velocity;
+      pose = poseBetween(pose, start, target, duration, 1.0, &velocity);
     };
     for (const int b : given_bodies_)
       move(inputs.bodies[b], state.bodies[b].X_WB, state.bodies[b].velocity);
@@ -321,6 +334,7 @@ private:
   int lone_nodes_ = 0;
   std::vector<StepReport> reports_;          ///< of lone rods
   std::vector<std::exception_ptr> errors_;   ///< likewise
+  std::vector<int> touching_threads_;        ///< that are joined with rods or bodies
   std::vector<int> given_bodies_;            ///< driven bodies that no island moves
   bool gives_obstacles_ = true;              ///< no island moves them
   WorldState before_;                        ///< a step that may fail in one of several islands

@@ -118,6 +118,7 @@ public:
   ~ContactPotential();
   ContactPotential(ContactPotential&&) noexcept;
   const ContactOptions& options() const;
+  const ContactSolid& solid(std::size_t number) const;
 
   /// Other points, segments and objects (sound ones) from now on; the solids stay. For curves that are fed and divided
   /// while they move.

@@ -14,8 +14,8 @@ struct GraspTarget
   std::optional<Twist> velocity;
 };
 
-/// Pose (and velocity, may be null) at a fraction s of a motion of `duration` seconds from `start` to a target: uniform,
-/// or a cubic through both ends' velocities.
+/// Pose (and velocity, may be null) at a fraction s of a motion of `duration` seconds from `start` to a target:
+/// uniform, or a cubic through both ends' velocities.
 Pose poseBetween(const Pose& start, const Twist& start_velocity, const GraspTarget& target, double duration, double s,
                  Twist* velocity);
 

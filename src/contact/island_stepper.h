@@ -1,0 +1,81 @@
+#pragma once
+
+#include <vector>
+
+#include "island_system.h"
+#include "part_steps.h"
+#include "slender_sim/dynamics/time_config.h"
+
+namespace slender {
+
+/// A potential of surface points that is made anew in each substep, for example the merging of threads.
+class SubstepPotential : public SurfacePotential
+{
+public:
+  /// A substep of h seconds begins: `pairs` of segments are near each other.
+  virtual void begin(const Eigen::Matrix3Xd& x, const ContactSurface& surface,
+                     const std::vector<GridPairs::Pair>& pairs, double gap, double h) = 0;
+  virtual double largestForce() const = 0;   ///< that it exerts at the start of the substep [N]
+};
+
+/// Advances the parts of an island together, in substeps common to all.
+class IslandStepper : SubstepEquations
+{
+public:
+  explicit IslandStepper(const TimeConfig& time, bool simplicial) : time_(time), island_(simplicial) {}
+
+  IslandSystem& island() { return island_; }
+  const IslandSystem& island() const { return island_; }
+
+  /// A part and its steps are the same object.
+  struct Member
+  {
+    Part* part;
+    PartSteps* steps;
+  };
+  /// The parts, bodies first. They must outlive the stepper, or the next call.
+  void setMembers(const std::vector<Member>& members);
+  /// Makes contact for the surfaces of the members and these solids. `ignores` of a solid are numbers of members.
+  void setContact(const std::vector<ContactSolid>& solids, const ContactOptions& options);
+  /// Acts besides contact; null: nothing does.
+  void setAttraction(SubstepPotential* attraction);
+
+  /// Advances by `duration` [s], from what the parts have loaded. `first`: length of the first substep [s], 0: the
+  /// longest; becomes that of the next step's first one. On failure the report says why.
+  StepReport step(double duration, double& first);
+  /// Of the barrier [N]; part of the state. 0: not chosen yet.
+  double stiffness() const { return stiffness_; }
+  void setStiffness(double stiffness);
+
+private:
+  bool conserves() const;
+  double energyAtStart(double& allowance);
+  double energyAtEnd() const;
+  void startAccelerations();
+  bool loadContact(double h);
+  void takeSurface();
+  NewtonResult solveStage(std::size_t stage, const Substep& substep);
+  StepFailure solveSubstep(const Substep& substep, StepReport& report);
+  std::size_t farthestFromBalance() const;
+
+  StepFailure attempt(const Substep& substep, StepReport& report) override;
+  void accept(const Substep& substep) override;
+  bool shorterMayHelp(StepFailure failure) const override;
+  bool mend(StepReport& report) override;
+  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override;
+
+  const TimeConfig time_;
+  IslandSystem island_;
+  std::vector<Member> members_;
+  std::vector<Part*> parts_;
+  SubstepPotential* attraction_ = nullptr;
+  ContactSurface surface_;   ///< of the parts, without solids
+  bool surface_changes_ = false;
+  StepPlan plan_;
+  double duration_ = 0.0, first_stiffness_ = 0.0, stiffness_ = 0.0, gap_ = 0.0;
+  bool conserving_ = false;    ///< the present step may not add to the energy
+  double most_energy_ = 0.0;   ///< of a step that conserves [J]
+  std::size_t failed_ = 0;     ///< member that the last failure is about
+};
+
+}   // namespace slender

@@ -1,0 +1,150 @@
+// A rod in the substeps of an island.
+#include "rod_part.h"
+
+#include "slender_sim/geometry/rotation.h"
+
+namespace slender {
+
+StepFailure RodPart::beginSubstep(const StepPlan& plan, const Substep& substep)
+{
+  plan_ = &plan;
+  substep_ = substep;
+  return rod_.beginStep(plan, *inputs_, duration_, substep.from, substep.length);
+}
+
+/// Contacts count from the first step on.
+void RodPart::addStartLoads()
+{
+  if (welds_.empty())
+    return;
+  RodSystem& system = rod_.system;
+  system.setResponse(0.0, nullptr);   // an attempt that failed leaves its viscous response
+  for (int i = 0; i < system.nodes(); ++i)
+    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), rod_.load(*inputs_, i));
+  system.evaluateWhole(false);
+  system.closeGradient();
+  for (const Weld& weld : welds_)
+  {
+    const GraspState& g = rod_.work.grasps[weld.grasp];
+    if (!g.active)
+      continue;
+    const BodySystem& body = weld.body->system;
+    BodySystem::Vector6 wrench = BodySystem::Vector6::Zero();
+    BodySystem::Matrix6 inertia = BodySystem::Matrix6::Zero();
+    wrench.tail<3>() += system.clampTorque(weld.grasp);
+    for (int i = g.first_node; i <= g.last_node; ++i)
+    {
+      const Eigen::Vector3d r = rod_.work.x.col(i) - body.pose.position, w = body.velocity().angular;
+      const double m = rod_.model->mass[i];
+      const Eigen::Vector3d force = -system.nodeGradient(i) - m * w.cross(w.cross(r));
+      wrench.head<3>() += force;
+      wrench.tail<3>() += r.cross(force);
+      inertia.topLeftCorner<3, 3>() += m * Eigen::Matrix3d::Identity();
+      inertia.topRightCorner<3, 3>() -= m * skew(r);
+      inertia.bottomLeftCorner<3, 3>() += m * skew(r);
+      inertia.bottomRightCorner<3, 3>() -= m * skew(r) * skew(r);
+    }
+    weld.body->addStartLoad(wrench, inertia);
+  }
+}
+
+void RodPart::takeStartAcceleration()
+{
+  for (const Weld& weld : welds_)
+  {
+    const GraspState& g = rod_.work.grasps[weld.grasp];
+    if (!g.active)
+      continue;
+    const BodySystem& body = weld.body->system;
+    const BodySystem::Vector6& a = weld.body->startAcceleration();
+    for (int i = g.first_node; i <= g.last_node; ++i)
+    {
+      const Eigen::Vector3d r = rod_.work.x.col(i) - body.pose.position, w = body.velocity().angular;
+      rod_.work.a.col(i) = a.head<3>() + a.tail<3>().cross(r) + w.cross(w.cross(r));
+    }
+  }
+}
+
+void RodPart::addSurface(ContactSurface& surface) const
+{
+  if (!touches_)
+    return;
+  const RodModel& m = *rod_.model;
+  double start = 0.0;
+  for (int j = 0; j < m.edges(); ++j)
+  {
+    ContactSegment s;
+    s.a = surface.points + j;
+    s.b = surface.points + (j + 1) % m.nodes();
+    s.radius = std::max(m.radius_a[j], m.radius_b[j]);
+    s.object = static_cast<int>(surface.objects.size());
+    s.start = start;
+    s.length = m.rest_length[j];
+    start += s.length;
+    surface.segments.push_back(s);
+  }
+  constexpr int kNoOwner = -1;   // solids that belong to one object alone belong to threads
+  surface.objects.push_back(
+      {start, m.closed, contact_.self, contact_.others, contact_.solids, contact_.friction, kNoOwner});
+  surface.points += m.nodes();
+}
+
+/// A contact force that every scene meets: the weight of an edge, or what stops it within the gap in a step.
+BarrierRange RodPart::barrierRange(double gap) const
+{
+  const double step = rod_.time.step;
+  BarrierRange range;
+  if (touches_)
+    range.least = rod_.model->mass.maxCoeff() * std::max(10.0, gap / (step * step));
+  return range;
+}
+
+void RodPart::beginStage(std::size_t stage)
+{
+  rod_.beginStage(stage, *inputs_, duration_, substep_.from, substep_.length);
+  setCarriedInertia(plan_->stages[stage]);
+  followJoints();
+}
+
+void RodPart::endStage(std::size_t stage, bool last, StepReport& report)
+{
+  takeCarriedMotion();
+  if (last)
+    rod_.finishStep(*inputs_, duration_, substep_.from, substep_.length, report);
+  else
+    rod_.endStage(stage, *inputs_, duration_, substep_.from, substep_.length);
+}
+
+void RodPart::acceptSubstep(const Substep& substep)
+{
+  rod_.moveGrasps(*inputs_, duration_, substep.to);
+  std::swap(rod_.work, rod_.next);
+}
+
+bool RodPart::conserves() const
+{
+  const std::vector<GraspState>& grasps = rod_.work.grasps;
+  for (std::size_t k = 0; k < grasps.size(); ++k)
+    if (grasps[k].active && grasps[k].body < 0)
+    {
+      const Pose &from = grasps[k].X_WG, &to = inputs_->grasps[k].X_WG;
+      if (from.position != to.position || from.orientation.coeffs() != to.orientation.coeffs())
+        return false;
+    }
+  return true;
+}
+
+double RodPart::energyAtStart(double& allowance)
+{
+  double own = 0.0;
+  const double energy = rod_.startEnergy(*inputs_, &own);
+  allowance += own;
+  return energy;
+}
+
+void RodPart::refuse(StepFailure failure, double length, StepReport& report) const
+{
+  rod_.refuseUnsolved(report, failure, length, false);
+}
+
+}   // namespace slender

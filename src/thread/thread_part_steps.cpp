@@ -1,0 +1,94 @@
+// A thread in the substeps of an island.
+#include <algorithm>
+
+#include "thread_part.h"
+
+namespace slender {
+
+StepFailure ThreadPart::beginSubstep(const StepPlan&, const Substep& substep)
+{
+  length_ = substep.length;
+  const StepFailure failure = thread_.prepare(substep.from, substep.to, duration_);
+  if (failure == StepFailure::none)
+    begin(substep.from / duration_, substep.to / duration_, substep.to - substep.from);
+  return failure;
+}
+
+void ThreadPart::addSurface(ContactSurface& surface) const
+{
+  const ThreadState& state = thread_.work;
+  const auto isHeld = [&](int i) {
+    return state.deposited[i] || (i == 0 && state.ends[0].held) || (i + 1 == state.nodes() && state.ends[1].held);
+  };
+  ContactSegment s;
+  s.object = static_cast<int>(surface.objects.size());
+  s.core = contact_.merging > 0.0 ? contact_.merging : 1.0;
+  for (int j = 0; j < state.edges(); ++j)
+  {
+    s.a = surface.points + j;
+    s.b = surface.points + j + 1;
+    s.radius = state.radius(j);
+    s.length = state.edge(j).norm();
+    s.driven = isHeld(j) && isHeld(j + 1);
+    surface.segments.push_back(s);
+    s.start += s.length;
+  }
+  surface.objects.push_back(
+      {s.start, false, contact_.self, contact_.others, contact_.solids, contact_.friction, owner_});
+  surface.points += state.nodes();
+}
+
+/// The barrier is no softer than weights and what stops a node within the gap ask for. It does not become stiffer than
+/// a force that would double the length of the thread in a step: where parts are jammed, gaps do not open however stiff
+/// the barrier is.
+BarrierRange ThreadPart::barrierRange(double gap) const
+{
+  const double h = length_, gravity = thread_.inputs().gravity.norm();
+  const RodArrays& a = system_.arrays();
+  BarrierRange range;
+  for (int i = 0; i < a.nodes; ++i)
+    range.least = std::max(range.least, a.weight[i] * h * h * std::max(gravity, gap / (duration_ * duration_)));
+  double length = 0.0;
+  for (int j = 0; j < thread_.work.edges(); ++j)
+    length += thread_.work.edge(j).norm();
+  range.most = 3.0 * thread_.model->viscosity * thread_.work.totalVolume() / (length * duration_);
+  return range;
+}
+
+void ThreadPart::holdMore()
+{
+  if (const double earliest = thread_.firstLanding(); earliest <= 1.0)
+  {
+    thread_.stopLanding(length_, earliest);
+    holdLanded();
+  }
+}
+
+StepFailure ThreadPart::finishSubstep(StepReport&)
+{
+  thread_.takeOver(length_);
+  if (!thread_.remesh(guard_))
+    return StepFailure::overstretched;
+  return thread_.overgrownEdge() >= 0 ? StepFailure::squeezed : StepFailure::none;
+}
+
+/// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by
+/// bit.
+bool ThreadPart::shorterMayHelp(StepFailure failure) const
+{
+  return failure != StepFailure::overstretched && thread_.overgrownEdge() < 0;
+}
+
+/// Takes out the sharpest fold, if there is one.
+bool ThreadPart::mend()
+{
+  const int fold = thread_.foldedNode();
+  return fold >= 0 && mendFold(thread_.work, fold, guard_);
+}
+
+void ThreadPart::refuse(StepFailure failure, double length, StepReport& report) const
+{
+  thread_.refuseUnsolved(report, failure, length);
+}
+
+}   // namespace slender

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "slender_sim/contact/contact_potential.h"
+
+namespace slender {
+
+/// Surfaces at one instant, with their names, for messages about what touches.
+struct Meeting
+{
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;                 ///< points of the surface [m]
+  std::vector<std::string> objects;   ///< name of each object of the surface: "rod 'rope'"
+  std::vector<std::string> solids;    ///< name of each solid
+  std::vector<Pose> poses;            ///< of the solids
+
+  void addSolid(const std::string& name, const ContactSolid& solid, const Pose& pose);
+  /// The two that are nearest to each other, of those that may touch: "thread 'honey' and obstacle 'plate'". `gap`: at
+  /// which surfaces repel [m].
+  std::string nearest(double gap) const;
+};
+
+}   // namespace slender
