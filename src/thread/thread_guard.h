@@ -4,7 +4,7 @@
 
 #include "slender_sim/dynamics/chain_system.h"
 #include "slender_sim/thread/thread_remesh.h"
-#include "slender_sim/thread/touching_threads.h"
+#include "slender_sim/thread/thread_touch.h"
 
 namespace slender {
 

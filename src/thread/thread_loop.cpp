@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "thread_contact.h"
 #include "slender_sim/dynamics/substep_controller.h"
 #include "slender_sim/linalg/interruption.h"
 
@@ -11,124 +10,76 @@ namespace slender {
 
 namespace {
 
-/// Threads that a step advances together, and what the last substep of them came to.
+/// The substeps of a thread on its own.
 class ThreadSubsteps : public SubstepEquations
 {
 public:
-  ThreadSubsteps(const SteppedThread* parts, int count, double duration, ThreadContact* contact)
-    : parts_(parts),
-      end_(parts + count),
-      duration_(duration),
-      contact_(contact),
-      failed_(parts)
-  {
-  }
+  ThreadSubsteps(ThreadStepper::Impl& thread, double duration) : thread_(thread), duration_(duration) {}
 
   StepFailure attempt(const Substep& substep, StepReport& report) override;
-  void accept(const Substep&) override {}   // the attempt changes the parts' work states only when it succeeds
-  bool shorterMayHelp(StepFailure failure) const override;
+  void accept(const Substep&) override {}   // the attempt changes the work state only when it succeeds
+  /// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by
+  /// bit.
+  bool shorterMayHelp(StepFailure failure) const override
+  {
+    return !thread_.explicit_step && failure != StepFailure::overstretched && thread_.overgrownEdge() < 0;
+  }
   bool mend(StepReport& report) override;
   void refuse(const Substep& substep, StepFailure failure, StepReport& report) override;
 
 private:
-  const SteppedThread* farthestFromBalance() const;
-
-  const SteppedThread *parts_, *end_;
+  ThreadStepper::Impl& thread_;
   double duration_;
-  ThreadContact* contact_;
-  const SteppedThread* failed_;   ///< part that the last failure is about
 };
-
-/// The part on which the largest unbalanced force acts.
-const SteppedThread* ThreadSubsteps::farthestFromBalance() const
-{
-  Largest force;
-  for (const SteppedThread* p = parts_; p != end_; ++p)
-    if (const Largest own = p->thread->unbalancedForce(); own.any())
-      force.add(static_cast<int>(p - parts_), own.value());
-  return parts_ + std::max(force.index(), 0);
-}
 
 StepFailure ThreadSubsteps::attempt(const Substep& substep, StepReport& report)
 {
-  const double from = substep.from, to = substep.to, h = to - from;
-  for (failed_ = parts_; failed_ != end_; ++failed_)
-    if (const StepFailure failure = failed_->thread->prepare(from, to, duration_); failure != StepFailure::none)
-      return failure;
-  failed_ = parts_;
-  const StepFailure failure =
-      contact_ ? contact_->solve(from / duration_, to / duration_, h, report) : parts_->thread->solveAlone(h, report);
+  const double h = substep.to - substep.from;
+  StepFailure failure = thread_.prepare(substep.from, substep.to, duration_);
+  if (failure == StepFailure::none)
+    failure = thread_.solveAlone(h, report);
   if (failure != StepFailure::none)
-  {
-    failed_ = farthestFromBalance();
     return failure;
-  }
-  for (const SteppedThread* p = parts_; p != end_; ++p)
-    p->thread->takeOver(h);
-  for (failed_ = parts_; failed_ != end_; ++failed_)
-  {
-    if (!failed_->thread->remesh(contact_))
-      return StepFailure::overstretched;
-    if (failed_->thread->overgrownEdge() >= 0)
-      return StepFailure::squeezed;
-  }
-  return StepFailure::none;
+  thread_.takeOver(h);
+  if (!thread_.remesh(nullptr))
+    return StepFailure::overstretched;
+  return thread_.overgrownEdge() >= 0 ? StepFailure::squeezed : StepFailure::none;
 }
 
-/// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by
-/// bit.
-bool ThreadSubsteps::shorterMayHelp(StepFailure failure) const
-{
-  return !failed_->thread->explicit_step && failure != StepFailure::overstretched &&
-         failed_->thread->overgrownEdge() < 0;
-}
-
-/// Takes out the sharpest fold of a part, if there is one.
+/// Takes out the sharpest fold, if there is one.
 bool ThreadSubsteps::mend(StepReport& report)
 {
   constexpr int kMostFolds = 20;   // in one step
-  if (report.mended_folds >= kMostFolds)
+  const int fold = thread_.foldedNode();
+  if (report.mended_folds >= kMostFolds || fold < 0 || !mendFold(thread_.work, fold))
     return false;
-  for (const SteppedThread* p = parts_; p != end_; ++p)
-    if (const int fold = p->thread->foldedNode(); fold >= 0 && mendFold(p->thread->work, fold, contact_))
-    {
-      ++report.mended_folds;
-      return true;
-    }
-  return false;
+  ++report.mended_folds;
+  return true;
 }
 
 void ThreadSubsteps::refuse(const Substep& substep, StepFailure failure, StepReport& report)
 {
-  const ThreadStepper::Impl& thread = *(failed_ == end_ ? parts_ : failed_)->thread;
   if (failure == StepFailure::interrupted)
-    thread.refuse(report, failure, kStepInterrupted);
+    thread_.refuse(report, failure, kStepInterrupted);
   else
-    thread.refuseUnsolved(report, failure, substep.length);
+    thread_.refuseUnsolved(report, failure, substep.length);
 }
 
 }   // namespace
 
-StepReport advanceThreads(const SteppedThread* parts, int count, double duration, ThreadContact* contact)
+StepReport advanceThread(ThreadStepper::Impl& thread, ThreadState& state, const ThreadInputs& inputs, double duration)
 {
   StepReport report;
-  const SteppedThread* const end = parts + count;
-  double longest = duration;
-  for (const SteppedThread* p = parts; p != end; ++p)
-  {
-    if (!p->thread->begin(*p->state, *p->inputs, duration, report))
-      return report;
-    longest = std::min(longest, p->thread->longestSubstep(duration));
-  }
+  if (!thread.begin(state, inputs, duration, report))
+    return report;
+  const double longest = thread.longestSubstep(duration);
   SubstepRule rule;
   rule.longest = duration / std::ceil(duration / longest * (1 - 1e-9));   // all but shortened substeps are equally long
-  rule.max_cuts = parts->thread->newton.max_cuts;
-  ThreadSubsteps substeps(parts, count, duration, contact);
+  rule.max_cuts = thread.newton.max_cuts;
+  ThreadSubsteps substeps(thread, duration);
   SubstepController(rule).run(substeps, duration, report);
-  if (!report.ok)
-    return report;
-  for (const SteppedThread* p = parts; p != end; ++p)
-    std::swap(*p->state, p->thread->work);
+  if (report.ok)
+    std::swap(state, thread.work);
   return report;
 }
 

@@ -4,18 +4,8 @@
 
 namespace slender {
 
-class ThreadContact;
-
-/// A thread in a step, its state and its inputs.
-struct SteppedThread
-{
-  ThreadStepper::Impl* thread;
-  ThreadState* state;
-  const ThreadInputs* inputs;
-};
-
-/// Advances threads together by `duration` [s], in substeps common to all. `contact` (null: a single thread that
-/// touches nothing) solves their equations. On failure the states are untouched and the report says why.
-StepReport advanceThreads(const SteppedThread* parts, int count, double duration, ThreadContact* contact);
+/// Advances a thread that touches nothing by `duration` [s], in substeps. On failure the state is untouched and the
+/// report says why.
+StepReport advanceThread(ThreadStepper::Impl& thread, ThreadState& state, const ThreadInputs& inputs, double duration);
 
 }   // namespace slender

@@ -4,7 +4,7 @@
 
 #include "../contact/chain_part.h"
 #include "../contact/part_steps.h"
-#include "slender_sim/thread/touching_threads.h"
+#include "slender_sim/thread/thread_touch.h"
 #include "thread_stepper_impl.h"
 
 namespace slender {

@@ -43,9 +43,9 @@ ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const New
     throw std::invalid_argument("thread '" + model->name + "': integrator is " + toString(integrator) +
                                 ", allowed: implicit_euler, symplectic_euler");
   if (model->floor.slips())
-    throw std::invalid_argument("thread '" + model->name + "': floor.friction is " +
-                                std::to_string(model->floor.friction) +
-                                ", but a floor that slips needs TouchingThreads");
+    throw std::invalid_argument(
+        "thread '" + model->name + "': floor.friction is " + std::to_string(model->floor.friction) +
+        ", but on a floor that slips a thread needs contact: give it one, for example contact: {}");
   impl_ = std::make_unique<Impl>(std::move(model), newton, integrator == Integrator::symplectic_euler);
 }
 ThreadStepper::~ThreadStepper() = default;
@@ -54,8 +54,7 @@ ThreadStepper& ThreadStepper::operator=(ThreadStepper&&) noexcept = default;
 
 StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, double duration)
 {
-  const SteppedThread part{impl_.get(), &state, &inputs};
-  return advanceThreads(&part, 1, duration, nullptr);
+  return advanceThread(*impl_, state, inputs, duration);
 }
 const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return impl_->loads; }
 const ThreadModel& ThreadStepper::model() const { return *impl_->model; }

@@ -24,7 +24,7 @@ public:
   {
   }
 
-  // ---- a step in substeps, see advanceThreads()
+  // ---- a step in substeps, see advanceThread()
   /// Returns false if an input or the state is not sound. The report then says so.
   bool begin(const ThreadState& state, const ThreadInputs& inputs, double duration, StepReport& report);
   /// Of a substep: no more than an edge leaves the nozzle at a time, and ThreadLimits::max_step.

@@ -2,6 +2,7 @@
 // states, bit by bit, as a new stepper that starts from the same state.
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -10,8 +11,8 @@
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/rod/averaged_rod.h"
 #include "slender_sim/scene/state_bytes.h"
-#include "slender_sim/thread/touching_threads.h"
 #include "test/support/groups.h"
+#include "test/support/thread_world.h"
 #include "test/support/threads.h"
 
 namespace slender::test {
@@ -27,13 +28,19 @@ std::string bytesOf(const ThreadState& s)
   group.threads.push_back(s);
   return stateBytes(group);
 }
-std::string bytesOf(const TouchingState& s)
+std::string bytesOf(const WorldState& s)
 {
   std::string bytes;
   for (const ThreadGroupState& thread : s.threads)
     bytes += stateBytes(thread);
-  return bytes + std::to_string(s.contact_stiffness);
+  return bytes + std::to_string(s.thread_contact_stiffness);
 }
+/// A world with the function of the steppers; its step has the length of its model.
+struct WorldStepper
+{
+  std::unique_ptr<World> world;
+  StepReport step(WorldState& state, const WorldInputs& inputs, double) { return world->step(state, inputs); }
+};
 std::string bytesOf(const ClothGroupState& s)
 {
   std::string bytes;
@@ -343,11 +350,7 @@ TEST(FailedSteps, RefusalsOfThreadsLeaveNothing)
 
 TEST(FailedSteps, RefusalsOfThreadsInContactLeaveNothing)
 {
-  TouchingModel model;
-  model.options.gap = 5e-5;
-  model.options.least_stiffness = 1e-8;
-  TouchingState state;
-  TouchingInputs inputs;
+  ThreadWorld cross(5e-5, 2e-3);
   ThreadModel syrup = honey();
   syrup.nozzle_diameter = 0;
   syrup.surface_tension = 0.05;
@@ -356,18 +359,16 @@ TEST(FailedSteps, RefusalsOfThreadsInContactLeaveNothing)
     Eigen::Matrix3Xd x(3, 13);
     for (int i = 0; i < 13; ++i)
       x.col(i) = Eigen::Vector3d(k == 0 ? 1e-3 * (i - 6) : 0, k == 1 ? 1e-3 * (i - 6) : 0, 2.02e-3 * k);
-    model.threads.push_back(std::make_shared<ThreadModel>(syrup));
-    model.touches.emplace_back();
-    state.threads.emplace_back();
-    state.threads.back().threads.push_back(makeThread(x, Eigen::VectorXd::Constant(12, 1e-3)));
-    for (Eigen::Vector3d& v : state.threads.back().threads[0].v)
+    ThreadState thread = makeThread(x, Eigen::VectorXd::Constant(12, 1e-3));
+    for (Eigen::Vector3d& v : thread.v)
       v.z() = k == 1 ? -0.02 : 0.0;
-    inputs.threads.emplace_back();
+    cross.add(syrup, thread, ThreadInputs{}, ThreadTouch{});
   }
-  TouchingInputs spoilt = inputs;
+  WorldInputs spoilt = cross.inputs;
   spoilt.threads[1].gravity = {1e200, 0, -1e300};
-  expectRefusalLeavesNothing<TouchingState, TouchingInputs, TouchingThreads>(
-      "threads in contact", state, inputs, spoilt, 2e-3, [&] { return TouchingThreads(model, NewtonConfig{}); });
+  expectRefusalLeavesNothing<WorldState, WorldInputs, WorldStepper>(
+      "threads in contact", cross.state, cross.inputs, spoilt, 2e-3,
+      [&] { return WorldStepper{std::make_unique<World>(cross.model, cross.state)}; });
 }
 
 TEST(FailedSteps, RefusalsOfClothsLeaveNothing)

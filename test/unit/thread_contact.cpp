@@ -6,41 +6,14 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/contact/distance.h"
-#include "slender_sim/thread/touching_threads.h"
 #include "src/thread/merging.h"
+#include "test/support/thread_world.h"
 #include "test/support/threads.h"
 
 namespace slender::test {
 namespace {
 
 using Eigen::Vector3d;
-
-struct Touching
-{
-  TouchingModel model;
-  TouchingState state;
-  TouchingInputs inputs;
-
-  explicit Touching(double gap)
-  {
-    model.options.gap = gap;
-    model.options.least_stiffness = 1e-8;
-  }
-  void add(const ThreadModel& m, const ThreadState& s, const ThreadInputs& in, const ThreadTouch& touch)
-  {
-    model.threads.push_back(std::make_shared<ThreadModel>(m));
-    model.touches.push_back(touch);
-    state.threads.emplace_back();
-    state.threads.back().threads.push_back(s);
-    inputs.threads.push_back(in);
-  }
-  void addObstacle(const Shape& shape, const Pose& pose, double friction)
-  {
-    model.obstacles.push_back({shape, friction});
-    state.obstacles.push_back(pose);
-    inputs.obstacles.push_back(pose);
-  }
-};
 
 /// Straight along x at `at`, from -length/2 to length/2.
 ThreadState straight(double length, int edges, double radius, const Vector3d& at)
@@ -148,10 +121,10 @@ TEST(Merging, GradientAndStiffnessMatchDifferences)
 }
 
 /// Two parallel threads just in touch; distance of their axes over time.
-struct Pair : Touching
+struct Pair : ThreadWorld
 {
   double r = 1e-3;
-  Pair(double merging, double friction) : Touching(1e-5)
+  Pair(double merging, double friction, double step) : ThreadWorld(1e-5, step)
   {
     ThreadModel m = syrup();
     m.density = 1;
@@ -191,13 +164,13 @@ TEST(TouchingThreads, ParallelThreadsMergeAtTheRateOfTheModel)
   double error[2];
   for (int fine = 0; fine < 2; ++fine)
   {
-    Pair pair(0.4, 0.3);
     const double h = fine ? 5e-4 : 1e-3;
-    TouchingThreads threads(pair.model, NewtonConfig{});
+    Pair pair(0.4, 0.3, h);
+    World threads(pair.model, pair.state);
     const double volume = pair.state.threads[0].volumeBalance();
     for (int k = 0; k < std::lround(end / h); ++k)
     {
-      const StepReport report = threads.step(pair.state, pair.inputs, h);
+      const StepReport report = threads.step(pair.state, pair.inputs);
       ASSERT_TRUE(report.ok) << k << " " << report.message;
     }
     EXPECT_NEAR(pair.state.threads[0].volumeBalance(), volume, 1e-13 * volume);
@@ -212,16 +185,16 @@ TEST(TouchingThreads, ParallelThreadsMergeAtTheRateOfTheModel)
 
 TEST(TouchingThreads, MergedThreadsStayAtTheDistanceAskedFor)
 {
-  Pair pair(0.6, 0.3);
-  TouchingThreads threads(pair.model, NewtonConfig{});
+  Pair pair(0.6, 0.3, 2e-3);
+  World threads(pair.model, pair.state);
   for (int k = 0; k < 80; ++k)
   {
-    const StepReport report = threads.step(pair.state, pair.inputs, 2e-3);
+    const StepReport report = threads.step(pair.state, pair.inputs);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
   }
   const double r = pair.state.threads[0].threads[0].radius(10);
   EXPECT_GT(pair.distance(), 0.6 * 2 * r);
-  EXPECT_LT(pair.distance(), 0.6 * 2 * r + pair.model.options.gap);
+  EXPECT_LT(pair.distance(), 0.6 * 2 * r + pair.model.contact.gap);
 }
 
 TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
@@ -234,17 +207,17 @@ TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
     m.feed_length = 0.004;
     m.limits.max_edge_length = 0.005;
     const Thread t = Thread::fromNozzle(m, {0, 0, 0.06}, 0.05);
-    Touching touching(3e-4);
+    ThreadWorld touching(3e-4, 0.002);
     ThreadTouch touch;
     touch.merging = merging ? 0.6 : 0.0;
     touching.add(m, t.state, t.inputs, touch);
-    TouchingThreads threads(touching.model, NewtonConfig{});
+    World threads(touching.model, touching.state);
     ThreadGroup group(std::make_shared<ThreadModel>(m), NewtonConfig{});
     ThreadGroupState alone;
     alone.threads.push_back(t.state);
     for (int k = 0; k < 100; ++k)
     {
-      ASSERT_TRUE(threads.step(touching.state, touching.inputs, 0.002).ok);
+      ASSERT_TRUE(threads.step(touching.state, touching.inputs).ok);
       ASSERT_TRUE(group.step(alone, t.inputs, 0.002).ok);
       const ThreadState &s = touching.state.threads[0].threads[0], &a = alone.threads[0];
       ASSERT_EQ(s.id, a.id);
@@ -257,7 +230,7 @@ TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
 
 /// Smallest distance of centrelines over the sum of radii, of all parts that are no neighbours and do not both lie on
 /// the floor. The floor, to which lying parts stick, lets them pass through each other.
-double closest(const TouchingState& state)
+double closest(const WorldState& state)
 {
   struct Piece
   {
@@ -298,23 +271,23 @@ double closest(const TouchingState& state)
 /// steps to follow, so it may lag behind by a part of the gap.
 TEST(TouchingThreads, MergedThreadsOfUnequalRadiiStayAtTheDistanceAskedFor)
 {
-  Pair pair(0.6, 0.3);
+  Pair pair(0.6, 0.3, 2e-3);
   for (ThreadGroupState& group : pair.state.threads)
     for (const int j : {0, 19})
       group.threads[0].volume[j] *= 0.98;
-  TouchingThreads threads(pair.model, NewtonConfig{});
+  World threads(pair.model, pair.state);
   for (int k = 0; k < 80; ++k)
   {
-    const StepReport report = threads.step(pair.state, pair.inputs, 2e-3);
+    const StepReport report = threads.step(pair.state, pair.inputs);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
-    EXPECT_GT(closest(pair.state), 0.6 - pair.model.options.gap / (2 * pair.r)) << k;
+    EXPECT_GT(closest(pair.state), 0.6 - pair.model.contact.gap / (2 * pair.r)) << k;
   }
 }
 
 /// Honey that coils on a plate.
-struct Coil : Touching
+struct Coil : ThreadWorld
 {
-  Coil(double gap, const ThreadTouch& touch, double viscosity, double surface_tension) : Touching(gap)
+  Coil(double gap, const ThreadTouch& touch, double viscosity, double surface_tension) : ThreadWorld(gap, 0.002)
   {
     ThreadModel m = honey();
     m.viscosity = viscosity;
@@ -344,13 +317,13 @@ TEST(TouchingThreads, ACoilPilesUpAndNothingPassesThrough)
     ThreadTouch touch;
     touch.merging = merging ? 0.6 : 0.0;
     Coil coil(3e-4, touch, c.viscosity, c.surface_tension);
-    TouchingThreads threads(coil.model, NewtonConfig{});
+    World threads(coil.model, coil.state);
     const double start = coil.state.threads[0].volumeBalance();
     double least = 1e9;
     std::size_t most = 0;
     for (int k = 0; k < 1300; ++k)
     {
-      const StepReport report = threads.step(coil.state, coil.inputs, 0.002);
+      const StepReport report = threads.step(coil.state, coil.inputs);
       ASSERT_TRUE(report.ok) << k << " " << report.message;
       least = std::min(least, closest(coil.state));
       most = std::max(most, threads.contacts().size());
@@ -370,7 +343,7 @@ TEST(TouchingThreads, ACoilPilesUpAndNothingPassesThrough)
 TEST(TouchingThreads, ContactConservesMomentum)
 {
   // two threads thrown at each other, crosswise
-  Touching cross(5e-5);
+  ThreadWorld cross(5e-5, 1e-3);
   ThreadModel m = syrup();
   for (int k = 0; k < 2; ++k)
   {
@@ -384,7 +357,7 @@ TEST(TouchingThreads, ContactConservesMomentum)
       v.z() = k ? -0.5 : 0.7;
     cross.add(m, s, weightless(), ThreadTouch{});
   }
-  TouchingThreads threads(cross.model, NewtonConfig{});
+  World threads(cross.model, cross.state);
   const auto momentum = [&] {
     return Vector3d(momentumOf(cross.state.threads[0].threads[0]) + momentumOf(cross.state.threads[1].threads[0]));
   };
@@ -392,7 +365,7 @@ TEST(TouchingThreads, ContactConservesMomentum)
   std::size_t most = 0;
   for (int k = 0; k < 100; ++k)
   {
-    const StepReport report = threads.step(cross.state, cross.inputs, 1e-3);
+    const StepReport report = threads.step(cross.state, cross.inputs);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
     most = std::max(most, threads.contacts().size());
     ASSERT_GT(closest(cross.state), 0.95) << k;
@@ -404,20 +377,23 @@ TEST(TouchingThreads, ContactConservesMomentum)
 /// A thread that lies across an obstacle and sags on both sides.
 TEST(TouchingThreads, AThreadSagsOverAMovingObstacle)
 {
-  Touching over(1e-4);
+  ThreadWorld over(1e-4, 2e-3);
   ThreadModel m = syrup();
   m.viscosity = 1000;
   ThreadInputs in;
   over.add(m, straight(0.1, 40, 1.5e-3, {0, 0, 0.0137}), in, ThreadTouch{});
   over.addObstacle(Sphere{0.012}, Pose{}, 0.5);
-  TouchingThreads threads(over.model, NewtonConfig{});
+  World threads(over.model, over.state);
   double least = 1e9;
   for (int k = 0; k < 200; ++k)
   {
-    over.inputs.obstacles[0].position.z() = 1e-2 * std::sin(0.05 * (k + 1));
-    const StepReport report = threads.step(over.state, over.inputs, 2e-3);
+    over.inputs.obstacles[0].X_WG.position.z() = 1e-2 * std::sin(0.05 * (k + 1));
+    const StepReport report = threads.step(over.state, over.inputs);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
-    least = std::min(least, threads.clearance(over.state));
+    const Vector3d centre = over.state.obstacles[0].position;
+    for (int j = 0; j < over.thread(0).edges(); ++j)
+      least = std::min(least, pointSegmentDistance(centre, over.thread(0).x[j], over.thread(0).x[j + 1]) - 0.012 -
+                                  over.thread(0).radius(j));
   }
   const ThreadState& s = over.state.threads[0].threads[0];
   EXPECT_GT(least, 0.0);
@@ -432,7 +408,7 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
   const double tilt = 0.4, h = 1e-3;
   for (const double friction : {0.0, 0.2, 0.6})
   {
-    Touching slope(2e-5);
+    ThreadWorld slope(2e-5, h);
     ThreadModel m = syrup();
     m.surface_tension = 0;
     m.viscosity = 1e3;
@@ -442,16 +418,16 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
     slope.add(m, straight(0.02, 10, 1e-3, 1.01e-3 * normal), ThreadInputs{}, touch);
     slope.addObstacle(Plane{}, {Vector3d::Zero(), Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal)},
                       friction * friction);
-    TouchingThreads threads(slope.model, NewtonConfig{});
+    World threads(slope.model, slope.state);
     for (int k = 0; k < 200; ++k)
     {
-      const StepReport report = threads.step(slope.state, slope.inputs, h);
+      const StepReport report = threads.step(slope.state, slope.inputs);
       ASSERT_TRUE(report.ok) << k << " " << report.message;
     }
     const double expected = std::max(0.0, 9.81 * (std::sin(tilt) - friction * std::cos(tilt))) * 200 * h;
     EXPECT_NEAR(slope.state.threads[0].threads[0].v[5].dot(down), expected, 0.02 * expected + 1e-3) << friction;
   }
-  Touching belt(2e-5);
+  ThreadWorld belt(2e-5, h);
   ThreadModel m = syrup();
   m.surface_tension = 0;
   m.viscosity = 1e3;
@@ -463,10 +439,10 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
   ThreadTouch touch;
   touch.friction = 0.25;
   belt.add(m, straight(0.02, 10, 1e-3, {0, 0, 1.01e-3}), in, touch);
-  TouchingThreads threads(belt.model, NewtonConfig{});
+  World threads(belt.model, belt.state);
   for (int k = 1; k <= 400; ++k)
   {
-    const StepReport report = threads.step(belt.state, belt.inputs, h);
+    const StepReport report = threads.step(belt.state, belt.inputs);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
     if (k == 100)
       EXPECT_NEAR(belt.state.threads[0].threads[0].v[5].y(), 0.25 * 9.81 * k * h, 0.01);
@@ -479,22 +455,24 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
 
 TEST(TouchingThreads, RefusesWhatDoesNotFit)
 {
-  Touching bad(1e-4);
+  ThreadWorld bad(1e-4, 1e-3);
   ThreadTouch touch;
   touch.merging = 1.0;
   bad.add(syrup(), straight(0.02, 4, 1e-3, Vector3d::Zero()), weightless(), touch);
-  EXPECT_THROW(TouchingThreads(bad.model, NewtonConfig{}), std::invalid_argument);
-  bad.model.touches[0].merging = 0.0;
+  EXPECT_THROW(World(bad.model, bad.state), WorldError);
+  bad.model.threads[0].contact->merging = 0.0;
   bad.add(syrup(), straight(0.02, 4, 1e-3, {0, 0, 1.9e-3}), weightless(), ThreadTouch{});
-  TouchingThreads threads(bad.model, NewtonConfig{});
-  EXPECT_THROW(threads.checkClearance(bad.state), std::invalid_argument);   // they overlap
-  const ThreadState before = bad.state.threads[0].threads[0];
+  EXPECT_THROW(World(bad.model, bad.state), WorldError);   // they overlap
+  for (Vector3d& x : bad.state.threads[1].threads[0].x)
+    x.z() = 2.5e-3;
+  World threads(bad.model, bad.state);
+  const ThreadState before = bad.thread(0);
   bad.inputs.threads[1].gravity.x() = std::nan("");
-  EXPECT_FALSE(threads.step(bad.state, bad.inputs, 1e-3).ok);
+  EXPECT_FALSE(threads.step(bad.state, bad.inputs).ok);
   bad.inputs.threads[1].gravity.x() = 0.0;
   bad.inputs.threads.pop_back();
-  EXPECT_FALSE(threads.step(bad.state, bad.inputs, 1e-3).ok);
-  EXPECT_TRUE(sameThread(bad.state.threads[0].threads[0], before));
+  EXPECT_FALSE(threads.step(bad.state, bad.inputs).ok);
+  EXPECT_TRUE(sameThread(bad.thread(0), before));
 }
 
 }   // namespace

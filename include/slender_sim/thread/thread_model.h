@@ -11,7 +11,7 @@
 namespace slender {
 
 /// A horizontal floor or belt. A node whose section touches it stays there (no slip) and moves with the belt; or it
-/// slips, see TouchingThreads.
+/// slips, see WorldModel::Thread::contact.
 struct ThreadFloor
 {
   bool present = false;

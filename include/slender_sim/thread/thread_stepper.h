@@ -47,7 +47,7 @@ public:
 
   const ThreadModel& model() const;
 
-  class Impl;   ///< for TouchingThreads
+  class Impl;   ///< for the parts of islands
 
 private:
   std::unique_ptr<Impl> impl_;

@@ -86,6 +86,15 @@ void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
 /// Returns true for a key that is given as false.
 bool isOff(const YamlCursor& key) { return key.present() && !key.boolean().value_or(true); }
 
+/// Whether there are several rods and threads with contact, so that they may meet each other.
+bool meetsChains(const SceneConfig& scene)
+{
+  const auto touches = [](const auto& object) { return object.contact.has_value(); };
+  return std::count_if(scene.rods.begin(), scene.rods.end(), touches) +
+             std::count_if(scene.threads.begin(), scene.threads.end(), touches) >
+         1;
+}
+
 /// Warns of a contact that finds no partner. `others`: the key for contact with objects of the same kind, of which the
 /// scene has any if `has_others`.
 void warnOfContact(YamlMap contact, const char* others, bool has_others, bool has_solids)
@@ -97,6 +106,27 @@ void warnOfContact(YamlMap contact, const char* others, bool has_others, bool ha
     contact.at().warning(std::string("has no effect: self is false, and ") + others +
                          " and obstacles are false or the scene has none, so that there is nothing to touch; leave "
                          "contact out, or change these keys");
+  }
+}
+
+/// Rods, threads and bodies meet each other. Cloths meet only cloths and what moves as prescribed.
+void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene)
+{
+  const auto touches = [](const auto& object) { return object.contact.has_value(); };
+  const auto moves = [](const BodyConfig& body) { return body.contact && body.shape && !body.motion; };
+  if (!cloths.present() || !any(scene.cloths, touches))
+    return;
+  std::vector<std::string> others;
+  if (any(scene.rods, touches))
+    others.push_back("rods");
+  if (any(scene.threads, touches))
+    others.push_back("threads");
+  if (any(scene.bodies, moves))
+    others.push_back("simulated bodies");
+  if (!others.empty())
+  {
+    cloths.warning("pass through the " + joinWords(others) +
+                   " of this scene: contact of cloth is with cloth, obstacles, and bodies with a given motion");
   }
 }
 
@@ -293,7 +323,8 @@ void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig&
         "has no effect: neither parts of the thread nor other threads are in touch with it; take contact: {self: "
         "true}");
   }
-  warnOfContact(contact, "threads", has_others, !scene.obstacles.empty() || (config.floor && config.floor->friction));
+  warnOfContact(contact, "threads", meetsChains(scene),
+                !scene.obstacles.empty() || !scene.bodies.empty() || (config.floor && config.floor->friction));
   if (config.nozzle && thread.has("nozzle"))
   {
     const YamlCursor flow = YamlMap(thread.get("nozzle")).get("flow");
@@ -311,7 +342,7 @@ void warnOfGenerator(YamlMap generator, const SceneConfig& scene, const std::str
     if (!rods->at().present())
       continue;
     warnOfMaterial(YamlMap(rods->get("material")), scene.gravity);
-    warnOfContact(YamlMap(rods->get("contact")), "rods", scene.rods.size() > 1,
+    warnOfContact(YamlMap(rods->get("contact")), "rods", meetsChains(scene),
                   !scene.obstacles.empty() || !scene.bodies.empty());
   }
   if (chain.has("spacing") && chain.get("links").integer(1, 10'000).value_or(2) == 1)
@@ -331,6 +362,7 @@ void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
   warnOfTime(YamlMap(map.get("time")), scene);
   warnOfWind(map.get("wind"), scene);
   warnOfObstacles(map.get("obstacles"), scene);
+  warnOfKindsThatDoNotMeet(map.get("cloths"), scene);
   warnOfSlipSpeed(YamlMap(map.get("contact")).get("slip_speed"), scene);
   for (const YamlCursor& obstacle : entriesOf(map.get("obstacles")))
     warnOfFriction(YamlMap(obstacle).get("friction"), why_no_friction);
@@ -338,7 +370,7 @@ void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
   {
     YamlMap rod(entry);
     warnOfMaterial(YamlMap(rod.get("material")), scene.gravity);
-    warnOfContact(YamlMap(rod.get("contact")), "rods", scene.rods.size() > 1,
+    warnOfContact(YamlMap(rod.get("contact")), "rods", meetsChains(scene),
                   !scene.obstacles.empty() || !scene.bodies.empty());
   }
   for (const YamlCursor& generator : entriesOf(map.get("generate")))

@@ -167,19 +167,36 @@ private:
       const bool own = r == object_;
       if (own ? !contact->self : !(contact->rods && config_.rods[r].contact && config_.rods[r].contact->rods))
         continue;
-      const RodModel& other = simulation_.rodModel(r);
-      const Eigen::Matrix3Xd& x = simulation_.state().rods[r].x;
-      for (int j = 0; j < other.edges(); ++j)
-      {
-        const double radii = radius + largestRadius(other, j);
-        const Eigen::Vector3d a = x.col(j), b = x.col((j + 1) % other.nodes());
-        if (!own || comesBack(other, j, radii, pointSegmentDistance(place_.position, a, b)))
-        {
-          addSegment(a, b, radii,
-                     own ? "the rod itself at edge " + std::to_string(j) : quoted("rod", config_.rods[r].name));
-        }
-      }
+      addRod(r, radius);
     }
+    if (contact->rods)
+      addThreads(-1, radius);
+  }
+
+  void addRod(int r, double radius)
+  {
+    const bool own = place_.kind == Kind::rod && r == object_;
+    const RodModel& other = simulation_.rodModel(r);
+    const Eigen::Matrix3Xd& x = simulation_.state().rods[r].x;
+    for (int j = 0; j < other.edges(); ++j)
+    {
+      const double radii = radius + largestRadius(other, j);
+      const Eigen::Vector3d a = x.col(j), b = x.col((j + 1) % other.nodes());
+      if (!own || comesBack(other, j, radii, pointSegmentDistance(place_.position, a, b)))
+        addSegment(a, b, radii,
+                   own ? "the rod itself at edge " + std::to_string(j) : quoted("rod", config_.rods[r].name));
+    }
+  }
+
+  /// Those with contact but one.
+  void addThreads(int but, double radius)
+  {
+    for (int k = 0; k < static_cast<int>(config_.threads.size()); ++k)
+      if (k != but && config_.threads[k].contact && config_.threads[k].contact->threads)
+        for (const ThreadState& thread : simulation_.state().threads[k].threads)
+          for (int j = 0; j < thread.edges(); ++j)
+            addSegment(thread.x[j], thread.x[j + 1], radius + thread.radius(j),
+                       quoted("thread", config_.threads[k].name));
   }
 
   static double largestRadius(const RodModel& model, int edge)
@@ -220,20 +237,13 @@ private:
     if (config.floor)
       partner_.add(place_.position.z() - config.floor->height - radius, "the floor");
     if (config.contact && config.contact->obstacles)
-      addSolids(radius, [](const BodyConfig&) { return false; });   // threads do not meet bodies
-    for (int k = 0; config.contact && config.contact->threads && k < static_cast<int>(config_.threads.size()); ++k)
-    {
-      if (k == object_ || !config_.threads[k].contact || !config_.threads[k].contact->threads)
-        continue;
-      for (const ThreadState& thread : state.threads[k].threads)
-      {
-        for (int j = 0; j < thread.edges(); ++j)
-        {
-          addSegment(thread.x[j], thread.x[j + 1], radius + thread.radius(j),
-                     quoted("thread", config_.threads[k].name));
-        }
-      }
-    }
+      addSolids(radius, [](const BodyConfig&) { return true; });
+    if (!config.contact || !config.contact->threads)
+      return;
+    addThreads(object_, radius);
+    for (int r = 0; r < static_cast<int>(config_.rods.size()); ++r)
+      if (config_.rods[r].contact && config_.rods[r].contact->rods)
+        addRod(r, radius);
   }
 
   void findPartnersOfCloth()

@@ -137,9 +137,8 @@ std::vector<Feature> features()
   const std::vector<Scene> all = {kRod, kExplicitRod, kThread, kCloth, kTracked};
   return {
       {"contact",
-       {"src/contact/", "include/slender_sim/contact/", "src/thread/touching_threads",
-        "include/slender_sim/thread/touching_threads", "src/cloth/cloth_group",
-        "include/slender_sim/cloth/cloth_group"},
+       {"src/contact/", "include/slender_sim/contact/", "src/world/joined_parts", "src/world/joined_steps",
+        "src/world/meeting", "src/cloth/cloth_group", "include/slender_sim/cloth/cloth_group"},
        "[cC]ontact|[tT]ouching|[cC]ollision|[cC]ollide",
        all,
        {rod_on_floor, thread_with_itself, cloth_on_ball}},

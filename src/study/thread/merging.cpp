@@ -5,7 +5,7 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
-#include "slender_sim/thread/touching_threads.h"
+#include "slender_sim/world/world.h"
 #include "study/rod/rod_cases.h"
 #include "thread_cases.h"
 
@@ -58,9 +58,9 @@ struct Seen
 
 Seen mergePair(const Case& c, int steps, double duration, double until)
 {
-  TouchingModel model;
-  TouchingState state;
-  TouchingInputs inputs;
+  WorldModel model;
+  WorldState state;
+  WorldInputs inputs;
   const double radii[2] = {2 * c.radius / (1 + c.ratio), 2 * c.radius * c.ratio / (1 + c.ratio)};
   for (int k = 0; k < 2; ++k)
   {
@@ -71,24 +71,24 @@ Seen mergePair(const Case& c, int steps, double duration, double until)
     t.model.density = 1e-4 * c.viscosity * c.viscosity / (c.surface_tension * c.radius);   // inertia is no matter
     for (Eigen::Vector3d& x : t.state.x)
       x += Eigen::Vector3d(k * c.shift, 0, 2.0 * k) * c.radius;
-    model.threads.push_back(std::make_shared<ThreadModel>(t.model));
     ThreadTouch touch;
     touch.merging = until;
-    model.touches.push_back(touch);
+    model.threads.push_back({std::make_shared<ThreadModel>(t.model), touch});
     state.threads.emplace_back();
+    state.end_loads.emplace_back();
     state.threads.back().threads.push_back(t.state);
     inputs.threads.push_back(t.inputs);
   }
-  model.options.gap = 0.01 * c.radius;
-  model.options.least_stiffness = 1e-6 * c.surface_tension * c.radius;
-  NewtonConfig newton;
-  newton.tolerance = 1e-7;
-  TouchingThreads threads(model, newton);
+  model.contact.gap = 0.01 * c.radius;
+  model.contact.least_stiffness = 1e-6 * c.surface_tension * c.radius;
+  model.time.newton.tolerance = 1e-7;
+  model.time.step = duration / steps;
+  World threads(model, state);
   const double before = state.threads[0].volumeBalance() + state.threads[1].volumeBalance();
   Seen seen;
   for (int k = 0; k < steps; ++k)
   {
-    const StepReport report = threads.step(state, inputs, duration / steps);
+    const StepReport report = threads.step(state, inputs);
     if (!report.ok)
       throw std::runtime_error(std::string("merging, ") + c.name + ": " + report.message);
     const ThreadState &a = state.threads[0].threads[0], &b = state.threads[1].threads[0];
