@@ -113,7 +113,6 @@ void IslandSystem::beginStage(bool first)
   contact_->begin(points_base_, poses_base_, duration_);
   if (!first)
     return;
-  contact_->evaluate(points_base_, poses_base_, false);
   if (attraction_)
     attraction_->evaluate(points_base_, false);
   takeFirst();

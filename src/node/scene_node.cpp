@@ -42,8 +42,9 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
   // one kind of state on the topic `state`
   const std::string who = "scene " + scene.name + ": ";
   const auto refuse = [&](const std::string& has, const std::string& other) {
-    throw SceneError(who + "it has " + has + ", which " + other + " simulates; they do not meet what " +
-                     toString(kind) + " simulates: put them in two scenes");
+    throw SceneError(who + "it has " + has + ", which " + other +
+                     " simulates, and a node publishes one kind of state: put " +
+                     "them in two scenes, or run the scene by `simulate`");
   };
   const auto tracks = [](const auto& objects) {
     return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; });
@@ -75,7 +76,9 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
   if (kind == NodeKind::threads && scene.threads.empty())
     throw SceneError(who + "it has no threads; rod_node simulates rods");
   if (kind == NodeKind::threads && !scene.bodies.empty())
-    throw SceneError(who + "it has bodies beside its threads, which do not meet them; put them in two scenes");
+    throw SceneError(who +
+                     "it has bodies beside its threads, which this node does not publish: put them in two scenes, or "
+                     "run the scene by `simulate`");
   if (kind == NodeKind::cloths && scene.cloths.empty())
     throw SceneError(who + "it has no cloths; rod_node simulates rods and bodies");
   if (options.markers.style == MarkerStyle::regions && !tracked)

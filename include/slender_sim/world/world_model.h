@@ -7,6 +7,7 @@
 
 #include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/rod/rod_group.h"
+#include "slender_sim/thread/thread_model.h"
 #include "slender_sim/thread/thread_touch.h"
 #include "slender_sim/tracking/function_set.h"
 

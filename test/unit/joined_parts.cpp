@@ -1,0 +1,142 @@
+// Rods, threads and bodies that meet: nothing passes through anything, and what one loses the other gets.
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "slender_sim/contact/distance.h"
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender::test {
+namespace {
+
+using Eigen::Vector3d;
+
+const char* const kCrossing = R"(
+time: {step: 0.001, duration: 1}
+gravity: [0, 0, 0]
+contact: {gap: 5.0e-5}
+rods:
+  - name: cable
+    centerline: {straight: {from: [-0.02, 0, 0], to: [0.02, 0, 0], edges: 20}}
+    cross_section: {radius: 0.001}
+    material: {density: 1100, youngs_modulus: 1.0e6, poissons_ratio: 0.3}
+    contact: {friction: 0.3}
+threads:
+  - name: syrup
+    fluid: {density: 1300, viscosity: 10, surface_tension: 0.03}
+    radius: 0.001
+    centerline: {straight: {from: [0.001, -0.02, 0.0028], to: [0.001, 0.02, 0.0028], edges: 20}}
+    contact: {friction: 0.3}
+bodies:
+  - name: ball
+    shape: {sphere: {radius: 0.004}}
+    mass: 0.0002
+    pose: {position: [0.001, 0.0005, 0.0084]}
+    velocity: {linear: [0, 0, -0.3]}
+    friction: 0.3
+)";
+
+/// Smallest distance between the surfaces of the rod, the thread and the ball [m].
+double room(const Simulation& s)
+{
+  const RodState& rod = s.state().rods[0];
+  const ThreadState& thread = s.state().threads[0].threads[0];
+  const Vector3d ball = s.state().bodies[0].X_WB.position;
+  double least = 1.0;
+  for (int j = 0; j < thread.edges(); ++j)
+  {
+    least = std::min(least, pointSegmentDistance(ball, thread.x[j], thread.x[j + 1]) - 0.004 - thread.radius(j));
+    for (Eigen::Index i = 0; i + 1 < rod.x.cols(); ++i)
+      least = std::min(least, segmentDistance(rod.x.col(i), rod.x.col(i + 1), thread.x[j], thread.x[j + 1]) - 0.001 -
+                                  thread.radius(j));
+  }
+  return least;
+}
+
+Vector3d momentum(const Simulation& s)
+{
+  const RodState& rod = s.state().rods[0];
+  Vector3d sum = 0.0002 * s.state().bodies[0].velocity.linear;
+  for (Eigen::Index i = 0; i < rod.x.cols(); ++i)
+    sum += s.rodModel(0).mass[i] * rod.v.col(i);
+  const ThreadState& thread = s.state().threads[0].threads[0];
+  for (int j = 0; j < thread.edges(); ++j)
+    sum += 0.5 * s.threadModel(0).density * thread.volume[j] * (thread.v[j] + thread.v[j + 1]);
+  return sum;
+}
+
+/// A ball falls onto a thread, which falls onto a rod.
+TEST(JoinedParts, ContactBetweenKindsKeepsMomentumAndDistance)
+{
+  Simulation s(parseScene(kCrossing, "crossing"));
+  const Vector3d before = momentum(s);
+  std::size_t most = 0;
+  for (int k = 0; k < 60; ++k)
+  {
+    const StepReport report = s.step(s.defaultInputs());
+    ASSERT_TRUE(report.ok) << k << " " << report.message;
+    most = std::max(most, s.world().contacts().size());
+    ASSERT_GT(room(s), 0.0) << k;
+  }
+  EXPECT_GE(most, 2u);
+  EXPECT_LT(s.state().rods[0].v.row(2).mean(), -0.01);   // the ball pushes the rod through the thread
+  // Newton's tolerance leaves forces of 1e-6 of the largest one unbalanced
+  EXPECT_LT((momentum(s) - before).norm(), 1e-5 * before.norm());
+}
+
+TEST(JoinedParts, WhatIsFarApartMovesAsOnItsOwn)
+{
+  const std::vector<std::string> apart = {
+      "threads.0.centerline.straight={from: [1, -0.02, 0], to: [1, 0.02, 0], edges: 20}",
+      "bodies.0.pose.position=[0, 1, 0]", "gravity=[0, 0, -9.81]"};
+  Simulation together(parseScene(kCrossing, "together", apart));
+  std::vector<std::string> without = apart;
+  without.emplace_back("rods=[]");
+  without.emplace_back("bodies=[]");
+  Simulation alone(parseScene(kCrossing, "alone", without));
+  for (int k = 0; k < 50; ++k)
+  {
+    ASSERT_TRUE(together.step(together.defaultInputs()).ok);
+    ASSERT_TRUE(alone.step(alone.defaultInputs()).ok);
+  }
+  const ThreadState &a = together.state().threads[0].threads[0], &b = alone.state().threads[0].threads[0];
+  for (int i = 0; i < a.nodes(); ++i)
+    EXPECT_LT((a.x[i] - b.x[i]).norm(), 1e-9) << i;   // one Newton iteration more or less
+  EXPECT_NEAR(together.state().bodies[0].X_WB.position.z(), -0.3 * 0.05 - 9.81 * 0.05 * 0.051 / 2, 1e-12);
+}
+
+TEST(JoinedParts, RefusesIntegratorsThatThreadsDoNotHave)
+{
+  EXPECT_THROW(Simulation(parseScene(kCrossing, "bdf2", {"time.integrator=bdf2"})), SceneError);
+}
+
+TEST(JoinedParts, NamesWhatCrossesAtTheStart)
+{
+  try
+  {
+    Simulation(parseScene(kCrossing, "t", {"bodies.0.pose.position=[0.001, 0, 0.0065]"}));
+    FAIL() << "was accepted";
+  }
+  catch (const SceneError& error)
+  {
+    EXPECT_NE(std::string(error.what()).find("thread 'syrup' and body 'ball' touch or cross"), std::string::npos)
+        << error.what();
+  }
+}
+
+/// Cloth does not meet rods yet, and a scene where it would is warned of.
+TEST(JoinedParts, WarnsOfClothsThatPassThroughOthers)
+{
+  const std::string cloth =
+      "cloths=[{name: sheet, grid: {corner: [0, 0, -1], sides: [[0.1, 0, 0], [0, 0.1, 0]], "
+      "cells: 2}, contact: {}}]";
+  const SceneConfig scene = parseScene(kCrossing, "t", {cloth});
+  EXPECT_TRUE(std::any_of(scene.warnings.begin(), scene.warnings.end(), [](const std::string& text) {
+    return text.find("pass through the rods, threads and simulated bodies") != std::string::npos;
+  }));
+}
+
+}   // namespace
+}   // namespace slender::test
