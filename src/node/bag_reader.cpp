@@ -170,21 +170,42 @@ void BagReader::Contents::open()
   }
 }
 
+namespace {
+
+bool endsWith(const std::string& text, const std::string& end)
+{
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+std::string withoutEnd(const std::string& text, const std::string& end)
+{
+  return text.substr(0, text.size() - end.size());
+}
+
+/// Namespace of the node, given that of a topic: in scenes of several kinds each kind has its own namespace, and the
+/// topic `scene` is outside of these.
+std::string nodeOf(const std::string& topic_namespace, const std::set<std::string>& topics)
+{
+  for (const char* kind : {"/rods", "/threads", "/cloths"})
+    if (endsWith(topic_namespace, kind) && topics.count(withoutEnd(topic_namespace, kind) + "/scene"))
+      return withoutEnd(topic_namespace, kind);
+  return topic_namespace;
+}
+
+}   // namespace
+
 void BagReader::Contents::choosePrefix(const std::string& topic_namespace)
 {
   static const std::set<std::string> ours{"slender_sim/RodState", "slender_sim/ThreadState", "slender_sim/ClothState",
                                           "slender_sim/BodyStates"};
-  std::set<std::string> found;
+  std::set<std::string> found, topics;
   rosbag::View all(bag);
   for (const rosbag::ConnectionInfo* connection : all.getConnections())
+    topics.insert(connection->topic);
+  for (const rosbag::ConnectionInfo* connection : all.getConnections())
     for (const char* name : {"/state", "/body_states"})
-    {
-      const std::string& topic = connection->topic;
-      const std::size_t length = std::string(name).size();
-      if (ours.count(connection->datatype) && topic.size() >= length &&
-          topic.compare(topic.size() - length, length, name) == 0)
-        found.insert(topic.substr(0, topic.size() - length));
-    }
+      if (ours.count(connection->datatype) && endsWith(connection->topic, name))
+        found.insert(nodeOf(withoutEnd(connection->topic, name), topics));
   if (found.empty())
     throw BagError(path +
                    ": holds no states of slender_sim; record with simulate --bag, with ~record_bag of a node, or at "
@@ -215,7 +236,7 @@ void BagReader::Contents::readScene(const std::string& folder)
       }
   if (!scene && scene_problem.empty())
     scene_problem = "the topic " + prefix + "scene is not in the bag";
-  rosbag::View meshes(bag, rosbag::TopicQuery(prefix + "mesh"));
+  rosbag::View meshes(bag, rosbag::TopicQuery(std::vector<std::string>{prefix + "mesh", prefix + "cloths/mesh"}));
   for (const rosbag::MessageInstance& instance : meshes)
     if (const auto message = instance.instantiate<slender_sim::MeshStamped>())
     {
@@ -241,11 +262,11 @@ void BagReader::Contents::openStreams()
     if (!seen.insert({topic, connection->datatype}).second)
       continue;
     const std::string type = connection->datatype.substr(connection->datatype.find('/') + 1);
-    if (name == "state" && type == "RodState")
+    if ((name == "state" || name == "rods/state") && type == "RodState")
       stream<slender_sim::RodState>(topic, "RodState", [this](const auto& m) { add(m); });
-    else if (name == "state" && type == "ThreadState")
+    else if ((name == "state" || name == "threads/state") && type == "ThreadState")
       stream<slender_sim::ThreadState>(topic, "ThreadState", [this](const auto& m) { add(m); });
-    else if (name == "state" && type == "ClothState")
+    else if ((name == "state" || name == "cloths/state") && type == "ClothState")
       stream<slender_sim::ClothState>(topic, "ClothState", [this](const auto& m) { add(m); });
     else if (name == "body_states" && type == "BodyStates")
       stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { add(m, out->bodies); });
@@ -294,7 +315,9 @@ void BagReader::Contents::findStepLength()
       step_length =
           shortestStep(static_cast<double>(ns - first->first), static_cast<double>(message.step - first->second));
   };
-  rosbag::View states(bag, rosbag::TopicQuery(prefix + "state"));
+  rosbag::View states(bag,
+                      rosbag::TopicQuery(std::vector<std::string>{prefix + "state", prefix + "rods/state",
+                                                                  prefix + "threads/state", prefix + "cloths/state"}));
   for (const rosbag::MessageInstance& instance : states)
     if (const auto rod = instance.instantiate<slender_sim::RodState>())
       look(*rod);

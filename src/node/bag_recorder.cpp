@@ -13,22 +13,26 @@
 
 namespace slender {
 
-BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace,
-                         const std::vector<std::string>& grasp_names, const std::vector<std::string>& thread_prefixes)
+BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const Simulation& simulation)
 {
   const std::string prefix =
       topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
-  state_topic_ = prefix + "state";
+  const SceneConfig& scene = simulation.config();
+  const bool several_kinds = !scene.rods.empty() + !scene.threads.empty() + !scene.cloths.empty() > 1;
+  const auto of = [&](const char* kind) { return several_kinds ? prefix + kind + "/" : prefix; };
+  rods_topic_ = of("rods") + "state";
+  threads_topic_ = of("threads") + "state";
+  cloths_topic_ = of("cloths") + "state";
+  mesh_topic_ = of("cloths") + "mesh";
   scene_topic_ = prefix + "scene";
   inputs_topic_ = prefix + "inputs";
-  mesh_topic_ = prefix + "mesh";
   bodies_topic_ = prefix + "body_states";
   grasps_topic_ = prefix + "grasp_states";
   obstacles_topic_ = prefix + "obstacle_states";
   fields_topic_ = prefix + "fields";
-  for (const std::string& name : grasp_names)
+  for (const std::string& name : graspTopicNames(simulation))
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
-  for (const std::string& thread : thread_prefixes)
+  for (const std::string& thread : threadTopicPrefixes(simulation))
     nozzle_topics_.push_back(prefix + thread + "nozzle/wrench");
   try
   {
@@ -89,11 +93,11 @@ void BagRecorder::recordInput(const slender_sim::Input& input) { write(inputs_to
 void BagRecorder::record(const SceneMessages& messages)
 {
   for (const auto& state : messages.states)
-    write(state_topic_, state->header.stamp, *state);
+    write(rods_topic_, state->header.stamp, *state);
   for (const auto& state : messages.threads)
-    write(state_topic_, state->header.stamp, *state);
+    write(threads_topic_, state->header.stamp, *state);
   if (!messages.cloth_state->names.empty())
-    write(state_topic_, messages.cloth_state->header.stamp, *messages.cloth_state);
+    write(cloths_topic_, messages.cloth_state->header.stamp, *messages.cloth_state);
   for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
     write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
   if (!messages.bodies.name.empty())
@@ -139,7 +143,7 @@ public:
     clock.skip(simulation.state().steps);
     if (!bag_)
     {
-      bag_ = std::make_unique<BagRecorder>(path_, "/", graspTopicNames(simulation), threadTopicPrefixes(simulation));
+      bag_ = std::make_unique<BagRecorder>(path_, "/", simulation);
       bag_->recordScene(simulation.config().source, clock.stamp());
       if (!simulation.config().cloths.empty())
         bag_->recordMesh(clothMesh(simulation, clock.stamp(), "world"));

@@ -119,7 +119,7 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   grasp_names_ = graspTopicNames(*simulation_);
   thread_prefixes_ = threadTopicPrefixes(*simulation_);
   if (!options_.record_bag.empty())
-    bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), grasp_names_, thread_prefixes_);
+    bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), *simulation_);
   if (options_.paused)
     mode_ = Mode::paused;
   start();

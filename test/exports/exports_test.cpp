@@ -53,6 +53,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Recording{"honey_coil",
                               "--duration 1.2 --set 'record.fields=[curvature, strain, force]'",
                               {"nodes.csv", "grasps.csv", "threads.csv", "thread_fields.csv"}},
+                    Recording{"honey_on_cable", "--duration 0.1", {"nodes.csv", "grasps.csv", "threads.csv"}},
                     Recording{"handkerchief", "--duration 0.1", {"nodes.csv", "grasps.csv", "cloths.csv"}},
                     Recording{"obstacle_course",
                               "--duration 0.1 --set 'record.fields=[force, moment, energy, contact_force]'",

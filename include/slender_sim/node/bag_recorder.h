@@ -18,10 +18,10 @@ class BagRecorder
 {
 public:
   /// Opens PATH.active, which close() renames to PATH, in place of an older bag; where PATH is a symbolic link, beside
-  /// the file that it leads to. `topic_namespace` precedes the topics, e.g. "/". Throws std::runtime_error when the
-  /// file cannot be written, and when PATH is no regular file.
-  BagRecorder(const std::string& path, const std::string& topic_namespace, const std::vector<std::string>& grasp_names,
-              const std::vector<std::string>& thread_prefixes);
+  /// the file that it leads to. `topic_namespace` precedes the topics, e.g. "/". In scenes with objects of several
+  /// kinds, each kind has its own namespace for `state` and `mesh`: `rods/state`, `threads/state`, `cloths/state`,
+  /// `cloths/mesh`. Throws std::runtime_error when the file cannot be written, and when PATH is no regular file.
+  BagRecorder(const std::string& path, const std::string& topic_namespace, const Simulation& simulation);
   ~BagRecorder();
 
   /// The scene as parsed, on `scene`; once, before the first record().
@@ -44,8 +44,8 @@ private:
   void write(const std::string& topic, const ros::Time& stamp, const Message& message);
   std::string remains() const;
 
-  std::string path_, state_topic_, scene_topic_, inputs_topic_, mesh_topic_, bodies_topic_, grasps_topic_,
-      obstacles_topic_, fields_topic_;
+  std::string path_, rods_topic_, threads_topic_, cloths_topic_, mesh_topic_;
+  std::string scene_topic_, inputs_topic_, bodies_topic_, grasps_topic_, obstacles_topic_, fields_topic_;
   std::vector<std::string> wrench_topics_, nozzle_topics_;
   std::unique_ptr<rosbag::Bag> bag_;
   bool open_ = false;

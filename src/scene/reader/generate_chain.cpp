@@ -78,7 +78,7 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
       grasp.attach = Attach::initial;
       rod.grasps.push_back(std::move(grasp));
     }
-    out.rods.emplace_back(RodPart{rod, edges}, at);
+    out.rods.emplace_back(ReadRod{rod, edges}, at);
   }
 }
 

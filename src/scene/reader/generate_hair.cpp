@@ -87,7 +87,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
     grasp.motion = BodyMotion{head.name};
     grasp.attach = Attach::initial;
     rod.grasps = {std::move(grasp)};
-    out.rods.emplace_back(RodPart{rod, edges}, at);
+    out.rods.emplace_back(ReadRod{rod, edges}, at);
   }
   out.obstacles.emplace_back(std::move(head), at);
 }

@@ -174,7 +174,7 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
       grasp.attach = Attach::initial;
       rod.grasps.push_back(std::move(grasp));
     }
-    out.rods.emplace_back(RodPart{rod, branch.nodes - 1}, at);
+    out.rods.emplace_back(ReadRod{rod, branch.nodes - 1}, at);
   }
 }
 

@@ -97,7 +97,7 @@ void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
   }
 }
 
-void readWeld(const YamlCursor& at, const std::vector<RodPart>& rods, std::vector<WeldConfig>& welds)
+void readWeld(const YamlCursor& at, const std::vector<ReadRod>& rods, std::vector<WeldConfig>& welds)
 {
   YamlMap map(at);
   const YamlCursor at_rod = map.require("rod"), edge = map.require("edge");
@@ -106,11 +106,11 @@ void readWeld(const YamlCursor& at, const std::vector<RodPart>& rods, std::vecto
   if (!name)
     return;
   const auto found =
-      std::find_if(rods.begin(), rods.end(), [&](const RodPart& part) { return part.config.name == *name; });
+      std::find_if(rods.begin(), rods.end(), [&](const ReadRod& part) { return part.config.name == *name; });
   if (found == rods.end())
   {
     std::vector<std::string> names;
-    for (const RodPart& part : rods)
+    for (const ReadRod& part : rods)
       names.push_back(part.config.name);
     const std::string nearest = nearestWord(*name, names);
     names.resize(std::min<std::size_t>(names.size(), 10));
@@ -174,7 +174,7 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
 }
 
 /// Nodes of one rod may be held only once, by grasps and welds together.
-void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<RodPart>& rods,
+void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<ReadRod>& rods,
                const std::vector<BodyConfig>& bodies)
 {
   const auto overlaps = [&](int first, int last) { return weld.first_node <= last && first <= weld.last_node; };
@@ -196,7 +196,7 @@ void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<R
 
 }   // namespace
 
-std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodPart>& rods)
+std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods)
 {
   std::vector<BodyConfig> bodies;
   if (!at.present())

@@ -48,7 +48,7 @@ void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod);
 Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
 /// A rod, and how many edges it has: 0 when its centreline could not be read.
-struct RodPart
+struct ReadRod
 {
   RodConfig config;
   int edges = 0;
@@ -59,12 +59,12 @@ void readTraits(YamlMap& map, RodConfig& rod);
 /// something was reported.
 std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context,
                                                        const RodConfig& rod, int edges);
-RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
+ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
 
 /// What the generators of a scene make, each with the place that asked for it. Welds count rods from `first_rod`.
 struct Generated
 {
-  std::vector<std::pair<RodPart, YamlCursor>> rods;
+  std::vector<std::pair<ReadRod, YamlCursor>> rods;
   std::vector<std::pair<ObstacleConfig, YamlCursor>> obstacles;
   std::vector<std::pair<BodyConfig, YamlCursor>> bodies;
 };
@@ -85,11 +85,11 @@ void completeThreads(SceneConfig& scene, const std::vector<YamlCursor>& at);
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context);
 /// The list `tracked`: appends to the cloths.
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
-ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods,
+ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
                           const std::vector<ThreadConfig>& threads);
 std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
-std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodPart>& rods);
+std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods);
 TimeConfig readTime(const YamlCursor& at);
 RecordConfig readRecord(const YamlCursor& at);
 StartConfig readStart(const YamlCursor& at);

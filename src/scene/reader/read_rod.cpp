@@ -327,7 +327,7 @@ void readTraits(YamlMap& map, RodConfig& rod)
   rod.contact = readRodContact(map.get("contact"));
 }
 
-RodPart readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
+ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
   RodConfig rod;
   YamlMap map(at);

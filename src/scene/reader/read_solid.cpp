@@ -210,14 +210,14 @@ std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at)
   return readTouch(at, "threads", &ThreadContactConfig::threads);
 }
 
-ContactConfig readContact(const YamlCursor& at, const std::vector<RodPart>& rods,
+ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
                           const std::vector<ThreadConfig>& threads)
 {
   ContactConfig contact;
   const std::size_t before = at.problems().size();
   YamlMap map(at);
   double smallest = std::numeric_limits<double>::infinity();
-  for (const RodPart& rod : rods)
+  for (const ReadRod& rod : rods)
   {
     if (rod.config.contact)
     {

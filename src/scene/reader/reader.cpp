@@ -17,9 +17,9 @@ namespace {
 
 constexpr std::uintmax_t max_file_size = 256u << 20;   // [bytes]
 
-std::vector<RodPart> readRods(const YamlCursor& at, const ReadContext& context)
+std::vector<ReadRod> readRods(const YamlCursor& at, const ReadContext& context)
 {
-  std::vector<RodPart> rods;
+  std::vector<ReadRod> rods;
   std::map<std::string, std::string> rod_names, grasp_names;   // to the path that used it first
   const auto entries = at.items(1, 100'000);
   for (std::size_t k = 0; k < entries.size(); ++k)
@@ -46,7 +46,7 @@ std::vector<RodPart> readRods(const YamlCursor& at, const ReadContext& context)
 }
 
 /// Adds what the generators made; names must differ from those of the file.
-void takeGeneratedRods(Generated& generated, std::vector<RodPart>& rods)
+void takeGeneratedRods(Generated& generated, std::vector<ReadRod>& rods)
 {
   std::set<std::string> names, grasps;
   const auto take = [&](std::set<std::string>& used, const std::string& what, const std::string& name,
@@ -58,7 +58,7 @@ void takeGeneratedRods(Generated& generated, std::vector<RodPart>& rods)
     }
     return true;
   };
-  for (const RodPart& part : rods)
+  for (const ReadRod& part : rods)
   {
     take(names, "rod", part.config.name, nullptr);
     for (const GraspConfig& grasp : part.config.grasps)
@@ -189,7 +189,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
         "[{...}]");
   }
   const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
-  std::vector<RodPart> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<RodPart>{};
+  std::vector<ReadRod> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<ReadRod>{};
   Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
   takeGeneratedRods(generated, rods);
   scene.threads = readThreads(at_threads, context);
@@ -215,7 +215,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     names.take(maker, body.name, true);
     scene.bodies.push_back(std::move(body));
   }
-  for (RodPart& part : rods)
+  for (ReadRod& part : rods)
     scene.rods.push_back(std::move(part.config));
   std::vector<YamlCursor> cloths = entriesOf(at_cloths);
   for (const YamlCursor& entry : entriesOf(at_tracked))
