@@ -12,10 +12,15 @@ namespace slender {
 template <class F>
 void IslandSystem::forParts(F&& f)
 {
+  if (!parallel_ || threads_ == 1)
+  {
+    for (Part* part : parts_)   // OpenMP would take memory for its one thread
+      f(*part);
+    return;
+  }
   const int count = static_cast<int>(parts_.size());
 #ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic, 4) if (parallel_ && threads_ != 1) \
-    num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
+#pragma omp parallel for schedule(dynamic, 4) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
 #endif
   for (int k = 0; k < count; ++k)
     f(*parts_[k]);

@@ -75,6 +75,9 @@ StepReport IslandStepper::step(double duration, double& first)
   rule.max_cuts = time_.newton.max_cuts;
   rule.first = rule.error_tolerance > 0 ? first : 0.0;
   island_.beginStep(duration);
+  swept_.resize(members_.size());
+  for (std::size_t k = 0; k < members_.size(); ++k)
+    swept_[k] = members_[k].steps->surfaceBox(0.0);
   SubstepController controller(rule);
   controller.run(*this, duration, report);
   if (report.ok)
@@ -249,8 +252,11 @@ StepFailure IslandStepper::attempt(const Substep& substep, StepReport& report)
 
 void IslandStepper::accept(const Substep& substep)
 {
-  for (const Member& member : members_)
-    member.steps->acceptSubstep(substep);
+  for (std::size_t k = 0; k < members_.size(); ++k)
+  {
+    members_[k].steps->acceptSubstep(substep);
+    swept_[k].include(members_[k].steps->surfaceBox(0.0));
+  }
   if (const ContactPotential* contact = island_.contact())
     stiffness_ = contact->stiffness();
 }

@@ -43,6 +43,8 @@ public:
   /// Advances by `duration` [s], from what the parts have loaded. `first`: length of the first substep [s], 0: the
   /// longest; becomes that of the next step's first one. On failure the report says why.
   StepReport step(double duration, double& first);
+  /// Box of the surface of a member during the last step, see PartSteps::surfaceBox().
+  const BoundingBox& sweptBox(std::size_t member) const { return swept_[member]; }
   /// Of the barrier [N]; part of the state. 0: not chosen yet.
   double stiffness() const { return stiffness_; }
   void setStiffness(double stiffness);
@@ -68,6 +70,7 @@ private:
   IslandSystem island_;
   std::vector<Member> members_;
   std::vector<Part*> parts_;
+  std::vector<BoundingBox> swept_;   ///< per member
   SubstepPotential* attraction_ = nullptr;
   ContactSurface surface_;   ///< of the parts, without solids
   bool surface_changes_ = false;

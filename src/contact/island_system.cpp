@@ -94,6 +94,11 @@ bool IslandSystem::solidsMove() const
 void IslandSystem::beginSubstep(double fraction)
 {
   exact_ = false;
+  for (Part* part : parts_)
+  {
+    pattern_valid_ = pattern_valid_ && part->island == this;   // another island has numbered its unknowns
+    part->island = this;
+  }
   countPoints();
   numberUnknowns();
   if (!contact_)

@@ -30,6 +30,7 @@ public:
   virtual ~Part() = default;
 
   // ---- state of the part in the island, which IslandSystem sets
+  const void* island = nullptr;                ///< in which the part was stepped last
   bool coupled = false;                        ///< the matrix of the island has its unknowns
   int offset = 0;                              ///< number of its first unknown in that matrix
   int first_point = 0;                         ///< number of its first surface point among those of the island

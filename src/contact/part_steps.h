@@ -50,6 +50,9 @@ public:
   /// `gap`: at which surfaces repel [m].
   virtual BarrierRange barrierRange(double gap) const = 0;
 
+  /// Box that the surface fills now, or would fill `ahead` seconds later without forces, radii included [m].
+  virtual BoundingBox surfaceBox(double) const { return BoundingBox::empty(); }
+
   // ---- a stage of a substep
   virtual void beginStage(std::size_t stage) = 0;
   /// After a solution. Returns whether the part holds more than before, so that the stage has to be solved again.

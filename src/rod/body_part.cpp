@@ -104,6 +104,16 @@ StepFailure BodyPart::beginSubstep(const StepPlan& plan, const Substep& substep)
   return StepFailure::none;
 }
 
+BoundingBox BodyPart::surfaceBox(double ahead) const
+{
+  BoundingBox box = BoundingBox::empty();
+  if (reach_ < 0.0)
+    return box;
+  box.include(now_.X_WB.position + ahead * now_.velocity.linear);
+  box.enlarge(reach_);
+  return box;
+}
+
 void BodyPart::addStartLoad(const BodySystem::Vector6& wrench, const BodySystem::Matrix6& inertia)
 {
   start_wrench_ += wrench;

@@ -73,6 +73,9 @@ public:
   void solveStartAcceleration() override;
   const BodySystem::Vector6& startAcceleration() const { return start_acceleration_; }
   void addSurface(ContactSurface&) const override {}
+  /// No point of the shape is farther from the origin of the body [m]. Without a call the body has no shape.
+  void setReach(double reach) { reach_ = reach; }
+  BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double) const override { return {}; }
   void beginStage(std::size_t stage) override;
   void endStage(std::size_t stage, bool last, StepReport&) override;
@@ -89,6 +92,7 @@ private:
   RigidBodyState now_, next_;
   const StepPlan* plan_ = nullptr;
   double length_ = 0.0;   ///< of the substep [s]
+  double reach_ = -1.0;   ///< negative: no shape
   BodySystem::Vector6 start_wrench_, start_acceleration_;
   BodySystem::Matrix6 start_inertia_;
 };

@@ -67,6 +67,7 @@ public:
   void addStartLoads() override;
   void takeStartAcceleration() override;
   void addSurface(ContactSurface& surface) const override;
+  BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
   void beginStage(std::size_t stage) override;
   void endStage(std::size_t stage, bool last, StepReport& report) override;

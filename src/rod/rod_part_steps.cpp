@@ -89,6 +89,17 @@ void RodPart::addSurface(ContactSurface& surface) const
   surface.points += m.nodes();
 }
 
+BoundingBox RodPart::surfaceBox(double ahead) const
+{
+  BoundingBox box = BoundingBox::empty();
+  if (!touches_)
+    return box;
+  for (Eigen::Index i = 0; i < rod_.work.x.cols(); ++i)
+    box.include(rod_.work.x.col(i) + ahead * rod_.work.v.col(i));
+  box.enlarge(std::max(rod_.model->radius_a.maxCoeff(), rod_.model->radius_b.maxCoeff()));
+  return box;
+}
+
 /// A contact force that every scene meets: the weight of an edge, or what stops it within the gap in a step.
 BarrierRange RodPart::barrierRange(double gap) const
 {

@@ -43,6 +43,7 @@ public:
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
   void addSurface(ContactSurface& surface) const override;
   bool surfaceChanges() const override { return true; }
+  BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
   void beginStage(std::size_t) override {}
   bool meetsMore() override { return thread_.firstLanding() <= 1.0; }

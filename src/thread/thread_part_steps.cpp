@@ -38,6 +38,19 @@ void ThreadPart::addSurface(ContactSurface& surface) const
   surface.points += state.nodes();
 }
 
+BoundingBox ThreadPart::surfaceBox(double ahead) const
+{
+  const ThreadState& state = thread_.work;
+  BoundingBox box = BoundingBox::empty();
+  double radius = 0.0;
+  for (int i = 0; i < state.nodes(); ++i)
+    box.include(state.x[i] + ahead * state.v[i]);
+  for (int j = 0; j < state.edges(); ++j)
+    radius = std::max(radius, state.radius(j));
+  box.enlarge(radius);
+  return box;
+}
+
 /// The barrier is no softer than weights and what stops a node within the gap ask for. It does not become stiffer than
 /// a force that would double the length of the thread in a step: where parts are jammed, gaps do not open however stiff
 /// the barrier is.

@@ -22,8 +22,8 @@ public:
   /// Is called when all islands have made their step, and the time is that of its end. Writes into the state what
   /// follows from the step, and completes the report.
   virtual void finish(WorldState&, const WorldInputs&, StepReport&) {}
-  /// Contacts of the last step; null for islands that have none to show.
-  virtual const std::vector<ContactTerm>* contacts() const { return nullptr; }
+  /// Appends the contacts of the last step.
+  virtual void addContacts(std::vector<ContactForce>&) const {}
   virtual void setThreads(int) {}
 };
 
@@ -33,6 +33,8 @@ class RodIsland : public Island
 public:
   virtual const std::vector<Wrench>& wrenches(int rod) const = 0;
   virtual RodEnergies energies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const = 0;
+  /// Forces of contact on the nodes of a rod [N]; without columns for a rod that touches nothing.
+  virtual Eigen::Matrix3Xd contactForces(int) const { return Eigen::Matrix3Xd(3, 0); }
   virtual RodStepper* stepper() { return nullptr; }   ///< of the only rod, where it has one
 };
 

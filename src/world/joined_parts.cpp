@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "slender_sim/contact/solids.h"
+
 namespace slender {
 
 namespace {
@@ -34,37 +36,34 @@ void check(const WorldModel& world, const IslandContent& content)
        "implicit_euler");
 }
 
-/// Threads are stepped by implicit Euler alone.
-TimeConfig timeOf(const WorldModel& world, const IslandContent& content)
-{
-  TimeConfig time = world.time;
-  if (!content.threads.empty())
-    time.integrator = Integrator::implicit_euler;
-  return time;
-}
-
 }   // namespace
 
 JoinedParts::JoinedParts(const WorldModel& world, IslandContent content, WorldState& state)
   : world_(world),
-    content_(std::move(content)),
-    guard_(world.contact.gap),
-    stepper_(timeOf(world, content_), !content_.threads.empty())
+    content_(std::move(content))
 {
   check(world, content_);
   for (const int b : content_.bodies)
-    if (world.bodies[b].body.simulated)
-      bodies_.push_back({b, std::make_unique<BodyPart>(world.bodies[b].body)});
+    if (const WorldModel::Body& body = world.bodies[b]; body.body.simulated)
+    {
+      objects_.bodies.push_back({b, std::make_unique<BodyPart>(body.body)});
+      if (body.shape)
+        objects_.bodies.back().part->setReach(body.X_BS.position.norm() + boundingRadius(*body.shape));
+    }
   addRods(state);
-  addThreads();
-  setMembers();
-  addContact();
+  for (const int k : content_.threads)
+  {
+    objects_.threads.emplace_back();
+    objects_.threads.back().index = k;
+  }
+  addSolids();
+  reach_.resize(static_cast<std::size_t>(objects_.parts()));
   checkClearance(state);
 }
 
 BodyPart* JoinedParts::simulated(int body) const
 {
-  for (const Body& b : bodies_)
+  for (const JoinedBody& b : objects_.bodies)
     if (b.index == body)
       return b.part.get();
   return nullptr;
@@ -72,27 +71,21 @@ BodyPart* JoinedParts::simulated(int body) const
 
 void JoinedParts::addRods(WorldState& state)
 {
-  int nodes = 0;
-  IslandTolerances& tolerances = stepper_.island().tolerances;
   for (const int r : content_.rods)
   {
     const WorldModel::Rod& rod = world_.rods[r];
-    Rod added{r, std::make_unique<RodStepper::Impl>(rod.model, world_.time), nullptr, {}};
+    JoinedRod added{r, std::make_unique<RodStepper::Impl>(rod.model, world_.time), nullptr, {}};
     added.part = std::make_unique<RodPart>(*added.stepper, rod.contact.has_value());
     if (rod.contact)
       added.part->setContact(*rod.contact);
-    rods_.push_back(std::move(added));
-    nodes += rod.model->nodes();
+    objects_.rods.push_back(std::move(added));
+    nodes_ += rod.model->nodes();
   }
-  tolerances.angles_may_keep_shift = !rods_.empty();
-  tolerances.most_unbalanced =
-      content_.threads.empty() ? std::numeric_limits<double>::infinity() : ThreadSystem::mostUnbalanced();
-  constexpr int kWorthThreads = 4000;   // nodes; less is done before threads are awake
-  stepper_.island().setThreads(0, rods_.size() > 1 && nodes >= kWorthThreads);
   for (const WorldModel::RodWeld& weld : world_.welds)
   {
-    const auto at = std::find_if(rods_.begin(), rods_.end(), [&](const Rod& rod) { return rod.index == weld.rod; });
-    if (at == rods_.end())
+    const auto at = std::find_if(objects_.rods.begin(), objects_.rods.end(),
+                                 [&](const JoinedRod& rod) { return rod.index == weld.rod; });
+    if (at == objects_.rods.end())
       continue;
     RodState& rod = state.rods[weld.rod];
     GraspState grasp = makeGrasp(*world_.rods[weld.rod].model, rod, weld.first_node, weld.last_node, true);
@@ -100,119 +93,70 @@ void JoinedParts::addRods(WorldState& state)
     grasp.body = body ? weld.body : -1;
     const Pose X_BG = state.bodies[weld.body].X_WB.inverse() * grasp.X_WG;
     const int number = static_cast<int>(rod.grasps.size());
-    welds_.push_back({static_cast<int>(at - rods_.begin()), number, weld.body, X_BG});
+    objects_.welds.push_back({static_cast<int>(at - objects_.rods.begin()), number, weld.body, X_BG});
     if (body)
       at->part->addWeld({number, body, X_BG});
     rod.grasps.push_back(grasp);
   }
 }
 
-void JoinedParts::addThreads()
+void JoinedParts::addSolids()
 {
-  for (const int k : content_.threads)
-  {
-    threads_.emplace_back();
-    threads_.back().index = k;
-    merges_ = merges_ || world_.threads[k].contact->merging > 0.0;
-  }
-  if (merges_)
-    stepper_.setAttraction(&merging_);
-}
-
-/// Numbers of the objects of the contact that are welded to a body. They start inside it.
-std::vector<int> JoinedParts::objectsWeldedTo(int body) const
-{
-  std::vector<int> objects;
-  int object = 0;
-  for (std::size_t r = 0; r < rods_.size(); ++r)
-  {
-    if (!world_.rods[rods_[r].index].contact)
-      continue;
-    if (std::any_of(welds_.begin(), welds_.end(),
-                    [&](const Weld& weld) { return weld.body == body && weld.rod == static_cast<int>(r); }))
-      objects.push_back(object);
-    ++object;
-  }
-  return objects;
-}
-
-void JoinedParts::addContact()
-{
-  const bool touches = !threads_.empty() || std::any_of(rods_.begin(), rods_.end(), [&](const Rod& rod) {
-    return world_.rods[rod.index].contact.has_value();
-  });
-  if (!touches)
-    return;
-  std::vector<ContactSolid> solids;
-  std::vector<IslandSolid>& moving = stepper_.island().solids;
   for (std::size_t k = 0; k < world_.obstacles.size(); ++k)
   {
-    solids_.push_back({Solid::Kind::obstacle, static_cast<int>(k)});
-    solids.push_back({world_.obstacles[k].shape, world_.obstacles[k].friction, {}});
-    moving.emplace_back();
+    const WorldModel::Obstacle& obstacle = world_.obstacles[k];
+    objects_.solids.push_back({JoinedSolid::Kind::obstacle, static_cast<int>(k), obstacle.shape, obstacle.friction});
   }
   for (const int b : content_.bodies)
   {
     const WorldModel::Body& body = world_.bodies[b];
     if (!body.shape)
       continue;
-    solids_.push_back({Solid::Kind::body, b});
-    solids.push_back({*body.shape, body.friction, objectsWeldedTo(b)});
-    moving.emplace_back();
-    moving.back().body = simulated(b);
-    moving.back().X_BS = body.X_BS;
+    objects_.solids.push_back({JoinedSolid::Kind::body, b, *body.shape, body.friction, simulated(b), body.X_BS});
+    for (const Weld& weld : objects_.welds)
+      if (weld.body == b)
+        objects_.solids.back().welded_rods.push_back(weld.rod);
   }
-  for (const Thread& thread : threads_)
+  for (const JoinedThread& thread : objects_.threads)
     if (const ThreadFloor& floor = world_.threads[thread.index].model->floor; floor.slips())
-    {
-      solids_.push_back({Solid::Kind::floor, thread.index});
-      solids.push_back({Plane{}, floor.friction, {}});
-      solids.back().only = thread.index;
-      moving.emplace_back();
-    }
-  stepper_.setContact(solids, world_.contact);
+      objects_.solids.push_back({JoinedSolid::Kind::floor, thread.index, Plane{}, floor.friction});
 }
 
-const std::vector<ContactTerm>* JoinedParts::contacts() const
+// ---- what the last step leaves
+
+void JoinedParts::addContacts(std::vector<ContactForce>& out) const
 {
-  const ContactPotential* contact = stepper_.island().contact();
-  return contact ? &contact->terms() : nullptr;
+  for (const JoinedIsland* island : islands_)
+    if (const ContactPotential* contact = island->contact())
+      for (const ContactTerm& term : contact->terms())
+        out.push_back({term.position, term.force});
 }
 
-void JoinedParts::setThreads(int threads)
+Eigen::Matrix3Xd JoinedParts::contactForces(int rod) const
 {
-  int nodes = 0;
-  for (const Rod& rod : rods_)
-    nodes += rod.stepper->model->nodes();
-  constexpr int kWorthThreads = 4000;
-  stepper_.island().setThreads(threads, rods_.size() > 1 && nodes >= kWorthThreads);
+  const RodPart& part = *objects_.rods[rod].part;
+  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, part.points());
+  for (const JoinedIsland* island : islands_)
+  {
+    if (!island->contact() || !std::binary_search(island->parts().begin(), island->parts().end(), rod))
+      continue;
+    for (const ContactTerm& term : island->contact()->terms())
+      for (int k = 0; k < 4; ++k)
+        if (const int point = term.point[k] - part.first_point;
+            term.point[k] >= 0 && point >= 0 && point < part.points())
+          forces.col(point) += term.weight[k] * term.force;
+  }
+  return forces;
 }
 
-/// The parts of the present step, bodies first.
-void JoinedParts::setMembers()
-{
-  members_.clear();
-  for (const Body& body : bodies_)
-    members_.push_back({body.part.get(), body.part.get()});
-  for (const Rod& rod : rods_)
-    members_.push_back({rod.part.get(), rod.part.get()});
-  for (ThreadPart* strand : strands_)
-    members_.push_back({strand, strand});
-  stepper_.setMembers(members_);
-}
-
-/// Threads with their own contact have a stiffness of their own; it depends on their scale.
-double& JoinedParts::stiffnessOf(WorldState& state) const
-{
-  return rods_.empty() && bodies_.empty() ? state.thread_contact_stiffness : state.contact_stiffness;
-}
+// ---- statics
 
 StepReport JoinedParts::solveEquilibrium(WorldState& state, const WorldInputs& inputs)
 {
-  if (rods_.empty() && bodies_.empty())
+  if (objects_.rods.empty() && objects_.bodies.empty())
     return {};
   RodGroupModel model;
-  for (const Rod& rod : rods_)
+  for (const JoinedRod& rod : objects_.rods)
   {
     model.rods.push_back(world_.rods[rod.index].model);
     if (const auto& contact = world_.rods[rod.index].contact)
@@ -238,32 +182,36 @@ StepReport JoinedParts::solveEquilibrium(WorldState& state, const WorldInputs& i
   for (const WorldModel::Obstacle& obstacle : world_.obstacles)
     model.contact.obstacles.push_back({obstacle.shape, obstacle.friction});
   model.contact.options = world_.contact;
-  for (const Weld& weld : welds_)
+  for (const Weld& weld : objects_.welds)
     model.welds.push_back({weld.rod, weld.grasp, placeOf(weld.body), weld.X_BG});
-  for (const Rod& rod : rods_)
+  for (const JoinedRod& rod : objects_.rods)
   {
     group_state.rods.push_back(state.rods[rod.index]);
     group_inputs.rods.push_back(inputs.rods[rod.index]);
   }
   group_state.obstacles = state.obstacles;
   group_state.obstacle_velocities = state.obstacle_velocities;
-  group_state.contact_stiffness = state.contact_stiffness;
+  for (const JoinedRod& rod : objects_.rods)
+    group_state.contact_stiffness = std::max(group_state.contact_stiffness, state.contact_stiffness.rods[rod.index]);
   group_inputs.obstacles = inputs.obstacles;
   group_inputs.gravity = inputs.gravity;
   RodGroup group(std::move(model), world_.time);
   const StepReport report = group.solveEquilibrium(group_state, group_inputs);
   if (!report.ok)
     return report;
-  for (std::size_t r = 0; r < rods_.size(); ++r)
+  for (std::size_t r = 0; r < objects_.rods.size(); ++r)
   {
-    state.rods[rods_[r].index] = group_state.rods[r];
-    rods_[r].stepper->wrenches = group.wrenches(static_cast<int>(r));
+    state.rods[objects_.rods[r].index] = group_state.rods[r];
+    objects_.rods[r].stepper->wrenches = group.wrenches(static_cast<int>(r));
   }
   for (const int b : content_.bodies)
     state.bodies[b] = group_state.bodies[placeOf(b)];
   state.obstacles = group_state.obstacles;
   state.obstacle_velocities = group_state.obstacle_velocities;
-  state.contact_stiffness = group_state.contact_stiffness;
+  for (const JoinedRod& rod : objects_.rods)
+    state.contact_stiffness.rods[rod.index] = group_state.contact_stiffness;
+  for (const JoinedBody& body : objects_.bodies)
+    state.contact_stiffness.bodies[body.index] = group_state.contact_stiffness;
   return report;
 }
 

@@ -78,7 +78,7 @@ std::string JoinedParts::badInput(const WorldState& state, const WorldInputs& in
 /// comes nearer to one than the thread is thick: no shorter step helps then.
 bool JoinedParts::endsHaveRoom(const WorldState& state, const WorldInputs& inputs, StepReport& report) const
 {
-  for (const Thread& thread : threads_)
+  for (const JoinedThread& thread : objects_.threads)
     for (const ThreadState& strand : state.threads[thread.index].threads)
       for (int end = 0; end < 2 && world_.threads[thread.index].contact->solids; ++end)
       {
@@ -110,11 +110,11 @@ bool JoinedParts::endsHaveRoom(const WorldState& state, const WorldInputs& input
 /// Grasps that driven bodies carry get their targets from these.
 void JoinedParts::carryGrasps(const WorldInputs& inputs)
 {
-  for (const Weld& weld : welds_)
+  for (const Weld& weld : objects_.welds)
     if (!world_.bodies[weld.body].body.simulated)
     {
       const GraspTarget& body = inputs.bodies[weld.body];
-      GraspTarget& grasp = rods_[weld.rod].inputs.grasps[weld.grasp];
+      GraspTarget& grasp = objects_.rods[weld.rod].inputs.grasps[weld.grasp];
       grasp.X_WG = body.X_WG * weld.X_BG;
       grasp.velocity = body.velocity;
       if (grasp.velocity)
@@ -122,86 +122,166 @@ void JoinedParts::carryGrasps(const WorldInputs& inputs)
     }
 }
 
-void JoinedParts::setSolids(const WorldState& state, const WorldInputs& inputs)
-{
-  for (std::size_t k = 0; k < solids_.size(); ++k)
-  {
-    IslandSolid& solid = stepper_.island().solids[k];
-    const int index = solids_[k].index;
-    if (solids_[k].kind == Solid::Kind::obstacle)
-    {
-      solid.start = state.obstacles[index];
-      solid.start_velocity = state.obstacle_velocities[index];
-      solid.target = inputs.obstacles[index];
-    }
-    else if (solids_[k].kind == Solid::Kind::floor)
-    {
-      solid.start = {Eigen::Vector3d(0, 0, world_.threads[index].model->floor.height), Eigen::Quaterniond::Identity()};
-      solid.target.X_WG = solid.start;
-      solid.target.X_WG.position += world_.time.step * inputs.threads[index].belt_velocity;
-    }
-    else if (!solid.body)
-    {
-      solid.start = state.bodies[index].X_WB;
-      solid.start_velocity = state.bodies[index].velocity;
-      solid.target = inputs.bodies[index];
-    }
-  }
-}
+// ---- parts are loaded
 
 bool JoinedParts::begin(const WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
-  for (Rod& rod : rods_)
+  for (JoinedRod& rod : objects_.rods)
     rod.inputs = inputs.rods[rod.index];
   carryGrasps(inputs);
   std::string what;
-  for (Rod& rod : rods_)
-  {
+  for (const JoinedRod& rod : objects_.rods)
     if (!rod.stepper->inputsFinite(state.rods[rod.index], rod.inputs, what))
     {
       report = refusedInput("rod '" + rod.stepper->model->name + "': " + what);
       return false;
     }
-    rod.stepper->begin(state.rods[rod.index]);
-    rod.part->begin(rod.inputs, world_.time.step);
-  }
-  for (const Body& body : bodies_)
-    body.part->begin(state.bodies[body.index], inputs.gravity);
-  setSolids(state, inputs);
-  return threads_.empty() || beginThreads(state, inputs, report);
-}
-
-bool JoinedParts::beginThreads(const WorldState& state, const WorldInputs& inputs, StepReport& report)
-{
   if (!endsHaveRoom(state, inputs, report))
     return false;
-  strands_.clear();
-  guarded_.clear();
-  for (Thread& thread : threads_)
-  {
-    thread.inputs = thread.still = inputs.threads[thread.index];
-    thread.still.flow_rate = 0.0;
-    thread.work = state.threads[thread.index];
-    const ThreadTouch& contact = *world_.threads[thread.index].contact;
-    const std::uint64_t next_id = nextId(thread.work.threads);
-    for (std::size_t s = 0; s < thread.work.threads.size(); ++s)
-    {
-      ThreadState& strand = thread.work.threads[s];
-      strand.next_id = next_id;
-      if (thread.strands.size() <= s)
-        addStrand(thread);
-      ThreadStepper::Impl& stepper = *thread.strands[s].stepper;
-      if (!stepper.begin(strand, strand.ends[1].held ? thread.inputs : thread.still, world_.time.step, report))
-        return false;
-      thread.strands[s].part->setDuration(world_.time.step);
-      strands_.push_back(thread.strands[s].part.get());
-      guarded_.push_back({&stepper.work, contact});
-    }
-  }
-  setMembers();
-  guard_.setStrands(guarded_);
-  merging_.setParts(strands_);
+  for (int part = 0; part < objects_.parts(); ++part)
+    if (!load(part, state, inputs, report))
+      return false;
   return true;
+}
+
+/// Loads the state of a part where the step begins.
+bool JoinedParts::load(int part, const WorldState& state, const WorldInputs& inputs, StepReport& report)
+{
+  if (part < objects_.partOfThread(0))
+  {
+    JoinedRod& rod = objects_.rods[part];
+    rod.stepper->begin(state.rods[rod.index]);
+    rod.part->begin(rod.inputs, world_.time.step);
+    return true;
+  }
+  if (part < objects_.partOfBody(0))
+    return loadThread(objects_.threads[part - objects_.partOfThread(0)], state, inputs, report);
+  const JoinedBody& body = objects_.bodies[part - objects_.partOfBody(0)];
+  body.part->begin(state.bodies[body.index], inputs.gravity);
+  return true;
+}
+
+bool JoinedParts::loadThread(JoinedThread& thread, const WorldState& state, const WorldInputs& inputs,
+                             StepReport& report)
+{
+  thread.inputs = thread.still = inputs.threads[thread.index];
+  thread.still.flow_rate = 0.0;
+  thread.work = state.threads[thread.index];
+  const std::uint64_t next_id = nextId(thread.work.threads);
+  for (std::size_t s = 0; s < thread.work.threads.size(); ++s)
+  {
+    ThreadState& strand = thread.work.threads[s];
+    strand.next_id = next_id;
+    if (thread.strands.size() <= s)
+      addStrand(thread);
+    ThreadStepper::Impl& stepper = *thread.strands[s].stepper;
+    if (!stepper.begin(strand, strand.ends[1].held ? thread.inputs : thread.still, world_.time.step, report))
+      return false;
+    thread.strands[s].part->setDuration(world_.time.step);
+  }
+  return true;
+}
+
+// ---- islands
+
+/// Where parts would be at the end of the step if they kept their velocities.
+void JoinedParts::predict()
+{
+  const auto reach = [&](const PartSteps& part, BoundingBox& box) {
+    box.include(part.surfaceBox(0.0));
+    box.include(part.surfaceBox(world_.time.step));
+  };
+  for (std::size_t k = 0; k < objects_.rods.size(); ++k)
+  {
+    const auto& contact = world_.rods[objects_.rods[k].index].contact;
+    const bool touches = contact.has_value();
+    reach_[k] = {touches, touches && contact->others, touches && contact->solids, false, BoundingBox::empty()};
+    reach(*objects_.rods[k].part, reach_[k].box);
+  }
+  for (std::size_t k = 0; k < objects_.threads.size(); ++k)
+  {
+    const JoinedThread& thread = objects_.threads[k];
+    const ThreadTouch& contact = *world_.threads[thread.index].contact;
+    IslandFinder::Reach& of_thread = reach_[objects_.partOfThread(k)];
+    of_thread = {true, contact.others, contact.solids, false, BoundingBox::empty()};
+    for (std::size_t s = 0; s < thread.work.threads.size(); ++s)
+      reach(*thread.strands[s].part, of_thread.box);
+  }
+  for (std::size_t k = 0; k < objects_.bodies.size(); ++k)
+  {
+    IslandFinder::Reach& of_body = reach_[objects_.partOfBody(k)];
+    of_body = {false, false, false, world_.bodies[objects_.bodies[k].index].shape.has_value(), BoundingBox::empty()};
+    reach(*objects_.bodies[k].part, of_body.box);
+  }
+  finder_.begin(objects_.parts());
+  for (const Weld& weld : objects_.welds)
+    for (std::size_t k = 0; k < objects_.bodies.size(); ++k)
+      if (objects_.bodies[k].index == weld.body)
+        finder_.join(weld.rod, objects_.partOfBody(k));
+  finder_.joinNear(reach_, world_.contact.gap);
+}
+
+/// Takes the islands that the finder has found. Those that the step does not know yet begin theirs.
+void JoinedParts::arrange(const WorldState& state, const WorldInputs& inputs)
+{
+  const int count = finder_.find();
+  islands_.clear();
+  for (int k = 0; k < count; ++k)
+  {
+    finder_.partsOf(k, numbers_);
+    auto at = known_.find(numbers_);
+    const bool is_new = at == known_.end();
+    if (is_new)
+      at = known_.try_emplace(numbers_, world_, objects_, numbers_).first;
+    islands_.push_back(&at->second);
+    if (is_new || !at->second.stepped())
+      at->second.begin(state, inputs);
+  }
+}
+
+StepReport JoinedParts::stepIslands()
+{
+  StepReport total;
+  const int count = static_cast<int>(islands_.size());
+  for (JoinedIsland* island : islands_)
+    island->setThreads(count > 1 ? 1 : loop_.threads);
+  loop_.run(
+      count, nodes_, [&](int k) { return islands_[k]->stepped() ? StepReport() : islands_[k]->step(); }, total);
+  return total;
+}
+
+/// Joins islands of which parts came near each other on their ways. Returns whether there were any.
+bool JoinedParts::joinThoseThatMet()
+{
+  if (islands_.size() < 2)
+    return false;
+  for (const JoinedIsland* island : islands_)
+    for (std::size_t place = 0; place < island->parts().size(); ++place)
+      reach_[island->parts()[place]].box = island->sweptBox(place);
+  return finder_.joinNear(reach_, 0.5 * world_.contact.gap);
+}
+
+StepReport JoinedParts::stepAndJoin(const WorldState& state, const WorldInputs& inputs)
+{
+  // Islands that no step needs any more are dropped now and then.
+  if (known_.size() > 2 * static_cast<std::size_t>(objects_.parts()) + 16)
+    known_.clear();
+  for (auto& [parts, island] : known_)
+    island.forgetStep();
+  predict();
+  arrange(state, inputs);
+  StepReport report = stepIslands();
+  while (report.ok && joinThoseThatMet())
+  {
+    arrange(state, inputs);
+    for (const JoinedIsland* island : islands_)
+      if (!island->stepped())
+        for (const int part : island->parts())
+          if (!load(part, state, inputs, report))
+            return report;
+    report.merge(stepIslands());
+  }
+  return report;
 }
 
 StepReport JoinedParts::step(WorldState& state, const WorldInputs& inputs)
@@ -211,18 +291,13 @@ StepReport JoinedParts::step(WorldState& state, const WorldInputs& inputs)
     return refusedInput(bad);
   if (!begin(state, inputs, report))
     return report;
-  stepper_.setStiffness(stiffnessOf(state));
-  double first = rods_.empty() ? 0.0 : state.rods[rods_.front().index].next_step;
-  report = stepper_.step(world_.time.step, first);
-  if (!report.ok)
-    return report;
-  for (const Rod& rod : rods_)
-    rod.stepper->work.next_step = first;
-  end(state);
+  report = stepAndJoin(state, inputs);
+  if (report.ok)
+    end(state);
   return report;
 }
 
-void JoinedParts::endThread(Thread& thread)
+void JoinedParts::endThread(JoinedThread& thread)
 {
   thread.loads = {};
   const std::uint64_t before = nextId(thread.work.threads);
@@ -242,42 +317,54 @@ void JoinedParts::endThread(Thread& thread)
 
 void JoinedParts::end(WorldState& state)
 {
-  for (const Rod& rod : rods_)
+  for (const JoinedRod& rod : objects_.rods)
     state.rods[rod.index] = rod.stepper->work;
-  for (const Body& body : bodies_)
+  for (const JoinedBody& body : objects_.bodies)
     state.bodies[body.index] = body.part->state();
-  for (Thread& thread : threads_)
+  for (JoinedThread& thread : objects_.threads)
   {
     endThread(thread);
     std::swap(state.threads[thread.index], thread.work);
   }
-  stiffnessOf(state) = stepper_.stiffness();
+  for (const JoinedIsland* island : islands_)
+    island->end(state);
 }
 
 void JoinedParts::finish(WorldState& state, const WorldInputs&, StepReport&)
 {
-  for (const Thread& thread : threads_)
+  for (const JoinedThread& thread : objects_.threads)
     state.end_loads[thread.index] = thread.loads;
 }
 
-void JoinedParts::addStrand(Thread& thread) const
+void JoinedParts::addStrand(JoinedThread& thread) const
 {
-  Strand added;
+  JoinedThread::Strand added;
   added.stepper = std::make_unique<ThreadStepper::Impl>(world_.threads[thread.index].model, world_.time.newton, false);
   added.part = std::make_unique<ThreadPart>(*added.stepper);
   added.part->setContact(*world_.threads[thread.index].contact, thread.index);
-  added.part->setGuard(&guard_);
   thread.strands.push_back(std::move(added));
+}
+
+/// Numbers that rods have among the objects of a contact, which the rods that touch something begin.
+std::vector<int> JoinedParts::objectsOf(const std::vector<int>& rods) const
+{
+  std::vector<int> objects;
+  int object = 0;
+  for (std::size_t r = 0; r < objects_.rods.size(); ++r)
+    if (world_.rods[objects_.rods[r].index].contact)
+    {
+      if (std::count(rods.begin(), rods.end(), static_cast<int>(r)) > 0)
+        objects.push_back(object);
+      ++object;
+    }
+  return objects;
 }
 
 void JoinedParts::checkClearance(const WorldState& state)
 {
-  ContactPotential* contact = stepper_.island().contact();
-  if (!contact)
-    return;
   Meeting meeting;
   std::vector<Eigen::Vector3d> points;
-  for (const Rod& rod : rods_)
+  for (const JoinedRod& rod : objects_.rods)
     if (world_.rods[rod.index].contact)
     {
       rod.part->addSurface(meeting.surface);
@@ -286,7 +373,7 @@ void JoinedParts::checkClearance(const WorldState& state)
       for (Eigen::Index i = 0; i < x.cols(); ++i)
         points.emplace_back(x.col(i));
     }
-  for (Thread& thread : threads_)
+  for (JoinedThread& thread : objects_.threads)
     for (std::size_t s = 0; s < state.threads[thread.index].threads.size(); ++s)
     {
       const ThreadState& strand = state.threads[thread.index].threads[s];
@@ -299,21 +386,31 @@ void JoinedParts::checkClearance(const WorldState& state)
     }
   meeting.x = Eigen::Map<const Eigen::Matrix3Xd>(points.empty() ? nullptr : points[0].data(), 3,
                                                  static_cast<Eigen::Index>(points.size()));
-  for (std::size_t k = 0; k < solids_.size(); ++k)
+  if (meeting.surface.segments.empty())
+    return;
+  for (const JoinedSolid& solid : objects_.solids)
   {
-    const int index = solids_[k].index;
-    if (solids_[k].kind == Solid::Kind::obstacle)
-      meeting.addSolid("obstacle '" + world_.obstacles[index].name + "'", contact->solid(k), state.obstacles[index]);
-    else if (solids_[k].kind == Solid::Kind::body)
-      meeting.addSolid("body '" + world_.bodies[index].body.name + "'", contact->solid(k),
+    ContactSolid touched{solid.shape, solid.friction, {}};
+    const int index = solid.index;
+    if (solid.kind == JoinedSolid::Kind::obstacle)
+    {
+      meeting.addSolid("obstacle '" + world_.obstacles[index].name + "'", touched, state.obstacles[index]);
+    }
+    else if (solid.kind == JoinedSolid::Kind::body)
+    {
+      touched.ignores = objectsOf(solid.welded_rods);
+      meeting.addSolid("body '" + world_.bodies[index].body.name + "'", touched,
                        state.bodies[index].X_WB * world_.bodies[index].X_BS);
+    }
     else
+    {
+      touched.only = index;
       meeting.addSolid(
-          "its floor", contact->solid(k),
+          "its floor", touched,
           {Eigen::Vector3d(0, 0, world_.threads[index].model->floor.height), Eigen::Quaterniond::Identity()});
+    }
   }
-  contact->setCurves(meeting.surface.points, meeting.surface.segments, meeting.surface.objects);
-  const double room = contact->clearance(meeting.x, meeting.poses);
+  const double room = ContactPotential(meeting.surface, world_.contact).clearance(meeting.x, meeting.poses);
   if (!(room > 0))
     throw std::invalid_argument(meeting.nearest(world_.contact.gap) + " touch or cross by " +
                                 std::to_string(-1e3 * room) +

@@ -109,7 +109,6 @@ public:
     takeInputs(inputs);
     return group_->solveEquilibrium(state_, inputs_);
   }
-  const std::vector<ContactTerm>* contacts() const override { return &group_->contacts(); }
   void setThreads(int threads) override { group_->setThreads(threads); }
   const std::vector<Wrench>& wrenches(int rod) const override { return group_->wrenches(rod); }
   RodEnergies energies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const override
@@ -158,7 +157,6 @@ private:
       std::swap(state_.bodies[k], state.bodies[bodies_[k]]);
     std::swap(state_.obstacles, state.obstacles);
     std::swap(state_.obstacle_velocities, state.obstacle_velocities);
-    std::swap(state_.contact_stiffness, state.contact_stiffness);
   }
 
   void takeInputs(const WorldInputs& inputs)

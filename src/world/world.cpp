@@ -8,12 +8,9 @@
 #include "cloth_islands.h"
 #include "joined_parts.h"
 #include "rod_islands.h"
+#include "step_islands.h"
 #include "thread_islands.h"
 #include "tracked_parts.h"
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 namespace slender {
 
@@ -55,13 +52,14 @@ public:
       rods(model.rods.size()),
       cloths(model.cloths.size())
   {
+    state.contact_stiffness.rods.resize(model.rods.size());
+    state.contact_stiffness.threads.resize(model.threads.size());
+    state.contact_stiffness.bodies.resize(model.bodies.size());
     addThreads(state);
     addCloths(true);
     addCloths(false);
     addRods(state);
     checkCloths(state);
-    reports_.resize(lone_end_ - lone_begin_);
-    errors_.resize(reports_.size());
   }
 
   /// Calls `advance` on all islands until one fails, or throws. Then the state is as it was before.
@@ -117,7 +115,7 @@ public:
   {
     if (threads < 1)
       throw std::invalid_argument("threads = " + std::to_string(threads) + "; must be at least 1");
-    threads_ = threads;
+    lone_loop_.threads = threads;
     for (const auto& island : islands_)
       island->setThreads(threads);
   }
@@ -129,14 +127,12 @@ public:
         place.island->check(state);
   }
 
-  const std::vector<ContactTerm>& contacts() const
+  std::vector<ContactForce> contacts() const
   {
-    static const std::vector<ContactTerm> none;
-    const std::vector<ContactTerm>* last = nullptr;   // rods come after threads
+    std::vector<ContactForce> all;
     for (const auto& island : islands_)
-      if (const auto* terms = island->contacts())
-        last = terms;
-    return last ? *last : none;
+      island->addContacts(all);
+    return all;
   }
 
   const WorldModel model;
@@ -281,36 +277,8 @@ private:
       total.merge(islands_[lone_begin_]->step(state, inputs));
       return;
     }
-    constexpr int kWorthThreads = 500;   // nodes; less is done before threads are awake
-    std::fill(errors_.begin(), errors_.end(), nullptr);
-    const auto stepOne = [&](int k) {
-      try
-      {
-        reports_[k] = islands_[lone_begin_ + k]->step(state, inputs);
-      }
-      catch (...)
-      {
-        errors_[k] = std::current_exception();   // must not leave the parallel region
-      }
-    };
-    if (threads_ == 1 || lone_nodes_ < kWorthThreads)
-    {
-      for (int k = 0; k < count; ++k)   // OpenMP would take memory for its one thread
-        stepOne(k);
-    }
-    else
-    {
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
-#endif
-      for (int k = 0; k < count; ++k)
-        stepOne(k);
-    }
-    for (const std::exception_ptr& error : errors_)
-      if (error)
-        std::rethrow_exception(error);
-    for (const StepReport& report : reports_)
-      total.merge(report);
+    lone_loop_.run(
+        count, lone_nodes_, [&](int k) { return islands_[lone_begin_ + k]->step(state, inputs); }, total);
   }
 
   /// Bodies and obstacles that are driven, to where they are at the end of the step.
@@ -332,13 +300,11 @@ private:
   std::vector<std::unique_ptr<Island>> islands_;
   std::size_t lone_begin_ = 0, lone_end_ = 0;   ///< the lone rods among them
   int lone_nodes_ = 0;
-  std::vector<StepReport> reports_;          ///< of lone rods
-  std::vector<std::exception_ptr> errors_;   ///< likewise
-  std::vector<int> touching_threads_;        ///< that are joined with rods or bodies
-  std::vector<int> given_bodies_;            ///< driven bodies that no island moves
-  bool gives_obstacles_ = true;              ///< no island moves them
-  WorldState before_;                        ///< a step that may fail in one of several islands
-  int threads_ = 0;                          ///< 0: as OpenMP says
+  std::vector<int> touching_threads_;   ///< that are joined with rods or bodies
+  std::vector<int> given_bodies_;       ///< driven bodies that no island moves
+  bool gives_obstacles_ = true;         ///< no island moves them
+  WorldState before_;                   ///< a step that may fail in one of several islands
+  IslandLoop lone_loop_;
 };
 
 World::World(WorldModel model, WorldState& state)
@@ -376,7 +342,14 @@ const Eigen::Matrix3Xd& World::pinForces(int cloth) const
   return place.island->pinForces(place.index);
 }
 
-Eigen::Matrix3Xd World::contactForces(int cloth) const
+Eigen::Matrix3Xd World::rodContactForces(int rod) const
+{
+  const auto& place = impl_->rods.at(rod);
+  const Eigen::Matrix3Xd forces = place.island->contactForces(place.index);
+  return forces.cols() > 0 ? forces : Eigen::Matrix3Xd::Zero(3, impl_->model.rods[rod].model->nodes());
+}
+
+Eigen::Matrix3Xd World::clothContactForces(int cloth) const
 {
   const auto& place = impl_->cloths.at(cloth);
   return place.island->contactForces(place.index);
@@ -388,7 +361,7 @@ ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eig
   return place.island->stepper(place.index).energies(state, gravity);
 }
 
-const std::vector<ContactTerm>& World::contacts() const { return impl_->contacts(); }
+std::vector<ContactForce> World::contacts() const { return impl_->contacts(); }
 
 const FunctionSet& World::functions(int cloth, const WorldState& state) const
 {

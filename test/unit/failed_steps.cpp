@@ -33,7 +33,9 @@ std::string bytesOf(const WorldState& s)
   std::string bytes;
   for (const ThreadGroupState& thread : s.threads)
     bytes += stateBytes(thread);
-  return bytes + std::to_string(s.thread_contact_stiffness);
+  for (const double stiffness : s.contact_stiffness.threads)
+    bytes += std::to_string(stiffness);
+  return bytes;
 }
 /// A world with the function of the steppers; its step has the length of its model.
 struct WorldStepper
@@ -55,7 +57,7 @@ std::string bytesOf(const RodGroupState& s)
   scene.bodies = s.bodies;
   scene.obstacles = s.obstacles;
   scene.obstacle_velocities = s.obstacle_velocities;
-  scene.contact_stiffness = s.contact_stiffness;
+  scene.contact_stiffness.rods = {s.contact_stiffness};
   return stateBytes(scene);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,6 +12,14 @@ namespace slender {
 struct BoundingBox
 {
   Eigen::Vector3d low, high;
+  static BoundingBox empty()
+  {
+    const Eigen::Vector3d far = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+    return {far, -far};
+  }
+  void include(const Eigen::Vector3d& point) { low = low.cwiseMin(point), high = high.cwiseMax(point); }
+  void include(const BoundingBox& b) { low = low.cwiseMin(b.low), high = high.cwiseMax(b.high); }
+  void enlarge(double margin) { low.array() -= margin, high.array() += margin; }
   bool overlaps(
       const BoundingBox& b) const   // without branches: most boxes of a grid cell do not, and nobody can predict which
   {

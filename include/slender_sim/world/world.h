@@ -66,11 +66,13 @@ public:
 
   const Eigen::Matrix3Xd& pinForces(int cloth) const;   ///< as ClothStepper::pinForces()
   /// As ClothGroup::contactForces(); without columns for a cloth that touches nothing.
-  Eigen::Matrix3Xd contactForces(int cloth) const;
+  Eigen::Matrix3Xd clothContactForces(int cloth) const;
+  /// Forces of contact on the nodes of a rod in the last step (3 x nodes [N]).
+  Eigen::Matrix3Xd rodContactForces(int rod) const;
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const;
 
-  /// Contacts of rods and bodies in the last step; of threads where no rods are stepped together.
-  const std::vector<ContactTerm>& contacts() const;
+  /// Contacts of rods, threads and bodies in the last step.
+  std::vector<ContactForce> contacts() const;
 
   /// Test functions in force of a tracked cloth.
   const FunctionSet& functions(int cloth, const WorldState& state) const;

@@ -23,6 +23,20 @@ struct GuideState
   FunctionBlend blend;         ///< of the set in force, which ClothState::average_set names
 };
 
+/// Stiffness of the barrier of contact per part [N]; 0: not chosen yet. Parts of one island have the same. The lists
+/// are as long as those of the state.
+struct ContactStiffness
+{
+  std::vector<double> rods, threads, bodies;
+};
+
+/// A force of contact and where it acts.
+struct ContactForce
+{
+  Eigen::Vector3d position;   ///< [m]
+  Eigen::Vector3d force;      ///< on what touches, a solid excepted [N]
+};
+
 /// Everything that changes while a world moves; saving and restoring it restarts bit-equal.
 struct WorldState
 {
@@ -36,8 +50,7 @@ struct WorldState
   std::vector<RigidBodyState> bodies;     ///< driven ones included
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
-  double contact_stiffness = 0.0;                  ///< of the barrier between rods and what they touch [N]
-  double thread_contact_stiffness = 0.0;           ///< of the barrier between threads [N]
+  ContactStiffness contact_stiffness;
   std::vector<std::array<EndLoad, 2>> end_loads;   ///< per thread, of the last step
 };
 

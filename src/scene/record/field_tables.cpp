@@ -59,32 +59,6 @@ bool asks(const std::vector<RecordField>& fields, RecordField field)
   return std::find(fields.begin(), fields.end(), field) != fields.end();
 }
 
-/// Forces of contact on the nodes of each rod [N]; zero without contact.
-std::vector<Eigen::Matrix3Xd> rodContactForces(const Simulation& simulation)
-{
-  const std::vector<RodConfig>& rods = simulation.config().rods;
-  std::vector<Eigen::Matrix3Xd> forces;
-  // rod and node of each point of contact: those of all rods with contact, in order
-  std::vector<std::pair<std::size_t, int>> places;
-  for (std::size_t r = 0; r < rods.size(); ++r)
-  {
-    const int nodes = simulation.rodModel(static_cast<int>(r)).nodes();
-    forces.push_back(Eigen::Matrix3Xd::Zero(3, nodes));
-    for (int i = 0; rods[r].contact && i < nodes; ++i)
-      places.emplace_back(r, i);
-  }
-  if (places.empty())
-    return forces;
-  for (const ContactTerm& term : simulation.world().contacts())
-    for (int k = 0; k < 4; ++k)
-      if (term.point[k] >= 0)
-      {
-        const auto [rod, node] = places.at(static_cast<std::size_t>(term.point[k]));
-        forces[rod].col(node) += term.weight[k] * term.force;
-      }
-  return forces;
-}
-
 const std::vector<std::string> contact_columns = {"contact_fx [N]", "contact_fy [N]", "contact_fz [N]"};
 
 /// `contact`: forces on the nodes, of no columns when they are not asked for.
@@ -125,7 +99,7 @@ void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordF
     return;
   const Eigen::Index vertices = simulation.state().cloths[static_cast<std::size_t>(cloth)].x.cols();
   Columns columns("cloth_fields", simulation.clothModel(cloth).name, vertices);
-  Eigen::Matrix3Xd forces = simulation.world().contactForces(cloth);
+  Eigen::Matrix3Xd forces = simulation.world().clothContactForces(cloth);
   if (forces.cols() != vertices)
     forces.setZero(3, vertices);   // it touches nothing, or has not been stepped yet
   columns.add(contact_columns, forces);
@@ -231,10 +205,12 @@ std::vector<FieldTable> fieldTablesOf(const Simulation& simulation)
   if (fields.empty())
     return out;
   std::vector<Eigen::Matrix3Xd> contact(simulation.state().rods.size());
-  if (asks(fields, RecordField::contact_force))
-    contact = rodContactForces(simulation);
   for (std::size_t r = 0; r < contact.size(); ++r)
+  {
+    if (asks(fields, RecordField::contact_force))
+      contact[r] = simulation.world().rodContactForces(static_cast<int>(r));
     addRod(simulation, static_cast<int>(r), fields, contact[r], out);
+  }
   for (std::size_t k = 0; k < simulation.state().threads.size(); ++k)
     addThread(simulation, static_cast<int>(k), fields, out);
   for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)

@@ -214,6 +214,17 @@ struct Fields<RigidBodyState>
 };
 
 template <>
+struct Fields<ContactStiffness>
+{
+  static constexpr bool listed = true;
+  template <class Visitor, class State>
+  static void visit(Visitor& visitor, State& stiffness)
+  {
+    visitor(stiffness.rods, stiffness.threads, stiffness.bodies);
+  }
+};
+
+template <>
 struct Fields<SceneState>
 {
   static constexpr bool listed = true;
@@ -221,8 +232,8 @@ struct Fields<SceneState>
   static void visit(Visitor& visitor, State& scene)
   {
     visitor(scene.time, scene.steps, scene.rods, scene.rod_guides, scene.threads, scene.cloths, scene.cloth_guides,
-            scene.bodies, scene.obstacles, scene.obstacle_velocities, scene.contact_stiffness,
-            scene.thread_contact_stiffness, scene.end_loads, scene.cloth_grasps, scene.grasp_offsets, scene.wrenches);
+            scene.bodies, scene.obstacles, scene.obstacle_velocities, scene.contact_stiffness, scene.end_loads,
+            scene.cloth_grasps, scene.grasp_offsets, scene.wrenches);
   }
 };
 

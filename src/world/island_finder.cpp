@@ -1,0 +1,83 @@
+#include "island_finder.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+namespace slender {
+
+void IslandFinder::begin(int parts)
+{
+  parent_.resize(static_cast<std::size_t>(parts));
+  std::iota(parent_.begin(), parent_.end(), 0);
+}
+
+int IslandFinder::root(int part)
+{
+  while (parent_[part] != part)
+    part = parent_[part] = parent_[parent_[part]];
+  return part;
+}
+
+void IslandFinder::join(int a, int b)
+{
+  a = root(a), b = root(b);
+  parent_[std::max(a, b)] = std::min(a, b);
+}
+
+/// Sorts the boxes along x, and compares each with those that begin before it ends.
+bool IslandFinder::joinNear(const std::vector<Reach>& parts, double margin)
+{
+  boxes_.resize(parts.size());
+  order_.resize(parts.size());
+  std::iota(order_.begin(), order_.end(), 0);
+  for (std::size_t k = 0; k < parts.size(); ++k)
+  {
+    boxes_[k] = {parts[k].box.low.array() - margin, parts[k].box.high.array() + margin};
+    if (!boxes_[k].low.allFinite() || !boxes_[k].high.allFinite())
+    {
+      const Eigen::Vector3d far = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+      boxes_[k] = {-far, far};
+    }
+  }
+  std::sort(order_.begin(), order_.end(), [this](int a, int b) {
+    return boxes_[a].low.x() != boxes_[b].low.x() ? boxes_[a].low.x() < boxes_[b].low.x() : a < b;
+  });
+  bool joined = false;
+  for (std::size_t i = 0; i < order_.size(); ++i)
+    for (std::size_t k = i + 1; k < order_.size() && boxes_[order_[k]].low.x() <= boxes_[order_[i]].high.x(); ++k)
+    {
+      const int a = order_[i], b = order_[k];
+      if (boxes_[a].overlaps(boxes_[b]) && parts[a].mayTouch(parts[b]) && root(a) != root(b))
+      {
+        join(a, b);
+        joined = true;
+      }
+    }
+  return joined;
+}
+
+int IslandFinder::find()
+{
+  const int parts = static_cast<int>(parent_.size());
+  int islands = 0;
+  island_of_.resize(parent_.size());
+  for (int k = 0; k < parts; ++k)   // the root of an island is its first part
+    island_of_[k] = root(k) == k ? islands++ : island_of_[root(k)];
+  start_.assign(static_cast<std::size_t>(islands) + 1, 0);
+  for (int k = 0; k < parts; ++k)
+    ++start_[island_of_[k] + 1];
+  std::partial_sum(start_.begin(), start_.end(), start_.begin());
+  members_.resize(parent_.size());
+  order_.assign(start_.begin(), start_.end() - 1);
+  for (int k = 0; k < parts; ++k)
+    members_[order_[island_of_[k]]++] = k;
+  return islands;
+}
+
+void IslandFinder::partsOf(int island, std::vector<int>& parts) const
+{
+  parts.assign(members_.begin() + start_[island], members_.begin() + start_[island + 1]);
+}
+
+}   // namespace slender

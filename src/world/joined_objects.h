@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "../rod/rod_part.h"
+#include "../thread/thread_part.h"
+#include "slender_sim/world/world_model.h"
+#include "slender_sim/world/world_state.h"
+
+/// Rods, threads, bodies and solids as JoinedParts and JoinedIsland share them. `index`: number in the world.
+namespace slender {
+
+struct JoinedRod
+{
+  int index;
+  std::unique_ptr<RodStepper::Impl> stepper;
+  std::unique_ptr<RodPart> part;
+  RodInputs inputs;   ///< of the present step, with the targets of grasps that driven bodies carry
+};
+
+/// A simulated body.
+struct JoinedBody
+{
+  int index;
+  std::unique_ptr<BodyPart> part;
+};
+
+struct JoinedThread
+{
+  /// The thread, or a part that has broken off it.
+  struct Strand
+  {
+    std::unique_ptr<ThreadStepper::Impl> stepper;
+    std::unique_ptr<ThreadPart> part;
+  };
+  int index;
+  std::vector<Strand> strands;   ///< as many as there have ever been at once
+  ThreadInputs inputs, still;    ///< of the present step; without flow, for what has broken off
+  ThreadGroupState work;         ///< its first strands are those of the present step
+  std::array<EndLoad, 2> loads;
+};
+
+/// A solid that parts may touch.
+struct JoinedSolid
+{
+  enum class Kind
+  {
+    obstacle,
+    body,
+    floor   ///< on which a thread slips
+  } kind;
+  int index;   ///< of the obstacle, the body or the thread
+  Shape shape;
+  double friction;                  ///< negative: that of what touches it
+  BodyPart* body = nullptr;         ///< that carries it; null: it moves as prescribed
+  Pose X_BS{};                      ///< in the frame of the body
+  std::vector<int> welded_rods{};   ///< places of rods that begin inside of it
+};
+
+struct JoinedObjects
+{
+  std::vector<JoinedRod> rods;
+  std::vector<JoinedBody> bodies;
+  std::vector<JoinedThread> threads;
+  std::vector<Weld> welds;   ///< rod: place in `rods`; body: number in the world
+  std::vector<JoinedSolid> solids;
+
+  // ---- numbers of all parts: rods, then threads, then simulated bodies
+  int parts() const { return static_cast<int>(rods.size() + threads.size() + bodies.size()); }
+  int partOfThread(std::size_t thread) const { return static_cast<int>(rods.size() + thread); }
+  int partOfBody(std::size_t body) const { return static_cast<int>(rods.size() + threads.size() + body); }
+};
+
+}   // namespace slender

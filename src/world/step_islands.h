@@ -1,0 +1,64 @@
+#pragma once
+
+#include <algorithm>
+#include <exception>
+#include <vector>
+
+#include "slender_sim/dynamics/step_report.h"
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+namespace slender {
+
+/// Steps islands that do not depend on each other, in parallel where that is worth it. Memory is reused.
+class IslandLoop
+{
+public:
+  int threads = 0;   ///< that are used; 0: as OpenMP says
+
+  /// Calls step(k), which returns a StepReport, for 0 <= k < count, and merges the reports in this order into `total`.
+  /// `nodes`: of all islands. Throws what a call throws, after all calls.
+  template <class Step>
+  void run(int count, int nodes, const Step& step, StepReport& total)
+  {
+    constexpr int kWorthThreads = 500;   // nodes; less is done before threads are awake
+    reports_.resize(static_cast<std::size_t>(count));
+    errors_.assign(static_cast<std::size_t>(count), nullptr);
+    const auto stepOne = [&](int k) {
+      try
+      {
+        reports_[k] = step(k);
+      }
+      catch (...)
+      {
+        errors_[k] = std::current_exception();   // must not leave the parallel region
+      }
+    };
+    if (count == 1 || threads == 1 || nodes < kWorthThreads)
+    {
+      for (int k = 0; k < count; ++k)   // OpenMP would take memory for its one thread
+        stepOne(k);
+    }
+    else
+    {
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic) num_threads(threads > 0 ? threads : omp_get_max_threads())
+#endif
+      for (int k = 0; k < count; ++k)
+        stepOne(k);
+    }
+    for (const std::exception_ptr& error : errors_)
+      if (error)
+        std::rethrow_exception(error);
+    for (const StepReport& report : reports_)
+      total.merge(report);
+  }
+
+private:
+  std::vector<StepReport> reports_;
+  std::vector<std::exception_ptr> errors_;
+};
+
+}   // namespace slender
