@@ -21,64 +21,23 @@ RodEvaluation total(RodEvaluation result, const RodEvaluation& added)
 
 }   // namespace
 
-void ChainSystem::setSize(int nodes, bool closed, Curvature curvature)
-{
-  a_.nodes = nodes;
-  a_.edges = closed ? nodes : nodes - 1;
-  a_.closed = closed;
-  curvature_ = curvature;
-}
-
 void ChainSystem::allocate(int capacity)
 {
-  capacity_ = capacity;
-  const std::size_t padded = capacity + 2 * kHalo;
-  const auto array = [&](double*& p, double fill) {
-    storage_.emplace_back(padded, fill);
-    p = storage_.back().data() + kHalo;
-  };
-  storage_.clear();
-  storage_.reserve(64);
-  for (int k = 0; k < 3; ++k)
-    for (double** p : {&a_.x[k], &a_.base_t[k], &a_.base_d1[k], &a_.t[k], &a_.d1[k], &a_.target[k], &a_.force[k]})
-      array(*p, 0.0);
-  for (double** p : {&a_.turn, &a_.base_twist, &a_.twist, &a_.strain, &a_.kappa1, &a_.kappa2, &a_.stretch,
-                     &a_.rest_strain, &a_.b11, &a_.b12, &a_.b22, &a_.beta, &a_.rest_kappa1, &a_.rest_kappa2,
-                     &a_.rest_twist, &a_.weight, &a_.theta_diagonal, &a_.theta_off})
-    array(*p, 0.0);
-  a_.coupling = nullptr;
-  if (curvature_ == Curvature::compensated)
-    array(a_.coupling, 0.0);
-  for (double** p : {&a_.inverse_length, &a_.inverse_rest_length})
-    array(*p, 1.0);
+  allocateArrays(capacity);
   for (auto* v : {&gradient_, &direction_, &reduced_})
     v->assign(4 * capacity, 0.0);
   a_.gradient = gradient_.data();
-  for (auto& v : x_base_)
-    v.assign(capacity, 0.0);
-  for (auto& v : saved_)
-    v.assign(padded, 0.0);
   matrix_.resize(capacity, a_.closed);
   if (capacity > kLongChain && !a_.closed)
     piece_.resize(kPiece + RodSweep::kOvershoot + ChainTerm::kReach + 1);
-}
-
-void ChainSystem::wrapHalo(double* p, int count) const
-{
-  if (a_.closed)
-    for (int i = 1; i <= kHalo; ++i)
-    {
-      p[-i] = p[((count - i) % count + count) % count];
-      p[count - 1 + i] = p[(i - 1) % count];
-    }
 }
 
 /// Evaluates the nodes from `from` to at least `to`, and the terms there. Returns the first node not done.
 int ChainSystem::advance(RodSweep& sweep, bool with_hessian, int from, int to, RodEvaluation& added)
 {
   RodPanel* const panels = with_hessian ? panels_ : nullptr;
-  const int done = kernels_.advance[static_cast<int>(curvature_)](a_, sweep, panels, first_panel_, to);
-  const ChainRange range{a_, turned_.data(), panels, first_panel_, from, done};
+  const int done = kernels_.advance[static_cast<int>(curvature())](a_, sweep, panels, first_panel_, to);
+  const ChainRange range{a_, turned(), panels, first_panel_, from, done};
   for (ChainTerm* term : terms_)
     term->add(range, added);
   return done;
@@ -169,19 +128,7 @@ void ChainSystem::solve()
 
 void ChainSystem::takeReactions(int from, int to)
 {
-  for (std::size_t k = 0; k < held_nodes_.size(); ++k)
-    if (const int node = held_nodes_[k]; node >= from && node < to)
-      for (int c = 0; c < 3; ++c)
-      {
-        reactions_[k][c] = gradient_[4 * node + c];
-        gradient_[4 * node + c] = 0.0;
-      }
-  for (std::size_t k = 0; k < held_angles_.size(); ++k)
-    if (const int edge = held_angles_[k]; edge >= from && edge < to)
-    {
-      angle_reactions_[k] = gradient_[4 * edge + 3];
-      gradient_[4 * edge + 3] = 0.0;
-    }
+  holds_.takeReactions(from, to, gradient_.data());
   if (!a_.closed && to == a_.nodes)   // the last node has no edge
     gradient_[4 * a_.nodes - 1] = 0.0;
 }
@@ -223,10 +170,10 @@ void ChainSystem::fixTurn(int edge, int from, int to)
 void ChainSystem::fixPanels(int from, int to)
 {
   const auto near = [&](int node) { return a_.closed || (node >= from && node < to + 2); };
-  for (int node : held_nodes_)
+  for (int node : holds_.nodes())
     if (near(node))
       fixPosition(node, from, to);
-  for (int edge : held_angles_)
+  for (int edge : holds_.turns())
     if (near(edge))
       fixTurn(edge, from, to);
   if (!a_.closed)
@@ -244,66 +191,25 @@ void ChainSystem::addShift(int from, int to, const HessianShift& shift)
       panel(i).diag[3][3] += diagonalShift(i, shift)[1];
 }
 
-void ChainSystem::moveAlong(double alpha)
-{
-  if (alpha == 0.0)   // whatever the direction is, which may be that of an attempt that overflowed
-  {
-    for (int k = 0; k < 3; ++k)
-      std::copy_n(x_base_[k].data(), a_.nodes, a_.x[k]);
-    std::fill(a_.turn - kHalo, a_.turn + a_.nodes + kHalo, 0.0);
-    return;
-  }
-  for (int i = 0; i < a_.nodes; ++i)
-  {
-    for (int k = 0; k < 3; ++k)
-      a_.x[k][i] = x_base_[k][i] + alpha * direction_[4 * i + k];
-    a_.turn[i] = alpha * direction_[4 * i + 3];
-  }
-  wrapHalo(a_.turn, a_.edges);
-}
+void ChainSystem::moveAlong(double alpha) { moveTrial(alpha, direction_.data()); }
 
 void ChainSystem::accept()
 {
-  for (int k = 0; k < 3; ++k)
-  {
-    std::swap(a_.base_t[k], a_.t[k]);
-    std::swap(a_.base_d1[k], a_.d1[k]);
-    std::copy_n(a_.x[k], a_.nodes, x_base_[k].data());
-  }
-  std::swap(a_.base_twist, a_.twist);
-  for (std::size_t j = 0; j < turned_.size(); ++j)
-    turned_[j] += a_.turn[j];
-  std::fill(a_.turn - kHalo, a_.turn + a_.nodes + kHalo, 0.0);
+  takeBase();
   for (ChainTerm* term : terms_)
     term->accept();
 }
 
 void ChainSystem::saveBase()
 {
-  const std::size_t count = a_.nodes + 2 * kHalo;
-  for (int k = 0; k < 3; ++k)
-  {
-    std::copy_n(x_base_[k].data(), a_.nodes, saved_[k].data());
-    std::copy_n(a_.base_t[k] - kHalo, count, saved_[3 + k].data());
-    std::copy_n(a_.base_d1[k] - kHalo, count, saved_[6 + k].data());
-  }
-  std::copy_n(a_.base_twist - kHalo, count, saved_[9].data());
-  saved_turned_ = turned_;
+  keepBase();
   for (ChainTerm* term : terms_)
     term->saveBase();
 }
 
 void ChainSystem::restoreBase()
 {
-  const std::size_t count = a_.nodes + 2 * kHalo;
-  for (int k = 0; k < 3; ++k)
-  {
-    std::copy_n(saved_[k].data(), a_.nodes, x_base_[k].data());
-    std::copy_n(saved_[3 + k].data(), count, a_.base_t[k] - kHalo);
-    std::copy_n(saved_[6 + k].data(), count, a_.base_d1[k] - kHalo);
-  }
-  std::copy_n(saved_[9].data(), count, a_.base_twist - kHalo);
-  turned_ = saved_turned_;
+  returnToBase();
   for (ChainTerm* term : terms_)
     term->restoreBase();
 }

@@ -34,7 +34,7 @@ void RodSystem::compose(const RodState& state)
   ++composition_;
 
   const int n = a_.nodes, edges = a_.edges;
-  releaseAll();
+  holds_.release(a_.nodes);
   carried_.assign(n, 0);
   std::vector<char> jointless(n, 0);
   if (!model_.closed)
@@ -43,12 +43,12 @@ void RodSystem::compose(const RodState& state)
     if (g.active)
       for (int i = g.first_node; i <= g.last_node; ++i)
       {
-        hold(i);
+        holds_.hold(i);
         carried_[i] = g.body >= 0;
         if (g.holds_frame)
           jointless[i] = 1;
         if (i < g.last_node)
-          holdTurn(i);
+          holds_.holdTurn(i);
       }
 
   // Voronoi lengths of the joints that remain, with the half cells of the clamps next to them
@@ -132,7 +132,7 @@ void RodSystem::compose(const RodState& state)
   shift_x_ = 1e-2 * bend;
   shift_theta_ = twist;
   // A rod whose frames nobody holds can spin about itself without energy (if isotropic): keep its matrix definite.
-  spin_ = clamps_.joints.empty() && heldTurns().empty() ? 1e-8 * twist : 0.0;
+  spin_ = clamps_.joints.empty() && holds_.turns().empty() ? 1e-8 * twist : 0.0;
   listTerms();
   if (allocated())
     setResponse(0.0, nullptr);

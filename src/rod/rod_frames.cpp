@@ -17,7 +17,7 @@ double RodSystem::solveFrames()
     d[j] += spin_;
   for (ClampJoint& c : clamps_.joints)
     d[c.edge] += c.beta * c.scale;
-  for (int edge : heldTurns())
+  for (int edge : holds_.turns())
   {
     d[edge] = 1.0;
     off[edge] = 0.0;

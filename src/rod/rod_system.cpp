@@ -105,7 +105,7 @@ Eigen::Vector3d RodSystem::clampTorque(int grasp) const
   for (const ClampJoint& c : clamps_.joints)
     if (c.grasp == grasp)
       torque += c.torque;
-  for (int j : heldTurns())
+  for (int j : holds_.turns())
     if (j >= grasps_[grasp].first_node && j < grasps_[grasp].last_node)
       torque -= angleGradient(j) * get(a_.t, j);
   return torque;

@@ -20,7 +20,7 @@ void ThreadSystem::resize(int nodes)
   std::fill_n(gradient_.begin(), 4 * nodes, 0.0);
   keepTurns(true);
   forgetTurns();
-  releaseAll();
+  holds_.release(nodes);
   spin_inertia_.resize(a_.edges);
   has_surface_ = false;
   clearTerms();

@@ -28,7 +28,7 @@ public:
     const ThreadState state = wigglyThread(n, random);
     setSize(n, false, Curvature::tangent);
     allocate(n);
-    releaseAll();
+    holds_.release(a_.nodes);
     keepTurns(true);
     for (int i = 0; i < n; ++i)
       setPosition(i, state.x[i]);

@@ -39,8 +39,8 @@ public:
   double spinWeight(int j) const { return spin_inertia_.weight(j); }
   /// Turn of the trial from the base.
   void setTurn(int j, double turn) { a_.turn[j] = turn; }
-  using ChainSystem::hold;
-  using ChainSystem::holdTurn;
+  void hold(int node) { holds_.hold(node); }
+  void holdTurn(int edge) { holds_.holdTurn(edge); }
 
   /// Turn of edge j about its tangent since the start of the step [rad].
   double turn(int j) const { return turned()[j] + a_.turn[j]; }
