@@ -41,8 +41,8 @@ const RodModel& RodStepper::model() const { return *impl_->model; }
 RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t)
   : model(std::move(m)),
     time(t),
-    without_frames(doesWithoutFrames(*model)),
-    system(*model)
+    system(*model),
+    without_frames(doesWithoutFrames(*model))
 {
   if (time.integrator == Integrator::imex)
     throw std::invalid_argument("rod '" + model->name + "': imex is for cloth only");

@@ -26,7 +26,6 @@ public:
 
   std::shared_ptr<const RodModel> model;
   TimeConfig time;
-  bool without_frames;   ///< a state may come without them
   RodSystem system;
   std::vector<Wrench> wrenches;
   RodState work, next;           ///< start and end of a substep
@@ -43,11 +42,9 @@ public:
   /// Held nodes and frames at a fraction of the step; poses of carried grasps stay as they are.
   void placeAt(const RodInputs& inputs, double duration, double fraction);
   RodEnergies energies(const RodState& state, const Eigen::Vector3d& gravity);
-  double mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const;
   double startEnergy(const RodInputs& inputs, double* allowance);
   double endEnergy(const RodInputs& inputs) const { return mechanicalEnergy(next, inputs, end_evaluation, nullptr); }
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message);
-  std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
   /// Largest unbalanced force [N] on a free node in the last evaluation of an implicit step.
   Largest unbalancedForce() const;
   /// Refuses a step of `length` seconds that could not be solved. The message says why and where the rod was farthest
@@ -70,6 +67,8 @@ public:
   std::array<int, 2> overstretched{-1, -1};   ///< held nodes that the last failed projection found too far apart
 
 private:
+  double mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const;
+  std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
   static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
   StepFailure computeAcceleration(const RodInputs& inputs, double duration, double t);
   Eigen::Vector3d heldVelocity(const RodInputs& inputs, double duration, double at, int node,
@@ -94,6 +93,7 @@ private:
   void setViscousResponseAtEnd(const Stage& stage, double h);
   void finishStrainHistory(const Stage& stage);
 
+  bool without_frames;   ///< a state may come without them
   const std::vector<GraspState>* origin = nullptr;
   const StepPlan* plan = nullptr;   ///< of the substep
   RodEvaluation end_evaluation;     ///< at the end of a substep whose stage lies inside it
