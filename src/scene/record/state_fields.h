@@ -18,6 +18,18 @@ struct Fields
   static constexpr bool listed = false;
 };
 
+/// A list of data members, in the order in which they are visited.
+template <auto... members>
+struct Members
+{
+  static constexpr bool listed = true;
+  template <class Visitor, class State>
+  static void visit(Visitor& visitor, State& state)
+  {
+    visitor(state.*members...);
+  }
+};
+
 /// Visits numbers, matrices, lists and states, down to the numbers and matrices, which `archive` takes.
 template <class Archive>
 class FieldVisitor
@@ -69,172 +81,127 @@ private:
       visit(entry);
   }
 
+  template <class Value, std::size_t count>
+  void visit(Value (&values)[count])
+  {
+    for (auto& entry : values)
+      visit(entry);
+  }
+
   Archive& archive_;
 };
 
 template <>
-struct Fields<Pose>
+struct Fields<Eigen::Quaterniond>
 {
   static constexpr bool listed = true;
   template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& pose)
+  static void visit(Visitor& visitor, State& quaternion)
   {
-    visitor(pose.position, pose.orientation.coeffs());
+    visitor(quaternion.coeffs());
   }
 };
 
 template <>
-struct Fields<Twist>
+struct Fields<Pose> : Members<&Pose::position, &Pose::orientation>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& twist)
-  {
-    visitor(twist.linear, twist.angular);
-  }
 };
 
 template <>
-struct Fields<Wrench>
+struct Fields<Twist> : Members<&Twist::linear, &Twist::angular>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& wrench)
-  {
-    visitor(wrench.force, wrench.torque);
-  }
 };
 
 template <>
-struct Fields<EndLoad>
+struct Fields<Wrench> : Members<&Wrench::force, &Wrench::torque>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& load)
-  {
-    visitor(load.force, load.torque);
-  }
+};
+
+template <>
+struct Fields<EndLoad> : Members<&EndLoad::force, &EndLoad::torque>
+{
 };
 
 template <>
 struct Fields<GraspState>
+  : Members<&GraspState::active, &GraspState::first_node, &GraspState::last_node, &GraspState::holds_frame,
+            &GraspState::body, &GraspState::X_WG, &GraspState::velocity, &GraspState::nodes_G, &GraspState::directors_G,
+            &GraspState::section_G, &GraspState::section_twist>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& grasp)
-  {
-    visitor(grasp.active, grasp.first_node, grasp.last_node, grasp.holds_frame, grasp.body, grasp.X_WG, grasp.velocity,
-            grasp.nodes_G, grasp.directors_G, grasp.section_G[0], grasp.section_G[1], grasp.section_twist[0],
-            grasp.section_twist[1]);
-  }
 };
 
 template <>
 struct Fields<RodState>
+  : Members<&RodState::x, &RodState::v, &RodState::d1, &RodState::twist, &RodState::director, &RodState::grasps,
+            &RodState::last_step, &RodState::next_step, &RodState::a, &RodState::x_previous, &RodState::v_previous,
+            &RodState::strain_rate, &RodState::strain_rate_previous, &RodState::strain_previous>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& rod)
-  {
-    visitor(rod.x, rod.v, rod.d1, rod.twist, rod.director, rod.grasps, rod.last_step, rod.next_step, rod.a,
-            rod.x_previous, rod.v_previous, rod.strain_rate, rod.strain_rate_previous, rod.strain_previous);
-  }
+};
+
+template <>
+struct Fields<ThreadEnd> : Members<&ThreadEnd::held, &ThreadEnd::X_WE>
+{
 };
 
 template <>
 struct Fields<ThreadState>
+  : Members<&ThreadState::x, &ThreadState::v, &ThreadState::d1, &ThreadState::twist, &ThreadState::spin,
+            &ThreadState::volume, &ThreadState::id, &ThreadState::deposited, &ThreadState::ends, &ThreadState::next_id,
+            &ThreadState::thread_id, &ThreadState::fed_volume, &ThreadState::dropped_volume, &ThreadState::left_volume>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& thread)
-  {
-    visitor(thread.x, thread.v, thread.d1, thread.twist, thread.spin, thread.volume, thread.id, thread.deposited);
-    for (auto& end : thread.ends)
-      visitor(end.held, end.X_WE);
-    visitor(thread.next_id, thread.thread_id, thread.fed_volume, thread.dropped_volume, thread.left_volume);
-  }
 };
 
 template <>
 struct Fields<ThreadGroupState>
+  : Members<&ThreadGroupState::threads, &ThreadGroupState::next_thread_id, &ThreadGroupState::dropped_volume,
+            &ThreadGroupState::left_volume, &ThreadGroupState::start_volume>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& group)
-  {
-    visitor(group.threads, group.next_thread_id, group.dropped_volume, group.left_volume, group.start_volume);
-  }
 };
 
 template <>
 struct Fields<ClothState>
+  : Members<&ClothState::x, &ClothState::v, &ClothState::rest_angles, &ClothState::next_step, &ClothState::stiffening,
+            &ClothState::pins, &ClothState::at_bound, &ClothState::average_set>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& cloth)
-  {
-    visitor(cloth.x, cloth.v, cloth.rest_angles, cloth.next_step, cloth.stiffening, cloth.pins, cloth.at_bound,
-            cloth.average_set);
-  }
 };
 
 template <>
 struct Fields<ClothGrasp>
+  : Members<&ClothGrasp::active, &ClothGrasp::vertices, &ClothGrasp::points_G, &ClothGrasp::X_WG>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& grasp)
-  {
-    visitor(grasp.active, grasp.vertices, grasp.points_G, grasp.X_WG);
-  }
 };
 
 template <>
-struct Fields<GuideState>
+struct Fields<FunctionBlend>
+  : Members<&FunctionBlend::gap, &FunctionBlend::rate, &FunctionBlend::start, &FunctionBlend::duration>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& guide)
-  {
-    visitor(guide.points, guide.velocity, guide.forces, guide.blend.gap, guide.blend.rate, guide.blend.start,
-            guide.blend.duration);
-  }
 };
 
 template <>
-struct Fields<RigidBodyState>
+struct Fields<GuideState> : Members<&GuideState::points, &GuideState::velocity, &GuideState::forces, &GuideState::blend>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& body)
-  {
-    visitor(body.X_WB, body.velocity, body.has_history, body.linear_acceleration, body.angular_acceleration,
-            body.X_previous, body.velocity_previous);
-  }
+};
+
+template <>
+struct Fields<RigidBodyState> : Members<&RigidBodyState::X_WB, &RigidBodyState::velocity, &RigidBodyState::has_history,
+                                        &RigidBodyState::linear_acceleration, &RigidBodyState::angular_acceleration,
+                                        &RigidBodyState::X_previous, &RigidBodyState::velocity_previous>
+{
 };
 
 template <>
 struct Fields<ContactStiffness>
+  : Members<&ContactStiffness::rods, &ContactStiffness::threads, &ContactStiffness::bodies>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& stiffness)
-  {
-    visitor(stiffness.rods, stiffness.threads, stiffness.bodies);
-  }
 };
 
 template <>
 struct Fields<SceneState>
+  : Members<&SceneState::time, &SceneState::steps, &SceneState::rods, &SceneState::rod_guides, &SceneState::threads,
+            &SceneState::cloths, &SceneState::cloth_guides, &SceneState::bodies, &SceneState::obstacles,
+            &SceneState::obstacle_velocities, &SceneState::contact_stiffness, &SceneState::end_loads,
+            &SceneState::cloth_grasps, &SceneState::grasp_offsets, &SceneState::wrenches>
 {
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& scene)
-  {
-    visitor(scene.time, scene.steps, scene.rods, scene.rod_guides, scene.threads, scene.cloths, scene.cloth_guides,
-            scene.bodies, scene.obstacles, scene.obstacle_velocities, scene.contact_stiffness, scene.end_loads,
-            scene.cloth_grasps, scene.grasp_offsets, scene.wrenches);
-  }
 };
 
 }   // namespace slender
