@@ -44,7 +44,7 @@ struct SceneMessages
   /// the scene's bodies, simulated and driven; none: not published
   slender_sim::BodyStates bodies;
 
-  slender_sim::GraspStates grasps;     ///< recorded only; none: not recorded
+  slender_sim::GraspStates grasps;     ///< none: neither published nor recorded
   slender_sim::BodyStates obstacles;   ///< likewise
 
   slender_sim::Fields fields;   ///< see fillFields(); no tables: neither published nor recorded
