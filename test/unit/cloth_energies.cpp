@@ -1,5 +1,5 @@
-// Derivatives of hinges and membrane against differences; invariances; reference 3f (one triangle of St.
-// Venant-Kirchhoff).
+// What hinges and membranes alone have to show; energy_contract.cpp checks what holds for every energy. Sharp folds,
+// degenerate faces, fibre directions, and reference 3f (one triangle of St. Venant-Kirchhoff).
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -23,13 +23,6 @@ struct Sheet
   {
   }
   int points() const { return static_cast<int>(mesh.vertices.cols()); }
-  Matrix3Xd shaken(Random& random, double size) const
-  {
-    Matrix3Xd x = mesh.vertices;
-    for (Eigen::Index i = 0; i < x.cols(); ++i)
-      x.col(i) += random.vector(size);
-    return x;
-  }
 };
 
 double energyOf(const HingeBending& e, const Matrix3Xd& x) { return e.energy(pointsOf(x).data()); }
@@ -50,25 +43,6 @@ void check(Derivatives<Energy>& d, const Matrix3Xd& x, double h, double toleranc
   const double size = exact.norm();
   EXPECT_GT(smallestEigenvalue(semidefinite), -1e-12 * size);
   EXPECT_GT(smallestEigenvalue(semidefinite - exact), -1e-12 * size);
-}
-
-HingeBending hingesOf(const Sheet& s, Random& random, double rest)
-{
-  return HingeBending(s.topology.hinges, hingeStiffness(s.mesh, s.topology, 0.7),
-                      random.numbers(s.topology.hingeCount(), rest));
-}
-
-TEST(HingeBending, DerivativesMatchDifferences)
-{
-  Random random(3);
-  for (const GridPattern pattern : {GridPattern::one_diagonal, GridPattern::alternating, GridPattern::irregular})
-    for (const double size : {0.05, 0.5})
-    {
-      const Sheet s(pattern);
-      const HingeBending hinges = hingesOf(s, random, 0.4);
-      Derivatives<HingeBending> d(hinges, s.points(), s.topology.hinges);
-      check(d, s.shaken(random, size), 1e-3 * size, size < 0.1 ? 1e-7 : 1e-5);
-    }
 }
 
 /// Two triangles folded about their common edge by `angle`, the third points `height` high.
@@ -123,66 +97,6 @@ TEST(HingeBending, DegenerateFacesStayFinite)
     EXPECT_TRUE(d.hessian(x, HessianKind::exact).allFinite());
     EXPECT_TRUE(d.hessian(x, HessianKind::semidefinite).allFinite());
   }
-}
-
-TEST(HingeBending, ViscousResponseIsElasticAndViscousMoment)
-{
-  Random random(7);
-  const Sheet s(GridPattern::irregular);
-  HingeBending hinges = hingesOf(s, random, 0.4);
-  const Matrix3Xd x = s.shaken(random, 0.2), before = s.shaken(random, 0.2);
-  const double ratio = 0.6;
-  const int n = hinges.count();
-  VectorXd angles(hinges.paddedCount());
-  hinges.angles(pointsOf(before).data(), angles.data());
-  Derivatives<HingeBending> d(hinges, s.points(), s.topology.hinges);
-  const Matrix3Xd elastic = d.gradient(x);
-  hinges.setResponse(ratio, angles.data());
-  const Matrix3Xd whole = d.gradient(x);
-  const HingeBending about(s.topology.hinges, hingeStiffness(s.mesh, s.topology, 0.7), angles.head(n));
-  Derivatives<HingeBending> viscous(about, s.points(), s.topology.hinges);
-  EXPECT_LT((whole - elastic - ratio * viscous.gradient(x)).norm(), 1e-12 * whole.norm());
-  hinges.setResponse(0.0, nullptr);
-  EXPECT_EQ(d.gradient(x), elastic);
-}
-
-TEST(HingeBending, RigidMotionsDoNothing)
-{
-  Random random(9);
-  const Sheet s(GridPattern::alternating);
-  const HingeBending hinges = hingesOf(s, random, 0.4);
-  Derivatives<HingeBending> d(hinges, s.points(), s.topology.hinges);
-  const Matrix3Xd x = s.shaken(random, 0.3), g = d.gradient(x);
-  EXPECT_LT(g.rowwise().sum().norm(), 1e-12 * g.norm());
-  Vector3d torque = Vector3d::Zero();
-  for (Eigen::Index i = 0; i < x.cols(); ++i)
-    torque += x.col(i).cross(g.col(i));
-  EXPECT_LT(torque.norm(), 1e-11 * g.norm());
-  const Matrix3Xd moved = (random.rotation().toRotationMatrix() * x).colwise() + Vector3d(3, 4, 5);
-  EXPECT_NEAR(energyOf(hinges, moved) / energyOf(hinges, x), 1.0, 1e-12);
-}
-
-TEST(Membrane, DerivativesMatchDifferences)
-{
-  Random random(11);
-  const MembraneModuli odd = orthotropicMembrane(3.0, 1.2, 0.4, 0.5);
-  for (const GridPattern pattern : {GridPattern::one_diagonal, GridPattern::irregular})
-    for (const double size : {0.02, 0.4})
-    {
-      const Sheet s(pattern);
-      MembraneEnergy membrane(s.mesh, odd, Vector3d(1, 0.4, 0.1));
-      Derivatives<MembraneEnergy> d(membrane, s.points(), s.mesh.triangles);
-      const Matrix3Xd x = s.shaken(random, size);
-      check(d, x, 1e-3, 1e-9);
-      check(d, 0.7 * x, 1e-3, 1e-9);   // compressed
-      AlignedVector<double> strains[3];
-      double* pointers[3];
-      for (int k = 0; k < 3; ++k)
-        strains[k].resize(membrane.paddedCount()), pointers[k] = strains[k].data();
-      membrane.strains(pointsOf(s.shaken(random, size)).data(), pointers);
-      membrane.setResponse(0.8, pointers);
-      check(d, x, 1e-3, 1e-9);
-    }
 }
 
 TEST(Membrane, TakesItsAxesAlongTheWarp)
