@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "marker_tools.h"
+#include "slender_sim/contact/solids.h"
 #include "slender_sim/node/guide_inputs.h"
 
 namespace slender {
@@ -31,18 +32,8 @@ void sizeGraspHandle(const Simulation& simulation, const GraspRef& ref, Handle& 
   handle.turns = simulation.state().rods[ref.rod].grasps[ref.index].holds_frame;
 }
 
-struct Reach   // [m] how far a shape reaches from its origin
-{
-  double operator()(const Plane&) const { return 0.3; }
-  double operator()(const Sphere& s) const { return s.radius; }
-  double operator()(const Box& b) const { return 0.5 * b.size.norm(); }
-  double operator()(const Cylinder& c) const { return std::hypot(c.radius, 0.5 * c.length); }
-  double operator()(const Capsule& c) const { return c.radius + 0.5 * c.length; }
-  double operator()(const std::shared_ptr<const TriangleMesh>& mesh) const
-  {
-    return mesh->vertices.colwise().norm().maxCoeff();
-  }
-};
+/// How far a shape reaches from its origin [m]. Of a plane only a piece is drawn.
+double reachOf(const Shape& shape) { return std::holds_alternative<Plane>(shape) ? 0.3 : boundingRadius(shape); }
 
 }   // namespace
 
@@ -85,7 +76,7 @@ std::vector<Handle> GuideInputs::handles(const Simulation& simulation) const
       const Shape* shape = solid >= bodies_            ? &scene.obstacles[solid - bodies_].shape
                            : scene.bodies[solid].shape ? &*scene.bodies[solid].shape
                                                        : nullptr;
-      handle.size = shape ? 2.4 * std::visit(Reach(), *shape) : 0.15 * diagonal(sceneBox(simulation.state()));
+      handle.size = shape ? 2.4 * reachOf(*shape) : 0.15 * diagonal(sceneBox(simulation.state()));
       handle.ball = 0.35 * handle.size;
     }
     else
