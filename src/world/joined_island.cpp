@@ -8,9 +8,8 @@ namespace slender {
 namespace {
 
 /// Threads are stepped by implicit Euler alone.
-TimeConfig timeOf(const WorldModel& world, bool threads)
+TimeConfig timeOf(TimeConfig time, bool threads)
 {
-  TimeConfig time = world.time;
   if (threads)
     time.integrator = Integrator::implicit_euler;
   return time;
@@ -24,13 +23,13 @@ bool hasThreads(const JoinedObjects& objects, const std::vector<int>& parts)
 
 }   // namespace
 
-JoinedIsland::JoinedIsland(const WorldModel& world, JoinedObjects& objects, const std::vector<int>& parts)
-  : world_(world),
+JoinedIsland::JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts, const TimeConfig& time)
+  : world_(objects.world),
     objects_(objects),
     parts_(parts),
-    guard_(world.contact.gap),
+    guard_(world_.contact.gap),
     swept_(parts.size()),
-    stepper_(timeOf(world, hasThreads(objects, parts)), hasThreads(objects, parts))
+    stepper_(timeOf(time, hasThreads(objects, parts)), hasThreads(objects, parts))
 {
   std::vector<ThreadGuard::Tube> tubes;
   bool merges = false;
@@ -42,13 +41,13 @@ JoinedIsland::JoinedIsland(const WorldModel& world, JoinedObjects& objects, cons
       rods_.push_back(&rod);
       const RodModel& model = *rod.stepper->model;
       nodes_ += model.nodes();
-      if (const auto& contact = world.rods[rod.index].contact; contact && contact->others)
+      if (const auto& contact = world_.rods[rod.index].contact; contact && contact->others)
         tubes.push_back({&rod.stepper->system, model.radius_a.cwiseMax(model.radius_b)});
     }
     else if (part < objects_.partOfBody(0))
     {
       threads_.push_back(&objects_.threads[part - objects_.partOfThread(0)]);
-      merges = merges || world.threads[threads_.back()->index].contact->merging > 0.0;
+      merges = merges || world_.threads[threads_.back()->index].contact->merging > 0.0;
     }
     else
     {
@@ -182,13 +181,13 @@ void JoinedIsland::begin(const WorldState& state, const WorldInputs& inputs)
   merging_.setParts(strands_);
 }
 
-StepReport JoinedIsland::step()
+StepReport JoinedIsland::step(double duration)
 {
   double first = 0.0;
   for (const JoinedRod* rod : rods_)
     if (const double own = rod->stepper->work.next_step; own > 0.0)
       first = first > 0.0 ? std::min(first, own) : own;
-  StepReport report = stepper_.step(world_.time.step, first);
+  StepReport report = stepper_.step(duration, first);
   stepped_ = report.ok;
   if (!report.ok)
     return report;

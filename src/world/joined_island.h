@@ -14,14 +14,14 @@ class JoinedIsland
 {
 public:
   /// `parts`: numbers of its parts, see JoinedObjects. The objects must outlive the island, and no part may be added.
-  JoinedIsland(const WorldModel& world, JoinedObjects& objects, const std::vector<int>& parts);
+  JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts, const TimeConfig& time);
   JoinedIsland(const JoinedIsland&) = delete;
   JoinedIsland& operator=(const JoinedIsland&) = delete;
 
   /// Begins a step: takes the strands that its threads have now, the motion of solids and the stiffness of contact.
   void begin(const WorldState& state, const WorldInputs& inputs);
-  /// Advances its parts, whose states have been loaded.
-  StepReport step();
+  /// Advances its parts, whose states have been loaded, by `duration` [s].
+  StepReport step(double duration);
   /// Writes into the state what belongs to the island as a whole.
   void end(WorldState& state) const;
   bool stepped() const { return stepped_; }   ///< since forgetStep() and begin()

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "../rod/rod_part.h"
@@ -59,8 +60,27 @@ struct JoinedSolid
   std::vector<int> welded_rods{};   ///< places of rods that begin inside of it
 };
 
+/// Which parts of the world may meet, by their numbers.
+struct IslandContent
+{
+  std::vector<int> rods, threads;
+  std::vector<int> bodies;   ///< simulated ones, and driven ones that something is welded to or that have a shape
+};
+
 struct JoinedObjects
 {
+  /// Appends the grasps of the welds to the rods of the state. The model of the world must live as long.
+  JoinedObjects(const WorldModel& world, IslandContent content, WorldState& state);
+  /// The same rods and bodies without the threads, for steps of another kind. The state has the grasps of the welds.
+  JoinedObjects(const JoinedObjects& other, const TimeConfig& time);
+  JoinedObjects& operator=(const JoinedObjects&) = delete;
+
+  /// Takes the inputs of the rods for a step. Returns false, and fills the report, where the inputs do not fit the
+  /// state or are not finite.
+  bool takeInputs(const WorldState& state, const WorldInputs& inputs, StepReport& report);
+
+  const WorldModel& world;
+  const IslandContent content;
   std::vector<JoinedRod> rods;
   std::vector<JoinedBody> bodies;
   std::vector<JoinedThread> threads;
@@ -71,6 +91,15 @@ struct JoinedObjects
   int parts() const { return static_cast<int>(rods.size() + threads.size() + bodies.size()); }
   int partOfThread(std::size_t thread) const { return static_cast<int>(rods.size() + thread); }
   int partOfBody(std::size_t body) const { return static_cast<int>(rods.size() + threads.size() + body); }
+
+private:
+  void addParts(const TimeConfig& time);
+  void addWelds(WorldState& state);
+  void addSolids();
+  void follow(const Weld& weld);
+  BodyPart* simulated(int body) const;
+  std::string badInput(const WorldState& state, const WorldInputs& inputs) const;
+  void carryGrasps(const WorldInputs& inputs);
 };
 
 }   // namespace slender

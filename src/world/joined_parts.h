@@ -1,7 +1,6 @@
 #pragma once
 
 #include <map>
-#include <string>
 #include <vector>
 
 #include "island.h"
@@ -11,13 +10,6 @@
 #include "step_islands.h"
 
 namespace slender {
-
-/// Which parts of the world may meet, by their numbers.
-struct IslandContent
-{
-  std::vector<int> rods, threads;
-  std::vector<int> bodies;   ///< simulated ones, and driven ones that something is welded to or that have a shape
-};
 
 /// Rods, threads and bodies that contact or welds can join, and the obstacles that they meet, in implicit steps.
 ///
@@ -45,15 +37,10 @@ public:
   }
 
 private:
-  void addRods(WorldState& state);
-  void addSolids();
-  BodyPart* simulated(int body) const;
   std::vector<int> objectsOf(const std::vector<int>& rods) const;
   void checkClearance(const WorldState& state);
 
-  std::string badInput(const WorldState& state, const WorldInputs& inputs) const;
   bool endsHaveRoom(const WorldState& state, const WorldInputs& inputs, StepReport& report) const;
-  void carryGrasps(const WorldInputs& inputs);
   bool begin(const WorldState& state, const WorldInputs& inputs, StepReport& report);
   bool load(int part, const WorldState& state, const WorldInputs& inputs, StepReport& report);
   bool loadThread(JoinedThread& thread, const WorldState& state, const WorldInputs& inputs, StepReport& report);
@@ -68,7 +55,6 @@ private:
   void endThread(JoinedThread& thread);
 
   const WorldModel& world_;
-  const IslandContent content_;
   JoinedObjects objects_;
   int nodes_ = 0;   ///< of its rods
 

@@ -10,21 +10,6 @@ namespace slender {
 
 namespace {
 
-bool isSound(const GraspTarget& t)
-{
-  return t.X_WG.position.allFinite() && std::abs(t.X_WG.orientation.norm() - 1.0) < 1e-3 &&
-         (!t.velocity || (t.velocity->linear.allFinite() && t.velocity->angular.allFinite()));
-}
-
-StepReport refusedInput(const std::string& what)
-{
-  StepReport report;
-  report.ok = false;
-  report.failure = StepFailure::input_not_finite;
-  report.message = what + " is not finite or not valid; correct this input";
-  return report;
-}
-
 /// Nodes made in one step have numbers that differ, as if the threads had been stepped one after the other.
 void renumber(std::vector<ThreadState>& threads, std::uint64_t before)
 {
@@ -49,30 +34,6 @@ std::uint64_t nextId(const std::vector<ThreadState>& threads)
 }
 
 }   // namespace
-
-/// What is wrong with the inputs that all parts share; empty: nothing is.
-std::string JoinedParts::badInput(const WorldState& state, const WorldInputs& inputs) const
-{
-  if (inputs.rods.size() != state.rods.size() || state.rods.size() != world_.rods.size())
-    return "number of rods";
-  if (inputs.threads.size() != state.threads.size() || state.threads.size() != world_.threads.size())
-    return "number of threads";
-  if (inputs.bodies.size() != state.bodies.size() || state.bodies.size() != world_.bodies.size())
-    return "number of bodies";
-  if (inputs.obstacles.size() != state.obstacles.size() || state.obstacles.size() != world_.obstacles.size() ||
-      state.obstacle_velocities.size() != state.obstacles.size())
-    return "number of obstacles";
-  for (const int b : content_.bodies)
-    if (!world_.bodies[b].body.simulated && !isSound(inputs.bodies[b]))
-      return "pose of body " + world_.bodies[b].body.name;
-  for (std::size_t k = 0; k < inputs.obstacles.size(); ++k)
-    if (!isSound(inputs.obstacles[k]))
-      return "pose of obstacle " + world_.obstacles[k].name;
-  for (const int k : content_.threads)
-    if (!inputs.threads[k].belt_velocity.allFinite())
-      return "belt velocity of thread " + world_.threads[k].model->name;
-  return inputs.gravity.allFinite() ? "" : "gravity";
-}
 
 /// An end that is held cannot give way. Returns false, and fills the report, when a solid that moves as prescribed
 /// comes nearer to one than the thread is thick: no shorter step helps then.
@@ -107,35 +68,12 @@ bool JoinedParts::endsHaveRoom(const WorldState& state, const WorldInputs& input
   return true;
 }
 
-/// Grasps that driven bodies carry get their targets from these.
-void JoinedParts::carryGrasps(const WorldInputs& inputs)
-{
-  for (const Weld& weld : objects_.welds)
-    if (!world_.bodies[weld.body].body.simulated)
-    {
-      const GraspTarget& body = inputs.bodies[weld.body];
-      GraspTarget& grasp = objects_.rods[weld.rod].inputs.grasps[weld.grasp];
-      grasp.X_WG = body.X_WG * weld.X_BG;
-      grasp.velocity = body.velocity;
-      if (grasp.velocity)
-        grasp.velocity->linear += grasp.velocity->angular.cross(body.X_WG.orientation * weld.X_BG.position);
-    }
-}
-
 // ---- parts are loaded
 
 bool JoinedParts::begin(const WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
-  for (JoinedRod& rod : objects_.rods)
-    rod.inputs = inputs.rods[rod.index];
-  carryGrasps(inputs);
-  std::string what;
-  for (const JoinedRod& rod : objects_.rods)
-    if (!rod.stepper->inputsFinite(state.rods[rod.index], rod.inputs, what))
-    {
-      report = refusedInput("rod '" + rod.stepper->model->name + "': " + what);
-      return false;
-    }
+  if (!objects_.takeInputs(state, inputs, report))
+    return false;
   if (!endsHaveRoom(state, inputs, report))
     return false;
   for (int part = 0; part < objects_.parts(); ++part)
@@ -232,7 +170,7 @@ void JoinedParts::arrange(const WorldState& state, const WorldInputs& inputs)
     auto at = known_.find(numbers_);
     const bool is_new = at == known_.end();
     if (is_new)
-      at = known_.try_emplace(numbers_, world_, objects_, numbers_).first;
+      at = known_.try_emplace(numbers_, objects_, numbers_, world_.time).first;
     islands_.push_back(&at->second);
     if (is_new || !at->second.stepped())
       at->second.begin(state, inputs);
@@ -246,7 +184,8 @@ StepReport JoinedParts::stepIslands()
   for (JoinedIsland* island : islands_)
     island->setThreads(count > 1 ? 1 : loop_.threads);
   loop_.run(
-      count, nodes_, [&](int k) { return islands_[k]->stepped() ? StepReport() : islands_[k]->step(); }, total);
+      count, nodes_, [&](int k) { return islands_[k]->stepped() ? StepReport() : islands_[k]->step(world_.time.step); },
+      total);
   return total;
 }
 
@@ -287,8 +226,6 @@ StepReport JoinedParts::stepAndJoin(const WorldState& state, const WorldInputs& 
 StepReport JoinedParts::step(WorldState& state, const WorldInputs& inputs)
 {
   StepReport report;
-  if (const std::string bad = badInput(state, inputs); !bad.empty())
-    return refusedInput(bad);
   if (!begin(state, inputs, report))
     return report;
   report = stepAndJoin(state, inputs);

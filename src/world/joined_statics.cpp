@@ -1,0 +1,265 @@
+#include "joined_statics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "../rod/statics_advice.h"
+#include "slender_sim/dynamics/lowest_eigenvalue.h"
+#include "slender_sim/geometry/rotation.h"
+
+namespace slender {
+
+namespace {
+
+TimeConfig timeOfStatics(TimeConfig time)
+{
+  time.integrator = Integrator::implicit_euler;
+  time.error_tolerance = 0;
+  time.newton.max_iterations = std::max(60, time.newton.max_iterations);
+  time.newton.tolerance = std::min(1e-7, time.newton.tolerance);
+  return time;
+}
+
+std::vector<int> allParts(const JoinedObjects& objects)
+{
+  std::vector<int> parts(static_cast<std::size_t>(objects.parts()));
+  std::iota(parts.begin(), parts.end(), 0);
+  return parts;
+}
+
+void standStill(WorldState& state)
+{
+  for (RodState& rod : state.rods)
+  {
+    rod.forgetHistory();
+    rod.v.setZero();
+    for (GraspState& g : rod.grasps)
+      g.velocity = {};
+  }
+  for (RigidBodyState& body : state.bodies)
+  {
+    body.velocity = {};
+    body.has_history = false;
+  }
+  for (Twist& v : state.obstacle_velocities)
+    v = {};
+}
+
+StepReport refuseTorques()
+{
+  StepReport report;
+  report.ok = false;
+  report.failure = StepFailure::input_not_finite;
+  report.message =
+      "statics of rods with contact or bodies does not know torques about the tangent: weld a body with this torque, "
+      "or let the scene settle by time stepping with damping (start: as_given)";
+  return report;
+}
+
+}   // namespace
+
+JoinedStatics::JoinedStatics(JoinedObjects& objects)
+  : origin_(objects),
+    time_(timeOfStatics(objects.world.time)),
+    objects_(objects, time_),
+    island_(objects_, allParts(objects_), time_),
+    lever_(std::numeric_limits<double>::max())
+{
+  for (const JoinedRod& rod : objects_.rods)
+    lever_ = std::min(lever_, rod.stepper->model->rest_length.minCoeff());
+}
+
+// ---- states of its parts
+
+void JoinedStatics::take(const WorldState& state)
+{
+  work_.rods.resize(state.rods.size());
+  work_.bodies.resize(state.bodies.size());
+  for (const JoinedRod& rod : objects_.rods)
+    work_.rods[rod.index] = state.rods[rod.index];
+  for (const int b : objects_.content.bodies)
+    work_.bodies[b] = state.bodies[b];
+  work_.obstacles = state.obstacles;
+  work_.obstacle_velocities = state.obstacle_velocities;
+  work_.contact_stiffness = state.contact_stiffness;
+}
+
+void JoinedStatics::give(WorldState& state) const
+{
+  for (const JoinedRod& rod : objects_.rods)
+    state.rods[rod.index] = work_.rods[rod.index];
+  for (const int b : objects_.content.bodies)
+    state.bodies[b] = work_.bodies[b];
+  state.obstacles = work_.obstacles;
+  state.obstacle_velocities = work_.obstacle_velocities;
+  state.contact_stiffness = work_.contact_stiffness;
+}
+
+void JoinedStatics::restore(const Configuration& c)
+{
+  work_ = c.state;
+  report_.residual = c.residual;
+  report_.max_strain = c.max_strain;
+  report_.message.clear();
+}
+
+// ---- steps
+
+/// Loads the present configuration for a step of this duration [s].
+void JoinedStatics::load(double duration)
+{
+  for (JoinedRod& rod : objects_.rods)
+  {
+    rod.stepper->begin(work_.rods[rod.index]);
+    rod.part->begin(rod.inputs, duration);
+  }
+  for (const JoinedBody& body : objects_.bodies)
+    body.part->begin(work_.bodies[body.index], inputs_->gravity);
+  island_.begin(work_, *inputs_);
+}
+
+StepReport JoinedStatics::step(double h)
+{
+  load(h);
+  const StepReport report = island_.step(h);
+  if (!report.ok)
+    return report;
+  for (const JoinedRod& rod : objects_.rods)
+    work_.rods[rod.index] = rod.stepper->work;
+  for (const JoinedBody& body : objects_.bodies)
+    work_.bodies[body.index] = body.part->state();
+  island_.end(work_);
+  const auto arrive = [h](const GraspTarget& target, Pose& pose, const Twist& velocity) {
+    pose = poseBetween(pose, velocity, target, h, 1.0, nullptr);
+  };
+  for (const int b : objects_.content.bodies)
+    if (!objects_.world.bodies[b].body.simulated)
+      arrive(inputs_->bodies[b], work_.bodies[b].X_WB, work_.bodies[b].velocity);
+  for (std::size_t k = 0; k < work_.obstacles.size(); ++k)
+    arrive(inputs_->obstacles[k], work_.obstacles[k], work_.obstacle_velocities[k]);
+  return report;
+}
+
+/// Returns the largest unbalanced force [N]: the one that accelerates rods and bodies in a step of h from rest.
+double JoinedStatics::unbalanced(double h) const
+{
+  double sum = 0.0;
+  for (const JoinedRod& rod : objects_.rods)
+  {
+    const RodModel& m = *rod.stepper->model;
+    const Eigen::Matrix3Xd &from = before_.rods[rod.index].x, &to = work_.rods[rod.index].x;
+    for (int i = 0; i < m.nodes(); ++i)
+      if (rod.stepper->system.isMoving(i))
+        sum = std::max(sum, m.mass[i] * (to.col(i) - from.col(i)).norm() / (h * h));
+  }
+  for (const JoinedBody& body : objects_.bodies)
+  {
+    const RigidBodyModel& m = objects_.world.bodies[body.index].body;
+    const Pose &from = before_.bodies[body.index].X_WB, &to = work_.bodies[body.index].X_WB;
+    const Eigen::Vector3d turn = rotationVector(from.orientation.conjugate() * to.orientation);
+    sum = std::max(
+        {sum, m.mass * (to.position - from.position).norm() / (h * h), (m.inertia * turn).norm() / (lever_ * h * h)});
+  }
+  return sum;
+}
+
+/// Steps from rest, the first of `h` seconds, until nothing is accelerated. Returns false when that does not end.
+bool JoinedStatics::settle(double h)
+{
+  constexpr int kMaxRounds = 400;
+  constexpr double kUnbalanced = 1e-8;   // of the largest force
+  for (int round = 0, failures = 0; round < kMaxRounds; ++round)
+  {
+    standStill(work_);
+    before_ = work_;
+    const StepReport report = step(h);
+    report_.iterations += report.iterations;
+    report_.factorizations += report.factorizations;
+    if (!report.ok)
+    {
+      failure_ = report.failure;
+      report_.message.clear();
+      h *= 0.1;
+      if (++failures > 12 || failure_ == StepFailure::interrupted)
+        return false;
+      continue;
+    }
+    ++report_.substeps;
+    force_scale_ = std::max(force_scale_, system().forceScale());
+    report_.residual = unbalanced(h) / force_scale_;
+    report_.max_strain = report.max_strain;
+    if (round > 0 && report_.residual < kUnbalanced)
+    {
+      standStill(work_);
+      return true;
+    }
+    h = std::min(h * (report.iterations < 10 ? 4.0 : 1.5), 1e6);
+  }
+  failure_ = StepFailure::newton_diverged;
+  report_.message =
+      "the equilibrium did not settle: something may be free to drift; hold it, or let it settle by time stepping with "
+      "damping (start: as_given)";
+  return false;
+}
+
+// ---- leaving saddles
+
+EquilibriumStability JoinedStatics::assess(bool spectrum)
+{
+  beginStability();
+  const RodEvaluation at = energyAt(0.0);
+  EquilibriumStability result;
+  result.energy = at.energy();
+  result.energy_noise = 1e-13 * (std::abs(at.stretch) + std::abs(at.bend_twist) + std::abs(at.potential));
+  if (!spectrum)
+    return result;
+  result.lowest = lowestEigenvalue([&](double s) { return definite(s); }, neutralBand()).value;
+  result.stable = result.lowest >= 0;
+  return result;
+}
+
+bool JoinedStatics::displace(double turn)
+{
+  // The factor of the matrix near its lowest eigenvalue, which inverse iteration needs, belongs to the saddle: other
+  // steps came in between.
+  beginStability();
+  lowestEigenvalue([&](double s) { return definite(s); }, neutralBand());
+  findLowestMode();
+  return displaceAlongMode(turn);
+}
+
+bool JoinedStatics::settleFrom(double lowest)
+{
+  // Inertia above the negative eigenvalue makes the first steps convex, so that they slide down instead of jumping.
+  return settle(std::isfinite(lowest) ? 0.7 / std::sqrt(-lowest) : 1e-3 * time_.step);
+}
+
+StepReport JoinedStatics::solve(WorldState& state, const WorldInputs& inputs)
+{
+  report_ = StepReport();
+  for (const JoinedRod& rod : objects_.rods)
+    if (rod.index < static_cast<int>(inputs.rods.size()) && inputs.rods[rod.index].torques.size() > 0)
+      return refuseTorques();
+  if (!objects_.takeInputs(state, inputs, report_))
+    return report_;
+  inputs_ = &inputs;
+  take(state);
+  if (settle(time_.step))
+  {
+    settleStably(*this, true, report_);
+    report_.message.clear();
+    give(state);
+    for (std::size_t r = 0; r < objects_.rods.size(); ++r)
+      origin_.rods[r].stepper->wrenches = objects_.rods[r].stepper->wrenches;
+    return report_;
+  }
+  report_.ok = false;
+  report_.failure = failure_;
+  if (report_.message.empty())
+    report_.message = explainStatics(report_.failure);
+  return report_;
+}
+
+}   // namespace slender
