@@ -25,40 +25,51 @@ Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q
 
 }   // namespace
 
-ExplicitSystem::ExplicitSystem(const RodGroupModel* group, const std::vector<RodStepper::Impl*>& rods)
-  : model_(group),
-    rods_(rods)
+ExplicitSystem::ExplicitSystem(const std::vector<RodStepper::Impl*>& rods, const std::vector<SimulatedBody>& bodies,
+                               std::vector<Weld> welds)
+  : welds_(std::move(welds))
 {
-  for (const RodStepper::Impl* rod : rods_)
+  for (RodStepper::Impl* rod : rods)
   {
     const RodModel& m = *rod->model;
-    chains_.push_back(m.inextensible ? projection_.addChain(m.rest_length, m.mass, m.closed) : -1);
+    rods_.push_back({rod, m.inextensible ? projection_.addChain(m.rest_length, m.mass, m.closed) : -1, nullptr});
     inextensible_ = inextensible_ || m.inextensible;
   }
-  if (!model_)
-    return;
-  for (int b = 0; b < static_cast<int>(model_->bodies.size()); ++b)
-    if (model_->bodies[b].simulated)
-    {
-      Body body;
-      body.index = b;
-      bodies_.push_back(body);
-      projection_.addBody();
-    }
+  for (const SimulatedBody& added : bodies)
+  {
+    Body body;
+    body.number = added.number;
+    body.model = added.model;
+    bodies_.push_back(body);
+    projection_.addBody();
+  }
 }
 
-void ExplicitSystem::begin(const RodGroupState& state, const RodGroupInputs& inputs, double duration)
+void ExplicitSystem::begin(const std::vector<RigidBodyState>& bodies, const Eigen::Vector3d& gravity)
 {
-  origin_ = &state;
-  inputs_ = &inputs;
-  duration_ = duration;
-  bodies_now_ = bodies_next_ = state.bodies;
+  gravity_ = gravity;
+  for (Body& body : bodies_)
+    body.now = body.next = bodies[body.number];
 }
 
-bool ExplicitSystem::isWelded(const RodStepper::Impl& rod, const Weld& weld) const
+void ExplicitSystem::commitStep()
 {
-  return weld.grasp < static_cast<int>(rod.work.grasps.size()) && rod.work.grasps[weld.grasp].active &&
-         rod.work.grasps[weld.grasp].body == weld.body;
+  for (Body& body : bodies_)
+    body.now = body.next;
+}
+
+void ExplicitSystem::end(std::vector<RigidBodyState>& bodies) const
+{
+  for (const Body& body : bodies_)
+    bodies[body.number] = body.now;
+}
+
+/// Whether a weld holds now.
+bool ExplicitSystem::isWelded(const Weld& weld) const
+{
+  const std::vector<GraspState>& grasps = rods_[weld.rod].rod->work.grasps;
+  return weld.grasp < static_cast<int>(grasps.size()) && grasps[weld.grasp].active &&
+         grasps[weld.grasp].body == weld.body;
 }
 
 /// Masses of the bodies with the nodes they carry, and where they are now.
@@ -66,17 +77,17 @@ void ExplicitSystem::composeBodies()
 {
   for (Body& body : bodies_)
   {
-    const RigidBodyModel& m = model_->bodies[body.index];
+    const RigidBodyModel& m = *body.model;
     body.mass = m.mass;
     Eigen::Vector3d moment = Eigen::Vector3d::Zero();
     Eigen::Matrix3d inertia = m.inertia;   // about the body's own centre of mass so far
-    for (const Weld& weld : model_->welds)
-      if (weld.body == body.index && isWelded(*rods_[weld.rod], weld))
+    for (const Weld& weld : welds_)
+      if (weld.body == body.number && isWelded(weld))
       {
-        const GraspState& g = rods_[weld.rod]->work.grasps[weld.grasp];
+        const GraspState& g = rods_[weld.rod].rod->work.grasps[weld.grasp];
         for (int i = g.first_node; i <= g.last_node; ++i)
         {
-          const double mass = rods_[weld.rod]->model->mass[i];
+          const double mass = rods_[weld.rod].rod->model->mass[i];
           const Eigen::Vector3d r = weld.X_BG * g.nodes_G[i - g.first_node];
           body.mass += mass;
           moment += mass * r;
@@ -85,7 +96,7 @@ void ExplicitSystem::composeBodies()
       }
     body.centre = moment / body.mass;
     body.inertia = inertia - pointInertia(body.mass, body.centre);
-    const RigidBodyState& s = bodies_now_[body.index];
+    const RigidBodyState& s = body.now;
     const Eigen::Vector3d arm = s.X_WB.orientation * body.centre;
     body.start = {s.X_WB.position + arm, s.X_WB.orientation};
     body.velocity = {s.velocity.linear + s.velocity.angular.cross(arm), s.velocity.angular};
@@ -96,16 +107,16 @@ void ExplicitSystem::composeBodies()
 /// found by the midpoint rule, which keeps the energy of a tumbling body.
 void ExplicitSystem::predictBody(Body& body, double h)
 {
-  const RigidBodyModel& m = model_->bodies[body.index];
-  const RigidBodyState& now = bodies_now_[body.index];
+  const RigidBodyModel& m = *body.model;
+  const RigidBodyState& now = body.now;
   Eigen::Vector3d force = m.force, torque = m.torque;
   if (m.gravity)
-    force += m.mass * inputs_->gravity;
+    force += m.mass * gravity_;
   torque += (now.X_WB.position - body.start.position).cross(force);
-  for (const Weld& weld : model_->welds)
-    if (weld.body == body.index && isWelded(*rods_[weld.rod], weld))
+  for (const Weld& weld : welds_)
+    if (weld.body == body.number && isWelded(weld))
     {
-      const RodStepper::Impl& rod = *rods_[weld.rod];
+      const RodStepper::Impl& rod = *rods_[weld.rod].rod;
       const GraspState& g = rod.work.grasps[weld.grasp];
       force += rod.wrenches[weld.grasp].force;
       torque += rod.wrenches[weld.grasp].torque +
@@ -151,14 +162,14 @@ void ExplicitSystem::predictBody(Body& body, double h)
 /// Takes over a body's motion at the end of the substep, and moves the grasps that it carries.
 void ExplicitSystem::placeBody(Body& body, const Pose& X, const Twist& velocity)
 {
-  RigidBodyState& next = bodies_next_[body.index];
+  RigidBodyState& next = body.next;
   const Eigen::Vector3d arm = X.orientation * body.centre;
   next.X_WB = {X.position - arm, X.orientation};
   next.velocity = {velocity.linear - velocity.angular.cross(arm), velocity.angular};
-  for (const Weld& weld : model_->welds)
-    if (weld.body == body.index && isWelded(*rods_[weld.rod], weld))
+  for (const Weld& weld : welds_)
+    if (weld.body == body.number && isWelded(weld))
     {
-      RodStepper::Impl& rod = *rods_[weld.rod];
+      RodStepper::Impl& rod = *rods_[weld.rod].rod;
       rod.stage_poses[weld.grasp] = next.X_WB * weld.X_BG;
       rod.carried_velocity[weld.grasp] = {
           next.velocity.linear + next.velocity.angular.cross(rod.stage_poses[weld.grasp].position - next.X_WB.position),
@@ -167,14 +178,14 @@ void ExplicitSystem::placeBody(Body& body, const Pose& X, const Twist& velocity)
 }
 
 /// Moves a body, and what it carries, as the substep begins.
-void ExplicitSystem::placeStart(const Body& body, const Pose& X)
+void ExplicitSystem::placeStart(Body& body, const Pose& X)
 {
-  Pose& X_WB = bodies_now_[body.index].X_WB;
+  Pose& X_WB = body.now.X_WB;
   X_WB = {X.position - X.orientation * body.centre, X.orientation};
-  for (const Weld& weld : model_->welds)
-    if (weld.body == body.index && isWelded(*rods_[weld.rod], weld))
+  for (const Weld& weld : welds_)
+    if (weld.body == body.number && isWelded(weld))
     {
-      RodStepper::Impl& rod = *rods_[weld.rod];
+      RodStepper::Impl& rod = *rods_[weld.rod].rod;
       GraspState& g = rod.work.grasps[weld.grasp];
       g.X_WG = rod.stage_poses[weld.grasp] = X_WB * weld.X_BG;
       for (int i = g.first_node; i <= g.last_node; ++i)
@@ -182,12 +193,11 @@ void ExplicitSystem::placeStart(const Body& body, const Pose& X)
     }
 }
 
-StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, double t, double h, StepReport& report,
-                                 std::size_t& failed)
+StepFailure ExplicitSystem::step(double duration, double t, double h, StepReport& report, std::size_t& failed)
 {
   // before a run's first step whatever stretching a rod comes with is taken out without becoming a velocity
   const bool first =
-      std::any_of(rods_.begin(), rods_.end(), [](const RodStepper::Impl* rod) { return rod->work.last_step == 0.0; });
+      std::any_of(rods_.begin(), rods_.end(), [](const Rod& rod) { return rod.rod->work.last_step == 0.0; });
   if (inextensible_ && first)
   {
     composeBodies();
@@ -195,7 +205,7 @@ StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, doubl
       return failure;
   }
   for (failed = 0; failed < rods_.size(); ++failed)
-    if (const StepFailure failure = rods_[failed]->explicitPredict(inputs[failed], duration, t, h, report);
+    if (const StepFailure failure = rods_[failed].rod->explicitPredict(*rods_[failed].inputs, duration, t, h, report);
         failure != StepFailure::none)
       return failure;
   composeBodies();
@@ -210,12 +220,12 @@ StepFailure ExplicitSystem::step(const RodInputs* inputs, double duration, doubl
     for (Body& body : bodies_)
       placeBody(body, body.predicted, body.velocity);
   for (failed = 0; failed < rods_.size(); ++failed)
-    if (const StepFailure failure = rods_[failed]->explicitFinish(inputs[failed], duration, t, h);
+    if (const StepFailure failure = rods_[failed].rod->explicitFinish(*rods_[failed].inputs, duration, t, h);
         failure != StepFailure::none)
       return failure;
   for (const Body& body : bodies_)
   {
-    const RigidBodyState& b = bodies_next_[body.index];
+    const RigidBodyState& b = body.next;
     if (!b.X_WB.position.allFinite() || !b.X_WB.orientation.coeffs().allFinite() || !b.velocity.linear.allFinite() ||
         !b.velocity.angular.allFinite())
     {
@@ -232,9 +242,9 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
 {
   for (std::size_t r = 0; r < rods_.size(); ++r)
   {
-    if (chains_[r] < 0)
+    if (rods_[r].chain < 0)
       continue;
-    RodStepper::Impl& rod = *rods_[r];
+    RodStepper::Impl& rod = *rods_[r].rod;
     const int n = rod.model->nodes();
     owner_.assign(n, -1);
     arm_.resize(n);
@@ -245,8 +255,8 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
         std::fill(owner_.begin() + g.first_node, owner_.begin() + g.last_node + 1, -2);
     }
     for (std::size_t b = 0; b < bodies_.size(); ++b)
-      for (const Weld& weld : model_->welds)
-        if (weld.rod == static_cast<int>(r) && weld.body == bodies_[b].index && isWelded(rod, weld))
+      for (const Weld& weld : welds_)
+        if (weld.rod == static_cast<int>(r) && weld.body == bodies_[b].number && isWelded(weld))
         {
           const GraspState& g = rod.work.grasps[weld.grasp];
           for (int i = g.first_node; i <= g.last_node; ++i)
@@ -257,11 +267,11 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
         }
     for (int i = 0; i < n; ++i)
       if (owner_[i] >= 0)
-        projection_.weld(chains_[r], i, owner_[i], arm_[i]);
+        projection_.weld(rods_[r].chain, i, owner_[i], arm_[i]);
       else
-        owner_[i] == -2 ? projection_.hold(chains_[r], i) : projection_.release(chains_[r], i);
-    projection_.setStart(chains_[r], rod.work.x);
-    projection_.setTrial(chains_[r], start_only ? rod.work.x : rod.next.x);
+        owner_[i] == -2 ? projection_.hold(rods_[r].chain, i) : projection_.release(rods_[r].chain, i);
+    projection_.setStart(rods_[r].chain, rod.work.x);
+    projection_.setTrial(rods_[r].chain, start_only ? rod.work.x : rod.next.x);
   }
   for (std::size_t b = 0; b < bodies_.size(); ++b)
   {
@@ -276,9 +286,9 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
   if (!result.ok)
   {
     failed = 0;
-    while (failed + 1 < rods_.size() && chains_[failed] != std::max(result.chain, 0))
+    while (failed + 1 < rods_.size() && rods_[failed].chain != std::max(result.chain, 0))
       ++failed;
-    rods_[failed]->overstretched =
+    rods_[failed].rod->overstretched =
         result.chain < 0 ? std::array<int, 2>{-1, -1} : std::array<int, 2>{result.first_node, result.last_node};
     return StepFailure::overstretched;
   }
@@ -287,32 +297,19 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
   if (start_only && result.iterations == 0)
     return StepFailure::none;
   for (std::size_t r = 0; r < rods_.size(); ++r)
-    if (chains_[r] >= 0 && start_only)
+    if (rods_[r].chain >= 0 && start_only)
     {
-      rods_[r]->next.v.setZero(3, rods_[r]->model->nodes());
-      projection_.correct(chains_[r], rods_[r]->work.x, rods_[r]->next.v);
+      rods_[r].rod->next.v.setZero(3, rods_[r].rod->model->nodes());
+      projection_.correct(rods_[r].chain, rods_[r].rod->work.x, rods_[r].rod->next.v);
     }
-    else if (chains_[r] >= 0)
-      rods_[r]->takeProjection(projection_, chains_[r]);
+    else if (rods_[r].chain >= 0)
+      rods_[r].rod->takeProjection(projection_, rods_[r].chain);
   for (std::size_t b = 0; b < bodies_.size(); ++b)
   {
     const ProjectedBody& body = projection_.body(static_cast<int>(b));
     start_only ? placeStart(bodies_[b], body.pose) : placeBody(bodies_[b], body.pose, body.velocity);
   }
   return StepFailure::none;
-}
-
-/// Bodies, and obstacles and driven bodies at the end of their given motions.
-void ExplicitSystem::end(RodGroupState& state)
-{
-  for (std::size_t b = 0; b < bodies_now_.size(); ++b)
-    if (!model_->bodies[b].simulated)
-      bodies_now_[b].X_WB = poseBetween(origin_->bodies[b].X_WB, origin_->bodies[b].velocity, inputs_->bodies[b],
-                                        duration_, 1.0, &bodies_now_[b].velocity);
-  state.bodies = bodies_now_;
-  for (std::size_t k = 0; k < state.obstacles.size(); ++k)
-    state.obstacles[k] = poseBetween(state.obstacles[k], Twist(state.obstacle_velocities[k]), inputs_->obstacles[k],
-                                     duration_, 1.0, &state.obstacle_velocities[k]);
 }
 
 }   // namespace slender

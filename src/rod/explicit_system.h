@@ -4,7 +4,7 @@
 
 #include "rod_stepper_impl.h"
 #include "slender_sim/dynamics/fast_projection.h"
-#include "slender_sim/rod/rod_group.h"
+#include "slender_sim/rod/rigid_body.h"
 
 namespace slender {
 
@@ -13,21 +13,32 @@ namespace slender {
 class ExplicitSystem
 {
 public:
-  /// `group` null: a single rod.
-  ExplicitSystem(const RodGroupModel* group, const std::vector<RodStepper::Impl*>& rods);
+  /// A simulated body and the number by which welds and states know it.
+  struct SimulatedBody
+  {
+    int number;
+    const RigidBodyModel* model;
+  };
+  /// `welds` with other bodies than these have no effect. A weld names its rod by the place in `rods`.
+  explicit ExplicitSystem(const std::vector<RodStepper::Impl*>& rods, const std::vector<SimulatedBody>& bodies = {},
+                          std::vector<Weld> welds = {});
 
-  void begin(const RodGroupState& state, const RodGroupInputs& inputs, double duration);
+  /// Inputs of a rod in the next step. They must live as long as the step.
+  void setInputs(std::size_t rod, const RodInputs& inputs) { rods_[rod].inputs = &inputs; }
+  /// Begins a step. `bodies` holds the states of all bodies, by their numbers; gravity [m/s^2].
+  void begin(const std::vector<RigidBodyState>& bodies, const Eigen::Vector3d& gravity);
   /// `failed`: the rod that a failure is about.
-  StepFailure step(const RodInputs* inputs, double duration, double t, double h, StepReport& report,
-                   std::size_t& failed);
-  void commitStep() { bodies_now_ = bodies_next_; }
-  void end(RodGroupState& state);
+  StepFailure step(double duration, double t, double h, StepReport& report, std::size_t& failed);
+  void commitStep();
+  void end(std::vector<RigidBodyState>& bodies) const;
 
 private:
   /// A simulated body together with the nodes welded to it, whose masses it carries.
   struct Body
   {
-    int index = 0;   ///< in the group
+    int number;
+    const RigidBodyModel* model;
+    RigidBodyState now, next;   ///< at the start and the end of the substep
     double mass = 0;
     Eigen::Vector3d centre{0, 0, 0};                         ///< of all masses, body axes
     Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();   ///< about it
@@ -38,19 +49,21 @@ private:
   void composeBodies();
   void predictBody(Body& body, double h);
   void placeBody(Body& body, const Pose& X, const Twist& velocity);
-  void placeStart(const Body& body, const Pose& X);
+  void placeStart(Body& body, const Pose& X);
   StepFailure project(double h, bool start_only, StepReport& report, std::size_t& failed);
-  bool isWelded(const RodStepper::Impl& rod, const Weld& weld) const;
+  bool isWelded(const Weld& weld) const;
 
-  const RodGroupModel* model_;
-  std::vector<RodStepper::Impl*> rods_;
-  std::vector<int> chains_;   ///< per rod: its number in the projection, -1: it stretches
+  struct Rod
+  {
+    RodStepper::Impl* rod;
+    int chain;   ///< its number in the projection, -1: it stretches
+    const RodInputs* inputs;
+  };
+  std::vector<Rod> rods_;
   std::vector<Body> bodies_;
-  FastProjection projection_;                              ///< its bodies are numbered as bodies_
-  std::vector<RigidBodyState> bodies_now_, bodies_next_;   ///< all of the group
-  const RodGroupState* origin_ = nullptr;
-  const RodGroupInputs* inputs_ = nullptr;
-  double duration_ = 0;
+  const std::vector<Weld> welds_;
+  FastProjection projection_;   ///< its bodies are numbered as bodies_
+  Eigen::Vector3d gravity_{0, 0, 0};
   bool inextensible_ = false;
   std::vector<int> owner_;   ///< per node of a rod: -1 free, -2 held, or a body
   std::vector<Eigen::Vector3d> arm_;

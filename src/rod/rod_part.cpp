@@ -12,8 +12,6 @@ void RodPart::addWeld(const Weld& weld)
   welds_.push_back(weld);
 }
 
-bool RodPart::isActive(const Weld& weld) const { return rod_.work.grasps[weld.grasp].active; }
-
 /// The body that carries a grasp; null: none does.
 const BodyPart* RodPart::carrier(int grasp) const
 {

@@ -7,7 +7,7 @@
 #include "../contact/chain_part.h"
 #include "body_part.h"
 #include "rod_stepper_impl.h"
-#include "slender_sim/rod/rod_group.h"
+#include "slender_sim/rod/rod_touch.h"
 
 namespace slender {
 
@@ -31,19 +31,12 @@ public:
     Pose X_BG;
   };
   void addWeld(const Weld& weld);
-  const std::vector<Weld>& welds() const { return welds_; }
-  bool isActive(const Weld& weld) const;
   RodStepper::Impl& rod() const { return rod_; }
   /// Inputs of a step of `duration` seconds. They must live as long as the step.
   void begin(const RodInputs& inputs, double duration) { inputs_ = &inputs, duration_ = duration; }
   const RodInputs& inputs() const { return *inputs_; }
   /// Whether an unknown has a number of its own, in the part that an inverse iteration acts on.
   bool isUnknown(int unknown) const { return dof_[unknown] >= 0; }
-
-  /// Inertia of the nodes that bodies carry, as points of these, when a stage has begun.
-  void setCarriedInertia(const Stage& stage);
-  /// After a stage: poses and velocities of the grasps that bodies carry.
-  void takeCarriedMotion();
 
   bool numberUnknowns() override;
   bool joined() const override { return welded_; }
@@ -60,7 +53,7 @@ public:
 
   // ---- steps
   /// What the rod touches; without a call nothing.
-  void setContact(const GroupContact::Rod& contact) { contact_ = contact; }
+  void setContact(const RodTouch& contact) { contact_ = contact; }
   double lastSubstep() const override { return rod_.work.last_step; }
   double shortestEdge() const override { return shortest_edge_; }
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
@@ -87,11 +80,15 @@ private:
   void columnsOf(int unknown, double weight, Columns& row) const;
   void addCarried(CouplingMatrix& matrix) const;
   void addClamps(CouplingMatrix& matrix) const;
+  /// Inertia of the nodes that bodies carry, as points of these, when a stage has begun.
+  void setCarriedInertia(const Stage& stage);
+  /// After a stage: poses and velocities of the grasps that bodies carry.
+  void takeCarriedMotion();
 
   RodStepper::Impl& rod_;
   const bool touches_;
   const double shortest_edge_;   ///< at rest [m]
-  GroupContact::Rod contact_;
+  RodTouch contact_;
   const StepPlan* plan_ = nullptr;
   Substep substep_;
   std::vector<Weld> welds_;

@@ -12,7 +12,7 @@ namespace slender {
 
 RodStepper::RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& time)
   : impl_(std::make_unique<Impl>(std::move(model), time)),
-    loop_(std::make_unique<StepLoop>(time, std::vector<Impl*>{impl_.get()}))
+    loop_(std::make_unique<StepLoop>(time, *impl_))
 {
 }
 RodStepper::~RodStepper() = default;
@@ -20,7 +20,7 @@ RodStepper::RodStepper(RodStepper&&) noexcept = default;
 
 StepReport RodStepper::step(RodState& state, const RodInputs& inputs, double duration)
 {
-  return loop_->step(&state, &inputs, duration);
+  return loop_->step(state, inputs, duration);
 }
 StepReport RodStepper::solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles)
 {

@@ -1,32 +1,26 @@
 #include "step_loop.h"
 #include "slender_sim/linalg/interruption.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace slender {
 
-StepLoop::StepLoop(const TimeConfig& time, std::vector<RodStepper::Impl*> rods, const RodGroupModel* group)
-  : time_(time),
-    rods_(std::move(rods))
+StepLoop::StepLoop(const TimeConfig& time, RodStepper::Impl& rod) : time_(time), rod_(rod)
 {
   plan_.stages.reserve(2);
   if (time_.integrator == Integrator::symplectic_euler)
-    explicit_ = std::make_unique<ExplicitSystem>(group, rods_);
-  else if (group)
-    coupled_ = std::make_unique<CoupledSystem>(*group, rods_);
+    explicit_ = std::make_unique<ExplicitSystem>(std::vector<RodStepper::Impl*>{&rod_});
 }
 
 StepLoop::~StepLoop() = default;
 
-bool StepLoop::begin(const RodState* states, StepReport& report)
+bool StepLoop::begin(const RodState& state, StepReport& report)
 {
   std::string what;
   if (!(duration_ > 0) || !std::isfinite(duration_))
     what = "step length must be positive and finite, got " + std::to_string(duration_);
-  for (std::size_t r = 0; r < rods_.size() && what.empty(); ++r)
-    if (!rods_[r]->inputsFinite(states[r], inputs_[r], what))
-      what = "rod '" + rods_[r]->model->name + "': " + what + " is not finite or not valid; correct this input";
+  else if (!rod_.inputsFinite(state, *inputs_, what))
+    what = "rod '" + rod_.model->name + "': " + what + " is not finite or not valid; correct this input";
   if (!what.empty())
   {
     report.ok = false;
@@ -34,59 +28,39 @@ bool StepLoop::begin(const RodState* states, StepReport& report)
     report.message = what;
     return false;
   }
-  for (std::size_t r = 0; r < rods_.size(); ++r)
-    rods_[r]->begin(states[r]);
+  rod_.begin(state);
   return true;
 }
 
 /// Whether nothing but the step itself can change the energy. Methods without damping at infinite frequency can feed on
-/// a stiff rod's stretching when it turns far in a step; contact stores energy that is not counted.
-bool StepLoop::conserves(const RodState* states) const
+/// a stiff rod's stretching when it turns far in a step.
+bool StepLoop::conserves(const RodState& state) const
 {
-  bool conserving =
-      (time_.integrator == Integrator::implicit_midpoint || time_.integrator == Integrator::generalized_alpha) &&
-      !(coupled_ && coupled_->hasContact());
-  for (std::size_t r = 0; conserving && r < rods_.size(); ++r)
-    for (std::size_t k = 0; k < states[r].grasps.size(); ++k)
-      if (states[r].grasps[k].active && states[r].grasps[k].body < 0)
-      {
-        const Pose& a = states[r].grasps[k].X_WG;
-        const Pose& b = inputs_[r].grasps[k].X_WG;
-        conserving = conserving && a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
-      }
-  return conserving;
+  if (time_.integrator != Integrator::implicit_midpoint && time_.integrator != Integrator::generalized_alpha)
+    return false;
+  for (std::size_t k = 0; k < state.grasps.size(); ++k)
+    if (state.grasps[k].active && state.grasps[k].body < 0)
+    {
+      const Pose &from = state.grasps[k].X_WG, &to = inputs_->grasps[k].X_WG;
+      if (from.position != to.position || from.orientation.coeffs() != to.orientation.coeffs())
+        return false;
+    }
+  return true;
 }
 
-double StepLoop::energy(bool at_start, double* allowance)
-{
-  double sum = coupled_ ? coupled_->bodyEnergy(!at_start) : 0.0, allowed = 0.0;
-  for (std::size_t r = 0; r < rods_.size(); ++r)
-  {
-    double own = 0.0;
-    sum += at_start ? rods_[r]->startEnergy(inputs_[r], &own) : rods_[r]->endEnergy(inputs_[r]);
-    allowed += own;
-  }
-  if (allowance)
-    *allowance = allowed + (coupled_ ? 0.05 * std::abs(coupled_->bodyEnergy(false)) : 0.0);
-  return sum;
-}
-
-StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double duration, RodGroupState* group,
-                          const RodGroupInputs* group_inputs)
+StepReport StepLoop::step(RodState& state, const RodInputs& inputs, double duration)
 {
   StepReport report;
-  inputs_ = inputs;
+  inputs_ = &inputs;
   duration_ = duration;
-  if (!begin(states, report))
+  if (!begin(state, report))
     return report;
-  if (coupled_)
-    coupled_->begin(*group, *group_inputs, duration);
-  if (explicit_ && group)
-    explicit_->begin(*group, *group_inputs, duration);
+  if (explicit_)
+    explicit_->setInputs(0, inputs);
 
-  conserving_ = conserves(states);
+  conserving_ = conserves(state);
   double allowance = 0.0;
-  const double start_energy = conserving_ ? energy(true, &allowance) : 0.0;
+  const double start_energy = conserving_ ? rod_.startEnergy(inputs, &allowance) : 0.0;
   most_energy_ = start_energy + allowance;
   SubstepRule rule{duration,
                    0.0,
@@ -94,46 +68,31 @@ StepReport StepLoop::step(RodState* states, const RodInputs* inputs, double dura
                    time_.min_step,
                    order(time_.integrator),
                    time_.newton.max_cuts};
-  if (rule.error_tolerance > 0 && !rods_.empty())
-    rule.first = states[0].next_step;
+  if (rule.error_tolerance > 0)
+    rule.first = state.next_step;
   SubstepController controller(rule);
   controller.run(*this, duration, report);
   if (!report.ok)
     return report;
-  for (std::size_t r = 0; r < rods_.size(); ++r)
-  {
-    rods_[r]->work.next_step = controller.nextLength();
-    states[r] = rods_[r]->work;
-  }
-  if (coupled_)
-    coupled_->end(*group);
-  if (explicit_ && group)
-    explicit_->end(*group);
+  rod_.work.next_step = controller.nextLength();
+  state = rod_.work;
   return report;
 }
 
 StepFailure StepLoop::attempt(const Substep& substep, StepReport& report)
 {
-  failed_ = 0;
-  const StepFailure failure = explicit_
-                                  ? explicit_->step(inputs_, duration_, substep.from, substep.length, report, failed_)
-                                  : implicitStep(substep.from, substep.length, report);
-  if (conserving_ && failure == StepFailure::none && energy(false, nullptr) > most_energy_)
+  std::size_t failed = 0;   // the only rod
+  const StepFailure failure = explicit_ ? explicit_->step(duration_, substep.from, substep.length, report, failed)
+                                        : implicitStep(substep.from, substep.length, report);
+  if (conserving_ && failure == StepFailure::none && rod_.endEnergy(*inputs_) > most_energy_)
     return StepFailure::energy_grew;
   return failure;
 }
 
 void StepLoop::accept(const Substep& substep)
 {
-  for (std::size_t r = 0; r < rods_.size(); ++r)
-  {
-    rods_[r]->moveGrasps(inputs_[r], duration_, substep.to);
-    std::swap(rods_[r]->work, rods_[r]->next);
-  }
-  if (coupled_)
-    coupled_->commitStep();
-  if (explicit_)
-    explicit_->commitStep();
+  rod_.moveGrasps(*inputs_, duration_, substep.to);
+  std::swap(rod_.work, rod_.next);
 }
 
 /// Explicit steps have one length, on which their stability depends.
@@ -141,67 +100,33 @@ bool StepLoop::shorterMayHelp(StepFailure) const { return explicit_ == nullptr; 
 
 void StepLoop::refuse(const Substep& substep, StepFailure failure, StepReport& report)
 {
-  if (!rods_.empty())
-  {
-    failure == StepFailure::interrupted
-        ? rods_[failed_]->refuse(report, failure, kStepInterrupted)
-        : rods_[failed_]->refuseUnsolved(report, failure, substep.length, explicit_ != nullptr);
-    return;
-  }
-  report.ok = false;
-  report.failure = failure;
-  report.message =
-      failure == StepFailure::interrupted ? kStepInterrupted : "the bodies' motion was not found: use a shorter step";
+  if (failure == StepFailure::interrupted)
+    rod_.refuse(report, failure, kStepInterrupted);
+  else
+    rod_.refuseUnsolved(report, failure, substep.length, explicit_ != nullptr);
 }
 
 StepFailure StepLoop::implicitStep(double t, double h, StepReport& report)
 {
-  // a rod that has lost its history makes all start anew
-  double previous = rods_.empty() ? 0.0 : rods_[0]->work.last_step;
-  for (const RodStepper::Impl* rod : rods_)
-    previous = std::min(previous, rod->work.last_step);
-  planStep(time_.integrator, time_.spectral_radius, h, previous, plan_);
-  const auto failing = [&](std::size_t r, StepFailure failure) {
-    failed_ = r;
+  planStep(time_.integrator, time_.spectral_radius, h, rod_.work.last_step, plan_);
+  if (const StepFailure failure = rod_.beginStep(plan_, *inputs_, duration_, t, h); failure != StepFailure::none)
     return failure;
-  };
-  for (std::size_t r = 0; r < rods_.size(); ++r)
-    if (const StepFailure failure = rods_[r]->beginStep(plan_, inputs_[r], duration_, t, h);
-        failure != StepFailure::none)
-      return failing(r, failure);
-  if (coupled_)
-    coupled_->beginStep(plan_, t);
-
   for (std::size_t s = 0; s < plan_.stages.size(); ++s)
   {
-    for (std::size_t r = 0; r < rods_.size(); ++r)
-      rods_[r]->beginStage(s, inputs_[r], duration_, t, h);
-    const NewtonResult newton =
-        coupled_ ? coupled_->solveStage(plan_, s, t, h, time_.newton) : minimize(rods_[0]->system, time_.newton);
+    rod_.beginStage(s, *inputs_, duration_, t, h);
+    const NewtonResult newton = minimize(rod_.system, time_.newton);
     report.iterations += newton.iterations;
     report.factorizations += newton.factorizations;
     if (!newton.ok())
-      return failing(farthestFromBalance(), newton.failure);
+      return newton.failure;
     report.residual = std::max(report.residual, newton.residual);
     report.max_strain = std::max(report.max_strain, newton.max_strain);
-    const bool last = s + 1 == plan_.stages.size();
-    if (coupled_)
-      coupled_->endStage(plan_, s, last);
-    for (std::size_t r = 0; r < rods_.size(); ++r)
-      last ? rods_[r]->finishStep(inputs_[r], duration_, t, h, report)
-           : rods_[r]->endStage(s, inputs_[r], duration_, t, h);
+    if (s + 1 == plan_.stages.size())
+      rod_.finishStep(*inputs_, duration_, t, h, report);
+    else
+      rod_.endStage(s, *inputs_, duration_, t, h);
   }
   return StepFailure::none;
-}
-
-/// The rod on which the largest unbalanced force acts.
-std::size_t StepLoop::farthestFromBalance() const
-{
-  Largest force;
-  for (std::size_t r = 0; r < rods_.size(); ++r)
-    if (const Largest own = rods_[r]->unbalancedForce(); own.any())
-      force.add(static_cast<int>(r), own.value());
-  return force.any() ? static_cast<std::size_t>(force.index()) : 0;
 }
 
 }   // namespace slender

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "island.h"
+#include "joined_objects.h"
 
 /// The islands that have rods or bodies. All throw std::invalid_argument for models that are not valid.
 namespace slender {
@@ -12,7 +13,6 @@ std::unique_ptr<RodIsland> makeLoneRod(const WorldModel& world, int rod);
 /// A rod that nothing else meets and that tracks a guide.
 std::unique_ptr<RodIsland> makeTrackedRod(const WorldModel& world, int rod);
 /// Rods and bodies that welds join, in explicit steps. Appends the grasps of the welds to the rods of the state.
-std::unique_ptr<RodIsland> makeExplicitRods(const WorldModel& world, std::vector<int> rods, std::vector<int> bodies,
-                                            WorldState& state);
+std::unique_ptr<RodIsland> makeExplicitRods(const WorldModel& world, IslandContent content, WorldState& state);
 
 }   // namespace slender

@@ -232,15 +232,13 @@ private:
     if (!group)
       group_bodies.clear();
     for (int b = 0; b < static_cast<int>(model.bodies.size()); ++b)
-      if (!model.bodies[b].body.simulated &&
-          !(explicit_steps && std::count(group_bodies.begin(), group_bodies.end(), b) > 0))
+      if (!model.bodies[b].body.simulated)
         given_bodies_.push_back(b);
-    gives_obstacles_ = !(group && explicit_steps);
     if (!group)
       return;
     RodIsland* island = add(built(Kind::none, -1, [&]() -> std::unique_ptr<RodIsland> {
       if (explicit_steps && touching_threads_.empty())
-        return makeExplicitRods(model, group_rods, group_bodies, state);
+        return makeExplicitRods(model, IslandContent{group_rods, {}, group_bodies}, state);
       return std::make_unique<JoinedParts>(model, IslandContent{group_rods, touching_threads_, group_bodies}, state);
     }));
     for (std::size_t k = 0; k < group_rods.size(); ++k)
@@ -291,7 +289,7 @@ private:
     };
     for (const int b : given_bodies_)
       move(inputs.bodies[b], state.bodies[b].X_WB, state.bodies[b].velocity);
-    for (std::size_t k = 0; gives_obstacles_ && k < state.obstacles.size(); ++k)
+    for (std::size_t k = 0; k < state.obstacles.size(); ++k)
       move(inputs.obstacles[k], state.obstacles[k], state.obstacle_velocities[k]);
   }
 
@@ -301,8 +299,7 @@ private:
   std::size_t lone_begin_ = 0, lone_end_ = 0;   ///< the lone rods among them
   int lone_nodes_ = 0;
   std::vector<int> touching_threads_;   ///< that are joined with rods or bodies
-  std::vector<int> given_bodies_;       ///< driven bodies that no island moves
-  bool gives_obstacles_ = true;         ///< no island moves them
+  std::vector<int> given_bodies_;       ///< driven bodies
   WorldState before_;                   ///< a step that may fail in one of several islands
   IslandLoop lone_loop_;
 };

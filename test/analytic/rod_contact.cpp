@@ -20,16 +20,16 @@ Rod rope(int n, double length, double radius, double z, double youngs = 1e6)
 
 void touch(Group& g, double gap, double friction = 0.3)
 {
-  for (std::size_t r = 0; r < g.model.rods.size(); ++r)
-    g.model.contact.rods.push_back({static_cast<int>(r), true, true, true, friction});
-  g.model.contact.options.gap = gap;
+  for (WorldModel::Rod& rod : g.model.rods)
+    rod.contact = RodTouch{true, true, true, friction};
+  g.model.contact.gap = gap;
 }
 
-double contactForce(const RodGroup& group, int axis)
+double contactForce(const World& world, int axis)
 {
   double sum = 0;
-  for (const ContactTerm& term : group.contacts())
-    sum += term.force[axis];
+  for (const ContactForce& contact : world.contacts())
+    sum += contact.force[axis];
   return sum;
 }
 
@@ -43,10 +43,10 @@ TEST(RodContact, RopeComesToRestOnTheFloor)
     g.addRod(rope(21, 0.4, radius, 0.05));
     g.addObstacle(Plane{}, {});
     touch(g, 0.1 * radius);
-    RodGroup group(g.model, withIntegrator(integrator));
+    World world = g.world(withIntegrator(integrator), 2e-3);
     for (int k = 0; k < 400; ++k)
     {
-      const StepReport report = group.step(g.state, g.inputs, 2e-3);
+      const StepReport report = world.step(g.state, g.inputs);
       ASSERT_TRUE(report.ok) << toString(integrator) << " step " << k << ": " << report.message;
       ASSERT_EQ(report.cut_steps, 0) << toString(integrator) << " step " << k << ": a wrong matrix makes Newton fail";
       ASSERT_GT(g.state.rods[0].x.row(2).minCoeff(), radius) << k;
@@ -57,8 +57,8 @@ TEST(RodContact, RopeComesToRestOnTheFloor)
       continue;
     }
     EXPECT_LT(g.state.rods[0].x.row(2).maxCoeff(), 1.11 * radius) << toString(integrator);
-    const double weight = 9.81 * g.model.rods[0]->totalMass();
-    EXPECT_NEAR(contactForce(group, 2), weight, 0.02 * weight) << toString(integrator);
+    const double weight = 9.81 * g.model.rods[0].model->totalMass();
+    EXPECT_NEAR(contactForce(world, 2), weight, 0.02 * weight) << toString(integrator);
     EXPECT_LT(g.state.rods[0].v.cwiseAbs().maxCoeff(), 2e-3) << toString(integrator);
   }
 }
@@ -70,15 +70,15 @@ double slide(double slope, double friction)
   g.addRod(rope(11, 0.2, 0.004, 0.00425));
   g.addObstacle(Plane{}, {});
   touch(g, 0.0008, friction);
-  RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
+  World world = g.world(withIntegrator(Integrator::implicit_euler), 2e-3);
   for (int k = -50; k < 100; ++k)
   {
     if (k >= 0)
       g.setGravity(9.81 * Vector3d(std::sin(slope), 0, -std::cos(slope)));
-    const StepReport report = group.step(g.state, g.inputs, 2e-3);
+    const StepReport report = world.step(g.state, g.inputs);
     EXPECT_TRUE(report.ok) << report.message;
   }
-  return (g.state.rods[0].v * g.model.rods[0]->mass).x() / g.model.rods[0]->totalMass();
+  return (g.state.rods[0].v * g.model.rods[0].model->mass).x() / g.model.rods[0].model->totalMass();
 }
 
 TEST(RodContact, CoulombsLawOnASlope)
@@ -105,15 +105,15 @@ TEST(RodContact, MovedObstaclePushesARope)
   Pose pose{Vector3d(0.2, 0, 0.03), Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitX()))};
   g.addObstacle(Cylinder{0.02, 0.2}, pose, 0.3);
   touch(g, 0.1 * radius);
-  RodGroup group(g.model, withIntegrator(Integrator::tr_bdf2));
+  World world = g.world(withIntegrator(Integrator::tr_bdf2), 1e-3);
   double force = 0.0;
   for (int k = 1; k <= 80; ++k)
   {
     g.inputs.obstacles[0].X_WG.position.z() = 0.03 - 0.001 * k;
-    const StepReport report = group.step(g.state, g.inputs, 1e-3);
+    const StepReport report = world.step(g.state, g.inputs);
     ASSERT_TRUE(report.ok) << k << ": " << report.message;
-    ASSERT_GT(group.clearance(g.state), 0.0) << k;
-    force += contactForce(group, 2);
+    ASSERT_GT(clearance(g), 0.0) << k;
+    force += contactForce(world, 2);
   }
   EXPECT_LT(g.state.rods[0].x.row(2).minCoeff(), -0.05);
   EXPECT_LT(force, 0.0);
@@ -132,12 +132,12 @@ TEST(RodContact, TwistFollowsTheClamps)
     Group g;
     g.addRod(rod);
     touch(g, 3e-4);
-    RodGroup group(g.model, withIntegrator(integrator));
+    World world = g.world(withIntegrator(integrator), 1e-3);
     for (double turn : {1e-4, 0.01, 0.5})
     {
       g.inputs.rods[0].grasps[1].X_WG.orientation =
           fromRotationVector(Vector3d(turn, 0, 0)) * rod.inputs.grasps[1].X_WG.orientation;
-      ASSERT_TRUE(group.step(g.state, g.inputs, 1e-3).ok);
+      ASSERT_TRUE(world.step(g.state, g.inputs).ok);
       const RodState& state = g.state.rods[0];
       double twist = state.twist.sum();
       for (const GraspState& grasp : state.grasps)
@@ -161,12 +161,12 @@ TEST(RodContact, CrossingRopesCarryEachOther)
   g.addRod(above);
   touch(g, 0.1 * radius, 0.5);
   g.setGravity(Vector3d(0, 0, -9.81));
-  RodGroup group(g.model, withIntegrator(Integrator::bdf2));
+  World world = g.world(withIntegrator(Integrator::bdf2), 1e-3);
   for (int k = 0; k < 300; ++k)
   {
-    const StepReport report = group.step(g.state, g.inputs, 1e-3);
+    const StepReport report = world.step(g.state, g.inputs);
     ASSERT_TRUE(report.ok) << k << ": " << report.message;
-    ASSERT_GT(group.clearance(g.state), 0.0) << k;
+    ASSERT_GT(clearance(g), 0.0) << k;
   }
   EXPECT_GT(g.state.rods[1].x.row(2).maxCoeff(), g.state.rods[0].x(2, 15));
 }
@@ -182,12 +182,12 @@ TEST(RodContact, WhipDoesNotPassAThinObstacle)
   g.addObstacle(Capsule{0.002, 0.4},
                 {Vector3d(0.253, 0, -0.3), Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitX()))}, 0.2);
   touch(g, 0.2 * radius);
-  RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
+  World world = g.world(withIntegrator(Integrator::implicit_euler), 1e-3);
   for (int k = 0; k < 12; ++k)
   {
-    const StepReport report = group.step(g.state, g.inputs, 1e-3);
+    const StepReport report = world.step(g.state, g.inputs);
     ASSERT_TRUE(report.ok) << k << ": " << report.message;
-    ASSERT_GT(group.clearance(g.state), 0.0) << k;
+    ASSERT_GT(clearance(g), 0.0) << k;
   }
   // wrapped around it: the middle is held above while the ends go on
   EXPECT_GT(g.state.rods[0].x.row(2).maxCoeff(), -0.31);
@@ -212,15 +212,15 @@ TEST(RodContact, BodyFallsOnRopesAndStaysOnThem)
   const int plate =
       g.addBody(bodyOf(0.05, {6e-5, 3e-5, 8e-5}), {Vector3d(0.2, 0, 0.03), Eigen::Quaterniond::Identity()});
   touch(g, 0.1 * radius);
-  g.model.contact.bodies.push_back({plate, Box{Vector3d(0.06, 0.12, 0.01)}, {}, -1.0});
-  RodGroup group(g.model, withIntegrator(Integrator::implicit_euler));
+  g.model.bodies[plate].shape = Box{Vector3d(0.06, 0.12, 0.01)};
+  World world = g.world(withIntegrator(Integrator::implicit_euler), 1e-3);
   double force = 0.0;
   for (int k = 0; k < 1000; ++k)
   {
-    const StepReport report = group.step(g.state, g.inputs, 1e-3);
+    const StepReport report = world.step(g.state, g.inputs);
     ASSERT_TRUE(report.ok) << k << ": " << report.message;
-    ASSERT_GT(group.clearance(g.state), 0.0) << k;
-    force += k < 500 ? 0.0 : contactForce(group, 2) / 500;
+    ASSERT_GT(clearance(g), 0.0) << k;
+    force += k < 500 ? 0.0 : contactForce(world, 2) / 500;
   }
   EXPECT_GT(g.state.bodies[0].X_WB.position.z(), -0.1);
   EXPECT_LT(g.state.bodies[0].velocity.linear.norm(), 0.02);
@@ -235,15 +235,15 @@ TEST(RodContact, RestartIsBitEqual)
   g.addObstacle(Plane{}, {});
   touch(g, 0.1 * radius);
   g.state.rods[0].x.row(2) += 0.02 * g.state.rods[0].x.row(0);
-  RodGroup one(g.model, withIntegrator(Integrator::tr_bdf2));
+  World one = g.world(withIntegrator(Integrator::tr_bdf2), 2e-3);
   for (int k = 0; k < 40; ++k)
-    ASSERT_TRUE(one.step(g.state, g.inputs, 2e-3).ok);
-  RodGroupState copy = g.state;
-  RodGroup other(g.model, withIntegrator(Integrator::tr_bdf2));
+    ASSERT_TRUE(one.step(g.state, g.inputs).ok);
+  WorldState copy = g.state;
+  World other = g.world(withIntegrator(Integrator::tr_bdf2), 2e-3);
   for (int k = 0; k < 40; ++k)
   {
-    ASSERT_TRUE(one.step(g.state, g.inputs, 2e-3).ok);
-    ASSERT_TRUE(other.step(copy, g.inputs, 2e-3).ok);
+    ASSERT_TRUE(one.step(g.state, g.inputs).ok);
+    ASSERT_TRUE(other.step(copy, g.inputs).ok);
     ASSERT_EQ(g.state.rods[0].x, copy.rods[0].x) << k;
   }
 }

@@ -114,31 +114,17 @@ StepReport loadedColumn(double weight, double& aside)
 {
   constexpr int n = 41;
   const Matrix3Xd nodes = straightNodes(n, 1.0, Vector3d::Zero(), Vector3d::UnitZ());
-  RodGroupModel model;
-  RodGroupState state;
-  RodGroupInputs inputs;
-  model.rods.push_back(std::make_shared<RodModel>(openRod(nodes, modulusSection(1.0, 0.8, 1e5, 1e-4))));
-  state.rods.push_back(makeRodState(*model.rods[0], nodes, Vector3d::Zero()));
-  RigidBodyModel body;
-  body.name = "top";
-  body.simulated = true;
-  body.mass = 1.0;
-  body.inertia = 1e-2 * Eigen::Matrix3d::Identity();
-  model.bodies.push_back(body);
-  RigidBodyState body_state;
-  body_state.X_WB.position = Vector3d(0, 0, 1);
-  state.bodies.push_back(body_state);
-  state.rods[0].grasps.push_back(makeGrasp(*model.rods[0], state.rods[0], 0, 0, true));
-  makeWeld(model, state, 0, n - 1, n - 1, 0);
-  inputs.gravity = Vector3d(0, 0, -weight);
-  inputs.rods.resize(1);
-  inputs.rods[0].gravity = inputs.gravity;
-  inputs.rods[0].grasps.resize(2);
-  inputs.rods[0].grasps[0].X_WG = state.rods[0].grasps[0].X_WG;
-  inputs.bodies.resize(1);
-  RodGroup group(model, TimeConfig{});
-  const StepReport report = group.solveEquilibrium(state, inputs);
-  aside = state.bodies[0].X_WB.position.head<2>().norm();
+  Rod rod(openRod(nodes, modulusSection(1.0, 0.8, 1e5, 1e-4)), nodes);
+  rod.state = makeRodState(*rod.model, nodes, Vector3d::Zero());
+  rod.hold(0, 0);
+  Group g;
+  g.addRod(rod);
+  g.weld(0, n - 1, n - 1,
+         g.addBody(bodyOf(1.0, {1e-2, 1e-2, 1e-2}), {Vector3d(0, 0, 1), Eigen::Quaterniond::Identity()}));
+  g.setGravity(Vector3d(0, 0, -weight));
+  World world = g.world(TimeConfig{}, 0.005);
+  const StepReport report = world.solveEquilibrium(g.state, g.inputs);
+  aside = g.state.bodies[0].X_WB.position.head<2>().norm();
   return report;
 }
 

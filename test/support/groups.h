@@ -1,20 +1,23 @@
 #pragma once
 
-#include "slender_sim/rod/rod_group.h"
+#include <optional>
+
+#include "slender_sim/world/world.h"
 #include "test/support/rods.h"
 
 namespace slender::test {
 
-/// Rods, bodies and obstacles under construction, with inputs that hold everything held where it is.
+/// Rods, bodies and obstacles under construction, with inputs that hold everything held where it is: the model of a
+/// world, its state and its inputs, without a scene.
 struct Group
 {
-  RodGroupModel model;
-  RodGroupState state;
-  RodGroupInputs inputs;
+  WorldModel model;
+  WorldState state;
+  WorldInputs inputs;
 
   int addRod(const Rod& rod)
   {
-    model.rods.push_back(rod.model);
+    model.rods.push_back({rod.model, {}, {}});
     state.rods.push_back(rod.state);
     inputs.rods.push_back(rod.inputs);
     inputs.gravity = rod.inputs.gravity;
@@ -22,7 +25,7 @@ struct Group
   }
   int addBody(const RigidBodyModel& body, const Pose& pose, const Twist& velocity = {})
   {
-    model.bodies.push_back(body);
+    model.bodies.push_back({body, {}, {}, -1.0});
     RigidBodyState s;
     s.X_WB = pose;
     s.velocity = velocity;
@@ -32,16 +35,30 @@ struct Group
   }
   int addObstacle(const Shape& shape, const Pose& pose, double friction = -1.0)
   {
-    model.contact.obstacles.push_back({shape, friction});
+    model.obstacles.push_back({"obstacle", shape, friction});
     state.obstacles.push_back(pose);
     state.obstacle_velocities.push_back({});
     inputs.obstacles.push_back({pose, std::nullopt});
-    return static_cast<int>(model.contact.obstacles.size()) - 1;
+    return static_cast<int>(model.obstacles.size()) - 1;
   }
   void weld(int rod, int first, int last, int body)
   {
-    makeWeld(model, state, rod, first, last, body);
-    inputs.rods[rod].grasps.push_back({state.rods[rod].grasps.back().X_WG, std::nullopt});
+    model.welds.push_back({rod, first, last, body});
+    inputs.rods[rod].grasps.emplace_back();
+  }
+  /// A world of this that takes steps of `step` [s]. With the first one the state gets the grasps of the welds. Others
+  /// are made from the same start and take the present state as it is.
+  World world(const TimeConfig& time, double step)
+  {
+    model.time = time;
+    model.time.step = step;
+    if (start_)
+    {
+      WorldState again = *start_;
+      return World(model, again);
+    }
+    start_ = state;
+    return World(model, state);
   }
   void setGravity(const Vector3d& g)
   {
@@ -53,27 +70,73 @@ struct Group
   {
     Vector3d sum = Vector3d::Zero();
     for (std::size_t r = 0; r < model.rods.size(); ++r)
-      sum += state.rods[r].v * model.rods[r]->mass;
+      sum += state.rods[r].v * model.rods[r].model->mass;
     for (std::size_t b = 0; b < model.bodies.size(); ++b)
-      sum += model.bodies[b].mass * state.bodies[b].velocity.linear;
+      sum += model.bodies[b].body.mass * state.bodies[b].velocity.linear;
     return sum;
   }
   Vector3d angularMomentum() const
   {
     Vector3d sum = Vector3d::Zero();
     for (std::size_t r = 0; r < model.rods.size(); ++r)
-      for (int i = 0; i < model.rods[r]->nodes(); ++i)
-        sum += model.rods[r]->mass[i] * state.rods[r].x.col(i).cross(state.rods[r].v.col(i));
+      for (int i = 0; i < model.rods[r].model->nodes(); ++i)
+        sum += model.rods[r].model->mass[i] * state.rods[r].x.col(i).cross(state.rods[r].v.col(i));
     for (std::size_t b = 0; b < model.bodies.size(); ++b)
     {
       const RigidBodyState& s = state.bodies[b];
       const Eigen::Matrix3d r = s.X_WB.orientation.toRotationMatrix();
-      sum += model.bodies[b].mass * s.X_WB.position.cross(s.velocity.linear) +
-             r * model.bodies[b].inertia * r.transpose() * s.velocity.angular;
+      sum += model.bodies[b].body.mass * s.X_WB.position.cross(s.velocity.linear) +
+             r * model.bodies[b].body.inertia * r.transpose() * s.velocity.angular;
     }
     return sum;
   }
+
+private:
+  std::optional<WorldState> start_;   ///< of its first world
 };
+
+/// Smallest distance between surfaces that may touch [m], up to the gap at which they repel.
+inline double clearance(const Group& g)
+{
+  ContactSurface surface;
+  Matrix3Xd points(3, 0);
+  for (std::size_t r = 0; r < g.model.rods.size(); ++r)
+  {
+    const auto& contact = g.model.rods[r].contact;
+    if (!contact)
+      continue;
+    const RodModel& m = *g.model.rods[r].model;
+    const int object = static_cast<int>(surface.objects.size());
+    double start = 0.0;
+    for (int j = 0; j < m.edges(); ++j)
+    {
+      ContactSegment s;
+      s.a = surface.points + j;
+      s.b = surface.points + (j + 1) % m.nodes();
+      s.radius = std::max(m.radius_a[j], m.radius_b[j]);
+      s.object = object;
+      s.start = start;
+      s.length = m.rest_length[j];
+      start += s.length;
+      surface.segments.push_back(s);
+    }
+    surface.objects.push_back(
+        {start, m.closed, contact->self, contact->others, contact->solids, contact->friction, -1});
+    surface.points += m.nodes();
+    points.conservativeResize(3, surface.points);
+    points.rightCols(m.nodes()) = g.state.rods[r].x;
+  }
+  std::vector<Pose> solids = g.state.obstacles;
+  for (const WorldModel::Obstacle& obstacle : g.model.obstacles)
+    surface.solids.push_back({obstacle.shape, obstacle.friction, {}});
+  for (std::size_t b = 0; b < g.model.bodies.size(); ++b)
+    if (const WorldModel::Body& body = g.model.bodies[b]; body.shape)
+    {
+      surface.solids.push_back({*body.shape, body.friction, {}});
+      solids.push_back(g.state.bodies[b].X_WB * body.X_BS);
+    }
+  return ContactPotential(surface, g.model.contact).clearance(points, solids);
+}
 
 inline RigidBodyModel bodyOf(double mass, const Vector3d& principal)
 {

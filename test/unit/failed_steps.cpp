@@ -35,7 +35,15 @@ std::string bytesOf(const WorldState& s)
     bytes += stateBytes(thread);
   for (const double stiffness : s.contact_stiffness.threads)
     bytes += std::to_string(stiffness);
-  return bytes;
+  if (s.rods.empty())
+    return bytes;
+  SceneState scene;   // stateBytes() takes the state of a scene; that of a world counts its steps
+  scene.rods = s.rods;
+  scene.bodies = s.bodies;
+  scene.obstacles = s.obstacles;
+  scene.obstacle_velocities = s.obstacle_velocities;
+  scene.contact_stiffness = s.contact_stiffness;
+  return bytes + stateBytes(scene);
 }
 /// A world with the function of the steppers; its step has the length of its model.
 struct WorldStepper
@@ -50,20 +58,11 @@ std::string bytesOf(const ClothGroupState& s)
     bytes += stateBytes(cloth);
   return bytes;
 }
-std::string bytesOf(const RodGroupState& s)
-{
-  SceneState scene;   // stateBytes() takes the state of a scene
-  scene.rods = s.rods;
-  scene.bodies = s.bodies;
-  scene.obstacles = s.obstacles;
-  scene.obstacle_velocities = s.obstacle_velocities;
-  scene.contact_stiffness.rods = {s.contact_stiffness};
-  return stateBytes(scene);
-}
 
 /// Expects that a step whose first substep fails, and whose two halves succeed, ends like two steps of half its length
 /// of a new stepper. The step length (at most `longest` [s]) and the limit of Newton iterations are varied until such a
-/// step is found. `make(newton)` returns a stepper, and `step(stepper, state, h)` takes one step with it.
+/// step is found. `make(newton, h)` returns a stepper for steps of h, and `step(stepper, state, h)` takes one step with
+/// it.
 template <class State, class Make, class Step>
 void expectHalvesLikeFresh(const std::string& what, const State& start, double longest, const Make& make,
                            const Step& step)
@@ -75,13 +74,13 @@ void expectHalvesLikeFresh(const std::string& what, const State& start, double l
     const double h = std::ldexp(longest, -(k / kMost));
     NewtonConfig newton;
     newton.max_iterations = 1 + k % kMost;
-    auto halved = make(newton);
+    auto halved = make(newton, h);
     State state = start;
     const StepReport report = step(halved, state, h);
     if (!report.ok || report.cut_steps != 1 || report.substeps != 2)
       continue;
     ++found;
-    auto fresh = make(newton);
+    auto fresh = make(newton, 0.5 * h);
     State expected = start;
     for (int half = 0; half < 2; ++half)
     {
@@ -135,11 +134,11 @@ Rod whip(bool damped)
 Group tumbling(bool damped)
 {
   Group g = tee();
-  for (auto& rod : g.model.rods)
+  for (WorldModel::Rod& rod : g.model.rods)
   {
-    RodModel model = *rod;
+    RodModel model = *rod.model;
     model.stiffness_damping = damped ? 2e-3 : 0.0;
-    rod = std::make_shared<RodModel>(model);
+    rod.model = std::make_shared<RodModel>(model);
   }
   g.state.bodies[0].velocity.angular *= 8.0;
   g.setGravity({0, 0, -9.81});
@@ -157,11 +156,10 @@ Group landing(double speed)
   const int body = g.addBody(bodyOf(0.01, {2e-6, 3e-6, 4e-6}), {Vector3d(0.16, 0, 0), Eigen::Quaterniond::Identity()});
   g.weld(0, 14, 14, body);
   g.addObstacle(Sphere{0.05}, {Vector3d(0, 0.004, -0.0565), Eigen::Quaterniond::Identity()});
-  GroupContact::Rod touching;
-  touching.rod = 0;
-  touching.friction = 0.0;
-  g.model.contact.rods.push_back(touching);
-  g.model.contact.options.gap = 2e-3;
+  g.model.rods[0].contact.emplace();
+  g.model.rods[0].contact->friction = 0.0;
+  g.model.contact.gap = 2e-3;
+  g.model.contact.least_stiffness = 3.0;   // more than follows from steps of 1 ms and longer: the same for all
   g.state.rods[0].v.colwise() = Vector3d(0, 0, -speed);
   g.state.bodies[0].velocity.linear = {0, 0, -speed};
   g.setGravity({0, 0, -9.81});
@@ -174,7 +172,7 @@ TEST(FailedSteps, HalvesOfARodAreThoseOfAFreshOne)
     for (const Integrator integrator : implicitIntegrators())
     {
       const Rod rod = whip(damped);
-      const auto make = [&](const NewtonConfig& newton) {
+      const auto make = [&](const NewtonConfig& newton, double) {
         TimeConfig time = withIntegrator(integrator);
         time.newton = newton;
         return RodStepper(rod.model, time);
@@ -185,16 +183,21 @@ TEST(FailedSteps, HalvesOfARodAreThoseOfAFreshOne)
     }
 }
 
-void expectGroupHalves(const std::string& what, const Group& g, Integrator integrator, double h)
+WorldStepper stepperOf(Group& g, const TimeConfig& time, double step)
 {
-  const auto make = [&](const NewtonConfig& newton) {
-    TimeConfig time = withIntegrator(integrator);
-    time.step = h;
+  return {std::unique_ptr<World>(new World(g.world(time, step)))};
+}
+
+void expectGroupHalves(const std::string& what, Group g, Integrator integrator, double h)
+{
+  TimeConfig time = withIntegrator(integrator);
+  g.world(time, h);   // the state gets the grasps of the welds
+  const auto make = [&](const NewtonConfig& newton, double length) {
     time.newton = newton;
-    return RodGroup(g.model, time);
+    return stepperOf(g, time, length);
   };
-  expectHalvesLikeFresh(what, g.state, h, make, [&](RodGroup& group, RodGroupState& state, double length) {
-    return group.step(state, g.inputs, length);
+  expectHalvesLikeFresh(what, g.state, h, make, [&](WorldStepper& world, WorldState& state, double length) {
+    return world.step(state, g.inputs, length);
   });
 }
 
@@ -220,8 +223,8 @@ TEST(FailedSteps, AFirstStepWithADampedRodAndABodyCanBeHalved)
     Group g = tumbling(true);
     TimeConfig time = withIntegrator(integrator);
     time.newton.max_iterations = 6;   // the whole step needs more, a part of it does not
-    RodGroup group(g.model, time);
-    const StepReport report = group.step(g.state, g.inputs, 0.02);
+    World world = g.world(time, 0.02);
+    const StepReport report = world.step(g.state, g.inputs);
     EXPECT_TRUE(report.ok) << named("", integrator) << ": " << report.message;
     EXPECT_GT(report.cut_steps, 0) << named("", integrator);
   }
@@ -246,7 +249,7 @@ TEST(FailedSteps, HalvesOfAClothAreThoseOfAFreshOne)
       ClothInputs inputs;
       inputs.pins.resize(3, 2);
       inputs.pins << start.x.col(0), start.x.col(8);
-      const auto make = [&](const NewtonConfig& newton) {
+      const auto make = [&](const NewtonConfig& newton, double) {
         ClothOptions options;
         options.integrator = integrator;
         options.newton = newton;
@@ -271,7 +274,7 @@ TEST(FailedSteps, HalvesOfAThreadAreThoseOfAFreshOne)
   const auto shared = std::make_shared<ThreadModel>(model);
   const ThreadInputs inputs;
   expectHalvesLikeFresh(
-      "thread", start, 16 * kPart, [&](const NewtonConfig& newton) { return ThreadStepper(shared, newton); },
+      "thread", start, 16 * kPart, [&](const NewtonConfig& newton, double) { return ThreadStepper(shared, newton); },
       [&](ThreadStepper& stepper, ThreadState& state, double h) { return stepper.step(state, inputs, h); });
 }
 
@@ -297,15 +300,16 @@ TEST(FailedSteps, RefusalsOfRodsWithBodiesLeaveNothing)
   for (const bool damped : {false, true})
     for (const Integrator integrator : allIntegrators())
     {
-      const Group g = tumbling(damped);
-      RodGroupInputs spoilt = g.inputs;
+      Group g = tumbling(damped);
+      WorldInputs spoilt = g.inputs;
       spoilt.rods[1].forces.setZero(3, 9);
       spoilt.rods[1].forces.col(5) << 0, 1e300, -1e300;
       TimeConfig time = withIntegrator(integrator);
       const double h = integrator == Integrator::symplectic_euler ? 1e-5 : 2e-3;
-      expectRefusalLeavesNothing<RodGroupState, RodGroupInputs, RodGroup>(
+      g.world(time, h);   // the state gets the grasps of the welds
+      expectRefusalLeavesNothing<WorldState, WorldInputs, WorldStepper>(
           named(damped ? "damped, tumbling" : "tumbling", integrator), g.state, g.inputs, spoilt, h,
-          [&] { return RodGroup(g.model, time); });
+          [&] { return stepperOf(g, time, h); });
     }
 }
 
@@ -316,19 +320,19 @@ TEST(FailedSteps, RefusalsOfRodsInContactLeaveNothing)
     Group g = landing(1.5);
     TimeConfig time = withIntegrator(integrator);
     time.step = 2e-3;
-    RodGroupInputs spoilt = g.inputs;
+    WorldInputs spoilt = g.inputs;
     spoilt.rods[0].forces.setZero(3, 15);
-    RodGroup first(g.model, time);
+    World first = g.world(time, time.step);
     for (int k = 0; k < 4; ++k)   // the first steps end before contact begins
     {
       for (const double force : {1e9, 1e300})
       {
         spoilt.rods[0].forces.col(7) << 0, force, -force;
-        expectRefusalLeavesNothing<RodGroupState, RodGroupInputs, RodGroup>(named("landing", integrator), g.state,
-                                                                            g.inputs, spoilt, time.step,
-                                                                            [&] { return RodGroup(g.model, time); });
+        expectRefusalLeavesNothing<WorldState, WorldInputs, WorldStepper>(
+            named("landing", integrator), g.state, g.inputs, spoilt, time.step,
+            [&] { return stepperOf(g, time, time.step); });
       }
-      ASSERT_TRUE(first.step(g.state, g.inputs, time.step).ok);
+      ASSERT_TRUE(first.step(g.state, g.inputs).ok);
     }
   }
 }

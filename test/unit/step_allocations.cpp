@@ -148,14 +148,14 @@ TEST(Allocations, WarmProjectedStepsMakeNone)
 TEST(Allocations, WarmProjectedStepsWithBodiesMakeNone)
 {
   Group g = tee();
-  for (auto& model : g.model.rods)
+  for (WorldModel::Rod& rod : g.model.rods)
   {
-    auto changed = std::make_shared<RodModel>(*model);
+    auto changed = std::make_shared<RodModel>(*rod.model);
     changed->isotropic = changed->inextensible = true;
-    model = changed;
+    rod.model = changed;
   }
-  RodGroup group(g.model, withIntegrator(Integrator::symplectic_euler));
-  const auto advance = [&] { return group.step(g.state, g.inputs, 2e-5).ok; };
+  World world = g.world(withIntegrator(Integrator::symplectic_euler), 2e-5);
+  const auto advance = [&] { return world.step(g.state, g.inputs).ok; };
   for (int k = 0; k < 20; ++k)
     ASSERT_TRUE(advance());
   const long before = allocations;

@@ -6,7 +6,10 @@
 #include <vector>
 
 #include "slender_sim/cloth/cloth_group.h"
-#include "slender_sim/rod/rod_group.h"
+#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/rod/rigid_body.h"
+#include "slender_sim/rod/rod_model.h"
+#include "slender_sim/rod/rod_touch.h"
 #include "slender_sim/thread/thread_model.h"
 #include "slender_sim/thread/thread_touch.h"
 #include "slender_sim/tracking/function_set.h"
@@ -28,8 +31,8 @@ struct WorldModel
   struct Rod
   {
     std::shared_ptr<const RodModel> model;
-    std::optional<GroupContact::Rod> contact;   ///< its index `rod` has no meaning here; nothing: touches nothing
-    TrackedGuide tracked;                       ///< with one set
+    std::optional<RodTouch> contact;   ///< nothing: touches nothing
+    TrackedGuide tracked;              ///< with one set
   };
   struct Thread
   {

@@ -167,7 +167,7 @@ void addRod(SceneConfig& scene, int r, SceneParts& parts)
   WorldModel::Rod part;
   part.model = std::make_shared<const RodModel>(std::move(built.model));
   if (const auto& contact = rod.contact)
-    part.contact = GroupContact::Rod{0, contact->self, contact->rods, contact->obstacles, contact->friction};
+    part.contact = RodTouch{contact->self, contact->rods, contact->obstacles, contact->friction};
   part.tracked = trackedBy(scene, r);
   parts.model.rods.push_back(std::move(part));
   parts.state.rods.push_back(std::move(state));

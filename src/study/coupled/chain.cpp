@@ -48,7 +48,7 @@ int hooked(const std::vector<RodState>& links)
 /// Cuts a ring between its last node and its first: the edge there is gone, all else stays as it is.
 void cut(GroupSetup& g, int rod)
 {
-  auto open = std::make_shared<RodModel>(*g.model.rods[rod]);
+  auto open = std::make_shared<RodModel>(*g.model.rods[rod].model);
   const int edges = open->edges() - 1;
   open->closed = false;
   for (Eigen::VectorXd* perEdge : {&open->rest_length, &open->stretch_modulus, &open->radius_a, &open->radius_b})
@@ -57,7 +57,7 @@ void cut(GroupSetup& g, int rod)
   state.d1.conservativeResize(3, edges);
   state.twist[0] = state.twist[edges] = 0;
   state.forgetHistory();
-  g.model.rods[rod] = open;
+  g.model.rods[rod].model = open;
 }
 
 void drawChain(Plot& picture, const std::string& label, const std::vector<std::shared_ptr<const RodModel>>& models,
@@ -89,9 +89,12 @@ void cutChain(StudyContext& context, int links, int edges, double way, Plot& pic
       penetration = std::max(penetration, -bruteForceClearance(groupOf(scene)));
   }
   GroupSetup g = groupOf(scene);
-  for (const auto& model : g.model.rods)
+  std::vector<std::shared_ptr<const RodModel>> models;
+  for (const WorldModel::Rod& rod : g.model.rods)
+    models.push_back(rod.model);
+  for (const auto& model : models)
     weight += model->totalMass() * scene.config().gravity.norm();
-  drawChain(picture, "drawn taut", g.model.rods, g.state.rods, 0);
+  drawChain(picture, "drawn taut", models, g.state.rods, 0);
   const auto row = [&](const char* quantity) -> Row& {
     return context.row().set("case", "closed links, one cut").set("n", edges).set("quantity", quantity);
   };
@@ -104,18 +107,19 @@ void cutChain(StudyContext& context, int links, int edges, double way, Plot& pic
 
   const int middle = links / 2;
   cut(g, middle);
-  RodGroup group(g.model, scene.config().time);
+  models[middle] = g.model.rods[middle].model;
+  World world = g.world(scene.config().time);
   double parted = 0;
   std::vector<double> looks = {0.02, 0.1, 0.3};
   for (int k = 1; k * step < 0.3 + 0.5 * step; ++k)
   {
-    require(group.step(g.state, g.inputs, step), "cut link");
+    require(world.step(g.state, g.inputs), "cut link");
     penetration = std::max(penetration, -bruteForceClearance(g));
     if (parted == 0 && hooked(g.state.rods) < links - 1)
       parted = k * step;
     for (std::size_t look = 0; look < looks.size(); ++look)
       if (std::abs(k * step - looks[look]) < 0.5 * step)
-        drawChain(picture, std::to_string(static_cast<int>(1e3 * looks[look])) + " ms after the cut", g.model.rods,
+        drawChain(picture, std::to_string(static_cast<int>(1e3 * looks[look])) + " ms after the cut", models,
                   g.state.rods, 0.25 * static_cast<double>(look + 1));
   }
   const int left = linking(g.state.rods[middle - 1], g.state.rods[middle]),

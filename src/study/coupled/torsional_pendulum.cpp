@@ -35,8 +35,8 @@ double period(const Pendulum& p, int edges, Integrator integrator, int steps_per
   g.weld(0, edges, 0);
   g.setGravity({0, 0, -9.81});
   const double h = expected / steps_per_period;
-  RodGroup group(g.model, timeConfig(integrator, h));
-  require(group.solveEquilibrium(g.state, g.inputs), "hanging disc");
+  World world = g.world(timeConfig(integrator, h));
+  require(world.solveEquilibrium(g.state, g.inputs), "hanging disc");
   g.state.bodies[0].velocity.angular = {0, 0, M_PI * 2 * M_PI / expected};
 
   double angle = 0, first = 0, last = 0;
@@ -44,7 +44,7 @@ double period(const Pendulum& p, int edges, Integrator integrator, int steps_per
   for (int k = 1; k <= 4 * steps_per_period + steps_per_period / 4; ++k)
   {
     const Eigen::Quaterniond before = g.state.bodies[0].X_WB.orientation;
-    const StepReport report = group.step(g.state, g.inputs, h);
+    const StepReport report = world.step(g.state, g.inputs);
     require(report, "torsional pendulum");
     worst.iterations = std::max(worst.iterations, report.iterations);
     const double was = angle;

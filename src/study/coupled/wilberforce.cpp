@@ -75,7 +75,7 @@ GroupSetup hang(const Spring& s, int edges_per_turn, const JointOptions& joints)
 /// The body belongs to the simulation, or is held where the inputs say.
 void setSimulated(GroupSetup& g, bool simulated)
 {
-  g.model.bodies[0].simulated = simulated;
+  g.model.bodies[0].body.simulated = simulated;
   g.state.rods[0].grasps[1].body = simulated ? 0 : -1;
   g.inputs.bodies[0].X_WG = g.state.bodies[0].X_WB;
 }
@@ -85,15 +85,15 @@ Record swing(const Spring& s, int edges_per_turn, const JointOptions& joints, do
   GroupSetup g = hang(s, edges_per_turn, joints);
   const double h = 1 / s.f2 / kStepsPerPeriod;
   const TimeConfig time = timeConfig(Integrator::tr_bdf2, h, 1e-7);
-  require(RodGroup(g.model, time).solveEquilibrium(g.state, g.inputs), std::string(s.name) + ", equilibrium");
+  require(g.world(time).solveEquilibrium(g.state, g.inputs), std::string(s.name) + ", equilibrium");
   const Pose rest = g.state.bodies[0].X_WB;
 
   setSimulated(g, false);
   g.inputs.bodies[0].X_WG.position.z() += kDisplacement;
-  require(RodGroup(g.model, time).solveEquilibrium(g.state, g.inputs), std::string(s.name) + ", displaced");
+  require(g.world(time).solveEquilibrium(g.state, g.inputs), std::string(s.name) + ", displaced");
   setSimulated(g, true);
 
-  RodGroup group(g.model, time);
+  World world = g.world(time);
   Record r;
   r.interval = h;
   double angle = 0;
@@ -110,7 +110,7 @@ Record swing(const Spring& s, int edges_per_turn, const JointOptions& joints, do
     r.sway.push_back(at.head<2>().norm());
     r.bobbing.push_back(0.5 * s.mass * std::pow(body.velocity.linear.z(), 2));
     r.turning.push_back(0.5 * s.inertia * std::pow(body.velocity.angular.z(), 2));
-    require(group.step(g.state, g.inputs, h), s.name);
+    require(world.step(g.state, g.inputs), s.name);
   }
   return r;
 }

@@ -154,8 +154,8 @@ std::vector<Feature> features()
        {kRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball, thread_with_itself},
        {with(rod_on_floor, {"rods.0.contact.friction=0.3"}), with(cloth_on_ball, {"cloths.0.contact.friction=0.3"})}},
       {"rigid bodies",
-       {"src/rod/body_system", "src/rod/coupled_", "src/rod/rod_group", "include/slender_sim/rod/rod_group",
-        "include/slender_sim/rod/rigid_body", "src/dynamics/fast_projection_bodies"},
+       {"src/rod/body_system", "src/rod/body_part", "src/world/explicit_rods", "include/slender_sim/rod/rigid_body",
+        "src/dynamics/fast_projection_bodies"},
        "\\b[bB]od(y|ies)|\\bweld",
        all,
        {with(kRod, {"bodies=[{name: disc, mass: 0.1, shape: {sphere: {radius: 0.02}}, contact: false, welds: [{rod: "

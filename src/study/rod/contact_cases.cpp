@@ -11,13 +11,13 @@ namespace slender::study {
 int addTouching(GroupSetup& group, const RodSetup& rod, double friction)
 {
   const int index = group.add(rod);
-  group.model.contact.rods.push_back({index, true, true, true, friction});
+  group.model.rods[index].contact = RodTouch{true, true, true, friction};
   return index;
 }
 
 int addObstacle(GroupSetup& group, const Shape& shape, const Pose& pose, double friction)
 {
-  group.model.contact.obstacles.push_back({shape, friction});
+  group.model.obstacles.push_back({"obstacle", shape, friction});
   group.state.obstacles.push_back(pose);
   group.state.obstacle_velocities.push_back({});
   group.inputs.obstacles.push_back({pose, std::nullopt});
@@ -113,16 +113,20 @@ double bruteForceClearance(const GroupSetup& g)
     double low, high;
   };
   std::vector<Piece> pieces;
-  for (const GroupContact::Rod& touching : g.model.contact.rods)
+  for (std::size_t r = 0; r < g.model.rods.size(); ++r)
   {
-    const RodModel& m = *g.model.rods[touching.rod];
-    const Eigen::Matrix3Xd& x = g.state.rods[touching.rod].x;
+    const auto& touching = g.model.rods[r].contact;
+    if (!touching)
+      continue;
+    const RodModel& m = *g.model.rods[r].model;
+    const Eigen::Matrix3Xd& x = g.state.rods[r].x;
     double s = 0.0;
     for (int j = 0; j < m.edges(); ++j)
     {
       const Vector3d a = x.col(j), b = x.col((j + 1) % m.nodes());
-      pieces.push_back({a, b, m.radius_a[j], s, s + m.rest_length[j], m.rest_length.sum(), touching.rod, m.closed,
-                        touching.self, std::min(a.x(), b.x()) - m.radius_a[j], std::max(a.x(), b.x()) + m.radius_a[j]});
+      pieces.push_back({a, b, m.radius_a[j], s, s + m.rest_length[j], m.rest_length.sum(), static_cast<int>(r),
+                        m.closed, touching->self, std::min(a.x(), b.x()) - m.radius_a[j],
+                        std::max(a.x(), b.x()) + m.radius_a[j]});
       s += m.rest_length[j];
     }
   }
@@ -141,14 +145,13 @@ double bruteForceClearance(const GroupSetup& g)
         double apart = std::max(q.from - p.to, p.from - q.to);
         if (p.closed)
           apart = std::min(apart, p.whole - std::max(p.to, q.to) + std::min(p.from, q.from));
-        if (!p.self || apart < 0.5 * M_PI * (p.radius + q.radius) + g.model.contact.options.gap)
+        if (!p.self || apart < 0.5 * M_PI * (p.radius + q.radius) + g.model.contact.gap)
           continue;
       }
       least = std::min(least, segmentsApart(p.a, p.b, q.a, q.b) - p.radius - q.radius);
     }
     for (std::size_t k = 0; k < g.state.obstacles.size(); ++k)
-      least =
-          std::min(least, obstacleApart(g.model.contact.obstacles[k].shape, g.state.obstacles[k], p.a, p.b) - p.radius);
+      least = std::min(least, obstacleApart(g.model.obstacles[k].shape, g.state.obstacles[k], p.a, p.b) - p.radius);
   }
   return least;
 }

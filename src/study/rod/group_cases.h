@@ -1,21 +1,25 @@
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "rod_cases.h"
-#include "slender_sim/rod/rod_group.h"
+#include "slender_sim/world/world.h"
 
 namespace slender::study {
 
-/// Model, state and inputs of rods and bodies that belong together; everything held stays where it is.
+/// Model, state and inputs of a world of rods, bodies and obstacles, without a scene. Everything held stays where it
+/// is.
 struct GroupSetup
 {
-  RodGroupModel model;
-  RodGroupState state;
-  RodGroupInputs inputs;
+  WorldModel model;
+  WorldState state;
+  WorldInputs inputs;
 
   /// Takes the rod over as it is; returns its index.
   int add(const RodSetup& rod)
   {
-    model.rods.push_back(rod.model);
+    model.rods.push_back({rod.model, {}, {}});
     state.rods.push_back(rod.state);
     inputs.rods.push_back(rod.inputs);
     return static_cast<int>(model.rods.size()) - 1;
@@ -27,18 +31,31 @@ struct GroupSetup
     body.name = name;
     body.mass = mass;
     body.inertia = moments.asDiagonal();
-    model.bodies.push_back(body);
+    model.bodies.push_back({body, {}, {}, -1.0});
     RigidBodyState at;
     at.X_WB = X_WB;
     state.bodies.push_back(at);
     inputs.bodies.push_back({X_WB, {}});
     return static_cast<int>(model.bodies.size()) - 1;
   }
-  /// Welds the section of a rod's node, as it lies now.
+  /// Welds the section of a rod's node, as it lies when the first world is made.
   void weld(int rod, int node, int body)
   {
-    makeWeld(model, state, rod, node, node, body);
-    inputs.rods[rod].grasps.push_back({state.rods[rod].grasps.back().X_WG, {}});
+    model.welds.push_back({rod, node, node, body});
+    inputs.rods[rod].grasps.emplace_back();
+  }
+  /// A world of this that takes steps of time.step. With the first one the state gets the grasps of the welds. Others
+  /// are made from the same start and take the present state as it is.
+  World world(const TimeConfig& time)
+  {
+    model.time = time;
+    if (start_)
+    {
+      WorldState again = *start_;
+      return World(model, again);
+    }
+    start_ = state;
+    return World(model, state);
   }
   void setGravity(const Eigen::Vector3d& gravity)
   {
@@ -46,6 +63,9 @@ struct GroupSetup
     for (RodInputs& rod : inputs.rods)
       rod.gravity = gravity;
   }
+
+private:
+  std::optional<WorldState> start_;   ///< of its first world
 };
 
 }   // namespace slender::study

@@ -56,10 +56,9 @@ std::vector<Loop> pullKnot(StudyContext& context, double radius, const std::vect
   GroupSetup g;
   addTouching(g, rod, 0.0);
   g.setGravity(Eigen::Vector3d::Zero());
-  g.model.contact.options.gap = 0.05 * radius;
-  TimeConfig time = timeConfig(Integrator::implicit_euler, 1e-3, 1e-7);
-  RodGroup group(g.model, time);
-  group.checkClearance(g.state);
+  g.model.contact.gap = 0.05 * radius;
+  TimeConfig time = timeConfig(Integrator::implicit_euler, 0.05, 1e-7);
+  World world = g.world(time);
   const Pose start = rod.inputs.grasps[1].X_WG;
   std::vector<Loop> sums(pulls.size());
   double at = 0.0;
@@ -73,11 +72,11 @@ std::vector<Loop> pullKnot(StudyContext& context, double radius, const std::vect
     {
       g.inputs.rods[0].grasps[1].X_WG = start;
       g.inputs.rods[0].grasps[1].X_WG.position.x() += at + (pulls[k] - at) * i / steps;
-      require(group.step(g.state, g.inputs, 0.05), "knot");
+      require(world.step(g.state, g.inputs), "knot");
     }
     at = pulls[k];
-    require(group.solveEquilibrium(g.state, g.inputs), "knot at rest");
-    const double force = -group.wrenches(0)[1].force.x(), size = loopRadius(g.state.rods[0], edge);
+    require(world.solveEquilibrium(g.state, g.inputs), "knot at rest");
+    const double force = -world.rodWrenches(0)[1].force.x(), size = loopRadius(g.state.rods[0], edge);
     context.row().set("n", edges).set("h", radius).set("pulled", at).set("R", size).set("F", force);
     sums[k].epsilon += std::sqrt(radius / size);
     sums[k].force += force * radius * radius;

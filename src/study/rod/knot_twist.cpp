@@ -62,11 +62,11 @@ public:
     : setup_(groupOf(packageScene(
           "knot_twist", {"rods.0.contact.friction=0", "rods.0.centerline.straight.edges=" + std::to_string(edges),
                          std::string("rods.0.initial.trefoil.left_handed=") + (left_handed ? "true" : "false")}))),
-      group_(setup_.model, timeConfig(Integrator::implicit_euler, 0.004)),
+      world_(setup_.world(timeConfig(Integrator::implicit_euler, 0.004))),
       start_(target().orientation)
   {
     // twist-free: turn until the clamp's torque is gone (frames along the tied curve are not those of the rod at rest)
-    const RodModel& m = *setup_.model.rods[0];
+    const RodModel& m = *setup_.model.rods[0].model;
     const double compliance = m.rest_length.sum() / m.twist_modulus[0];
     do
     {
@@ -81,21 +81,21 @@ public:
   void turn(double angle)
   {
     target().orientation = fromRotationVector(Vector3d(angle, 0, 0)) * start_;
-    require(group_.solveEquilibrium(setup_.state, setup_.inputs),
+    require(world_.solveEquilibrium(setup_.state, setup_.inputs),
             "knot turned by " + std::to_string(angle / kDegree) + " degrees");
   }
 
   const RodState& rod() const { return setup_.state.rods[0]; }
-  double torque() const { return group_.wrenches(0)[1].torque.x(); }   ///< of the rod on the clamp that turns [N m]
-  double tension() const { return -group_.wrenches(0)[1].force.x(); }
-  double energy() { return group_.energies(0, rod(), Vector3d::Zero()).total(); }
+  double torque() const { return world_.rodWrenches(0)[1].torque.x(); }   ///< of the rod on the clamp that turns [N m]
+  double tension() const { return -world_.rodWrenches(0)[1].force.x(); }
+  double energy() { return world_.rodEnergies(0, rod(), Vector3d::Zero()).total(); }
   const GroupSetup& setup() const { return setup_; }
 
 private:
   Pose& target() { return setup_.inputs.rods[0].grasps[1].X_WG; }
 
   GroupSetup setup_;
-  RodGroup group_;
+  World world_;
   Eigen::Quaterniond start_;
 };
 
@@ -110,7 +110,7 @@ Jump turnUntilJump(StudyContext& context, int edges, int direction, double step,
                    Plot* picture)
 {
   TurnedKnot knot(edges, false);
-  const RodModel& m = *knot.setup().model.rods[0];
+  const RodModel& m = *knot.setup().model.rods[0].model;
   const double length = m.rest_length.sum(), link = totalTwist(knot.rod()) + writhe(knot.rod());
   Series& series = torques.at(std::string(direction > 0 ? "+" : "-") + ", n = " + std::to_string(edges));
   const auto show = [&](const std::string& what, const Eigen::Matrix3Xd& nodes, double right) {

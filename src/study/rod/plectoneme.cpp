@@ -101,10 +101,10 @@ void ply(StudyContext& context, int edges, bool with_picture, double radius, dou
   GroupSetup g;
   addTouching(g, rod, 0.0);
   g.setGravity(Eigen::Vector3d::Zero());
-  g.model.contact.options.gap = 0.05 * radius;
+  g.model.contact.gap = 0.05 * radius;
   TimeConfig time = timeConfig(Integrator::implicit_euler, 0.02);
   time.newton.max_iterations = 60;   // contacts slide along the whole ply
-  RodGroup group(g.model, time);
+  World world = g.world(time);
   RodInputs& inputs = g.inputs.rods[0];
   const Pose start = inputs.grasps[1].X_WG;
   constexpr int kMoves = 32;   // per turn
@@ -114,19 +114,19 @@ void ply(StudyContext& context, int edges, bool with_picture, double radius, dou
     inputs.grasps[1].X_WG.position = start.position - Eigen::Vector3d(slack * std::min(1.0, turns / 4), 0, 0);
     inputs.grasps[1].X_WG.orientation = fromRotationVector(Eigen::Vector3d(2 * M_PI * turns, 0, 0)) * start.orientation;
     inputs.forces *= 0.95;
-    require(group.step(g.state, g.inputs, 0.02), "ply");
+    require(world.step(g.state, g.inputs), "ply");
     const auto look = std::find_if(looks.begin(), looks.end(), [&](int at) { return at * kMoves == k; });
     if (look == looks.end())
       continue;
     context.progress(k, kMoves * looks.back(),
                      "ply of " + std::to_string(edges) + " edges, turned " + std::to_string(*look));
     inputs.forces.setZero();
-    require(group.solveEquilibrium(g.state, g.inputs), "ply at rest");
+    require(world.solveEquilibrium(g.state, g.inputs), "ply at rest");
     const std::vector<Ply> plies = pliesOf(g.state.rods[0].x, radius);
     if (plies.empty())
       throw std::runtime_error("ply: the rod has not wound up");
     const Ply& p = plies.front();
-    const Wrench end = group.wrenches(0)[1];
+    const Wrench end = world.rodWrenches(0)[1];
     const double moment = -end.torque.x() * p.radius, tension = -end.force.x() * p.radius * p.radius;
     const auto row = [&]() -> Row& {
       return context.row()

@@ -126,7 +126,7 @@ double smallestRadius(const GroupSetup& g)
 {
   double least = std::numeric_limits<double>::infinity();
   for (const auto& rod : g.model.rods)
-    least = std::min(least, rod->radius_a.minCoeff());
+    least = std::min(least, rod.model->radius_a.minCoeff());
   return least;
 }
 
@@ -151,16 +151,15 @@ void runRodContactSafety(StudyContext& context)
     Random random(1000 + n);
     Scene scene = make(random);
     GroupSetup& g = scene.group;
-    g.model.contact.options.gap = 0.1 * smallestRadius(g);
+    g.model.contact.gap = 0.1 * smallestRadius(g);
     TimeConfig time = timeConfig(Integrator::implicit_euler, scene.step);
-    RodGroup group(g.model, time);
-    group.checkClearance(g.state);
+    World world = g.world(time);
     Tally& tally = tallies[kind];
     ++tally.scenes;
     for (int k = 1; k <= scene.steps; ++k)
     {
       scene.drive(g, k * scene.step);
-      const StepReport report = group.step(g.state, g.inputs, scene.step);
+      const StepReport report = world.step(g.state, g.inputs);
       if (!report.ok)
       {
         ++tally.refused;

@@ -51,13 +51,13 @@ Result press(int edges, const Slip& slip)
   GroupSetup g;
   g.add(rod);
   g.setGravity(Eigen::Vector3d::Zero());
-  g.model.contact.rods.push_back({0, false, false, true, slip.mu});
+  g.model.rods[0].contact = RodTouch{false, false, true, slip.mu};
   addObstacle(g, Plane{}, {});
-  g.model.contact.options.gap = gap;
+  g.model.contact.gap = gap;
   // creep: at most 2e-6 in a move; less, and the range that sticks is no longer resolved
-  g.model.contact.options.slip_speed = 5e-5;
+  g.model.contact.slip_speed = 5e-5;
   const double step = 0.02;
-  RodGroup group(g.model, timeConfig(Integrator::implicit_euler, step, 1e-8));
+  World world = g.world(timeConfig(Integrator::implicit_euler, step, 1e-8));
   const Pose start = rod.inputs.grasps[0].X_WG;
   Result result;
   double foot_before = g.state.rods[0].x(0, edges);
@@ -67,11 +67,11 @@ Result press(int edges, const Slip& slip)
     g.inputs.rods[0].grasps[0].X_WG = start;
     g.inputs.rods[0].grasps[0].X_WG.position.z() -= compression;
     for (int k = 0; k < 2; ++k)   // and wait: the motion shall be quasistatic
-      require(group.step(g.state, g.inputs, step), "stick-slip, mu = " + std::to_string(slip.mu));
+      require(world.step(g.state, g.inputs), "stick-slip, mu = " + std::to_string(slip.mu));
     const double at = g.state.rods[0].x(0, edges);
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
-    for (const ContactTerm& term : group.contacts())
-      force += term.force;
+    for (const ContactForce& contact : world.contacts())
+      force += contact.force;
     result.compressions.push_back(compression);
     result.ratios.push_back(std::hypot(force.x(), force.y()) / force.z());
     if (compression > 0.3 * slip.compression && std::abs(at - foot_before) > 1e-3)
