@@ -136,7 +136,10 @@ void BodyPart::endStage(std::size_t stage, bool last, StepReport&)
   system.accept();
   system.endStage(plan_->stages[stage], last);
   if (last)
+  {
     system.finishStep(*plan_, next_);
+    next_.last_step = length_;
+  }
 }
 
 double BodyPart::energyOf(const RigidBodyState& s) const

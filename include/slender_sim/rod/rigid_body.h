@@ -34,7 +34,7 @@ struct RigidBodyState
   Twist velocity;   ///< linear: of the centre of mass; world axes
 
   /// Integrator memory, as of rods.
-  bool has_history = false;
+  double last_step = 0.0;   ///< length of the last substep [s]; 0: none
   Eigen::Vector3d linear_acceleration{0, 0, 0}, angular_acceleration{0, 0, 0};
   Pose X_previous;
   Twist velocity_previous;

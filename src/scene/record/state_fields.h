@@ -183,7 +183,7 @@ struct Fields<GuideState> : Members<&GuideState::points, &GuideState::velocity, 
 };
 
 template <>
-struct Fields<RigidBodyState> : Members<&RigidBodyState::X_WB, &RigidBodyState::velocity, &RigidBodyState::has_history,
+struct Fields<RigidBodyState> : Members<&RigidBodyState::X_WB, &RigidBodyState::velocity, &RigidBodyState::last_step,
                                         &RigidBodyState::linear_acceleration, &RigidBodyState::angular_acceleration,
                                         &RigidBodyState::X_previous, &RigidBodyState::velocity_previous>
 {
