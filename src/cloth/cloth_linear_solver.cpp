@@ -29,7 +29,7 @@ ClothLinearSolver::ClothLinearSolver(const ClothModel& model, const ClothOptions
   else
   {
     preconditioner_ = std::make_unique<ClothPreconditioner>(model, system.terms(), system.matrix());
-    cg_.resize(points());
+    cg_.resize(4 * static_cast<std::size_t>(points()));
   }
   for (PointVector* v : {&right_, &product_, &correction_})
     v->assign(4 * static_cast<std::size_t>(points()), 0.0);

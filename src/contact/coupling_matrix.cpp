@@ -29,18 +29,132 @@ void CouplingMatrix::noteBases(const Bases& bases)
             note(bases[i] + r, bases[j] + c);
 }
 
-void CouplingMatrix::finish()
+void CouplingMatrix::finish(const std::vector<int>& blocks, Solver solver)
 {
-  std::vector<int> starts{0}, rows;
+  solver_ = solver;
+  starts_.assign(1, 0);
+  rows_.clear();
   for (int u = 0; u < unknowns_; ++u)
   {
     std::vector<int>& column = columns_[u];
     std::sort(column.begin(), column.end());
-    rows.insert(rows.end(), column.begin(), std::unique(column.begin(), column.end()));
+    rows_.insert(rows_.end(), column.begin(), std::unique(column.begin(), column.end()));
+    starts_.push_back(static_cast<int>(rows_.size()));
+  }
+  values_.assign(rows_.size(), 0.0);
+  cholesky_known_ = false;
+  if (solver_ == Solver::conjugate_gradients && unknowns_ > 0)
+    takeBlocks(blocks);
+}
+
+/// The pattern of the blocks stays when contacts between blocks come and go. Then its analysis stays, too.
+void CouplingMatrix::takeBlocks(const std::vector<int>& blocks)
+{
+  std::vector<int> starts{0}, rows;
+  block_entries_.clear();
+  for (int u = 0; u < unknowns_; ++u)
+  {
+    for (int k = starts_[u]; k < starts_[u + 1]; ++k)
+      if (blocks[rows_[k]] == blocks[u])
+      {
+        rows.push_back(rows_[k]);
+        block_entries_.push_back(k);
+      }
     starts.push_back(static_cast<int>(rows.size()));
   }
-  if (unknowns_ > 0)
-    matrix_.setPattern(unknowns_, std::move(starts), std::move(rows));
+  if (starts != block_starts_ || rows != block_rows_)
+  {
+    block_starts_ = starts;
+    block_rows_ = rows;
+    block_cholesky_.setPattern(unknowns_, std::move(starts), std::move(rows));
+  }
+  gradients_.resize(static_cast<std::size_t>(unknowns_));
+  x_.resize(static_cast<std::size_t>(unknowns_));
+}
+
+int CouplingMatrix::index(int a, int b) const
+{
+  const int column = std::min(a, b);
+  const auto begin = rows_.begin();
+  return static_cast<int>(
+      std::lower_bound(begin + starts_[column], begin + starts_[column + 1], std::max(a, b)) - begin);
+}
+
+// ---- solutions
+
+bool CouplingMatrix::factorPresent() { return solver_ == Solver::cholesky ? factorDirectly() : factorBlocks(); }
+
+bool CouplingMatrix::factorDirectly()
+{
+  direct_ = true;
+  if (unknowns_ == 0)
+    return true;
+  if (!cholesky_known_)
+    cholesky_.setPattern(unknowns_, starts_, rows_);
+  cholesky_known_ = true;
+  std::copy(values_.begin(), values_.end(), cholesky_.values());
+  return cholesky_.factor();
+}
+
+bool CouplingMatrix::factorBlocks()
+{
+  direct_ = false;
+  if (unknowns_ == 0)
+    return true;
+  double* values = block_cholesky_.values();
+  for (std::size_t k = 0; k < block_entries_.size(); ++k)
+    values[k] = values_[block_entries_[k]];
+  return block_cholesky_.factor();
+}
+
+bool CouplingMatrix::solve()
+{
+  iterations_ = 0;
+  if (unknowns_ == 0)
+    return true;
+  if (direct_)
+  {
+    cholesky_.solve(solution_.data());
+    return true;
+  }
+  constexpr double kTolerance = 1e-9;   // Newton's method then converges as with a direct solution
+  constexpr int kMostIterations = 300;
+  const LinearResult result = gradients_.solve(
+      solution_, x_, kTolerance, kMostIterations,
+      [this](const std::vector<double>& p, std::vector<double>& ap) { multiply(p, ap); },
+      [this](const std::vector<double>& r, std::vector<double>& z) {
+        z = r;
+        block_cholesky_.solve(z.data());
+      });
+  iterations_ = result.iterations;
+  if (!result.definite || result.residual > kTolerance)
+    return false;
+  solution_.swap(x_);
+  return true;
+}
+
+/// y := A x
+void CouplingMatrix::multiply(const std::vector<double>& x, std::vector<double>& y) const
+{
+  std::fill(y.begin(), y.end(), 0.0);
+  for (int u = 0; u < unknowns_; ++u)
+  {
+    double sum = 0.0;
+    for (int k = starts_[u]; k < starts_[u + 1]; ++k)
+    {
+      const int row = rows_[k];
+      sum += values_[k] * x[row];
+      if (row != u)
+        y[row] += values_[k] * x[u];
+    }
+    y[u] += sum;
+  }
+}
+
+double CouplingMatrix::Space::dot(const Vector& x, const Vector& y)
+{
+  const auto n = static_cast<Eigen::Index>(x.size());
+  return Eigen::Map<const Eigen::VectorXd>(x.data(), n).dot(Eigen::Map<const Eigen::VectorXd>(y.data(), n));
 }
 
 void CouplingMatrix::addPair(const Columns& a, const Columns& b, double value)
@@ -61,7 +175,7 @@ void CouplingMatrix::addSquare(const Columns& a, double value)
 template <class Block>
 void CouplingMatrix::addBlocks(const Bases& bases, Block&& block)
 {
-  double* values = matrix_.values();
+  double* values = values_.data();
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < 4; ++j)
       if (bases[i] >= bases[j] && bases[j] >= 0)
@@ -69,7 +183,7 @@ void CouplingMatrix::addBlocks(const Bases& bases, Block&& block)
         const Eigen::Matrix3d b = block(i, j);
         for (int c = 0; c < 3; ++c)
         {
-          const int first = i == j ? c : 0, at = matrix_.index(bases[i] + first, bases[j] + c);
+          const int first = i == j ? c : 0, at = index(bases[i] + first, bases[j] + c);
           for (int r = first; r < 3; ++r)
             values[at + r - first] += b(r, c);
         }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 namespace slender {
@@ -13,9 +14,18 @@ namespace slender {
 ///
 /// For one pattern: begin(), then what couples unknowns by note(), notePairs() and noteBases(), then finish(). For one
 /// matrix: factor() with a function that calls clear() and adds all entries.
+///
+/// The matrix is solved by sparse Cholesky factorisation, or by conjugate gradients. These are preconditioned by the
+/// factorisation of blocks: the matrix without what couples unknowns of different blocks.
 class CouplingMatrix
 {
 public:
+  enum class Solver
+  {
+    cholesky,
+    conjugate_gradients
+  };
+
   /// A row of unknowns with weights: what one component of a displacement depends on.
   struct Columns
   {
@@ -33,22 +43,24 @@ public:
   using Bases = std::array<int, 4>;
 
   /// `simplicial`: see SparseCholesky.
-  explicit CouplingMatrix(bool simplicial) : matrix_(simplicial) {}
+  explicit CouplingMatrix(bool simplicial) : cholesky_(simplicial), block_cholesky_(simplicial) {}
 
   // ---- pattern
   void begin(int unknowns);
   void note(int a, int b) { columns_[std::min(a, b)].push_back(std::max(a, b)); }
   void notePairs(const Columns& a, const Columns& b);
   void noteBases(const Bases& bases);
-  void finish();
+  /// `blocks`: the number of the block that each unknown belongs to; only conjugate gradients need it.
+  void finish(const std::vector<int>& blocks = {}, Solver solver = Solver::cholesky);
   int unknowns() const { return unknowns_; }
+  Solver solver() const { return solver_; }
   /// Where an entry of the pattern lies among values().
-  int index(int a, int b) const { return matrix_.index(std::max(a, b), std::min(a, b)); }
+  int index(int a, int b) const;
 
   // ---- values
-  void clear() { std::fill_n(matrix_.values(), matrix_.rows().size(), 0.0); }
-  double* values() { return matrix_.values(); }
-  void add(int a, int b, double value) { matrix_.values()[index(a, b)] += value; }
+  void clear() { std::fill(values_.begin(), values_.end(), 0.0); }
+  double* values() { return values_.data(); }
+  void add(int a, int b, double value) { values_[index(a, b)] += value; }
   /// The symmetric pair of entries (a, b) and (b, a) of rows of unknowns.
   void addPair(const Columns& a, const Columns& b, double value);
   /// The diagonal entry (a, a).
@@ -61,46 +73,72 @@ public:
   void beginStage() { whole_ = {}; }
   /// Factors what assemble(whole) makes: with the contacts' whole second derivatives where `contacts` says that there
   /// are any, that is due and leaves the matrix positive definite; else without those parts of them that may be
-  /// negative. Returns whether the matrix is positive definite.
+  /// negative. Returns whether the matrix is positive definite. With conjugate gradients, only the blocks are
+  /// examined; see solve().
   template <class Assemble>
   bool factor(bool contacts, Assemble&& assemble)
   {
     if (contacts && whole_.due())
     {
       assemble(true);
-      const bool definite = matrix_.factor();
+      const bool definite = factorPresent();
       whole_.tried(definite);
       if (definite)
         return true;
     }
     assemble(false);
-    return matrix_.factor();
+    return factorPresent();
   }
   /// The same with whole second derivatives only.
   template <class Assemble>
   bool factorExactly(Assemble&& assemble)
   {
     assemble(true);
-    return matrix_.factor();
+    return factorDirectly();
   }
   /// Right-hand side, then solution: one per unknown.
   double* solution() { return solution_.data(); }
   const double* solution() const { return solution_.data(); }
-  void solve()
-  {
-    if (unknowns_ > 0)
-      matrix_.solve(solution_.data());
-  }
+  /// Returns false if conjugate gradients met negative curvature, or did not converge; then the solution is still the
+  /// right-hand side.
+  bool solve();
+  /// Factors the present values by Cholesky factorisation, which solve() then uses, whatever the solver is.
+  bool factorDirectly();
+  /// Of the last solve().
+  int linearIterations() const { return iterations_; }
 
 private:
+  struct Space
+  {
+    using Vector = std::vector<double>;
+    static double dot(const Vector& x, const Vector& y);
+  };
+
   template <class Block>
   void addBlocks(const Bases& bases, Block&& block);
+  void takeBlocks(const std::vector<int>& blocks);
+  bool factorPresent();
+  bool factorBlocks();
+  void multiply(const std::vector<double>& x, std::vector<double>& y) const;
 
-  SparseCholesky matrix_;
   WholeStiffness whole_;
   int unknowns_ = 0;
   std::vector<std::vector<int>> columns_;
+  std::vector<int> starts_, rows_;   ///< lower triangle by columns, as SparseCholesky has it
+  std::vector<double> values_;
   std::vector<double> solution_;
+  Solver solver_ = Solver::cholesky;
+
+  SparseCholesky cholesky_;
+  bool cholesky_known_ = false;   ///< has the present pattern
+  bool direct_ = true;            ///< the last factorisation is that of the whole matrix
+
+  SparseCholesky block_cholesky_;
+  std::vector<int> block_entries_;               ///< places in values_ of the entries of blocks
+  std::vector<int> block_starts_, block_rows_;   ///< pattern of the blocks
+  ConjugateGradientsIn<Space> gradients_;
+  std::vector<double> x_;
+  int iterations_ = 0;
 };
 
 }   // namespace slender

@@ -147,11 +147,50 @@ void IslandSystem::buildPattern()
       for (const Part::Columns& b : rows)
         matrix_.notePairs(a, b);
   }
-  matrix_.finish();
+  const std::vector<int> blocks = numberBlocks();
+  matrix_.finish(blocks, chooseSolver());
   pattern_valid_ = true;
   for (Part* part : parts_)
     if (part->coupled)
       part->findEntries(matrix_);
+}
+
+/// Numbers the blocks of the matrix: parts that joints connect are one block, any other part is one. Returns the block
+/// of each unknown.
+std::vector<int> IslandSystem::numberBlocks()
+{
+  std::vector<int> blocks;
+  blocks_ = 1;   // the first is that of joined parts
+  for (Part* part : parts_)
+    if (part->coupled)
+    {
+      part->block = part->joined() ? 0 : blocks_++;
+      blocks.insert(blocks.end(), static_cast<std::size_t>(part->unknowns()), part->block);
+    }
+  return blocks;
+}
+
+/// Factors fill up where contacts close loops of parts: each layer of a pile meets many parts of the next one. Where
+/// parts meet like the links of a chain, or two of them along their whole lengths, factorisation is faster. The limit
+/// is measured by the study island_solvers.
+CouplingMatrix::Solver IslandSystem::chooseSolver()
+{
+  if (solver != IslandSolver::automatic)
+    return solver == IslandSolver::cholesky ? CouplingMatrix::Solver::cholesky
+                                            : CouplingMatrix::Solver::conjugate_gradients;
+  met_.clear();
+  for (const Key& key : keys_)
+  {
+    const RigidPart* body = bodyOf(key[4]);
+    const int a = partOf(key[0]).block, b = body ? body->block : key[2] < 0 ? a : partOf(key[2]).block;
+    if (a != b)
+      met_.emplace_back(std::min(a, b), std::max(a, b));
+  }
+  std::sort(met_.begin(), met_.end());
+  met_.erase(std::unique(met_.begin(), met_.end()), met_.end());
+  constexpr int kPairsPerBlock = 2;
+  return static_cast<int>(met_.size()) >= kPairsPerBlock * blocks_ ? CouplingMatrix::Solver::conjugate_gradients
+                                                                    : CouplingMatrix::Solver::cholesky;
 }
 
 // ---- the matrix
@@ -208,6 +247,8 @@ bool IslandSystem::factor(const HessianShift& shift)
 RodEvaluation IslandSystem::evaluate(bool with_hessian, const HessianShift& shift)
 {
   RodEvaluation sum;
+  if (with_hessian)
+    shift_ = shift;
   if (contact_)
   {
     gather(points_, poses_);
@@ -254,7 +295,14 @@ void IslandSystem::solve()
   for (const Part* part : parts_)
     if (part->coupled)
       part->takeGradient(matrix_.solution());
-  matrix_.solve();
+  const bool solved = matrix_.solve();
+  linear_iterations_ += matrix_.linearIterations();
+  if (!solved)
+  {
+    assemble(shift_, false);   // without what may be negative
+    matrix_.factorDirectly();
+    matrix_.solve();
+  }
   forParts([](Part& part) {
     if (!part.coupled)
       part.solve();

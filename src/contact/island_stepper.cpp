@@ -80,6 +80,7 @@ StepReport IslandStepper::step(double duration, double& first)
     swept_[k] = members_[k].steps->surfaceBox(0.0);
   SubstepController controller(rule);
   controller.run(*this, duration, report);
+  report.linear_iterations += island_.linearIterations();
   if (report.ok)
     first = controller.nextLength();
   return report;

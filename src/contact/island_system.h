@@ -7,6 +7,7 @@
 
 #include "confined_newton.h"
 #include "part.h"
+#include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/pose_motion.h"
 
 namespace slender {
@@ -52,6 +53,8 @@ public:
   void setParts(const std::vector<Part*>& parts);
   std::vector<IslandSolid> solids;   ///< in the order of those of the contact
   IslandTolerances tolerances;
+  /// Solver of the shared matrix; automatic: by what meets, see chooseSolver().
+  IslandSolver solver = IslandSolver::automatic;
   /// Where the parts meet each other and solids. Without a call nothing touches.
   void setContact(ContactSurface surface, const ContactOptions& options);
   /// A potential of the surface points besides contact; null: none.
@@ -62,7 +65,7 @@ public:
   const ContactPotential* contact() const { return contact_.get(); }
 
   // ---- a step. Fractions are of this step.
-  void beginStep(double duration) { duration_ = duration; }   ///< [s]
+  void beginStep(double duration) { duration_ = duration, linear_iterations_ = 0; }   ///< [s]
   /// A substep begins at this fraction: numbers unknowns and surface points, and takes the configuration where it
   /// starts.
   void beginSubstep(double fraction);
@@ -78,6 +81,8 @@ public:
   /// The trial, at which a stage ended, becomes the start of the next one.
   void endStage();
   double forceScale() const;   ///< largest force [N]
+  /// Iterations of conjugate gradients since the step began.
+  int linearIterations() const { return linear_iterations_; }
 
   // ---- for the stability of an equilibrium
   /// From now on all contacts couple, and only the exact matrix is factored.
@@ -134,6 +139,8 @@ private:
   void takeFirst();
   void makeRoom(const ContactTerm& term);
   void buildPattern();
+  std::vector<int> numberBlocks();
+  CouplingMatrix::Solver chooseSolver();
   CouplingMatrix::Bases basesOf(const int (&point)[4]) const;
   bool isCarried(const CouplingMatrix::Bases& bases, int solid) const;
   void columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>& rows) const;
@@ -149,6 +156,10 @@ private:
 
   CouplingMatrix matrix_;
   bool pattern_valid_ = false, exact_ = false;
+  HessianShift shift_;   ///< of the last evaluation with a Hessian
+  int linear_iterations_ = 0;
+  int blocks_ = 0;                         ///< of the matrix
+  std::vector<std::pair<int, int>> met_;   ///< blocks of which parts touch each other
   std::vector<Key> keys_, keys_before_;   ///< room for contacts that the pattern has, sorted
 
   std::unique_ptr<ContactPotential> contact_;

@@ -33,6 +33,7 @@ public:
   const void* island = nullptr;                ///< in which the part was stepped last
   bool coupled = false;                        ///< the matrix of the island has its unknowns
   int offset = 0;                              ///< number of its first unknown in that matrix
+  int block = 0;                               ///< number of its block of that matrix
   int first_point = 0;                         ///< number of its first surface point among those of the island
   std::vector<const ContactTerm*> own_terms;   ///< present contacts that the part's own matrix has room for
   std::vector<const ContactRow*> own_rows;     ///< likewise

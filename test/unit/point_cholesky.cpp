@@ -68,7 +68,7 @@ TEST(SymmetricSweeps, SolveWithAndWithoutAMatrixOfPoints)
     EXPECT_TRUE(result.definite);
     EXPECT_LT(result.residual, 1e-12);
     ConjugateGradients plain;   // preconditioned by the diagonal blocks alone
-    plain.resize(s.points());
+    plain.resize(4 * static_cast<std::size_t>(s.points()));
     PointVector y = x;
     const LinearResult slow = plain.solve(
         b, y, 1e-12, 2000,

@@ -37,7 +37,7 @@ struct StepReport
   int substeps = 0;            ///< steps actually taken (1 unless the step was cut or adapted)
   int cut_steps = 0;           ///< how often a step was halved because it could not be done
   int iterations = 0;          ///< Newton iterations
-  int linear_iterations = 0;   ///< of conjugate gradients (cloth)
+  int linear_iterations = 0;   ///< of conjugate gradients (cloth; islands of several parts)
   int factorizations = 0;      ///< banded factorisations (more than iterations when a Hessian was shifted)
   double residual = 0.0;       ///< largest unbalanced nodal force over the largest force on any node [-]
   double max_strain = 0.0;     ///< largest |stretch strain| over all edges [-]

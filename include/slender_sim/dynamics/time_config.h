@@ -22,6 +22,14 @@ struct NewtonConfig
   int max_cuts = 10;         ///< how often a failing step is halved [0, 30]
 };
 
+/// How the linear equations of an island of several parts are solved.
+enum class IslandSolver
+{
+  automatic,   ///< by how many parts meet how many others
+  cholesky,
+  conjugate_gradients   ///< preconditioned by the factors of the parts
+};
+
 struct TimeConfig
 {
   double step = 0.005;      ///< [s] (0, 10]
@@ -31,6 +39,7 @@ struct TimeConfig
   double error_tolerance = 0.0;   ///< [m] local error per step; 0 = fixed step
   double min_step = 1e-7;         ///< [s] adaptive or cut steps never get shorter
   NewtonConfig newton;
+  IslandSolver island_solver = IslandSolver::automatic;
 };
 
 }   // namespace slender

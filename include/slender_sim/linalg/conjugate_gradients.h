@@ -17,15 +17,28 @@ struct LinearResult
   bool definite = true;   ///< no direction of negative curvature was met
 };
 
-/// Preconditioned conjugate gradients for points, with memory of its own.
-class ConjugateGradients
+/// Vectors of points, four doubles each, of which the fourth does not count.
+struct PointSpace
+{
+  using Vector = PointVector;
+  static double dot(const Vector& x, const Vector& y)
+  {
+    return pointKernels().dot(static_cast<int>(x.size() / 4), x.data(), y.data());
+  }
+};
+
+/// Preconditioned conjugate gradients, with memory of its own. `Space`: the vectors and their inner product.
+template <class Space>
+class ConjugateGradientsIn
 {
 public:
-  void resize(int points)
+  using Vector = typename Space::Vector;
+
+  /// `numbers`: of a vector.
+  void resize(std::size_t numbers)
   {
-    points_ = points;
-    for (PointVector* v : {&r_, &z_, &p_, &ap_})
-      v->assign(4 * points, 0.0);
+    for (Vector* v : {&r_, &z_, &p_, &ap_})
+      v->assign(numbers, 0.0);
   }
 
   /// Solves A x = b from x = 0. apply(p, ap) writes A p, precondition(r, z) writes P r and may take out of r what no
@@ -33,15 +46,14 @@ public:
   /// tolerance times that of b, or times `reference` if that is positive; after max_iterations; or at negative
   /// curvature with the x so far.
   template <class Apply, class Precondition>
-  LinearResult solve(const PointVector& b, PointVector& x, double tolerance, int max_iterations, Apply apply,
+  LinearResult solve(const Vector& b, Vector& x, double tolerance, int max_iterations, Apply apply,
                      Precondition precondition, double reference = 0.0)
   {
-    const PointKernels& k = pointKernels();
     LinearResult result;
     std::fill(x.begin(), x.end(), 0.0);
     std::copy(b.begin(), b.end(), r_.begin());
     precondition(r_, z_);
-    double rz = k.dot(points_, r_.data(), z_.data());
+    double rz = Space::dot(r_, z_);
     const double scale = reference > 0 ? reference * reference : rz;
     if (!(rz > 0))
     {
@@ -54,7 +66,7 @@ public:
     while (result.residual > tolerance && result.iterations < max_iterations && !stepsInterrupted())
     {
       apply(p_, ap_);
-      const double curvature = k.dot(points_, p_.data(), ap_.data());
+      const double curvature = Space::dot(p_, ap_);
       if (!(curvature > 0))
       {
         result.definite = false;
@@ -68,7 +80,7 @@ public:
       }
       ++result.iterations;
       precondition(r_, z_);
-      const double next = k.dot(points_, r_.data(), z_.data());
+      const double next = Space::dot(r_, z_);
       result.residual = std::sqrt(std::abs(next) / scale);
       const double beta = next / rz;
       rz = next;
@@ -79,8 +91,9 @@ public:
   }
 
 private:
-  int points_ = 0;
-  PointVector r_, z_, p_, ap_;
+  Vector r_, z_, p_, ap_;
 };
+
+using ConjugateGradients = ConjugateGradientsIn<PointSpace>;
 
 }   // namespace slender

@@ -38,6 +38,8 @@ void warnOfTime(YamlMap time, const SceneConfig& scene)
   }
   if (newton.present() && integrator == Integrator::symplectic_euler && scene.threads.empty())
     newton.warning("has no effect: explicit steps solve no equations by Newton's method; leave it out");
+  else if (YamlMap(newton).has("linear") && scene.rods.size() + scene.threads.size() + scene.bodies.size() < 2)
+    YamlMap(newton).get("linear").warning("has no effect: it is for rods, threads and bodies that meet; leave it out");
 }
 
 /// Wind acts on rods by damping.drag, on cloth by aerodynamics or damping.drag.

@@ -174,7 +174,7 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
 
   std::vector<Eigen::Matrix3d> inverse(n);
   ConjugateGradients cg;
-  cg.resize(n);
+  cg.resize(4 * static_cast<std::size_t>(n));
   const auto seconds = [&](auto prepare, auto precondition) {
     prepare();
     const auto iterationsWithin = [&](double tolerance, int most) {
