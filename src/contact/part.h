@@ -11,6 +11,43 @@
 
 namespace slender {
 
+/// What IslandSystem writes into a part.
+struct PartInIsland
+{
+  const void* island = nullptr;                ///< in which the part was stepped last
+  bool coupled = false;                        ///< the matrix of the island has its unknowns
+  int offset = 0;                              ///< number of its first unknown in that matrix
+  int block = 0;                               ///< number of its block of that matrix
+  int first_point = 0;                         ///< number of its first surface point among those of the island
+  std::vector<const ContactTerm*> own_terms;   ///< present contacts that the part's own matrix has room for
+  std::vector<const ContactRow*> own_rows;     ///< likewise
+  RodEvaluation evaluation;                    ///< result of the last evaluate()
+};
+
+/// The surface points of a part: what it shows to contact. `point` counts from 0 in each part.
+class PartSurface
+{
+public:
+  using Columns = CouplingMatrix::Columns;
+  /// Number of an unknown, or of a point, that has none in the matrix because its motion is prescribed.
+  static constexpr int kPrescribed = -1;
+
+  virtual ~PartSurface() = default;
+
+  virtual int points() const = 0;   ///< number of its surface points
+  /// Writes the positions of its surface points at the trial into the columns of x from first_point on.
+  virtual void gather(Eigen::Matrix3Xd& x) const = 0;
+  /// The same for where they are when a substep begins.
+  virtual void gatherStart(Eigen::Matrix3Xd& x) const { gather(x); }
+  /// Number of the first of a point's three unknowns in the matrix, or kPrescribed. Less than kPrescribed: its
+  /// displacement depends on other unknowns, see addColumns().
+  virtual int base(int point) const = 0;
+  /// Adds a weighted component of the displacement of a point to a row of unknowns.
+  virtual void addColumns(int point, int component, double weight, Columns& row) const = 0;
+  virtual void addForce(int point, const Eigen::Vector3d& force) = 0;   ///< gradient -= force
+  virtual Eigen::Vector3d move(int point) const = 0;                    ///< displacement by the direction [m]
+};
+
 /// A part of an island: something with unknowns of its own. A rod, a thread, a cloth, and a rigid body are parts.
 /// IslandSystem minimises the energy of several parts together, and knows them by this class alone.
 ///
@@ -20,25 +57,9 @@ namespace slender {
 /// A part that contacts or joints connect to another part is coupled: its unknowns are in the matrix of the island. A
 /// part that is not coupled solves with its own matrix. It stays so while it touches only what moves as prescribed,
 /// because such contacts couple no more than neighbouring points of the part; they are its own contacts.
-class Part
+class Part : public PartInIsland, public PartSurface
 {
 public:
-  using Columns = CouplingMatrix::Columns;
-  /// Number of an unknown, or of a point, that has none in the matrix because its motion is prescribed.
-  static constexpr int kPrescribed = -1;
-
-  virtual ~Part() = default;
-
-  // ---- state of the part in the island, which IslandSystem sets
-  const void* island = nullptr;                ///< in which the part was stepped last
-  bool coupled = false;                        ///< the matrix of the island has its unknowns
-  int offset = 0;                              ///< number of its first unknown in that matrix
-  int block = 0;                               ///< number of its block of that matrix
-  int first_point = 0;                         ///< number of its first surface point among those of the island
-  std::vector<const ContactTerm*> own_terms;   ///< present contacts that the part's own matrix has room for
-  std::vector<const ContactRow*> own_rows;     ///< likewise
-  RodEvaluation evaluation;                    ///< result of the last evaluate()
-
   // ---- unknowns
   /// Numbers the unknowns that are not prescribed. Returns false if the numbers differ from those of the last call.
   virtual bool numberUnknowns() = 0;
@@ -63,13 +84,6 @@ public:
   /// Puts into the trial what joints make the part follow, after all parts have moved.
   virtual void followJoints() {}
 
-  // ---- surface
-  virtual int points() const = 0;   ///< number of its surface points
-  /// Writes the positions of its surface points at the trial into the columns of x from first_point on.
-  virtual void gather(Eigen::Matrix3Xd& x) const = 0;
-  /// The same for where they are when a substep begins.
-  virtual void gatherStart(Eigen::Matrix3Xd& x) const { gather(x); }
-
   // ---- equations
   /// Computes energy, gradient and, on request, the Hessian at the trial, and keeps the sums in `evaluation`. A part
   /// that is not coupled includes its own contacts, and factors its matrix plus the shift.
@@ -87,15 +101,6 @@ public:
   virtual void addHessian(CouplingMatrix& matrix, const HessianShift& shift) = 0;
   virtual void takeGradient(double* right) const = 0;       ///< right-hand side := minus its gradient
   virtual void takeDirection(const double* solution) = 0;   ///< direction := its part of the solution
-
-  // ---- contact. `point` counts from 0 in each part.
-  /// Number of the first of a point's three unknowns in the matrix, or kPrescribed. Less than kPrescribed: its
-  /// displacement depends on other unknowns, see addColumns().
-  virtual int base(int point) const = 0;
-  /// Adds a weighted component of the displacement of a point to a row of unknowns.
-  virtual void addColumns(int point, int component, double weight, Columns& row) const = 0;
-  virtual void addForce(int point, const Eigen::Vector3d& force) = 0;   ///< gradient -= force
-  virtual Eigen::Vector3d move(int point) const = 0;                    ///< displacement by the direction [m]
 
   // ---- measures for Newton's method, see newton.h
   virtual double stepLimit() const = 0;

@@ -54,7 +54,7 @@ JoinedIsland::JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts
       bodies_.push_back(&objects_.bodies[part - objects_.partOfBody(0)]);
     }
   }
-  stepper_.island().solver = world.time.island_solver;
+  stepper_.island().solver = world_.time.island_solver;
   IslandTolerances& tolerances = stepper_.island().tolerances;
   tolerances.angles_may_keep_shift = !rods_.empty();
   tolerances.most_unbalanced =
