@@ -228,7 +228,7 @@ void softenedCylinder(benchmark::State& state)
   ContactSurface surface;
   surface.points = 2;
   surface.segments.push_back({0, 1, 0.01, 0, 0.0, 0.1});
-  surface.objects.push_back({});
+  surface.objects.push_back({{true, true, true, 0.0}});
   surface.solids.push_back({Cylinder{0.1, 0.5}, -1.0, {}});
   ContactOptions options;
   options.gap = 0.02;

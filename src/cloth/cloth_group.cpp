@@ -64,24 +64,18 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     const ClothModel& cloth = *model_.cloths[k];
-    const ClothContact& contact = model_.contact[k];
+    const ContactProperties& contact = model_.contact[k];
     steppers_.emplace_back(model_.cloths[k], model_.options.empty() ? options : model_.options[k]);
     if ((model_.options.empty() ? options : model_.options[k]).error_tolerance == 0)
       steppers_.back().useBudget(budget_);
     surface_.rest.conservativeResize(3, first_.back() + cloth.vertices());
     surface_.rest.rightCols(cloth.vertices()) = cloth.rest.vertices;
-    CollisionSheet sheet;
-    sheet.triangles = cloth.rest.triangles.array() + first_.back();
-    sheet.thickness = contact.thickness;
-    sheet.friction = contact.friction;
-    sheet.self = contact.self;
-    sheet.others = contact.others;
-    sheet.solids = contact.solids;
-    surface_.sheets.push_back(sheet);
+    surface_.sheets.push_back({contact, cloth.rest.triangles.array() + first_.back()});
     checkThickness(cloth, contact.thickness);
     first_.push_back(first_.back() + cloth.vertices());
   }
-  surface_.solids = model_.solids;
+  for (const Obstacle& solid : model_.solids)
+    surface_.solids.push_back({solid});
   collider_ = std::make_unique<SurfaceCollider>(surface_);
   for (Eigen::Matrix3Xd* m :
        {&x_start_, &x_, &v_, &v_before_, &push_, &answer_, &contact_forces_, &contact_sums_, &contact_now_})
@@ -410,8 +404,8 @@ int ClothGroup::clothOf(int point) const
 
 std::string ClothGroup::solidName(int solid) const
 {
-  const bool named = solid < static_cast<int>(model_.solid_names.size());
-  return named ? "'" + model_.solid_names[solid] + "'" : "solid " + std::to_string(solid);
+  const std::string& name = model_.solids[solid].name;
+  return name.empty() ? "solid " + std::to_string(solid) : "'" + name + "'";
 }
 
 /// A point as the collider counts them.

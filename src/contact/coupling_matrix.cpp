@@ -76,8 +76,8 @@ int CouplingMatrix::index(int a, int b) const
 {
   const int column = std::min(a, b);
   const auto begin = rows_.begin();
-  return static_cast<int>(
-      std::lower_bound(begin + starts_[column], begin + starts_[column + 1], std::max(a, b)) - begin);
+  return static_cast<int>(std::lower_bound(begin + starts_[column], begin + starts_[column + 1], std::max(a, b)) -
+                          begin);
 }
 
 // ---- solutions

@@ -190,7 +190,7 @@ CouplingMatrix::Solver IslandSystem::chooseSolver()
   met_.erase(std::unique(met_.begin(), met_.end()), met_.end());
   constexpr int kPairsPerBlock = 2;
   return static_cast<int>(met_.size()) >= kPairsPerBlock * blocks_ ? CouplingMatrix::Solver::conjugate_gradients
-                                                                    : CouplingMatrix::Solver::cholesky;
+                                                                   : CouplingMatrix::Solver::cholesky;
 }
 
 // ---- the matrix

@@ -160,7 +160,7 @@ private:
   int linear_iterations_ = 0;
   int blocks_ = 0;                         ///< of the matrix
   std::vector<std::pair<int, int>> met_;   ///< blocks of which parts touch each other
-  std::vector<Key> keys_, keys_before_;   ///< room for contacts that the pattern has, sorted
+  std::vector<Key> keys_, keys_before_;    ///< room for contacts that the pattern has, sorted
 
   std::unique_ptr<ContactPotential> contact_;
   SurfacePotential* attraction_ = nullptr;

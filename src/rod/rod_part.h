@@ -7,7 +7,7 @@
 #include "../contact/chain_part.h"
 #include "body_part.h"
 #include "rod_stepper_impl.h"
-#include "slender_sim/rod/rod_touch.h"
+#include "slender_sim/contact/contact_properties.h"
 
 namespace slender {
 
@@ -53,7 +53,7 @@ public:
 
   // ---- steps
   /// What the rod touches; without a call nothing.
-  void setContact(const RodTouch& contact) { contact_ = contact; }
+  void setContact(const ContactProperties& contact) { contact_ = contact; }
   double lastSubstep() const override { return rod_.work.last_step; }
   double shortestEdge() const override { return shortest_edge_; }
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
@@ -88,7 +88,7 @@ private:
   RodStepper::Impl& rod_;
   const bool touches_;
   const double shortest_edge_;   ///< at rest [m]
-  RodTouch contact_;
+  ContactProperties contact_;
   const StepPlan* plan_ = nullptr;
   Substep substep_;
   std::vector<Weld> welds_;

@@ -63,8 +63,8 @@ bool ThreadGuard::forOthers(const ThreadState& state, int first, int last, F&& f
   const auto at = std::find_if(strands_.begin(), strands_.end(), [&](const Strand& s) { return s.state == &state; });
   if (at == strands_.end())
     return true;
-  const ThreadTouch& own = at->contact;
-  const double core = own.merging > 0.0 ? own.merging : 1.0;
+  const ContactProperties& own = at->contact;
+  const double core = at->merging > 0.0 ? at->merging : 1.0;
   const auto meets = [&](const ThreadState& other, int j) {
     return f(other.x[j], other.x[j + 1], other.radius(j), core);
   };

@@ -2,9 +2,9 @@
 
 #include <vector>
 
+#include "slender_sim/contact/contact_properties.h"
 #include "slender_sim/dynamics/chain_system.h"
 #include "slender_sim/thread/thread_remesh.h"
-#include "slender_sim/thread/thread_touch.h"
 
 namespace slender {
 
@@ -19,7 +19,8 @@ public:
   struct Strand
   {
     const ThreadState* state;
-    ThreadTouch contact;
+    ContactProperties contact;
+    double merging;   ///< as WorldModel::Thread::merging
   };
   /// A rod that threads touch, at its trial configuration.
   struct Tube

@@ -4,7 +4,7 @@
 
 #include "../contact/chain_part.h"
 #include "../contact/part_steps.h"
-#include "slender_sim/thread/thread_touch.h"
+#include "slender_sim/contact/contact_properties.h"
 #include "thread_stepper_impl.h"
 
 namespace slender {
@@ -32,8 +32,14 @@ public:
 
   // ---- steps
   /// What the thread touches; `owner` is the number of the thread of which it is a part.
-  void setContact(const ThreadTouch& contact, int owner) { contact_ = contact, owner_ = owner; }
-  const ThreadTouch& contact() const { return contact_; }
+  /// `merging`: as WorldModel::Thread::merging.
+  void setContact(const ContactProperties& contact, double merging, int owner)
+  {
+    contact_ = contact;
+    merging_ = merging;
+    owner_ = owner;
+  }
+  double merging() const { return merging_; }
   int owner() const { return owner_; }
   /// In the steps below: what a change of shape may not come near (null: nothing).
   void setGuard(const RemeshGuard* guard) { guard_ = guard; }
@@ -64,7 +70,8 @@ private:
   Eigen::Vector3d lying(int node) const { return thread_.work.x[node] + share_ * (end_[node] - thread_.work.x[node]); }
 
   ThreadStepper::Impl& thread_;
-  ThreadTouch contact_;
+  ContactProperties contact_;
+  double merging_ = 0.0;
   int owner_ = 0;
   const RemeshGuard* guard_ = nullptr;
   double duration_ = 1.0, length_ = 0.0;   ///< of the step and the substep [s]

@@ -22,7 +22,7 @@ void ThreadPart::addSurface(ContactSurface& surface) const
   };
   ContactSegment s;
   s.object = static_cast<int>(surface.objects.size());
-  s.core = contact_.merging > 0.0 ? contact_.merging : 1.0;
+  s.core = merging_ > 0.0 ? merging_ : 1.0;
   for (int j = 0; j < state.edges(); ++j)
   {
     s.a = surface.points + j;
@@ -33,8 +33,7 @@ void ThreadPart::addSurface(ContactSurface& surface) const
     surface.segments.push_back(s);
     s.start += s.length;
   }
-  surface.objects.push_back(
-      {s.start, false, contact_.self, contact_.others, contact_.solids, contact_.friction, owner_});
+  surface.objects.push_back({contact_, s.start, false, owner_});
   surface.points += state.nodes();
 }
 

@@ -71,22 +71,14 @@ public:
       model.contact.push_back(*world.cloths[k].contact);
       model.options.push_back(world.cloths[k].options);
     }
-    const auto add = [&model](const std::string& name, const Shape& shape, double friction) {
-      ContactSolid solid;
-      solid.shape = shape;
-      solid.friction = friction;
-      model.solids.push_back(std::move(solid));
-      model.solid_names.push_back(name);
-    };
-    for (const WorldModel::Obstacle& obstacle : world.obstacles)
-      add(obstacle.name, obstacle.shape, obstacle.friction);
+    model.solids = world.obstacles;
     for (std::size_t b = 0; b < world.bodies.size(); ++b)
     {
       const WorldModel::Body& body = world.bodies[b];
       if (!body.shape || body.body.simulated)
         continue;
       bodies_.push_back(static_cast<int>(b));
-      add(body.body.name, *body.shape, body.friction);
+      model.solids.push_back(body.solid());
     }
     const ClothOptions common = model.options.front();
     group_ = std::make_unique<ClothGroup>(std::move(model), common);

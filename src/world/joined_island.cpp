@@ -47,7 +47,7 @@ JoinedIsland::JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts
     else if (part < objects_.partOfBody(0))
     {
       threads_.push_back(&objects_.threads[part - objects_.partOfThread(0)]);
-      merges = merges || world_.threads[threads_.back()->index].contact->merging > 0.0;
+      merges = merges || world_.threads[threads_.back()->index].merging > 0.0;
     }
     else
     {
@@ -91,7 +91,7 @@ std::vector<ContactSolid> JoinedIsland::takeSolids()
                                    [&](const JoinedBody* body) { return body->part.get() == solid.body; }))
       continue;
     solids_.push_back(&solid);
-    solids.push_back({solid.shape, solid.friction, {}});
+    solids.push_back({solid.obstacle});
     if (floor)
       solids.back().only = solid.index;
     int object = 0;   // of the contact: rods that touch something come first
@@ -175,7 +175,8 @@ void JoinedIsland::begin(const WorldState& state, const WorldInputs& inputs)
       const JoinedThread::Strand& strand = thread->strands[s];
       strand.part->setGuard(&guard_);
       strands_.push_back(strand.part.get());
-      guarded_.push_back({&strand.stepper->work, *world_.threads[thread->index].contact});
+      const WorldModel::Thread& of = world_.threads[thread->index];
+      guarded_.push_back({&strand.stepper->work, *of.contact, of.merging});
     }
   setMembers();
   guard_.setStrands(guarded_);

@@ -37,6 +37,9 @@ JoinedObjects::JoinedObjects(const WorldModel& model, IslandContent parts, World
   : world(model),
     content(std::move(parts))
 {
+  state.contact_stiffness.rods.resize(world.rods.size());
+  state.contact_stiffness.threads.resize(world.threads.size());
+  state.contact_stiffness.bodies.resize(world.bodies.size());
   addParts(world.time);
   addWelds(state);
   addSolids();
@@ -112,23 +115,20 @@ void JoinedObjects::follow(const Weld& weld)
 void JoinedObjects::addSolids()
 {
   for (std::size_t k = 0; k < world.obstacles.size(); ++k)
-  {
-    const WorldModel::Obstacle& obstacle = world.obstacles[k];
-    solids.push_back({JoinedSolid::Kind::obstacle, static_cast<int>(k), obstacle.shape, obstacle.friction});
-  }
+    solids.push_back({JoinedSolid::Kind::obstacle, static_cast<int>(k), world.obstacles[k]});
   for (const int b : content.bodies)
   {
     const WorldModel::Body& body = world.bodies[b];
     if (!body.shape)
       continue;
-    solids.push_back({JoinedSolid::Kind::body, b, *body.shape, body.friction, simulated(b), body.X_BS});
+    solids.push_back({JoinedSolid::Kind::body, b, body.solid(), simulated(b), body.X_BS});
     for (const Weld& weld : welds)
       if (weld.body == b)
         solids.back().welded_rods.push_back(weld.rod);
   }
   for (const JoinedThread& thread : threads)
     if (const ThreadFloor& floor = world.threads[thread.index].model->floor; floor.slips())
-      solids.push_back({JoinedSolid::Kind::floor, thread.index, Plane{}, floor.friction});
+      solids.push_back({JoinedSolid::Kind::floor, thread.index, {Plane{}, floor.friction}});
 }
 
 // ---- inputs

@@ -52,9 +52,8 @@ struct JoinedSolid
     body,
     floor   ///< on which a thread slips
   } kind;
-  int index;   ///< of the obstacle, the body or the thread
-  Shape shape;
-  double friction;                  ///< negative: that of what touches it
+  int index;                        ///< of the obstacle, the body or the thread
+  Obstacle obstacle;                ///< what others touch
   BodyPart* body = nullptr;         ///< that carries it; null: it moves as prescribed
   Pose X_BS{};                      ///< in the frame of the body
   std::vector<int> welded_rods{};   ///< places of rods that begin inside of it
@@ -69,7 +68,8 @@ struct IslandContent
 
 struct JoinedObjects
 {
-  /// Appends the grasps of the welds to the rods of the state. The model of the world must live as long.
+  /// Appends the grasps of the welds to the rods of the state, and makes room for the stiffnesses of contact. The model
+  /// of the world must live as long.
   JoinedObjects(const WorldModel& world, IslandContent content, WorldState& state);
   /// The same rods and bodies without the threads, for steps of another kind. The state has the grasps of the welds.
   JoinedObjects(const JoinedObjects& other, const TimeConfig& time);

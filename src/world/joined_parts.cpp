@@ -22,13 +22,13 @@ IslandContent checked(const WorldModel& world, IslandContent content)
   for (const int k : content.threads)
   {
     const ThreadModel& model = *world.threads[k].model;
-    const ThreadTouch& touch = *world.threads[k].contact;
+    const double friction = world.threads[k].contact->friction, merging = world.threads[k].merging;
     checkThreadModel(model);
     const auto check_value = [&](bool good, const char* what, double value, const char* range) {
       need(good, "thread '" + model.name + "': " + what + " is " + std::to_string(value) + ", allowed: " + range);
     };
-    check_value(touch.friction >= 0.0 && std::isfinite(touch.friction), "friction", touch.friction, "zero or more");
-    check_value(touch.merging >= 0.0 && touch.merging < 1.0, "merging", touch.merging, "zero to 1 (exclusive)");
+    check_value(friction >= 0.0 && std::isfinite(friction), "friction", friction, "zero or more");
+    check_value(merging >= 0.0 && merging < 1.0, "merging", merging, "zero to 1 (exclusive)");
   }
   const bool simulates = !content.rods.empty() || std::any_of(content.bodies.begin(), content.bodies.end(),
                                                               [&](int b) { return world.bodies[b].body.simulated; });

@@ -48,7 +48,7 @@ bool JoinedParts::endsHaveRoom(const WorldState& state, const WorldInputs& input
         const double radius = strand.radius(end ? strand.edges() - 1 : 0);
         for (std::size_t o = 0; strand.ends[end].held && o < world_.obstacles.size(); ++o)
         {
-          const WorldModel::Obstacle& obstacle = world_.obstacles[o];
+          const Obstacle& obstacle = world_.obstacles[o];
           const Pose target = normalized(inputs.obstacles[o].X_WG);
           if ((to - target.position).norm() > boundingRadius(obstacle.shape) + radius)
             continue;
@@ -139,7 +139,7 @@ void JoinedParts::predict()
   for (std::size_t k = 0; k < objects_.threads.size(); ++k)
   {
     const JoinedThread& thread = objects_.threads[k];
-    const ThreadTouch& contact = *world_.threads[thread.index].contact;
+    const ContactProperties& contact = *world_.threads[thread.index].contact;
     IslandFinder::Reach& of_thread = reach_[objects_.partOfThread(k)];
     of_thread = {true, contact.others, contact.solids, false, BoundingBox::empty()};
     for (std::size_t s = 0; s < thread.work.threads.size(); ++s)
@@ -278,7 +278,8 @@ void JoinedParts::addStrand(JoinedThread& thread) const
   JoinedThread::Strand added;
   added.stepper = std::make_unique<ThreadStepper::Impl>(world_.threads[thread.index].model, world_.time.newton, false);
   added.part = std::make_unique<ThreadPart>(*added.stepper);
-  added.part->setContact(*world_.threads[thread.index].contact, thread.index);
+  const WorldModel::Thread& of = world_.threads[thread.index];
+  added.part->setContact(*of.contact, of.merging, thread.index);
   thread.strands.push_back(std::move(added));
 }
 
@@ -327,7 +328,7 @@ void JoinedParts::checkClearance(const WorldState& state)
     return;
   for (const JoinedSolid& solid : objects_.solids)
   {
-    ContactSolid touched{solid.shape, solid.friction, {}};
+    ContactSolid touched{solid.obstacle};
     const int index = solid.index;
     if (solid.kind == JoinedSolid::Kind::obstacle)
     {

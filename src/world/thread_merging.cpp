@@ -10,7 +10,7 @@ void ThreadMerging::begin(const Eigen::Matrix3Xd& x, const ContactSurface& surfa
   for (const ThreadPart* part : parts_)
   {
     const ThreadModel& model = *part->thread().model;
-    fluids_.push_back({part->contact().merging > 0.0, model.surface_tension, model.viscosity});
+    fluids_.push_back({part->merging() > 0.0, model.surface_tension, model.viscosity});
     for (int i = 0; i < part->points(); ++i)
       held_[static_cast<std::size_t>(part->first_point + i)] = part->thread().isHeld(i);
   }

@@ -52,9 +52,6 @@ public:
       rods(model.rods.size()),
       cloths(model.cloths.size())
   {
-    state.contact_stiffness.rods.resize(model.rods.size());
-    state.contact_stiffness.threads.resize(model.threads.size());
-    state.contact_stiffness.bodies.resize(model.bodies.size());
     addThreads(state);
     addCloths(true);
     addCloths(false);

@@ -21,7 +21,7 @@ Rod rope(int n, double length, double radius, double z, double youngs = 1e6)
 void touch(Group& g, double gap, double friction = 0.3)
 {
   for (WorldModel::Rod& rod : g.model.rods)
-    rod.contact = RodTouch{true, true, true, friction};
+    rod.contact = ContactProperties{true, true, true, friction};
   g.model.contact.gap = gap;
 }
 

@@ -35,7 +35,7 @@ struct Group
   }
   int addObstacle(const Shape& shape, const Pose& pose, double friction = -1.0)
   {
-    model.obstacles.push_back({"obstacle", shape, friction});
+    model.obstacles.push_back({shape, friction, "obstacle"});
     state.obstacles.push_back(pose);
     state.obstacle_velocities.push_back({});
     inputs.obstacles.push_back({pose, std::nullopt});
@@ -120,19 +120,18 @@ inline double clearance(const Group& g)
       start += s.length;
       surface.segments.push_back(s);
     }
-    surface.objects.push_back(
-        {start, m.closed, contact->self, contact->others, contact->solids, contact->friction, -1});
+    surface.objects.push_back({*contact, start, m.closed, -1});
     surface.points += m.nodes();
     points.conservativeResize(3, surface.points);
     points.rightCols(m.nodes()) = g.state.rods[r].x;
   }
   std::vector<Pose> solids = g.state.obstacles;
-  for (const WorldModel::Obstacle& obstacle : g.model.obstacles)
-    surface.solids.push_back({obstacle.shape, obstacle.friction, {}});
+  for (const Obstacle& obstacle : g.model.obstacles)
+    surface.solids.push_back({obstacle});
   for (std::size_t b = 0; b < g.model.bodies.size(); ++b)
     if (const WorldModel::Body& body = g.model.bodies[b]; body.shape)
     {
-      surface.solids.push_back({*body.shape, body.friction, {}});
+      surface.solids.push_back({body.solid()});
       solids.push_back(g.state.bodies[b].X_WB * body.X_BS);
     }
   return ContactPotential(surface, g.model.contact).clearance(points, solids);

@@ -20,9 +20,10 @@ struct ThreadWorld
     model.contact.least_stiffness = 1e-8;
     model.time.step = step;
   }
-  void add(const ThreadModel& m, const ThreadState& s, const ThreadInputs& in, const ThreadTouch& contact)
+  void add(const ThreadModel& m, const ThreadState& s, const ThreadInputs& in, const ContactProperties& contact = {},
+           double merging = 0.0)
   {
-    model.threads.push_back({std::make_shared<ThreadModel>(m), contact});
+    model.threads.push_back({std::make_shared<ThreadModel>(m), contact, merging});
     state.threads.emplace_back();
     state.threads.back().threads.push_back(s);
     state.end_loads.emplace_back();
@@ -30,7 +31,7 @@ struct ThreadWorld
   }
   void addObstacle(const Shape& shape, const Pose& pose, double friction)
   {
-    model.obstacles.push_back({"obstacle", shape, friction});
+    model.obstacles.push_back({shape, friction, "obstacle"});
     state.obstacles.push_back(pose);
     state.obstacle_velocities.emplace_back();
     inputs.obstacles.push_back({pose, {}});

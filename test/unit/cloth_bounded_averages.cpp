@@ -190,7 +190,7 @@ TEST(BoundedAverages, AreGivenUpWhereCollisionsForbidThem)
     ClothGroupModel model;
     model.cloths = {t.model};
     model.contact.resize(1);
-    ContactSolid floor;
+    Obstacle floor;
     floor.shape = Plane{};
     model.solids.push_back(floor);
     ClothGroup group(model, t.options);
@@ -262,7 +262,7 @@ TEST(BoundedAverages, HoldInContactWhateverTheTolerance)
     ClothGroupModel model;
     model.cloths = {t.model};
     model.contact.resize(1);
-    ContactSolid ball;
+    Obstacle ball;
     ball.shape = Sphere{0.1};
     model.solids.push_back(ball);
     ClothGroup group(model, t.options);

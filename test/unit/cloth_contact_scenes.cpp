@@ -116,10 +116,10 @@ TEST(ClothContact, ReadsItsKeys)
     return parseScene(one, "t", {"cloths.0.contact=" + text}).cloths[0].contact;
   };
   ASSERT_TRUE(contact("{}"));
-  EXPECT_TRUE(contact("{}")->self && contact("{}")->cloths && contact("{}")->obstacles);
+  EXPECT_TRUE(contact("{}")->self && contact("{}")->others && contact("{}")->solids);
   EXPECT_EQ(contact("{}")->thickness, 1e-3);
   const auto all = contact("{self: false, cloths: false, obstacles: false, friction: 0.1, thickness: 0.01}");
-  EXPECT_FALSE(all->self || all->cloths || all->obstacles);
+  EXPECT_FALSE(all->self || all->others || all->solids);
   EXPECT_EQ(all->friction, 0.1);
   EXPECT_EQ(all->thickness, 0.01);
   EXPECT_FALSE(parseScene("cloths: [{grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: 2}}]", "t").cloths[0].contact);

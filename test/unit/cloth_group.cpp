@@ -24,7 +24,7 @@ struct Cloths
     cloth.bending_modulus = 1e-6;
     cloth.stiffness_damping = 1e-3;
     model.cloths.push_back(std::make_shared<ClothModel>(cloth));
-    ClothContact contact;
+    ContactProperties contact;
     contact.thickness = 4e-3;
     contact.friction = friction;
     model.contact.push_back(contact);

@@ -268,7 +268,7 @@ TEST(ClothPlasticity, FlowsFromWhatCollisionsLeave)
   ClothGroupModel group;
   auto model = std::make_shared<ClothModel>(strip({0.5, 0.2, 0.0}));
   group.cloths.push_back(model);
-  group.contact.push_back({4e-3, 0.3, true, true, true});
+  group.contact.push_back({true, true, true, 0.3, 4e-3});
   group.solids.push_back({Capsule{0.02, 0.3}, 0.3, {}});
   ClothGroup stepper(group, {});
   ClothGroupState state;

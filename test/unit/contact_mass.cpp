@@ -77,7 +77,7 @@ TEST(ContactPotential, RefusesBadSurfaces)
   ContactSurface surface;
   surface.points = 2;
   surface.segments.push_back({0, 1, 0.01, 0, 0.0, 0.1});
-  surface.objects.push_back({});
+  surface.objects.push_back({{true, true, true, 0.0}});
   ContactOptions options;
   EXPECT_THROW(ContactPotential(surface, options), std::invalid_argument);   // no gap
   options.gap = 0.01;
@@ -94,7 +94,7 @@ TEST(ContactPotential, AdaptsItsStiffnessToTheLoad)
   ContactSurface surface;
   surface.points = 2;
   surface.segments.push_back({0, 1, 0.01, 0, 0.0, 0.1});
-  surface.objects.push_back({});
+  surface.objects.push_back({{true, true, true, 0.0}});
   surface.solids.push_back({Plane{}, -1.0, {}});
   ContactOptions options;
   options.gap = 1e-3;

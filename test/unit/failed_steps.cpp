@@ -368,7 +368,7 @@ TEST(FailedSteps, RefusalsOfThreadsInContactLeaveNothing)
     ThreadState thread = makeThread(x, Eigen::VectorXd::Constant(12, 1e-3));
     for (Eigen::Vector3d& v : thread.v)
       v.z() = k == 1 ? -0.02 : 0.0;
-    cross.add(syrup, thread, ThreadInputs{}, ThreadTouch{});
+    cross.add(syrup, thread, ThreadInputs{});
   }
   WorldInputs spoilt = cross.inputs;
   spoilt.threads[1].gravity = {1e200, 0, -1e300};

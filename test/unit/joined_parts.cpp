@@ -243,7 +243,8 @@ TEST(JoinedParts, IterativeAndDirectSolutionsAgree)
   int linear = 0;
   for (int k = 0; k < 25; ++k)
   {
-    const StepReport factored = direct.step(direct.defaultInputs()), iterated = iterative.step(iterative.defaultInputs()),
+    const StepReport factored = direct.step(direct.defaultInputs()),
+                     iterated = iterative.step(iterative.defaultInputs()),
                      chosen = automatic.step(automatic.defaultInputs());
     ASSERT_TRUE(factored.ok && iterated.ok && chosen.ok) << k;
     EXPECT_EQ(factored.linear_iterations, 0);

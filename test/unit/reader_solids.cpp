@@ -60,14 +60,14 @@ TEST(ReaderSolids, readsContact)
   EXPECT_DOUBLE_EQ(scene.contact.gap, 0.0002);   // of the rope's smaller half axis; the ring takes no part
   EXPECT_EQ(scene.contact.slip_speed, 1e-3);
   ASSERT_TRUE(scene.rods[0].contact);
-  EXPECT_TRUE(scene.rods[0].contact->self && scene.rods[0].contact->rods && scene.rods[0].contact->obstacles);
+  EXPECT_TRUE(scene.rods[0].contact->self && scene.rods[0].contact->others && scene.rods[0].contact->solids);
   EXPECT_EQ(scene.rods[0].contact->friction, 0.5);
   EXPECT_FALSE(scene.rods[1].contact);
   const SceneConfig other =
       parseScene(good_scene, "t", {"rods.1.contact={self: false, rods: no}", "contact.gap=0.003"});
   EXPECT_EQ(other.contact.gap, 0.003);
   ASSERT_TRUE(other.rods[1].contact);
-  EXPECT_FALSE(other.rods[1].contact->self || other.rods[1].contact->rods);
+  EXPECT_FALSE(other.rods[1].contact->self || other.rods[1].contact->others);
   EXPECT_EQ(other.rods[1].contact->friction, 0.3);
   EXPECT_TRUE(parseScene("rods: [{contact: {}}]").rods[0].contact);
   EXPECT_EQ(parseScene("rods: [{}]").contact.gap, 0);
@@ -85,7 +85,7 @@ TEST(ReaderSolids, readsObstacles)
   EXPECT_TRUE(std::holds_alternative<FixedMotion>(floor.motion));
   EXPECT_EQ(std::get<Cylinder>(pin.shape).length, 0.3);
   EXPECT_LT((pin.pose * Eigen::Vector3d(0, 0, 1) - Eigen::Vector3d(1, 1, 0)).norm(), 1e-12);
-  EXPECT_FALSE(pin.friction);
+  EXPECT_LT(pin.friction, 0.0);
   EXPECT_EQ(std::get<Box>(door.shape).size, Eigen::Vector3d(1, 0.1, 2));
   EXPECT_EQ(door.pose.position, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(std::get<TableMotion>(door.motion).poses.evaluate(2).position.x(), 2);

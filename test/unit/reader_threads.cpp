@@ -229,7 +229,7 @@ TEST(ThreadContactReader, ReadsWhatTouches)
   EXPECT_EQ(a.merging, 0.5);
   EXPECT_EQ(*a.floor->friction, 0.2);
   EXPECT_FALSE(b.contact->self);
-  EXPECT_TRUE(b.contact->threads);
+  EXPECT_TRUE(b.contact->others);
   EXPECT_EQ(b.contact->friction, 0.3);
   EXPECT_EQ(b.merging, 0.0);
   EXPECT_DOUBLE_EQ(scene.contact.gap, 0.1 * 0.001);   // a quarter of the nozzle's radius is less than the bridge's

@@ -129,11 +129,10 @@ struct Pair : ThreadWorld
     ThreadModel m = syrup();
     m.density = 1;
     m.surface_tension = 0.05;
-    ThreadTouch touch;
-    touch.merging = merging;
-    touch.friction = friction;
+    ContactProperties contact;
+    contact.friction = friction;
     for (int k = 0; k < 2; ++k)
-      add(m, straight(0.02, 20, r, {0, 0, (2 * k - 1) * r}), weightless(), touch);
+      add(m, straight(0.02, 20, r, {0, 0, (2 * k - 1) * r}), weightless(), contact, merging);
   }
   double distance() const { return (state.threads[1].threads[0].x[10] - state.threads[0].threads[0].x[10]).norm(); }
 };
@@ -208,9 +207,7 @@ TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
     m.limits.max_edge_length = 0.005;
     const Thread t = Thread::fromNozzle(m, {0, 0, 0.06}, 0.05);
     ThreadWorld touching(3e-4, 0.002);
-    ThreadTouch touch;
-    touch.merging = merging ? 0.6 : 0.0;
-    touching.add(m, t.state, t.inputs, touch);
+    touching.add(m, t.state, t.inputs, {}, merging ? 0.6 : 0.0);
     World threads(touching.model, touching.state);
     ThreadGroup group(std::make_shared<ThreadModel>(m), NewtonConfig{});
     ThreadGroupState alone;
@@ -287,7 +284,7 @@ TEST(TouchingThreads, MergedThreadsOfUnequalRadiiStayAtTheDistanceAskedFor)
 /// Honey that coils on a plate.
 struct Coil : ThreadWorld
 {
-  Coil(double gap, const ThreadTouch& touch, double viscosity, double surface_tension) : ThreadWorld(gap, 0.002)
+  Coil(double gap, double merging, double viscosity, double surface_tension) : ThreadWorld(gap, 0.002)
   {
     ThreadModel m = honey();
     m.viscosity = viscosity;
@@ -300,7 +297,7 @@ struct Coil : ThreadWorld
     const Thread t = Thread::fromNozzle(m, {0, 0, 0.06}, 0.05);
     ThreadState s = t.state;
     s.x[0].x() += 1e-4;
-    add(m, s, t.inputs, touch);
+    add(m, s, t.inputs, {}, merging);
   }
 };
 
@@ -314,9 +311,7 @@ TEST(TouchingThreads, ACoilPilesUpAndNothingPassesThrough)
   for (const auto& c : cases)
   {
     const bool merging = c.merging;
-    ThreadTouch touch;
-    touch.merging = merging ? 0.6 : 0.0;
-    Coil coil(3e-4, touch, c.viscosity, c.surface_tension);
+    Coil coil(3e-4, merging ? 0.6 : 0.0, c.viscosity, c.surface_tension);
     World threads(coil.model, coil.state);
     const double start = coil.state.threads[0].volumeBalance();
     double least = 1e9;
@@ -355,7 +350,7 @@ TEST(TouchingThreads, ContactConservesMomentum)
           : s;
     for (auto& v : s.v)
       v.z() = k ? -0.5 : 0.7;
-    cross.add(m, s, weightless(), ThreadTouch{});
+    cross.add(m, s, weightless());
   }
   World threads(cross.model, cross.state);
   const auto momentum = [&] {
@@ -381,7 +376,7 @@ TEST(TouchingThreads, AThreadSagsOverAMovingObstacle)
   ThreadModel m = syrup();
   m.viscosity = 1000;
   ThreadInputs in;
-  over.add(m, straight(0.1, 40, 1.5e-3, {0, 0, 0.0137}), in, ThreadTouch{});
+  over.add(m, straight(0.1, 40, 1.5e-3, {0, 0, 0.0137}), in);
   over.addObstacle(Sphere{0.012}, Pose{}, 0.5);
   World threads(over.model, over.state);
   double least = 1e9;
@@ -413,7 +408,7 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
     m.surface_tension = 0;
     m.viscosity = 1e3;
     const Vector3d normal(0, -std::sin(tilt), std::cos(tilt)), down(0, -std::cos(tilt), -std::sin(tilt));
-    ThreadTouch touch;
+    ContactProperties touch;
     touch.friction = 1.0;
     slope.add(m, straight(0.02, 10, 1e-3, 1.01e-3 * normal), ThreadInputs{}, touch);
     slope.addObstacle(Plane{}, {Vector3d::Zero(), Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal)},
@@ -436,7 +431,7 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
   EXPECT_THROW(ThreadStepper(std::make_shared<ThreadModel>(m), NewtonConfig{}), std::invalid_argument);
   ThreadInputs in;
   in.belt_velocity << 0.0, 0.5, 0.0;
-  ThreadTouch touch;
+  ContactProperties touch;
   touch.friction = 0.25;
   belt.add(m, straight(0.02, 10, 1e-3, {0, 0, 1.01e-3}), in, touch);
   World threads(belt.model, belt.state);
@@ -456,12 +451,10 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
 TEST(TouchingThreads, RefusesWhatDoesNotFit)
 {
   ThreadWorld bad(1e-4, 1e-3);
-  ThreadTouch touch;
-  touch.merging = 1.0;
-  bad.add(syrup(), straight(0.02, 4, 1e-3, Vector3d::Zero()), weightless(), touch);
+  bad.add(syrup(), straight(0.02, 4, 1e-3, Vector3d::Zero()), weightless(), {}, 1.0);
   EXPECT_THROW(World(bad.model, bad.state), WorldError);
-  bad.model.threads[0].contact->merging = 0.0;
-  bad.add(syrup(), straight(0.02, 4, 1e-3, {0, 0, 1.9e-3}), weightless(), ThreadTouch{});
+  bad.model.threads[0].merging = 0.0;
+  bad.add(syrup(), straight(0.02, 4, 1e-3, {0, 0, 1.9e-3}), weightless());
   EXPECT_THROW(World(bad.model, bad.state), WorldError);   // they overlap
   for (Vector3d& x : bad.state.threads[1].threads[0].x)
     x.z() = 2.5e-3;

@@ -13,21 +13,13 @@
 
 namespace slender {
 
-struct ClothContact
-{
-  double thickness = 1e-3;   ///< [m] > 0
-  double friction = 0.3;     ///< Coulomb
-  bool self = true, others = true, solids = true;
-};
-
 /// Cloths that touch themselves, each other and solids.
 struct ClothGroupModel
 {
   std::vector<std::shared_ptr<const ClothModel>> cloths;
-  std::vector<ClothContact> contact;      ///< of each cloth
-  std::vector<ClothOptions> options;      ///< of each cloth; empty: those of the group
-  std::vector<ContactSolid> solids;       ///< `ignores` names cloths
-  std::vector<std::string> solid_names;   ///< for messages; may be shorter or empty
+  std::vector<ContactProperties> contact;   ///< of each cloth
+  std::vector<ClothOptions> options;        ///< of each cloth; empty: those of the group
+  std::vector<Obstacle> solids;
 };
 
 struct ClothGroupState

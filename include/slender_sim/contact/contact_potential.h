@@ -7,7 +7,8 @@
 #include <Eigen/Core>
 
 #include "slender_sim/contact/broad_phase.h"
-#include "slender_sim/contact/shape.h"
+#include "slender_sim/contact/contact_properties.h"
+#include "slender_sim/contact/obstacle.h"
 #include "slender_sim/geometry/pose.h"
 
 namespace slender {
@@ -28,22 +29,18 @@ struct ContactSegment
 
 /// What a curve (later: a surface) touches. Pieces of one curve that are closer along it than about a quarter of a turn
 /// at its tightest are neighbours and never a pair.
-struct ContactObject
+struct ContactObject : ContactProperties
 {
   double curve_length = 0.0;   ///< [m]
   bool closed = false;
-  bool self = true, others = true, solids = true;
-  double friction = 0.0;   ///< Coulomb [-]
-  int owner = 0;           ///< see ContactSolid::only
+  int owner = 0;   ///< see ContactSolid::only
 };
 
-/// An obstacle or a rigid body: a shape that moves rigidly.
-struct ContactSolid
+/// A solid of a contact surface, which moves rigidly, and which objects of the surface pass through it.
+struct ContactSolid : Obstacle
 {
-  Shape shape;
-  double friction = -1.0;     ///< negative: that of whatever touches it; otherwise the geometric mean of both counts
-  std::vector<int> ignores;   ///< objects it never touches
-  int only = -1;              ///< touches nothing but the objects of this owner; -1: those of all
+  std::vector<int> ignores{};   ///< objects it never touches
+  int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
 };
 
 struct ContactSurface

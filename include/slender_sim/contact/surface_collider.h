@@ -12,12 +12,9 @@
 namespace slender {
 
 /// A sheet of cloth among the points of a CollisionSurface.
-struct CollisionSheet
+struct CollisionSheet : ContactProperties
 {
   Eigen::Matrix3Xi triangles;   ///< corners: points
-  double thickness = 1e-3;      ///< distance of two sheets in contact [m] > 0; half of it from a solid
-  double friction = 0.3;        ///< Coulomb; of two sheets the geometric mean counts
-  bool self = true, others = true, solids = true;
 };
 
 /// What collides. Solids' `ignores` name sheets.

@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "slender_sim/cloth/cloth_stepper.h"
-#include "slender_sim/contact/shape.h"
+#include "slender_sim/contact/contact_properties.h"
+#include "slender_sim/contact/obstacle.h"
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/number_table.h"
 #include "slender_sim/geometry/pose.h"
@@ -192,15 +193,6 @@ enum class Stretching
   projected
 };
 
-/// What a rod touches.
-struct RodContact
-{
-  bool self = true;
-  bool rods = true;        ///< other rods that have this set, too
-  bool obstacles = true;   ///< obstacles and bodies
-  double friction = 0.3;   ///< Coulomb [-] >= 0
-};
-
 struct RodConfig
 {
   std::string name;
@@ -223,8 +215,8 @@ struct RodConfig
   Material material;
   Damping damping;
   std::vector<GraspConfig> grasps;
-  std::vector<RodLoadConfig> loads;    ///< dead point loads, in statics and in dynamics
-  std::optional<RodContact> contact;   ///< nothing: touches nothing
+  std::vector<RodLoadConfig> loads;           ///< dead point loads, in statics and in dynamics
+  std::optional<ContactProperties> contact;   ///< nothing: touches nothing
   /// what it follows (`track`), with one set of test functions; null: nothing
   std::shared_ptr<const TrackingConfig> tracking;
 };
@@ -237,12 +229,10 @@ struct ContactConfig
   double slip_speed = 1e-4;   ///< friction sticks below it [m/s] > 0
 };
 
-struct ObstacleConfig
+/// An obstacle with its motion.
+struct ObstacleConfig : Obstacle
 {
-  std::string name;
-  Shape shape = Plane{};
-  Pose pose;                        ///< of the shape, where the scene starts
-  std::optional<double> friction;   ///< [-]; nothing: that of the rod
+  Pose pose;   ///< of the shape, where the scene starts
   GivenMotion motion = FixedMotion{};
 };
 
@@ -300,15 +290,6 @@ struct FloorConfig
   std::optional<double> friction;   ///< it slips with this coefficient of Coulomb [-]; nothing: it sticks
 };
 
-/// What a thread touches.
-struct ThreadContactConfig
-{
-  bool self = true;
-  bool threads = true;   ///< other threads that have this set, too, and parts that broke off
-  bool obstacles = true;
-  double friction = 0.3;   ///< Coulomb [-] >= 0
-};
-
 /// A thread that leaves a nozzle, or one that is there from the start: one of `nozzle` and `centerline`.
 struct ThreadConfig
 {
@@ -332,7 +313,7 @@ struct ThreadConfig
   double breakup_radius = 0.0;
   int most_deposited = 0;                                 ///< nodes on the floor; 0: all are kept
   std::optional<std::array<Eigen::Vector3d, 2>> region;   ///< corners; what lies outside is dropped, oldest first
-  std::optional<ThreadContactConfig> contact;             ///< nothing: touches nothing but the floor
+  std::optional<ContactProperties> contact;               ///< nothing: touches nothing but the floor
   /// parts in touch are drawn together down to this share of the sum of their radii; 0: never
   double merging = 0.0;
 };
@@ -352,16 +333,6 @@ struct ClothGrid
   Eigen::Vector3d corner{0, 0, 0};   ///< lower left [m]
   /// to the lower right, to the upper left; at right angles
   std::array<Eigen::Vector3d, 2> sides{Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)};
-};
-
-/// What a cloth touches.
-struct ClothContactConfig
-{
-  bool self = true;
-  bool cloths = true;        ///< other cloths that have this set, too
-  bool obstacles = true;     ///< obstacles and driven bodies
-  double friction = 0.3;     ///< Coulomb [-] >= 0
-  double thickness = 1e-3;   ///< distance of two layers in contact [m] > 0; half of it from an obstacle
 };
 
 /// A grasp's frame has its origin at the mean of the held vertices and the world's axes when it takes hold; then it
@@ -393,7 +364,7 @@ struct ClothConfig
   std::vector<GraspConfig> grasps;
   std::vector<ClothLoadConfig> loads;               ///< dead loads on vertices, in statics and in dynamics
   std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`tracked`); null: nothing
-  std::optional<ClothContactConfig> contact;        ///< nothing: touches nothing
+  std::optional<ContactProperties> contact;         ///< nothing: touches nothing
 };
 
 /// How a scene starts.

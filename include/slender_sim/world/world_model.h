@@ -7,11 +7,11 @@
 
 #include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_properties.h"
+#include "slender_sim/contact/obstacle.h"
 #include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_model.h"
-#include "slender_sim/rod/rod_touch.h"
 #include "slender_sim/thread/thread_model.h"
-#include "slender_sim/thread/thread_touch.h"
 #include "slender_sim/tracking/function_set.h"
 
 namespace slender {
@@ -31,19 +31,23 @@ struct WorldModel
   struct Rod
   {
     std::shared_ptr<const RodModel> model;
-    std::optional<RodTouch> contact;   ///< nothing: touches nothing
-    TrackedGuide tracked;              ///< with one set
+    std::optional<ContactProperties> contact;   ///< nothing: touches nothing
+    TrackedGuide tracked;                       ///< with one set
   };
   struct Thread
   {
     std::shared_ptr<const ThreadModel> model;
-    std::optional<ThreadTouch> contact;   ///< nothing: touches nothing but its floor
+    std::optional<ContactProperties> contact;   ///< nothing: touches nothing but its floor
+    /// Surface tension draws parts that touch into each other (thesis 5.4.3), until the distance of their centrelines
+    /// is this share of the sum of their radii; there they touch. In [0, 1); 0: they do not merge. Half discs of one
+    /// round section have their centroids at 0.6.
+    double merging = 0.0;
   };
   struct Cloth
   {
     std::shared_ptr<const ClothModel> model;
     ClothOptions options;
-    std::optional<ClothContact> contact;   ///< nothing: touches nothing
+    std::optional<ContactProperties> contact;   ///< nothing: touches nothing
     TrackedGuide tracked;
   };
   struct Body
@@ -51,14 +55,10 @@ struct WorldModel
     RigidBodyModel body;
     std::optional<Shape> shape;   ///< that other parts touch; nothing: they pass through the body
     Pose X_BS;                    ///< the shape in the body's frame
-    double friction = -1.0;       ///< negative: that of what touches it
-  };
-  /// A solid whose motion is an input.
-  struct Obstacle
-  {
-    std::string name;
-    Shape shape;
-    double friction = -1.0;   ///< negative: that of what touches it
+    double friction = -1.0;       ///< as Obstacle::friction
+
+    /// What others touch. There must be a shape.
+    Obstacle solid() const { return {*shape, friction, body.name}; }
   };
   /// Holds nodes first..last of a rod as they lie in a body at the start.
   struct RodWeld
@@ -70,9 +70,9 @@ struct WorldModel
   std::vector<Thread> threads;
   std::vector<Cloth> cloths;
   std::vector<Body> bodies;
-  std::vector<Obstacle> obstacles;
-  std::vector<RodWeld> welds;   ///< ascending by body
-  ContactOptions contact;       ///< of rods and threads; `least_stiffness` is chosen by what touches
+  std::vector<Obstacle> obstacles;   ///< whose motions are inputs
+  std::vector<RodWeld> welds;        ///< ascending by body
+  ContactOptions contact;            ///< of rods and threads; `least_stiffness` is chosen by what touches
   TimeConfig time;
 
   /// Whether a cloth is the guide of another one. Such cloths are stepped first and meet only each other.

@@ -24,7 +24,7 @@ struct GuideState
 };
 
 /// Stiffness of the barrier of contact per part [N]; 0: not chosen yet. Parts of one island have the same. The lists
-/// are as long as those of the state.
+/// are as long as those of the state, or empty where no rod, thread or body can meet another part.
 struct ContactStiffness
 {
   std::vector<double> rods, threads, bodies;

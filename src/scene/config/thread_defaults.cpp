@@ -79,7 +79,7 @@ Falls fallsOf(const SceneConfig& scene, const ThreadConfig& thread)
     for (int k = 0; k <= kLooks; ++k)
       places.push_back(table->poses.evaluate(first + (end - first) * k / kLooks).position);
   }
-  const bool meets = thread.contact && thread.contact->obstacles && scene.gravity.norm() > 0;
+  const bool meets = thread.contact && thread.contact->solids && scene.gravity.norm() > 0;
   for (const Eigen::Vector3d& place : places)
   {
     double height = thread.floor ? place.z() - thread.floor->height : kUnknown;
@@ -164,7 +164,7 @@ void checkHeight(const Falls& falls, const ThreadConfig& thread, const YamlCurso
   const YamlCursor place = std::holds_alternative<TableMotion>(nozzle.motion) ? map.get("motion") : map.get("position");
   const double radius = 0.5 * nozzle.diameter;
   const std::string what =
-      thread.floor && !(thread.contact && thread.contact->obstacles) ? "its floor" : "what it flows onto";
+      thread.floor && !(thread.contact && thread.contact->solids) ? "its floor" : "what it flows onto";
   if (!(falls.least > radius))
   {
     place.problem("brings the nozzle to " + millimetres(falls.least) + " above " + what +

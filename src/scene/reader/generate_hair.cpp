@@ -30,7 +30,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   head.pose.position = head_map.get("center").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
   const double head_radius = head_map.get("radius").number(kGeneratorLength).value_or(0.1);
   head.shape = Sphere{head_radius};
-  head.friction = head_map.get("friction").number(Range::closed(0, 100));
+  assign(head.friction, head_map.get("friction").number(Range::closed(0, 100)));
   const YamlCursor motion = head_map.get("motion");
   assign(head.motion, readSolidMotion(motion, context, false));
   head_map.finish();

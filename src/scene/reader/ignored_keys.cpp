@@ -62,7 +62,7 @@ void warnOfWind(const YamlCursor& wind, const SceneConfig& scene)
 /// An obstacle that nothing touches is of use only as the frame that grasps follow.
 void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
 {
-  const auto touches = [](const auto& object) { return object.contact && object.contact->obstacles; };
+  const auto touches = [](const auto& object) { return object.contact && object.contact->solids; };
   if (any(scene.rods, touches) || any(scene.threads, touches) || any(scene.cloths, touches))
     return;
   const auto follows = [&scene](const std::string& name) {
@@ -135,7 +135,7 @@ void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene
 /// Returns why the friction of a solid has no effect, or an empty text.
 std::string whyNoFriction(const SceneConfig& scene)
 {
-  const auto touches = [](const auto& object) { return object.contact && object.contact->obstacles; };
+  const auto touches = [](const auto& object) { return object.contact && object.contact->solids; };
   const auto slips = [&touches](const auto& object) { return touches(object) && object.contact->friction > 0; };
   if (!any(scene.rods, touches) && !any(scene.threads, touches) && !any(scene.cloths, touches))
     return "nothing touches it; give the rods, threads or cloths a contact with obstacles, or leave friction out";

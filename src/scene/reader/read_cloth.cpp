@@ -261,21 +261,6 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
   }
 }
 
-std::optional<ClothContactConfig> readClothContact(const YamlCursor& at)
-{
-  if (!at.present())
-    return std::nullopt;
-  ClothContactConfig contact;
-  YamlMap map(at);
-  assign(contact.self, map.get("self").boolean());
-  assign(contact.cloths, map.get("cloths").boolean());
-  assign(contact.obstacles, map.get("obstacles").boolean());
-  assign(contact.friction, map.get("friction").number(Range::closed(0, 100)));
-  assign(contact.thickness, map.get("thickness").number(Range::above(0, 1, "m")));
-  map.finish();
-  return contact;
-}
-
 ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
   ClothConfig cloth;
@@ -336,7 +321,7 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
   assign(cloth.one_newton_step, solver.get("one_newton_step").boolean());
   solver.finish();
   readGrasps(map.get("grasps"), context, cloth);
-  cloth.contact = readClothContact(map.get("contact"));
+  cloth.contact = readContactProperties(map.get("contact"), "cloths", true);
 }
 
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context)

@@ -77,7 +77,10 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
 std::optional<Pose> readPose(const YamlCursor& at);
 /// `pose` may be replaced by the shape (a plane by point and normal).
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
-std::optional<RodContact> readRodContact(const YamlCursor& at);
+/// What a rod, a thread or a cloth touches. `others`: the key for contact with objects of the same kind. Cloth has the
+/// key `thickness` as well.
+std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others,
+                                                       bool has_thickness = false);
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context);
 /// Chooses the edges and the break-up radius of threads whose entries `at` do not give them, and says what is not
 /// resolved. All other objects of the scene, its gravity and its time have been read.
@@ -87,7 +90,6 @@ std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& con
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
 ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
                           const std::vector<ThreadConfig>& threads);
-std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods);
 TimeConfig readTime(const YamlCursor& at);

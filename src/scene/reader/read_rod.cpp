@@ -324,7 +324,7 @@ void readTraits(YamlMap& map, RodConfig& rod)
       map.get("stretching").choice<Stretching>({{"stiff", Stretching::stiff}, {"projected", Stretching::projected}}));
   rod.material = readMaterial(map.get("material"));
   rod.damping = readDamping(map.get("damping"));
-  rod.contact = readRodContact(map.get("contact"));
+  rod.contact = readContactProperties(map.get("contact"), "rods");
 }
 
 ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)

@@ -182,32 +182,20 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
   return shape;
 }
 
-namespace {
-
-/// Reads the contact of rods or threads. `others`: the key for contact with objects of the same kind, and the member
-/// that it sets.
-template <class Contact>
-std::optional<Contact> readTouch(const YamlCursor& at, const char* others, bool Contact::*touches_others)
+std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others, bool has_thickness)
 {
   if (!at.present())
     return std::nullopt;
-  Contact contact;
+  ContactProperties contact;
   YamlMap map(at);
   assign(contact.self, map.get("self").boolean());
-  assign(contact.*touches_others, map.get(others).boolean());
-  assign(contact.obstacles, map.get("obstacles").boolean());
+  assign(contact.others, map.get(others).boolean());
+  assign(contact.solids, map.get("obstacles").boolean());
   assign(contact.friction, map.get("friction").number(friction));
+  if (has_thickness)
+    assign(contact.thickness, map.get("thickness").number(Range::above(0, 1, "m")));
   map.finish();
   return contact;
-}
-
-}   // namespace
-
-std::optional<RodContact> readRodContact(const YamlCursor& at) { return readTouch(at, "rods", &RodContact::rods); }
-
-std::optional<ThreadContactConfig> readThreadContact(const YamlCursor& at)
-{
-  return readTouch(at, "threads", &ThreadContactConfig::threads);
 }
 
 ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
@@ -266,7 +254,7 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
     const YamlCursor at_pose = map.get("pose");
     std::optional<Pose> pose = readPose(at_pose);
     assign(obstacle.shape, readShape(map.require("shape"), context, pose));
-    obstacle.friction = map.get("friction").number(friction);
+    assign(obstacle.friction, map.get("friction").number(friction));
     assign(obstacle.motion, readSolidMotion(map.get("motion"), context, false));
     if (const auto* table = std::get_if<TableMotion>(&obstacle.motion))
     {

@@ -235,9 +235,9 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
   const YamlCursor floor = map.get("floor");
   if (floor.present())
     thread.floor = readFloor(floor);
-  thread.contact = readThreadContact(map.get("contact"));
+  thread.contact = readContactProperties(map.get("contact"), "threads");
   readMerging(map.get("merging"), thread);
-  if (thread.floor && thread.floor->friction && !(thread.contact && thread.contact->obstacles))
+  if (thread.floor && thread.floor->friction && !(thread.contact && thread.contact->solids))
   {
     YamlMap(floor)
         .get("friction")

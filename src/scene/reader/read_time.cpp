@@ -36,10 +36,10 @@ TimeConfig readTime(const YamlCursor& at)
   assign(time.newton.tolerance, newton.get("tolerance").number(Range::between(1e-14, 1e-1)));
   assign(time.newton.max_iterations, newton.get("max_iterations").integer(1, 1000));
   assign(time.newton.max_cuts, newton.get("max_cuts").integer(0, 30));
-  assign(time.island_solver, newton.get("linear").choice<IslandSolver>(
-                                 {{"auto", IslandSolver::automatic},
-                                  {"cholesky", IslandSolver::cholesky},
-                                  {"conjugate_gradients", IslandSolver::conjugate_gradients}}));
+  assign(time.island_solver,
+         newton.get("linear").choice<IslandSolver>({{"auto", IslandSolver::automatic},
+                                                    {"cholesky", IslandSolver::cholesky},
+                                                    {"conjugate_gradients", IslandSolver::conjugate_gradients}}));
   newton.finish();
   map.finish();
   return time;

@@ -138,7 +138,7 @@ void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cl
                                  [](const BodyConfig& b) { return !b.motion && b.shape && b.contact; });
   for (std::size_t k = 0; body != scene.bodies.end() && k < cloths.size(); ++k)
   {
-    if (scene.cloths[k].contact && scene.cloths[k].contact->obstacles)
+    if (scene.cloths[k].contact && scene.cloths[k].contact->solids)
     {
       YamlMap(cloths[k]).get("contact").problem(
           "body " + body->name +

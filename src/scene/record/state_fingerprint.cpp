@@ -36,6 +36,14 @@ std::uint64_t stateFingerprint(const SceneConfig& config, const WorldModel& worl
       }
     }
   };
+  const auto touching = [&out](const std::optional<ContactProperties>& contact) {
+    const ContactProperties touch = contact.value_or(ContactProperties{});
+    out(contact.has_value());
+    out(touch.self);
+    out(touch.others);
+    out(touch.solids);
+    out(touch.friction);
+  };
   out(config.gravity);
   const TimeConfig& time = config.time;
   out(time.step);
@@ -77,12 +85,7 @@ std::uint64_t stateFingerprint(const SceneConfig& config, const WorldModel& worl
     }
     if (const auto& tracking = config.rods[r].tracking)
       tracked(*tracking);
-    const RodContact touch = config.rods[r].contact.value_or(RodContact{});
-    out(config.rods[r].contact.has_value());
-    out(touch.self);
-    out(touch.rods);
-    out(touch.obstacles);
-    out(touch.friction);
+    touching(config.rods[r].contact);
   }
   for (const WorldModel::Thread& thread : world.threads)
   {
@@ -99,12 +102,7 @@ std::uint64_t stateFingerprint(const SceneConfig& config, const WorldModel& worl
   }
   for (const ThreadConfig& thread : config.threads)
   {
-    const ThreadContactConfig touch = thread.contact.value_or(ThreadContactConfig{});
-    out(thread.contact.has_value());
-    out(touch.self);
-    out(touch.threads);
-    out(touch.obstacles);
-    out(touch.friction);
+    touching(thread.contact);
     out(thread.merging);
   }
   for (std::size_t k = 0; k < world.cloths.size(); ++k)
@@ -132,13 +130,8 @@ std::uint64_t stateFingerprint(const SceneConfig& config, const WorldModel& worl
     out(config.cloths[k].one_newton_step);
     if (const auto& tracking = config.cloths[k].tracking)
       tracked(*tracking);
-    const ClothContactConfig touch = config.cloths[k].contact.value_or(ClothContactConfig{});
-    out(config.cloths[k].contact.has_value());
-    out(touch.self);
-    out(touch.cloths);
-    out(touch.obstacles);
-    out(touch.friction);
-    out(touch.thickness);
+    touching(config.cloths[k].contact);
+    out(config.cloths[k].contact.value_or(ContactProperties{}).thickness);
     for (const GraspConfig& grasp : config.cloths[k].grasps)
     {
       text(grasp.name);

@@ -91,8 +91,7 @@ void addCloth(SceneConfig& scene, int k, SceneParts& parts)
   WorldModel::Cloth cloth;
   cloth.model = std::make_shared<const ClothModel>(modelOf(config, scene.warnings));
   cloth.options = optionsOf(config, scene.time);
-  if (const auto& contact = config.contact)
-    cloth.contact = {contact->thickness, contact->friction, contact->self, contact->cloths, contact->obstacles};
+  cloth.contact = config.contact;
   ClothState state = makeClothState(*cloth.model, config.start.cols() ? config.start : config.mesh.vertices);
   if (config.start_velocity.cols())
     state.v = config.start_velocity;
@@ -139,7 +138,7 @@ void checkContact(SceneConfig& scene, const WorldModel& model)
 {
   const auto meetsOthers = [&](bool leads) {
     for (int k = 0; k < static_cast<int>(scene.cloths.size()); ++k)
-      if (scene.cloths[k].contact && scene.cloths[k].contact->cloths && model.leads(k) == leads)
+      if (scene.cloths[k].contact && scene.cloths[k].contact->others && model.leads(k) == leads)
         return k;
     return -1;
   };
@@ -150,9 +149,8 @@ void checkContact(SceneConfig& scene, const WorldModel& model)
                              scene.cloths[other].name +
                              " and all others that are no guides. Give both contact: {cloths: false} if that is meant");
   }
-  const bool obstacles = std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
-    return cloth.contact && cloth.contact->obstacles;
-  });
+  const bool obstacles = std::any_of(scene.cloths.begin(), scene.cloths.end(),
+                                     [](const ClothConfig& cloth) { return cloth.contact && cloth.contact->solids; });
   for (const BodyConfig& body : scene.bodies)
   {
     if (obstacles && body.shape && body.contact && !body.motion)

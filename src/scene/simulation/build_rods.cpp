@@ -166,8 +166,7 @@ void addRod(SceneConfig& scene, int r, SceneParts& parts)
   parts.inputs.rods.push_back(loadsOf(scene, r, built.model));
   WorldModel::Rod part;
   part.model = std::make_shared<const RodModel>(std::move(built.model));
-  if (const auto& contact = rod.contact)
-    part.contact = RodTouch{contact->self, contact->rods, contact->obstacles, contact->friction};
+  part.contact = rod.contact;
   part.tracked = trackedBy(scene, r);
   parts.model.rods.push_back(std::move(part));
   parts.state.rods.push_back(std::move(state));

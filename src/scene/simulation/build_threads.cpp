@@ -93,8 +93,8 @@ void buildThreads(const SceneConfig& scene, SceneParts& parts)
       WorldModel::Thread thread;
       thread.model = std::make_shared<const ThreadModel>(modelOf(config));
       checkThreadModel(*thread.model);   // before its state is made
-      if (const auto& contact = config.contact)
-        thread.contact = {contact->self, contact->threads, contact->obstacles, contact->friction, config.merging};
+      thread.contact = config.contact;
+      thread.merging = config.merging;
       ThreadGroupState state;
       state.threads.push_back(stateOf(config, *thread.model, scene.gravity));
       state.start_volume = state.volumeBalance();

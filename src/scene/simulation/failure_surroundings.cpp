@@ -155,7 +155,7 @@ private:
       return;
     const RodModel& model = simulation_.rodModel(object_);
     const double radius = largestRadius(model, std::min(place_.node, model.edges() - 1));
-    if (contact->obstacles)
+    if (contact->solids)
     {
       addSolids(radius, [this](const BodyConfig& body) {
         return std::none_of(body.welds.begin(), body.welds.end(),
@@ -165,11 +165,11 @@ private:
     for (int r = 0; r < static_cast<int>(config_.rods.size()); ++r)
     {
       const bool own = r == object_;
-      if (own ? !contact->self : !(contact->rods && config_.rods[r].contact && config_.rods[r].contact->rods))
+      if (own ? !contact->self : !(contact->others && config_.rods[r].contact && config_.rods[r].contact->others))
         continue;
       addRod(r, radius);
     }
-    if (contact->rods)
+    if (contact->others)
       addThreads(-1, radius);
   }
 
@@ -192,7 +192,7 @@ private:
   void addThreads(int but, double radius)
   {
     for (int k = 0; k < static_cast<int>(config_.threads.size()); ++k)
-      if (k != but && config_.threads[k].contact && config_.threads[k].contact->threads)
+      if (k != but && config_.threads[k].contact && config_.threads[k].contact->others)
         for (const ThreadState& thread : simulation_.state().threads[k].threads)
           for (int j = 0; j < thread.edges(); ++j)
             addSegment(thread.x[j], thread.x[j + 1], radius + thread.radius(j),
@@ -236,13 +236,13 @@ private:
     }
     if (config.floor)
       partner_.add(place_.position.z() - config.floor->height - radius, "the floor");
-    if (config.contact && config.contact->obstacles)
+    if (config.contact && config.contact->solids)
       addSolids(radius, [](const BodyConfig&) { return true; });
-    if (!config.contact || !config.contact->threads)
+    if (!config.contact || !config.contact->others)
       return;
     addThreads(object_, radius);
     for (int r = 0; r < static_cast<int>(config_.rods.size()); ++r)
-      if (config_.rods[r].contact && config_.rods[r].contact->rods)
+      if (config_.rods[r].contact && config_.rods[r].contact->others)
         addRod(r, radius);
   }
 
@@ -251,14 +251,14 @@ private:
     const auto& contact = config_.cloths[object_].contact;
     if (!contact)
       return;
-    if (contact->obstacles)
+    if (contact->solids)
     {
       // cloth meets driven bodies only
       addSolids(0.0, [](const BodyConfig& body) { return body.motion.has_value(); });
     }
     for (int k = 0; k < static_cast<int>(config_.cloths.size()); ++k)
     {
-      if (k == object_ || !contact->cloths || !config_.cloths[k].contact || !config_.cloths[k].contact->cloths)
+      if (k == object_ || !contact->others || !config_.cloths[k].contact || !config_.cloths[k].contact->others)
         continue;
       const Eigen::Matrix3Xi& faces = config_.cloths[k].mesh.triangles;
       const Eigen::Matrix3Xd& x = simulation_.state().cloths[k].x;

@@ -49,7 +49,7 @@ void buildBodies(const SceneConfig& scene, SceneParts& parts)
   }
   for (const ObstacleConfig& obstacle : scene.obstacles)
   {
-    parts.model.obstacles.push_back({obstacle.name, obstacle.shape, obstacle.friction.value_or(-1.0)});
+    parts.model.obstacles.push_back(obstacle);
     parts.state.obstacles.push_back(obstacle.pose);
     parts.state.obstacle_velocities.push_back({});
   }

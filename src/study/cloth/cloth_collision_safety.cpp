@@ -47,7 +47,7 @@ void addCloth(Scene& s, const TriangleMesh& mesh, const Pose& pose, double frict
   for (Eigen::Index i = 0; i < x.cols(); ++i)
     x.col(i) = pose * Vector3d(mesh.vertices.col(i));
   s.model.cloths.push_back(std::make_shared<ClothModel>(cloth));
-  ClothContact contact;
+  ContactProperties contact;
   contact.thickness = thickness;
   contact.friction = friction;
   s.model.contact.push_back(contact);

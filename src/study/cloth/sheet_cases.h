@@ -18,8 +18,8 @@ struct SheetScene
   int columns = 0, rows = 0;   ///< its cells
   Eigen::Matrix3Xd start;      ///< 3 x n [m]
   ClothModel model;            ///< of this mesh; its bending model is replaced
-  ClothContact contact;
-  std::vector<ContactSolid> solids;   ///< at the identity pose
+  ContactProperties contact;
+  std::vector<Obstacle> solids;   ///< at the identity pose
   std::vector<int> pins;
   Eigen::Vector3d gravity{0, 0, -9.81}, wind{0, 0, 0};
   double step = 5e-3, duration = 2.0, keep_from = 0.0, keep_every = 0.1;   ///< [s]

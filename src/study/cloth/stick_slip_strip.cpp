@@ -60,7 +60,7 @@ Result press(StudyContext& context, int cells, const Slip& slip, double crossed)
   model.stiffness_damping = 1e-3;
   ClothGroupModel group_model;
   group_model.cloths.push_back(std::make_shared<ClothModel>(model));
-  group_model.contact.push_back({kThickness, slip.mu, false, false, true});
+  group_model.contact.push_back({false, false, true, slip.mu, kThickness});
   group_model.solids.push_back({Plane{}, -1.0, {}});
   ClothGroupState state;
   state.cloths.push_back(makeClothState(model, start));

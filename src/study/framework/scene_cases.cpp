@@ -70,10 +70,10 @@ GroupSetup groupOf(const Simulation& scene)
       rod.inputs.grasps.push_back({grasp.X_WG, std::nullopt});
     const int index = g.add(rod);
     if (const auto& contact = config.rods[r].contact)
-      g.model.rods[index].contact = RodTouch{contact->self, contact->rods, contact->obstacles, contact->friction};
+      g.model.rods[index].contact = *contact;
   }
   for (std::size_t k = 0; k < config.obstacles.size(); ++k)
-    addObstacle(g, config.obstacles[k].shape, scene.state().obstacles[k], config.obstacles[k].friction.value_or(-1.0));
+    addObstacle(g, config.obstacles[k].shape, scene.state().obstacles[k], config.obstacles[k].friction);
   g.model.contact.gap = config.contact.gap;
   g.model.contact.slip_speed = config.contact.slip_speed;
   g.setGravity(config.gravity);

@@ -7,7 +7,7 @@
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
 #include "study/framework/cpu_clock.h"
-#include "study/framework/measure.h"
+#include "study/rod/rod_cases.h"
 
 namespace slender::study {
 
@@ -21,7 +21,8 @@ std::string pile(int rods, const std::string& solver)
   const double length = kSpacing * (rods + 1);
   std::ostringstream text;
   text << "time: {step: 0.002, duration: 10, integrator: implicit_euler, newton: {linear: " << solver << "}}\n"
-       << "contact: {gap: 2.0e-4}\nobstacles:\n  - {name: floor, shape: {plane: {point: [0, 0, 0], normal: [0, 0, 1]}}}\n"
+       << "contact: {gap: 2.0e-4}\nobstacles:\n  - {name: floor, shape: {plane: {point: [0, 0, 0], normal: [0, 0, "
+          "1]}}}\n"
        << "rods:\n";
   for (int layer = 0; layer < 4; ++layer)
     for (int k = 0; k < rods; ++k)
@@ -93,8 +94,7 @@ void runIslandSolvers(StudyContext& context)
               automatic = runPile(rods, "auto", steps);
     const double error = difference(direct.rods, iterative.rods) / (kSpacing * (rods + 1));
     worst = std::max(worst, error);
-    slowest_choice =
-        std::max(slowest_choice, automatic.seconds / std::min(direct.seconds, iterative.seconds));
+    slowest_choice = std::max(slowest_choice, automatic.seconds / std::min(direct.seconds, iterative.seconds));
     if (automatic.linear_iterations > 0 && change == 0)
       change = automatic.nodes;
     context.row()
@@ -116,7 +116,8 @@ void runIslandSolvers(StudyContext& context)
 }
 
 const StudyRegistration kIslandSolversRegistration{
-    "island_solvers", "time of a step of a pile of rods over its size: factorisation, conjugate gradients, and the choice",
+    "island_solvers",
+    "time of a step of a pile of rods over its size: factorisation, conjugate gradients, and the choice",
     runIslandSolvers};
 
 }   // namespace slender::study

@@ -11,13 +11,13 @@ namespace slender::study {
 int addTouching(GroupSetup& group, const RodSetup& rod, double friction)
 {
   const int index = group.add(rod);
-  group.model.rods[index].contact = RodTouch{true, true, true, friction};
+  group.model.rods[index].contact = ContactProperties{true, true, true, friction};
   return index;
 }
 
 int addObstacle(GroupSetup& group, const Shape& shape, const Pose& pose, double friction)
 {
-  group.model.obstacles.push_back({"obstacle", shape, friction});
+  group.model.obstacles.push_back({shape, friction, "obstacle"});
   group.state.obstacles.push_back(pose);
   group.state.obstacle_velocities.push_back({});
   group.inputs.obstacles.push_back({pose, std::nullopt});

@@ -51,7 +51,7 @@ Result press(int edges, const Slip& slip)
   GroupSetup g;
   g.add(rod);
   g.setGravity(Eigen::Vector3d::Zero());
-  g.model.rods[0].contact = RodTouch{false, false, true, slip.mu};
+  g.model.rods[0].contact = ContactProperties{false, false, true, slip.mu};
   addObstacle(g, Plane{}, {});
   g.model.contact.gap = gap;
   // creep: at most 2e-6 in a move; less, and the range that sticks is no longer resolved

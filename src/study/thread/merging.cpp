@@ -71,9 +71,7 @@ Seen mergePair(const Case& c, int steps, double duration, double until)
     t.model.density = 1e-4 * c.viscosity * c.viscosity / (c.surface_tension * c.radius);   // inertia is no matter
     for (Eigen::Vector3d& x : t.state.x)
       x += Eigen::Vector3d(k * c.shift, 0, 2.0 * k) * c.radius;
-    ThreadTouch touch;
-    touch.merging = until;
-    model.threads.push_back({std::make_shared<ThreadModel>(t.model), touch});
+    model.threads.push_back({std::make_shared<ThreadModel>(t.model), ContactProperties{}, until});
     state.threads.emplace_back();
     state.end_loads.emplace_back();
     state.threads.back().threads.push_back(t.state);

@@ -114,7 +114,7 @@ void runBackflip(StudyContext& context)
     const MeshTopology topology = meshTopology(mesh);
     ClothGroupModel alone;   // to check the output by all pairs
     alone.cloths = {std::make_shared<const ClothModel>(scene.clothModel(0))};
-    alone.contact = {{cloth.contact->thickness, cloth.contact->friction, true, true, true}};
+    alone.contact = {*cloth.contact};
     ClothOptions options;
     options.one_newton_step = cloth.one_newton_step;
     const ClothGroup checker(alone, options);

@@ -21,7 +21,7 @@ struct Scene
   TrackedCase cloth;
   bool full_newton = false, contact = false;
   double thickness = 4e-3;   ///< with contact
-  std::vector<ContactSolid> solids = {};
+  std::vector<Obstacle> solids = {};
   std::vector<Pose> poses = {};
 };
 
@@ -92,7 +92,7 @@ Result follow(StudyContext& context, const Scene& scene, int steps)
   options.one_newton_step = !scene.full_newton;
   ClothGroupModel model;
   model.cloths = {c.model};
-  ClothContact contact;
+  ContactProperties contact;
   contact.thickness = scene.thickness;
   contact.self = contact.solids = scene.contact;
   model.contact = {contact};
