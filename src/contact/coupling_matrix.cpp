@@ -32,6 +32,9 @@ void CouplingMatrix::noteBases(const Bases& bases)
 void CouplingMatrix::finish(const std::vector<int>& blocks, Solver solver)
 {
   solver_ = solver;
+  cholesky_known_ = false;
+  if (unknowns_ == 0)
+    return;
   starts_.assign(1, 0);
   rows_.clear();
   for (int u = 0; u < unknowns_; ++u)
@@ -42,8 +45,7 @@ void CouplingMatrix::finish(const std::vector<int>& blocks, Solver solver)
     starts_.push_back(static_cast<int>(rows_.size()));
   }
   values_.assign(rows_.size(), 0.0);
-  cholesky_known_ = false;
-  if (solver_ == Solver::conjugate_gradients && unknowns_ > 0)
+  if (solver_ == Solver::conjugate_gradients)
     takeBlocks(blocks);
 }
 

@@ -134,10 +134,13 @@ std::vector<Feature> features()
       with(kCloth, {"cloths.0.contact={self: false, friction: 0, thickness: 0.002}",
                     "obstacles=[{name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0.15, 0.15, 0.198]}}]"});
   const Scene thread_with_itself = with(kThread, {"threads.0.contact={self: true, friction: 0}"});
+  const std::string welded_disc =
+      "bodies=[{name: disc, mass: 0.1, shape: {sphere: {radius: 0.02}}, contact: false, welds: [{rod: rod, edge: "
+      "-1}]}]";
   const std::vector<Scene> all = {kRod, kExplicitRod, kThread, kCloth, kTracked};
   return {
       {"contact",
-       {"src/contact/", "include/slender_sim/contact/", "src/world/joined_parts", "src/world/joined_steps",
+       {"src/contact/", "include/slender_sim/contact/", "src/world/joined_", "src/world/island_finder",
         "src/world/meeting", "src/cloth/cloth_group", "include/slender_sim/cloth/cloth_group"},
        "[cC]ontact|[tT]ouching|[cC]ollision|[cC]ollide",
        all,
@@ -153,13 +156,17 @@ std::vector<Feature> features()
        "[fF]riction|\\bslip",
        {kRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball, thread_with_itself},
        {with(rod_on_floor, {"rods.0.contact.friction=0.3"}), with(cloth_on_ball, {"cloths.0.contact.friction=0.3"})}},
+      {"coupled matrix",
+       {"src/contact/coupling_matrix"},
+       "[cC]onjugateGradientsIn|CouplingMatrix",
+       {kRod, kExplicitRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball},
+       {with(kRod, {welded_disc}), thread_with_itself}},
       {"rigid bodies",
        {"src/rod/body_system", "src/rod/body_part", "src/world/explicit_rods", "include/slender_sim/rod/rigid_body",
         "src/dynamics/fast_projection_bodies"},
        "\\b[bB]od(y|ies)|\\bweld",
        all,
-       {with(kRod, {"bodies=[{name: disc, mass: 0.1, shape: {sphere: {radius: 0.02}}, contact: false, welds: [{rod: "
-                    "rod, edge: -1}]}]"})}},
+       {with(kRod, {welded_disc})}},
       {"material frames",
        {"src/rod/rod_frames", "src/rod/rod_system", "src/dynamics/chain_system", "src/energy/rod_energy_kernel",
         "include/slender_sim/geometry/framed_curve"},
