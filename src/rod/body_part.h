@@ -19,6 +19,22 @@ public:
   BodySystem::Vector6 direction = BodySystem::Vector6::Zero();
   bool welded = false;   ///< carries parts of rods
 
+  /// v := matrix^-1 v with the matrix of the last evaluate(true), of a body that is not coupled.
+  void solveFor(BodySystem::Vector6& v) const { factor_.solveInPlace(v); }
+  /// Begins a step from this state; gravity [m/s^2].
+  void begin(const RigidBodyState& state, const Eigen::Vector3d& step_gravity);
+  const RigidBodyState& state() const { return now_; }   ///< where the last accepted substep ended
+  /// What a rod at the start of a run exerts on the body, and the inertia that it adds.
+  void addStartLoad(const BodySystem::Vector6& wrench, const BodySystem::Matrix6& inertia);
+  const BodySystem::Vector6& startAcceleration() const { return start_acceleration_; }
+  /// No point of the shape is farther from the origin of the body [m]. Without a call the body has no shape.
+  void setReach(double reach) { reach_ = reach; }
+  const Pose& pose() const override { return system.pose; }
+  void addColumnsAt(const Eigen::Vector3d& position, int component, double weight, Columns& row) const override;
+  void addForceAt(const Eigen::Vector3d& position, const Eigen::Vector3d& force) override;
+
+private:
+  // ---- as RigidPart
   bool numberUnknowns() override { return true; }   // they never change
   int unknowns() const override { return 6; }
   bool joined() const override { return welded; }
@@ -37,8 +53,6 @@ public:
   void evaluate(bool with_hessian, const HessianShift& shift) override;
   void closeGradient() override {}
   void solve() override { direction = -factor_.solve(system.gradient); }
-  /// v := matrix^-1 v with the matrix of the last evaluate(true), of a body that is not coupled.
-  void solveFor(BodySystem::Vector6& v) const { factor_.solveInPlace(v); }
 
   void notePattern(CouplingMatrix& matrix) override;
   void findEntries(const CouplingMatrix&) override {}
@@ -51,10 +65,6 @@ public:
   void addForce(int, const Eigen::Vector3d&) override {}
   Eigen::Vector3d move(int) const override { return Eigen::Vector3d::Zero(); }
 
-  const Pose& pose() const override { return system.pose; }
-  void addColumnsAt(const Eigen::Vector3d& position, int component, double weight, Columns& row) const override;
-  void addForceAt(const Eigen::Vector3d& position, const Eigen::Vector3d& force) override;
-
   double stepLimit() const override;
   double incrementSize(double length) const override;
   double slope() const override { return system.gradient.dot(direction); }
@@ -62,20 +72,12 @@ public:
   double forceScale() const override;
   double noiseLevel() const override { return 0.0; }
 
-  // ---- steps
-  /// Begins a step from this state; gravity [m/s^2].
-  void begin(const RigidBodyState& state, const Eigen::Vector3d& step_gravity);
-  const RigidBodyState& state() const { return now_; }   ///< where the last accepted substep ended
+  // ---- as PartSteps
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
   double lastSubstep() const override { return now_.last_step; }
   bool startsFresh() const override { return now_.last_step == 0.0; }
-  /// What a rod at the start of a run exerts on the body, and the inertia that it adds.
-  void addStartLoad(const BodySystem::Vector6& wrench, const BodySystem::Matrix6& inertia);
   void solveStartAcceleration() override;
-  const BodySystem::Vector6& startAcceleration() const { return start_acceleration_; }
   void addSurface(ContactSurface&) const override {}
-  /// No point of the shape is farther from the origin of the body [m]. Without a call the body has no shape.
-  void setReach(double reach) { reach_ = reach; }
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double) const override { return {}; }
   void beginStage(std::size_t stage) override;
@@ -86,7 +88,6 @@ public:
   double energyAtEnd() const override { return energyOf(next_); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
-private:
   double energyOf(const RigidBodyState& state) const;
 
   Eigen::LLT<BodySystem::Matrix6> factor_;

@@ -38,12 +38,19 @@ public:
   /// Whether an unknown has a number of its own, in the part that an inverse iteration acts on.
   bool isUnknown(int unknown) const { return dof_[unknown] >= 0; }
 
+  /// What the rod touches; without a call nothing.
+  void setContact(const ContactProperties& contact) { contact_ = contact; }
+  int points() const override { return touches_ ? system_.nodes() : 0; }
+  void addSurface(ContactSurface& surface) const override;
+
+private:
+  // ---- as Part
+  int nodeOf(int point) const override { return point; }
   bool numberUnknowns() override;
   bool joined() const override { return welded_; }
   void placeHeld(double fraction) override { rod_.placeAt(*inputs_, duration_, fraction); }
   bool heldMoves(double from, double to) const override;
   void followJoints() override;
-  int points() const override { return touches_ ? system_.nodes() : 0; }
   void gather(Eigen::Matrix3Xd& x) const override;
   void passGradient() override;
   void notePattern(CouplingMatrix& matrix) override;
@@ -51,15 +58,12 @@ public:
   void takeDirection(const double* solution) override;
   void addColumns(int point, int component, double weight, Columns& row) const override;
 
-  // ---- steps
-  /// What the rod touches; without a call nothing.
-  void setContact(const ContactProperties& contact) { contact_ = contact; }
+  // ---- as PartSteps
   double lastSubstep() const override { return rod_.work.last_step; }
   double shortestEdge() const override { return shortest_edge_; }
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
   void addStartLoads() override;
   void takeStartAcceleration() override;
-  void addSurface(ContactSurface& surface) const override;
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
   void beginStage(std::size_t stage) override;
@@ -71,10 +75,6 @@ public:
   Largest unbalancedForce() const override { return rod_.unbalancedForce(); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
-protected:
-  int nodeOf(int point) const override { return point; }
-
-private:
   const RodSystem& system() const { return rod_.system; }
   const BodyPart* carrier(int grasp) const;
   void columnsOf(int unknown, double weight, Columns& row) const;

@@ -22,15 +22,6 @@ public:
   /// Nodes have been held where they met the floor: they go there from the base.
   void holdLanded();
 
-  bool numberUnknowns() override;
-  void placeHeld(double fraction) override;
-  bool heldMoves(double from, double to) const override;
-  void retreatHeld(double share) override;
-  int points() const override { return thread_.work.nodes(); }
-  void gather(Eigen::Matrix3Xd& x) const override;
-  void gatherStart(Eigen::Matrix3Xd& x) const override;
-
-  // ---- steps
   /// What the thread touches; `owner` is the number of the thread of which it is a part.
   /// `merging`: as WorldModel::Thread::merging.
   void setContact(const ContactProperties& contact, double merging, int owner)
@@ -44,10 +35,23 @@ public:
   /// In the steps below: what a change of shape may not come near (null: nothing).
   void setGuard(const RemeshGuard* guard) { guard_ = guard; }
   void setDuration(double duration) { duration_ = duration; }   ///< of the step [s]
+  int points() const override { return thread_.work.nodes(); }
+  void addSurface(ContactSurface& surface) const override;
+
+private:
+  // ---- as Part
+  int nodeOf(int point) const override { return thread_.inSystem(point); }
+  bool numberUnknowns() override;
+  void placeHeld(double fraction) override;
+  bool heldMoves(double from, double to) const override;
+  void retreatHeld(double share) override;
+  void gather(Eigen::Matrix3Xd& x) const override;
+  void gatherStart(Eigen::Matrix3Xd& x) const override;
+
+  // ---- as PartSteps
   double longestSubstep(double duration) const override { return thread_.longestSubstep(duration); }
   double shortestEdge() const override { return system_.leastRestLength(); }
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
-  void addSurface(ContactSurface& surface) const override;
   bool surfaceChanges() const override { return true; }
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
@@ -62,10 +66,6 @@ public:
   Largest unbalancedForce() const override { return thread_.unbalancedForce(); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
-protected:
-  int nodeOf(int point) const override { return thread_.inSystem(point); }
-
-private:
   bool isHeld(int node) const { return nodeOf(node) >= 0 && !system_.isFree(nodeOf(node)); }
   Eigen::Vector3d lying(int node) const { return thread_.work.x[node] + share_ * (end_[node] - thread_.work.x[node]); }
 
