@@ -23,13 +23,6 @@ bool mayTouch(const ContactSurface& surface, const ContactSegment& a, const Cont
   return surface.objects[a.object].others && surface.objects[b.object].others;
 }
 
-bool mayTouch(const ContactSurface& surface, const ContactSegment& segment, const ContactSolid& solid)
-{
-  const ContactObject& object = surface.objects[segment.object];
-  return object.solids && !segment.driven && (solid.only < 0 || solid.only == object.owner) &&
-         std::find(solid.ignores.begin(), solid.ignores.end(), segment.object) == solid.ignores.end();
-}
-
 }   // namespace
 
 bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap)
@@ -41,8 +34,8 @@ bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const C
   return apart < 0.5 * M_PI * (a.radius + b.radius) + gap;
 }
 
-void Candidates::build(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion,
-                       double gap, double margin, double turn)
+void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
+                       const Motion& motion, double gap, double margin, double turn)
 {
   low_ = motion.x.cwiseMin(motion.x_end).array() - margin;
   high_ = motion.x.cwiseMax(motion.x_end).array() + margin;
@@ -70,6 +63,8 @@ void Candidates::build(const ContactSurface& surface, const std::vector<SolidPie
     turn_[k] = angleBetween(motion.solids_end[k], solids_[k]) + turn;
     findOnSolid(surface, static_cast<int>(k), solids[k], motion, gap, margin);
   }
+  if (!sheets.empty())
+    sheets_.build(surface, sheets, solids, motion, {gap, margin, shift_, turn_});
   built_ = true;
 }
 
@@ -91,7 +86,7 @@ void Candidates::findOnSolid(const ContactSurface& surface, int solid, const Sol
     const double slack = moved + shift_[solid] + turn_[solid] * (farthest + moved + shift_[solid]);
     const double range = gap + s.radius + slack;
     const Eigen::Vector3d middle = 0.5 * (a + b);
-    if (middle.norm() > reach + half + range || !mayTouch(surface, s, properties))
+    if (middle.norm() > reach + half + range || s.driven || !mayTouch(surface, s.object, properties))
       continue;
     const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
     if (pieces.tree.empty())

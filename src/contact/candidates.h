@@ -2,19 +2,13 @@
 
 #include <vector>
 
-#include "mesh_tree.h"
+#include "sheet_candidates.h"
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/contact/solids.h"
+#include "surface_motion.h"
 
 namespace slender {
-
-/// A solid taken apart into convex pieces.
-struct SolidPieces
-{
-  std::vector<ConvexPiece> pieces;
-  std::vector<MeshTree> tree;   ///< of a mesh: one; of other shapes: none
-};
 
 /// What may touch while points and solids stay near a motion. Memory is reused.
 class Candidates
@@ -24,21 +18,23 @@ public:
   {
     int solid, segment, piece;
   };
-  struct Motion
-  {
-    const Eigen::Matrix3Xd &x, &x_end;
-    const std::vector<Pose>&solids, &solids_end;
-  };
+  using Motion = SurfaceMotion;
 
   /// All pairs that may come within `gap` of each other while no coordinate leaves the boxes that the points' motions
   /// fill by more than `margin` [m], and no solid its own motion by more than `margin` and `turn` [rad].
-  void build(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion, double gap,
-             double margin, double turn);
-  void clear() { built_ = false; }
+  void build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
+             const Motion& motion, double gap, double margin, double turn);
+  /// Forgets everything: the surface has other pieces from now on.
+  void clear()
+  {
+    built_ = false;
+    sheets_.forget();
+  }
   bool holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
 
   const std::vector<GridPairs::Pair>& pairs() const { return pairs_; }
   const std::vector<OnSolid>& onSolids() const { return on_solids_; }
+  const SheetCandidates& sheets() const { return sheets_; }   ///< Of triangles, if there are any.
 
 private:
   void findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
@@ -53,6 +49,7 @@ private:
   std::vector<GridPairs::Pair> pairs_;
   std::vector<OnSolid> on_solids_;
   std::vector<int> triangles_;
+  SheetCandidates sheets_;
 };
 
 }   // namespace slender

@@ -8,6 +8,7 @@
 
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/geometry/rotation.h"
+#include "pair_gap.h"
 #include "soft_gap.h"
 
 namespace slender {
@@ -140,23 +141,37 @@ Pose RigidMotion::at(double share) const
   return {from.position + share * shift, fromRotationVector(share * turn) * from.orientation};
 }
 
-double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const ConvexPiece& piece,
-                         const RigidMotion& motion, const ApproachLimit& limit)
+namespace {
+
+/// Lower bounds of distances that cost little.
+double leastOf(const ConvexPiece& piece, const Eigen::Vector3d (&z)[2]) { return leastDistance(piece, z[0], z[1]); }
+template <int N>
+double leastOf(const ConvexPiece& piece, const Eigen::Vector3d (&z)[N])
+{
+  return leastFaceDistance(piece, z, N);
+}
+
+/// A face of N corners that moves along straight lines, and a convex piece of a solid; plane(z) gives a FacePlane for
+/// the corners z in the frame of the solid.
+template <int N, class Plane>
+double advanceToSolid(const MovingPoint* const (&corner)[N], const ConvexPiece& piece, const RigidMotion& motion,
+                      const ApproachLimit& limit, Plane nearestPlane)
 {
   // Seen from the solid, whose axes turn with w, a corner at r from the origin has the velocity v - w x r and an
   // acceleration of at most 2 |w| |v| + w^2 |r|; v is constant and r runs along a line, so that both are largest at an
   // end of the remaining time.
   const double spin = motion.turn.norm();
-  const MovingPoint* corner[2] = {&a, &b};
-  const Eigen::Vector3d v[2] = {a.to - a.from - motion.shift, b.to - b.from - motion.shift};
+  Eigen::Vector3d v[N];
+  for (int i = 0; i < N; ++i)
+    v[i] = corner[i]->to - corner[i]->from - motion.shift;
   double t = 0.0, goal = 0.0;
   for (int k = 0; k < kMaxAdvances; ++k)
   {
     const Pose pose = k == 0 ? motion.from : motion.at(t);
     const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
-    Eigen::Vector3d r[2], rate[2], z[2];
+    Eigen::Vector3d r[N], rate[N], z[N];
     double speed = 0.0, acceleration = 0.0;
-    for (int i = 0; i < 2; ++i)
+    for (int i = 0; i < N; ++i)
     {
       r[i] = corner[i]->from + t * (corner[i]->to - corner[i]->from) - pose.position;
       const Eigen::Vector3d r_end = r[i] + (1.0 - t) * v[i];
@@ -167,15 +182,15 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
     }
     if (k == 0)
     {
-      const double least = leastDistance(piece, z[0], z[1]) - limit.thickness;
+      const double least = leastOf(piece, z) - limit.thickness;
       if (least > 0.0 && least - limit.kept * std::min(least, limit.reach) >= speed)
         return 1.0;
     }
-    const SegmentPieceDistance nearest = segmentPieceDistance(piece, z[0], z[1]);
+    const FacePlane nearest = nearestPlane(z);
     const double gap = nearest.distance - limit.thickness;
     if (k == 0)
     {
-      if (!(gap > 0.0))
+      if (nearest.meets || !(gap > 0.0))
         return 0.0;
       goal = limit.kept * std::min(gap, limit.reach);
     }
@@ -185,11 +200,10 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
     if (room <= kTolerance * goal)
       return t;
     double plane = std::numeric_limits<double>::infinity();
-    const Eigen::Vector3d foot = z[0] + nearest.t * (z[1] - z[0]);
-    for (int i = 0; i < 2; ++i)
+    for (int i = 0; i < N; ++i)
     {
       // the first time at which room + beyond + rate t - acceleration t^2 / 2 = 0
-      const double c = std::max(0.0, room + nearest.normal.dot(z[i] - foot)), s = nearest.normal.dot(rate[i]);
+      const double c = std::max(0.0, room + nearest.normal.dot(z[i] - nearest.foot)), s = nearest.normal.dot(rate[i]);
       const double root = std::sqrt(s * s + 2.0 * acceleration * c);
       const double time = !(c > 0.0)           ? 0.0
                           : s <= 0.0           ? (root > s ? 2.0 * c / (root - s) : plane)
@@ -202,6 +216,33 @@ double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const Conve
       return 1.0;
   }
   return t;
+}
+
+}   // namespace
+
+double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const ConvexPiece& piece,
+                         const RigidMotion& motion, const ApproachLimit& limit)
+{
+  const MovingPoint* const corner[2] = {&a, &b};
+  return advanceToSolid(corner, piece, motion, limit, [&](const Eigen::Vector3d* z) {
+    const SegmentPieceDistance at = segmentPieceDistance(piece, z[0], z[1]);
+    return FacePlane{at.distance, !(at.distance - limit.thickness > 0.0), z[0] + at.t * (z[1] - z[0]), at.normal};
+  });
+}
+
+double faceSolidLimit(const MovingPoint* corner, int corners, const ConvexPiece& piece, const RigidMotion& motion,
+                      const ApproachLimit& limit)
+{
+  const auto plane = [&](const Eigen::Vector3d* z) { return separatingPlane(piece, z, corners, limit.thickness); };
+  if (corners == 1)
+  {
+    const MovingPoint* const one[1] = {corner};
+    return advanceToSolid(one, piece, motion, limit, plane);
+  }
+  if (corners == 2)
+    return segmentSolidLimit(corner[0], corner[1], piece, motion, limit);
+  const MovingPoint* const three[3] = {corner, corner + 1, corner + 2};
+  return advanceToSolid(three, piece, motion, limit, plane);
 }
 
 }   // namespace slender

@@ -4,43 +4,10 @@
 #include <numeric>
 
 #include "contact_potential_impl.h"
+#include "convex_minimum.h"
 #include "slender_sim/contact/distance.h"
 
 namespace slender {
-
-namespace {
-
-/// Smallest value of a convex function on [0, 1] by golden section.
-template <class Function>
-double convexMinimum(Function f)
-{
-  constexpr double kGolden = 0.6180339887498949;
-  double a = 0.0, b = 1.0, p = 1.0 - kGolden, q = kGolden, fp = f(p), fq = f(q);
-  double best = std::min({f(0.0), f(1.0), fp, fq});
-  for (int k = 0; k < 60; ++k)
-  {
-    if (fp < fq)
-    {
-      b = q;
-      q = p;
-      fq = fp;
-      p = b - kGolden * (b - a);
-      fp = f(p);
-    }
-    else
-    {
-      a = p;
-      p = q;
-      fp = fq;
-      q = a + kGolden * (b - a);
-      fq = f(q);
-    }
-    best = std::min({best, fp, fq});
-  }
-  return best;
-}
-
-}   // namespace
 
 double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
                                          const std::vector<Pose>& poses, const std::vector<Pose>& poses_end)
@@ -52,10 +19,12 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
   const Candidates* candidates = &near_;
   if (!near_.holdsFor(x, poses) || !near_.holdsFor(x_end, poses_end))
   {
-    swept_.build(surface, solids, {x, x_end, poses, poses_end}, options.gap, 0.0, 0.0);
+    swept_.build(surface, sheets_, solids, {x, x_end, poses, poses_end}, options.gap, 0.0, 0.0);
     candidates = &swept_;
     const double moved = (x_end - x).colwise().norm().maxCoeff();
     margin_ = std::min(std::max(options.gap, 2.0 * moved), 20.0 * options.gap);
+    if (!sheets_.empty())
+      limitMargin(x);
   }
   double share = 1.0;
   ApproachLimit limit;
@@ -79,7 +48,7 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
     share =
         std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids[on.solid].pieces[on.piece], rigid, limit));
   }
-  return share;
+  return sheets_.empty() ? share : std::min(share, sheetsLimit(*candidates, x, x_end, poses, poses_end));
 }
 
 double ContactPotential::Impl::thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key,
@@ -89,21 +58,24 @@ double ContactPotential::Impl::thinned(const std::vector<Thinned>& list, const s
   return at != list.end() && at->key == key ? at->thickness : thickness;
 }
 
-bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+bool ContactPotential::Impl::fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance,
+                                 double thickness) const
 {
-  check(x, poses);
-  near_.build(surface, solids, {x, x, poses, poses}, options.gap, margin_, 0.0);
-  thin_pairs_.clear();
-  thin_on_solids_.clear();
   // Less than the twelfth at which the barrier is made stiffer: a step under load then ends with more room than it
   // began with, and parts that something else than motion brought together come apart again.
   const double least = options.gap / 20, opened = options.gap / 16;
-  // Thins what is nearer than that, but never to less than half of the distance between centrelines. False: they meet.
-  const auto fit = [&](std::vector<Thinned>& list, const std::array<int, 3>& key, double distance, double thickness) {
-    if (distance - thickness < least)
-      list.push_back({key, distance - std::min(opened, 0.5 * distance)});
-    return distance - thickness >= least || distance > 1e-3 * thickness;
-  };
+  // Never to less than half of the distance between centrelines.
+  if (distance - thickness < least)
+    list.push_back({key, distance - std::min(opened, 0.5 * distance)});
+  return distance - thickness >= least || distance > 1e-3 * thickness;
+}
+
+bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+{
+  check(x, poses);
+  near_.build(surface, sheets_, solids, {x, x, poses, poses}, options.gap, margin_, 0.0);
+  for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
+    list->clear();
   for (const GridPairs::Pair& pair : near_.pairs())
   {
     const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
@@ -124,7 +96,7 @@ bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vec
   }
   std::sort(thin_pairs_.begin(), thin_pairs_.end());
   std::sort(thin_on_solids_.begin(), thin_on_solids_.end());
-  return true;
+  return sheets_.empty() || thinSheetsToFit(x, poses);
 }
 
 double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
@@ -161,9 +133,7 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     const double reach = boundingRadius(solid.shape) + options.gap;
     for (const ContactSegment& s : surface.segments)
     {
-      const ContactObject& object = surface.objects[s.object];
-      if (!object.solids || s.driven || (solid.only >= 0 && solid.only != object.owner) ||
-          std::count(solid.ignores.begin(), solid.ignores.end(), s.object))
+      if (s.driven || !mayTouch(surface, s.object, solid))
         continue;
       const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a)), e = to_solid * Eigen::Vector3d(x.col(s.b)) - a;
       if ((a + 0.5 * e).norm() > 0.5 * e.norm() + s.radius + reach)
@@ -176,7 +146,7 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
       }
     }
   }
-  return least;
+  return surface.triangles.empty() ? least : sheetClearance(x, poses, least);
 }
 
 }   // namespace slender

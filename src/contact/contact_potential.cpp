@@ -18,9 +18,29 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastGap = 12.0;     // the gap over the smallest that barriers are to be resolved in
 constexpr double kTurnMargin = 0.02;   // [rad] a solid may turn before candidates are sought again
 
+[[noreturn]] void refuse(const std::string& why) { throw std::invalid_argument("contact: " + why); }
+
+void checkTriangle(const ContactSurface& surface, std::size_t number)
+{
+  const ContactTriangle& t = surface.triangles[number];
+  const auto refuseThis = [&](const std::string& why) { refuse("triangle " + std::to_string(number) + why); };
+  if (!(t.object >= 0 && t.object < static_cast<int>(surface.objects.size())))
+    refuseThis(" names an object that does not exist");
+  const ContactObject& object = surface.objects[t.object];
+  for (int k = 0; k < 3; ++k)
+  {
+    const int i = t.corner[k];
+    if (!(i >= 0 && i < surface.points && i != t.corner[(k + 1) % 3]))
+      refuseThis(" names points outside 0 ... " + std::to_string(surface.points - 1) + " or one point twice");
+    if (object.rest && !(i >= object.first_point && i - object.first_point < object.rest->cols()))
+      refuseThis(" names a point of which the rest position is not known");
+  }
+  if (!(t.half_thickness > 0.0 && std::isfinite(t.half_thickness)))
+    refuseThis(": half the thickness is " + std::to_string(t.half_thickness) + " m; must be positive");
+}
+
 void checkSurface(const ContactSurface& surface, const ContactOptions& options)
 {
-  const auto refuse = [](const std::string& why) { throw std::invalid_argument("contact: " + why); };
   if (!(options.gap > 0.0 && std::isfinite(options.gap)))
     refuse("gap is " + std::to_string(options.gap) + " m; must be positive");
   if (!(options.slip_speed > 0.0))
@@ -40,6 +60,8 @@ void checkSurface(const ContactSurface& surface, const ContactOptions& options)
     if (!(s.length >= 0.0))
       refuseThis(": length is " + std::to_string(s.length) + " m; must not be negative");
   }
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i)
+    checkTriangle(surface, i);
   for (std::size_t i = 0; i < surface.objects.size(); ++i)
     if (!(surface.objects[i].friction >= 0.0))
       refuse("object " + std::to_string(i) + ": friction is negative");
@@ -62,6 +84,7 @@ ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
     stiffness(o.least_stiffness),
     margin_(o.gap)
 {
+  sheets_.build(surface);
   solids.resize(surface.solids.size());
   for (std::size_t k = 0; k < solids.size(); ++k)
     std::visit(
@@ -79,6 +102,21 @@ ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
             solids[k].pieces.push_back(shape);
         },
         surface.solids[k].shape);
+}
+
+void ContactPotential::Impl::setPieces(const ContactSurface& pieces)
+{
+  surface.points = pieces.points;
+  surface.segments = pieces.segments;
+  surface.triangles = pieces.triangles;
+  surface.objects = pieces.objects;
+  sheets_.build(surface);
+  lagged.clear();
+  contacts.clear();
+  near_.clear();
+  swept_.clear();
+  for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
+    list->clear();
 }
 
 void ContactPotential::Impl::check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses) const
@@ -106,7 +144,7 @@ double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::ve
   if (!x.allFinite())
     return kInfinity;
   if (!near_.holdsFor(x, poses))
-    near_.build(surface, solids, {x, x, poses, poses}, options.gap, margin_, kTurnMargin);
+    near_.build(surface, sheets_, solids, {x, x, poses, poses}, options.gap, margin_, kTurnMargin);
   double energy = 0.0;
   for (const GridPairs::Pair& pair : near_.pairs())
   {
@@ -120,6 +158,10 @@ double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::ve
     if (!std::isfinite(energy))
       return restart();
   }
+  if (!sheets_.empty())
+    energy += addSheets(x, poses, with_stiffness);
+  if (!std::isfinite(energy))
+    return restart();
   for (Contact& contact : lagged)
     energy += addFriction(x, poses, contact, with_stiffness);
   return energy;
@@ -136,18 +178,18 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
   if (middles2 > 0.75 * (e.squaredNorm() + f.squaredNorm()) + 3.0 * range * range ||
       segmentDistance(a0, a1, b0, b1) >= range)
     return 0.0;
-  const SoftGap gap = softGap(a0, a1, b0, b1, thickness);
+  const PairGap gap = edgesGap(a0, a1, b0, b1, thickness, with_stiffness);
   const double share = b.coreRadius() / (a.coreRadius() + b.coreRadius());
   Contact contact{pair.first,
                   pair.second,
                   {a.a, a.b, b.a, b.b},
-                  {1.0 - gap.s, gap.s, gap.t - 1.0, -gap.t},
+                  {},
                   -1,
                   Eigen::Vector3d::Zero(),
-                  b0 + gap.t * f + (share * thickness + 0.5 * gap.gap / gap.weight) * gap.normal,
+                  b0 - gap.place[3] * f + (share * thickness + 0.5 * gap.gap / gap.weight) * gap.normal,
                   Eigen::Vector3d::Zero(),
                   std::sqrt(surface.objects[a.object].friction * surface.objects[b.object].friction)};
-  return addContact(gap, contact, with_stiffness);
+  return addContact(gap, contact, 1.0, with_stiffness);
 }
 
 double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose,
@@ -162,31 +204,38 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
   const double radius = thicknessOf(on);
   if (leastDistance(piece, a, b) > radius + options.gap)
     return 0.0;
-  SoftGap gap = softGap(a, b, radius, piece);
-  const Eigen::Vector3d foot = a + gap.t * (b - a) - (gap.gap / gap.weight + radius) * gap.normal;
+  const Eigen::Vector3d ends[2] = {a, b};
+  PairGap gap = facePieceGap(ends, 2, radius, piece);
+  const Eigen::Vector3d foot = a + gap.place[1] * (b - a) - (gap.gap / gap.weight + radius) * gap.normal;
   gap.normal = pose.orientation * gap.normal;
-  const double own = surface.objects[s.object].friction;
-  const double coefficient = own > 0.0 && solid.friction >= 0.0 ? std::sqrt(own * solid.friction) : own;
   // behind the pairs of segments
   Contact contact{static_cast<std::int64_t>(surface.segments.size()) + on.solid,
                   (static_cast<std::int64_t>(on.segment) << 32) + on.piece,
                   {s.a, s.b, -1, -1},
-                  {1.0 - gap.t, gap.t, 0.0, 0.0},
+                  {},
                   on.solid,
                   foot,
                   pose * foot,
                   Eigen::Vector3d::Zero(),
-                  coefficient};
-  return addContact(gap, contact, with_stiffness);
+                  frictionOnSolid(s.object, solid)};
+  return addContact(gap, contact, 1.0, with_stiffness);
 }
 
-double ContactPotential::Impl::addContact(const SoftGap& gap, Contact& contact, bool with_stiffness)
+double ContactPotential::Impl::frictionOnSolid(int object, const ContactSolid& solid) const
+{
+  const double own = surface.objects[object].friction;
+  return own > 0.0 && solid.friction >= 0.0 ? std::sqrt(own * solid.friction) : own;
+}
+
+double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness)
 {
   if (!(gap.gap > 0.0))
     return kInfinity;
-  if (gap.gap >= options.gap)
+  const double g = gap.gap / scale;
+  if (g >= options.gap)
     return 0.0;
-  const double force = stiffness * barrier.force(gap.gap);
+  const double force = stiffness * barrier.force(g);
+  copyFour(contact.weight, gap.place);
   contact.force = force * gap.weight * gap.normal;
   terms.emplace_back();
   ContactTerm& term = terms.back();
@@ -198,24 +247,23 @@ double ContactPotential::Impl::addContact(const SoftGap& gap, Contact& contact, 
   if (with_stiffness)
   {
     const Eigen::Matrix3d normals = gap.normal * gap.normal.transpose();
-    term.stiffness = stiffness * barrier.stiffness(gap.gap) * gap.weight * gap.weight * normals;
+    const double own = stiffness * barrier.stiffness(g) / scale * gap.weight * gap.weight;
+    term.stiffness = own * normals;
     if (contact.solid < 0)
       term.geometric = -force * gap.weight / gap.distance * (Eigen::Matrix3d::Identity() - normals);
-    addRunning(gap, contact, force);
+    addMotion(gap, contact, force, own);
   }
   contacts.push_back(contact);
   largest_force = std::max(largest_force, force * gap.weight);
-  smallest_gap = std::min(smallest_gap, gap.gap);
-  return stiffness * barrier.energy(gap.gap);
+  smallest_gap = std::min(smallest_gap, g);
+  return stiffness * barrier.energy(g) * scale;
 }
 
-/// The place of contact runs along the segments as they turn: force r^T H^-1 r of the softened gap, column by column of
+/// The place of contact runs along the pieces as they turn: force r^T H^-1 r of the gap, column by column of
 /// H = L D L^T.
-void ContactPotential::Impl::addRunning(const SoftGap& gap, const Contact& contact, double force)
+void ContactPotential::Impl::addMotion(const PairGap& gap, const Contact& contact, double force, double own)
 {
   constexpr double kNegligible = 1e-3;   // of the pair's own stiffness
-  const double own = stiffness * barrier.stiffness(gap.gap) * gap.weight * gap.weight;
-  const Eigen::Map<const Eigen::Vector4d> u(contact.weight);
   const auto add = [&](const Eigen::Vector4d& along, const Eigen::Vector3d& turning, double d) {
     const double k = force / d;
     if (!(d > 0.0) || !(k * (along.squaredNorm() + turning.squaredNorm()) > kNegligible * own))
@@ -224,26 +272,18 @@ void ContactPotential::Impl::addRunning(const SoftGap& gap, const Contact& conta
     ContactRow& row = rows.back();
     copyFour(row.point, contact.point);
     Eigen::Map<Eigen::Vector4d>(row.along) = along;
-    Eigen::Map<Eigen::Vector4d>(row.across) = u;
+    copyFour(row.across, contact.weight);
     row.normal = gap.normal;
     row.turning = turning;
     row.stiffness = k;
   };
-  if (contact.solid >= 0)
+  const PlaceMotion& m = gap.motion;
+  if (m.count > 0)
+    add(m.along[0], m.turn[0], m.h00);
+  if (m.count > 1)
   {
-    // The solid's own turning is left out: only the rate of convergence could tell.
-    if (gap.free_t)
-      add(gap.weight * Eigen::Vector4d(-1, 1, 0, 0), Eigen::Vector3d::Zero(), gap.htt);
-    return;
-  }
-  const Eigen::Vector4d along_s = gap.weight * Eigen::Vector4d(-1, 1, 0, 0) + gap.weight_s * u;
-  const Eigen::Vector4d along_t = gap.weight * Eigen::Vector4d(0, 0, 1, -1) + gap.weight_t * u;
-  if (gap.free_s)
-    add(along_s, gap.turn_s, gap.hss);
-  if (gap.free_t)
-  {
-    const double l = gap.free_s ? gap.hst / gap.hss : 0.0;
-    add(along_t - l * along_s, gap.turn_t - l * gap.turn_s, gap.htt - l * (gap.free_s ? gap.hst : 0.0));
+    const double l = m.h01 / m.h00;
+    add(m.along[1] - l * m.along[0], m.turn[1] - l * m.turn[0], m.h11 - l * m.h01);
   }
 }
 
@@ -345,16 +385,7 @@ ContactPotential::ContactPotential(ContactPotential&&) noexcept = default;
 const ContactOptions& ContactPotential::options() const { return impl_->options; }
 const ContactSolid& ContactPotential::solid(std::size_t number) const { return impl_->surface.solids[number]; }
 
-void ContactPotential::setCurves(int points, const std::vector<ContactSegment>& segments,
-                                 const std::vector<ContactObject>& objects)
-{
-  impl_->surface.points = points;
-  impl_->surface.segments = segments;
-  impl_->surface.objects = objects;
-  impl_->lagged.clear();
-  impl_->contacts.clear();
-  impl_->forgetCandidates();
-}
+void ContactPotential::setPieces(const ContactSurface& surface) { impl_->setPieces(surface); }
 
 bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
 {

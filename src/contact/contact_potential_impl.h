@@ -9,6 +9,7 @@
 #include "slender_sim/contact/barrier.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "soft_gap.h"
+#include "pair_gap.h"
 
 namespace slender {
 
@@ -40,14 +41,7 @@ public:
   double lagFriction();
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
-  /// What was found or thinned with other curves.
-  void forgetCandidates()
-  {
-    near_.clear();
-    swept_.clear();
-    thin_pairs_.clear();
-    thin_on_solids_.clear();
-  }
+  void setPieces(const ContactSurface& pieces);
   void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
 
   ContactSurface surface;
@@ -67,8 +61,14 @@ public:
 private:
   double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
   double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose, bool with_stiffness);
-  double addContact(const SoftGap& gap, Contact& contact, bool with_stiffness);
-  void addRunning(const SoftGap& gap, const Contact& contact, double force);
+  double addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
+  double addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair, bool with_stiffness);
+  double addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on, const Pose& pose,
+                         bool with_stiffness);
+  /// `scale`: of the gap at which the pair repels.
+  double addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
+  void addMotion(const PairGap& gap, const Contact& contact, double force, double own);
+  double frictionOnSolid(int object, const ContactSolid& solid) const;
   double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact, bool with_stiffness);
   double restart();
 
@@ -80,6 +80,9 @@ private:
     double thickness;
     bool operator<(const Thinned& other) const { return key < other.key; }
   };
+  /// Thins a pair at this distance if it has to be. False: the pieces meet.
+  bool fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance, double thickness) const;
+  bool thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   static double thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key, double thickness);
   /// Distances of centrelines [m] at which pairs touch.
   double thicknessOf(const GridPairs::Pair& pair) const
@@ -92,9 +95,27 @@ private:
     const double full = surface.segments[on.segment].radius;
     return thin_on_solids_.empty() ? full : thinned(thin_on_solids_, {on.solid, on.segment, on.piece}, full);
   }
+  static std::array<int, 3> keyOf(const SheetCandidates::Pair& pair) { return {pair.edges, pair.first, pair.second}; }
+  static std::array<int, 3> keyOf(const SheetCandidates::OnSolid& on)
+  {
+    return {3 * on.solid + on.face.corners - 1, on.face.index, on.piece};
+  }
+  double thicknessOf(const SheetCandidates::Pair& pair) const
+  {
+    return thin_sheets_.empty() ? pair.thickness : thinned(thin_sheets_, keyOf(pair), pair.thickness);
+  }
+  double thicknessOf(const SheetCandidates::OnSolid& on) const
+  {
+    return thin_sheets_on_solids_.empty() ? on.face.radius : thinned(thin_sheets_on_solids_, keyOf(on), on.face.radius);
+  }
+  double sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
+                     const std::vector<Pose>& solids, const std::vector<Pose>& solids_end) const;
+  void limitMargin(const Eigen::Matrix3Xd& x);
+  double sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double least);
 
-  std::vector<Thinned> thin_pairs_, thin_on_solids_;   ///< sorted
+  std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
   Candidates near_, swept_;
+  SheetPieces sheets_;
   double margin_;
   std::vector<int> order_;   ///< for clearance()
   std::vector<BoundingBox> boxes_;

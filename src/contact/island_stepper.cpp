@@ -26,6 +26,7 @@ void IslandStepper::takeSurface()
 {
   surface_.points = 0;
   surface_.segments.clear();
+  surface_.triangles.clear();
   surface_.objects.clear();
   for (const Member& member : members_)
     member.steps->addSurface(surface_);
@@ -139,7 +140,7 @@ bool IslandStepper::loadContact(double h)
   if (surface_changes_)
   {
     takeSurface();
-    contact->setCurves(surface_.points, surface_.segments, surface_.objects);
+    contact->setPieces(surface_);
     if (!contact->thinToFit(island_.startPoints(), island_.startSolids()))
       return false;
   }

@@ -32,48 +32,6 @@ struct Case
   }
 };
 
-/// Largest error of the gradient by central differences over the largest force, over points and, if any, the solids'
-/// poses.
-double gradientError(const Case& c, ContactPotential& potential)
-{
-  constexpr double kStep = 1e-7;
-  potential.evaluate(c.x, c.solids, false);
-  const std::vector<ContactTerm> terms = potential.terms();
-  const Eigen::Matrix3Xd g = gradient(potential, c.x.cols());
-  double error = 0.0;
-  for (Eigen::Index i = 0; i < c.x.size(); ++i)
-  {
-    Eigen::Matrix3Xd plus = c.x, minus = c.x;
-    plus(i) += kStep;
-    minus(i) -= kStep;
-    const double slope =
-        (potential.evaluate(plus, c.solids, false) - potential.evaluate(minus, c.solids, false)) / (2 * kStep);
-    error = std::max(error, std::abs(slope - g(i)));
-  }
-  for (std::size_t k = 0; k < c.solids.size(); ++k)
-  {
-    Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();   // on the solid
-    for (const ContactTerm& term : terms)
-      if (term.solid == static_cast<int>(k))
-      {
-        force -= term.force;
-        torque -= (term.position - c.solids[k].position).cross(term.force);
-      }
-    for (int d = 0; d < 6; ++d)
-    {
-      const Eigen::Vector3d unit = kStep * Eigen::Vector3d::Unit(d % 3), none = Eigen::Vector3d::Zero();
-      std::vector<Pose> plus = c.solids, minus = c.solids;
-      plus[k] = moved(c.solids[k], d < 3 ? unit : none, d < 3 ? none : unit);
-      minus[k] = moved(c.solids[k], d < 3 ? -unit : none, d < 3 ? none : -unit);
-      const double slope = (potential.evaluate(c.x, plus, false) - potential.evaluate(c.x, minus, false)) / (2 * kStep);
-      error = std::max(error, std::abs(slope + (d < 3 ? force : torque)[d % 3]));
-    }
-  }
-  const double largest = g.colwise().norm().maxCoeff();
-  EXPECT_GT(largest, 0.0);
-  return error / largest;
-}
-
 // Central differences over 1e-7 m where the barrier's third derivative is at most 1e8 N/m^2 at forces of some newtons:
 // 1e-6.
 constexpr double kDifferences = 2e-6;
@@ -97,7 +55,8 @@ TEST(ContactPotential, ForceOfRodsIsTheGradient)
         {
           Case c = twoRods({along, 0.003, 0}, angle, tilt, height);
           ContactPotential p = c.potential();
-          EXPECT_LT(gradientError(c, p), kDifferences) << height << " " << angle << " " << tilt << " " << along;
+          EXPECT_LT(gradientError(p, c.x, c.solids), kDifferences)
+              << height << " " << angle << " " << tilt << " " << along;
         }
 }
 
@@ -133,7 +92,7 @@ TEST(ContactPotential, ForceOfSolidsIsTheGradient)
       }
       if (std::abs(p.clearance(c.x, c.solids) - kGap / 3) > 1e-6)
         continue;   // a plane that n does not leave
-      EXPECT_LT(gradientError(c, p), kDifferences) << shape.index() << " case " << k;
+      EXPECT_LT(gradientError(p, c.x, c.solids), kDifferences) << shape.index() << " case " << k;
       ++checked;
     }
     EXPECT_GT(checked, 10);

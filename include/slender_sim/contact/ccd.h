@@ -40,7 +40,10 @@ struct RigidMotion
   Eigen::Vector3d shift, turn;   ///< [m], rotation vector in world axes [rad]
 };
 
-/// A segment against a convex piece of a solid that moves rigidly.
+/// A point, segment or triangle of 1 to 3 corners against a convex piece of a solid that moves rigidly.
+double faceSolidLimit(const MovingPoint* corner, int corners, const ConvexPiece& piece, const RigidMotion& motion,
+                      const ApproachLimit& limit);
+/// The same for a segment.
 double segmentSolidLimit(const MovingPoint& a, const MovingPoint& b, const ConvexPiece& piece,
                          const RigidMotion& motion, const ApproachLimit& limit);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -27,13 +28,31 @@ struct ContactSegment
   double coreRadius() const { return core * radius; }
 };
 
-/// What a curve (later: a surface) touches. Pieces of one curve that are closer along it than about a quarter of a turn
-/// at its tightest are neighbours and never a pair.
+/// A triangle of a cloth. Its edges and corners are derived from all triangles that have them in common.
+struct ContactTriangle
+{
+  std::array<int, 3> corner{};   ///< points
+  /// [m] > 0. The middle surfaces of two layers keep the sum of their half thicknesses as a distance, and the middle
+  /// surface keeps half the thickness from a solid.
+  double half_thickness = 0.0;
+  int object = 0;
+  /// Bit k: corner k moves as prescribed. Pieces of which all corners do so pass through each other. Of a triangle only
+  /// the corners that move freely, and the edge between two of them, touch solids that move as prescribed.
+  unsigned char driven = 0;
+};
+
+/// What a curve or a cloth touches. Pieces of one curve that are closer along it than about a quarter of a turn at its
+/// tightest are neighbours and never a pair. Pieces of one cloth are neighbours if they have a corner in common.
 struct ContactObject : ContactProperties
 {
   double curve_length = 0.0;   ///< [m]
   bool closed = false;
   int owner = 0;   ///< see ContactSolid::only
+  /// Of a cloth: where its points are at rest [m], and the number of the first of them. Two pieces of it that are near
+  /// each other there keep the thickness and repel from the gap only as far as both together are at most half of that
+  /// distance; pieces that meet there are neighbours. Null: all of them keep the whole thickness.
+  std::shared_ptr<const Eigen::Matrix3Xd> rest{};
+  int first_point = 0;
 };
 
 /// A solid of a contact surface, which moves rigidly, and which objects of the surface pass through it.
@@ -41,12 +60,14 @@ struct ContactSolid : Obstacle
 {
   std::vector<int> ignores{};   ///< objects it never touches
   int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
+  bool body = false;            ///< moves freely, so that triangles touch it wherever their corners are driven
 };
 
 struct ContactSurface
 {
   int points = 0;
   std::vector<ContactSegment> segments;
+  std::vector<ContactTriangle> triangles{};
   std::vector<ContactObject> objects;
   std::vector<ContactSolid> solids;
 };
@@ -78,7 +99,7 @@ struct ContactTerm
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero(), geometric = Eigen::Matrix3d::Zero();
 };
 
-/// What a pair's second derivative contains besides, because the place of contact runs along the segments: stiffness r
+/// What a pair's second derivative contains besides, because the place of contact runs along the pieces: stiffness r
 /// r^T over the points, with r_i = along[i] normal + across[i] turning. Without `turning` the parts that make up for
 /// `geometric` are left out.
 struct ContactRow
@@ -106,8 +127,13 @@ private:
 };
 
 /// Barrier potential of surfaces that may not touch, with Coulomb friction by lagged normal forces
-/// [Li et al., Incremental Potential Contact, SIGGRAPH 2020; Codimensional IPC, 2021]. Infinite where surfaces meet;
-/// with stepLimit() the iterates of a minimisation never get there. Memory is reused from step to step.
+/// [Li et al., Incremental Potential Contact, SIGGRAPH 2020; with thickness: Codimensional IPC, 2021]. It is infinite
+/// where surfaces meet, except where an edge has passed through the inside of a triangle. With stepLimit() the iterates
+/// of a minimisation never get to either. Memory is reused from step to step.
+///
+/// The pairs are: two edges (segments, and edges of triangles), a point and a triangle (corners, and ends of segments),
+/// a segment and a solid, and a triangle (or its free edge or corner) and a solid. All of them have energies that are
+/// once continuously differentiable, see soft_gap.h and pair_gap.h.
 class ContactPotential
 {
 public:
@@ -117,21 +143,21 @@ public:
   const ContactOptions& options() const;
   const ContactSolid& solid(std::size_t number) const;
 
-  /// Other points, segments and objects (sound ones) from now on; the solids stay. For curves that are fed and divided
-  /// while they move.
-  void setCurves(int points, const std::vector<ContactSegment>& segments, const std::vector<ContactObject>& objects);
-  /// Thins segments where others, or solids, are nearer than a twentieth of the gap, or overlap: to a sixteenth of it.
-  /// What was brought together by something else than motion (a division, growing radii) can so begin a step. False:
-  /// two centrelines, or one and a solid, meet.
+  /// Takes the points, segments, triangles, and objects of another surface, which must be sound; the solids stay. For
+  /// curves that are fed and divided while they move.
+  void setPieces(const ContactSurface& surface);
+  /// Thins segments and triangles where others, or solids, are nearer than a twentieth of the gap, or overlap: to a
+  /// sixteenth of it. What was brought together by something else than motion (a division, growing radii) can so begin
+  /// a step. False: two centrelines or middle surfaces, or one and a solid, meet.
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const std::vector<ContactSegment>& segments() const;
-  /// Segments that thinToFit() found near each other: all those within the gap, and more. First and second are in
-  /// order.
+  /// Pairs of segments that thinToFit() found near each other: all those within the gap, and more. First and second are
+  /// in order.
   const std::vector<GridPairs::Pair>& nearPairs() const;
 
   /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less:
-  /// they meet. Shares no search structure and no minimisation with the rest of this class. The surface of a mesh is
-  /// touched from both sides.
+  /// they meet. Triangles that an edge passes through meet it. Shares no search structure and no minimisation with the
+  /// rest of this class. The surface of a mesh is touched from both sides.
   double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
 
   /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its
@@ -151,8 +177,8 @@ public:
 
   /// Potential [J] at a configuration; infinite where surfaces meet or x is not finite. Fills terms(), in an order that
   /// depends on x and solids only; their stiffness and rows() only on request. The second derivative is exact for pairs
-  /// of segments; of solids, what their own curvature and turning add to it is left out, and friction's is that of the
-  /// secant where it slips back and forth.
+  /// of segments and triangles; of solids, what their own curvature and turning add to it is left out, and friction's
+  /// is that of the secant where it slips back and forth.
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   const std::vector<ContactTerm>& terms() const;
   const std::vector<ContactRow>& rows() const;

@@ -1,0 +1,196 @@
+// The parts of ContactPotential that concern triangles.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "contact_potential_impl.h"
+#include "slender_sim/contact/distance.h"
+
+namespace slender {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}   // namespace
+
+double ContactPotential::Impl::addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness)
+{
+  double energy = 0.0;
+  for (const SheetCandidates::Pair& pair : near_.sheets().pairs())
+    if (energy += addSheetPair(x, pair, with_stiffness); !std::isfinite(energy))
+      return kInfinity;
+  for (const SheetCandidates::OnSolid& on : near_.sheets().onSolids())
+    if (energy += addSheetOnSolid(x, on, poses[on.solid], with_stiffness); !std::isfinite(energy))
+      return kInfinity;
+  return energy;
+}
+
+double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair,
+                                            bool with_stiffness)
+{
+  const double thickness = thicknessOf(pair), range = thickness + pair.scale * options.gap;
+  Contact contact;
+  PairGap gap;
+  int object, other;
+  double radius;   // of the second piece
+  const auto at = [&](int k) -> Eigen::Vector3d { return x.col(contact.point[k]); };
+  if (pair.edges)
+  {
+    const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
+    const Eigen::Vector3d a0 = x.col(a.a), a1 = x.col(a.b), b0 = x.col(b.a), b1 = x.col(b.b);
+    if (segmentDistance(a0, a1, b0, b1) >= range)
+      return 0.0;
+    gap = edgesGap(a0, a1, b0, b1, thickness, with_stiffness);
+    contact.point[0] = a.a;
+    contact.point[1] = a.b;
+    contact.point[2] = b.a;
+    contact.point[3] = b.b;
+    object = a.object;
+    other = b.object;
+    radius = thickness * b.radius / (a.radius + b.radius);
+  }
+  else
+  {
+    const SheetPieces::Point& p = sheets_.points[pair.first];
+    const ContactTriangle& t = surface.triangles[pair.second];
+    contact.point[0] = p.point;
+    std::copy(t.corner.begin(), t.corner.end(), contact.point + 1);
+    gap = pointTriangleGap(at(0), at(1), at(2), at(3), thickness);
+    object = p.object;
+    other = t.object;
+    radius = thickness * t.half_thickness / (p.radius + t.half_thickness);
+  }
+  if (gap.gap >= range - thickness)
+    return 0.0;
+  // behind the pairs of segments, and segments on solids; points behind edges
+  contact.first = static_cast<std::int64_t>(surface.segments.size() + solids.size()) + pair.first +
+                  (pair.edges ? 0 : static_cast<std::int64_t>(sheets_.edges.size()));
+  contact.second = pair.second;
+  contact.solid = -1;
+  contact.material.setZero();
+  contact.position = (radius + 0.5 * gap.gap / gap.weight) * gap.normal;
+  for (int k = pair.edges ? 2 : 1; k < 4; ++k)
+    contact.position -= gap.place[k] * x.col(contact.point[k]);
+  contact.friction = std::sqrt(surface.objects[object].friction * surface.objects[other].friction);
+  return addContact(gap, contact, pair.scale, with_stiffness);
+}
+
+double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on,
+                                               const Pose& pose, bool with_stiffness)
+{
+  const SheetPieces::Face& face = on.face;
+  const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
+  const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
+  Eigen::Vector3d z[3];
+  for (int k = 0; k < face.corners; ++k)
+    z[k] = to_solid * Eigen::Vector3d(x.col(face.corner[k]) - pose.position);
+  const double radius = thicknessOf(on);
+  if (leastFaceDistance(piece, z, face.corners) >= radius + options.gap)
+    return 0.0;
+  PairGap gap = facePieceGap(z, face.corners, radius, piece);
+  if (gap.gap >= options.gap)
+    return 0.0;
+  Contact contact;
+  contact.first = static_cast<std::int64_t>(surface.segments.size() + solids.size() + sheets_.edges.size() +
+                                            sheets_.points.size()) +
+                  3 * on.solid + face.corners - 1;
+  contact.second = (static_cast<std::int64_t>(face.index) << 32) + on.piece;
+  std::copy(face.corner.begin(), face.corner.end(), contact.point);
+  contact.point[3] = -1;
+  contact.solid = on.solid;
+  contact.material = -(gap.gap / gap.weight + radius) * gap.normal;
+  for (int k = 0; k < face.corners; ++k)
+    contact.material += gap.place[k] * z[k];
+  contact.position = pose * contact.material;
+  gap.normal = pose.orientation * gap.normal;
+  contact.friction = frictionOnSolid(face.object, surface.solids[on.solid]);
+  return addContact(gap, contact, 1.0, with_stiffness);
+}
+
+/// Limits the margin around points for which candidates hold: triangles would find all their neighbours in a wide one.
+void ContactPotential::Impl::limitMargin(const Eigen::Matrix3Xd& x)
+{
+  constexpr double kShare = 0.25;   // of an edge
+  double sum = 0.0;
+  const std::size_t edges = sheets_.edges.size();
+  for (std::size_t i = static_cast<std::size_t>(sheets_.segments); i < edges; ++i)
+    sum += (x.col(sheets_.edges[i].a) - x.col(sheets_.edges[i].b)).norm();
+  const double share = kShare * sum / static_cast<double>(edges - static_cast<std::size_t>(sheets_.segments));
+  margin_ = std::min(margin_, std::max(options.gap, share));
+}
+
+double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x,
+                                           const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& poses,
+                                           const std::vector<Pose>& poses_end) const
+{
+  double share = 1.0;
+  ApproachLimit limit;
+  const auto motion = [&](int i) { return MovingPoint{x.col(i), x_end.col(i)}; };
+  for (const SheetCandidates::Pair& pair : candidates.sheets().pairs())
+  {
+    limit.reach = pair.scale * options.gap;
+    limit.thickness = thicknessOf(pair);
+    if (pair.edges)
+    {
+      const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
+      share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
+      continue;
+    }
+    const auto& c = surface.triangles[pair.second].corner;
+    const int p = sheets_.points[pair.first].point;
+    share = std::min(share, pointTriangleLimit(motion(p), motion(c[0]), motion(c[1]), motion(c[2]), limit));
+  }
+  int solid = -1;
+  RigidMotion rigid{Pose{}, Pose{}};
+  limit.reach = options.gap;
+  for (const SheetCandidates::OnSolid& on : candidates.sheets().onSolids())
+  {
+    if (on.solid != solid)
+      rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
+    solid = on.solid;
+    limit.thickness = thicknessOf(on);
+    MovingPoint corner[3];
+    for (int k = 0; k < on.face.corners; ++k)
+      corner[k] = motion(on.face.corner[k]);
+    share = std::min(share, faceSolidLimit(corner, on.face.corners, solids[on.solid].pieces[on.piece], rigid, limit));
+  }
+  return share;
+}
+
+bool ContactPotential::Impl::thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+{
+  for (const SheetCandidates::Pair& pair : near_.sheets().pairs())
+  {
+    double distance;
+    if (pair.edges)
+    {
+      const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
+      distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b));
+    }
+    else
+    {
+      const auto& c = surface.triangles[pair.second].corner;
+      distance = pointTriangleDistance(x.col(sheets_.points[pair.first].point), x.col(c[0]), x.col(c[1]), x.col(c[2]));
+    }
+    if (!fit(thin_sheets_, keyOf(pair), distance, pair.thickness))
+      return false;
+  }
+  for (const SheetCandidates::OnSolid& on : near_.sheets().onSolids())
+  {
+    const Pose to_solid = poses[on.solid].inverse();
+    Eigen::Vector3d z[3];
+    for (int k = 0; k < on.face.corners; ++k)
+      z[k] = to_solid * Eigen::Vector3d(x.col(on.face.corner[k]));
+    FacePlane plane = separatingPlane(solids[on.solid].pieces[on.piece], z, on.face.corners, on.face.radius);
+    if (plane.meets)
+      plane = separatingPlane(solids[on.solid].pieces[on.piece], z, on.face.corners, 0.0);
+    if (!fit(thin_sheets_on_solids_, keyOf(on), plane.distance, on.face.radius))
+      return false;
+  }
+  std::sort(thin_sheets_.begin(), thin_sheets_.end());
+  std::sort(thin_sheets_on_solids_.begin(), thin_sheets_on_solids_.end());
+  return true;
+}
+
+}   // namespace slender

@@ -1,0 +1,128 @@
+#include "sheet_pieces.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace slender {
+
+namespace {
+
+bool isDriven(const ContactTriangle& triangle, int corner) { return (triangle.driven >> corner & 1) != 0; }
+
+}   // namespace
+
+void SheetPieces::build(const ContactSurface& surface)
+{
+  for (auto* list : {&faces, &whole, &corners})
+    list->clear();
+  points.clear();
+  edges.clear();
+  elements.clear();
+  triangles = static_cast<int>(surface.triangles.size());
+  segments = triangles > 0 ? static_cast<int>(surface.segments.size()) : 0;
+  if (triangles == 0)
+    return;
+  number_of_point_.assign(static_cast<std::size_t>(surface.points), -1);
+  for (int i = 0; i < segments; ++i)
+  {
+    const ContactSegment& s = surface.segments[i];
+    edges.push_back({s.a, s.b, s.object, s.radius, s.driven});
+    Element e{2, {s.a, s.b, s.b}, {-1, -1, -1}, {i, -1, -1}, s.object};
+    addPoint(s.a, s.object, s.radius, s.driven, e.point[0]);
+    addPoint(s.b, s.object, s.radius, s.driven, e.point[1]);
+    elements.push_back(e);
+  }
+  const std::size_t first = points.size();
+  for (const ContactTriangle& t : surface.triangles)
+  {
+    Element e{3, t.corner, {-1, -1, -1}, {-1, -1, -1}, t.object};
+    for (int k = 0; k < 3; ++k)
+      addPoint(t.corner[k], t.object, t.half_thickness, isDriven(t, k), e.point[k]);
+    elements.push_back(e);
+  }
+  findEdges(surface);
+  for (std::size_t i = first; i < points.size(); ++i)
+    if (!points[i].driven)
+      corners.push_back({1, static_cast<int>(i), {points[i].point, -1, -1}, points[i].radius, points[i].object});
+  findFaces(surface);
+}
+
+/// `number` becomes that of the point if nobody has owned it so far.
+void SheetPieces::addPoint(int point, int object, double radius, bool driven, int& number)
+{
+  int& known = number_of_point_[static_cast<std::size_t>(point)];
+  if (known >= 0)
+  {
+    Point& p = points[static_cast<std::size_t>(known)];
+    p.radius = std::max(p.radius, radius);
+    p.driven = p.driven || driven;   // a segment is driven if both of its ends are
+    return;
+  }
+  known = number = static_cast<int>(points.size());
+  points.push_back({point, object, radius, driven});
+}
+
+void SheetPieces::findEdges(const ContactSurface& surface)
+{
+  sides_.clear();
+  for (int i = 0; i < triangles; ++i)
+    for (int k = 0; k < 3; ++k)
+    {
+      const int a = surface.triangles[i].corner[k], b = surface.triangles[i].corner[(k + 1) % 3];
+      sides_.push_back({std::min(a, b), std::max(a, b), i, k});
+    }
+  std::sort(sides_.begin(), sides_.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.low, a.high, a.triangle, a.side) < std::tie(b.low, b.high, b.triangle, b.side);
+  });
+  for (std::size_t i = 0; i < sides_.size(); ++i)
+  {
+    const Side& side = sides_[i];
+    const ContactTriangle& t = surface.triangles[side.triangle];
+    if (i > 0 && sides_[i - 1].low == side.low && sides_[i - 1].high == side.high)
+    {
+      edges.back().radius = std::max(edges.back().radius, t.half_thickness);
+      continue;
+    }
+    elements[segments + side.triangle].edge[side.side] = static_cast<int>(edges.size());
+    edges.push_back(
+        {side.low, side.high, t.object, t.half_thickness, isDriven(t, side.side) && isDriven(t, (side.side + 1) % 3)});
+  }
+}
+
+/// A triangle without driven corners is a face. So is an edge, or a corner, that moves freely and is not part of one.
+void SheetPieces::findFaces(const ContactSurface& surface)
+{
+  covered_.assign(static_cast<std::size_t>(surface.points), 0);
+  for (const ContactTriangle& t : surface.triangles)
+  {
+    const int free = 3 - isDriven(t, 0) - isDriven(t, 1) - isDriven(t, 2);
+    if (free >= 2)
+      for (int k = 0; k < 3; ++k)
+        covered_[t.corner[k]] = 1;
+  }
+  for (const Face& corner : corners)
+    if (!covered_[corner.corner[0]])
+      faces.push_back(corner);
+  for (std::size_t i = 0; i < sides_.size();)
+  {
+    const Side& side = sides_[i];
+    bool in_face = false;
+    std::size_t j = i;
+    for (; j < sides_.size() && sides_[j].low == side.low && sides_[j].high == side.high; ++j)
+      in_face = in_face || surface.triangles[sides_[j].triangle].driven == 0;
+    const ContactTriangle& t = surface.triangles[side.triangle];
+    const int number = elements[segments + side.triangle].edge[side.side];
+    if (!in_face && !isDriven(t, side.side) && !isDriven(t, (side.side + 1) % 3))
+      faces.push_back({2, number, {side.low, side.high, -1}, edges[number].radius, t.object});
+    i = j;
+  }
+  for (int i = 0; i < triangles; ++i)
+  {
+    const ContactTriangle& t = surface.triangles[i];
+    whole.push_back({3, i, t.corner, t.half_thickness, t.object});
+    if (t.driven == 0)
+      faces.push_back(whole.back());
+  }
+}
+
+}   // namespace slender
