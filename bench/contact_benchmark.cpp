@@ -1,4 +1,5 @@
-// Contact of rods: cost of the potential, broad phases against each other, and how smooth FCL's distances are.
+// Contact of rods and sheets: cost of the potential, broad phases against each other, and how smooth FCL's distances
+// are.
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include "slender_sim/contact/broad_phase.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/contact/solids.h"
+#include "slender_sim/geometry/mesh_shapes.h"
 
 namespace {
 
@@ -239,6 +241,61 @@ void softenedCylinder(benchmark::State& state)
   state.counters["terms"] = static_cast<double>(potential.terms().size());
 }
 BENCHMARK(softenedCylinder);
+
+// ---- triangles
+
+/// A square sheet of 1 m with 2 mm of thickness: flat (0), or folded into five layers that touch (1).
+ContactSurface sheet(int cells, bool folded, Eigen::Matrix3Xd& x)
+{
+  constexpr double kThickness = 2e-3;
+  const TriangleMesh mesh = gridMesh(1, 1, cells, cells, GridPattern::irregular);
+  x = mesh.vertices;
+  for (Eigen::Index i = 0; folded && i < x.cols(); ++i)
+  {
+    const int layer = std::min(4, static_cast<int>(5.0 * x(0, i)));
+    const double along = 5.0 * x(0, i) - layer;
+    x(0, i) = 0.2 * (layer % 2 == 0 ? along : 1.0 - along);
+    x(2, i) = 1.2 * kThickness * layer;
+  }
+  ContactSurface surface;
+  surface.points = static_cast<int>(x.cols());
+  for (Eigen::Index i = 0; i < mesh.triangles.cols(); ++i)
+  {
+    const Eigen::Vector3i t = mesh.triangles.col(i);
+    surface.triangles.push_back({{t[0], t[1], t[2]}, 0.5 * kThickness, 0});
+  }
+  ContactObject object;
+  object.rest = std::make_shared<Eigen::Matrix3Xd>(mesh.vertices);
+  surface.objects.push_back(object);
+  return surface;
+}
+
+/// Search, and continuous collision detection, of a sheet that falls by 20 mm.
+void sheetStepLimit(benchmark::State& state)
+{
+  Eigen::Matrix3Xd x;
+  const ContactSurface surface = sheet(static_cast<int>(state.range(0)), state.range(1) != 0, x);
+  ContactOptions options;
+  options.gap = 1e-3;
+  ContactPotential potential(surface, options);
+  const Eigen::Matrix3Xd end = x.colwise() - Eigen::Vector3d(0, 0, 0.02);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(potential.stepLimit(x, end, {}, {}));
+}
+BENCHMARK(sheetStepLimit)->ArgsProduct({{20, 40, 80}, {0, 1}})->Unit(benchmark::kMillisecond);
+
+void sheetEvaluate(benchmark::State& state)
+{
+  Eigen::Matrix3Xd x;
+  const ContactSurface surface = sheet(static_cast<int>(state.range(0)), state.range(1) != 0, x);
+  ContactOptions options;
+  options.gap = 1e-3;
+  ContactPotential potential(surface, options);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(potential.evaluate(x, {}, true));
+  state.counters["terms"] = static_cast<double>(potential.terms().size());
+}
+BENCHMARK(sheetEvaluate)->ArgsProduct({{20, 40, 80}, {0, 1}})->Unit(benchmark::kMillisecond);
 
 }   // namespace
 

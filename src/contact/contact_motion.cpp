@@ -21,10 +21,9 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
   {
     swept_.build(surface, sheets_, solids, {x, x_end, poses, poses_end}, options.gap, 0.0, 0.0);
     candidates = &swept_;
-    const double moved = (x_end - x).colwise().norm().maxCoeff();
-    margin_ = std::min(std::max(options.gap, 2.0 * moved), 20.0 * options.gap);
-    if (!sheets_.empty())
-      limitMargin(x);
+    // Triangles would find all their neighbours in a wide margin, and examine them in each evaluation.
+    const double moved = (x_end - x).colwise().norm().maxCoeff(), most = sheets_.empty() ? 20.0 : 1.0;
+    margin_ = std::min(std::max(options.gap, 2.0 * moved), most * options.gap);
   }
   double share = 1.0;
   ApproachLimit limit;

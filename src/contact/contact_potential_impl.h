@@ -110,7 +110,6 @@ private:
   }
   double sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
                      const std::vector<Pose>& solids, const std::vector<Pose>& solids_end) const;
-  void limitMargin(const Eigen::Matrix3Xd& x);
   double sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double least);
 
   std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted

@@ -108,18 +108,6 @@ double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const 
   return addContact(gap, contact, 1.0, with_stiffness);
 }
 
-/// Limits the margin around points for which candidates hold: triangles would find all their neighbours in a wide one.
-void ContactPotential::Impl::limitMargin(const Eigen::Matrix3Xd& x)
-{
-  constexpr double kShare = 0.25;   // of an edge
-  double sum = 0.0;
-  const std::size_t edges = sheets_.edges.size();
-  for (std::size_t i = static_cast<std::size_t>(sheets_.segments); i < edges; ++i)
-    sum += (x.col(sheets_.edges[i].a) - x.col(sheets_.edges[i].b)).norm();
-  const double share = kShare * sum / static_cast<double>(edges - static_cast<std::size_t>(sheets_.segments));
-  margin_ = std::min(margin_, std::max(options.gap, share));
-}
-
 double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x,
                                            const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& poses,
                                            const std::vector<Pose>& poses_end) const

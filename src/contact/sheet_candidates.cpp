@@ -13,19 +13,6 @@ namespace {
 const double kCorner = std::sqrt(3.0);   // of a cube, from its middle, over half its side
 constexpr double kMet = 1e-6;            // of thickness and gap: pieces that are nearer at rest are neighbours
 
-/// Largest relative displacement of two pieces of N and M points [m].
-template <int N, int M>
-double relativeMotion(const SurfaceMotion& motion, const int (&a)[N], const int (&b)[M])
-{
-  double most2 = 0.0;
-  for (int i = 0; i < N; ++i)
-    for (int j = 0; j < M; ++j)
-      most2 = std::max(
-          most2,
-          (motion.x_end.col(a[i]) - motion.x.col(a[i]) - motion.x_end.col(b[j]) + motion.x.col(b[j])).squaredNorm());
-  return std::sqrt(most2);
-}
-
 /// Thickness and scale of a pair, by the distance that `distance` gives at points. False: they are neighbours.
 template <class Distance>
 bool fitToRest(const ContactSurface& surface, int a, int b, double gap, Distance&& distance,
@@ -100,11 +87,14 @@ void SheetCandidates::findPairs(const ContactSurface& surface, const SheetPieces
   mean /= static_cast<double>(pieces.points.size());
   const double around = 0.5 * slack.gap + kCorner * slack.margin;
   points_.resize(static_cast<std::size_t>(surface.points));
+  strays_.resize(static_cast<std::size_t>(surface.points));
   for (const SheetPieces::Point& p : pieces.points)
   {
     const Eigen::Vector3d end = motion.x_end.col(p.point) - mean;
     points_[p.point] = Kdop::swept(motion.x.col(p.point).data(), end.data(), p.radius + around);
+    strays_[p.point] = (end - motion.x.col(p.point)).norm() + around;
   }
+  takeBalls(surface, pieces, motion.x);
   for (std::size_t i = 0; i < volumes_.size(); ++i)
   {
     const auto& corner = pieces.elements[i].corner;
@@ -116,64 +106,85 @@ void SheetCandidates::findPairs(const ContactSurface& surface, const SheetPieces
   tree_.refit(volumes_, active_);
   tree_.selfPairs(found_);
   for (const KdopTree::Pair& p : found_)
-    testElements(surface, pieces, motion, p.first, p.second, slack.gap + 2.0 * kCorner * slack.margin);
+    testElements(surface, pieces, motion.x, p.first, p.second);
   std::sort(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) {
     return std::make_tuple(!a.edges, a.first, a.second) < std::make_tuple(!b.edges, b.first, b.second);
   });
 }
 
-void SheetCandidates::testElements(const ContactSurface& surface, const SheetPieces& pieces,
-                                   const SurfaceMotion& motion, int a, int b, double slack)
+/// Balls around edges and triangles at the start of the motion, which hold them while they move with the mean.
+void SheetCandidates::takeBalls(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x)
+{
+  edge_balls_.resize(pieces.edges.size());
+  for (std::size_t i = 0; i < pieces.edges.size(); ++i)
+  {
+    const SheetPieces::Edge& e = pieces.edges[i];
+    const double stray = e.radius + std::max(strays_[e.a], strays_[e.b]);
+    edge_balls_[i] = {0.5 * (x.col(e.a) + x.col(e.b)), 0.5 * (x.col(e.a) - x.col(e.b)).norm() + stray, stray};
+  }
+  triangle_balls_.resize(surface.triangles.size());
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i)
+  {
+    const ContactTriangle& t = surface.triangles[i];
+    const auto& c = t.corner;
+    const double stray = t.half_thickness + std::max({strays_[c[0]], strays_[c[1]], strays_[c[2]]});
+    const Eigen::Vector3d middle = (x.col(c[0]) + x.col(c[1]) + x.col(c[2])) / 3.0;
+    const double far2 = std::max({(x.col(c[0]) - middle).squaredNorm(), (x.col(c[1]) - middle).squaredNorm(),
+                                  (x.col(c[2]) - middle).squaredNorm()});
+    triangle_balls_[i] = {middle, std::sqrt(far2) + stray, stray};
+  }
+}
+
+void SheetCandidates::testElements(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
+                                   int a, int b)
 {
   const SheetPieces::Element &e = pieces.elements[a], &f = pieces.elements[b];
   for (const int i : e.edge)
     for (const int j : f.edge)
       if (i >= 0 && j >= 0)
-        testEdges(surface, pieces, motion, std::min(i, j), std::max(i, j), slack);
+        testEdges(surface, pieces, x, std::min(i, j), std::max(i, j));
   for (int k = 0; k < 3; ++k)
   {
     if (e.point[k] >= 0 && f.corners == 3)
-      testPoint(surface, pieces, motion, e.point[k], pieces.triangleOf(b), slack);
+      testPoint(surface, pieces, x, e.point[k], pieces.triangleOf(b));
     if (f.point[k] >= 0 && e.corners == 3)
-      testPoint(surface, pieces, motion, f.point[k], pieces.triangleOf(a), slack);
+      testPoint(surface, pieces, x, f.point[k], pieces.triangleOf(a));
   }
 }
 
-void SheetCandidates::testEdges(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion,
-                                int a, int b, double slack)
+void SheetCandidates::testEdges(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
+                                int a, int b)
 {
+  const Ball &p = edge_balls_[a], &q = edge_balls_[b];
+  if (p.misses(q))
+    return;
   const SheetPieces::Edge &e = pieces.edges[a], &f = pieces.edges[b];
   if (e.a == f.a || e.a == f.b || e.b == f.a || e.b == f.b || (e.driven && f.driven))
     return;
-  Pair pair{true, a, b, e.radius + f.radius, 1.0};
-  const double range = pair.thickness + slack + relativeMotion(motion, {e.a, e.b}, {f.a, f.b});
-  const Eigen::Vector3d a0 = motion.x.col(e.a), a1 = motion.x.col(e.b), b0 = motion.x.col(f.a), b1 = motion.x.col(f.b);
-  // half the lengths and the range, squared: (p + q + r)^2 <= 3 (p^2 + q^2 + r^2)
-  if (0.25 * (a0 + a1 - b0 - b1).squaredNorm() >
-          0.75 * ((a1 - a0).squaredNorm() + (b1 - b0).squaredNorm()) + 3.0 * range * range ||
-      segmentDistance(a0, a1, b0, b1) > range)
-    return;
-  const auto atRest = [&](const Eigen::Matrix3Xd& x, int first) {
-    return segmentDistance(x.col(e.a - first), x.col(e.b - first), x.col(f.a - first), x.col(f.b - first));
+  const auto distance = [&](const Eigen::Matrix3Xd& y, int first) {
+    return segmentDistance(y.col(e.a - first), y.col(e.b - first), y.col(f.a - first), y.col(f.b - first));
   };
-  if (fitToRest(surface, e.object, f.object, gap_, atRest, pair))
+  Pair pair{true, a, b, e.radius + f.radius, 1.0};
+  if (distance(x, 0) <= p.stray + q.stray && fitToRest(surface, e.object, f.object, gap_, distance, pair))
     pairs_.push_back(pair);
 }
 
-void SheetCandidates::testPoint(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion,
-                                int number, int triangle, double slack)
+void SheetCandidates::testPoint(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
+                                int number, int triangle)
 {
   const SheetPieces::Point& p = pieces.points[number];
+  const Ball &q = triangle_balls_[triangle], ball{x.col(p.point), p.radius + strays_[p.point], 0.0};
+  if (q.misses(ball))
+    return;
   const ContactTriangle& t = surface.triangles[triangle];
   const auto& c = t.corner;
   if (p.point == c[0] || p.point == c[1] || p.point == c[2] || (p.driven && t.driven == 7))
     return;
-  Pair pair{false, number, triangle, p.radius + t.half_thickness, 1.0};
-  const double range = pair.thickness + slack + relativeMotion(motion, {p.point}, {c[0], c[1], c[2]});
-  const auto distance = [&](const Eigen::Matrix3Xd& x, int first) {
-    return pointTriangleDistance(x.col(p.point - first), x.col(c[0] - first), x.col(c[1] - first), x.col(c[2] - first));
+  const auto distance = [&](const Eigen::Matrix3Xd& y, int first) {
+    return pointTriangleDistance(y.col(p.point - first), y.col(c[0] - first), y.col(c[1] - first), y.col(c[2] - first));
   };
-  if (distance(motion.x, 0) <= range && fitToRest(surface, p.object, t.object, gap_, distance, pair))
+  Pair pair{false, number, triangle, p.radius + t.half_thickness, 1.0};
+  if (distance(x, 0) <= ball.reach + q.stray && fitToRest(surface, p.object, t.object, gap_, distance, pair))
     pairs_.push_back(pair);
 }
 

@@ -11,8 +11,8 @@ namespace slender {
 /// What may touch of triangles while points and solids stay near a motion. Memory is reused.
 ///
 /// Pairs of triangles, and of triangles and segments, are found by a tree of k-DOPs over them. Of what the tree finds,
-/// the pairs of edges, and of points and triangles, that are too far apart for their relative motion are dropped. So a
-/// cloth that is flat has hardly any, however fast it moves as a whole.
+/// the pairs of edges, and of points and triangles, that are too far apart for their motion against the mean are
+/// dropped. So a cloth that is flat has hardly any, however fast it moves as a whole.
 class SheetCandidates
 {
 public:
@@ -51,14 +51,25 @@ private:
   void buildTree(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x);
   void findPairs(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion,
                  const Slack& slack);
-  void testElements(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion, int a, int b,
-                    double slack);
-  void testEdges(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion, int a, int b,
-                 double slack);
-  void testPoint(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion, int number,
-                 int triangle, double slack);
+  void takeBalls(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x);
+  void testElements(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int a, int b);
+  void testEdges(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int a, int b);
+  void testPoint(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int number,
+                 int triangle);
   void findOnSolid(const ContactSurface& surface, const std::vector<SheetPieces::Face>& faces, int solid,
                    const SolidPieces& pieces, const SurfaceMotion& motion, const Slack& slack);
+
+  struct Ball
+  {
+    Eigen::Vector3d middle;
+    double reach;   ///< radius [m], what the surface adds included
+    double stray;   ///< that part of it: how far from the piece another one may be felt
+    bool misses(const Ball& b) const
+    {
+      const double sum = reach + b.reach;
+      return (middle - b.middle).squaredNorm() > sum * sum;
+    }
+  };
 
   bool tree_built_ = false;
   double gap_ = 0.0;
@@ -67,6 +78,8 @@ private:
   std::vector<int> groups_;
   std::vector<char> touching_, active_;
   std::vector<Kdop> volumes_, points_;
+  std::vector<double> strays_;   ///< of points: how far they get from where the mean motion takes them, and the margin
+  std::vector<Ball> edge_balls_, triangle_balls_;
   std::vector<KdopTree::Pair> found_;
   std::vector<Pair> pairs_;
   std::vector<OnSolid> on_solids_;
