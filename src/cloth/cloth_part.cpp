@@ -46,6 +46,11 @@ void ClothPart::begin(const ClothState& state, const ClothInputs& inputs, double
 {
   budget_->start(WorkBudget::kUnbounded);
   stages_->begin(state, inputs, duration);
+  if (contact_ && stages_->present().pins != surface_pins_)
+  {
+    surface_pins_ = stages_->present().pins;
+    ++surface_version_;
+  }
 }
 
 StepFailure ClothPart::beginSubstep(const StepPlan& plan, const Substep& substep)

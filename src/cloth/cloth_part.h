@@ -1,9 +1,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "../contact/part.h"
+#include "../contact/part_steps.h"
 #include "cloth_stages.h"
 #include "slender_sim/dynamics/failure_place.h"
 #include "slender_sim/dynamics/substep_controller.h"
@@ -17,7 +19,7 @@ namespace slender {
 /// Far from the minimum the Hessian is the one that is never indefinite, near it the exact one, as for a cloth on its
 /// own. There a shift of angles, which cloth does not have, adds a share of its inertia. With a shift of positions the
 /// Hessian is the semidefinite one again.
-class ClothPart final : public Part
+class ClothPart final : public Part, public PartSteps
 {
 public:
   /// Throws std::invalid_argument for other integrators than implicit_euler, for prescribed averages, and for a model
@@ -32,19 +34,28 @@ public:
     return stages_->accepts(state, inputs, duration, report);
   }
 
+  /// What the cloth touches, in steps of this length [s]. Without a call nothing.
+  void setContact(const ContactProperties& contact, double step);
+
   // ---- a step, substep by substep
   /// Takes a step of `duration` [s] from a state. The inputs must live until the end().
   void begin(const ClothState& state, const ClothInputs& inputs, double duration);
   void end(ClothState& state) { stages_->end(state); }
-  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep);
-  void beginStage(std::size_t stage);
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
+  double shortestEdge() const override { return stages_->shortestEdge(); }
+  /// Held vertices are driven corners.
+  void addSurface(ContactSurface& surface) const override;
+  long surfaceVersion() const override { return surface_version_; }
+  BarrierRange barrierRange(double gap) const override;
+  BoundingBox surfaceBox(double ahead) const override;
+  void beginStage(std::size_t stage) override;
   /// Takes over the solution of a stage, which is the trial as last evaluated.
-  void endStage(std::size_t stage, bool last, StepReport& report);
-  void acceptSubstep(const Substep&) { stages_->commitStep(); }
+  void endStage(std::size_t stage, bool last, StepReport& report) override;
+  void acceptSubstep(const Substep&) override { stages_->commitStep(); }
   /// Largest unbalanced force in the last evaluation [N].
-  Largest unbalancedForce() const;
+  Largest unbalancedForce() const override;
   /// Completes the report of a step that is refused because of this part.
-  void refuse(StepFailure failure, double length, StepReport& report) const
+  void refuse(StepFailure failure, double length, StepReport& report) const override
   {
     stages_->refuseUnsolved(report, failure, length);
   }
@@ -94,8 +105,13 @@ private:
   void factor(const HessianShift& shift);
 
   std::unique_ptr<ClothStages> stages_;   ///< whose x is the trial
-  std::shared_ptr<WorkBudget> budget_;    ///< The island bounds the work, so that this one has no bound.
-  std::vector<double> inverse_length_;    ///< of edges at rest [1/m]
+  std::optional<ContactProperties> contact_;
+  double contact_step_ = 0.0;   ///< [s]
+  std::shared_ptr<const Eigen::Matrix3Xd> rest_;
+  std::vector<int> surface_pins_;   ///< that the surface has as driven corners
+  long surface_version_ = 0;
+  std::shared_ptr<WorkBudget> budget_;   ///< The island bounds the work, so that this one has no bound.
+  std::vector<double> inverse_length_;   ///< of edges at rest [1/m]
   PointVector base_, saved_, direction_, solution_;
   int unknowns_ = 0;
   std::vector<int> number_;   ///< per vertex: of the first of its unknowns in the part, or kPrescribed

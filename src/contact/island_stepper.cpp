@@ -28,8 +28,20 @@ void IslandStepper::takeSurface()
   surface_.segments.clear();
   surface_.triangles.clear();
   surface_.objects.clear();
+  versions_.clear();
   for (const Member& member : members_)
+  {
     member.steps->addSurface(surface_);
+    versions_.push_back(member.steps->surfaceVersion());
+  }
+}
+
+bool IslandStepper::surfaceIsStale() const
+{
+  for (std::size_t k = 0; k < members_.size(); ++k)
+    if (members_[k].steps->surfaceVersion() != versions_[k])
+      return true;
+  return false;
 }
 
 void IslandStepper::setContact(const std::vector<ContactSolid>& solids, const ContactOptions& options)
@@ -137,11 +149,11 @@ bool IslandStepper::loadContact(double h)
     range.least = std::max(range.least, surface_changes_ ? own.least : 0.0);
     range.most = std::max(range.most, own.most);
   }
-  if (surface_changes_)
+  if (surface_changes_ || surfaceIsStale())
   {
     takeSurface();
     contact->setPieces(surface_);
-    if (!contact->thinToFit(island_.startPoints(), island_.startSolids()))
+    if (surface_changes_ && !contact->thinToFit(island_.startPoints(), island_.startSolids()))
       return false;
   }
   if (attraction_)

@@ -56,6 +56,7 @@ private:
   void startAccelerations();
   bool loadContact(double h);
   void takeSurface();
+  bool surfaceIsStale() const;
   NewtonResult solveStage(std::size_t stage, const Substep& substep);
   StepFailure solveSubstep(const Substep& substep, StepReport& report);
   std::size_t farthestFromBalance() const;
@@ -72,7 +73,8 @@ private:
   std::vector<Part*> parts_;
   std::vector<BoundingBox> swept_;   ///< per member
   SubstepPotential* attraction_ = nullptr;
-  ContactSurface surface_;   ///< of the parts, without solids
+  ContactSurface surface_;       ///< of the parts, without solids
+  std::vector<long> versions_;   ///< of the members' surfaces
   bool surface_changes_ = false;
   StepPlan plan_;
   double duration_ = 0.0, first_stiffness_ = 0.0, stiffness_ = 0.0, gap_ = 0.0;

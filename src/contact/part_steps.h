@@ -43,9 +43,13 @@ public:
   virtual double shortestEdge() const { return std::numeric_limits<double>::infinity(); }
 
   // ---- its surface
-  /// Appends its objects and segments; their points begin at surface.points, which grows by the number of its points.
+  /// Appends its objects, segments and triangles; their points begin at surface.points, which grows by the number of
+  /// its points.
   virtual void addSurface(ContactSurface& surface) const = 0;
-  /// Whether the surface consists of other pieces in each substep.
+  /// Counts the changes of what addSurface() says, as when other points of a cloth are held. In one substep there is
+  /// none.
+  virtual long surfaceVersion() const { return 0; }
+  /// Whether the surface consists of other pieces in each substep, which something else than motion may bring together.
   virtual bool surfaceChanges() const { return false; }
   /// `gap`: at which surfaces repel [m].
   virtual BarrierRange barrierRange(double gap) const = 0;

@@ -92,6 +92,7 @@ std::vector<ContactSolid> JoinedIsland::takeSolids()
       continue;
     solids_.push_back(&solid);
     solids.push_back({solid.obstacle});
+    solids.back().body = solid.body != nullptr;
     if (floor)
       solids.back().only = solid.index;
     int object = 0;   // of the contact: rods that touch something come first
