@@ -46,11 +46,7 @@ void ClothPart::begin(const ClothState& state, const ClothInputs& inputs, double
 {
   budget_->start(WorkBudget::kUnbounded);
   stages_->begin(state, inputs, duration);
-  if (contact_ && stages_->present().pins != surface_pins_)
-  {
-    surface_pins_ = stages_->present().pins;
-    ++surface_version_;
-  }
+  setPins(state.pins);
 }
 
 StepFailure ClothPart::beginSubstep(const StepPlan& plan, const Substep& substep)
@@ -70,7 +66,7 @@ void ClothPart::beginStage(std::size_t stage)
 void ClothPart::endStage(std::size_t stage, bool last, StepReport& report)
 {
   if (last)
-    stages_->takeEnd(stages_->largestInternal(), evaluation.max_strain, report);
+    stages_->takeEnd(std::max(stages_->largestInternal(), largest_contact_), evaluation.max_strain, report);
   else
     stages_->endStage(stage);
 }
@@ -159,6 +155,7 @@ void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
   const ClothEvaluation e =
       with_hessian ? system().evaluateHessian(stages_->x, exact_ ? HessianKind::exact : HessianKind::semidefinite)
                    : system().evaluate(stages_->x);
+  largest_contact_ = 0.0;
   evaluation = {};
   evaluation.stretch = e.membrane;
   evaluation.bend_twist = e.bending;
@@ -169,6 +166,12 @@ void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
   addOwnContacts(with_hessian);
   if (with_hessian && std::isfinite(evaluation.energy()))
     factor(shift);
+}
+
+void ClothPart::addForce(int point, const Eigen::Vector3d& force)
+{
+  vertex(system().gradient(), point) -= force;
+  largest_contact_ = std::max(largest_contact_, force.norm());
 }
 
 /// In units of the weight of inertia. An island shifts all its parts; a cloth that is definite by itself, so far as

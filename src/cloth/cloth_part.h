@@ -7,8 +7,7 @@
 #include "../contact/part.h"
 #include "../contact/part_steps.h"
 #include "cloth_stages.h"
-#include "slender_sim/dynamics/failure_place.h"
-#include "slender_sim/dynamics/substep_controller.h"
+#include "slender_sim/contact/contact_properties.h"
 
 namespace slender {
 
@@ -27,7 +26,7 @@ public:
   ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
 
   /// State, inputs, forces on pins, and messages.
-  const ClothStages& stages() const { return *stages_; }
+  ClothStages& stages() const { return *stages_; }
   /// Whether a step from this state with these inputs can begin. If not, the report says why.
   bool accepts(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report) const
   {
@@ -36,32 +35,33 @@ public:
 
   /// What the cloth touches, in steps of this length [s]. Without a call nothing.
   void setContact(const ContactProperties& contact, double step);
+  /// These vertices are driven corners of the surface from now on. begin() takes them from the state.
+  void setPins(const std::vector<int>& pins);
+  int points() const override { return stages_->model->vertices(); }
+  void addSurface(ContactSurface& surface) const override;
 
-  // ---- a step, substep by substep
+  // ---- a step
   /// Takes a step of `duration` [s] from a state. The inputs must live until the end().
   void begin(const ClothState& state, const ClothInputs& inputs, double duration);
   void end(ClothState& state) { stages_->end(state); }
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
-  double shortestEdge() const override { return stages_->shortestEdge(); }
-  /// Held vertices are driven corners.
-  void addSurface(ContactSurface& surface) const override;
-  long surfaceVersion() const override { return surface_version_; }
-  BarrierRange barrierRange(double gap) const override;
-  BoundingBox surfaceBox(double ahead) const override;
   void beginStage(std::size_t stage) override;
-  /// Takes over the solution of a stage, which is the trial as last evaluated.
   void endStage(std::size_t stage, bool last, StepReport& report) override;
   void acceptSubstep(const Substep&) override { stages_->commitStep(); }
-  /// Largest unbalanced force in the last evaluation [N].
   Largest unbalancedForce() const override;
-  /// Completes the report of a step that is refused because of this part.
   void refuse(StepFailure failure, double length, StepReport& report) const override
   {
     stages_->refuseUnsolved(report, failure, length);
   }
 
 private:
-  // An island knows the rest as a Part.
+  // ---- as PartSteps
+  double shortestEdge() const override { return stages_->shortestEdge(); }
+  long surfaceVersion() const override { return surface_version_; }
+  BarrierRange barrierRange(double gap) const override;
+  BoundingBox surfaceBox(double ahead) const override;
+
+  // ---- as Part
   bool numberUnknowns() override;
   int unknowns() const override { return unknowns_; }
   void moveAlong(double alpha) override;
@@ -72,7 +72,6 @@ private:
   void placeHeld(double fraction) override;
   bool heldMoves(double from, double to) const override;
   void retreatHeld(double share) override;
-  int points() const override { return stages_->model->vertices(); }
   void gather(Eigen::Matrix3Xd& x) const override;
   void gatherStart(Eigen::Matrix3Xd& x) const override;
   void evaluate(bool with_hessian, const HessianShift& shift) override;
@@ -86,7 +85,7 @@ private:
   void takeDirection(const double* solution) override;
   int base(int point) const override { return number_[point] < 0 ? kPrescribed : offset + number_[point]; }
   void addColumns(int point, int component, double weight, Columns& row) const override;
-  void addForce(int point, const Eigen::Vector3d& force) override { vertex(system().gradient(), point) -= force; }
+  void addForce(int point, const Eigen::Vector3d& force) override;
   Eigen::Vector3d move(int point) const override { return vertex(direction_, point); }
   double stepLimit() const override;
   double incrementSize(double length) const override;
@@ -113,6 +112,7 @@ private:
   std::shared_ptr<WorkBudget> budget_;   ///< The island bounds the work, so that this one has no bound.
   std::vector<double> inverse_length_;   ///< of edges at rest [1/m]
   PointVector base_, saved_, direction_, solution_;
+  double largest_contact_ = 0.0;   ///< force on a vertex in the last evaluation [N]
   int unknowns_ = 0;
   std::vector<int> number_;   ///< per vertex: of the first of its unknowns in the part, or kPrescribed
   std::vector<char> held_;    ///< for which the vertices were numbered

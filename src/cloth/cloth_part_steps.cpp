@@ -13,6 +13,14 @@ void ClothPart::setContact(const ContactProperties& contact, double step)
   ++surface_version_;
 }
 
+void ClothPart::setPins(const std::vector<int>& pins)
+{
+  if (pins == surface_pins_)
+    return;
+  surface_pins_ = pins;
+  ++surface_version_;
+}
+
 void ClothPart::addSurface(ContactSurface& surface) const
 {
   const int first = surface.points;
@@ -57,6 +65,8 @@ BoundingBox ClothPart::surfaceBox(double ahead) const
   const ClothState& state = stages_->present();
   for (Eigen::Index i = 0; i < state.x.cols(); ++i)
     box.include(state.x.col(i) + ahead * state.v.col(i));
+  for (std::size_t k = 0; ahead > 0.0 && k < state.pins.size(); ++k)
+    box.include(stages_->pinAt(k, std::min(1.0, ahead / contact_step_)));
   box.enlarge(0.5 * contact_->thickness);
   return box;
 }

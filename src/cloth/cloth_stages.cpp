@@ -247,6 +247,26 @@ ClothBalance ClothStages::takeEnd(double internal, double max_strain, StepReport
   return {unbalanced, force};
 }
 
+ClothEnergies ClothStages::energies(const ClothState& state, const Eigen::Vector3d& gravity)
+{
+  ClothEnergies result;
+  followClamps(state);
+  PointVector at;
+  toPoints(state.x, at);
+  PointVector unused(at.size(), 0.0);
+  system->usePlasticState(state);
+  system->setViscosity(0.0, at);
+  const ClothEvaluation e = system->addInternal(at, unused);
+  result.membrane = e.membrane;
+  result.bending = e.bending;
+  for (int i = 0; i < model->vertices(); ++i)
+  {
+    result.kinetic += 0.5 * model->mass[i] * state.v.col(i).squaredNorm();
+    result.gravity -= model->mass[i] * gravity.dot(state.x.col(i));
+  }
+  return result;
+}
+
 /// Elastic and viscous forces at (x, v_), wind, gravity and extra forces into force_. Mass damping is left out.
 ClothEvaluation ClothStages::addForces(bool with_constant)
 {

@@ -55,6 +55,8 @@ public:
   ClothBalance takeEnd(double internal, double max_strain, StepReport& report);
   void commitStep() { std::swap(work_, next_); }
 
+  ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity);
+
   /// At the start of the substep.
   const ClothState& present() const { return work_; }
   /// Inputs of the step.

@@ -105,23 +105,7 @@ const ClothModel& ClothStepper::model() const { return *impl_->model; }
 
 ClothEnergies ClothStepper::energies(const ClothState& state, const Eigen::Vector3d& gravity) const
 {
-  ClothEnergies result;
-  impl_->followClamps(state);
-  ClothSystem& system = *impl_->system;
-  PointVector x;
-  toPoints(state.x, x);
-  PointVector unused(x.size(), 0.0);
-  system.usePlasticState(state);
-  system.setViscosity(0.0, x);
-  const ClothEvaluation e = system.addInternal(x, unused);
-  result.membrane = e.membrane;
-  result.bending = e.bending;
-  for (int i = 0; i < impl_->model->vertices(); ++i)
-  {
-    result.kinetic += 0.5 * impl_->model->mass[i] * state.v.col(i).squaredNorm();
-    result.gravity -= impl_->model->mass[i] * gravity.dot(state.x.col(i));
-  }
-  return result;
+  return impl_->energies(state, gravity);
 }
 
 }   // namespace slender

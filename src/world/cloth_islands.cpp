@@ -46,9 +46,12 @@ public:
     if (tracks())
       takeClothGuide(world_, cloth_, tracked_inputs_.averages, stepper_.averageForces(), inputs, state, report);
   }
-  const ClothStepper& stepper(int) const override { return stepper_; }
+  ClothEnergies clothEnergies(int, const ClothState& state, const Eigen::Vector3d& gravity) const override
+  {
+    return stepper_.energies(state, gravity);
+  }
   const Eigen::Matrix3Xd& pinForces(int) const override { return stepper_.pinForces(); }
-  Eigen::Matrix3Xd contactForces(int) const override { return Eigen::Matrix3Xd(3, 0); }
+  Eigen::Matrix3Xd clothContactForces(int) const override { return Eigen::Matrix3Xd(3, 0); }
 
 private:
   bool tracks() const { return world_.cloths[cloth_].tracked.sets != nullptr; }
@@ -116,9 +119,12 @@ public:
       }
     }
   }
-  const ClothStepper& stepper(int cloth) const override { return group_->stepper(cloth); }
+  ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override
+  {
+    return group_->stepper(cloth).energies(state, gravity);
+  }
   const Eigen::Matrix3Xd& pinForces(int cloth) const override { return group_->pinForces(cloth); }
-  Eigen::Matrix3Xd contactForces(int cloth) const override { return group_->contactForces(cloth); }
+  Eigen::Matrix3Xd clothContactForces(int cloth) const override { return group_->contactForces(cloth); }
   void check(WorldState& state) override
   {
     const Loan<TouchingCloths> loan(*this, state);

@@ -82,7 +82,7 @@ public:
 
   void setThreads(int threads) override { threads_ = threads; }
   const std::vector<Wrench>& wrenches(int rod) const override { return objects_.rods[rod].stepper->wrenches; }
-  RodEnergies energies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const override
+  RodEnergies rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const override
   {
     return objects_.rods[rod].stepper->energies(state, gravity);
   }

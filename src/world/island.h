@@ -28,23 +28,23 @@ public:
 };
 
 /// An island with rods. Rods are named by their place in the island.
-class RodIsland : public Island
+class RodIsland : public virtual Island
 {
 public:
   virtual const std::vector<Wrench>& wrenches(int rod) const = 0;
-  virtual RodEnergies energies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const = 0;
+  virtual RodEnergies rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const = 0;
   /// Forces of contact on the nodes of a rod [N]; without columns for a rod that touches nothing.
-  virtual Eigen::Matrix3Xd contactForces(int) const { return Eigen::Matrix3Xd(3, 0); }
+  virtual Eigen::Matrix3Xd rodContactForces(int) const { return Eigen::Matrix3Xd(3, 0); }
   virtual RodStepper* stepper() { return nullptr; }   ///< of the only rod, where it has one
 };
 
 /// An island of cloths. Cloths are named by their place in the island.
-class ClothIsland : public Island
+class ClothIsland : public virtual Island
 {
 public:
-  virtual const ClothStepper& stepper(int cloth) const = 0;
+  virtual ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const = 0;
   virtual const Eigen::Matrix3Xd& pinForces(int cloth) const = 0;
-  virtual Eigen::Matrix3Xd contactForces(int cloth) const = 0;
+  virtual Eigen::Matrix3Xd clothContactForces(int cloth) const = 0;
   virtual void check(WorldState&) {}   ///< Throws std::invalid_argument where its cloths cross something.
 };
 

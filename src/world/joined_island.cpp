@@ -7,10 +7,10 @@ namespace slender {
 
 namespace {
 
-/// Threads are stepped by implicit Euler alone.
-TimeConfig timeOf(TimeConfig time, bool threads)
+/// Threads and cloths are stepped by implicit Euler alone.
+TimeConfig timeOf(TimeConfig time, bool damped)
 {
-  if (threads)
+  if (damped)
     time.integrator = Integrator::implicit_euler;
   return time;
 }
@@ -18,7 +18,13 @@ TimeConfig timeOf(TimeConfig time, bool threads)
 bool hasThreads(const JoinedObjects& objects, const std::vector<int>& parts)
 {
   return std::any_of(parts.begin(), parts.end(),
-                     [&](int part) { return part >= objects.partOfThread(0) && part < objects.partOfBody(0); });
+                     [&](int part) { return part >= objects.partOfThread(0) && part < objects.partOfCloth(0); });
+}
+
+bool hasCloths(const JoinedObjects& objects, const std::vector<int>& parts)
+{
+  return std::any_of(parts.begin(), parts.end(),
+                     [&](int part) { return part >= objects.partOfCloth(0) && part < objects.partOfBody(0); });
 }
 
 }   // namespace
@@ -29,7 +35,7 @@ JoinedIsland::JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts
     parts_(parts),
     guard_(world_.contact.gap),
     swept_(parts.size()),
-    stepper_(timeOf(time, hasThreads(objects, parts)), hasThreads(objects, parts))
+    stepper_(timeOf(time, hasThreads(objects, parts) || hasCloths(objects, parts)), hasThreads(objects, parts))
 {
   std::vector<ThreadGuard::Tube> tubes;
   bool merges = false;
@@ -44,10 +50,14 @@ JoinedIsland::JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts
       if (const auto& contact = world_.rods[rod.index].contact; contact && contact->others)
         tubes.push_back({&rod.stepper->system, model.radius_a.cwiseMax(model.radius_b)});
     }
-    else if (part < objects_.partOfBody(0))
+    else if (part < objects_.partOfCloth(0))
     {
       threads_.push_back(&objects_.threads[part - objects_.partOfThread(0)]);
       merges = merges || world_.threads[threads_.back()->index].merging > 0.0;
+    }
+    else if (part < objects_.partOfBody(0))
+    {
+      cloths_.push_back(&objects_.cloths[part - objects_.partOfCloth(0)]);
     }
     else
     {
@@ -64,9 +74,9 @@ JoinedIsland::JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts
     stepper_.setAttraction(&merging_);
   setThreads(0);
   setMembers();
-  const bool touches = !threads_.empty() || std::any_of(rods_.begin(), rods_.end(), [&](const JoinedRod* rod) {
-    return world_.rods[rod->index].contact.has_value();
-  });
+  const bool touches = !threads_.empty() || !cloths_.empty() ||
+                       std::any_of(rods_.begin(), rods_.end(),
+                                   [&](const JoinedRod* rod) { return world_.rods[rod->index].contact.has_value(); });
   if (touches)
     stepper_.setContact(takeSolids(), world_.contact);
 }
@@ -149,6 +159,8 @@ void JoinedIsland::setMembers()
     members_.push_back({body->part.get(), body->part.get()});
   for (const JoinedRod* rod : rods_)
     members_.push_back({rod->part.get(), rod->part.get()});
+  for (const JoinedCloth* cloth : cloths_)
+    members_.push_back({cloth->part.get(), cloth->part.get()});
   for (ThreadPart* strand : strands_)
     members_.push_back({strand, strand});
   stepper_.setMembers(members_);
@@ -165,6 +177,8 @@ void JoinedIsland::begin(const WorldState& state, const WorldInputs& inputs)
     stiffness = std::max(stiffness, state.contact_stiffness.bodies[body->index]);
   for (const JoinedThread* thread : threads_)
     stiffness = std::max(stiffness, state.contact_stiffness.threads[thread->index]);
+  for (const JoinedCloth* cloth : cloths_)
+    stiffness = std::max(stiffness, state.contact_stiffness.cloths[cloth->index]);
   stepper_.setStiffness(stiffness);
   if (threads_.empty())
     return;
@@ -204,11 +218,13 @@ StepReport JoinedIsland::step(double duration)
 void JoinedIsland::trace()
 {
   std::size_t member = 0, place = 0;
-  const std::size_t bodies_at = rods_.size() + threads_.size();
+  const std::size_t cloths_at = rods_.size() + threads_.size(), bodies_at = cloths_at + cloths_.size();
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     swept_[bodies_at + b] = stepper_.sweptBox(member++);
   for (; place < rods_.size(); ++place)
     swept_[place] = stepper_.sweptBox(member++);
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    swept_[cloths_at + c] = stepper_.sweptBox(member++);
   for (const JoinedThread* thread : threads_)
   {
     swept_[place] = BoundingBox::empty();
@@ -228,6 +244,8 @@ void JoinedIsland::end(WorldState& state) const
     state.contact_stiffness.bodies[body->index] = stepper_.stiffness();
   for (const JoinedThread* thread : threads_)
     state.contact_stiffness.threads[thread->index] = stepper_.stiffness();
+  for (const JoinedCloth* cloth : cloths_)
+    state.contact_stiffness.cloths[cloth->index] = stepper_.stiffness();
 }
 
 }   // namespace slender

@@ -47,6 +47,7 @@ private:
   const std::vector<int> parts_;
   std::vector<JoinedRod*> rods_;
   std::vector<JoinedThread*> threads_;
+  std::vector<JoinedCloth*> cloths_;
   std::vector<JoinedBody*> bodies_;
   std::vector<const JoinedSolid*> solids_;   ///< that its parts may touch
   int nodes_ = 0;                            ///< of its rods

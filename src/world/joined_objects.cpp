@@ -23,9 +23,10 @@ bool refuseInput(const std::string& what, StepReport& report)
   return false;
 }
 
-IslandContent withoutThreads(IslandContent content)
+IslandContent rodsAndBodies(IslandContent content)
 {
   content.threads.clear();
+  content.cloths.clear();
   return content;
 }
 
@@ -40,6 +41,7 @@ JoinedObjects::JoinedObjects(const WorldModel& model, IslandContent parts, World
   state.contact_stiffness.rods.resize(world.rods.size());
   state.contact_stiffness.threads.resize(world.threads.size());
   state.contact_stiffness.bodies.resize(world.bodies.size());
+  state.contact_stiffness.cloths.resize(world.cloths.size());
   addParts(world.time);
   addWelds(state);
   addSolids();
@@ -47,7 +49,7 @@ JoinedObjects::JoinedObjects(const WorldModel& model, IslandContent parts, World
 
 JoinedObjects::JoinedObjects(const JoinedObjects& other, const TimeConfig& time)
   : world(other.world),
-    content(withoutThreads(other.content)),
+    content(rodsAndBodies(other.content)),
     welds(other.welds)
 {
   addParts(time);
@@ -78,6 +80,12 @@ void JoinedObjects::addParts(const TimeConfig& time)
   {
     threads.emplace_back();
     threads.back().index = k;
+  }
+  for (const int c : content.cloths)
+  {
+    const WorldModel::Cloth& cloth = world.cloths[c];
+    cloths.push_back({c, std::make_unique<ClothPart>(cloth.model, cloth.options)});
+    cloths.back().part->setContact(*cloth.contact, time.step);
   }
 }
 
@@ -140,6 +148,8 @@ std::string JoinedObjects::badInput(const WorldState& state, const WorldInputs& 
     return "number of rods";
   if (inputs.threads.size() != state.threads.size() || state.threads.size() != world.threads.size())
     return "number of threads";
+  if (inputs.cloths.size() != state.cloths.size() || state.cloths.size() != world.cloths.size())
+    return "number of cloths";
   if (inputs.bodies.size() != state.bodies.size() || state.bodies.size() != world.bodies.size())
     return "number of bodies";
   if (inputs.obstacles.size() != state.obstacles.size() || state.obstacles.size() != world.obstacles.size() ||

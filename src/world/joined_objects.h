@@ -5,12 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "../cloth/cloth_part.h"
 #include "../rod/rod_part.h"
 #include "../thread/thread_part.h"
 #include "slender_sim/world/world_model.h"
 #include "slender_sim/world/world_state.h"
 
-/// Rods, threads, bodies and solids as JoinedParts and JoinedIsland share them. `index`: number in the world.
+/// Rods, threads, cloths, bodies and solids as JoinedParts and JoinedIsland share them. `index`: number in the world.
 namespace slender {
 
 struct JoinedRod
@@ -43,6 +44,12 @@ struct JoinedThread
   std::array<EndLoad, 2> loads;
 };
 
+struct JoinedCloth
+{
+  int index;
+  std::unique_ptr<ClothPart> part;
+};
+
 /// A solid that parts may touch.
 struct JoinedSolid
 {
@@ -64,6 +71,7 @@ struct IslandContent
 {
   std::vector<int> rods, threads;
   std::vector<int> bodies;   ///< simulated ones, and driven ones that something is welded to or that have a shape
+  std::vector<int> cloths;   ///< whose contact is the barrier
 };
 
 struct JoinedObjects
@@ -71,7 +79,8 @@ struct JoinedObjects
   /// Appends the grasps of the welds to the rods of the state, and makes room for the stiffnesses of contact. The model
   /// of the world must live as long.
   JoinedObjects(const WorldModel& world, IslandContent content, WorldState& state);
-  /// The same rods and bodies without the threads, for steps of another kind. The state has the grasps of the welds.
+  /// The same rods and bodies without the threads and cloths, for steps of another kind. The state has the grasps of
+  /// the welds.
   JoinedObjects(const JoinedObjects& other, const TimeConfig& time);
   JoinedObjects& operator=(const JoinedObjects&) = delete;
 
@@ -84,13 +93,15 @@ struct JoinedObjects
   std::vector<JoinedRod> rods;
   std::vector<JoinedBody> bodies;
   std::vector<JoinedThread> threads;
+  std::vector<JoinedCloth> cloths;
   std::vector<Weld> welds;   ///< rod: place in `rods`; body: number in the world
   std::vector<JoinedSolid> solids;
 
-  // ---- numbers of all parts: rods, then threads, then simulated bodies
-  int parts() const { return static_cast<int>(rods.size() + threads.size() + bodies.size()); }
+  // ---- numbers of all parts: rods, then threads, then cloths, then simulated bodies
+  int parts() const { return partOfBody(bodies.size()); }
   int partOfThread(std::size_t thread) const { return static_cast<int>(rods.size() + thread); }
-  int partOfBody(std::size_t body) const { return static_cast<int>(rods.size() + threads.size() + body); }
+  int partOfCloth(std::size_t cloth) const { return partOfThread(threads.size()) + static_cast<int>(cloth); }
+  int partOfBody(std::size_t body) const { return partOfCloth(cloths.size()) + static_cast<int>(body); }
 
 private:
   void addParts(const TimeConfig& time);

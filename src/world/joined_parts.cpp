@@ -1,4 +1,4 @@
-// Rods, threads and bodies as one island: what it consists of.
+// Rods, threads, cloths and bodies as one island: what it consists of.
 #include "joined_parts.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ IslandContent checked(const WorldModel& world, IslandContent content)
   const bool simulates = !content.rods.empty() || std::any_of(content.bodies.begin(), content.bodies.end(),
                                                               [&](int b) { return world.bodies[b].body.simulated; });
   need(content.threads.empty() || !simulates || world.time.integrator == Integrator::implicit_euler,
-       "threads that touch rods or bodies are stepped together with them, by implicit Euler: set time.integrator: "
+       "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
        "implicit_euler");
   return content;
 }
@@ -60,27 +60,40 @@ void JoinedParts::addContacts(std::vector<ContactForce>& out) const
         out.push_back({term.position, term.force});
 }
 
-Eigen::Matrix3Xd JoinedParts::contactForces(int rod) const
+/// On the surface points of a part with this number [N].
+Eigen::Matrix3Xd JoinedParts::contactForces(int number, const Part& part, int points) const
 {
-  const RodPart& part = *objects_.rods[rod].part;
-  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, part.points());
+  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, points);
   for (const JoinedIsland* island : islands_)
   {
-    if (!island->contact() || !std::binary_search(island->parts().begin(), island->parts().end(), rod))
+    if (!island->contact() || !std::binary_search(island->parts().begin(), island->parts().end(), number))
       continue;
     for (const ContactTerm& term : island->contact()->terms())
       for (int k = 0; k < 4; ++k)
-        if (const int point = term.point[k] - part.first_point;
-            term.point[k] >= 0 && point >= 0 && point < part.points())
+        if (const int point = term.point[k] - part.first_point; term.point[k] >= 0 && point >= 0 && point < points)
           forces.col(point) += term.weight[k] * term.force;
   }
   return forces;
+}
+
+Eigen::Matrix3Xd JoinedParts::rodContactForces(int rod) const
+{
+  const RodPart& part = *objects_.rods[rod].part;
+  return contactForces(rod, part, part.points());
+}
+
+Eigen::Matrix3Xd JoinedParts::clothContactForces(int cloth) const
+{
+  const ClothPart& part = *objects_.cloths[cloth].part;
+  return contactForces(objects_.partOfCloth(static_cast<std::size_t>(cloth)), part, part.points());
 }
 
 // ---- statics
 
 StepReport JoinedParts::solveEquilibrium(WorldState& state, const WorldInputs& inputs)
 {
+  if (!objects_.cloths.empty())
+    throw std::invalid_argument("cloth with contact has no statics");
   if (objects_.rods.empty() && objects_.bodies.empty())
     return {};
   JoinedStatics statics(objects_);

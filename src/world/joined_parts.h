@@ -11,12 +11,13 @@
 
 namespace slender {
 
-/// Rods, threads and bodies that contact or welds can join, and the obstacles that they meet, in implicit steps.
+/// Rods, threads, cloths and bodies that contact or welds can join, and the obstacles that they meet, in implicit
+/// steps.
 ///
 /// In each step the parts are divided into islands. The division begins with parts that are joined, or that would come
 /// near each other if they kept their velocities. When all islands have made their step, parts of different islands
 /// whose ways came near each other are joined, and these islands make their step again.
-class JoinedParts final : public RodIsland
+class JoinedParts final : public RodIsland, public ClothIsland
 {
 public:
   /// Appends the grasps of the welds to the rods of the state. Throws std::invalid_argument for models that are not
@@ -25,25 +26,37 @@ public:
 
   StepReport step(WorldState& state, const WorldInputs& inputs) override;
   /// Of rods and bodies. Threads have no equilibrium: they stay where they are, and the others do not feel them.
+  /// Throws std::invalid_argument where there are cloths.
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override;
   void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override;
   void addContacts(std::vector<ContactForce>& out) const override;
   void setThreads(int threads) override { loop_.threads = threads; }
   const std::vector<Wrench>& wrenches(int rod) const override { return objects_.rods[rod].stepper->wrenches; }
-  Eigen::Matrix3Xd contactForces(int rod) const override;
-  RodEnergies energies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const override
+  Eigen::Matrix3Xd rodContactForces(int rod) const override;
+  RodEnergies rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const override
   {
     return objects_.rods[rod].stepper->energies(state, gravity);
   }
+  ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override
+  {
+    return objects_.cloths[cloth].part->stages().energies(state, gravity);
+  }
+  const Eigen::Matrix3Xd& pinForces(int cloth) const override
+  {
+    return objects_.cloths[cloth].part->stages().pin_forces;
+  }
+  Eigen::Matrix3Xd clothContactForces(int cloth) const override;
 
 private:
   std::vector<int> objectsOf(const std::vector<int>& rods) const;
+  Eigen::Matrix3Xd contactForces(int part, const Part& surface, int points) const;
   void checkClearance(const WorldState& state);
 
   bool endsHaveRoom(const WorldState& state, const WorldInputs& inputs, StepReport& report) const;
   bool begin(const WorldState& state, const WorldInputs& inputs, StepReport& report);
   bool load(int part, const WorldState& state, const WorldInputs& inputs, StepReport& report);
   bool loadThread(JoinedThread& thread, const WorldState& state, const WorldInputs& inputs, StepReport& report);
+  bool loadCloth(JoinedCloth& cloth, const WorldState& state, const WorldInputs& inputs, StepReport& report);
   void addStrand(JoinedThread& thread) const;
 
   void predict();

@@ -1,4 +1,4 @@
-// Rods, threads and bodies as one island: their steps.
+// Rods, threads, cloths and bodies as one island: their steps.
 #include <algorithm>
 #include <stdexcept>
 
@@ -92,8 +92,10 @@ bool JoinedParts::load(int part, const WorldState& state, const WorldInputs& inp
     rod.part->begin(rod.inputs, world_.time.step);
     return true;
   }
-  if (part < objects_.partOfBody(0))
+  if (part < objects_.partOfCloth(0))
     return loadThread(objects_.threads[part - objects_.partOfThread(0)], state, inputs, report);
+  if (part < objects_.partOfBody(0))
+    return loadCloth(objects_.cloths[part - objects_.partOfCloth(0)], state, inputs, report);
   const JoinedBody& body = objects_.bodies[part - objects_.partOfBody(0)];
   body.part->begin(state.bodies[body.index], inputs.gravity);
   return true;
@@ -117,6 +119,16 @@ bool JoinedParts::loadThread(JoinedThread& thread, const WorldState& state, cons
       return false;
     thread.strands[s].part->setDuration(world_.time.step);
   }
+  return true;
+}
+
+bool JoinedParts::loadCloth(JoinedCloth& cloth, const WorldState& state, const WorldInputs& inputs, StepReport& report)
+{
+  const ClothState& from = state.cloths[cloth.index];
+  const ClothInputs& with = inputs.cloths[cloth.index];
+  if (!cloth.part->accepts(from, with, world_.time.step, report))
+    return false;
+  cloth.part->begin(from, with, world_.time.step);
   return true;
 }
 
@@ -144,6 +156,13 @@ void JoinedParts::predict()
     of_thread = {true, contact.others, contact.solids, false, BoundingBox::empty()};
     for (std::size_t s = 0; s < thread.work.threads.size(); ++s)
       reach(*thread.strands[s].part, of_thread.box);
+  }
+  for (std::size_t k = 0; k < objects_.cloths.size(); ++k)
+  {
+    const ContactProperties& contact = *world_.cloths[objects_.cloths[k].index].contact;
+    IslandFinder::Reach& of_cloth = reach_[objects_.partOfCloth(k)];
+    of_cloth = {true, contact.others, contact.solids, false, BoundingBox::empty()};
+    reach(*objects_.cloths[k].part, of_cloth.box);
   }
   for (std::size_t k = 0; k < objects_.bodies.size(); ++k)
   {
@@ -263,6 +282,8 @@ void JoinedParts::end(WorldState& state)
     endThread(thread);
     std::swap(state.threads[thread.index], thread.work);
   }
+  for (const JoinedCloth& cloth : objects_.cloths)
+    cloth.part->end(state.cloths[cloth.index]);
   for (const JoinedIsland* island : islands_)
     island->end(state);
 }
@@ -322,13 +343,23 @@ void JoinedParts::checkClearance(const WorldState& state)
       meeting.objects.push_back("thread '" + world_.threads[thread.index].model->name + "'");
       points.insert(points.end(), strand.x.begin(), strand.x.end());
     }
+  for (const JoinedCloth& cloth : objects_.cloths)
+  {
+    const ClothState& from = state.cloths[cloth.index];
+    cloth.part->setPins(from.pins);
+    cloth.part->addSurface(meeting.surface);
+    meeting.objects.push_back("cloth '" + world_.cloths[cloth.index].model->name + "'");
+    for (Eigen::Index i = 0; i < from.x.cols(); ++i)
+      points.emplace_back(from.x.col(i));
+  }
   meeting.x = Eigen::Map<const Eigen::Matrix3Xd>(points.empty() ? nullptr : points[0].data(), 3,
                                                  static_cast<Eigen::Index>(points.size()));
-  if (meeting.surface.segments.empty())
+  if (meeting.surface.segments.empty() && meeting.surface.triangles.empty())
     return;
   for (const JoinedSolid& solid : objects_.solids)
   {
     ContactSolid touched{solid.obstacle};
+    touched.body = solid.body != nullptr;
     const int index = solid.index;
     if (solid.kind == JoinedSolid::Kind::obstacle)
     {

@@ -23,7 +23,7 @@ public:
     return stepper_.solveEquilibrium(state.rods[rod_], inputs.rods[rod_]);
   }
   const std::vector<Wrench>& wrenches(int) const override { return stepper_.wrenches(); }
-  RodEnergies energies(int, const RodState& state, const Eigen::Vector3d& gravity) const override
+  RodEnergies rodEnergies(int, const RodState& state, const Eigen::Vector3d& gravity) const override
   {
     return stepper_.energies(state, gravity);
   }
@@ -63,7 +63,7 @@ public:
         report.tracking_error, constraints_->error(targets_, state.rods[rod_].x) / world_.rods[rod_].tracked.size);
   }
   const std::vector<Wrench>& wrenches(int) const override { return stepper_.wrenches(); }
-  RodEnergies energies(int, const RodState& state, const Eigen::Vector3d& gravity) const override
+  RodEnergies rodEnergies(int, const RodState& state, const Eigen::Vector3d& gravity) const override
   {
     return stepper_.energies(state, gravity);
   }

@@ -24,6 +24,11 @@ namespace {
 
 using Kind = FailurePlace::Kind;
 
+bool meetsByBarrier(const WorldModel::Cloth& cloth)
+{
+  return cloth.contact && cloth.contact->method == ContactMethod::barrier;
+}
+
 /// Calls `make`; what it throws becomes an error of the part.
 template <class Make>
 auto built(Kind kind, int index, const Make& make)
@@ -169,11 +174,13 @@ private:
     }
     const auto touches = [](const auto& part) { return part.contact.has_value(); };
     const auto shown = [](const WorldModel::Body& body) { return body.shape.has_value(); };
+    const auto joins = [](const WorldModel::Cloth& cloth) { return meetsByBarrier(cloth); };
     if (touching_threads_.empty() || std::any_of(model.rods.begin(), model.rods.end(), touches) ||
-        std::any_of(model.bodies.begin(), model.bodies.end(), shown))
+        std::any_of(model.bodies.begin(), model.bodies.end(), shown) ||
+        std::any_of(model.cloths.begin(), model.cloths.end(), joins))
       return;   // addRods() joins them with the others
     add(built(Kind::none, -1, [&] {
-      return std::make_unique<JoinedParts>(model, IslandContent{{}, touching_threads_, {}}, state);
+      return std::make_unique<JoinedParts>(model, IslandContent{{}, touching_threads_, {}, {}}, state);
     }));
     touching_threads_.clear();
   }
@@ -186,7 +193,9 @@ private:
     {
       if (model.leads(k) != leaders)
         continue;
-      if (model.cloths[k].contact)
+      if (meetsByBarrier(model.cloths[k]))
+        joined_cloths_.push_back(k);
+      else if (model.cloths[k].contact)
         touching.push_back(k);
       else
         cloths[k] = {add(built(Kind::cloth, k, [&] { return makeLoneCloth(model, k); })), 0};
@@ -194,10 +203,10 @@ private:
     if (touching.empty())
       return;
     ClothIsland* island = add(built(Kind::none, -1, [&] { return makeTouchingCloths(model, touching); }));
-    for (std::size_t k = 0; k < touching.size(); ++k)
-      cloths[touching[k]] = {island, static_cast<int>(k)};
+    place(cloths, touching, island);
   }
 
+  /// Rods, alone or joined, and all that the barrier of contact may join with them.
   void addRods(WorldState& state)
   {
     std::vector<char> joined(model.rods.size(), 0);
@@ -224,7 +233,7 @@ private:
         addLoneRod(r);
     }
     lone_end_ = islands_.size();
-    const bool group = !group_rods.empty() || simulated || !touching_threads_.empty();
+    const bool group = !group_rods.empty() || simulated || !touching_threads_.empty() || !joined_cloths_.empty();
     const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
     if (!group)
       group_bodies.clear();
@@ -233,13 +242,24 @@ private:
         given_bodies_.push_back(b);
     if (!group)
       return;
-    RodIsland* island = add(built(Kind::none, -1, [&]() -> std::unique_ptr<RodIsland> {
-      if (explicit_steps && touching_threads_.empty())
-        return makeExplicitRods(model, IslandContent{group_rods, {}, group_bodies}, state);
-      return std::make_unique<JoinedParts>(model, IslandContent{group_rods, touching_threads_, group_bodies}, state);
-    }));
-    for (std::size_t k = 0; k < group_rods.size(); ++k)
-      rods[group_rods[k]] = {island, static_cast<int>(k)};
+    const IslandContent content{group_rods, touching_threads_, group_bodies, joined_cloths_};
+    if (explicit_steps && touching_threads_.empty() && joined_cloths_.empty())
+    {
+      place(rods, group_rods, add(built(Kind::none, -1, [&] { return makeExplicitRods(model, content, state); })));
+      return;
+    }
+    JoinedParts* island =
+        add(built(Kind::none, -1, [&] { return std::make_unique<JoinedParts>(model, content, state); }));
+    place(rods, group_rods, static_cast<RodIsland*>(island));
+    place(cloths, joined_cloths_, static_cast<ClothIsland*>(island));
+  }
+
+  /// Notes that an island has these parts, in this order.
+  template <class IslandType>
+  static void place(std::vector<Place<IslandType>>& places, const std::vector<int>& parts, IslandType* island)
+  {
+    for (std::size_t k = 0; k < parts.size(); ++k)
+      places[parts[k]] = {island, static_cast<int>(k)};
   }
 
   void addLoneRod(int r)
@@ -295,7 +315,8 @@ private:
   std::vector<std::unique_ptr<Island>> islands_;
   std::size_t lone_begin_ = 0, lone_end_ = 0;   ///< the lone rods among them
   int lone_nodes_ = 0;
-  std::vector<int> touching_threads_;   ///< that are joined with rods or bodies
+  std::vector<int> touching_threads_;   ///< that are joined with rods, cloths or bodies
+  std::vector<int> joined_cloths_;      ///< whose contact is the barrier
   std::vector<int> given_bodies_;       ///< driven bodies
   WorldState before_;                   ///< a step that may fail in one of several islands
   IslandLoop lone_loop_;
@@ -325,7 +346,7 @@ const std::vector<Wrench>& World::rodWrenches(int rod) const
 RodEnergies World::rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const
 {
   const auto& place = impl_->rods.at(rod);
-  return place.island->energies(place.index, state, gravity);
+  return place.island->rodEnergies(place.index, state, gravity);
 }
 
 RodStepper* World::rodStepper(int rod) { return impl_->rods.at(rod).island->stepper(); }
@@ -339,20 +360,20 @@ const Eigen::Matrix3Xd& World::pinForces(int cloth) const
 Eigen::Matrix3Xd World::rodContactForces(int rod) const
 {
   const auto& place = impl_->rods.at(rod);
-  const Eigen::Matrix3Xd forces = place.island->contactForces(place.index);
+  const Eigen::Matrix3Xd forces = place.island->rodContactForces(place.index);
   return forces.cols() > 0 ? forces : Eigen::Matrix3Xd::Zero(3, impl_->model.rods[rod].model->nodes());
 }
 
 Eigen::Matrix3Xd World::clothContactForces(int cloth) const
 {
   const auto& place = impl_->cloths.at(cloth);
-  return place.island->contactForces(place.index);
+  return place.island->clothContactForces(place.index);
 }
 
 ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const
 {
   const auto& place = impl_->cloths.at(cloth);
-  return place.island->stepper(place.index).energies(state, gravity);
+  return place.island->clothEnergies(place.index, state, gravity);
 }
 
 std::vector<ContactForce> World::contacts() const { return impl_->contacts(); }

@@ -24,10 +24,10 @@ struct GuideState
 };
 
 /// Stiffness of the barrier of contact per part [N]; 0: not chosen yet. Parts of one island have the same. The lists
-/// are as long as those of the state, or empty where no rod, thread or body can meet another part.
+/// are as long as those of the state, or empty where no part can meet another one by the barrier.
 struct ContactStiffness
 {
-  std::vector<double> rods, threads, bodies;
+  std::vector<double> rods, threads, bodies, cloths;
 };
 
 /// A force of contact and where it acts.

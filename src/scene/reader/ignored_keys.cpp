@@ -88,12 +88,19 @@ void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
 /// Returns true for a key that is given as false.
 bool isOff(const YamlCursor& key) { return key.present() && !key.boolean().value_or(true); }
 
-/// Whether there are several rods and threads with contact, so that they may meet each other.
-bool meetsChains(const SceneConfig& scene)
+bool meetsBy(const ClothConfig& cloth, ContactMethod method)
+{
+  return cloth.contact && cloth.contact->method == method;
+}
+
+/// Whether the barrier of contact has several objects, which may meet each other.
+bool haveOthers(const SceneConfig& scene)
 {
   const auto touches = [](const auto& object) { return object.contact.has_value(); };
   return std::count_if(scene.rods.begin(), scene.rods.end(), touches) +
-             std::count_if(scene.threads.begin(), scene.threads.end(), touches) >
+             std::count_if(scene.threads.begin(), scene.threads.end(), touches) +
+             std::count_if(scene.cloths.begin(), scene.cloths.end(),
+                           [](const ClothConfig& cloth) { return meetsBy(cloth, ContactMethod::barrier); }) >
          1;
 }
 
@@ -111,12 +118,14 @@ void warnOfContact(YamlMap contact, const char* others, bool has_others, bool ha
   }
 }
 
-/// Rods, threads and bodies meet each other. Cloths meet only cloths and what moves as prescribed.
+/// Cloths whose contact is by impulses meet only each other and what moves as prescribed.
 void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene)
 {
   const auto touches = [](const auto& object) { return object.contact.has_value(); };
   const auto moves = [](const BodyConfig& body) { return body.contact && body.shape && !body.motion; };
-  if (!cloths.present() || !any(scene.cloths, touches))
+  const auto impulses = [](const ClothConfig& cloth) { return meetsBy(cloth, ContactMethod::impulses); };
+  const auto barrier = [](const ClothConfig& cloth) { return meetsBy(cloth, ContactMethod::barrier); };
+  if (!cloths.present() || !any(scene.cloths, impulses))
     return;
   std::vector<std::string> others;
   if (any(scene.rods, touches))
@@ -125,10 +134,13 @@ void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene
     others.push_back("threads");
   if (any(scene.bodies, moves))
     others.push_back("simulated bodies");
+  if (any(scene.cloths, barrier))
+    others.push_back("cloths with contact: {method: barrier}");
   if (!others.empty())
   {
-    cloths.warning("pass through the " + joinWords(others) +
-                   " of this scene: contact of cloth is with cloth, obstacles, and bodies with a given motion");
+    cloths.warning(
+        "that have contact: {method: impulses}, or track a guide, pass through the " + joinWords(others) +
+        " of this scene: such contact is with cloth of this kind, obstacles, and bodies with a given motion");
   }
 }
 
@@ -280,7 +292,7 @@ void warnOfTracking(YamlMap tracked, const ClothConfig& config)
 void warnOfCloth(YamlMap cloth, const SceneConfig& scene, const ClothConfig& config)
 {
   warnOfPlasticity(YamlMap(cloth.get("plasticity")), config);
-  warnOfContact(YamlMap(cloth.get("contact")), "cloths", scene.cloths.size() > 1,
+  warnOfContact(YamlMap(cloth.get("contact")), "cloths", scene.cloths.size() > 1 || haveOthers(scene),
                 !scene.obstacles.empty() || !scene.bodies.empty());
   const YamlCursor air_density = YamlMap(cloth.get("aerodynamics")).get("air_density"),
                    thickness = YamlMap(cloth.get("material")).get("thickness");
@@ -325,7 +337,7 @@ void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig&
         "has no effect: neither parts of the thread nor other threads are in touch with it; take contact: {self: "
         "true}");
   }
-  warnOfContact(contact, "threads", meetsChains(scene),
+  warnOfContact(contact, "threads", haveOthers(scene),
                 !scene.obstacles.empty() || !scene.bodies.empty() || (config.floor && config.floor->friction));
   if (config.nozzle && thread.has("nozzle"))
   {
@@ -344,7 +356,7 @@ void warnOfGenerator(YamlMap generator, const SceneConfig& scene, const std::str
     if (!rods->at().present())
       continue;
     warnOfMaterial(YamlMap(rods->get("material")), scene.gravity);
-    warnOfContact(YamlMap(rods->get("contact")), "rods", meetsChains(scene),
+    warnOfContact(YamlMap(rods->get("contact")), "rods", haveOthers(scene),
                   !scene.obstacles.empty() || !scene.bodies.empty());
   }
   if (chain.has("spacing") && chain.get("links").integer(1, 10'000).value_or(2) == 1)
@@ -372,7 +384,7 @@ void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
   {
     YamlMap rod(entry);
     warnOfMaterial(YamlMap(rod.get("material")), scene.gravity);
-    warnOfContact(YamlMap(rod.get("contact")), "rods", meetsChains(scene),
+    warnOfContact(YamlMap(rod.get("contact")), "rods", haveOthers(scene),
                   !scene.obstacles.empty() || !scene.bodies.empty());
   }
   for (const YamlCursor& generator : entriesOf(map.get("generate")))

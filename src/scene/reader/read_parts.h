@@ -78,9 +78,8 @@ std::optional<Pose> readPose(const YamlCursor& at);
 /// `pose` may be replaced by the shape (a plane by point and normal).
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
 /// What a rod, a thread or a cloth touches. `others`: the key for contact with objects of the same kind. Cloth has the
-/// key `thickness` as well.
-std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others,
-                                                       bool has_thickness = false);
+/// keys `thickness` and `method` as well.
+std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others, bool of_cloth = false);
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context);
 /// Chooses the edges and the break-up radius of threads whose entries `at` do not give them, and says what is not
 /// resolved. All other objects of the scene, its gravity and its time have been read.
@@ -88,8 +87,9 @@ void completeThreads(SceneConfig& scene, const std::vector<YamlCursor>& at);
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context);
 /// The list `tracked`: appends to the cloths.
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
+/// The contact methods of the cloths have been chosen.
 ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
-                          const std::vector<ThreadConfig>& threads);
+                          const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods);
 TimeConfig readTime(const YamlCursor& at);

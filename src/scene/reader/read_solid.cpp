@@ -182,7 +182,7 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
   return shape;
 }
 
-std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others, bool has_thickness)
+std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others, bool of_cloth)
 {
   if (!at.present())
     return std::nullopt;
@@ -192,14 +192,18 @@ std::optional<ContactProperties> readContactProperties(const YamlCursor& at, con
   assign(contact.others, map.get(others).boolean());
   assign(contact.solids, map.get("obstacles").boolean());
   assign(contact.friction, map.get("friction").number(friction));
-  if (has_thickness)
+  if (of_cloth)
+  {
     assign(contact.thickness, map.get("thickness").number(Range::above(0, 1, "m")));
+    assign(contact.method, map.get("method").choice<ContactMethod>(
+                               {{"barrier", ContactMethod::barrier}, {"impulses", ContactMethod::impulses}}));
+  }
   map.finish();
   return contact;
 }
 
 ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
-                          const std::vector<ThreadConfig>& threads)
+                          const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths)
 {
   ContactConfig contact;
   const std::size_t before = at.problems().size();
@@ -224,17 +228,20 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
         smallest = std::min(smallest, radius);
     }
   }
-  const bool any = std::isfinite(smallest);
-  contact.gap = any ? 0.1 * smallest : 0.0;
+  double gap = 0.1 * smallest;
+  for (const ClothConfig& cloth : cloths)
+    if (cloth.contact && cloth.contact->method == ContactMethod::barrier)
+      gap = std::min(gap, 0.5 * cloth.contact->thickness);
+  const bool any = std::isfinite(gap);
+  contact.gap = any ? gap : 0.0;
   assign(contact.gap, map.get("gap").number(Range::above(0, 1, "m")));
   assign(contact.slip_speed, map.get("slip_speed").number(Range::above(0, 10, "m/s")));
   map.finish();
   if (at.present() && !any && at.problems().size() == before)
   {
     at.problem(
-        "no rod or thread takes part; give those that do a contact of their own, for example contact: {friction: 0.3} "
-        "(a cloth's own says its "
-        "thickness instead of a gap)");
+        "no rod, thread, or cloth with method: barrier takes part; give those that do a contact of their own, for "
+        "example contact: {friction: 0.3} (contact of cloth by impulses has a thickness and no gap)");
   }
   return contact;
 }

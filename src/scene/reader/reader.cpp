@@ -131,19 +131,55 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
     check(scene.cloths[k].grasps, cloths[k], "cloth follows obstacles and driven bodies only");
 }
 
-/// Cloth is corrected after its step so that it gives way, which nothing that is simulated along with it would notice.
+/// Sets the method of contact of each cloth that does not name one. Impulses are cheap, but let cloth meet nothing else
+/// than cloth and what moves as prescribed. Cloths that track a guide, and their guides, have no other method.
+void chooseContactMethods(const std::vector<YamlCursor>& cloths, const std::vector<ReadRod>& rods, SceneConfig& scene)
+{
+  const auto method = [&](std::size_t k) { return YamlMap(YamlMap(cloths[k]).get("contact")).get("method"); };
+  std::vector<char> tracks(cloths.size(), 0);
+  bool others =
+      std::any_of(rods.begin(), rods.end(), [](const ReadRod& rod) { return rod.config.contact.has_value(); });
+  for (const ThreadConfig& thread : scene.threads)
+    others = others || thread.contact;
+  for (const BodyConfig& body : scene.bodies)
+    others = others || (!body.motion && body.shape && body.contact);
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+  {
+    const ClothConfig& cloth = scene.cloths[k];
+    others = others || (cloth.contact && method(k).present() && cloth.contact->method == ContactMethod::barrier);
+    if (!cloth.tracking)
+      continue;
+    tracks[k] = 1;
+    if (const auto* guide = std::get_if<ClothGuide>(&cloth.tracking->guide.motion))
+      tracks[guide->cloth] = 1;
+  }
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+  {
+    if (!scene.cloths[k].contact)
+      continue;
+    ContactMethod& chosen = scene.cloths[k].contact->method;
+    if (!method(k).present())
+      chosen = others && !tracks[k] ? ContactMethod::barrier : ContactMethod::impulses;
+    else if (tracks[k] && chosen == ContactMethod::barrier)
+      method(k).problem("is not for cloth that tracks a guide, or is one; must be impulses");
+  }
+}
+
+/// Cloth that impulses correct after its step gives way, which nothing that is simulated along with it would notice.
 void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cloths)
 {
   const auto body = std::find_if(scene.bodies.begin(), scene.bodies.end(),
                                  [](const BodyConfig& b) { return !b.motion && b.shape && b.contact; });
   for (std::size_t k = 0; body != scene.bodies.end() && k < cloths.size(); ++k)
   {
-    if (scene.cloths[k].contact && scene.cloths[k].contact->solids)
+    const std::optional<ContactProperties>& contact = scene.cloths[k].contact;
+    if (contact && contact->solids && contact->method == ContactMethod::impulses)
     {
-      YamlMap(cloths[k]).get("contact").problem(
-          "body " + body->name +
-          " is simulated, and cloth does not push bodies; give the body a motion or "
-          "contact: false, or the cloth contact: {obstacles: false}");
+      YamlMap(cloths[k]).get("contact").problem("body " + body->name +
+                                                " is simulated, and contact by impulses does not push bodies; give the "
+                                                "body a motion or contact: false, or the "
+                                                "cloth contact: {obstacles: false}" +
+                                                (scene.cloths[k].tracking ? "" : " or contact: {method: barrier}"));
     }
   }
 }
@@ -195,9 +231,11 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   scene.threads = readThreads(at_threads, context);
   scene.cloths = readCloths(at_cloths, context);
   readTrackedCloths(at_tracked, context, scene.cloths);
-  scene.contact = readContact(map.get("contact"), rods, scene.threads);
   scene.obstacles = readObstacles(at_obstacles, context);
   scene.bodies = readBodies(at_bodies, context, rods);
+  std::vector<YamlCursor> cloths = entriesOf(at_cloths);
+  for (const YamlCursor& entry : entriesOf(at_tracked))
+    cloths.push_back(entry);
 
   SolidNames names;
   const std::vector<YamlCursor> obstacles = entriesOf(at_obstacles), bodies = entriesOf(at_bodies);
@@ -215,11 +253,10 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     names.take(maker, body.name, true);
     scene.bodies.push_back(std::move(body));
   }
+  chooseContactMethods(cloths, rods, scene);
+  scene.contact = readContact(map.get("contact"), rods, scene.threads, scene.cloths);
   for (ReadRod& part : rods)
     scene.rods.push_back(std::move(part.config));
-  std::vector<YamlCursor> cloths = entriesOf(at_cloths);
-  for (const YamlCursor& entry : entriesOf(at_tracked))
-    cloths.push_back(entry);
   completeThreads(scene, entriesOf(at_threads));
   checkFollowed(scene, entriesOf(at_rods), cloths);
   checkGraspNames(scene, cloths);

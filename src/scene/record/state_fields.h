@@ -191,7 +191,7 @@ struct Fields<RigidBodyState> : Members<&RigidBodyState::X_WB, &RigidBodyState::
 
 template <>
 struct Fields<ContactStiffness>
-  : Members<&ContactStiffness::rods, &ContactStiffness::threads, &ContactStiffness::bodies>
+  : Members<&ContactStiffness::rods, &ContactStiffness::threads, &ContactStiffness::bodies, &ContactStiffness::cloths>
 {
 };
 

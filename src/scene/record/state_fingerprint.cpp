@@ -132,6 +132,7 @@ std::uint64_t stateFingerprint(const SceneConfig& config, const WorldModel& worl
       tracked(*tracking);
     touching(config.cloths[k].contact);
     out(config.cloths[k].contact.value_or(ContactProperties{}).thickness);
+    out(static_cast<int>(config.cloths[k].contact.value_or(ContactProperties{}).method));
     for (const GraspConfig& grasp : config.cloths[k].grasps)
     {
       text(grasp.name);

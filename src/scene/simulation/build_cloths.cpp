@@ -149,14 +149,16 @@ void checkContact(SceneConfig& scene, const WorldModel& model)
                              scene.cloths[other].name +
                              " and all others that are no guides. Give both contact: {cloths: false} if that is meant");
   }
-  const bool obstacles = std::any_of(scene.cloths.begin(), scene.cloths.end(),
-                                     [](const ClothConfig& cloth) { return cloth.contact && cloth.contact->solids; });
+  const bool obstacles = std::any_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
+    return cloth.contact && cloth.contact->solids && cloth.contact->method == ContactMethod::impulses;
+  });
   for (const BodyConfig& body : scene.bodies)
   {
     if (obstacles && body.shape && body.contact && !body.motion)
     {
       throw SceneError(placeOf(scene, FailurePlace::Kind::none, -1) + ": body " + body.name +
-                       " is simulated, and cloth does not push bodies; give it a motion or contact: false");
+                       " is simulated, and contact of cloth by impulses does not push bodies; give it a motion or "
+                       "contact: false, or the cloth contact: {method: barrier}");
     }
   }
 }
