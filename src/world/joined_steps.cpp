@@ -381,8 +381,7 @@ void JoinedParts::checkClearance(const WorldState& state)
   }
   const double room = ContactPotential(meeting.surface, world_.contact).clearance(meeting.x, meeting.poses);
   if (!(room > 0))
-    throw std::invalid_argument(meeting.nearest(world_.contact.gap) + " touch or cross by " +
-                                std::to_string(-1e3 * room) +
+    throw std::invalid_argument(meeting.nearest(world_.contact) + " touch or cross by " + std::to_string(-1e3 * room) +
                                 " mm as the scene starts: move them apart, or make them thinner");
 }
 

@@ -1,12 +1,29 @@
 #include "meeting.h"
 
-#include <algorithm>
 #include <limits>
 
-#include "slender_sim/contact/distance.h"
-#include "slender_sim/contact/solids.h"
-
 namespace slender {
+
+namespace {
+
+/// The part of a surface that is of two objects, which may be one. `self`: they meet themselves.
+ContactSurface piecesOf(const ContactSurface& all, int a, int b, bool self)
+{
+  ContactSurface result;
+  result.points = all.points;
+  result.objects = all.objects;
+  for (ContactObject& object : result.objects)
+    object.self = object.self && self;
+  for (const ContactSegment& segment : all.segments)
+    if (segment.object == a || segment.object == b)
+      result.segments.push_back(segment);
+  for (const ContactTriangle& triangle : all.triangles)
+    if (triangle.object == a || triangle.object == b)
+      result.triangles.push_back(triangle);
+  return result;
+}
+
+}   // namespace
 
 void Meeting::addSolid(const std::string& name, const ContactSolid& solid, const Pose& pose)
 {
@@ -15,38 +32,52 @@ void Meeting::addSolid(const std::string& name, const ContactSolid& solid, const
   poses.push_back(pose);
 }
 
-std::string Meeting::nearest(double gap) const
+std::vector<BoundingBox> Meeting::boxes() const
+{
+  std::vector<BoundingBox> result(objects.size(), BoundingBox::empty());
+  const auto add = [&](int object, int point, double radius) {
+    BoundingBox ball = BoundingBox::empty();
+    ball.include(x.col(point));
+    ball.enlarge(radius);
+    result[object].include(ball);
+  };
+  for (const ContactSegment& segment : surface.segments)
+    for (const int point : {segment.a, segment.b})
+      add(segment.object, point, segment.radius);
+  for (const ContactTriangle& triangle : surface.triangles)
+    for (const int point : triangle.corner)
+      add(triangle.object, point, triangle.half_thickness);
+  return result;
+}
+
+std::string Meeting::nearest(const ContactOptions& options) const
 {
   double least = std::numeric_limits<double>::infinity();
   std::string names;
-  const auto note = [&](double room, const std::string& first, const std::string& second) {
+  const auto note = [&](ContactSurface pieces, const std::vector<Pose>& at, const std::string& first,
+                        const std::string& second) {
+    const double room = ContactPotential(std::move(pieces), options).clearance(x, at);
     if (room < least)
     {
       least = room;
       names = first + " and " + second;
     }
   };
-  for (std::size_t p = 0; p < surface.segments.size(); ++p)
+  std::vector<BoundingBox> near = boxes();
+  for (BoundingBox& box : near)
+    box.enlarge(options.gap);
+  const int count = static_cast<int>(objects.size());
+  for (int a = 0; a < count; ++a)
   {
-    const ContactSegment& a = surface.segments[p];
-    const ContactObject& object = surface.objects[a.object];
-    for (std::size_t q = p + 1; q < surface.segments.size(); ++q)
+    note(piecesOf(surface, a, a, true), {}, objects[a], "itself");
+    for (int b = a + 1; b < count; ++b)
+      if (near[a].overlaps(near[b]))
+        note(piecesOf(surface, a, b, false), {}, objects[a], objects[b]);
+    for (std::size_t k = 0; k < solids.size(); ++k)
     {
-      const ContactSegment& b = surface.segments[q];
-      const bool same = a.object == b.object;
-      if ((a.driven && b.driven) || (same ? !object.self || contactNeighbours(a, b, object, gap)
-                                          : !object.others || !surface.objects[b.object].others))
-        continue;
-      note(segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - a.coreRadius() - b.coreRadius(),
-           objects[a.object], same ? "itself" : objects[b.object]);
-    }
-    for (std::size_t k = 0; object.solids && !a.driven && k < surface.solids.size(); ++k)
-    {
-      const ContactSolid& solid = surface.solids[k];
-      const bool meets = (solid.only < 0 || solid.only == object.owner) &&
-                         std::find(solid.ignores.begin(), solid.ignores.end(), a.object) == solid.ignores.end();
-      if (meets)
-        note(distanceToShape(solid.shape, poses[k], x.col(a.a), x.col(a.b)) - a.radius, objects[a.object], solids[k]);
+      ContactSurface pieces = piecesOf(surface, a, a, false);
+      pieces.solids = {surface.solids[k]};
+      note(std::move(pieces), {poses[k]}, objects[a], solids[k]);
     }
   }
   return names;

@@ -17,9 +17,12 @@ struct Meeting
   std::vector<Pose> poses;            ///< of the solids
 
   void addSolid(const std::string& name, const ContactSolid& solid, const Pose& pose);
-  /// The two that are nearest to each other, of those that may touch: "thread 'honey' and obstacle 'plate'". `gap`: at
-  /// which surfaces repel [m].
-  std::string nearest(double gap) const;
+  /// The two that are nearest to each other, of those that may touch: "thread 'honey' and obstacle 'plate'".
+  std::string nearest(const ContactOptions& options) const;
+
+private:
+  /// Of the objects, thickness included [m].
+  std::vector<BoundingBox> boxes() const;
 };
 
 }   // namespace slender

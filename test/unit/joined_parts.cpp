@@ -276,12 +276,12 @@ TEST(JoinedParts, NamesWhatCrossesAtTheStart)
   }
 }
 
-/// Cloth does not meet rods yet, and a scene where it would is warned of.
+/// Cloth that impulses keep apart does not meet rods, and a scene with both is warned of.
 TEST(JoinedParts, WarnsOfClothsThatPassThroughOthers)
 {
   const std::string cloth =
       "cloths=[{name: sheet, grid: {corner: [0, 0, -1], sides: [[0.1, 0, 0], [0, 0.1, 0]], "
-      "cells: 2}, contact: {obstacles: false}}]";
+      "cells: 2}, contact: {obstacles: false, method: impulses}}]";
   const SceneConfig scene = parseScene(kCrossing, "t", {cloth});
   EXPECT_TRUE(std::any_of(scene.warnings.begin(), scene.warnings.end(), [](const std::string& text) {
     return text.find("pass through the rods, threads, simulated bodies") != std::string::npos;
