@@ -55,7 +55,9 @@ void KdopTree::build(const Eigen::Matrix3Xd& centers, const std::vector<int>& gr
   order_.resize(n);
   for (int i = 0; i < n; ++i)
     order_[i] = i;
-  std::stable_sort(order_.begin(), order_.end(), [&](int i, int j) { return groups[i] < groups[j]; });
+  // not std::stable_sort(), which takes memory
+  std::sort(order_.begin(), order_.end(),
+            [&](int i, int j) { return groups[i] != groups[j] ? groups[i] < groups[j] : i < j; });
   second_.clear();
   leaves_.clear();
   if (n > 0)

@@ -112,20 +112,15 @@ public:
   {
     ContactSurface surface;
     Eigen::Matrix3Xd x;
-    const auto add = [&](const Eigen::Matrix3Xd& points) {
+    const auto add = [&](const PartSteps& part, const Eigen::Matrix3Xd& points) {
+      part.addSurface(surface);
       x.conservativeResize(3, x.cols() + points.cols());
       x.rightCols(points.cols()) = points;
     };
-    for (Rod& rod : rods)
-    {
-      rod.part->addSurface(surface);
-      add(rod.state.x);
-    }
-    for (Cloth& cloth : cloths)
-    {
-      cloth.part->addSurface(surface);
-      add(cloth.state.x);
-    }
+    for (const Rod& rod : rods)
+      add(*rod.part, rod.state.x);
+    for (const Cloth& cloth : cloths)
+      add(*cloth.part, cloth.state.x);
     surface.solids = solids();
     std::vector<Pose> poses;
     for (const Body& body : bodies)

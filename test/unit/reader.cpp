@@ -132,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"start=now", "must be one of: as_given, equilibrium"},
                     Case{"record.every=0", "in [1, 1000000000] steps"},
                     Case{"contact.self=true", "unknown key; known here: gap, slip_speed"},
-                    Case{"contact.gap=0.001", "no rod or thread takes part; give those that do a contact of their own"},
+                    Case{"contact.gap=0.001", "no rod, thread, or cloth with method: barrier takes part"},
                     Case{"threads=[]", "threads = []: has 0 entries; must have 1 to 10000"},
                     Case{"cloths=[]", "cloths = []: has 0 entries; must have 1 to 1000"},
                     Case{"tracked=[]", "tracked = []: has 0 entries; must have 1 to 1000"},
