@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <mutex>
 #include <new>
+#include <numeric>
 
 #include <suitesparse/cholmod.h>
 
@@ -98,12 +99,17 @@ struct SparseCholesky::Impl
     int at, column_length;   ///< of its first column, and of that column
     bool transposed, diagonal;
   };
-  std::vector<int> place;   ///< of each point in the order of elimination
+  void takeSupernodes();
+
+  std::vector<int> place;   ///< of each point (or, without points, unknown) in the order of elimination
   std::vector<Target> targets;
   int unknowns = 1;                 ///< per point
   cholmod_dense* right = nullptr;   ///< work space of solvePoints: for blocks
   PointVector permuted;             ///< for numbers
-  SupernodalNumeric numeric;        ///< of matrices of points
+  SupernodalNumeric numeric;
+  /// Without points: where each entry goes in the order of elimination, and the values in that order.
+  std::vector<int> permuted_at;
+  std::vector<double> permuted_values;
 
   cholmod_common common;
   cholmod_factor* factor = nullptr;
@@ -128,6 +134,36 @@ void SparseCholesky::setPattern(int size, std::vector<int> starts, std::vector<i
   m.factor = cholmod_analyze(&a, &m.common);
   if (!m.factor)
     throw std::bad_alloc();
+  if (m.factor->is_super)
+    m.takeSupernodes();
+}
+
+/// CHOLMOD's own factorisation by supernodes takes memory and starts a team of threads in each call, which takes most
+/// of the time of matrices of a few thousand unknowns.
+void SparseCholesky::Impl::takeSupernodes()
+{
+  const int n = static_cast<int>(starts.size()) - 1;
+  place.resize(n);
+  for (int k = 0; k < n; ++k)
+    place[static_cast<int*>(factor->Perm)[k]] = k;
+  std::vector<int> permuted_starts(n + 1, 0), permuted_rows(rows.size());
+  for (int j = 0; j < n; ++j)
+    for (int k = starts[j]; k < starts[j + 1]; ++k)
+      ++permuted_starts[std::min(place[j], place[rows[k]]) + 1];
+  std::partial_sum(permuted_starts.begin(), permuted_starts.end(), permuted_starts.begin());
+  std::vector<int> next(permuted_starts.begin(), permuted_starts.end() - 1);
+  permuted_at.resize(rows.size());
+  for (int j = 0; j < n; ++j)
+    for (int k = starts[j]; k < starts[j + 1]; ++k)
+    {
+      const int at = next[std::min(place[j], place[rows[k]])]++;
+      permuted_at[k] = at;
+      permuted_rows[at] = std::max(place[j], place[rows[k]]);
+    }
+  permuted_values.resize(rows.size());
+  if (!cholmod_change_factor(CHOLMOD_REAL, 1, 1, 1, 1, factor, &common))
+    throw std::bad_alloc();
+  numeric.setPattern(supernodes(), permuted_starts, permuted_rows);
 }
 
 void SparseCholesky::setPattern(const BlockMatrix& matrix) { setPointPattern(matrix, 3); }
@@ -323,6 +359,12 @@ int SparseCholesky::index(int row, int column) const
 bool SparseCholesky::factor()
 {
   Impl& m = *impl_;
+  if (m.factor->is_super)
+  {
+    for (std::size_t k = 0; k < m.values.size(); ++k)
+      m.permuted_values[m.permuted_at[k]] = m.values[k];
+    return m.numeric.factor(m.permuted_values.data(), static_cast<double*>(m.factor->x));
+  }
   cholmod_sparse a = m.view();
   m.common.status = CHOLMOD_OK;
   cholmod_factorize(&a, m.factor, &m.common);
