@@ -188,7 +188,8 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
                   Eigen::Vector3d::Zero(),
                   b0 - gap.place[3] * f + (share * thickness + 0.5 * gap.gap / gap.weight) * gap.normal,
                   Eigen::Vector3d::Zero(),
-                  std::sqrt(surface.objects[a.object].friction * surface.objects[b.object].friction)};
+                  a.object,
+                  b.object};
   return addContact(gap, contact, 1.0, with_stiffness);
 }
 
@@ -217,14 +218,17 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
                   foot,
                   pose * foot,
                   Eigen::Vector3d::Zero(),
-                  frictionOnSolid(s.object, solid)};
+                  s.object,
+                  -1};
   return addContact(gap, contact, 1.0, with_stiffness);
 }
 
-double ContactPotential::Impl::frictionOnSolid(int object, const ContactSolid& solid) const
+double ContactPotential::Impl::frictionOf(const Contact& contact) const
 {
-  const double own = surface.objects[object].friction;
-  return own > 0.0 && solid.friction >= 0.0 ? std::sqrt(own * solid.friction) : own;
+  const double own = surface.objects[contact.object].friction;
+  const double other =
+      contact.solid >= 0 ? surface.solids[contact.solid].friction : surface.objects[contact.other].friction;
+  return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
 }
 
 double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness)
@@ -351,8 +355,12 @@ double ContactPotential::Impl::lagFriction()
   };
   double change = 0.0, largest = 0.0;
   auto old = lagged.begin();
+  rubbing_.clear();
   for (Contact& contact : contacts)
   {
+    contact.friction = frictionOf(contact);
+    if (!(contact.friction > 0.0))
+      continue;
     for (; old != lagged.end() && before(*old, contact); ++old)
       change = std::max(change, old->force.norm());
     const bool same = old != lagged.end() && !before(contact, *old);
@@ -366,12 +374,13 @@ double ContactPotential::Impl::lagFriction()
       contact.last_stiffness = old->last_stiffness;
       ++old;
     }
+    rubbing_.push_back(contact);
   }
   for (; old != lagged.end(); ++old)
     change = std::max(change, old->force.norm());
   for (const Contact& contact : lagged)
     largest = std::max(largest, contact.force.norm());
-  lagged = contacts;
+  lagged.swap(rubbing_);
   return largest > 0.0 ? change / largest : 0.0;
 }
 

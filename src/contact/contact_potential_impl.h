@@ -25,7 +25,8 @@ public:
     int solid;
     Eigen::Vector3d material;          ///< in the solid's frame
     Eigen::Vector3d position, force;   ///< normal force on u
-    double friction;
+    int object, other;                 ///< that touch; other: -1 for a solid
+    double friction = 0.0;             ///< of the two, once the contact is lagged
     /// Slip, force over the largest one, and its derivative at the iterate before. None before the first one.
     bool has_iterate = false;
     Eigen::Vector3d last_slip = Eigen::Vector3d::Zero(), last_force = Eigen::Vector3d::Zero();
@@ -68,7 +69,7 @@ private:
   /// `scale`: of the gap at which the pair repels.
   double addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
   void addMotion(const PairGap& gap, const Contact& contact, double force, double own);
-  double frictionOnSolid(int object, const ContactSolid& solid) const;
+  double frictionOf(const Contact& contact) const;
   double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact, bool with_stiffness);
   double restart();
 
@@ -113,6 +114,7 @@ private:
   double sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double least);
 
   std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
+  std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
   Candidates near_, swept_;
   SheetPieces sheets_;
   double margin_;

@@ -72,7 +72,8 @@ double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const She
   contact.position = (radius + 0.5 * gap.gap / gap.weight) * gap.normal;
   for (int k = pair.edges ? 2 : 1; k < 4; ++k)
     contact.position -= gap.place[k] * x.col(contact.point[k]);
-  contact.friction = std::sqrt(surface.objects[object].friction * surface.objects[other].friction);
+  contact.object = object;
+  contact.other = other;
   return addContact(gap, contact, pair.scale, with_stiffness);
 }
 
@@ -104,7 +105,8 @@ double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const 
     contact.material += gap.place[k] * z[k];
   contact.position = pose * contact.material;
   gap.normal = pose.orientation * gap.normal;
-  contact.friction = frictionOnSolid(face.object, surface.solids[on.solid]);
+  contact.object = face.object;
+  contact.other = -1;
   return addContact(gap, contact, 1.0, with_stiffness);
 }
 

@@ -114,6 +114,17 @@ BoundingBox BodyPart::surfaceBox(double ahead) const
   return box;
 }
 
+/// A body may come to rest with its weight on few contacts. A barrier that is much softer holds it at gaps so small
+/// that Newton's method needs many iterations.
+BarrierRange BodyPart::barrierRange(double) const
+{
+  constexpr double kAcceleration = 10.0;   // [m/s^2]
+  BarrierRange range;
+  if (reach_ >= 0.0)
+    range.least = system.model().mass * kAcceleration;
+  return range;
+}
+
 void BodyPart::addStartLoad(const BodySystem::Vector6& wrench, const BodySystem::Matrix6& inertia)
 {
   start_wrench_ += wrench;

@@ -79,7 +79,7 @@ private:
   void solveStartAcceleration() override;
   void addSurface(ContactSurface&) const override {}
   BoundingBox surfaceBox(double ahead) const override;
-  BarrierRange barrierRange(double) const override { return {}; }
+  BarrierRange barrierRange(double) const override;
   void beginStage(std::size_t stage) override;
   void endStage(std::size_t stage, bool last, StepReport&) override;
   void acceptSubstep(const Substep&) override { std::swap(now_, next_); }

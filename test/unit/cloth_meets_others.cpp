@@ -119,8 +119,8 @@ TEST(ClothMeetsOthers, WhatOneLosesTheOtherGets)
         << k << " " << gained.transpose() << " lost " << lost.transpose() << " terms " << s.world().contacts().size();
   }
   EXPECT_GT(s.state().bodies[0].velocity.linear.z(), -0.9);   // it has been braked
-  // the same, summed over the steps of the collision
-  EXPECT_LT((momentum() - before).norm(), 1e-7 * before.norm());
+  // The same, summed over the steps of the collision. Newton's method ends at increments of 1e-3 of the gap.
+  EXPECT_LT((momentum() - before).norm(), 1e-6 * before.norm());
 }
 
 TEST(ClothMeetsOthers, SavedStatesGoOnBitByBit)
