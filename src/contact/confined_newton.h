@@ -8,18 +8,18 @@
 
 namespace slender {
 
-/// What came of going towards a configuration that contact may be in the way of.
+/// Outcome of moving towards a target configuration while contact may block the way.
 enum class Approach
 {
   arrived,
-  partly,    ///< as far as nothing touches
-  squeezed   ///< no way at all
+  partly,    ///< moved until contact blocked the rest of the way
+  squeezed   ///< could not move at all
 };
 
 /// Minimises the energy of a system with contact whose held parts and driven solids move from the fraction `from` of a
-/// time step to `to`: as far as nothing touches, again and again, while what is in the way gives way; then to the end,
-/// with friction's forces lagging one solution behind, until they have settled. `gap` is that of contact over the
-/// shortest edge. The solution is left as the trial.
+/// time step to `to`. They advance until contact blocks them; a solution lets the blocking parts give way; and so on.
+/// Then it solves at `to`, with friction forces from the previous solution, until these no longer change. `gap` is the
+/// gap of contact over the shortest edge. The solution is left as the trial.
 ///
 /// System offers what minimize() needs, and:
 /// - approach(from, to, reached): goes from the base towards the present trial, as far as nothing touches. That

@@ -9,8 +9,8 @@
 
 namespace slender {
 
-/// Between which forces a part asks the stiffness of the barrier to stay [N]. The largest lower end of all parts
-/// counts, and the largest upper end.
+/// The range in which a part wants the stiffness of the barrier [N]. The island takes the largest `least` and the
+/// largest `most` of its parts.
 struct BarrierRange
 {
   double least = 0.0, most = std::numeric_limits<double>::infinity();
@@ -27,7 +27,7 @@ public:
   /// No substep may be longer than this [s].
   virtual double longestSubstep(double duration) const { return duration; }
   /// Length of the last substep [s], from which a multistep method goes on; 0: the part has no history. Infinite: the
-  /// part does not mind.
+  /// part does not depend on it.
   virtual double lastSubstep() const { return std::numeric_limits<double>::infinity(); }
   /// Loads the state at the start of a substep.
   virtual StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) = 0;
@@ -61,7 +61,7 @@ public:
   virtual void beginStage(std::size_t stage) = 0;
   /// After a solution. Returns whether the part holds more than before, so that the stage has to be solved again.
   virtual bool meetsMore() { return false; }
-  /// Holds that, where meetsMore() said so; IslandSystem has accepted the solution.
+  /// Holds what meetsMore() found. Is called after IslandSystem has accepted the solution.
   virtual void holdMore() {}
   /// Takes over the solution of a stage, the last one of a substep included.
   virtual void endStage(std::size_t stage, bool last, StepReport& report) = 0;

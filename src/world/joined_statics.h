@@ -64,7 +64,7 @@ private:
   StepReport report_;
   StepFailure failure_ = StepFailure::none;
   double force_scale_ = 0.0;   ///< largest force so far [N]
-  double lever_;               ///< turns moments into forces; the shortest edge [m]
+  double lever_;               ///< divides moments to compare them with forces: the shortest edge [m]
 };
 
 }   // namespace slender

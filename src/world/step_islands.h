@@ -23,7 +23,7 @@ public:
   template <class Step>
   void run(int count, int nodes, const Step& step, StepReport& total)
   {
-    constexpr int kWorthThreads = 500;   // nodes; less is done before threads are awake
+    constexpr int kWorthThreads = 500;   // nodes; a smaller step is faster on one thread than starting threads is
     reports_.resize(static_cast<std::size_t>(count));
     errors_.assign(static_cast<std::size_t>(count), nullptr);
     const auto stepOne = [&](int k) {

@@ -7,11 +7,11 @@
 #include "slender_sim/energy/hinge.h"
 #include "slender_sim/linalg/block_matrix.h"
 
-/// What a part that consists of points can be made of. Calls are virtual, one per term and evaluation; loops over
+/// Energies and loads of parts that consist of points. Calls are virtual, one per term and evaluation; loops over
 /// elements lie inside. Points have 4 doubles (see PointVector). Terms may use work space: one thread at a time.
 namespace slender {
 
-/// The name under which reports count the energy of a term.
+/// The group of a term. Reports sum the energies of a group, and preconditioners its constant matrices.
 enum class TermAccount
 {
   stretching,
@@ -25,8 +25,8 @@ struct TermSums
   double max_strain = 0;   ///< largest |principal stretch - 1|; 0 for terms that do not know stretches
 };
 
-/// Strains from which viscous forces count: those of the points x + move + share (other - x), to second order in
-/// `move`.
+/// The points x + move + share (other - x). Viscous forces are zero at their strains, which are needed to second order
+/// in `move`.
 struct StrainReference
 {
   const PointVector* x = nullptr;
@@ -46,8 +46,8 @@ struct PlasticState
 /// An elastic energy of points with its viscous response: value, gradient, Hessian and pattern of the Hessian.
 ///
 /// With a ratio set by setResponse() the term has the elastic forces and, in addition, `ratio` times the forces of the
-/// strains that exceed those of takeStrains(). Both together are the gradient of one energy, so that value, gradient
-/// and Hessian agree for every ratio. test/unit/energy_contract.cpp states what holds for all terms.
+/// strains minus those of takeStrains(). Both together are the gradient of one energy, so that value, gradient and
+/// Hessian agree for every ratio. Rigid motions must not change the energy (see test/unit/energy_contract.cpp).
 class PointTerm
 {
 public:
@@ -71,9 +71,9 @@ public:
   /// Hessian or a positive semidefinite one that is not below it, for example that of Gauss and Newton.
   virtual TermSums addHessian(HessianKind kind, const double* x, double* gradient, double* values) = 0;
 
-  /// Sets the strains from which viscous forces count.
+  /// Keeps the strains of these points, at which viscous forces are zero.
   virtual void takeStrains(const StrainReference& at) = 0;
-  /// Sets the stiffness of viscous forces over the elastic one, 0 or more. 0 leaves the elastic forces alone.
+  /// Sets the ratio of the viscous stiffness to the elastic one, 0 or more. With 0 only elastic forces act.
   virtual void setResponse(double ratio) = 0;
   /// Comes before setResponse() where both change.
   virtual void setPlasticState(const PlasticState& /*state*/) {}
