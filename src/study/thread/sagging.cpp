@@ -2,6 +2,7 @@
 // sag_D0175.csv, sag_D0033.csv).
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -85,50 +86,73 @@ double slowest(double length, double diameter, double gamma, int edges)
   return lowest;
 }
 
-}   // namespace
-
-void runSagging(StudyContext& context)
+/// One thread of the reference from its start to the last time listed: its path, and its sag at the times listed.
+void followPath(StudyContext& context, Plot& path, double diameter, double gamma, int edges)
 {
-  const int edges = context.quick() ? 50 : 100;
-  Plot& path = context.plot("sagging_path", "Sag of the middle, plates 2.5 cm apart", "time [s]", "sag [cm]");
-  path.log_x = path.log_y = false;
-  for (const double diameter : {0.175, 0.033})
-    for (const double gamma : {0.0, kTension})
+  ThreadSetup t = heldThread(2.5, diameter, gamma, edges);
+  ThreadStepper stepper = makeStepper(t);
+  char label[64];
+  std::snprintf(label, sizeof label, "D = %g, gamma = %g", diameter, gamma);
+  context.progress(0, 1, label);
+  const double h = 2e-4;
+  for (const Reference& r : kReference)
+  {
+    if (r.diameter != diameter || r.gamma != gamma)
+      continue;
+    while (t.time < r.time - 0.5 * h)
     {
-      ThreadSetup t = heldThread(2.5, diameter, gamma, edges);
-      ThreadStepper stepper = makeStepper(t);
-      char label[64];
-      std::snprintf(label, sizeof label, "D = %g, gamma = %g", diameter, gamma);
-      context.progress(0, 1, label);
-      const double h = 2e-4;
-      for (const Reference& r : kReference)
-      {
-        if (r.diameter != diameter || r.gamma != gamma)
-          continue;
-        while (t.time < r.time - 0.5 * h)
-        {
-          advance(stepper, t, h, "sagging");
-          path.at(label).x.push_back(t.time);
-          path.at(label).y.push_back(middleOf(t.state, 2.5).sag);
-        }
-        const Middle middle = middleOf(t.state, 2.5);
-        Row& row = context.row();
-        row.set("test", label).set("t", r.time);
-        if (diameter < 0.1)
-          row.check(middle.sag, r.sag, 0.05 * r.sag, "string with inertia");
-        else   // it resists bending and is clamped, the reference is neither
-          row.set("measured", middle.sag).set("expected", r.sag);
-        row.set("relative_error", middle.sag / r.sag - 1);
-        row.set("middle_radius_error", middle.radius / r.middle_radius - 1);
-        Series& series = path.at(std::string(label) + ", string");
-        series.points = true;
-        series.x.push_back(r.time);
-        series.y.push_back(r.sag);
-      }
+      advance(stepper, t, h, "sagging");
+      path.at(label).x.push_back(t.time);
+      path.at(label).y.push_back(middleOf(t.state, 2.5).sag);
     }
+    const Middle middle = middleOf(t.state, 2.5);
+    Row& row = context.row();
+    row.set("test", label).set("t", r.time);
+    if (diameter < 0.1)
+      row.check(middle.sag, r.sag, 0.05 * r.sag, "string with inertia");
+    else   // it resists bending and is clamped, the reference is neither
+      row.set("measured", middle.sag).set("expected", r.sag);
+    row.set("relative_error", middle.sag / r.sag - 1);
+    row.set("middle_radius_error", middle.radius / r.middle_radius - 1);
+    Series& series = path.at(std::string(label) + ", string");
+    series.points = true;
+    series.x.push_back(r.time);
+    series.y.push_back(r.sag);
+  }
+}
 
+/// A thread whose shape is to be told: L D is ratio times 4.7 a^2, where a is the capillary length.
+struct Shape
+{
+  double length, diameter, ratio;
+  double slowed_to = 0;   ///< lowest speed of the middle over that without surface tension
+
+  // a U has all but stopped where a thread without surface tension goes on
+  bool catenary() const { return slowed_to > 0.2; }
+  bool agrees() const { return catenary() == (ratio > 1); }
+};
+
+void reportShape(StudyContext& context, Plot& map, const Shape& shape, double capillary)
+{
+  const char* name = shape.catenary() ? "catenary" : "U";
+  context.row()
+      .set("test", "shape")
+      .set("L_over_a", shape.length / capillary)
+      .set("D_over_a", shape.diameter / capillary)
+      .set("L_D_over_4.7a2", shape.ratio)
+      .set("slowed_to", shape.slowed_to)
+      .set("shape", name)
+      .set("agrees", shape.agrees() ? "yes" : "no");
+  Series& s = map.at(name);
+  s.points = true;
+  s.x.push_back(shape.diameter / capillary);
+  s.y.push_back(shape.length / capillary);
+}
+
+/// Maps the shapes of threads of several lengths and diameters; returns the fraction that disagrees with the law.
+double mapShapes(StudyContext& context, Plot& map, int edges)
+{
   const double capillary = std::sqrt(kTension / (kDensity * kGravity));
-  Plot& map = context.plot("sagging_shapes", "Catenary or U", "D / a", "L / a");
   const std::vector<double> lengths =
       context.quick() ? std::vector<double>{1.0, 2.5} : std::vector<double>{0.6, 1.0, 1.6, 2.5, 4.0};
   const std::vector<double> ratios = context.quick() ? std::vector<double>{0.3, 0.7, 1.4, 3.0}
@@ -138,33 +162,35 @@ void runSagging(StudyContext& context)
     for (const double ratio : ratios)
     {
       context.progress(done++, static_cast<int>(lengths.size() * ratios.size()), "catenary or U");
-      const double diameter = ratio * 4.7 * capillary * capillary / length;
-      if (diameter > 0.25 * length)
+      Shape shape{length, ratio * 4.7 * capillary * capillary / length, ratio};
+      if (shape.diameter > 0.25 * length)
         continue;   // no thread
-      // a U has all but stopped where a thread without surface tension goes on
-      const double speed = slowest(length, diameter, kTension, edges) / slowest(length, diameter, 0.0, edges);
-      const bool catenary = speed > 0.2, right = catenary == (ratio > 1);
-      wrong += !right;
+      shape.slowed_to = slowest(length, shape.diameter, kTension, edges) / slowest(length, shape.diameter, 0.0, edges);
+      wrong += !shape.agrees();
       ++cases;
-      context.row()
-          .set("test", "shape")
-          .set("L_over_a", length / capillary)
-          .set("D_over_a", diameter / capillary)
-          .set("L_D_over_4.7a2", ratio)
-          .set("slowed_to", speed)
-          .set("shape", catenary ? "catenary" : "U")
-          .set("agrees", right ? "yes" : "no");
-      Series& s = map.at(catenary ? "catenary" : "U");
-      s.points = true;
-      s.x.push_back(diameter / capillary);
-      s.y.push_back(length / capillary);
+      reportShape(context, map, shape, capillary);
     }
   for (double d = 0.1; d < 2; d *= 1.2)
   {
     map.at("L D = 4.7 a^2").x.push_back(d);
     map.at("L D = 4.7 a^2").y.push_back(4.7 / d);
   }
-  const double fraction = static_cast<double>(wrong) / cases;
+  return static_cast<double>(wrong) / cases;
+}
+
+}   // namespace
+
+void runSagging(StudyContext& context)
+{
+  const int edges = context.quick() ? 50 : 100;
+  Plot& path = context.plot("sagging_path", "Sag of the middle, plates 2.5 cm apart", "time [s]", "sag [cm]");
+  path.log_x = path.log_y = false;
+  for (const double diameter : {0.175, 0.033})
+    for (const double gamma : {0.0, kTension})
+      followPath(context, path, diameter, gamma, edges);
+
+  Plot& map = context.plot("sagging_shapes", "Catenary or U", "D / a", "L / a");
+  const double fraction = mapShapes(context, map, edges);
   context.row().set("test", "misclassified").check(fraction, 0.0, 0.1, "L D = 4.7 a^2, Le Merrer et al. 2008");
   context.metric("misclassified_fraction", fraction);
   context.note(

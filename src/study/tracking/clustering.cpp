@@ -55,6 +55,66 @@ Fit fitOf(const TriangleMesh& mesh, const std::vector<int>& body, const std::vec
   return {joint_seams / joints, seams / all, impure / area.sum()};
 }
 
+constexpr int kThesisRegions = 200;
+
+/// Means over the seeds.
+struct Outcome
+{
+  Fit fit;
+  double seconds = 0, iterations = 0, settled = 0;
+};
+
+const char* nameOf(bool aware) { return aware ? "animation-aware" : "static"; }
+
+/// The regions at rest and on a frame of the walk.
+void draw(SurfacePicture& picture, const TriangleMesh& mesh, const Eigen::Matrix3Xd& frame, const Clustering& clusters,
+          bool aware)
+{
+  const Eigen::VectorXi hues = huesOf(mesh.triangles, clusters.region);
+  const char* what = nameOf(aware);
+  picture.panels.push_back({std::string(what) + ", at rest", {{mesh, true, hues}}});
+  const Eigen::Matrix3Xd here = frame.colwise() - Eigen::Vector3d(frame.row(0).mean(), 0, 0);
+  picture.panels.push_back({std::string(what) + ", walking", {{{here, mesh.triangles}, true, hues}}});
+}
+
+/// Clusters one seed, adds its share to the means and returns its regions.
+Clustering addSeed(Outcome& mean, const Biped& biped, const std::vector<Eigen::Matrix3Xd>& frames, int count, int seed,
+                   int seeds)
+{
+  const TriangleMesh& mesh = biped.mesh();
+  ClusteringOptions options;
+  options.regions = count;
+  options.compactness = 0.5;
+  options.max_iterations = 32;
+  options.seed = static_cast<unsigned>(seed);
+  const auto start = std::chrono::steady_clock::now();
+  Clustering clusters = clusterFaces(mesh.triangles, frames, options);
+  mean.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / seeds;
+  mean.iterations += static_cast<double>(clusters.iterations) / seeds;
+  mean.settled += static_cast<double>(clusters.settled) / seeds;
+  const Fit fit = fitOf(mesh, biped.bodyOfFace(), clusters.region);
+  mean.fit.joint_seams += fit.joint_seams / seeds;
+  mean.fit.seams += fit.seams / seeds;
+  mean.fit.impure += fit.impure / seeds;
+  return clusters;
+}
+
+void report(StudyContext& context, Plot& plot, const Outcome& mean, const TriangleMesh& mesh, int count, bool aware)
+{
+  context.row()
+      .set("clustering", nameOf(aware))
+      .set("vertices", static_cast<double>(mesh.vertices.cols()))
+      .set("regions", count)
+      .set("seams_at_joints", mean.fit.joint_seams)
+      .set("seams_anywhere", mean.fit.seams)
+      .set("impure_area", mean.fit.impure)
+      .set("iterations", mean.iterations)
+      .set("settled", mean.settled)
+      .set("seconds", mean.seconds);
+  plot.at(nameOf(aware)).x.push_back(count);
+  plot.at(nameOf(aware)).y.push_back(mean.fit.joint_seams);
+}
+
 }   // namespace
 
 void runClustering(StudyContext& context)
@@ -64,6 +124,7 @@ void runClustering(StudyContext& context)
   std::vector<Eigen::Matrix3Xd> walk;
   for (int k = 0; k < 60; ++k)
     walk.push_back(biped.at(Biped::kPeriod * (1.0 + k / 60.0)));
+  const std::vector<Eigen::Matrix3Xd> rest = {mesh.vertices};
   SurfacePicture& picture = context.picture("clustering", "200 regions of a walking character (thesis figure 6.7)");
   picture.view = {-0.8, 0.6, -0.1};
   picture.columns = 4;
@@ -72,70 +133,28 @@ void runClustering(StudyContext& context)
   plot.log_y = false;
 
   const int seeds = context.quick() ? 2 : 10;
-  const std::vector<int> counts = context.quick() ? std::vector<int>{200} : std::vector<int>{50, 100, 200, 280};
-  const double compactness = 0.5;
+  const std::vector<int> counts =
+      context.quick() ? std::vector<int>{kThesisRegions} : std::vector<int>{50, 100, kThesisRegions, 280};
   int done = 0;
-  double gain = 0, seconds_200 = 0, iterations_200 = 0;
+  Outcome thesis[2];   // of the thesis's count of regions: static, animation-aware
   for (const int count : counts)
-  {
-    double joints_of[2] = {0, 0};
     for (const bool aware : {false, true})
     {
-      Fit mean;
-      double seconds = 0, iterations = 0, settled = 0;
+      Outcome mean;
       for (int seed = 1; seed <= seeds; ++seed)
       {
-        context.progress(done++, 2 * seeds * static_cast<int>(counts.size()), aware ? "animation-aware" : "static");
-        ClusteringOptions options;
-        options.regions = count;
-        options.compactness = compactness;
-        options.max_iterations = 32;
-        options.seed = static_cast<unsigned>(seed);
-        const auto start = std::chrono::steady_clock::now();
-        const Clustering clusters =
-            clusterFaces(mesh.triangles, aware ? walk : std::vector<Eigen::Matrix3Xd>{mesh.vertices}, options);
-        seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / seeds;
-        iterations += static_cast<double>(clusters.iterations) / seeds;
-        settled += static_cast<double>(clusters.settled) / seeds;
-        const Fit fit = fitOf(mesh, biped.bodyOfFace(), clusters.region);
-        mean.joint_seams += fit.joint_seams / seeds;
-        mean.seams += fit.seams / seeds;
-        mean.impure += fit.impure / seeds;
-        if (count == 200 && seed == 1)
-        {
-          const Eigen::VectorXi hues = huesOf(mesh.triangles, clusters.region);
-          const char* what = aware ? "animation-aware" : "static";
-          picture.panels.push_back({std::string(what) + ", at rest", {{mesh, true, hues}}});
-          const Eigen::Matrix3Xd& frame = walk[12];
-          const Eigen::Matrix3Xd here = frame.colwise() - Eigen::Vector3d(frame.row(0).mean(), 0, 0);
-          picture.panels.push_back({std::string(what) + ", walking", {{{here, mesh.triangles}, true, hues}}});
-        }
+        context.progress(done++, 2 * seeds * static_cast<int>(counts.size()), nameOf(aware));
+        const Clustering clusters = addSeed(mean, biped, aware ? walk : rest, count, seed, seeds);
+        if (count == kThesisRegions && seed == 1)
+          draw(picture, mesh, walk[12], clusters, aware);
       }
-      joints_of[aware] = mean.joint_seams;
-      context.row()
-          .set("clustering", aware ? "animation-aware" : "static")
-          .set("vertices", static_cast<double>(mesh.vertices.cols()))
-          .set("regions", count)
-          .set("seams_at_joints", mean.joint_seams)
-          .set("seams_anywhere", mean.seams)
-          .set("impure_area", mean.impure)
-          .set("iterations", iterations)
-          .set("settled", settled)
-          .set("seconds", seconds);
-      plot.at(aware ? "animation-aware" : "static").x.push_back(count);
-      plot.at(aware ? "animation-aware" : "static").y.push_back(mean.joint_seams);
-      if (count == 200 && aware)
-      {
-        seconds_200 = seconds;
-        iterations_200 = iterations;
-      }
+      report(context, plot, mean, mesh, count, aware);
+      if (count == kThesisRegions)
+        thesis[aware] = mean;
     }
-    if (count == 200)
-      gain = joints_of[1] / joints_of[0];
-  }
-  context.metric("seams_at_joints_gain", gain);
-  context.metric("seconds", seconds_200);
-  context.metric("iterations", iterations_200);
+  context.metric("seams_at_joints_gain", thesis[1].fit.joint_seams / thesis[0].fit.joint_seams);
+  context.metric("seconds", thesis[1].seconds);
+  context.metric("iterations", thesis[1].iterations);
   context.note(
       "seams_at_joints: share of the length of edges between faces of different bodies that lie between two regions; "
       "seams_anywhere: "
