@@ -182,128 +182,158 @@ double segmentDepth(const ConvexPiece& piece, const Eigen::Vector3d& a, const Ei
   return std::min({distance(0.0), distance(1.0), distance(0.5 * (low + high))});
 }
 
-}   // namespace
-
-std::vector<Intersection> intersections(const CollisionSurface& surface, const Eigen::Matrix3Xd& x,
-                                        const std::vector<Pose>& solids)
+/// The pieces of a surface, all of them in one list each.
+class AllPieces
 {
-  std::vector<Face> faces;
-  std::vector<Side> sides;
-  std::vector<Eigen::Vector3d> points;
+public:
+  AllPieces(const CollisionSurface& surface, const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  /// Faces of sheets that touch or enter solids that are no meshes.
+  void meetSolids(std::vector<Intersection>& out) const;
+  /// Edges that meet faces.
+  void meetFaces(std::vector<Intersection>& out);
+
+private:
+  bool touches(int sheet, std::size_t solid) const;
+  bool mayTouch(int a, int b) const;
+  double left(const Side& s) const { return std::min(points_[s.a].x(), points_[s.b].x()); }
+
+  const CollisionSurface& surface_;
+  const std::vector<Pose>& solids_;
+  const int sheets_;
+  std::vector<Eigen::Vector3d> points_;   ///< of the sheets, then of the solids that are meshes
+  std::vector<Face> faces_;               ///< likewise
+  std::size_t sheet_faces_ = 0;
+  std::vector<Side> sides_;
+};
+
+AllPieces::AllPieces(const CollisionSurface& surface, const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
+  : surface_(surface),
+    solids_(solids),
+    sheets_(static_cast<int>(surface.sheets.size()))
+{
   for (Eigen::Index i = 0; i < x.cols(); ++i)
-    points.emplace_back(x.col(i));
-  const int sheets = static_cast<int>(surface.sheets.size());
-  for (int s = 0; s < sheets; ++s)
-    addFaces(surface.sheets[s].triangles, 0, s, faces, sides);
-  std::vector<Intersection> out;
-  const auto touches = [&](int sheet, std::size_t k) {
-    const std::vector<int>& ignores = surface.solids[k].ignores;
-    return surface.sheets[sheet].solids && std::find(ignores.begin(), ignores.end(), sheet) == ignores.end();
-  };
-  const std::size_t sheet_faces = faces.size();
+    points_.emplace_back(x.col(i));
+  for (int s = 0; s < sheets_; ++s)
+    addFaces(surface.sheets[s].triangles, 0, s, faces_, sides_);
+  sheet_faces_ = faces_.size();
   for (std::size_t k = 0; k < surface.solids.size(); ++k)
-  {
-    const Shape& shape = surface.solids[k].shape;
-    const int first = static_cast<int>(points.size()), object = sheets + static_cast<int>(k);
-    if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&shape))
+    if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&surface.solids[k].shape))
     {
+      const int first = static_cast<int>(points_.size());
       for (Eigen::Index i = 0; i < (*mesh)->vertices.cols(); ++i)
-        points.push_back(solids[k] * Eigen::Vector3d((*mesh)->vertices.col(i)));
-      addFaces((*mesh)->triangles, first, object, faces, sides);
-      continue;
+        points_.push_back(solids[k] * Eigen::Vector3d((*mesh)->vertices.col(i)));
+      addFaces((*mesh)->triangles, first, sheets_ + static_cast<int>(k), faces_, sides_);
     }
-    ConvexPiece piece;
-    if (const auto* p = std::get_if<Plane>(&shape))
-      piece = *p;
-    else if (const auto* s = std::get_if<Sphere>(&shape))
-      piece = *s;
-    else if (const auto* b = std::get_if<Box>(&shape))
-      piece = *b;
-    else if (const auto* y = std::get_if<Cylinder>(&shape))
-      piece = *y;
-    else
-      piece = std::get<Capsule>(shape);
-    const Pose inverse = solids[k].inverse();
-    for (std::size_t f = 0; f < sheet_faces; ++f)
+}
+
+bool AllPieces::touches(int sheet, std::size_t solid) const
+{
+  const std::vector<int>& ignores = surface_.solids[solid].ignores;
+  return surface_.sheets[sheet].solids && std::find(ignores.begin(), ignores.end(), sheet) == ignores.end();
+}
+
+bool AllPieces::mayTouch(int a, int b) const
+{
+  if (a >= sheets_ && b >= sheets_)
+    return false;
+  if (a >= sheets_ || b >= sheets_)
+    return touches(std::min(a, b), static_cast<std::size_t>(std::max(a, b) - sheets_));
+  return a == b ? surface_.sheets[a].self : surface_.sheets[a].others && surface_.sheets[b].others;
+}
+
+/// A shape that is no mesh.
+ConvexPiece convexPiece(const Shape& shape)
+{
+  if (const auto* p = std::get_if<Plane>(&shape))
+    return *p;
+  if (const auto* s = std::get_if<Sphere>(&shape))
+    return *s;
+  if (const auto* b = std::get_if<Box>(&shape))
+    return *b;
+  if (const auto* y = std::get_if<Cylinder>(&shape))
+    return *y;
+  return std::get<Capsule>(shape);
+}
+
+/// Whether what sticks out of a solid meets the inside of a face, whose corners are in the frame of the solid.
+bool meetsInside(const Shape& shape, const std::array<Eigen::Vector3d, 3>& v)
+{
+  const auto axisMeets = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius) {
+    return segmentMeetsTriangle(a, b, v[0], v[1], v[2]) ||
+           (radius > 0.0 &&
+            std::min(pointTriangleDistance(a, v[0], v[1], v[2]), pointTriangleDistance(b, v[0], v[1], v[2])) <= radius);
+  };
+  bool meets = false;
+  if (const auto* s = std::get_if<Sphere>(&shape))
+    meets = axisMeets({0, 0, 0}, {0, 0, 0}, s->radius);
+  else if (const auto* c = std::get_if<Capsule>(&shape))
+    meets = axisMeets({0, 0, -0.5 * c->length}, {0, 0, 0.5 * c->length}, c->radius);
+  else if (const auto* y = std::get_if<Cylinder>(&shape))
+    for (int i = 0; i < 64 && !meets; ++i)
     {
-      if (!touches(faces[f].object, k))
+      const double angle = 2.0 * M_PI * i / 64, px = y->radius * std::cos(angle), py = y->radius * std::sin(angle);
+      meets = axisMeets({px, py, -0.5 * y->length}, {px, py, 0.5 * y->length}, 0.0);
+    }
+  else if (const auto* b = std::get_if<Box>(&shape))
+    for (int i = 0; i < 8 && !meets; ++i)
+      for (int axis = 0; axis < 3 && !meets; ++axis)
+      {
+        const Eigen::Vector3d p =
+            0.5 * b->size.cwiseProduct(Eigen::Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
+        Eigen::Vector3d q = p;
+        q[axis] = -q[axis];
+        meets = axisMeets(p, q, 0.0);
+      }
+  return meets;
+}
+
+void AllPieces::meetSolids(std::vector<Intersection>& out) const
+{
+  for (std::size_t k = 0; k < surface_.solids.size(); ++k)
+  {
+    const Shape& shape = surface_.solids[k].shape;
+    if (std::holds_alternative<std::shared_ptr<const TriangleMesh>>(shape))
+      continue;
+    const ConvexPiece piece = convexPiece(shape);
+    const Pose inverse = solids_[k].inverse();
+    for (std::size_t f = 0; f < sheet_faces_; ++f)
+    {
+      if (!touches(faces_[f].object, k))
         continue;
       std::array<Eigen::Vector3d, 3> v;
       for (int i = 0; i < 3; ++i)
-        v[i] = inverse * points[faces[f].v[i]];
+        v[i] = inverse * points_[faces_[f].v[i]];
       bool meets = false;
       for (int i = 0; i < 3 && !meets; ++i)
         meets = segmentDepth(piece, v[i], v[(i + 1) % 3]) <= 0.0;
-      // the inside of a face, on what sticks out of the solid
-      const auto axisMeets = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius) {
-        return segmentMeetsTriangle(a, b, v[0], v[1], v[2]) ||
-               (radius > 0.0 && std::min(pointTriangleDistance(a, v[0], v[1], v[2]),
-                                         pointTriangleDistance(b, v[0], v[1], v[2])) <= radius);
-      };
-      if (const auto* s = std::get_if<Sphere>(&shape))
-        meets = meets || axisMeets({0, 0, 0}, {0, 0, 0}, s->radius);
-      else if (const auto* c = std::get_if<Capsule>(&shape))
-        meets = meets || axisMeets({0, 0, -0.5 * c->length}, {0, 0, 0.5 * c->length}, c->radius);
-      else if (const auto* y = std::get_if<Cylinder>(&shape))
-        for (int i = 0; i < 64 && !meets; ++i)
-        {
-          const double angle = 2.0 * M_PI * i / 64, px = y->radius * std::cos(angle), py = y->radius * std::sin(angle);
-          meets = axisMeets({px, py, -0.5 * y->length}, {px, py, 0.5 * y->length}, 0.0);
-        }
-      else if (const auto* b = std::get_if<Box>(&shape))
-        for (int i = 0; i < 8 && !meets; ++i)
-          for (int axis = 0; axis < 3 && !meets; ++axis)
-          {
-            const Eigen::Vector3d p =
-                0.5 * b->size.cwiseProduct(Eigen::Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
-            Eigen::Vector3d q = p;
-            q[axis] = -q[axis];
-            meets = axisMeets(p, q, 0.0);
-          }
-      if (meets)
-        out.push_back({{faces[f].v[0], faces[f].v[1]}, {-1, -1, static_cast<int>(k)}});
+      if (meets || meetsInside(shape, v))
+        out.push_back({{faces_[f].v[0], faces_[f].v[1]}, {-1, -1, static_cast<int>(k)}});
     }
   }
-  std::sort(sides.begin(), sides.end(),
+}
+
+/// Sorts the edges along x, and tests each face against those that begin before it ends.
+void AllPieces::meetFaces(std::vector<Intersection>& out)
+{
+  std::sort(sides_.begin(), sides_.end(),
             [](const Side& a, const Side& b) { return std::tie(a.object, a.a, a.b) < std::tie(b.object, b.a, b.b); });
-  sides.erase(
-      std::unique(sides.begin(), sides.end(),
+  sides_.erase(
+      std::unique(sides_.begin(), sides_.end(),
                   [](const Side& a, const Side& b) { return a.object == b.object && a.a == b.a && a.b == b.b; }),
-      sides.end());
-  const auto mayTouch = [&](int a, int b) {
-    if (a >= sheets && b >= sheets)
-      return false;
-    if (a >= sheets || b >= sheets)
-      return touches(std::min(a, b), std::max(a, b) - sheets);
-    return a == b ? surface.sheets[a].self : surface.sheets[a].others && surface.sheets[b].others;
-  };
-  // sorted along x, each face against the edges that begin before it ends
-  const auto low = [&](const Face& f, int k) {
-    return std::min({points[f.v[0]][k], points[f.v[1]][k], points[f.v[2]][k]});
-  };
-  const auto high = [&](const Face& f, int k) {
-    return std::max({points[f.v[0]][k], points[f.v[1]][k], points[f.v[2]][k]});
-  };
-  std::sort(sides.begin(), sides.end(), [&](const Side& a, const Side& b) {
-    return std::min(points[a.a].x(), points[a.b].x()) < std::min(points[b.a].x(), points[b.b].x());
-  });
+      sides_.end());
+  std::sort(sides_.begin(), sides_.end(), [&](const Side& a, const Side& b) { return left(a) < left(b); });
   double longest = 0.0;
-  for (const Side& s : sides)
-    longest = std::max(longest, std::abs(points[s.a].x() - points[s.b].x()));
-  for (const Face& f : faces)
+  for (const Side& s : sides_)
+    longest = std::max(longest, std::abs(points_[s.a].x() - points_[s.b].x()));
+  for (const Face& f : faces_)
   {
-    Eigen::Vector3d from, to;
-    for (int k = 0; k < 3; ++k)
+    const Eigen::Vector3d &a = points_[f.v[0]], &b = points_[f.v[1]], &c = points_[f.v[2]];
+    const Eigen::Vector3d from = a.cwiseMin(b).cwiseMin(c), to = a.cwiseMax(b).cwiseMax(c);
+    const auto begin = std::lower_bound(sides_.begin(), sides_.end(), from.x() - longest,
+                                        [&](const Side& s, double value) { return left(s) < value; });
+    for (auto s = begin; s != sides_.end() && left(*s) <= to.x(); ++s)
     {
-      from[k] = low(f, k);
-      to[k] = high(f, k);
-    }
-    const auto begin = std::lower_bound(
-        sides.begin(), sides.end(), from.x() - longest,
-        [&](const Side& s, double value) { return std::min(points[s.a].x(), points[s.b].x()) < value; });
-    for (auto s = begin; s != sides.end() && std::min(points[s->a].x(), points[s->b].x()) <= to.x(); ++s)
-    {
-      const Eigen::Vector3d &p = points[s->a], &q = points[s->b];
+      const Eigen::Vector3d &p = points_[s->a], &q = points_[s->b];
       if (p.x() < from.x() && q.x() < from.x())
         continue;
       if ((p.y() < from.y() && q.y() < from.y()) || (p.y() > to.y() && q.y() > to.y()) ||
@@ -311,11 +341,21 @@ std::vector<Intersection> intersections(const CollisionSurface& surface, const E
         continue;
       const bool shared =
           std::find(f.v.begin(), f.v.end(), s->a) != f.v.end() || std::find(f.v.begin(), f.v.end(), s->b) != f.v.end();
-      if (!shared && mayTouch(s->object, f.object) &&
-          segmentMeetsTriangle(p, q, points[f.v[0]], points[f.v[1]], points[f.v[2]]))
+      if (!shared && mayTouch(s->object, f.object) && segmentMeetsTriangle(p, q, a, b, c))
         out.push_back({{s->a, s->b}, {f.v[0], f.v[1], f.v[2]}});
     }
   }
+}
+
+}   // namespace
+
+std::vector<Intersection> intersections(const CollisionSurface& surface, const Eigen::Matrix3Xd& x,
+                                        const std::vector<Pose>& solids)
+{
+  AllPieces pieces(surface, x, solids);
+  std::vector<Intersection> out;
+  pieces.meetSolids(out);
+  pieces.meetFaces(out);
   return out;
 }
 

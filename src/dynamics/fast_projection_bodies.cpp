@@ -87,90 +87,25 @@ void FastProjection::linearise()
 /// multipliers as unknowns, too.
 bool FastProjection::solveBodies()
 {
-  const int bodies = static_cast<int>(bodies_.size()), first_special = 6 * bodies;
   std::vector<double>& values = matrix_.values();
   std::fill(values.begin(), values.end(), 0.0);
   solution_.setZero();
-  for (int b = 0; b < bodies; ++b)
+  addInertias();
+  for (OnChain on{0, 0, 0, 0}; on.begin < touches_.size(); on.begin = on.end, on.first = on.last)
   {
-    const Eigen::Matrix3d r = bodies_[b].start.orientation.toRotationMatrix(),
-                          inertia = r * bodies_[b].inertia * r.transpose();
-    for (int k = 0; k < 3; ++k)
-    {
-      entry(6 * b + k, 6 * b + k) = bodies_[b].mass;
-      for (int l = 0; l < 3; ++l)
-        entry(6 * b + 3 + k, 6 * b + 3 + l) = inertia(k, l);
-    }
-  }
-  for (std::size_t begin = 0, special = 0; begin < touches_.size();)
-  {
-    std::size_t end = begin;
-    while (end < touches_.size() && touches_[end].chain == touches_[begin].chain)
-      ++end;
-    const Chain& chain = chains_[touches_[begin].chain];
-    std::copy_n(chain.a.c, chain.a.edges, column_.data());
-    solveChain(chain, column_.data());
-    for (std::size_t q = begin; q < end; ++q)
-      if (touches_[q].special < 0)
-        solution_.segment<6>(6 * touches_[q].body) += touches_[q].column * column_[touches_[q].edge];
-    const std::size_t first = special;
-    for (; special < specials_.size() && specials_[special].chain == touches_[begin].chain; ++special)
-    {
-      const Special& s = specials_[special];
-      solution_[first_special + special] = s.c - (s.before >= 0 ? s.from_before * column_[s.before] : 0.0);
-    }
-    for (std::size_t p = begin; p < end; ++p)
-    {
-      const Touch& t = touches_[p];
-      if (t.special >= 0)
-      {
-        const int row = first_special + t.special;
-        for (int k = 0; k < 6; ++k)
-        {
-          entry(row, 6 * t.body + k) -= t.row[k];
-          entry(6 * t.body + k, row) -= t.column[k];
-        }
-        continue;
-      }
-      std::fill_n(column_.data(), chain.a.edges, 0.0);
-      column_[t.edge] = 1.0;
-      solveChain(chain, column_.data());
-      for (std::size_t q = begin; q < end; ++q)
-        if (touches_[q].special < 0 && touches_[q].run == t.run)
-          for (int l = 0; l < 6; ++l)
-          {
-            double* block = &entry(6 * touches_[q].body, 6 * t.body + l);   // six rows follow one another
-            for (int k = 0; k < 6; ++k)
-              block[k] -= column_[touches_[q].edge] * touches_[q].column[k] * t.row[l];
-          }
-      for (std::size_t k = first; k < special; ++k)
-        if (specials_[k].before >= 0 && specials_[k].run == t.run)
-          for (int l = 0; l < 6; ++l)
-            entry(first_special + static_cast<int>(k), 6 * t.body + l) +=
-                specials_[k].from_before * column_[specials_[k].before] * t.row[l];
-    }
-    for (std::size_t k = first; k < special; ++k)
-    {
-      const Special& s = specials_[k];
-      if (s.before < 0)
-        continue;
-      const int column = first_special + static_cast<int>(k);
-      std::fill_n(column_.data(), chain.a.edges, 0.0);
-      column_[s.before] = s.to_before;
-      solveChain(chain, column_.data());
-      entry(column, column) = s.own - s.from_before * column_[s.before];
-      for (std::size_t q = begin; q < end; ++q)
-        if (touches_[q].special < 0 && touches_[q].run == s.run)
-          for (int l = 0; l < 6; ++l)
-            entry(6 * touches_[q].body + l, column) += touches_[q].column[l] * column_[touches_[q].edge];
-    }
-    begin = end;
+    while (on.end < touches_.size() && touches_[on.end].chain == touches_[on.begin].chain)
+      ++on.end;
+    while (on.last < specials_.size() && specials_[on.last].chain == touches_[on.begin].chain)
+      ++on.last;
+    addChain(on);
+    addSpecials(on);
   }
   if (!matrix_.factor())
     return false;
   matrix_.solve(solution_.data());
   if (!solution_.allFinite())
     return false;
+  const int first_special = 6 * static_cast<int>(bodies_.size());
   for (const Touch& t : touches_)
   {
     const ChainArrays& a = chains_[t.chain].a;
@@ -181,6 +116,89 @@ bool FastProjection::solveBodies()
     if (specials_[k].before >= 0)
       chains_[specials_[k].chain].a.c[specials_[k].before] -= specials_[k].to_before * solution_[first_special + k];
   return true;
+}
+
+void FastProjection::addInertias()
+{
+  for (int b = 0; b < static_cast<int>(bodies_.size()); ++b)
+  {
+    const Eigen::Matrix3d r = bodies_[b].start.orientation.toRotationMatrix(),
+                          inertia = r * bodies_[b].inertia * r.transpose();
+    for (int k = 0; k < 3; ++k)
+    {
+      entry(6 * b + k, 6 * b + k) = bodies_[b].mass;
+      for (int l = 0; l < 3; ++l)
+        entry(6 * b + 3 + k, 6 * b + 3 + l) = inertia(k, l);
+    }
+  }
+}
+
+/// Right-hand sides of the bodies and special edges of a chain, and what its touches add to the matrix.
+void FastProjection::addChain(const OnChain& on)
+{
+  const int first_special = 6 * static_cast<int>(bodies_.size());
+  const Chain& chain = chains_[touches_[on.begin].chain];
+  std::copy_n(chain.a.c, chain.a.edges, column_.data());
+  solveChain(chain, column_.data());
+  for (std::size_t q = on.begin; q < on.end; ++q)
+    if (touches_[q].special < 0)
+      solution_.segment<6>(6 * touches_[q].body) += touches_[q].column * column_[touches_[q].edge];
+  for (std::size_t k = on.first; k < on.last; ++k)
+  {
+    const Special& s = specials_[k];
+    solution_[first_special + k] = s.c - (s.before >= 0 ? s.from_before * column_[s.before] : 0.0);
+  }
+  for (std::size_t p = on.begin; p < on.end; ++p)
+  {
+    const Touch& t = touches_[p];
+    if (t.special >= 0)
+    {
+      const int row = first_special + t.special;
+      for (int k = 0; k < 6; ++k)
+      {
+        entry(row, 6 * t.body + k) -= t.row[k];
+        entry(6 * t.body + k, row) -= t.column[k];
+      }
+      continue;
+    }
+    std::fill_n(column_.data(), chain.a.edges, 0.0);
+    column_[t.edge] = 1.0;
+    solveChain(chain, column_.data());
+    for (std::size_t q = on.begin; q < on.end; ++q)
+      if (touches_[q].special < 0 && touches_[q].run == t.run)
+        for (int l = 0; l < 6; ++l)
+        {
+          double* block = &entry(6 * touches_[q].body, 6 * t.body + l);   // six rows follow one another
+          for (int k = 0; k < 6; ++k)
+            block[k] -= column_[touches_[q].edge] * touches_[q].column[k] * t.row[l];
+        }
+    for (std::size_t k = on.first; k < on.last; ++k)
+      if (specials_[k].before >= 0 && specials_[k].run == t.run)
+        for (int l = 0; l < 6; ++l)
+          entry(first_special + static_cast<int>(k), 6 * t.body + l) +=
+              specials_[k].from_before * column_[specials_[k].before] * t.row[l];
+  }
+}
+
+/// What the special edges of a chain add to the matrix.
+void FastProjection::addSpecials(const OnChain& on)
+{
+  const Chain& chain = chains_[touches_[on.begin].chain];
+  for (std::size_t k = on.first; k < on.last; ++k)
+  {
+    const Special& s = specials_[k];
+    if (s.before < 0)
+      continue;
+    const int column = 6 * static_cast<int>(bodies_.size()) + static_cast<int>(k);
+    std::fill_n(column_.data(), chain.a.edges, 0.0);
+    column_[s.before] = s.to_before;
+    solveChain(chain, column_.data());
+    entry(column, column) = s.own - s.from_before * column_[s.before];
+    for (std::size_t q = on.begin; q < on.end; ++q)
+      if (touches_[q].special < 0 && touches_[q].run == s.run)
+        for (int l = 0; l < 6; ++l)
+          entry(6 * touches_[q].body + l, column) += touches_[q].column[l] * column_[touches_[q].edge];
+  }
 }
 
 /// Bodies, and the nodes welded to them, by their impulses so far.

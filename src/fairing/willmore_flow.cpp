@@ -162,10 +162,60 @@ double WillmoreFlow::energy(const Eigen::Matrix3Xd& vertices)
   return willmore_.energy(x_.data());
 }
 
+/// direction_ := the step of the flow from x_, as far as it is linear. Returns why that cannot be; empty: it can.
+std::string WillmoreFlow::findDirection(Reach& reach)
+{
+  std::fill(gradient_.begin(), gradient_.end(), 0.0);
+  if (!std::isfinite(willmore_.addGradient(x_.data(), gradient_.data())))
+    return "a face has no area, or a vertex is not finite; mend the mesh first";
+  for (std::size_t i = 0; i < held_.size(); ++i)
+    for (int k = 0; k < 4; ++k)
+    {
+      double& g = gradient_[4 * i + k];
+      g = held_[i] || k == 3 ? 0.0 : -g - mass_rate_[i] * (x_[4 * i + k] - start_[4 * i + k]);
+    }
+  cholesky_.solvePoints(gradient_.data(), direction_.data());
+  reach = {};
+  for (std::size_t k = 0; k < gradient_.size(); ++k)
+  {
+    reach.decrement += gradient_[k] * direction_[k];
+    reach.move = std::max(reach.move, std::abs(direction_[k]));
+    reach.size = std::max(reach.size, std::abs(x_[k]));
+  }
+  return std::isfinite(reach.decrement)
+             ? ""
+             : "the gradient is too large for finite numbers; mend the mesh's thinnest faces first";
+}
+
+/// Goes along direction_ as far as `merit` falls enough, and counts how often the way was halved. Returns false if it
+/// falls nowhere.
+bool WillmoreFlow::search(double decrement, double& merit, double& energy, int& cuts)
+{
+  cuts = 0;
+  for (double scale = 1.0; cuts <= kCuts; scale *= 0.5, ++cuts)
+  {
+    double distance = 0.0;
+    for (std::size_t i = 0; i < held_.size(); ++i)
+      for (int k = 0; k < 4; ++k)
+      {
+        trial_[4 * i + k] = x_[4 * i + k] + scale * direction_[4 * i + k];
+        distance += mass_rate_[i] * std::pow(trial_[4 * i + k] - start_[4 * i + k], 2);
+      }
+    const double there = willmore_.foldsOver(x_.data(), trial_.data()) ? INFINITY : willmore_.energy(trial_.data());
+    if (there + 0.5 * distance <= merit - kSufficient * scale * decrement)
+    {
+      merit = there + 0.5 * distance;
+      energy = there;
+      return true;
+    }
+  }
+  return false;
+}
+
 FairingReport WillmoreFlow::step(Eigen::Matrix3Xd& vertices)
 {
   FairingReport report;
-  const auto refuse = [&](const char* reason) {
+  const auto refuse = [&](const std::string& reason) {
     report.ok = false;
     report.energy = report.energy_before;
     report.message = reason;
@@ -175,67 +225,28 @@ FairingReport WillmoreFlow::step(Eigen::Matrix3Xd& vertices)
   start_ = x_;
   report.energy_before = report.energy = willmore_.energy(x_.data());
   double merit = report.energy;   // E + |x - start|^2_M / (2 h), whose minimum is the step's end
-  double first = 0.0;
   for (int iteration = 0; iteration < iterations_; ++iteration)
   {
     if (stepsInterrupted())
       return refuse(kStepInterrupted);
-    std::fill(gradient_.begin(), gradient_.end(), 0.0);
-    if (!std::isfinite(willmore_.addGradient(x_.data(), gradient_.data())))
-      return refuse("a face has no area, or a vertex is not finite; mend the mesh first");
-    for (std::size_t i = 0; i < held_.size(); ++i)
-      for (int k = 0; k < 4; ++k)
-      {
-        double& g = gradient_[4 * i + k];
-        g = held_[i] || k == 3 ? 0.0 : -g - mass_rate_[i] * (x_[4 * i + k] - start_[4 * i + k]);
-      }
-    cholesky_.solvePoints(gradient_.data(), direction_.data());
-    double decrement = 0.0, reach = 0.0, size = 0.0;
-    for (std::size_t k = 0; k < gradient_.size(); ++k)
-    {
-      decrement += gradient_[k] * direction_[k];
-      reach = std::max(reach, std::abs(direction_[k]));
-      size = std::max(size, std::abs(x_[k]));
-    }
-    if (!std::isfinite(decrement))
-      return refuse("the gradient is too large for finite numbers; mend the mesh's thinnest faces first");
+    Reach reach;
+    if (const std::string why = findDirection(reach); !why.empty())
+      return refuse(why);
     if (iteration == 0)
-      report.decrement = first = decrement;
-    const bool resolved = decrement > kEnergyResolved * report.energy && reach > kMoveResolved * size;
-    if (!resolved || decrement <= kConverged * first * (iteration > 0))
+      report.decrement = reach.decrement;
+    const bool resolved = reach.decrement > kEnergyResolved * report.energy && reach.move > kMoveResolved * reach.size;
+    if (!resolved || reach.decrement <= kConverged * report.decrement * (iteration > 0))
     {
       report.stationary = iteration == 0;
       break;
     }
-    double scale = 1.0;
     int cuts = 0;
-    bool taken = false;
-    for (; !taken && cuts <= kCuts; scale *= 0.5)
-    {
-      double distance = 0.0;
-      for (std::size_t i = 0; i < held_.size(); ++i)
-        for (int k = 0; k < 4; ++k)
-        {
-          trial_[4 * i + k] = x_[4 * i + k] + scale * direction_[4 * i + k];
-          distance += mass_rate_[i] * std::pow(trial_[4 * i + k] - start_[4 * i + k], 2);
-        }
-      double energy = INFINITY;
-      if (!willmore_.foldsOver(x_.data(), trial_.data()))
-        energy = willmore_.energy(trial_.data());
-      taken = energy + 0.5 * distance <= merit - kSufficient * scale * decrement;
-      if (!taken)
-      {
-        ++cuts;
-        continue;
-      }
-      merit = energy + 0.5 * distance;
-      report.energy = energy;
-    }
-    if (!taken)
+    if (!search(reach.decrement, merit, report.energy, cuts))
     {
       if (iteration > 0)
         break;   // the iterations so far are a step
-      report.stationary = decrement <= kEnergyDoubtful * report.energy_before || reach <= kMoveDoubtful * size;
+      report.stationary =
+          reach.decrement <= kEnergyDoubtful * report.energy_before || reach.move <= kMoveDoubtful * reach.size;
       if (report.stationary)
         return report;
       return refuse(

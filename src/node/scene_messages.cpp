@@ -67,13 +67,21 @@ slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time
 void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id,
                          std::uint32_t epoch)
 {
-  const SceneState& scene = simulation.state();
   geometry_msgs::PoseArray& poses = edge_poses.renew();
-  slender_sim::ClothState& cloths = cloth_state.renew();
-  states.resize(scene.rods.size());
   poses.header.stamp = stamp;
   poses.header.frame_id = frame_id;
   poses.poses.clear();
+  fillRods(simulation, epoch, poses);
+  fillThreads(simulation, epoch, poses);
+  fillCloths(simulation, epoch, poses.header);
+  fillGrasps(simulation, poses.header);
+  fillSolids(simulation, poses.header);
+}
+
+void SceneMessages::fillRods(const Simulation& simulation, std::uint32_t epoch, geometry_msgs::PoseArray& poses)
+{
+  const SceneState& scene = simulation.state();
+  states.resize(scene.rods.size());
   for (std::size_t r = 0; r < scene.rods.size(); ++r)
   {
     const RodModel& model = simulation.rodModel(static_cast<int>(r));
@@ -86,6 +94,11 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     message.step = scene.steps;
     appendPoses(model, scene.rods[r], poses.poses);
   }
+}
+
+void SceneMessages::fillThreads(const Simulation& simulation, std::uint32_t epoch, geometry_msgs::PoseArray& poses)
+{
+  const SceneState& scene = simulation.state();
   std::size_t piece = 0;
   nozzles.resize(scene.threads.size());
   for (std::size_t k = 0; k < scene.threads.size(); ++k)
@@ -107,7 +120,13 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     nozzles[k].wrench.torque = toVector3(load.torque);
   }
   threads.resize(piece);
-  cloths.header = poses.header;
+}
+
+void SceneMessages::fillCloths(const Simulation& simulation, std::uint32_t epoch, const std_msgs::Header& header)
+{
+  const SceneState& scene = simulation.state();
+  slender_sim::ClothState& cloths = cloth_state.renew();
+  cloths.header = header;
   cloths.epoch = epoch;
   cloths.step = scene.steps;
   cloths.names.clear();
@@ -136,15 +155,19 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
         simulation.config().cloths[k].tracking ? simulation.functions(static_cast<int>(k)).name : std::string());
     cloths.blend_distances.push_back(error.blend);
   }
+}
+
+void SceneMessages::fillGrasps(const Simulation& simulation, const std_msgs::Header& header)
+{
   wrenches.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < wrenches.size(); ++g)
   {
     const int grasp = static_cast<int>(g);
-    wrenches[g].header = poses.header;
+    wrenches[g].header = header;
     wrenches[g].wrench =
         simulation.grasps().isActive(grasp) ? toMessage(simulation.grasps().wrench(grasp)) : geometry_msgs::Wrench();
   }
-  grasps.header = poses.header;
+  grasps.header = header;
   grasps.name.resize(wrenches.size());
   grasps.object.resize(wrenches.size());
   grasps.active.resize(wrenches.size());
@@ -157,8 +180,13 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     grasps.active[g] = simulation.grasps().isActive(grasp);
     grasps.pose[g] = toMessage(simulation.grasps().pose(grasp));
   }
+}
+
+void SceneMessages::fillSolids(const Simulation& simulation, const std_msgs::Header& header)
+{
+  const SceneState& scene = simulation.state();
   const std::vector<BodyConfig>& configs = simulation.config().bodies;
-  bodies.header = poses.header;
+  bodies.header = header;
   resize(bodies, configs.size());
   for (std::size_t b = 0; b < configs.size(); ++b)
   {
@@ -166,7 +194,7 @@ void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, c
     bodies.pose[b] = toMessage(scene.bodies[b].X_WB);
     bodies.twist[b] = toMessage(scene.bodies[b].velocity);
   }
-  obstacles.header = poses.header;
+  obstacles.header = header;
   resize(obstacles, scene.obstacles.size());
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
   {

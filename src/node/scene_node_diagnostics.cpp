@@ -81,6 +81,79 @@ void addFunctions(const Simulation& simulation, int cloth, DiagnosticStatus& sta
   add(status, "blend of " + config.name + " leaves at most [m]", held.blend.left(time));
 }
 
+/// How a run that begins in equilibrium began.
+void addStart(const Simulation& simulation, DiagnosticStatus& status)
+{
+  if (const auto& start = simulation.startReport())
+  {
+    add(status, "start: residual", start->residual);
+    add(status, "start: energy [J]", start->energy);
+    add(status, "start: lowest eigenvalue [1/s^2]", start->lowest_eigenvalue);
+    add(status, "start: stable", std::string(start->stable ? "yes" : "no"));
+    add(status, "start: unstable equilibria left", static_cast<std::uint64_t>(start->escapes));
+    if (!start->stable)
+      raise(status, DiagnosticStatus::WARN, "the run started from an unstable equilibrium");
+  }
+}
+
+/// How far shells and rods are from what they track.
+void addTracking(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
+{
+  double error = 0.0, force = 0.0, refused = 0.0;
+  for (std::size_t k = 0; k < simulation.state().cloth_guides.size(); ++k)
+  {
+    const TrackingError now = simulation.trackingError(static_cast<int>(k));
+    error = std::max(error, now.met);
+    refused = std::max(refused, now.at_bound);
+    const Eigen::Matrix3Xd& forces = simulation.state().cloth_guides[k].forces;
+    force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
+  }
+  for (std::size_t r = 0; r < simulation.state().rod_guides.size(); ++r)
+  {
+    error = std::max(error, simulation.rodTrackingError(static_cast<int>(r)));
+    const Eigen::Matrix3Xd& forces = simulation.state().rod_guides[r].forces;
+    force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
+  }
+  add(status, "constraint residual [m]", error);
+  add(status, "worst constraint residual over size", recent.tracking_error);
+  add(status, "largest guide force [N]", force);
+  for (std::size_t k = 0; k < simulation.config().cloths.size(); ++k)
+    addFunctions(simulation, static_cast<int>(k), status);
+  const auto& cloths = simulation.config().cloths;
+  if (std::any_of(cloths.begin(), cloths.end(),
+                  [](const ClothConfig& cloth) { return cloth.tracking && cloth.tracking->sets[0].bounds.size() > 0; }))
+  {
+    add(status, "most guide forces at their bounds", static_cast<std::uint64_t>(recent.forces_at_bound));
+    add(status, "greatest distance where forces are at their bounds [m]", refused);
+  }
+}
+
+void addCloths(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
+{
+  std::uint64_t vertices = 0;
+  for (const ClothState& cloth : simulation.state().cloths)
+    vertices += static_cast<std::uint64_t>(cloth.x.cols());
+  add(status, "vertices", vertices);
+  const auto& cloths = simulation.config().cloths;
+  if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.contact.has_value(); }))
+  {
+    add(status, "contacts per step",
+        recent.steps ? static_cast<double>(recent.repulsions) / static_cast<double>(recent.steps) : 0.0);
+    add(status, "collisions stopped", recent.impulses);
+    add(status, "rigid pieces", recent.zones);
+  }
+}
+
+double energyOf(const Simulation& simulation)
+{
+  double energy = 0.0;
+  for (std::size_t r = 0; r < simulation.state().rods.size(); ++r)
+    energy += simulation.energies(static_cast<int>(r)).total();
+  for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
+    energy += simulation.clothEnergies(static_cast<int>(k)).total();
+  return energy;
+}
+
 }   // namespace
 
 void SceneNode::publishDiagnostics()
@@ -168,16 +241,7 @@ DiagnosticStatus SceneNode::simulationStatus() const
   add(status, "cut steps", recent_.cut_steps);
   add(status, "residual", recent_.residual);
   add(status, "largest strain", recent_.max_strain);
-  if (const auto& start = simulation_->startReport())
-  {
-    add(status, "start: residual", start->residual);
-    add(status, "start: energy [J]", start->energy);
-    add(status, "start: lowest eigenvalue [1/s^2]", start->lowest_eigenvalue);
-    add(status, "start: stable", std::string(start->stable ? "yes" : "no"));
-    add(status, "start: unstable equilibria left", static_cast<std::uint64_t>(start->escapes));
-    if (!start->stable)
-      raise(status, DiagnosticStatus::WARN, "the run started from an unstable equilibrium");
-  }
+  addStart(*simulation_, status);
   if (kind_ == NodeKind::threads)
     addThreads(*simulation_, recent_, status);
   if (recent_.projection_iterations > 0)
@@ -186,60 +250,11 @@ DiagnosticStatus SceneNode::simulationStatus() const
     add(status, "constraint error", recent_.constraint_error);
   }
   if (kind_ == NodeKind::tracking)
-  {
-    double error = 0.0, force = 0.0, refused = 0.0;
-    for (std::size_t k = 0; k < simulation_->state().cloth_guides.size(); ++k)
-    {
-      const TrackingError now = simulation_->trackingError(static_cast<int>(k));
-      error = std::max(error, now.met);
-      refused = std::max(refused, now.at_bound);
-      const Eigen::Matrix3Xd& forces = simulation_->state().cloth_guides[k].forces;
-      force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
-    }
-    for (std::size_t r = 0; r < simulation_->state().rod_guides.size(); ++r)
-    {
-      error = std::max(error, simulation_->rodTrackingError(static_cast<int>(r)));
-      const Eigen::Matrix3Xd& forces = simulation_->state().rod_guides[r].forces;
-      force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
-    }
-    add(status, "constraint residual [m]", error);
-    add(status, "worst constraint residual over size", recent_.tracking_error);
-    add(status, "largest guide force [N]", force);
-    for (std::size_t k = 0; k < simulation_->config().cloths.size(); ++k)
-      addFunctions(*simulation_, static_cast<int>(k), status);
-    const auto& cloths = simulation_->config().cloths;
-    if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) {
-          return cloth.tracking && cloth.tracking->sets[0].bounds.size() > 0;
-        }))
-    {
-      add(status, "most guide forces at their bounds", static_cast<std::uint64_t>(recent_.forces_at_bound));
-      add(status, "greatest distance where forces are at their bounds [m]", refused);
-    }
-  }
+    addTracking(*simulation_, recent_, status);
   if (hasCloths())
-  {
-    std::uint64_t vertices = 0;
-    for (const ClothState& cloth : simulation_->state().cloths)
-      vertices += static_cast<std::uint64_t>(cloth.x.cols());
-    add(status, "vertices", vertices);
-    const auto& cloths = simulation_->config().cloths;
-    if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.contact.has_value(); }))
-    {
-      add(status, "contacts per step",
-          recent_.steps ? static_cast<double>(recent_.repulsions) / static_cast<double>(recent_.steps) : 0.0);
-      add(status, "collisions stopped", recent_.impulses);
-      add(status, "rigid pieces", recent_.zones);
-    }
-  }
+    addCloths(*simulation_, recent_, status);
   if (kind_ != NodeKind::threads)   // viscous threads keep none
-  {
-    double energy = 0.0;
-    for (std::size_t r = 0; r < simulation_->state().rods.size(); ++r)
-      energy += simulation_->energies(static_cast<int>(r)).total();
-    for (std::size_t k = 0; k < simulation_->state().cloths.size(); ++k)
-      energy += simulation_->clothEnergies(static_cast<int>(k)).total();
-    add(status, "energy [J]", energy);
-  }
+    add(status, "energy [J]", energyOf(*simulation_));
   add(status, "recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);
   return status;
 }

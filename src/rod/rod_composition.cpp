@@ -32,9 +32,24 @@ void RodSystem::compose(const RodState& state)
   if (unchanged)
     return;
   ++composition_;
+  const std::vector<char> jointless = holdNodes();
+  // Voronoi lengths of the joints that remain, with the half cells of the clamps next to them
+  std::vector<double> length(a_.nodes, 0.0);
+  for (int i = 0; i < a_.nodes; ++i)
+    if (!jointless[i])
+      length[i] = 0.5 * (model_.rest_length[before(i)] + model_.rest_length[i]);
+  addClamps(jointless, length);
+  composeJoints(length);
+  listTerms();
+  if (allocated())
+    setResponse(0.0, nullptr);
+}
 
-  const int n = a_.nodes, edges = a_.edges;
-  holds_.release(a_.nodes);
+/// Holds what active grasps hold. Returns for each node whether it has no joint: ends, and what frames are held of.
+std::vector<char> RodSystem::holdNodes()
+{
+  const int n = a_.nodes;
+  holds_.release(n);
   carried_.assign(n, 0);
   std::vector<char> jointless(n, 0);
   if (!model_.closed)
@@ -50,12 +65,13 @@ void RodSystem::compose(const RodState& state)
         if (i < g.last_node)
           holds_.holdTurn(i);
       }
+  return jointless;
+}
 
-  // Voronoi lengths of the joints that remain, with the half cells of the clamps next to them
-  std::vector<double> length(n, 0.0);
-  for (int i = 0; i < n; ++i)
-    if (!jointless[i])
-      length[i] = 0.5 * (model_.rest_length[before(i)] + model_.rest_length[i]);
+/// Half joints between a held frame and the edge beside it.
+void RodSystem::addClamps(const std::vector<char>& jointless, std::vector<double>& length)
+{
+  const int n = a_.nodes;
   clamps_.joints.clear();
   for (int g = 0; g < static_cast<int>(grasps_.size()); ++g)
     if (grasps_[g].active && grasps_[g].holds_frame)
@@ -82,31 +98,43 @@ void RodSystem::compose(const RodState& state)
           l -= h / 12.0;
           length[next] += h / 12.0;
         }
-        c.b11 = model_.bend_modulus(0, node) / l;
-        c.b12 = model_.bend_modulus(1, node) / l;
-        c.b22 = model_.bend_modulus(2, node) / l;
-        c.beta = model_.twist_modulus[node] / l;
-        // The half joint of the rest shape turns and twists by its share of the joint; its directors' mean lies
-        // elsewhere between the edges than the joint's own, and strains are tangents of half angles (3.13, 3.14).
-        const double share = shareOfEdge(model_, node, side), m = model_.rest_twist[node];
-        const Eigen::Vector2d kappa = model_.rest_curvature.col(node);
-        double ratio = share;
-        if (model_.curvature == Curvature::tangent)
-        {
-          const double mean = std::abs(std::cos(0.5 * m)) > 1e-3 ? std::cos(0.5 * m) : 1.0,
-                       half_tangent = 0.5 * kappa.norm() / std::abs(mean);
-          ratio = half_tangent > 0
-                      ? std::tan(share * std::atan(half_tangent)) / half_tangent * std::cos(0.5 * share * m) / mean
-                      : 0.0;
-        }
-        const Eigen::Vector2d half = ratio * (Eigen::Rotation2Dd((side ? -0.5 : 0.5) * (1 - share) * m) * kappa);
-        c.rest_kappa1 = half[0];
-        c.rest_kappa2 = half[1];
-        c.rest_twist = share * m;
-        c.coupling = couplingOf(model_, node);
+        setClamp(c, l);
         clamps_.joints.push_back(c);
       }
+}
 
+/// Stiffness of a clamp over a length [m], and its rest shape.
+void RodSystem::setClamp(ClampJoint& c, double length) const
+{
+  const int node = c.node, side = c.side;
+  c.b11 = model_.bend_modulus(0, node) / length;
+  c.b12 = model_.bend_modulus(1, node) / length;
+  c.b22 = model_.bend_modulus(2, node) / length;
+  c.beta = model_.twist_modulus[node] / length;
+  // The half joint of the rest shape turns and twists by its share of the joint; its directors' mean lies elsewhere
+  // between the edges than the joint's own, and strains are tangents of half angles (3.13, 3.14).
+  const double share = shareOfEdge(model_, node, side), m = model_.rest_twist[node];
+  const Eigen::Vector2d kappa = model_.rest_curvature.col(node);
+  double ratio = share;
+  if (model_.curvature == Curvature::tangent)
+  {
+    const double mean = std::abs(std::cos(0.5 * m)) > 1e-3 ? std::cos(0.5 * m) : 1.0,
+                 half_tangent = 0.5 * kappa.norm() / std::abs(mean);
+    ratio = half_tangent > 0
+                ? std::tan(share * std::atan(half_tangent)) / half_tangent * std::cos(0.5 * share * m) / mean
+                : 0.0;
+  }
+  const Eigen::Vector2d half = ratio * (Eigen::Rotation2Dd((side ? -0.5 : 0.5) * (1 - share) * m) * kappa);
+  c.rest_kappa1 = half[0];
+  c.rest_kappa2 = half[1];
+  c.rest_twist = share * m;
+  c.coupling = couplingOf(model_, node);
+}
+
+/// Stiffness and rest shape of the joints with a length [m], and of the edges.
+void RodSystem::composeJoints(const std::vector<double>& length)
+{
+  const int n = a_.nodes, edges = a_.edges;
   const auto resize = [n](AlignedVector<double>& v) { v.assign(n, 0.0); };
   for (auto* v : {&stretch_, &b11_, &b12_, &b22_, &beta_, &rest_k1_, &rest_k2_, &rest_m_, &coupling_})
     resize(*v);
@@ -133,9 +161,6 @@ void RodSystem::compose(const RodState& state)
   shift_theta_ = twist;
   // A rod whose frames nobody holds can spin about itself without energy (if isotropic): keep its matrix definite.
   spin_ = clamps_.joints.empty() && holds_.turns().empty() ? 1e-8 * twist : 0.0;
-  listTerms();
-  if (allocated())
-    setResponse(0.0, nullptr);
 }
 
 void RodSystem::placeGrasps(const std::vector<Pose>& X_WG)

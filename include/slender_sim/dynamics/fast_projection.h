@@ -125,6 +125,14 @@ private:
   double evaluate();
   void linearise();
   bool solveBodies();
+  /// Touches and special edges of one chain, by their numbers.
+  struct OnChain
+  {
+    std::size_t begin, end, first, last;
+  };
+  void addInertias();
+  void addChain(const OnChain& on);
+  void addSpecials(const OnChain& on);
   void moveBodies();
   bool findOverstretched(ProjectionReport& report) const;
 

@@ -56,6 +56,15 @@ private:
   explicit WillmoreFlow(Part part);
   void load(const Eigen::Matrix3Xd& vertices);
 
+  /// Of a direction.
+  struct Reach
+  {
+    double decrement = 0.0;          ///< of the merit, as far as it is linear
+    double move = 0.0, size = 0.0;   ///< its largest coordinate, and that of the points [m]
+  };
+  std::string findDirection(Reach& reach);
+  bool search(double decrement, double& merit, double& energy, int& cuts);
+
   Eigen::Index mesh_vertices_;
   int iterations_;
   std::vector<int> moving_;     ///< in the mesh

@@ -53,6 +53,13 @@ struct SceneMessages
   /// What `record.fields` of the scene asks for, of the instant of the last fill(). It is computed here, so call it
   /// only if somebody takes it.
   void fillFields(const Simulation& simulation);
+
+private:
+  void fillRods(const Simulation& simulation, std::uint32_t epoch, geometry_msgs::PoseArray& poses);
+  void fillThreads(const Simulation& simulation, std::uint32_t epoch, geometry_msgs::PoseArray& poses);
+  void fillCloths(const Simulation& simulation, std::uint32_t epoch, const std_msgs::Header& header);
+  void fillGrasps(const Simulation& simulation, const std_msgs::Header& header);
+  void fillSolids(const Simulation& simulation, const std_msgs::Header& header);
 };
 
 }   // namespace slender

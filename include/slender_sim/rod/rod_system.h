@@ -74,6 +74,10 @@ public:
   const double* restTwist() const { return rest_m_.data(); }
 
 private:
+  std::vector<char> holdNodes();
+  void addClamps(const std::vector<char>& jointless, std::vector<double>& length);
+  void setClamp(ClampJoint& c, double length) const;
+  void composeJoints(const std::vector<double>& length);
   void listTerms();
   int before(int node) const { return node > 0 ? node - 1 : model_.edges() - 1; }
 

@@ -72,19 +72,23 @@ void shareNodes(std::vector<Branch>& branches, int vertices)
     ++branches[rests[static_cast<std::size_t>(k)].second].nodes;
 }
 
-}   // namespace
-
-/// A trunk with side branches, theirs, and so on. Each branch is a tapered rod; where it leaves its parent, a small
-/// rigid ball carries both.
-void generateTree(const YamlCursor& at, const ReadContext& context, int first_rod, Generated& out)
+/// What the scene says of a tree.
+struct Tree
 {
-  const std::size_t before = at.problems().size();
-  YamlMap map(at);
-  const std::string name = map.get("name").name().value_or("tree");
-  Dice dice(map.get("seed").integer(0, 1'000'000'000).value_or(1));
+  std::string name;
   TreeShape shape;
-  const YamlCursor at_vertices = map.get("vertices");
-  shape.vertices = at_vertices.integer(least_nodes, max_edges).value_or(2158);
+  double taper = 0.0, joint_density = 0.0;
+  Eigen::Vector3d root, up;
+  RodConfig rod;   ///< of which each branch is a copy
+  Motion motion;
+};
+
+Tree readTree(YamlMap& map, const ReadContext& context)
+{
+  Tree tree;
+  tree.name = map.get("name").name().value_or("tree");
+  TreeShape& shape = tree.shape;
+  shape.vertices = map.get("vertices").integer(least_nodes, max_edges).value_or(2158);
   shape.levels = map.get("levels").integer(1, 6).value_or(3);
   shape.children = map.get("children").integer(1, 30).value_or(7);
   shape.length = map.get("length").number(kGeneratorLength).value_or(3.0);
@@ -93,19 +97,57 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   shape.length_ratio = map.get("length_ratio").number(ratio).value_or(0.5);
   shape.radius_ratio = map.get("radius_ratio").number(ratio).value_or(0.45);
   shape.incline = map.get("angle").number(Range::between(0, 0.5 * M_PI, "rad")).value_or(0.9);
-  const double taper = map.get("taper").number(ratio).value_or(0.4);
-  const Eigen::Vector3d root = map.get("root").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
-  const Eigen::Vector3d up = readDirection(map.get("direction"), Eigen::Vector3d::UnitZ());
-  RodConfig rod;
-  rod.material.density = 700;
-  readTraits(map, rod);
-  const double joint_density =
-      map.get("joint_density").number(Range::above(0, 1e6, "kg/m^3")).value_or(rod.material.density);
-  const Motion motion = readMotion(map.get("motion"), context, false);
+  tree.taper = map.get("taper").number(ratio).value_or(0.4);
+  tree.root = map.get("root").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
+  tree.up = readDirection(map.get("direction"), Eigen::Vector3d::UnitZ());
+  tree.rod.material.density = 700;
+  readTraits(map, tree.rod);
+  tree.joint_density =
+      map.get("joint_density").number(Range::above(0, 1e6, "kg/m^3")).value_or(tree.rod.material.density);
+  tree.motion = readMotion(map.get("motion"), context, false);
+  return tree;
+}
+
+/// Places a branch where it leaves its parent, at an edge, whose ends are given.
+void leaveParent(Branch& branch, const Eigen::Vector3d& from, const Eigen::Vector3d& to)
+{
+  const Eigen::Vector3d tangent = (to - from).normalized();
+  const Eigen::Vector3d normal = rotateAbout(anyNormal(tangent), tangent, branch.azimuth);
+  branch.root = 0.5 * (from + to);
+  branch.direction = std::cos(branch.incline) * tangent + std::sin(branch.incline) * normal;
+}
+
+/// The ball that carries a branch and an edge of its parent.
+BodyConfig jointBall(const Branch& branch, const Branch& parent, double density, const WeldConfig& on_parent,
+                     const WeldConfig& on_branch)
+{
+  BodyConfig ball;
+  const double radius = 1.5 * parent.radius;
+  ball.shape = Sphere{radius};
+  ball.mass = density * 4.0 / 3.0 * M_PI * std::pow(radius, 3);
+  ball.inertia = 0.4 * ball.mass * radius * radius * Eigen::Matrix3d::Identity();
+  ball.pose.position = branch.root;
+  ball.contact = false;
+  ball.welds = {on_parent, on_branch};
+  return ball;
+}
+
+}   // namespace
+
+/// A trunk with side branches, theirs, and so on. Each branch is a tapered rod; where it leaves its parent, a small
+/// rigid ball carries both.
+void generateTree(const YamlCursor& at, const ReadContext& context, int first_rod, Generated& out)
+{
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  Tree tree = readTree(map, context);
+  const TreeShape& shape = tree.shape;
+  const YamlCursor at_vertices = map.get("vertices");
+  const auto seed = map.get("seed").integer(0, 1'000'000'000).value_or(1);
   map.finish();
   if (at.problems().size() != before)
     return;
-
+  Dice dice(seed);
   long count = 0, of_level = 1;
   for (int level = 0; level < shape.levels; ++level, of_level *= shape.children)
     count += of_level;
@@ -120,14 +162,16 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   std::vector<Branch> branches = grow(shape, dice);
   shareNodes(branches, shape.vertices);
 
-  branches[0].root = root;
-  branches[0].direction = up;
+  branches[0].root = tree.root;
+  branches[0].direction = tree.up;
   std::vector<std::vector<Eigen::Vector3d>> points(branches.size());
   std::vector<int> last_joint(branches.size(), -1);   // edge of the branch that carries its last ball so far
   for (std::size_t b = 0; b < branches.size(); ++b)
   {
     Branch& branch = branches[b];
-    const std::string rod_name = name + "_" + std::to_string(b);
+    RodConfig& rod = tree.rod;
+    rod.name = tree.name + "_" + std::to_string(b);
+    rod.grasps.clear();
     if (branch.parent >= 0)
     {
       const Branch& parent = branches[branch.parent];
@@ -135,45 +179,33 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
       const int edge = std::max({static_cast<int>(branch.at * (parent.nodes - 1)), last_joint[branch.parent] + 2, 1});
       if (edge > parent.nodes - 3)
       {
-        return place.problem("gives " + name + "_" + std::to_string(branch.parent) + " too few (" +
+        return place.problem("gives " + tree.name + "_" + std::to_string(branch.parent) + " too few (" +
                              std::to_string(parent.nodes) + ") for its " + std::to_string(shape.children) +
                              " children; raise it, or lower levels or children");
       }
       last_joint[branch.parent] = edge;
-      const Eigen::Vector3d tangent = (line[edge + 1] - line[edge]).normalized();
-      const Eigen::Vector3d normal = rotateAbout(anyNormal(tangent), tangent, branch.azimuth);
-      branch.root = 0.5 * (line[edge] + line[edge + 1]);
-      branch.direction = std::cos(branch.incline) * tangent + std::sin(branch.incline) * normal;
-
-      BodyConfig ball;
-      const double radius = 1.5 * parent.radius;
-      ball.name = rod_name + "_joint";
-      ball.shape = Sphere{radius};
-      ball.mass = joint_density * 4.0 / 3.0 * M_PI * std::pow(radius, 3);
-      ball.inertia = 0.4 * ball.mass * radius * radius * Eigen::Matrix3d::Identity();
-      ball.pose.position = branch.root;
-      ball.contact = false;
-      ball.welds = {{first_rod + branch.parent, edge, edge + 1}, {first_rod + static_cast<int>(b), 0, 0}};
+      leaveParent(branch, line[edge], line[edge + 1]);
+      BodyConfig ball = jointBall(branch, parent, tree.joint_density, {first_rod + branch.parent, edge, edge + 1},
+                                  {first_rod + static_cast<int>(b), 0, 0});
+      ball.name = rod.name + "_joint";
       out.bodies.emplace_back(std::move(ball), at);
+    }
+    else
+    {
+      GraspConfig grasp;
+      grasp.name = tree.name + "_root";
+      grasp.motion = tree.motion;
+      grasp.attach = Attach::initial;
+      rod.grasps.push_back(std::move(grasp));
     }
     // Branches turn up towards their tips.
     for (int i = 0; i < branch.nodes; ++i)
     {
       const double u = static_cast<double>(i) / (branch.nodes - 1);
-      points[b].push_back(branch.root + branch.length * (u * branch.direction + 0.15 * u * u * up));
+      points[b].push_back(branch.root + branch.length * (u * branch.direction + 0.15 * u * u * tree.up));
     }
-    rod.name = rod_name;
     rod.centerline = PolylineCurve{points[b], std::nullopt};
-    rod.cross_section.a = rod.cross_section.b = {branch.radius, taper * branch.radius};
-    rod.grasps.clear();
-    if (b == 0)
-    {
-      GraspConfig grasp;
-      grasp.name = name + "_root";
-      grasp.motion = motion;
-      grasp.attach = Attach::initial;
-      rod.grasps.push_back(std::move(grasp));
-    }
+    rod.cross_section.a = rod.cross_section.b = {branch.radius, tree.taper * branch.radius};
     out.rods.emplace_back(ReadRod{rod, branch.nodes - 1}, at);
   }
 }
