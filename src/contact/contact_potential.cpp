@@ -154,7 +154,7 @@ double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::ve
   }
   for (const Candidates::OnSolid& on : near_.onSolids())
   {
-    energy += addOnSolid(x, on, poses[on.solid], with_stiffness);
+    energy += addOnSolid(x, on, poses, with_stiffness);
     if (!std::isfinite(energy))
       return restart();
   }
@@ -193,9 +193,10 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
   return addContact(gap, contact, 1.0, with_stiffness);
 }
 
-double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose,
-                                          bool with_stiffness)
+double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on,
+                                          const std::vector<Pose>& poses, bool with_stiffness)
 {
+  const Pose& pose = poses[on.solid];
   const ContactSegment& s = surface.segments[on.segment];
   const ContactSolid& solid = surface.solids[on.solid];
   const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
@@ -220,6 +221,8 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
                   Eigen::Vector3d::Zero(),
                   s.object,
                   -1};
+  if (const int carrier = surface.objects[s.object].carrier; carrier >= 0)
+    contact.own = poses[carrier].inverse() * contact.position;
   return addContact(gap, contact, 1.0, with_stiffness);
 }
 
@@ -304,7 +307,11 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   term.solid = contact.solid;
   term.position = contact.position;
   Eigen::Vector3d u = Eigen::Vector3d::Zero();
-  for (int i = 0; i < 4; ++i)
+  const int carrier = surface.objects[contact.object].carrier;
+  term.carried = carrier >= 0;
+  if (term.carried)
+    u = poses[carrier] * contact.own - solids_begin[carrier] * contact.own;
+  for (int i = 0; i < 4 && !term.carried; ++i)
     if (contact.point[i] >= 0)
       u += contact.weight[i] * (x.col(contact.point[i]) - x_begin.col(contact.point[i]));
   if (contact.solid >= 0)

@@ -23,10 +23,11 @@ public:
     int point[4];
     double weight[4];
     int solid;
-    Eigen::Vector3d material;          ///< in the solid's frame
-    Eigen::Vector3d position, force;   ///< normal force on u
-    int object, other;                 ///< that touch; other: -1 for a solid
-    double friction = 0.0;             ///< of the two, once the contact is lagged
+    Eigen::Vector3d material;                        ///< in the solid's frame
+    Eigen::Vector3d position, force;                 ///< normal force on u
+    int object, other;                               ///< that touch; other: -1 for a solid
+    double friction = 0.0;                           ///< of the two, once the contact is lagged
+    Eigen::Vector3d own = Eigen::Vector3d::Zero();   ///< the position in the frame of the carrier, if there is one
     /// Slip, force over the largest one, and its derivative at the iterate before. None before the first one.
     bool has_iterate = false;
     Eigen::Vector3d last_slip = Eigen::Vector3d::Zero(), last_force = Eigen::Vector3d::Zero();
@@ -61,7 +62,8 @@ public:
 
 private:
   double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
-  double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const Pose& pose, bool with_stiffness);
+  double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const std::vector<Pose>& poses,
+                    bool with_stiffness);
   double addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   double addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair, bool with_stiffness);
   double addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on, const Pose& pose,

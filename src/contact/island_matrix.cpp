@@ -32,7 +32,7 @@ void IslandSystem::take()
       makeRoom(term);
   });
   for (const ContactRow& row : contact_->rows())
-    if (row.point[2] < 0)   // of a segment and a solid
+    if (row.point[3] < 0)   // of a segment or a triangle and a solid
       partOf(row.point[0]).own_rows.push_back(&row);
 }
 
@@ -49,12 +49,14 @@ void IslandSystem::takeFirst()
 
 void IslandSystem::addForce(const ContactTerm& term)
 {
-  for (int p = 0; p < 4; ++p)
+  for (int p = 0; p < 4 && !term.carried; ++p)
     if (term.point[p] >= 0)
     {
       Part& part = partOf(term.point[p]);
       part.addForce(term.point[p] - part.first_point, term.weight[p] * term.force);
     }
+  if (term.carried)
+    carrierOf(term).addForceAt(term.position, term.force);
   if (RigidPart* body = bodyOf(term.solid))
     body->addForceAt(term.position, -term.force);
 }
@@ -81,7 +83,9 @@ void IslandSystem::columnsOf(const ContactTerm& term, std::array<Part::Columns, 
   for (int c = 0; c < 3; ++c)
   {
     rows[c].count = 0;
-    for (int p = 0; p < 4; ++p)
+    if (term.carried)
+      carrierOf(term).addColumnsAt(term.position, c, 1.0, rows[c]);
+    for (int p = 0; p < 4 && !term.carried; ++p)
       if (term.point[p] >= 0)
       {
         const Part& part = partOf(term.point[p]);

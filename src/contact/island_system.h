@@ -127,6 +127,8 @@ private:
   template <class F>
   void forTerms(F&& f) const;
   Part& partOf(int point) const { return *part_of_point_[point]; }
+  /// The body that carries the points of a term.
+  RigidPart& carrierOf(const ContactTerm& term) const { return static_cast<RigidPart&>(partOf(term.point[0])); }
   RigidPart* bodyOf(int solid) const { return solid < 0 ? nullptr : solids[solid].body; }
   bool isOwn(const ContactTerm& term) const { return !exact_ && term.solid >= 0 && !bodyOf(term.solid); }
 

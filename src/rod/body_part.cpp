@@ -20,12 +20,87 @@ void BodyPart::evaluate(bool with_hessian, const HessianShift& shift)
   system.evaluate(with_hessian);
   evaluation = {};
   evaluation.potential = system.energy();
-  if (!with_hessian || coupled)
+  if (coupled)
+    return;
+  addOwnContacts(with_hessian);
+  if (!with_hessian)
     return;
   system.addShift(shift);
   factor_.compute(system.hessian);
   evaluation.inertia.negative = factor_.info() != Eigen::Success;
 }
+
+/// Contacts with what moves as prescribed. The curvature of the turn is left out: it is g h^2 / r of the inertia.
+void BodyPart::addOwnContacts(bool with_hessian)
+{
+  using Rows = Eigen::Matrix<double, 3, 6>;
+  const auto displacement = [this](const Eigen::Vector3d& at) {
+    Rows rows;
+    rows << Eigen::Matrix3d::Identity(), -skew(at - system.pose.position);
+    return rows;
+  };
+  for (const ContactTerm* term : own_terms)
+  {
+    Rows rows = Rows::Zero();
+    if (term->carried)
+      rows = displacement(term->position);
+    for (int p = 0; p < 4 && !term->carried; ++p)
+      if (term->point[p] >= 0)
+        rows += term->weight[p] * displacement(position(term->point[p] - first_point));
+    system.gradient -= rows.transpose() * term->force;
+    if (with_hessian)
+      system.hessian += rows.transpose() * term->stiffness * rows;
+  }
+  for (const ContactRow* contact : own_rows)
+  {
+    BodySystem::Vector6 row = BodySystem::Vector6::Zero();
+    for (int p = 0; p < 4; ++p)
+      if (contact->point[p] >= 0)
+        row +=
+            contact->along[p] * displacement(position(contact->point[p] - first_point)).transpose() * contact->normal;
+    if (with_hessian)
+      system.hessian += contact->stiffness * row * row.transpose();
+  }
+}
+
+// ---- the surface
+
+void BodyPart::gather(Eigen::Matrix3Xd& x) const
+{
+  for (int i = 0; i < points(); ++i)
+    x.col(first_point + i) = position(i);
+}
+
+Eigen::Matrix3Xd BodyPart::surfaceAt(const Pose& pose) const
+{
+  Eigen::Matrix3Xd x(3, points());
+  for (int i = 0; i < points(); ++i)
+    x.col(i) = pose * Eigen::Vector3d(surface_.points.col(i));
+  return x;
+}
+
+Eigen::Vector3d BodyPart::move(int point) const
+{
+  return direction.head<3>() + direction.tail<3>().cross(position(point) - system.pose.position);
+}
+
+/// Its segments touch solids alone: rods, threads and cloths touch the solid of the body.
+void BodyPart::addSurface(ContactSurface& surface) const
+{
+  if (!hasSurface())
+    return;
+  const int first = surface.points, object = static_cast<int>(surface.objects.size());
+  for (const BodySurface::Segment& s : surface_.segments)
+    surface.segments.push_back({first + s.a, first + s.b, s.radius, object, 0.0, 0.0});
+  surface.points += points();
+  ContactObject own;
+  own.self = own.others = false;
+  own.friction = friction_;
+  own.carrier = carrier_;
+  surface.objects.push_back(own);
+}
+
+// ---- the matrix of the island
 
 void BodyPart::notePattern(CouplingMatrix& matrix)
 {

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <utility>
+
 #include <Eigen/Cholesky>
 
 #include "../contact/part.h"
 #include "../contact/part_steps.h"
+#include "body_surface.h"
 #include "body_system.h"
+#include "slender_sim/contact/contact_properties.h"
 
 namespace slender {
 
@@ -29,6 +33,17 @@ public:
   const BodySystem::Vector6& startAcceleration() const { return start_acceleration_; }
   /// No point of the shape is farther from the origin of the body [m]. Without a call the body has no shape.
   void setReach(double reach) { reach_ = reach; }
+  /// The body touches solids with this surface. Without a call solids pass through it.
+  void setSurface(BodySurface surface, double friction)
+  {
+    surface_ = std::move(surface);
+    friction_ = friction;
+  }
+  /// Points of the surface [m] where the body has this pose.
+  Eigen::Matrix3Xd surfaceAt(const Pose& pose) const;
+  /// Number of the body's solid in the contact that addSurface() is for.
+  void setCarrier(int solid) { carrier_ = solid; }
+  bool hasSurface() const { return !surface_.segments.empty(); }
   const Pose& pose() const override { return system.pose; }
   void addColumnsAt(const Eigen::Vector3d& position, int component, double weight, Columns& row) const override;
   void addForceAt(const Eigen::Vector3d& position, const Eigen::Vector3d& force) override;
@@ -47,8 +62,8 @@ private:
   void placeHeld(double) override {}
   bool heldMoves(double, double) const override { return false; }
 
-  int points() const override { return 0; }
-  void gather(Eigen::Matrix3Xd&) const override {}
+  int points() const override { return static_cast<int>(surface_.points.cols()); }
+  void gather(Eigen::Matrix3Xd& x) const override;
 
   void evaluate(bool with_hessian, const HessianShift& shift) override;
   void closeGradient() override {}
@@ -61,9 +76,12 @@ private:
   void takeDirection(const double* solution) override;
 
   int base(int) const override { return kPrescribed - 1; }
-  void addColumns(int, int, double, Columns&) const override {}
-  void addForce(int, const Eigen::Vector3d&) override {}
-  Eigen::Vector3d move(int) const override { return Eigen::Vector3d::Zero(); }
+  void addColumns(int point, int component, double weight, Columns& row) const override
+  {
+    addColumnsAt(position(point), component, weight, row);
+  }
+  void addForce(int point, const Eigen::Vector3d& force) override { addForceAt(position(point), force); }
+  Eigen::Vector3d move(int point) const override;
 
   double stepLimit() const override;
   double incrementSize(double length) const override;
@@ -77,7 +95,7 @@ private:
   double lastSubstep() const override { return now_.last_step; }
   bool startsFresh() const override { return now_.last_step == 0.0; }
   void solveStartAcceleration() override;
-  void addSurface(ContactSurface&) const override {}
+  void addSurface(ContactSurface& surface) const override;
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double) const override;
   void beginStage(std::size_t stage) override;
@@ -89,12 +107,17 @@ private:
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
   double energyOf(const RigidBodyState& state) const;
+  Eigen::Vector3d position(int point) const { return system.pose * Eigen::Vector3d(surface_.points.col(point)); }
+  void addOwnContacts(bool with_hessian);
 
   Eigen::LLT<BodySystem::Matrix6> factor_;
   RigidBodyState now_, next_;
   const StepPlan* plan_ = nullptr;
   double length_ = 0.0;   ///< of the substep [s]
   double reach_ = -1.0;   ///< negative: no shape
+  BodySurface surface_;
+  double friction_ = 0.0;
+  int carrier_ = -1;
   BodySystem::Vector6 start_wrench_, start_acceleration_;
   BodySystem::Matrix6 start_inertia_;
 };

@@ -74,9 +74,11 @@ JoinedIsland::JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts
     stepper_.setAttraction(&merging_);
   setThreads(0);
   setMembers();
-  const bool touches = !threads_.empty() || !cloths_.empty() ||
-                       std::any_of(rods_.begin(), rods_.end(),
-                                   [&](const JoinedRod* rod) { return world_.rods[rod->index].contact.has_value(); });
+  const bool touches =
+      !threads_.empty() || !cloths_.empty() ||
+      std::any_of(bodies_.begin(), bodies_.end(), [](const JoinedBody* body) { return body->part->hasSurface(); }) ||
+      std::any_of(rods_.begin(), rods_.end(),
+                  [&](const JoinedRod* rod) { return world_.rods[rod->index].contact.has_value(); });
   if (touches)
     stepper_.setContact(takeSolids(), world_.contact);
 }
@@ -105,7 +107,14 @@ std::vector<ContactSolid> JoinedIsland::takeSolids()
     solids.back().body = solid.body != nullptr;
     if (floor)
       solids.back().only = solid.index;
-    int object = 0;   // of the contact: rods that touch something come first
+    int object = 0;   // of the contact: bodies that touch solids come first, then rods that touch something
+    for (const JoinedBody* body : bodies_)
+      if (body->part->hasSurface())
+      {
+        if (body->part.get() == solid.body)
+          solids.back().ignores.push_back(object);
+        ++object;
+      }
     for (const JoinedRod* rod : rods_)
     {
       if (!world_.rods[rod->index].contact)
@@ -119,7 +128,17 @@ std::vector<ContactSolid> JoinedIsland::takeSolids()
     stepper_.island().solids.back().body = solid.body;
     stepper_.island().solids.back().X_BS = solid.X_BS;
   }
+  setCarriers();
   return solids;
+}
+
+/// Tells bodies which solid of this island is their own.
+void JoinedIsland::setCarriers()
+{
+  for (const JoinedBody* body : bodies_)
+    for (std::size_t k = 0; k < solids_.size(); ++k)
+      if (solids_[k]->body == body->part.get())
+        body->part->setCarrier(static_cast<int>(k));
 }
 
 // ---- a step
@@ -169,6 +188,7 @@ void JoinedIsland::setMembers()
 void JoinedIsland::begin(const WorldState& state, const WorldInputs& inputs)
 {
   stepped_ = false;
+  setCarriers();
   setSolids(state, inputs);
   double stiffness = 0.0;
   for (const JoinedRod* rod : rods_)

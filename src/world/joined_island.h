@@ -38,6 +38,7 @@ public:
 
 private:
   std::vector<ContactSolid> takeSolids();
+  void setCarriers();
   void setSolids(const WorldState& state, const WorldInputs& inputs);
   void setMembers();
   void trace();

@@ -23,6 +23,18 @@ bool refuseInput(const std::string& what, StepReport& report)
   return false;
 }
 
+/// Whether a body touches solids, and there are any besides its own.
+bool meetsSolids(const WorldModel& world, int body)
+{
+  const std::optional<Shape>& shape = world.bodies[body].shape;
+  if (!shape || !hasBodySurface(*shape) || !(world.contact.gap > 0.0))
+    return false;
+  bool others = !world.obstacles.empty();
+  for (int b = 0; b < static_cast<int>(world.bodies.size()); ++b)
+    others = others || (b != body && world.bodies[b].shape);
+  return others;
+}
+
 IslandContent rodsAndBodies(IslandContent content)
 {
   content.threads.clear();
@@ -64,8 +76,12 @@ void JoinedObjects::addParts(const TimeConfig& time)
     if (const WorldModel::Body& body = world.bodies[b]; body.body.simulated)
     {
       bodies.push_back({b, std::make_unique<BodyPart>(body.body)});
-      if (body.shape)
-        bodies.back().part->setReach(body.X_BS.position.norm() + boundingRadius(*body.shape));
+      if (!body.shape)
+        continue;
+      bodies.back().part->setReach(body.X_BS.position.norm() + boundingRadius(*body.shape));
+      if (meetsSolids(world, b))
+        bodies.back().part->setSurface(makeBodySurface(*body.shape, body.X_BS),
+                                       body.friction < 0.0 ? ContactProperties().friction : body.friction);
     }
   for (const int r : content.rods)
   {

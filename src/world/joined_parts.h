@@ -11,6 +11,8 @@
 
 namespace slender {
 
+struct Meeting;
+
 /// Rods, threads, cloths and bodies that contact or welds can join, and the obstacles that they meet, in implicit
 /// steps.
 ///
@@ -48,7 +50,8 @@ public:
   Eigen::Matrix3Xd clothContactForces(int cloth) const override;
 
 private:
-  std::vector<int> objectsOf(const std::vector<int>& rods) const;
+  std::vector<int> objectsIgnoredBy(const JoinedSolid& solid) const;
+  void addBodies(const WorldState& state, Meeting& meeting, std::vector<Eigen::Vector3d>& points) const;
   Eigen::Matrix3Xd contactForces(int part, const Part& surface, int points) const;
   void checkClearance(const WorldState& state);
 

@@ -167,7 +167,9 @@ void JoinedParts::predict()
   for (std::size_t k = 0; k < objects_.bodies.size(); ++k)
   {
     IslandFinder::Reach& of_body = reach_[objects_.partOfBody(k)];
-    of_body = {false, false, false, world_.bodies[objects_.bodies[k].index].shape.has_value(), BoundingBox::empty()};
+    const bool touches = objects_.bodies[k].part->hasSurface();
+    of_body = {touches, false, touches, world_.bodies[objects_.bodies[k].index].shape.has_value(),
+               BoundingBox::empty()};
     reach(*objects_.bodies[k].part, of_body.box);
   }
   finder_.begin(objects_.parts());
@@ -304,25 +306,48 @@ void JoinedParts::addStrand(JoinedThread& thread) const
   thread.strands.push_back(std::move(added));
 }
 
-/// Numbers that rods have among the objects of a contact, which the rods that touch something begin.
-std::vector<int> JoinedParts::objectsOf(const std::vector<int>& rods) const
+/// Numbers of the objects of a contact that a solid never touches: its own body, and rods that are welded into it.
+/// Bodies that touch solids come first among the objects, then rods that touch something.
+std::vector<int> JoinedParts::objectsIgnoredBy(const JoinedSolid& solid) const
 {
   std::vector<int> objects;
   int object = 0;
+  for (const JoinedBody& body : objects_.bodies)
+    if (body.part->hasSurface())
+    {
+      if (body.part.get() == solid.body)
+        objects.push_back(object);
+      ++object;
+    }
   for (std::size_t r = 0; r < objects_.rods.size(); ++r)
     if (world_.rods[objects_.rods[r].index].contact)
     {
-      if (std::count(rods.begin(), rods.end(), static_cast<int>(r)) > 0)
+      if (std::count(solid.welded_rods.begin(), solid.welded_rods.end(), static_cast<int>(r)) > 0)
         objects.push_back(object);
       ++object;
     }
   return objects;
 }
 
+void JoinedParts::addBodies(const WorldState& state, Meeting& meeting, std::vector<Eigen::Vector3d>& points) const
+{
+  for (const JoinedBody& body : objects_.bodies)
+  {
+    if (!body.part->hasSurface())
+      continue;
+    static_cast<const PartSteps&>(*body.part).addSurface(meeting.surface);
+    meeting.objects.push_back("body '" + world_.bodies[body.index].body.name + "'");
+    const Eigen::Matrix3Xd x = body.part->surfaceAt(state.bodies[body.index].X_WB);
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+      points.emplace_back(x.col(i));
+  }
+}
+
 void JoinedParts::checkClearance(const WorldState& state)
 {
   Meeting meeting;
   std::vector<Eigen::Vector3d> points;
+  addBodies(state, meeting, points);
   for (const JoinedRod& rod : objects_.rods)
     if (world_.rods[rod.index].contact)
     {
@@ -367,7 +392,7 @@ void JoinedParts::checkClearance(const WorldState& state)
     }
     else if (solid.kind == JoinedSolid::Kind::body)
     {
-      touched.ignores = objectsOf(solid.welded_rods);
+      touched.ignores = objectsIgnoredBy(solid);
       meeting.addSolid("body '" + world_.bodies[index].body.name + "'", touched,
                        state.bodies[index].X_WB * world_.bodies[index].X_BS);
     }

@@ -206,7 +206,7 @@ class Cloth(NodeCase):
 
     def test_refuses_other_scenes(self):
         self.refused("name: rope\nrods: [{}]\n", "which rod_node simulates")
-        self.refused("name: none\nbodies: [{mass: 1, inertia: [1, 1, 1]}]\n", "a scene has rods")
+        self.refused("name: none\nbodies: [{mass: 1, inertia: [1, 1, 1]}]\n", "it has no cloths; rod_node simulates rods and bodies")
 
 
 if __name__ == "__main__":

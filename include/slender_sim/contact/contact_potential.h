@@ -53,6 +53,9 @@ struct ContactObject : ContactProperties
   /// distance; pieces that meet there are neighbours. Null: all of them keep the whole thickness.
   std::shared_ptr<const Eigen::Matrix3Xd> rest{};
   int first_point = 0;
+  /// Of the surface of a simulated body: the number of its solid. Friction then acts where the surfaces meet, and not
+  /// on the points of the surface, which may lie inside of the body.
+  int carrier = -1;
 };
 
 /// A solid of a contact surface, which moves rigidly, and which objects of the surface pass through it.
@@ -95,7 +98,10 @@ struct ContactTerm
   double weight[4] = {0, 0, 0, 0};
   int solid = -1;                      ///< that is touched, -1: none
   Eigen::Vector3d position{0, 0, 0};   ///< of the contact, world
-  Eigen::Vector3d force{0, 0, 0};      ///< on u [N], friction included
+  /// u begins with the displacement of the material point at `position` of the body that carries the points, in place
+  /// of the sum over the points.
+  bool carried = false;
+  Eigen::Vector3d force{0, 0, 0};   ///< on u [N], friction included
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero(), geometric = Eigen::Matrix3d::Zero();
 };
 

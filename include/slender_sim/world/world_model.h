@@ -53,9 +53,11 @@ struct WorldModel
   struct Body
   {
     RigidBodyModel body;
-    std::optional<Shape> shape;   ///< that other parts touch; nothing: they pass through the body
-    Pose X_BS;                    ///< the shape in the body's frame
-    double friction = -1.0;       ///< as Obstacle::friction
+    /// That other parts touch; nothing: they pass through the body. Spheres, boxes and capsules of simulated bodies
+    /// touch obstacles and other bodies, if contact.gap is not 0.
+    std::optional<Shape> shape;
+    Pose X_BS;                ///< the shape in the body's frame
+    double friction = -1.0;   ///< as Obstacle::friction
 
     /// What others touch. There must be a shape.
     Obstacle solid() const { return {*shape, friction, body.name}; }
@@ -72,7 +74,7 @@ struct WorldModel
   std::vector<Body> bodies;
   std::vector<Obstacle> obstacles;   ///< whose motions are inputs
   std::vector<RodWeld> welds;        ///< ascending by body
-  ContactOptions contact;            ///< of rods and threads; `least_stiffness` is chosen by what touches
+  ContactOptions contact;            ///< of all that meets by the barrier; `least_stiffness` is chosen by what touches
   TimeConfig time;
 
   /// Whether a cloth is the guide of another one. Such cloths are stepped first and meet only each other.

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "../../rod/body_surface.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/geometry/mesh_topology.h"
 
@@ -59,11 +60,17 @@ void warnOfWind(const YamlCursor& wind, const SceneConfig& scene)
   }
 }
 
+bool isSimulatedSolid(const BodyConfig& body) { return body.contact && body.shape && !body.motion; }
+
+/// Whether a body touches obstacles and other bodies.
+bool touchesSolids(const BodyConfig& body) { return isSimulatedSolid(body) && hasBodySurface(*body.shape); }
+
 /// An obstacle that nothing touches is of use only as the frame that grasps follow.
 void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
 {
   const auto touches = [](const auto& object) { return object.contact && object.contact->solids; };
-  if (any(scene.rods, touches) || any(scene.threads, touches) || any(scene.cloths, touches))
+  if (any(scene.rods, touches) || any(scene.threads, touches) || any(scene.cloths, touches) ||
+      any(scene.bodies, touchesSolids))
     return;
   const auto follows = [&scene](const std::string& name) {
     const auto by_grasp = [&name](const GraspConfig& grasp) {
@@ -122,7 +129,6 @@ void warnOfContact(YamlMap contact, const char* others, bool has_others, bool ha
 void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene)
 {
   const auto touches = [](const auto& object) { return object.contact.has_value(); };
-  const auto moves = [](const BodyConfig& body) { return body.contact && body.shape && !body.motion; };
   const auto impulses = [](const ClothConfig& cloth) { return meetsBy(cloth, ContactMethod::impulses); };
   const auto barrier = [](const ClothConfig& cloth) { return meetsBy(cloth, ContactMethod::barrier); };
   if (!cloths.present() || !any(scene.cloths, impulses))
@@ -132,7 +138,7 @@ void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene
     others.push_back("rods");
   if (any(scene.threads, touches))
     others.push_back("threads");
-  if (any(scene.bodies, moves))
+  if (any(scene.bodies, isSimulatedSolid))
     others.push_back("simulated bodies");
   if (any(scene.cloths, barrier))
     others.push_back("cloths with contact: {method: barrier}");
@@ -149,9 +155,12 @@ std::string whyNoFriction(const SceneConfig& scene)
 {
   const auto touches = [](const auto& object) { return object.contact && object.contact->solids; };
   const auto slips = [&touches](const auto& object) { return touches(object) && object.contact->friction > 0; };
-  if (!any(scene.rods, touches) && !any(scene.threads, touches) && !any(scene.cloths, touches))
+  const auto body_slips = [](const BodyConfig& body) { return touchesSolids(body) && body.friction.value_or(1.0) > 0; };
+  if (!any(scene.rods, touches) && !any(scene.threads, touches) && !any(scene.cloths, touches) &&
+      !any(scene.bodies, touchesSolids))
     return "nothing touches it; give the rods, threads or cloths a contact with obstacles, or leave friction out";
-  if (!any(scene.rods, slips) && !any(scene.threads, slips) && !any(scene.cloths, slips))
+  if (!any(scene.rods, slips) && !any(scene.threads, slips) && !any(scene.cloths, slips) &&
+      !any(scene.bodies, body_slips))
   {
     return "the friction between two objects is the geometric mean of both, and that of everything that touches solids "
            "is 0; give them a friction as well";
@@ -169,11 +178,12 @@ void warnOfFriction(const YamlCursor& friction, const std::string& why)
 void warnOfSlipSpeed(const YamlCursor& slip_speed, const SceneConfig& scene)
 {
   const auto slips = [](const auto& object) { return object.contact && object.contact->friction > 0; };
-  if (slip_speed.present() && !any(scene.rods, slips) && !any(scene.threads, slips))
+  const auto body_slips = [](const BodyConfig& body) { return touchesSolids(body) && body.friction.value_or(1.0) > 0; };
+  if (slip_speed.present() && !any(scene.rods, slips) && !any(scene.threads, slips) && !any(scene.bodies, body_slips))
   {
     slip_speed.warning(
-        "has no effect: friction is 0 for all rods and threads that touch anything; give them a friction, or leave it "
-        "out");
+        "has no effect: friction is 0 for all rods, threads and bodies that touch anything; give them a friction, or "
+        "leave it out");
   }
 }
 
@@ -192,6 +202,18 @@ void warnOfMaterial(YamlMap material, const Eigen::Vector3d& gravity)
     inextensible.warning(
         "has no effect: it raises the stretching modulus by the rod's own weight, and there is no gravity; give "
         "stretch_modulus instead");
+  }
+}
+
+/// `others`: whether there are obstacles or other bodies with a shape.
+void warnOfBodyShape(const YamlCursor& shape, const BodyConfig& config, bool others)
+{
+  if (isSimulatedSolid(config) && !touchesSolids(config) && others)
+  {
+    shape.warning(
+        "passes through obstacles, and through other bodies whose shape is a cylinder or a mesh: of simulated bodies "
+        "spheres, boxes and capsules touch them; rods, threads and cloths touch it. Take one of these shapes, or "
+        "contact: false");
   }
 }
 
@@ -400,7 +422,14 @@ void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
   }
   const std::vector<YamlCursor> bodies = entriesOf(map.get("bodies")), threads = entriesOf(map.get("threads"));
   for (std::size_t b = 0; b < bodies.size(); ++b)
-    warnOfBody(YamlMap(bodies[b]), scene.bodies[b], why_no_friction);
+  {
+    YamlMap body(bodies[b]);
+    const auto isOther = [&](const BodyConfig& other) {
+      return &other != &scene.bodies[b] && other.contact && other.shape;
+    };
+    warnOfBody(body, scene.bodies[b], why_no_friction);
+    warnOfBodyShape(body.get("shape"), scene.bodies[b], !scene.obstacles.empty() || any(scene.bodies, isOther));
+  }
   for (std::size_t t = 0; t < threads.size(); ++t)
     warnOfThread(YamlMap(threads[t]), scene.threads[t], scene);
 }

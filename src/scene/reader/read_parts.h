@@ -89,7 +89,8 @@ std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& con
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
 /// The contact methods of the cloths have been chosen.
 ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
-                          const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths);
+                          const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths,
+                          const std::vector<BodyConfig>& bodies);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods);
 TimeConfig readTime(const YamlCursor& at);

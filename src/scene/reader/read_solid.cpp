@@ -203,7 +203,8 @@ std::optional<ContactProperties> readContactProperties(const YamlCursor& at, con
 }
 
 ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
-                          const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths)
+                          const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths,
+                          const std::vector<BodyConfig>& bodies)
 {
   ContactConfig contact;
   const std::size_t before = at.problems().size();
@@ -232,6 +233,10 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
   for (const ClothConfig& cloth : cloths)
     if (cloth.contact && cloth.contact->method == ContactMethod::barrier)
       gap = std::min(gap, 0.5 * cloth.contact->thickness);
+  if (!std::isfinite(gap))   // bodies alone
+    for (const BodyConfig& body : bodies)
+      if (body.contact && body.shape && !body.motion)
+        gap = std::min(gap, 5e-3 * boundingRadius(*body.shape));
   const bool any = std::isfinite(gap);
   contact.gap = any ? gap : 0.0;
   assign(contact.gap, map.get("gap").number(Range::above(0, 1, "m")));

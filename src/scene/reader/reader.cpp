@@ -217,14 +217,14 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads"), at_cloths = map.get("cloths"),
                    at_tracked = map.get("tracked");
   const YamlCursor at_rods = map.get("rods");
+  const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
   if (!at_rods.present() && !at_generate.present() && !at_threads.present() && !at_cloths.present() &&
-      !at_tracked.present())
+      !at_tracked.present() && !at_bodies.present())
   {
     at_rods.problem(
-        "is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}], tracked: [{...}] or generate: "
-        "[{...}]");
+        "is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}], tracked: [{...}], generate: [{...}] "
+        "or bodies: [{...}]");
   }
-  const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
   std::vector<ReadRod> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<ReadRod>{};
   Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
   takeGeneratedRods(generated, rods);
@@ -254,7 +254,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     scene.bodies.push_back(std::move(body));
   }
   chooseContactMethods(cloths, rods, scene);
-  scene.contact = readContact(map.get("contact"), rods, scene.threads, scene.cloths);
+  scene.contact = readContact(map.get("contact"), rods, scene.threads, scene.cloths, scene.bodies);
   for (ReadRod& part : rods)
     scene.rods.push_back(std::move(part.config));
   completeThreads(scene, entriesOf(at_threads));
