@@ -1,4 +1,5 @@
 // Simulated bodies that touch obstacles and each other, against formulas.
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <string>
@@ -124,6 +125,20 @@ bodies:
   run(s, 0.5);
   EXPECT_GT(s.state().bodies[1].velocity.linear.x(), 0.5);   // it was hit
   EXPECT_LT((momentum() - before).norm(), 1e-12 * before.norm());
+}
+
+TEST(BodyContact, ACylinderPassesThroughFloorsWithAWarning)
+{
+  const SceneConfig scene = parseScene(
+      "time: {step: 0.005, duration: 1}\nbodies:\n  - {name: disc, mass: 1, shape: "
+      "{cylinder: {radius: 0.1, length: 0.02}}, pose: {position: [0, 0, 0.2]}}\n" +
+      kFloor);
+  const auto warned = [&](const std::string& text) {
+    return std::any_of(scene.warnings.begin(), scene.warnings.end(),
+                       [&](const std::string& warning) { return warning.find(text) != std::string::npos; });
+  };
+  EXPECT_TRUE(warned("passes through obstacles"));
+  EXPECT_TRUE(warned("are touched by nothing (floor)"));
 }
 
 /// In a step the ball moves as far as it is wide.

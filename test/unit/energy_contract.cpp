@@ -224,6 +224,43 @@ TYPED_TEST(EnergyContract, ViscousForcesCountFromTheReference)
   EXPECT_EQ(this->gradient(x), elastic);
 }
 
+/// The reference x + move + share (other - x). The error of its strains is of second order in the move.
+TYPED_TEST(EnergyContract, TheReferenceIsMoved)
+{
+  const Matrix3Xd x = this->sheet.shaken(this->random, 0.2), from = this->sheet.shaken(this->random, 0.1),
+                  other = this->sheet.shaken(this->random, 0.1),
+                  way = this->sheet.shaken(this->random, 0.1) - this->sheet.shaken(this->random, 0.1);
+  const auto error = [&](double size, double share) {
+    const PointVector a = pointsOf(from), b = pointsOf(other), move = pointsOf(size * way),
+                      ahead = pointsOf(from + size * way), behind = pointsOf(from - size * way);
+    StrainReference at;
+    at.x = &a;
+    at.move = &move;
+    at.ahead = &ahead;
+    at.behind = &behind;
+    at.share = share;
+    at.other = share != 0.0 ? &b : nullptr;
+    this->term->takeStrains(at);
+    this->term->setResponse(0.8);
+    const Matrix3Xd moved = this->gradient(x);
+    this->respond(0.8, from + size * way);
+    return (moved - this->gradient(x)).norm() / moved.norm();
+  };
+  const double coarse = error(0.2, 0.0), fine = error(0.1, 0.0);
+  EXPECT_LT(coarse, 0.05);
+  EXPECT_LT(fine, 0.3 * coarse + 1e-12);   // a quarter, or nothing where strains are linear
+  // All of the way to the other points: their strains.
+  this->respond(0.8, other);
+  const Matrix3Xd there = this->gradient(x);
+  const PointVector a = pointsOf(from), b = pointsOf(other);
+  StrainReference at;
+  at.x = &a;
+  at.share = 1.0;
+  at.other = &b;
+  this->term->takeStrains(at);
+  EXPECT_LT((this->gradient(x) - there).norm(), 1e-11 * there.norm());
+}
+
 TYPED_TEST(EnergyContract, RefusesBadParameters)
 {
   for (const auto& construct : TypeParam::refused())
