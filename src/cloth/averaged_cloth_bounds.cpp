@@ -159,6 +159,67 @@ double AveragedClothSolver::boundedForces()
   return envelope;
 }
 
+void AveragedClothSolver::setBoundedGap(const PointVector& d, const Eigen::Matrix3Xd& averages)
+{
+  for (std::size_t i = 0; i < d.size(); ++i)
+    product_[i] = system_.start()[i] + d[i];
+  setGap(averages, product_);
+}
+
+/// Solves the linear system of one semismooth Newton step by conjugate gradients. The right-hand side is right_; the
+/// step is written to bounds_->before.
+LinearResult AveragedClothSolver::solveBoundedStep(double tolerance, int most)
+{
+  AverageBounds& b = *bounds_;
+  return cg_.solve(
+      right_, b.before, tolerance, most,
+      [&](const PointVector& p, PointVector& ap) {
+        system_.applyMatrix(p, ap);
+        clearHeld(ap);
+        averagesOf(p, averages_now_);
+        for (int i = 0; i < averages_->count(); ++i)   // a force at its bound only turns
+        {
+          const Eigen::Vector3d n = point(b.wanted, i);
+          point(b.response, i) = b.weights[i] * (averages_now_.col(i) - n.dot(averages_now_.col(i)) * n);
+        }
+        averages_->addForces(b.response.data(), ap.data());
+      },
+      [&](PointVector& r, PointVector& z) { averages_->solveSoftened(r.data(), z.data()); });
+}
+
+/// Moves d along the Newton step bounds_->before. A line search keeps the sum of the quadratic part and the envelope
+/// falling; `start` is the envelope at d. Returns the envelope where the search ends.
+double AveragedClothSolver::moveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double start)
+{
+  constexpr double kArmijo = 1e-4;
+  AverageBounds& b = *bounds_;
+  const PointKernels& kernels = pointKernels();
+  const PointVector& move = b.before;
+  PointVector& image = b.image_before;
+  double envelope = start;
+  // the quadratic part along the step, and the envelope
+  system_.applyMatrix(move, image);
+  const double slope = -kernels.dot(points(), right_.data(), move.data()),
+               curvature = kernels.dot(points(), move.data(), image.data());
+  double linear = 0.0, alpha = 1.0;
+  for (std::size_t i = 0; i < d.size(); ++i)
+    linear += (system_.gradient()[i] + b.image[i]) * move[i];
+  for (double change = 1.0;; change = -0.5 * alpha, alpha *= 0.5)   // of the share of the step that is taken
+  {
+    for (std::size_t i = 0; i < d.size(); ++i)
+      d[i] += change * move[i];
+    setBoundedGap(d, averages);
+    envelope = boundedForces();
+    if (alpha * linear + 0.5 * alpha * alpha * curvature + envelope - start <=
+            kArmijo * alpha * slope + 1e-12 * std::abs(start) ||
+        alpha < 1e-6)
+      break;
+  }
+  for (std::size_t i = 0; i < d.size(); ++i)
+    b.image[i] += alpha * image[i];
+  return envelope;
+}
+
 /// The same problem by the method of multipliers [Rockafellar, Math. Oper. Res. 1 (1976), 97], whose smooth problems
 /// take a few steps of semismooth Newton with a line search [Li, Sun & Toh, SIAM J. Optim. 28 (2018), 433], and these
 /// conjugate gradients.
@@ -169,22 +230,15 @@ LinearOutcome AveragedClothSolver::minimizeBounded(PointVector& d, const Eigen::
   constexpr int kMostRounds = 60, kMostSteps = 60, kMostIterations = 4000;
   constexpr double kStiff = 10.0;     // of the averages
   constexpr double kForcing = 0.05;   // of a Newton step's residual
-  constexpr double kArmijo = 1e-4;
   AverageBounds& b = *bounds_;
   const PointKernels& kernels = pointKernels();
   const int m = averages_->count(), before = linear_iterations;
   for (int i = 0; i < m; ++i)
     b.stiffness[i] = kStiff * averages_->stiffness(i);
   system_.applyMatrix(d, b.image);
-  const auto setBoundedGap = [&] {
-    for (std::size_t i = 0; i < d.size(); ++i)
-      product_[i] = system_.start()[i] + d[i];
-    setGap(averages, product_);
-  };
-  PointVector &move = b.before, &image = b.image_before;
   for (int round = 0; round < kMostRounds; ++round)
   {
-    setBoundedGap();
+    setBoundedGap(d, averages);
     double envelope = boundedForces();
     bool balanced = false;
     for (int step = 0; step < kMostSteps && !balanced; ++step)
@@ -195,8 +249,8 @@ LinearOutcome AveragedClothSolver::minimizeBounded(PointVector& d, const Eigen::
       averages_->addForces(b.bounded.data(), right_.data());
       averages_->soften(b.weights);
       budget_->spend(static_cast<long>(m) * m * m / kFlops);
-      averages_->solveSoftened(right_.data(), move.data());
-      const double left = std::sqrt(std::max(kernels.dot(points(), right_.data(), move.data()), 0.0)),
+      averages_->solveSoftened(right_.data(), b.before.data());
+      const double left = std::sqrt(std::max(kernels.dot(points(), right_.data(), b.before.data()), 0.0)),
                    allowed = 0.5 * linear_tolerance_ * reference;
       if (!std::isfinite(left))
         return LinearOutcome::not_definite;
@@ -206,45 +260,12 @@ LinearOutcome AveragedClothSolver::minimizeBounded(PointVector& d, const Eigen::
       const int most = iterationsWithin(kMostIterations - (linear_iterations - before));
       if (most <= 0 || budget_->spent())
         return LinearOutcome::not_converged;
-      const LinearResult result = cg_.solve(
-          right_, move, std::max(kForcing, 0.5 * allowed / left), most,
-          [&](const PointVector& p, PointVector& ap) {
-            system_.applyMatrix(p, ap);
-            clearHeld(ap);
-            averagesOf(p, averages_now_);
-            for (int i = 0; i < m; ++i)   // a force at its bound only turns
-            {
-              const Eigen::Vector3d n = point(b.wanted, i);
-              point(b.response, i) = b.weights[i] * (averages_now_.col(i) - n.dot(averages_now_.col(i)) * n);
-            }
-            averages_->addForces(b.response.data(), ap.data());
-          },
-          [&](PointVector& r, PointVector& z) { averages_->solveSoftened(r.data(), z.data()); });
+      const LinearResult result = solveBoundedStep(std::max(kForcing, 0.5 * allowed / left), most);
       linear_iterations += result.iterations;
       spend(result.iterations + 1);
       if (!result.definite)
         return LinearOutcome::not_definite;
-      // the quadratic part along the step, and the envelope
-      system_.applyMatrix(move, image);
-      const double slope = -kernels.dot(points(), right_.data(), move.data()),
-                   curvature = kernels.dot(points(), move.data(), image.data());
-      const double start = envelope;
-      double linear = 0.0, alpha = 1.0;
-      for (std::size_t i = 0; i < d.size(); ++i)
-        linear += (system_.gradient()[i] + b.image[i]) * move[i];
-      for (double change = 1.0;; change = -0.5 * alpha, alpha *= 0.5)   // of the share of the step that is taken
-      {
-        for (std::size_t i = 0; i < d.size(); ++i)
-          d[i] += change * move[i];
-        setBoundedGap();
-        envelope = boundedForces();
-        if (alpha * linear + 0.5 * alpha * alpha * curvature + envelope - start <=
-                kArmijo * alpha * slope + 1e-12 * std::abs(start) ||
-            alpha < 1e-6)
-          break;
-      }
-      for (std::size_t i = 0; i < d.size(); ++i)
-        b.image[i] += alpha * image[i];
+      envelope = moveBounded(d, averages, envelope);
     }
     if (!balanced)
       return LinearOutcome::not_converged;

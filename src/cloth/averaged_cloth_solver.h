@@ -81,6 +81,9 @@ private:
   LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference,
                                 int& linear_iterations);
   double boundedForces();
+  void setBoundedGap(const PointVector& d, const Eigen::Matrix3Xd& averages);
+  LinearResult solveBoundedStep(double tolerance, int most);
+  double moveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double start);
   void takeOutAverages(PointVector& r);
 
   const bool choose_;   ///< the solver of steps with averages is ours to choose

@@ -276,27 +276,23 @@ void IsotropicRod::releaseTwists(const GraspState& before, RodState& to, const G
   }
 }
 
-/// The total twist is read off the frame carried along the span from one held section to the other, and counted on from
-/// the last one; equilibrium of the frames (thesis 4.3) then shares it out in proportion to the joints' compliances.
-StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, const std::vector<Pose>& poses,
-                                     RodState& to)
+IsotropicRod::Section IsotropicRod::sectionOf(int clamp, const RodState& from, const std::vector<Pose>& poses) const
 {
-  struct Section
-  {
-    Eigen::Vector3d t, d1;
-    double turn = 0.0;
-  };
-  const std::vector<ClampJoint>& clamps = system_.clamps();
-  const auto section = [&](int clamp) {
-    const GraspState& g = from.grasps[clamps[clamp].grasp];
-    const Eigen::Matrix3d before = g.X_WG.orientation * g.section_G[clamps[clamp].side];
-    const Eigen::Matrix3d now = poses[clamps[clamp].grasp].orientation * g.section_G[clamps[clamp].side];
-    Section s;
-    s.t = now.col(0);
-    s.d1 = now.col(1);
-    s.turn = signedAngle(parallelTransport(before.col(1), before.col(0), s.t), s.d1, s.t);
-    return s;
-  };
+  const ClampJoint& joint = system_.clamps()[clamp];
+  const GraspState& g = from.grasps[joint.grasp];
+  const Eigen::Matrix3d before = g.X_WG.orientation * g.section_G[joint.side];
+  const Eigen::Matrix3d now = poses[joint.grasp].orientation * g.section_G[joint.side];
+  Section s;
+  s.t = now.col(0);
+  s.d1 = now.col(1);
+  s.turn = signedAngle(parallelTransport(before.col(1), before.col(0), s.t), s.d1, s.t);
+  return s;
+}
+
+/// Carries the frame along each piece of the span: along the first from the section before it, if there is one. False:
+/// an edge has folded back.
+bool IsotropicRod::transportFrames(const Span& span, const RodState& from, const Section& start)
+{
   const std::size_t index = &span - spans_.data();
   for (int p = 0; p < span.pieces; ++p)
   {
@@ -304,64 +300,62 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
     const Eigen::Vector3d& before = old_tangents_[index][p];
     const Eigen::Vector3d t = tangent(edge), d = parallelTransport(from.d1.col(edge), before, t);
     if (!(1.0 + before.dot(t) > kFoldedChi))
-      return StepFailure::folded_back;
+      return false;
     setDirector(edge, (d - d.dot(t) * t).normalized());
   }
-  double phi = 0.0, total = span.held() ? totalTwist(span, from) : span.rest;
-  Section start, end;
   if (span.before >= 0)
   {
-    start = section(span.before);
     if (!(1.0 + start.t.dot(tangent(span.first)) > kFoldedChi))
-      return StepFailure::folded_back;
+      return false;
     setDirector(span.first, parallelTransport(start.d1, start.t, tangent(span.first)));
   }
   isotropicKernels().transport(a_, span.pieces, span.piece_first, span.piece_count);
+  return true;
+}
 
-  // how far the pieces' frames lie from the one that is parallel along the whole span
-  std::array<double, 4> ahead = {};
+/// How far the pieces' frames lie from the one that is parallel along the whole span.
+IsotropicRod::Ahead IsotropicRod::anglesAhead(const Span& span) const
+{
+  Ahead ahead = {};
   for (int p = 1; p < span.pieces; ++p)
   {
     const int edge = span.piece_first[p], last = (edge + a_.edges - 1) % a_.edges;
     ahead[p] = ahead[p - 1] + signedAngle(parallelTransport(director(last), tangent(last), tangent(edge)),
                                           director(edge), tangent(edge));
   }
+  return ahead;
+}
+
+/// From the parallel frame to the held one at the span's end, or to its beginning if it is a loop; 0 at a free end.
+/// `behind`: the last piece's angle. Nothing: the rod has folded back there.
+std::optional<double> IsotropicRod::angleToEnd(const Span& span, const Section& end, double behind) const
+{
   const int last = (span.first + span.count - 1) % a_.edges;
-  const double behind = ahead[span.pieces - 1];
-  double angle = 0.0;   // from the parallel frame to the held one at the end
   if (span.after >= 0)
   {
-    end = section(span.after);
     if (!(1.0 + end.t.dot(tangent(last)) > kFoldedChi))
-      return StepFailure::folded_back;
-    angle = signedAngle(parallelTransport(director(last), tangent(last), end.t), end.d1, end.t) + behind;
+      return std::nullopt;
+    return signedAngle(parallelTransport(director(last), tangent(last), end.t), end.d1, end.t) + behind;
   }
-  else if (span.loop)
-    angle = signedAngle(parallelTransport(director(last), tangent(last), tangent(span.first)), director(span.first),
-                        tangent(span.first)) +
-            behind;
+  if (span.loop)
+    return signedAngle(parallelTransport(director(last), tangent(last), tangent(span.first)), director(span.first),
+                       tangent(span.first)) +
+           behind;
+  return 0.0;
+}
 
-  double moment = 0.0;
-  if (span.held())
-  {
-    const double expected = span.loop ? total : total + end.turn - start.turn;
-    const double next = unwrapNear(angle, expected);
-    if (std::abs(next - expected) > kCountable)
-      return StepFailure::turned_too_far;
-    total = next;
-    moment = (total - span.rest) / span.compliance;
-  }
-  else
-  {
-    phi = span.after >= 0 ? angle - total : 0.0;
-  }
+double IsotropicRod::setSectionTwist(int clamp, double moment, RodState& to) const
+{
+  const ClampJoint& joint = system_.clamps()[clamp];
+  const double m = joint.rest_twist + moment / joint.beta;
+  to.grasps[joint.grasp].section_twist[joint.side] = m;
+  return m;
+}
 
+/// Gives the joints inside a span their twists under a twisting moment [N m].
+void IsotropicRod::shareTwist(const Span& span, double moment, RodState& to) const
+{
   const double *twist_stiffness = system_.twistStiffness(), *rest_twist = system_.restTwist();
-  const auto setSection = [&](int clamp) {
-    const double m = clamps[clamp].rest_twist + moment / clamps[clamp].beta;
-    to.grasps[clamps[clamp].grasp].section_twist[clamps[clamp].side] = m;
-    return m;
-  };
   if (span.held())
     forJoints(span, [&](int i) {
       if (twist_stiffness[i] > 0)   // else the whole rod is held
@@ -370,10 +364,11 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
   else if (span.count > 1 && twist_stiffness[span.first + 1] > 0)   // of an open rod, unless all of it is held
     to.twist.segment(span.first + 1, span.count - 1) =
         Eigen::Map<const Eigen::VectorXd>(rest_twist + span.first + 1, span.count - 1);
-  if (span.before >= 0)
-    phi += setSection(span.before);
-  if (span.after >= 0)
-    setSection(span.after);
+}
+
+/// Turns the transported frames by the joints' twists, from the angle phi of the span's first edge on.
+void IsotropicRod::turnFrames(const Span& span, double phi, const Ahead& ahead, const RodState& to)
+{
   for (int p = 0, k = 0; p < span.pieces; ++p)
     for (int q = 0; q < span.piece_count[p]; ++q, ++k)
     {
@@ -386,6 +381,43 @@ StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, con
   isotropicKernels().turn(a_, span.first, until);
   if (span.first + span.count > a_.edges)
     isotropicKernels().turn(a_, 0, span.first + span.count - a_.edges);
+}
+
+/// The total twist is read off the frame carried along the span from one held section to the other, and counted on from
+/// the last one; equilibrium of the frames (thesis 4.3) then shares it out in proportion to the joints' compliances.
+StepFailure IsotropicRod::settleSpan(const Span& span, const RodState& from, const std::vector<Pose>& poses,
+                                     RodState& to)
+{
+  const double before = span.held() ? totalTwist(span, from) : span.rest;
+  const Section start = span.before >= 0 ? sectionOf(span.before, from, poses) : Section();
+  const Section end = span.after >= 0 ? sectionOf(span.after, from, poses) : Section();
+  if (!transportFrames(span, from, start))
+    return StepFailure::folded_back;
+  const Ahead ahead = anglesAhead(span);
+  const std::optional<double> angle = angleToEnd(span, end, ahead[span.pieces - 1]);
+  if (!angle)
+    return StepFailure::folded_back;
+
+  double moment = 0.0, phi = 0.0;
+  if (span.held())
+  {
+    const double expected = span.loop ? before : before + end.turn - start.turn;
+    const double total = unwrapNear(*angle, expected);
+    if (std::abs(total - expected) > kCountable)
+      return StepFailure::turned_too_far;
+    moment = (total - span.rest) / span.compliance;
+  }
+  else
+  {
+    phi = span.after >= 0 ? *angle - before : 0.0;
+  }
+
+  shareTwist(span, moment, to);
+  if (span.before >= 0)
+    phi += setSectionTwist(span.before, moment, to);
+  if (span.after >= 0)
+    setSectionTwist(span.after, moment, to);
+  turnFrames(span, phi, ahead, to);
   return StepFailure::none;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "slender_sim/dynamics/step_report.h"
@@ -45,9 +47,24 @@ private:
     bool held() const { return loop || (before >= 0 && after >= 0); }
   };
 
+  /// A held section's frame, and how far it has turned in the step.
+  struct Section
+  {
+    Eigen::Vector3d t = Eigen::Vector3d::UnitX(), d1 = Eigen::Vector3d::UnitY();
+    double turn = 0.0;   ///< [rad]
+  };
+  using Ahead = std::array<double, 4>;   ///< per piece: its frame's angle from the one parallel along the span [rad]
+
   void compose();
   double totalTwist(const Span& span, const RodState& state) const;
   double evaluateClamp(int clamp, const RodState& state, double& min_chi);
+  Section sectionOf(int clamp, const RodState& from, const std::vector<Pose>& poses) const;
+  bool transportFrames(const Span& span, const RodState& from, const Section& start);
+  Ahead anglesAhead(const Span& span) const;
+  std::optional<double> angleToEnd(const Span& span, const Section& end, double behind) const;
+  double setSectionTwist(int clamp, double moment, RodState& to) const;
+  void shareTwist(const Span& span, double moment, RodState& to) const;
+  void turnFrames(const Span& span, double phi, const Ahead& ahead, const RodState& to);
   StepFailure settleSpan(const Span& span, const RodState& from, const std::vector<Pose>& poses, RodState& to);
   void releaseTwists(const GraspState& before, RodState& to, const GraspState& now) const;
   template <class F>

@@ -197,6 +197,85 @@ void readBodyPoses(const YamlCursor& at, const ReadContext& context, CarriedGuid
   }
 }
 
+/// The keys of a guide's motion, and which kind of motion they stand for.
+struct MotionKeys
+{
+  YamlCursor frames, bodies, topic, bag, rate, begin, groups, attach, late;
+  bool by_points = false;   ///< by topic
+  bool by_bodies = false;   ///< by file, bag or topic
+};
+
+/// Reports keys that are for another kind of motion.
+void refuseOtherKeys(const MotionKeys& keys)
+{
+  const auto only_for = [](const YamlCursor& key, bool fits, const char* what) {
+    if (key.present() && !fits)
+      key.problem(std::string("is for ") + what);
+  };
+  only_for(keys.rate, keys.frames.present(), "frames");
+  only_for(keys.begin, keys.frames.present() || keys.bag.present(), "frames and bags");
+  only_for(keys.groups, keys.by_bodies, "bodies");
+  only_for(keys.attach, keys.by_bodies, "bodies");
+  only_for(keys.late, keys.topic.present(), "guides by topic");
+}
+
+/// Nothing, after a report, unless the keys say one kind of motion.
+std::optional<MotionKeys> readMotionKeys(const YamlCursor& at)
+{
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  MotionKeys keys{map.get("frames"), map.get("bodies"), map.get("topic"),  map.get("bag"), map.get("rate"),
+                  map.get("begin"),  map.get("groups"), map.get("attach"), map.get("late")};
+  map.finish();
+  if (keys.frames.present() + keys.bodies.present() + keys.topic.present() + keys.bag.present() != 1)
+  {
+    if (at.problems().size() == before)
+    {
+      at.problem(
+          "must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {bag: "
+          "FILE.bag}, {topic: points}, "
+          "{topic: bodies, groups: obj}");
+    }
+    return std::nullopt;
+  }
+  const std::optional<bool> chosen = keys.topic.choice<bool>({{"points", true}, {"bodies", false}});
+  if (keys.topic.present() && !chosen)
+    return std::nullopt;
+  keys.by_points = chosen.value_or(false);
+  keys.by_bodies = keys.bodies.present() || (keys.topic.present() && !keys.by_points) ||
+                   (keys.bag.present() && keys.groups.present());
+  refuseOtherKeys(keys);
+  return keys;
+}
+
+/// A guide whose vertices ride on bodies. `first`: time of a bag [s] at which the scene begins.
+void readCarriedMotion(const YamlCursor& at, const MotionKeys& keys, const ReadContext& context, double first,
+                       const std::string& object, GuideSource& source)
+{
+  if (!keys.groups.present())
+  {
+    YamlMap(at).require("groups");
+    return;
+  }
+  auto carried = readGroups(keys.groups, context, source);
+  if (!carried)
+    return;
+  assign(carried->keeps_offset, keys.attach.choice<bool>({{"initial", true}, {"frame", false}}));
+  if (keys.bag.present())
+  {
+    const auto recorded = readBag(keys.bag, context, true, first, object);
+    if (!recorded)
+      return;
+    takeBodyPoses(keys.bag, recorded->bodies, *carried);
+  }
+  else
+  {
+    readBodyPoses(keys.bodies, context, *carried);
+  }
+  if (keys.topic.present() || carried->poses.size() == carried->bodies.size())   // else reported
+    source.config.motion = std::move(*carried);
+}
+
 void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std::string& object, GuideSource& source)
 {
   GuideMotion& motion = source.config.motion;
@@ -207,81 +286,31 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
     at.choice<bool>({{"fixed", true}});
     return;
   }
-  const std::size_t before = at.problems().size();
-  YamlMap map(at);
-  const YamlCursor frames = map.get("frames"), bodies = map.get("bodies"), topic = map.get("topic"),
-                   bag = map.get("bag");
-  const YamlCursor rate = map.get("rate"), begin = map.get("begin"), groups = map.get("groups"),
-                   attach = map.get("attach"), late = map.get("late");
-  map.finish();
-  if (frames.present() + bodies.present() + topic.present() + bag.present() != 1)
-  {
-    if (at.problems().size() == before)
-    {
-      at.problem(
-          "must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {bag: "
-          "FILE.bag}, {topic: points}, "
-          "{topic: bodies, groups: obj}");
-    }
+  const std::optional<MotionKeys> keys = readMotionKeys(at);
+  if (!keys)
     return;
-  }
-  const std::optional<bool> chosen = topic.choice<bool>({{"points", true}, {"bodies", false}});
-  if (topic.present() && !chosen)
-    return;
-  const bool by_points = chosen.value_or(false);
-  const bool by_bodies = bodies.present() || (topic.present() && !by_points) || (bag.present() && groups.present());
-  const auto only_for = [](const YamlCursor& key, bool fits, const char* what) {
-    if (key.present() && !fits)
-      key.problem(std::string("is for ") + what);
-  };
-  only_for(rate, frames.present(), "frames");
-  only_for(begin, frames.present() || bag.present(), "frames and bags");
-  only_for(groups, by_bodies, "bodies");
-  only_for(attach, by_bodies, "bodies");
-  only_for(late, topic.present(), "guides by topic");
-  assign(source.config.coast, readLate(late));
-  const double first = begin.number(Range::closed(-1e6, 1e6, "s")).value_or(0.0);
-  if (frames.present())
+  assign(source.config.coast, readLate(keys->late));
+  const double first = keys->begin.number(Range::closed(-1e6, 1e6, "s")).value_or(0.0);
+  if (keys->frames.present())
   {
-    if (!rate.present())
+    if (!keys->rate.present())
       YamlMap(at).require("rate");
-    const auto hertz = rate.number(Range::above(0, 1e6, "Hz"));
+    const auto hertz = keys->rate.number(Range::above(0, 1e6, "Hz"));
     if (hertz)
-      assign(motion, readFrames(frames, *hertz, first, context, source));
-    return;
+      assign(motion, readFrames(keys->frames, *hertz, first, context, source));
   }
-  if (by_points)
+  else if (keys->by_points)
   {
     motion = TopicGuide{};
-    return;
   }
-  if (bag.present() && !by_bodies)
+  else if (keys->bag.present() && !keys->by_bodies)
   {
-    readBagPoints(bag, context, first, object, source);
-    return;
-  }
-  if (!groups.present())
-  {
-    YamlMap(at).require("groups");
-    return;
-  }
-  auto carried = readGroups(groups, context, source);
-  if (!carried)
-    return;
-  assign(carried->keeps_offset, attach.choice<bool>({{"initial", true}, {"frame", false}}));
-  if (bag.present())
-  {
-    const auto recorded = readBag(bag, context, true, first, object);
-    if (!recorded)
-      return;
-    takeBodyPoses(bag, recorded->bodies, *carried);
+    readBagPoints(keys->bag, context, first, object, source);
   }
   else
   {
-    readBodyPoses(bodies, context, *carried);
+    readCarriedMotion(at, *keys, context, first, object, source);
   }
-  if (topic.present() || carried->poses.size() == carried->bodies.size())   // else reported
-    motion = std::move(*carried);
 }
 
 /// A cloth of the scene as the guide.
