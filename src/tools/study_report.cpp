@@ -45,7 +45,7 @@ const std::vector<Plan>& plans()
        "Stiff and extreme cases. Done, done with cut steps, or refused with a reason; never NaN, a crash or silently "
        "wrong.",
        {"rod_stability", "thread_stability", "cloth_stability", "tracking_stability", "statics_stability"},
-       {"rod_contact_safety", "cloth_collision_safety"}},
+       {"rod_contact_safety", "cloth_collision_safety", "coupled_safety"}},
       {"Repeatability",
        "Runs of fresh processes, whose heaps and numbers of threads differ: equal bit by bit.",
        {"repeatability"},

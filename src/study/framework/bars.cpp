@@ -62,6 +62,11 @@ const std::vector<Bar>& bars()
       {"helical_scene", "worst_moment_error", at_most, 0.001},
       {"helical_scene", "frames_matter", at_most, 1e-9, result, full},   // round-off
       {"helical_buckling", "order", at_least, 1.9, result, full},        // the quick form has one mesh
+      {"coupled_safety", "penetrations", at_most, 0},
+      {"coupled_safety", "thickness_violations", at_most, 0},
+      {"coupled_safety", "nan_count", at_most, 0},
+      {"coupled_safety", "unexplained_failures", at_most, 0},
+      {"coupled_safety", "scenes", at_least, 1000, result, full},
       {"projection", "length_error_max", at_most, 1e-8},
       {"projection", "iterations_max_to_1ms", at_most, 5},
       {"statics_stability", "wrong_equilibria", at_most, 0},

@@ -1,0 +1,332 @@
+#include "mixed_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/distance.h"
+#include "slender_sim/contact/intersection.h"
+
+namespace slender::study {
+
+namespace {
+
+using Eigen::Vector3d;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kRounding = 1e-9;   // [m] of distances
+
+double segmentTriangle(const Vector3d& p, const Vector3d& q, const Vector3d& a, const Vector3d& b, const Vector3d& c)
+{
+  if (segmentMeetsTriangle(p, q, a, b, c))
+    return 0.0;
+  return std::min({pointTriangleDistance(p, a, b, c), pointTriangleDistance(q, a, b, c), segmentDistance(p, q, a, b),
+                   segmentDistance(p, q, b, c), segmentDistance(p, q, c, a)});
+}
+
+double triangleTriangle(const Vector3d (&a)[3], const Vector3d (&b)[3])
+{
+  double least = kInfinity;
+  for (int k = 0; k < 3; ++k)
+    least = std::min({least, segmentTriangle(a[k], a[(k + 1) % 3], b[0], b[1], b[2]),
+                      segmentTriangle(b[k], b[(k + 1) % 3], a[0], a[1], a[2])});
+  return least;
+}
+
+double pointBox(const Box& box, const Vector3d& p)
+{
+  const Vector3d out = p.cwiseAbs() - 0.5 * box.size;
+  return out.maxCoeff() > 0.0 ? out.cwiseMax(0.0).norm() : out.maxCoeff();
+}
+
+/// Minimum of a convex function over [0, 1].
+template <class F>
+double leastAlong(const F& f)
+{
+  double low = 0.0, high = 1.0;
+  for (int k = 0; k < 70; ++k)
+  {
+    const double s = low + 0.382 * (high - low), t = high - 0.382 * (high - low);
+    (f(s) < f(t) ? high : low) = f(s) < f(t) ? t : s;
+  }
+  return std::min({f(0.0), f(1.0), f(0.5 * (low + high))});
+}
+
+/// Distance of a triangle (or, with two equal corners, a segment) in the frame of a shape from it; negative inside.
+double shapeDistance(const Shape& shape, const Vector3d (&v)[3])
+{
+  if (std::holds_alternative<Plane>(shape))
+    return std::min({v[0].z(), v[1].z(), v[2].z()});
+  if (const auto* sphere = std::get_if<Sphere>(&shape))
+    return pointTriangleDistance(Vector3d::Zero(), v[0], v[1], v[2]) - sphere->radius;
+  if (const auto* capsule = std::get_if<Capsule>(&shape))
+    return segmentTriangle({0, 0, -0.5 * capsule->length}, {0, 0, 0.5 * capsule->length}, v[0], v[1], v[2]) -
+           capsule->radius;
+  const Box& box = std::get<Box>(shape);
+  return leastAlong([&](double s) {
+    return leastAlong(
+        [&](double t) { return pointBox(box, v[0] + s * ((1.0 - t) * (v[1] - v[0]) + t * (v[2] - v[0]))); });
+  });
+}
+
+/// Solid angle of a mesh seen from a point [sr] [Van Oosterom & Strackee 1983]. Where the mesh passes through the point
+/// it jumps by 4 pi.
+double solidAngle(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xi& triangles, const Vector3d& p)
+{
+  double sum = 0.0;
+  for (Eigen::Index t = 0; t < triangles.cols(); ++t)
+  {
+    const Vector3d a = x.col(triangles(0, t)) - p, b = x.col(triangles(1, t)) - p, c = x.col(triangles(2, t)) - p;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    sum += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return sum;
+}
+
+/// Gauss's linking integral of two open polylines, exact segment by segment [Klenin & Langowski 2000]. Where they pass
+/// through each other it jumps by 1.
+double linking(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& y)
+{
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i + 1 < x.cols(); ++i)
+    for (Eigen::Index j = 0; j + 1 < y.cols(); ++j)
+    {
+      const Vector3d r13 = y.col(j) - x.col(i), r14 = y.col(j + 1) - x.col(i), r23 = y.col(j) - x.col(i + 1),
+                     r24 = y.col(j + 1) - x.col(i + 1);
+      const Vector3d n[4] = {r13.cross(r14), r14.cross(r24), r24.cross(r23), r23.cross(r13)};
+      double area = 0.0;
+      for (int k = 0; k < 4; ++k)
+      {
+        const double size = n[k].norm() * n[(k + 1) % 4].norm();
+        if (size > 0.0)
+          area += std::asin(std::clamp(n[k].dot(n[(k + 1) % 4]) / size, -1.0, 1.0));
+      }
+      const Vector3d e = x.col(i + 1) - x.col(i), f = y.col(j + 1) - y.col(j);
+      sum += std::copysign(area, f.cross(e).dot(r13)) / (4.0 * M_PI);
+    }
+  return sum;
+}
+
+}   // namespace
+
+MixedCheck::MixedCheck(const Simulation& scene)
+{
+  const SceneConfig& config = scene.config();
+  gap_ = config.contact.gap;
+  for (std::size_t r = 0; r < config.rods.size(); ++r)
+  {
+    const RodModel& model = scene.rodModel(static_cast<int>(r));
+    double along = 0.0;
+    for (int e = 0; e < model.edges(); ++e)
+    {
+      tubes_.push_back({static_cast<int>(r), e, (e + 1) % model.nodes(), std::max(model.radius_a[e], model.radius_b[e]),
+                        along, model.rest_length[e]});
+      along += model.rest_length[e];
+    }
+    names_.push_back("rod " + model.name);
+    rest_.emplace_back();
+  }
+  for (std::size_t c = 0; c < config.cloths.size(); ++c)
+  {
+    const ClothModel& model = scene.clothModel(static_cast<int>(c));
+    for (Eigen::Index t = 0; t < model.rest.triangles.cols(); ++t)
+      faces_.push_back({static_cast<int>(names_.size()),
+                        {model.rest.triangles(0, t), model.rest.triangles(1, t), model.rest.triangles(2, t)},
+                        0.5 * config.cloths[c].contact->thickness});
+    names_.push_back("cloth " + model.name);
+    rest_.push_back(model.rest.vertices);
+  }
+  for (const ObstacleConfig& obstacle : config.obstacles)
+    solids_.push_back({"obstacle " + obstacle.name, obstacle.shape, {}, false});
+  for (const BodyConfig& body : config.bodies)
+    solids_.push_back({"body " + body.name, *body.shape, {}, !body.motion});
+  take(scene);
+  MixedFindings ignored;
+  checkSides(ignored);
+}
+
+void MixedCheck::take(const Simulation& scene)
+{
+  x_.clear();
+  for (const RodState& rod : scene.state().rods)
+    x_.push_back(rod.x);
+  for (const ClothState& cloth : scene.state().cloths)
+    x_.push_back(cloth.x);
+  const std::size_t obstacles = scene.config().obstacles.size();
+  for (std::size_t k = 0; k < solids_.size(); ++k)
+    solids_[k].pose = k < obstacles
+                          ? scene.state().obstacles[k]
+                          : scene.state().bodies[k - obstacles].X_WB * scene.config().bodies[k - obstacles].X_BS;
+}
+
+MixedFindings MixedCheck::check(const Simulation& scene)
+{
+  take(scene);
+  MixedFindings out;
+  out.least_room = kInfinity;
+  checkTubes(out);
+  checkFaces(out);
+  checkSolids(out);
+  checkSides(out);
+  return out;
+}
+
+void MixedCheck::note(double room, const std::string& a, const std::string& b, MixedFindings& out) const
+{
+  out.least_room = std::min(out.least_room, room);
+  if (room >= -kRounding)
+    return;
+  ++out.thickness_violations;
+  if (out.first.empty())
+    out.first = a + " and " + b + " by " + std::to_string(-1e3 * room) + " mm";
+}
+
+void MixedCheck::checkTubes(MixedFindings& out) const
+{
+  const ContactObject curve;
+  for (std::size_t i = 0; i < tubes_.size(); ++i)
+    for (std::size_t j = i + 1; j < tubes_.size(); ++j)
+    {
+      const Tube &s = tubes_[i], &t = tubes_[j];
+      if (s.object == t.object && contactNeighbours({0, 0, s.radius, 0, s.start, s.length},
+                                                    {0, 0, t.radius, 0, t.start, t.length}, curve, gap_))
+        continue;
+      const Eigen::Matrix3Xd &x = x_[s.object], &y = x_[t.object];
+      const double reach = s.radius + t.radius + 0.51 * (s.length + t.length) + 1e-2;
+      if ((0.5 * (x.col(s.a) + x.col(s.b)) - 0.5 * (y.col(t.a) + y.col(t.b))).norm() > 2.0 * reach)
+        continue;
+      note(segmentDistance(x.col(s.a), x.col(s.b), y.col(t.a), y.col(t.b)) - s.radius - t.radius, names_[s.object],
+           names_[t.object], out);
+    }
+}
+
+/// Of two faces of one cloth: the share of the thickness that they keep, because they are near each other at rest.
+double MixedCheck::restScale(const Face& f, const Face& g) const
+{
+  const Eigen::Matrix3Xd& rest = rest_[f.object];
+  Vector3d a[3], b[3];
+  for (int k = 0; k < 3; ++k)
+  {
+    a[k] = rest.col(f.corner[k]);
+    b[k] = rest.col(g.corner[k]);
+  }
+  const double reach = f.half_thickness + g.half_thickness + gap_;
+  return std::min(1.0, 0.5 * triangleTriangle(a, b) / reach);
+}
+
+void MixedCheck::checkFaces(MixedFindings& out) const
+{
+  for (std::size_t i = 0; i < faces_.size(); ++i)
+  {
+    const Face& f = faces_[i];
+    Vector3d a[3];
+    for (int k = 0; k < 3; ++k)
+      a[k] = x_[f.object].col(f.corner[k]);
+    const Vector3d low = a[0].cwiseMin(a[1]).cwiseMin(a[2]), high = a[0].cwiseMax(a[1]).cwiseMax(a[2]);
+    const auto far = [&](const Vector3d& p, const Vector3d& q, const Vector3d& r, double thickness) {
+      return ((p.cwiseMin(q).cwiseMin(r).array() - thickness) > high.array()).any() ||
+             ((p.cwiseMax(q).cwiseMax(r).array() + thickness) < low.array()).any();
+    };
+    for (std::size_t j = i + 1; j < faces_.size(); ++j)
+    {
+      const Face& g = faces_[j];
+      const double thickness = f.half_thickness + g.half_thickness;
+      Vector3d b[3];
+      bool shared = false;
+      for (int k = 0; k < 3; ++k)
+      {
+        b[k] = x_[g.object].col(g.corner[k]);
+        for (int l = 0; l < 3; ++l)
+          shared = shared || (f.object == g.object && f.corner[k] == g.corner[l]);
+      }
+      if (shared || far(b[0], b[1], b[2], thickness))
+        continue;
+      const double scale = f.object == g.object ? restScale(f, g) : 1.0;
+      if (scale > 1e-6)
+        note(triangleTriangle(a, b) - scale * thickness, names_[f.object], names_[g.object], out);
+    }
+    for (const Tube& t : tubes_)
+    {
+      const Vector3d p = x_[t.object].col(t.a), q = x_[t.object].col(t.b);
+      if (!far(p, q, q, t.radius + f.half_thickness))
+        note(segmentTriangle(p, q, a[0], a[1], a[2]) - t.radius - f.half_thickness, names_[t.object], names_[f.object],
+             out);
+    }
+  }
+}
+
+void MixedCheck::checkSolids(MixedFindings& out) const
+{
+  for (std::size_t k = 0; k < solids_.size(); ++k)
+  {
+    const Solid& solid = solids_[k];
+    const Pose inverse = solid.pose.inverse();
+    for (const Tube& t : tubes_)
+    {
+      const Vector3d v[3] = {inverse * Vector3d(x_[t.object].col(t.a)), inverse * Vector3d(x_[t.object].col(t.b)),
+                             inverse * Vector3d(x_[t.object].col(t.b))};
+      note(shapeDistance(solid.shape, v) - t.radius, names_[t.object], solid.name, out);
+    }
+    for (const Face& f : faces_)
+    {
+      const Eigen::Matrix3Xd& x = x_[f.object];
+      const Vector3d v[3] = {inverse * Vector3d(x.col(f.corner[0])), inverse * Vector3d(x.col(f.corner[1])),
+                             inverse * Vector3d(x.col(f.corner[2]))};
+      note(shapeDistance(solid.shape, v) - f.half_thickness, names_[f.object], solid.name, out);
+    }
+    for (std::size_t j = 0; j < solids_.size(); ++j)   // spheres against all
+      if (const auto* ball = std::get_if<Sphere>(&solids_[j].shape); ball && j != k && solids_[j].simulated)
+      {
+        const Vector3d c = inverse * solids_[j].pose.position, v[3] = {c, c, c};
+        note(shapeDistance(solid.shape, v) - ball->radius, solids_[j].name, solid.name, out);
+      }
+  }
+}
+
+/// Rods on the other side of a cloth or of a rod than before, and balls on the other side of a cloth: the solid angle
+/// of the cloth, or the linking integral, changes its sign while it is large.
+void MixedCheck::checkSides(MixedFindings& out)
+{
+  std::vector<std::vector<double>> now;
+  std::vector<std::string> pairs;
+  const std::size_t rods = names_.size() - static_cast<std::size_t>(std::count_if(
+                                               rest_.begin(), rest_.end(), [](const auto& r) { return r.cols() > 0; }));
+  for (std::size_t i = 0; i < rods; ++i)
+    for (std::size_t j = i + 1; j < rods; ++j)
+    {
+      now.push_back({4.0 * linking(x_[i], x_[j])});   // large: 1, of at most 2
+      pairs.push_back(names_[i] + " and " + names_[j]);
+    }
+  for (std::size_t c = rods; c < names_.size(); ++c)
+  {
+    Eigen::Matrix3Xi triangles(3, 0);
+    for (const Face& f : faces_)
+      if (f.object == static_cast<int>(c))
+      {
+        triangles.conservativeResize(3, triangles.cols() + 1);
+        triangles.rightCols(1) << f.corner[0], f.corner[1], f.corner[2];
+      }
+    const auto add = [&](const Eigen::Matrix3Xd& points, const std::string& name) {
+      now.emplace_back();
+      for (Eigen::Index i = 0; i < points.cols(); ++i)
+        now.back().push_back(solidAngle(x_[c], triangles, points.col(i)) / M_PI);   // large: 1, of at most 2
+      pairs.push_back(name + " and " + names_[c]);
+    };
+    for (std::size_t i = 0; i < rods; ++i)
+      add(x_[i], names_[i]);
+    for (const Solid& solid : solids_)
+      if (solid.simulated)
+        add(solid.pose.position, solid.name);
+  }
+  for (std::size_t k = 0; k < sides_.size(); ++k)
+    for (std::size_t i = 0; i < now[k].size(); ++i)
+      if (now[k][i] * sides_[k][i] < 0.0 && std::min(std::abs(now[k][i]), std::abs(sides_[k][i])) > 1.0)
+      {
+        ++out.penetrations;
+        if (out.first.empty())
+          out.first = pairs[k] + " passed through each other";
+      }
+  sides_.swap(now);
+}
+
+}   // namespace slender::study
