@@ -174,9 +174,9 @@ std::vector<int> IslandSystem::numberBlocks()
   return blocks;
 }
 
-/// Factors fill up where contacts close loops of parts: each layer of a pile meets many parts of the next one. Where
-/// parts meet like the links of a chain, or two of them along their whole lengths, factorisation is faster. The limit
-/// is measured by the study island_solvers.
+/// Factors fill up where contacts close loops of parts: each layer of a pile meets many parts of the next one. In large
+/// piles conjugate gradients are faster then. Where parts meet like the links of a chain, or two of them along their
+/// whole lengths, factorisation is always faster. Both limits are measured by the study island_solvers.
 CouplingMatrix::Solver IslandSystem::chooseSolver()
 {
   if (solver != IslandSolver::automatic)
@@ -192,9 +192,10 @@ CouplingMatrix::Solver IslandSystem::chooseSolver()
   }
   std::sort(met_.begin(), met_.end());
   met_.erase(std::unique(met_.begin(), met_.end()), met_.end());
-  constexpr int kPairsPerBlock = 2;
-  return static_cast<int>(met_.size()) >= kPairsPerBlock * blocks_ ? CouplingMatrix::Solver::conjugate_gradients
-                                                                   : CouplingMatrix::Solver::cholesky;
+  constexpr int kPairsPerBlock = 2, kLeastUnknowns = 40'000;
+  const bool loops = static_cast<int>(met_.size()) >= kPairsPerBlock * blocks_;
+  return loops && matrix_.unknowns() >= kLeastUnknowns ? CouplingMatrix::Solver::conjugate_gradients
+                                                       : CouplingMatrix::Solver::cholesky;
 }
 
 // ---- the matrix

@@ -248,7 +248,7 @@ TEST(JoinedParts, IterativeAndDirectSolutionsAgree)
                      chosen = automatic.step(automatic.defaultInputs());
     ASSERT_TRUE(factored.ok && iterated.ok && chosen.ok) << k;
     EXPECT_EQ(factored.linear_iterations, 0);
-    EXPECT_EQ(chosen.linear_iterations, iterated.linear_iterations);   // 32 pairs of 12 parts
+    EXPECT_EQ(chosen.linear_iterations, 0);   // a small pile is factored
     linear += iterated.linear_iterations;
   }
   EXPECT_GT(linear, 25);
