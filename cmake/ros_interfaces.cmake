@@ -7,7 +7,7 @@ endif()
 if(SERVICES)
   add_service_files(FILES ${SERVICES})
 endif()
-generate_messages(DEPENDENCIES std_msgs geometry_msgs)
+generate_messages(DEPENDENCIES std_msgs geometry_msgs LANGS gencpp genpy)
 catkin_package(
   INCLUDE_DIRS include
   LIBRARIES slender_sim slender_sim_node

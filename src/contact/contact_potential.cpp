@@ -14,7 +14,6 @@ namespace slender {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastGap = 12.0;     // the gap over the smallest that barriers are to be resolved in
 constexpr double kTurnMargin = 0.02;   // [rad] a solid may turn before candidates are sought again
 

@@ -13,6 +13,8 @@
 
 namespace slender {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 class ContactPotential::Impl
 {
 public:

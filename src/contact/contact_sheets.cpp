@@ -8,12 +8,6 @@
 
 namespace slender {
 
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}   // namespace
-
 double ContactPotential::Impl::addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness)
 {
   double energy = 0.0;

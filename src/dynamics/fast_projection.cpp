@@ -14,8 +14,6 @@ namespace {
 
 constexpr int kHalo = ChainArrays::kHalo;
 
-Eigen::Vector3d at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
-
 }   // namespace
 
 void FastProjection::put(double* const* p, int i, const Eigen::Vector3d& v)

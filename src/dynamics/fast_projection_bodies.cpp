@@ -6,12 +6,6 @@
 
 namespace slender {
 
-namespace {
-
-Eigen::Vector3d at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
-
-}   // namespace
-
 /// Bodies whose touches lie in one run are coupled; touches are sorted by chain, so by run, too, but for closed chains.
 void FastProjection::buildPattern()
 {

@@ -5,12 +5,6 @@
 
 namespace slender {
 
-namespace {
-
-constexpr int kPack = 8;
-
-}   // namespace
-
 HingeBending::HingeBending(const Eigen::Matrix4Xi& hinges, const Eigen::VectorXd& stiffness,
                            const Eigen::VectorXd& rest_angles)
   : hinges_(hinges)

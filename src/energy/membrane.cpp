@@ -12,8 +12,6 @@ namespace slender {
 
 namespace {
 
-constexpr int kPack = 8;
-
 void require(bool good, const char* name, double value, const char* range)
 {
   if (!good)

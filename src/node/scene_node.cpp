@@ -36,7 +36,7 @@ bool isText(const std::string& scene)
 
 SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
 {
-  setBagReader(readGuideBag);
+  setGuideBagReader(readGuideBag);
   SceneConfig scene = isText(options.scene) ? parseScene(options.scene, "~scene", options.overrides)
                                             : readScene(options.scene, options.overrides);
   // one kind of state on the topic `state`

@@ -12,7 +12,6 @@ namespace slender {
 
 namespace {
 Vec3<double> vec(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-Vec3<double> at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
 
 /// A section and the free edge beside it as a joint.
 struct HalfJoint
@@ -29,7 +28,7 @@ HalfJoint halfJoint(ClampJoint& c, const RodArrays& a)
 {
   const int j = c.edge;
   const Vec3<double> section_t = vec(c.t), section_d1 = vec(c.d1), section_d2 = vec(c.t.cross(c.d1));
-  const Vec3<double> edge_t = at(a.t, j), edge_d1 = at(a.d1, j), edge_d2 = cross(edge_t, edge_d1);
+  const Vec3<double> edge_t = pointAt(a.t, j), edge_d1 = pointAt(a.d1, j), edge_d2 = cross(edge_t, edge_d1);
   const double inverse = a.inverse_length[j];
   const bool section_first = c.side == 1;
   const JointFrames<double> frames =

@@ -11,7 +11,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-Vec3<double> at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
 Vector3d eigen(const Vec3<double>& v) { return {v.x, v.y, v.z}; }
 
 struct Joint
@@ -24,7 +23,7 @@ struct Joint
 Joint jointAt(const RodModel& model, const RodArrays& a, int node, int e)
 {
   const int f = node;
-  const Vec3<double> te = at(a.t, e), d1e = at(a.d1, e), tf = at(a.t, f), d1f = at(a.d1, f);
+  const Vec3<double> te = pointAt(a.t, e), d1e = pointAt(a.d1, e), tf = pointAt(a.t, f), d1f = pointAt(a.d1, f);
   const JointFrames<double> frames = {
       te, d1e, cross(te, d1e), tf, d1f, cross(tf, d1f), a.inverse_length[e], a.inverse_length[f]};
   const JointStrains<double> strains = jointStrains(frames);
@@ -152,13 +151,13 @@ RodSections sectionsOf(const RodModel& model, const RodState& given)
   for (int j = 0; j < edges; ++j)
   {
     out.strain[j] = a.strain[j];
-    out.force.col(j) = a.stretch[j] * (a.strain[j] - a.rest_strain[j]) * eigen(at(a.t, j));
+    out.force.col(j) = a.stretch[j] * (a.strain[j] - a.rest_strain[j]) * eigen(pointAt(a.t, j));
   }
   takeJoints(model, state, system, out);
   takeClamps(model, system, out);
   blankHeldParts(state, out);
   for (int j = 0; j < edges; ++j)
-    out.tension[j] = out.force.col(j).dot(eigen(at(a.t, j)));
+    out.tension[j] = out.force.col(j).dot(eigen(pointAt(a.t, j)));
   return out;
 }
 

@@ -297,7 +297,7 @@ int runStatics(const Options& options, Simulation& simulation, Clock::time_point
 int run(const Options& options)
 {
 #ifdef SLENDER_WITH_BAG
-  slender::setBagReader(slender::readGuideBag);
+  slender::setGuideBagReader(slender::readGuideBag);
 #else
   if (!options.bag.empty())
   {

@@ -11,7 +11,7 @@ namespace slender {
 
 namespace {
 
-IslandContent checked(const WorldModel& world, IslandContent content)
+IslandContent checkedForExplicitSteps(const WorldModel& world, IslandContent content)
 {
   if (std::any_of(content.rods.begin(), content.rods.end(), [&](int r) { return world.rods[r].contact.has_value(); }))
     throw std::invalid_argument(
@@ -44,7 +44,7 @@ class ExplicitRods final : public RodIsland, SubstepEquations
 public:
   ExplicitRods(const WorldModel& world, IslandContent content, WorldState& state)
     : world_(world),
-      objects_(world, checked(world, std::move(content)), state),
+      objects_(world, checkedForExplicitSteps(world, std::move(content)), state),
       system_(steppersOf(objects_), bodiesOf(objects_), objects_.welds)
   {
     for (std::size_t r = 0; r < objects_.rods.size(); ++r)

@@ -118,6 +118,7 @@ private:
   void setOwner(int chain, int node, int owner);
   void prepare();
   void buildPattern();
+  static Eigen::Vector3d at(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
   static void put(double* const* p, int i, const Eigen::Vector3d& v);
   double& entry(int row, int column) { return matrix_.values()[matrix_.index(row, column)]; }
   void factorChain(Chain& chain);

@@ -5,6 +5,8 @@
 /// last hinge that have k = 0.
 namespace slender {
 
+constexpr int kPack = 8;   ///< entries of a pack, to whole ones of which the arrays of hinges and membranes are padded
+
 struct HingeArrays
 {
   int count = 0;                        ///< hinges with the padding

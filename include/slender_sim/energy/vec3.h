@@ -12,6 +12,9 @@ struct Vec3
   T x, y, z;
 };
 
+/// Point i of three arrays of coordinates.
+SLENDER_INLINE Vec3<double> pointAt(double* const* p, int i) { return {p[0][i], p[1][i], p[2][i]}; }
+
 template <class T>
 SLENDER_INLINE Vec3<T> operator+(const Vec3<T>& a, const Vec3<T>& b)
 {

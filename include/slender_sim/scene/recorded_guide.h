@@ -31,9 +31,9 @@ struct RecordedGuide
 };
 
 /// Throws std::runtime_error "FILE: reason".
-using BagReader = std::function<RecordedGuide(const BagSource&)>;
+using GuideBagReader = std::function<RecordedGuide(const BagSource&)>;
 
 /// How scenes that are read from now on read bags, which takes ROS (node/guide_bag.h).
-void setBagReader(BagReader reader);
+void setGuideBagReader(GuideBagReader reader);
 
 }   // namespace slender

@@ -17,11 +17,6 @@ namespace slender {
 
 namespace {
 
-std::vector<YamlCursor> entriesOf(const YamlCursor& list)
-{
-  return list.isList() ? list.items() : std::vector<YamlCursor>{};
-}
-
 template <class Objects, class Condition>
 bool any(const Objects& objects, const Condition& condition)
 {

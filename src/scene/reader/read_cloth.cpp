@@ -11,7 +11,6 @@ namespace slender {
 
 namespace {
 
-const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
 {
   if (!at.present())
@@ -129,7 +128,7 @@ std::vector<int> alongSide(const ClothConfig& cloth, int axis, bool far)
 std::vector<int> readNear(const YamlCursor& at, const Eigen::Matrix3Xd& vertices)
 {
   YamlMap map(at);
-  const auto point = map.require("point").vector3(coordinate);
+  const auto point = map.require("point").vector3(kCoordinate);
   const auto radius = map.get("radius").number(Range::above(0, kMaxCoordinate, "m"));
   map.finish();
   if (!point)

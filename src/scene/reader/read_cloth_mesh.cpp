@@ -12,7 +12,6 @@ namespace slender {
 
 namespace {
 
-const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 constexpr int max_cells = 2000;   // per side of a grid
 
 }   // namespace
@@ -59,13 +58,13 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
 {
   ClothGrid grid;
   YamlMap map(at);
-  assign(grid.corner, map.get("corner").vector3(coordinate));
+  assign(grid.corner, map.get("corner").vector3(kCoordinate));
   const YamlCursor at_sides = map.require("sides"), at_cells = map.require("cells"), at_seed = map.get("seed");
   const auto sides = at_sides.present() ? at_sides.items(2, 2) : std::vector<YamlCursor>{};
   bool good = sides.size() == 2;
   for (std::size_t k = 0; k < sides.size(); ++k)
   {
-    const auto side = sides[k].vector3(coordinate);
+    const auto side = sides[k].vector3(kCoordinate);
     good = good && side;
     assign(grid.sides[k], side);
     if (side && !(side->norm() > 0))

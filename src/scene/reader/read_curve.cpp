@@ -10,7 +10,6 @@ namespace slender {
 
 namespace {
 
-const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 const Range positive = Range::above(0, kMaxCoordinate, "m");
 
 std::optional<int> readEdges(YamlMap& map) { return map.get("edges").integer(1, max_edges); }
@@ -19,7 +18,7 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& at)
 {
   std::vector<Eigen::Vector3d> points;
   for (const YamlCursor& item : at.items(2, max_edges + 1))
-    if (const auto point = item.vector3(coordinate))
+    if (const auto point = item.vector3(kCoordinate))
       points.push_back(*point);
   return points;
 }
@@ -27,8 +26,8 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& at)
 StraightCurve readStraight(YamlMap& map)
 {
   StraightCurve curve;
-  assign(curve.from, map.get("from").vector3(coordinate));
-  assign(curve.to, map.get("to").vector3(coordinate));
+  assign(curve.from, map.get("from").vector3(kCoordinate));
+  assign(curve.to, map.get("to").vector3(kCoordinate));
   assign(curve.edges, readEdges(map));
   assign(curve.grading, map.get("grading").number(Range::closed(0.01, 100)));
   if (!((curve.to - curve.from).norm() > 0))
@@ -47,9 +46,9 @@ PolylineCurve readPolyline(YamlMap& map)
 ArcCurve readArc(YamlMap& map)
 {
   ArcCurve curve;
-  assign(curve.center, map.get("center").vector3(coordinate));
-  assign(curve.start, map.get("start").vector3(coordinate));
-  assign(curve.axis, map.get("axis").vector3(coordinate));
+  assign(curve.center, map.get("center").vector3(kCoordinate));
+  assign(curve.start, map.get("start").vector3(kCoordinate));
+  assign(curve.axis, map.get("axis").vector3(kCoordinate));
   const YamlCursor angle = map.get("angle");
   assign(curve.angle, angle.number(Range::closed(-2e5 * M_PI, 2e5 * M_PI, "rad")));
   if (curve.angle == 0)
@@ -68,10 +67,10 @@ ArcCurve readArc(YamlMap& map)
 HelixCurve readHelix(YamlMap& map)
 {
   HelixCurve curve;
-  assign(curve.center, map.get("center").vector3(coordinate));
-  assign(curve.axis, map.get("axis").vector3(coordinate));
+  assign(curve.center, map.get("center").vector3(kCoordinate));
+  assign(curve.axis, map.get("axis").vector3(kCoordinate));
   assign(curve.radius, map.get("radius").number(positive));
-  assign(curve.pitch, map.get("pitch").number(coordinate));
+  assign(curve.pitch, map.get("pitch").number(kCoordinate));
   const YamlCursor turns = map.get("turns");
   assign(curve.turns, turns.number(Range::closed(-1e5, 1e5)));
   if (curve.turns == 0)
@@ -83,8 +82,8 @@ HelixCurve readHelix(YamlMap& map)
 CatenaryCurve readCatenary(YamlMap& map)
 {
   CatenaryCurve curve;
-  assign(curve.from, map.get("from").vector3(coordinate));
-  assign(curve.to, map.get("to").vector3(coordinate));
+  assign(curve.from, map.get("from").vector3(kCoordinate));
+  assign(curve.to, map.get("to").vector3(kCoordinate));
   assign(curve.length, map.get("length").number(positive));
   assign(curve.edges, readEdges(map));
   return curve;
@@ -93,9 +92,9 @@ CatenaryCurve readCatenary(YamlMap& map)
 TrefoilCurve readTrefoil(YamlMap& map)
 {
   TrefoilCurve curve;
-  assign(curve.center, map.get("center").vector3(coordinate));
-  assign(curve.axis, map.get("axis").vector3(coordinate));
-  assign(curve.up, map.get("up").vector3(coordinate));
+  assign(curve.center, map.get("center").vector3(kCoordinate));
+  assign(curve.axis, map.get("axis").vector3(kCoordinate));
+  assign(curve.up, map.get("up").vector3(kCoordinate));
   assign(curve.radius, map.get("radius").number(positive));
   assign(curve.separation, map.get("separation").number(positive));
   assign(curve.length, map.get("length").number(positive));
@@ -107,8 +106,8 @@ TrefoilCurve readTrefoil(YamlMap& map)
 TorusKnotCurve readTorusKnot(YamlMap& map)
 {
   TorusKnotCurve curve;
-  assign(curve.center, map.get("center").vector3(coordinate));
-  assign(curve.axis, map.get("axis").vector3(coordinate));
+  assign(curve.center, map.get("center").vector3(kCoordinate));
+  assign(curve.axis, map.get("axis").vector3(kCoordinate));
   assign(curve.radius, map.get("radius").number(positive));
   assign(curve.tube_radius, map.get("tube_radius").number(positive));
   assign(curve.around, map.get("around").integer(1, 1000));
@@ -120,9 +119,9 @@ TorusKnotCurve readTorusKnot(YamlMap& map)
 VeeCurve readVee(YamlMap& map)
 {
   VeeCurve curve;
-  assign(curve.tip, map.get("tip").vector3(coordinate));
-  assign(curve.direction, map.get("direction").vector3(coordinate));
-  assign(curve.normal, map.get("normal").vector3(coordinate));
+  assign(curve.tip, map.get("tip").vector3(kCoordinate));
+  assign(curve.direction, map.get("direction").vector3(kCoordinate));
+  assign(curve.normal, map.get("normal").vector3(kCoordinate));
   assign(curve.arm, map.get("arm").number(positive));
   assign(curve.angle, map.get("angle").number(Range::between(0, M_PI, "rad")));
   assign(curve.edges, readEdges(map));

@@ -8,15 +8,15 @@ namespace slender {
 
 namespace {
 
-BagReader& bagReader()
+GuideBagReader& guideBagReader()
 {
-  static BagReader reader;
+  static GuideBagReader reader;
   return reader;
 }
 
 }   // namespace
 
-void setBagReader(BagReader reader) { bagReader() = std::move(reader); }
+void setGuideBagReader(GuideBagReader reader) { guideBagReader() = std::move(reader); }
 
 std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& context, bool bodies, double begin,
                                      const std::string& object)
@@ -40,14 +40,14 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
   if (source.file.empty())
     return std::nullopt;
   source.file = context.resolve(source.file);
-  if (!bagReader())
+  if (!guideBagReader())
   {
     at.problem("needs a program that reads bags: simulate or tracking_node, built with ROS (WITH_ROS)");
     return std::nullopt;
   }
   try
   {
-    RecordedGuide recorded = bagReader()(source);
+    RecordedGuide recorded = guideBagReader()(source);
     if (!recorded.gaps.empty())
       at.warning(recorded.gaps);
     return recorded;

@@ -17,6 +17,8 @@ constexpr int max_edges = 1'000'000;
 constexpr double kMaxSceneNodes = 1e7;
 #endif
 
+inline const Range kCoordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
+
 /// What the parts need to know of the scene around them.
 struct ReadContext
 {
@@ -30,6 +32,11 @@ struct ReadContext
   bool claim(const YamlCursor& at, double more) const;
 };
 
+/// Entries of a list; none if there is no list, which somebody else reports.
+inline std::vector<YamlCursor> entriesOf(const YamlCursor& list)
+{
+  return list.isList() ? list.items() : std::vector<YamlCursor>{};
+}
 /// Whole numbers of [0, count), sorted; an entry "3..7" stands for all between, negative ones count from the end.
 /// `count` 0: not known, not checked. Empty when reported.
 std::vector<int> readIndexList(const YamlCursor& at, int count);

@@ -14,7 +14,6 @@ namespace slender {
 
 namespace {
 
-const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 const Range size = Range::above(0, kMaxCoordinate, "m");
 const Range friction = Range::closed(0, 100);
 
@@ -36,7 +35,7 @@ Plane readPlane(YamlMap& map, std::optional<Pose>& pose)
     map.at().problem("has a point or normal, and there is a pose as well; give one or the other");
     return {};
   }
-  const auto through = point.vector3(coordinate);
+  const auto through = point.vector3(kCoordinate);
   const auto up = normal.vector3(Range::closed(-1e6, 1e6));
   if (up && !(up->norm() > 0))
   {
@@ -94,7 +93,7 @@ std::optional<Pose> readPose(const YamlCursor& at)
     return std::nullopt;
   Pose pose;
   YamlMap map(at);
-  assign(pose.position, map.get("position").vector3(coordinate));
+  assign(pose.position, map.get("position").vector3(kCoordinate));
   const YamlCursor orientation = map.get("orientation"), rpy = map.get("rpy");
   map.finish();
   if (orientation.present() && rpy.present())

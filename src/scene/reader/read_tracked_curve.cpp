@@ -16,7 +16,6 @@ namespace slender {
 namespace {
 
 constexpr int most_functions = 2000;   // their equations are dense
-const Range coordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
 
 /// The rod beside which a guide is read; without nodes when it could not be.
 struct TrackedCurve
@@ -56,7 +55,7 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& points, const YamlCurs
     }
   }
   for (const YamlCursor& item : points.present() ? points.items() : std::vector<YamlCursor>{})
-    if (const auto point = item.vector3(coordinate))
+    if (const auto point = item.vector3(kCoordinate))
       out.push_back(*point);
   return out;
 }
@@ -125,7 +124,7 @@ std::optional<PointTrajectory> readTable(const YamlCursor& at, int nodes)
   PointTrajectory points;
   for (const YamlCursor& item : at.items(1))
   {
-    const auto row = item.numbers(coordinate);
+    const auto row = item.numbers(kCoordinate);
     if (!row)
       return std::nullopt;
     if (row->size() != 1 + 3 * static_cast<std::size_t>(nodes))

@@ -206,11 +206,6 @@ void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cl
   }
 }
 
-std::vector<YamlCursor> entriesOf(const YamlCursor& list)
-{
-  return list.isList() ? list.items() : std::vector<YamlCursor>{};
-}
-
 /// All that has a place in space.
 void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
 {
