@@ -46,9 +46,22 @@ def scene(name):
     return only(r"`%s\.yaml`[^\n]*:\n\n```yaml\n([^`]*)```" % name)
 
 
+def commands(start):
+    """The command lines of the text that begin so: indented, and continued where a line ends with a backslash or within quotes."""
+    return re.findall(r"\n    (%s[^\n]*(?:\n      [^\n]*)*)" % re.escape(start), TEXT)
+
+
+def command(start):
+    """The one command line that begins so."""
+    found = commands(start)
+    if len(found) != 1:
+        raise AssertionError("%d commands begin with %s" % (len(found), start))
+    return found[0]
+
+
 def launch_command(name):
-    """`roslaunch ... scene:=$PWD/NAME.yaml ...` without rviz."""
-    return only(r"`(roslaunch slender_sim \w+\.launch scene:=\$PWD/%s\.yaml[^`]*)`" % name).replace(" rviz:=true", "")
+    """The first `roslaunch ... scene:=$PWD/NAME.yaml ...` without rviz."""
+    return [line for line in commands("roslaunch slender_sim ") if "scene:=$PWD/%s.yaml" % name in line][0].replace(" rviz:=true", "")
 
 
 class Tutorials(unittest.TestCase):
@@ -115,13 +128,12 @@ class Tutorials(unittest.TestCase):
 
     def test_rope(self):
         self.write("rope.yaml", scene("rope"))
-        record = only(r"`(record_bag:=\$PWD/rope\.bag)`")
-        node = self.shell(launch_command("rope") + " " + record)
+        self.assertIn(" record_bag:=$PWD/rope.bag", launch_command("rope"))
+        node = self.shell(launch_command("rope"))
         state = self.listen("/state", RodState)
         first = self.see(state, lambda m: True, "/state").nodes[0]
         self.assertAlmostEqual(first.y, 0.0, 9)   # nobody moves it yet
-        command = only(r"\n( +rostopic pub -r 20 -s /grasps/gripper/pose .*?)\n\n")
-        mover = self.shell(command)
+        mover = self.shell(command("rostopic pub -r 20 -s /grasps/gripper/pose"))
         moved = self.see(state, lambda m: abs(m.nodes[0].y - 0.2) < 1e-6, "the gripper to be at y = 0.2 m")
         self.assertAlmostEqual(moved.nodes[0].z, 1.0, 6)
         # every message has its own stamp: none is dropped as stale, and the input stays young
@@ -140,11 +152,25 @@ class Tutorials(unittest.TestCase):
         self.see(wrench, lambda m: abs(m.wrench.force.z) > 0.01, "the rope's weight on the gripper")
         self.stop(mover)
         self.stop(node)
-        self.bag_lists(only(r"`(rosbag info rope\.bag)`"), ["/state", "/scene", "/grasps/gripper/wrench"])
+        self.bag_lists(command("rosbag info rope.bag"), ["/state", "/scene", "/grasps/gripper/wrench"])
+
+    def test_table_and_film(self):
+        """The gripper goes 0.3 m aside and back. The film has a picture for each 0.04 s."""
+        self.write("rope.yaml", scene("rope"))
+        self.done(command("rosrun slender_sim simulate rope.yaml --bag "))
+        with rosbag.Bag(self.path("table.bag")) as bag:
+            places = [message.nodes[0].y for _, message, _ in bag.read_messages("/state")]
+        self.assertEqual(len(places), 801)
+        self.assertAlmostEqual(max(places), 0.3, 9)
+        self.assertAlmostEqual(places[-1], 0.0, 9)
+        self.done(command("rosrun slender_sim bag_to_video "))
+        self.assertGreater(os.path.getsize(self.path("rope.mp4")), 10000)
 
     def test_stiffer_rope(self):
         self.write("rope.yaml", scene("rope"))
-        self.shell(launch_command("rope") + " " + only(r'`(set:="\[rods\.0\.material\.youngs_modulus=1e8\]")`'))
+        stiffer = [line for line in commands("roslaunch slender_sim rod.launch") if "youngs_modulus=1e8" in line]
+        self.assertEqual(len(stiffer), 1)
+        self.shell(stiffer[0].replace(" rviz:=true", ""))
         text = self.listen("/scene", String)
         self.see(text, lambda m: "youngs_modulus: 1e8" in m.data, "the overridden scene")
         self.see(self.listen("/state", RodState), lambda m: m.step > 10, "steps of the stiffer rope")
@@ -158,7 +184,7 @@ class Tutorials(unittest.TestCase):
         self.bag_lists("rosbag info honey.bag", ["/state", "/scene"])
 
     def test_driven_nozzle(self):
-        flow, motion, replaced = only(r"With `(flow: \{topic: true[^`]*)` and\s+`(motion: \{topic: true\})` in place of `(swirl: 0\.3)` in `nozzle`")
+        flow, motion, replaced = only(r"With `(flow: \{topic: true[^`]*)` and\s+`(motion: \{topic: true\})`\s+in\s+place\s+of\s+`(swirl: 0\.3)`\s+in\s+`nozzle`")
         text = scene("honey")
         self.assertIn("flow: 4.0e-7, " + replaced, text)
         self.write("honey.yaml", text.replace("flow: 4.0e-7, " + replaced, flow + ", " + motion))
@@ -185,9 +211,9 @@ class Tutorials(unittest.TestCase):
 
     def test_sweep(self):
         """The first run of the map ends; the whole map takes long."""
-        command = only(r"`(rosrun slender_sim sweep [^`]*)`")
-        self.assertIn("--out out/map", command)
-        sweep = self.shell(command)
+        line = command("rosrun slender_sim sweep ")
+        self.assertIn("--out out/map", line)
+        sweep = self.shell(line)
 
         def begun():
             self.assertIsNone(sweep.poll(), self.output())
@@ -203,16 +229,15 @@ class Tutorials(unittest.TestCase):
         state = self.listen("/state", ClothState)
         self.see(state, lambda m: m.step > 2, "the handkerchief")
         held = state.all()[0].vertices[0]
-        # "drive grasps/hand/pose as above": the command for the gripper, with the hand's topic and pose. Poses of cloths count relative to the first one.
-        command = only(r"\n( +rostopic pub -r 20 -s /grasps/gripper/pose .*?)\n\n").replace("gripper", "hand")
-        mover = self.shell(command)
+        # "drive /grasps/hand/pose as above": the command for the gripper, with the hand's topic and pose. Poses of cloths count relative to the first one.
+        pose = command("rostopic pub -r 20 -s /grasps/gripper/pose").replace("gripper", "hand")
+        mover = self.shell(pose)
         sent = self.listen("/grasps/hand/pose", PoseStamped)
         wait_for(lambda: sent.count() > 40, "two seconds of poses")   # the first of them is what later ones count from
         self.stop(mover)
-        self.shell(command.replace("y: 0.2", "y: 0.3"))
+        self.shell(pose.replace("y: 0.2", "y: 0.3"))
         self.see(state, lambda m: abs(m.vertices[0].y - held.y - 0.1) < 1e-6, "the corner 0.1 m further")
-        release = only(r"`(rosservice call /cloth_node/set_grasp [^`]*)`")
-        self.assertIn("success: True", self.done(release))
+        self.assertIn("success: True", self.done(command("rosservice call /cloth_node/set_grasp ")))
         self.see(state, lambda m: m.vertices[0].z < held.z - 0.05, "the corner that was let go")
         self.stop(node)
         self.bag_lists("rosbag info cloth.bag", ["/state", "/scene", "/mesh"])
@@ -241,7 +266,7 @@ class Tutorials(unittest.TestCase):
         self.see(state, lambda m: sum(f.z for f in m.guide_forces) > 0.0, "forces that bear the weight")
         self.stop(node)
         self.bag_lists("rosbag info tracked.bag", ["/state", "/scene", "/mesh"])
-        self.done(only(r"`(rosrun slender_sim regions tracked\.yaml out\.ply)`"))
+        self.done(command("rosrun slender_sim regions tracked.yaml out.ply"))
         self.assertGreater(os.path.getsize(self.path("out.ply")), 1000)
 
 

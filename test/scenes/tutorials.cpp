@@ -86,13 +86,19 @@ protected:
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  /// Writes the scene NAME.yaml of the text and runs the text's `simulate` commands that begin with it.
+  /// Writes the scene NAME.yaml of the text and runs the text's `simulate` commands that begin with it. They are
+  /// indented, and continued where a line ends with a backslash. Those that record a bag need ROS and are left to
+  /// test/nodes/tutorials_test.py.
   void follow(const std::string& name, std::size_t commands)
   {
     const std::vector<std::string> scenes = matches(text_, "`" + name + R"(\.yaml`[^\n]*:\n\n```yaml\n([^`]*)```)");
     ASSERT_EQ(scenes.size(), 1u);
     std::ofstream(folder_ + "/" + name + ".yaml") << scenes[0];
-    const std::vector<std::string> lines = matches(text_, "`rosrun slender_sim simulate (" + name + R"(\.yaml[^`]*)`)");
+    std::vector<std::string> lines =
+        matches(text_, "\n    rosrun slender_sim simulate (" + name + R"(\.yaml[^\n]*(?:\n      [^\n]*)*))");
+    lines.erase(std::remove_if(lines.begin(), lines.end(),
+                               [](const std::string& line) { return line.find("--bag") != std::string::npos; }),
+                lines.end());
     ASSERT_EQ(lines.size(), commands);
     for (const std::string& line : lines)
     {
