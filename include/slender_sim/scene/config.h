@@ -202,7 +202,7 @@ struct RodConfig
   bool closed = false;                  ///< loop: the last node is joined to the first by one more edge
   bool naturally_straight = false;      ///< rest curvature zero whatever the centerline's shape
   JointOptions joints;                  ///< `curvature`, `matched_to_arcs`
-  /// joints.curvature is chosen when the rod is built: see `curvature` in the README
+  /// joints.curvature is chosen when the rod is built: see `curvature` in docs/rods.md
   bool automatic_curvature = true;
   std::vector<double> rest_twist;   ///< natural twist [rad]: of the whole rod, or of each joint; empty: none
   /// about d2, -d1 [1/m]: of all joints, or of each; empty: that of the centreline

@@ -282,7 +282,7 @@ struct VibratingShell
 };
 
 constexpr int kModes = 4;
-/// Bending has the ratio of hinges on equilateral triangles (see docs/cloth_node.md). The membrane has its own.
+/// Bending has the ratio of hinges on equilateral triangles (see docs/cloth.md). The membrane has its own.
 const ShellMaterial kShell{1.0, 1e6, 0.3, 1e6 * 2e-3 * 2e-3 / 12, -1.0 / 3};
 
 /// Largest relative difference of two lists of frequencies.

