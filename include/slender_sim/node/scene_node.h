@@ -41,8 +41,8 @@ enum class NodeKind
 const char* toString(NodeKind kind);
 
 /// Simulates a scene of rods and bodies, of viscous threads, of cloth, or of cloth or rods that track guides: poses of
-/// what moves them come in as messages, their motion goes out. docs/nodes.md lists topics, services and parameters. Everything
-/// runs in the thread of spin(), so a callback never sees a half-taken step.
+/// what moves them come in as messages, their motion goes out. docs/nodes.md lists topics, services and parameters.
+/// Everything runs in the thread of spin(), so a callback never sees a half-taken step.
 class SceneNode
 {
 public:
