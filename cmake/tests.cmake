@@ -31,3 +31,6 @@ foreach(program study_tests node_unit_tests)
     set_target_properties(${program} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
   endif()
 endforeach()
+
+# README, docs/ and the change log: their form, and that what they name is there.
+add_test(NAME documents COMMAND ${PROJECT_SOURCE_DIR}/test/docs/check_documents.py --self-test)
