@@ -34,7 +34,8 @@ GOOD = {
 | `gravity` | a list [x, y, z] of numbers in [-1, 1] |
 | `time.step` | a number in (0, 10] s |
 | `rods.N.material.density` | a number |
-| `rods.N.cross_section.ellipse.N` | a number |
+| `rods.N.cross_section.ellipse` | a list, each entry a number |
+| `generate.N.chain.material` | a map, keys as of [`rods.N.material`](#keys) |
 | `rods.N.grasps.NAME.edges.N` | a place |
 | `rods.N.grasps.NAME.motion` | one of: fixed |
 | `rods.N.grasps.NAME.motion.topic` | true or false |
@@ -76,6 +77,12 @@ rods:
 ```yaml
     grasps:
       left: {edges: [0], motion: fixed}
+```
+
+```yaml
+generate:
+  - chain:
+      material: {density: 1}
 ```
 
 ```yaml
@@ -132,6 +139,7 @@ BREAKS = [   # (what breaks, file, text, what stands there instead, problem that
     ('key of a scene', 'docs/page.md', '{density: 1000}', '{desnity: 1000}', 'no key desnity'),
     ('key at the wrong place', 'docs/page.md', 'cross_section: {ellipse', 'ellipse: {cross_section', 'no key ellipse'),
     ('key of a grasp', 'docs/page.md', 'right: {edges', 'right: {edge', 'no key edge'),
+    ('key that two places share', 'docs/page.md', '      material: {density: 1}', '      material: {desnity: 1}', 'no key desnity'),
     ('key of a fragment', 'docs/page.md', 'motion: fixed', 'motions: fixed', 'no key motions'),
     ('key of a plan', 'docs/page.md', 'scene: chain.yaml', 'scenes: chain.yaml', 'sweeps have no key scenes'),
     ('axis of a plan', 'docs/page.md', 'axes: {rods.0.material', 'axes: {rods.0.materials', 'no key rods.0.materials'),

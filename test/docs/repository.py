@@ -17,16 +17,27 @@ class Keys:
 
     def __init__(self, text):
         self.root = {}
-        for path in re.findall(r'^\| `([\w.]+)` \|', text, re.M):
-            node = self.root
-            for part in path.split('.'):
-                node = node.setdefault(part, {})
-        self.anchors = list(self._anchors(self.root))
+        shared = []
+        for path, rest in re.findall(r'^\| `([\w.]+)` \|(.*)$', text, re.M):
+            node = self._at(path)
+            shared += [(node, owner) for owner in re.findall(r'keys as of \[`([\w.]+)`\]', rest)]
+        for node, owner in shared + shared:   # twice, for owners that share the keys of others
+            for key, below in self._at(owner).items():
+                node.setdefault(key, below)
+        self.anchors = list(self._anchors(self.root, set()))
 
-    def _anchors(self, node):
-        yield node
-        for child in node.values():
-            yield from self._anchors(child)
+    def _at(self, path):
+        node = self.root
+        for part in path.split('.'):
+            node = node.setdefault(part, {})
+        return node
+
+    def _anchors(self, node, seen):
+        if id(node) not in seen:
+            seen.add(id(node))
+            yield node
+            for child in node.values():
+                yield from self._anchors(child, seen)
 
     def misses(self, node, value):
         """Keys of a YAML value that the reference does not have at this node."""
