@@ -43,7 +43,8 @@ GOOD = {
 
 ## More
 ''',
-    'docs/README.md': '# Index\n\n- [A page](page.md)\n- [keys](scene_reference.md)\n\n## By subject\n',
+    'docs/studies.md': '# Studies\n\n    study list\n\n## Rods\n\n| Study | |\n|---|---|\n| `knot` | knots |\n',
+    'docs/README.md': '# Index\n\n- [A page](page.md)\n- [studies](studies.md)\n- [keys](scene_reference.md)\n\n## By subject\n',
     'README.md': '# slender_sim\n\nSee [the page](docs/page.md#what-it-does-twice).\n\n## Two commands\n\n    scripts/demo --headless\n',
     'CHANGELOG.rst': 'Changelog\n=========\n\n0.1.0\n-----\n* One entry\n  of two lines.\n* Another.\n',
     'docs/page.md': '''# A page
@@ -134,6 +135,8 @@ BREAKS = [   # (what breaks, file, text, what stands there instead, problem that
     ('argument in a sentence', 'docs/page.md', '`scene:=FILE`', '`inner:=FILE`', 'no launch file has an argument inner'),
     ('study', 'docs/page.md', 'study run knot --out', 'study run knots --out', 'no study knots'),
     ('study in a list', 'docs/page.md', '       study run knot\n', '       study run knots\n', 'no study knots'),
+    ('study that is left out', 'docs/studies.md', '| `knot` |', '| knot |', 'study knot is in no table'),
+    ('study in a table', 'docs/studies.md', '| `knot` |', '| `knot`, `knots` |', 'no study knots'),
     ('parameter of a node', 'docs/page.md', '_max_lag', '_max_leg', 'no node has a parameter ~max_leg'),
     ('service of a node', 'docs/page.md', '`~pause`', '`~pose`', 'service ~pose'),
     ('key of a scene', 'docs/page.md', '{density: 1000}', '{desnity: 1000}', 'no key desnity'),
@@ -153,7 +156,7 @@ BREAKS = [   # (what breaks, file, text, what stands there instead, problem that
 ]
 
 
-PAGES = ['README.md', 'docs/README.md', 'docs/page.md', 'docs/scene_reference.md']
+PAGES = ['README.md', 'docs/README.md', 'docs/page.md', 'docs/scene_reference.md', 'docs/studies.md']
 
 
 class Documents(unittest.TestCase):

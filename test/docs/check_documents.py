@@ -237,6 +237,22 @@ def check_program(page, line, program, words):
             page.problem(line, 'no node has a parameter ~%s' % parameter.group(1))
 
 
+def check_studies(page):
+    """docs/studies.md has every study, in the first columns of tables with the heading Study, and none that is not there."""
+    if page.name != 'docs/studies.md':
+        return
+    named = {}
+    for block in page.blocks:
+        if block.kind == 'table' and re.match(r'\|\s*Study\s*\|', block.lines[0]):
+            for k, row in enumerate(block.lines):
+                named.update((name, block.line + k) for name in re.findall(r'`(\w+)`', row.split('|')[1]))
+    for name, line in named.items():
+        if name not in page.repository.studies:
+            page.problem(line, 'there is no study %s' % name)
+    for name in sorted(page.repository.studies - set(named) - {'all'}):
+        page.problem(1, 'study %s is in no table' % name)
+
+
 def study_names(words):
     skip = False
     for word in words:
@@ -365,7 +381,7 @@ def check_changelog(repository):
     return problems
 
 
-RULES = [check_width, check_paragraphs, check_size, check_opening, check_links, check_index, check_paths, check_commands, check_keys]
+RULES = [check_width, check_paragraphs, check_size, check_opening, check_links, check_index, check_paths, check_commands, check_studies, check_keys]
 
 
 def check(repository, names, rules=RULES):
