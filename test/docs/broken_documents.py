@@ -35,6 +35,8 @@ GOOD = {
 | `time.step` | a number in (0, 10] s |
 | `rods.N.material.density` | a number |
 | `rods.N.cross_section.ellipse` | a list, each entry a number |
+| `tracked.N.functions` | a list of maps; or a map | |
+| `tracked.N.functions.basis` | one of: hats |
 | `generate.N.chain.material` | a map, keys as of [`rods.N.material`](#keys) |
 | `rods.N.grasps.NAME.edges.N` | a place |
 | `rods.N.grasps.NAME.motion` | one of: fixed |
@@ -84,6 +86,8 @@ rods:
 generate:
   - chain:
       material: {density: 1}
+tracked:
+  - functions: [{basis: hats}, {basis: hats}]
 ```
 
 ```yaml
@@ -143,6 +147,8 @@ BREAKS = [   # (what breaks, file, text, what stands there instead, problem that
     ('key at the wrong place', 'docs/page.md', 'cross_section: {ellipse', 'ellipse: {cross_section', 'no key ellipse'),
     ('key of a grasp', 'docs/page.md', 'right: {edges', 'right: {edge', 'no key edge'),
     ('key that two places share', 'docs/page.md', '      material: {density: 1}', '      material: {desnity: 1}', 'no key desnity'),
+    ('key in a list of maps', 'docs/page.md', '{basis: hats}]', '{bases: hats}]', 'no key bases'),
+    ('list where none belongs', 'docs/page.md', '  - material: {density: 1000}', '  - material: [{density: 1000}]', 'for a list with maps'),
     ('key of a fragment', 'docs/page.md', 'motion: fixed', 'motions: fixed', 'no key motions'),
     ('key of a plan', 'docs/page.md', 'scene: chain.yaml', 'scenes: chain.yaml', 'sweeps have no key scenes'),
     ('axis of a plan', 'docs/page.md', 'axes: {rods.0.material', 'axes: {rods.0.materials', 'no key rods.0.materials'),

@@ -17,9 +17,12 @@ class Keys:
 
     def __init__(self, text):
         self.root = {}
+        self.maps = set()   # identities of the nodes that take a list of maps, whose keys are below the node itself
         shared = []
         for path, rest in re.findall(r'^\| `([\w.]+)` \|(.*)$', text, re.M):
             node = self._at(path)
+            if 'a list of maps' in rest.split('|')[0]:
+                self.maps.add(id(node))
             shared += [(node, owner) for owner in re.findall(r'keys as of \[`([\w.]+)`\]', rest)]
         for node, owner in shared + shared:   # twice, for owners that share the keys of others
             for key, below in self._at(owner).items():
@@ -55,8 +58,10 @@ class Keys:
             for entry in value:
                 if 'N' in node:
                     yield from self.misses(node['N'], entry)
+                elif id(node) in self.maps:
+                    yield from self.misses(node, entry)
                 elif contains_mapping(entry):
-                    yield 'a list here'
+                    yield 'for a list with maps'
 
     @staticmethod
     def child(node, key, below):
