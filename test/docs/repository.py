@@ -1,9 +1,13 @@
 """What documents may name: programs, options, launch files, studies, parameters and keys of scenes, as the sources have them."""
 import re
+import sys
 from functools import cached_property, lru_cache
 from pathlib import Path
 
-import yaml
+try:
+    import yaml
+except ImportError:
+    sys.exit('check_documents.py needs PyYAML (Debian: python3-yaml)')
 
 CPP_STRING = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
 
