@@ -29,6 +29,7 @@ NOT_SCENES = {
     '{left_wrist: left}': 'parameter ~bodies of motion_player',
     'numpy.bool': 'a name of Python',
 }
+WORKSPACE = 'src/slender_sim'   # this package in a catkin workspace
 SHELL = {'', 'sh', 'bash', 'shell', 'console'}
 FOLDERS = 'scripts|config|launch|test|src|include|bench|docs|cmake|msg|srv'
 PATH = re.compile(r'(?<![\w./$~-])(?:\$\((?:rospack )?find slender_sim\)/)?((?:%s)/[\w./*{},-]*)' % FOLDERS)
@@ -129,7 +130,7 @@ def check_paths(page):
             for path in PATH.findall(text):
                 path = re.sub(r'[.,:;]+$', '', path)
                 path = path if path.count('{') == path.count('}') else path[:path.find('{')]
-                if not placeholder(path) and not page.repository.exists(path):
+                if not placeholder(path) and path != WORKSPACE and not page.repository.exists(path):
                     page.problem(line, 'path %s is not there' % path)
             for path in ROOM_FILE.findall(text):
                 if not any((page.repository.root / base / path).exists() for base in ('include/slender_sim', 'src')):
