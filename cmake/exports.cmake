@@ -45,5 +45,5 @@ if(BUILD_TESTING AND YUV_LIBRARY AND TinyGLTF_FOUND)   # scripts/test installs b
   endforeach()
   add_dependencies(export_tests slender_sim_simulate)
   set_target_properties(export_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
-  add_test(NAME exports COMMAND export_tests)
+  slender_gtest(export_tests)
 endif()

@@ -53,7 +53,11 @@ if(BUILD_TESTING)
   target_link_libraries(study_tests PRIVATE slender_sim_studies GTest::gtest GTest::gtest_main)
   add_dependencies(study_tests slender_sim_sweep_program slender_sim_study_program)
   set_target_properties(study_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
-  add_test(NAME study COMMAND study_tests)
-  # The quick form of every study, judged. Two at a time, as many as the smallest machine has cores.
-  add_test(NAME studies COMMAND slender_sim_study_program check --jobs 2 --xml ${PROJECT_BINARY_DIR}/test_results/gtest/studies.xml)
+  slender_gtest(study_tests)
+  # The quick form of every study, judged: one test each, study.NAME. Those that take more than ten seconds are slow.
+  set(SLOW_STUDIES cloth_accuracy cloth_collision_safety coiling cost_model coupled_safety drape fabric_drape flag ibm_vs_hinge lean
+    partitions rod_implicit_vs_explicit rod_stability stick_slip_strip stiffness_range thread_stability tracking_methods tracking_overhead)
+  configure_file(${CMAKE_CURRENT_LIST_DIR}/study_tests.cmake.in ${PROJECT_BINARY_DIR}/study_tests.cmake.in @ONLY)
+  file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/study_tests.cmake INPUT ${PROJECT_BINARY_DIR}/study_tests.cmake.in)
+  set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY TEST_INCLUDE_FILES ${PROJECT_BINARY_DIR}/study_tests.cmake)
 endif()

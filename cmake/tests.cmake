@@ -1,4 +1,6 @@
 # Tests without ROS; those with it are in nodes.cmake. scripts/test builds and runs them all.
+# Each test case is a test of CTest: `ctest --test-dir build -j2 -R NAME` chooses some. Those with the label `slow` are left out
+# by `scripts/test`, and run by `scripts/test --all`.
 find_package(GTest REQUIRED)
 foreach(kind unit analytic scenes)
   file(GLOB test_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/${kind}/*.cpp)
@@ -12,7 +14,7 @@ foreach(kind unit analytic scenes)
     target_compile_options(${kind}_tests PRIVATE $<$<CONFIG:Release>:-O1>)   # tests spend their time in the library
     # Not among the programs that rosrun offers.
     set_target_properties(${kind}_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
-    add_test(NAME ${kind} COMMAND ${kind}_tests)
+    slender_gtest(${kind}_tests)
   endif()
 endforeach()
 if(TARGET scenes_tests)

@@ -1,13 +1,10 @@
 #!/usr/bin/python3
-"""Runs the tests that CTest knows in a build directory and counts single test cases.
-
-Google Test and rostest write result files in JUnit's XML; the cases in them are counted. A test program that fails without
-saying which case (a crash, a timeout, no result file) counts as one failed case, so that nothing fails silently. Exit status 0
-only if nothing failed and something passed.
+"""Runs the tests that CTest knows in a build directory and counts them. Each case of Google Test, each study and each case
+of a rostest is one test, and a rostest that fails counts as one more failed test. The last line is "N passed, N failed";
+the exit status is 0 only if nothing failed and something passed.
 """
 
 import argparse
-import json
 import os
 import pathlib
 import shutil
@@ -16,76 +13,61 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 
-def results_in(folder):
-    return set(folder.rglob("*.xml")) if folder.is_dir() else set()
+def cases(path):
+    """Yields (name, passed) for the cases of a JUnit file that were run."""
+    for case in ElementTree.parse(path).getroot().iter("testcase"):
+        failed = case.find("failure") is not None or case.find("error") is not None or case.get("status") == "fail"
+        if failed or (case.find("skipped") is None and case.get("status", "run") == "run"):
+            yield case.get("name"), not failed
 
 
-def count(path):
-    """(passed, names of failed cases) in one result file, or None when it cannot be read."""
-    try:
-        root = ElementTree.parse(path).getroot()
-    except (ElementTree.ParseError, OSError):
-        return None
-    passed, failed = 0, []
-    for case in root.iter("testcase"):
-        name = "{}.{}".format(case.get("classname", ""), case.get("name", ""))
-        if case.find("failure") is not None or case.find("error") is not None:
-            failed.append(name)
-        elif case.find("skipped") is None and case.get("status") != "notrun":
-            passed += 1
-    return passed, failed
+def rostest_cases(build):
+    """Yields (name, passed) for the cases of all rostests, from the files that their test nodes wrote."""
+    for path in sorted((build / "test_results").rglob("rosunit-*.xml")):
+        try:
+            for name, passed in cases(path):
+                yield "{}: {}".format(path.stem, name), passed
+        except ElementTree.ParseError:
+            yield "{}: the result file cannot be read".format(path.name), False
 
 
-def run(build, name, timeout):
-    """Runs one test; returns (passed, names of failed cases)."""
-    gtest_folder = build / "test_results" / "gtest"
-    gtest_folder.mkdir(parents=True, exist_ok=True)
-    before = results_in(build / "test_results")
-    environment = dict(os.environ, GTEST_OUTPUT="xml:{}/{}.xml".format(gtest_folder.resolve(), name.replace("/", "_")))
-    command = ["ctest", "--test-dir", str(build), "-R", "^{}$".format(name), "--output-on-failure", "--timeout", str(timeout)]
-    print("== {}".format(name), flush=True)
-    good = subprocess.run(command, env=environment).returncode == 0
-    files = sorted(results_in(build / "test_results") - before)
-    # rostest writes a summary (rostest-*.xml) beside the results of each test node (rosunit-*.xml): the single cases are in the
-    # latter; the former tells of nodes that died.
-    detailed = [path for path in files if path.name.startswith("rosunit-")]
-    summaries = [path for path in files if path.name.startswith("rostest-")] if detailed else []
-    passed, failed = 0, []
-    for path in files:
-        counted = count(path)
-        if counted is None:
-            failed.append("{}: result file {} cannot be read".format(name, path.name))
-        elif path in summaries:
-            if not any((count(other) or (0, ["?"]))[1] for other in detailed):
-                failed += ["{}: {}".format(name, case) for case in counted[1]]
-        else:
-            passed += counted[0]
-            failed += ["{}: {}".format(name, case) for case in counted[1]]
-    if not good and not failed:
-        failed.append("{}: the program failed without naming a case (crash, timeout, or not built)".format(name))
-    if good and not files:
-        passed += 1   # a plain program whose exit status is all it says
+def run(build, arguments, junit):
+    """Runs CTest; returns (number of passed tests, names of failed ones)."""
+    command = ["ctest", "--test-dir", str(build), "-j", str(arguments.jobs), "--output-on-failure", "--timeout",
+               str(arguments.timeout), "--output-junit", str(junit.resolve()), "--no-tests=error"]
+    if not arguments.all:
+        command += ["-LE", "slow"]
+    junit.unlink(missing_ok=True)
+    status = subprocess.run(command).returncode
+    if not junit.exists():
+        return 0, ["ctest ended with status {} and wrote no results".format(status)]
+    rostests = list(rostest_cases(build))
+    passed = sum(good for _, good in rostests)
+    failed = [name for name, good in rostests if not good]
+    for name, good in cases(junit):
+        if "_rostest_" in name and good:
+            continue   # its cases are counted; a node may have died where all cases passed
+        passed += good
+        failed += [] if good else [name]
+    if status != 0 and not failed:
+        failed.append("ctest ended with status {}".format(status))
     return passed, failed
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("build", type=pathlib.Path)
-    parser.add_argument("--timeout", type=int, default=1500, help="seconds for each test program")
+    parser.add_argument("--all", action="store_true", help="slow tests as well")
+    parser.add_argument("--jobs", type=int, default=int(os.environ.get("JOBS", "2")))
+    parser.add_argument("--timeout", type=int, default=1500, help="seconds for each test")
     parser.add_argument("--passed", action="append", default=[], help="counts a check done elsewhere")
     parser.add_argument("--failed", action="append", default=[])
     arguments = parser.parse_args()
 
     shutil.rmtree(arguments.build / "test_results", ignore_errors=True)
-    listing = subprocess.run(["ctest", "--test-dir", str(arguments.build), "--show-only=json-v1"], stdout=subprocess.PIPE, check=True)
-    names = [test["name"] for test in json.loads(listing.stdout)["tests"]]
-    passed, failed = len(arguments.passed), list(arguments.failed)
-    for name in names:
-        more_passed, more_failed = run(arguments.build, name, arguments.timeout)
-        passed += more_passed
-        failed += more_failed
-    if not names:
-        failed.append("CTest knows no tests in {}".format(arguments.build))
+    passed, failed = run(arguments.build, arguments, arguments.build / "ctest.xml")
+    passed += len(arguments.passed)
+    failed += arguments.failed
     for line in failed:
         print("FAILED {}".format(line))
     print("{} passed, {} failed".format(passed, len(failed)), flush=True)
