@@ -23,7 +23,15 @@ set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/performance/lean.cpp ${PROJE
 
 # `study` is too common a name for a target in a shared catkin workspace.
 set(TOOLS ${PROJECT_SOURCE_DIR}/src/tools)
-add_executable(slender_sim_study_program ${TOOLS}/study.cpp ${TOOLS}/study_check.cpp ${TOOLS}/study_report.cpp ${TOOLS}/report_page.cpp)
+add_executable(slender_sim_study_program ${TOOLS}/study.cpp ${TOOLS}/study_check.cpp ${TOOLS}/study_report.cpp ${TOOLS}/report_page.cpp ${TOOLS}/results_page.cpp
+  ${TOOLS}/loaded_study.cpp)
+# Reports name version and commit.
+set(COMMIT_HEADER ${PROJECT_BINARY_DIR}/commit/commit.h)
+add_custom_target(slender_sim_commit BYPRODUCTS ${COMMIT_HEADER}
+  COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DOUT=${COMMIT_HEADER} -P ${CMAKE_CURRENT_LIST_DIR}/commit.cmake)
+add_dependencies(slender_sim_study_program slender_sim_commit)
+target_include_directories(slender_sim_study_program PRIVATE ${PROJECT_BINARY_DIR}/commit)
+set_property(SOURCE ${TOOLS}/study_report.cpp PROPERTY COMPILE_DEFINITIONS SLENDER_VERSION="${PROJECT_VERSION}")
 set_target_properties(slender_sim_study_program PROPERTIES OUTPUT_NAME study)
 target_link_libraries(slender_sim_study_program PRIVATE slender_sim_studies)
 add_executable(slender_sim_sweep_program ${TOOLS}/sweep.cpp ${TOOLS}/sweep_runs.cpp ${TOOLS}/sweep_engines.cpp)

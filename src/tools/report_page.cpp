@@ -9,10 +9,9 @@
 #include <map>
 #include <sstream>
 
-#include "../scene/reader/yaml_tree.h"
 #include "../study/framework/whole_file.h"
+#include "loaded_study.h"
 #include "markup.h"
-#include "slender_sim/scene/reader.h"
 #include "slender_sim/study/bars.h"
 #include "slender_sim/study/output.h"
 
@@ -49,21 +48,19 @@ std::string base64(const std::string& bytes)
   return out;
 }
 
-bool isNumber(const std::string& text, double& value)
+std::string cell(double value)
 {
-  char* end = nullptr;
-  value = std::strtod(text.c_str(), &end);
-  return !text.empty() && *end == '\0';
+  if (std::isnan(value))
+    return "<td>not a number</td>";
+  char number[32];
+  std::snprintf(number, sizeof number, "%.4g", value);
+  return std::string("<td class=n>") + number + "</td>";
 }
 
 std::string cell(const std::string& text)
 {
   double value = 0.0;
-  if (!isNumber(text, value))
-    return "<td>" + escaped(text) + "</td>";
-  char number[32];
-  std::snprintf(number, sizeof number, "%.4g", value);
-  return std::string("<td class=n>") + number + "</td>";
+  return isNumber(text, value) ? cell(value) : "<td>" + escaped(text) + "</td>";
 }
 
 /// Returns two table cells with the bar of a metric and whether the value meets it, or nothing if the metric has no
@@ -77,41 +74,6 @@ std::string rating(const std::string& study, const std::string& metric, double v
   char text[48];
   std::snprintf(text, sizeof text, "<td class=n>%s %g</td>", sense, bar->limit);
   return text + std::string(bar->metBy(value) ? "<td class=good>met</td>" : "<td class=bad>missed</td>");
-}
-
-struct Loaded
-{
-  std::vector<std::pair<std::string, std::string>> metrics;
-  std::vector<std::string> notes;
-  double seconds = 0.0;
-  std::string error;
-};
-
-Loaded load(const ReportedStudy& study)
-{
-  Loaded loaded;
-  loaded.error = study.failure;
-  const std::string file = study.folder + "/result.json";
-  if (!fs::exists(file))
-    return loaded;
-  try
-  {
-    const YamlTree tree = parseYaml(wholeFile(file), file);   // JSON is YAML
-    const YamlTree& result = tree.find("studies")->items.at(0);
-    for (const auto& [name, value] : result.find("metrics")->members)
-      loaded.metrics.emplace_back(name, value.kind == YamlTree::Kind::null ? "not a number" : value.scalar);
-    if (const YamlTree* notes = result.find("notes"))
-      for (const YamlTree& note : notes->items)
-        loaded.notes.push_back(note.scalar);
-    if (const YamlTree* error = result.find("error"))
-      loaded.error = error->scalar;
-    loaded.seconds = std::strtod(result.find("wall_seconds")->scalar.c_str(), nullptr);
-  }
-  catch (const SceneError& error)
-  {
-    loaded.error = error.what();
-  }
-  return loaded;
 }
 
 void writeRows(std::ostream& page, const std::string& csv)
@@ -134,7 +96,7 @@ void writeRows(std::ostream& page, const std::string& csv)
          << table.str() << "</table></div></details>\n";
 }
 
-void writeStudy(std::ostream& page, const ReportedStudy& study, const Loaded& loaded)
+void writeStudy(std::ostream& page, const ReportedStudy& study, const LoadedStudy& loaded)
 {
   page << "<h3 id=\"" << escaped(study.name) << "\">" << escaped(study.name) << "</h3>\n<p class=words>"
        << escaped(study.description) << "</p>\n";
@@ -152,12 +114,9 @@ void writeStudy(std::ostream& page, const ReportedStudy& study, const Loaded& lo
   if (!loaded.metrics.empty())
   {
     page << "<table>";
-    for (const auto& [key, text] : loaded.metrics)
-    {
-      double value = 0.0;
-      page << "<tr><td>" << escaped(key) << "</td>" << cell(text)
-           << (isNumber(text, value) ? rating(study.name, key, value) : "") << "</tr>\n";
-    }
+    for (const auto& [key, value] : loaded.metrics)
+      page << "<tr><td>" << escaped(key) << "</td>" << cell(value)
+           << (std::isnan(value) ? "" : rating(study.name, key, value)) << "</tr>\n";
     page << "</table>\n";
   }
   if (!loaded.notes.empty())
@@ -181,10 +140,10 @@ void writeStudy(std::ostream& page, const ReportedStudy& study, const Loaded& lo
 std::string reportPage(const std::string& title, const std::vector<std::pair<std::string, std::string>>& facts,
                        const std::vector<ReportSection>& sections)
 {
-  std::map<std::string, Loaded> loaded;
+  std::map<std::string, LoadedStudy> loaded;
   for (const ReportSection& section : sections)
     for (const ReportedStudy& study : section.studies)
-      loaded[study.name] = load(study);
+      loaded[study.name] = loadStudy(study);
 
   std::ostringstream page;
   page << "<!DOCTYPE html>\n<html lang=en><head><meta charset=utf-8><title>" << escaped(title) << "</title><style>"
@@ -208,19 +167,17 @@ std::string reportPage(const std::string& title, const std::vector<std::pair<std
   for (const ReportSection& section : sections)
     for (const ReportedStudy& study : section.studies)
     {
-      const Loaded& result = loaded[study.name];
+      const LoadedStudy& result = loaded[study.name];
       if (!result.error.empty())
         page << "<tr><td><a href=\"#" << escaped(study.name) << "\">" << escaped(study.name)
              << "</a></td><td colspan=4 class=bad>failed</td></tr>\n";
-      for (const auto& [key, text] : result.metrics)
+      for (const auto& [key, value] : result.metrics)
       {
-        double value = std::nan("");
-        const bool number = isNumber(text, value);
         const std::string verdict =
-            number ? rating(study.name, key, value) : "<td></td><td class=bad>not a number</td>";
+            std::isnan(value) ? "<td></td><td class=bad>not a number</td>" : rating(study.name, key, value);
         if (!verdict.empty())
           page << "<tr><td><a href=\"#" << escaped(study.name) << "\">" << escaped(study.name) << "</a></td><td>"
-               << escaped(key) << "</td>" << cell(text) << verdict << "</tr>\n";
+               << escaped(key) << "</td>" << cell(value) << verdict << "</tr>\n";
       }
     }
   page << "</table>\n";

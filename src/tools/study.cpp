@@ -1,4 +1,4 @@
-// study list | run NAME... | check | report: the experiments behind the package's claims.
+// study list | run NAME... | check | report | results: the experiments behind the package's claims.
 
 #include <chrono>
 #include <cstring>
@@ -12,6 +12,7 @@
 
 #include "arguments.h"
 #include "slender_sim/study/bars.h"
+#include "slender_sim/study/headlines.h"
 #include "slender_sim/study/output.h"
 #include "slender_sim/study/study.h"
 #include "study_check.h"
@@ -30,16 +31,19 @@ const char kUsage[] =
     "       study run NAME... [--quick] [--judge] [--json FILE] [--out DIR]\n"
     "       study check [NAME...] [--jobs N] [--xml FILE]\n"
     "       study report [NAME...] --out DIR [--quick] [--jobs N]\n"
+    "       study results DIR\n"
     "  NAME     a study of `study list`, or all\n"
     "  --quick  fewer cases and coarser ones: at most a minute or two each\n"
-    "  --judge  fails a study that exceeds a bound or misses a bar (timings are not judged)\n"
+    "  --judge  fails a study that exceeds a bound, misses a bar (timings are not judged) or lacks a figure of its "
+    "headlines\n"
     "  check    runs the quick form of every study, or of those named, and judges it; --xml writes the results in "
     "JUnit's format\n"
     "  --json   metrics and rows of all studies run\n"
     "  --out    a CSV table and PNG plots of each study (the directory is made); report: DIR/report.html, one page "
-    "with all of them.\n"
+    "with all of them, and DIR/results.md.\n"
     "           Stopped, it goes on where it was;\n"
     "           with names: of these studies alone\n"
+    "  results  writes DIR/results.md again from the results that a report left in DIR, and runs nothing\n"
     "  --jobs   studies at a time (default 1; times are of CPUs, but more of them disturb each other a little)\n"
     "exit status: 0 done, 1 a study failed, 2 bad usage\n";
 
@@ -174,11 +178,12 @@ int run(const Options& options)
       status = kStudyFailed;
     }
     if (options.judge && result.error.empty())
-      for (const std::string& failure : slender::study::judge(context))
-      {
-        std::cerr << "study: " << study->name << ": " << failure << "\n";
-        status = kStudyFailed;
-      }
+      for (const auto& judged : {slender::study::judge(context), slender::study::missingFigures(context)})
+        for (const std::string& failure : judged)
+        {
+          std::cerr << "study: " << study->name << ": " << failure << "\n";
+          status = kStudyFailed;
+        }
     if (!options.out.empty() && !writeFiles(options, context))
       status = kStudyFailed;
     results.push_back(result);
@@ -220,6 +225,15 @@ int report(const std::vector<std::string>& words)
   return slender::makeReport(options) == 0 ? kDone : kStudyFailed;
 }
 
+int results(const std::vector<std::string>& words)
+{
+  if (words.size() != 1 || words[0].rfind("-", 0) == 0)
+    return badUsage("results needs the directory of a report");
+  slender::writeResults(words[0]);
+  std::cout << words[0] << "/results.md\n";
+  return kDone;
+}
+
 int check(const std::vector<std::string>& words)
 {
   slender::StudyCheckOptions options;
@@ -253,6 +267,8 @@ int main(int argc, char** argv)
   {
     if (words[0] == "report")
       return report({words.begin() + 1, words.end()});
+    if (words[0] == "results")
+      return results({words.begin() + 1, words.end()});
     if (words[0] == "check")
       return check({words.begin() + 1, words.end()});
   }

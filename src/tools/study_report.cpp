@@ -17,7 +17,9 @@
 #include "arguments.h"
 #include "../study/framework/processes.h"
 #include "../study/framework/whole_file.h"
+#include "commit.h"
 #include "report_page.h"
+#include "results_page.h"
 #include "slender_sim/study/study.h"
 
 namespace slender {
@@ -129,6 +131,27 @@ std::string extent(bool quick)
          std::to_string(fs::last_write_time(thisProgram()).time_since_epoch().count()) + "\n";
 }
 
+using Facts = std::vector<std::pair<std::string, std::string>>;
+
+/// What made the results: program and machine.
+Facts facts(bool quick)
+{
+  utsname system{};
+  uname(&system);
+  const std::string commit = SLENDER_COMMIT;
+  return {{"version", SLENDER_VERSION + (commit.empty() ? "" : ", commit " + commit)},
+          {"made", localTime()},
+          {"extent", quick ? "quick: fewer and coarser cases" : "full"},
+          {"processor", systemValue("/proc/cpuinfo", "model name")},
+          {"memory", systemValue("/proc/meminfo", "MemTotal")},
+          {"system", std::string(system.sysname) + " " + system.release},
+          {"compiler", "GCC " __VERSION__},
+          {"Eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
+                        std::to_string(EIGEN_MINOR_VERSION)}};
+}
+
+std::string factsFile(const std::string& directory) { return directory + "/data/facts.txt"; }
+
 void prepare(const ReportOptions& options)
 {
   std::error_code error;
@@ -136,38 +159,37 @@ void prepare(const ReportOptions& options)
   if (error)
     throw BadInput("cannot make directory " + options.out + "/data: " + error.message());
   const std::string file = options.out + "/data/extent.txt", wanted = extent(options.quick);
-  if (!fs::exists(file))
-    std::ofstream(file) << wanted;
-  else if (wholeFile(file) != wanted)
+  if (fs::exists(file) && wholeFile(file) != wanted)
     throw BadInput(options.out + " holds the results of another program or extent (" + file +
                    "); give another --out or delete it");
+  if (fs::exists(file))
+    return;
+  std::ofstream(file) << wanted;
+  std::ofstream kept(factsFile(options.out));
+  for (const auto& [key, text] : facts(options.quick))
+    kept << key << ": " << text << "\n";
 }
 
-std::vector<std::pair<std::string, std::string>> facts(const ReportOptions& options, double seconds,
-                                                       std::size_t studies)
+/// Returns what prepare() kept. A report of a version that did not keep it has none.
+Facts keptFacts(const std::string& directory)
 {
-  utsname system{};
-  uname(&system);
-  char took[64];
-  std::snprintf(took, sizeof took, "%.0f s for %zu studies, %ld at a time", seconds, studies, options.jobs);
-  return {{"made", localTime()},
-          {"extent", options.quick ? "quick: fewer and coarser cases" : "full"},
-          {"processor", systemValue("/proc/cpuinfo", "model name")},
-          {"memory", systemValue("/proc/meminfo", "MemTotal")},
-          {"system", std::string(system.sysname) + " " + system.release},
-          {"compiler", "GCC " __VERSION__},
-          {"Eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
-                        std::to_string(EIGEN_MINOR_VERSION)},
-          {"this call", took}};
+  Facts kept;
+  std::ifstream lines(factsFile(directory));
+  for (std::string line; std::getline(lines, line);)
+    if (const std::size_t at = line.find(": "); at != std::string::npos)
+      kept.emplace_back(line.substr(0, at), line.substr(at + 2));
+  return kept;
 }
 
-}   // namespace
-
-int makeReport(const ReportOptions& options)
+bool chosen(const ReportOptions& options, const std::string& name)
 {
-  checkPlans();
+  return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
+}
+
+/// Sections of the report with the studies that were asked for.
+std::vector<ReportSection> sectionsOf(const ReportOptions& options)
+{
   std::vector<ReportSection> sections;
-  std::vector<ReportedStudy*> todo;
   for (const Plan& plan : plans())
   {
     sections.push_back({plan.title, plan.words, {}});
@@ -175,7 +197,7 @@ int makeReport(const ReportOptions& options)
     if (!options.quick)
       names.insert(names.end(), plan.more.begin(), plan.more.end());
     for (const char* name : names)
-      if (!options.only.empty() && std::find(options.only.begin(), options.only.end(), name) == options.only.end())
+      if (!chosen(options, name))
         continue;
       else if (const study::Study* found = study::findStudy(name))
         sections.back().studies.push_back({name, found->description, options.out + "/data/" + name, ""});
@@ -190,6 +212,49 @@ int makeReport(const ReportOptions& options)
                              [&](const ReportedStudy& s) { return s.name == name; });
         }))
       throw BadInput("report: " + name + " is no study of the " + (options.quick ? "quick" : "full") + " report");
+  return sections;
+}
+
+/// The command that runs a study and leaves its result.
+std::vector<std::string> commandOf(const ReportedStudy& s, bool quick)
+{
+  const std::string json = s.folder + "/result.json";
+  // under its own name only once it is whole
+  return {"/bin/sh", "-c",
+          shellWord(thisProgram()) + " run " + s.name + (quick ? " --quick" : "") + " --out " + shellWord(s.folder) +
+              " --json " + shellWord(json + ".part") + " > " + shellWord(s.folder + "/log.txt") +
+              " 2>&1; status=$?; [ $status -le 1 ] && mv " + shellWord(json + ".part") + " " + shellWord(json) +
+              "; exit $status"};
+}
+
+void writePage(const std::string& path, const std::string& text)
+{
+  std::ofstream file(path);
+  file << text;
+  file.close();
+  if (!file)
+    throw BadInput("cannot write " + path);
+}
+
+}   // namespace
+
+void writeResults(const std::string& directory)
+{
+  const std::string extent_file = directory + "/data/extent.txt";
+  if (!fs::exists(extent_file))
+    throw BadInput(directory + " holds no report: there is no " + extent_file);
+  checkPlans();
+  ReportOptions all;
+  all.out = directory;
+  const bool quick = wholeFile(extent_file).rfind("quick", 0) == 0;
+  writePage(directory + "/results.md", resultsPage(keptFacts(directory), quick, sectionsOf(all)));
+}
+
+int makeReport(const ReportOptions& options)
+{
+  checkPlans();
+  std::vector<ReportSection> sections = sectionsOf(options);
+  std::vector<ReportedStudy*> todo;
   prepare(options);
   for (ReportSection& section : sections)
     for (ReportedStudy& s : section.studies)
@@ -197,16 +262,8 @@ int makeReport(const ReportOptions& options)
         todo.push_back(&s);
 
   const auto command = [&](std::size_t k) {
-    const ReportedStudy& s = *todo[k];
-    fs::create_directories(s.folder);
-    const std::string json = s.folder + "/result.json";
-    // under its own name only once it is whole
-    return std::vector<std::string>{"/bin/sh", "-c",
-                                    shellWord(thisProgram()) + " run " + s.name + (options.quick ? " --quick" : "") +
-                                        " --out " + shellWord(s.folder) + " --json " + shellWord(json + ".part") +
-                                        " > " + shellWord(s.folder + "/log.txt") +
-                                        " 2>&1; status=$?; [ $status -le 1 ] && mv " + shellWord(json + ".part") + " " +
-                                        shellWord(json) + "; exit $status"};
+    fs::create_directories(todo[k]->folder);
+    return commandOf(*todo[k], options.quick);
   };
   const auto start = std::chrono::steady_clock::now();
   Progress progress("report", "studies", todo.size());
@@ -224,13 +281,13 @@ int makeReport(const ReportOptions& options)
                  progress.show(++done);
                });
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  char took[64];
+  std::snprintf(took, sizeof took, "%.0f s for %zu studies, %ld at a time", seconds, todo.size(), options.jobs);
+  Facts of_page = facts(options.quick);
+  of_page.emplace_back("this call", took);
   const std::string page = options.out + "/report.html";
-  std::ofstream file(page);
-  file << reportPage("slender_sim: error against run time, stability, cost", facts(options, seconds, todo.size()),
-                     sections);
-  file.close();
-  if (!file)
-    throw BadInput("cannot write " + page);
+  writePage(page, reportPage("slender_sim: error against run time, stability, cost", of_page, sections));
+  writeResults(options.out);
   std::cout << page << ": " << todo.size() << " studies in " << static_cast<long>(seconds) << " s, " << failed
             << " failed\n";
   return failed;

@@ -14,9 +14,13 @@ struct ReportOptions
 };
 
 /// Runs the studies of the report, each as a process of its own (`study run NAME --json ... --out OUT/data/NAME`),
-/// those that OUT holds already left out, and writes OUT/report.html, which needs no other file. Progress on stderr.
-/// Returns the number of studies that failed; the page names them. Throws BadInput when OUT holds results of another
-/// program or extent, or cannot be written, and for names that the report has not.
+/// those that OUT holds already left out, and writes OUT/report.html, which needs no other file, and OUT/results.md.
+/// Progress on stderr. Returns the number of studies that failed; the page names them. Throws BadInput when OUT holds
+/// results of another program or extent, or cannot be written, and for names that the report has not.
 int makeReport(const ReportOptions& options);
+
+/// Writes DIR/results.md (see results_page.h) from the results that an earlier report left in DIR/data. Runs nothing.
+/// Throws BadInput if DIR holds no report or cannot be written.
+void writeResults(const std::string& directory);
 
 }   // namespace slender

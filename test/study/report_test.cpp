@@ -78,6 +78,9 @@ TEST_F(Report, isOnePageWithFiguresAndTablesThatLoadsNothing)
       }
   }
   EXPECT_GE(countOf(html, "<img "), 1u);
+  const std::string results = contents(folder_ + "/out/results.md");
+  EXPECT_NE(results.find("| version | "), std::string::npos) << results;
+  EXPECT_NE(results.find("**These are results of the quick form**"), std::string::npos);
   EXPECT_NE(html.find("worst_error_over_bound"), std::string::npos);
   EXPECT_NE(html.find("<td>processor</td>"), std::string::npos);
   // nothing is loaded: what refers to anything refers to the page itself
@@ -142,6 +145,100 @@ TEST_F(Report, mixesNothingAndKnowsItsStudies)
   const Result unknown = report("trouton elastika");
   EXPECT_EQ(unknown.status, 2);
   EXPECT_NE(unknown.output.find("elastika"), std::string::npos) << unknown.output;
+}
+
+/// A report of four studies as files, written by hand: one that meets its targets, one that misses some, one whose
+/// metric is not a number, and one that did not end.
+class Results : public Report
+{
+protected:
+  void SetUp() override
+  {
+    Report::SetUp();
+    write("extent.txt", "full report\n");
+    write("facts.txt", "version: 1.2.3, commit abc\nprocessor: a processor of the test\n");
+    result("elastica", R"("worst_error_over_bound": 0.89)");
+    // projection has two targets of its own; nan_count is that of every study
+    result("projection", R"("length_error_max": 5e-9, "iterations_max_to_1ms": 7, "isotropic_over_general_cpu": 0.47,
+      "nan_count": 2)");
+    result("trouton", R"("worst_error_over_bound": null)");
+    fs::create_directories(folder_ + "/out/data/torsion");
+  }
+  void write(const std::string& file, const std::string& text) const
+  {
+    fs::create_directories(fs::path(folder_ + "/out/data/" + file).parent_path());
+    std::ofstream(folder_ + "/out/data/" + file) << text;
+  }
+  void result(const std::string& study, const std::string& metrics) const
+  {
+    write(study + "/result.json", "{\"studies\": [{\"name\": \"" + study + "\", \"metrics\": {" + metrics +
+                                      "}, \"rows\": [], \"wall_seconds\": 1}]}\n");
+  }
+  /// Returns the first row of the page that has both texts.
+  std::string row(const std::string& study, const std::string& text) const
+  {
+    std::istringstream lines(contents(folder_ + "/out/results.md"));
+    for (std::string line; std::getline(lines, line);)
+      if (line.rfind("| `" + study + "` |", 0) == 0 && line.find(text) != std::string::npos)
+        return line;
+    return "no row of " + study + " with " + text;
+  }
+  Result make() const { return slender::test::shell(SLENDER_STUDY " results " + folder_ + "/out"); }
+};
+
+TEST_F(Results, sayWhatIsMetMissedAndNotMeasured)
+{
+  const Result made = make();
+  ASSERT_EQ(made.status, 0) << made.output;
+  const auto has = [](const std::string& line, const std::string& text) {
+    EXPECT_NE(line.find(text), std::string::npos) << line;
+  };
+  has(row("elastica", "elliptic integrals"), "| 0.89 of the bound | at most 1 of the bound; exact:");
+  has(row("elastica", "elliptic integrals"), "| yes |");
+  has(row("projection", "edge lengths"), "| 5e-9 | at most 1e-8 | yes |");
+  has(row("projection", "iterations"), "| **7** | at most 5;");
+  has(row("projection", "iterations"), "| no |");
+  has(row("projection", "isotropic"), "| 0.47 |  | - |");
+  // misses a target that has no headline: told all the same
+  has(row("projection", "nan_count"), "| **2** | 0 | no |");
+  // not a number is not met
+  has(row("trouton", "stretched"), "| **not a number** |");
+  has(row("trouton", "stretched"), "| no |");
+  has(row("torsion", "gripper"), "| did not end | at most 1 of the bound;");
+  has(row("torsion", "gripper"), "| - |");
+  has(row("swing", "8 mm"), "| not in this report | at most 0.25 s (time);");
+  has(row("swing", "8 mm"), "| - |");
+  const std::string page = contents(folder_ + "/out/results.md");
+  has(page, "Of 5 targets, **2 are met and 3 are missed**.");
+  has(page, "`projection` (`iterations_max_to_1ms`)");
+  has(page, "| version | 1.2.3, commit abc |");
+  EXPECT_EQ(page.find("quick form**"), std::string::npos);
+}
+
+TEST_F(Results, sayIfTheyAreOfTheQuickForm)
+{
+  write("extent.txt", "quick report\n");
+  result("coupled_safety", R"("penetrations": 0, "thickness_violations": 0, "nan_count": 0, "unexplained_failures": 0,
+    "scenes": 20)");
+  ASSERT_EQ(make().status, 0);
+  const std::string page = contents(folder_ + "/out/results.md");
+  EXPECT_NE(page.find("**These are results of the quick form**"), std::string::npos);
+  // a target of the full form alone: a thousand scenes
+  EXPECT_NE(row("coupled_safety", "stand behind").find("| not in the quick form | at least 1,000 (full form) | - |"),
+            std::string::npos)
+      << row("coupled_safety", "stand behind");
+}
+
+TEST_F(Results, fromABrokenOrAbsentReportAreNone)
+{
+  write("elastica/result.json", "{\"studies\": [");
+  ASSERT_EQ(make().status, 0);
+  EXPECT_NE(row("elastica", "the study itself").find("**failed**"), std::string::npos);
+  EXPECT_NE(row("elastica", "elliptic").find("| **missing** |"), std::string::npos) << row("elastica", "elliptic");
+  fs::remove(folder_ + "/out/data/extent.txt");
+  const Result none = make();
+  EXPECT_EQ(none.status, 2);
+  EXPECT_NE(none.output.find("holds no report"), std::string::npos) << none.output;
 }
 
 }   // namespace
