@@ -18,7 +18,8 @@ foreach(kind unit analytic scenes)
   endif()
 endforeach()
 if(TARGET scenes_tests)
-  add_dependencies(scenes_tests slender_sim_simulate slender_sim_fair_mesh slender_sim_regions)
+  add_dependencies(scenes_tests slender_sim_simulate slender_sim_fair_mesh slender_sim_regions
+    slender_sim_scene_reference)
   get_target_property(simulate_definitions slender_sim_simulate COMPILE_DEFINITIONS)
   set(has_bag 0)
   if("SLENDER_WITH_BAG" IN_LIST simulate_definitions)
@@ -26,7 +27,8 @@ if(TARGET scenes_tests)
   endif()
   target_compile_definitions(scenes_tests PRIVATE SLENDER_HAS_BAG=${has_bag}
     SLENDER_SIMULATE="$<TARGET_FILE:slender_sim_simulate>" SLENDER_FAIR_MESH="$<TARGET_FILE:slender_sim_fair_mesh>"
-    SLENDER_REGIONS="$<TARGET_FILE:slender_sim_regions>")
+    SLENDER_REGIONS="$<TARGET_FILE:slender_sim_regions>"
+    SLENDER_SCENE_REFERENCE="$<TARGET_FILE:slender_sim_scene_reference>")
 endif()
 foreach(program study_tests node_unit_tests)
   if(TARGET ${program})

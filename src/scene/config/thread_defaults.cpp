@@ -160,8 +160,8 @@ std::string millimetres(double length) { return about(1e3 * length) + " mm"; }
 void checkHeight(const Falls& falls, const ThreadConfig& thread, const YamlCursor& at)
 {
   const NozzleConfig& nozzle = *thread.nozzle;
-  YamlMap map(YamlMap(at).get("nozzle"));
-  const YamlCursor place = std::holds_alternative<TableMotion>(nozzle.motion) ? map.get("motion") : map.get("position");
+  YamlMap map(YamlMap(at).find("nozzle"));
+  const YamlCursor place = std::holds_alternative<TableMotion>(nozzle.motion) ? map.find("motion") : map.find("position");
   const double radius = 0.5 * nozzle.diameter;
   const std::string what =
       thread.floor && !(thread.contact && thread.contact->solids) ? "its floor" : "what it flows onto";
@@ -189,8 +189,8 @@ void checkDripping(const ThreadConfig& thread, const YamlCursor& at, double grav
   const double least = leastJettingSpeed(fall, thread.surface_tension);
   if (flow < least * area)
   {
-    YamlMap(YamlMap(at).get("nozzle"))
-        .get("flow")
+    YamlMap(YamlMap(at).find("nozzle"))
+        .find("flow")
         .problem("is " + about(flow / area) +
                  " m/s in the nozzle, at which so thin a fluid drips: surface tension draws "
                  "it up, and no thread forms. Must be at least " +
@@ -202,17 +202,17 @@ void checkDripping(const ThreadConfig& thread, const YamlCursor& at, double grav
 /// What was given, against what forms.
 void checkGiven(const Needs& needs, const Falls& falls, const ThreadConfig& thread, const YamlCursor& at, double step)
 {
-  YamlMap edges(YamlMap(at).get("edges"));
+  YamlMap edges(YamlMap(at).find("edges"));
   if (thread.feed_length > 0 && thread.feed_length > 0.5 * falls.least)
   {
-    edges.get("feed").problem("is more than half of the fall of " + millimetres(falls.least) + "; must be at most " +
+    edges.find("feed").problem("is more than half of the fall of " + millimetres(falls.least) + "; must be at most " +
                               about(0.1 * falls.least) + " m for ten edges, or leave it out");
     return;
   }
   const Landing& landing = needs.tightest;
   if (!landing.slender())
   {
-    YamlMap(at).get("nozzle").warning(
+    YamlMap(at).find("nozzle").warning(
         "a coil would be no wider than the thread (" + millimetres(landing.coil_radius) + " beside a radius of " +
         millimetres(landing.radius) +
         "): it falls as a jet and ends in a puddle, which is no thread. Only the falling " + "part is to be trusted.");
@@ -221,7 +221,7 @@ void checkGiven(const Needs& needs, const Falls& falls, const ThreadConfig& thre
   const double longest = thread.longest_edge > 0 ? thread.longest_edge : thread.feed_length;
   if (longest > 0 && edgesPerTurn(landing, longest) < kFewPerTurn)
   {
-    (thread.longest_edge > 0 ? edges.get("longest") : edges.get("feed"))
+    (thread.longest_edge > 0 ? edges.find("longest") : edges.find("feed"))
         .warning("coils of a radius of about " + millimetres(landing.coil_radius) +
                  " form at the floor, and such edges make only " + about(edgesPerTurn(landing, longest)) +
                  " per turn, too few to resolve them. Use edges.longest: " + about(needs.edges.longest) +
@@ -286,7 +286,7 @@ void swirl(const Falls& falls, const Needs& needs, ThreadConfig& thread, const Y
 {
   if (!(thread.swirl > 0))
     return;
-  const YamlCursor key = YamlMap(YamlMap(at).get("nozzle")).get("swirl");
+  const YamlCursor key = YamlMap(YamlMap(at).find("nozzle")).find("swirl");
   if (falls.heights.empty())
     key.warning(
         "has no effect: there is nothing below the nozzle on which a coil could form; give a floor, or leave it out");
@@ -325,7 +325,7 @@ void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& 
     thread.breakup_radius = 0.05 * std::min(0.5 * thread.nozzle->diameter, needs.thinnest);
   if (!falls.flow_known && thread.nozzle->flow.topic && !(thread.longest_edge > 0) && !(thread.feed_length > 0))
   {
-    map.get("edges").warning("the flow comes by messages, so edges are chosen for a flow of " +
+    map.find("edges").warning("the flow comes by messages, so edges are chosen for a flow of " +
                              about(falls.flows.front()) +
                              " m^3/s. Give nozzle.flow.initial a typical flow, or edges.longest.");
   }
@@ -344,33 +344,33 @@ void completeThreads(SceneConfig& scene, const std::vector<YamlCursor>& at)
     ThreadConfig& thread = scene.threads[k];
     YamlMap map(at[k]);
     if (!map.has("fluid"))
-      map.get("fluid").warning(
+      map.find("fluid").warning(
           "is absent: water-thin or thick, the fluid decides what forms. Taken are density: 1000, viscosity: 1, "
           "surface_tension: 0.");
     if (!thread.nozzle)
       continue;
-    YamlMap nozzle(map.get("nozzle"));
+    YamlMap nozzle(map.find("nozzle"));
     if (!nozzle.has("flow"))
-      nozzle.get("flow").warning(
+      nozzle.find("flow").warning(
           "is absent, so nothing flows out of the nozzle. Give it in m^3/s, or flow: {topic: true}.");
     complete(scene, thread, at[k]);
     const double most = greatestFlow(thread, scene.time.step);
     if (thread.nozzle->flow.table.greatest() > most)
     {
-      nozzle.get("flow").problem(
+      nozzle.find("flow").problem(
           "is too much: over a thousand edges would leave the nozzle in one step; must be at most " +
           shortNumber(most) + " m^3/s, or with longer edges.feed or a shorter time.step more");
     }
     if (thread.breakup_radius >= 0.5 * thread.nozzle->diameter)
     {
-      map.get("breakup_radius")
+      map.find("breakup_radius")
           .problem("must be less than the nozzle's radius " + shortNumber(0.5 * thread.nozzle->diameter) +
                    " m, or the thread would break wherever it is");
     }
-    YamlMap edges(map.get("edges"));
+    YamlMap edges(map.find("edges"));
     if (!edges.has("longest") && thread.longest_edge > 0 && thread.shortest_edge > 0.4 * thread.longest_edge)
     {
-      edges.get("shortest")
+      edges.find("shortest")
           .problem("must be at most 0.4 of edges.longest (" + shortNumber(0.4 * thread.longest_edge) +
                    " m), or edges would be joined and divided in turn");
     }

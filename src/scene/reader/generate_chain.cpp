@@ -8,46 +8,21 @@
 
 namespace slender {
 
-/// Round links in a row, each turned by a quarter against the last and hooked into it. The outermost points of the
-/// first and the last are held.
-void generateChain(const YamlCursor& at, const ReadContext& context, Generated& out)
+namespace {
+
+/// What the scene says of a chain; see the meanings of its keys.
+struct Chain
 {
-  const std::size_t before = at.problems().size();
-  YamlMap map(at);
-  const std::string name = map.get("name").name().value_or("chain");
-  const int links = map.get("links").integer(1, 10'000).value_or(7);
-  const double radius = map.get("radius").number(kGeneratorLength).value_or(0.05);
-  const YamlCursor at_opening = map.get("opening"), at_spacing = map.get("spacing"), at_up = map.get("up");
-  const double opening = at_opening.number(Range::closed(0, 0.5 * M_PI, "rad")).value_or(0.0);
-  const int edges = map.get("edges").integer(3, 10'000).value_or(30);
-  const Eigen::Vector3d from = map.get("from").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
-  const Eigen::Vector3d along = readDirection(map.get("direction"), Eigen::Vector3d::UnitX());
-  const Eigen::Vector3d up = readDirection(at_up, Eigen::Vector3d::UnitZ());
-  RodConfig rod;
-  rod.name = name;
-  const YamlCursor at_section = map.get("cross_section");
-  rod.cross_section = readCrossSection(at_section, edges);
-  readTraits(map, rod);
-  warnOfRoundContact(at_section, rod);
-  const Motion motions[2] = {readMotion(map.get("start_motion"), context, false),
-                             readMotion(map.get("end_motion"), context, false)};
-  double thickness = 0.0;
-  for (const auto* radii : {&rod.cross_section.a, &rod.cross_section.b})
-    for (double r : *radii)
-      thickness = std::max(thickness, r);
-  // Closer, links two apart meet; farther, neighbours do.
-  const Range allowed = Range::between(radius + thickness, 2 * (radius - thickness), "m");
-  const double spacing = at_spacing.number(allowed).value_or(2 * radius - 4 * thickness);
-  map.finish();
-  if (up.cross(along).norm() < 1e-6)
-    at_up.problem("is along direction; must point away from it");
-  if (at.problems().size() == before && !allowed.holds(spacing))
-  {
-    at.problem("the wire is too thick: its radius " + shortNumber(thickness) +
-               " m must be less than a fifth of the links' radius " + shortNumber(radius) + " m");
-  }
-  if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * links))
-    return;
+  std::string name;
+  int links, edges;
+  double radius, opening, spacing;   ///< [m], [rad], [m]
+  Eigen::Vector3d from, along, up;   ///< [m], unit vectors
+};
+
+/// `motions`: of the outermost points of the first and the last link. `rod`: what all links have in common.
+void makeLinks(const Chain& chain, const Motion (&motions)[2], RodConfig rod, const YamlCursor& at, Generated& out)
+{
+  const auto& [name, links, edges, radius, opening, spacing, from, along, up] = chain;
   const Eigen::Vector3d side = up.cross(along).normalized();
   for (int k = 0; k < links; ++k)
   {
@@ -80,6 +55,76 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
     }
     out.rods.emplace_back(ReadRod{rod, edges}, at);
   }
+}
+
+}   // namespace
+
+/// Round links in a row, each turned by a quarter against the last and hooked into it. The outermost points of the
+/// first and the last are held.
+void generateChain(const YamlCursor& at, const ReadContext& context, Generated& out)
+{
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  const std::string name =
+      map.get("name", "Name of the chain; its links are NAME_0, NAME_1, ... Without the key: chain.")
+          .name()
+          .value_or("chain");
+  const int links = map.get("links", "Number of links. Without the key: 7.").integer(1, 10'000).value_or(7);
+  const double radius =
+      map.get("radius", "Radius of each link, to the centreline of its wire. Without the key: 0.05 m.")
+          .number(kGeneratorLength)
+          .value_or(0.05);
+  const YamlCursor
+      at_opening = map.get("opening", "Angle of the gap in each link. Without the key: 0, closed links."),
+      at_spacing = map.get(
+          "spacing",
+          "Distance of the centres of two neighbouring links, more than the link's radius plus the wire's and less "
+          "than twice their difference. Without the key: twice the link's radius minus four times the wire's."),
+      at_up = map.get("up",
+                      "Direction about which the links are turned, not along `direction`. Without the key: [0, 0, 1].");
+  const double opening = at_opening.number(Range::closed(0, 0.5 * M_PI, "rad")).value_or(0.0);
+  const int edges =
+      map.get("edges", "Number of edges of each link. Without the key: 30.").integer(3, 10'000).value_or(30);
+  const Eigen::Vector3d from = map.get("from", "Centre of the first link. Without the key: [0, 0, 0].")
+                                   .vector3(kGeneratorPosition)
+                                   .value_or(Eigen::Vector3d::Zero());
+  const Eigen::Vector3d along = readDirection(
+      map.get("direction", "Direction of the chain. Without the key: [1, 0, 0]."), Eigen::Vector3d::UnitX());
+  at_spacing.takes("a number in (R + r, 2 (R - r)) m, with the radius R of a link and r of the wire");
+  const Eigen::Vector3d up = readDirection(at_up, Eigen::Vector3d::UnitZ());
+  RodConfig rod;
+  rod.name = name;
+  const YamlCursor at_section =
+      map.get("cross_section", "Cross-section of the wire. Without the key: a radius of 0.005 m.");
+  rod.cross_section = readCrossSection(at_section, edges);
+  readTraits(map, rod);
+  warnOfRoundContact(at_section, rod);
+  const Motion motions[2] = {readMotion(map.get("start_motion",
+                                                "How the outermost point of the first link moves, which the grasp "
+                                                "NAME_start holds. Without the key: fixed."),
+                                        context, false),
+                             readMotion(map.get("end_motion",
+                                                "How the outermost point of the last link moves, which the grasp "
+                                                "NAME_end holds. Without the key: fixed."),
+                                        context, false)};
+  double thickness = 0.0;
+  for (const auto* radii : {&rod.cross_section.a, &rod.cross_section.b})
+    for (double r : *radii)
+      thickness = std::max(thickness, r);
+  // Closer, links two apart meet; farther, neighbours do.
+  const Range allowed = Range::between(radius + thickness, 2 * (radius - thickness), "m");
+  const double spacing = at_spacing.number(allowed).value_or(2 * radius - 4 * thickness);
+  map.finish();
+  if (up.cross(along).norm() < 1e-6)
+    at_up.problem("is along direction; must point away from it");
+  if (at.problems().size() == before && !allowed.holds(spacing))
+  {
+    at.problem("the wire is too thick: its radius " + shortNumber(thickness) +
+               " m must be less than a fifth of the links' radius " + shortNumber(radius) + " m");
+  }
+  if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * links))
+    return;
+  makeLinks({name, links, edges, radius, opening, spacing, from, along, up}, motions, rod, at, out);
 }
 
 }   // namespace slender

@@ -9,42 +9,88 @@
 
 namespace slender {
 
+namespace {
+
+/// The ball on which the strands grow.
+ObstacleConfig readHead(YamlMap& map, const ReadContext& context)
+{
+  YamlMap head_map(map.get("head", "The ball on which the strands grow, an obstacle. The roots follow its motion."));
+  ObstacleConfig head;
+  head.name = head_map.get("name", "Name of the obstacle. Without the key: head.").name().value_or("head");
+  head.pose.position = head_map.get("center", "Centre of the ball at the start. Without the key: [0, 0, 0].")
+                           .vector3(kGeneratorPosition)
+                           .value_or(Eigen::Vector3d::Zero());
+  const double head_radius =
+      head_map.get("radius", "Radius of the ball. Without the key: 0.1 m.").number(kGeneratorLength).value_or(0.1);
+  head.shape = Sphere{head_radius};
+  assign(head.friction, head_map
+                            .get("friction",
+                                 "Coefficient of friction. Between two objects the geometric mean of both coefficients "
+                                 "counts. Without the key: that of the other object.")
+                            .number(Range::closed(0, 100)));
+  const YamlCursor motion = head_map.get("motion", "How the ball moves. Without the key: it stands.");
+  assign(head.motion, readSolidMotion(motion, context, false));
+  head_map.finish();
+  if (const auto* table = std::get_if<TableMotion>(&head.motion))
+    head.pose = table->poses.evaluate(table->poses.firstTime());
+  return head;
+}
+
+/// A helix of the given arc length about an axis through its root, turned about the axis by `phase` [rad].
+PolylineCurve curled(double length, double radius, double pitch, int edges, const Eigen::Vector3d& axis, double phase)
+{
+  const double turns = length / std::hypot(2 * M_PI * radius, pitch);
+  const Eigen::Matrix3Xd helix = helixCurve(Eigen::Vector3d::Zero(), axis, radius, pitch, turns, edges);
+  PolylineCurve curve;
+  for (Eigen::Index i = 0; i < helix.cols(); ++i)
+    curve.points.push_back(rotateAbout(helix.col(i), axis, phase));
+  return curve;
+}
+
+}   // namespace
+
 /// Strands on the upper part of a ball, which is an obstacle; their roots follow it. They start straight out, where
 /// nothing touches, whatever their natural curl.
 void generateHair(const YamlCursor& at, const ReadContext& context, Generated& out)
 {
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const std::string name = map.get("name").name().value_or("hair");
-  Dice dice(map.get("seed").integer(0, 1'000'000'000).value_or(1));
-  const int strands = map.get("strands").integer(1, 100'000).value_or(100);
-  const int edges = map.get("edges").integer(2, 10'000).value_or(49);
-  const double length = map.get("length").number(kGeneratorLength).value_or(0.15);
-  const double variation = map.get("length_variation").number(Range::closed(0, 0.9)).value_or(0.0);
-  const double cap = map.get("cap").number(Range::above(0, M_PI, "rad")).value_or(0.5 * M_PI);
-  const Eigen::Vector3d up = readDirection(map.get("up"), Eigen::Vector3d::UnitZ());
+  const std::string name =
+      map.get("name", "Name of the hair; strands are NAME_0, ... Without the key: hair.").name().value_or("hair");
+  Dice dice(map.get("seed", "Seed of the random places and lengths. Without the key: 1.")
+                .integer(0, 1'000'000'000)
+                .value_or(1));
+  const int strands = map.get("strands", "Number of strands. Without the key: 100.").integer(1, 100'000).value_or(100);
+  const int edges =
+      map.get("edges", "Number of edges of each strand. Without the key: 49.").integer(2, 10'000).value_or(49);
+  const double length = map.get("length", "Length of the longest strand. Without the key: 0.15 m.")
+                            .number(kGeneratorLength)
+                            .value_or(0.15);
+  const double variation =
+      map.get("length_variation", "Share of the length by which strands may be shorter. Without the key: 0.")
+          .number(Range::closed(0, 0.9))
+          .value_or(0.0);
+  const double cap =
+      map.get("cap", "Angle from `up` within which strands grow on the ball. Without the key: pi/2, half of the ball.")
+          .number(Range::above(0, M_PI, "rad"))
+          .value_or(0.5 * M_PI);
+  const Eigen::Vector3d up = readDirection(
+      map.get("up", "Direction of the middle of the hair. Without the key: [0, 0, 1]."), Eigen::Vector3d::UnitZ());
 
-  YamlMap head_map(map.get("head"));
-  ObstacleConfig head;
-  head.name = head_map.get("name").name().value_or("head");
-  head.pose.position = head_map.get("center").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
-  const double head_radius = head_map.get("radius").number(kGeneratorLength).value_or(0.1);
-  head.shape = Sphere{head_radius};
-  assign(head.friction, head_map.get("friction").number(Range::closed(0, 100)));
-  const YamlCursor motion = head_map.get("motion");
-  assign(head.motion, readSolidMotion(motion, context, false));
-  head_map.finish();
-  if (const auto* table = std::get_if<TableMotion>(&head.motion))
-    head.pose = table->poses.evaluate(table->poses.firstTime());
-
-  const YamlCursor at_curl = map.get("curl");
+  ObstacleConfig head = readHead(map, context);
+  const YamlCursor at_curl = map.get(
+      "curl",
+      "Natural curl of the strands, helices about their straight axes. Without the key the strands are straight.");
   YamlMap curl(at_curl);
-  const double curl_radius = curl.get("radius").number(kGeneratorLength).value_or(0.004);
-  const double curl_pitch = curl.get("pitch").number(kGeneratorLength).value_or(0.02);
+  const double curl_radius =
+      curl.get("radius", "Radius of the helix. Without the key: 0.004 m.").number(kGeneratorLength).value_or(0.004);
+  const double curl_pitch =
+      curl.get("pitch", "Rise of the helix per turn. Without the key: 0.02 m.").number(kGeneratorLength).value_or(0.02);
   curl.finish();
 
   RodConfig rod;
-  const YamlCursor at_section = map.get("cross_section");
+  const YamlCursor at_section =
+      map.get("cross_section", "Cross-section of each strand. Without the key: a radius of 4e-5 m.");
   rod.cross_section = readCrossSection(at_section, edges);
   if (!at_section.present())
     rod.cross_section = {{4e-5}, {4e-5}};
@@ -55,7 +101,8 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * strands))
     return;
 
-  const double root_distance = head_radius + 2 * std::max(rod.cross_section.a[0], rod.cross_section.b[0]);
+  const double root_distance =
+      std::get<Sphere>(head.shape).radius + 2 * std::max(rod.cross_section.a[0], rod.cross_section.b[0]);
   const Eigen::Vector3d e1 = anyNormal(up), e2 = up.cross(e1);
   for (int k = 0; k < strands; ++k)
   {
@@ -74,12 +121,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
     const double phase = dice.between(0, 2 * M_PI);
     if (at_curl.present())
     {
-      const double turns = own_length / std::hypot(2 * M_PI * curl_radius, curl_pitch);
-      const Eigen::Matrix3Xd helix = helixCurve(Eigen::Vector3d::Zero(), out_W, curl_radius, curl_pitch, turns, edges);
-      PolylineCurve curled;
-      for (Eigen::Index i = 0; i < helix.cols(); ++i)
-        curled.points.push_back(rotateAbout(helix.col(i), out_W, phase));
-      rod.centerline = std::move(curled);
+      rod.centerline = curled(own_length, curl_radius, curl_pitch, edges, out_W, phase);
       rod.initial = straight;
     }
     GraspConfig grasp;

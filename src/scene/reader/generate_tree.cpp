@@ -86,25 +86,51 @@ struct Tree
 Tree readTree(YamlMap& map, const ReadContext& context)
 {
   Tree tree;
-  tree.name = map.get("name").name().value_or("tree");
+  tree.name =
+      map.get("name", "Name of the tree; its branches are NAME_0 (the trunk), NAME_1, ... Without the key: tree.")
+          .name()
+          .value_or("tree");
   TreeShape& shape = tree.shape;
-  shape.vertices = map.get("vertices").integer(least_nodes, max_edges).value_or(2158);
-  shape.levels = map.get("levels").integer(1, 6).value_or(3);
-  shape.children = map.get("children").integer(1, 30).value_or(7);
-  shape.length = map.get("length").number(kGeneratorLength).value_or(3.0);
-  shape.radius = map.get("radius").number(Range::above(0, 10, "m")).value_or(0.05);
+  shape.vertices = map.get("vertices", "Number of nodes of all branches together. Without the key: 2158.")
+                       .integer(least_nodes, max_edges)
+                       .value_or(2158);
+  shape.levels =
+      map.get("levels", "Number of levels: 1 is a trunk alone. Without the key: 3.").integer(1, 6).value_or(3);
+  shape.children =
+      map.get("children", "Number of side branches of each branch. Without the key: 7.").integer(1, 30).value_or(7);
+  shape.length = map.get("length", "Length of the trunk. Without the key: 3 m.").number(kGeneratorLength).value_or(3.0);
+  shape.radius = map.get("radius", "Radius of the trunk at its root. Without the key: 0.05 m.")
+                     .number(Range::above(0, 10, "m"))
+                     .value_or(0.05);
   const Range ratio = Range::above(0, 1);
-  shape.length_ratio = map.get("length_ratio").number(ratio).value_or(0.5);
-  shape.radius_ratio = map.get("radius_ratio").number(ratio).value_or(0.45);
-  shape.incline = map.get("angle").number(Range::between(0, 0.5 * M_PI, "rad")).value_or(0.9);
-  tree.taper = map.get("taper").number(ratio).value_or(0.4);
-  tree.root = map.get("root").vector3(kGeneratorPosition).value_or(Eigen::Vector3d::Zero());
-  tree.up = readDirection(map.get("direction"), Eigen::Vector3d::UnitZ());
-  tree.rod.material.density = 700;
+  shape.length_ratio =
+      map.get("length_ratio", "Length of a side branch over that of its parent, about. Without the key: 0.5.")
+          .number(ratio)
+          .value_or(0.5);
+  shape.radius_ratio =
+      map.get("radius_ratio", "Radius of a side branch over that of its parent. Without the key: 0.45.")
+          .number(ratio)
+          .value_or(0.45);
+  shape.incline = map.get("angle", "Angle between a side branch and its parent, about. Without the key: 0.9 rad.")
+                      .number(Range::between(0, 0.5 * M_PI, "rad"))
+                      .value_or(0.9);
+  tree.taper = map.get("taper", "Radius of a branch at its tip over that at its root. Without the key: 0.4.")
+                   .number(ratio)
+                   .value_or(0.4);
+  tree.root = map.get("root", "Position of the root. Without the key: [0, 0, 0].")
+                  .vector3(kGeneratorPosition)
+                  .value_or(Eigen::Vector3d::Zero());
+  tree.up = readDirection(map.get("direction", "Direction of the trunk. Without the key: [0, 0, 1]."),
+                          Eigen::Vector3d::UnitZ());
   readTraits(map, tree.rod);
   tree.joint_density =
-      map.get("joint_density").number(Range::above(0, 1e6, "kg/m^3")).value_or(tree.rod.material.density);
-  tree.motion = readMotion(map.get("motion"), context, false);
+      map.get("joint_density",
+              "Mass per volume of the balls that join branches. Without the key: that of the branches.")
+          .number(Range::above(0, 1e6, "kg/m^3"))
+          .value_or(tree.rod.material.density);
+  tree.motion =
+      readMotion(map.get("motion", "How the root moves, which the grasp NAME_root holds. Without the key: fixed."),
+                 context, false);
   return tree;
 }
 
@@ -142,8 +168,10 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   YamlMap map(at);
   Tree tree = readTree(map, context);
   const TreeShape& shape = tree.shape;
-  const YamlCursor at_vertices = map.get("vertices");
-  const auto seed = map.get("seed").integer(0, 1'000'000'000).value_or(1);
+  const YamlCursor at_vertices = map.find("vertices");
+  const auto seed = map.get("seed", "Seed of the random places and angles of the branches. Without the key: 1.")
+                        .integer(0, 1'000'000'000)
+                        .value_or(1);
   map.finish();
   if (at.problems().size() != before)
     return;

@@ -26,7 +26,7 @@ bool any(const Objects& objects, const Condition& condition)
 void warnOfTime(YamlMap time, const SceneConfig& scene)
 {
   const Integrator integrator = scene.time.integrator;
-  const YamlCursor radius = time.get("spectral_radius"), newton = time.get("newton");
+  const YamlCursor radius = time.find("spectral_radius"), newton = time.find("newton");
   if (radius.present() && integrator != Integrator::generalized_alpha)
   {
     radius.warning(std::string("has no effect: it is for integrator: generalized_alpha, and this scene takes ") +
@@ -35,7 +35,7 @@ void warnOfTime(YamlMap time, const SceneConfig& scene)
   if (newton.present() && integrator == Integrator::symplectic_euler && scene.threads.empty())
     newton.warning("has no effect: explicit steps solve no equations by Newton's method; leave it out");
   else if (YamlMap(newton).has("linear") && scene.rods.size() + scene.threads.size() + scene.bodies.size() < 2)
-    YamlMap(newton).get("linear").warning("has no effect: it is for rods, threads and bodies that meet; leave it out");
+    YamlMap(newton).find("linear").warning("has no effect: it is for rods, threads and bodies that meet; leave it out");
 }
 
 /// Wind acts on rods by damping.drag, on cloth by aerodynamics or damping.drag.
@@ -110,9 +110,9 @@ bool haveOthers(const SceneConfig& scene)
 /// scene has any if `has_others`.
 void warnOfContact(YamlMap contact, const char* others, bool has_others, bool has_solids)
 {
-  const bool meets_others = has_others && !isOff(contact.get(others)),
-             meets_solids = has_solids && !isOff(contact.get("obstacles"));
-  if (contact.at().present() && isOff(contact.get("self")) && !meets_others && !meets_solids)
+  const bool meets_others = has_others && !isOff(contact.find(others)),
+             meets_solids = has_solids && !isOff(contact.find("obstacles"));
+  if (contact.at().present() && isOff(contact.find("self")) && !meets_others && !meets_solids)
   {
     contact.at().warning(std::string("has no effect: self is false, and ") + others +
                          " and obstacles are false or the scene has none, so that there is nothing to touch; leave "
@@ -184,14 +184,14 @@ void warnOfSlipSpeed(const YamlCursor& slip_speed, const SceneConfig& scene)
 
 void warnOfMaterial(YamlMap material, const Eigen::Vector3d& gravity)
 {
-  const YamlCursor ratio = material.get("poissons_ratio"), torsion = material.get("torsion"),
-                   density = material.get("density");
+  const YamlCursor ratio = material.find("poissons_ratio"), torsion = material.find("torsion"),
+                   density = material.find("density");
   for (const YamlCursor& key : {ratio, torsion})
     if (key.present() && material.has("twist_modulus"))
       key.warning("has no effect, since twist_modulus is given and nothing else follows from it; leave it out");
   if (density.present() && material.has("linear_density"))
     density.warning("has no effect, since linear_density is given; leave one of them out");
-  const YamlCursor inextensible = material.get("inextensible");
+  const YamlCursor inextensible = material.find("inextensible");
   if (inextensible.present() && inextensible.boolean().value_or(false) && gravity == Eigen::Vector3d::Zero())
   {
     inextensible.warning(
@@ -214,7 +214,7 @@ void warnOfBodyShape(const YamlCursor& shape, const BodyConfig& config, bool oth
 
 void warnOfBody(YamlMap body, const BodyConfig& config, const std::string& why_no_friction)
 {
-  const YamlCursor contact = body.get("contact"), friction = body.get("friction");
+  const YamlCursor contact = body.find("contact"), friction = body.find("friction");
   if (contact.present() && config.contact && !config.shape)
   {
     contact.warning(
@@ -227,7 +227,7 @@ void warnOfBody(YamlMap body, const BodyConfig& config, const std::string& why_n
   {
     if (config.motion && body.has(key))
     {
-      body.get(key).warning(
+      body.find(key).warning(
           "has no effect: the body's motion is given, so that no force moves it; leave it out, or take motion: free");
     }
   }
@@ -258,7 +258,7 @@ void warnOfPlasticity(YamlMap plasticity, const ClothConfig& config)
   }
   if (config.plasticity.yield_curvature * narrowest >= M_PI)
   {
-    plasticity.get("yield_curvature")
+    plasticity.find("yield_curvature")
         .warning(
             "is never reached, so that plasticity has no effect: no hinge of this mesh can be bent by more than half a "
             "turn, "
@@ -272,11 +272,11 @@ void warnOfClusters(YamlMap clusters, std::size_t shapes)
 {
   if (!clusters.at().present())
     return;
-  const YamlCursor frames = clusters.get("frames");
-  const bool one_region = clusters.get("count").integer(1, 1'000'000, "regions").value_or(2) == 1;
+  const YamlCursor frames = clusters.find("frames");
+  const bool one_region = clusters.find("count").integer(1, 1'000'000, "regions").value_or(2) == 1;
   for (const char* key : {"compactness", "seed", "frames"})
     if (one_region && clusters.has(key))
-      clusters.get(key).warning("has no effect with count: 1, since all faces are in one region; leave it out");
+      clusters.find(key).warning("has no effect with count: 1, since all faces are in one region; leave it out");
   if (!one_region && frames.present() && shapes < 2)
     frames.warning("has no effect: only one shape of the guide is known when regions are clustered; leave it out");
 }
@@ -289,7 +289,7 @@ void warnOfTracking(YamlMap tracked, const ClothConfig& config)
   const auto* frames = std::get_if<FrameGuide>(&motion);
   const auto* carried = std::get_if<CarriedGuide>(&motion);
   const std::size_t shapes = frames ? frames->points.frames().size() : carried && !carried->poses.empty() ? 2 : 1;
-  const YamlCursor functions = tracked.get("test_functions");
+  const YamlCursor functions = tracked.find("test_functions");
   for (const YamlCursor& set : functions.isList() ? functions.items() : std::vector<YamlCursor>{functions})
   {
     YamlMap map(set);
@@ -297,32 +297,32 @@ void warnOfTracking(YamlMap tracked, const ClothConfig& config)
     {
       if (functions.isList() && config.tracking->sets.size() == 1 && map.has(key))
       {
-        map.get(key).warning(
+        map.find(key).warning(
             "has no effect: there is only one set of test functions, which acts from the start; leave it out, or add "
             "another set");
       }
     }
-    warnOfClusters(YamlMap(map.get("clusters")), shapes);
+    warnOfClusters(YamlMap(map.find("clusters")), shapes);
   }
 }
 
 void warnOfCloth(YamlMap cloth, const SceneConfig& scene, const ClothConfig& config)
 {
-  warnOfPlasticity(YamlMap(cloth.get("plasticity")), config);
-  warnOfContact(YamlMap(cloth.get("contact")), "cloths", scene.cloths.size() > 1 || haveOthers(scene),
+  warnOfPlasticity(YamlMap(cloth.find("plasticity")), config);
+  warnOfContact(YamlMap(cloth.find("contact")), "cloths", scene.cloths.size() > 1 || haveOthers(scene),
                 !scene.obstacles.empty() || !scene.bodies.empty());
-  const YamlCursor air_density = YamlMap(cloth.get("aerodynamics")).get("air_density"),
-                   thickness = YamlMap(cloth.get("material")).get("thickness");
+  const YamlCursor air_density = YamlMap(cloth.find("aerodynamics")).find("air_density"),
+                   thickness = YamlMap(cloth.find("material")).find("thickness");
   if (air_density.present() && !(config.aerodynamics.drag > 0) && !(config.aerodynamics.lift > 0))
     air_density.warning("has no effect: aerodynamics.drag and lift are 0; give one of them");
-  if (thickness.present() && cloth.has("membrane") && !YamlMap(cloth.get("material")).has("density"))
+  if (thickness.present() && cloth.has("membrane") && !YamlMap(cloth.find("material")).has("density"))
   {
     thickness.warning(
         "has no effect beside membrane and an area density, since nothing else follows from it; leave it out (contact "
         "has a thickness of its own)");
   }
-  YamlMap bending(cloth.get("bending")), solver(cloth.get("solver"));
-  const YamlCursor model = bending.get("model"), modulus = bending.get("modulus");
+  YamlMap bending(cloth.find("bending")), solver(cloth.find("solver"));
+  const YamlCursor model = bending.find("model"), modulus = bending.find("modulus");
   if (model.isScalar() && model.tree()->scalar == "none" && modulus.present())
     modulus.warning("has no effect with model: none, which does not bend at all; leave it out, or take another model");
   const bool explicit_steps =
@@ -332,15 +332,15 @@ void warnOfCloth(YamlMap cloth, const SceneConfig& scene, const ClothConfig& con
     solver.at().warning(std::string("has no effect with time.integrator: ") + toString(scene.time.integrator) +
                         ", which solves no such equations; leave it out");
   }
-  const YamlCursor linear = solver.get("linear"), tolerance = solver.get("tolerance");
+  const YamlCursor linear = solver.find("linear"), tolerance = solver.find("tolerance");
   if (linear.isScalar() && linear.tree()->scalar == "cholesky" && tolerance.present() && !explicit_steps)
     tolerance.warning("has no effect with linear: cholesky, which is exact; leave it out");
 }
 
 void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig& scene)
 {
-  const YamlCursor deposited = YamlMap(thread.get("edges")).get("deposited"), merging = thread.get("merging");
-  YamlMap contact(thread.get("contact"));
+  const YamlCursor deposited = YamlMap(thread.find("edges")).find("deposited"), merging = thread.find("merging");
+  YamlMap contact(thread.find("contact"));
   if (deposited.present() && !config.floor)
   {
     deposited.warning(
@@ -348,7 +348,7 @@ void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig&
         "in which fluid is kept");
   }
   const bool has_others = scene.threads.size() > 1;
-  if (config.merging > 0 && isOff(contact.get("self")) && (!has_others || isOff(contact.get("threads"))))
+  if (config.merging > 0 && isOff(contact.find("self")) && (!has_others || isOff(contact.find("threads"))))
   {
     merging.warning(
         "has no effect: neither parts of the thread nor other threads are in touch with it; take contact: {self: "
@@ -358,7 +358,7 @@ void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig&
                 !scene.obstacles.empty() || !scene.bodies.empty() || (config.floor && config.floor->friction));
   if (config.nozzle && thread.has("nozzle"))
   {
-    const YamlCursor flow = YamlMap(thread.get("nozzle")).get("flow");
+    const YamlCursor flow = YamlMap(thread.find("nozzle")).find("flow");
     if (flow.present() && !config.nozzle->flow.topic && !(config.nozzle->flow.table.greatest() > 0))
       flow.warning("is 0, so nothing flows out of the nozzle; give it in m^3/s, or flow: {topic: true}");
   }
@@ -367,22 +367,22 @@ void warnOfThread(YamlMap thread, const ThreadConfig& config, const SceneConfig&
 /// Keys of a generator that do nothing beside its others.
 void warnOfGenerator(YamlMap generator, const SceneConfig& scene, const std::string& why_no_friction)
 {
-  YamlMap chain(generator.get("chain")), tree(generator.get("tree")), hair(generator.get("hair"));
+  YamlMap chain(generator.find("chain")), tree(generator.find("tree")), hair(generator.find("hair"));
   for (YamlMap* rods : {&chain, &tree, &hair})
   {
     if (!rods->at().present())
       continue;
-    warnOfMaterial(YamlMap(rods->get("material")), scene.gravity);
-    warnOfContact(YamlMap(rods->get("contact")), "rods", haveOthers(scene),
+    warnOfMaterial(YamlMap(rods->find("material")), scene.gravity);
+    warnOfContact(YamlMap(rods->find("contact")), "rods", haveOthers(scene),
                   !scene.obstacles.empty() || !scene.bodies.empty());
   }
-  if (chain.has("spacing") && chain.get("links").integer(1, 10'000).value_or(2) == 1)
-    chain.get("spacing").warning("has no effect with links: 1; leave it out");
+  if (chain.has("spacing") && chain.find("links").integer(1, 10'000).value_or(2) == 1)
+    chain.find("spacing").warning("has no effect with links: 1; leave it out");
   for (const char* key : {"seed", "children", "length_ratio", "radius_ratio", "angle", "joint_density"})
-    if (tree.has(key) && tree.get("levels").integer(1, 6).value_or(2) == 1)
-      tree.get(key).warning("has no effect with levels: 1, a trunk without branches; leave it out");
+    if (tree.has(key) && tree.find("levels").integer(1, 6).value_or(2) == 1)
+      tree.find(key).warning("has no effect with levels: 1, a trunk without branches; leave it out");
   if (hair.at().present())
-    warnOfFriction(YamlMap(hair.get("head")).get("friction"), why_no_friction);
+    warnOfFriction(YamlMap(hair.find("head")).find("friction"), why_no_friction);
 }
 
 }   // namespace
@@ -390,32 +390,32 @@ void warnOfGenerator(YamlMap generator, const SceneConfig& scene, const std::str
 void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
 {
   const std::string why_no_friction = whyNoFriction(scene);
-  warnOfTime(YamlMap(map.get("time")), scene);
-  warnOfWind(map.get("wind"), scene);
-  warnOfObstacles(map.get("obstacles"), scene);
-  warnOfKindsThatDoNotMeet(map.get("cloths"), scene);
-  warnOfSlipSpeed(YamlMap(map.get("contact")).get("slip_speed"), scene);
-  for (const YamlCursor& obstacle : entriesOf(map.get("obstacles")))
-    warnOfFriction(YamlMap(obstacle).get("friction"), why_no_friction);
-  for (const YamlCursor& entry : entriesOf(map.get("rods")))
+  warnOfTime(YamlMap(map.find("time")), scene);
+  warnOfWind(map.find("wind"), scene);
+  warnOfObstacles(map.find("obstacles"), scene);
+  warnOfKindsThatDoNotMeet(map.find("cloths"), scene);
+  warnOfSlipSpeed(YamlMap(map.find("contact")).find("slip_speed"), scene);
+  for (const YamlCursor& obstacle : entriesOf(map.find("obstacles")))
+    warnOfFriction(YamlMap(obstacle).find("friction"), why_no_friction);
+  for (const YamlCursor& entry : entriesOf(map.find("rods")))
   {
     YamlMap rod(entry);
-    warnOfMaterial(YamlMap(rod.get("material")), scene.gravity);
-    warnOfContact(YamlMap(rod.get("contact")), "rods", haveOthers(scene),
+    warnOfMaterial(YamlMap(rod.find("material")), scene.gravity);
+    warnOfContact(YamlMap(rod.find("contact")), "rods", haveOthers(scene),
                   !scene.obstacles.empty() || !scene.bodies.empty());
   }
-  for (const YamlCursor& generator : entriesOf(map.get("generate")))
+  for (const YamlCursor& generator : entriesOf(map.find("generate")))
     warnOfGenerator(YamlMap(generator), scene, why_no_friction);
   std::size_t k = 0;   // tracked cloths come after the others
   for (const char* key : {"cloths", "tracked"})
   {
-    for (const YamlCursor& cloth : entriesOf(map.get(key)))
+    for (const YamlCursor& cloth : entriesOf(map.find(key)))
     {
       warnOfCloth(YamlMap(cloth), scene, scene.cloths[k]);
       warnOfTracking(YamlMap(cloth), scene.cloths[k++]);
     }
   }
-  const std::vector<YamlCursor> bodies = entriesOf(map.get("bodies")), threads = entriesOf(map.get("threads"));
+  const std::vector<YamlCursor> bodies = entriesOf(map.find("bodies")), threads = entriesOf(map.find("threads"));
   for (std::size_t b = 0; b < bodies.size(); ++b)
   {
     YamlMap body(bodies[b]);
@@ -423,7 +423,7 @@ void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene)
       return &other != &scene.bodies[b] && other.contact && other.shape;
     };
     warnOfBody(body, scene.bodies[b], why_no_friction);
-    warnOfBodyShape(body.get("shape"), scene.bodies[b], !scene.obstacles.empty() || any(scene.bodies, isOther));
+    warnOfBodyShape(body.find("shape"), scene.bodies[b], !scene.obstacles.empty() || any(scene.bodies, isOther));
   }
   for (std::size_t t = 0; t < threads.size(); ++t)
     warnOfThread(YamlMap(threads[t]), scene.threads[t], scene);

@@ -14,6 +14,7 @@ const Range inertia_entry = Range::closed(-1e15, 1e15, "kg m^2");
 /// [Ixx, Iyy, Izz] or the rows of a symmetric matrix.
 std::optional<Eigen::Matrix3d> readInertia(const YamlCursor& at)
 {
+  at.takes("[Ixx, Iyy, Izz] of numbers in (0, 1e+15] kg m^2, or three rows of a symmetric matrix");
   if (!at.present())
     return std::nullopt;
   const auto rows = at.items(3, 3);
@@ -44,7 +45,14 @@ std::optional<Eigen::Matrix3d> readInertia(const YamlCursor& at)
 /// Mass and inertia from the file or from the shape; moves the body's frame to the shape's centre of mass.
 void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
 {
-  const YamlCursor mass = map.get("mass"), density = map.get("density"), at_inertia = map.get("inertia");
+  const YamlCursor mass = map.get(
+                       "mass",
+                       "Mass of the body. Give either `mass` or `density`; bodies with a given motion need neither."),
+                   density = map.get("density", "Mass per volume of `shape`, from which mass and inertia follow."),
+                   at_inertia =
+                       map.get("inertia",
+                               "Moments of inertia about the centre of mass in the body's axes: [Ixx, Iyy, Izz], or "
+                               "the rows of a symmetric matrix. Without the key: those of the shape.");
   const std::size_t before = mass.problems().size();
   const auto kilograms = mass.number(Range::above(0, 1e9, "kg"));
   const auto per_volume = density.number(Range::above(0, 1e6, "kg/m^3"));
@@ -100,7 +108,10 @@ void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
 void readWeld(const YamlCursor& at, const std::vector<ReadRod>& rods, std::vector<WeldConfig>& welds)
 {
   YamlMap map(at);
-  const YamlCursor at_rod = map.require("rod"), edge = map.require("edge");
+  const YamlCursor at_rod = map.require("rod", "Name of the rod that the body holds."),
+                   edge = map.require("edge",
+                                      "Edge of the rod that the body holds; a negative index counts from the end. An "
+                                      "end edge of an open rod, 0 or -1, means the section at the end node.");
   map.finish();
   const auto name = at_rod.text();
   if (!name)
@@ -136,9 +147,19 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
   BodyConfig body;
   YamlMap map(at);
   body.name = default_name;
-  assign(body.name, map.get("name").name());
-  body.motion = readSolidMotion(map.get("motion"), context, true);
-  const YamlCursor at_pose = map.get("pose"), at_shape = map.get("shape");
+  assign(body.name, map.get("name",
+                            "Name of the body; bodies and obstacles need different names. Without the key: body if "
+                            "there is one body, otherwise body0, body1, ...")
+                        .name());
+  body.motion = readSolidMotion(
+      map.get("motion", "How the body moves. Without the key, or with free, it is simulated: forces move it."), context,
+      true);
+  const YamlCursor at_pose = map.get("pose",
+                                     "Where the shape is at the start. Without the key: at the origin, not turned. Not "
+                                     "with a table of poses, whose first pose it would contradict."),
+                   at_shape = map.get(
+                       "shape",
+                       "Shape of the body: give one. Without the key the body has no shape, and touches nothing.");
   std::optional<Pose> pose = readPose(at_pose);
   body.shape = readShape(at_shape, context, pose);
   if (body.motion)
@@ -152,23 +173,46 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
   }
   assign(body.pose, pose);
   readMass(map, at_shape.present(), body);
-  YamlMap velocity(map.get("velocity"));
-  assign(body.velocity.linear, velocity.get("linear").vector3(Range::closed(-1e5, 1e5, "m/s")));
-  assign(body.velocity.angular, velocity.get("angular").vector3(Range::closed(-1e5, 1e5, "rad/s")));
+  YamlMap velocity(map.get("velocity", "Velocity of a simulated body at the start. Without the key: at rest."));
+  assign(body.velocity.linear, velocity.get("linear", "Velocity of the centre of mass. Without the key: 0.")
+                                   .vector3(Range::closed(-1e5, 1e5, "m/s")));
+  assign(body.velocity.angular, velocity.get("angular", "Angular velocity in world axes. Without the key: 0.")
+                                    .vector3(Range::closed(-1e5, 1e5, "rad/s")));
   velocity.finish();
   if (velocity.at().present() && body.motion)
     velocity.at().problem("the body's motion is given; only free bodies start with a velocity");
-  assign(body.gravity, map.get("gravity").boolean());
-  assign(body.force, map.get("force").vector3(Range::closed(-1e12, 1e12, "N")));
-  assign(body.torque, map.get("torque").vector3(Range::closed(-1e12, 1e12, "N m")));
-  YamlMap damping(map.get("damping"));
-  assign(body.linear_damping, damping.get("linear").number(Range::closed(0, 1e6, "1/s")));
-  assign(body.angular_damping, damping.get("angular").number(Range::closed(0, 1e6, "1/s")));
+  assign(body.gravity,
+         map.get("gravity", "Whether gravity acts on the simulated body. Without the key: true.").boolean());
+  assign(body.force, map.get("force", "Constant force at the centre of mass, in world axes. Without the key: none.")
+                         .vector3(Range::closed(-1e12, 1e12, "N")));
+  assign(body.torque, map.get("torque", "Constant torque, in world axes. Without the key: none.")
+                          .vector3(Range::closed(-1e12, 1e12, "N m")));
+  YamlMap damping(map.get("damping", "Damping of the motion of a simulated body. Without the key: none."));
+  assign(body.linear_damping, damping
+                                  .get("linear",
+                                       "Rate of the damping of the velocity: the force is -linear times mass times "
+                                       "velocity. Without the key: 0.")
+                                  .number(Range::closed(0, 1e6, "1/s")));
+  assign(body.angular_damping, damping
+                                   .get("angular",
+                                        "Rate of the damping of the rotation: the torque is -angular times inertia "
+                                        "times angular velocity. Without the key: 0.")
+                                   .number(Range::closed(0, 1e6, "1/s")));
   damping.finish();
-  assign(body.contact, map.get("contact").boolean());
-  body.friction = map.get("friction").number(Range::closed(0, 100));
-  assign(body.broadcast_tf, map.get("broadcast_tf").boolean());
-  map.get("welds");   // read where the rods are known
+  assign(body.contact,
+         map.get("contact",
+                 "Whether the shape touches rods, threads and cloths that have contact. Simulated spheres, boxes and "
+                 "capsules also touch obstacles and other bodies. Without the key: true.")
+             .boolean());
+  body.friction = map.get("friction",
+                          "Coefficient of friction. Between two objects the geometric mean of both coefficients "
+                          "counts. Without the key: that of the other object, and 0.3 against obstacles and bodies.")
+                      .number(Range::closed(0, 100));
+  assign(body.broadcast_tf,
+         map.get("broadcast_tf", "Whether nodes publish the body's frame on tf. Without the key: false.").boolean());
+  map.get("welds",
+          "Edges of rods that the body holds: they keep the place and the orientation that they have in the body at "
+          "the start. Without the key: none.");   // read where the rods are known
   map.finish();
   return body;
 }
@@ -205,7 +249,7 @@ std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& cont
   for (std::size_t k = 0; k < entries.size(); ++k)
   {
     bodies.push_back(readBody(entries[k], context, entries.size() == 1 ? "body" : "body" + std::to_string(k)));
-    const YamlCursor welds = YamlMap(entries[k]).get("welds");
+    const YamlCursor welds = YamlMap(entries[k]).find("welds");
     if (!welds.present())
       continue;
     for (const YamlCursor& item : welds.items())

@@ -13,12 +13,22 @@ namespace {
 
 void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
 {
+  YamlMap map(at.sharesKeysOf("cloths.N.plasticity"));
   if (!at.present())
     return;
-  YamlMap map(at);
-  assign(cloth.plasticity.yield_curvature, map.require("yield_curvature").number(Range::closed(0, 1e9, "1/m")));
-  assign(cloth.plasticity.hardening, map.get("hardening").number(Range::closed(-1e6, 1e6, "m")));
-  assign(cloth.plasticity.creep_time, map.get("creep_time").number(Range::closed(0, 1e9, "s")));
+  assign(cloth.plasticity.yield_curvature,
+         map.require(
+                "yield_curvature",
+                "Largest elastic deviation of a crease's curvature. What is beyond it stays: it moves the rest angle.")
+             .number(Range::closed(0, 1e9, "1/m")));
+  assign(cloth.plasticity.hardening, map.get("hardening",
+                                             "How creases get stiffer as they flow: by exp(hardening times plastic "
+                                             "curvature). Negative: softer. Without the key: 0.")
+                                         .number(Range::closed(-1e6, 1e6, "m")));
+  assign(
+      cloth.plasticity.creep_time,
+      map.get("creep_time", "Time in which all but 1/e of what is beyond the yield flows. Without the key: 0, at once.")
+          .number(Range::closed(0, 1e9, "s")));
   map.finish();
   if (cloth.bending != BendingModel::hinge)
   {
@@ -31,73 +41,112 @@ void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
 Aerodynamics readAerodynamics(const YamlCursor& at)
 {
   Aerodynamics air;
-  YamlMap map(at);
-  assign(air.air_density, map.get("air_density").number(Range::above(0, 1e5, "kg/m^3")));
-  assign(air.drag, map.get("drag").number(Range::closed(0, 1e3)));
-  assign(air.lift, map.get("lift").number(Range::closed(0, 1e3)));
+  YamlMap map(at.sharesKeysOf("cloths.N.aerodynamics"));
+  assign(air.air_density, map.get("air_density", "Density of the air. Without the key: 1.2 kg/m^3.")
+                              .number(Range::above(0, 1e5, "kg/m^3")));
+  assign(air.drag, map.get("drag", "Drag coefficient C_D; a plate across the flow has about 1.2. Without the key: 0.")
+                       .number(Range::closed(0, 1e3)));
+  assign(air.lift, map.get("lift", "Lift coefficient C_L; the lift is largest at 45 degrees. Without the key: 0.")
+                       .number(Range::closed(0, 1e3)));
   map.finish();
   return air;
+}
+
+/// The moduli of an orthotropic cloth, per width.
+void readMembrane(const YamlCursor& at_membrane, ClothConfig& cloth)
+{
+  double warp = 300, weft = 300, poisson = 0.0, shear = 100;
+  const Range per_width = Range::above(0, 1e9, "N/m");
+  YamlMap membrane(at_membrane);
+  assign(warp, membrane.require("warp", "Stiffness along the warp, force per width and strain.").number(per_width));
+  assign(weft, membrane.require("weft", "Stiffness along the weft, force per width and strain.").number(per_width));
+  assign(poisson, membrane.get("poissons_ratio", "Poisson's ratio of the membrane. Without the key: 0.")
+                      .number(Range::between(-1e3, 1e3)));
+  assign(shear, membrane.require("shear", "Stiffness against shear, force per width.").number(per_width));
+  cloth.warp = readDirection(membrane.get("direction",
+                                          "Direction of the warp in the undeformed shape. Without the key: the first "
+                                          "side of the grid, or x of a mesh."),
+                             cloth.warp);
+  membrane.finish();
+  try
+  {
+    cloth.membrane = orthotropicMembrane(warp, weft, poisson, shear);
+  }
+  catch (const std::invalid_argument& error)
+  {
+    at_membrane.problem(error.what());
+  }
 }
 
 /// Mass, membrane and bending.
 void readMaterials(YamlMap& map, ClothConfig& cloth)
 {
   double youngs_modulus = 1e6, poissons_ratio = 0.3, thickness = 3e-4;
-  YamlMap material(map.get("material"));
-  const YamlCursor per_area = material.get("area_density"), per_volume = material.get("density"),
-                   modulus = material.get("youngs_modulus");
-  assign(thickness, material.get("thickness").number(Range::above(0, 1, "m")));
+  YamlMap material(
+      map.get("material", "Mass and stiffness of the cloth. Without the key: the defaults of the keys in it.")
+          .sharesKeysOf("cloths.N.material"));
+  const YamlCursor per_area = material.get("area_density", "Mass per area. Without the key: 0.15 kg/m^2."),
+                   per_volume = material.get(
+                       "density", "Mass per volume, which is multiplied by `thickness`; in place of `area_density`."),
+                   modulus = material.get("youngs_modulus",
+                                          "Young's modulus E. Without the key: 1e6 Pa. Not beside `membrane`.");
+  assign(thickness, material
+                        .get("thickness",
+                             "Thickness h of the cloth, for its stiffness and mass; contact has a thickness of its "
+                             "own. Without the key: 0.0003 m.")
+                        .number(Range::above(0, 1, "m")));
   assign(cloth.area_density, per_area.number(Range::above(0, 1e4, "kg/m^2")));
   if (const auto density = per_volume.number(Range::above(0, 1e6, "kg/m^3")))
     cloth.area_density = *density * thickness;
   if (per_area.present() && per_volume.present())
     per_volume.problem("there is an area_density as well; give one of them");
   assign(youngs_modulus, modulus.number(Range::above(0, 1e13, "Pa")));
-  const YamlCursor ratio = material.get("poissons_ratio");
+  const YamlCursor ratio =
+      material.get("poissons_ratio", "Poisson's ratio. Without the key: 0.3. Not beside `membrane`.");
   assign(poissons_ratio, ratio.number(Range::above(-1, 0.5)));
   material.finish();
 
-  const YamlCursor at_membrane = map.get("membrane"), at_bending = map.get("bending");
-  YamlMap bending(at_bending);
-  assign(cloth.bending, bending.get("model").choice<BendingModel>({{"isometric", BendingModel::isometric_nonconforming},
-                                                                   {"conforming", BendingModel::isometric_conforming},
-                                                                   {"hinge", BendingModel::hinge},
-                                                                   {"none", BendingModel::none}}));
-  const YamlCursor bending_modulus = bending.get("modulus"), bending_ratio = bending.get("poissons_ratio");
+  const YamlCursor at_membrane = map.get("membrane",
+                                         "Stiffness of an orthotropic cloth in its plane; `bending.modulus` must then "
+                                         "be given, too. Without the key it follows from `material`."),
+                   at_bending = map.get("bending",
+                                        "Stiffness against bending. Without the key: the defaults of the keys in it.");
+  at_membrane.sharesKeysOf("cloths.N.membrane");
+  YamlMap bending(at_bending.sharesKeysOf("cloths.N.bending"));
+  assign(cloth.bending, bending
+                            .get("model",
+                                 "Model of bending. isometric is the fastest, for flat shapes at rest; hinge takes any "
+                                 "shape at rest; conforming does not depend on the mesh but is for flat shapes at "
+                                 "rest; none does not bend at all. Without the key: isometric.")
+                            .choice<BendingModel>({{"isometric", BendingModel::isometric_nonconforming},
+                                                   {"conforming", BendingModel::isometric_conforming},
+                                                   {"hinge", BendingModel::hinge},
+                                                   {"none", BendingModel::none}}));
+  const YamlCursor bending_modulus = bending.get("modulus",
+                                                 "Bending stiffness D, moment per width and curvature. Without the "
+                                                 "key: E h^3 / (12 (1 - nu^2)), 0 with model none."),
+                   bending_ratio = bending.get("poissons_ratio",
+                                               "Poisson's ratio of bending, for model isometric. Without the key: that "
+                                               "of the mesh, about -1/3 on equilateral triangles.");
   cloth.bending_poissons_ratio = bending_ratio.number(Range::between(-1, 1));
   bending.finish();
   if (bending_ratio.present() && cloth.bending != BendingModel::isometric_nonconforming)
   {
     bending_ratio.problem(
         "is for bending: {model: isometric}. Hinges have the ratio of their mesh (-1/3 on equilateral triangles), "
-        "conforming bending "
-        "has 1; leave it out");
+        "conforming bending has 1; leave it out");
   }
-  readPlasticity(map.get("plasticity"), cloth);
+  readPlasticity(
+      map.get("plasticity", "Creases that stay, for bending model hinge. Without the key the cloth is elastic."),
+      cloth);
   if (at_membrane.present())
   {
-    double warp = 300, weft = 300, poisson = 0.0, shear = 100;
-    const Range per_width = Range::above(0, 1e9, "N/m");
-    YamlMap membrane(at_membrane);
-    assign(warp, membrane.require("warp").number(per_width));
-    assign(weft, membrane.require("weft").number(per_width));
-    assign(poisson, membrane.get("poissons_ratio").number(Range::between(-1e3, 1e3)));
-    assign(shear, membrane.require("shear").number(per_width));
-    cloth.warp = readDirection(membrane.get("direction"), cloth.warp);
-    membrane.finish();
+    readMembrane(at_membrane, cloth);
     for (const YamlCursor& other : {modulus, ratio})
       if (other.present())
         other.problem("there is a membrane as well, which says it per width");
     if (!bending_modulus.present() && cloth.bending != BendingModel::none && at_membrane.isMap())
       at_membrane.problem("says nothing of bending; give bending: {modulus: D} in N m, or bending: {model: none}");
-    try
-    {
-      cloth.membrane = orthotropicMembrane(warp, weft, poisson, shear);
-    }
-    catch (const std::invalid_argument& error)
-    {
-      at_membrane.problem(error.what());
-    }
   }
   else
   {
@@ -127,9 +176,11 @@ std::vector<int> alongSide(const ClothConfig& cloth, int axis, bool far)
 
 std::vector<int> readNear(const YamlCursor& at, const Eigen::Matrix3Xd& vertices)
 {
-  YamlMap map(at);
-  const auto point = map.require("point").vector3(kCoordinate);
-  const auto radius = map.get("radius").number(Range::above(0, kMaxCoordinate, "m"));
+  YamlMap map(at.sharesKeysOf("cloths.N.grasps.NAME.near"));
+  const auto point = map.require("point", "Place near which vertices are held or loaded.").vector3(kCoordinate);
+  const auto radius =
+      map.get("radius", "All vertices within this distance of `point` count. Without the key: the nearest one alone.")
+          .number(Range::above(0, kMaxCoordinate, "m"));
   map.finish();
   if (!point)
     return {};
@@ -149,8 +200,12 @@ std::vector<int> readNear(const YamlCursor& at, const Eigen::Matrix3Xd& vertices
 
 std::vector<int> readHeldVertices(YamlMap& map, const ClothConfig& cloth)
 {
-  const YamlCursor list = map.get("vertices"), corner = map.get("corner"), edge = map.get("edge"),
-                   near = map.get("near");
+  const YamlCursor list = map.get("vertices",
+                                  "Indices of the vertices; a negative index counts from the end, and \"5..9\" is a "
+                                  "range. Give one of `vertices`, `corner`, `edge` and `near`."),
+                   corner = map.get("corner", "Corner of a grid."),
+                   edge = map.get("edge", "All vertices along a side of a grid."),
+                   near = map.get("near", "Vertices near a point, where the cloth starts.");
   if (list.present() + corner.present() + edge.present() + near.present() != 1)
   {
     if (map.at().isMap())
@@ -222,7 +277,9 @@ std::vector<ClothLoadConfig> readClothLoads(const YamlCursor& at, const ClothCon
     ClothLoadConfig load;
     YamlMap map(item);
     load.vertices = readHeldVertices(map, cloth);
-    assign(load.force, map.require("force").vector3(Range::closed(-1e15, 1e15, "N")));
+    assign(load.force,
+           map.require("force", "Force on each of the vertices; it keeps its size and its direction in the world.")
+               .vector3(Range::closed(-1e15, 1e15, "N")));
     map.finish();
     loads.push_back(std::move(load));
   }
@@ -231,21 +288,33 @@ std::vector<ClothLoadConfig> readClothLoads(const YamlCursor& at, const ClothCon
 
 void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& cloth)
 {
+  at.sharesKeysOf("cloths.N.grasps");
   if (!at.present())
     return;
   std::map<int, std::string> holders;
-  for (const auto& [name, entry] : at.members())
+  for (const auto& [name, entry] :
+       at.members("A grasp under a name of yours (letters, digits and '_'), which topics and tables use."))
   {
     GraspConfig grasp;
     grasp.name = name;
     YamlMap map(entry);
     grasp.vertices = readHeldVertices(map, cloth);
-    assign(grasp.clamp, map.get("clamp").boolean());
+    assign(grasp.clamp, map.get("clamp",
+                                "Whether the grasp also holds the slope: it then holds all vertices of the faces that "
+                                "touch its vertices. Without the key: false.")
+                            .boolean());
     if (grasp.clamp)
       grasp.vertices = withFaces(cloth.mesh, grasp.vertices);
     grasp.attach = Attach::initial;
-    assign(grasp.attach, map.get("attach").choice<Attach>({{"frame", Attach::section}, {"initial", Attach::initial}}));
-    grasp.motion = readMotion(map.get("motion"), context, grasp.attach == Attach::section);
+    assign(grasp.attach,
+           map.get("attach",
+                   "Which point the poses of `motion` describe. `initial`: a gripper, which keeps the offset to the "
+                   "vertices that it has at its first pose. `frame`: the grasp's frame, with the origin at the mean of "
+                   "the vertices and the world's axes at the start. Without the key: initial.")
+               .choice<Attach>({{"frame", Attach::section}, {"initial", Attach::initial}}));
+    grasp.motion =
+        readMotion(map.get("motion", "How the held vertices move, as one rigid body. Without the key: fixed."), context,
+                   grasp.attach == Attach::section);
     map.finish();
     for (const int vertex : grasp.vertices)
     {
@@ -266,8 +335,12 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
   cloth.name = default_name;
   cloth.place = at.place();
   YamlMap map(at);
-  assign(cloth.name, map.get("name").name());
-  const YamlCursor grid = map.get("grid"), mesh = map.get("mesh");
+  assign(cloth.name, map.get("name",
+                             "Name of the cloth, which topics, tables and other keys use. Without the key: cloth if "
+                             "there is one cloth, otherwise cloth0, cloth1, ...")
+                         .name());
+  const YamlCursor grid = map.get("grid", "Rectangle of cloth. Give either `grid` or `mesh`."),
+                   mesh = map.get("mesh", "Mesh of the undeformed cloth from a file. Give either `grid` or `mesh`.");
   if (grid.present() == mesh.present())
   {
     at.problem("must have either grid: {corner: [...], sides: [[...], [...]], cells: N} or mesh: {file: PATH}");
@@ -282,7 +355,9 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
     cloth.mesh = TriangleMesh{};
   }
   readClothTraits(map, context, cloth);
-  cloth.loads = readClothLoads(map.get("loads"), cloth);
+  cloth.loads = readClothLoads(
+      map.get("loads", "Forces on vertices that act all the time, in steps and in statics. Without the key: none."),
+      cloth);
   map.finish();
   return cloth;
 }
@@ -292,8 +367,15 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
 void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& cloth)
 {
   readMaterials(map, cloth);
-  const YamlCursor undeformed = map.get("undeformed");
-  const Eigen::Matrix3Xd start = readClothShape(map.get("start"), context, cloth.mesh);
+  const YamlCursor undeformed =
+      map.get("undeformed",
+              "Shape whose bend angles are those at rest: a mesh file with the same triangles, or folds, ridges or "
+              "crinkles of the cloth's mesh. For bending model hinge or isometric. Without the key: the mesh itself.");
+  const YamlCursor at_start =
+      map.get("start",
+              "Shape in which the cloth starts: a mesh file with the same triangles of the same vertices. Without the "
+              "key: the mesh itself; a tracked cloth starts as its guide does.");
+  const Eigen::Matrix3Xd start = readClothShape(at_start.sharesKeysOf("cloths.N.mesh"), context, cloth.mesh);
   cloth.start = start.cols() ? start : cloth.start;
   readUndeformed(undeformed, context, cloth);
   if (undeformed.present() &&
@@ -301,26 +383,54 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
   {
     undeformed.problem(
         "gives angles at rest, which this bending model does not have; use bending: {model: hinge}, or isometric, "
-        "which takes hinges "
-        "for curved shapes at rest");
+        "which takes hinges for curved shapes at rest");
   }
-  cloth.aerodynamics = readAerodynamics(map.get("aerodynamics"));
-  YamlMap damping(map.get("damping"));
-  assign(cloth.mass_damping, damping.get("mass").number(Range::closed(0, 1e6, "1/s")));
-  assign(cloth.stiffness_damping, damping.get("stiffness").number(Range::closed(0, 1e3, "s")));
-  assign(cloth.drag, damping.get("drag").number(Range::closed(0, 1e6, "N s/m^3")));
+  cloth.aerodynamics = readAerodynamics(
+      map.get("aerodynamics",
+              "Drag and lift of thin plates in the wind, in addition to `damping.drag`. Without the key: none."));
+  YamlMap damping(map.get("damping", "Damping of the cloth. Without the key: none.").sharesKeysOf("cloths.N.damping"));
+  assign(cloth.mass_damping,
+         damping
+             .get("mass",
+                  "Damping of the motion against the world: the force on a mass m is -mass m v. Without the key: 0.")
+             .number(Range::closed(0, 1e6, "1/s")));
+  assign(cloth.stiffness_damping, damping
+                                      .get("stiffness",
+                                           "Damping of deformation (Rayleigh): it acts like the stiffness times this "
+                                           "time, on the rate of the strain. Without the key: 0.")
+                                      .number(Range::closed(0, 1e3, "s")));
+  assign(
+      cloth.drag,
+      damping.get("drag", "Pressure per velocity of the air against the cloth, along the normal. Without the key: 0.")
+          .number(Range::closed(0, 1e6, "N s/m^3")));
   damping.finish();
-  YamlMap solver(map.get("solver"));
+  YamlMap solver(map.get("solver", "Settings of the implicit solver of the cloth.").sharesKeysOf("cloths.N.solver"));
   assign(cloth.solver,
-         solver.get("linear").choice<ClothSolver>({{"auto", ClothSolver::automatic},
-                                                   {"cholesky", ClothSolver::cholesky},
-                                                   {"conjugate_gradients", ClothSolver::conjugate_gradients},
-                                                   {"gauss_seidel", ClothSolver::gauss_seidel}}));
-  assign(cloth.linear_tolerance, solver.get("tolerance").number(Range::between(0, 1)));
-  assign(cloth.one_newton_step, solver.get("one_newton_step").boolean());
+         solver
+             .get("linear",
+                  "Solver of the linear equations: gauss_seidel and conjugate_gradients solve to `tolerance`, cholesky "
+                  "exactly. Without the key, or with auto, it is chosen by the number of vertices.")
+             .choice<ClothSolver>({{"auto", ClothSolver::automatic},
+                                   {"cholesky", ClothSolver::cholesky},
+                                   {"conjugate_gradients", ClothSolver::conjugate_gradients},
+                                   {"gauss_seidel", ClothSolver::gauss_seidel}}));
+  assign(cloth.linear_tolerance,
+         solver.get("tolerance", "Relative residual to which the linear equations are solved. Without the key: 0.005.")
+             .number(Range::between(0, 1)));
+  assign(cloth.one_newton_step, solver
+                                    .get("one_newton_step",
+                                         "Whether each step takes a single Newton iteration: several times as fast, "
+                                         "and less exact. Without the key: false.")
+                                    .boolean());
   solver.finish();
-  readGrasps(map.get("grasps"), context, cloth);
-  cloth.contact = readContactProperties(map.get("contact"), "cloths", true);
+  readGrasps(map.get("grasps",
+                     "Vertices that are held, each group under a name of its own. Names of grasps differ within a "
+                     "scene. Without the key the cloth is free."),
+             context, cloth);
+  cloth.contact = readContactProperties(
+      map.get("contact",
+              "What the cloth touches. Without the key it touches nothing; `contact: {}` lets it touch everything."),
+      "cloths", true);
 }
 
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context)
@@ -335,7 +445,7 @@ std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& con
     cloths.push_back(readCloth(entries[k], context, entries.size() == 1 ? "cloth" : "cloth" + std::to_string(k)));
     const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
     if (!is_new)
-      YamlMap(entries[k]).get("name").problem("is also the name of " + other->second + "; names must differ");
+      YamlMap(entries[k]).find("name").problem("is also the name of " + other->second + "; names must differ");
   }
   return cloths;
 }

@@ -14,6 +14,31 @@ namespace {
 
 constexpr int max_cells = 2000;   // per side of a grid
 
+/// Returns false when something was reported.
+bool readSides(const YamlCursor& at_sides, ClothGrid& grid)
+{
+  const auto sides = at_sides.present() ? at_sides.items(2, 2) : std::vector<YamlCursor>{};
+  bool good = sides.size() == 2;
+  for (std::size_t k = 0; k < sides.size(); ++k)
+  {
+    const auto side = sides[k].vector3(kCoordinate);
+    good = good && side;
+    assign(grid.sides[k], side);
+    if (side && !(side->norm() > 0))
+    {
+      sides[k].problem("has no length");
+      good = false;
+    }
+  }
+  const double width = grid.sides[0].norm(), height = grid.sides[1].norm();
+  if (good && std::abs(grid.sides[0].dot(grid.sides[1])) > 1e-6 * width * height)
+  {
+    at_sides.problem("must be at right angles; other shapes come from a mesh file");
+    good = false;
+  }
+  return good;
+}
+
 }   // namespace
 
 void MeshFile::place(Eigen::Matrix3Xd& vertices) const
@@ -27,9 +52,13 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
 {
   MeshFile read;
   YamlMap map(at);
-  const YamlCursor file = map.require("file");
-  assign(read.scale, map.get("scale").number(Range::above(0, 1e6)));
-  read.pose = readPose(map.get("pose")).value_or(Pose{});
+  const YamlCursor file =
+      map.require("file", "OBJ or PLY file with a triangle mesh; relative to the folder of the scene file.");
+  assign(read.scale, map.get("scale", "Factor by which the coordinates of the file are multiplied. Without the key: 1.")
+                         .number(Range::above(0, 1e6)));
+  read.pose =
+      readPose(map.get("pose", "Where the mesh is placed, after scaling. Without the key: at the origin, not turned."))
+          .value_or(Pose{});
   map.finish();
   const auto text = file.text();
   if (!text)
@@ -57,29 +86,20 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
 std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh)
 {
   ClothGrid grid;
-  YamlMap map(at);
-  assign(grid.corner, map.get("corner").vector3(kCoordinate));
-  const YamlCursor at_sides = map.require("sides"), at_cells = map.require("cells"), at_seed = map.get("seed");
-  const auto sides = at_sides.present() ? at_sides.items(2, 2) : std::vector<YamlCursor>{};
-  bool good = sides.size() == 2;
-  for (std::size_t k = 0; k < sides.size(); ++k)
-  {
-    const auto side = sides[k].vector3(kCoordinate);
-    good = good && side;
-    assign(grid.sides[k], side);
-    if (side && !(side->norm() > 0))
-    {
-      sides[k].problem("has no length");
-      good = false;
-    }
-  }
+  YamlMap map(at.sharesKeysOf("cloths.N.grid"));
+  assign(grid.corner,
+         map.get("corner", "Lower left corner of the rectangle. Without the key: [0, 0, 0].").vector3(kCoordinate));
+  const YamlCursor
+      at_sides = map.require("sides",
+                             "Vectors from the lower left corner to the lower right and to the upper left corner; they "
+                             "are at right angles."),
+      at_cells = map.require(
+          "cells", "Number of cells along both sides: [columns, rows], or columns alone, from which the rows follow."),
+      at_seed = map.get("seed", "Seed of the random positions of `pattern: irregular`. Without the key: 1.");
+  bool good = readSides(at_sides, grid);
   const double width = grid.sides[0].norm(), height = grid.sides[1].norm();
-  if (good && std::abs(grid.sides[0].dot(grid.sides[1])) > 1e-6 * width * height)
-  {
-    at_sides.problem("must be at right angles; other shapes come from a mesh file");
-    good = false;
-  }
   int columns = 0, rows = 0;
+  at_cells.takes("a whole number in [1, 2000], or [columns, rows]");
   if (at_cells.isList())
   {
     const auto cells = at_cells.items(2, 2);
@@ -102,10 +122,13 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
     good = false;
   }
   GridPattern pattern = GridPattern::equilateral;
-  assign(pattern, map.get("pattern").choice<GridPattern>({{"one_diagonal", GridPattern::one_diagonal},
-                                                          {"alternating", GridPattern::alternating},
-                                                          {"equilateral", GridPattern::equilateral},
-                                                          {"irregular", GridPattern::irregular}}));
+  assign(pattern, map.get("pattern",
+                          "How the rectangle is divided into triangles; bending depends on the pattern. Vertices are "
+                          "numbered from the corner along the first side, row after row. Without the key: equilateral.")
+                      .choice<GridPattern>({{"one_diagonal", GridPattern::one_diagonal},
+                                            {"alternating", GridPattern::alternating},
+                                            {"equilateral", GridPattern::equilateral},
+                                            {"irregular", GridPattern::irregular}}));
   int seed = 1;
   assign(seed, at_seed.integer(0, 2'000'000'000));
   if (at_seed.present() && pattern != GridPattern::irregular)
@@ -140,7 +163,7 @@ bool readClothMesh(const YamlCursor& at, const ReadContext& context, TriangleMes
   }
   catch (const std::exception& error)
   {
-    YamlMap(at).get("file").problem(error.what());
+    YamlMap(at).find("file").problem(error.what());
     return false;
   }
   return true;
@@ -153,7 +176,7 @@ Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context
     return {};   // none, or reported
   const TriangleMesh& mesh = read->mesh;
   const std::string& path = read->path;
-  const YamlCursor file = YamlMap(at).get("file");
+  const YamlCursor file = YamlMap(at).find("file");
   const auto differs = [&](const std::string& what, Eigen::Index here, Eigen::Index there) {
     file.problem(path + " has " + std::to_string(here) + " " + what + ", the cloth's mesh has " +
                  std::to_string(there) + "; both must have the same triangles of the same vertices, in the same order");

@@ -12,7 +12,10 @@ namespace {
 
 const Range positive = Range::above(0, kMaxCoordinate, "m");
 
-std::optional<int> readEdges(YamlMap& map) { return map.get("edges").integer(1, max_edges); }
+std::optional<int> readEdges(YamlMap& map, const char* meaning)
+{
+  return map.get("edges", meaning).integer(1, max_edges);
+}
 
 std::vector<Eigen::Vector3d> readPoints(const YamlCursor& at)
 {
@@ -26,10 +29,13 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& at)
 StraightCurve readStraight(YamlMap& map)
 {
   StraightCurve curve;
-  assign(curve.from, map.get("from").vector3(kCoordinate));
-  assign(curve.to, map.get("to").vector3(kCoordinate));
-  assign(curve.edges, readEdges(map));
-  assign(curve.grading, map.get("grading").number(Range::closed(0.01, 100)));
+  assign(curve.from, map.get("from", "First node. Without the key: [0, 0, 0].").vector3(kCoordinate));
+  assign(curve.to, map.get("to", "Last node. Without the key: [1, 0, 0].").vector3(kCoordinate));
+  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
+  assign(curve.grading,
+         map.get("grading",
+                 "Length of the last edge over that of the first. Without the key: 1, all edges are equally long.")
+             .number(Range::closed(0.01, 100)));
   if (!((curve.to - curve.from).norm() > 0))
     map.at().problem("from and to are the same point; must differ");
   return curve;
@@ -38,22 +44,25 @@ StraightCurve readStraight(YamlMap& map)
 PolylineCurve readPolyline(YamlMap& map)
 {
   PolylineCurve curve;
-  curve.points = readPoints(map.require("points"));
-  curve.edges = readEdges(map);
+  curve.points = readPoints(map.require(
+      "points", "Points [x, y, z] through which the polyline runs. They are the nodes, unless `edges` is given."));
+  curve.edges = readEdges(map, "Number of edges of equal length. Without the key the points are the nodes.");
   return curve;
 }
 
 ArcCurve readArc(YamlMap& map)
 {
   ArcCurve curve;
-  assign(curve.center, map.get("center").vector3(kCoordinate));
-  assign(curve.start, map.get("start").vector3(kCoordinate));
-  assign(curve.axis, map.get("axis").vector3(kCoordinate));
-  const YamlCursor angle = map.get("angle");
+  assign(curve.center, map.get("center", "Centre of the circle. Without the key: [0, 0, 0].").vector3(kCoordinate));
+  assign(curve.start, map.get("start", "First node. Without the key: [1, 0, 0].").vector3(kCoordinate));
+  assign(curve.axis, map.get("axis", "Axis about which the arc turns, through `center`. Without the key: [0, 0, 1].")
+                         .vector3(kCoordinate));
+  const YamlCursor angle =
+      map.get("angle", "Angle of the arc, positive by the right-hand rule about `axis`. Without the key: 1 rad.");
   assign(curve.angle, angle.number(Range::closed(-2e5 * M_PI, 2e5 * M_PI, "rad")));
   if (curve.angle == 0)
     angle.problem("must not be zero");
-  assign(curve.edges, readEdges(map));
+  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
   // Edges that turn by half a turn or more each lie the wrong way round the circle, or fold back.
   if (std::abs(curve.angle) >= 0.999 * M_PI * curve.edges)
   {
@@ -67,72 +76,95 @@ ArcCurve readArc(YamlMap& map)
 HelixCurve readHelix(YamlMap& map)
 {
   HelixCurve curve;
-  assign(curve.center, map.get("center").vector3(kCoordinate));
-  assign(curve.axis, map.get("axis").vector3(kCoordinate));
-  assign(curve.radius, map.get("radius").number(positive));
-  assign(curve.pitch, map.get("pitch").number(kCoordinate));
-  const YamlCursor turns = map.get("turns");
+  assign(
+      curve.center,
+      map.get("center", "Foot of the axis, beside the first node. Without the key: [0, 0, 0].").vector3(kCoordinate));
+  assign(curve.axis, map.get("axis", "Direction of the axis. Without the key: [0, 0, 1].").vector3(kCoordinate));
+  assign(curve.radius, map.get("radius", "Radius of the helix. Without the key: 0.1 m.").number(positive));
+  assign(curve.pitch, map.get("pitch", "Rise along the axis per turn. Without the key: 0.05 m.").number(kCoordinate));
+  const YamlCursor turns = map.get("turns", "Number of turns; negative for a left-handed helix. Without the key: 3.");
   assign(curve.turns, turns.number(Range::closed(-1e5, 1e5)));
   if (curve.turns == 0)
     turns.problem("must not be zero; negative turns give a left-handed helix");
-  assign(curve.edges, readEdges(map));
+  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 150."));
   return curve;
 }
 
 CatenaryCurve readCatenary(YamlMap& map)
 {
   CatenaryCurve curve;
-  assign(curve.from, map.get("from").vector3(kCoordinate));
-  assign(curve.to, map.get("to").vector3(kCoordinate));
-  assign(curve.length, map.get("length").number(positive));
-  assign(curve.edges, readEdges(map));
+  assign(curve.from, map.get("from", "First node. Without the key: [0, 0, 0].").vector3(kCoordinate));
+  assign(curve.to, map.get("to", "Last node. Without the key: [1, 0, 0].").vector3(kCoordinate));
+  assign(curve.length,
+         map.get("length",
+                 "Length of the hanging chain; not shorter than the distance of its ends. Without the key: 1.2 m.")
+             .number(positive));
+  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
   return curve;
 }
 
 TrefoilCurve readTrefoil(YamlMap& map)
 {
   TrefoilCurve curve;
-  assign(curve.center, map.get("center").vector3(kCoordinate));
-  assign(curve.axis, map.get("axis").vector3(kCoordinate));
-  assign(curve.up, map.get("up").vector3(kCoordinate));
-  assign(curve.radius, map.get("radius").number(positive));
-  assign(curve.separation, map.get("separation").number(positive));
-  assign(curve.length, map.get("length").number(positive));
-  assign(curve.left_handed, map.get("left_handed").boolean());
-  assign(curve.edges, readEdges(map));
+  assign(curve.center,
+         map.get("center", "Centre of the knot, on the line of its two tails. Without the key: [0, 0, 0].")
+             .vector3(kCoordinate));
+  assign(curve.axis, map.get("axis", "Direction of the two tails. Without the key: [1, 0, 0].").vector3(kCoordinate));
+  assign(curve.up,
+         map.get("up", "Direction away from which the loop lies. Without the key: [0, 0, 1].").vector3(kCoordinate));
+  assign(curve.radius, map.get("radius", "Radius of the loop. Without the key: 0.1 m.").number(positive));
+  assign(
+      curve.separation,
+      map.get("separation",
+              "Distance of the two strands where they wind about each other. Without the key: an eighth of the radius.")
+          .number(positive));
+  assign(curve.length, map.get("length", "Length of the whole curve. Without the key: 1.5 m.").number(positive));
+  assign(curve.left_handed,
+         map.get("left_handed", "Whether the knot is the mirror image. Without the key: false.").boolean());
+  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 150."));
   return curve;
 }
 
 TorusKnotCurve readTorusKnot(YamlMap& map)
 {
   TorusKnotCurve curve;
-  assign(curve.center, map.get("center").vector3(kCoordinate));
-  assign(curve.axis, map.get("axis").vector3(kCoordinate));
-  assign(curve.radius, map.get("radius").number(positive));
-  assign(curve.tube_radius, map.get("tube_radius").number(positive));
-  assign(curve.around, map.get("around").integer(1, 1000));
-  assign(curve.through, map.get("through").integer(1, 1000));
-  assign(curve.edges, readEdges(map));
+  assign(curve.center, map.get("center", "Centre of the knot. Without the key: [0, 0, 0].").vector3(kCoordinate));
+  assign(curve.axis, map.get("axis", "Axis of the torus. Without the key: [0, 0, 1].").vector3(kCoordinate));
+  assign(
+      curve.radius,
+      map.get("radius", "Radius of the circle around which the curve winds. Without the key: 0.1 m.").number(positive));
+  assign(curve.tube_radius,
+         map.get("tube_radius", "Distance of the curve from that circle. Without the key: 0.04 m.").number(positive));
+  assign(curve.around, map.get("around", "Number of turns about the axis. Without the key: 2.").integer(1, 1000));
+  assign(curve.through,
+         map.get("through",
+                 "Number of turns about the circle. Without the key: 3, which with `around` 2 is the closed trefoil.")
+             .integer(1, 1000));
+  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 120."));
   return curve;
 }
 
 VeeCurve readVee(YamlMap& map)
 {
   VeeCurve curve;
-  assign(curve.tip, map.get("tip").vector3(kCoordinate));
-  assign(curve.direction, map.get("direction").vector3(kCoordinate));
-  assign(curve.normal, map.get("normal").vector3(kCoordinate));
-  assign(curve.arm, map.get("arm").number(positive));
-  assign(curve.angle, map.get("angle").number(Range::between(0, M_PI, "rad")));
-  assign(curve.edges, readEdges(map));
+  assign(curve.tip, map.get("tip", "Point where the two arms meet. Without the key: [0, 0, 0].").vector3(kCoordinate));
+  assign(curve.direction,
+         map.get("direction", "Direction between the arms. Without the key: [1, 0, 0].").vector3(kCoordinate));
+  assign(curve.normal,
+         map.get("normal", "Normal of the plane of the arms. Without the key: [0, 0, 1].").vector3(kCoordinate));
+  assign(curve.arm, map.get("arm", "Length of each arm. Without the key: 0.5 m.").number(positive));
+  assign(curve.angle,
+         map.get("angle", "Angle between the arms. Without the key: pi/2.").number(Range::between(0, M_PI, "rad")));
+  assign(curve.edges, readEdges(map, "Number of edges, an even one. Without the key: 50."));
   return curve;
 }
 
 FileCurve readFile(YamlMap& map, const ReadContext& context)
 {
   FileCurve curve;
-  const YamlCursor path = map.require("path");
-  curve.edges = readEdges(map);
+  const YamlCursor path =
+      map.require("path", "CSV file with a point x,y,z per line. The points are the nodes, unless `edges` is given.");
+  curve.edges = readEdges(map, "Number of edges of equal length. Without the key the points are the nodes.");
   if (const auto text = path.text())
   {
     curve.path = context.resolve(*text);
@@ -170,11 +202,11 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
   if (!at.present())
     return std::nullopt;
   const std::size_t before = at.problems().size();
-  YamlMap kinds(at);
+  YamlMap kinds(at.sharesKeysOf("rods.N.centerline"));
   std::optional<Curve> curve;
   int given = 0;
-  const auto read = [&](const char* kind, auto reader) {
-    const YamlCursor value = kinds.get(kind);
+  const auto read = [&](const char* kind, const char* meaning, auto reader) {
+    const YamlCursor value = kinds.get(kind, meaning);
     if (value.present())
     {
       ++given;
@@ -185,15 +217,15 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
       curve = read_curve;
     }
   };
-  read("straight", readStraight);
-  read("polyline", readPolyline);
-  read("arc", readArc);
-  read("helix", readHelix);
-  read("catenary", readCatenary);
-  read("trefoil", readTrefoil);
-  read("torus_knot", readTorusKnot);
-  read("vee", readVee);
-  read("file", [&](YamlMap& map) { return readFile(map, context); });
+  read("straight", "A straight line.", readStraight);
+  read("polyline", "A polyline through points.", readPolyline);
+  read("arc", "An arc of a circle.", readArc);
+  read("helix", "A helix.", readHelix);
+  read("catenary", "A chain of given length that hangs between two points along gravity.", readCatenary);
+  read("trefoil", "A loose overhand (trefoil) knot with two straight tails.", readTrefoil);
+  read("torus_knot", "A closed knot on a torus.", readTorusKnot);
+  read("vee", "Two straight arms that meet at a tip.", readVee);
+  read("file", "A polyline through the points of a file.", [&](YamlMap& map) { return readFile(map, context); });
   kinds.finish();
   if (given != 1 && at.problems().size() == before)
   {

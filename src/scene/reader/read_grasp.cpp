@@ -27,7 +27,16 @@ std::optional<std::pair<int, int>> readIndices(const YamlCursor& at, int count)
 
 void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
 {
-  const YamlCursor edge_list = map.get("edges"), node_list = map.get("nodes");
+  const YamlCursor
+      edge_list =
+          map.get("edges",
+                  "Edges that are held, as consecutive indices; a negative index counts from the end, and \"3..7\" is "
+                  "a range. A single end edge of an open rod, [0] or [-1], means the section at the end node, so that "
+                  "the whole length is free. All nodes of other edges are held. Give either `edges` or `nodes`."),
+      node_list =
+          map.get("nodes",
+                  "Nodes that are held, as consecutive indices; a negative index counts from the end, and \"3..7\" is "
+                  "a range. One index holds the section at that node. Give either `edges` or `nodes`.");
   if (edge_list.present() == node_list.present())
   {
     if (map.at().isMap())
@@ -58,10 +67,18 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
 void readFrame(YamlMap& map, GraspConfig& grasp)
 {
   const Range any = Range::closed(-1e6, 1e6);
-  for (const auto& [key, vector] :
-       {std::make_pair("direction", &grasp.direction), std::make_pair("director", &grasp.director)})
+  const YamlCursor direction =
+                       map.get("direction",
+                               "Tangent of the held section in world axes, from the first node to the last, for "
+                               "poses without an orientation. Without the key the tangent at the start is kept."),
+                   director =
+                       map.get("director",
+                               "First material axis d1 of the held section in world axes, for poses without an "
+                               "orientation; the part along the tangent does not count. Without the key d1 at the "
+                               "start is carried to the new tangent by the smallest rotation.");
+  for (const auto& [at, vector] :
+       {std::make_pair(direction, &grasp.direction), std::make_pair(director, &grasp.director)})
   {
-    const YamlCursor at = map.get(key);
     const auto value = at.vector3(any);
     if (!value)
       continue;
@@ -75,7 +92,7 @@ void readFrame(YamlMap& map, GraspConfig& grasp)
       *vector = value->normalized();
   }
   if (grasp.direction.cross(grasp.director).norm() < 1e-6 && grasp.direction.norm() * grasp.director.norm() > 0)
-    map.get("director").problem("is along direction; must point away from it");
+    map.find("director").problem("is along direction; must point away from it");
 }
 
 /// Poses with an orientation of their own leave nothing for `direction` and `director` to say.
@@ -83,8 +100,8 @@ void checkFrame(YamlMap& map, const GraspConfig& grasp)
 {
   if (grasp.direction.isZero(0) && grasp.director.isZero(0))
     return;
-  const YamlCursor at = map.get(grasp.direction.isZero(0) ? "director" : "direction"), motion = map.get("motion");
-  const YamlCursor table = motion.isMap() ? YamlMap(motion).get("table") : motion;
+  const YamlCursor at = map.find(grasp.direction.isZero(0) ? "director" : "direction"), motion = map.find("motion");
+  const YamlCursor table = motion.isMap() ? YamlMap(motion).find("table") : motion;
   if (!std::holds_alternative<FixedMotion>(grasp.motion) && !(motion.isMap() && table.present()))
   {
     at.problem(
@@ -110,6 +127,7 @@ void checkFrame(YamlMap& map, const GraspConfig& grasp)
 std::vector<int> readIndexList(const YamlCursor& at, int count)
 {
   std::vector<int> indices;
+  at.takes("a list of indices from 0 (negative: from the end) and ranges FIRST..LAST");
   const int limit = count > 0 ? count : max_edges + 1;
   const auto resolve = [&](int index) { return index < 0 && count > 0 ? index + count : index; };
   for (const YamlCursor& item : at.items(1, static_cast<std::size_t>(limit)))
@@ -169,13 +187,21 @@ GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadC
   grasp.name = name;
   YamlMap map(at);
   readHeldNodes(map, grasp, closed, edges);
-  const YamlCursor hold = map.get("hold");
+  const YamlCursor hold = map.get("hold",
+                                  "`frame` clamps position and material frame. `position` pins the position of one "
+                                  "node, which can turn freely. Without the key: frame.");
   assign(grasp.hold, hold.choice<Hold>({{"frame", Hold::frame}, {"position", Hold::position}}));
-  assign(grasp.attach, map.get("attach").choice<Attach>({{"section", Attach::section}, {"initial", Attach::initial}}));
+  assign(grasp.attach, map.get("attach",
+                               "Which point the poses of `motion` describe. `section`: the held section itself, with "
+                               "the origin half way along the held part, x along the tangent and y along d1; the "
+                               "section moves to the first pose. `initial`: a gripper, which keeps the offset to the "
+                               "section that it has at its first pose. Without the key: section.")
+                           .choice<Attach>({{"section", Attach::section}, {"initial", Attach::initial}}));
   readFrame(map, grasp);
   const bool oriented = grasp.direction.norm() + grasp.director.norm() > 0;
   grasp.motion =
-      readMotion(map.get("motion"), context, grasp.hold == Hold::frame && grasp.attach == Attach::section && !oriented);
+      readMotion(map.get("motion", "How the held section moves. Without the key: fixed where it is at the start."),
+                 context, grasp.hold == Hold::frame && grasp.attach == Attach::section && !oriented);
   checkFrame(map, grasp);
   if (grasp.hold == Hold::position && grasp.first_node != grasp.last_node)
   {

@@ -148,7 +148,7 @@ std::optional<CarriedGuide> readGroups(const YamlCursor& at, const ReadContext& 
     for (const VertexGroup& group : readGroupsOf(at, context, source.file))
       add(group.name, group.vertices);
   else if (at.present())
-    for (const auto& [name, list] : at.members())
+    for (const auto& [name, list] : at.members("Vertices that the body of this name carries; \"3..7\" is a range."))
       add(name, readIndexList(list, vertices));
   if (vertices == 0 || guide.bodies.empty())
     return std::nullopt;
@@ -224,8 +224,32 @@ std::optional<MotionKeys> readMotionKeys(const YamlCursor& at)
 {
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  MotionKeys keys{map.get("frames"), map.get("bodies"), map.get("topic"),  map.get("bag"), map.get("rate"),
-                  map.get("begin"),  map.get("groups"), map.get("attach"), map.get("late")};
+  MotionKeys keys{
+      map.get("frames",
+              "One mesh file per frame: a path with one * in place of the frame's number, for example "
+              "guide/frame_*.obj. Give one of `frames`, `bodies`, `bag` and `topic`."),
+      map.get("bodies",
+              "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw of bodies that carry vertices of the guide, see "
+              "`groups`."),
+      map.get(
+          "topic",
+          "The guide comes by messages: its vertices on `guide/points`, or bodies that carry them on `guide/bodies`."),
+      map.get("bag",
+              "Bag with the recorded motion of the guide: the path of the file, or a map if the bag holds several "
+              "motions."),
+      map.get("rate", "Frames per second; needed with `frames`."),
+      map.get("begin",
+              "Time of the first frame in the scene; of a bag, the time after its first stamp at which the scene "
+              "begins. Without the key: 0."),
+      map.get("groups",
+              "Vertices that each body carries: obj for the groups of the guide's OBJ file, or a map from bodies to "
+              "vertices. Needed for bodies."),
+      map.get("attach",
+              "Which frame the poses of bodies describe. `initial`: bodies carry the vertices from where both are at "
+              "first. `frame`: the guide's mesh is given in the frames of the bodies. Without the key: initial."),
+      map.get("late",
+              "What the guide does when no message comes: hold the last one, or go on at the last speed, which dies "
+              "out. Without the key: hold.")};
   map.finish();
   if (keys.frames.present() + keys.bodies.present() + keys.topic.present() + keys.bag.present() != 1)
   {
@@ -254,7 +278,7 @@ void readCarriedMotion(const YamlCursor& at, const MotionKeys& keys, const ReadC
 {
   if (!keys.groups.present())
   {
-    YamlMap(at).require("groups");
+    YamlMap(at).missing("groups");
     return;
   }
   auto carried = readGroups(keys.groups, context, source);
@@ -294,7 +318,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   if (keys->frames.present())
   {
     if (!keys->rate.present())
-      YamlMap(at).require("rate");
+      YamlMap(at).missing("rate");
     const auto hertz = keys->rate.number(Range::above(0, 1e6, "Hz"));
     if (hertz)
       assign(motion, readFrames(keys->frames, *hertz, first, context, source));
@@ -349,7 +373,9 @@ std::optional<double> readLate(const YamlCursor& at)
   if (!at.isMap())
     return at.choice<double>({{"hold", 0.0}, {"extrapolate", 0.2}});
   YamlMap map(at);
-  const auto coast = map.require("extrapolate").number(Range::above(0, 60, "s"));
+  const auto coast =
+      map.require("extrapolate", "Time within which the last speed dies out. The word extrapolate alone means 0.2 s.")
+          .number(Range::above(0, 60, "s"));
   map.finish();
   return coast;
 }
@@ -383,7 +409,11 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
 {
   GuideSource source;
   YamlMap map(at);
-  const YamlCursor mesh = map.get("mesh"), grid = map.get("grid"), motion = map.get("motion"), cloth = map.get("cloth");
+  const YamlCursor mesh = map.get("mesh", "Undeformed shape of the guide from a file; it may touch itself."),
+                   grid = map.get("grid", "Undeformed shape of the guide as a rectangle."),
+                   motion = map.get("motion", "How the guide moves. Without the key: fixed."),
+                   cloth =
+                       map.get("cloth", "Name of a cloth of the scene that is the guide, with its mesh and motion.");
   if (cloth.present())
   {
     for (const YamlCursor& other : {mesh, grid, motion})
@@ -405,13 +435,13 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
   {
     source.grid = readClothGrid(grid, context, source.config.mesh);
   }
-  else if ((source.file = readMeshFile(mesh, context)))
+  else if ((source.file = readMeshFile(mesh.sharesKeysOf("cloths.N.mesh"), context)))
   {
     source.config.mesh = source.file->mesh;
     const std::vector<MeshDefect> defects = topologyDefects(source.config.mesh);   // it may meet itself
     if (!defects.empty())
     {
-      YamlMap(mesh).get("file").problem(source.file->path + ": " + defects.front().message);
+      YamlMap(mesh).find("file").problem(source.file->path + ": " + defects.front().message);
       source.config.mesh = TriangleMesh{};
     }
   }

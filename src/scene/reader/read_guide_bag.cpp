@@ -28,9 +28,11 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
   if (at.isMap())
   {
     YamlMap map(at);
-    assign(source.file, map.require("file").text());
-    assign(source.topic, map.get("topic").text());
-    assign(source.object, map.get("cloth").text());
+    assign(source.file, map.require("file", "Path of the bag.").text());
+    assign(source.topic, map.get("topic", "Topic of the messages, if the bag holds several.").text());
+    assign(
+        source.object,
+        map.get("cloth", "Name of the cloth in the messages. Without the key: the name of the tracked cloth.").text());
     map.finish();
   }
   else

@@ -12,6 +12,7 @@ std::optional<TableMotion> readTable(const YamlCursor& at, bool needs_orientatio
 {
   TableMotion motion;
   bool good = true;
+  at.takes("rows [t, x, y, z, qx, qy, qz, qw]; or [t, x, y, z] where no orientation is needed");
   for (const YamlCursor& item : at.items(1))
   {
     const auto row = item.numbers(Range::closed(-1e9, 1e9));
@@ -80,6 +81,7 @@ void checkTopic(const YamlCursor& topic)
 Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation)
 {
   Motion motion = FixedMotion{};
+  at.sharesKeysOf("rods.N.grasps.NAME.motion");
   if (!at.present())
     return motion;
   if (at.isScalar())
@@ -89,7 +91,14 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
   }
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const YamlCursor topic = map.get("topic"), body = map.get("body"), table = map.get("table"), file = map.get("file");
+  const YamlCursor topic = map.get("topic", "Must be true: the motion comes by messages. Same as the word topic."),
+                   body = map.get("body",
+                                  "Name of the body to follow: a driven body or an obstacle of the scene, or one that "
+                                  "only messages tell of. With `file`: name of the body in the file."),
+                   table = map.get("table",
+                                   "Timed poses: rows [t, x, y, z, qx, qy, qz, qw], with t in s, lengths in m and a "
+                                   "unit quaternion. Poses between rows are interpolated smoothly."),
+                   file = map.get("file", "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. Give `body` as well.");
   map.finish();
   const int given = topic.present() + table.present() + (body.present() || file.present());
   if (given != 1)
@@ -122,6 +131,7 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
 std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadContext& context, bool may_be_free)
 {
   const std::optional<GivenMotion> fixed = GivenMotion{FixedMotion{}};
+  at.sharesKeysOf("obstacles.N.motion");
   if (!at.present())
     return may_be_free ? std::nullopt : fixed;
   if (at.isScalar())
@@ -134,7 +144,14 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
   }
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const YamlCursor topic = map.get("topic"), body = map.get("body"), table = map.get("table"), file = map.get("file");
+  const YamlCursor topic = map.get("topic",
+                                   "Must be true: the motion comes by messages on the topic `bodies`, or `nozzle/pose` "
+                                   "for a nozzle. Same as the word topic."),
+                   body = map.get("body", "Name of the body in `file`."),
+                   table = map.get("table",
+                                   "Timed poses: rows [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z], with t in s, "
+                                   "lengths in m and a unit quaternion. Poses between rows are interpolated smoothly."),
+                   file = map.get("file", "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. Give `body` as well.");
   map.finish();
   std::optional<TableMotion> poses;
   if (topic.present() + table.present() + (body.present() || file.present()) != 1 || body.present() != file.present())

@@ -10,8 +10,14 @@ RecordConfig readRecord(const YamlCursor& at)
 {
   RecordConfig record;
   YamlMap map(at);
-  assign(record.every, map.get("every").integer(1, 1'000'000'000, "steps"));
-  if (const YamlCursor fields = map.get("fields"); fields.present())
+  assign(record.every, map.get("every",
+                               "`simulate` records every n-th step, in tables, bags and OBJ files alike; nodes take "
+                               "their parameter `~state_every` instead. Without the key: 1, every step.")
+                           .integer(1, 1'000'000'000, "steps"));
+  if (const YamlCursor fields = map.get("fields",
+                                        "Quantities that are recorded in addition to the motion; docs/quantities.md "
+                                        "defines them. Without the key nothing is computed or recorded in addition.");
+      fields.present())
     for (const YamlCursor& item : fields.items())
       if (const auto field = item.choice(recordFieldNames()))
       {
@@ -27,7 +33,7 @@ void checkRecord(const YamlCursor& at, const SceneConfig& scene)
 {
   if (scene.record.fields.empty() || !at.problems().empty())
     return;
-  const YamlCursor fields = YamlMap(at).get("fields");
+  const YamlCursor fields = YamlMap(at).find("fields");
   const bool bodies =
       std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyConfig& body) { return !body.motion; });
   for (const YamlCursor& item : fields.items())
@@ -49,8 +55,7 @@ void checkRecord(const YamlCursor& at, const SceneConfig& scene)
     if (*field == RecordField::force && projected != scene.rods.end())
       item.problem("is not known of rod " + projected->name +
                    ", whose edges keep their lengths by projection (stretching: projected): its tension is no function "
-                   "of the state; "
-                   "leave it out, or take stretching: stiff");
+                   "of the state; leave it out, or take stretching: stiff");
   }
 }
 

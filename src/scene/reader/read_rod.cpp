@@ -25,6 +25,7 @@ void checkCount(const YamlCursor& at, std::size_t count, int edges)
 
 std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
 {
+  at.takes("a number in (0, 1e+15] N m^2, [B1, B2] of such numbers, or [[B11, B12], [B12, B22]]");
   if (!at.present())
     return std::nullopt;
   if (!at.isList())
@@ -66,7 +67,8 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
 {
   if (!at.present())
     return;
-  for (const auto& [name, value] : at.members())
+  for (const auto& [name, value] :
+       at.members("A grasp under a name of yours (letters, digits and '_'), which topics and tables use."))
   {
     const std::size_t before = value.problems().size();
     YamlTree word;
@@ -93,11 +95,20 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
 /// Edges of the rod as its curves give them; 0 when they could not be read or do not make a rod.
 int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
 {
-  const YamlCursor centerline = map.get("centerline"), initial = map.get("initial");
+  const YamlCursor centerline = map.get(
+                       "centerline",
+                       "Rest shape of the rod, and the shape in which it starts unless `initial` is given. Give one "
+                       "kind of curve. Without the key: a straight line of 1 m along x with 50 edges."),
+                   initial = map.get("initial",
+                                     "Shape in which the rod starts, if it is not the rest shape. The edges keep their "
+                                     "shares of the length. Without the key: the rest shape.");
   const std::size_t before = map.at().problems().size();
   assign(rod.centerline, readCurve(centerline, context));
   rod.initial = readCurve(initial, context);
-  const YamlCursor director = map.get("director");
+  const YamlCursor director =
+      map.get("director",
+              "Direction of the first material axis d1 at the first edge; the part along the edge does not count. The "
+              "other edges follow without twist. Without the key some normal is chosen.");
   assign(rod.director, director.vector3(Range::closed(-1e6, 1e6)));
   if (map.at().problems().size() != before)
     return 0;
@@ -138,14 +149,22 @@ void checkInitial(YamlMap& map, const ReadContext& context, const RodConfig& rod
   }
   catch (const std::invalid_argument& error)
   {
-    map.get("initial").problem(error.what());
+    map.find("initial").problem(error.what());
   }
 }
 
 /// `rest_twist` and `natural_curvature` of a rod with so many edges (0: not known).
 void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
 {
-  const YamlCursor at_twist = map.get("rest_twist"), at_curvature = map.get("natural_curvature");
+  const YamlCursor at_twist = map.get("rest_twist",
+                                      "Natural twist of the rod: the turn of the material frames about the centreline "
+                                      "in the unloaded rod. A number is for the whole rod and is spread evenly; a list "
+                                      "has one entry per inner node (closed rod: per node). Without the key: 0."),
+                   at_curvature =
+                       map.get("natural_curvature",
+                               "Natural curvature [kappa1, kappa2] about d2 and -d1, in the frames that `rest_twist` "
+                               "turns: one pair for the whole rod, or a list of pairs, one per inner node (closed rod: "
+                               "per node). Without the key: the curvature of the centreline.");
   const std::size_t joints = edges == 0 ? 0 : rod.closed ? edges : edges - 1;
   const auto checkJoints = [joints, &rod](const YamlCursor& at, std::size_t count) {
     if (joints > 0 && count != 1 && count != joints)
@@ -157,6 +176,7 @@ void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
     checkJoints(at_twist, twist->size());
     rod.rest_twist = *twist;
   }
+  at_curvature.takes("[kappa1, kappa2] of numbers in [-1000000, 1000000] 1/m, or a list of such pairs");
   if (!at_curvature.present())
     return;
   const Range curvature = Range::closed(-1e6, 1e6, "1/m");
@@ -209,10 +229,17 @@ void checkModuli(const YamlMap& material, const YamlCursor& at_youngs)
 CrossSection readCrossSection(const YamlCursor& at, int edges)
 {
   CrossSection section{{0.005}, {0.005}};
+  at.sharesKeysOf("rods.N.cross_section");
   if (!at.present())
     return section;
   YamlMap map(at);
-  const YamlCursor round = map.get("radius"), ellipse = map.get("ellipse");
+  const YamlCursor
+      round = map.get(
+          "radius",
+          "Radius of a round section. One number, two for a taper from the first edge to the last, or one per edge."),
+      ellipse = map.get("ellipse",
+                        "Half-axes [a, b] of an elliptical section, a along d1 and b along d2. Each is one number, two "
+                        "for a taper, or one per edge.");
   map.finish();
   if (at.isMap() && round.present() == ellipse.present())
   {
@@ -276,18 +303,39 @@ void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod)
 Material readMaterial(const YamlCursor& at)
 {
   Material material;
-  YamlMap map(at);
-  assign(material.density, map.get("density").number(Range::above(0, 1e6, "kg/m^3")));
-  const YamlCursor at_youngs = map.get("youngs_modulus");
+  YamlMap map(at.sharesKeysOf("rods.N.material"));
+  assign(material.density,
+         map.get("density", "Mass per volume. Without the key: 1000 kg/m^3.").number(Range::above(0, 1e6, "kg/m^3")));
+  const YamlCursor at_youngs =
+      map.get("youngs_modulus",
+              "Young's modulus E. Moduli that are not given follow from it and the section. Without the key: 1e6 Pa; "
+              "it must be given if only some of stretch_modulus, bend_modulus and twist_modulus are.");
   assign(material.youngs_modulus, at_youngs.number(Range::above(0, 1e15, "Pa")));
-  assign(material.poissons_ratio, map.get("poissons_ratio").number(Range::above(-1, 0.5)));
+  assign(material.poissons_ratio,
+         map.get("poissons_ratio", "Poisson's ratio, which gives the shear modulus. Without the key: 0.5.")
+             .number(Range::above(-1, 0.5)));
   assign(material.torsion,
-         map.get("torsion").choice<Torsion>({{"polar", Torsion::polar}, {"saint_venant", Torsion::saint_venant}}));
-  material.linear_density = map.get("linear_density").number(Range::above(0, 1e6, "kg/m"));
-  material.stretch_modulus = map.get("stretch_modulus").number(modulus);
-  assign(material.inextensible, map.get("inextensible").boolean());
-  material.bend_modulus = readBendModulus(map.get("bend_modulus"));
-  material.twist_modulus = map.get("twist_modulus").number(stiffness);
+         map.get("torsion",
+                 "How the twisting stiffness follows from the section: polar takes G times the polar moment of area, "
+                 "saint_venant the exact value of an ellipse. Both agree for round sections. Without the key: polar.")
+             .choice<Torsion>({{"polar", Torsion::polar}, {"saint_venant", Torsion::saint_venant}}));
+  material.linear_density = map.get("linear_density", "Mass per length, in place of density times area.")
+                                .number(Range::above(0, 1e6, "kg/m"));
+  material.stretch_modulus =
+      map.get("stretch_modulus", "Force per strain (E A), in place of what follows from youngs_modulus.")
+          .number(modulus);
+  assign(material.inextensible, map.get("inextensible",
+                                        "Whether the stretching modulus is raised until the rod's own weight stretches "
+                                        "it by 1e-5 at most. It has no effect without gravity. Without the key: false.")
+                                    .boolean());
+  material.bend_modulus =
+      readBendModulus(map.get("bend_modulus",
+                              "Moment per curvature (E I), in place of what follows from youngs_modulus: a number, "
+                              "[B1, B2] for bending towards d1 and d2, or a symmetric 2x2 matrix."));
+  material.twist_modulus =
+      map.get("twist_modulus",
+              "Moment per twist rate (G J), in place of what follows from youngs_modulus and poissons_ratio.")
+          .number(stiffness);
   map.finish();
   checkModuli(map, at_youngs);
   return material;
@@ -296,10 +344,21 @@ Material readMaterial(const YamlCursor& at)
 Damping readDamping(const YamlCursor& at)
 {
   Damping damping;
-  YamlMap map(at);
-  assign(damping.mass, map.get("mass").number(Range::closed(0, 1e6, "1/s")));
-  assign(damping.stiffness, map.get("stiffness").number(Range::closed(0, 1e3, "s")));
-  assign(damping.drag, map.get("drag").number(Range::closed(0, 1e6, "N s/m^2")));
+  YamlMap map(at.sharesKeysOf("rods.N.damping"));
+  assign(damping.mass,
+         map.get("mass",
+                 "Damping of the motion against the world: the force on a mass m is -mass m v. Without the key: 0.")
+             .number(Range::closed(0, 1e6, "1/s")));
+  assign(damping.stiffness, map.get("stiffness",
+                                    "Damping of deformation (Rayleigh): it acts like the stiffness times this time, on "
+                                    "the rate of the strain. Without the key: 0.")
+                                .number(Range::closed(0, 1e3, "s")));
+  assign(
+      damping.drag,
+      map.get(
+             "drag",
+             "Drag force per length and per velocity relative to the wind. Without the key: 0, and wind has no effect.")
+          .number(Range::closed(0, 1e6, "N s/m^2")));
   map.finish();
   return damping;
 }
@@ -307,7 +366,10 @@ Damping readDamping(const YamlCursor& at)
 void readTraits(YamlMap& map, RodConfig& rod)
 {
   const auto curvature =
-      map.get("curvature")
+      map.get("curvature",
+              "Formula for the curvature of a joint. `tangent` depends on how the material frames twist; `compensated` "
+              "does not. Without the key, or with auto: compensated if every section bends alike in all directions, "
+              "tangent otherwise and for explicit steps in the isotropic formulation.")
           .choice<std::optional<Curvature>>(
               {{"auto", std::nullopt}, {"tangent", Curvature::tangent}, {"compensated", Curvature::compensated}});
   if (curvature && *curvature)
@@ -315,16 +377,26 @@ void readTraits(YamlMap& map, RodConfig& rod)
     rod.automatic_curvature = false;
     rod.joints.curvature = **curvature;
   }
-  assign(rod.formulation, map.get("formulation")
-                              .choice<Formulation>({{"auto", Formulation::automatic},
-                                                    {"isotropic", Formulation::isotropic},
-                                                    {"general", Formulation::general}}));
-  assign(
-      rod.stretching,
-      map.get("stretching").choice<Stretching>({{"stiff", Stretching::stiff}, {"projected", Stretching::projected}}));
-  rod.material = readMaterial(map.get("material"));
-  rod.damping = readDamping(map.get("damping"));
-  rod.contact = readContactProperties(map.get("contact"), "rods");
+  assign(rod.formulation,
+         map.get("formulation",
+                 "Equations of explicit steps (integrator symplectic_euler): `isotropic` is cheaper, and is for "
+                 "naturally straight rods that bend alike in all directions; `general` is for all rods. Without the "
+                 "key, or with auto: isotropic where it applies. Implicit steps always take general.")
+             .choice<Formulation>({{"auto", Formulation::automatic},
+                                   {"isotropic", Formulation::isotropic},
+                                   {"general", Formulation::general}}));
+  assign(rod.stretching,
+         map.get("stretching",
+                 "`stiff` lets edges stretch by their modulus. `projected` keeps the length of every edge by a "
+                 "projection after each explicit step (integrator symplectic_euler). Without the key: stiff.")
+             .choice<Stretching>({{"stiff", Stretching::stiff}, {"projected", Stretching::projected}}));
+  rod.material = readMaterial(
+      map.get("material", "Density and stiffness of the rod. Without the key: the defaults of the keys in it."));
+  rod.damping = readDamping(map.get("damping", "Damping of the rod. Without the key: none."));
+  rod.contact = readContactProperties(
+      map.get("contact",
+              "What the rod touches. Without the key it touches nothing; `contact: {}` lets it touch everything."),
+      "rods");
 }
 
 ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
@@ -332,28 +404,53 @@ ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::str
   RodConfig rod;
   YamlMap map(at);
   rod.name = default_name;
-  assign(rod.name, map.get("name").name());
-  assign(rod.closed, map.get("closed").boolean());
-  assign(rod.naturally_straight, map.get("naturally_straight").boolean());
-  const YamlCursor matched = map.get("matched_to_arcs");
+  assign(rod.name, map.get("name",
+                           "Name of the rod, which topics, tables and other keys use. Without the key: rod if there is "
+                           "one rod, otherwise rod0, rod1, ...")
+                       .name());
+  assign(rod.closed,
+         map.get("closed",
+                 "Whether the rod is a loop: one more edge joins its last node to its first. Without the key: false.")
+             .boolean());
+  assign(rod.naturally_straight, map.get("naturally_straight",
+                                         "Whether the unloaded rod is straight, also where the centreline is curved. "
+                                         "Without the key: false, the rest curvature is that of the centreline.")
+                                     .boolean());
+  const YamlCursor matched =
+      map.get("matched_to_arcs",
+              "Whether each joint is as stiff as the arc of the smooth curve that it stands for. Coils of few edges "
+              "become about ten times more accurate. Not for naturally straight rods. Without the key: false.");
   assign(rod.joints.matched_to_arcs, matched.boolean());
   if (rod.joints.matched_to_arcs && rod.naturally_straight)
   {
     matched.problem(
         "must not be true of a rod with naturally_straight: true, which has no arcs to match its joints to");
   }
-  assign(rod.initial_twist, map.get("initial_twist").number(Range::closed(-1e5, 1e5, "rad")));
+  assign(rod.initial_twist, map.get("initial_twist",
+                                    "Twist of the whole rod in the shape in which it starts, beyond the rest twist, "
+                                    "spread evenly. Without the key: 0.")
+                                .number(Range::closed(-1e5, 1e5, "rad")));
   const int edges = readCenterline(map, context, rod);
   readNaturalFrames(map, rod, edges);
   if (edges > 0 && rod.initial)
     checkInitial(map, context, rod);
-  const YamlCursor at_section = map.get("cross_section");
+  const YamlCursor at_section =
+      map.get("cross_section",
+              "Cross-section of the rod: give either `radius` or `ellipse`. Without the key: a radius of 0.005 m.");
   rod.cross_section = readCrossSection(at_section, edges);
   readTraits(map, rod);
   warnOfRoundContact(at_section, rod);
-  readGrasps(map.get("grasps"), context, rod, edges);
-  rod.loads = readRodLoads(map.get("loads"), rod.closed, edges);
-  rod.tracking = readTrackedCurve(map.get("track"), context, rod, edges);
+  readGrasps(map.get("grasps",
+                     "Places where the rod is held, each under a name of its own. Names of grasps differ within a "
+                     "scene. Without the key the rod is free."),
+             context, rod, edges);
+  rod.loads = readRodLoads(
+      map.get("loads",
+              "Forces and torques that act on the rod all the time, in steps and in statics. Without the key: none."),
+      rod.closed, edges);
+  rod.tracking =
+      readTrackedCurve(map.get("track", "Guide curve whose averages the rod has in every step. Without the key: none."),
+                       context, rod, edges);
   map.finish();
   return {std::move(rod), edges};
 }

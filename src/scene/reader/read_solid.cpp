@@ -27,7 +27,9 @@ Eigen::Quaterniond fromRpy(const Eigen::Vector3d& rpy)
 
 Plane readPlane(YamlMap& map, std::optional<Pose>& pose)
 {
-  const YamlCursor point = map.get("point"), normal = map.get("normal");
+  const YamlCursor point = map.get("point", "A point of the surface, in place of `pose`. Without the key: the origin."),
+                   normal = map.get("normal",
+                                    "Direction out of the solid, in place of `pose`. Without the key: z of the pose.");
   if (!point.present() && !normal.present())
     return {};
   if (pose)
@@ -52,22 +54,30 @@ template <class Round>
 Round readRound(YamlMap& map)
 {
   Round shape;
-  assign(shape.radius, map.get("radius").number(size));
-  assign(shape.length, map.get("length").number(size));
+  assign(shape.radius, map.get("radius", "Radius about the z axis of the shape. Without the key: 0.1 m.").number(size));
+  assign(shape.length,
+         map.get("length",
+                 "Length along the z axis of the shape, without the round ends of a capsule. Without the key: 0.2 m.")
+             .number(size));
   return shape;
 }
 
 Box readBox(YamlMap& map)
 {
   Box box;
-  assign(box.size, map.get("size").vector3(size));
+  assign(
+      box.size,
+      map.get("size", "Lengths of the edges along the axes of the shape. Without the key: 0.1 m each.").vector3(size));
   return box;
 }
 
 std::optional<Shape> readMesh(YamlMap& map, const ReadContext& context)
 {
-  const YamlCursor file = map.require("file");
-  const double scale = map.get("scale").number(Range::above(0, 1e6)).value_or(1.0);
+  const YamlCursor file = map.require("file", "OBJ file with a closed triangle mesh.");
+  const double scale =
+      map.get("scale", "Factor by which the coordinates of the file are multiplied. Without the key: 1.")
+          .number(Range::above(0, 1e6))
+          .value_or(1.0);
   const auto path = file.text();
   if (!path)
     return std::nullopt;
@@ -89,12 +99,19 @@ std::optional<Shape> readMesh(YamlMap& map, const ReadContext& context)
 
 std::optional<Pose> readPose(const YamlCursor& at)
 {
+  at.sharesKeysOf("obstacles.N.pose");
   if (!at.present())
     return std::nullopt;
   Pose pose;
   YamlMap map(at);
-  assign(pose.position, map.get("position").vector3(kCoordinate));
-  const YamlCursor orientation = map.get("orientation"), rpy = map.get("rpy");
+  assign(pose.position, map.get("position", "Position of the origin of the shape or mesh. Without the key: [0, 0, 0].")
+                            .vector3(kCoordinate));
+  const YamlCursor orientation = map.get("orientation",
+                                         "Orientation as a unit quaternion [x, y, z, w]. Give either `orientation` or "
+                                         "`rpy`. Without both: not turned."),
+                   rpy = map.get("rpy",
+                                 "Orientation as roll, pitch and yaw about the fixed axes x, y and z, in this order.");
+  orientation.takes("a unit quaternion [x, y, z, w]");
   map.finish();
   if (orientation.present() && rpy.present())
   {
@@ -130,6 +147,7 @@ std::optional<Pose> readPose(const YamlCursor& at)
 
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose)
 {
+  at.sharesKeysOf("obstacles.N.shape");
   if (!at.present())
     return std::nullopt;
   const std::size_t before = at.problems().size();
@@ -141,8 +159,8 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
   YamlMap kinds(at);
   std::optional<Shape> shape;
   int given = 0;
-  const auto read = [&](const char* kind, auto reader) {
-    const YamlCursor value = kinds.get(kind);
+  const auto read = [&](const char* kind, const char* meaning, auto reader) {
+    const YamlCursor value = kinds.get(kind, meaning);
     if (value.present())
     {
       ++given;
@@ -151,16 +169,17 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
       map.finish();
     }
   };
-  read("plane", [&](YamlMap& map) { return readPlane(map, pose); });
-  read("sphere", [](YamlMap& map) {
+  read("plane", "A half-space below a plane: z of the pose points out of the solid. `plane: {}` is the floor z = 0.",
+       [&](YamlMap& map) { return readPlane(map, pose); });
+  read("sphere", "A sphere about the origin of the pose.", [](YamlMap& map) {
     Sphere sphere;
-    assign(sphere.radius, map.get("radius").number(size));
+    assign(sphere.radius, map.get("radius", "Radius. Without the key: 0.1 m.").number(size));
     return sphere;
   });
-  read("box", readBox);
-  read("cylinder", readRound<Cylinder>);
-  read("capsule", readRound<Capsule>);
-  read("mesh", [&](YamlMap& map) { return readMesh(map, context); });
+  read("box", "A box, centred at the origin of the pose.", readBox);
+  read("cylinder", "A cylinder about z, centred at the origin of the pose.", readRound<Cylinder>);
+  read("capsule", "A cylinder about z with round ends, centred at the origin of the pose.", readRound<Capsule>);
+  read("mesh", "A closed triangle mesh.", [&](YamlMap& map) { return readMesh(map, context); });
   kinds.finish();
   if (given != 1 && at.problems().size() == before)
   {
@@ -183,19 +202,34 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
 
 std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others, bool of_cloth)
 {
+  at.sharesKeysOf((std::string(others) + ".N.contact").c_str());
   if (!at.present())
     return std::nullopt;
   ContactProperties contact;
   YamlMap map(at);
-  assign(contact.self, map.get("self").boolean());
-  assign(contact.others, map.get(others).boolean());
-  assign(contact.solids, map.get("obstacles").boolean());
-  assign(contact.friction, map.get("friction").number(friction));
+  assign(contact.self, map.get("self", "Whether the object touches itself. Without the key: true.").boolean());
+  assign(contact.others,
+         map.get(others, "Whether the object touches others of its kind that have contact. Without the key: true.")
+             .boolean());
+  assign(contact.solids,
+         map.get("obstacles", "Whether the object touches obstacles and bodies. Without the key: true.").boolean());
+  assign(contact.friction, map.get("friction",
+                                   "Coefficient of friction. Between two objects the geometric mean of both "
+                                   "coefficients counts. Without the key: 0.3.")
+                               .number(friction));
   if (of_cloth)
   {
-    assign(contact.thickness, map.get("thickness").number(Range::above(0, 1, "m")));
-    assign(contact.method, map.get("method").choice<ContactMethod>(
-                               {{"barrier", ContactMethod::barrier}, {"impulses", ContactMethod::impulses}}));
+    assign(contact.thickness, map.get("thickness",
+                                      "Distance of two layers of cloth in contact; of two cloths the mean counts, and "
+                                      "half of it from an obstacle. Without the key: 0.001 m.")
+                                  .number(Range::above(0, 1, "m")));
+    assign(contact.method,
+           map.get("method",
+                   "`barrier` makes contact a part of the step, so that cloth meets everything that has contact. "
+                   "`impulses` correct the end of the step: cheaper, but for cloth, obstacles and driven bodies only. "
+                   "Without the key: barrier if rods, threads, simulated bodies or another cloth with barrier have "
+                   "contact, otherwise impulses; cloth that tracks or is a guide always takes impulses.")
+               .choice<ContactMethod>({{"barrier", ContactMethod::barrier}, {"impulses", ContactMethod::impulses}}));
   }
   map.finish();
   return contact;
@@ -238,8 +272,17 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
         gap = std::min(gap, 5e-3 * boundingRadius(*body.shape));
   const bool any = std::isfinite(gap);
   contact.gap = any ? gap : 0.0;
-  assign(contact.gap, map.get("gap").number(Range::above(0, 1, "m")));
-  assign(contact.slip_speed, map.get("slip_speed").number(Range::above(0, 10, "m/s")));
+  assign(contact.gap,
+         map.get("gap",
+                 "Distance of two surfaces at which they begin to repel each other. Without the key: a tenth of the "
+                 "smallest radius of the rods and threads with contact (of a nozzle a quarter of its radius counts), "
+                 "and at most half the smallest thickness of cloths with method barrier. If only simulated bodies "
+                 "touch: 0.005 times their smallest bounding radius.")
+             .number(Range::above(0, 1, "m")));
+  assign(contact.slip_speed, map.get("slip_speed",
+                                     "Sliding speed below which friction sticks: it grows smoothly up to this speed "
+                                     "and is full from there on. Without the key: 1e-4 m/s.")
+                                 .number(Range::above(0, 10, "m/s")));
   map.finish();
   if (at.present() && !any && at.problems().size() == before)
   {
@@ -261,12 +304,21 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
     ObstacleConfig obstacle;
     YamlMap map(entries[k]);
     obstacle.name = entries.size() == 1 ? "obstacle" : "obstacle" + std::to_string(k);
-    assign(obstacle.name, map.get("name").name());
-    const YamlCursor at_pose = map.get("pose");
+    assign(obstacle.name, map.get("name",
+                                  "Name of the obstacle; bodies and obstacles need different names. Without the key: "
+                                  "obstacle if there is one obstacle, otherwise obstacle0, obstacle1, ...")
+                              .name());
+    const YamlCursor at_pose = map.get("pose",
+                                       "Where the shape is at the start. Without the key: at the origin, not turned. "
+                                       "Not with a table of poses, whose first pose it would contradict.");
     std::optional<Pose> pose = readPose(at_pose);
-    assign(obstacle.shape, readShape(map.require("shape"), context, pose));
-    assign(obstacle.friction, map.get("friction").number(friction));
-    assign(obstacle.motion, readSolidMotion(map.get("motion"), context, false));
+    assign(obstacle.shape, readShape(map.require("shape", "Shape of the obstacle: give one."), context, pose));
+    assign(obstacle.friction, map.get("friction",
+                                      "Coefficient of friction. Between two objects the geometric mean of both "
+                                      "coefficients counts. Without the key: that of the other object.")
+                                  .number(friction));
+    assign(obstacle.motion,
+           readSolidMotion(map.get("motion", "How the obstacle moves. Without the key: it stands."), context, false));
     if (const auto* table = std::get_if<TableMotion>(&obstacle.motion))
     {
       if (pose)

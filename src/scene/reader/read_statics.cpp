@@ -11,7 +11,11 @@ const Range factor_range = Range::closed(-most_factor, most_factor);
 
 void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
 {
-  const YamlCursor at = map.get("at"), node = map.get("node");
+  const YamlCursor at =
+                       map.get("at",
+                               "Where the load acts, as an arc length of the rest shape from the first node, or at the "
+                               "rod's start or end. Between two nodes both bear the load. Give either `at` or `node`."),
+                   node = map.get("node", "Node on which the load acts. Give either `at` or `node`.");
   if (at.present() == node.present())
   {
     if (map.at().isMap())
@@ -41,7 +45,12 @@ RodLoadConfig readRodLoad(const YamlCursor& at, bool closed, int edges)
   RodLoadConfig load;
   YamlMap map(at);
   readLoadPlace(map, closed, edges, load);
-  const YamlCursor force = map.get("force"), torque = map.get("torque");
+  const YamlCursor force = map.get("force",
+                                   "Force that keeps its size and its direction in the world. Without the key: none."),
+                   torque = map.get(
+                       "torque",
+                       "Torque about the tangent of the rod, right-handed about the direction from the first node to "
+                       "the last. A bending moment is a couple of forces instead. Without the key: none.");
   assign(load.force, force.vector3(Range::closed(-1e15, 1e15, "N")));
   if (torque.isList())
   {
@@ -68,10 +77,13 @@ std::optional<PathConfig> readPath(const YamlCursor& at)
     return std::nullopt;
   PathConfig path;
   YamlMap map(at);
-  assign(path.from, map.get("from").number(factor_range));
-  const YamlCursor to = map.get("to");
+  assign(path.from, map.get("from", "Load factor of the first equilibrium. Without the key: 0.").number(factor_range));
+  const YamlCursor to = map.get("to", "Load factor at which the path ends. Without the key: 1.");
   assign(path.to, to.number(factor_range));
-  assign(path.steps, map.get("steps").integer(1, 100'000));
+  assign(path.steps, map.get("steps",
+                             "Number of steps of equal length along the path, if nothing moves; more are taken where "
+                             "the rod moves. Without the key: 20.")
+                         .integer(1, 100'000));
   if (path.from == path.to)
     to.problem("is the factor that the path starts from; must differ from it");
   map.finish();
@@ -87,7 +99,10 @@ std::optional<double> readBuckling(const YamlCursor& at)
   if (at.isMap())
   {
     YamlMap map(at);
-    const double up_to = map.get("up_to").number(Range::above(0, most_factor)).value_or(kFarEnough);
+    const double up_to =
+        map.get("up_to", "Largest load factor up to which the critical one is looked for. Without the key: 1000000.")
+            .number(Range::above(0, most_factor))
+            .value_or(kFarEnough);
     map.finish();
     return up_to;
   }
@@ -129,10 +144,18 @@ StartConfig readStart(const YamlCursor& at)
     return start;
   }
   YamlMap map(at);
-  assign(start.equilibrium, map.get("equilibrium").boolean());
-  const YamlCursor keep = map.get("keep_velocities");
+  assign(start.equilibrium, map.get("equilibrium",
+                                    "Whether the static solver runs before the first step, so that the scene starts at "
+                                    "a stable equilibrium. Without the key: false.")
+                                .boolean());
+  const YamlCursor keep = map.get("keep_velocities",
+                                  "Whether simulated bodies have their `velocity` at the equilibrium. Without the key: "
+                                  "false, everything is at rest.");
   assign(start.keep_velocities, keep.boolean());
-  assign(start.accept_unstable, map.get("accept_unstable").boolean());
+  assign(start.accept_unstable, map.get("accept_unstable",
+                                        "Whether an unstable equilibrium is accepted with a warning. Without the key: "
+                                        "false, such a scene is refused.")
+                                    .boolean());
   map.finish();
   if (start.keep_velocities && !start.equilibrium)
     keep.problem("needs equilibrium: true; a scene that starts as given keeps all velocities anyway");
@@ -145,7 +168,16 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
     return std::nullopt;
   StaticsConfig statics;
   YamlMap map(at);
-  const YamlCursor factors = map.get("factors"), path = map.get("path"), perturbation = map.get("perturbation");
+  const YamlCursor factors = map.get("factors",
+                                     "Load factors at each of which a stable equilibrium is found, each from the one "
+                                     "before. Without `factors` and `path`: one equilibrium at the factor 1."),
+                   path = map.get("path",
+                                  "Equilibria, stable or not, that are followed while the load factor grows, also "
+                                  "through folds. For scenes of one rod without contact, bodies and cloth."),
+                   perturbation = map.get("perturbation",
+                                          "Imperfection that rounds branch points off: forces along the lowest mode of "
+                                          "the first equilibrium, whose sizes sum to this share of the scaled loads. A "
+                                          "negative number pushes to the other side. Without the key: 0.");
   if (const auto values = factors.numbers(factor_range))
   {
     statics.factors = *values;
@@ -156,10 +188,16 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
   if (factors.present() && path.present())
     path.problem("and factors are two ways to choose the factors; leave one of them out");
   assign(statics.scales,
-         map.get("scales").choice<FactorScales>(
-             {{"all", FactorScales::all}, {"gravity", FactorScales::gravity}, {"loads", FactorScales::loads}}));
+         map.get("scales",
+                 "Which loads the load factor multiplies: gravity, the `loads` of rods and cloths, or both. Without "
+                 "the key: all.")
+             .choice<FactorScales>(
+                 {{"all", FactorScales::all}, {"gravity", FactorScales::gravity}, {"loads", FactorScales::loads}}));
   assign(statics.perturbation, perturbation.number(Range::closed(-1, 1)));
-  statics.buckling = readBuckling(map.get("buckling"));
+  statics.buckling =
+      readBuckling(map.get("buckling",
+                           "Whether the critical load factor is found: the smallest at which the equilibrium stops "
+                           "being stable. Give true, or a map with `up_to`. Without the key: false."));
   map.finish();
   return statics;
 }
@@ -179,8 +217,8 @@ void checkStatics(const YamlCursor& at, const SceneConfig& scene)
   {
     if (given && !joined.empty())
     {
-      map.get(key).problem("is for scenes of one rod that touches nothing and carries no body, but " + joined +
-                           "; factors can be given for all scenes");
+      map.find(key).problem("is for scenes of one rod that touches nothing and carries no body, but " + joined +
+                            "; factors can be given for all scenes");
     }
   }
   const auto bears = [](const auto& object) { return !object.loads.empty(); };

@@ -17,6 +17,7 @@ const Range length = Range::above(0, kMaxCoordinate, "m");
 TimedNumber readTimed(const YamlCursor& at, const Range& range)
 {
   TimedNumber timed;
+  at.sharesKeysOf("threads.N.nozzle.flow");
   const auto constant = [](double value) { return NumberTable({{0.0, value}}); };
   if (!at.isMap())
   {
@@ -24,7 +25,11 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
     return timed;
   }
   YamlMap map(at);
-  const YamlCursor topic = map.get("topic"), initial = map.get("initial"), table = map.get("table");
+  const YamlCursor topic = map.get("topic", "Must be true: the value comes by messages."),
+                   initial = map.get("initial", "Value until the first message. Without the key: 0."),
+                   table = map.get(
+                       "table", "Values over time: rows [t, value] with t in s. Values between rows are interpolated.");
+  initial.takes("a number in the range of the key above");
   map.finish();
   if (topic.present() == table.present())
   {
@@ -44,6 +49,7 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
   else
   {
     std::vector<NumberTable::Entry> entries;
+    table.takes("rows [t, value]");
     for (const YamlCursor& row : table.items(1))
     {
       const auto pair = row.items(2, 2);
@@ -68,16 +74,26 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double
 {
   NozzleConfig nozzle;
   YamlMap map(at);
-  assign(nozzle.diameter, map.require("diameter").number(Range::above(0, 10, "m")));
-  const YamlCursor position = map.get("position"), direction = map.get("direction");
+  assign(nozzle.diameter, map.require("diameter", "Inner diameter of the nozzle.").number(Range::above(0, 10, "m")));
+  const YamlCursor position = map.get("position", "Centre of the outlet. Without the key: [0, 0, 0]."),
+                   direction =
+                       map.get("direction", "Direction of the flow out of the nozzle. Without the key: [0, 0, -1].");
   assign(nozzle.pose.position, position.vector3(Range::closed(-kMaxCoordinate, kMaxCoordinate, "m")));
   const Eigen::Vector3d along = readDirection(direction, -Eigen::Vector3d::UnitZ());
   nozzle.pose.orientation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), along);
-  const YamlCursor flow = map.get("flow");
+  const YamlCursor flow = map.get("flow",
+                                  "Volume that leaves the nozzle per second: a number, a table over time, or values by "
+                                  "messages on `nozzle/flow`. Without the key: 0, with a warning.");
   if (flow.present())
     nozzle.flow = readTimed(flow, Range::closed(0, 1e3, "m^3/s"));
-  assign(nozzle.motion, readSolidMotion(map.get("motion"), context, false));
-  const YamlCursor at_swirl = map.get("swirl");
+  assign(nozzle.motion, readSolidMotion(map.get("motion",
+                                                "How the nozzle moves: the pose has its origin at the outlet and x "
+                                                "along the flow. Without the key: it stands."),
+                                        context, false));
+  const YamlCursor at_swirl =
+      map.get("swirl",
+              "Radius of the circle in which the nozzle starts, so that the thread coils at once; it stands after the "
+              "first turns of the coil. Without the key: 0, the nozzle stands.");
   assign(swirl, at_swirl.number(Range::closed(0, 1, "of the coil's radius")));
   if (swirl > 0 && !std::holds_alternative<FixedMotion>(nozzle.motion))
     at_swirl.problem("is for nozzles that stand; this one has a motion of its own");
@@ -99,12 +115,22 @@ FloorConfig readFloor(const YamlCursor& at)
   FloorConfig floor;
   const Range speed = Range::closed(-kMaxBeltSpeed, kMaxBeltSpeed, "m/s");
   YamlMap map(at);
-  assign(floor.height, map.get("height").number(Range::closed(-kMaxCoordinate, kMaxCoordinate, "m")));
-  const YamlCursor belt = map.get("belt");
+  assign(floor.height, map.get("height", "Height (z) of the floor. Without the key: 0.")
+                           .number(Range::closed(-kMaxCoordinate, kMaxCoordinate, "m")));
+  const YamlCursor belt =
+      map.get("belt", "Velocity of the floor: [vx, vy], or a map. Without the key: the floor stands.");
   if (belt.isMap())
   {
     YamlMap velocity(belt);
-    const YamlCursor x = velocity.get("x"), y = velocity.get("y"), topic = velocity.get("topic");
+    const YamlCursor x = velocity.get(
+                         "x",
+                         "Velocity along x: a number, a table over time, or values by messages. Without the key: 0."),
+                     y = velocity.get(
+                         "y",
+                         "Velocity along y: a number, a table over time, or values by messages. Without the key: 0."),
+                     topic = velocity.get("topic",
+                                          "Whether messages on `belt/velocity` set both velocities; `x` and `y` hold "
+                                          "until the first one. Without the key: false.");
     velocity.finish();
     if (topic.present())
       floor.belt_x.topic = floor.belt_y.topic = topic.boolean().value_or(true);
@@ -123,6 +149,7 @@ FloorConfig readFloor(const YamlCursor& at)
   }
   else if (belt.present())
   {
+    belt.takes("[vx, vy] of numbers in [-1000, 1000] m/s");
     const auto velocity = belt.numbers(speed);
     if (velocity && velocity->size() != 2)
     {
@@ -135,7 +162,13 @@ FloorConfig readFloor(const YamlCursor& at)
       floor.belt_y.table = NumberTable({{0.0, (*velocity)[1]}});
     }
   }
-  const YamlCursor on_surface = map.get("centreline_on_surface"), friction = map.get("friction");
+  const YamlCursor
+      on_surface = map.get(
+          "centreline_on_surface",
+          "Whether the centreline comes to lie on the floor, instead of one radius above. Without the key: false."),
+      friction = map.get("friction",
+                         "Coefficient of friction with which the thread slips on the floor; the thread needs "
+                         "`contact`. Without the key the thread sticks to the floor.");
   assign(floor.on_surface, on_surface.boolean());
   floor.friction = friction.number(Range::closed(0, 100, "[-]"));
   if (floor.friction && floor.on_surface)
@@ -147,11 +180,24 @@ FloorConfig readFloor(const YamlCursor& at)
 void readEdges(const YamlCursor& at, ThreadConfig& thread)
 {
   YamlMap map(at);
-  const YamlCursor feed = map.get("feed"), longest = map.get("longest"), shortest = map.get("shortest");
+  const YamlCursor
+      feed = map.get("feed",
+                     "Length of the edges that leave the nozzle. Without the key: from the flow, or one nozzle "
+                     "diameter where nothing is below."),
+      longest = map.get("longest",
+                        "Length from which an edge is divided. Without the key: from the flow, about twenty edges per "
+                        "turn of a coil; without a nozzle or anything below it, edges are not divided."),
+      shortest =
+          map.get("shortest",
+                  "Length below which an edge is joined to its neighbour; at most 0.4 of `longest`. Without the key: "
+                  "from the flow if `feed` and `longest` are not given either, otherwise edges are not joined.");
   assign(thread.feed_length, feed.number(length));
   assign(thread.longest_edge, longest.number(length));
   assign(thread.shortest_edge, shortest.number(length));
-  assign(thread.most_deposited, map.get("deposited").integer(4, 10'000'000, "nodes"));
+  assign(thread.most_deposited,
+         map.get("deposited",
+                 "Number of nodes that are kept on the floor; older ones are dropped. Without the key all are kept.")
+             .integer(4, 10'000'000, "nodes"));
   if (feed.present() && !thread.nozzle)
     feed.problem("is for threads with a nozzle");
   if (shortest.present() && thread.longest_edge > 0 && thread.shortest_edge > 0.4 * thread.longest_edge)
@@ -173,7 +219,8 @@ void readMerging(const YamlCursor& at, ThreadConfig& thread)
   {
     YamlMap map(at);
     thread.merging = half_discs;
-    assign(thread.merging, map.get("until").number(Range::closed(0.05, 0.95, "of the sum of the radii")));
+    assign(thread.merging, map.get("until", "Distance of the centrelines at which merging ends. Without the key: 0.6.")
+                               .number(Range::closed(0.05, 0.95, "of the sum of the radii")));
     map.finish();
   }
   else if (at.boolean().value_or(false))
@@ -184,20 +231,77 @@ void readMerging(const YamlCursor& at, ThreadConfig& thread)
     at.problem("is for parts that touch; give the thread a contact, for example contact: {self: true}");
 }
 
+/// A thread that is there from the start: its curve, its radii and its ends.
+void readThreadCurve(const YamlCursor& centerline, const YamlCursor& radius, const YamlCursor& ends,
+                     const ReadContext& context, ThreadConfig& thread)
+{
+  thread.centerline = readCurve(centerline, context);
+  thread.radius = radius.numbers(Range::above(0, 10, "m")).value_or(std::vector<double>{});
+  if (!radius.present())
+    radius.problem("is missing");
+  if (thread.centerline && !thread.radius.empty())
+  {
+    try
+    {
+      perEdge(thread.radius, static_cast<int>(curveNodes(*thread.centerline, context.gravity).cols()) - 1, "radius");
+    }
+    catch (const std::invalid_argument& error)
+    {
+      radius.problem(error.what());
+    }
+  }
+  YamlMap held(ends);
+  const char* names[2] = {"oldest", "newest"};
+  const char* meanings[2] = {"Whether the oldest end is clamped where it is. Without the key: free.",
+                             "Whether the newest end is clamped where it is. Without the key: free."};
+  for (int end = 0; end < 2; ++end)
+    assign(thread.held[end], held.get(names[end], meanings[end]).choice<bool>({{"free", false}, {"held", true}}));
+  held.finish();
+}
+
+void readRegion(const YamlCursor& region, ThreadConfig& thread)
+{
+  if (!region.present())
+    return;
+  YamlMap box(region);
+  const YamlCursor low = box.require("from", "Lower corner of the box."),
+                   high = box.require("to", "Upper corner of the box.");
+  box.finish();
+  const Range anywhere = Range::closed(-1e9, 1e9, "m");
+  const auto a = low.vector3(anywhere), b = high.vector3(anywhere);
+  if (a && b && !(b->array() > a->array()).all())
+    high.problem("must be greater than region.from in every component");
+  else if (a && b)
+    thread.region = {*a, *b};
+}
+
 ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
   ThreadConfig thread;
   thread.name = default_name;
   YamlMap map(at);
-  assign(thread.name, map.get("name").name());
-  YamlMap fluid(map.get("fluid"));
-  assign(thread.density, fluid.get("density").number(Range::above(0, 1e6, "kg/m^3")));
-  assign(thread.viscosity, fluid.get("viscosity").number(Range::above(0, 1e12, "Pa s")));
-  assign(thread.surface_tension, fluid.get("surface_tension").number(Range::closed(0, 1e3, "N/m")));
+  assign(thread.name, map.get("name",
+                              "Name of the thread, which topics and tables use. Without the key: thread if there is "
+                              "one thread, otherwise thread0, thread1, ...")
+                          .name());
+  YamlMap fluid(map.get("fluid", "The fluid. Without the key: the defaults of the keys in it, with a warning."));
+  assign(thread.density,
+         fluid.get("density", "Mass per volume. Without the key: 1000 kg/m^3.").number(Range::above(0, 1e6, "kg/m^3")));
+  assign(thread.viscosity,
+         fluid.get("viscosity", "Dynamic viscosity. Without the key: 1 Pa s.").number(Range::above(0, 1e12, "Pa s")));
+  assign(thread.surface_tension,
+         fluid.get("surface_tension", "Surface tension. Without the key: 0.").number(Range::closed(0, 1e3, "N/m")));
   fluid.finish();
 
-  const YamlCursor nozzle = map.get("nozzle"), centerline = map.get("centerline"), radius = map.get("radius"),
-                   ends = map.get("ends");
+  const YamlCursor nozzle =
+                       map.get("nozzle", "Nozzle out of which the thread flows. Give either `nozzle` or `centerline`."),
+                   centerline = map.get("centerline",
+                                        "Shape of a thread that is there at the start, from its oldest end to its "
+                                        "newest. Give either `nozzle` or `centerline`."),
+                   radius = map.get("radius",
+                                    "Radius of a thread with a `centerline`: one number, two for a taper from the "
+                                    "oldest end to the newest, or one per edge. It must be given there."),
+                   ends = map.get("ends", "Ends of a thread with a `centerline`. Without the key both are free.");
   if (nozzle.present() == centerline.present())
   {
     at.problem("must have either a nozzle that it flows out of, or a centerline (with radius)");
@@ -211,56 +315,39 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
   }
   else
   {
-    thread.centerline = readCurve(centerline, context);
-    thread.radius = radius.numbers(Range::above(0, 10, "m")).value_or(std::vector<double>{});
-    if (!radius.present())
-      map.require("radius");
-    if (thread.centerline && !thread.radius.empty())
-    {
-      try
-      {
-        perEdge(thread.radius, static_cast<int>(curveNodes(*thread.centerline, context.gravity).cols()) - 1, "radius");
-      }
-      catch (const std::invalid_argument& error)
-      {
-        radius.problem(error.what());
-      }
-    }
-    YamlMap held(ends);
-    const char* names[2] = {"oldest", "newest"};
-    for (int end = 0; end < 2; ++end)
-      assign(thread.held[end], held.get(names[end]).choice<bool>({{"free", false}, {"held", true}}));
-    held.finish();
+    readThreadCurve(centerline, radius, ends, context, thread);
   }
-  const YamlCursor floor = map.get("floor");
+  const YamlCursor floor =
+      map.get("floor", "Horizontal floor or belt on which the thread lands. Without the key: none.");
   if (floor.present())
     thread.floor = readFloor(floor);
-  thread.contact = readContactProperties(map.get("contact"), "threads");
-  readMerging(map.get("merging"), thread);
+  thread.contact = readContactProperties(map.get("contact",
+                                                 "What the thread touches beside its floor. Without the key: nothing; "
+                                                 "`contact: {}` lets it touch everything."),
+                                         "threads");
+  readMerging(map.get("merging",
+                      "Whether parts of threads that touch flow together: true, false, or a map with `until`. It needs "
+                      "`contact`. Without the key: false."),
+              thread);
   if (thread.floor && thread.floor->friction && !(thread.contact && thread.contact->solids))
   {
     YamlMap(floor)
-        .get("friction")
+        .find("friction")
         .problem(
             "makes the floor an obstacle, which this thread does not touch; give it contact: {obstacles: true}, or "
-            "leave "
-            "friction out, then it sticks");
+            "leave friction out, then it sticks");
   }
-  readEdges(map.get("edges"), thread);
-  assign(thread.breakup_radius, map.get("breakup_radius").number(Range::closed(0, kMaxCoordinate, "m")));
-  const YamlCursor region = map.get("region");
-  if (region.present())
-  {
-    YamlMap box(region);
-    const YamlCursor low = box.require("from"), high = box.require("to");
-    box.finish();
-    const Range anywhere = Range::closed(-1e9, 1e9, "m");
-    const auto a = low.vector3(anywhere), b = high.vector3(anywhere);
-    if (a && b && !(b->array() > a->array()).all())
-      high.problem("must be greater than region.from in every component");
-    else if (a && b)
-      thread.region = {*a, *b};
-  }
+  readEdges(map.get("edges", "Lengths of the edges. Without the key they are chosen from the flow."), thread);
+  assign(thread.breakup_radius,
+         map.get("breakup_radius",
+                 "Radius below which the thread parts; 0: it never parts. Without the key: 0.05 of the smallest radius "
+                 "that is expected from the flow (of the nozzle's radius if that is smaller); 0.01 of the nozzle's "
+                 "diameter if nothing is below it; 0 without a nozzle.")
+             .number(Range::closed(0, kMaxCoordinate, "m")));
+  const YamlCursor region = map.get("region",
+                                    "Box in which fluid is kept: what lies outside is dropped, the oldest first. "
+                                    "Without the key everything is kept.");
+  readRegion(region, thread);
   map.finish();
   return thread;
 }
@@ -279,7 +366,7 @@ std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& c
     threads.push_back(readThread(entries[k], context, entries.size() == 1 ? "thread" : "thread" + std::to_string(k)));
     const auto [other, is_new] = names.emplace(threads.back().name, entries[k].path());
     if (!is_new)
-      YamlMap(entries[k]).get("name").problem("is also the name of " + other->second + "; names must differ");
+      YamlMap(entries[k]).find("name").problem("is also the name of " + other->second + "; names must differ");
   }
   return threads;
 }

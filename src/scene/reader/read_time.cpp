@@ -8,23 +8,38 @@ TimeConfig readTime(const YamlCursor& at)
 {
   TimeConfig time;
   YamlMap map(at);
-  assign(time.step, map.get("step").number(Range::above(0, 10, "s")));
-  assign(time.duration, map.get("duration").number(Range::above(0, 1e7, "s")));
-  assign(time.integrator, map.get("integrator")
-                              .choice<Integrator>({{"implicit_euler", Integrator::implicit_euler},
-                                                   {"bdf2", Integrator::bdf2},
-                                                   {"tr_bdf2", Integrator::tr_bdf2},
-                                                   {"implicit_midpoint", Integrator::implicit_midpoint},
-                                                   {"generalized_alpha", Integrator::generalized_alpha},
-                                                   {"symplectic_euler", Integrator::symplectic_euler},
-                                                   {"imex", Integrator::imex}}));
-  assign(time.spectral_radius, map.get("spectral_radius").number(Range::closed(0, 1)));
-  const YamlCursor error_tolerance = map.get("error_tolerance");
+  assign(time.step,
+         map.get("step", "Length of a time step. Without the key: 0.005 s.").number(Range::above(0, 10, "s")));
+  assign(time.duration,
+         map.get("duration", "Simulated time after which `simulate` ends; nodes run on. Without the key: 10 s.")
+             .number(Range::above(0, 1e7, "s")));
+  assign(time.integrator,
+         map.get("integrator",
+                 "Method by which time steps are taken. Without the key: tr_bdf2; implicit_euler in scenes with cloth, "
+                 "with rods that have `contact`, and with rods that have `track`. Threads always take implicit_euler; "
+                 "imex is for cloth alone, and symplectic_euler takes explicit steps.")
+             .choice<Integrator>({{"implicit_euler", Integrator::implicit_euler},
+                                  {"bdf2", Integrator::bdf2},
+                                  {"tr_bdf2", Integrator::tr_bdf2},
+                                  {"implicit_midpoint", Integrator::implicit_midpoint},
+                                  {"generalized_alpha", Integrator::generalized_alpha},
+                                  {"symplectic_euler", Integrator::symplectic_euler},
+                                  {"imex", Integrator::imex}}));
+  assign(time.spectral_radius, map.get("spectral_radius",
+                                       "Numerical damping of generalized_alpha: the factor by which one step changes "
+                                       "the fastest vibrations. 1 damps nothing, 0 damps most. Without the key: 0.8.")
+                                   .number(Range::closed(0, 1)));
+  const YamlCursor error_tolerance =
+      map.get("error_tolerance",
+              "Largest error of a position that one step may make; `time.step` is then the longest step, and shorter "
+              "ones are taken where they are needed. Without the key, or with 0, steps have a fixed length.");
   assign(time.error_tolerance, error_tolerance.number(Range::closed(0, 1, "m")));
   if (time.error_tolerance > 0 &&
       (time.integrator == Integrator::symplectic_euler || time.integrator == Integrator::imex))
     error_tolerance.problem("is for implicit integrators; steps of symplectic_euler and imex are of fixed length");
-  const YamlCursor min_step = map.get("min_step");
+  const YamlCursor min_step = map.get("min_step",
+                                      "Shortest step to which the error control and halving may go. Without the key: "
+                                      "1e-7 s, or `time.step` if that is shorter.");
   if (const auto value = min_step.number(Range::above(0, 10, "s")))
   {
     time.min_step = *value;
@@ -32,14 +47,28 @@ TimeConfig readTime(const YamlCursor& at)
       min_step.problem("is longer than time.step; must be in (0, " + shortNumber(time.step) + "] s");
   }
   time.min_step = std::min(time.min_step, time.step);
-  YamlMap newton(map.get("newton"));
-  assign(time.newton.tolerance, newton.get("tolerance").number(Range::between(1e-14, 1e-1)));
-  assign(time.newton.max_iterations, newton.get("max_iterations").integer(1, 1000));
-  assign(time.newton.max_cuts, newton.get("max_cuts").integer(0, 30));
+  YamlMap newton(map.get("newton", "Settings of the solver of implicit steps (Newton's method)."));
+  assign(time.newton.tolerance, newton
+                                    .get("tolerance",
+                                         "A step is solved when the last change of the positions is smaller than this "
+                                         "fraction of the shortest edge. Without the key: 1e-6.")
+                                    .number(Range::between(1e-14, 1e-1)));
+  assign(time.newton.max_iterations,
+         newton
+             .get("max_iterations",
+                  "Number of Newton iterations after which a step counts as failed. Without the key: 30.")
+             .integer(1, 1000));
+  assign(time.newton.max_cuts,
+         newton.get("max_cuts", "How often a step that fails is halved before it is refused. Without the key: 10.")
+             .integer(0, 30));
   assign(time.island_solver,
-         newton.get("linear").choice<IslandSolver>({{"auto", IslandSolver::automatic},
-                                                    {"cholesky", IslandSolver::cholesky},
-                                                    {"conjugate_gradients", IslandSolver::conjugate_gradients}}));
+         newton
+             .get("linear",
+                  "Solver of the linear equations of rods, threads and bodies that touch or are joined. Without the "
+                  "key, or with auto, it is chosen by the number of parts and of contacts.")
+             .choice<IslandSolver>({{"auto", IslandSolver::automatic},
+                                    {"cholesky", IslandSolver::cholesky},
+                                    {"conjugate_gradients", IslandSolver::conjugate_gradients}}));
   newton.finish();
   map.finish();
   return time;

@@ -64,9 +64,16 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& points, const YamlCurs
 /// length.
 GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurve& rod)
 {
-  const YamlCursor nodes = map.get("nodes"), points = map.get("points"), file = map.get("file");
+  const YamlCursor nodes = map.get("nodes",
+                                   "Number of nodes of the guide: as many nodes of the rod where it starts, evenly "
+                                   "spaced. Give one of `nodes`, `points` and `file`."),
+                   points =
+                       map.get("points",
+                               "Nodes of the guide. They lie along the rod by their shares of the polyline's length."),
+                   file = map.get("file", "CSV file with a node x,y,z of the guide per line.");
   GuideNodes guide;
   const int fewest = rod.closed ? 3 : 2;
+  nodes.takes("a whole number, from 2 (of a closed rod 3) to the number of the rod's nodes");
   if (nodes.present() + points.present() + file.present() != 1)
   {
     if (map.at().isMap())
@@ -122,6 +129,7 @@ GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurv
 std::optional<PointTrajectory> readTable(const YamlCursor& at, int nodes)
 {
   PointTrajectory points;
+  at.takes("rows [t, x0, y0, z0, x1, ...], t in s and lengths in m");
   for (const YamlCursor& item : at.items(1))
   {
     const auto row = item.numbers(kCoordinate);
@@ -182,7 +190,14 @@ void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConf
   }
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const YamlCursor table = map.get("table"), file = map.get("file"), topic = map.get("topic"), late = map.get("late");
+  const YamlCursor table = map.get(
+                       "table",
+                       "Motion of all nodes of the guide: rows [t, x0, y0, z0, x1, ...], interpolated smoothly."),
+                   file = map.get("file", "CSV file with the motion of all nodes of the guide: rows t,x0,y0,z0,x1,..."),
+                   topic = map.get("topic", "The guide comes by messages on `guide/points`, nodes in order."),
+                   late = map.get("late",
+                                  "What the guide does when no message comes: hold the last one, or go on at the last "
+                                  "speed, which dies out. Without the key: hold.");
   map.finish();
   if (table.present() + file.present() + topic.present() != 1)
   {
@@ -216,7 +231,10 @@ TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, 
   if (!at.present())
     return curveHats(weights);
   YamlMap map(at);
-  const YamlCursor basis = map.get("basis"), segments = map.get("segments");
+  const YamlCursor basis = map.get("basis", "The guide's hat functions: one average per node of the guide."),
+                   segments =
+                       map.get("segments", "Number of equal parts of the rod's length whose averages are prescribed.");
+  segments.takes("a whole number, from 1 to the number of the rod's nodes");
   map.finish();
   if (basis.present() == segments.present())
   {
@@ -265,15 +283,17 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
     }
   }
   auto tracking = std::make_shared<TrackingConfig>();
-  YamlMap map(at), guide_map(map.require("guide"));
+  YamlMap map(at), guide_map(map.require("guide", "The guide curve, a polyline: give `nodes`, `points` or `file`."));
   const GuideNodes guide = readNodes(guide_map, context, rod);
   tracking->guide.mesh.vertices = guide.nodes;
-  readCurveMotion(guide_map.get("motion"), context, tracking->guide);
+  readCurveMotion(guide_map.get("motion", "How the guide moves. Without the key: fixed."), context, tracking->guide);
   guide_map.finish();
   const bool good = guide.nodes.cols() > 0 && rod.rest.cols() > 0;
   const MassMatrix weights = good ? polylineWeights(guide.shares, rod.shares, rod.closed) : MassMatrix(0, 0);
   FunctionSet set;
-  const YamlCursor at_functions = map.get("test_functions");
+  const YamlCursor at_functions = map.get("test_functions",
+                                          "Averages of the rod that are prescribed: give `basis` or `segments`. "
+                                          "Without the key: the guide's hat functions.");
   set.functions = readCurveFunctions(at_functions, rod, weights);
   map.finish();
   checkTraits(at, config);

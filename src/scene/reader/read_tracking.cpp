@@ -55,18 +55,19 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
     }
     else
     {
-      const auto given = map.require("subdivide").integer(1, 10, "levels");
+      const auto given =
+          map.require("subdivide", "How often each face of the guide is divided into four.").integer(1, 10, "levels");
       map.finish();
       if (!given)
         return tracked;
       levels = *given;
       if (std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols()) > 2 * max_fine_vertices)
       {
-        map.get("subdivide")
+        map.find("subdivide")
             .problem("makes more than " + std::to_string(static_cast<int>(max_fine_vertices)) + " vertices");
         return tracked;
       }
-      if (!context.claim(map.get("subdivide"),
+      if (!context.claim(map.find("subdivide"),
                          0.5 * std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols())))
         return tracked;
     }
@@ -124,12 +125,17 @@ TestFunctions readClusters(const YamlCursor& at, const GuideConfig& guide)
 {
   ClusteringOptions options;
   YamlMap map(at);
-  assign(options.regions, map.require("count").integer(1, 1'000'000, "regions"));
-  assign(options.compactness, map.get("compactness").number(Range::closed(0, 1)));
+  assign(options.regions, map.require("count", "Number of regions.").integer(1, 1'000'000, "regions"));
+  assign(
+      options.compactness,
+      map.get("compactness", "1: compact regions, 0: flat regions. Without the key: 0.5.").number(Range::closed(0, 1)));
   int seed = 1;
-  assign(seed, map.get("seed").integer(0, 2'000'000'000));
+  assign(seed,
+         map.get("seed", "Seed of the random start of the clustering. Without the key: 1.").integer(0, 2'000'000'000));
   options.seed = static_cast<unsigned>(seed);
-  assign(options.sampled_frames, map.get("frames").integer(1, 10'000));
+  assign(options.sampled_frames,
+         map.get("frames", "Number of frames of the guide's motion that the regions suit. Without the key: 20.")
+             .integer(1, 10'000));
   map.finish();
   const auto* carried = std::get_if<CarriedGuide>(&guide.motion);
   const bool live = std::holds_alternative<TopicGuide>(guide.motion) || (carried && carried->poses.empty());
@@ -160,12 +166,18 @@ std::vector<PaintedRegion> readRegions(const YamlCursor& at, const ReadContext& 
         region.tracked = region.name == group.name ? group.vertices : region.tracked;
     return regions;
   }
-  for (const auto& [name, entry] : at.members())
+  for (const auto& [name, entry] : at.members("A region of your name."))
   {
     PaintedRegion region{name, {}, {}};
     YamlMap map(entry);
-    region.guide = readIndexList(map.require("guide"), static_cast<int>(guide.config.mesh.vertices.cols()));
-    const YamlCursor own = tracked.kind == TrackedMesh::separate ? map.require("tracked") : map.get("tracked");
+    region.guide = readIndexList(map.require("guide", "Vertices of the guide in the region; \"3..7\" is a range."),
+                                 static_cast<int>(guide.config.mesh.vertices.cols()));
+    const char* const meaning =
+        "Vertices of the tracked mesh in the region. Needed if that mesh comes from a file; otherwise the guide's "
+        "function "
+        "is prolonged to it.";
+    const YamlCursor own =
+        tracked.kind == TrackedMesh::separate ? map.require("tracked", meaning) : map.get("tracked", meaning);
     if (own.present())
       region.tracked = readIndexList(own, static_cast<int>(tracked.subdivision.mesh.vertices.cols()));
     map.finish();
@@ -180,14 +192,31 @@ TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, co
                             const TrackedMesh& tracked, FunctionSet* named)
 {
   YamlMap map(at);
-  const YamlCursor basis = map.get("basis"), vertices = map.get("vertices"), regions = map.get("regions"),
-                   clusters = map.get("clusters");
+  const YamlCursor
+      basis = map.get("basis", "One average per vertex of the guide, by the hat functions of its subdivision."),
+      vertices =
+          map.get("vertices", "Vertices of the guide that count for `basis: subdivision`. Without the key: all."),
+      regions = map.get(
+          "regions",
+          "One average per region: those of the groups in the guide's OBJ file, or a map from names to vertices."),
+      clusters =
+          map.get("clusters", "One average per region, found by clustering the guide's faces; for `mesh: same`.");
   if (named)
   {
-    assign(named->name, map.require("name").name());
-    if (const auto from = map.get("from").number(Range::above(0, 1e7, "s")))
+    assign(named->name,
+           map.require("name",
+                       "Name of a set of test functions; for entries of a list of sets, of which one acts at a time.")
+               .name());
+    if (const auto from =
+            map.get("from",
+                    "Simulated time at which the set takes over; for entries of a list of sets. Without the key only "
+                    "the service `~set_functions` calls for it; the first set acts from the start.")
+                .number(Range::above(0, 1e7, "s")))
       named->from = *from;
-    assign(named->blend, map.get("blend").number(Range::closed(0, 1e7, "s")));
+    assign(named->blend, map.get("blend",
+                                 "Time within which the averages go over to the guide's when the set takes over; 0: in "
+                                 "one step. For entries of a list of sets. Without the key: 0.2 s.")
+                             .number(Range::closed(0, 1e7, "s")));
   }
   map.finish();
   if (basis.present() + regions.present() + clusters.present() > 1)
@@ -248,7 +277,7 @@ std::vector<Traction> readTractions(const YamlCursor& at)
   if (at.present() && !at.isMap())
     tractions.push_back({"", at, at.number(range).value_or(1.0)});
   else if (at.present())
-    for (const auto& [name, entry] : at.members())
+    for (const auto& [name, entry] : at.members("Largest force per area of the test function of this name."))
       tractions.push_back({name, entry, entry.number(range).value_or(1.0)});
   return tractions;
 }
@@ -322,13 +351,14 @@ std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const s
     tracking->sets.push_back(readFunctionSet(at, false, tractions, used, context, guide, tracked, cloth));
   for (const YamlCursor& entry : at.isList() ? at.items(1, 100) : std::vector<YamlCursor>())
   {
+    entry.sharesKeysOf("tracked.N.test_functions");
     const FunctionSet set = readFunctionSet(entry, true, tractions, used, context, guide, tracked, cloth);
     for (const FunctionSet& other : tracking->sets)
     {
       if (!set.name.empty() && other.name == set.name)
-        YamlMap(entry).get("name").problem("is also the name of another set; names must differ");
+        YamlMap(entry).find("name").problem("is also the name of another set; names must differ");
       if (set.from && other.from == set.from)
-        YamlMap(entry).get("from").problem("is also when set " + other.name + " takes over; times must differ");
+        YamlMap(entry).find("from").problem("is also when set " + other.name + " takes over; times must differ");
     }
     tracking->sets.push_back(set);
   }
@@ -347,11 +377,25 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   cloth.name = default_name;
   cloth.place = at.place();
   YamlMap map(at);
-  assign(cloth.name, map.get("name").name());
-  const YamlCursor at_functions = map.get("test_functions");
-  const std::vector<Traction> tractions = readTractions(map.get("max_traction"));
-  const GuideSource guide = readGuide(map.require("guide"), context, cloths, cloth.name);
-  const TrackedMesh tracked = readTrackedMesh(map.get("mesh"), context, guide);
+  assign(cloth.name, map.get("name",
+                             "Name of the cloth, which topics, tables and other keys use. Without the key: tracked if "
+                             "there is one, otherwise tracked0, tracked1, ...")
+                         .name());
+  const YamlCursor at_functions =
+      map.get("test_functions",
+              "Averages of the cloth that are prescribed: a map, or a list of maps with names that take over from each "
+              "other. Without the key: `{basis: subdivision}`.");
+  at_functions.takes("a list of maps");
+  const std::vector<Traction> tractions =
+      readTractions(map.get("max_traction",
+                            "Largest force per area with which averages are enforced: a number, or numbers by the "
+                            "names of test functions. Without the key averages are met at whatever force it takes."));
+  const GuideSource guide = readGuide(map.require("guide", "The guide, a coarse mesh: give `mesh`, `grid` or `cloth`."),
+                                      context, cloths, cloth.name);
+  const TrackedMesh tracked = readTrackedMesh(map.get("mesh",
+                                                      "Mesh that tracks the guide: `same` as the guide's, `{subdivide: "
+                                                      "N}`, or a mesh file of its own. Without the key: same."),
+                                              context, guide);
   if (tracked.good)
     cloth.mesh = tracked.subdivision.mesh;
   if (tracked.kind != TrackedMesh::separate)
@@ -389,7 +433,7 @@ void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::ve
         readTrackedCloth(entries[k], context, cloths, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
     const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
     if (!is_new)
-      YamlMap(entries[k]).get("name").problem("is also the name of " + other->second + "; names must differ");
+      YamlMap(entries[k]).find("name").problem("is also the name of " + other->second + "; names must differ");
   }
 }
 

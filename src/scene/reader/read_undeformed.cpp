@@ -63,25 +63,30 @@ Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, cons
     return {};
   }
   YamlMap shape(folds.present() ? folds : ridges.present() ? ridges : crinkles);
-  const auto height = shape.require("height").number(Range::above(0, 10, "m"));
+  const auto height = shape.require("height", "Height of the offsets from the mesh, along its normals.")
+                          .number(Range::above(0, 10, "m"));
   Eigen::Vector3d direction(0, 0, 1);
   const std::size_t before = at.problems().size();
   double wavelength = 1.0;
   int count = 1, seed = 1;
   if (crinkles.present())
   {
-    assign(seed, shape.get("seed").integer(0, 2'000'000'000));
+    assign(seed, shape.get("seed", "Seed of the random offsets. Without the key: 1.").integer(0, 2'000'000'000));
   }
   else
   {
-    const YamlCursor along = folds.present() ? shape.require("along") : shape.get("axis");
+    const YamlCursor along =
+        folds.present() ? shape.require("along", "Direction within the cloth along which folds follow each other.")
+                        : shape.get("axis", "Axis about which ridges follow each other. Without the key: [0, 0, 1].");
     assign(direction, along.vector3(Range::closed(-1e6, 1e6)));
     if (!(direction.norm() > 0))
     {
       along.problem("must not be zero");
       return {};
     }
-    const YamlCursor scale = shape.require(folds.present() ? "wavelength" : "count");
+    const YamlCursor scale =
+        folds.present() ? shape.require("wavelength", "Length of a fold and the next; at least four edges of the mesh.")
+                        : shape.require("count", "Number of ridges around the axis.");
     if (folds.present())
       assign(wavelength, scale.number(Range::above(0, 1e3, "m")));
     else
@@ -103,15 +108,20 @@ Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, cons
 
 void readUndeformed(const YamlCursor& at, const ReadContext& context, ClothConfig& cloth)
 {
-  YamlMap map(at);
+  YamlMap map(at.sharesKeysOf("cloths.N.undeformed"));
   if (!at.isMap() || !(map.has("folds") || map.has("ridges") || map.has("crinkles")))
   {
     cloth.undeformed = readClothShape(at, context, cloth.mesh);
     return;
   }
   bool lengths = false;
-  const YamlCursor folds = map.get("folds"), ridges = map.get("ridges"), crinkles = map.get("crinkles");
-  assign(lengths, map.get("lengths").boolean());
+  const YamlCursor folds = map.get("folds", "Folds like those of an accordion."),
+                   ridges = map.get("ridges", "Ridges about an axis."),
+                   crinkles = map.get("crinkles", "Random offsets of the vertices.");
+  assign(lengths, map.get("lengths",
+                          "Whether lengths at rest are also those of the offset shape; the cloth still starts as its "
+                          "mesh. Without the key: false, lengths at rest are those of the mesh.")
+                      .boolean());
   map.finish();
   const Eigen::Matrix3Xd shape = readOffsets(at, folds, ridges, crinkles, cloth.mesh);
   if (shape.cols() == 0 || !lengths)

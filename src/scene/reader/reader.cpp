@@ -29,15 +29,15 @@ std::vector<ReadRod> readRods(const YamlCursor& at, const ReadContext& context)
     rods.back().config.place = entry.place();
     const auto [rod, new_rod] = rod_names.emplace(rods.back().config.name, entry.path());
     if (!new_rod)
-      YamlMap(entry).get("name").problem("is also the name of " + rod->second + "; names must differ");
+      YamlMap(entry).find("name").problem("is also the name of " + rod->second + "; names must differ");
     for (const GraspConfig& grasp : rods.back().config.grasps)
     {
       const std::string path = entry.path() + ".grasps." + grasp.name;
       const auto [other, new_grasp] = grasp_names.emplace(grasp.name, path);
       if (!new_grasp)
       {
-        YamlMap(YamlMap(entry).get("grasps"))
-            .get(grasp.name)
+        YamlMap(YamlMap(entry).find("grasps"))
+            .find(grasp.name)
             .problem("has the same name as " + other->second + "; grasps of a scene need different names");
       }
     }
@@ -85,7 +85,7 @@ public:
     if (!is_new)
     {
       const std::string reason = "is also the name of " + other->second + "; names of bodies and obstacles must differ";
-      generated ? at.problem("makes " + name + ", which " + reason) : YamlMap(at).get("name").problem(reason);
+      generated ? at.problem("makes " + name + ", which " + reason) : YamlMap(at).find("name").problem(reason);
     }
   }
 
@@ -111,7 +111,7 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
     {
       const auto* motion = std::get_if<BodyMotion>(&grasp.motion);
       const bool known = !motion || std::find(names.begin(), names.end(), motion->body) != names.end();
-      const auto at = [&] { return YamlMap(YamlMap(YamlMap(entry).get("grasps")).get(grasp.name)).get("motion"); };
+      const auto at = [&] { return YamlMap(YamlMap(YamlMap(entry).find("grasps")).find(grasp.name)).find("motion"); };
       if (motion && simulated.count(motion->body))
       {
         at().problem("body " + motion->body + " is simulated; " + instead);
@@ -135,7 +135,7 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
 /// than cloth and what moves as prescribed. Cloths that track a guide, and their guides, have no other method.
 void chooseContactMethods(const std::vector<YamlCursor>& cloths, const std::vector<ReadRod>& rods, SceneConfig& scene)
 {
-  const auto method = [&](std::size_t k) { return YamlMap(YamlMap(cloths[k]).get("contact")).get("method"); };
+  const auto method = [&](std::size_t k) { return YamlMap(YamlMap(cloths[k]).find("contact")).find("method"); };
   std::vector<char> tracks(cloths.size(), 0);
   bool others =
       std::any_of(rods.begin(), rods.end(), [](const ReadRod& rod) { return rod.config.contact.has_value(); });
@@ -175,11 +175,12 @@ void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cl
     const std::optional<ContactProperties>& contact = scene.cloths[k].contact;
     if (contact && contact->solids && contact->method == ContactMethod::impulses)
     {
-      YamlMap(cloths[k]).get("contact").problem("body " + body->name +
-                                                " is simulated, and contact by impulses does not push bodies; give the "
-                                                "body a motion or contact: false, or the "
-                                                "cloth contact: {obstacles: false}" +
-                                                (scene.cloths[k].tracking ? "" : " or contact: {method: barrier}"));
+      YamlMap(cloths[k]).find("contact").problem(
+          "body " + body->name +
+          " is simulated, and contact by impulses does not push bodies; give the "
+          "body a motion or contact: false, or the "
+          "cloth contact: {obstacles: false}" +
+          (scene.cloths[k].tracking ? "" : " or contact: {method: barrier}"));
     }
   }
 }
@@ -198,8 +199,8 @@ void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cl
       const auto [other, is_new] = owners.emplace(grasp.name, scene.cloths[k].name);
       if (!is_new)
       {
-        YamlMap(YamlMap(cloths[k]).get("grasps"))
-            .get(grasp.name)
+        YamlMap(YamlMap(cloths[k]).find("grasps"))
+            .find(grasp.name)
             .problem("has the same name as a grasp of " + other->second + "; grasps of a scene need different names");
       }
     }
@@ -209,10 +210,21 @@ void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cl
 /// All that has a place in space.
 void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
 {
-  const YamlCursor at_generate = map.get("generate"), at_threads = map.get("threads"), at_cloths = map.get("cloths"),
-                   at_tracked = map.get("tracked");
-  const YamlCursor at_rods = map.get("rods");
-  const YamlCursor at_obstacles = map.get("obstacles"), at_bodies = map.get("bodies");
+  // in the order of docs/scene_reference.md
+  const YamlCursor at_rods = map.get("rods", "Elastic rods: cables, ropes, wires, hair.");
+  const YamlCursor at_threads = map.get("threads", "Viscous threads.");
+  const YamlCursor at_cloths = map.get("cloths", "Cloths.");
+  const YamlCursor at_tracked = map.get("tracked",
+                                        "Cloths and thin shells that track a guide. All keys of `cloths` but `grid`, "
+                                        "`mesh` and `loads` are allowed, too.");
+  const YamlCursor at_bodies =
+      map.get("bodies", "Rigid bodies: simulated ones, which forces move, and driven ones, whose motion is given.");
+  const YamlCursor at_obstacles = map.get(
+      "obstacles", "Solids that move as prescribed, and that rods, threads, cloths and bodies with contact touch.");
+  const YamlCursor at_contact =
+      map.get("contact", "Settings of all contacts of rods, threads, bodies and of cloth with method barrier.");
+  const YamlCursor at_generate =
+      map.get("generate", "Chains, trees and hair, which are expanded into rods, bodies and obstacles.");
   if (!at_rods.present() && !at_generate.present() && !at_threads.present() && !at_cloths.present() &&
       !at_tracked.present() && !at_bodies.present())
   {
@@ -249,7 +261,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     scene.bodies.push_back(std::move(body));
   }
   chooseContactMethods(cloths, rods, scene);
-  scene.contact = readContact(map.get("contact"), rods, scene.threads, scene.cloths, scene.bodies);
+  scene.contact = readContact(at_contact, rods, scene.threads, scene.cloths, scene.bodies);
   for (ReadRod& part : rods)
     scene.rods.push_back(std::move(part.config));
   completeThreads(scene, entriesOf(at_threads));
@@ -260,12 +272,12 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
 
 void checkClothTime(YamlMap& map, SceneConfig& scene)
 {
-  const YamlCursor time = map.get("time");
+  const YamlCursor time = map.find("time");
   if (!YamlMap(time).has("integrator"))
   {
     if (scene.time.integrator != Integrator::implicit_euler && !(scene.rods.empty() && scene.bodies.empty()))
     {
-      map.get(map.has("cloths") ? "cloths" : "tracked")
+      map.find(map.has("cloths") ? "cloths" : "tracked")
           .warning(
               "makes implicit_euler the default integrator of the rods and bodies as well, which is of first order; "
               "without cloth it is " +
@@ -278,20 +290,20 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
            scene.time.integrator != Integrator::imex && scene.time.integrator != Integrator::symplectic_euler)
   {
     YamlMap(time)
-        .get("integrator")
+        .find("integrator")
         .problem("is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler");
   }
   if (YamlMap(time).has("spectral_radius"))
-    YamlMap(time).get("spectral_radius").problem("is for generalized_alpha, which cloth does not have; leave it out");
+    YamlMap(time).find("spectral_radius").problem("is for generalized_alpha, which cloth does not have; leave it out");
   if (scene.start.equilibrium)
   {
     for (const ClothConfig& cloth : scene.cloths)
     {
       if (cloth.tracking || cloth.contact)
       {
-        map.get("start").problem("is not for cloth that " +
-                                 std::string(cloth.tracking ? "tracks a guide" : "has contact") + ", as cloth " +
-                                 cloth.name + " does; must be as_given");
+        map.find("start").problem("is not for cloth that " +
+                                  std::string(cloth.tracking ? "tracks a guide" : "has contact") + ", as cloth " +
+                                  cloth.name + " does; must be as_given");
         return;
       }
     }
@@ -302,45 +314,74 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
 /// have; beside other objects, which may have it, that is a warning.
 void checkThreadTime(YamlMap& map, const SceneConfig& scene)
 {
-  YamlMap time(map.get("time"));
+  YamlMap time(map.find("time"));
   const bool alone = scene.rods.empty() && scene.bodies.empty() && scene.cloths.empty();
   const auto refuse = [&](const YamlCursor& at, const std::string& problem, const std::string& warning) {
     alone ? at.problem(problem) : at.warning(warning);
   };
   if (time.has("integrator") && scene.time.integrator != Integrator::implicit_euler)
   {
-    refuse(time.get("integrator"), "is not for threads; must be implicit_euler",
+    refuse(time.find("integrator"), "is not for threads; must be implicit_euler",
            "does not hold for the scene's threads, which take implicit Euler steps.");
   }
   if (scene.start.equilibrium)
   {
-    refuse(map.get("start"), "is not for threads, which flow; must be as_given",
+    refuse(map.find("start"), "is not for threads, which flow; must be as_given",
            "does not hold for the scene's threads, which flow: they start as given.");
   }
   if (scene.time.error_tolerance > 0)
   {
-    refuse(time.get("error_tolerance"), "is not for threads, whose steps are of fixed length; leave it out",
+    refuse(time.find("error_tolerance"), "is not for threads, whose steps are of fixed length; leave it out",
            "does not hold for the scene's threads, whose steps are of fixed length.");
   }
   if (scene.wind != Eigen::Vector3d::Zero() || scene.wind_topic)
-    map.get("wind").warning("does not act on threads.");
+    map.find("wind").warning("does not act on threads.");
 }
 
 /// Rods that track a guide take implicit Euler steps of fixed length.
 void checkTrackedTime(YamlMap& map, SceneConfig& scene)
 {
-  YamlMap time(map.get("time"));
+  YamlMap time(map.find("time"));
   if (!time.has("integrator"))
     scene.time.integrator = Integrator::implicit_euler;
   else if (scene.time.integrator != Integrator::implicit_euler)
-    time.get("integrator").problem("is not for rods that track a guide; must be implicit_euler");
+    time.find("integrator").problem("is not for rods that track a guide; must be implicit_euler");
   if (scene.time.error_tolerance > 0)
   {
-    time.get("error_tolerance")
+    time.find("error_tolerance")
         .problem("is not for rods that track a guide, whose steps are of fixed length; leave it out");
   }
   if (scene.start.equilibrium)
-    map.get("start").problem("is not for rods that track a guide; must be as_given");
+    map.find("start").problem("is not for rods that track a guide; must be as_given");
+}
+
+/// The integrator of rods that touch something.
+void checkContactTime(const YamlCursor& time, SceneConfig& scene)
+{
+  const bool touches =
+      std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
+  if (touches && !YamlMap(time).has("integrator"))
+  {
+    // methods of second order carry an impact's velocity on and bounce
+    scene.time.integrator = Integrator::implicit_euler;
+  }
+  else if (touches && scene.time.integrator != Integrator::implicit_euler &&
+           scene.time.integrator != Integrator::symplectic_euler)
+  {
+    YamlMap(time)
+        .find("integrator")
+        .warning(
+            "of second order carries the velocity before an impact beyond it, so that a rod may bounce higher than it "
+            "fell: use implicit_euler, the default with contact, where rods hit something");
+  }
+  if (touches && scene.time.integrator == Integrator::symplectic_euler)
+  {
+    YamlMap(time)
+        .find("integrator")
+        .problem(
+            "takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
+            "bdf2 or tr_bdf2, or no rod may have contact");
+  }
 }
 
 SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::string& directory, KeyLog* log = nullptr)
@@ -357,20 +398,28 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   // The largest acceleration serves scaled problems, whose lengths, masses and moduli are of order one.
   const Range acceleration = Range::closed(-1e9, 1e9, "m/s^2"),
               speed = Range::closed(-kMaxWindSpeed, kMaxWindSpeed, "m/s");
-  assign(scene.name, map.get("name").text());
-  assign(scene.gravity, map.get("gravity").vector3(acceleration));
-  const YamlCursor wind = map.get("wind");
+  assign(scene.name, map.get("name", "Name of the scene. Without the key: scene.").text());
+  assign(scene.gravity,
+         map.get("gravity", "Acceleration by gravity. Without the key: [0, 0, -9.81] m/s^2.").vector3(acceleration));
+  const YamlCursor wind = map.get("wind",
+                                  "The air, the same everywhere. It acts on rods with `damping.drag`, and on cloths "
+                                  "with `aerodynamics` or `damping.drag`.");
   YamlMap wind_map(wind);
-  assign(scene.wind, wind_map.get("velocity").vector3(speed));
-  const YamlCursor wind_topic = wind_map.get("topic");
+  assign(scene.wind,
+         wind_map.get("velocity", "Velocity of the air. Without the key: [0, 0, 0], still air.").vector3(speed));
+  const YamlCursor wind_topic =
+      wind_map.get("topic", "Whether messages on the topic `wind` set the velocity. Without the key: false.");
   assign(scene.wind_topic, wind_topic.boolean());
   wind_map.finish();
-  scene.start = readStart(map.get("start"));
-  const YamlCursor statics = map.get("statics");
+  scene.start = readStart(map.get("start",
+                                  "How the scene starts: `as_given`, or in a static equilibrium, which the static "
+                                  "solver finds first. Without the key: as_given."));
+  const YamlCursor statics = map.get("statics", "What `simulate --statics` finds. Without the key: one equilibrium.");
   scene.statics = readStatics(statics);
-  const YamlCursor time = map.get("time");
+  const YamlCursor time =
+      map.get("time", "Time steps, duration and solver. Without the key: the defaults of the keys in it.");
   scene.time = readTime(time);
-  const YamlCursor record = map.get("record");
+  const YamlCursor record = map.get("record", "What is recorded. Without the key: every step, the motion alone.");
   scene.record = readRecord(record);
   ReadContext context;
   context.directory = directory;
@@ -379,30 +428,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   readObjects(map, context, scene);
   checkRecord(record, scene);
   checkStatics(statics, scene);
-  const bool touches =
-      std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
-  if (touches && !YamlMap(time).has("integrator"))
-  {
-    // methods of second order carry an impact's velocity on and bounce
-    scene.time.integrator = Integrator::implicit_euler;
-  }
-  else if (touches && scene.time.integrator != Integrator::implicit_euler &&
-           scene.time.integrator != Integrator::symplectic_euler)
-  {
-    YamlMap(time)
-        .get("integrator")
-        .warning(
-            "of second order carries the velocity before an impact beyond it, so that a rod may bounce higher than it "
-            "fell: use implicit_euler, the default with contact, where rods hit something");
-  }
-  if (touches && scene.time.integrator == Integrator::symplectic_euler)
-  {
-    YamlMap(time)
-        .get("integrator")
-        .problem(
-            "takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
-            "bdf2 or tr_bdf2, or no rod may have contact");
-  }
+  checkContactTime(time, scene);
   if (std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.tracking != nullptr; }))
     checkTrackedTime(map, scene);
   if (!scene.threads.empty())
@@ -413,7 +439,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
       !(scene.rods.empty() && scene.threads.empty() && scene.bodies.empty()))
   {
     YamlMap(time)
-        .get("integrator")
+        .find("integrator")
         .problem("is for cloth only; must be another one in scenes with rods, threads or bodies");
   }
   map.finish();
@@ -487,6 +513,17 @@ SceneConfig parseScene(const std::string& text, const std::string& name, const s
 void logKeys(const std::string& path, KeyLog& log)
 {
   readTree(parseYaml(fileText(path), path), path, directoryOf(path), &log);
+}
+
+void logKeysOf(const std::string& text, KeyLog& log)
+{
+  try
+  {
+    readTree(parseYaml(text, "scene"), "scene", ".", &log);
+  }
+  catch (const SceneError&)
+  {
+  }
 }
 
 SceneConfig readScene(const std::string& path, const std::vector<std::string>& overrides)

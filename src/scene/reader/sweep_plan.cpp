@@ -21,9 +21,10 @@ constexpr long max_points = 1'000'000;
 std::vector<std::string> readSeries(const YamlCursor& at)
 {
   YamlMap map(at);
-  const YamlCursor log_at = map.get("log"), from_at = map.require("from");
-  const auto from = from_at.number({}), to = map.require("to").number({});
-  const auto count = map.require("count").integer(2, max_points);
+  const YamlCursor log_at = map.get("log", "Whether the values form a geometric series. Without the key: false."),
+                   from_at = map.require("from", "First value of the series.");
+  const auto from = from_at.number({}), to = map.require("to", "Last value of the series.").number({});
+  const auto count = map.require("count", "Number of values.").integer(2, max_points);
   const bool log = log_at.boolean().value_or(false);
   map.finish();
   std::vector<std::string> values;
@@ -62,13 +63,13 @@ SweepPlot readPlot(const YamlCursor& at)
 {
   SweepPlot plot;
   YamlMap map(at);
-  assign(plot.x, map.require("x").text());
-  assign(plot.y, map.require("y").text());
-  assign(plot.by, map.get("by").text());
+  assign(plot.x, map.require("x", "Measure or path on the horizontal axis.").text());
+  assign(plot.y, map.require("y", "Measure on the vertical axis.").text());
+  assign(plot.by, map.get("by", "Path whose values get a curve each. Without the key there is one curve.").text());
   plot.x_label = plot.x;
   plot.y_label = plot.y;
-  plot.log = map.get("log").boolean().value_or(false);
-  const YamlCursor labels = map.get("labels");
+  plot.log = map.get("log", "Whether both axes are logarithmic. Without the key: false.").boolean().value_or(false);
+  const YamlCursor labels = map.get("labels", "Labels of both axes. Without the key: the names in x and y.");
   if (labels.present())
   {
     const auto words = labels.items(2, 2);
@@ -150,13 +151,14 @@ SweepPlan readSweepPlan(const std::string& path)
   Problems problems(path);
   SweepPlan plan;
   YamlMap map(YamlCursor(&tree, nullptr, "", problems));
-  assign(plan.name, map.require("name").name());
+  assign(plan.name, map.require("name", "Name of the sweep.").name());
   const std::string folder = std::filesystem::path(path).parent_path().string();
-  if (const auto scene = map.require("scene").text())
+  if (const auto scene = map.require("scene", "Path of the scene file.").text())
     plan.scene = scene->front() == '/' || folder.empty() ? *scene : folder + "/" + *scene;
-  const YamlCursor axes = map.require("axes");
+  const YamlCursor axes =
+      map.require("axes", "Values of the scene that are varied: a map from paths to lists of values, or to series.");
   double points = 1;
-  for (const auto& [name, at] : axes.members())
+  for (const auto& [name, at] : axes.members("Values of the scene at this path."))
   {
     plan.axes.push_back(readAxis(name, at));
     points *= static_cast<double>(plan.axes.back().values.size());
@@ -167,11 +169,13 @@ SweepPlan readSweepPlan(const std::string& path)
     axes.problem("names no value to vary");
   if (points > max_points)
     axes.problem("make " + shortNumber(points) + " runs or more; at most " + std::to_string(max_points));
-  for (const YamlCursor& measure : map.require("measures").items(1))
+  for (const YamlCursor& measure :
+       map.require("measures", "Names of the measures that are taken of each run.").items(1))
     if (const auto name = measure.name())
       plan.measures.push_back(*name);
-  assign(plan.after, map.get("after").number(Range::closed(0, 1e9, "s")));
-  const YamlCursor plot = map.get("plot");
+  assign(plan.after, map.get("after", "Simulated time from which measures are taken. Without the key: 0.")
+                         .number(Range::closed(0, 1e9, "s")));
+  const YamlCursor plot = map.get("plot", "Picture of the results. Without the key: none.");
   if (plot.present())
     plan.plot = readPlot(plot);
   map.finish();

@@ -304,7 +304,8 @@ int YamlCursor::chosen(const std::vector<std::string>& words) const
   if (found == words.end())
   {
     const std::string nearest = nearestWord(tree_->scalar, words);
-    problem("is not known; must be " + expected + (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
+    problem("is not known; must be " + expected + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") +
+            shortMeaning());
     return -1;
   }
   return static_cast<int>(found - words.begin());
@@ -331,10 +332,22 @@ std::vector<YamlCursor> YamlCursor::items(std::size_t min_size, std::size_t max_
   return entries;
 }
 
-std::vector<std::pair<std::string, YamlCursor>> YamlCursor::members() const
+std::string YamlCursor::shortMeaning() const
+{
+  constexpr std::size_t longest = 120;   // one line of a terminal, beside the place and the allowed values
+  if (!meaning_)
+    return "";
+  const std::string text = meaning_;
+  const std::string first = text.substr(0, text.find(". "));
+  const std::string sentence = !first.empty() && first.back() == '.' ? first.substr(0, first.size() - 1) : first;
+  return sentence.size() > longest ? "" : "; " + path_.substr(path_.rfind('.') + 1) + ": " + sentence;
+}
+
+std::vector<std::pair<std::string, YamlCursor>> YamlCursor::members(const char* meaning) const
 {
   std::vector<std::pair<std::string, YamlCursor>> entries;
   problems_->named(path_);
+  problems_->means(path_ + (path_.empty() ? "" : ".") + "NAME", meaning);
   if (!check(YamlTree::Kind::map, "a map of names"))
     return entries;
   for (const auto& [key, value] : tree_->members)
@@ -350,21 +363,32 @@ YamlMap::YamlMap(const YamlCursor& at) : at_(at)
     at.problem(std::string("is ") + toString(at.tree()->kind) + "; must be a map of keys and values");
 }
 
-YamlCursor YamlMap::get(const std::string& key)
+YamlCursor YamlMap::childOf(const std::string& key, const char* meaning) const
 {
-  at_.problems().asked(at_.path() + (at_.path().empty() ? "" : ".") + key, "");
-  known_.push_back(key);
   const YamlTree* value = map_ ? map_->find(key) : nullptr;
-  return YamlCursor(value, at_.tree(), at_.path() + (at_.path().empty() ? "" : ".") + key, at_.problems());
+  return YamlCursor(value, at_.tree(), at_.path() + (at_.path().empty() ? "" : ".") + key, at_.problems(), meaning);
 }
 
-YamlCursor YamlMap::require(const std::string& key)
+YamlCursor YamlMap::get(const std::string& key, const char* meaning)
 {
-  YamlCursor value = get(key);
+  const YamlCursor child = childOf(key, meaning);
+  at_.problems().asked(child.path(), "");
+  at_.problems().means(child.path(), meaning);
+  known_.push_back(key);
+  return child;
+}
+
+YamlCursor YamlMap::require(const std::string& key, const char* meaning)
+{
+  const YamlCursor value = get(key, meaning);
   if (!value.present() && map_)
-    value.problem("is missing");
+    value.problem("is missing" + value.shortMeaning());
   return value;
 }
+
+YamlCursor YamlMap::find(const std::string& key) const { return childOf(key, nullptr); }
+
+void YamlMap::missing(const std::string& key) const { find(key).problem("is missing"); }
 
 void YamlMap::finish()
 {

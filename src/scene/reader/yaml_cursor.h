@@ -53,11 +53,29 @@ public:
   bool empty() const { return lines_.empty(); }
   std::size_t size() const { return lines_.size(); }
   std::string text() const;
-  /// A key that is asked for, and what it may be.
+  /// Notes a key that is asked for, and the values that it may have.
   void asked(const std::string& path, const std::string& what) const
   {
     if (log_)
       log_->note(path, what);
+  }
+  /// Notes what a key means.
+  void means(const std::string& path, const char* meaning) const
+  {
+    if (log_)
+      log_->noteMeaning(path, meaning);
+  }
+  /// Notes the values that a key may have, in words that replace those of the typed getters.
+  void takes(const std::string& path, const char* what) const
+  {
+    if (log_)
+      log_->noteValue(path, what);
+  }
+  /// Notes that the keys below a path are those below the key `owner`.
+  void sharesKeys(const std::string& path, const char* owner) const
+  {
+    if (log_)
+      log_->noteShared(path, owner);
   }
   /// What is below has names that the user gives.
   void named(const std::string& path) const
@@ -80,11 +98,14 @@ private:
 class YamlCursor
 {
 public:
-  YamlCursor(const YamlTree* tree, const YamlTree* parent, std::string path, Problems& problems)
+  /// `meaning`: a sentence that says what the key does, or nullptr. It must live as long as the program.
+  YamlCursor(const YamlTree* tree, const YamlTree* parent, std::string path, Problems& problems,
+             const char* meaning = nullptr)
     : tree_(tree),
       parent_(parent),
       path_(std::move(path)),
-      problems_(&problems)
+      problems_(&problems),
+      meaning_(meaning)
   {
   }
 
@@ -103,6 +124,21 @@ public:
   /// Warns of this value: the scene runs, but not as its writer may expect. The text says what happens instead and what
   /// to do.
   void warning(const std::string& text) const { problems_->warn(tree_, parent_, path_, text); }
+
+  /// Says in the reference of scene files that the keys below this one are those below the key `owner`, for example
+  /// "rods.N.material". The reference describes them there alone.
+  const YamlCursor& sharesKeysOf(const char* owner) const
+  {
+    problems_->sharesKeys(path_, owner);
+    return *this;
+  }
+  /// Says in the reference of scene files which values this key takes, where the typed getters below would say it less
+  /// well: for tables, for lists of lists, and for bounds that depend on other keys.
+  const YamlCursor& takes(const char* values) const
+  {
+    problems_->takes(path_, values);
+    return *this;
+  }
 
   std::optional<double> number(const Range& range) const;
   std::optional<int> integer(long low, long high, const char* unit = "") const;
@@ -128,34 +164,48 @@ public:
   /// Entries of a list; reports and returns none for anything else. `size`: allowed sizes.
   std::vector<YamlCursor> items(std::size_t min_size = 0,
                                 std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
-  /// Members of a map, in file order; reports and returns none for anything else.
-  std::vector<std::pair<std::string, YamlCursor>> members() const;
+  /// Members of a map whose keys are names that the user gives, in file order; reports and returns none for anything
+  /// else. `meaning`: a sentence that says what each of them is.
+  std::vector<std::pair<std::string, YamlCursor>> members(const char* meaning) const;
 
 private:
   std::optional<double> numberIn(const Range& range) const;
   std::optional<std::string> word() const;
   bool check(YamlTree::Kind kind, const char* expected) const;
   int chosen(const std::vector<std::string>& words) const;
+  std::string shortMeaning() const;
+
+  friend class YamlMap;
 
   const YamlTree* tree_;
   const YamlTree* parent_;
   std::string path_;
   Problems* problems_;
+  const char* meaning_;
 };
 
-/// A map whose keys are asked for by name. Keys nobody asked for are reported by finish(), with the nearest known one.
+/// A map whose keys are asked for by name, each with its meaning: a sentence that says what the key does and what holds
+/// without it. The meanings are the text of docs/scene_reference.md. Keys nobody asked for are reported by finish(),
+/// with the nearest known one.
 class YamlMap
 {
 public:
   explicit YamlMap(const YamlCursor& at);
 
-  YamlCursor get(const std::string& key);
-  YamlCursor require(const std::string& key);
+  YamlCursor get(const std::string& key, const char* meaning);
+  /// Like get(), but reports a key that is missing.
+  YamlCursor require(const std::string& key, const char* meaning);
+  /// A key that has been read elsewhere with its meaning, for checks that concern several keys.
+  YamlCursor find(const std::string& key) const;
+  /// Reports that a key is missing that only some of the other values need. The key has been read with its meaning.
+  void missing(const std::string& key) const;
   bool has(const std::string& key) const { return map_ && map_->find(key); }
   const YamlCursor& at() const { return at_; }
   void finish();
 
 private:
+  YamlCursor childOf(const std::string& key, const char* meaning) const;
+
   YamlCursor at_;
   const YamlTree* map_ = nullptr;
   std::vector<std::string> known_;
