@@ -217,6 +217,39 @@ TEST_F(Simulate, writesTables)
   EXPECT_EQ(rows, 1 + 5);
 }
 
+TEST_F(Simulate, writesTablesOfChosenNodes)
+{
+  const std::string run = cantilever +
+                          " --duration 0.1 --set record.every=5 --set record.fields=[curvature]"
+                          " --set rods.0.centerline.straight.edges=10 --csv " +
+                          folder_;
+  ASSERT_EQ(simulate(run + "/all").status, 0);
+  const Result result = simulate(run + "/ends --set record.nodes=[0,-1]");
+  ASSERT_EQ(result.status, 0) << result.output;
+  const auto rows = [&](const std::string& table) {
+    std::vector<std::string> lines;
+    std::ifstream file(folder_ + table);
+    for (std::string line; std::getline(file, line);)
+      lines.push_back(line);
+    return lines;
+  };
+  for (const char* table : {"/nodes.csv", "/rod_fields.csv"})
+  {
+    const std::vector<std::string> all = rows(std::string("/all") + table), ends = rows(std::string("/ends") + table);
+    ASSERT_EQ(all.size(), 1u + 5 * 11) << table;
+    ASSERT_EQ(ends.size(), 1u + 5 * 2) << table;
+    EXPECT_EQ(ends[0], all[0]) << table;
+    EXPECT_EQ(ends[3], all[1 + 11]) << table;        // the clamped end at the second instant
+    EXPECT_EQ(ends[4], all[1 + 11 + 10]) << table;   // the free end
+  }
+  EXPECT_EQ(rows("/ends/grasps.csv"), rows("/all/grasps.csv"));
+  const Result wrong = simulate(run + "/wrong --set record.nodes=[0,11]");
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_NE(wrong.output.find("record.nodes.1 = 11: is out of range; must be a number in [-11, 10]"), std::string::npos)
+      << wrong.output;
+  EXPECT_FALSE(fs::exists(folder_ + "/wrong"));
+}
+
 TEST_F(Simulate, writesATableOfBodies)
 {
   const Result result =

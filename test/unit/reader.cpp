@@ -231,6 +231,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"rods.0.grasps.left.motion={topic: false}", "must be true"},
         Case{"rods.0.grasps.left.motion={topic: true, body: b}", "must be fixed or one of"},
         Case{"rods.0.grasps.left.motion={file: nowhere.csv, body: b}", "nowhere.csv: cannot be opened"},
+        Case{"rods.0.grasps.left.attach=gripper",
+             "must be one of: section, initial; attach: Which point the poses of `motion` describe"},
         Case{"rods.0.grasps.left.motion={file: nowhere.csv}", "body: is missing"},
         Case{"rods.0.grasps.left.motion={table: []}", "has 0 entries"},
         Case{"rods.0.grasps.left.motion={table: [[0, 1, 2]]}", "has 3 numbers; must be [t, x, y, z, qx, qy, qz, qw]"},

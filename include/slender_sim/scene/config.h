@@ -377,9 +377,15 @@ struct StartConfig
   bool accept_unstable = false;   ///< an unstable equilibrium is a warning; otherwise the scene is refused
 };
 
+/// Names of rods and cloths with the nodes or vertices of theirs that tables hold, ascending. Of an object that is not
+/// named, tables hold all.
+using NodeChoice = std::map<std::string, std::vector<int>>;
+
 struct RecordConfig
 {
   int every = 1;   ///< record every n-th step (`simulate`)
+  /// what the tables of `simulate --csv` hold; bags and OBJ files hold all nodes
+  NodeChoice nodes;
   /// what is computed and recorded besides, each once (see field_tables.h)
   std::vector<RecordField> fields;
 };

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "slender_sim/scene/config.h"
 #include "slender_sim/scene/snapshot.h"
 
 namespace slender {
@@ -28,6 +29,9 @@ namespace slender {
 ///   in a row per instant and node or vertex (energies: and object). docs/quantities.md defines every column. A cell
 ///   is empty if its value is not determined.
 ///
+/// With a choice of nodes, nodes.csv, cloths.csv, rod_fields.csv and cloth_fields.csv have rows of these alone, under
+/// the indices that they have in the whole object.
+///
 /// Numbers are the shortest that read back to the same double. All functions throw std::runtime_error if writing
 /// fails.
 class CsvTables
@@ -35,7 +39,7 @@ class CsvTables
 public:
   explicit CsvTables(const std::string& folder);
   ~CsvTables();
-  void write(const SceneSnapshot& instant);
+  void write(const SceneSnapshot& instant, const NodeChoice& nodes = {});
   /// Everything is in the files afterwards; nothing may be written any more.
   void finish();
 

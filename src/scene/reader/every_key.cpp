@@ -7,7 +7,7 @@ const std::vector<std::string>& everyKeyScenes()
   static const std::vector<std::string> scenes = {R"(
 start: {equilibrium: true}
 statics: {path: {steps: 2}, buckling: {up_to: 2}, factors: [1]}
-record: {fields: [energy]}
+record: {fields: [energy], nodes: {a: [0]}}
 rods:
   - {name: a, closed: false, centerline: {straight: {}}, initial: {arc: {}}, cross_section: {ellipse: [0.01, 0.02]},
      rest_twist: 1, natural_curvature: [1, 0], material: {bend_modulus: 1},

@@ -107,7 +107,8 @@ StartConfig readStart(const YamlCursor& at);
 std::optional<StaticsConfig> readStatics(const YamlCursor& at);
 /// Reports what statics cannot do with this scene; called when all objects have been read.
 void checkStatics(const YamlCursor& at, const SceneConfig& scene);
-/// Reports fields that nothing in the scene has; called when all objects have been read.
-void checkRecord(const YamlCursor& at, const SceneConfig& scene);
+/// Reports fields that nothing in the scene has, and finds the nodes that are chosen; called when all objects have been
+/// read.
+void completeRecord(const YamlCursor& at, SceneConfig& scene);
 
 }   // namespace slender

@@ -426,7 +426,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   context.gravity = scene.gravity;
   context.step = scene.time.step;
   readObjects(map, context, scene);
-  checkRecord(record, scene);
+  completeRecord(record, scene);
   checkStatics(statics, scene);
   checkContactTime(time, scene);
   if (std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.tracking != nullptr; }))

@@ -68,11 +68,23 @@ void put(TextFile& file, const Pose& pose)
   file.number(q[3]);
 }
 
-void writeRod(TextFile& file, double time, const RodSnapshot& rod)
+/// Calls row(index) for the chosen ones of `count` nodes of an object.
+template <class Row>
+void eachChosen(const NodeChoice& nodes, const std::string& object, Eigen::Index count, const Row& row)
+{
+  const auto chosen = nodes.find(object);
+  if (chosen != nodes.end())
+    for (const int index : chosen->second)
+      row(static_cast<Eigen::Index>(index));
+  else
+    for (Eigen::Index index = 0; index < count; ++index)
+      row(index);
+}
+
+void writeRod(TextFile& file, double time, const RodSnapshot& rod, const NodeChoice& nodes)
 {
   const Eigen::Index edges = static_cast<Eigen::Index>(rod.frames.size());
-  for (Eigen::Index i = 0; i < rod.x.cols(); ++i)
-  {
+  eachChosen(nodes, rod.name, rod.x.cols(), [&](Eigen::Index i) {
     file.number(time) << ',' << rod.name << ',';
     file.number(i) << ',';
     file.vector(rod.x.col(i), ',') << ',';
@@ -81,7 +93,7 @@ void writeRod(TextFile& file, double time, const RodSnapshot& rod)
     file.vector(rod.frames[std::min(i, edges - 1)] * Eigen::Vector3d::UnitY(), ',') << ',';
     file.number(rod.twist[i]);
     file.endLine();
-  }
+  });
 }
 
 void writeThread(TextFile& file, double time, const ThreadSnapshot& thread)
@@ -98,16 +110,15 @@ void writeThread(TextFile& file, double time, const ThreadSnapshot& thread)
   }
 }
 
-void writeCloth(TextFile& file, double time, const ClothSnapshot& cloth)
+void writeCloth(TextFile& file, double time, const ClothSnapshot& cloth, const NodeChoice& nodes)
 {
-  for (Eigen::Index i = 0; i < cloth.x.cols(); ++i)
-  {
+  eachChosen(nodes, cloth.name, cloth.x.cols(), [&](Eigen::Index i) {
     file.number(time) << ',' << cloth.name << ',';
     file.number(i) << ',';
     file.vector(cloth.x.col(i), ',') << ',';
     file.vector(cloth.v.col(i), ',');
     file.endLine();
-  }
+  });
 }
 
 void writeGrasp(TextFile& file, double time, const GraspSnapshot& grasp)
@@ -136,11 +147,13 @@ void writeSolid(TextFile& file, double time, const SolidSnapshot& solid)
   file.endLine();
 }
 
-void writeFields(TextFile& file, double time, const FieldTable& table)
+/// Tables of threads, and of whole objects (energies), have all their rows.
+bool isOfNodes(const FieldTable& table) { return table.table == "rod_fields" || table.table == "cloth_fields"; }
+
+void writeFields(TextFile& file, double time, const FieldTable& table, const NodeChoice& nodes)
 {
   const bool indexed = table.values.rows() > 1;
-  for (Eigen::Index i = 0; i < table.values.rows(); ++i)
-  {
+  eachChosen(isOfNodes(table) ? nodes : NodeChoice(), table.object, table.values.rows(), [&](Eigen::Index i) {
     file.number(time) << ',' << table.object;
     if (indexed)
     {
@@ -154,7 +167,7 @@ void writeFields(TextFile& file, double time, const FieldTable& table)
         file.number(table.values(i, k));
     }
     file.endLine();
-  }
+  });
 }
 
 std::string headerOf(const FieldTable& table)
@@ -178,11 +191,11 @@ CsvTables::CsvTables(const std::string& folder) : files_(std::make_unique<Files>
 
 CsvTables::~CsvTables() = default;
 
-void CsvTables::write(const SceneSnapshot& instant)
+void CsvTables::write(const SceneSnapshot& instant, const NodeChoice& nodes)
 {
   const double time = instant.time;
   for (const RodSnapshot& rod : instant.rods)
-    writeRod(files_->nodes, time, rod);
+    writeRod(files_->nodes, time, rod, nodes);
   for (const ThreadSnapshot& thread : instant.threads)
     writeThread(
         files_->opened(files_->threads, "/threads.csv",
@@ -191,7 +204,7 @@ void CsvTables::write(const SceneSnapshot& instant)
   for (const ClothSnapshot& cloth : instant.cloths)
     writeCloth(files_->opened(files_->cloths, "/cloths.csv",
                               "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s]"),
-               time, cloth);
+               time, cloth, nodes);
   for (const FunctionSnapshot& function : instant.functions)
   {
     TextFile& file = files_->opened(files_->tracking, "/tracking.csv",
@@ -219,7 +232,7 @@ void CsvTables::write(const SceneSnapshot& instant)
       place->second << headerOf(table);
       place->second.endLine();
     }
-    writeFields(place->second, time, table);
+    writeFields(place->second, time, table, nodes);
   }
 }
 

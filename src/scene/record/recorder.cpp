@@ -22,7 +22,7 @@ public:
   explicit CsvRecorder(const std::string& folder) : folder_(folder), tables_(folder) {}
   void record(const Simulation& simulation, const StepReport&) override
   {
-    guarded([&] { tables_.write(snapshotOf(simulation)); });
+    guarded([&] { tables_.write(snapshotOf(simulation), simulation.config().record.nodes); });
   }
   void finish() override
   {
