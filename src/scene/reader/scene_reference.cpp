@@ -53,6 +53,24 @@ std::string escaped(std::string text)
   return text;
 }
 
+/// Words joined to lines of at most 100 columns.
+std::string wrapped(const std::string& text, const std::string& indent)
+{
+  constexpr std::size_t width = 100;
+  std::istringstream words(text);
+  std::string out, line = indent;
+  for (std::string word; words >> word;)
+  {
+    if (line.size() > indent.size() && line.size() + 1 + word.size() > width)
+    {
+      out += line + "\n";
+      line = indent;
+    }
+    line += (line.size() > indent.size() ? " " : "") + word;
+  }
+  return line.size() > indent.size() ? out + line + "\n" : out;
+}
+
 /// Sections of a part that get a heading of their own: those with so many keys that the part's table would be hard to
 /// read.
 class Page
@@ -108,7 +126,7 @@ private:
     const bool is_part = section.path.find('.') == std::string::npos;
     const bool has_rows = std::any_of(keys_.begin(), keys_.end(), belongs);
     if (is_part && has_rows)
-      out << section.meaning << "\n\n";
+      out << wrapped(section.meaning, "") << "\n";
     out << "| Key | Value | Meaning |\n|---|---|---|\n";
     if (is_part && (!has_rows || !section.what.empty()))
       writeRow(out, section, has_rows);
@@ -202,24 +220,6 @@ std::string resolved(const std::vector<SceneKey>& keys, const std::string& query
   return plain != at.end() ? *plain : *at.begin();
 }
 
-/// Words joined to lines of at most 100 columns.
-std::string wrapped(const std::string& text, const std::string& indent)
-{
-  constexpr std::size_t width = 100;
-  std::istringstream words(text);
-  std::string out, line = indent;
-  for (std::string word; words >> word;)
-  {
-    if (line.size() > indent.size() && line.size() + 1 + word.size() > width)
-    {
-      out += line + "\n";
-      line = indent;
-    }
-    line += (line.size() > indent.size() ? " " : "") + word;
-  }
-  return line.size() > indent.size() ? out + line + "\n" : out;
-}
-
 std::string described(const std::vector<SceneKey>& keys, const SceneKey& key)
 {
   std::string text = key.path + "\n";
@@ -264,16 +264,13 @@ std::vector<SceneKey> sceneKeys(const std::vector<std::string>& files)
 
 std::string sceneReference(const std::vector<SceneKey>& keys)
 {
-  return "# Keys of scene files\n\n"
-         "This page is written by the reader of scene files: `rosrun slender_sim scene_reference`.\n"
-         "`scene_reference --key rods.N.grasps.NAME.attach` explains one key, and `--key attach` all keys of that "
-         "name.\n"
-         "\n"
-         "`N` is a place in a list, counted from 0. `NAME` is a name of yours. All units are SI units, and angles are "
-         "in "
-         "rad.\n"
-         "How a scene file is written, with an example: [the scene file](scene_file.md).\n" +
-         Page(keys).text();
+  const char* const how =
+      "This page is written by the reader of scene files itself: `rosrun slender_sim scene_reference`. "
+      "`scene_reference --key rods.N.grasps.NAME.attach` explains one key, and `--key attach` all keys of that name.";
+  const char* const notation =
+      "`N` is a place in a list, counted from 0. `NAME` is a name of yours. All units are SI units, and angles are in "
+      "rad. [The scene file](scene_file.md) shows how a scene is written.";
+  return "# Keys of scene files\n\n" + wrapped(how, "") + "\n" + wrapped(notation, "") + Page(keys).text();
 }
 
 std::string describeKeys(const std::vector<SceneKey>& keys, const std::string& query)
