@@ -161,7 +161,8 @@ void checkHeight(const Falls& falls, const ThreadConfig& thread, const YamlCurso
 {
   const NozzleConfig& nozzle = *thread.nozzle;
   YamlMap map(YamlMap(at).find("nozzle"));
-  const YamlCursor place = std::holds_alternative<TableMotion>(nozzle.motion) ? map.find("motion") : map.find("position");
+  const YamlCursor place =
+      std::holds_alternative<TableMotion>(nozzle.motion) ? map.find("motion") : map.find("position");
   const double radius = 0.5 * nozzle.diameter;
   const std::string what =
       thread.floor && !(thread.contact && thread.contact->solids) ? "its floor" : "what it flows onto";
@@ -206,7 +207,7 @@ void checkGiven(const Needs& needs, const Falls& falls, const ThreadConfig& thre
   if (thread.feed_length > 0 && thread.feed_length > 0.5 * falls.least)
   {
     edges.find("feed").problem("is more than half of the fall of " + millimetres(falls.least) + "; must be at most " +
-                              about(0.1 * falls.least) + " m for ten edges, or leave it out");
+                               about(0.1 * falls.least) + " m for ten edges, or leave it out");
     return;
   }
   const Landing& landing = needs.tightest;
@@ -326,8 +327,8 @@ void complete(const SceneConfig& scene, ThreadConfig& thread, const YamlCursor& 
   if (!falls.flow_known && thread.nozzle->flow.topic && !(thread.longest_edge > 0) && !(thread.feed_length > 0))
   {
     map.find("edges").warning("the flow comes by messages, so edges are chosen for a flow of " +
-                             about(falls.flows.front()) +
-                             " m^3/s. Give nozzle.flow.initial a typical flow, or edges.longest.");
+                              about(falls.flows.front()) +
+                              " m^3/s. Give nozzle.flow.initial a typical flow, or edges.longest.");
   }
   if (falls.flow_known)
     checkGiven(needs, falls, thread, at, scene.time.step);
