@@ -122,12 +122,12 @@ FloorConfig readFloor(const YamlCursor& at)
   if (belt.isMap())
   {
     YamlMap velocity(belt);
-    const YamlCursor x = velocity.get(
-                         "x",
-                         "Velocity along x: a number, a table over time, or values by messages. Without the key: 0."),
-                     y = velocity.get(
-                         "y",
-                         "Velocity along y: a number, a table over time, or values by messages. Without the key: 0."),
+    const YamlCursor x = velocity.get("x",
+                                      "Velocity along x: a number, a table over time, or values by messages on "
+                                      "`belt/velocity`, each of which sets both velocities. Without the key: 0."),
+                     y = velocity.get("y",
+                                      "Velocity along y: a number, a table over time, or values by messages on "
+                                      "`belt/velocity`, each of which sets both velocities. Without the key: 0."),
                      topic = velocity.get("topic",
                                           "Whether messages on `belt/velocity` set both velocities; `x` and `y` hold "
                                           "until the first one. Without the key: false.");
