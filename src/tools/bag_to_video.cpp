@@ -131,46 +131,76 @@ private:
   long pictures_ = 0;
 };
 
-void extend(Eigen::AlignedBox3d& box, const Eigen::Matrix3Xd& x, double margin = 0.0)
+/// What a film shows: the box around it, and the eye that sees all of it.
+struct Reach
 {
-  box.extend(Eigen::Vector3d(x.rowwise().minCoeff().array() - margin));
-  box.extend(Eigen::Vector3d(x.rowwise().maxCoeff().array() + margin));
+  explicit Reach(const slender::PictureView& view) : eye(view.from, view.width, view.height) {}
+  void add(const Eigen::Matrix3Xd& x, double radius = 0.0)
+  {
+    box.extend(Eigen::Vector3d(x.rowwise().minCoeff().array() - radius));
+    box.extend(Eigen::Vector3d(x.rowwise().maxCoeff().array() + radius));
+    eye.add(x, radius);
+  }
+  void add(const Reach& other)
+  {
+    box.extend(other.box);
+    eye.add(other.eye);
+  }
+
+  Eigen::AlignedBox3d box;
+  slender::EyeFinder eye;
+};
+
+/// A body or an obstacle: its surface, which does not change. Planes have no end and are left out.
+Eigen::Matrix3Xd surfaceOf(const slender::Shape& shape)
+{
+  return std::holds_alternative<slender::Plane>(shape) ? Eigen::Matrix3Xd(3, 0) : slender::shapeMesh(shape).vertices;
 }
 
-/// What the motion reaches, with the obstacles that are no larger.
-Eigen::AlignedBox3d reach(const slender::ExportOptions& options)
+void addSolid(const Eigen::Matrix3Xd& surface, const slender::Pose& X, Reach& to)
+{
+  if (surface.cols() > 0)
+    to.add((X.orientation.toRotationMatrix() * surface).colwise() + X.position);
+}
+
+/// Places the camera: what the motion reaches is seen, with the obstacles that are no larger.
+void placeCamera(const slender::ExportOptions& options, slender::PictureView& view)
 {
   slender::BagReader bag(options.bag, options.topic_namespace, options.scene_folder);
-  Eigen::AlignedBox3d box;
-  std::vector<Eigen::AlignedBox3d> obstacles(bag.scene() ? bag.scene()->obstacles.size() : 0);
-  const auto addSolid = [](const slender::Shape& shape, const Eigen::Vector3d& at, Eigen::AlignedBox3d& to) {
-    if (!std::holds_alternative<slender::Plane>(shape))
-      extend(to, at, slender::shapeMesh(shape).vertices.colwise().norm().maxCoeff());
-  };
+  Reach motion(view);
+  std::vector<Eigen::Matrix3Xd> bodies, obstacles;
+  if (bag.scene())
+  {
+    for (const auto& body : bag.scene()->bodies)
+      bodies.push_back(body.shape ? surfaceOf(*body.shape) : Eigen::Matrix3Xd(3, 0));
+    for (const auto& obstacle : bag.scene()->obstacles)
+      obstacles.push_back(surfaceOf(obstacle.shape));
+  }
+  std::vector<Reach> reached(obstacles.size(), Reach(view));
   slender::SceneSnapshot instant;
   while (bag.next(instant))
   {
     for (const slender::RodSnapshot& rod : instant.rods)
-      extend(box, rod.x, std::max(rod.radius_a.maxCoeff(), rod.radius_b.maxCoeff()));
+      motion.add(rod.x, std::max(rod.radius_a.maxCoeff(), rod.radius_b.maxCoeff()));
     for (const slender::ThreadSnapshot& thread : instant.threads)
-      extend(box, thread.x, thread.radius.maxCoeff());
+      motion.add(thread.x, thread.radius.maxCoeff());
     for (const slender::ClothSnapshot& cloth : instant.cloths)
-      extend(box, cloth.x);
-    for (std::size_t b = 0; bag.scene() && b < std::min(instant.bodies.size(), bag.scene()->bodies.size()); ++b)
-      if (const auto& shape = bag.scene()->bodies[b].shape)
-        addSolid(*shape, instant.bodies[b].pose.position, box);
+      motion.add(cloth.x);
+    for (std::size_t b = 0; b < std::min(instant.bodies.size(), bodies.size()); ++b)
+      addSolid(bodies[b], instant.bodies[b].pose, motion);
     for (std::size_t k = 0; k < std::min(instant.obstacles.size(), obstacles.size()); ++k)
-      addSolid(bag.scene()->obstacles[k].shape, instant.obstacles[k].pose.position, obstacles[k]);
+      addSolid(obstacles[k], instant.obstacles[k].pose, reached[k]);
     for (const slender::ObjectMesh& holder : slender::holderMeshes(instant, bag.scene()))
-      extend(box, holder.mesh.vertices);
+      motion.add(holder.mesh.vertices);
   }
-  if (box.isEmpty())
+  if (motion.box.isEmpty())
     throw BadInput(options.bag + ": holds nothing that can be seen");
-  const double size = box.diagonal().norm();
-  for (const Eigen::AlignedBox3d& obstacle : obstacles)
-    if (!obstacle.isEmpty() && obstacle.diagonal().norm() <= size)
-      box.extend(obstacle);
-  return box;
+  const double size = motion.box.diagonal().norm();
+  for (const Reach& obstacle : reached)
+    if (!obstacle.box.isEmpty() && obstacle.box.diagonal().norm() <= size)
+      motion.add(obstacle);
+  view.box = motion.box;
+  view.eye = motion.eye.eye();
 }
 
 /// Paints instants and hands the pictures over in their order. As many are painted at a time as there are processors.
@@ -247,7 +277,7 @@ void run(const slender::ExportOptions& options, const VideoOptions& video)
   slender::PictureView view;
   std::tie(view.width, view.height) = video.size.value_or(gif ? std::pair(640, 360) : std::pair(1280, 720));
   view.from = video.from;
-  view.box = reach(options);
+  placeCamera(options, view);
   view.ground = slender::groundOf(bag.scene());
   slender::TubeResolution resolution;
   view.tube_sides = resolution.sides;

@@ -17,6 +17,8 @@ namespace {
 constexpr int kSuper = 2;   // samples per pixel and direction
 constexpr int kShadowCells = 1536;
 constexpr double kTanHalfHeight = 0.3;
+constexpr double kFilled = 0.9;     // share of the picture, in the direction in which objects fill more of it
+constexpr double kNearest = 0.25;   // least distance of the eye, as a share of the depth of what is seen
 constexpr float kNeverLit = -std::numeric_limits<float>::infinity();
 
 /// Grey: videos keep hues coarsely, and show stripes in a faint gradient of them.
@@ -27,6 +29,41 @@ bool isTube(ObjectKind kind) { return kind == ObjectKind::rod || kind == ObjectK
 std::uint8_t toByte(float share) { return static_cast<std::uint8_t>(255.0f * std::clamp(share, 0.0f, 1.0f) + 0.5f); }
 
 }   // namespace
+
+EyeFinder::EyeFinder(const Vector3d& from, int width, int height)
+  : forward_(-from.normalized()),
+    tan_width_(kFilled * kTanHalfHeight * width / height),
+    tan_height_(kFilled * kTanHalfHeight),
+    reach_(decltype(reach_)::Constant(-std::numeric_limits<double>::infinity()))
+{
+  right_ =
+      std::abs(forward_.z()) > 0.999 ? Vector3d(1, 0, 0) : Vector3d(forward_.cross(Vector3d::UnitZ()).normalized());
+  up_ = right_.cross(forward_);
+  planes_.row(0) = right_ - tan_width_ * forward_;
+  planes_.row(1) = -right_ - tan_width_ * forward_;
+  planes_.row(2) = up_ - tan_height_ * forward_;
+  planes_.row(3) = -up_ - tan_height_ * forward_;
+  planes_.row(4) = forward_;
+  planes_.row(5) = -forward_;
+}
+
+void EyeFinder::add(const Eigen::Matrix3Xd& points, double radius)
+{
+  const Eigen::Matrix<double, 6, 1> farthest = (planes_ * points).rowwise().maxCoeff();
+  reach_ = reach_.cwiseMax(farthest + radius * planes_.rowwise().norm());
+}
+
+/// A point p is left of the right border of the picture if n p <= n e, where e is the eye and n the border's normal
+/// `right - tan forward`; likewise for the other borders. Opposite borders say where the eye is across, and how far it
+/// is forward at most. A point that is far in front of the others must not touch the eye.
+Vector3d EyeFinder::eye() const
+{
+  const double across = 0.5 * (reach_[0] - reach_[1]), along = 0.5 * (reach_[2] - reach_[3]);
+  const double free = kNearest * (reach_[4] + reach_[5]) + 1e-6;   // [m]; the micrometre is for a single point
+  const double forward = std::min(
+      {-0.5 * (reach_[0] + reach_[1]) / tan_width_, -0.5 * (reach_[2] + reach_[3]) / tan_height_, -reach_[5] - free});
+  return across * right_ + along * up_ + forward * forward_;
+}
 
 PicturePainter::PicturePainter(const PictureView& view)
   : view_(view),
@@ -49,24 +86,18 @@ PicturePainter::PicturePainter(const PictureView& view)
   paintBackground();
 }
 
-/// Far enough away that all of the box is in the picture.
 void PicturePainter::placeCamera()
 {
-  forward_ = -view_.from.normalized();
-  right_ =
-      std::abs(forward_.z()) > 0.999 ? Vector3d(1, 0, 0) : Vector3d(forward_.cross(Vector3d::UnitZ()).normalized());
-  up_ = right_.cross(forward_);
+  EyeFinder finder(view_.from, width_, height_);
+  forward_ = finder.forward();
+  right_ = finder.right();
+  up_ = finder.up();
   scale_ = 0.5 * height_ / kTanHalfHeight;
-  const double tan_width = kTanHalfHeight * width_ / height_, margin = 0.9;
-  const Vector3d middle = view_.box.center();
-  double distance = 0.0;
+  Eigen::Matrix3Xd corners(3, 8);
   for (int k = 0; k < 8; ++k)
-  {
-    const Vector3d corner = view_.box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k)) - middle;
-    distance = std::max({distance, std::abs(right_.dot(corner)) / (margin * tan_width) - forward_.dot(corner),
-                         std::abs(up_.dot(corner)) / (margin * kTanHalfHeight) - forward_.dot(corner)});
-  }
-  eye_ = middle - std::max(distance, 1e-6) * forward_;
+    corners.col(k) = view_.box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k));
+  finder.add(corners);
+  eye_ = view_.eye.value_or(finder.eye());
 }
 
 /// From the eye through a sample to the plane at distance 1 along the view.

@@ -14,11 +14,38 @@
 /// Shaded pictures of surfaces, drawn in memory: no display, no graphics card.
 namespace slender {
 
+/// Finds the place of an eye that looks along a given direction and sees all of some points, as near as possible. The
+/// eye has the best distance for exactly these points: it needs only how far they reach along the normals of six
+/// planes, four of which go through the borders of the picture.
+class EyeFinder
+{
+public:
+  /// `from`: direction from what is seen to the eye, not zero.
+  EyeFinder(const Eigen::Vector3d& from, int width, int height);
+  /// Balls of this radius around the points are to be seen.
+  void add(const Eigen::Matrix3Xd& points, double radius = 0.0);
+  /// Whatever another finder for the same direction and picture sees is to be seen.
+  void add(const EyeFinder& other) { reach_ = reach_.cwiseMax(other.reach_); }
+  /// Returns the place of the eye. At least one point must have been added.
+  Eigen::Vector3d eye() const;
+
+  const Eigen::Vector3d& right() const { return right_; }
+  const Eigen::Vector3d& up() const { return up_; }
+  const Eigen::Vector3d& forward() const { return forward_; }
+
+private:
+  Eigen::Vector3d right_, up_, forward_;
+  double tan_width_, tan_height_;        ///< of the angles from the middle to the borders, less a margin
+  Eigen::Matrix<double, 6, 3> planes_;   ///< normals: borders right, left, upper, lower; forward, backward
+  Eigen::Matrix<double, 6, 1> reach_;    ///< largest product of a plane's normal and a point
+};
+
 struct PictureView
 {
   int width = 1280, height = 720;           ///< [pixels]
   Eigen::Vector3d from{0.55, -1.0, 0.45};   ///< direction from what is seen to the eye
-  Eigen::AlignedBox3d box;                  ///< what is to be seen; not empty
+  std::optional<Eigen::Vector3d> eye;       ///< where it is; by default so that all of `box` is seen
+  Eigen::AlignedBox3d box;                  ///< where objects and their shadows are; not empty
   std::optional<double> ground;             ///< height of a floor [m]
   int tube_sides = 16;                      ///< of rods, which get stripes along their material frames
 };

@@ -281,6 +281,35 @@ TEST(Picture, showsTheNearerSurfaceLitFromAboveAndItsShadow)
   EXPECT_GT(darker, 100);   // grey: the shadow on the floor
 }
 
+TEST(Picture, allPointsAreSeenFromAsNearAsPossible)
+{
+  constexpr double kHalfHeight = 0.3 * 0.9, kHalfWidth = kHalfHeight * 16 / 9;   // slopes, with the margin of a tenth
+  for (const Eigen::Vector3d& from : {Eigen::Vector3d(0.55, -1.0, 0.45), Eigen::Vector3d(0, 0, 2)})
+    for (const Eigen::Vector3d& size : {Eigen::Vector3d(1, 0.1, 0.2), Eigen::Vector3d(0.05, 0.05, 3)})
+    {
+      EyeFinder finder(from, 1280, 720), balls(from, 1280, 720);
+      // a tetrahedron, whose box has corners where nothing is
+      Eigen::Matrix3Xd points(3, 4);
+      points << 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1;
+      points = (size.asDiagonal() * points).colwise() + Eigen::Vector3d(5, -3, 2);
+      finder.add(points.leftCols(2));
+      finder.add(points.rightCols(2));
+      balls.add(points, 0.1);
+      const Eigen::Matrix3Xd seen = points.colwise() - finder.eye();
+      const Eigen::ArrayXd depth = (finder.forward().transpose() * seen).transpose();
+      const Eigen::ArrayXd across = (finder.right().transpose() * seen).transpose().array() / depth / kHalfWidth;
+      const Eigen::ArrayXd along = (finder.up().transpose() * seen).transpose().array() / depth / kHalfHeight;
+      EXPECT_GT(depth.minCoeff(), 0);
+      EXPECT_LT(std::max(across.abs().maxCoeff(), along.abs().maxCoeff()), 1 + 1e-9);   // rounding
+      // Points touch both of two opposite borders, or one is so near that the farthest is five times as far away.
+      const double filled =
+          std::max(std::min(across.maxCoeff(), -across.minCoeff()), std::min(along.maxCoeff(), -along.minCoeff()));
+      const double nearness = depth.minCoeff() / (depth.maxCoeff() - depth.minCoeff());
+      EXPECT_TRUE(std::abs(filled - 1) < 1e-9 || std::abs(nearness - 0.25) < 1e-4) << filled << " " << nearness;
+      EXPECT_LT(finder.forward().dot(balls.eye()), finder.forward().dot(finder.eye()) - 0.1);
+    }
+}
+
 TEST(FrameChoice, thinsToTheRateFromTheFirstOn)
 {
   FrameChoice all(0), thin(10);
