@@ -46,4 +46,7 @@ if(BUILD_TESTING AND YUV_LIBRARY AND TinyGLTF_FOUND)   # scripts/test installs b
   add_dependencies(export_tests slender_sim_simulate)
   set_target_properties(export_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
   slender_gtest(export_tests)
+  if(FFMPEG)
+    add_test(NAME gallery COMMAND ${PROJECT_SOURCE_DIR}/test/exports/gallery_test.py $<TARGET_FILE_DIR:slender_sim_bag_to_video>)
+  endif()
 endif()
