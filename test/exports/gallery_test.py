@@ -64,7 +64,8 @@ class Gallery(unittest.TestCase):
             self.assertEqual(sorted(articles), ['boxes_and_balls', 'cantilever'])
             for name, article in articles.items():
                 self.assertGreater(article['factor'], 0)
-                self.assertIn('simulate config/scenes/%s.yaml --bag' % name, article['text'])
+                self.assertIn('simulate config/scenes/%s.yaml' % name, article['text'])
+                self.assertIn('--bag out/%s.bag' % name, article['text'])
                 self.assertIn('name: ' + name, article['text'])   # the YAML
                 self.assertEqual(len(article['files']), 2)
                 for file in article['files']:
