@@ -1,4 +1,5 @@
 # Messages and services, and what dependent packages get.
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME messages)   # see packages.cmake
 file(GLOB MESSAGES RELATIVE ${PROJECT_SOURCE_DIR}/msg CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/msg/*.msg)
 file(GLOB SERVICES RELATIVE ${PROJECT_SOURCE_DIR}/srv CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/srv/*.srv)
 if(MESSAGES)
@@ -8,11 +9,14 @@ if(SERVICES)
   add_service_files(FILES ${SERVICES})
 endif()
 generate_messages(DEPENDENCIES std_msgs geometry_msgs LANGS gencpp genpy)
+# Whether there are libraries decides slender_sim-library.cmake when a dependent package is configured.
 catkin_package(
   INCLUDE_DIRS include
-  LIBRARIES slender_sim slender_sim_node
-  CATKIN_DEPENDS diagnostic_msgs geometry_msgs message_runtime roscpp sensor_msgs std_msgs std_srvs tf2_ros visualization_msgs
-  DEPENDS EIGEN3)
+  CATKIN_DEPENDS geometry_msgs message_runtime std_msgs
+  CFG_EXTRAS slender_sim-library.cmake)
+# Here, because pluginlib complains about packages whose list of nodelets is missing.
+install(FILES nodelets.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME programs)
 
 # rosrun passes over folders named build in a package; here it finds the programs of one (if the source folder can be written).
 if(CATKIN_DEVEL_PREFIX STREQUAL "${PROJECT_SOURCE_DIR}/build/devel")

@@ -11,9 +11,13 @@ else()
   set(INSTALL_SHARE ${CMAKE_INSTALL_DATADIR}/slender_sim)
   set(INSTALL_INCLUDE ${CMAKE_INSTALL_INCLUDEDIR}/slender_sim)
 endif()
-# Installed programs find the library beside them, sourced setup.bash or not.
-set(CMAKE_INSTALL_RPATH "$ORIGIN;$ORIGIN/..;$ORIGIN/../${CMAKE_INSTALL_LIBDIR};$ORIGIN/../lib")
-set_target_properties(slender_sim PROPERTIES INSTALL_RPATH "$ORIGIN")
+# Installed programs find the library beside them, sourced setup.bash or not. The loader knows /usr.
+set(BESIDE "")
+if(NOT CMAKE_INSTALL_PREFIX STREQUAL "/usr")
+  set(BESIDE "$ORIGIN")
+  set(CMAKE_INSTALL_RPATH "$ORIGIN;$ORIGIN/..;$ORIGIN/../${CMAKE_INSTALL_LIBDIR};$ORIGIN/../lib")
+endif()
+set_target_properties(slender_sim PROPERTIES INSTALL_RPATH "${BESIDE}")
 
 # Rods of one scene are stepped in parallel where the compiler has OpenMP; results do not depend on it.
 find_package(OpenMP QUIET COMPONENTS CXX)
@@ -51,12 +55,11 @@ add_executable(slender_sim_scene_reference src/tools/scene_reference.cpp)
 set_target_properties(slender_sim_scene_reference PROPERTIES OUTPUT_NAME scene_reference)
 target_link_libraries(slender_sim_scene_reference PRIVATE slender_sim)
 
-install(TARGETS slender_sim EXPORT slender_sim_targets
+install(TARGETS slender_sim EXPORT slender_sim_targets COMPONENT library
   ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS slender_sim_simulate slender_sim_fair_mesh slender_sim_regions slender_sim_scene_reference RUNTIME DESTINATION ${INSTALL_BIN})
 if(TARGET slender_sim_node)
-  set_target_properties(slender_sim_node slender_sim_nodelets PROPERTIES INSTALL_RPATH "$ORIGIN")
-  install(FILES nodelets.xml DESTINATION ${INSTALL_SHARE})
+  set_target_properties(slender_sim_node slender_sim_nodelets PROPERTIES INSTALL_RPATH "${BESIDE}")
   install(TARGETS slender_sim_node slender_sim_nodelets ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB})
   foreach(node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
     if(TARGET ${node})
@@ -64,7 +67,11 @@ if(TARGET slender_sim_node)
     endif()
   endforeach()
 endif()
-install(DIRECTORY include/slender_sim/ DESTINATION ${INSTALL_INCLUDE} FILES_MATCHING PATTERN "*.h")
+set(without_headers)
+if(NOT WITH_ROS)
+  set(without_headers PATTERN node EXCLUDE)
+endif()
+install(DIRECTORY include/slender_sim/ DESTINATION ${INSTALL_INCLUDE} COMPONENT library FILES_MATCHING PATTERN "*.h" ${without_headers})
 foreach(folder config launch)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder})
     install(DIRECTORY ${folder} DESTINATION ${INSTALL_SHARE})
@@ -73,9 +80,15 @@ endforeach()
 
 if(NOT WITH_ROS)
   # find_package(slender_sim) without catkin (catkin writes its own configuration).
-  install(EXPORT slender_sim_targets NAMESPACE slender_sim:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/slender_sim)
+  set(INSTALL_CMAKE ${CMAKE_INSTALL_LIBDIR}/cmake/slender_sim)
+  install(EXPORT slender_sim_targets NAMESPACE slender_sim:: DESTINATION ${INSTALL_CMAKE} COMPONENT library)
   file(WRITE ${PROJECT_BINARY_DIR}/slender_simConfig.cmake
     "include(CMakeFindDependencyMacro)\nfind_dependency(Eigen3 3.3)\nfind_dependency(Threads)\n"
     "include(\${CMAKE_CURRENT_LIST_DIR}/slender_sim_targets.cmake)\n")
-  install(FILES ${PROJECT_BINARY_DIR}/slender_simConfig.cmake DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/slender_sim)
+  include(CMakePackageConfigHelpers)
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/slender_simConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+  install(FILES ${PROJECT_BINARY_DIR}/slender_simConfig.cmake ${PROJECT_BINARY_DIR}/slender_simConfigVersion.cmake
+    DESTINATION ${INSTALL_CMAKE} COMPONENT library)
+elseif(CMAKE_INSTALL_PREFIX STREQUAL "/usr" AND CMAKE_SOURCE_DIR STREQUAL PROJECT_SOURCE_DIR)
+  include(${PROJECT_SOURCE_DIR}/cmake/packages.cmake)
 endif()

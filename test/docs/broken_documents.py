@@ -26,6 +26,8 @@ GOOD = {
     'scripts/demo': '#!/bin/bash\n# demo [--headless]\n',
     'config/scenes/chain.yaml': 'name: chain\n',
     'docs/picture.png': '',
+    'test/library/main.cpp': 'int main()\n{\n}\n',
+    'docs/library.md': '# The library\n\n```cpp\nint main()\n{\n}\n```\n\n## Errors\n',
     'docs/scene_reference.md': '''# Keys
 
 | Key | Value |
@@ -46,7 +48,7 @@ GOOD = {
 ## More
 ''',
     'docs/studies.md': '# Studies\n\n    study list\n\n## Rods\n\n| Study | |\n|---|---|\n| `knot` | knots |\n',
-    'docs/README.md': '# Index\n\n- [A page](page.md)\n- [studies](studies.md)\n- [keys](scene_reference.md)\n\n## By subject\n',
+    'docs/README.md': '# Index\n\n- [A page](page.md)\n- [studies](studies.md)\n- [keys](scene_reference.md)\n- [library](library.md)\n\n## By subject\n',
     'README.md': '# slender_sim\n\nSee [the page](docs/page.md#what-it-does-twice).\n\n## Two commands\n\n    scripts/demo --headless\n',
     'CHANGELOG.rst': 'Changelog\n=========\n\n0.1.0\n-----\n* One entry\n  of two lines.\n* Another.\n',
     'docs/page.md': '''# A page
@@ -120,6 +122,7 @@ BREAKS = [   # (what breaks, file, text, what stands there instead, problem that
     ('picture', 'docs/page.md', '(picture.png)', '(missing.png)', 'link to missing.png'),
     ('picture in HTML', 'docs/page.md', '![picture](picture.png)', '<img width="9" src="missing.png">', 'link to missing.png'),
     ('page outside the index', 'docs/README.md', '[A page](page.md)', 'A page', 'does not link to this page'),
+    ('program that is not the file', 'docs/library.md', 'main()\n{', 'main() {', 'does not show test/library/main.cpp'),
     ('path in code', 'docs/page.md', 'config/scenes/chain.yaml --csv', 'config/scenes/missing.yaml --csv', 'path config/scenes/missing.yaml'),
     ('path in a sentence', 'docs/page.md', '`include/slender_sim/ROOM`', '`test/unit/missing.cpp`', 'path test/unit/missing.cpp'),
     ('path with braces', 'docs/page.md', '`include/slender_sim/ROOM`', '`scripts/{demo,missing}`', 'path scripts/{demo,missing}'),
@@ -162,7 +165,7 @@ BREAKS = [   # (what breaks, file, text, what stands there instead, problem that
 ]
 
 
-PAGES = ['README.md', 'docs/README.md', 'docs/page.md', 'docs/scene_reference.md', 'docs/studies.md']
+PAGES = ['README.md', 'docs/README.md', 'docs/library.md', 'docs/page.md', 'docs/scene_reference.md', 'docs/studies.md']
 
 
 class Documents(unittest.TestCase):

@@ -120,6 +120,16 @@ def check_index(page):
             page.problem(1, 'docs/README.md does not link to this page')
 
 
+def check_programs(page):
+    """docs/library.md shows the files of test/library word by word."""
+    if page.name != 'docs/library.md':
+        return
+    shown = [b.text.strip('\n') for b in page.blocks if b.kind == 'code']
+    for path in sorted((page.repository.root / 'test/library').glob('*')):
+        if path.read_text(encoding='utf-8').strip('\n') not in shown:
+            page.problem(1, 'does not show test/library/%s as it is' % path.name)
+
+
 # ------------------------------------------------------------------ names of files
 
 def check_paths(page):
@@ -382,7 +392,7 @@ def check_changelog(repository):
     return problems
 
 
-RULES = [check_width, check_paragraphs, check_size, check_opening, check_links, check_index, check_paths, check_commands, check_studies, check_keys]
+RULES = [check_width, check_paragraphs, check_size, check_opening, check_links, check_index, check_programs, check_paths, check_commands, check_studies, check_keys]
 
 
 def check(repository, names, rules=RULES):

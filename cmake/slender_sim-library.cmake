@@ -1,0 +1,51 @@
+# catkin's slender_simConfig.cmake includes this file after it has found the messages. It adds the libraries and what their headers need
+# to slender_sim_LIBRARIES and slender_sim_INCLUDE_DIRS. Without the libraries (Debian package slender-sim-msgs) only messages are found.
+#   slender_sim::slender_sim   the library without ROS, with what its headers need
+foreach(_library slender_sim slender_sim_node)
+  if(TARGET ${_library})   # a workspace that catkin_make builds as one project
+    set(_${_library} ${_library})
+  else()
+    unset(_${_library}_FILE CACHE)   # another prefix may be in front now
+    get_filename_component(_prefix "${slender_sim_DIR}/../../.." ABSOLUTE)
+    find_library(_${_library}_FILE ${_library} PATHS ${_prefix}/lib ${_prefix}/lib/${CMAKE_LIBRARY_ARCHITECTURE} NO_DEFAULT_PATH)
+    mark_as_advanced(_${_library}_FILE)
+    set(_${_library} ${_${_library}_FILE})
+  endif()
+endforeach()
+find_package(Eigen3 3.3 QUIET NO_MODULE)
+if(NOT _slender_sim)
+  message(STATUS "slender_sim: messages without the library")
+  return()
+elseif(NOT Eigen3_FOUND)
+  message(STATUS "slender_sim: messages without the library, because Eigen is missing (Debian: libeigen3-dev)")
+  return()
+endif()
+
+if(NOT TARGET slender_sim::slender_sim)
+  add_library(slender_sim::slender_sim INTERFACE IMPORTED)
+  set_target_properties(slender_sim::slender_sim PROPERTIES
+    INTERFACE_INCLUDE_DIRECTORIES "${slender_sim_INCLUDE_DIRS}" INTERFACE_LINK_LIBRARIES "${_slender_sim};Eigen3::Eigen")
+endif()
+list(APPEND slender_sim_LIBRARIES ${_slender_sim})
+get_target_property(_include_dirs Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
+list(APPEND slender_sim_INCLUDE_DIRS ${_include_dirs})
+
+# The headers of the room `node` need packages of ROS.
+set(_missing "")
+foreach(_depend diagnostic_msgs interactive_markers rosbag roscpp sensor_msgs std_srvs tf2_ros visualization_msgs)
+  find_package(${_depend} QUIET NO_MODULE)
+  if(NOT ${_depend}_FOUND)
+    list(APPEND _missing ${_depend})
+  endif()
+endforeach()
+if(_missing OR NOT _slender_sim_node)
+  message(STATUS "slender_sim: without the library of the nodes, because these are missing: ${_missing}")
+  return()
+endif()
+list(APPEND slender_sim_LIBRARIES ${_slender_sim_node})
+foreach(_depend diagnostic_msgs interactive_markers rosbag roscpp sensor_msgs std_srvs tf2_ros visualization_msgs)
+  list(APPEND slender_sim_INCLUDE_DIRS ${${_depend}_INCLUDE_DIRS})
+  list(APPEND slender_sim_LIBRARIES ${${_depend}_LIBRARIES})
+endforeach()
+list(REMOVE_DUPLICATES slender_sim_INCLUDE_DIRS)
+list(REMOVE_DUPLICATES slender_sim_LIBRARIES)
