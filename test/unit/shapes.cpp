@@ -1,5 +1,7 @@
 #include "slender_sim/scene/shapes.h"
 
+#include <unistd.h>
+
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
@@ -117,7 +119,7 @@ class PoseFile : public testing::Test
 protected:
   std::string write(const std::string& text)
   {
-    path_ = testing::TempDir() + "/slender_sim_pose_file.csv";
+    path_ = testing::TempDir() + "/slender_sim_pose_file_" + std::to_string(getpid()) + ".csv";
     std::ofstream(path_) << text;
     return path_;
   }
