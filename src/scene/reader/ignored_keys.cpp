@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "../../rod/body_surface.h"
+#include "read_parts.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/geometry/mesh_topology.h"
 
