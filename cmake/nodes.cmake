@@ -3,6 +3,7 @@ file(GLOB NODE_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/node/*.cpp)
 add_library(slender_sim_node SHARED ${NODE_SOURCES})
 slender_compile_together(slender_sim_node <ros/ros.h> <Eigen/Dense>)
 add_dependencies(slender_sim_node ${PROJECT_NAME}_generate_messages_cpp)
+target_compile_options(slender_sim_node PRIVATE -O1)
 target_include_directories(slender_sim_node PUBLIC
   $<BUILD_INTERFACE:${CATKIN_DEVEL_PREFIX}/include> ${catkin_INCLUDE_DIRS})
 target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES})

@@ -197,7 +197,6 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
 {
   const Pose& pose = poses[on.solid];
   const ContactSegment& s = surface.segments[on.segment];
-  const ContactSolid& solid = surface.solids[on.solid];
   const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
   const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a) - pose.position),

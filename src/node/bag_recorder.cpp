@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include <rosbag/bag.h>
 #include <std_msgs/String.h>
 
 #include "slender_sim/node/sim_clock.h"

@@ -1,6 +1,7 @@
 #include "slender_sim/node/hand_markers.h"
 
 #include "marker_tools.h"
+#include "slender_sim/geometry/rotation.h"
 #include "slender_sim/node/converters.h"
 
 namespace slender {
@@ -23,7 +24,7 @@ InteractiveMarker makeHandle(const Handle& handle, const std::string& frame_id)
         continue;
       InteractiveMarkerControl control;
       const Eigen::Vector3d along = Eigen::Vector3d::Unit(axis);
-      control.orientation = toQuaternion(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), along));
+      control.orientation = toQuaternion(rotationBetween(Eigen::Vector3d::UnitX(), along));
       control.name = std::string(turn ? "turn_" : "move_") + "xyz"[axis];
       control.interaction_mode = turn ? InteractiveMarkerControl::ROTATE_AXIS : InteractiveMarkerControl::MOVE_AXIS;
       out.controls.push_back(control);

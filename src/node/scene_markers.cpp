@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "marker_tools.h"
+#include "slender_sim/geometry/rotation.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/scene/snapshot_meshes.h"
 
@@ -158,9 +159,8 @@ void addThreadMarkers(const Simulation& simulation, const std_msgs::Header& head
       Marker nozzle = makeMarker(header, "nozzles", static_cast<int>(k), Marker::TRIANGLE_LIST);
       const Pose& X = simulation.state().threads[k].threads.front().ends[1].X_WE;
       const double length = 4.0 * config.nozzle->diameter;
-      nozzle.pose =
-          toMessage(Pose{X.position - X.orientation * Vector3d(0.5 * length, 0, 0),
-                         X.orientation * Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d::UnitX())});
+      nozzle.pose = toMessage(Pose{X.position - X.orientation * Vector3d(0.5 * length, 0, 0),
+                                   X.orientation * rotationBetween(Vector3d::UnitZ(), Vector3d::UnitX())});
       nozzle.color = metal;
       paintMesh(shapeMesh(Cylinder{0.7 * config.nozzle->diameter, length}), nozzle);
       out.markers.push_back(nozzle);

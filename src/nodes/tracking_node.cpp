@@ -1,22 +1,3 @@
-#include <exception>
-#include <iostream>
+#include "slender_sim/node/node_main.h"
 
-#include <ros/init.h>
-
-#include "slender_sim/node/arguments.h"
-#include "slender_sim/node/scene_node.h"
-#include "slender_sim/node/signals.h"
-
-int main(int argc, char** argv)
-try
-{
-  ros::init(argc, argv, "tracking_node", ros::init_options::NoSigintHandler);
-  slender::requireNoArguments(argc, argv);
-  slender::stopOnSignals();   // or the bag stays unfinished, and a long step goes on
-  return slender::SceneNode(ros::NodeHandle(), ros::NodeHandle("~"), slender::NodeKind::tracking).spin();
-}
-catch (const std::exception& e)
-{
-  std::cerr << "tracking_node: " << e.what() << std::endl;
-  return 2;
-}
+int main(int argc, char** argv) { return slender::nodeMain(argc, argv, "tracking_node", slender::NodeKind::tracking); }

@@ -13,8 +13,6 @@
 
 namespace slender {
 
-namespace {
-
 /// A rod's equations under constraints C x = targets, as minimize() wants them.
 class ConstrainedRod
 {
@@ -144,8 +142,6 @@ private:
   Eigen::VectorXd gap_, multipliers_;
   AverageProjection projection_;
 };
-
-}   // namespace
 
 class AveragedRod::Impl : public SubstepEquations
 {

@@ -26,8 +26,7 @@ void BodyPart::evaluate(bool with_hessian, const HessianShift& shift)
   if (!with_hessian)
     return;
   system.addShift(shift);
-  factor_.compute(system.hessian);
-  evaluation.inertia.negative = factor_.info() != Eigen::Success;
+  evaluation.inertia.negative = !factor_.compute(system.hessian);
 }
 
 /// Contacts with what moves as prescribed. The curvature of the turn is left out: it is g h^2 / r of the inertia.

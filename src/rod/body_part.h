@@ -2,10 +2,9 @@
 
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "../contact/part.h"
 #include "../contact/part_steps.h"
+#include "../linalg/cholesky6.h"
 #include "body_surface.h"
 #include "body_system.h"
 #include "slender_sim/contact/contact_properties.h"
@@ -67,7 +66,11 @@ private:
 
   void evaluate(bool with_hessian, const HessianShift& shift) override;
   void closeGradient() override {}
-  void solve() override { direction = -factor_.solve(system.gradient); }
+  void solve() override
+  {
+    direction = -system.gradient;
+    factor_.solveInPlace(direction);
+  }
 
   void notePattern(CouplingMatrix& matrix) override;
   void findEntries(const CouplingMatrix&) override {}
@@ -110,7 +113,7 @@ private:
   Eigen::Vector3d position(int point) const { return system.pose * Eigen::Vector3d(surface_.points.col(point)); }
   void addOwnContacts(bool with_hessian);
 
-  Eigen::LLT<BodySystem::Matrix6> factor_;
+  Cholesky6 factor_;
   RigidBodyState now_, next_;
   const StepPlan* plan_ = nullptr;
   double length_ = 0.0;   ///< of the substep [s]

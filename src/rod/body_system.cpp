@@ -3,9 +3,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "../linalg/cholesky6.h"
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
@@ -60,7 +60,10 @@ BodySystem::Vector6 BodySystem::startAcceleration(const Vector6& wrench, const M
   inertia.bottomRightCorner<3, 3>() += i_world;
   Vector6 load = wrench;
   load.tail<3>() += model_.torque - w.cross(i_world * w);
-  const Vector6 a = inertia.ldlt().solve(load);
+  Cholesky6 factor;
+  factor.compute(inertia);   // of a body with mass, and so positive definite
+  Vector6 a = load;
+  factor.solveInPlace(a);
   acceleration_ = {a.head<3>(), a.tail<3>()};
   history_[kA] = {a.head<3>(), a.tail<3>()};
   return a;

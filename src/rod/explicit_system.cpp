@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
+#include "../linalg/cholesky6.h"
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
@@ -142,7 +141,9 @@ void ExplicitSystem::predictBody(Body& body, double h)
     matrix << (body.mass + k) * Eigen::Matrix3d::Identity(), -k * arm, k * arm, r * body.inertia * r.transpose() + own;
     Eigen::Matrix<double, 6, 1> end;
     end << body.mass * v.linear, momentum;
-    matrix.ldlt().solveInPlace(end);
+    Cholesky6 factor;
+    factor.compute(matrix);   // of a body with mass, and so positive definite
+    factor.solveInPlace(end);
     v.linear = end.head<3>();
     momentum -= k * arm * v.linear + own * Eigen::Vector3d(end.tail<3>());
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "slender_sim/geometry/mesh_shapes.h"
+#include "slender_sim/geometry/rotation.h"
 
 namespace slender {
 
@@ -103,9 +104,9 @@ std::vector<ObjectMesh> holderMeshes(const SceneSnapshot& instant, const SceneCo
       continue;
     const double diameter = config->nozzle->diameter, length = 4.0 * diameter;
     const Vector3d along = upstream(*config->nozzle, thread, instant.time);
-    out.push_back(placed(ObjectKind::nozzle, thread.name + "_nozzle", 0, shapeMesh(Cylinder{0.7 * diameter, length}),
-                         Pose{thread.x.col(thread.x.cols() - 1) + 0.5 * length * along,
-                              Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along)}));
+    out.push_back(placed(
+        ObjectKind::nozzle, thread.name + "_nozzle", 0, shapeMesh(Cylinder{0.7 * diameter, length}),
+        Pose{thread.x.col(thread.x.cols() - 1) + 0.5 * length * along, rotationBetween(Vector3d::UnitZ(), along)}));
   }
   return out;
 }

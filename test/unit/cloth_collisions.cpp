@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "slender_sim/geometry/rotation.h"
 #include "src/contact/impact_zones.h"
 #include "test/support/random.h"
 #include "test/support/sheets.h"
@@ -67,7 +68,7 @@ TEST(ClothCollisions, HeapOfSheets)
 
 TEST(ClothCollisions, EdgesCornersAndNeedles)
 {
-  const Eigen::Quaterniond corner = Eigen::Quaterniond::FromTwoVectors(Vector3d(1, 1, 1), Vector3d::UnitZ());
+  const Eigen::Quaterniond corner = rotationBetween(Vector3d(1, 1, 1), Vector3d::UnitZ());
   const auto cone = std::make_shared<TriangleMesh>();
   cone->vertices.resize(3, 4);
   cone->vertices << 0, 0.02, -0.02, 0, 0, 0.02, 0.02, -0.02, 0.3, 0, 0, 0;

@@ -28,6 +28,25 @@ TEST(ParallelTransport, IsTheSmallestRotation)
   }
 }
 
+TEST(RotationBetween, TakesOneDirectionToTheOther)
+{
+  Random random(24);
+  for (int k = 0; k < 200; ++k)
+  {
+    const Vector3d a = random.direction(), b = random.direction();
+    const Eigen::Quaterniond q = rotationBetween(3.0 * a, 0.2 * b);
+    EXPECT_LT((q * a - b).norm(), 1e-14);   // some roundings
+    // the smallest rotation has no twist; acos loses half of the digits near its ends
+    EXPECT_NEAR(rotationVector(q).norm(), std::acos(a.dot(b)), 1e-7);
+  }
+  for (double off : {0.0, 1e-13, 1e-11, 1e-8, 1e-4})   // near opposite directions
+  {
+    const Vector3d a = random.direction(), b = rotateAbout(-a, anyNormal(a), off);
+    EXPECT_LT((rotationBetween(a, b) * a - b).norm(), 2e-12) << off;   // the half turn stands for 1e-12 and less
+  }
+  EXPECT_EQ(rotationBetween(Vector3d::UnitZ(), Vector3d::UnitZ()).coeffs(), Eigen::Quaterniond::Identity().coeffs());
+}
+
 TEST(ParallelTransport, StaysARotationNearOpposite)
 {
   Random random(22);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/contact/distance.h"
+#include "slender_sim/geometry/rotation.h"
 #include "src/thread/merging.h"
 #include "test/support/thread_world.h"
 #include "test/support/threads.h"
@@ -411,8 +412,7 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
     ContactProperties touch;
     touch.friction = 1.0;
     slope.add(m, straight(0.02, 10, 1e-3, 1.01e-3 * normal), ThreadInputs{}, touch);
-    slope.addObstacle(Plane{}, {Vector3d::Zero(), Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal)},
-                      friction * friction);
+    slope.addObstacle(Plane{}, {Vector3d::Zero(), rotationBetween(Vector3d::UnitZ(), normal)}, friction * friction);
     World threads(slope.model, slope.state);
     for (int k = 0; k < 200; ++k)
     {

@@ -49,6 +49,10 @@ inline Eigen::Vector3d anyNormal(const Eigen::Vector3d& t)
   return t.cross(Eigen::Vector3d::Unit(smallest)).normalized();
 }
 
+/// The smallest rotation that takes the direction of `from` to the direction of `to`; neither may be zero. For opposite
+/// directions, where many are the smallest, the half turn about anyNormal(from).
+Eigen::Quaterniond rotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 /// Axis times angle of a rotation, |angle| <= pi [rad].
 inline Eigen::Vector3d rotationVector(const Eigen::Quaterniond& q)
 {

@@ -4,11 +4,13 @@
 #include <string>
 #include <vector>
 
-#include <rosbag/bag.h>
-
 #include "slender_sim/Input.h"
 #include "slender_sim/node/scene_messages.h"
 #include "slender_sim/scene/recorder.h"
+
+namespace rosbag {
+class Bag;
+}
 
 namespace slender {
 

@@ -23,22 +23,13 @@
 #include "slender_sim/node/guide_inputs.h"
 #include "slender_sim/node/hand_markers.h"
 #include "slender_sim/node/input_replay.h"
+#include "slender_sim/node/node_kind.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/run_statistics.h"
 #include "slender_sim/node/scene_messages.h"
 #include "slender_sim/node/sim_clock.h"
 
 namespace slender {
-
-/// What a node simulates, and its name in what it prints.
-enum class NodeKind
-{
-  rods,
-  threads,
-  cloths,
-  tracking
-};
-const char* toString(NodeKind kind);
 
 /// Simulates a scene of rods and bodies, of viscous threads, of cloth, or of cloth or rods that track guides: poses of
 /// what moves them come in as messages, their motion goes out. docs/nodes.md lists topics, services and parameters.

@@ -6,6 +6,7 @@
 #include "read_parts.h"
 #include "slender_sim/contact/solids.h"
 #include "slender_sim/geometry/mesh_file.h"
+#include "slender_sim/geometry/rotation.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/pose_file.h"
 
@@ -45,7 +46,7 @@ Plane readPlane(YamlMap& map, std::optional<Pose>& pose)
     return {};
   }
   pose = Pose{through.value_or(Eigen::Vector3d::Zero()),
-              Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up.value_or(Eigen::Vector3d::UnitZ()))};
+              rotationBetween(Eigen::Vector3d::UnitZ(), up.value_or(Eigen::Vector3d::UnitZ()))};
   return {};
 }
 

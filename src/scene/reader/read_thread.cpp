@@ -4,6 +4,7 @@
 
 #include "generators.h"
 #include "read_parts.h"
+#include "slender_sim/geometry/rotation.h"
 #include "slender_sim/scene/shapes.h"
 
 /// Viscous threads, their nozzles and floors.
@@ -80,7 +81,7 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double
                        map.get("direction", "Direction of the flow out of the nozzle. Without the key: [0, 0, -1].");
   assign(nozzle.pose.position, position.vector3(Range::closed(-kMaxCoordinate, kMaxCoordinate, "m")));
   const Eigen::Vector3d along = readDirection(direction, -Eigen::Vector3d::UnitZ());
-  nozzle.pose.orientation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), along);
+  nozzle.pose.orientation = rotationBetween(Eigen::Vector3d::UnitX(), along);
   const YamlCursor flow = map.get("flow",
                                   "Volume that leaves the nozzle per second: a number, a table over time, or values by "
                                   "messages on `nozzle/flow`. Without the key: 0, with a warning.");

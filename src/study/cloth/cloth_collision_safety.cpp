@@ -8,6 +8,7 @@
 #include "collision_pairs.h"
 #include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/geometry/mesh_shapes.h"
+#include "slender_sim/geometry/rotation.h"
 #include "study/framework/cpu_clock.h"
 
 namespace slender::study {
@@ -199,7 +200,7 @@ void runClothCollisionSafety(StudyContext& context)
   const bool quick = context.quick();
   runCollisionPairs(context, quick ? 52'000 : 1'040'000);
   const int n = quick ? 16 : 40;
-  const Quaterniond on_corner = Quaterniond::FromTwoVectors(Vector3d(1, 1, 1), Vector3d::UnitZ());
+  const Quaterniond on_corner = rotationBetween(Vector3d(1, 1, 1), Vector3d::UnitZ());
   std::vector<Scene> scenes{drape("a sphere", n, Sphere{0.15}, {}),
                             drape("a box corner", n, Box{{0.17, 0.17, 0.17}}, {{0, 0, 0}, on_corner}),
                             needle(n),

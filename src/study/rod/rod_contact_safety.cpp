@@ -7,6 +7,7 @@
 #include <random>
 
 #include "contact_cases.h"
+#include "slender_sim/geometry/rotation.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {
@@ -116,7 +117,7 @@ Scene whip(Random& random)
   addTouching(s.group, rod, uniform(random, 0, 0.5));
   const Vector3d across = (Vector3d::UnitY() + 0.5 * direction(random)).normalized();
   const Pose bar{Vector3d(uniform(random, 0.15, 0.4), 0, -uniform(random, 0.02, 0.1)),
-                 Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), across)};
+                 rotationBetween(Vector3d::UnitZ(), across)};
   addObstacle(s.group, Capsule{logUniform(random, 0.0005, 0.005), 0.4}, bar, 0.2);
   s.steps = 40;
   return s;
