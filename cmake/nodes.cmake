@@ -8,7 +8,7 @@ target_include_directories(slender_sim_node PUBLIC
   $<BUILD_INTERFACE:${CATKIN_DEVEL_PREFIX}/include> ${catkin_INCLUDE_DIRS})
 target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES})
 
-foreach(node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
+foreach(node scene_node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
   add_executable(${node} ${PROJECT_SOURCE_DIR}/src/nodes/${node}.cpp)
   target_link_libraries(${node} PRIVATE slender_sim_node)
 endforeach()
@@ -37,7 +37,7 @@ if(BUILD_TESTING)
 
   file(GLOB ROSTESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/nodes/*.test)
   foreach(test ${ROSTESTS})
-    add_rostest(${test} DEPENDENCIES rod_node thread_node cloth_node tracking_node fairing_node motion_player slender_sim_nodelets nodelet_tests slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
+    add_rostest(${test} DEPENDENCIES scene_node rod_node thread_node cloth_node tracking_node fairing_node motion_player slender_sim_nodelets nodelet_tests slender_sim_simulate ${PROJECT_NAME}_generate_messages_py)
   endforeach()
   # Rostests have the label rostest: they wait more than they compute. Those that judge times run alone.
   get_property(tests DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTY TESTS)

@@ -61,7 +61,7 @@ install(TARGETS slender_sim_simulate slender_sim_fair_mesh slender_sim_regions s
 if(TARGET slender_sim_node)
   set_target_properties(slender_sim_node slender_sim_nodelets PROPERTIES INSTALL_RPATH "${BESIDE}")
   install(TARGETS slender_sim_node slender_sim_nodelets ARCHIVE DESTINATION ${INSTALL_LIB} LIBRARY DESTINATION ${INSTALL_LIB})
-  foreach(node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
+  foreach(node scene_node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
     if(TARGET ${node})
       install(TARGETS ${node} RUNTIME DESTINATION ${INSTALL_BIN})
     endif()

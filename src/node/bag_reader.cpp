@@ -117,7 +117,8 @@ struct BagReader::Contents
   std::uint32_t epoch = 0;
   StepGaps gaps;
 
-  SceneSnapshot* out = nullptr;   ///< what the streams fill
+  SceneSnapshot* out = nullptr;        ///< what the streams fill
+  std::vector<std::string> own_axes;   ///< grasps whose wrench of this instant is in the grasp's own frame
 
   void open();
   void choosePrefix(const std::string& topic_namespace);
@@ -131,6 +132,7 @@ struct BagReader::Contents
         std::make_unique<TopicStream<Message>>(bag, topic, std::string("slender_sim/") + type, std::move(use)));
   }
   GraspSnapshot& grasp(const std::string& name);
+  void turnWrenches();
   void add(const slender_sim::RodState& rod);
   void add(const slender_sim::ThreadState& thread);
   void add(const slender_sim::ClothState& cloths);
@@ -288,6 +290,8 @@ void BagReader::Contents::openStreams()
       streams.push_back(std::make_unique<TopicStream<geometry_msgs::WrenchStamped>>(
           bag, topic, connection->datatype, [this, of](const auto& m) {
             grasp(of).wrench = {vectorOf(m.wrench.force), vectorOf(m.wrench.torque)};
+            if (endsWith(m.header.frame_id, "/grasps/" + of))
+              own_axes.push_back(of);
           }));
     }
     else
@@ -335,6 +339,21 @@ GraspSnapshot& BagReader::Contents::grasp(const std::string& name)
   out->grasps.emplace_back();
   out->grasps.back().name = name;
   return out->grasps.back();
+}
+
+/// Nodes publish wrenches in the frames of the grasps; snapshots have them in the axes of the scene.
+void BagReader::Contents::turnWrenches()
+{
+  for (const std::string& name : own_axes)
+  {
+    GraspSnapshot& turned = grasp(name);
+    if (!turned.held)
+      throw BagError("the wrench of grasp " + name + " is in the axes of the grasp, whose pose is not in the bag; " +
+                     "record the topic " + prefix + "grasp_states as well");
+    const Eigen::Quaterniond& q = turned.held->X_WG.orientation;
+    turned.wrench = {q * turned.wrench.force, q * turned.wrench.torque};
+  }
+  own_axes.clear();
 }
 
 void BagReader::Contents::add(const slender_sim::RodState& rod)
@@ -484,6 +503,7 @@ bool BagReader::next(SceneSnapshot& out)
     for (const auto& stream : c.streams)
       for (; stream->alive() && stream->stamp() == *stamp; ++c.done)
         stream->take();
+    c.turnWrenches();
   }
   catch (const ros::Exception& e)   // rosbag's, and messages cut short
   {

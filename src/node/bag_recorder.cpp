@@ -9,6 +9,7 @@
 #include <rosbag/bag.h>
 #include <std_msgs/String.h>
 
+#include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/scene/file_paths.h"
 
@@ -18,23 +19,21 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
 {
   const std::string prefix =
       topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
-  const SceneConfig& scene = simulation.config();
-  const bool several_kinds = !scene.rods.empty() + !scene.threads.empty() + !scene.cloths.empty() > 1;
-  const auto of = [&](const char* kind) { return several_kinds ? prefix + kind + "/" : prefix; };
-  rods_topic_ = of("rods") + "state";
-  threads_topic_ = of("threads") + "state";
-  cloths_topic_ = of("cloths") + "state";
-  mesh_topic_ = of("cloths") + "mesh";
+  const SceneTopics topics(simulation);
+  rods_topic_ = prefix + topics.rods + "state";
+  threads_topic_ = prefix + topics.threads + "state";
+  cloths_topic_ = prefix + topics.cloths + "state";
+  mesh_topic_ = prefix + topics.cloths + "mesh";
   scene_topic_ = prefix + "scene";
   inputs_topic_ = prefix + "inputs";
   bodies_topic_ = prefix + "body_states";
   grasps_topic_ = prefix + "grasp_states";
   obstacles_topic_ = prefix + "obstacle_states";
   fields_topic_ = prefix + "fields";
-  for (const std::string& name : graspTopicNames(simulation))
+  for (const std::string& name : topics.grasps)
     wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
-  for (const std::string& thread : threadTopicPrefixes(simulation))
-    nozzle_topics_.push_back(prefix + thread + "nozzle/wrench");
+  for (const std::string& nozzle : topics.nozzles)
+    nozzle_topics_.push_back(prefix + nozzle + "nozzle/wrench");
   try
   {
     if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())

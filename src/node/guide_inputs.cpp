@@ -27,8 +27,7 @@ std::set<std::string> solidNames(const SceneConfig& scene)
 }   // namespace
 
 GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation,
-                         const SimClock& clock, const std::vector<std::string>& grasp_names,
-                         const std::vector<std::string>& thread_prefixes)
+                         const SimClock& clock, const SceneTopics& names)
   : options_(options),
     simulation_(&simulation),
     clock_(clock),
@@ -48,7 +47,7 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   {
     const GraspRef& ref = simulation.grasps()[g];
     Guided guided;
-    guided.name = grasp_names[g];
+    guided.name = names.grasps[g];
     guided.topic = "grasps/" + guided.name + "/pose";
     const auto* body = std::get_if<BodyMotion>(&ref.config->motion);
     if (body && !solids.count(body->body))
@@ -66,7 +65,7 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   }
   grasps_ = guided_.size();
   addSolids(simulation, buffer_options);
-  const bool threads = addThreads(nh, simulation, buffer_options, thread_prefixes);
+  const bool threads = addThreads(nh, simulation, buffer_options, names.nozzles);
   const bool bodies =
       std::any_of(guided_.begin(), guided_.end(), [](const Guided& guided) { return !guided.body.empty(); });
   if (topics)

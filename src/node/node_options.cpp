@@ -41,6 +41,10 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
       "marker_style", o.markers.style,
       {{"tube", MarkerStyle::tube}, {"line", MarkerStyle::line}, {"regions", MarkerStyle::regions}});
   params.read("interactive", o.interactive);
+  params.read<WrenchFrame>(
+      "wrench_frame", o.wrench_frame,
+      {{"auto", WrenchFrame::automatic}, {"grasp", WrenchFrame::grasp}, {"world", WrenchFrame::world}});
+  params.read("wrench_filter", o.wrench_filter, 0.0, 100.0, true);
   params.read("marker_frames", o.markers.frames);
   params.read<MarkerColor>("marker_color", o.markers.color,
                            {{"none", MarkerColor::none},

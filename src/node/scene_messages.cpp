@@ -1,23 +1,12 @@
 #include "slender_sim/node/scene_messages.h"
 
 #include <algorithm>
-#include <stdexcept>
-
-#include <ros/names.h>
 
 #include "slender_sim/node/converters.h"
 #include "slender_sim/scene/field_tables.h"
 
 namespace slender {
 namespace {
-
-void checkName(const std::string& name, const std::string& kind)
-{
-  std::string why;
-  if (name.empty() || name.find_first_of("/~") != std::string::npos || !ros::names::validate(name, why))
-    throw std::invalid_argument(
-        kind + " \"" + name + "\": the name cannot be part of a topic; use letters, digits and _, with a letter first");
-}
 
 void resize(slender_sim::BodyStates& states, std::size_t size)
 {
@@ -27,32 +16,6 @@ void resize(slender_sim::BodyStates& states, std::size_t size)
 }
 
 }   // namespace
-
-std::vector<std::string> graspTopicNames(const Simulation& simulation)
-{
-  for (const RodConfig& rod : simulation.config().rods)
-    checkName(rod.name, "rod");
-  for (const ClothConfig& cloth : simulation.config().cloths)
-    checkName(cloth.name, "cloth");
-  std::vector<std::string> names;
-  for (const GraspRef& grasp : simulation.grasps())
-  {
-    checkName(grasp.config->name, "grasp");
-    names.push_back(grasp.config->name);
-  }
-  return names;
-}
-
-std::vector<std::string> threadTopicPrefixes(const Simulation& simulation)
-{
-  std::vector<std::string> prefixes;
-  for (const ThreadConfig& thread : simulation.config().threads)
-  {
-    checkName(thread.name, "thread");
-    prefixes.push_back(simulation.config().threads.size() == 1 ? std::string() : "threads/" + thread.name + "/");
-  }
-  return prefixes;
-}
 
 slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id)
 {
@@ -67,19 +30,21 @@ slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time
 void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id,
                          std::uint32_t epoch)
 {
-  geometry_msgs::PoseArray& poses = edge_poses.renew();
-  poses.header.stamp = stamp;
-  poses.header.frame_id = frame_id;
-  poses.poses.clear();
-  fillRods(simulation, epoch, poses);
-  fillThreads(simulation, epoch, poses);
-  fillCloths(simulation, epoch, poses.header);
-  fillGrasps(simulation, poses.header);
-  fillSolids(simulation, poses.header);
+  header.stamp = stamp;
+  header.frame_id = frame_id;
+  epoch_ = epoch;
+  fillRods(simulation);
+  fillThreads(simulation);
+  fillCloths(simulation);
+  fillGrasps(simulation);
+  fillSolids(simulation);
 }
 
-void SceneMessages::fillRods(const Simulation& simulation, std::uint32_t epoch, geometry_msgs::PoseArray& poses)
+void SceneMessages::fillRods(const Simulation& simulation)
 {
+  geometry_msgs::PoseArray& poses = rod_poses.renew();
+  poses.header = header;
+  poses.poses.clear();
   const SceneState& scene = simulation.state();
   states.resize(scene.rods.size());
   for (std::size_t r = 0; r < scene.rods.size(); ++r)
@@ -89,15 +54,18 @@ void SceneMessages::fillRods(const Simulation& simulation, std::uint32_t epoch, 
     toMessage(model, scene.rods[r], message);
     if (const RodConfig& rod = simulation.config().rods[r]; rod.tracking)
       toTracking(rod, scene.rod_guides[r], scene.rods[r], message);
-    message.header = poses.header;
-    message.epoch = epoch;
+    message.header = header;
+    message.epoch = epoch_;
     message.step = scene.steps;
     appendPoses(model, scene.rods[r], poses.poses);
   }
 }
 
-void SceneMessages::fillThreads(const Simulation& simulation, std::uint32_t epoch, geometry_msgs::PoseArray& poses)
+void SceneMessages::fillThreads(const Simulation& simulation)
 {
+  geometry_msgs::PoseArray& poses = thread_poses.renew();
+  poses.header = header;
+  poses.poses.clear();
   const SceneState& scene = simulation.state();
   std::size_t piece = 0;
   nozzles.resize(scene.threads.size());
@@ -108,26 +76,26 @@ void SceneMessages::fillThreads(const Simulation& simulation, std::uint32_t epoc
       threads.resize(std::max(threads.size(), piece + 1));
       slender_sim::ThreadState& message = threads[piece++].renew();
       toMessage(thread, message);
-      message.header = poses.header;
-      message.epoch = epoch;
+      message.header = header;
+      message.epoch = epoch_;
       message.step = scene.steps;
       message.name = simulation.threadModel(static_cast<int>(k)).name;
       appendPoses(thread, poses.poses);
     }
     const EndLoad& load = simulation.state().end_loads[static_cast<int>(k)][1];
-    nozzles[k].header = poses.header;
+    nozzles[k].header = header;
     nozzles[k].wrench.force = toVector3(load.force);
     nozzles[k].wrench.torque = toVector3(load.torque);
   }
   threads.resize(piece);
 }
 
-void SceneMessages::fillCloths(const Simulation& simulation, std::uint32_t epoch, const std_msgs::Header& header)
+void SceneMessages::fillCloths(const Simulation& simulation)
 {
   const SceneState& scene = simulation.state();
   slender_sim::ClothState& cloths = cloth_state.renew();
   cloths.header = header;
-  cloths.epoch = epoch;
+  cloths.epoch = epoch_;
   cloths.step = scene.steps;
   cloths.names.clear();
   cloths.offsets.clear();
@@ -157,7 +125,7 @@ void SceneMessages::fillCloths(const Simulation& simulation, std::uint32_t epoch
   }
 }
 
-void SceneMessages::fillGrasps(const Simulation& simulation, const std_msgs::Header& header)
+void SceneMessages::fillGrasps(const Simulation& simulation)
 {
   wrenches.resize(simulation.grasps().size());
   for (std::size_t g = 0; g < wrenches.size(); ++g)
@@ -182,7 +150,7 @@ void SceneMessages::fillGrasps(const Simulation& simulation, const std_msgs::Hea
   }
 }
 
-void SceneMessages::fillSolids(const Simulation& simulation, const std_msgs::Header& header)
+void SceneMessages::fillSolids(const Simulation& simulation)
 {
   const SceneState& scene = simulation.state();
   const std::vector<BodyConfig>& configs = simulation.config().bodies;
@@ -206,8 +174,8 @@ void SceneMessages::fillSolids(const Simulation& simulation, const std_msgs::Hea
 
 void SceneMessages::fillFields(const Simulation& simulation)
 {
-  fields.header = edge_poses->header;
-  fields.epoch = cloth_state->epoch;
+  fields.header = header;
+  fields.epoch = epoch_;
   fields.step = simulation.state().steps;
   fields.tables.clear();
   for (const FieldTable& table : fieldTablesOf(simulation))

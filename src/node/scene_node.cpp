@@ -34,54 +34,32 @@ bool isText(const std::string& scene)
          (scene.find(": ") != std::string::npos && !std::filesystem::exists(scene, error));
 }
 
+/// Throws SceneError when the scene has no object of the node's kind.
+void requireObjects(const SceneConfig& scene, NodeKind kind)
+{
+  const auto require = [&](bool has, const char* objects) {
+    if (!has)
+      throw SceneError("scene " + scene.name + ": it has no " + objects + ", which " + toString(kind) +
+                       " is for; scene_node runs every scene");
+  };
+  switch (kind)
+  {
+    case NodeKind::scene: return;
+    case NodeKind::rods: return require(!scene.rods.empty() || !scene.bodies.empty(), "rods or bodies");
+    case NodeKind::threads: return require(!scene.threads.empty(), "threads");
+    case NodeKind::cloths: return require(!scene.cloths.empty(), "cloths");
+    case NodeKind::tracking:
+      return require(tracksGuide(scene.cloths) || tracksGuide(scene.rods), "cloths or rods that track a guide");
+  }
+}
+
 SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
 {
   setGuideBagReader(readGuideBag);
   SceneConfig scene = isText(options.scene) ? parseScene(options.scene, "~scene", options.overrides)
                                             : readScene(options.scene, options.overrides);
-  // one kind of state on the topic `state`
-  const std::string who = "scene " + scene.name + ": ";
-  const auto refuse = [&](const std::string& has, const std::string& other) {
-    throw SceneError(who + "it has " + has + ", which " + other +
-                     " simulates, and a node publishes one kind of state: put " +
-                     "them in two scenes, or run the scene by `simulate`");
-  };
-  const auto tracks = [](const auto& objects) {
-    return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; });
-  };
-  const bool tracked = tracks(scene.cloths), tracked_rods = tracks(scene.rods), follows = kind == NodeKind::tracking;
-  if (follows && tracked && !scene.rods.empty())
-    throw SceneError(who +
-                     "it has tracked cloths and rods, whose states are messages of two types; put them in two scenes");
-  if (follows && tracked_rods && !scene.cloths.empty())
-    throw SceneError(
-        who +
-        "it has rods that track a guide and cloths, whose states are messages of two types; put them in two scenes");
-  if (kind == NodeKind::rods && tracked_rods)
-    throw SceneError(who + "it has rods that track a guide; tracking_node simulates them, and rods beside them");
-  if (kind != NodeKind::rods && !tracked_rods && !scene.rods.empty())
-    refuse("rods", toString(NodeKind::rods));
-  if (!follows && kind != NodeKind::rods && tracked_rods)
-    refuse("rods that track a guide", toString(NodeKind::tracking));
-  if (kind != NodeKind::threads && !scene.threads.empty())
-    refuse("threads", toString(NodeKind::threads));
-  if ((kind == NodeKind::rods || kind == NodeKind::threads) && !scene.cloths.empty())
-    refuse(tracked ? "tracked cloths" : "cloths", toString(tracked ? NodeKind::tracking : NodeKind::cloths));
-  if (kind == NodeKind::cloths && tracked)
-    throw SceneError(who + "it has tracked cloths; tracking_node simulates them, and cloths beside them");
-  if (follows && !tracked && !tracked_rods)
-    throw SceneError(
-        who +
-        "it has no tracked cloths and no rods that track a guide; cloth_node and rod_node simulate what follows none");
-  if (kind == NodeKind::threads && scene.threads.empty())
-    throw SceneError(who + "it has no threads; rod_node simulates rods");
-  if (kind == NodeKind::threads && !scene.bodies.empty())
-    throw SceneError(who +
-                     "it has bodies beside its threads, which this node does not publish: put them in two scenes, or "
-                     "run the scene by `simulate`");
-  if (kind == NodeKind::cloths && scene.cloths.empty())
-    throw SceneError(who + "it has no cloths; rod_node simulates rods and bodies");
-  if (options.markers.style == MarkerStyle::regions && !tracked)
+  requireObjects(scene, kind);
+  if (options.markers.style == MarkerStyle::regions && !tracksGuide(scene.cloths))
     throw OptionError("~marker_style: regions are those of tracked cloths, of which scene " + scene.name +
                       " has none; choose tube or line");
   return scene;
@@ -91,7 +69,8 @@ SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
 
 const char* toString(NodeKind kind)
 {
-  return kind == NodeKind::rods      ? "rod_node"
+  return kind == NodeKind::scene     ? "scene_node"
+         : kind == NodeKind::rods    ? "rod_node"
          : kind == NodeKind::threads ? "thread_node"
          : kind == NodeKind::cloths  ? "cloth_node"
                                      : "tracking_node";
@@ -116,8 +95,7 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   if (replay_ && options_.scene != replay_->scene() && simulation_->config().source != replay_->scene())
     throw OptionError("~replay: " + options_.replay +
                       ": was recorded with another scene (or other values of ~set) than ~scene; leave ~scene away");
-  grasp_names_ = graspTopicNames(*simulation_);
-  thread_prefixes_ = threadTopicPrefixes(*simulation_);
+  topics_ = std::make_unique<SceneTopics>(*simulation_);
   if (!options_.record_bag.empty())
     bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), *simulation_);
   if (options_.paused)
@@ -138,7 +116,7 @@ void SceneNode::start()
   if (!stamp)
     return;
   clock_ = SimClock(*stamp, simulation_->config().time.step);
-  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, grasp_names_, thread_prefixes_);
+  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, *topics_);
   if (replay_)
     inputs_->stopListening();
   inputs_->onTaken([this](slender_sim::Input input) { note(std::move(input), clock_.ticks()); });
@@ -160,7 +138,7 @@ void SceneNode::start()
   scene_pub_.publish(scene);
   if (bag_)
     bag_->recordScene(scene.data, clock_.stamp());
-  if (hasCloths())
+  if (topics_->has_cloths)
     publishMesh();
   total_ = recent_ = RunStatistics();
   publishState();
@@ -176,26 +154,35 @@ void SceneNode::publishMesh()
 
 void SceneNode::advertise()
 {
-  if (hasCloths())
+  const SceneTopics& names = *topics_;
+  if (names.has_rods)
   {
-    state_pub_ = nh_.advertise<slender_sim::ClothState>("state", 1000);
-    points_pub_ = nh_.advertise<sensor_msgs::PointCloud2>("points", 100);
-    mesh_pub_ = nh_.advertise<slender_sim::MeshStamped>("mesh", 1, true);
+    rod_state_pub_ = nh_.advertise<slender_sim::RodState>(names.rods + "state", 1000);
+    rod_poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>(names.rods + "poses", 100);
   }
-  else if (kind_ == NodeKind::threads)
-    state_pub_ = nh_.advertise<slender_sim::ThreadState>("state", 1000);
-  else
-    state_pub_ = nh_.advertise<slender_sim::RodState>("state", 1000);
-  for (const std::string& prefix : thread_prefixes_)
+  if (names.has_threads)
+  {
+    thread_state_pub_ = nh_.advertise<slender_sim::ThreadState>(names.threads + "state", 1000);
+    thread_poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>(names.threads + "poses", 100);
+  }
+  if (names.has_cloths)
+  {
+    cloth_state_pub_ = nh_.advertise<slender_sim::ClothState>(names.cloths + "state", 1000);
+    points_pub_ = nh_.advertise<sensor_msgs::PointCloud2>(names.cloths + "points", 100);
+    mesh_pub_ = nh_.advertise<slender_sim::MeshStamped>(names.cloths + "mesh", 1, true);
+  }
+  for (const std::string& prefix : names.nozzles)
     nozzle_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>(prefix + "nozzle/wrench", 100));
-  if (!hasCloths())
-    poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>("poses", 100);
   if (simulation_->config().rods.size() > 1)
     for (const RodConfig& rod : simulation_->config().rods)
       rod_poses_pubs_.push_back(nh_.advertise<geometry_msgs::PoseArray>("rods/" + rod.name + "/poses", 100));
   rod_poses_.resize(rod_poses_pubs_.size());
-  for (const std::string& name : grasp_names_)
-    wrench_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>("grasps/" + name + "/wrench", 100));
+  const std::string node = nh_priv_.getNamespace().substr(1);
+  frames_ = std::make_unique<FrameBroadcaster>(nh_, node, options_.frame_id, names, graspsHaveFrames());
+  wrenches_ = std::make_unique<GraspWrenches>(
+      nh_, names.grasps, frames_->graspFrames(),
+      GraspWrenches::Options{options_.wrench_frame == WrenchFrame::world || !graspsHaveFrames(),
+                             options_.wrench_filter});
   const std::vector<BodyConfig>& bodies = simulation_->config().bodies;
   if (!bodies.empty())
     bodies_pub_ = nh_.advertise<slender_sim::BodyStates>("body_states", 1000);
@@ -205,8 +192,6 @@ void SceneNode::advertise()
     obstacles_pub_ = nh_.advertise<slender_sim::BodyStates>("obstacle_states", 1000);
   if (!simulation_->config().record.fields.empty())
     fields_pub_ = nh_.advertise<slender_sim::Fields>("fields", 1000);
-  if (std::any_of(bodies.begin(), bodies.end(), [](const BodyConfig& body) { return body.broadcast_tf; }))
-    tf_broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   broadcastFrame();
   markers_pub_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
   scene_pub_ = nh_.advertise<std_msgs::String>("scene", 1, true);
@@ -276,16 +261,11 @@ void SceneNode::publishState()
     message.clock = clock_.stamp();
     clock_pub_.publish(message);
   }
-  broadcastBodies();
-  const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
-  if (!bag_ && !heard(state_pub_) && !heard(points_pub_) && !heard(poses_pub_) && !heard(bodies_pub_) &&
-      !heard(grasps_pub_) && !heard(obstacles_pub_) && !heard(fields_pub_) &&
-      std::none_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) &&
-      std::none_of(wrench_pubs_.begin(), wrench_pubs_.end(), heard) &&
-      std::none_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard))
+  frames_->broadcast(*simulation_, clock_.stamp());
+  if (!bag_ && !isHeard())
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
-  if (fields_pub_ && (bag_ || heard(fields_pub_)))
+  if (fields_pub_ && (bag_ || fields_pub_.getNumSubscribers() > 0))
     messages_.fillFields(*simulation_);
   if (bag_)   // first: what is published belongs to others
     try
@@ -296,42 +276,60 @@ void SceneNode::publishState()
     {
       recordingFailed(e.what());
     }
-  if (heard(points_pub_))
-  {
-    sensor_msgs::PointCloud2& points = points_.renew();
-    points.header = messages_.cloth_state->header;
-    toPoints(*messages_.cloth_state, points);
-    points_pub_.publish(points_.pointer());
-  }
-  for (std::size_t r = 0; r < rod_poses_pubs_.size(); ++r)
-    if (heard(rod_poses_pubs_[r]))
-    {
-      geometry_msgs::PoseArray& poses = rod_poses_[r].renew();
-      poses.header = messages_.edge_poses->header;
-      poses.poses.clear();
-      appendPoses(simulation_->rodModel(static_cast<int>(r)), simulation_->state().rods[r], poses.poses);
-      rod_poses_pubs_[r].publish(rod_poses_[r].pointer());
-    }
-  for (const auto& state : messages_.states)
-    state_pub_.publish(state.pointer());
-  for (const auto& state : messages_.threads)
-    state_pub_.publish(state.pointer());
-  if (hasCloths())
-    state_pub_.publish(messages_.cloth_state.pointer());
-  else
-    poses_pub_.publish(messages_.edge_poses.pointer());
+  publishObjects();
   for (std::size_t k = 0; k < nozzle_pubs_.size(); ++k)
     nozzle_pubs_[k].publish(messages_.nozzles[k]);
-  for (std::size_t g = 0; g < wrench_pubs_.size(); ++g)
-    wrench_pubs_[g].publish(messages_.wrenches[g]);
+  wrenches_->publish(messages_);
   if (!messages_.bodies.name.empty())
     bodies_pub_.publish(messages_.bodies);
   if (!messages_.grasps.name.empty())
     grasps_pub_.publish(messages_.grasps);
   if (!messages_.obstacles.name.empty())
     obstacles_pub_.publish(messages_.obstacles);
-  if (heard(fields_pub_))
+  if (fields_pub_.getNumSubscribers() > 0)
     fields_pub_.publish(messages_.fields);
+}
+
+/// True when somebody listens to what publishState() publishes.
+bool SceneNode::isHeard() const
+{
+  const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
+  return heard(rod_state_pub_) || heard(rod_poses_pub_) || heard(thread_state_pub_) || heard(thread_poses_pub_) ||
+         heard(cloth_state_pub_) || heard(points_pub_) || heard(bodies_pub_) || heard(grasps_pub_) ||
+         heard(obstacles_pub_) || heard(fields_pub_) ||
+         std::any_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) || wrenches_->isHeard() ||
+         std::any_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard);
+}
+
+/// Publishes rods, threads and cloths. The messages belong to their listeners afterwards.
+void SceneNode::publishObjects()
+{
+  if (points_pub_.getNumSubscribers() > 0)
+  {
+    sensor_msgs::PointCloud2& points = points_.renew();
+    points.header = messages_.header;
+    toPoints(*messages_.cloth_state, points);
+    points_pub_.publish(points_.pointer());
+  }
+  for (std::size_t r = 0; r < rod_poses_pubs_.size(); ++r)
+    if (rod_poses_pubs_[r].getNumSubscribers() > 0)
+    {
+      geometry_msgs::PoseArray& poses = rod_poses_[r].renew();
+      poses.header = messages_.header;
+      poses.poses.clear();
+      appendPoses(simulation_->rodModel(static_cast<int>(r)), simulation_->state().rods[r], poses.poses);
+      rod_poses_pubs_[r].publish(rod_poses_[r].pointer());
+    }
+  for (const auto& state : messages_.states)
+    rod_state_pub_.publish(state.pointer());
+  for (const auto& state : messages_.threads)
+    thread_state_pub_.publish(state.pointer());
+  if (topics_->has_cloths)
+    cloth_state_pub_.publish(messages_.cloth_state.pointer());
+  if (topics_->has_rods)
+    rod_poses_pub_.publish(messages_.rod_poses.pointer());
+  if (topics_->has_threads)
+    thread_poses_pub_.publish(messages_.thread_poses.pointer());
 }
 
 /// tf knows a frame only by a transform. Without any rviz warns that its fixed frame does not exist.
@@ -346,26 +344,10 @@ void SceneNode::broadcastFrame()
   frame_broadcaster_->sendTransform(transform);
 }
 
-void SceneNode::broadcastBodies()
+/// A thousand frames are too many for tf unless somebody asks for them.
+bool SceneNode::graspsHaveFrames() const
 {
-  if (!tf_broadcaster_)
-    return;
-  std::vector<geometry_msgs::TransformStamped> transforms;
-  const std::vector<BodyConfig>& bodies = simulation_->config().bodies;
-  for (std::size_t b = 0; b < bodies.size(); ++b)
-  {
-    if (!bodies[b].broadcast_tf)
-      continue;
-    const Pose& X_WB = simulation_->state().bodies[b].X_WB;
-    geometry_msgs::TransformStamped transform;
-    transform.header.stamp = clock_.stamp();
-    transform.header.frame_id = options_.frame_id;
-    transform.child_frame_id = bodies[b].name;
-    transform.transform.translation = toVector3(X_WB.position);
-    transform.transform.rotation = toQuaternion(X_WB.orientation);
-    transforms.push_back(transform);
-  }
-  tf_broadcaster_->sendTransform(transforms);
+  return options_.wrench_frame == WrenchFrame::grasp || topics_->grasps.size() <= kMostGraspFrames;
 }
 
 void SceneNode::showHandles()
@@ -480,7 +462,7 @@ void SceneNode::summary() const
   if (s.skipped > 0.0)
     std::cout << name << ": slower than real time, the clock skipped " << s.skipped << " s (~max_lag)\n";
   for (std::size_t g = 0; g < s.max_force.size(); ++g)
-    std::cout << name << ": grasp " << grasp_names_[g] << ": largest force " << s.max_force[g] << " N, torque "
+    std::cout << name << ": grasp " << topics_->grasps[g] << ": largest force " << s.max_force[g] << " N, torque "
               << s.max_torque[g] << " N m\n";
   if (inputs_ && inputs_->drops().total() > 0)
     std::cout << name << ": " << inputs_->drops().total() << " messages dropped\n";

@@ -71,6 +71,7 @@ void SceneNode::anchor()
 std::uint64_t SceneNode::jumped()
 {
   ++epoch_;
+  wrenches_->restart();
   clock_.tick();   // stamps grow even so
   showHandles();
   const std::uint64_t skipped = replay_ ? 0 : realign();

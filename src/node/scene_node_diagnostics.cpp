@@ -242,18 +242,18 @@ DiagnosticStatus SceneNode::simulationStatus() const
   add(status, "residual", recent_.residual);
   add(status, "largest strain", recent_.max_strain);
   addStart(*simulation_, status);
-  if (kind_ == NodeKind::threads)
+  if (topics_->has_threads)
     addThreads(*simulation_, recent_, status);
   if (recent_.projection_iterations > 0)
   {
     add(status, "projection iterations", static_cast<std::uint64_t>(recent_.projection_iterations));
     add(status, "constraint error", recent_.constraint_error);
   }
-  if (kind_ == NodeKind::tracking)
+  if (tracksGuide(simulation_->config().cloths) || tracksGuide(simulation_->config().rods))
     addTracking(*simulation_, recent_, status);
-  if (hasCloths())
+  if (topics_->has_cloths)
     addCloths(*simulation_, recent_, status);
-  if (kind_ != NodeKind::threads)   // viscous threads keep none
+  if (topics_->has_rods || topics_->has_cloths)   // viscous threads keep none
     add(status, "energy [J]", energyOf(*simulation_));
   add(status, "recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);
   return status;

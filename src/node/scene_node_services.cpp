@@ -15,9 +15,9 @@ void SceneNode::advertiseServices()
                nh_priv_.advertiseService("step", &SceneNode::onStep, this),
                nh_priv_.advertiseService("save_state", &SceneNode::onSave, this),
                nh_priv_.advertiseService("load_state", &SceneNode::onLoad, this)};
-  if (kind_ != NodeKind::threads)
+  if (topics_->has_rods || topics_->has_cloths)
     services_.push_back(nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this));
-  if (kind_ == NodeKind::tracking && hasCloths())
+  if (tracksGuide(simulation_->config().cloths))
     services_.push_back(nh_priv_.advertiseService("set_functions", &SceneNode::onSetFunctions, this));
 }
 
@@ -127,18 +127,18 @@ bool SceneNode::onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim:
 
 void SceneNode::setGrasp(const slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response)
 {
-  const auto found = std::find(grasp_names_.begin(), grasp_names_.end(), request.name);
+  const auto found = std::find(topics_->grasps.begin(), topics_->grasps.end(), request.name);
   response.success = false;
   response.first_node = response.last_node = -1;
-  if (found == grasp_names_.end())
+  if (found == topics_->grasps.end())
   {
     response.message = "no grasp \"" + request.name + "\"; the scene has" +
-                       (grasp_names_.empty() ? " none: give it grasps: {NAME: {...}}" : ":");
-    for (const std::string& name : grasp_names_)
+                       (topics_->grasps.empty() ? " none: give it grasps: {NAME: {...}}" : ":");
+    for (const std::string& name : topics_->grasps)
       response.message += " " + name;
     return;
   }
-  const int g = static_cast<int>(found - grasp_names_.begin());
+  const int g = static_cast<int>(found - topics_->grasps.begin());
   const bool active = simulation_->grasps().isActive(g);
   if (request.action == slender_sim::SetGrasp::Request::RELEASE)
   {
@@ -153,7 +153,7 @@ void SceneNode::setGrasp(const slender_sim::SetGrasp::Request& request, slender_
     return;
   }
   if (active)
-    response.message = request.name + " holds the " + (hasCloths() ? "cloth" : "rod") + " already; release it first";
+    response.message = request.name + " holds " + simulation_->grasps().heldObject(g) + " already; release it first";
   else
     response.message = attach(request, g, response);
   response.success = response.message.empty();

@@ -1,4 +1,4 @@
-// The four simulating nodes as nodelets: the same SceneNode, in a thread of its own.
+// The simulating nodes as nodelets: the same SceneNode, in a thread of its own.
 #include <exception>
 #include <memory>
 #include <mutex>
@@ -72,6 +72,10 @@ private:
   std::thread thread_;
 };
 
+struct AnySceneNodelet : SceneNodelet
+{
+  AnySceneNodelet() : SceneNodelet(NodeKind::scene) {}
+};
 struct RodNodelet : SceneNodelet
 {
   RodNodelet() : SceneNodelet(NodeKind::rods) {}
@@ -91,6 +95,7 @@ struct TrackingNodelet : SceneNodelet
 
 }   // namespace slender
 
+PLUGINLIB_EXPORT_CLASS(slender::AnySceneNodelet, nodelet::Nodelet)
 PLUGINLIB_EXPORT_CLASS(slender::RodNodelet, nodelet::Nodelet)
 PLUGINLIB_EXPORT_CLASS(slender::ThreadNodelet, nodelet::Nodelet)
 PLUGINLIB_EXPORT_CLASS(slender::ClothNodelet, nodelet::Nodelet)

@@ -139,8 +139,11 @@ class Repository:
 
     @cached_property
     def launch_arguments(self):
-        return {f.name: set(re.findall(r'<arg name="(\w+)"(?![^>]*\bvalue=)', read(f)))
-                for f in self.root.glob('launch/*.launch')}
+        """Arguments per launch file. An include with pass_all_args takes those of the included file as well."""
+        texts = {f.name: read(f) for f in self.root.glob('launch/*.launch')}
+        found = {name: set(re.findall(r'<arg name="(\w+)"(?![^>]*\bvalue=)', text)) for name, text in texts.items()}
+        return {name: found[name].union(*(found.get(other, set()) for other in re.findall(
+            r'<include file="[^"]*/(\w+\.launch)" pass_all_args="true"', text))) for name, text in texts.items()}
 
     @cached_property
     def node_names(self):

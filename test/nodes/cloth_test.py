@@ -205,8 +205,8 @@ class Cloth(NodeCase):
             self.refused(scene, "scene.yaml:3: cloths.0.mesh.file = " + name, name + ": ", word)
 
     def test_refuses_other_scenes(self):
-        self.refused("name: rope\nrods: [{}]\n", "which rod_node simulates")
-        self.refused("name: none\nbodies: [{mass: 1, inertia: [1, 1, 1]}]\n", "it has no cloths; rod_node simulates rods and bodies")
+        self.refused("name: rope\nrods: [{}]\n", "which cloth_node is for; scene_node runs every scene")
+        self.refused("name: none\nbodies: [{mass: 1, inertia: [1, 1, 1]}]\n", "it has no cloths, which cloth_node is for")
 
 
 if __name__ == "__main__":

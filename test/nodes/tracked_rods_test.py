@@ -26,7 +26,6 @@ rods:
     track: {guide: {nodes: 5, motion: %s}}
 """
 FREE = "  - {name: free, centerline: {straight: {from: [0, 1, 1], to: [1, 1, 1], edges: 10}}}\n"
-CLOTH = "cloths: [{name: sheet, grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}}]\n"
 REST = [(0.25 * k, 0.0, 1.0) for k in range(5)]
 
 
@@ -149,14 +148,6 @@ class TrackedRods(NodeCase):
         values = self.diagnostics("simulation")
         self.assertLess(float(values["worst constraint residual over size"]), 1e-10)
         self.assertGreater(float(values["largest guide force [N]"]), 0.0)
-
-    def test_each_node_says_who_simulates_what(self):
-        tracked = SCENE % "fixed"
-        for program, scene, expected in (("rod_node", tracked, "tracking_node"), ("thread_node", tracked, "tracking_node"), ("tracking_node", tracked + CLOTH, "two scenes"),
-                                         ("tracking_node", "rods:" + "\n" + FREE, "rod_node")):
-            process = self.start(scene, wait=False, program=program)
-            self.assertEqual(process.wait(20), 2, program)
-            self.assertIn(expected, self.output("rod.err"), program)
 
 
 if __name__ == "__main__":

@@ -123,7 +123,7 @@ TEST(ReaderSolids, readsBodies)
   const BodyConfig& brick = scene.bodies[1];
   EXPECT_DOUBLE_EQ(brick.mass, 6);
   EXPECT_LT((brick.inertia.diagonal() - Eigen::Vector3d(0.065, 0.05, 0.025)).norm(), 1e-12);
-  EXPECT_TRUE(brick.gravity && brick.contact && !brick.broadcast_tf);
+  EXPECT_TRUE(brick.gravity && brick.contact && brick.broadcast_tf);
   EXPECT_EQ(scene.bodies[2].inertia, Eigen::Matrix3d(Eigen::Vector3d(1, 2, 2.5).asDiagonal()));
   EXPECT_FALSE(scene.bodies[2].shape);
   ASSERT_TRUE(scene.bodies[3].motion);

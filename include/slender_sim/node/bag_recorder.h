@@ -20,9 +20,8 @@ class BagRecorder
 {
 public:
   /// Opens PATH.active, which close() renames to PATH, in place of an older bag; where PATH is a symbolic link, beside
-  /// the file that it leads to. `topic_namespace` precedes the topics, e.g. "/". In scenes with objects of several
-  /// kinds, each kind has its own namespace for `state` and `mesh`: `rods/state`, `threads/state`, `cloths/state`,
-  /// `cloths/mesh`. Throws std::runtime_error when the file cannot be written, and when PATH is no regular file.
+  /// the file that it leads to. `topic_namespace` precedes the topics, e.g. "/"; SceneTopics has
+  /// their names. Throws std::runtime_error when the file cannot be written, and when PATH is no regular file.
   BagRecorder(const std::string& path, const std::string& topic_namespace, const Simulation& simulation);
   ~BagRecorder();
 

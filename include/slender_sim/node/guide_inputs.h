@@ -23,6 +23,7 @@
 #include "slender_sim/node/input_replay.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/pending_messages.h"
+#include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/node/tracking_inputs.h"
 #include "slender_sim/scene/simulation.h"
@@ -39,7 +40,7 @@ class GuideInputs
 public:
   /// `nh` carries the callback queue of the simulating thread: callbacks never run beside a step.
   GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
-              const std::vector<std::string>& grasp_names, const std::vector<std::string>& thread_prefixes);
+              const SceneTopics& topics);
 
   /// Takes in messages whose transforms have arrived meanwhile; drops those that waited too long.
   void processPending();

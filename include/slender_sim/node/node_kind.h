@@ -2,14 +2,16 @@
 
 namespace slender {
 
-/// What a node simulates, and its name in what it prints.
+/// The nodes that simulate scenes. `scene` runs every scene, the others every scene that has an object of their kind.
 enum class NodeKind
 {
+  scene,
   rods,
   threads,
   cloths,
   tracking
 };
+/// Name of the program.
 const char* toString(NodeKind kind);
 
 }   // namespace slender

@@ -18,14 +18,6 @@
 
 namespace slender {
 
-/// Names of the grasps in scene order, as they stand in topics (the reader has made sure that they differ). Throws
-/// std::invalid_argument for a rod, a cloth or a grasp whose name cannot be part of a topic.
-std::vector<std::string> graspTopicNames(const Simulation& simulation);
-
-/// Before the topics of a thread: nothing in a scene of one thread, else "threads/NAME/". Throws like
-/// graspTopicNames().
-std::vector<std::string> threadTopicPrefixes(const Simulation& simulation);
-
 /// The undeformed cloths.
 slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id);
 
@@ -36,8 +28,9 @@ struct SceneMessages
   std::vector<SharedMessage<slender_sim::RodState>> states;       ///< per rod
   std::vector<SharedMessage<slender_sim::ThreadState>> threads;   ///< per thread and piece of it
   SharedMessage<slender_sim::ClothState> cloth_state;             ///< all of them in one message; none: not published
-  /// the edges' frames at their middles, all rods and threads one after the other
-  SharedMessage<geometry_msgs::PoseArray> edge_poses;
+  std_msgs::Header header;                                        ///< of all messages of this instant
+  /// Frames of the edges at their middles, object after object.
+  SharedMessage<geometry_msgs::PoseArray> rod_poses, thread_poses;
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
   /// per thread: what it does to its nozzle, about the outlet; zero without one
   std::vector<geometry_msgs::WrenchStamped> nozzles;
@@ -55,11 +48,13 @@ struct SceneMessages
   void fillFields(const Simulation& simulation);
 
 private:
-  void fillRods(const Simulation& simulation, std::uint32_t epoch, geometry_msgs::PoseArray& poses);
-  void fillThreads(const Simulation& simulation, std::uint32_t epoch, geometry_msgs::PoseArray& poses);
-  void fillCloths(const Simulation& simulation, std::uint32_t epoch, const std_msgs::Header& header);
-  void fillGrasps(const Simulation& simulation, const std_msgs::Header& header);
-  void fillSolids(const Simulation& simulation, const std_msgs::Header& header);
+  void fillRods(const Simulation& simulation);
+  void fillThreads(const Simulation& simulation);
+  void fillCloths(const Simulation& simulation);
+  void fillGrasps(const Simulation& simulation);
+  void fillSolids(const Simulation& simulation);
+
+  std::uint32_t epoch_ = 0;
 };
 
 }   // namespace slender

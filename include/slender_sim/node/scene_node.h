@@ -13,13 +13,14 @@
 #include <std_srvs/SetBool.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_ros/static_transform_broadcaster.h>
-#include <tf2_ros/transform_broadcaster.h>
 
 #include "slender_sim/FilePath.h"
 #include "slender_sim/SetFunctions.h"
 #include "slender_sim/SetGrasp.h"
 #include "slender_sim/Step.h"
 #include "slender_sim/node/bag_recorder.h"
+#include "slender_sim/node/frame_broadcaster.h"
+#include "slender_sim/node/grasp_wrenches.h"
 #include "slender_sim/node/guide_inputs.h"
 #include "slender_sim/node/hand_markers.h"
 #include "slender_sim/node/input_replay.h"
@@ -27,12 +28,13 @@
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/run_statistics.h"
 #include "slender_sim/node/scene_messages.h"
+#include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
 
 namespace slender {
 
-/// Simulates a scene of rods and bodies, of viscous threads, of cloth, or of cloth or rods that track guides: poses of
-/// what moves them come in as messages, their motion goes out. docs/nodes.md lists topics, services and parameters.
+/// Simulates a scene of rods, viscous threads, cloths and bodies. Poses of what moves them come in as messages, and
+/// their motion goes out. docs/nodes.md lists topics, services and parameters.
 /// Everything runs in the thread of spin(), so a callback never sees a half-taken step.
 class SceneNode
 {
@@ -55,10 +57,10 @@ private:
     paused,
     failed
   };
-  static constexpr double kBurst = 0.02;   // [s] longest run of steps between two looks at the callbacks
+  static constexpr std::size_t kMostGraspFrames = 64;   // a head of hair has a thousand grasps
+  static constexpr double kBurst = 0.02;                // [s] longest run of steps between two looks at the callbacks
 
   // scene_node.cpp
-  bool hasCloths() const { return !simulation_->config().cloths.empty(); }   // and then no rods
   void start();
   void advertise();
   void publishMesh();
@@ -67,8 +69,10 @@ private:
   bool advance();   // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
   void publishState();
+  void publishObjects();
+  bool isHeard() const;
   void broadcastFrame();
-  void broadcastBodies();
+  bool graspsHaveFrames() const;
   void showHandles();
   void publishMarkers();
   void work();
@@ -129,7 +133,7 @@ private:
   const NodeKind kind_;
   NodeOptions options_;
   std::unique_ptr<Simulation> simulation_;
-  std::vector<std::string> grasp_names_, thread_prefixes_;
+  std::unique_ptr<SceneTopics> topics_;
   SimClock clock_;
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;
@@ -161,11 +165,13 @@ private:
   std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture
 
   ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_, fields_pub_;   // only when the scene has any, like the next
-  std::unique_ptr<tf2_ros::TransformBroadcaster> tf_broadcaster_;
+  std::unique_ptr<FrameBroadcaster> frames_;
+  std::unique_ptr<GraspWrenches> wrenches_;
   std::unique_ptr<tf2_ros::StaticTransformBroadcaster> frame_broadcaster_;   // tells rviz that ~frame_id is there
-  ros::Publisher points_pub_, mesh_pub_;                                     // cloth only; poses_pub_ is for the others
-  ros::Publisher state_pub_, poses_pub_, markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
-  std::vector<ros::Publisher> rod_poses_pubs_, wrench_pubs_, nozzle_pubs_;
+  ros::Publisher rod_state_pub_, rod_poses_pub_, thread_state_pub_, thread_poses_pub_;   // of kinds that the scene has
+  ros::Publisher cloth_state_pub_, points_pub_, mesh_pub_;                               // likewise
+  ros::Publisher markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
+  std::vector<ros::Publisher> rod_poses_pubs_, nozzle_pubs_;
   std::vector<ros::ServiceServer> services_;
 };
 

@@ -262,7 +262,7 @@ struct BodyConfig
   /// obstacles and other bodies.
   bool contact = true;
   std::optional<double> friction;   ///< [-]; nothing: that of the rod; against solids 0.3
-  bool broadcast_tf = false;
+  bool broadcast_tf = false;        ///< nodes publish the frame of the body on tf
   std::vector<WeldConfig> welds;
 };
 

@@ -208,8 +208,11 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
                           "Coefficient of friction. Between two objects the geometric mean of both coefficients "
                           "counts. Without the key: that of the other object, and 0.3 against obstacles and bodies.")
                       .number(Range::closed(0, 100));
-  assign(body.broadcast_tf,
-         map.get("broadcast_tf", "Whether nodes publish the body's frame on tf. Without the key: false.").boolean());
+  body.broadcast_tf = !body.motion;
+  assign(body.broadcast_tf, map.get("broadcast_tf",
+                                    "Whether nodes publish the body's frame on tf. Without the key: true for simulated "
+                                    "bodies, false for bodies with a given motion.")
+                                .boolean());
   map.get("welds",
           "Edges of rods that the body holds: they keep the place and the orientation that they have in the body at "
           "the start. Without the key: none.");   // read where the rods are known

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <ros/node_handle.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "slender_sim/node/scene_topics.h"
+#include "slender_sim/scene/simulation.h"
+
+namespace slender {
+
+/// Publishes tf frames: bodies as NAME, grasps as NODE/grasps/NAME, nozzles as NODE/nozzle or NODE/threads/NAME/nozzle.
+/// Nothing is computed while nobody listens to /tf.
+class FrameBroadcaster
+{
+public:
+  /// `node`: name of the node with its namespace, without a slash at the beginning. `grasps`: whether grasps have
+  /// frames.
+  FrameBroadcaster(ros::NodeHandle& nh, const std::string& node, std::string frame_id, const SceneTopics& topics,
+                   bool grasps);
+
+  const std::vector<std::string>& graspFrames() const { return grasps_; }
+  void broadcast(const Simulation& simulation, const ros::Time& stamp);
+
+private:
+  void add(const std::string& child, const Pose& X_WC, const ros::Time& stamp);
+
+  std::string frame_id_;
+  bool has_grasps_;
+  std::vector<std::string> grasps_, nozzles_;
+  ros::Publisher publisher_;
+  tf2_msgs::TFMessage message_;
+};
+
+}   // namespace slender

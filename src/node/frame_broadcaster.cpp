@@ -1,0 +1,47 @@
+#include "slender_sim/node/frame_broadcaster.h"
+
+#include "slender_sim/node/converters.h"
+
+namespace slender {
+
+FrameBroadcaster::FrameBroadcaster(ros::NodeHandle& nh, const std::string& node, std::string frame_id,
+                                   const SceneTopics& topics, bool grasps)
+  : frame_id_(std::move(frame_id)),
+    has_grasps_(grasps),
+    publisher_(nh.advertise<tf2_msgs::TFMessage>("/tf", 100))
+{
+  for (const std::string& name : topics.grasps)
+    grasps_.push_back(node + "/grasps/" + name);
+  for (const std::string& prefix : topics.nozzles)
+    nozzles_.push_back(node + "/" + prefix + "nozzle");
+}
+
+void FrameBroadcaster::add(const std::string& child, const Pose& X_WC, const ros::Time& stamp)
+{
+  geometry_msgs::TransformStamped& transform = message_.transforms.emplace_back();
+  transform.header.stamp = stamp;
+  transform.header.frame_id = frame_id_;
+  transform.child_frame_id = child;
+  transform.transform.translation = toVector3(X_WC.position);
+  transform.transform.rotation = toQuaternion(X_WC.orientation);
+}
+
+void FrameBroadcaster::broadcast(const Simulation& simulation, const ros::Time& stamp)
+{
+  if (publisher_.getNumSubscribers() == 0)
+    return;
+  message_.transforms.clear();
+  const SceneConfig& scene = simulation.config();
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    if (scene.bodies[b].broadcast_tf)
+      add(scene.bodies[b].name, simulation.state().bodies[b].X_WB, stamp);
+  for (std::size_t g = 0; has_grasps_ && g < grasps_.size(); ++g)
+    add(grasps_[g], simulation.grasps().pose(static_cast<int>(g)), stamp);
+  for (std::size_t k = 0; k < nozzles_.size(); ++k)
+    if (scene.threads[k].nozzle)
+      add(nozzles_[k], simulation.state().threads[k].threads.front().ends[1].X_WE, stamp);
+  if (!message_.transforms.empty())
+    publisher_.publish(message_);
+}
+
+}   // namespace slender
