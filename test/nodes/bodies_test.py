@@ -96,7 +96,7 @@ class Bodies(NodeCase):
         self.assertAlmostEqual(2 * math.atan2(ball.orientation.z, ball.orientation.w), 1.0, places=6)
         wait_until(lambda: tf.count() and tf.last().transforms[0].header.stamp == stamp, what="tf")
         frames = tf.last().transforms
-        self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in frames], [("world", "ball")])
+        self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in frames], [("world", "ball"), ("world", "t/rod/grasps/left")])
         self.assertEqual(frames[0].transform.translation.z, ball.position.z)
         # back at the start
         self.assertTrue(self.call("reset", Trigger).success)

@@ -97,7 +97,7 @@ class Scene(NodeCase):
         self.assertEqual(listeners["cloths/points"].last().width, len(self.cloths.last().vertices))
         self.assertEqual(self.rods.last().name, "rope")
         drawn = {marker.ns for marker in listeners["markers"].last().markers}
-        for name in ("rods/rope", "threads/honey", "cloths/napkin", "bodies/ball"):
+        for name in ("rods/rope", "threads/honey", "cloths/napkin", "bodies"):
             self.assertIn(name, drawn)
         values = self.diagnostics("simulation")
         for key in ("energy [J]", "largest guide force [N]", "vertices"):
@@ -140,7 +140,7 @@ class Scene(NodeCase):
             topics = set(bag.get_type_and_topic_info().topics)
         self.assertTrue({"/t/rods/state", "/t/threads/state", "/t/cloths/state", "/t/cloths/mesh", "/t/body_states"} <= topics, topics)
 
-        node = self.begin(pace="wall", guide_delay=0.05, record_bag=self.path("run.bag"))
+        node = self.begin(pace="wall", guide_delay=0.05, stop_after=0.0, record_bag=self.path("run.bag"))
         gripper = self.publisher("/t/grasps/left/pose", PoseStamped)
         rate = rospy.Rate(50)
         for k in range(40):
@@ -148,7 +148,7 @@ class Scene(NodeCase):
             rate.sleep()
         node.terminate()
         self.assertEqual(node.wait(60), 0, self.output("rod.err"))
-        node = self.start("", program="scene_node", wait=False, pace="fast", replay=self.path("run.bag"), record_bag=self.path("again.bag"))
+        node = self.start("", program="scene_node", wait=False, pace="fast", stop_after=0.0, replay=self.path("run.bag"), record_bag=self.path("again.bag"))
         self.assertEqual(node.wait(200), 0, self.output("rod.err"))
         first, again = [[(topic, bytes(raw[1]), stamp) for topic, raw, stamp in rosbag.Bag(self.path(name)).read_messages(raw=True)
                          if not topic.endswith("/inputs")] for name in ("run.bag", "again.bag")]

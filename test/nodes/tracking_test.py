@@ -400,13 +400,6 @@ class Tracking(NodeCase):
         fine = x[9:]
         self.assertGreater(max(p[2] for p in fine) - min(p[2] for p in fine), 0.2)   # the rest of it hangs
 
-    def test_other_nodes_say_who_tracks(self):
-        with open(self.path("rest.obj"), "w") as file:
-            file.write(obj(REST))
-        process = self.start(SCENE % (self.path("rest.obj"), "fixed"), wait=False, program="cloth_node")
-        self.assertEqual(process.wait(60), 2)
-        self.assertIn("tracking_node", self.output("rod.err"))
-
 
 if __name__ == "__main__":
     run("tracking_test", Tracking)

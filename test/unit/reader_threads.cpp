@@ -72,6 +72,7 @@ TEST(ThreadReader, NamesWhatIsWrong)
       {"threads.0.centerline={straight: {edges: 3}}", "must have either a nozzle"},
       {"threads.0.radius=0.1", "is for threads with a centerline"},
       {"threads.0.floor.belt=[1, 2, 3]", "must be [vx, vy]"},
+      {"threads.0.floor.belt={x: {topic: true}, y: {table: [[0, 0], [1, 1]]}}", "sets both; write topic: true"},
       {"threads.0.edges.shortest=0.0019", "0.4 of edges.longest"},
       {"threads.0.region={from: [0, 0, 0], to: [1, 0, 1]}", "must be greater than region.from"},
       {"threads.0.breakup_radius=0.0025", "must be less than the nozzle's radius 0.0025 m"},

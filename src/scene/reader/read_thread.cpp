@@ -133,20 +133,17 @@ FloorConfig readFloor(const YamlCursor& at)
                                           "Whether messages on `belt/velocity` set both velocities; `x` and `y` hold "
                                           "until the first one. Without the key: false.");
     velocity.finish();
-    if (topic.present())
-      floor.belt_x.topic = floor.belt_y.topic = topic.boolean().value_or(true);
     if (x.present())
-    {
-      const bool on_topic = floor.belt_x.topic;
       floor.belt_x = readTimed(x, speed);
-      floor.belt_x.topic = floor.belt_x.topic || on_topic;
-    }
     if (y.present())
-    {
-      const bool on_topic = floor.belt_y.topic;
       floor.belt_y = readTimed(y, speed);
-      floor.belt_y.topic = floor.belt_y.topic || on_topic;
-    }
+    const bool of_both = topic.present() && topic.boolean().value_or(true);
+    if (!of_both && x.present() && y.present() && floor.belt_x.topic != floor.belt_y.topic)
+      belt.problem("one of x and y comes by messages and the other one does not, but each message on belt/velocity "
+                   "sets both; write topic: true beside x and y, whose numbers and tables then hold until the first "
+                   "message");
+    if (of_both)
+      floor.belt_x.topic = floor.belt_y.topic = true;
   }
   else if (belt.present())
   {
