@@ -28,6 +28,11 @@ foreach(program ${EXPORT_PROGRAMS})
   install(TARGETS slender_sim_${program} RUNTIME DESTINATION ${INSTALL_BIN})
 endforeach()
 
+add_executable(marker_player src/nodes/marker_player.cpp)
+target_include_directories(marker_player PRIVATE ${PROJECT_SOURCE_DIR}/src/node)
+target_link_libraries(marker_player PRIVATE slender_sim_exports)
+install(TARGETS marker_player RUNTIME DESTINATION ${INSTALL_BIN})
+
 if(YUV_LIBRARY)
   target_link_libraries(slender_sim_bag_to_video PRIVATE ${YUV_LIBRARY} Threads::Threads)
 endif()

@@ -6,9 +6,9 @@ add_dependencies(slender_sim_node ${PROJECT_NAME}_generate_messages_cpp)
 target_compile_options(slender_sim_node PRIVATE -O1)
 target_include_directories(slender_sim_node PUBLIC
   $<BUILD_INTERFACE:${CATKIN_DEVEL_PREFIX}/include> ${catkin_INCLUDE_DIRS})
-target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES})
+target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES} PRIVATE yaml-cpp)
 
-foreach(node scene_node rod_node thread_node cloth_node tracking_node fairing_node motion_player)
+foreach(node scene_node rod_node thread_node cloth_node tracking_node fairing_node motion_player rviz_on_scene)
   add_executable(${node} ${PROJECT_SOURCE_DIR}/src/nodes/${node}.cpp)
   target_link_libraries(${node} PRIVATE slender_sim_node)
 endforeach()
@@ -25,10 +25,11 @@ if(BUILD_TESTING)
     ${PROJECT_SOURCE_DIR}/test/nodes/guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/converters_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/bag_recorder_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/markers_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/point_guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/late_guides_test.cpp
+    ${PROJECT_SOURCE_DIR}/test/nodes/paused_messages_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/run_statistics_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/camera_fit_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/step_gaps_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/guide_gaps_test.cpp)
   target_compile_definitions(node_unit_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   find_package(GTest REQUIRED)
-  target_link_libraries(node_unit_tests PRIVATE slender_sim_node GTest::gtest GTest::gtest_main)
+  target_link_libraries(node_unit_tests PRIVATE slender_sim_node yaml-cpp GTest::gtest GTest::gtest_main)
   slender_gtest(node_unit_tests)
 
   # Loads the nodelets into itself: what is copied between them can be counted.

@@ -12,6 +12,9 @@ foreach(kind unit analytic scenes)
     target_precompile_headers(${kind}_tests PRIVATE
       <gtest/gtest.h> <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h>)
     target_compile_options(${kind}_tests PRIVATE $<$<CONFIG:Release>:-O1>)   # tests spend their time in the library
+    if(assimp_FOUND)
+      target_compile_definitions(${kind}_tests PRIVATE SLENDER_WITH_ASSIMP)
+    endif()
     # Not among the programs that rosrun offers.
     set_target_properties(${kind}_tests PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/test_programs)
     slender_gtest(${kind}_tests)

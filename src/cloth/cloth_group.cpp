@@ -76,6 +76,8 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   }
   for (const Obstacle& solid : model_.solids)
     surface_.solids.push_back({solid});
+  for (std::size_t k = 0; k < model_.ignored.size(); ++k)
+    surface_.solids.at(k).ignores = model_.ignored[k];
   collider_ = std::make_unique<SurfaceCollider>(surface_);
   for (Eigen::Matrix3Xd* m :
        {&x_start_, &x_, &v_, &v_before_, &push_, &answer_, &contact_forces_, &contact_sums_, &contact_now_})

@@ -33,8 +33,9 @@ public:
     return stages_->accepts(state, inputs, duration, report);
   }
 
-  /// What the cloth touches, in steps of this length [s]. Without a call nothing.
-  void setContact(const ContactProperties& contact, double step);
+  /// What the cloth touches, in steps of this length [s], and which solids its points pass through. Without a call
+  /// nothing.
+  void setContact(const ContactProperties& contact, double step, const std::vector<IgnoredSolid>& ignored = {});
   /// These vertices are driven corners of the surface from now on. begin() takes them from the state.
   void setPins(const std::vector<int>& pins);
   int points() const override { return stages_->model->vertices(); }
@@ -105,7 +106,8 @@ private:
 
   std::unique_ptr<ClothStages> stages_;   ///< whose x is the trial
   std::optional<ContactProperties> contact_;
-  double contact_step_ = 0.0;   ///< [s]
+  std::shared_ptr<const std::vector<IgnoredSolid>> ignored_;   ///< null: none
+  double contact_step_ = 0.0;                                  ///< [s]
   std::shared_ptr<const Eigen::Matrix3Xd> rest_;
   std::vector<int> surface_pins_;   ///< that the surface has as driven corners
   long surface_version_ = 0;

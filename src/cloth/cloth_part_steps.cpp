@@ -5,8 +5,9 @@
 
 namespace slender {
 
-void ClothPart::setContact(const ContactProperties& contact, double step)
+void ClothPart::setContact(const ContactProperties& contact, double step, const std::vector<IgnoredSolid>& ignored)
 {
+  ignored_ = ignored.empty() ? nullptr : std::make_shared<std::vector<IgnoredSolid>>(ignored);
   contact_ = contact;
   contact_step_ = step;
   rest_ = std::make_shared<Eigen::Matrix3Xd>(stages_->model->rest.vertices);
@@ -45,7 +46,7 @@ void ClothPart::addSurface(ContactSurface& surface) const
     surface.triangles.push_back(t);
   }
   constexpr int kNoOwner = -1;   // solids that belong to one object alone belong to threads
-  surface.objects.push_back({*contact_, 0.0, false, kNoOwner, rest_, first});
+  surface.objects.push_back({*contact_, 0.0, false, kNoOwner, rest_, first, ignored_});
 }
 
 /// A contact force that every scene meets: the weight of a vertex, or what stops it within the gap in a step.

@@ -86,7 +86,7 @@ void Candidates::findOnSolid(const ContactSurface& surface, int solid, const Sol
     const double slack = moved + shift_[solid] + turn_[solid] * (farthest + moved + shift_[solid]);
     const double range = gap + s.radius + slack;
     const Eigen::Vector3d middle = 0.5 * (a + b);
-    if (middle.norm() > reach + half + range || s.driven || !mayTouch(surface, s.object, properties))
+    if (middle.norm() > reach + half + range || !mayTouch(surface, s, properties))
       continue;
     const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
     if (pieces.tree.empty())

@@ -132,7 +132,7 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     const double reach = boundingRadius(solid.shape) + options.gap;
     for (const ContactSegment& s : surface.segments)
     {
-      if (s.driven || !mayTouch(surface, s.object, solid))
+      if (!mayTouch(surface, s, solid))
         continue;
       const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a)), e = to_solid * Eigen::Vector3d(x.col(s.b)) - a;
       if ((a + 0.5 * e).norm() > 0.5 * e.norm() + s.radius + reach)

@@ -212,7 +212,8 @@ void SheetCandidates::findOnSolid(const ContactSurface& surface, const std::vect
     // how far a point of the face may come nearer, seen from the solid
     const double moved = std::sqrt(moved2) + kCorner * slack.margin;
     const double range = slack.gap + face.radius + moved + shift + turn * (std::sqrt(farthest2) + moved + shift);
-    if (middle.norm() > reach + std::sqrt(half2) + range || !mayTouch(surface, face.object, properties))
+    if (middle.norm() > reach + std::sqrt(half2) + range || !mayTouch(surface, face.object, properties) ||
+        passesThrough(surface, face.object, face.corner.data(), face.corners, properties))
       continue;
     for (int k = 0; k < face.corners; ++k)
       z[k] = to_solid * z[k];

@@ -168,12 +168,15 @@ double ContactPotential::Impl::sheetClearance(const Eigen::Matrix3Xd& x, const s
         continue;
       // What is driven does not touch what is driven: the free corners, or the edge between them, remain.
       Eigen::Vector3d z[3];
-      int corners = 0;
+      int corners = 0, points[3];
       const Pose to_solid = poses[k].inverse();
       for (int i = 0; i < 3; ++i)
         if (solid.body || !t.isDriven(i))
+        {
+          points[corners] = t.corner[i];
           z[corners++] = to_solid * t.at(x, i);
-      if (corners == 0)
+        }
+      if (corners == 0 || passesThrough(surface, t.object, points, corners, solid))
         continue;
       // No place of the face is farther from its middle than this, and distances do not change faster.
       Eigen::Vector3d middle = Eigen::Vector3d::Zero();

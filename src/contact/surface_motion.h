@@ -31,4 +31,27 @@ inline bool mayTouch(const ContactSurface& surface, int object, const ContactSol
          std::find(solid.ignores.begin(), solid.ignores.end(), object) == solid.ignores.end();
 }
 
+/// Whether a piece of an object, which has these points, passes through a solid: the object ignores the solid there.
+inline bool passesThrough(const ContactSurface& surface, int object, const int* points, int count,
+                          const ContactSolid& solid)
+{
+  const ContactObject& o = surface.objects[object];
+  if (!o.ignored || solid.number < 0)
+    return false;
+  for (const IgnoredSolid& ignored : *o.ignored)
+    if (ignored.number == solid.number)
+      return ignored.points.empty() || std::any_of(points, points + count, [&](int point) {
+               return ignored.points[static_cast<std::size_t>(point - o.first_point)] != 0;
+             });
+  return false;
+}
+
+/// Whether a segment and a solid may touch.
+inline bool mayTouch(const ContactSurface& surface, const ContactSegment& segment, const ContactSolid& solid)
+{
+  const int points[2] = {segment.a, segment.b};
+  return !segment.driven && mayTouch(surface, segment.object, solid) &&
+         !passesThrough(surface, segment.object, points, 2, solid);
+}
+
 }   // namespace slender

@@ -53,6 +53,24 @@ bool pausesAt(const std::vector<double>& times, std::size_t k, bool growing, dou
          (before && !turnsSteadily(times, k - 1, growing, chord));
 }
 
+/// Whether sample k, the first or the last, is where a motion was cut: see PoseTrajectory::cutWithin(). Two samples
+/// are a step, and no motion.
+inline bool isCut(const std::vector<double>& times, std::size_t k, double within)
+{
+  if (times.size() < 3)
+    return false;
+  const std::size_t later = k == 0 ? 1 : times.size() - 1;
+  return times[later] - times[later - 1] < within;
+}
+
+/// Slope at such an end. Of the parabola through three samples, the chord is the mean of the slopes at both ends of an
+/// interval. The slope beside it is a bound, so that the motion does not overshoot after a jump or before a pause.
+inline Eigen::Vector3d cutSlope(const Eigen::Vector3d& chord, const Eigen::Vector3d& beside)
+{
+  const Eigen::Vector3d parabola = 2.0 * chord - beside;
+  return parabola.norm() < beside.norm() ? parabola : beside;
+}
+
 /// Weights of the end value and of both slopes at the share s of a segment of length h that starts at zero, and their
 /// rates.
 struct HermiteWeights

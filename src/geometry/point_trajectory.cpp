@@ -61,6 +61,8 @@ Eigen::Vector3d PointTrajectory::slope(std::size_t k, Eigen::Index i) const
     return (times_[1] - times_[0]) * burst_ratio < times_[2] - times_[1] ? next
                                                                          : Eigen::Vector3d(2.0 * chord(1, i) - next);
   }
+  if ((k == 0 || k + 1 >= times_.size()) && isCut(times_, k, cut_))
+    return cutSlope(chord(k == 0 ? 1 : k, i), slope(k == 0 ? 1 : k - 1, i));
   if (k == 0 || k + 1 >= times_.size())
     return Eigen::Vector3d::Zero();   // held beyond the ends
   const auto shift = [this, i](std::size_t j) { return Eigen::Vector3d(frames_[j].col(i) - frames_[j - 1].col(i)); };

@@ -76,7 +76,7 @@ Twist PoseTrajectory::slope(std::size_t k) const
             rotationVector(poses_[k - 1].orientation.conjugate() * poses_[k].orientation) / h};
   }
   if (k == 0 || k + 1 >= times_.size())
-    return {};   // held beyond the ends
+    return isCut(times_, k, cut_) ? endSlope(k) : Twist();   // else held beyond the ends
   const double h0 = times_[k] - times_[k - 1], h1 = times_[k + 1] - times_[k];
   const Eigen::Quaterniond back = poses_[k].orientation.conjugate();
   const auto shift = [this](std::size_t j) { return Eigen::Vector3d(poses_[j].position - poses_[j - 1].position); };
@@ -95,6 +95,17 @@ Twist PoseTrajectory::slope(std::size_t k) const
                                     rotationVector(back * poses_[k + 1].orientation));
   }
   return slope;
+}
+
+Twist PoseTrajectory::endSlope(std::size_t k) const
+{
+  const std::size_t first = k == 0 ? 0 : k - 1, second = first + 1, beside = k == 0 ? 1 : k - 1;
+  const double h = times_[second] - times_[first];
+  const Pose &a = poses_[first], &b = poses_[second];
+  const Twist next = slope(beside);
+  // angular: in the axes of the sample itself. The turn from one sample to the other has the same vector in both.
+  const Eigen::Vector3d turn = rotationVector(a.orientation.conjugate() * b.orientation) / h;
+  return {cutSlope((b.position - a.position) / h, next.linear), cutSlope(turn, next.angular)};
 }
 
 Pose PoseTrajectory::evaluate(double time, Twist* velocity) const

@@ -4,15 +4,15 @@ namespace slender {
 
 Eigen::Quaterniond rotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to)
 {
-  const Eigen::Vector3d a = from.normalized(), between = a + to.normalized();
-  const double length = between.norm();   // twice the cosine of half the angle
-  if (length < 1e-12)
-  {
-    const Eigen::Vector3d axis = anyNormal(a);
-    return {0.0, axis.x(), axis.y(), axis.z()};
-  }
-  const Eigen::Vector3d middle = between / length, sine = a.cross(middle);
-  return Eigen::Quaterniond(a.dot(middle), sine.x(), sine.y(), sine.z()).normalized();
+  const Eigen::Vector3d a = from.normalized(), b = to.normalized(), cross = a.cross(b);
+  const double sine = cross.norm(), cosine = a.dot(b);
+  if (cosine > -0.5)
+    return Eigen::Quaterniond(1.0 + cosine, cross.x(), cross.y(), cross.z()).normalized();
+  // 1 + cosine loses its digits near opposite directions. The axis must be normal to a to the last digit.
+  const Eigen::Vector3d axis = sine > 1e-15 ? (cross / sine - a * a.dot(cross / sine)).normalized() : anyNormal(a);
+  const double half = 0.5 * std::atan2(sine, cosine);
+  const Eigen::Vector3d v = std::sin(half) * axis;
+  return {std::cos(half), v.x(), v.y(), v.z()};
 }
 
 }   // namespace slender

@@ -25,7 +25,6 @@
 #include "topic_stream.h"
 
 namespace slender {
-
 namespace {
 
 template <class Vectors>
@@ -77,7 +76,6 @@ void require(bool fits, const std::string& what)
                    " has arrays that do not fit each other: the bag was not written by slender_sim, or is damaged");
 }
 
-/// The solvers never let a NaN out.
 void requireFinite(bool finite, const std::string& what)
 {
   if (!finite)
@@ -106,7 +104,7 @@ struct BagReader::Contents
   rosbag::Bag bag;
   std::optional<SceneConfig> scene;
   std::string scene_problem;
-  slender_sim::MeshStamped mesh;
+  std::vector<slender_sim::MeshStamped> meshes;   ///< one more after each edit of the scene
   std::vector<std::unique_ptr<Stream>> streams;
   std::size_t messages = 0, done = 0;
   double step_length = 0.0;   ///< [s]; 0: one instant only
@@ -133,6 +131,7 @@ struct BagReader::Contents
   }
   GraspSnapshot& grasp(const std::string& name);
   void turnWrenches();
+  const slender_sim::MeshStamped* meshOf(const slender_sim::ClothState& cloths) const;
   void add(const slender_sim::RodState& rod);
   void add(const slender_sim::ThreadState& thread);
   void add(const slender_sim::ClothState& cloths);
@@ -238,17 +237,17 @@ void BagReader::Contents::readScene(const std::string& folder)
       }
   if (!scene && scene_problem.empty())
     scene_problem = "the topic " + prefix + "scene is not in the bag";
-  rosbag::View meshes(bag, rosbag::TopicQuery(std::vector<std::string>{prefix + "mesh", prefix + "cloths/mesh"}));
-  for (const rosbag::MessageInstance& instance : meshes)
+  rosbag::View recorded(bag, rosbag::TopicQuery(std::vector<std::string>{prefix + "mesh", prefix + "cloths/mesh"}));
+  for (const rosbag::MessageInstance& instance : recorded)
     if (const auto message = instance.instantiate<slender_sim::MeshStamped>())
     {
-      mesh = *message;
+      const slender_sim::MeshStamped& mesh = *message;
       for (std::size_t k = 0; k < mesh.names.size(); ++k)
         require(mesh.vertex_offsets.size() == mesh.names.size() && mesh.triangle_offsets.size() == mesh.names.size() &&
                     mesh.vertex_offsets[k] <= mesh.vertices.size() &&
                     3 * std::size_t{mesh.triangle_offsets[k]} <= mesh.triangles.size(),
                 "mesh");
-      break;
+      meshes.push_back(mesh);
     }
 }
 
@@ -341,15 +340,14 @@ GraspSnapshot& BagReader::Contents::grasp(const std::string& name)
   return out->grasps.back();
 }
 
-/// Nodes publish wrenches in the frames of the grasps; snapshots have them in the axes of the scene.
 void BagReader::Contents::turnWrenches()
 {
   for (const std::string& name : own_axes)
   {
     GraspSnapshot& turned = grasp(name);
     if (!turned.held)
-      throw BagError("the wrench of grasp " + name + " is in the axes of the grasp, whose pose is not in the bag; " +
-                     "record the topic " + prefix + "grasp_states as well");
+      throw BagError("the wrench of grasp " + name +
+                     " is in the axes of the grasp: record the topic grasp_states, too");
     const Eigen::Quaterniond& q = turned.held->X_WG.orientation;
     turned.wrench = {q * turned.wrench.force, q * turned.wrench.torque};
   }
@@ -395,6 +393,16 @@ void BagReader::Contents::add(const slender_sim::ThreadState& thread)
                 "thread " + thread.name);
 }
 
+/// The last mesh of these cloths that was recorded until then; null: none.
+const slender_sim::MeshStamped* BagReader::Contents::meshOf(const slender_sim::ClothState& cloths) const
+{
+  const slender_sim::MeshStamped* found = nullptr;
+  for (const slender_sim::MeshStamped& mesh : meshes)
+    if (mesh.names == cloths.names && (!found || mesh.header.stamp <= cloths.header.stamp))
+      found = &mesh;
+  return found;
+}
+
 void BagReader::Contents::add(const slender_sim::ClothState& cloths)
 {
   const std::size_t count = cloths.names.size();
@@ -416,8 +424,9 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
     ClothSnapshot cloth{
         cloths.names[k], columns(cloths.vertices, first, last), columns(cloths.velocities, first, last), {}};
     requireFinite(cloth.x.allFinite() && cloth.v.allFinite(), "cloth " + cloth.name);
-    if (mesh.names == cloths.names)
+    if (const slender_sim::MeshStamped* found = meshOf(cloths))
     {
+      const slender_sim::MeshStamped& mesh = *found;
       const auto [from, to] = range(mesh.triangle_offsets, k, mesh.triangles.size() / 3);
       cloth.triangles.resize(3, static_cast<Eigen::Index>(to - from));
       for (std::size_t i = 3 * from; i < 3 * to; ++i)

@@ -9,6 +9,7 @@
 #include <rosbag/bag.h>
 #include <std_msgs/String.h>
 
+#include "slender_sim/node/bag_paths.h"
 #include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/scene/file_paths.h"
@@ -16,36 +17,46 @@
 namespace slender {
 
 BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const Simulation& simulation)
+  : prefix_(topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace)
 {
-  const std::string prefix =
-      topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace;
-  const SceneTopics topics(simulation);
-  rods_topic_ = prefix + topics.rods + "state";
-  threads_topic_ = prefix + topics.threads + "state";
-  cloths_topic_ = prefix + topics.cloths + "state";
-  mesh_topic_ = prefix + topics.cloths + "mesh";
-  scene_topic_ = prefix + "scene";
-  inputs_topic_ = prefix + "inputs";
-  bodies_topic_ = prefix + "body_states";
-  grasps_topic_ = prefix + "grasp_states";
-  obstacles_topic_ = prefix + "obstacle_states";
-  fields_topic_ = prefix + "fields";
-  for (const std::string& name : topics.grasps)
-    wrench_topics_.push_back(prefix + "grasps/" + name + "/wrench");
-  for (const std::string& nozzle : topics.nozzles)
-    nozzle_topics_.push_back(prefix + nozzle + "nozzle/wrench");
+  nameTopics(simulation);
+  for (const std::string& read : simulation.config().guide_bags)
+    requireOtherBag(path, read, "a guide of the scene");
   try
   {
     if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())
       makeFolder(folder);
     path_ = replaceablePath(path);
-    bag_ = std::make_unique<rosbag::Bag>(replaceablePath(path_ + ".active"), rosbag::bagmode::Write);
+    const std::string active = replaceablePath(path_ + ".active");
+    keepEarlierBags(active);
+    bag_ = std::make_unique<rosbag::Bag>(active, rosbag::bagmode::Write);
   }
   catch (const std::exception& e)   // rosbag's, and a path that must not be replaced
   {
     throw std::runtime_error("bag " + path + ": cannot be written: " + e.what());
   }
   open_ = true;
+}
+
+void BagRecorder::nameTopics(const Simulation& simulation)
+{
+  const SceneTopics topics(simulation);
+  rods_topic_ = prefix_ + topics.rods + "state";
+  threads_topic_ = prefix_ + topics.threads + "state";
+  cloths_topic_ = prefix_ + topics.cloths + "state";
+  mesh_topic_ = prefix_ + topics.cloths + "mesh";
+  scene_topic_ = prefix_ + "scene";
+  inputs_topic_ = prefix_ + "inputs";
+  bodies_topic_ = prefix_ + "body_states";
+  grasps_topic_ = prefix_ + "grasp_states";
+  obstacles_topic_ = prefix_ + "obstacle_states";
+  fields_topic_ = prefix_ + "fields";
+  wrench_topics_.clear();
+  nozzle_topics_.clear();
+  for (const std::string& name : topics.grasps)
+    wrench_topics_.push_back(prefix_ + "grasps/" + name + "/wrench");
+  for (const std::string& nozzle : topics.nozzles)
+    nozzle_topics_.push_back(prefix_ + nozzle + "nozzle/wrench");
 }
 
 BagRecorder::~BagRecorder()
@@ -58,6 +69,22 @@ BagRecorder::~BagRecorder()
   {
     // close() is there for those who want to know
   }
+}
+
+/// A bag must not be lost because a parameter of an earlier start names it again.
+void BagRecorder::keepEarlierBags(const std::string& active)
+{
+  const std::string previous = replaceablePath(previousBag(path_)), unfinished = replaceablePath(previous + ".active");
+  const auto keep = [this](const std::string& what, const std::string& as) {
+    notes_.push_back("bag " + what + " is kept as " + as +
+                     (std::filesystem::exists(as) ? ", in place of the one that is there" : ""));
+  };
+  if (std::filesystem::exists(path_))
+    keep(path_ + " exists already; when the new one is complete, the old one", previous);
+  if (!std::filesystem::exists(active))
+    return;
+  keep(active + " was left by a run that did not end properly; it", unfinished);
+  std::filesystem::rename(active, unfinished);
 }
 
 /// What a failure leaves behind.
@@ -126,6 +153,12 @@ void BagRecorder::close()
     (void)bag_.release();   // its destructor would try again, and end the program
     throw WriteError("bag " + path_ + ": " + e.what() + remains());
   }
+  const std::string previous = previousBag(path_);
+  if (std::filesystem::exists(path_) && std::rename(path_.c_str(), previous.c_str()) != 0)
+  {
+    throw WriteError("bag " + path_ + ": the old one cannot be renamed to " + previous + ": " + std::strerror(errno) +
+                     remains());
+  }
   if (std::rename((path_ + ".active").c_str(), path_.c_str()) != 0)
     throw WriteError("bag " + path_ + ": cannot be renamed from " + path_ + ".active: " + std::strerror(errno));
 }
@@ -144,6 +177,8 @@ public:
     if (!bag_)
     {
       bag_ = std::make_unique<BagRecorder>(path_, "/", simulation);
+      for (const std::string& note : bag_->notes())
+        std::fprintf(stderr, "simulate: warning: %s\n", note.c_str());
       bag_->recordScene(simulation.config().source, clock.stamp());
       if (!simulation.config().cloths.empty())
         bag_->recordMesh(clothMesh(simulation, clock.stamp(), "world"));

@@ -1,5 +1,6 @@
 #include "slender_sim/node/drop_counter.h"
 
+#include <cmath>
 #include <numeric>
 
 #include <ros/console.h>
@@ -41,6 +42,21 @@ void DropCounter::drop(Drop reason, const std::string& what, const std::string& 
            static_cast<unsigned long>(r.count));
   r.warned = now;
   r.silent = 0;
+}
+
+void DropCounter::dropByStamp(bool stale, const std::string& what, double ahead)
+{
+  drop(stale ? Drop::stale : Drop::from_future, what,
+       "its stamp is " + std::to_string(std::abs(ahead)) + " s " +
+           (stale ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
+}
+
+void DropCounter::keep(const std::string& what)
+{
+  if (told_of_kept_)
+    return;
+  told_of_kept_ = true;
+  ROS_INFO("%s: the simulation stands still; the last messages are kept, and count when it goes on", what.c_str());
 }
 
 std::uint64_t DropCounter::total() const

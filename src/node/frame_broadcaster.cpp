@@ -3,6 +3,25 @@
 #include "slender_sim/node/converters.h"
 
 namespace slender {
+namespace {
+
+std::string graspFrame(const std::string& node, const std::string& name) { return node + "/grasps/" + name; }
+std::string nozzleFrame(const std::string& node, const std::string& prefix) { return node + "/" + prefix + "nozzle"; }
+
+}   // namespace
+
+std::set<std::string> broadcastFrames(const std::string& node, const SceneTopics& topics, const Simulation& simulation)
+{
+  std::set<std::string> frames;
+  for (const std::string& name : topics.grasps)
+    frames.insert(graspFrame(node, name));
+  for (const std::string& prefix : topics.nozzles)
+    frames.insert(nozzleFrame(node, prefix));
+  for (const BodyConfig& body : simulation.config().bodies)
+    if (body.broadcast_tf)
+      frames.insert(body.name);
+  return frames;
+}
 
 FrameBroadcaster::FrameBroadcaster(ros::NodeHandle& nh, const std::string& node, std::string frame_id,
                                    const SceneTopics& topics, bool grasps)
@@ -11,9 +30,9 @@ FrameBroadcaster::FrameBroadcaster(ros::NodeHandle& nh, const std::string& node,
     publisher_(nh.advertise<tf2_msgs::TFMessage>("/tf", 100))
 {
   for (const std::string& name : topics.grasps)
-    grasps_.push_back(node + "/grasps/" + name);
+    grasps_.push_back(graspFrame(node, name));
   for (const std::string& prefix : topics.nozzles)
-    nozzles_.push_back(node + "/" + prefix + "nozzle");
+    nozzles_.push_back(nozzleFrame(node, prefix));
 }
 
 void FrameBroadcaster::add(const std::string& child, const Pose& X_WC, const ros::Time& stamp)

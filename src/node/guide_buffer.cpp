@@ -13,10 +13,11 @@ using Eigen::Vector3d;
 
 }   // namespace
 
-GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG)
-  : GuideStream(options.timing(), options.coast),
+GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG, const std::optional<Pose>& X_HG)
+  : GuideStream(options.timing(), options.coast, options.catch_up_time),
     options_(options),
-    attach_(attach)
+    attach_(X_HG ? Attach::section : attach),
+    X_HG_(X_HG.value_or(Pose()))
 {
   if (!(options.catch_up_time > 0.0) || !(options.catch_up_speed > 0.0) || !(options.catch_up_turning > 0.0))
     throw std::invalid_argument("GuideBuffer: catch-up time and speeds must be > 0");
@@ -33,7 +34,10 @@ bool GuideBuffer::push(double time, const Pose& X_WH)
 
 void GuideBuffer::join(double start)
 {
-  X_HG_ = attach_ == Attach::initial ? trajectory_.evaluate(start).inverse() * last_.X : Pose();
+  if (attach_ == Attach::initial && (held_anew_ || !first_X_HG_))
+    X_HG_ = trajectory_.evaluate(start).inverse() * last_.X;
+  if (attach_ == Attach::initial && !held_anew_)
+    first_X_HG_ = X_HG_;
   last_.V = Twist();
 }
 
@@ -66,19 +70,27 @@ GraspTarget GuideBuffer::target(double time)
 
 void GuideBuffer::attachAt(const Pose& X_WG)
 {
+  held_anew_ = true;
+  if (following_ && attach_ == Attach::initial)
+    X_HG_ = trajectory_.evaluate(query_).inverse() * X_WG;
+  catchUpFrom(X_WG);
+}
+
+void GuideBuffer::catchUpFrom(const Pose& X_WG)
+{
   last_ = {X_WG, Twist()};
   offset_.reset();
-  if (!following_)
-    return;
-  if (attach_ == Attach::initial)
-    X_HG_ = trajectory_.evaluate(query_).inverse() * X_WG;
-  blendFrom(*last_time_, last_, followed(query_ + kLimitOffset, rate_));
+  if (following_)
+    blendFrom(*last_time_, last_, followed(query_ + kLimitOffset, rate_));
 }
 
 void GuideBuffer::restart(const Pose& X_WG)
 {
   restartStream();
   offset_.reset();
+  held_anew_ = false;
+  if (attach_ == Attach::initial)
+    X_HG_ = first_X_HG_.value_or(Pose());
   last_ = {X_WG, Twist()};
 }
 

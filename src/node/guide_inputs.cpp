@@ -27,11 +27,16 @@ std::set<std::string> solidNames(const SceneConfig& scene)
 }   // namespace
 
 GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation,
-                         const SimClock& clock, const SceneTopics& names)
+                         const SimClock& clock, const SceneTopics& names, std::set<std::string> own_frames,
+                         GuideInputs* before)
   : options_(options),
     simulation_(&simulation),
     clock_(clock),
-    pending_(kMaxPending, options.tf_timeout)
+    pending_(kMaxPending, options.tf_timeout),
+    paused_(clock, options.guide_timeout, options.guide_ahead),
+    shared_tf_buffer_(before ? before->shared_tf_buffer_ : std::make_shared<tf2_ros::Buffer>()),
+    tf_buffer_(*shared_tf_buffer_),
+    tf_listener_(before ? std::move(before->tf_listener_) : nullptr)
 {
   GuideBuffer::Options buffer_options;
   buffer_options.delay = options.guide_delay;
@@ -41,29 +46,7 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   buffer_options.catch_up_speed = options.catch_up_speed;
   buffer_options.catch_up_turning = 3.0 * options.catch_up_speed;   // [rad/s]: as if a hand's radius of 1/3 m turned
 
-  bool topics = false;
-  const std::set<std::string> solids = solidNames(simulation.config());
-  for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
-  {
-    const GraspRef& ref = simulation.grasps()[g];
-    Guided guided;
-    guided.name = names.grasps[g];
-    guided.topic = "grasps/" + guided.name + "/pose";
-    const auto* body = std::get_if<BodyMotion>(&ref.config->motion);
-    if (body && !solids.count(body->body))
-      guided.body = body->body;
-    const bool topic = std::holds_alternative<TopicMotion>(ref.config->motion);
-    if (topic || !guided.body.empty())
-      guided.buffer = std::make_unique<GuideBuffer>(buffer_options, ref.config->attach,
-                                                    simulation.grasps().pose(static_cast<int>(g)));
-    guided_.push_back(std::move(guided));
-    if (topic)
-    {
-      topics = true;
-      subscribePose(nh);
-    }
-  }
-  grasps_ = guided_.size();
+  const bool topics = addGrasps(nh, simulation, buffer_options, names.grasps);
   addSolids(simulation, buffer_options);
   const bool threads = addThreads(nh, simulation, buffer_options, names.nozzles);
   const bool bodies =
@@ -79,8 +62,85 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
     subscribers_.push_back(
         nh.subscribe("wind", kQueueSize, &GuideInputs::onWind, this, ros::TransportHints().tcpNoDelay()));
   tracking_ = std::make_unique<TrackingInputs>(nh, options_, buffer_options, simulation, clock_, tf_buffer_, drops_);
-  if (topics || bodies || threads || wind_topic_ || tracking_->any())
+  tf_ = std::make_unique<TfInputs>(options_, clock_, tf_buffer_, drops_, std::move(own_frames));
+  followFrames();
+  if (!tf_listener_ && (topics || bodies || threads || wind_topic_ || tracking_->any() || tf_->any()))
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
+  if (before)
+    takeOver(*before);
+}
+
+/// True when any of them listens to a topic of its own.
+bool GuideInputs::addGrasps(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
+                            const std::vector<std::string>& names)
+{
+  bool topics = false;
+  const std::set<std::string> solids = solidNames(simulation.config());
+  for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
+  {
+    const GraspConfig& config = *simulation.grasps()[g].config;
+    Guided guided;
+    guided.name = names[g];
+    guided.topic = "grasps/" + guided.name + "/pose";
+    const auto* body = std::get_if<BodyMotion>(&config.motion);
+    if (body && !solids.count(body->body))
+      guided.body = body->body;
+    if (const auto* tf = std::get_if<TfMotion>(&config.motion))
+      guided.frame = tf->frame;
+    const bool topic = std::holds_alternative<TopicMotion>(config.motion);
+    if (topic || !guided.body.empty() || !guided.frame.empty())
+      guided.buffer = std::make_unique<GuideBuffer>(
+          options, config.attach, simulation.grasps().pose(static_cast<int>(g)), offsetInFrame(config));
+    guided_.push_back(std::move(guided));
+    if (topic)
+    {
+      topics = true;
+      subscribePose(nh);
+    }
+  }
+  grasps_ = guided_.size();
+  return topics;
+}
+
+/// "grasp left", for messages.
+std::string GuideInputs::kindOf(std::size_t guided) const
+{
+  const std::size_t solid = guided - grasps_;
+  const char* kind = guided < grasps_               ? "grasp "
+                     : solid < bodies_              ? "body "
+                     : solid < bodies_ + obstacles_ ? "obstacle "
+                                                    : "";
+  return kind + guided_[guided].name;
+}
+
+void GuideInputs::followFrames()
+{
+  for (std::size_t g = 0; g < guided_.size(); ++g)
+    if (!guided_[g].frame.empty())
+      tf_->follow(guided_[g].frame, kindOf(g), [this, g](double time, const Pose& X_WF) {
+        const bool later = guided_[g].buffer->push(time, X_WF);
+        if (later)
+          takenPose(g, time, X_WF);
+        return later;
+      });
+  tracking_->followFrames(*tf_);
+}
+
+/// What follows frames of tf is shown at one instant, with everything else that moves: links of a robot, what its
+/// gripper holds, and what messages move. The lag is the greatest that any input asks for which has not fallen silent.
+void GuideInputs::shareLag()
+{
+  if (!tf_->any())
+    return;
+  double lag = tracking_->wantedLag();
+  for (const Guided& guided : guided_)
+    if (guided.buffer && guided.buffer->lastTime() &&
+        clock_.seconds() - *guided.buffer->lastTime() <= options_.guide_timeout)
+      lag = std::max(lag, guided.buffer->timing().wantedLag());
+  for (Guided& guided : guided_)
+    if (guided.buffer)
+      guided.buffer->lagAtLeast(lag);
+  tracking_->lagAtLeast(lag);
 }
 
 /// Poses of the last of guided_, on its topic.
@@ -106,9 +166,13 @@ bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, 
     Guided nozzle;
     nozzle.topic = prefixes[k] + "nozzle/pose";
     nozzle.name = prefixes[k] + "nozzle";
+    const auto* tf = threads[k].nozzle ? std::get_if<TfMotion>(&threads[k].nozzle->motion) : nullptr;
     const bool moved = threads[k].nozzle && std::holds_alternative<TopicMotion>(threads[k].nozzle->motion);
-    if (moved)
-      nozzle.buffer = std::make_unique<GuideBuffer>(options, Attach::section, threads[k].nozzle->pose);
+    if (tf)
+      nozzle.frame = tf->frame;
+    if (moved || tf)
+      nozzle.buffer =
+          std::make_unique<GuideBuffer>(options, Attach::section, threads[k].nozzle->pose, tf ? tf->offset : Pose());
     guided_.push_back(std::move(nozzle));
     if (moved)
       subscribePose(nh);
@@ -146,6 +210,11 @@ void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Opt
     {
       guided.body = name;
       guided.buffer = std::make_unique<GuideBuffer>(options, Attach::section, pose);
+    }
+    if (const auto* tf = std::get_if<TfMotion>(&motion))
+    {
+      guided.frame = tf->frame;
+      guided.buffer = std::make_unique<GuideBuffer>(options, Attach::section, pose, tf->offset);
     }
     guided_.push_back(std::move(guided));
   };
@@ -198,7 +267,7 @@ void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
     Entry entry{static_cast<int>(g), Pose()};
     if (!checkPose(message.poses[g], "guides", guided_[g].name, entry.X_FH))
       return;   // all grasps at one instant, or none
-    if (guided_[g].buffer && guided_[g].body.empty())
+    if (guided_[g].byMessages())
       entries.push_back(entry);
   }
   take(kGuidesSource, "guides", message.header, entries);
@@ -257,17 +326,20 @@ void GuideInputs::take(int source, const std::string& what, const std_msgs::Head
   message.source = source;
   message.what = what;
   message.frame = header.frame_id.front() == '/' ? header.frame_id.substr(1) : header.frame_id;   // tf2 wants no slash
-  message.stamp = header.stamp.isZero() ? clock_.stamp() : header.stamp;
+  message.stamp = header.stamp;
   message.entries = std::move(entries);
-  const double age = -clock_.secondsAt(message.stamp) + clock_.seconds();
-  if (age > options_.guide_timeout || -age > options_.guide_ahead)
-  {
-    drops_.drop(
-        age > 0.0 ? Drop::stale : Drop::from_future, what,
-        "its stamp is " + std::to_string(std::abs(age)) + " s " +
-            (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
-    return;
-  }
+  const Arrival arrival = paused_.arrive(source, message);
+  if (arrival == Arrival::kept)
+    return drops_.keep(what);
+  if (arrival != Arrival::now)
+    return drops_.dropByStamp(arrival == Arrival::stale, what, clock_.secondsAt(message.stamp) - clock_.seconds());
+  takeNow(message);
+}
+
+void GuideInputs::takeNow(const Message& message)
+{
+  const int source = message.source;
+  const std::string& what = message.what;
   if (!pending_.holds(source, message.frame) && deliver(message, nullptr))
     return;
   if (!pending_.add(source, message.frame, message))
@@ -339,8 +411,25 @@ void GuideInputs::processPending()
                    });
 }
 
+void GuideInputs::onPresent(const std::function<ros::Time()>& present)
+{
+  paused_.onPresent(present);
+  tracking_->onPresent(present);
+}
+
+void GuideInputs::takeKept(bool all)
+{
+  if (all)
+    drops_.deliveredKept();
+  for (const auto& [source, message] : paused_.release(all))
+    takeNow(message);
+  tracking_->takeKept(all);
+}
+
 void GuideInputs::apply(double time, SceneInputs& inputs)
 {
+  tf_->look();
+  shareLag();
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
     {
@@ -394,9 +483,19 @@ void GuideInputs::attachAll(const Simulation& simulation)
   tracking_->attachAll(simulation);
 }
 
+void GuideInputs::catchUp(const Simulation& simulation)
+{
+  for (std::size_t g = 0; g < guided_.size(); ++g)
+    if (guided_[g].buffer)
+      guided_[g].buffer->catchUpFrom(poseOf(simulation, g));
+  tracking_->attachAll(simulation);
+}
+
 void GuideInputs::restart(const Simulation& simulation)
 {
   pending_.clear();
+  paused_.clear();
+  drops_.deliveredKept();
   hand_.clear();
   wind_.reset();
   for (Driven& thread : threads_)
@@ -405,6 +504,7 @@ void GuideInputs::restart(const Simulation& simulation)
     if (guided_[g].buffer)
       guided_[g].buffer->restart(poseOf(simulation, g));
   tracking_->restart(simulation);
+  tf_->restart();
 }
 
 void GuideInputs::skip(double seconds)
@@ -434,7 +534,9 @@ std::vector<GuideInputs::Age> GuideInputs::ages() const
     std::optional<double> age = guided.buffer->lastTime();
     if (age)
       age = clock_.seconds() - *age;
-    ages.push_back({guided.name, age, false, guided.buffer->timing().lag(), guided.buffer->timing().excess()});
+    const std::string name = guided.name + (guided.frame.empty() ? "" : " (tf " + guided.frame + ")");
+    ages.push_back({name, age, false, guided.buffer->timing().lag(), guided.buffer->timing().excess(),
+                    guided.buffer->timing().interval()});
   }
   for (const Age& age : tracking_->ages())
     ages.push_back(age);

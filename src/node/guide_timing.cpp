@@ -57,7 +57,7 @@ bool GuideTiming::sample(double stamp)
   return false;
 }
 
-double GuideTiming::wanted() const
+double GuideTiming::own() const
 {
   const double needed = required();
   if (fixed())

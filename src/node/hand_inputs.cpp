@@ -50,7 +50,8 @@ void GuideInputs::listenToHand(ros::NodeHandle nh, const std::string& topic)
 bool GuideInputs::isDraggable(std::size_t guided) const
 {
   const Guided& g = guided_[guided];
-  return g.buffer && (guided >= grasps_ || g.body.empty());   // grasps with a body are its, not the hand's
+  // grasps with a body are its, and what follows tf is a robot's, not the hand's
+  return g.buffer && g.frame.empty() && (guided >= grasps_ || g.body.empty());
 }
 
 std::string GuideInputs::handleName(std::size_t guided) const
@@ -123,8 +124,8 @@ void GuideInputs::takeHand()
     std_msgs::Header header;   // stamp zero: now
     header.frame_id = last ? moved->second.frame : options_.frame_id;
     // the first pose of all is where the thing is: there the hand took hold of it
-    const Entry entry{static_cast<int>(g), last ? moved->second.X_FH * guided_[g].buffer->graspInGripper().inverse()
-                                                : poseOf(*simulation_, g)};
+    const Pose X_FG = last ? moved->second.X_FH : poseOf(*simulation_, g);
+    const Entry entry{static_cast<int>(g), X_FG * guided_[g].buffer->graspInGripper().inverse()};
     const bool solid = g >= grasps_ && g < grasps_ + bodies_ + obstacles_;
     take(solid ? kBodiesSource : static_cast<int>(g), handleName(g), header, {entry});
     moved = last ? hand_.erase(moved) : std::next(moved);

@@ -41,7 +41,7 @@ Eigen::AlignedBox3d sceneBox(const SceneState& state)
 void addLegend(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
                visualization_msgs::MarkerArray& out)
 {
-  std::string text;
+  std::string text = options.note.empty() ? "" : options.note + "\n";
   if (options.color != MarkerColor::none)
     text += colorLine(options.color, range);
   if (options.style == MarkerStyle::regions)
@@ -55,7 +55,13 @@ void addLegend(const Simulation& simulation, const std_msgs::Header& header, con
                   options.forces);
     text += line;
   }
-  const Eigen::AlignedBox3d box = sceneBox(simulation.state());
+  Eigen::AlignedBox3d box = sceneBox(simulation.state());
+  for (std::size_t k = 0; k < simulation.config().threads.size(); ++k)   // not behind a nozzle
+    if (const auto& nozzle = simulation.config().threads[k].nozzle)
+    {
+      const Pose& X = simulation.state().threads[k].threads.front().ends[1].X_WE;
+      box.extend(X * Eigen::Vector3d(-4.0 * nozzle->diameter, 0, 0));
+    }
   if (text.empty() || box.isEmpty())
     return;
   const double size = box.diagonal().norm();

@@ -75,6 +75,7 @@ void GuideInputs::stopListening()
 {
   subscribers_.clear();
   tf_listener_.reset();
+  tf_->stop();
   tracking_->stopListening();
 }
 

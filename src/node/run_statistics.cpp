@@ -1,6 +1,8 @@
 #include "slender_sim/node/run_statistics.h"
 
 #include <algorithm>
+#include <numeric>
+#include <sstream>
 
 namespace slender {
 
@@ -34,6 +36,36 @@ void RunStatistics::add(const StepReport& report, const Simulation& simulation, 
     max_force[g] = std::max(max_force[g], wrench.force.norm());
     max_torque[g] = std::max(max_torque[g], wrench.torque.norm());
   }
+}
+
+std::vector<std::string> graspLines(const RunStatistics& statistics, const std::vector<std::string>& names)
+{
+  constexpr std::size_t kMostLines = 10;
+  std::vector<std::size_t> order(statistics.max_force.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&statistics](std::size_t a, std::size_t b) {
+    return statistics.max_force[a] > statistics.max_force[b];
+  });
+  const std::size_t named = order.size() > kMostLines ? kMostLines - 1 : order.size();
+  std::vector<std::string> lines;
+  const auto add = [&lines](const std::string& who, double force, double torque) {
+    std::ostringstream line;
+    line.precision(4);
+    line << who << ": largest force " << force << " N, torque " << torque << " N m";
+    lines.push_back(line.str());
+  };
+  double force = 0.0, torque = 0.0;   // of the grasps without a line
+  for (std::size_t k = 0; k < order.size(); ++k)
+  {
+    const std::size_t g = order[k];
+    if (k < named)
+      add("grasp " + names[g], statistics.max_force[g], statistics.max_torque[g]);
+    force = k < named ? 0.0 : std::max(force, statistics.max_force[g]);
+    torque = k < named ? 0.0 : std::max(torque, statistics.max_torque[g]);
+  }
+  if (order.size() > named)
+    add("the other " + std::to_string(order.size() - named) + " grasps", force, torque);
+  return lines;
 }
 
 }   // namespace slender

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <iomanip>
 #include <iostream>
 
@@ -18,21 +17,15 @@
 #include "slender_sim/ThreadState.h"
 #include "slender_sim/linalg/interruption.h"
 #include "slender_sim/node/converters.h"
-#include "slender_sim/node/guide_bag.h"
+#include "slender_sim/node/robot_sources.h"
 #include "slender_sim/node/scene_markers.h"
+#include "slender_sim/node/scene_option.h"
 #include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/residual_text.h"
 #include "slender_sim/scene/state_bytes.h"
 
 namespace slender {
 namespace {
-
-/// Text of a scene, not the path of one.
-bool isText(const std::string& scene)
-{
-  std::error_code error;
-  return scene.find('\n') != std::string::npos ||
-         (scene.find(": ") != std::string::npos && !std::filesystem::exists(scene, error));
-}
 
 /// Throws SceneError when the scene has no object of the node's kind.
 void requireObjects(const SceneConfig& scene, NodeKind kind)
@@ -53,19 +46,21 @@ void requireObjects(const SceneConfig& scene, NodeKind kind)
   }
 }
 
-SceneConfig loadScene(const NodeOptions& options, NodeKind kind)
+SceneConfig loadScene(const NodeOptions& options, const ros::NodeHandle& nh)
 {
-  setGuideBagReader(readGuideBag);
-  SceneConfig scene = isText(options.scene) ? parseScene(options.scene, "~scene", options.overrides)
-                                            : readScene(options.scene, options.overrides);
+  setRobotSources(rosSources(nh));
+  return readScene(options);
+}
+
+}   // namespace
+
+void SceneNode::checkKind(const SceneConfig& scene, const NodeOptions& options, NodeKind kind)
+{
   requireObjects(scene, kind);
   if (options.markers.style == MarkerStyle::regions && !tracksGuide(scene.cloths))
     throw OptionError("~marker_style: regions are those of tracked cloths, of which scene " + scene.name +
                       " has none; choose tube or line");
-  return scene;
 }
-
-}   // namespace
 
 const char* toString(NodeKind kind)
 {
@@ -86,18 +81,25 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   nh_priv_.setCallbackQueue(&services_queue_);
   openReplay();
   checkClock();
-  simulation_ = std::make_unique<Simulation>(loadScene(options_, kind_));
+  SceneConfig scene = loadScene(options_, nh_);
+  checkKind(scene, options_, kind_);
+  simulation_ = std::make_unique<Simulation>(std::move(scene));
   if (simulation_->config().statics)
     ROS_WARN("%s: the key statics of the scene is for simulate --statics; the node does not use it",
              nh_priv_.getNamespace().c_str());
   for (const std::string& warning : simulation_->config().warnings)
     ROS_WARN("%s", warning.c_str());
-  if (replay_ && options_.scene != replay_->scene() && simulation_->config().source != replay_->scene())
-    throw OptionError("~replay: " + options_.replay +
-                      ": was recorded with another scene (or other values of ~set) than ~scene; leave ~scene away");
+  for (const std::string& note : simulation_->config().notes)
+    ROS_INFO("%s", note.c_str());
+  limits_ = std::make_unique<LimitWatch>(*simulation_);
   topics_ = std::make_unique<SceneTopics>(*simulation_);
+  refuseLoops();
   if (!options_.record_bag.empty())
+  {
     bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), *simulation_);
+    for (const std::string& note : bag_->notes())
+      ROS_WARN("%s: %s", nh_priv_.getNamespace().c_str(), note.c_str());
+  }
   if (options_.paused)
     mode_ = Mode::paused;
   start();
@@ -116,17 +118,9 @@ void SceneNode::start()
   if (!stamp)
     return;
   clock_ = SimClock(*stamp, simulation_->config().time.step);
-  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, *topics_);
-  if (replay_)
-    inputs_->stopListening();
-  inputs_->onTaken([this](slender_sim::Input input) { note(std::move(input), clock_.ticks()); });
   if (options_.interactive && !replay_)
-  {
-    const std::string topic = nh_.resolveName("interactive");
-    hands_ = std::make_unique<HandMarkers>(topic, options_.frame_id);
-    inputs_->listenToHand(nh_, topic);
-    showHandles();
-  }
+    hands_ = std::make_unique<HandMarkers>(nh_.resolveName("interactive"), options_.frame_id);
+  makeInputs();
   advertise();
   advertiseServices();
   if (stampsAreOfTheWall())   // advertising takes its time: the stamps would lag by that for ever
@@ -142,6 +136,19 @@ void SceneNode::start()
     publishMesh();
   total_ = recent_ = RunStatistics();
   publishState();
+}
+
+void SceneNode::makeInputs()
+{
+  const std::unique_ptr<GuideInputs> before = std::move(inputs_);
+  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, *topics_, ownFrames(), before.get());
+  if (replay_)
+    inputs_->stopListening();
+  inputs_->onPresent([this] { return presentOfOthers(); });
+  inputs_->onTaken([this](slender_sim::Input input) { note(std::move(input), clock_.ticks()); });
+  if (hands_)
+    inputs_->listenToHand(nh_, nh_.resolveName("interactive"));
+  showHandles();
 }
 
 void SceneNode::publishMesh()
@@ -209,6 +216,9 @@ bool SceneNode::advance()
   const ros::WallTime begin = ros::WallTime::now();
   simulation_->defaultInputs(step_inputs_);
   inputs_->apply(clock_.seconds() + clock_.step(), step_inputs_);
+  guides_led_on_ = true;
+  if (!mindLimits(limits_->checkInputs(step_inputs_)))
+    return false;
   const StepReport report = simulation_->step(step_inputs_);
   last_report_ = report;
   if (!report.ok)
@@ -224,6 +234,7 @@ bool SceneNode::advance()
     return false;
   }
   clock_.tick();
+  guides_led_on_ = false;
   if (simulation_->state().steps % static_cast<std::uint64_t>(options_.state_every) == 0)
     publishState();
   else if (options_.publish_clock)
@@ -239,7 +250,7 @@ bool SceneNode::advance()
   recent_.add(report, *simulation_, clock_.step(), busy);
   if (options_.stop_after > 0.0 && clock_.seconds() >= options_.stop_after - 0.5 * clock_.step())
     finished_ = true;
-  return true;
+  return mindLimits(limits_->checkStep());
 }
 
 void SceneNode::fail(const std::string& reason)
@@ -367,6 +378,8 @@ void SceneNode::publishMarkers()
 {
   const std::uint32_t listeners = markers_pub_.getNumSubscribers();
   const auto now = std::make_pair(clock_.ticks(), listeners);
+  if (listeners == 0)
+    drawn_.reset();   // whoever listens next has no picture yet
   if (listeners == 0 || ros::WallTime::now() < next_markers_ || drawn_ == now)
     return;
   next_markers_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.marker_rate);
@@ -374,6 +387,7 @@ void SceneNode::publishMarkers()
   std_msgs::Header header;
   header.stamp = clock_.stamp();
   header.frame_id = options_.frame_id;
+  options_.markers.note = paceNote();
   markers_pub_.publish(
       boost::make_shared<visualization_msgs::MarkerArray>(sceneMarkers(*simulation_, header, options_.markers)));
 }
@@ -456,14 +470,14 @@ void SceneNode::summary() const
   const RunStatistics& s = total_;
   const char* name = toString(kind_);
   std::cout << std::setprecision(4) << name << ": " << s.steps << " steps, " << s.simulated << " s simulated, "
-            << s.busy << " s computing, real-time factor " << s.realTimeFactor() << ", worst residual " << s.residual
-            << " of the largest force, largest strain " << s.max_strain << ", Newton iterations per step "
+            << s.busy << " s computing, real-time factor " << s.realTimeFactor() << ", "
+            << "worst residual " << residualText(simulation_->config(), s.residual) << ", largest strain "
+            << s.max_strain << ", Newton iterations per step "
             << (s.steps ? static_cast<double>(s.iterations) / s.steps : 0.0) << ", cut steps " << s.cut_steps << "\n";
   if (s.skipped > 0.0)
     std::cout << name << ": slower than real time, the clock skipped " << s.skipped << " s (~max_lag)\n";
-  for (std::size_t g = 0; g < s.max_force.size(); ++g)
-    std::cout << name << ": grasp " << topics_->grasps[g] << ": largest force " << s.max_force[g] << " N, torque "
-              << s.max_torque[g] << " N m\n";
+  for (const std::string& line : graspLines(s, topics_->grasps))
+    std::cout << name << ": " << line << "\n";
   if (inputs_ && inputs_->drops().total() > 0)
     std::cout << name << ": " << inputs_->drops().total() << " messages dropped\n";
   if (bag_)

@@ -60,6 +60,12 @@ bool SceneNode::stampsAreOfTheWall() const
          options_.speed == 1.0;
 }
 
+ros::Time SceneNode::presentOfOthers() const
+{
+  const bool goes_on = mode_ != Mode::running && (options_.pace == Pace::follow || stampsAreOfTheWall());
+  return goes_on ? ros::Time::now() : clock_.stamp();
+}
+
 void SceneNode::anchor()
 {
   // the very time of the stamp, so that no lag is left of what is shorter than a step
@@ -72,6 +78,7 @@ std::uint64_t SceneNode::jumped()
 {
   ++epoch_;
   wrenches_->restart();
+  limits_->reset();
   clock_.tick();   // stamps grow even so
   showHandles();
   const std::uint64_t skipped = replay_ ? 0 : realign();

@@ -167,25 +167,53 @@ void SceneNode::publishDiagnostics()
     next_clock_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
     ROS_WARN("%s %s", nh_priv_.getNamespace().c_str(), waits.c_str());
   }
-  remindOfBodies();
+  remindOfInputs();
+  if (const double wall = recent_.wallSeconds(); mode_ != Mode::running || recent_.steps == 0)
+    shown_pace_ = 0.0;
+  else if (wall > 0.0)
+    shown_pace_ = recent_.simulated / wall;
   recent_ = RunStatistics();
   next_diagnostics_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.diagnostics_rate);
 }
 
-void SceneNode::remindOfBodies()
+/// A slow simulation would otherwise look like one that stands still.
+std::string SceneNode::paceNote() const
 {
-  if (mode_ != Mode::running || replay_ || ros::WallTime::now() < next_body_reminder_)
+  constexpr double kSlow = 0.9;   // of real time
+  if (mode_ == Mode::paused)
+    return "paused";
+  if (mode_ == Mode::failed)
+    return "stopped: a step failed";
+  return options_.pace != Pace::step && shown_pace_ > 0.0 && shown_pace_ < kSlow
+             ? text("%.2g of real time", shown_pace_)
+             : std::string();
+}
+
+void SceneNode::remindOfInputs()
+{
+  if (mode_ != Mode::running || replay_ || ros::WallTime::now() < next_input_reminder_)
     return;
   std::string waits;
   for (const std::string& body : inputs_->unheardBodies())
     waits += (waits.empty() ? "" : ", ") + body;
-  if (waits.empty())
-    return;
-  next_body_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
-  const std::string& stranger = inputs_->drops().last(Drop::unknown_name);
-  ROS_WARN("%s: nobody has published a pose yet of %s; what follows it stays where it is (topic %s)%s%s",
-           nh_priv_.getNamespace().c_str(), waits.c_str(), nh_.resolveName("bodies").c_str(),
-           stranger.empty() ? "" : ". Messages there name others: ", stranger.c_str());
+  if (!waits.empty())
+  {
+    const std::string& stranger = inputs_->drops().last(Drop::unknown_name);
+    ROS_WARN("%s: nobody has published a pose yet of %s; what follows it stays where it is (topic %s)%s%s",
+             nh_priv_.getNamespace().c_str(), waits.c_str(), nh_.resolveName("bodies").c_str(),
+             stranger.empty() ? "" : ". Messages there name others: ", stranger.c_str());
+  }
+  bool reminded = !waits.empty();
+  for (const TfInputs::State& frame : inputs_->frames())
+  {
+    if (frame.heard)
+      continue;
+    ROS_WARN("%s: tf has no pose yet of the frame %s, which %s follows, and which stays where it is: %s",
+             nh_priv_.getNamespace().c_str(), frame.frame.c_str(), frame.who.c_str(), frame.why.c_str());
+    reminded = true;
+  }
+  if (reminded)
+    next_input_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
 }
 
 std::string SceneNode::clockWentBack() const
@@ -219,6 +247,7 @@ DiagnosticStatus SceneNode::simulationStatus() const
     raise(status, DiagnosticStatus::ERROR, "recording stopped: " + bag_failure_);
   if (mode_ == Mode::failed)
     raise(status, DiagnosticStatus::ERROR, "stopped at " + failure_ + "; waiting for ~reset");
+  addLimits(status);
   if (status.message.empty())
     status.message = mode_ == Mode::paused ? "paused" : running ? "running" : "waiting for ~step";
 
@@ -275,15 +304,18 @@ DiagnosticStatus SceneNode::inputStatus()
       raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
     if (age.seconds)
       add(status, "input lag " + age.name + " [s]", age.lag);
-    if (age.seconds && age.excess > 0.0 && *age.seconds <= options_.guide_timeout)
+    if (age.seconds && age.late() > 0.0 && *age.seconds <= options_.guide_timeout)
       raise(status, DiagnosticStatus::WARN,
-            "guides arrive " + text("%.0f ms later than ~guide_delay", 1e3 * age.excess) + " allows: " + age.name +
+            "guides arrive " + text("%.0f ms later than ~guide_delay", 1e3 * age.late()) + " allows: " + age.name +
                 text(" lags by %.3g s; raise ~guide_delay", age.lag) +
                 (options_.pace == Pace::wall ? ", or set it to auto" : ""));
     const bool late = mode_ == Mode::running && clock_.seconds() - inputs_since_ > options_.guide_timeout;
     if (age.missing || (!age.seconds && late))
       raise(status, DiagnosticStatus::WARN, "no input yet for " + age.name);
   }
+  for (const TfInputs::State& frame : inputs_->frames())
+    if (!frame.why.empty())
+      add(status, "tf " + frame.frame, frame.why);
   const std::vector<GuideInputs::Setting> settings = inputs_->settings();
   for (const GuideInputs::Setting& setting : settings)
     add(status, setting.name, setting.value);

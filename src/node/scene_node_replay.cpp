@@ -1,4 +1,5 @@
 // What changes a run from outside: recorded beside its states, and repeated from such a record.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -6,8 +7,11 @@
 #include <iterator>
 #include <unistd.h>
 
+#include "slender_sim/node/bag_paths.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_node.h"
+#include "slender_sim/node/scene_option.h"
+#include "slender_sim/scene/reader.h"
 
 namespace slender {
 namespace {
@@ -33,8 +37,17 @@ void SceneNode::openReplay()
   if (options_.replay.empty())
     return;
   replay_ = std::make_unique<InputReplay>(options_.replay);
-  if (options_.scene.empty())
-    options_.scene = replay_->scene();
+  if (!options_.record_bag.empty())
+    try
+    {
+      requireOtherBag(options_.record_bag, options_.replay, "~replay");
+    }
+    catch (const std::runtime_error& e)
+    {
+      throw OptionError(std::string("~record_bag: ") + e.what() + leftover("record_bag"));
+    }
+  if (options_.scene != replay_->scene() || !options_.overrides.empty())
+    takeRecordedScene();
   const Input* settings = replay_->settings();
   if (!settings)
     return;
@@ -44,6 +57,38 @@ void SceneNode::openReplay()
   options_.live_guides = settings->values[2] != 0.0;
   options_.catch_up_time = settings->values[3];
   options_.catch_up_speed = settings->values[4];
+}
+
+/// The parameters may be of an earlier start, which had another scene: the recorded one has to run. Where they give the
+/// same scene they stay, because files that a scene names are looked for beside its own file.
+void SceneNode::takeRecordedScene()
+{
+  if (!options_.scene.empty())
+    try
+    {
+      if (readScene(options_).source == replay_->scene())
+        return;
+    }
+    catch (const SceneError&)
+    {
+      // the parameter names no scene that could be the recorded one
+    }
+  if (!options_.scene.empty() || !options_.overrides.empty())
+    ROS_WARN(
+        "%s: ~replay: %s was recorded with another scene (or other values of ~set) than the parameters give; the "
+        "recorded scene runs%s%s",
+        nh_priv_.getNamespace().c_str(), options_.replay.c_str(),
+        options_.scene.empty() ? "" : leftover("scene").c_str(),
+        options_.overrides.empty() ? "" : leftover("set").c_str());
+  options_.scene = replay_->scene();
+  options_.overrides.clear();
+}
+
+/// Parameters outlive the node that was started with them.
+std::string SceneNode::leftover(const std::string& parameter) const
+{
+  return " (an earlier start may have left ~" + parameter + ": rosparam delete " + nh_priv_.resolveName(parameter) +
+         ")";
 }
 
 std::string SceneNode::refusesInput() const
@@ -86,9 +131,10 @@ void SceneNode::noteJump(Input input, std::uint64_t tick, std::uint64_t skipped,
   note(std::move(input), tick);
 }
 
-void SceneNode::noteGrasp(const SetGrasp::Request& request)
+void SceneNode::noteGrasp(const SetGrasp::Request& request, const std::string& why)
 {
   Input input;
+  input.text = why;
   input.kind = Input::SET_GRASP;
   input.name = request.name;
   input.values = {static_cast<double>(request.action),
@@ -142,6 +188,12 @@ void SceneNode::repeat(const Input& input)
         throw std::runtime_error(response.message);
       return;
     }
+    case Input::SPAWN:
+    case Input::REMOVE:
+    case Input::ATTACH:
+    case Input::DETACH:
+    case Input::SET_PARAMETER: return repeatEdit(input);
+    case Input::GO_ON: return letInputsGoOn();
     case Input::SKIP: skip(static_cast<std::uint64_t>(values(input, 1)[0])); return anchor();
     default: inputs_->repeat(input);
   }
@@ -187,6 +239,10 @@ void SceneNode::repeatJump(const Input& input)
 void SceneNode::repeatGrasp(const Input& input)
 {
   const std::vector<double>& v = values(input, 8);
+  const auto named = std::find(topics_->grasps.begin(), topics_->grasps.end(), input.name);
+  if (input.text == kByLimit && named != topics_->grasps.end() &&
+      !simulation_->grasps().isActive(static_cast<int>(named - topics_->grasps.begin())))
+    return;   // the repeated run has exceeded the same limit
   SetGrasp::Request request;
   SetGrasp::Response response;
   request.name = input.name;

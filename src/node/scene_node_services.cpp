@@ -1,12 +1,25 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_node.h"
+#include "slender_sim/scene/reader.h"
 
 namespace slender {
+namespace {
+
+/// Relative paths start at the node's working directory, which whoever calls a service does not see.
+std::string wholePath(const std::string& path)
+{
+  std::error_code error;
+  const std::filesystem::path whole = std::filesystem::absolute(path, error);
+  return error || path.empty() ? path : whole.lexically_normal().string();
+}
+
+}   // namespace
 
 void SceneNode::advertiseServices()
 {
@@ -15,8 +28,8 @@ void SceneNode::advertiseServices()
                nh_priv_.advertiseService("step", &SceneNode::onStep, this),
                nh_priv_.advertiseService("save_state", &SceneNode::onSave, this),
                nh_priv_.advertiseService("load_state", &SceneNode::onLoad, this)};
-  if (topics_->has_rods || topics_->has_cloths)
-    services_.push_back(nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this));
+  advertiseEdits();
+  services_.push_back(nh_priv_.advertiseService("set_grasp", &SceneNode::onSetGrasp, this));
   if (tracksGuide(simulation_->config().cloths))
     services_.push_back(nh_priv_.advertiseService("set_functions", &SceneNode::onSetFunctions, this));
 }
@@ -37,6 +50,14 @@ bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::
     input.values = {static_cast<double>(skipped)};
     if (skipped > 0)
       note(std::move(input), tick);
+    inputs_->takeKept(true);
+  }
+  if (!request.data && !limits_->held().empty())
+  {
+    letInputsGoOn();
+    slender_sim::Input input;
+    input.kind = slender_sim::Input::GO_ON;
+    note(std::move(input), clock_.ticks());
   }
   mode_ = request.data ? Mode::paused : Mode::running;
   step_ended_ = "~pause was called";
@@ -52,7 +73,15 @@ bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
   if (!response.message.empty())
     return true;
   queue_.callAvailable();   // older than the reset
-  simulation_->reset();
+  try
+  {
+    simulation_->reset();
+  }
+  catch (const SceneError& e)   // after edits
+  {
+    response.message = e.what();
+    return true;
+  }
   inputs_->restart(*simulation_);
   const bool failed = mode_ == Mode::failed;
   if (failed)
@@ -62,7 +91,7 @@ bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
   slender_sim::Input input;
   input.kind = slender_sim::Input::RESET;
   const std::uint64_t tick = clock_.ticks(), skipped = jumped();
-  noteJump(std::move(input), tick, skipped, failed);
+  noteJump(std::move(input), tick, skipped, failed && guides_led_on_);
   publishState();
   inputs_since_ = clock_.seconds();
   publishDiagnostics();
@@ -87,6 +116,7 @@ bool SceneNode::onStep(slender_sim::Step::Request& request, slender_sim::Step::R
   {
     queue_.callAvailable();   // what came before counts, what comes meanwhile does not
     inputs_->processPending();
+    inputs_->takeKept(false);
     stepping_ = true;
     step_ended_.clear();
     ros::WallTime looked = ros::WallTime::now();
@@ -277,8 +307,10 @@ bool SceneNode::onSave(slender_sim::FilePath::Request& request, slender_sim::Fil
   else
     try
     {
-      simulation_->save(request.path);
+      const std::string path = wholePath(request.path);
+      simulation_->save(path);
       response.success = true;
+      response.message = "saved " + path;
     }
     catch (const std::exception& e)
     {
@@ -296,10 +328,11 @@ bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::Fil
   queue_.callAvailable();   // older than the state that takes over
   slender_sim::Input input;
   input.kind = slender_sim::Input::LOAD;
+  const std::string path = wholePath(request.path);
   try
   {
-    simulation_->load(request.path);
-    std::ifstream file(request.path, std::ios::binary);
+    simulation_->load(path);
+    std::ifstream file(path, std::ios::binary);
     if (bag_ && options_.record_inputs)
       input.data.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   }
@@ -314,9 +347,11 @@ bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::Fil
     mode_ = Mode::paused;   // what was loaded may be just before the failure
   failure_.clear();
   const std::uint64_t tick = clock_.ticks(), skipped = jumped();
-  noteJump(std::move(input), tick, skipped, failed);
+  noteJump(std::move(input), tick, skipped, failed && guides_led_on_);
+  inputs_->takeKept(true);   // the clock is at the present
   publishState();
   response.success = true;
+  response.message = "loaded " + path;
   return true;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "slender_sim/node/converters.h"
@@ -32,7 +33,8 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
     clock_(clock),
     tf_(tf),
     drops_(drops),
-    pending_(kMaxPending, options.tf_timeout)
+    pending_(kMaxPending, options.tf_timeout),
+    paused_(clock, options.guide_timeout, options.guide_ahead)
 {
   const std::vector<ClothConfig>& cloths = simulation.config().cloths;
   const std::vector<RodConfig>& rods = simulation.config().rods;
@@ -45,6 +47,7 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
       Guide guide;
       guide.index = static_cast<int>(k);
       guide.of_rod = of_rod;
+      guide.object = objects[k].name;
       guide.topic = tracked == 1 ? std::string() : "tracked/" + objects[k].name + "/";
       if (objects[k].tracking && objects[k].tracking->guide.byTopic())
         addGuide(objects[k].tracking->guide, guideNow(simulation, guide.index, of_rod), std::move(guide));
@@ -56,6 +59,8 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
   {
     const int index = static_cast<int>(g);
     const auto hints = ros::TransportHints().tcpNoDelay();
+    if (guides_[g].carried && guides_[g].carried->by_tf)
+      continue;   // see followFrames()
     if (guides_[g].carried)
     {
       const boost::function<void(const slender_sim::BodyStates&)> callback =
@@ -73,20 +78,93 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
   }
 }
 
+void TrackingInputs::takeOver(TrackingInputs& before)
+{
+  std::map<int, int> moved;
+  for (std::size_t j = 0; j < before.guides_.size(); ++j)
+    for (std::size_t k = 0; k < guides_.size(); ++k)
+    {
+      Guide &old = before.guides_[j], &now = guides_[k];
+      if (old.of_rod != now.of_rod || old.object != now.object)
+        continue;
+      moved[static_cast<int>(j)] = static_cast<int>(k);
+      // its place in the scene, its topic and what carries it are those of the edited scene
+      old.index = now.index;
+      old.topic = now.topic;
+      old.carried = now.carried;
+      now = std::move(old);
+    }
+  pending_ = std::move(before.pending_);
+  const auto keep = [&moved](int& source, Message& message) {
+    const auto found = moved.find(message.guide);
+    if (found == moved.end())
+      return false;
+    source = message.guide = found->second;
+    return true;
+  };
+  pending_.change(keep);
+  paused_.takeOver(before.paused_, keep);
+}
+
 /// `guide`: with its topic's prefix.
 void TrackingInputs::addGuide(const GuideConfig& config, const Eigen::Matrix3Xd& now, Guide guide)
 {
   guide.carried = std::get_if<CarriedGuide>(&config.motion);
-  guide.topic += guide.carried ? "guide/bodies" : "guide/points";
+  guide.topic += guide.carried && guide.carried->by_tf ? "guide" : guide.carried ? "guide/bodies" : "guide/points";
   GuideBuffer::Options own = buffers_;
   own.coast = config.coast;
   if (guide.carried)
     for (std::size_t b = 0; b < guide.carried->bodies.size(); ++b)
-      guide.bodies.emplace_back(own, guide.carried->keeps_offset ? Attach::initial : Attach::section, Pose());
+      guide.bodies.emplace_back(own, guide.carried->keeps_offset ? Attach::initial : Attach::section, Pose(),
+                                guide.carried->keeps_offset ? std::nullopt : std::optional(guide.carried->offset));
   else
     guide.points = std::make_unique<PointGuideBuffer>(own, now);
   guide.held = now;
   guides_.push_back(std::move(guide));
+}
+
+void TrackingInputs::followFrames(TfInputs& tf)
+{
+  for (std::size_t g = 0; g < guides_.size(); ++g)
+  {
+    if (!guides_[g].carried || !guides_[g].carried->by_tf)
+      continue;
+    const int guide = static_cast<int>(g);
+    tf.follow(guides_[g].carried->bodies.front(), guides_[g].topic, [this, guide](double time, const Pose& X_WF) {
+      const bool later = guides_[guide].bodies.front().push(time, X_WF);
+      if (later)
+        takenBody(guide, 0, time, X_WF);
+      return later;
+    });
+  }
+}
+
+double TrackingInputs::wantedLag() const
+{
+  double lag = 0.0;
+  const auto ask = [&](const auto& buffer) {
+    if (buffer.lastTime() && clock_.seconds() - *buffer.lastTime() <= options_.guide_timeout)
+      lag = std::max(lag, buffer.timing().wantedLag());
+  };
+  for (const Guide& guide : guides_)
+  {
+    if (guide.points)
+      ask(*guide.points);
+    for (const GuideBuffer& body : guide.bodies)
+      ask(body);
+  }
+  return lag;
+}
+
+void TrackingInputs::lagAtLeast(double lag)
+{
+  for (Guide& guide : guides_)
+  {
+    if (guide.points)
+      guide.points->lagAtLeast(lag);
+    for (GuideBuffer& body : guide.bodies)
+      body.lagAtLeast(lag);
+  }
 }
 
 void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message)
@@ -145,13 +223,18 @@ void TrackingInputs::take(Message message, const std_msgs::Header& header)
   if (header.frame_id.empty())
     return drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");
   message.frame = header.frame_id.front() == '/' ? header.frame_id.substr(1) : header.frame_id;   // tf2 wants no slash
-  message.stamp = header.stamp.isZero() ? clock_.stamp() : header.stamp;
-  const double age = clock_.seconds() - clock_.secondsAt(message.stamp);
-  if (age > options_.guide_timeout || -age > options_.guide_ahead)
-    return drops_.drop(
-        age > 0.0 ? Drop::stale : Drop::from_future, what,
-        "its stamp is " + std::to_string(std::abs(age)) + " s " +
-            (age > 0.0 ? "before the simulated time (~guide_timeout)" : "after the simulated time (~guide_ahead)"));
+  message.stamp = header.stamp;
+  const Arrival arrival = paused_.arrive(message.guide, message);
+  if (arrival == Arrival::kept)
+    return drops_.keep(what);
+  if (arrival != Arrival::now)
+    return drops_.dropByStamp(arrival == Arrival::stale, what, clock_.secondsAt(message.stamp) - clock_.seconds());
+  takeNow(message);
+}
+
+void TrackingInputs::takeNow(const Message& message)
+{
+  const std::string& what = guides_[message.guide].topic;
   if (!pending_.holds(message.guide, message.frame) && deliver(message, nullptr))
     return;
   if (!pending_.add(message.guide, message.frame, message))
@@ -226,6 +309,12 @@ void TrackingInputs::processPending()
                    });
 }
 
+void TrackingInputs::takeKept(bool all)
+{
+  for (const auto& [guide, message] : paused_.release(all))
+    takeNow(message);
+}
+
 void TrackingInputs::apply(double time, SceneInputs& inputs)
 {
   for (Guide& guide : guides_)
@@ -277,6 +366,7 @@ void TrackingInputs::attachAll(const Simulation& simulation)
 void TrackingInputs::restart(const Simulation& simulation)
 {
   pending_.clear();
+  paused_.clear();
   for (Guide& guide : guides_)
   {
     const Eigen::Matrix3Xd& now = guideNow(simulation, guide.index, guide.of_rod);
@@ -303,12 +393,14 @@ std::vector<TrackingInputs::Age> TrackingInputs::ages() const
   {
     if (guide.points)
       ages.push_back({guide.topic, age(guide.points->lastTime()), false, guide.points->timing().lag(),
-                      guide.points->timing().excess()});
+                      guide.points->timing().excess(), guide.points->timing().interval()});
     for (std::size_t b = 0; b < guide.bodies.size(); ++b)   // one may fall silent while others speak
     {
       const std::optional<double> own = age(guide.bodies[b].lastTime());
-      ages.push_back({guide.topic + " " + guide.carried->bodies[b], own, !own && guide.heard(),
-                      guide.bodies[b].timing().lag(), guide.bodies[b].timing().excess()});
+      const std::string& body = guide.carried->bodies[b];
+      ages.push_back({guide.topic + (guide.carried->by_tf ? " (tf " + body + ")" : " " + body), own,
+                      !own && guide.heard(), guide.bodies[b].timing().lag(), guide.bodies[b].timing().excess(),
+                      guide.bodies[b].timing().interval()});
     }
   }
   return ages;

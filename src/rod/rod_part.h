@@ -38,8 +38,12 @@ public:
   /// Whether an unknown has a number of its own, in the part that an inverse iteration acts on.
   bool isUnknown(int unknown) const { return dof_[unknown] >= 0; }
 
-  /// What the rod touches; without a call nothing.
-  void setContact(const ContactProperties& contact) { contact_ = contact; }
+  /// What the rod touches, and which solids its points pass through; without a call nothing.
+  void setContact(const ContactProperties& contact, const std::vector<IgnoredSolid>& ignored = {})
+  {
+    contact_ = contact;
+    ignored_ = ignored.empty() ? nullptr : std::make_shared<std::vector<IgnoredSolid>>(ignored);
+  }
   int points() const override { return touches_ ? system_.nodes() : 0; }
   void addSurface(ContactSurface& surface) const override;
 
@@ -89,6 +93,7 @@ private:
   const bool touches_;
   const double shortest_edge_;   ///< at rest [m]
   ContactProperties contact_;
+  std::shared_ptr<const std::vector<IgnoredSolid>> ignored_;   ///< null: none
   const StepPlan* plan_ = nullptr;
   Substep substep_;
   std::vector<Weld> welds_;

@@ -84,7 +84,7 @@ void RodPart::addSurface(ContactSurface& surface) const
     surface.segments.push_back(s);
   }
   constexpr int kNoOwner = -1;   // solids that belong to one object alone belong to threads
-  surface.objects.push_back({contact_, start, m.closed, kNoOwner});
+  surface.objects.push_back({contact_, start, m.closed, kNoOwner, nullptr, surface.points, ignored_});
   surface.points += m.nodes();
 }
 

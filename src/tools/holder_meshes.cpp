@@ -67,11 +67,11 @@ void addClothGrasp(const GraspSnapshot& grasp, const ClothSnapshot& cloth, const
 }
 
 /// Returns the unit vector from the outlet into the nozzle at `time` [s] of the scene. It is opposite to the direction
-/// that the scene gives. The poses of a nozzle that is moved by messages are not among what is recorded of each
+/// that the scene gives. The poses of a nozzle that messages or tf move are not among what is recorded of each
 /// instant: its newest edge, which runs into it, takes their place.
 Vector3d upstream(const NozzleConfig& nozzle, const ThreadSnapshot& thread, double time)
 {
-  if (std::holds_alternative<TopicMotion>(nozzle.motion))
+  if (comesFromOutside(nozzle.motion))
     return thread.frames.back() * Vector3d::UnitX();
   const auto* table = std::get_if<TableMotion>(&nozzle.motion);
   return -((table ? table->poses.evaluate(time) : nozzle.pose).orientation * Vector3d::UnitX());

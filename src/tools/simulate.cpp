@@ -17,13 +17,16 @@
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/linalg/interruption.h"
 #include "slender_sim/scene/file_paths.h"
+#include "slender_sim/scene/limit_watch.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
+#include "slender_sim/scene/residual_text.h"
 #include "slender_sim/scene/simulation.h"
 #include "statics_report.h"
 #ifdef SLENDER_WITH_BAG
 #include "slender_sim/node/bag_recorder.h"
 #include "slender_sim/node/guide_bag.h"
+#include "slender_sim/node/robot_sources.h"
 #endif
 
 /// simulate SCENE.yaml: runs a scene without a ROS master. Exit status 0 done, 2 bad input, 3 the simulation failed, or
@@ -181,6 +184,58 @@ private:
   Clock::time_point start_, last_;
 };
 
+/// Watches the limits of the scene and says on stderr what exceeds them: each excursion once, and at most one per
+/// simulated second.
+class LimitTeller
+{
+public:
+  explicit LimitTeller(Simulation& simulation) : simulation_(simulation), watch_(simulation) {}
+
+  /// Both return false when the run must stop.
+  bool beforeStep(slender::SceneInputs& inputs, Progress& progress)
+  {
+    return tell(watch_.checkInputs(inputs), progress);
+  }
+  bool afterStep(Progress& progress) { return tell(watch_.checkStep(), progress); }
+
+  void printSummary() const
+  {
+    if (watch_.count() > 0)
+      std::printf("limits            exceeded %llu times, %zu still are at the end\n",
+                  static_cast<unsigned long long>(watch_.count()), watch_.lasting().size());
+  }
+
+private:
+  bool tell(const std::vector<slender::LimitExcess>& begun, Progress& progress)
+  {
+    for (const slender::LimitExcess& excess : begun)
+    {
+      if (told_ && simulation_.state().time < *told_ + 1.0)
+        break;
+      told_ = simulation_.state().time;
+      progress.clear();
+      std::fprintf(stderr, "simulate: warning: %s%s\n", excess.text.c_str(),
+                   watch_.held().empty() ? "" : "; what is driven stays where it is from here on (on_limit: hold)");
+    }
+    for (const int grasp : watch_.released())
+    {
+      progress.clear();
+      std::fprintf(stderr, "simulate: warning: grasp '%s' is released (on_limit: release)\n",
+                   simulation_.grasps()[static_cast<std::size_t>(grasp)].config->name.c_str());
+    }
+    if (watch_.stopped().empty())
+      return true;
+    progress.clear();
+    std::fprintf(stderr, "simulate: stopped after step %llu: %s (on_limit: stop)\n",
+                 static_cast<unsigned long long>(simulation_.state().steps), watch_.stopped().c_str());
+    return false;
+  }
+
+  Simulation& simulation_;
+  slender::LimitWatch watch_;
+  std::optional<double> told_;   // [s] simulated
+};
+
 slender::ThreadVolumes volumesOf(const Simulation& simulation)
 {
   slender::ThreadVolumes volumes;
@@ -210,7 +265,7 @@ void printSummary(const Simulation& simulation, const StepReport& total, double 
   std::printf("simulated         %.6g s\n", simulated);
   std::printf("wall              %.6g s\n", wall);
   std::printf("real-time factor  %.4g (simulated over wall time)\n", simulated / std::max(wall, 1e-9));
-  std::printf("worst residual    %.3g of the largest force\n", total.residual);
+  std::printf("worst residual    %s\n", slender::residualText(simulation.config(), total.residual).c_str());
   std::printf("iterations        %d (%.2f per step)\n", total.iterations,
               total.iterations / std::max(1.0, static_cast<double>(simulation.state().steps)));
   std::printf("cut steps         %d\n", total.cut_steps);
@@ -294,10 +349,25 @@ int runStatics(const Options& options, Simulation& simulation, Clock::time_point
   return slender::reportStatics(simulation.config(), found) ? slender::kDone : slender::kFailed;
 }
 
+void printWarnings(const slender::SceneConfig& scene, const Options& options)
+{
+  for (const std::string& warning : scene.warnings)
+    std::fprintf(stderr, "simulate: warning: %s\n", warning.c_str());
+  if (!options.quiet)
+    for (const std::string& note : scene.notes)
+      std::fprintf(stderr, "simulate: note: %s\n", note.c_str());
+  if (scene.statics && !options.statics)
+  {
+    std::fprintf(stderr,
+                 "simulate: warning: the key statics of the scene is for --statics, without which it is not used\n");
+  }
+}
+
 int run(const Options& options)
 {
 #ifdef SLENDER_WITH_BAG
   slender::setGuideBagReader(slender::readGuideBag);
+  slender::setRobotSources(slender::packageSources());
 #else
   if (!options.bag.empty())
   {
@@ -315,15 +385,9 @@ int run(const Options& options)
   config.start.equilibrium = config.start.equilibrium || options.statics;
   const auto start = Clock::now();
   Simulation simulation(std::move(config), !options.statics);
-  for (const std::string& warning : simulation.config().warnings)
-    std::fprintf(stderr, "simulate: warning: %s\n", warning.c_str());
+  printWarnings(simulation.config(), options);
   if (options.threads)
     simulation.setThreads(*options.threads);
-  if (simulation.config().statics && !options.statics)
-  {
-    std::fprintf(stderr,
-                 "simulate: warning: the key statics of the scene is for --statics, without which it is not used\n");
-  }
   stopOnSignals();   // before there is anything to finish: until here a signal ends the process at once
   if (options.statics)
     return runStatics(options, simulation, start);
@@ -334,9 +398,13 @@ int run(const Options& options)
   Progress progress(!options.quiet && ::isatty(STDERR_FILENO), steps);
   bool ok = true;
   slender::SceneInputs inputs;
+  LimitTeller limits(simulation);
   for (long k = 1; ok && k <= steps; ++k)
   {
     simulation.defaultInputs(inputs);
+    ok = limits.beforeStep(inputs, progress);
+    if (!ok)
+      break;
     const StepReport report = simulation.step(inputs);
     ok = report.ok && stopped_by == 0;   // explicit steps, for one, are too short to be interrupted
     if (stopped_by != 0)
@@ -357,6 +425,7 @@ int run(const Options& options)
     if (k % every == 0)
       for (auto& recorder : recorders)
         recorder->record(simulation, report);
+    ok = limits.afterStep(progress);
     progress.show(k, simulation.state().time);
   }
   for (auto& recorder : recorders)
@@ -365,7 +434,10 @@ int run(const Options& options)
     saveState(simulation, options.state);
   progress.clear();
   if (!options.quiet)
+  {
     printSummary(simulation, total, std::chrono::duration<double>(Clock::now() - start).count());
+    limits.printSummary();
+  }
   const bool balanced = checkVolumes(simulation);
   return stopped_by != 0 && !ok ? 128 + stopped_by : balanced && ok ? slender::kDone : slender::kFailed;
 }

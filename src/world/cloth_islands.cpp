@@ -75,6 +75,10 @@ public:
       model.options.push_back(world.cloths[k].options);
     }
     model.solids = world.obstacles;
+    model.ignored.resize(world.obstacles.size());
+    for (std::size_t k = 0; k < cloths_.size(); ++k)
+      for (const IgnoredSolid& solid : world.cloths[cloths_[k]].ignored)
+        model.ignored[static_cast<std::size_t>(solid.number)].push_back(static_cast<int>(k));
     for (std::size_t b = 0; b < world.bodies.size(); ++b)
     {
       const WorldModel::Body& body = world.bodies[b];

@@ -105,6 +105,8 @@ std::vector<ContactSolid> JoinedIsland::takeSolids()
     solids_.push_back(&solid);
     solids.push_back({solid.obstacle});
     solids.back().body = solid.body != nullptr;
+    if (solid.kind == JoinedSolid::Kind::obstacle)
+      solids.back().number = solid.index;
     if (floor)
       solids.back().only = solid.index;
     int object = 0;   // of the contact: bodies that touch solids come first, then rods that touch something

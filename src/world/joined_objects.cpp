@@ -89,7 +89,7 @@ void JoinedObjects::addParts(const TimeConfig& time)
     JoinedRod added{r, std::make_unique<RodStepper::Impl>(rod.model, time), nullptr, {}};
     added.part = std::make_unique<RodPart>(*added.stepper, rod.contact.has_value());
     if (rod.contact)
-      added.part->setContact(*rod.contact);
+      added.part->setContact(*rod.contact, rod.ignored);
     rods.push_back(std::move(added));
   }
   for (const int k : content.threads)
@@ -101,7 +101,7 @@ void JoinedObjects::addParts(const TimeConfig& time)
   {
     const WorldModel::Cloth& cloth = world.cloths[c];
     cloths.push_back({c, std::make_unique<ClothPart>(cloth.model, cloth.options)});
-    cloths.back().part->setContact(*cloth.contact, time.step);
+    cloths.back().part->setContact(*cloth.contact, time.step, cloth.ignored);
   }
 }
 
@@ -123,7 +123,7 @@ void JoinedObjects::addWelds(WorldState& state)
     RodState& rod = state.rods[weld.rod];
     GraspState grasp = makeGrasp(*world.rods[weld.rod].model, rod, weld.first_node, weld.last_node, true);
     grasp.body = simulated(weld.body) ? weld.body : -1;
-    const Pose X_BG = state.bodies[weld.body].X_WB.inverse() * grasp.X_WG;
+    const Pose X_BG = weld.X_BG.value_or(state.bodies[weld.body].X_WB.inverse() * grasp.X_WG);
     welds.push_back({static_cast<int>(at - rods.begin()), static_cast<int>(rod.grasps.size()), weld.body, X_BG});
     follow(welds.back());
     rod.grasps.push_back(grasp);

@@ -388,6 +388,7 @@ void JoinedParts::checkClearance(const WorldState& state)
     const int index = solid.index;
     if (solid.kind == JoinedSolid::Kind::obstacle)
     {
+      touched.number = index;
       meeting.addSolid("obstacle '" + world_.obstacles[index].name + "'", touched, state.obstacles[index]);
     }
     else if (solid.kind == JoinedSolid::Kind::body)

@@ -113,7 +113,13 @@ class Repository:
         for source in [*self.root.glob('src/tools/*.cpp'), *self.root.glob('src/nodes/*.cpp')]:
             if re.search(r'\bmain\(', read(source)) and re.search(r'\b%s\b' % source.stem, cmake):
                 found[source.stem] = source
+        found.update((script.name, script) for script in self.scripts if re.search(r'PROGRAMS[^)]*\b%s\b' % script.name, cmake))
         return found
+
+    @cached_property
+    def scripts(self):
+        """Scripts that are nodes."""
+        return [f for f in self.root.glob('scripts/*') if f.is_file() and 'import rospy' in read(f)]
 
     @lru_cache(maxsize=None)
     def options(self, program):
@@ -147,8 +153,9 @@ class Repository:
 
     @cached_property
     def node_names(self):
-        """Names of parameters, services and topics: the strings of the node library."""
-        return {s.lstrip('~') for f in [*self.root.glob('src/node/*.cpp'), *self.root.glob('include/slender_sim/node/*.h'),
+        """Names of parameters, services and topics: the strings of the node library, and of nodes that are scripts."""
+        return {s.lstrip('~') for f in [*self.scripts, *self.root.glob('src/node/*.cpp'),
+                                        *self.root.glob('include/slender_sim/node/*.h'),
                                         *self.root.glob('src/nodes/*.cpp')] for s in CPP_STRING.findall(read(f))}
 
     @cached_property

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """~replay: a run in real time, with guides, wind, pauses and service calls, is repeated from its own bag, bit by bit."""
 import math
+import os
 
 import rosbag
 import rospy
@@ -90,11 +91,50 @@ class Replay(NodeCase):
         with open(self.path("run.bag"), "rb") as a, open(self.path("again.bag"), "rb") as b:
             self.assertTrue(a.read() == b.read())
 
+    def test_the_recorded_scene_runs_whatever_an_earlier_start_left(self):
+        node = self.start(wait=False, pace="fast", stop_after=0.1, record_bag=self.path("run.bag"), record_inputs=False)
+        self.assertEqual(node.wait(60), 0, self.output("rod.err"))
+        for scene, overrides, told in ((SCENE.replace("edges: 20", "edges: 21"), "", True), (self.path("gone.yaml"), "", True),
+                                       (SCENE, "time.step=0.001", True), (SCENE, "", False)):
+            node = self.start(scene, wait=False, pace="fast", stop_after=0.0, set=overrides, replay=self.path("run.bag"), record_bag=self.path("again.bag"))
+            self.assertEqual(node.wait(60), 0, self.output("rod.err"))
+            self.assertTrue(self.raw("run.bag") == self.raw("again.bag"))
+            text = self.output("rod.out") + self.output("rod.err")
+            self.assertEqual("the recorded scene runs" in text, told, text)
+            self.assertEqual("rosparam delete /t/rod/scene" in text, told, text)
+            self.assertEqual("rosparam delete /t/rod/set" in text, told and bool(overrides), text)
+
+    def test_a_bag_that_is_read_is_not_written(self):
+        """~record_bag is left over from the run that recorded the bag."""
+        run_bag = self.path("run.bag")
+        node = self.start(wait=False, pace="fast", stop_after=0.1, record_bag=run_bag)
+        self.assertEqual(node.wait(60), 0, self.output("rod.err"))
+        os.symlink(run_bag, self.path("link.bag"))
+        os.link(run_bag, self.path("hard.bag"))
+        os.link(run_bag, self.path("early.bag.active"))
+        os.link(run_bag, self.path("late.previous.bag"))
+        with open(run_bag, "rb") as file:
+            before = file.read()
+        for name in ("run.bag", "link.bag", "hard.bag", "early.bag", "late.bag"):
+            node = self.start("", wait=False, pace="fast", stop_after=0.0, replay=run_bag, record_bag=self.path(name))
+            self.assertEqual(node.wait(60), 2, name)
+            self.assertIn("which ~replay reads; name another file", self.output("rod.err"))
+            self.assertIn("rosparam delete /t/rod/record_bag", self.output("rod.err"))
+            with open(run_bag, "rb") as file:
+                self.assertTrue(file.read() == before)
+
+    def test_an_older_bag_is_kept(self):
+        bag = self.path("run.bag")
+        for _ in range(2):
+            node = self.start(wait=False, pace="fast", stop_after=0.1, record_bag=bag)
+            self.assertEqual(node.wait(60), 0, self.output("rod.err"))
+        self.assertIn("the old one is kept as " + self.path("run.previous.bag"), self.output("rod.out") + self.output("rod.err"))
+        self.assertTrue(self.raw("run.bag") == self.raw("run.previous.bag"))
+
     def test_what_cannot_be_replayed(self):
         node = self.start(wait=False, pace="fast", stop_after=0.1, record_bag=self.path("run.bag"))
         self.assertEqual(node.wait(60), 0, self.output("rod.err"))
         for expected, scene, parameters in (("there is no such file", SCENE, {"replay": self.path("none.bag")}),
-                                            ("was recorded with another scene", SCENE.replace("edges: 20", "edges: 21"), {"replay": self.path("run.bag")}),
                                             ("keeps the recorded stamps", SCENE, {"replay": self.path("run.bag"), "start_time": 5.0})):
             node = self.start(scene, wait=False, stop_after=0.0, record_bag="", **dict({"start_time": 0.0}, **parameters))
             self.assertEqual(node.wait(60), 2)

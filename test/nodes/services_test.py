@@ -80,7 +80,9 @@ class Services(NodeCase):
         state = self.listen("/t/state", RodState)
         self.step(30)
         file = self.path("saved")
-        self.assertTrue(self.call("save_state", FilePath, file).success)
+        answer = self.call("save_state", FilePath, file)
+        self.assertTrue(answer.success)
+        self.assertEqual(answer.message, "saved " + file)
         onwards = self.states_after(state, 30)
         answer = self.call("load_state", FilePath, file)
         self.assertTrue(answer.success, answer.message)
@@ -88,6 +90,21 @@ class Services(NodeCase):
         self.assertEqual(numbers(again), numbers(onwards))
         self.assertEqual((again.step, again.epoch), (60, 1))
         self.assertGreater(again.header.stamp, onwards.header.stamp)
+
+    def test_relative_paths_are_told_in_full(self):
+        self.start()   # the node's working directory is that of the test
+        self.step(3)
+        name = "slender_sim_relative_%d" % os.getpid()
+        try:
+            answer = self.call("save_state", FilePath, name)
+            self.assertTrue(answer.success, answer.message)
+            self.assertEqual(answer.message, "saved " + os.path.abspath(name))
+            answer = self.call("load_state", FilePath, "./" + name)
+            self.assertTrue(answer.success, answer.message)
+            self.assertEqual(answer.message, "loaded " + os.path.abspath(name))
+        finally:
+            if os.path.exists(name):
+                os.remove(name)
 
     def test_save_and_load_refuse(self):
         self.start()
@@ -267,8 +284,10 @@ class Services(NodeCase):
         self.start(guide_delay="1e-2")   # what rosparam makes of a number without a point
 
     def test_scene_of_one_line(self):
-        self.start(scene="{name: short, rods: [{name: rope}]}")
+        node = self.start(scene="{name: short, rods: [{name: rope}]}")
         self.assertEqual(self.step(1).step, 1)
+        node.terminate()   # the next one has the same name and writes into the same files
+        node.wait(60)
         self.refused("~scene:1: rods.0.radios", scene="rods: [{radios: 1}]")
 
     def test_follow_without_a_clock_says_so(self):

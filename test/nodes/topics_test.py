@@ -65,7 +65,7 @@ class Topics(NodeCase):
         wait_until(lambda: "half-axes 0.004 m and 0.002 m" in self.output("rod.out") + self.output("rod.err"), what="the warning")
 
     def test_messages(self):
-        self.start(frame_id="map", start_time=10.0)
+        self.start(frame_id="map", start_time=10.0, wrench_frame="world")
         state = self.listen("/t/state", RodState)
         poses = self.listen("/t/poses", PoseArray)
         wrench = self.listen("/t/grasps/left/wrench", WrenchStamped)
@@ -187,7 +187,7 @@ class Topics(NodeCase):
 
     def wrench_sum(self, scene, axis):
         """Force on both grippers along an axis when the rope has come to rest."""
-        self.start(scene)
+        self.start(scene, wrench_frame="world")
         listeners = [self.listen("/t/grasps/%s/wrench" % g, WrenchStamped) for g in ("left", "right")]
         stamp = self.step(3000).stamp
         wait_until(lambda: all(l.count() and l.last().header.stamp >= stamp for l in listeners), what="wrenches")

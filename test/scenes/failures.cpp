@@ -107,6 +107,7 @@ TEST(Failures, ofSeveralRodsNameTheRightOne)
   const std::string text =
       failureOf(hopeless + "gravity: [0, 0, 0]\nrods:\n" + rod("still", 0.0, "") + rod("pulled", 0.1, fast));
   EXPECT_NE(text.find("rod 'pulled'"), std::string::npos) << text;
+  EXPECT_EQ(text.find("overlap"), std::string::npos) << text;   // no grasp is in the way of another
   EXPECT_NE(text.find("nearest grasp is 'end_of_pulled'"), std::string::npos) << text;
   EXPECT_NEAR(numberIn(text, "nearest contact partner is rod 'still', ([-0-9.e+]+) m away"), 0.1 - 0.02, rounding);
 }
@@ -128,6 +129,39 @@ rods:
   EXPECT_NE(text.find("nearest grasp is 'pulled'"), std::string::npos) << text;
   EXPECT_NEAR(numberIn(text, "nearest contact partner is the rod itself at edge [0-9]+, ([-0-9.e+]+) m away"),
               0.1 - 0.01, rounding);
+}
+
+std::string twoGrasps(const std::string& wall, const std::string& gripper, double to, const std::string& contact)
+{
+  return R"(
+time: {step: 0.005, duration: 6}
+rods:
+  - name: cable
+    centerline: {straight: {from: [0, 0, 1], to: [1, 0, 1], edges: 40}}
+    cross_section: {radius: 0.004}
+    material: {density: 1100, youngs_modulus: 1.0e7, poissons_ratio: 0.45}
+    damping: {mass: 2}
+    )" + contact +
+         "\n    grasps:\n      wall: {edges: " + wall + "}\n      gripper: {edges: " + gripper +
+         ", attach: initial, motion: {table: [[0, 1, 0, 1, 0, 0, 0, 1], [1, " + std::to_string(to) +
+         ", 0, 1, 0, 0, 0, 1]]}}\n";
+}
+
+// A gripper that drives the end that it holds into the clamp of the other end.
+TEST(Failures, ofGraspsThatMeetNameBoth)
+{
+  const std::string text = failureOf(twoGrasps("[0]", "[-1]", -0.1, "contact: {self: true}"));
+  EXPECT_NE(text.find("squeezed: grasps 'wall' and 'gripper' overlap"), std::string::npos) << text;
+  EXPECT_LT(numberIn(text, "come within ([-0-9.e+]+) m of each other"), 0.0085);
+  EXPECT_NEAR(numberIn(text, "radii add up to ([-0-9.e+]+) m"), 0.008, 1e-9);
+}
+
+// Two grasps side by side, of which one is pushed over the other: the two edges between them have no room.
+TEST(Failures, ofGraspsWithoutRoomBetweenThemNameBoth)
+{
+  const std::string text = failureOf(twoGrasps("[0..9]", "[12, 13]", 0.8, ""));
+  EXPECT_NE(text.find("squeezed: grasps 'wall' and 'gripper' overlap"), std::string::npos) << text;
+  EXPECT_NEAR(numberIn(text, "with ([-0-9.e+]+) m of the rod between them"), 0.05, 1e-9);
 }
 
 TEST(Failures, ofExplicitStepsNameTheFastestNode)

@@ -103,6 +103,35 @@ TEST_F(Simulate, warnsEvenWhenItIsQuiet)
   EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;   // once
 }
 
+// A cable that is drawn out to 1.7 times its length within a second.
+const std::string drawn =
+    " --quiet --set 'rods.0.centerline={straight: {from: [0, 0, 1], to: [1, 0, 1], edges: 20}}'"
+    " --set 'rods.0.grasps={a: {edges: [0]}, b: {edges: [-1], attach: initial, motion: {table: [[0, 0, 0, 0, 0, 0, 0, "
+    "1], [1, 0.7, 0, 0, 0, 0, 0, 1]]}}}' --duration 1";
+
+TEST_F(Simulate, warnsOfLimitsOnce)
+{
+  const Result result = simulate(cantilever + drawn);
+  EXPECT_EQ(result.status, 0) << result.output;
+  EXPECT_NE(result.output.find("simulate: warning: rod 'beam', edge "), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find(" exceeds limits.strain = 0.5 (t = "), std::string::npos) << result.output;
+  EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
+  EXPECT_EQ(simulate(cantilever + drawn + " --set 'limits={strain: none}'").output, "");
+}
+
+TEST_F(Simulate, actsOnLimits)
+{
+  const Result stopped = simulate(cantilever + drawn + " --set limits.on_limit=stop");
+  EXPECT_EQ(stopped.status, 3) << stopped.output;
+  EXPECT_NE(stopped.output.find("simulate: stopped after step "), std::string::npos) << stopped.output;
+  const Result held = simulate(cantilever + drawn + " --set limits.on_limit=hold");
+  EXPECT_EQ(held.status, 0) << held.output;
+  EXPECT_NE(held.output.find("stays where it is from here on"), std::string::npos) << held.output;
+  const Result released = simulate(cantilever + drawn + " --set limits.on_limit=release");
+  EXPECT_EQ(released.status, 0) << released.output;
+  EXPECT_NE(released.output.find("' is released (on_limit: release)"), std::string::npos) << released.output;
+}
+
 TEST_F(Simulate, badInputIsStatus2)
 {
   for (const char* arguments : {"", "--nonsense", "/nonexistent.yaml", "a.yaml b.yaml", "--duration"})

@@ -1,10 +1,12 @@
 #include "src/linalg/cholesky6.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "test/support/random.h"
 
-namespace slender {
+namespace slender::test {
 namespace {
 
 TEST(Cholesky6, SolvesAndTellsIndefiniteMatrices)
@@ -33,4 +35,4 @@ TEST(Cholesky6, SolvesAndTellsIndefiniteMatrices)
 }
 
 }   // namespace
-}   // namespace slender
+}   // namespace slender::test

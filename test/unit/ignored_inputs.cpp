@@ -337,8 +337,10 @@ TEST(IgnoredInputs, overridesThatMatchNothingAreRefusedWithNearNames)
   EXPECT_TRUE(
       has(refusal("rods.0.material.youngs_modulis=1e7"), {"--set", "youngs_modulis", "did you mean youngs_modulus?"}))
       << refusal("rods.0.material.youngs_modulis=1e7");
-  EXPECT_TRUE(has(refusal("rods.rope.closed=true"), {"--set", "is a list", "0 is rope"}))
-      << refusal("rods.rope.closed=true");
+  EXPECT_TRUE(has(refusal("rods.rope.closed=true"), {"holds the edge that joins the last node"}))
+      << refusal("rods.rope.closed=true");   // a name stands for a number
+  EXPECT_TRUE(has(refusal("rods.rop.closed=true"), {"--set", "is a list", "0 is rope"}))
+      << refusal("rods.rop.closed=true");
   EXPECT_TRUE(has(refusal("rods.1.closed=true"), {"--set", "[-1, 0]"}));
   EXPECT_TRUE(has(refusal("rods.0.grasps.lefft.motion=topic"),
                   {"--set", "no grasp 'lefft'", "it has: left, right", "did you mean left?"}))

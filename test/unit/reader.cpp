@@ -233,7 +233,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"rods.0.grasps.left.motion={file: nowhere.csv, body: b}", "nowhere.csv: cannot be opened"},
         Case{"rods.0.grasps.left.attach=gripper",
              "must be one of: section, initial; attach: Which point the poses of `motion` describe"},
-        Case{"rods.0.grasps.left.motion={file: nowhere.csv}", "body: is missing"},
+        Case{"rods.0.grasps.left.motion={file: nowhere.csv}", "nowhere.csv: cannot be opened"},
+        Case{"rods.0.grasps.left.motion={body: b, file: [1]}", "must be"},
         Case{"rods.0.grasps.left.motion={table: []}", "has 0 entries"},
         Case{"rods.0.grasps.left.motion={table: [[0, 1, 2]]}", "has 3 numbers; must be [t, x, y, z, qx, qy, qz, qw]"},
         Case{"rods.0.grasps.left.motion={table: [[0, 1, 2, 3]]}", "has 4 numbers"},
@@ -250,6 +251,7 @@ INSTANTIATE_TEST_SUITE_P(
     Path, BadValue,
     testing::Values(Case{"rods.1.name=x", "'rods' is a list; '1' must be a whole number in [-1, 0]"},
                     Case{"rods.first.name=x", "'first' must be a whole number"},
+                    Case{"rods.rope.material.density=0", "material.density = 0: is out of range"},   // by its name
                     Case{"rods.4e85.name=x", "'4e85' must be a whole number"},
                     Case{"rods.-4e85.name=x", "'-4e85' must be a whole number"}, Case{"rods.0.5.name=x", "unknown key"},
                     Case{"time.step.size=1", "'time.step' is the single value '0.005' and has no part 'size'"},

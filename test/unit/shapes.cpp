@@ -179,5 +179,29 @@ TEST_F(PoseFile, drivesAGrasp)
   }
 }
 
+// `body` chooses one of several; the only one in a file needs no choice.
+TEST_F(PoseFile, ofOneBodyNeedsNoName)
+{
+  const auto scene = [](const std::string& path) {
+    return "rods: [{grasps: {g: {edges: [0], motion: {file: " + path +
+           "}}}}]\nobstacles: [{name: o, shape: {sphere: {radius: 1}}, motion: {file: " + path + "}}]\n";
+  };
+  const SceneConfig config = parseScene(scene(write("0,hand,0,0,0,0,0,0,1\n1,hand,0,0,1,0,0,0,1\n")));
+  EXPECT_EQ(std::get<TableMotion>(config.rods[0].grasps[0].motion).poses.evaluate(2).position.z(), 1.0);
+  EXPECT_EQ(std::get<TableMotion>(config.obstacles[0].motion).poses.evaluate(2).position.z(), 1.0);
+  try
+  {
+    parseScene(scene(write("0,hand,0,0,0,0,0,0,1\n0,foot,0,0,1,0,0,0,1\n")));
+    FAIL() << "a file of two bodies was accepted";
+  }
+  catch (const SceneError& error)
+  {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("rods.0.grasps.g.motion.body: is missing; "), std::string::npos) << text;
+    EXPECT_NE(text.find("obstacles.0.motion.body: is missing; "), std::string::npos) << text;
+    EXPECT_NE(text.find("holds several bodies, of which it names one: "), std::string::npos) << text;
+  }
+}
+
 }   // namespace
 }   // namespace slender

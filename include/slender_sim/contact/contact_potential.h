@@ -41,6 +41,13 @@ struct ContactTriangle
   unsigned char driven = 0;
 };
 
+/// A solid that pieces of an object pass through.
+struct IgnoredSolid
+{
+  int number = -1;            ///< see ContactSolid::number
+  std::vector<char> points;   ///< of each point of the object: whether the pieces there pass; empty: all pieces do
+};
+
 /// What a curve or a cloth touches. Pieces of one curve that are closer along it than about a quarter of a turn at its
 /// tightest are neighbours and never a pair. Pieces of one cloth are neighbours if they have a corner in common.
 struct ContactObject : ContactProperties
@@ -48,11 +55,12 @@ struct ContactObject : ContactProperties
   double curve_length = 0.0;   ///< [m]
   bool closed = false;
   int owner = 0;   ///< see ContactSolid::only
-  /// Of a cloth: where its points are at rest [m], and the number of the first of them. Two pieces of it that are near
+  /// Of a cloth: where its points are at rest [m]. Two pieces of it that are near
   /// each other there keep the thickness and repel from the gap only as far as both together are at most half of that
   /// distance; pieces that meet there are neighbours. Null: all of them keep the whole thickness.
   std::shared_ptr<const Eigen::Matrix3Xd> rest{};
-  int first_point = 0;
+  int first_point = 0;   ///< number of the first of its points, of cloths and rods
+  std::shared_ptr<const std::vector<IgnoredSolid>> ignored{};   ///< null: it passes through none
   /// Of the surface of a simulated body: the number of its solid. Friction then acts where the surfaces meet, and not
   /// on the points of the surface, which may lie inside of the body.
   int carrier = -1;
@@ -63,6 +71,7 @@ struct ContactSolid : Obstacle
 {
   std::vector<int> ignores{};   ///< objects it never touches
   int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
+  int number = -1;              ///< for IgnoredSolid; -1: nothing names it
   bool body = false;            ///< moves freely, so that triangles touch it wherever their corners are driven
 };
 

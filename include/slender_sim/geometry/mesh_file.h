@@ -33,6 +33,14 @@ TriangleMesh readPly(const std::string& path);
 /// By the end of the name: .obj or .ply, in small or capital letters. Throws std::runtime_error for another.
 TriangleMesh readMesh(const std::string& path);
 
+/// Reads a binary or ASCII STL file [unit of the file]. Corners with the same coordinates become one vertex. Throws
+/// std::runtime_error "FILE: reason".
+TriangleMesh readStl(const std::string& path);
+
+/// Reads all triangles of a COLLADA (DAE) file [m], by the unit of the file and without a turn to another up axis.
+/// Throws std::runtime_error "FILE: reason", also in builds without assimp.
+TriangleMesh readCollada(const std::string& path);
+
 /// Write all vertices in order, with enough digits to read the same doubles back (PLY: binary_little_endian, double).
 /// Throw std::runtime_error "FILE: cannot be written".
 void writeObj(const std::string& path, const TriangleMesh& mesh);

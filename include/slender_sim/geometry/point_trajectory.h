@@ -28,6 +28,8 @@ public:
   /// zero: of a motion that was under way when it was sampled. Before that frame points are held all the same, so that
   /// a query there sees a jump in velocity.
   void startInMotion() { moving_start_ = true; }
+  /// As PoseTrajectory::cutWithin().
+  void cutWithin(double interval) { cut_ = interval; }
   /// From now on more frames may come: two equal ones at the end may be the turning point of a swing, and are no pause
   /// yet.
   void expectMore() { growing_ = true; }
@@ -48,7 +50,7 @@ private:
 
   std::vector<double> times_;
   std::vector<Eigen::Matrix3Xd> frames_;
-  double coast_ = 0.0;
+  double coast_ = 0.0, cut_ = 0.0;
   bool moving_start_ = false;
   bool growing_ = false;   ///< see expectMore()
 };

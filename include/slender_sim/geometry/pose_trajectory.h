@@ -12,13 +12,14 @@ namespace slender {
 /// Positions: cubic Hermite segments whose slopes are the three-point (non-uniform) finite differences of the samples.
 /// Orientations: the same on rotation vectors, each segment R(t) = R_k exp(phi(t)), with phi cubic Hermite from 0 to
 /// log(R_k^T R_{k+1}) and angular velocities at the samples by the three-point difference. Outside the samples the end
-/// pose is held with zero velocity, so the slopes of the first and last sample are zero. Sparse (10..60 Hz) and jittery
-/// input so reaches the rod without jumps of velocity. Two exceptions to the three-point slope: beside a sample with
-/// the same value it is zero, so that a pause stays a pause, and where one interval is under a quarter of the other (a
-/// burst of late messages) it is the chord over both, whose noise does not grow with the shortness of the interval. Two
-/// equal samples are no pause when they lie on both sides of the turning point of a swing: the acceleration before, at
-/// and after them is then the same to within a third. q and -q are the same orientation; between samples the turn is
-/// the shorter one, so turns must be sampled more often than every half turn.
+/// pose is held with zero velocity, so the slopes of the first and last sample are zero, unless the motion is said to
+/// be cut out of a longer one (cutWithin()). Sparse (10..60 Hz) and jittery input so reaches the rod without jumps of
+/// velocity. Two exceptions to the three-point slope: beside a sample with the same value it is zero, so that a pause
+/// stays a pause, and where one interval is under a quarter of the other (a burst of late messages) it is the chord
+/// over both, whose noise does not grow with the shortness of the interval. Two equal samples are no pause when they
+/// lie on both sides of the turning point of a swing: the acceleration before, at and after them is then the same to
+/// within a third. q and -q are the same orientation; between samples the turn is the shorter one, so turns must be
+/// sampled more often than every half turn.
 class PoseTrajectory
 {
 public:
@@ -35,6 +36,10 @@ public:
   /// From now on more samples may come: two equal ones at the end may be the turning point of a swing, and are no pause
   /// yet.
   void expectMore() { growing_ = true; }
+  /// The samples may begin and end in the middle of a motion. An end whose interval is shorter than `interval` [s] then
+  /// has the slope of the parabola through the three samples there, or that of its neighbour if that is less (0: the
+  /// ends are at rest). Outside of the samples the pose is held all the same: a query there sees a jump in velocity.
+  void cutWithin(double interval) { cut_ = interval; }
   /// Forgets samples that no query at or after `time` needs.
   void forgetBefore(double time);
 
@@ -52,10 +57,12 @@ public:
 private:
   /// Velocity of sample k by differences: linear in world axes, angular in the axes of the sample itself.
   Twist slope(std::size_t k) const;
+  /// The same of the first or the last sample of a motion that was cut there.
+  Twist endSlope(std::size_t k) const;
 
   std::vector<double> times_;
   std::vector<Pose> poses_;
-  double coast_ = 0.0;
+  double coast_ = 0.0, cut_ = 0.0;
   bool growing_ = false;   ///< see expectMore()
 };
 

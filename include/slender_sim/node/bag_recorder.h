@@ -19,16 +19,19 @@ namespace slender {
 class BagRecorder
 {
 public:
-  /// Opens PATH.active, which close() renames to PATH, in place of an older bag; where PATH is a symbolic link, beside
-  /// the file that it leads to. `topic_namespace` precedes the topics, e.g. "/"; SceneTopics has
-  /// their names. Throws std::runtime_error when the file cannot be written, and when PATH is no regular file.
+  /// Opens PATH.active, which close() renames to PATH; where PATH is a symbolic link, beside the file that it leads to.
+  /// An older bag is kept under previousBag(), and notes() say so. `topic_namespace` precedes the topics, e.g. "/";
+  /// SceneTopics has their names. Throws std::runtime_error when the file cannot be written, when PATH is no regular
+  /// file, and when a guide of the scene reads that bag.
   BagRecorder(const std::string& path, const std::string& topic_namespace, const Simulation& simulation);
   ~BagRecorder();
 
-  /// The scene as parsed, on `scene`; once, before the first record().
+  /// The scene as parsed, on `scene`; before the first record().
   void recordScene(const std::string& yaml, const ros::Time& stamp);
   /// The undeformed cloths, on `mesh`; likewise, in scenes that have any.
   void recordMesh(const slender_sim::MeshStamped& mesh);
+  /// From now on records the edited scene. Its text and its cloths are recorded anew by the two above.
+  void sceneChanged(const Simulation& simulation) { nameTopics(simulation); }
   /// What changed the run, on `inputs`.
   void recordInput(const slender_sim::Input& input);
   /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies,
@@ -39,15 +42,20 @@ public:
   void close();
 
   const std::string& path() const { return path_; }
+  /// What becomes of bags that were there before, for the user; one sentence each.
+  const std::vector<std::string>& notes() const { return notes_; }
 
 private:
+  void keepEarlierBags(const std::string& active);
   template <class Message>
   void write(const std::string& topic, const ros::Time& stamp, const Message& message);
   std::string remains() const;
+  void nameTopics(const Simulation& simulation);
 
+  const std::string prefix_;
   std::string path_, rods_topic_, threads_topic_, cloths_topic_, mesh_topic_;
   std::string scene_topic_, inputs_topic_, bodies_topic_, grasps_topic_, obstacles_topic_, fields_topic_;
-  std::vector<std::string> wrench_topics_, nozzle_topics_;
+  std::vector<std::string> wrench_topics_, nozzle_topics_, notes_;
   std::unique_ptr<rosbag::Bag> bag_;
   bool open_ = false;
 };

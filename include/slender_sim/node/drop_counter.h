@@ -30,12 +30,19 @@ const char* toString(Drop reason);
 class DropCounter
 {
 public:
+  /// A paused node keeps a message. The log says so once until deliveredKept().
+  void keep(const std::string& what);
+  void deliveredKept() { told_of_kept_ = false; }
+
   /// Every message as it arrives, whatever becomes of it.
   void receive() { ++received_; }
   std::uint64_t received() const { return received_; }
 
   /// `what`: e.g. the topic; `detail` ends the sentence, e.g. the value.
   void drop(Drop reason, const std::string& what, const std::string& detail = "");
+
+  /// Drops a message whose stamp is `ahead` seconds after the simulated time (negative: before).
+  void dropByStamp(bool stale, const std::string& what, double ahead);
 
   std::uint64_t count(Drop reason) const { return reasons_[static_cast<int>(reason)].count; }
   std::uint64_t total() const;
@@ -51,6 +58,7 @@ private:
   };
   std::array<Reason, kDropReasons> reasons_;
   std::uint64_t received_ = 0;
+  bool told_of_kept_ = false;
 };
 
 }   // namespace slender

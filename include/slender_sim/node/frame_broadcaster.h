@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -33,5 +34,8 @@ private:
   ros::Publisher publisher_;
   tf2_msgs::TFMessage message_;
 };
+
+/// The names of all frames that a node may publish for a scene.
+std::set<std::string> broadcastFrames(const std::string& node, const SceneTopics& topics, const Simulation& simulation);
 
 }   // namespace slender

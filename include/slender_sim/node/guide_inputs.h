@@ -1,8 +1,10 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,25 +24,30 @@
 #include "slender_sim/node/hand_markers.h"
 #include "slender_sim/node/input_replay.h"
 #include "slender_sim/node/node_options.h"
+#include "slender_sim/node/paused_messages.h"
 #include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
+#include "slender_sim/node/tf_inputs.h"
 #include "slender_sim/node/tracking_inputs.h"
 #include "slender_sim/scene/simulation.h"
 
 namespace slender {
 
 /// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`,
-/// `bodies`, `nozzle/pose`, through tf2 into the node's frame; and `nozzle/flow`, `belt/velocity` and `wind`, which
-/// hold from the next step on. Subscribes only to what the scene asks for. Guides of tracked cloths: TrackingInputs.
-/// Bad messages are dropped and counted; what they would have moved keeps its previous input. A stamp of zero means
-/// now, as everywhere in tf.
+/// `bodies`, `nozzle/pose`, through tf2 into the node's frame; frames of tf themselves, see TfInputs; and
+/// `nozzle/flow`, `belt/velocity` and `wind`, which hold from the next step on. Subscribes only to what the scene asks
+/// for. Guides of tracked cloths: TrackingInputs. Bad messages are dropped and counted; what they would have moved
+/// keeps its previous input. A stamp of zero means now, as everywhere in tf.
 class GuideInputs
 {
 public:
-  /// `nh` carries the callback queue of the simulating thread: callbacks never run beside a step.
+  /// `nh` carries the callback queue of the simulating thread: callbacks never run beside a step. `own_frames`: of tf,
+  /// which the node itself broadcasts. `before`: those of the scene before an edit, from which everything is taken over
+  /// that goes on: what was heard from the same senders for the same things, transforms, and counts. They are of no use
+  /// afterwards.
   GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
-              const SceneTopics& topics);
+              const SceneTopics& names, std::set<std::string> own_frames, GuideInputs* before = nullptr);
 
   /// Takes in messages whose transforms have arrived meanwhile; drops those that waited too long.
   void processPending();
@@ -59,10 +66,18 @@ public:
   void attachAt(int grasp, const Pose& X_WG);
   /// Everything was moved: a state was loaded.
   void attachAll(const Simulation& simulation);
+  /// Everything stood still instead of following its input, which counts again.
+  void catchUp(const Simulation& simulation);
   /// The scene was reset: forgets all input.
   void restart(const Simulation& simulation);
   /// The clock skipped so many seconds, during which everything stood still.
   void skip(double seconds);
+
+  /// `present` returns the time of others: while the simulation is paused or has failed it may go on.
+  void onPresent(const std::function<ros::Time()>& present);
+  /// Takes in what came while the simulation stood still. With `all` it goes on at the present; else it takes some
+  /// steps where it is, for which only messages without a stamp count.
+  void takeKept(bool all);
 
   /// What is driven by messages of its own may also be dragged by hand: TOPIC/feedback counts as poses of the present.
   /// Whoever drags should be the only one who moves it.
@@ -78,6 +93,8 @@ public:
   /// Age of the last pose at the clock's present; nothing while none came.
   /// "NAME for grasp G" of each body that something follows by the topic `bodies` and that no message has named yet.
   std::vector<std::string> unheardBodies() const;
+  /// Of each frame of tf that something follows.
+  std::vector<TfInputs::State> frames() const { return tf_->states(); }
   std::vector<Age> ages() const;
 
   /// Per flow, belt and wind driven from outside: the value by message.
@@ -93,11 +110,12 @@ private:
   void takenPose(std::size_t guided, double time, const Pose& X_WH) const;
   void takenVector(std::uint8_t kind, std::size_t thread, const Eigen::Vector3d& v) const;
 
-  // buffer: null when not driven from outside
+  // buffer: null when not driven from outside; frame: of tf, empty when driven by messages
   struct Guided
   {
-    std::string name, body, topic;
+    std::string name, body, topic, frame;
     std::unique_ptr<GuideBuffer> buffer;
+    bool byMessages() const { return buffer && body.empty() && frame.empty(); }
   };
   struct Entry
   {
@@ -122,15 +140,23 @@ private:
   bool isDraggable(std::size_t guided) const;
   std::string handleName(std::size_t guided) const;
   std::optional<Eigen::Vector3d> velocityOf(const geometry_msgs::Vector3Stamped& message, const std::string& what);
+  void takeNow(const Message& message);
   void onGuides(const geometry_msgs::PoseArray& message);
   void onBodies(const slender_sim::BodyStates& message);
   Pose poseOf(const Simulation& simulation, std::size_t guided) const;
   bool addThreads(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
                   const std::vector<std::string>& prefixes);
   void subscribePose(ros::NodeHandle& nh);
+  bool addGrasps(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
+                 const std::vector<std::string>& names);
   void addSolids(const Simulation& simulation, const GuideBuffer::Options& options);
+  void followFrames();
+  void shareLag();
+  std::string kindOf(std::size_t guided) const;
   bool checkPose(const geometry_msgs::Pose& message, const std::string& what, const std::string& whose, Pose& X);
   void take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries);
+  std::vector<std::string> guidedKeys() const;
+  void takeOver(GuideInputs& before);
   void dropTransform(PoseFault fault, const std::string& what, const std::string& frame);
   /// False when the transform is not known yet.
   bool deliver(const Message& message, std::string* why);
@@ -160,9 +186,12 @@ private:
   };
   std::map<std::size_t, Dragged> hand_;   // per guided, not taken yet
   PendingMessages<Message> pending_;
+  PausedMessages<Message> paused_;
   DropCounter drops_;
-  tf2_ros::Buffer tf_buffer_;
+  std::shared_ptr<tf2_ros::Buffer> shared_tf_buffer_;   // also after an edit
+  tf2_ros::Buffer& tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<TfInputs> tf_;
   std::unique_ptr<TrackingInputs> tracking_;
   std::vector<ros::Subscriber> subscribers_;
   InputSink sink_;

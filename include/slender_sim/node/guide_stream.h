@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "slender_sim/node/catch_up.h"
@@ -17,10 +18,19 @@ public:
   /// Stamp of the last sample [s], if there is any.
   std::optional<double> lastTime() const { return last_stamp_; }
   const GuideTiming& timing() const { return timing_; }
+  /// See GuideTiming::lagAtLeast().
+  void lagAtLeast(double lag) { timing_.lagAtLeast(lag); }
 
 protected:
   /// `coast` [s] >= 0: within this time the motion comes to rest when no sample comes. With 0 the last sample is held.
-  GuideStream(const GuideTiming::Options& timing, double coast) : timing_(timing), coast_(coast) {}
+  /// `blend` [s] >= 0: shortest time in which the derived class takes up the speed of a stream, or lets go of it. Where
+  /// samples come faster than that, streams begin and end in the middle of a motion; else they begin and end at rest.
+  GuideStream(const GuideTiming::Options& timing, double coast, double blend)
+    : timing_(timing),
+      coast_(coast),
+      cut_(timing.delay > 0.0 || timing.automatic ? blend : 0.0)   // without a lag each sample is an end for a while
+  {
+  }
   virtual ~GuideStream() = default;
 
   /// The first stream takes effect. trajectory_ begins at `start` [s].
@@ -75,6 +85,8 @@ protected:
       if (changed_)
         rejoin(*last_time_);
       changed_ = false;
+      if (!now.jumped)
+        halt(time, now);
       query_ = now.time;
       rate_ = now.rate;
       output(time);
@@ -111,6 +123,22 @@ protected:
   double query_ = 0.0, rate_ = 1.0;   // [s] instant of the trajectory at last_time_, and its rate
 
 private:
+  /// When the motion runs past its last sample and is held there from then on, its speed is an offset to be blended
+  /// out.
+  void halt(double time, const GuideTiming::Instant& now)
+  {
+    const double end = trajectory_.times().back();
+    if (cut_ == 0.0 || coast_ > 0.0 || open_ || query_ >= end || now.time < end || trajectory_.times().size() < 3)
+      return;
+    const double when = *last_time_ + (time - *last_time_) * (end - query_) / std::max(now.time - query_, end - query_);
+    query_ = end - kLimitOffset;
+    rate_ = now.rate;
+    output(when);   // with the speed at which it arrives
+    query_ = end;
+    forgetPlain();
+    rejoin(when);
+  }
+
   /// Lets the newest stream take effect, which is the first one or one after a pause.
   void begin(double time, const GuideTiming::Instant& now)
   {
@@ -118,6 +146,7 @@ private:
       trajectory_ = std::move(*next_);
     next_.reset();
     trajectory_.coast(coast_);
+    trajectory_.cutWithin(cut_);
     trajectory_.expectMore();
     open_ = false;
     const double start = trajectory_.times().front();
@@ -130,7 +159,7 @@ private:
     rate_ = now.rate;
   }
 
-  double coast_;
+  double coast_, cut_;
   std::optional<Trajectory> next_;     // of a new stream that has not taken effect yet
   std::optional<double> last_stamp_;   // [s] of the last sample
   bool changed_ = false;               // the trajectory changed since the last query

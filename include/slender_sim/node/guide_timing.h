@@ -56,6 +56,12 @@ public:
   /// Moves on to simulated `time` [s], which does not decrease.
   Instant advance(double time);
 
+  /// The lag that the stream asks for [s]: the delay, or more.
+  double wantedLag() const { return own(); }
+  /// From now on the lag is at least this [s], unless there is none at all. Streams that shall be shown at one instant
+  /// are given the greatest lag that any of them asks for.
+  void lagAtLeast(double lag) { least_ = lag; }
+
   /// The simulated clock skipped so many seconds.
   void skip(double seconds);
   /// Forgets all samples.
@@ -68,11 +74,15 @@ public:
   /// By how much the needed lag exceeded the delay [s] during the last 2.5 to 5 seconds; 0 when it did not. The value
   /// is always 0 with the option `automatic`.
   double excess() const;
+  /// Between the last two stamps [s]; 0 when there are not two. A stream needs a lag of two intervals even if its
+  /// messages take no time at all.
+  double interval() const { return count_ > 1 ? last_ - previous_ : 0.0; }
 
 private:
   bool fixed() const { return options_.delay == 0.0 && !options_.automatic; }
   double required() const { return peak_ > older_peak_ ? peak_ : older_peak_; }
-  double wanted() const;
+  double own() const;   // the lag that this stream needs
+  double wanted() const { return fixed() ? 0.0 : least_ > own() ? least_ : own(); }
   bool ended(double time) const;
   double known() const { return count_ > 2 ? previous_ : first_; }
   void begin(double time, double lag);
@@ -90,6 +100,7 @@ private:
   double peak_ = kNever, older_peak_ = kNever, peaks_since_ = kNever;
   bool following_ = false, overran_ = false, jumped_ = false;
   double query_ = 0.0, rate_ = 1.0;
+  double least_ = 0.0;          // [s] see lagAtLeast()
   std::optional<double> lag_;   // [s] the lag while it is constant
 };
 

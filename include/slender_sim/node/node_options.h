@@ -56,6 +56,8 @@ struct MarkerOptions
   double range = 0.0;
   /// ~marker_forces [m/N]: arrows of contacts' and holders' forces so long; 0: none
   double forces = 0.0;
+  /// a line of the legend that does not come from a parameter: how fast time passes in the picture; empty: none
+  std::string note;
 };
 
 /// Private parameters of rod_node, thread_node, cloth_node and tracking_node, with their defaults.

@@ -61,6 +61,14 @@ public:
     }
   }
 
+  /// change(source, message) may change both; those for which it returns false are dropped.
+  template <class Change>
+  void change(const Change& change)
+  {
+    const auto lost = [&](Entry& entry) { return !change(entry.source, entry.message); };
+    waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), lost), waiting_.end());
+  }
+
 private:
   struct Entry
   {

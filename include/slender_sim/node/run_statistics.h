@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "slender_sim/scene/simulation.h"
@@ -35,5 +36,9 @@ struct RunStatistics
   double realTimeFactor() const { return busy > 0.0 ? simulated / busy : 0.0; }
   double wallSeconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count(); }
 };
+
+/// At most ten lines about grasps, those with the largest force first, for the closing summary. A last line tells of
+/// the others. `names` are those of all grasps of the scene.
+std::vector<std::string> graspLines(const RunStatistics& statistics, const std::vector<std::string>& names);
 
 }   // namespace slender

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include <std_srvs/Trigger.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 
+#include "slender_sim/EditScene.h"
 #include "slender_sim/FilePath.h"
 #include "slender_sim/SetFunctions.h"
 #include "slender_sim/SetGrasp.h"
@@ -30,6 +32,8 @@
 #include "slender_sim/node/scene_messages.h"
 #include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
+#include "slender_sim/scene/limit_watch.h"
+#include "slender_sim/scene/scene_edit.h"
 
 namespace slender {
 
@@ -59,15 +63,23 @@ private:
   };
   static constexpr std::size_t kMostGraspFrames = 64;   // a head of hair has a thousand grasps
   static constexpr double kBurst = 0.02;                // [s] longest run of steps between two looks at the callbacks
+  static constexpr const char* kByLimit = "limit exceeded";   // text of a recorded release
 
   // scene_node.cpp
+  static void checkKind(const SceneConfig& scene, const NodeOptions& options, NodeKind kind);   // throws SceneError
   void start();
+  void makeInputs();   // anew for an edited scene
   void advertise();
   void publishMesh();
   bool isStateFinite() const;
   bool ended() const { return !nh_.ok() || finished_ || stop_; }
   bool advance();   // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
+  // scene_node_limits.cpp
+  bool mindLimits(const std::vector<LimitExcess>& begun);   // false: the simulation stops
+  void letInputsGoOn();                                     // after `on_limit: hold`
+  void addLimits(diagnostic_msgs::DiagnosticStatus& status) const;
+
   void publishState();
   void publishObjects();
   bool isHeard() const;
@@ -81,10 +93,15 @@ private:
   void recordingFailed(const std::string& reason);
   void summary() const;
 
+  // scene_node_frames.cpp
+  std::set<std::string> ownFrames() const;   // of tf, that move
+  void refuseLoops() const;
+
   // scene_node_clock.cpp
   void checkClock() const;
   std::optional<ros::Time> firstStamp();   // nothing while there is no /clock to follow
   bool stampsAreOfTheWall() const;         // and so jump to the present after a pause
+  ros::Time presentOfOthers() const;       // the stamp of the clock unless the simulation stands still beside others
   void anchor();                           // the present tick is due now
   // the state was replaced: a new epoch begins, one tick later; returns the ticks skipped
   std::uint64_t jumped();
@@ -96,9 +113,11 @@ private:
 
   // scene_node_replay.cpp
   void openReplay();
+  void takeRecordedScene();
+  std::string leftover(const std::string& parameter) const;   // advice on a parameter of an earlier start
   void note(slender_sim::Input input, std::uint64_t tick);
   void noteJump(slender_sim::Input input, std::uint64_t tick, std::uint64_t skipped, bool failed);
-  void noteGrasp(const slender_sim::SetGrasp::Request& request);
+  void noteGrasp(const slender_sim::SetGrasp::Request& request, const std::string& why = "");
   bool replayInputs();   // those of the present tick; false when the run is over
   void repeat(const slender_sim::Input& input);
   void repeatJump(const slender_sim::Input& input);
@@ -119,11 +138,28 @@ private:
   std::string attach(const slender_sim::SetGrasp::Request& request, int grasp,
                      slender_sim::SetGrasp::Response& response);
 
+  // scene_node_edits.cpp
+  struct EditedScene
+  {
+    std::unique_ptr<Simulation> simulation;
+    std::unique_ptr<SceneTopics> topics;
+    std::string warnings;
+  };
+  void advertiseEdits();
+  bool onEdit(SceneEdit::Kind kind, slender_sim::EditScene::Request& request,
+              slender_sim::EditScene::Response& response);
+  EditedScene edited(const SceneEdit& edit) const;   // throws for an edit that is refused
+  void takeUp(EditedScene edited);
+  std::vector<ros::Publisher> takePublishers();
+  void deleteMarkers(const Simulation& before);
+  void repeatEdit(const slender_sim::Input& input);
+
   // scene_node_diagnostics.cpp
   void publishDiagnostics();
   static constexpr double kClockReminder = 10.0;   ///< [s] between complaints about /clock
   std::string clockWentBack() const;               ///< empty: it did not
-  void remindOfBodies();                           ///< that are followed, and that nobody has published yet
+  std::string paceNote() const;                    ///< for pictures: how much slower than real time they are
+  void remindOfInputs();                           ///< bodies and frames that are followed and have not come yet
   diagnostic_msgs::DiagnosticStatus simulationStatus() const;
   diagnostic_msgs::DiagnosticStatus inputStatus();
 
@@ -134,6 +170,7 @@ private:
   NodeOptions options_;
   std::unique_ptr<Simulation> simulation_;
   std::unique_ptr<SceneTopics> topics_;
+  std::unique_ptr<LimitWatch> limits_;
   SimClock clock_;
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;
@@ -148,20 +185,22 @@ private:
 
   Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
-  bool stepping_ = false;    // in ~step
-  std::string step_ended_;   // by what call; empty while it goes on
+  bool stepping_ = false;        // in ~step
+  bool guides_led_on_ = false;   // to the end of a step that was not taken
+  std::string step_ended_;       // by what call; empty while it goes on
   std::atomic<bool> stop_{false};
   std::uint32_t epoch_ = 0;
   std::string failure_, bag_failure_;
   StepReport last_report_;
+  double shown_pace_ = 0.0;        // simulated over wall time between the last two diagnostics; 0: not known
   RunStatistics total_, recent_;   // since the start, since the last diagnostics
-  std::uint64_t reported_drops_ = 0;
-  double inputs_since_ = 0.0;   // [s] of clock_: earlier ones were forgotten
+  std::uint64_t reported_drops_ = 0, limits_silent_ = 0;   // limits_silent_: excursions since the last warning
+  double inputs_since_ = 0.0;                              // [s] of clock_: earlier ones were forgotten
 
   ros::WallTime wall_start_;   // when the tick wall_start_ticks_ was due
-  ros::WallTime next_skip_warning_;
+  ros::WallTime next_skip_warning_, next_limit_warning_;
   std::uint64_t wall_start_ticks_ = 0;
-  ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_, next_body_reminder_;
+  ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_, next_input_reminder_;
   std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture
 
   ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_, fields_pub_;   // only when the scene has any, like the next

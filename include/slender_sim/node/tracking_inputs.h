@@ -14,9 +14,11 @@
 #include "slender_sim/node/guide_buffer.h"
 #include "slender_sim/node/input_replay.h"
 #include "slender_sim/node/node_options.h"
+#include "slender_sim/node/paused_messages.h"
 #include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/point_guide_buffer.h"
 #include "slender_sim/node/sim_clock.h"
+#include "slender_sim/node/tf_inputs.h"
 #include "slender_sim/scene/simulation.h"
 
 namespace slender {
@@ -32,6 +34,13 @@ public:
                  const Simulation& simulation, const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops);
 
   bool any() const { return !guides_.empty(); }
+  /// What was heard for the same objects before the scene was edited.
+  void takeOver(TrackingInputs& before);
+  /// Has tf tell of the guides that ride on its frames.
+  void followFrames(TfInputs& tf);
+  /// The greatest lag that a guide asks for which has not fallen silent, and the least for all [s]; see GuideTiming.
+  double wantedLag() const;
+  void lagAtLeast(double lag);
   void processPending();
   bool waiting() const { return !pending_.empty(); }
   /// Replaces the guides that are driven from outside by where they shall be at `time` [s since the clock's start].
@@ -45,19 +54,23 @@ public:
   void skip(double seconds);
 
   // As those of GuideInputs.
+  void onPresent(std::function<ros::Time()> present) { paused_.onPresent(std::move(present)); }
+  void takeKept(bool all);
   void onTaken(InputSink sink) { sink_ = std::move(sink); }
   void stopListening() { subscribers_.clear(); }
   void repeat(const slender_sim::Input& input);
 
   /// Of each guide by points, and of each body. `missing`: it has not spoken yet, though other bodies of its guide
   /// have. `lag`: behind which it is followed [s]. `excess`: by how much that had to be more than ~guide_delay lately
-  /// [s].
+  /// [s]. `interval`: between its messages [s].
   struct Age
   {
     std::string name;
     std::optional<double> seconds;
     bool missing;
-    double lag, excess;
+    double lag, excess, interval;
+    /// By how much messages took longer than ~guide_delay [s]; sparse ones that come at once do not count.
+    double late() const { return excess - 2.0 * interval; }
   };
   std::vector<Age> ages() const;
 
@@ -66,7 +79,7 @@ private:
   {
     int index = 0;   // of a cloth or rod of the scene
     bool of_rod = false;
-    std::string topic;
+    std::string topic, object;                  // object: its name
     std::unique_ptr<PointGuideBuffer> points;   // by points
     const CarriedGuide* carried = nullptr;      // by bodies, one buffer each:
     std::vector<GuideBuffer> bodies;
@@ -91,6 +104,7 @@ private:
   void onPoints(int guide, const sensor_msgs::PointCloud2& message);
   void onBodies(int guide, const slender_sim::BodyStates& message);
   void take(Message message, const std_msgs::Header& header);
+  void takeNow(const Message& message);
   bool deliver(const Message& message, std::string* why);
   void start(Guide& guide, const Eigen::Matrix3Xd& vertices) const;
   void placeBodies(Guide& guide, double time, Eigen::Matrix3Xd& vertices) const;
@@ -102,6 +116,7 @@ private:
   DropCounter& drops_;
   std::vector<Guide> guides_;
   PendingMessages<Message> pending_;
+  PausedMessages<Message> paused_;
   std::vector<ros::Subscriber> subscribers_;
   InputSink sink_;
 };

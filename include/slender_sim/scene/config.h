@@ -18,6 +18,7 @@
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
 #include "slender_sim/rod/rod_model.h"
+#include "slender_sim/scene/limits_config.h"
 #include "slender_sim/scene/record_fields.h"
 #include "slender_sim/scene/statics_config.h"
 #include "slender_sim/scene/tracking_config.h"
@@ -133,6 +134,13 @@ struct FixedMotion
 /// driven by `grasps/NAME/pose` or `guides`; fixed without a node
 struct TopicMotion
 {};
+/// Follows a frame of tf; fixed without a node. `offset`: what is moved, in the frame. It is applied to the smoothed
+/// motion of the frame, so that all that follow one frame stand still relative to each other.
+struct TfMotion
+{
+  std::string frame;   ///< without a leading slash
+  Pose offset;
+};
 /// Rigidly follows a body: an obstacle or a driven body of the scene, or else one that only the `bodies` topic knows.
 /// The scene's bodies have a pose from the start, so that `attach: initial` takes its offset then.
 struct BodyMotion
@@ -143,9 +151,16 @@ struct TableMotion
 {
   PoseTrajectory poses;
 };   ///< timed poses, from the scene or a CSV file
-using Motion = std::variant<FixedMotion, TopicMotion, BodyMotion, TableMotion>;
+using Motion = std::variant<FixedMotion, TopicMotion, TfMotion, BodyMotion, TableMotion>;
 /// Motion of obstacles and driven bodies. Topic: the entry of the same name in `bodies` messages.
-using GivenMotion = std::variant<FixedMotion, TopicMotion, TableMotion>;
+using GivenMotion = std::variant<FixedMotion, TopicMotion, TfMotion, TableMotion>;
+
+/// Whether a Motion or a GivenMotion comes to a node from outside: by messages or by tf.
+template <class AnyMotion>
+bool comesFromOutside(const AnyMotion& motion)
+{
+  return std::holds_alternative<TopicMotion>(motion) || std::holds_alternative<TfMotion>(motion);
+}
 
 enum class Hold
 {
@@ -174,10 +189,19 @@ struct GraspConfig
   Hold hold = Hold::frame;
   Motion motion = FixedMotion{};
   Attach attach = Attach::section;
+  /// Obstacles, or links of robots, that the held object passes through. Nothing: near the grasp the links that the
+  /// held part touches at the start.
+  std::optional<std::vector<std::string>> ignored_contacts;
+  GraspLimits limits;
+  /// The held section in the frame that `motion` gives; not with Attach::initial. Nothing: that of a TfMotion, or none.
+  std::optional<Pose> offset;
   /// Of a rod: unit tangent and unit first material axis of the held section, in world axes, for motions whose poses
   /// have no orientation. Zero: not given. The director need not be normal to the tangent; its normal part counts.
   Eigen::Vector3d direction{0, 0, 0}, director{0, 0, 0};
 };
+
+/// The held section in the frame that drives the grasp, if the scene says where it is there.
+std::optional<Pose> offsetInFrame(const GraspConfig& grasp);
 
 /// Selects the equations of a rod. `automatic` takes the isotropic form for explicit steps of naturally straight rods
 /// that bend alike in all directions, and the general form otherwise.
@@ -232,6 +256,8 @@ struct ContactConfig
 /// An obstacle with its motion.
 struct ObstacleConfig : Obstacle
 {
+  /// Of a collision element of a robot: name of the tf frame of its link. Several elements of a link have it in common.
+  std::string link;
   Pose pose;   ///< of the shape, where the scene starts
   GivenMotion motion = FixedMotion{};
 };
@@ -395,10 +421,16 @@ struct SceneConfig
   std::string name = "scene";
   std::string file;     ///< that it was read from, for messages; may be empty
   std::string source;   ///< the YAML text after --set overrides (what `scene` publishes)
+  /// to which names of files in the scene are relative
+  std::string directory = ".";
   /// What the user should know although the scene runs, one sentence or two each. The reader adds to them
   /// (YamlCursor::warning), then the constructor of Simulation. simulate prints them to stderr, nodes log them as ROS
   /// warnings.
   std::vector<std::string> warnings;
+  /// What the constructor of Simulation chose and the user may want to know, one sentence each. They are printed like
+  /// warnings, as information.
+  std::vector<std::string> notes;
+  std::vector<std::string> guide_bags;    ///< that guides were read from
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
   bool wind_topic = false;                ///< `wind` messages set it; until the first one it is as above
@@ -406,6 +438,7 @@ struct SceneConfig
   std::optional<StaticsConfig> statics;   ///< what `simulate --statics` does besides one equilibrium
   TimeConfig time;
   RecordConfig record;
+  LimitsConfig limits;
   ContactConfig contact;
   std::vector<RodConfig> rods;
   std::vector<ThreadConfig> threads;

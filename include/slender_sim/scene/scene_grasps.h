@@ -28,7 +28,7 @@ public:
   const Wrench& wrench(int grasp) const;
 
   /// The pose of the held section when the driving frame M of a grasp (a gripper, a body) is at X_WM: X_WM and the
-  /// offset that was taken as the scene began (none with `attach: section`), or last by attach() or setOffset().
+  /// offset that the scene gives, that was taken as it began (`attach: initial`), or last by attach() or setOffset().
   GraspTarget targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity = std::nullopt) const;
   /// Takes the offset between the driving frame now at X_WM and the held section.
   void setOffset(int grasp, const Pose& X_WM);
@@ -46,6 +46,7 @@ public:
 private:
   friend class Simulation;
   friend class StaticsRunner;
+  friend class StateTransfer;
 
   /// The configuration, the model and the state outlive the grasps.
   SceneGrasps(const SceneConfig& config, const WorldModel& model, SceneState& state, std::vector<GraspRef> refs);

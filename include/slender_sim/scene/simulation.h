@@ -29,6 +29,11 @@ public:
   /// makes a warning of it). With `solve_start` false it starts as given all the same, and leaves the search for
   /// equilibria to runStatics().
   explicit Simulation(SceneConfig config, bool solve_start = true);
+  /// A scene that goes on where `running` is: rods, threads, cloths, bodies, obstacles and grasps that both scenes
+  /// have, by their names, keep their state and what reset() gives back. What `running` does not have starts as in the
+  /// scene; new grasps of objects that both have take hold where the object is now. Nothing is solved, whatever `start`
+  /// says. Throws SceneError for what cannot be built, for surfaces that cross now, and for objects of other sizes.
+  Simulation(SceneConfig config, const Simulation& running);
   ~Simulation();
   Simulation(const Simulation&) = delete;
   Simulation& operator=(const Simulation&) = delete;
@@ -68,7 +73,7 @@ public:
   /// Threads for scenes of several rods (at least 1; default: what OpenMP offers). Results do not depend on it.
   void setThreads(int threads) { world_->setThreads(threads); }
 
-  /// Back to the initial state.
+  /// Back to the initial state. Throws SceneError after edits that leave surfaces crossed there; then the state stays.
   void reset();
 
   /// Test functions in force of a tracked cloth.
@@ -98,6 +103,8 @@ private:
   std::unique_ptr<SceneGrasps> grasps_;
   WorldInputs world_inputs_;
   std::optional<StepReport> start_report_;
+  std::vector<Pose> weld_poses_;   ///< per weld of the world: the held part in its body's frame, as the world began
+  std::string reset_problem_;      ///< why reset() is not possible; empty: it is
 };
 
 }   // namespace slender

@@ -32,6 +32,7 @@ struct WorldModel
   {
     std::shared_ptr<const RodModel> model;
     std::optional<ContactProperties> contact;   ///< nothing: touches nothing
+    std::vector<IgnoredSolid> ignored;          ///< obstacles, by their numbers, that nodes of it pass through
     TrackedGuide tracked;                       ///< with one set
   };
   struct Thread
@@ -48,6 +49,8 @@ struct WorldModel
     std::shared_ptr<const ClothModel> model;
     ClothOptions options;
     std::optional<ContactProperties> contact;   ///< nothing: touches nothing
+    /// Obstacles, by their numbers, that vertices of it pass through; of cloth by impulses the whole cloth.
+    std::vector<IgnoredSolid> ignored;
     TrackedGuide tracked;
   };
   struct Body
@@ -62,10 +65,11 @@ struct WorldModel
     /// What others touch. There must be a shape.
     Obstacle solid() const { return {*shape, friction, body.name}; }
   };
-  /// Holds nodes first..last of a rod as they lie in a body at the start.
+  /// Holds nodes first..last of a rod as they lie in a body when the world is made.
   struct RodWeld
   {
     int rod = 0, first_node = 0, last_node = 0, body = 0;
+    std::optional<Pose> X_BG;   ///< the held part in the body's frame; nothing: as they lie
   };
 
   std::vector<Rod> rods;

@@ -305,16 +305,21 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
                             .boolean());
     if (grasp.clamp)
       grasp.vertices = withFaces(cloth.mesh, grasp.vertices);
-    grasp.attach = Attach::initial;
-    assign(grasp.attach,
-           map.get("attach",
-                   "Which point the poses of `motion` describe. `initial`: a gripper, which keeps the offset to the "
-                   "vertices that it has at its first pose. `frame`: the grasp's frame, with the origin at the mean of "
-                   "the vertices and the world's axes at the start. Without the key: initial.")
-               .choice<Attach>({{"frame", Attach::section}, {"initial", Attach::initial}}));
+    grasp.limits = readGraspLimits(map.get("limits", "Limits of this grasp. Without the key: those of the scene.")
+                                       .sharesKeysOf("rods.N.grasps.NAME.limits"));
+    grasp.attach = givesOffset(map) ? Attach::section : Attach::initial;
+    assign(
+        grasp.attach,
+        map.get("attach",
+                "Which point the poses of `motion` describe. `initial`: a gripper, which keeps the offset to the "
+                "vertices that it has at its first pose. `frame`: the grasp's frame, with the origin at the mean of "
+                "the vertices and the world's axes at the start. Without the key: initial, but frame with an offset.")
+            .choice<Attach>({{"frame", Attach::section}, {"initial", Attach::initial}}));
     grasp.motion =
         readMotion(map.get("motion", "How the held vertices move, as one rigid body. Without the key: fixed."), context,
                    grasp.attach == Attach::section);
+    readOffset(map, grasp);
+    readGraspContact(map, grasp);
     map.finish();
     for (const int vertex : grasp.vertices)
     {

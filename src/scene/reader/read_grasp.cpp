@@ -124,6 +124,36 @@ void checkFrame(YamlMap& map, const GraspConfig& grasp)
 
 }   // namespace
 
+bool givesOffset(const YamlMap& grasp)
+{
+  const YamlCursor motion = grasp.find("motion");
+  return grasp.has("offset") || (motion.isMap() && YamlMap(motion).has("offset"));
+}
+
+void readOffset(YamlMap& map, GraspConfig& grasp)
+{
+  const YamlCursor own = map.get("offset",
+                                 "Where the held part is in the frame that `motion` gives, for example in that of a "
+                                 "gripper. It stays the same for ever; the grasp goes there, and after a reset again. "
+                                 "Not with attach: initial. Without the key: as `attach` says."),
+                   motion = map.find("motion");
+  const YamlCursor of_tf = motion.isMap() ? YamlMap(motion).find("offset") : map.find("offset");
+  const bool twice = motion.isMap() && own.present() && of_tf.present();
+  const YamlCursor& given = own.present() ? own : of_tf;
+  if (own.present())
+    grasp.offset = readPose(own);
+  if (!given.present())
+    return;
+  if (twice)
+    own.problem("and motion.offset both say where the grasp is in the frame; leave one of them out");
+  else if (grasp.attach == Attach::initial)
+    given.problem("says where the held part is, and attach: initial keeps it where it is; leave one of them out");
+  else if (std::holds_alternative<FixedMotion>(grasp.motion) && !motion.isMap())
+    own.problem("is for grasps that something moves; this one is fixed");
+  else if (!grasp.direction.isZero(0) || !grasp.director.isZero(0))
+    own.problem("turns the section, and so do direction and director; leave offset or those out");
+}
+
 std::vector<int> readIndexList(const YamlCursor& at, int count)
 {
   std::vector<int> indices;
@@ -181,6 +211,57 @@ std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool
   return {first, last + 1};
 }
 
+void readGraspContact(YamlMap& map, GraspConfig& grasp)
+{
+  const YamlCursor at = map.get("contact", "What the object of this grasp does not touch.");
+  at.sharesKeysOf("rods.N.grasps.NAME.contact");
+  if (!at.present())
+    return;
+  YamlMap contact(at);
+  const YamlCursor ignore = contact.get("ignore",
+                                        "Names of obstacles, or frames of links of a robot, that the whole object "
+                                        "passes through. Without the key the part near the grasp passes through the "
+                                        "links of robots that the held part touches at the start; with [] through "
+                                        "none.");
+  ignore.takes("a list of names");
+  contact.finish();
+  if (!ignore.present())
+    return;
+  grasp.ignored_contacts.emplace();
+  for (const YamlCursor& item : ignore.items())
+    if (const auto name = item.text())
+      grasp.ignored_contacts->push_back(*name);
+}
+
+void checkIgnoredContacts(const SceneConfig& scene, const std::vector<YamlCursor>& rods,
+                          const std::vector<YamlCursor>& cloths)
+{
+  std::vector<std::string> names;
+  for (const ObstacleConfig& obstacle : scene.obstacles)
+  {
+    names.push_back(obstacle.name);
+    if (!obstacle.link.empty() && obstacle.link != obstacle.name)
+      names.push_back(obstacle.link);
+  }
+  const auto check = [&](const std::vector<GraspConfig>& grasps, const YamlCursor& entry) {
+    for (const GraspConfig& grasp : grasps)
+      for (const std::string& name : grasp.ignored_contacts.value_or(std::vector<std::string>{}))
+      {
+        if (std::find(names.begin(), names.end(), name) != names.end())
+          continue;
+        const std::string nearest = nearestWord(name, names);
+        YamlMap(YamlMap(YamlMap(YamlMap(entry).find("grasps")).find(grasp.name)).find("contact"))
+            .find("ignore")
+            .problem("the scene has no obstacle and no link " + name +
+                     (nearest.empty() ? std::string() : " (did you mean " + nearest + "?)"));
+      }
+  };
+  for (std::size_t r = 0; r < rods.size(); ++r)
+    check(scene.rods[r].grasps, rods[r]);
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+    check(scene.cloths[k].grasps, cloths[k]);
+}
+
 GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges)
 {
   GraspConfig grasp;
@@ -197,12 +278,15 @@ GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadC
                                "section moves to the first pose. `initial`: a gripper, which keeps the offset to the "
                                "section that it has at its first pose. Without the key: section.")
                            .choice<Attach>({{"section", Attach::section}, {"initial", Attach::initial}}));
+  grasp.limits = readGraspLimits(map.get("limits", "Limits of this grasp. Without the key: those of the scene."));
   readFrame(map, grasp);
   const bool oriented = grasp.direction.norm() + grasp.director.norm() > 0;
   grasp.motion =
       readMotion(map.get("motion", "How the held section moves. Without the key: fixed where it is at the start."),
                  context, grasp.hold == Hold::frame && grasp.attach == Attach::section && !oriented);
   checkFrame(map, grasp);
+  readOffset(map, grasp);
+  readGraspContact(map, grasp);
   if (grasp.hold == Hold::position && grasp.first_node != grasp.last_node)
   {
     hold.problem("holds " + std::to_string(grasp.last_node - grasp.first_node + 1) +

@@ -137,7 +137,7 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
 std::optional<CarriedGuide> readGroups(const YamlCursor& at, const ReadContext& context, const GuideSource& source)
 {
   const int vertices = static_cast<int>(source.config.mesh.vertices.cols());
-  CarriedGuide guide{{}, GuideBinding(Eigen::Matrix3Xd(3, 0), {}, {}), true, {}};
+  CarriedGuide guide{{}, GuideBinding(Eigen::Matrix3Xd(3, 0), {}, {}), true, {}, false, {}};
   std::vector<GuideBinding::Share> shares;
   const auto add = [&](const std::string& name, const std::vector<int>& group) {
     for (const int vertex : group)
@@ -200,7 +200,7 @@ void readBodyPoses(const YamlCursor& at, const ReadContext& context, CarriedGuid
 /// The keys of a guide's motion, and which kind of motion they stand for.
 struct MotionKeys
 {
-  YamlCursor frames, bodies, topic, bag, rate, begin, groups, attach, late;
+  YamlCursor frames, bodies, topic, bag, tf, offset, rate, begin, groups, attach, late;
   bool by_points = false;   ///< by topic
   bool by_bodies = false;   ///< by file, bag or topic
 };
@@ -215,8 +215,9 @@ void refuseOtherKeys(const MotionKeys& keys)
   only_for(keys.rate, keys.frames.present(), "frames");
   only_for(keys.begin, keys.frames.present() || keys.bag.present(), "frames and bags");
   only_for(keys.groups, keys.by_bodies, "bodies");
-  only_for(keys.attach, keys.by_bodies, "bodies");
-  only_for(keys.late, keys.topic.present(), "guides by topic");
+  only_for(keys.attach, keys.by_bodies || keys.tf.present(), "bodies and tf");
+  only_for(keys.late, keys.topic.present() || keys.tf.present(), "guides by topic or tf");
+  only_for(keys.offset, keys.tf.present(), "tf");
 }
 
 /// Nothing, after a report, unless the keys say one kind of motion.
@@ -227,7 +228,7 @@ std::optional<MotionKeys> readMotionKeys(const YamlCursor& at)
   MotionKeys keys{
       map.get("frames",
               "One mesh file per frame: a path with one * in place of the frame's number, for example "
-              "guide/frame_*.obj. Give one of `frames`, `bodies`, `bag` and `topic`."),
+              "guide/frame_*.obj. Give one of `frames`, `bodies`, `bag`, `topic` and `tf`."),
       map.get("bodies",
               "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw of bodies that carry vertices of the guide, see "
               "`groups`."),
@@ -237,6 +238,9 @@ std::optional<MotionKeys> readMotionKeys(const YamlCursor& at)
       map.get("bag",
               "Bag with the recorded motion of the guide: the path of the file, or a map if the bag holds several "
               "motions."),
+      map.get("tf", "Name of a frame of tf that carries the whole guide; a node looks it up."),
+      map.get("offset",
+              "With `tf`: pose of the mesh in the frame. Without the key, the mesh is carried as `attach` says."),
       map.get("rate", "Frames per second; needed with `frames`."),
       map.get("begin",
               "Time of the first frame in the scene; of a bag, the time after its first stamp at which the scene "
@@ -251,14 +255,14 @@ std::optional<MotionKeys> readMotionKeys(const YamlCursor& at)
               "What the guide does when no message comes: hold the last one, or go on at the last speed, which dies "
               "out. Without the key: hold.")};
   map.finish();
-  if (keys.frames.present() + keys.bodies.present() + keys.topic.present() + keys.bag.present() != 1)
+  if (keys.frames.present() + keys.bodies.present() + keys.topic.present() + keys.bag.present() + keys.tf.present() !=
+      1)
   {
     if (at.problems().size() == before)
     {
       at.problem(
           "must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {bag: "
-          "FILE.bag}, {topic: points}, "
-          "{topic: bodies, groups: obj}");
+          "FILE.bag}, {topic: points}, {topic: bodies, groups: obj}, {tf: FRAME}");
     }
     return std::nullopt;
   }
@@ -300,6 +304,27 @@ void readCarriedMotion(const YamlCursor& at, const MotionKeys& keys, const ReadC
     source.config.motion = std::move(*carried);
 }
 
+/// A guide that rides on a frame of tf as a whole.
+void readFramedMotion(const MotionKeys& keys, GuideSource& source)
+{
+  const auto frame = readFrameName(keys.tf);
+  const std::size_t before = keys.tf.problems().size();
+  CarriedGuide guide{{}, GuideBinding(Eigen::Matrix3Xd(3, 0), {}, {}), !keys.offset.present(), {}, true, {}};
+  assign(guide.offset, readPose(keys.offset));
+  assign(guide.keeps_offset, keys.attach.choice<bool>({{"initial", true}, {"frame", false}}));
+  if (keys.offset.present() && guide.keeps_offset)
+    keys.offset.problem("says where the mesh is in the frame, and attach: initial keeps it where it is; give one");
+  const Eigen::Matrix3Xd& vertices = source.config.mesh.vertices;
+  if (!frame || vertices.cols() == 0 || keys.tf.problems().size() != before)
+    return;
+  guide.bodies.push_back(*frame);
+  std::vector<GuideBinding::Share> shares;
+  for (int vertex = 0; vertex < static_cast<int>(vertices.cols()); ++vertex)
+    shares.push_back({vertex, 0, 1.0});
+  guide.binding = GuideBinding(vertices, {Pose()}, shares);
+  source.config.motion = std::move(guide);
+}
+
 void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std::string& object, GuideSource& source)
 {
   GuideMotion& motion = source.config.motion;
@@ -322,6 +347,10 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
     const auto hertz = keys->rate.number(Range::above(0, 1e6, "Hz"));
     if (hertz)
       assign(motion, readFrames(keys->frames, *hertz, first, context, source));
+  }
+  else if (keys->tf.present())
+  {
+    readFramedMotion(*keys, source);
   }
   else if (keys->by_points)
   {

@@ -50,6 +50,7 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
   try
   {
     RecordedGuide recorded = guideBagReader()(source);
+    context.guide_bags.push_back(source.file);
     if (!recorded.gaps.empty())
       at.warning(recorded.gaps);
     return recorded;

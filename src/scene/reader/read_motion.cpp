@@ -44,11 +44,12 @@ std::optional<TableMotion> readTable(const YamlCursor& at, bool needs_orientatio
   return good && !motion.poses.empty() ? std::optional<TableMotion>(std::move(motion)) : std::nullopt;
 }
 
+/// Of the named body, or of the only one in the file.
 std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCursor& body, const ReadContext& context)
 {
   const auto file = path.text();
   const auto name = body.text();
-  if (!file || !name)
+  if (!file || (body.present() && !name))
     return std::nullopt;
   try
   {
@@ -56,11 +57,12 @@ std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCurs
     std::vector<std::string> names;
     for (BodyTrajectory& entry : bodies)
     {
-      if (entry.body == *name)
+      if (name ? entry.body == *name : bodies.size() == 1)
         return TableMotion{std::move(entry.poses)};
       names.push_back(entry.body);
     }
-    body.problem("is not in " + *file + "; it has: " + joinWords(names));
+    body.problem(name ? "is not in " + *file + "; it has: " + joinWords(names)
+                      : "is missing; " + *file + " holds several bodies, of which it names one: " + joinWords(names));
   }
   catch (const SceneError& error)
   {
@@ -76,7 +78,45 @@ void checkTopic(const YamlCursor& topic)
     topic.problem("must be true; without a topic it is written motion: fixed");
 }
 
+constexpr const char* kTfMeaning =
+    "Name of a frame of tf that is followed, for example tool0; a node looks it up, and without a node nothing moves.";
+constexpr const char* kTfOffsetMeaning =
+    "With `tf`: pose in the frame of what is moved. Without the key: the frame's own pose.";
+
+void refuseOffset(const YamlCursor& offset, const YamlCursor& tf)
+{
+  if (offset.present() && !tf.present())
+    offset.problem("is for motion: {tf: FRAME}");
+}
+
+/// Nothing when a problem was reported.
+std::optional<TfMotion> readTf(const YamlCursor& tf, const YamlCursor& offset)
+{
+  TfMotion motion;
+  const auto frame = readFrameName(tf);
+  const std::size_t before = offset.problems().size();
+  assign(motion.offset, readPose(offset));
+  if (!frame || offset.problems().size() != before)
+    return std::nullopt;
+  motion.frame = *frame;
+  return motion;
+}
+
 }   // namespace
+
+std::optional<std::string> readFrameName(const YamlCursor& at)
+{
+  const auto name = at.text();
+  if (!name)
+    return std::nullopt;
+  const std::string frame = name->empty() || name->front() != '/' ? *name : name->substr(1);
+  if (frame.empty() || frame.front() == '/' || frame.find_first_of(" \t\n") != std::string::npos)
+  {
+    at.problem("is no name of a frame of tf; must be one word, for example tool0");
+    return std::nullopt;
+  }
+  return frame;
+}
 
 Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation)
 {
@@ -95,21 +135,32 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
                    body = map.get("body",
                                   "Name of the body to follow: a driven body or an obstacle of the scene, or one that "
                                   "only messages tell of. With `file`: name of the body in the file."),
+                   tf = map.get("tf", kTfMeaning), offset = map.get("offset", kTfOffsetMeaning),
                    table = map.get("table",
                                    "Timed poses: rows [t, x, y, z, qx, qy, qz, qw], with t in s, lengths in m and a "
                                    "unit quaternion. Poses between rows are interpolated smoothly."),
-                   file = map.get("file", "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. Give `body` as well.");
+                   file = map.get("file",
+                                  "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, "
+                                  "give `body` as well.");
   map.finish();
-  const int given = topic.present() + table.present() + (body.present() || file.present());
+  refuseOffset(offset, tf);
+  const int given = topic.present() + tf.present() + table.present() + (body.present() || file.present());
   if (given != 1)
   {
     if (at.problems().size() == before)
-      at.problem("must be fixed or one of {topic: true}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}");
+    {
+      at.problem(
+          "must be fixed or one of {topic: true}, {tf: FRAME}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}");
+    }
   }
   else if (topic.present())
   {
     checkTopic(topic);
     motion = TopicMotion{};
+  }
+  else if (tf.present())
+  {
+    assign(motion, readTf(tf, offset));
   }
   else if (table.present())
   {
@@ -117,8 +168,6 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
   }
   else if (file.present())
   {
-    if (!body.present())
-      body.problem("is missing; the file holds several bodies");
     assign(motion, readFileMotion(file, body, context));
   }
   else if (const auto name = body.text())
@@ -147,20 +196,30 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
   const YamlCursor topic = map.get("topic",
                                    "Must be true: the motion comes by messages on the topic `bodies`, or `nozzle/pose` "
                                    "for a nozzle. Same as the word topic."),
+                   tf = map.get("tf", kTfMeaning), offset = map.get("offset", kTfOffsetMeaning),
                    body = map.get("body", "Name of the body in `file`."),
                    table = map.get("table",
                                    "Timed poses: rows [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z], with t in s, "
                                    "lengths in m and a unit quaternion. Poses between rows are interpolated smoothly."),
-                   file = map.get("file", "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. Give `body` as well.");
+                   file = map.get("file",
+                                  "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, "
+                                  "give `body` as well.");
   map.finish();
+  refuseOffset(offset, tf);
   std::optional<TableMotion> poses;
-  if (topic.present() + table.present() + (body.present() || file.present()) != 1 || body.present() != file.present())
+  const int given = topic.present() + tf.present() + table.present() + (body.present() || file.present());
+  if (given != 1 || (body.present() && !file.present()))
   {
     if (at.problems().size() == before)
     {
       at.problem(std::string("must be ") + (may_be_free ? "free, " : "") +
-                 "fixed or one of {topic: true}, {table: [...]}, {file: PATH, body: NAME}");
+                 "fixed or one of {topic: true}, {tf: FRAME}, {table: [...]}, {file: PATH, body: NAME}");
     }
+  }
+  else if (tf.present())
+  {
+    const auto motion = readTf(tf, offset);
+    return motion ? GivenMotion{*motion} : fixed;
   }
   else if (topic.present())
   {

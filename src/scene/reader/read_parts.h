@@ -24,8 +24,9 @@ struct ReadContext
 {
   std::string directory;   ///< files are relative to it
   Eigen::Vector3d gravity{0, 0, -9.81};
-  double step = 0.01;         ///< time.step [s]
-  mutable double nodes = 0;   ///< of rods and cloths so far
+  double step = 0.01;                            ///< time.step [s]
+  mutable double nodes = 0;                      ///< of rods and cloths so far
+  mutable std::vector<std::string> guide_bags;   ///< that were read so far
   std::string resolve(const std::string& path) const { return path[0] == '/' ? path : directory + "/" + path; }
   /// Counts nodes that are about to be made; false, and reported, when the scene gets too many: a few words can ask for
   /// more than fits into memory.
@@ -44,6 +45,12 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
 /// `edges` of the rod, or 0 when its centreline could not be read: then indices are not checked.
 /// Nodes held when edges first..last of the rod are (see GraspConfig); reports the joining edge of a closed rod.
 std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges);
+/// Whether the entry of a grasp says where it is in the frame that it follows.
+bool givesOffset(const YamlMap& grasp);
+/// `offset` of a grasp whose motion and `attach` have been read; reports what does not go with them.
+void readOffset(YamlMap& map, GraspConfig& grasp);
+LimitsConfig readLimits(const YamlCursor& at);
+GraspLimits readGraspLimits(const YamlCursor& at);
 GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed,
                       int edges);
 /// Point loads of a rod with so many edges (0: not known).
@@ -78,9 +85,16 @@ struct Generated
 /// The list `generate`; `first_rod`: number of rods before them.
 Generated readGenerators(const YamlCursor& at, const ReadContext& context, int first_rod);
 
+/// `contact` of a grasp.
+void readGraspContact(YamlMap& map, GraspConfig& grasp);
+/// Reports names in `contact.ignore` of grasps that no obstacle and no link has. All objects have been read.
+void checkIgnoredContacts(const SceneConfig& scene, const std::vector<YamlCursor>& rods,
+                          const std::vector<YamlCursor>& cloths);
 Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation);
 /// Nothing: free, which is also the default where it may be.
 std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadContext& context, bool may_be_free);
+/// Name of a frame of tf, without a leading slash. Nothing when a problem was reported.
+std::optional<std::string> readFrameName(const YamlCursor& at);
 std::optional<Pose> readPose(const YamlCursor& at);
 /// `pose` may be replaced by the shape (a plane by point and normal).
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
@@ -99,6 +113,11 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
                           const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths,
                           const std::vector<BodyConfig>& bodies);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
+/// The obstacles that the collision shapes of robots are, each with the robot's entry.
+std::vector<std::pair<ObstacleConfig, YamlCursor>> readRobots(const YamlCursor& at, const ReadContext& context);
+/// Puts the text of ROS parameters in place of their names in `robot`, so that the scene is complete. Returns whether
+/// there were any. `directory`: of the scene.
+bool takeRobotParameters(YamlTree& scene, const std::string& directory);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods);
 TimeConfig readTime(const YamlCursor& at);
 RecordConfig readRecord(const YamlCursor& at);

@@ -139,9 +139,10 @@ FloorConfig readFloor(const YamlCursor& at)
       floor.belt_y = readTimed(y, speed);
     const bool of_both = topic.present() && topic.boolean().value_or(true);
     if (!of_both && x.present() && y.present() && floor.belt_x.topic != floor.belt_y.topic)
-      belt.problem("one of x and y comes by messages and the other one does not, but each message on belt/velocity "
-                   "sets both; write topic: true beside x and y, whose numbers and tables then hold until the first "
-                   "message");
+      belt.problem(
+          "one of x and y comes by messages and the other one does not, but each message on belt/velocity "
+          "sets both; write topic: true beside x and y, whose numbers and tables then hold until the first "
+          "message");
     if (of_both)
       floor.belt_x.topic = floor.belt_y.topic = true;
   }

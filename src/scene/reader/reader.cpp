@@ -10,6 +10,8 @@
 #include "ignored_keys.h"
 #include "read_parts.h"
 #include "reader_log.h"
+#include "scene_tree.h"
+#include "solid_names.h"
 
 namespace slender {
 
@@ -74,24 +76,6 @@ void takeGeneratedRods(Generated& generated, std::vector<ReadRod>& rods)
     rods.push_back(std::move(part));
   }
 }
-
-/// Obstacles and bodies are entries of one topic: their names must differ.
-class SolidNames
-{
-public:
-  void take(const YamlCursor& at, const std::string& name, bool generated)
-  {
-    const auto [other, is_new] = paths_.emplace(name, at.path());
-    if (!is_new)
-    {
-      const std::string reason = "is also the name of " + other->second + "; names of bodies and obstacles must differ";
-      generated ? at.problem("makes " + name + ", which " + reason) : YamlMap(at).find("name").problem(reason);
-    }
-  }
-
-private:
-  std::map<std::string, std::string> paths_;
-};
 
 /// A grasp cannot follow what it may hold back. Bodies that the scene does not have may be known to a node.
 void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods, const std::vector<YamlCursor>& cloths)
@@ -221,6 +205,8 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
       map.get("bodies", "Rigid bodies: simulated ones, which forces move, and driven ones, whose motion is given.");
   const YamlCursor at_obstacles = map.get(
       "obstacles", "Solids that move as prescribed, and that rods, threads, cloths and bodies with contact touch.");
+  const YamlCursor at_robot = map.get(
+      "robot", "A robot, or a list of robots. The collision shapes of its links become obstacles that follow tf.");
   const YamlCursor at_contact =
       map.get("contact", "Settings of all contacts of rods, threads, bodies and of cloth with method barrier.");
   const YamlCursor at_generate =
@@ -239,6 +225,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   scene.cloths = readCloths(at_cloths, context);
   readTrackedCloths(at_tracked, context, scene.cloths);
   scene.obstacles = readObstacles(at_obstacles, context);
+  auto robots = readRobots(at_robot, context);
   scene.bodies = readBodies(at_bodies, context, rods);
   std::vector<YamlCursor> cloths = entriesOf(at_cloths);
   for (const YamlCursor& entry : entriesOf(at_tracked))
@@ -250,11 +237,12 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     names.take(obstacles[k], scene.obstacles[k].name, false);
   for (std::size_t k = 0; k < scene.bodies.size(); ++k)
     names.take(bodies[k], scene.bodies[k].name, false);
-  for (auto& [obstacle, maker] : generated.obstacles)
-  {
-    names.take(maker, obstacle.name, true);
-    scene.obstacles.push_back(std::move(obstacle));
-  }
+  for (auto* made : {&generated.obstacles, &robots})
+    for (auto& [obstacle, maker] : *made)
+    {
+      names.take(maker, obstacle.name, true);
+      scene.obstacles.push_back(std::move(obstacle));
+    }
   for (auto& [body, maker] : generated.bodies)
   {
     names.take(maker, body.name, true);
@@ -266,6 +254,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     scene.rods.push_back(std::move(part.config));
   completeThreads(scene, entriesOf(at_threads));
   checkFollowed(scene, entriesOf(at_rods), cloths);
+  checkIgnoredContacts(scene, entriesOf(at_rods), cloths);
   checkGraspNames(scene, cloths);
   checkUnderCloth(scene, cloths);
 }
@@ -421,11 +410,15 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   scene.time = readTime(time);
   const YamlCursor record = map.get("record", "What is recorded. Without the key: every step, the motion alone.");
   scene.record = readRecord(record);
+  scene.limits = readLimits(map.get("limits",
+                                    "Limits of what is plausible, of which a run warns when they are exceeded. "
+                                    "Without the key: the defaults of the keys in it."));
   ReadContext context;
   context.directory = directory;
   context.gravity = scene.gravity;
   context.step = scene.time.step;
   readObjects(map, context, scene);
+  scene.guide_bags = context.guide_bags;
   completeRecord(record, scene);
   checkStatics(statics, scene);
   checkContactTime(time, scene);
@@ -504,9 +497,17 @@ SceneConfig parseScene(const std::string& text, const std::string& name, const s
   YamlTree tree = parseYaml(text, name);
   for (const std::string& assignment : overrides)
     applyOverride(tree, assignment);
-  SceneConfig scene = readTree(tree, name, directory);
-  scene.file = name;
-  scene.source = overrides.empty() ? text : writeYaml(tree);
+  const bool completed = takeRobotParameters(tree, directory);
+  SceneConfig scene = sceneOfTree(tree, name, directory);
+  scene.source = overrides.empty() && !completed ? text : writeYaml(tree);
+  return scene;
+}
+
+SceneConfig sceneOfTree(const YamlTree& tree, const std::string& file, const std::string& directory)
+{
+  SceneConfig scene = readTree(tree, file, directory);
+  scene.file = file;
+  scene.directory = directory;
   return scene;
 }
 

@@ -213,6 +213,18 @@ std::string placesByName(const YamlTree& list)
   return text.empty() ? text : text + ")";
 }
 
+/// Which entry of a list part of a path means: a number, or the name of an entry.
+std::optional<double> placeIn(const YamlTree& list, const std::string& part)
+{
+  for (std::size_t k = 0; k < list.items.size(); ++k)
+  {
+    const YamlTree* name = list.items[k].find("name");
+    if (name && name->kind == YamlTree::Kind::scalar && name->scalar == part)
+      return static_cast<double>(k);
+  }
+  return parseNumber(part);
+}
+
 /// A new grasp can be set as a whole. A key of a grasp that is not there is a mistaken name: the reader would only see
 /// a grasp that holds nothing.
 void requireKnownGrasp(const YamlTree& map, const std::string& path, const std::string& name, std::size_t parts,
@@ -284,9 +296,9 @@ std::string writeYaml(const YamlTree& tree)
   return std::string(out.c_str()) + "\n";
 }
 
-void applyOverride(YamlTree& root, const std::string& assignment)
+void applyOverride(YamlTree& root, const std::string& assignment, const std::string& source)
 {
-  const std::string where = "--set " + assignment;
+  const std::string where = source + " " + assignment;
   const auto equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     throw SceneError(where + ": must be PATH=VALUE, for example rods.0.material.youngs_modulus=1e7");
@@ -314,7 +326,7 @@ void applyOverride(YamlTree& root, const std::string& assignment)
     if (at->kind == YamlTree::Kind::list)
     {
       const long size = static_cast<long>(at->items.size());
-      const auto index = parseNumber(part);
+      const auto index = placeIn(*at, part);
       if (!index || !(*index >= -size && *index < size) || *index != std::floor(*index))
       {
         throw SceneError(where + ": " + here + " is a list; '" + part + "' must be a whole number in [" +

@@ -38,7 +38,8 @@ YamlTree parseYaml(const std::string& text, const std::string& file);
 std::string writeYaml(const YamlTree& tree);
 
 /// Applies "path.to.value=YAML": keys that are missing are created, list entries are numbers from 0 (negative: from the
-/// end). Throws SceneError that says which part of the path does not fit.
-void applyOverride(YamlTree& root, const std::string& assignment);
+/// end), or names, where entries have a key `name`. Throws SceneError that says which part of the path does not fit.
+/// `source`: where the assignment comes from, for messages.
+void applyOverride(YamlTree& root, const std::string& assignment, const std::string& source = "--set");
 
 }   // namespace slender

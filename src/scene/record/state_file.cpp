@@ -13,6 +13,7 @@
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/scene/state_bytes.h"
 #include "state_fingerprint.h"
+#include "state_fit.h"
 
 /// Saving and loading of a simulation's state. The file: magic, version, fingerprint of the scene, size and checksum of
 /// the payload, payload; numbers as this machine keeps them (the magic number tells the byte order).
@@ -133,7 +134,8 @@ bool fits(const SceneState& loaded, const SceneState& now, std::size_t k, const 
   return good && pins == cloth.pins.size();
 }
 
-/// What does not fit between a loaded state and the scene, whose state is `now`; empty when all does.
+}   // namespace
+
 std::string misfit(const SceneState& loaded, const SceneState& now, const WorldModel& world)
 {
   if (loaded.rods.size() != now.rods.size() || loaded.rod_guides.size() != now.rod_guides.size() ||
@@ -167,8 +169,6 @@ std::string misfit(const SceneState& loaded, const SceneState& now, const WorldM
       problem = "cloth " + world.cloths[k].model->name + " does not fit together";
   return problem;
 }
-
-}   // namespace
 
 void Simulation::save(const std::string& path) const
 {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "ignored_contacts.h"
+
 namespace slender {
 
 SceneParts buildParts(SceneConfig& scene)
@@ -15,6 +17,7 @@ SceneParts buildParts(SceneConfig& scene)
   buildThreads(scene, parts);
   buildCloths(scene, parts);
   buildBodies(scene, parts);
+  ignoreHeldContacts(scene, parts);
   parts.state.grasp_offsets.resize(parts.grasps.size());
   parts.state.wrenches.resize(parts.grasps.size());
   return parts;

@@ -9,7 +9,10 @@
 #include "scene_inputs.h"
 #include "scene_parts.h"
 #include "slender_sim/scene/failure_surroundings.h"
+#include "slender_sim/scene/grasp_overlap.h"
 #include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/scene_edit.h"
+#include "state_transfer.h"
 #include "statics_runner.h"
 
 namespace slender {
@@ -28,6 +31,21 @@ std::unique_ptr<World> buildWorld(const SceneConfig& config, WorldModel model, W
   }
 }
 
+/// Where in their bodies the welds of a world are, right after it was made from this state.
+std::vector<Pose> weldPoses(const SceneConfig& config, const WorldModel& model, const SceneState& state)
+{
+  std::vector<std::size_t> next;   // per rod: its grasps come first
+  for (const RodConfig& rod : config.rods)
+    next.push_back(rod.grasps.size());
+  std::vector<Pose> poses;
+  for (const WorldModel::RodWeld& weld : model.welds)
+  {
+    const Pose& X_WG = state.rods[weld.rod].grasps[next[weld.rod]++].X_WG;
+    poses.push_back(weld.X_BG.value_or(state.bodies[weld.body].X_WB.inverse() * X_WG));
+  }
+  return poses;
+}
+
 }   // namespace
 
 Simulation::Simulation(SceneConfig config, bool solve_start) : config_(std::move(config))
@@ -36,6 +54,7 @@ Simulation::Simulation(SceneConfig config, bool solve_start) : config_(std::move
   state_ = std::move(parts.state);
   world_inputs_ = std::move(parts.inputs);
   world_ = buildWorld(config_, std::move(parts.model), state_);
+  weld_poses_ = weldPoses(config_, world_->model(), state_);
   grasps_.reset(new SceneGrasps(config_, world_->model(), state_, std::move(parts.grasps)));
   for (std::size_t g = 0; g < grasps_->size(); ++g)
   {
@@ -43,11 +62,64 @@ Simulation::Simulation(SceneConfig config, bool solve_start) : config_(std::move
     const auto* table = std::get_if<TableMotion>(&grasp.motion);
     if (grasp.attach == Attach::initial)
       grasps_->takeOffset(static_cast<int>(g), table ? table->poses.firstTime() : 0.0);
+    else
+      state_.grasp_offsets[g] = offsetInFrame(grasp).value_or(Pose());
   }
   initial_ = state_;
   if (config_.start.equilibrium && solve_start)
     findEquilibrium();
   initial_ = state_;
+}
+
+Simulation::Simulation(SceneConfig config, const Simulation& running) : config_(std::move(config))
+{
+  SceneParts parts = buildParts(config_);
+  const StateTransfer transfer(running.config_, running.grasps(), config_, parts.grasps);
+  transfer.checkTables(running.state_.time);
+  transfer.takeWelds(running.weld_poses_, parts.model);
+  world_inputs_ = std::move(parts.inputs);
+
+  // the state of reset(): nothing forbids that it is not possible
+  initial_ = parts.state;
+  transfer.take(running.initial_, parts.model, initial_);
+  reset_problem_ = transfer.newWelds();
+  try
+  {
+    World start(parts.model, initial_);
+    transfer.takeAdded(running.initial_, initial_);
+    SceneGrasps grasps(config_, start.model(), initial_, parts.grasps);
+    transfer.attachNew(grasps, initial_.time);
+  }
+  catch (const std::invalid_argument& error)   // WorldError, too
+  {
+    reset_problem_ = error.what();
+  }
+  catch (const SceneError& error)
+  {
+    reset_problem_ = error.what();
+  }
+
+  state_ = std::move(parts.state);
+  transfer.take(running.state_, parts.model, state_);
+  world_ = buildWorld(config_, std::move(parts.model), state_);
+  weld_poses_ = weldPoses(config_, world_->model(), state_);
+  transfer.takeAdded(running.state_, state_);
+  grasps_.reset(new SceneGrasps(config_, world_->model(), state_, std::move(parts.grasps)));
+  transfer.attachNew(*grasps_, state_.time);
+  start_report_ = running.start_report_;
+}
+
+std::unique_ptr<Simulation> editedSimulation(const Simulation& running, const SceneEdit& edit)
+{
+  try
+  {
+    return std::make_unique<Simulation>(editedScene(running.config(), edit), running);
+  }
+  catch (const SceneError& error)
+  {
+    const std::string where = toString(edit.kind), text = error.what();
+    throw SceneError(text.compare(0, where.size(), where) == 0 ? text : where + ": " + text);
+  }
 }
 
 Simulation::~Simulation() = default;
@@ -94,6 +166,11 @@ StepReport Simulation::step(const SceneInputs& inputs)
   if (!report.ok)
   {
     report.message += surroundingsOf(*this, report.place);
+    if (const std::string overlap = overlapOfGrasps(*this, world_inputs_); !overlap.empty())
+    {
+      report.failure = StepFailure::squeezed;
+      report.message = overlap + ". In detail: " + report.message;
+    }
     return report;
   }
   grasps_->takeWrenches(*world_);
@@ -137,7 +214,12 @@ void Simulation::findEquilibrium()
   start_report_ = report;
 }
 
-void Simulation::reset() { state_ = initial_; }
+void Simulation::reset()
+{
+  if (!reset_problem_.empty())
+    throw SceneError("the edited scene cannot start anew: " + reset_problem_);
+  state_ = initial_;
+}
 
 void Simulation::setFunctions(int cloth, const std::string& set, std::optional<double> blend)
 {

@@ -1,0 +1,200 @@
+// Services that change the scene while it runs.
+#include <algorithm>
+#include <array>
+#include <set>
+#include <utility>
+
+#include <std_msgs/String.h>
+
+#include "slender_sim/node/scene_markers.h"
+#include "slender_sim/node/scene_node.h"
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+namespace {
+
+using slender_sim::Input;
+using Kind = SceneEdit::Kind;
+
+/// The services, and what they are in a bag.
+const std::array<std::pair<Kind, std::uint8_t>, 5> kinds{{{Kind::spawn, Input::SPAWN},
+                                                          {Kind::remove, Input::REMOVE},
+                                                          {Kind::attach, Input::ATTACH},
+                                                          {Kind::detach, Input::DETACH},
+                                                          {Kind::set_parameter, Input::SET_PARAMETER}}};
+
+/// Of each grasp that is still there, the value that it had.
+void takeByName(const std::vector<std::string>& before, const std::vector<std::string>& now,
+                std::vector<double>& values)
+{
+  std::vector<double> taken(now.size(), 0.0);
+  for (std::size_t g = 0; g < now.size(); ++g)
+    for (std::size_t old = 0; old < std::min(before.size(), values.size()); ++old)
+      if (before[old] == now[g])
+        taken[g] = values[old];
+  values = std::move(taken);
+}
+
+/// A warning without the file and line, which edits change.
+std::string withoutPlace(const SceneConfig& scene, const std::string& warning)
+{
+  const auto end = warning.compare(0, scene.file.size(), scene.file) == 0 ? warning.find(": ", scene.file.size())
+                                                                          : std::string::npos;
+  return end == std::string::npos ? warning : warning.substr(end);
+}
+
+}   // namespace
+
+void SceneNode::advertiseEdits()
+{
+  using slender_sim::EditScene;
+  using Callback = boost::function<bool(EditScene::Request&, EditScene::Response&)>;
+  const auto to = [this](Kind kind) -> Callback {
+    return [this, kind](EditScene::Request& request, EditScene::Response& response) {
+      return onEdit(kind, request, response);
+    };
+  };
+  services_.insert(
+      services_.end(),
+      {nh_priv_.advertiseService("spawn", to(Kind::spawn)), nh_priv_.advertiseService("remove", to(Kind::remove)),
+       nh_priv_.advertiseService("attach", to(Kind::attach)), nh_priv_.advertiseService("detach", to(Kind::detach)),
+       nh_priv_.advertiseService("set_parameter", to(Kind::set_parameter))});
+}
+
+bool SceneNode::onEdit(Kind kind, slender_sim::EditScene::Request& request, slender_sim::EditScene::Response& response)
+{
+  response.success = false;
+  response.message = refusesInput();
+  if (response.message.empty() && !limits_->held().empty())
+    response.message = "inputs are held by a limit; call ~pause with false first";
+  if (response.message.empty() && mode_ == Mode::failed)
+    response.message = "stopped at " + failure_ + "; call ~reset or ~load_state first";
+  if (!response.message.empty())
+    return true;
+  queue_.callAvailable();   // older than the edit
+  try
+  {
+    EditedScene scene = edited({kind, request.text});
+    response.message = scene.warnings;
+    Input input;
+    for (const auto& [one, number] : kinds)
+      if (one == kind)
+        input.kind = number;
+    input.text = request.text;
+    note(std::move(input), clock_.ticks());
+    takeUp(std::move(scene));
+    response.success = true;
+  }
+  catch (const std::exception& e)
+  {
+    response.message = e.what();
+  }
+  return true;
+}
+
+SceneNode::EditedScene SceneNode::edited(const SceneEdit& edit) const
+{
+  EditedScene out;
+  out.simulation = editedSimulation(*simulation_, edit);
+  checkKind(out.simulation->config(), options_, kind_);
+  out.topics = std::make_unique<SceneTopics>(*out.simulation);
+  std::set<std::string> known;
+  for (const std::string& warning : simulation_->config().warnings)
+    known.insert(withoutPlace(simulation_->config(), warning));
+  for (const std::string& warning : out.simulation->config().warnings)
+    if (!known.count(withoutPlace(out.simulation->config(), warning)))
+      out.warnings += (out.warnings.empty() ? "" : "\n") + warning;
+  return out;
+}
+
+/// Everything that knows the scene takes up the edited one.
+void SceneNode::takeUp(EditedScene edited)
+{
+  if (!edited.warnings.empty())
+    ROS_WARN("%s", edited.warnings.c_str());
+  for (RunStatistics* statistics : {&total_, &recent_})
+  {
+    takeByName(topics_->grasps, edited.topics->grasps, statistics->max_force);
+    takeByName(topics_->grasps, edited.topics->grasps, statistics->max_torque);
+  }
+  const std::unique_ptr<GraspWrenches> wrenches_before = std::move(wrenches_);   // topics that stay keep connections
+  const std::unique_ptr<FrameBroadcaster> frames_before = std::move(frames_);
+  std::swap(simulation_, edited.simulation);   // the scene before it goes last: inputs still refer to it
+  topics_ = std::move(edited.topics);
+  limits_ = std::make_unique<LimitWatch>(*simulation_);
+  makeInputs();
+  {
+    const std::vector<ros::Publisher> before = takePublishers();   // topics that stay keep their connections
+    advertise();
+  }
+  std_msgs::String scene;
+  scene.data = simulation_->config().source;
+  scene_pub_.publish(scene);
+  if (bag_)
+    try
+    {
+      bag_->sceneChanged(*simulation_);
+      bag_->recordScene(scene.data, clock_.stamp());
+    }
+    catch (const std::runtime_error& e)
+    {
+      recordingFailed(e.what());
+    }
+  if (topics_->has_cloths)
+    publishMesh();
+  deleteMarkers(*edited.simulation);
+  drawn_.reset();
+}
+
+/// All publishers that advertise() makes. Afterwards there are none.
+std::vector<ros::Publisher> SceneNode::takePublishers()
+{
+  std::vector<ros::Publisher> taken;
+  for (ros::Publisher* publisher :
+       {&bodies_pub_, &grasps_pub_, &obstacles_pub_, &fields_pub_, &rod_state_pub_, &rod_poses_pub_, &thread_state_pub_,
+        &thread_poses_pub_, &cloth_state_pub_, &points_pub_, &mesh_pub_, &markers_pub_, &scene_pub_, &diagnostics_pub_,
+        &clock_pub_})
+    taken.push_back(std::exchange(*publisher, ros::Publisher()));
+  for (std::vector<ros::Publisher>* publishers : {&rod_poses_pubs_, &nozzle_pubs_})
+  {
+    taken.insert(taken.end(), publishers->begin(), publishers->end());
+    publishers->clear();
+  }
+  return taken;
+}
+
+/// Of what is gone.
+void SceneNode::deleteMarkers(const Simulation& before)
+{
+  if (markers_pub_.getNumSubscribers() == 0)
+    return;
+  std_msgs::Header header;
+  header.stamp = clock_.stamp();
+  header.frame_id = options_.frame_id;
+  using Id = std::pair<std::string, int>;
+  std::set<Id> now;
+  for (const visualization_msgs::Marker& marker : sceneMarkers(*simulation_, header, options_.markers).markers)
+    now.insert(Id(marker.ns, marker.id));
+  visualization_msgs::MarkerArray gone;
+  for (const visualization_msgs::Marker& marker : sceneMarkers(before, header, options_.markers).markers)
+  {
+    if (now.count(Id(marker.ns, marker.id)))
+      continue;
+    gone.markers.emplace_back();
+    gone.markers.back().header = header;
+    gone.markers.back().ns = marker.ns;
+    gone.markers.back().id = marker.id;
+    gone.markers.back().action = visualization_msgs::Marker::DELETE;
+  }
+  if (!gone.markers.empty())
+    markers_pub_.publish(gone);
+}
+
+void SceneNode::repeatEdit(const Input& input)
+{
+  for (const auto& [kind, number] : kinds)
+    if (number == input.kind)
+      takeUp(edited({kind, input.text}));
+}
+
+}   // namespace slender

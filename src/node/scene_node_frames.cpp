@@ -1,0 +1,53 @@
+// What follows frames of tf must not be what the node broadcasts there.
+#include "slender_sim/node/scene_node.h"
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+namespace {
+
+/// Calls visit(FRAME, WHO) for everything in the scene that follows a frame of tf.
+template <class Visit>
+void visitFollowers(const Simulation& simulation, const std::vector<std::string>& grasp_names, const Visit& visit)
+{
+  const auto look = [&visit](const auto& motion, const std::string& who) {
+    if (const auto* tf = std::get_if<TfMotion>(&motion))
+      visit(tf->frame, who);
+  };
+  const SceneConfig& scene = simulation.config();
+  for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
+    look(simulation.grasps()[g].config->motion, "grasp " + grasp_names[g]);
+  for (const BodyConfig& body : scene.bodies)
+    if (body.motion)
+      look(*body.motion, "body " + body.name);
+  for (const ObstacleConfig& obstacle : scene.obstacles)
+    look(obstacle.motion, "obstacle " + obstacle.name);
+  for (const ThreadConfig& thread : scene.threads)
+    if (thread.nozzle)
+      look(thread.nozzle->motion, "the nozzle of thread " + thread.name);
+  for (const ClothConfig& cloth : scene.cloths)
+    if (cloth.tracking)
+      if (const auto* carried = std::get_if<CarriedGuide>(&cloth.tracking->guide.motion))
+        if (carried->by_tf)
+          visit(carried->bodies.front(), "the guide of " + cloth.name);
+}
+
+}   // namespace
+
+std::set<std::string> SceneNode::ownFrames() const
+{
+  return broadcastFrames(nh_priv_.getNamespace().substr(1), *topics_, *simulation_);
+}
+
+/// What follows a frame that the node itself broadcasts would follow itself, ~guide_delay late.
+void SceneNode::refuseLoops() const
+{
+  const std::set<std::string> own = ownFrames();
+  visitFollowers(*simulation_, topics_->grasps, [&](const std::string& frame, const std::string& who) {
+    if (own.count(frame))
+      throw SceneError("scene " + simulation_->config().name + ": " + who + " follows the frame " + frame +
+                       " of tf, which this node broadcasts itself: follow the frame of what moves it instead; of a " +
+                       "body of this scene, take motion: {body: NAME}, or weld a rod to it");
+  });
+}
+
+}   // namespace slender

@@ -1,0 +1,152 @@
+#include "slender_sim/node/tf_inputs.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include <ros/console.h>
+
+#include "slender_sim/node/converters.h"
+
+namespace slender {
+namespace {
+
+// Share of ~guide_delay between poses that are taken at steps: two intervals of samples have to fit into the delay.
+constexpr double kSpacing = 0.4;
+constexpr int kMostParents = 100;
+
+std::string seconds(double value)
+{
+  char out[32];
+  std::snprintf(out, sizeof out, "%.3g s", value);
+  return out;
+}
+
+}   // namespace
+
+TfInputs::TfInputs(const NodeOptions& options, const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops,
+                   std::set<std::string> own)
+  : options_(options),
+    clock_(clock),
+    tf_(tf),
+    drops_(drops),
+    own_(std::move(own))
+{
+}
+
+void TfInputs::follow(const std::string& frame, const std::string& who, Sink sink)
+{
+  auto found = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& f) { return f.name == frame; });
+  if (found == frames_.end())
+  {
+    Frame added;
+    added.name = frame;
+    found = frames_.insert(frames_.end(), std::move(added));
+  }
+  found->followers.push_back({who, std::move(sink)});
+}
+
+void TfInputs::look()
+{
+  if (stopped_)
+    return;
+  for (Frame& frame : frames_)
+    lookAt(frame);
+}
+
+/// The instant at which the frame is to be looked up; nothing when there is none, or none that is new.
+std::optional<ros::Time> TfInputs::newest(Frame& frame) const
+{
+  const ros::Time step = clock_.nextStamp();
+  ros::Time stamp;
+  if (frame.name != options_.frame_id)
+    stamp = tf_.lookupTransform(options_.frame_id, frame.name, ros::Time(0)).header.stamp;
+  const bool beyond = stamp.isZero() || stamp > step;   // zero: static
+  if (beyond)
+    stamp = step;
+  const double time = clock_.secondsAt(stamp), age = clock_.seconds() - time;
+  if (age > options_.guide_timeout)
+  {
+    frame.why = "its newest transform is " + seconds(age) + " old (~guide_timeout)";
+    return std::nullopt;
+  }
+  const double spacing = beyond ? kSpacing * options_.guide_delay - 0.5 * clock_.step() : 0.0;
+  frame.why.clear();
+  return frame.last && time - *frame.last <= std::max(spacing, 0.0) ? std::nullopt : std::optional<ros::Time>(stamp);
+}
+
+void TfInputs::lookAt(Frame& frame)
+{
+  Pose X_WF;
+  std::optional<ros::Time> stamp;
+  try
+  {
+    stamp = newest(frame);
+    if (!stamp)
+      return;
+    if (frame.name != options_.frame_id)
+    {
+      drops_.receive();
+      const PoseFault fault = fromMessage(tf_.lookupTransform(options_.frame_id, frame.name, *stamp).transform, X_WF);
+      if (fault != PoseFault::none)
+      {
+        drops_.drop(fault == PoseFault::not_finite ? Drop::not_finite : Drop::bad_quaternion, "tf " + frame.name,
+                    "in the transform to " + options_.frame_id);
+        return;
+      }
+    }
+  }
+  catch (const tf2::TransformException& e)
+  {
+    frame.why = e.what();
+    return;
+  }
+  const double time = clock_.secondsAt(*stamp);
+  if (!(X_WF.position.cwiseAbs().maxCoeff() <= kMaxCoordinate))
+  {
+    drops_.drop(Drop::out_of_range, "tf " + frame.name,
+                "coordinates must be within " + std::to_string(static_cast<long>(kMaxCoordinate)) + " m");
+    return;
+  }
+  if (!frame.checked)
+    warnOfLoop(frame);
+  frame.last = time;
+  for (const Follower& follower : frame.followers)
+    follower.sink(time, X_WF);
+}
+
+/// A frame that hangs on what it moves runs away, or swings.
+void TfInputs::warnOfLoop(Frame& frame) const
+{
+  frame.checked = true;
+  std::string child = frame.name, parent;
+  for (int k = 0; k < kMostParents && tf_._getParent(child, ros::Time(0), parent); ++k)
+  {
+    if (own_.count(parent))
+      ROS_WARN(
+          "%s follows the frame %s of tf, which hangs on %s, a frame that this node broadcasts itself: if that is what "
+          "it moves, it follows itself, ever later",
+          frame.followers.front().who.c_str(), frame.name.c_str(), parent.c_str());
+    child = parent;
+  }
+}
+
+void TfInputs::restart()
+{
+  for (Frame& frame : frames_)
+    frame.last.reset();
+}
+
+std::vector<TfInputs::State> TfInputs::states() const
+{
+  std::vector<State> states;
+  for (const Frame& frame : frames_)
+  {
+    std::string who;
+    for (const Follower& follower : frame.followers)
+      who += (who.empty() ? "" : ", ") + follower.who;
+    states.push_back({frame.name, who, frame.last.has_value(), frame.why});
+  }
+  return states;
+}
+
+}   // namespace slender

@@ -1,0 +1,425 @@
+#include <algorithm>
+#include <cstdio>
+#include <sstream>
+
+#include "scene_tree.h"
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/scene_edit.h"
+#include "yaml_cursor.h"
+
+namespace slender {
+
+namespace {
+
+/// An object of a scene, and where its text is.
+struct ObjectEntry
+{
+  std::string section, name;
+  std::size_t index = 0;
+  bool generated = false;   ///< by `generate`: it has no text of its own
+};
+
+std::size_t entriesIn(const YamlTree& scene, const char* section)
+{
+  const YamlTree* list = scene.find(section);
+  return list ? list->items.size() : 0;
+}
+
+/// In the order of the configuration: what the text lists, and then what was generated.
+std::vector<ObjectEntry> objectsOf(const SceneConfig& config, const YamlTree& scene)
+{
+  std::vector<ObjectEntry> all;
+  const auto add = [&](const char* section, const auto& objects, std::size_t first, std::size_t last) {
+    const std::size_t listed = entriesIn(scene, section);
+    for (std::size_t k = first; k < last; ++k)
+      all.push_back({section, objects[k].name, k - first, k - first >= listed});
+  };
+  const std::size_t cloths = std::min(entriesIn(scene, "cloths"), config.cloths.size());
+  add("rods", config.rods, 0, config.rods.size());
+  add("threads", config.threads, 0, config.threads.size());
+  add("cloths", config.cloths, 0, cloths);
+  add("tracked", config.cloths, cloths, config.cloths.size());
+  add("bodies", config.bodies, 0, config.bodies.size());
+  add("obstacles", config.obstacles, 0, config.obstacles.size());
+  return all;
+}
+
+YamlTree scalar(const std::string& value, const std::string& origin)
+{
+  YamlTree tree;
+  tree.kind = YamlTree::Kind::scalar;
+  tree.scalar = value;
+  tree.origin = origin;
+  return tree;
+}
+
+/// The value of a key of a map, which is added when it is missing.
+YamlTree& keyOf(YamlTree& map, const std::string& key)
+{
+  map.kind = YamlTree::Kind::map;
+  if (!map.find(key))
+    map.members.emplace_back(key, YamlTree{});
+  return *map.find(key);
+}
+
+void eraseKey(YamlTree& map, const std::string& key)
+{
+  const auto has_key = [&](const auto& member) { return member.first == key; };
+  map.members.erase(std::remove_if(map.members.begin(), map.members.end(), has_key), map.members.end());
+}
+
+/// Names that follow from the number of objects of a kind would change with it.
+void writeNames(const std::vector<ObjectEntry>& objects, YamlTree& scene)
+{
+  for (const ObjectEntry& object : objects)
+  {
+    if (object.generated)
+      continue;
+    YamlTree& entry = keyOf(scene, object.section).items[object.index];
+    if (!entry.find("name"))
+    {
+      entry.kind = YamlTree::Kind::map;
+      entry.members.insert(entry.members.begin(), {"name", scalar(object.name, "")});
+    }
+  }
+}
+
+/// One edit of the text of a scene.
+class SceneText
+{
+public:
+  SceneText(const SceneConfig& scene, const SceneEdit& edit)
+    : where_(toString(edit.kind)),
+      tree_(parseYaml(scene.source, scene.file)),
+      objects_(objectsOf(scene, tree_))
+  {
+    writeNames(objects_, tree_);
+  }
+
+  void spawn(const std::string& text);
+  void remove(const std::string& name);
+  void attach(const std::string& text);
+  void detach(const std::string& name);
+  void setParameters(const std::string& text);
+  /// Writes down what followed from other objects before, where that would change. Returns whether anything was
+  /// written.
+  bool keepDefaults(const SceneConfig& before, const SceneConfig& after);
+  /// Leaves out the settings of contact, which are refused where nothing is left that has any. Returns whether there
+  /// were settings.
+  bool dropContact();
+
+  const YamlTree& tree() const { return tree_; }
+
+private:
+  [[noreturn]] void refuse(const std::string& why) const { throw SceneError(where_ + ": " + why); }
+  YamlTree parsed(const std::string& text) const;
+  const ObjectEntry& find(const std::string& name, const std::vector<std::string>& sections) const;
+  YamlTree& textOf(const ObjectEntry& object) { return tree_.find(object.section)->items[object.index]; }
+  void checkPath(const std::string& assignment) const;
+
+  const std::string where_;
+  YamlTree tree_;
+  const std::vector<ObjectEntry> objects_;
+};
+
+const std::vector<std::string> all_sections{"rods", "threads", "cloths", "tracked", "bodies", "obstacles"};
+
+/// Messages name the line of the request.
+void setPlace(YamlTree& tree, const std::string& where)
+{
+  tree.origin = where + ":" + std::to_string(std::max(1, tree.line));
+  for (YamlTree& item : tree.items)
+    setPlace(item, where);
+  for (auto& member : tree.members)
+    setPlace(member.second, where);
+}
+
+std::string trimmed(const std::string& text)
+{
+  const char* const blank = " \t\r\n";
+  const auto first = text.find_first_not_of(blank);
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(blank) - first + 1);
+}
+
+YamlTree SceneText::parsed(const std::string& text) const
+{
+  YamlTree tree = parseYaml(text, where_);
+  setPlace(tree, where_);
+  return tree;
+}
+
+/// The one object of this name, or of "SECTION.NAME", in these sections.
+const ObjectEntry& SceneText::find(const std::string& name, const std::vector<std::string>& sections) const
+{
+  std::vector<const ObjectEntry*> found;
+  std::vector<std::string> names;
+  for (const ObjectEntry& object : objects_)
+  {
+    if (std::find(sections.begin(), sections.end(), object.section) == sections.end())
+      continue;
+    names.push_back(object.name);
+    if (object.name == name || object.section + "." + object.name == name)
+      found.push_back(&object);
+  }
+  if (found.empty())
+  {
+    const std::string nearest = nearestWord(name, names);
+    names.resize(std::min<std::size_t>(names.size(), 20));
+    refuse("there is no object \"" + name + "\" for this" +
+           (names.empty() ? "" : "; the scene has: " + joinWords(names)) +
+           (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
+  }
+  if (found.size() > 1)
+  {
+    refuse("objects of several sections have the name " + name + "; give " + found[0]->section + "." + name + " or " +
+           found[1]->section + "." + name);
+  }
+  if (found[0]->generated)
+    refuse(name + " was made by generate and has no text of its own that could be changed");
+  return *found[0];
+}
+
+void SceneText::spawn(const std::string& text)
+{
+  const YamlTree added = parsed(text);
+  if (added.kind != YamlTree::Kind::map || added.members.empty())
+    refuse("the text must be a section with an object, as in a scene file, for example bodies: [{name: ball, ...}]");
+  for (const auto& [section, entries] : added.members)
+  {
+    if (section == "tracked" || section == "generate")
+    {
+      refuse(section +
+             " belongs into the scene from its start; what can be spawned: rods, threads, cloths, bodies, "
+             "obstacles");
+    }
+    if (std::find(all_sections.begin(), all_sections.end(), section) == all_sections.end())
+    {
+      refuse("'" + section + "' is no section of objects; must be one of rods, threads, cloths, bodies, obstacles" +
+             " (values are changed by ~set_parameter)");
+    }
+    const bool one = entries.kind == YamlTree::Kind::map;
+    if (!one && (entries.kind != YamlTree::Kind::list || entries.items.empty()))
+      refuse(section + " is " + toString(entries.kind) + "; must be a list of objects: " + section + ": [{...}]");
+    YamlTree& list = keyOf(tree_, section);
+    list.kind = YamlTree::Kind::list;
+    for (const YamlTree& entry : one ? std::vector<YamlTree>{entries} : entries.items)
+    {
+      if (section == "rods" && entry.find("track"))
+        refuse("a rod that tracks a guide belongs into the scene from its start; leave track out");
+      list.items.push_back(entry);
+    }
+  }
+}
+
+void SceneText::remove(const std::string& name)
+{
+  const ObjectEntry& object = find(trimmed(name), all_sections);
+  if (objects_.size() == 1)
+    refuse(object.name + " is the last object of the scene; a scene has at least one");
+  YamlTree& list = *tree_.find(object.section);
+  list.items.erase(list.items.begin() + static_cast<std::ptrdiff_t>(object.index));
+  if (list.items.empty())
+    eraseKey(tree_, object.section);
+}
+
+void SceneText::attach(const std::string& text)
+{
+  const YamlTree added = parsed(text);
+  const bool fits = added.kind == YamlTree::Kind::map && added.members.size() == 1 &&
+                    added.members[0].second.kind == YamlTree::Kind::map && !added.members[0].second.members.empty();
+  if (!fits)
+  {
+    refuse(
+        "the text must be OBJECT: {GRASP: {...}} with the keys of a grasp in a scene file, for example rope: "
+        "{hand: {edges: [-1], motion: {topic: true}}}");
+  }
+  YamlTree& grasps = keyOf(textOf(find(added.members[0].first, {"rods", "cloths", "tracked"})), "grasps");
+  for (const auto& [name, grasp] : added.members[0].second.members)
+  {
+    if (grasps.find(name))
+      refuse(added.members[0].first + " has a grasp " + name + " already; ~set_grasp moves it, ~detach removes it");
+    for (const char* key : {"direction", "director"})
+      if (grasp.find(key))
+        refuse(std::string(key) +
+               " turns a section as the scene starts; a grasp that is attached later holds it as "
+               "it is: leave " +
+               key + " out");
+    keyOf(grasps, name) = grasp;
+  }
+}
+
+void SceneText::detach(const std::string& name)
+{
+  const std::string wanted = trimmed(name);
+  std::vector<std::string> names;
+  for (const ObjectEntry& object : objects_)
+  {
+    if (object.generated)
+      continue;
+    YamlTree* grasps = textOf(object).find("grasps");
+    if (grasps && grasps->find(wanted))
+    {
+      eraseKey(*grasps, wanted);
+      if (grasps->members.empty())
+        eraseKey(textOf(object), "grasps");
+      return;
+    }
+    for (std::size_t g = 0; grasps && g < grasps->members.size(); ++g)
+      names.push_back(grasps->members[g].first);
+  }
+  const std::string nearest = nearestWord(wanted, names);
+  refuse("there is no grasp \"" + wanted + "\" in the text of the scene" +
+         (names.empty() ? "" : "; it has: " + joinWords(names)) +
+         (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
+}
+
+/// Keys whose values may change, by section.
+const std::vector<std::pair<std::string, std::vector<std::string>>> changeable{
+    {"wind", {"velocity"}},
+    {"contact", {"gap", "slip_speed"}},
+    {"rods", {"material", "damping", "contact", "loads"}},
+    {"threads", {"fluid", "contact"}},
+    {"cloths", {"material", "membrane", "bending", "plasticity", "damping", "aerodynamics", "contact", "loads"}},
+    {"tracked", {"material", "membrane", "bending", "plasticity", "damping", "aerodynamics", "contact"}},
+    {"bodies", {"mass", "density", "inertia", "gravity", "force", "torque", "damping", "friction", "contact"}},
+    {"obstacles", {"friction"}}};
+
+void SceneText::checkPath(const std::string& assignment) const
+{
+  std::vector<std::string> parts;
+  std::istringstream path(assignment.substr(0, assignment.find('=')));
+  for (std::string part; std::getline(path, part, '.');)
+    parts.push_back(part);
+  parts.resize(std::max<std::size_t>(parts.size(), 1));
+  for (const auto& [section, keys] : changeable)
+  {
+    if (section != parts[0])
+      continue;
+    const bool listed = std::find(all_sections.begin(), all_sections.end(), section) != all_sections.end();
+    const std::size_t at = listed ? 2 : 1;
+    if (parts.size() > at && std::find(keys.begin(), keys.end(), parts[at]) != keys.end())
+      return;
+    refuse(assignment + ": of " + section + " these may change while the scene runs: " + section +
+           (listed ? ".NAME." : ".") + "KEY with KEY one of " + joinWords(keys) + "; for others start the scene anew");
+  }
+  refuse(assignment +
+         ": may not change while the scene runs; what may: wind.velocity, contact, and materials, "
+         "damping, contact and loads of rods, threads, cloths, tracked, bodies and obstacles");
+}
+
+void SceneText::setParameters(const std::string& text)
+{
+  std::istringstream lines(text);
+  std::string line;
+  bool any = false;
+  while (std::getline(lines, line))
+  {
+    line = trimmed(line);
+    if (line.empty())
+      continue;
+    any = true;
+    if (line.find('=') == std::string::npos)
+      refuse(line + ": must be PATH=VALUE, for example rods.rope.material.youngs_modulus=1e7");
+    checkPath(line);
+    applyOverride(tree_, line, where_);
+  }
+  if (!any)
+    refuse("the text is empty; must be PATH=VALUE, for example rods.rope.material.youngs_modulus=1e7");
+}
+
+bool SceneText::keepDefaults(const SceneConfig& before, const SceneConfig& after)
+{
+  const std::string origin = where_ + " (kept as it was)";
+  bool wrote = false;
+  const auto keep = [&](YamlTree& map, const char* key, const std::string& value) {
+    if (map.find(key))
+      return;
+    keyOf(map, key) = scalar(value, origin);
+    wrote = true;
+  };
+  const bool integrates =
+      !before.rods.empty() || !before.bodies.empty() || !before.cloths.empty();   // not only threads
+  if (integrates && after.time.integrator != before.time.integrator)
+    keep(keyOf(tree_, "time"), "integrator", toString(before.time.integrator));
+  if (before.contact.gap > 0 && after.contact.gap > 0 && after.contact.gap != before.contact.gap)
+  {
+    char gap[40];
+    std::snprintf(gap, sizeof gap, "%.17g", before.contact.gap);
+    keep(keyOf(tree_, "contact"), "gap", gap);
+  }
+  for (std::size_t k = 0; k < entriesIn(tree_, "cloths") && k < after.cloths.size(); ++k)
+  {
+    const ClothConfig& cloth = after.cloths[k];
+    const auto same = std::find_if(before.cloths.begin(), before.cloths.end(),
+                                   [&](const ClothConfig& other) { return other.name == cloth.name; });
+    if (same == before.cloths.end() || !same->contact || !cloth.contact ||
+        same->contact->method == cloth.contact->method)
+      continue;
+    keep(keyOf(tree_.find("cloths")->items[k], "contact"), "method",
+         same->contact->method == ContactMethod::barrier ? "barrier" : "impulses");
+  }
+  return wrote;
+}
+
+bool SceneText::dropContact()
+{
+  const bool there = tree_.find("contact") != nullptr;
+  eraseKey(tree_, "contact");
+  return there;
+}
+
+const char* const edited_mark = " (edited)";
+
+}   // namespace
+
+const char* toString(SceneEdit::Kind kind)
+{
+  switch (kind)
+  {
+    case SceneEdit::Kind::spawn: return "~spawn";
+    case SceneEdit::Kind::remove: return "~remove";
+    case SceneEdit::Kind::attach: return "~attach";
+    case SceneEdit::Kind::detach: return "~detach";
+    case SceneEdit::Kind::set_parameter: return "~set_parameter";
+  }
+  return "";
+}
+
+SceneConfig editedScene(const SceneConfig& scene, const SceneEdit& edit)
+{
+  SceneText text(scene, edit);
+  switch (edit.kind)
+  {
+    case SceneEdit::Kind::spawn: text.spawn(edit.text); break;
+    case SceneEdit::Kind::remove: text.remove(edit.text); break;
+    case SceneEdit::Kind::attach: text.attach(edit.text); break;
+    case SceneEdit::Kind::detach: text.detach(edit.text); break;
+    case SceneEdit::Kind::set_parameter: text.setParameters(edit.text); break;
+  }
+  // lines of messages are those of the text as it is now
+  const bool edited_before = scene.file.size() > std::char_traits<char>::length(edited_mark) &&
+                             scene.file.compare(scene.file.size() - std::char_traits<char>::length(edited_mark),
+                                                std::string::npos, edited_mark) == 0;
+  const std::string file = scene.file + (edited_before ? "" : edited_mark);
+  SceneConfig edited;
+  try
+  {
+    edited = sceneOfTree(text.tree(), file, scene.directory);
+  }
+  catch (const SceneError&)
+  {
+    if (edit.kind != SceneEdit::Kind::remove || !text.dropContact())
+      throw;
+    edited = sceneOfTree(text.tree(), file, scene.directory);
+  }
+  if (text.keepDefaults(scene, edited))
+    edited = sceneOfTree(text.tree(), file, scene.directory);
+  if (edit.kind == SceneEdit::Kind::set_parameter && edited.wind_topic && edited.wind != scene.wind)
+    throw SceneError(
+        "~set_parameter: wind.velocity: messages on the topic wind set the wind of this scene (wind: "
+        "{topic: true}); publish there instead");
+  edited.source = writeYaml(text.tree());
+  return edited;
+}
+
+}   // namespace slender

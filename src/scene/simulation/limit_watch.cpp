@@ -1,0 +1,318 @@
+#include "slender_sim/scene/limit_watch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <set>
+
+namespace slender {
+
+namespace {
+
+using LimitKind = LimitExcess::Kind;
+
+constexpr double kExcursionEnd = 0.95;   // of the limit: below it an excursion is over
+constexpr double kNextRelease = 0.1;     // [s] after which an excursion that lasts releases the next grasp
+
+const char* limitName(LimitKind kind)
+{
+  switch (kind)
+  {
+    case LimitKind::strain: return "strain";
+    case LimitKind::force: return "force";
+    case LimitKind::torque: return "torque";
+    case LimitKind::speed: return "speed";
+  }
+  return "?";
+}
+
+/// Largest distance that one of the points moves [m]; 0 when there are none to compare.
+double largestMove(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
+{
+  return from.cols() == to.cols() && from.cols() > 0 ? (to - from).colwise().norm().maxCoeff() : 0.0;
+}
+
+double moveTo(const Pose& from, const GraspTarget& to) { return (to.X_WG.position - from.position).norm(); }
+
+bool hasInput(const std::optional<GivenMotion>& motion)
+{
+  return motion && !std::holds_alternative<FixedMotion>(*motion);
+}
+
+const Pose& nozzlePose(const ThreadGroupState& group) { return group.threads.front().ends[1].X_WE; }
+
+}   // namespace
+
+const char* toString(OnLimit on_limit)
+{
+  switch (on_limit)
+  {
+    case OnLimit::warn: return "warn";
+    case OnLimit::hold: return "hold";
+    case OnLimit::release: return "release";
+    case OnLimit::stop: return "stop";
+  }
+  return "?";
+}
+
+LimitWatch::LimitWatch(Simulation& simulation) : simulation_(simulation), limits_(simulation.config().limits)
+{
+  for (const ClothConfig& cloth : simulation.config().cloths)
+  {
+    std::set<std::pair<int, int>> edges;
+    const Eigen::Matrix3Xi& faces = cloth.mesh.triangles;
+    for (Eigen::Index f = 0; f < faces.cols(); ++f)
+      for (int k = 0; k < 3; ++k)
+        edges.insert(std::minmax({faces(k, f), faces((k + 1) % 3, f)}));
+    cloth_edges_.emplace_back(edges.begin(), edges.end());
+    cloth_lengths_.emplace_back();
+    for (const auto& [a, b] : cloth_edges_.back())
+      cloth_lengths_.back().push_back((cloth.mesh.vertices.col(b) - cloth.mesh.vertices.col(a)).norm());
+  }
+}
+
+/// Whether there is nothing to say of a value: it is within its limit, and was so before.
+bool LimitWatch::isQuiet(const Key& key, double value, double limit) const
+{
+  return value <= limit && (excursions_.empty() || excursions_.count(key) == 0);
+}
+
+/// `subject`: what exceeds the limit, e.g. "grasp 'left': its force".
+void LimitWatch::look(const Key& key, double value, double limit, const std::string& subject, const char* unit,
+                      std::vector<int> to_release, std::vector<LimitExcess>& begun)
+{
+  const auto found = excursions_.find(key);
+  if (value <= (found == excursions_.end() ? limit : kExcursionEnd * limit))
+  {
+    if (found != excursions_.end())
+      excursions_.erase(found);
+    return;
+  }
+  const double now = simulation_.state().time;
+  if (found != excursions_.end() && (limits_.on_limit != OnLimit::release || now < found->second.next_action))
+    return;
+  Excursion& excursion = excursions_[key];
+  char text[160];
+  std::snprintf(text, sizeof text, " %.4g%s exceeds limits.%s = %.4g%s (t = %.6g s)", value, unit, limitName(key.first),
+                limit, unit, now);
+  excursion.worst = {key.first, now, value, limit, std::move(to_release), subject + text};
+  act(excursion);
+  if (found != excursions_.end())
+    return;   // the same excursion goes on
+  ++count_;
+  begun.push_back(excursion.worst);
+}
+
+void LimitWatch::act(Excursion& excursion)
+{
+  const std::string& why = excursion.worst.text;
+  switch (limits_.on_limit)
+  {
+    case OnLimit::warn: return;
+    case OnLimit::hold: held_ = held_.empty() ? why : held_; return;
+    case OnLimit::stop: stopped_ = stopped_.empty() ? why : stopped_; return;
+    case OnLimit::release:
+      excursion.next_action = simulation_.state().time + kNextRelease;
+      for (const int grasp : excursion.worst.to_release)
+      {
+        if (!simulation_.grasps().isActive(grasp))
+          continue;
+        simulation_.grasps().release(grasp);
+        released_.push_back(grasp);
+      }
+  }
+}
+
+std::vector<LimitExcess> LimitWatch::checkInputs(SceneInputs& inputs)
+{
+  std::vector<LimitExcess> begun;
+  released_.clear();
+  if (!held_.empty())
+  {
+    holdInputs(inputs);
+    return begun;
+  }
+  const SceneConfig& config = simulation_.config();
+  const SceneState& state = simulation_.state();
+  int index = 0;
+  const auto see = [&](double move, const std::string& what, std::vector<int> to_release = {}) {
+    const Key key{LimitKind::speed, index++};
+    const double speed = move / config.time.step;
+    if (!isQuiet(key, speed, limits_.speed))
+      look(key, speed, limits_.speed, what + ": the speed of its input", " m/s", std::move(to_release), begun);
+  };
+  for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
+  {
+    const int grasp = static_cast<int>(g);
+    const bool driven = simulation_.grasps().isActive(grasp) &&
+                        !std::holds_alternative<FixedMotion>(simulation_.grasps()[g].config->motion);
+    see(driven ? moveTo(simulation_.grasps().pose(grasp), inputs.grasps[g]) : 0.0,
+        "grasp '" + simulation_.grasps()[g].config->name + "'", {grasp});
+  }
+  for (std::size_t b = 0; b < config.bodies.size(); ++b)
+    see(hasInput(config.bodies[b].motion) ? moveTo(state.bodies[b].X_WB, inputs.bodies[b]) : 0.0,
+        "body '" + config.bodies[b].name + "'");
+  for (std::size_t k = 0; k < config.obstacles.size(); ++k)
+    see(hasInput(config.obstacles[k].motion) ? moveTo(state.obstacles[k], inputs.obstacles[k]) : 0.0,
+        "obstacle '" + config.obstacles[k].name + "'");
+  for (std::size_t k = 0; k < config.threads.size(); ++k)
+    see(config.threads[k].nozzle && hasInput(config.threads[k].nozzle->motion)
+            ? (inputs.threads[k].nozzle.position - nozzlePose(state.threads[k]).position).norm()
+            : 0.0,
+        "thread '" + config.threads[k].name + "'");
+  for (std::size_t k = 0; k < inputs.guides.size(); ++k)
+    see(largestMove(state.cloth_guides[k].points, inputs.guides[k]), "cloth '" + config.cloths[k].name + "'");
+  for (std::size_t k = 0; k < inputs.rod_guides.size(); ++k)
+    see(largestMove(state.rod_guides[k].points, inputs.rod_guides[k]), "rod '" + config.rods[k].name + "'");
+  if (!held_.empty())
+    holdInputs(inputs);
+  return begun;
+}
+
+/// Targets that stand still where everything is now. Flows, belts and wind go on.
+void LimitWatch::holdInputs(SceneInputs& inputs) const
+{
+  const SceneState& state = simulation_.state();
+  for (std::size_t g = 0; g < inputs.grasps.size(); ++g)
+    inputs.grasps[g] = {simulation_.grasps().pose(static_cast<int>(g)), Twist{}};
+  for (std::size_t b = 0; b < inputs.bodies.size(); ++b)
+    inputs.bodies[b] = {state.bodies[b].X_WB, Twist{}};
+  for (std::size_t k = 0; k < inputs.obstacles.size(); ++k)
+    inputs.obstacles[k] = {state.obstacles[k], Twist{}};
+  for (std::size_t k = 0; k < inputs.threads.size(); ++k)
+    if (simulation_.config().threads[k].nozzle)
+      inputs.threads[k].nozzle = nozzlePose(state.threads[k]);
+  for (std::size_t k = 0; k < inputs.guides.size(); ++k)
+    if (inputs.guides[k].cols() > 0)
+      inputs.guides[k] = state.cloth_guides[k].points;
+  for (std::size_t k = 0; k < inputs.rod_guides.size(); ++k)
+    if (inputs.rod_guides[k].cols() > 0)
+      inputs.rod_guides[k] = state.rod_guides[k].points;
+}
+
+std::vector<LimitExcess> LimitWatch::checkStep()
+{
+  std::vector<LimitExcess> begun;
+  released_.clear();
+  for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
+  {
+    const int grasp = static_cast<int>(g);
+    const GraspConfig& config = *simulation_.grasps()[g].config;
+    const double force_limit = config.limits.force.value_or(limits_.force),
+                 torque_limit = config.limits.torque.value_or(limits_.torque);
+    if (std::isinf(force_limit) && std::isinf(torque_limit))
+      continue;
+    const bool active = simulation_.grasps().isActive(grasp);
+    const Wrench& wrench = simulation_.grasps().wrench(grasp);
+    const auto see = [&](const Key& key, double value, double limit, const char* unit) {
+      if (!isQuiet(key, value, limit))
+        look(key, value, limit, "grasp '" + config.name + "': its " + limitName(key.first), unit, {grasp}, begun);
+    };
+    see({LimitKind::force, grasp}, active ? wrench.force.norm() : 0.0, force_limit, " N");
+    see({LimitKind::torque, grasp}, active ? wrench.torque.norm() : 0.0, torque_limit, " N m");
+  }
+  checkStrains(begun);
+  return begun;
+}
+
+void LimitWatch::checkStrains(std::vector<LimitExcess>& begun)
+{
+  if (std::isinf(limits_.strain))
+    return;
+  for (std::size_t r = 0; r < simulation_.config().rods.size(); ++r)
+    checkRodStrain(static_cast<int>(r), begun);
+  for (std::size_t k = 0; k < simulation_.config().cloths.size(); ++k)
+    checkClothStrain(static_cast<int>(k), begun);
+}
+
+void LimitWatch::checkRodStrain(int rod, std::vector<LimitExcess>& begun)
+{
+  const RodModel& model = simulation_.rodModel(rod);
+  const Eigen::Matrix3Xd& x = simulation_.state().rods[rod].x;
+  double strain = 0.0;
+  int worst = 0;
+  for (int j = 0; j < model.edges(); ++j)
+  {
+    const int next = j + 1 < x.cols() ? j + 1 : 0;
+    const double here = std::abs((x.col(next) - x.col(j)).norm() / model.rest_length[j] - 1.0);
+    if (here > strain)
+    {
+      strain = here;
+      worst = j;
+    }
+  }
+  if (isQuiet({LimitKind::strain, rod}, strain, limits_.strain))
+    return;
+  look({LimitKind::strain, rod}, strain, limits_.strain,
+       "rod '" + model.name + "', edge " + std::to_string(worst) + ": its strain", "", mostLoaded(rod, -1), begun);
+}
+
+void LimitWatch::checkClothStrain(int cloth, std::vector<LimitExcess>& begun)
+{
+  const Eigen::Matrix3Xd& x = simulation_.state().cloths[cloth].x;
+  const auto& edges = cloth_edges_[cloth];
+  double strain = 0.0;
+  std::size_t worst = 0;
+  for (std::size_t e = 0; e < edges.size(); ++e)
+  {
+    const double here =
+        std::abs((x.col(edges[e].second) - x.col(edges[e].first)).norm() / cloth_lengths_[cloth][e] - 1.0);
+    if (here > strain)
+    {
+      strain = here;
+      worst = e;
+    }
+  }
+  const int rods = static_cast<int>(simulation_.config().rods.size());
+  if (isQuiet({LimitKind::strain, rods + cloth}, strain, limits_.strain))
+    return;
+  const std::string where = edges.empty() ? ""
+                                          : ", between vertices " + std::to_string(edges[worst].first) + " and " +
+                                                std::to_string(edges[worst].second);
+  look({LimitKind::strain, rods + cloth}, strain, limits_.strain,
+       "cloth '" + simulation_.config().cloths[cloth].name + "'" + where + ": its strain", "", mostLoaded(-1, cloth),
+       begun);
+}
+
+/// The active grasp of a rod or cloth that bears the largest force; none where nothing holds it.
+std::vector<int> LimitWatch::mostLoaded(int rod, int cloth) const
+{
+  if (limits_.on_limit != OnLimit::release)
+    return {};
+  int most = -1;
+  double largest = -1.0;
+  for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
+  {
+    const GraspRef& ref = simulation_.grasps()[g];
+    const int grasp = static_cast<int>(g);
+    if (ref.rod != rod || ref.cloth != cloth || !simulation_.grasps().isActive(grasp))
+      continue;
+    const double force = simulation_.grasps().wrench(grasp).force.norm();
+    if (force > largest)
+    {
+      largest = force;
+      most = grasp;
+    }
+  }
+  return most < 0 ? std::vector<int>{} : std::vector<int>{most};
+}
+
+void LimitWatch::goOn() { held_.clear(); }
+
+void LimitWatch::reset()
+{
+  excursions_.clear();
+  released_.clear();
+  held_.clear();
+  stopped_.clear();
+}
+
+std::vector<std::string> LimitWatch::lasting() const
+{
+  std::vector<std::string> texts;
+  for (const auto& [key, excursion] : excursions_)
+    texts.push_back(excursion.worst.text);
+  return texts;
+}
+
+}   // namespace slender

@@ -1,0 +1,306 @@
+#include "state_transfer.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <stdexcept>
+
+#include "../record/state_fit.h"
+#include "cloth_grasps.h"
+#include "slender_sim/scene/reader.h"
+
+namespace slender {
+
+namespace {
+
+/// Per entry of `to`, which entry of `from` has its name; -1: none.
+template <class Named>
+std::vector<int> sameNames(const std::vector<Named>& from, const std::vector<Named>& to)
+{
+  std::vector<int> same;
+  for (const Named& one : to)
+  {
+    const auto found =
+        std::find_if(from.begin(), from.end(), [&](const Named& other) { return other.name == one.name; });
+    same.push_back(found == from.end() ? -1 : static_cast<int>(found - from.begin()));
+  }
+  return same;
+}
+
+/// Copies the entries of a list that stay.
+template <class Value>
+void takeEntries(const std::vector<int>& same, const std::vector<Value>& from, std::vector<Value>& to)
+{
+  if (from.empty() || to.empty())   // lists that there are only with some kinds of objects
+    return;
+  for (std::size_t k = 0; k < same.size(); ++k)
+    if (same[k] >= 0)
+      to[k] = from[static_cast<std::size_t>(same[k])];
+}
+
+bool isNew(int same) { return same < 0; }
+
+/// Welds of a scene with the bodies that hold them, in the order of WorldModel::welds.
+struct BodyWeld
+{
+  int body, index;   ///< which of the welds of this body
+};
+
+std::vector<BodyWeld> weldsOf(const SceneConfig& config)
+{
+  std::vector<BodyWeld> welds;
+  for (int b = 0; b < static_cast<int>(config.bodies.size()); ++b)
+    for (int k = 0; k < static_cast<int>(config.bodies[b].welds.size()); ++k)
+      welds.push_back({b, k});
+  return welds;
+}
+
+}   // namespace
+
+StateTransfer::StateTransfer(const SceneConfig& from, const SceneGrasps& before, const SceneConfig& to,
+                             const std::vector<GraspRef>& now)
+  : from_(from),
+    to_(to),
+    before_(before.begin(), before.end()),
+    now_(now)
+{
+  rods_ = sameNames(from.rods, to.rods);
+  threads_ = sameNames(from.threads, to.threads);
+  cloths_ = sameNames(from.cloths, to.cloths);
+  bodies_ = sameNames(from.bodies, to.bodies);
+  obstacles_ = sameNames(from.obstacles, to.obstacles);
+  for (const GraspRef& grasp : now_)
+  {
+    const auto same = [&](const GraspRef& other) {
+      const bool held = grasp.cloth >= 0 ? other.cloth >= 0 && other.cloth == cloths_[grasp.cloth]
+                                         : other.cloth < 0 && other.rod == rods_[grasp.rod];
+      return held && other.config->name == grasp.config->name;
+    };
+    const auto found = std::find_if(before_.begin(), before_.end(), same);
+    grasps_.push_back(found == before_.end() ? -1 : static_cast<int>(found - before_.begin()));
+  }
+  const std::vector<BodyWeld> welds_before = weldsOf(from);
+  for (const BodyWeld& weld : weldsOf(to))
+  {
+    const auto same = [&](const BodyWeld& other) {
+      return other.body == bodies_[weld.body] && other.index == weld.index;
+    };
+    const auto found = std::find_if(welds_before.begin(), welds_before.end(), same);
+    welds_.push_back(found == welds_before.end() ? -1 : static_cast<int>(found - welds_before.begin()));
+  }
+}
+
+bool StateTransfer::ownerStays(const GraspRef& grasp) const
+{
+  return !isNew(grasp.cloth >= 0 ? cloths_[grasp.cloth] : rods_[grasp.rod]);
+}
+
+void StateTransfer::checkTables(double time) const
+{
+  const auto check = [time](const auto& motion, const std::string& what) {
+    const auto* table = std::get_if<TableMotion>(&motion);
+    if (!table)
+      return;
+    const Pose first = table->poses.evaluate(table->poses.firstTime()), now = table->poses.evaluate(time);
+    constexpr double kSame = 1e-9;   // [m], and of a unit quaternion
+    if ((first.position - now.position).norm() <= kSame &&
+        1.0 - std::abs(first.orientation.dot(now.orientation)) <= kSame)
+      return;
+    char text[40];
+    std::snprintf(text, sizeof text, "%.6g", time);
+    throw SceneError(what + ": times of tables are those of the scene, which is at t = " + text +
+                     " s: there the table has left its first pose already; let it begin later");
+  };
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    if (isNew(bodies_[b]) && to_.bodies[b].motion)
+      check(*to_.bodies[b].motion, "body " + to_.bodies[b].name);
+  for (std::size_t k = 0; k < obstacles_.size(); ++k)
+    if (isNew(obstacles_[k]))
+      check(to_.obstacles[k].motion, "obstacle " + to_.obstacles[k].name);
+  for (std::size_t k = 0; k < threads_.size(); ++k)
+    if (isNew(threads_[k]) && to_.threads[k].nozzle)
+      check(to_.threads[k].nozzle->motion, "the nozzle of thread " + to_.threads[k].name);
+  for (const GraspRef& grasp : now_)
+    if (!ownerStays(grasp))
+      check(grasp.config->motion, "grasp " + grasp.config->name);
+}
+
+std::string StateTransfer::newWelds() const
+{
+  const std::vector<BodyWeld> welds = weldsOf(to_);
+  for (std::size_t w = 0; w < welds.size(); ++w)
+  {
+    const BodyConfig& body = to_.bodies[welds[w].body];
+    const int rod = body.welds[static_cast<std::size_t>(welds[w].index)].rod;
+    if (isNew(welds_[w]) && !isNew(rods_[rod]))
+      return "body " + body.name + " was welded to rod " + to_.rods[rod].name +
+             " while it moved, so that the two do not fit together where the scene starts; ~remove " + body.name +
+             " before ~reset";
+  }
+  return "";
+}
+
+void StateTransfer::takeWelds(const std::vector<Pose>& before, WorldModel& model) const
+{
+  for (std::size_t w = 0; w < welds_.size(); ++w)
+    if (!isNew(welds_[w]))
+      model.welds[w].X_BG = before[static_cast<std::size_t>(welds_[w])];
+}
+
+/// Of objects that stay. State lists of grasps are as the scene gives them.
+void StateTransfer::takeGrasps(const SceneState& before, SceneState& state) const
+{
+  for (std::size_t g = 0; g < now_.size(); ++g)
+  {
+    const GraspRef& ref = now_[g];
+    if (!ownerStays(ref))
+      continue;
+    const GraspRef* old = isNew(grasps_[g]) ? nullptr : &before_[static_cast<std::size_t>(grasps_[g])];
+    if (ref.cloth >= 0)
+    {
+      ClothGrasp& grasp = state.cloth_grasps[ref.cloth][ref.index];
+      if (old)
+        grasp = before.cloth_grasps[old->cloth][old->index];
+      else
+        grasp.active = false;
+    }
+    else
+    {
+      GraspState& grasp = state.rods[ref.rod].grasps[ref.index];
+      if (old)
+        grasp = before.rods[old->rod].grasps[old->index];
+      else
+        grasp.active = false;
+    }
+  }
+  takeEntries(grasps_, before.grasp_offsets, state.grasp_offsets);
+  takeEntries(grasps_, before.wrenches, state.wrenches);
+}
+
+/// Whether the same grasps and welds hold a rod before and now, in the same order.
+bool StateTransfer::isHeldAsBefore(int rod) const
+{
+  std::vector<int> grasps_before, grasps_now, welds_before, welds_now;
+  for (int g = 0; g < static_cast<int>(before_.size()); ++g)
+    if (before_[g].cloth < 0 && before_[g].rod == rods_[rod])
+      grasps_before.push_back(g);
+  for (std::size_t g = 0; g < now_.size(); ++g)
+    if (now_[g].cloth < 0 && now_[g].rod == rod)
+      grasps_now.push_back(grasps_[g]);
+  const auto rodOf = [](const SceneConfig& config, const BodyWeld& weld) {
+    return config.bodies[weld.body].welds[static_cast<std::size_t>(weld.index)].rod;
+  };
+  const std::vector<BodyWeld> from = weldsOf(from_), to = weldsOf(to_);
+  for (int w = 0; w < static_cast<int>(from.size()); ++w)
+    if (rodOf(from_, from[w]) == rods_[rod])
+      welds_before.push_back(w);
+  for (std::size_t w = 0; w < to.size(); ++w)
+    if (rodOf(to_, to[w]) == rod)
+      welds_now.push_back(welds_[w]);
+  return grasps_before == grasps_now && welds_before == welds_now;
+}
+
+void StateTransfer::take(const SceneState& before, const WorldModel& world, SceneState& state) const
+{
+  const SceneState given = state;
+  state.time = before.time;
+  state.steps = before.steps;
+  takeEntries(rods_, before.rods, state.rods);
+  for (std::size_t r = 0; r < rods_.size(); ++r)
+  {
+    if (isNew(rods_[r]))
+      continue;
+    state.rods[r].grasps = given.rods[r].grasps;
+    if (!isHeldAsBefore(static_cast<int>(r)))
+      state.rods[r].forgetHistory();   // the integrator's past was that of another set of constraints
+  }
+  takeEntries(rods_, before.rod_guides, state.rod_guides);
+  takeEntries(threads_, before.threads, state.threads);
+  takeEntries(threads_, before.end_loads, state.end_loads);
+  takeEntries(cloths_, before.cloths, state.cloths);
+  takeEntries(cloths_, before.cloth_guides, state.cloth_guides);
+  takeEntries(bodies_, before.bodies, state.bodies);
+  takeEntries(obstacles_, before.obstacles, state.obstacles);
+  takeEntries(obstacles_, before.obstacle_velocities, state.obstacle_velocities);
+  takeGrasps(before, state);
+  for (std::size_t k = 0; k < cloths_.size(); ++k)
+    gatherPins(state.cloth_grasps[k], state.cloths[k]);
+  const std::string problem = misfit(state, given, world);
+  if (!problem.empty())
+    throw SceneError(problem + "; this cannot change while the scene runs: start the edited scene anew");
+}
+
+void StateTransfer::takeAdded(const SceneState& before, SceneState& state) const
+{
+  const ContactStiffness& stiffness = before.contact_stiffness;
+  takeEntries(rods_, stiffness.rods, state.contact_stiffness.rods);
+  takeEntries(threads_, stiffness.threads, state.contact_stiffness.threads);
+  takeEntries(bodies_, stiffness.bodies, state.contact_stiffness.bodies);
+  takeEntries(cloths_, stiffness.cloths, state.contact_stiffness.cloths);
+
+  // those of a rod are behind its own grasps, in the order of all welds
+  const auto places = [](const SceneConfig& config) {
+    std::vector<std::pair<int, std::size_t>> all;
+    std::vector<std::size_t> next;
+    for (const RodConfig& rod : config.rods)
+      next.push_back(rod.grasps.size());
+    for (const BodyConfig& body : config.bodies)
+      for (const WeldConfig& weld : body.welds)
+        all.emplace_back(weld.rod, next[weld.rod]++);
+    return all;
+  };
+  const auto from = places(from_), to = places(to_);
+  for (std::size_t w = 0; w < welds_.size(); ++w)
+  {
+    if (isNew(welds_[w]))
+      continue;
+    const auto& [old_rod, old_grasp] = from[static_cast<std::size_t>(welds_[w])];
+    GraspState& grasp = state.rods[to[w].first].grasps[to[w].second];
+    const int body = grasp.body;
+    grasp = before.rods[old_rod].grasps[old_grasp];
+    grasp.body = body;
+  }
+}
+
+void StateTransfer::attachNew(SceneGrasps& grasps, double time) const
+{
+  const auto isNewSolid = [this](const std::string& name) {
+    for (std::size_t b = 0; b < bodies_.size(); ++b)
+      if (isNew(bodies_[b]) && to_.bodies[b].name == name)
+        return true;
+    for (std::size_t k = 0; k < obstacles_.size(); ++k)
+      if (isNew(obstacles_[k]) && to_.obstacles[k].name == name)
+        return true;
+    return false;
+  };
+  for (int g = 0; g < static_cast<int>(now_.size()); ++g)
+  {
+    const GraspConfig& config = *now_[g].config;
+    const auto* body = std::get_if<BodyMotion>(&config.motion);
+    if (!isNew(grasps_[g]))
+    {
+      if (body && isNewSolid(body->body))   // it followed nothing of the scene before
+        grasps.takeOffset(g, time);
+    }
+    else if (!ownerStays(now_[g]))
+    {
+      if (config.attach == Attach::initial)
+        grasps.takeOffset(g, time);
+    }
+    else
+    {
+      try
+      {
+        if (now_[g].cloth >= 0)
+          grasps.attachVertices(g, config.vertices);
+        else
+          grasps.attach(g, config.first_node, config.last_node, config.hold);
+      }
+      catch (const std::invalid_argument& error)
+      {
+        throw SceneError(error.what());
+      }
+    }
+  }
+}
+
+}   // namespace slender
