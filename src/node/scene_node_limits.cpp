@@ -1,4 +1,4 @@
-// Limits of the scene: what the node says and does when they are exceeded.
+// When a limit of the scene is exceeded, the node warns and does what `on_limit` asks for.
 #include "slender_sim/node/scene_node.h"
 
 #include <algorithm>

@@ -37,8 +37,8 @@ namespace slender {
 /// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`,
 /// `bodies`, `nozzle/pose`, through tf2 into the node's frame; frames of tf themselves, see TfInputs; and
 /// `nozzle/flow`, `belt/velocity` and `wind`, which hold from the next step on. Subscribes only to what the scene asks
-/// for. Guides of tracked cloths: TrackingInputs. Bad messages are dropped and counted; what they would have moved
-/// keeps its previous input. A stamp of zero means now, as everywhere in tf.
+/// for. Guides of tracked cloths: TrackingInputs. Bad messages are dropped and counted; the object
+/// that they would have moved keeps its previous input. A message with stamp zero counts as one of the present.
 class GuideInputs
 {
 public:

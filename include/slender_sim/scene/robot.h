@@ -15,7 +15,7 @@ struct RobotSources
   std::function<std::string(const std::string& name)> package;
 };
 
-/// How scenes that are read from now on find robot descriptions and their meshes.
+/// Sets where the reader looks for robot descriptions and their meshes. It holds for all scenes that are read later.
 void setRobotSources(RobotSources sources);
 
 }   // namespace slender

@@ -1,4 +1,4 @@
-// Robots: the collision shapes of their links are obstacles.
+// Reads the key `robot`. The collision shapes of the links become obstacles of the scene.
 #include "slender_sim/scene/robot.h"
 
 #include <filesystem>
