@@ -93,7 +93,7 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
     ROS_INFO("%s", note.c_str());
   limits_ = std::make_unique<LimitWatch>(*simulation_);
   topics_ = std::make_unique<SceneTopics>(*simulation_);
-  refuseLoops();
+  refuseLoops(*simulation_, *topics_);
   if (!options_.record_bag.empty())
   {
     bag_ = std::make_unique<BagRecorder>(options_.record_bag, nh_.getNamespace(), *simulation_);
@@ -141,7 +141,7 @@ void SceneNode::start()
 void SceneNode::makeInputs()
 {
   const std::unique_ptr<GuideInputs> before = std::move(inputs_);
-  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, *topics_, ownFrames(), before.get());
+  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, *topics_, ownFrames(*simulation_, *topics_), before.get());
   if (replay_)
     inputs_->stopListening();
   inputs_->onPresent([this] { return presentOfOthers(); });

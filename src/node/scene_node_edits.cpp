@@ -98,6 +98,7 @@ SceneNode::EditedScene SceneNode::edited(const SceneEdit& edit) const
   out.simulation = editedSimulation(*simulation_, edit);
   checkKind(out.simulation->config(), options_, kind_);
   out.topics = std::make_unique<SceneTopics>(*out.simulation);
+  refuseLoops(*out.simulation, *out.topics);
   std::set<std::string> known;
   for (const std::string& warning : simulation_->config().warnings)
     known.insert(withoutPlace(simulation_->config(), warning));

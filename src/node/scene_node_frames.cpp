@@ -33,18 +33,18 @@ void visitFollowers(const Simulation& simulation, const std::vector<std::string>
 
 }   // namespace
 
-std::set<std::string> SceneNode::ownFrames() const
+std::set<std::string> SceneNode::ownFrames(const Simulation& simulation, const SceneTopics& topics) const
 {
-  return broadcastFrames(nh_priv_.getNamespace().substr(1), *topics_, *simulation_);
+  return broadcastFrames(nh_priv_.getNamespace().substr(1), topics, simulation);
 }
 
 /// What follows a frame that the node itself broadcasts would follow itself, ~guide_delay late.
-void SceneNode::refuseLoops() const
+void SceneNode::refuseLoops(const Simulation& simulation, const SceneTopics& topics) const
 {
-  const std::set<std::string> own = ownFrames();
-  visitFollowers(*simulation_, topics_->grasps, [&](const std::string& frame, const std::string& who) {
+  const std::set<std::string> own = ownFrames(simulation, topics);
+  visitFollowers(simulation, topics.grasps, [&](const std::string& frame, const std::string& who) {
     if (own.count(frame))
-      throw SceneError("scene " + simulation_->config().name + ": " + who + " follows the frame " + frame +
+      throw SceneError("scene " + simulation.config().name + ": " + who + " follows the frame " + frame +
                        " of tf, which this node broadcasts itself: follow the frame of what moves it instead; of a " +
                        "body of this scene, take motion: {body: NAME}, or weld a rod to it");
   });

@@ -76,7 +76,7 @@ class ClothContact(NodeCase):
         ball, touched = {}, 0
         for _ in range(100):
             state = self.states_after(states, 1)
-            wait_until(lambda: told.count() and told.last().header.stamp == state.header.stamp, what="the ball")
+            wait_until(lambda: told.last().header.stamp == state.header.stamp, what="the ball")
             centre = told.last().pose[told.last().name.index("ball")].position
             ball = (centre.x, centre.y, centre.z)
             points = [(v.x, v.y, v.z) for v in state.vertices]

@@ -152,7 +152,7 @@ class Cloth(NodeCase):
         self.assertEqual(len(state.velocities), 126)
         self.assertTrue(all(t < 63 for t in mesh.triangles[:3 * 96]) and all(63 <= t < 126 for t in mesh.triangles[3 * 96:]))
         self.assertAlmostEqual(mesh.vertices[63].x, 1.0, places=12)        # undeformed
-        wait_until(lambda: points.count() > 0 and points.last().header.stamp == state.header.stamp, what="points")
+        wait_until(lambda: points.last().header.stamp == state.header.stamp, what="points")
         cloud = list(point_cloud2.read_points(points.last(), ("x", "y", "z")))
         for p, v in zip(cloud, state.vertices):
             self.assertAlmostEqual(p[2], v.z, places=6)

@@ -133,6 +133,8 @@ class Edits(NodeCase):
         before = self.states_after(state, 60)
         self.refused("attach", "rope: {left: {nodes: [10]}}", "has a grasp left already")
         self.refused("attach", "rope: {hand: {nodes: [0]}}", "0")
+        self.refused("attach", "rope: {hand: {nodes: [10], motion: {tf: t/rod/grasps/left}}}", "which this node broadcasts itself")
+        self.refused("attach", "rope: {hand: {nodes: [10], motion: {tf: t/rod/grasps/hand}}}", "which this node broadcasts itself")
         self.done("attach", "rope: {hand: {nodes: [10], motion: {topic: true}}}")
         guide = self.publisher("/t/grasps/hand/pose", PoseStamped)
         wrench = self.listen("/t/grasps/hand/wrench", WrenchStamped)
@@ -291,7 +293,7 @@ class Edits(NodeCase):
         self.done("spawn", SECOND)
         rods, cloths = self.listen("/t/rods/state", RodState), self.listen("/t/cloths/state", ClothState)
         end = self.step(10).stamp
-        wait_until(lambda: rods.count() > 0 and rods.last().header.stamp == end and cloths.last().header.stamp == end, what="states of both kinds")
+        wait_until(lambda: rods.last().header.stamp == end and cloths.last().header.stamp == end, what="states of both kinds")
         self.assertEqual((rods.last().step, rods.last().name, cloths.last().names), (20, "rope", ["second"]))
         self.assertFalse(self.published("/t/state"))
         self.refused("remove", "rope", "which rod_node is for")

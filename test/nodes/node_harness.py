@@ -61,6 +61,8 @@ class Listener:
             return list(self.messages)
 
     def last(self):
+        """The newest message. Waits for the first one."""
+        wait_until(self.count, what="a message of " + self.subscriber.name)
         with self.lock:
             return self.messages[-1]
 
@@ -178,7 +180,7 @@ class NodeCase(unittest.TestCase):
     def states_after(self, listener, n):
         """Steps n times and returns the last state."""
         stamp = self.step(n).stamp
-        wait_until(lambda: listener.count() > 0 and listener.last().header.stamp >= stamp, what="the state at %s" % stamp)
+        wait_until(lambda: listener.last().header.stamp >= stamp, what="the state at %s" % stamp)
         return listener.last()
 
     def diagnostics(self, kind):

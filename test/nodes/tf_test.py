@@ -67,7 +67,7 @@ class Tf(NodeCase):
     def now(self, stamp):
         """Grasp, link, table and cart at the same instant."""
         for listener in (self.obstacles, self.grasps, self.bodies):
-            wait_until(lambda: listener.count() and listener.last().header.stamp >= stamp, what="states")
+            wait_until(lambda: listener.last().header.stamp >= stamp, what="states")
         obstacles, grasps, bodies = ([m for m in listener.all() if m.header.stamp == stamp][0]
                                      for listener in (self.obstacles, self.grasps, self.bodies))
         return place(grasps.pose[1]), place(obstacles.pose[0]), place(obstacles.pose[1]), place(bodies.pose[0])

@@ -94,8 +94,9 @@ private:
   void summary() const;
 
   // scene_node_frames.cpp
-  std::set<std::string> ownFrames() const;   // of tf, that move
-  void refuseLoops() const;
+  // The frames of tf that the node broadcasts for such a scene and that move.
+  std::set<std::string> ownFrames(const Simulation& simulation, const SceneTopics& topics) const;
+  void refuseLoops(const Simulation& simulation, const SceneTopics& topics) const;   // throws SceneError
 
   // scene_node_clock.cpp
   void checkClock() const;
