@@ -24,11 +24,15 @@ void visitFollowers(const Simulation& simulation, const std::vector<std::string>
   for (const ThreadConfig& thread : scene.threads)
     if (thread.nozzle)
       look(thread.nozzle->motion, "the nozzle of thread " + thread.name);
-  for (const ClothConfig& cloth : scene.cloths)
-    if (cloth.tracking)
-      if (const auto* carried = std::get_if<CarriedGuide>(&cloth.tracking->guide.motion))
-        if (carried->by_tf)
-          visit(carried->bodies.front(), "the guide of " + cloth.name);
+  const auto lookAtGuides = [&visit](const auto& objects) {
+    for (const auto& object : objects)
+      if (object.tracking)
+        if (const auto* carried = std::get_if<CarriedGuide>(&object.tracking->guide.motion))
+          if (carried->by_tf)
+            visit(carried->bodies.front(), "the guide of " + object.name);
+  };
+  lookAtGuides(scene.cloths);
+  lookAtGuides(scene.rods);
 }
 
 }   // namespace

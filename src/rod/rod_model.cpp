@@ -293,6 +293,11 @@ Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int n
   return frame;
 }
 
+Pose sectionPose(const RodModel& model, const RodState& state, int node)
+{
+  return {state.x.col(node), Eigen::Quaterniond(sectionFrame(model, state, node)).normalized()};
+}
+
 GraspState makeGrasp(const RodModel& model, const RodState& state, int first_node, int last_node, bool holds_frame)
 {
   const int n = model.nodes();
@@ -316,8 +321,7 @@ GraspState makeGrasp(const RodModel& model, const RodState& state, int first_nod
   const int held = last_node - first_node;
   if (held % 2 == 0)
   {
-    g.X_WG.position = state.x.col(first_node + held / 2);
-    g.X_WG.orientation = Eigen::Quaterniond(sectionFrame(model, state, first_node + held / 2)).normalized();
+    g.X_WG = sectionPose(model, state, first_node + held / 2);
   }
   else
   {

@@ -15,6 +15,7 @@ from visualization_msgs.msg import MarkerArray
 
 ROPE = SCENE.replace("      right: {edges: [-1], motion: {topic: true}, attach: initial}\n", "")
 CART_AND_BALL = ROPE + """
+    broadcast_tf: {tip: -1}
 bodies:
   - {name: cart, motion: {topic: true}, pose: {position: [1.1, 0, 1]}, welds: [{rod: rope, edge: -1}], shape: {box: {size: [0.2, 0.1, 0.1]}}}
   - {name: ball, mass: 2, shape: {sphere: {radius: 0.05}}, pose: {position: [5, 0, 2]}, velocity: {linear: [1, 0, 0], angular: [0, 0, 2]},
@@ -85,6 +86,7 @@ class Bodies(NodeCase):
         self.start(CART_AND_BALL)
         told = self.listen("/t/body_states", BodyStates)
         tf = self.listen("/tf", TFMessage)
+        state = self.listen("/t/state", RodState)
         stamp = self.step(100).stamp   # 0.5 s
         wait_until(lambda: told.last().header.stamp == stamp, what="the bodies")
         ball, twist = told.last().pose[1], told.last().twist[1]
@@ -96,7 +98,14 @@ class Bodies(NodeCase):
         self.assertAlmostEqual(2 * math.atan2(ball.orientation.z, ball.orientation.w), 1.0, places=6)
         wait_until(lambda: tf.last().transforms[0].header.stamp == stamp, what="tf")
         frames = tf.last().transforms
-        self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in frames], [("world", "ball"), ("world", "t/rod/grasps/left")])
+        self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in frames], [("world", "ball"), ("world", "t/rod/grasps/left"),
+                          ("world", "t/rod/rods/rope/tip")])
+        tip, q = frames[2].transform.translation, frames[2].transform.rotation
+        before, end = state.last().nodes[-2:]
+        self.assertEqual((tip.x, tip.y, tip.z), (end.x, end.y, end.z))
+        tangent = (1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y))
+        edge = (end.x - before.x, end.y - before.y, end.z - before.z)
+        self.assertLess(math.dist(tangent, [e / math.hypot(*edge) for e in edge]), 1e-12)   # a naturally straight rope
         self.assertEqual(frames[0].transform.translation.z, ball.position.z)
         # back at the start
         self.assertTrue(self.call("reset", Trigger).success)

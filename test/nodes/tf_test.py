@@ -5,7 +5,7 @@ import math
 import rosbag
 import rospy
 from geometry_msgs.msg import PoseStamped, TransformStamped
-from slender_sim.msg import BodyStates, ClothState, GraspStates, ThreadState
+from slender_sim.msg import BodyStates, ClothState, GraspStates, RodState, ThreadState
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
@@ -158,7 +158,7 @@ class Tf(NodeCase):
 
     def test_a_guide_rides_on_a_frame(self):
         """At an offset it goes there; with attach: initial it stays where it is, and the frame may be anywhere."""
-        scene = """
+        shell = """
 name: flap
 gravity: [0, 0, 0]
 time: {step: 0.01}
@@ -166,13 +166,23 @@ tracked:
   - {name: flap, guide: {grid: {corner: [0, 0, 0], sides: [[0.2, 0, 0], [0, 0.2, 0]], cells: 2}, motion: %s}, mesh: same,
      material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 2.0e5}, test_functions: {clusters: {count: 1}}}
 """
-        for motion, corner in (("{tf: hand, offset: {position: [0.1, 0, 0]}}", (1, 0.1, 2)), ("{tf: hand}", (0, 0, 0))):
+        rope = """
+name: flap
+gravity: [0, 0, 0]
+time: {step: 0.01}
+rods:
+  - {name: rope, centerline: {straight: {from: [0, 0, 0], to: [0.2, 0, 0], edges: 8}}, cross_section: {radius: 0.005},
+     track: {guide: {nodes: 3, motion: %s}}}
+"""
+        offset = "{tf: hand, offset: {position: [0.1, 0, 0]}}"
+        for scene, motion, corner in ((shell, offset, (1, 0.1, 2)), (shell, "{tf: hand}", (0, 0, 0)),
+                                      (rope, offset, (1, 0.1, 2)), (rope, "{tf: hand}", (0, 0, 0))):
             self.start(scene % motion, program="tracking_node", guide_delay=0.05)
-            state = self.listen("/t/state", ClothState)
+            state = self.listen("/t/state", ClothState if scene == shell else RodState)
             self.stand("hand", (1, 0, 2), turn=math.pi / 2)
             self.heard("hand")
             last = self.states_after(state, 400)   # 2.2 m at 1 m/s
-            first, second = last.guide_vertices[0], last.guide_vertices[1]
+            first, second = (last.guide_vertices if scene == shell else last.guide_nodes)[:2]
             self.assertLess(math.dist((first.x, first.y, first.z), corner), 1e-9)
             side = (0, 0.1, 0) if corner[0] else (0.1, 0, 0)   # turned with the frame
             self.assertLess(math.dist((second.x - first.x, second.y - first.y, second.z - first.z), side), 1e-9)

@@ -312,6 +312,8 @@ TEST(Reader, refusesRepeatedNames)
   EXPECT_NE(problemsOf(same).find("rods.1.grasps.g: has the same name as rods.0.grasps.g"), std::string::npos)
       << problemsOf(same);
   EXPECT_NE(problemsOf("rods: [{grasps: {left-hand: {edges: [0]}}}]").find("is not a name"), std::string::npos);
+  EXPECT_NE(problemsOf("rods: [{broadcast_tf: {left-end: 0}}]").find("is not a name"), std::string::npos);
+  EXPECT_NE(problemsOf("rods: [{broadcast_tf: {end: 51}}]").find("in [-51, 50]"), std::string::npos);
 }
 
 TEST(Reader, overridesCreateChangeAndAreWrittenOut)
@@ -349,6 +351,16 @@ TEST(Reader, readsNumbersInEveryUsualForm)
               1e6)
         << text;
   }
+}
+
+TEST(Reader, sectionsThatAreFramesOfTf)
+{
+  const std::string rod = "rods: [{centerline: {straight: {from: [0, 0, 0], to: [1, 0, 0], edges: 4}}, broadcast_tf: ";
+  const std::vector<SectionFrame> frames = parseScene(rod + "{tip: -1, two: 2}}]").rods[0].broadcast_tf;
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[0].name, "tip");
+  EXPECT_EQ(frames[0].node, 4);
+  EXPECT_EQ(frames[1].node, 2);
 }
 
 TEST(Reader, resolvesGraspedNodes)

@@ -142,33 +142,27 @@ cloths:
   EXPECT_EQ(scene.cloths[0].grasps[1].attach, Attach::section);
 }
 
-TEST(ReaderTf, aGuideRidesOnAFrame)
+/// `motion`: path of the key.
+void checkGuideOnAFrame(const std::string& text, const std::string& motion,
+                        const std::vector<std::pair<std::string, std::string>>& refused)
 {
-  const std::string text = R"(
-tracked:
-  - {name: shell, guide: {grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {tf: hand}},
-     mesh: same, test_functions: {clusters: {count: 1}}}
-)";
   const auto guide = [&](const std::string& change) {
     const SceneConfig scene = change.empty() ? parseScene(text) : parseScene(text, "t", {change});
-    EXPECT_TRUE(scene.cloths[0].tracking->guide.byTopic());
-    return std::get<CarriedGuide>(scene.cloths[0].tracking->guide.motion);
+    const GuideConfig& config = (scene.rods.empty() ? scene.cloths[0].tracking : scene.rods[0].tracking)->guide;
+    EXPECT_TRUE(config.byTopic());
+    return std::get<CarriedGuide>(config.motion);
   };
   const CarriedGuide carried = guide("");
   EXPECT_TRUE(carried.by_tf && carried.keeps_offset);
   EXPECT_EQ(carried.bodies, std::vector<std::string>{"hand"});
-  const std::string motion = "tracked.0.guide.motion=";
-  const CarriedGuide placed = guide(motion + "{tf: hand, offset: {position: [0, 0, 2]}, late: extrapolate}");
+  const CarriedGuide placed = guide(motion + "={tf: hand, offset: {position: [0, 0, 2]}, late: extrapolate}");
   EXPECT_FALSE(placed.keeps_offset);
   EXPECT_EQ(placed.offset.position.z(), 2.0);
-  for (const auto& [change, reason] :
-       std::vector<std::pair<std::string, std::string>>{{"{tf: hand, offset: {}, attach: initial}", "give one"},
-                                                        {"{topic: points, offset: {}}", "is for tf"},
-                                                        {"{tf: hand, groups: {a: [0]}}", "is for bodies"}})
+  for (const auto& [change, reason] : refused)
   {
     try
     {
-      parseScene(text, "t", {motion + change});
+      parseScene(text, "t", {motion + "=" + change});
       ADD_FAILURE() << change;
     }
     catch (const SceneError& error)
@@ -176,6 +170,28 @@ tracked:
       EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
     }
   }
+}
+
+TEST(ReaderTf, aGuideOfAShellRidesOnAFrame)
+{
+  checkGuideOnAFrame(R"(
+tracked:
+  - {name: shell, guide: {grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, 1, 0]], cells: 2}, motion: {tf: hand}},
+     mesh: same, test_functions: {clusters: {count: 1}}}
+)",
+                     "tracked.0.guide.motion",
+                     {{"{tf: hand, offset: {}, attach: initial}", "give one"},
+                      {"{topic: points, offset: {}}", "is for tf"},
+                      {"{tf: hand, groups: {a: [0]}}", "is for bodies"}});
+}
+
+TEST(ReaderTf, aGuideOfARodRidesOnAFrame)
+{
+  checkGuideOnAFrame("rods: [{centerline: {straight: {}}, track: {guide: {nodes: 4, motion: {tf: hand}}}}]",
+                     "rods.0.track.guide.motion",
+                     {{"{tf: hand, offset: {}, attach: initial}", "give one"},
+                      {"{topic: points, attach: frame}", "is for guides by tf"},
+                      {"{tf: hand, topic: points}", "one of"}});
 }
 
 }   // namespace

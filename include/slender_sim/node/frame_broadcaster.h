@@ -12,7 +12,8 @@
 
 namespace slender {
 
-/// Publishes tf frames: bodies as NAME, grasps as NODE/grasps/NAME, nozzles as NODE/nozzle or NODE/threads/NAME/nozzle.
+/// Publishes tf frames: bodies as NAME, grasps as NODE/grasps/NAME, sections of rods as NODE/rods/ROD/NAME, nozzles
+/// as NODE/nozzle or NODE/threads/NAME/nozzle.
 /// Nothing is computed while nobody listens to /tf.
 class FrameBroadcaster
 {
@@ -28,7 +29,7 @@ public:
 private:
   void add(const std::string& child, const Pose& X_WC, const ros::Time& stamp);
 
-  std::string frame_id_;
+  std::string node_, frame_id_;
   bool has_grasps_;
   std::vector<std::string> grasps_, nozzles_;
   ros::Publisher publisher_;

@@ -217,6 +217,13 @@ enum class Stretching
   projected
 };
 
+/// A section of a rod whose frame nodes publish on tf.
+struct SectionFrame
+{
+  std::string name;
+  int node = 0;   ///< resolved by the reader: never negative
+};
+
 struct RodConfig
 {
   std::string name;
@@ -243,6 +250,7 @@ struct RodConfig
   std::optional<ContactProperties> contact;   ///< nothing: touches nothing
   /// what it follows (`track`), with one set of test functions; null: nothing
   std::shared_ptr<const TrackingConfig> tracking;
+  std::vector<SectionFrame> broadcast_tf;   ///< sections whose frames nodes publish on tf
 };
 
 struct ContactConfig

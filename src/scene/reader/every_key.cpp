@@ -17,7 +17,7 @@ rods:
               i: {nodes: [3], motion: {body: c}}, j: {nodes: [5], motion: {file: none.csv, body: c}},
               k: {nodes: [7], motion: fixed}, l: {nodes: [9], motion: {tf: tool0, offset: {}}}}}
   - {name: b, centerline: {polyline: {points: [[0, 0, 0], [1, 0, 0]], edges: 4}}}
-  - {name: c, centerline: {helix: {}}, cross_section: {radius: 0.01}}
+  - {name: c, broadcast_tf: {tip: -1}, centerline: {helix: {}}, cross_section: {radius: 0.01}}
   - {name: d, centerline: {catenary: {}}}
   - {name: e, centerline: {trefoil: {}}}
   - {name: f, centerline: {torus_knot: {}}}
@@ -28,6 +28,7 @@ rods:
   - {name: k, track: {guide: {points: [[0, 0, 0], [1, 0, 0]], motion: {topic: points, late: {extrapolate: 1}}}}}
   - {name: l, track: {guide: {points: [[0, 0, 0], [1, 0, 0]], motion: fixed}}}
   - {name: m, track: {guide: {file: none.csv}}}
+  - {name: n, track: {guide: {points: [[0, 0, 0], [1, 0, 0]], motion: {tf: link, offset: {}}}}}
 threads:
   - {name: t, fluid: {}, nozzle: {flow: {table: [[0, 0], [1, 1]]}, motion: fixed},
      floor: {belt: {x: {table: [[0, 0]]}, y: {table: [[0, 0]]}, topic: true}}, contact: {}, merging: {until: 0.6},

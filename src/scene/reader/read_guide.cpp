@@ -304,27 +304,6 @@ void readCarriedMotion(const YamlCursor& at, const MotionKeys& keys, const ReadC
     source.config.motion = std::move(*carried);
 }
 
-/// A guide that rides on a frame of tf as a whole.
-void readFramedMotion(const MotionKeys& keys, GuideSource& source)
-{
-  const auto frame = readFrameName(keys.tf);
-  const std::size_t before = keys.tf.problems().size();
-  CarriedGuide guide{{}, GuideBinding(Eigen::Matrix3Xd(3, 0), {}, {}), !keys.offset.present(), {}, true, {}};
-  assign(guide.offset, readPose(keys.offset));
-  assign(guide.keeps_offset, keys.attach.choice<bool>({{"initial", true}, {"frame", false}}));
-  if (keys.offset.present() && guide.keeps_offset)
-    keys.offset.problem("says where the mesh is in the frame, and attach: initial keeps it where it is; give one");
-  const Eigen::Matrix3Xd& vertices = source.config.mesh.vertices;
-  if (!frame || vertices.cols() == 0 || keys.tf.problems().size() != before)
-    return;
-  guide.bodies.push_back(*frame);
-  std::vector<GuideBinding::Share> shares;
-  for (int vertex = 0; vertex < static_cast<int>(vertices.cols()); ++vertex)
-    shares.push_back({vertex, 0, 1.0});
-  guide.binding = GuideBinding(vertices, {Pose()}, shares);
-  source.config.motion = std::move(guide);
-}
-
 void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std::string& object, GuideSource& source)
 {
   GuideMotion& motion = source.config.motion;
@@ -350,7 +329,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   }
   else if (keys->tf.present())
   {
-    readFramedMotion(*keys, source);
+    readFramedMotion(keys->tf, keys->offset, keys->attach, source.config);
   }
   else if (keys->by_points)
   {
@@ -431,6 +410,26 @@ std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& c
     at.problem(error.what());
     return {};
   }
+}
+
+void readFramedMotion(const YamlCursor& tf, const YamlCursor& offset, const YamlCursor& attach, GuideConfig& config)
+{
+  const auto frame = readFrameName(tf);
+  const std::size_t before = tf.problems().size();
+  CarriedGuide guide{{}, GuideBinding(Eigen::Matrix3Xd(3, 0), {}, {}), !offset.present(), {}, true, {}};
+  assign(guide.offset, readPose(offset));
+  assign(guide.keeps_offset, attach.choice<bool>({{"initial", true}, {"frame", false}}));
+  if (offset.present() && guide.keeps_offset)
+    offset.problem("says where the guide is in the frame, and attach: initial keeps it where it is; give one");
+  const Eigen::Matrix3Xd& vertices = config.mesh.vertices;
+  if (!frame || vertices.cols() == 0 || tf.problems().size() != before)
+    return;
+  guide.bodies.push_back(*frame);
+  std::vector<GuideBinding::Share> shares;
+  for (int vertex = 0; vertex < static_cast<int>(vertices.cols()); ++vertex)
+    shares.push_back({vertex, 0, 1.0});
+  guide.binding = GuideBinding(vertices, {Pose()}, shares);
+  config.motion = std::move(guide);
 }
 
 GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const std::vector<ClothConfig>& cloths,

@@ -63,6 +63,17 @@ std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
   return B;
 }
 
+/// Checks the name that the user gave to an entry of a map.
+void checkNameOf(const std::string& name, const YamlCursor& map, const YamlCursor& entry)
+{
+  YamlTree word;
+  word.kind = YamlTree::Kind::scalar;
+  word.scalar = name;
+  word.line = entry.tree()->line;
+  word.origin = entry.tree()->origin;
+  YamlCursor(&word, map.tree(), entry.path() + " (name)", entry.problems()).name();
+}
+
 void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod, int edges)
 {
   if (!at.present())
@@ -71,12 +82,7 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
        at.members("A grasp under a name of yours (letters, digits and '_'), which topics and tables use."))
   {
     const std::size_t before = value.problems().size();
-    YamlTree word;
-    word.kind = YamlTree::Kind::scalar;
-    word.scalar = name;
-    word.line = value.tree()->line;
-    word.origin = value.tree()->origin;
-    YamlCursor(&word, at.tree(), value.path() + " (name)", value.problems()).name();
+    checkNameOf(name, at, value);
     GraspConfig grasp = readGrasp(name, value, context, rod.closed, edges);
     for (const GraspConfig& other : rod.grasps)
     {
@@ -222,6 +228,23 @@ void checkModuli(const YamlMap& material, const YamlCursor& at_youngs)
   }
   if (missing.empty() && at_youngs.present())
     at_youngs.warning("has no effect, since stretch_modulus, bend_modulus and twist_modulus are given; leave it out");
+}
+
+/// Sections of a rod with so many edges (0: not known) whose frames are published.
+std::vector<SectionFrame> readSectionFrames(const YamlCursor& at, bool closed, int edges)
+{
+  std::vector<SectionFrame> frames;
+  if (!at.present())
+    return frames;
+  const int nodes = (edges > 0 ? edges : max_edges) + (closed ? 0 : 1);
+  for (const auto& [name, value] :
+       at.members("A section under a name of yours: the index of its node (negative: from the end)."))
+  {
+    checkNameOf(name, at, value);
+    if (const auto node = value.integer(-nodes, nodes - 1))
+      frames.push_back({name, *node < 0 ? *node + nodes : *node});
+  }
+  return frames;
 }
 
 }   // namespace
@@ -451,6 +474,11 @@ ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::str
   rod.tracking =
       readTrackedCurve(map.get("track", "Guide curve whose averages the rod has in every step. Without the key: none."),
                        context, rod, edges);
+  rod.broadcast_tf = readSectionFrames(
+      map.get("broadcast_tf",
+              "Sections whose frames (x along the tangent, y along d1) nodes publish on tf, as NODE/rods/ROD/NAME. "
+              "Without the key: none."),
+      rod.closed, edges);
   map.finish();
   return {std::move(rod), edges};
 }

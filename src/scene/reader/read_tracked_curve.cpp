@@ -197,17 +197,34 @@ void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConf
                    topic = map.get("topic", "The guide comes by messages on `guide/points`, nodes in order."),
                    late = map.get("late",
                                   "What the guide does when no message comes: hold the last one, or go on at the last "
-                                  "speed, which dies out. Without the key: hold.");
+                                  "speed, which dies out. Without the key: hold."),
+                   tf = map.get("tf", "Name of a frame of tf that carries the whole guide; a node looks it up."),
+                   offset = map.get("offset",
+                                    "With `tf`: pose of the guide in the frame. Without the key, the guide is carried "
+                                    "as `attach` says."),
+                   attach = map.get("attach",
+                                    "With `tf`. `initial`: the frame carries the guide from where both are at first. "
+                                    "`frame`: the guide is given in the frame. Without the key: initial.");
   map.finish();
-  if (table.present() + file.present() + topic.present() != 1)
+  if (table.present() + file.present() + topic.present() + tf.present() != 1)
   {
     if (at.problems().size() == before)
-      at.problem("must be fixed or one of {table: [[t, x0, y0, z0, x1, ...], ...]}, {file: FILE.csv}, {topic: points}");
+      at.problem(
+          "must be fixed or one of {table: [[t, x0, y0, z0, x1, ...], ...]}, {file: FILE.csv}, {topic: points}, {tf: "
+          "FRAME}");
     return;
   }
-  if (late.present() && !topic.present())
-    late.problem("is for guides by topic");
+  if (late.present() && !topic.present() && !tf.present())
+    late.problem("is for guides by topic or tf");
+  for (const YamlCursor& key : {offset, attach})
+    if (key.present() && !tf.present())
+      key.problem("is for guides by tf");
   assign(guide.coast, readLate(late));
+  if (tf.present())
+  {
+    readFramedMotion(tf, offset, attach, guide);
+    return;
+  }
   if (topic.present())
   {
     if (topic.choice<bool>({{"points", true}}))

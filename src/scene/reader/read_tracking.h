@@ -28,6 +28,9 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
 void readBagPoints(const YamlCursor& at, const ReadContext& context, double begin, const std::string& object,
                    GuideSource& source);
 
+/// A guide that rides on a frame of tf as a whole.
+void readFramedMotion(const YamlCursor& tf, const YamlCursor& offset, const YamlCursor& attach, GuideConfig& config);
+
 /// `late` of a guide by topic, as GuideConfig::coast.
 std::optional<double> readLate(const YamlCursor& at);
 
