@@ -20,7 +20,7 @@ struct ClothGroupModel
   std::vector<ContactProperties> contact;   ///< of each cloth
   std::vector<ClothOptions> options;        ///< of each cloth; empty: those of the group
   std::vector<Obstacle> solids;
-  std::vector<std::vector<int>> ignored;   ///< of each solid: cloths that pass through it; empty: none do
+  std::vector<std::vector<int>> ignored;   ///< per solid: the cloths that pass through it; empty: no cloth does
 };
 
 struct ClothGroupState

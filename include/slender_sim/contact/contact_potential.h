@@ -41,11 +41,11 @@ struct ContactTriangle
   unsigned char driven = 0;
 };
 
-/// A solid that pieces of an object pass through.
+/// A solid that an object passes through, with all or some of its pieces (segments or triangles).
 struct IgnoredSolid
 {
   int number = -1;            ///< see ContactSolid::number
-  std::vector<char> points;   ///< of each point of the object: whether the pieces there pass; empty: all pieces do
+  std::vector<char> points;   ///< per point of the object: 1 if the pieces at this point pass; empty: all pieces pass
 };
 
 /// What a curve or a cloth touches. Pieces of one curve that are closer along it than about a quarter of a turn at its
@@ -55,14 +55,14 @@ struct ContactObject : ContactProperties
   double curve_length = 0.0;   ///< [m]
   bool closed = false;
   int owner = 0;   ///< see ContactSolid::only
-  /// Of a cloth: where its points are at rest [m]. Two pieces of it that are near
-  /// each other there keep the thickness and repel from the gap only as far as both together are at most half of that
-  /// distance; pieces that meet there are neighbours. Null: all of them keep the whole thickness.
+  /// Rest positions of the points of a cloth [m]. If two pieces of the cloth are close to each other at rest, their
+  /// thickness and gap are reduced, so that thickness plus gap is at most half of the distance at rest. Pieces with
+  /// distance zero at rest are neighbours. With nullptr all pieces keep the whole thickness and gap.
   std::shared_ptr<const Eigen::Matrix3Xd> rest{};
-  int first_point = 0;   ///< number of the first of its points, of cloths and rods
-  std::shared_ptr<const std::vector<IgnoredSolid>> ignored{};   ///< null: it passes through none
-  /// Of the surface of a simulated body: the number of its solid. Friction then acts where the surfaces meet, and not
-  /// on the points of the surface, which may lie inside of the body.
+  int first_point = 0;   ///< number of the first point of the object; used for cloths and rods
+  std::shared_ptr<const std::vector<IgnoredSolid>> ignored{};   ///< nullptr: the object passes through no solid
+  /// Number of the solid, if this object is the surface of a simulated body; -1 otherwise. Friction then acts where the
+  /// surfaces meet. It does not act at the points of the surface, because these may lie inside of the body.
   int carrier = -1;
 };
 
@@ -71,7 +71,7 @@ struct ContactSolid : Obstacle
 {
   std::vector<int> ignores{};   ///< objects it never touches
   int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
-  int number = -1;              ///< for IgnoredSolid; -1: nothing names it
+  int number = -1;              ///< IgnoredSolid refers to this number; -1: no object ignores the solid
   bool body = false;            ///< moves freely, so that triangles touch it wherever their corners are driven
 };
 

@@ -33,12 +33,12 @@ TriangleMesh readPly(const std::string& path);
 /// By the end of the name: .obj or .ply, in small or capital letters. Throws std::runtime_error for another.
 TriangleMesh readMesh(const std::string& path);
 
-/// Reads a binary or ASCII STL file [unit of the file]. Corners with the same coordinates become one vertex. Throws
-/// std::runtime_error "FILE: reason".
+/// Reads a binary or ASCII STL file. Coordinates stay in the unit of the file. Corners with the same coordinates become
+/// one vertex. Throws std::runtime_error "FILE: reason".
 TriangleMesh readStl(const std::string& path);
 
-/// Reads all triangles of a COLLADA (DAE) file [m], by the unit of the file and without a turn to another up axis.
-/// Throws std::runtime_error "FILE: reason", also in builds without assimp.
+/// Reads all triangles of a COLLADA (DAE) file and scales them to [m] by the unit that the file gives. The up axis that
+/// the file gives is ignored. Throws std::runtime_error "FILE: reason"; builds without assimp always throw.
 TriangleMesh readCollada(const std::string& path);
 
 /// Write all vertices in order, with enough digits to read the same doubles back (PLY: binary_little_endian, double).

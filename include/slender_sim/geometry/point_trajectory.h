@@ -28,7 +28,7 @@ public:
   /// zero: of a motion that was under way when it was sampled. Before that frame points are held all the same, so that
   /// a query there sees a jump in velocity.
   void startInMotion() { moving_start_ = true; }
-  /// As PoseTrajectory::cutWithin().
+  /// Does the same as PoseTrajectory::cutWithin().
   void cutWithin(double interval) { cut_ = interval; }
   /// From now on more frames may come: two equal ones at the end may be the turning point of a swing, and are no pause
   /// yet.

@@ -12,14 +12,14 @@ namespace slender {
 /// Positions: cubic Hermite segments whose slopes are the three-point (non-uniform) finite differences of the samples.
 /// Orientations: the same on rotation vectors, each segment R(t) = R_k exp(phi(t)), with phi cubic Hermite from 0 to
 /// log(R_k^T R_{k+1}) and angular velocities at the samples by the three-point difference. Outside the samples the end
-/// pose is held with zero velocity, so the slopes of the first and last sample are zero, unless the motion is said to
-/// be cut out of a longer one (cutWithin()). Sparse (10..60 Hz) and jittery input so reaches the rod without jumps of
-/// velocity. Two exceptions to the three-point slope: beside a sample with the same value it is zero, so that a pause
-/// stays a pause, and where one interval is under a quarter of the other (a burst of late messages) it is the chord
-/// over both, whose noise does not grow with the shortness of the interval. Two equal samples are no pause when they
-/// lie on both sides of the turning point of a swing: the acceleration before, at and after them is then the same to
-/// within a third. q and -q are the same orientation; between samples the turn is the shorter one, so turns must be
-/// sampled more often than every half turn.
+/// pose is held with zero velocity. The slopes of the first and last sample are therefore zero, unless cutWithin() says
+/// that the samples are a part of a longer motion. Sparse (10..60 Hz) and jittery input thus reaches the rod without
+/// jumps of velocity. The three-point slope has two exceptions. Beside a sample with the same value the slope is zero,
+/// so that a pause stays a pause. Where one interval is shorter than a quarter of the other (a burst of late messages),
+/// the slope is that of the chord over both intervals, because noise of this chord does not grow as the interval gets
+/// short. Two equal samples on both sides of the turning point of a swing are not a pause: the accelerations before, at
+/// and after them then agree to within a third. q and -q are the same orientation. Between two samples the rotation
+/// takes the shorter way, so each half turn needs more than one sample.
 class PoseTrajectory
 {
 public:
@@ -36,9 +36,10 @@ public:
   /// From now on more samples may come: two equal ones at the end may be the turning point of a swing, and are no pause
   /// yet.
   void expectMore() { growing_ = true; }
-  /// The samples may begin and end in the middle of a motion. An end whose interval is shorter than `interval` [s] then
-  /// has the slope of the parabola through the three samples there, or that of its neighbour if that is less (0: the
-  /// ends are at rest). Outside of the samples the pose is held all the same: a query there sees a jump in velocity.
+  /// Says that the samples may begin and end in the middle of a motion. If the first or last interval is shorter than
+  /// `interval` [s], the slope at this end is that of the parabola through the three outermost samples, but at most the
+  /// slope of the neighbouring sample. With 0 both ends are at rest. Outside of the samples the pose is held in any
+  /// case, so that the velocity jumps at such an end.
   void cutWithin(double interval) { cut_ = interval; }
   /// Forgets samples that no query at or after `time` needs.
   void forgetBefore(double time);
@@ -57,7 +58,7 @@ public:
 private:
   /// Velocity of sample k by differences: linear in world axes, angular in the axes of the sample itself.
   Twist slope(std::size_t k) const;
-  /// The same of the first or the last sample of a motion that was cut there.
+  /// Slope at sample k, the first or the last one, where cutWithin() applies.
   Twist endSlope(std::size_t k) const;
 
   std::vector<double> times_;

@@ -49,8 +49,8 @@ inline Eigen::Vector3d anyNormal(const Eigen::Vector3d& t)
   return t.cross(Eigen::Vector3d::Unit(smallest)).normalized();
 }
 
-/// The smallest rotation that takes the direction of `from` to the direction of `to`; neither may be zero. For opposite
-/// directions, where many are the smallest, the half turn about anyNormal(from).
+/// Returns the smallest rotation that takes the direction of `from` to the direction of `to`. Neither vector may be
+/// zero. For opposite directions this rotation is not unique; the half turn about anyNormal(from) is returned.
 Eigen::Quaterniond rotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// Axis times angle of a rotation, |angle| <= pi [rad].

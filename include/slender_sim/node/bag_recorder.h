@@ -19,20 +19,20 @@ namespace slender {
 class BagRecorder
 {
 public:
-  /// Opens PATH.active, which close() renames to PATH; where PATH is a symbolic link, beside the file that it leads to.
-  /// An older bag is kept under previousBag(), and notes() say so. `topic_namespace` precedes the topics, e.g. "/";
-  /// SceneTopics has their names. Throws std::runtime_error when the file cannot be written, when PATH is no regular
-  /// file, and when a guide of the scene reads that bag.
+  /// Opens PATH.active, which close() renames to PATH. If PATH is a symbolic link, both names are those of its target.
+  /// An existing bag is kept as previousBag(PATH), and notes() report this. `topic_namespace` is put before the names
+  /// of the topics (see SceneTopics), for example "/". Throws std::runtime_error if the file cannot be written, if PATH
+  /// is not a regular file, or if a guide of the scene reads this bag.
   BagRecorder(const std::string& path, const std::string& topic_namespace, const Simulation& simulation);
   ~BagRecorder();
 
-  /// The scene as parsed, on `scene`; before the first record().
+  /// Records the text of the scene on the topic `scene`. Call it before the first record().
   void recordScene(const std::string& yaml, const ros::Time& stamp);
-  /// The undeformed cloths, on `mesh`; likewise, in scenes that have any.
+  /// Records the undeformed cloths on the topic `mesh`. Call it before the first record() if the scene has cloths.
   void recordMesh(const slender_sim::MeshStamped& mesh);
-  /// From now on records the edited scene. Its text and its cloths are recorded anew by the two above.
+  /// Records the edited scene from now on. Call recordScene(), and recordMesh() if it has cloths, before record().
   void sceneChanged(const Simulation& simulation) { nameTopics(simulation); }
-  /// What changed the run, on `inputs`.
+  /// Records an input that changes the run, on the topic `inputs`.
   void recordInput(const slender_sim::Input& input);
   /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies,
   /// `nozzle/wrench` per thread, `grasp_states` and `obstacle_states` if there are any, and `fields` if the scene asks
@@ -42,7 +42,7 @@ public:
   void close();
 
   const std::string& path() const { return path_; }
-  /// What becomes of bags that were there before, for the user; one sentence each.
+  /// Tells the user where bags that existed before are kept, one sentence per bag.
   const std::vector<std::string>& notes() const { return notes_; }
 
 private:

@@ -30,7 +30,7 @@ const char* toString(Drop reason);
 class DropCounter
 {
 public:
-  /// A paused node keeps a message. The log says so once until deliveredKept().
+  /// Notes that a paused node keeps a message. The log says so once, and again only after deliveredKept().
   void keep(const std::string& what);
   void deliveredKept() { told_of_kept_ = false; }
 
@@ -41,7 +41,7 @@ public:
   /// `what`: e.g. the topic; `detail` ends the sentence, e.g. the value.
   void drop(Drop reason, const std::string& what, const std::string& detail = "");
 
-  /// Drops a message whose stamp is `ahead` seconds after the simulated time (negative: before).
+  /// Counts a message that is dropped because of its stamp. `ahead` is the stamp minus the simulated time [s].
   void dropByStamp(bool stale, const std::string& what, double ahead);
 
   std::uint64_t count(Drop reason) const { return reasons_[static_cast<int>(reason)].count; }

@@ -13,12 +13,11 @@
 namespace slender {
 
 /// Publishes tf frames: bodies as NAME, grasps as NODE/grasps/NAME, sections of rods as NODE/rods/ROD/NAME, nozzles
-/// as NODE/nozzle or NODE/threads/NAME/nozzle.
-/// Nothing is computed while nobody listens to /tf.
+/// as NODE/nozzle or NODE/threads/NAME/nozzle. Frames are computed only while somebody listens to /tf.
 class FrameBroadcaster
 {
 public:
-  /// `node`: name of the node with its namespace, without a slash at the beginning. `grasps`: whether grasps have
+  /// `node` is the name of the node with its namespace and without a leading slash. With `grasps` the grasps have
   /// frames.
   FrameBroadcaster(ros::NodeHandle& nh, const std::string& node, std::string frame_id, const SceneTopics& topics,
                    bool grasps);
@@ -36,7 +35,7 @@ private:
   tf2_msgs::TFMessage message_;
 };
 
-/// The names of all frames that a node may publish for a scene.
+/// Returns the names of all frames that a node may publish for a scene.
 std::set<std::string> broadcastFrames(const std::string& node, const SceneTopics& topics, const Simulation& simulation);
 
 }   // namespace slender

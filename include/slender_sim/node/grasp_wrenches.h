@@ -10,26 +10,27 @@
 
 namespace slender {
 
-/// Publishes `grasps/NAME/wrench`, the force and torque of the object on its gripper about the grasp's origin, and
-/// `grasps/NAME/wrench_filtered`, the same through a low-pass filter of first order for controllers.
+/// Publishes `grasps/NAME/wrench` and `grasps/NAME/wrench_filtered`. The wrench is the force [N] and torque [N m] that
+/// the object exerts on its gripper, about the grasp's origin. The filtered wrench is meant for controllers; it is the
+/// output of a first-order low-pass filter.
 class GraspWrenches
 {
 public:
   struct Options
   {
-    bool world = false;          ///< axes of the node's frame, else of the grasp's own tf frame
+    bool world = false;          ///< true: axes of the node's frame; false: axes of the grasp's own tf frame
     double filter_time = 0.05;   ///< [s] > 0, time constant of the filter
   };
 
-  /// `frames`: tf frames of the grasps, as in FrameBroadcaster.
+  /// `frames` are the tf frames of the grasps, as in FrameBroadcaster.
   GraspWrenches(ros::NodeHandle& nh, const std::vector<std::string>& names, std::vector<std::string> frames,
                 const Options& options);
 
-  /// True when somebody listens.
+  /// Returns true if one of the topics has a subscriber.
   bool isHeard() const;
-  /// Takes wrenches and poses of the grasps from the messages of one instant.
+  /// Publishes the wrenches of one instant, from the wrenches and poses of the grasps in `messages`.
   void publish(const SceneMessages& messages);
-  /// The state was replaced: the filter begins anew with the next wrench.
+  /// Restarts the filter with the next wrench. Call it after the state was replaced.
   void restart();
 
 private:

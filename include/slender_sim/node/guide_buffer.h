@@ -40,9 +40,9 @@ public:
   };
 
   /// `X_WG` is the present pose of the grasp in the world. With Attach::section samples are poses of the held section.
-  /// With Attach::initial the offset between gripper and section is kept that exists when the first pose of all takes
-  /// effect, after restart() as well. `X_HG`: the section in the gripper, which takes the place of `attach` and never
-  /// changes.
+  /// With Attach::initial the offset between gripper and section is measured when the very first pose takes effect, and
+  /// it stays the same after restart(). `X_HG` is the pose of the section in the gripper. If it is given, `attach` has
+  /// no effect and the offset never changes.
   GuideBuffer(const Options& options, Attach attach, const Pose& X_WG, const std::optional<Pose>& X_HG = std::nullopt);
 
   /// Adds the gripper's pose in the world at `time` [s]; false when it is not later than the last one (nothing
@@ -55,15 +55,17 @@ public:
   /// The grasp has been moved to X_WG. With Attach::initial it keeps its new offset to the gripper; with
   /// Attach::section it catches up with the gripper.
   void attachAt(const Pose& X_WG);
-  /// The grasp has stood still at X_WG instead of following. It keeps its offset to the gripper and catches up.
+  /// Call it after the grasp has stood still at X_WG instead of following. The grasp keeps its offset to the gripper
+  /// and catches up.
   void catchUpFrom(const Pose& X_WG);
-  /// Forgets all samples and stays at X_WG. When poses come, the grasp has the offset that it had at first, before any
-  /// attachAt(), and catches up.
+  /// Forgets all samples and stays at X_WG. When poses come again, the grasp catches up with its very first offset:
+  /// that before any attachAt().
   void restart(const Pose& X_WG);
   /// The simulated clock skipped `seconds` while the grasp stood still. The grasp then catches up.
   void skip(double seconds);
 
-  /// The grasp in the gripper's frame, once it follows; before, and with attach section, identity unless given.
+  /// Pose of the grasp in the gripper's frame, if it was given or once the grasp follows. Identity before that, and
+  /// with Attach::section.
   const Pose& graspInGripper() const { return X_HG_; }
 
 private:
@@ -90,8 +92,8 @@ private:
   Options options_;
   Attach attach_;
   Pose X_HG_;                        // grasp in the gripper, known once samples have taken effect
-  std::optional<Pose> first_X_HG_;   // with Attach::initial: as the first pose of all took effect
-  bool held_anew_ = false;           // attachAt() was called since the start or restart()
+  std::optional<Pose> first_X_HG_;   // Attach::initial: the offset when the very first pose took effect
+  bool held_anew_ = false;           // attachAt() was called since the start or since restart()
   Motion plain_;                     // motion without an offset at last_time_
   Motion last_;                      // last output
   std::optional<Offset> offset_;

@@ -34,70 +34,73 @@
 
 namespace slender {
 
-/// Everything that moves grasps, nozzles, driven bodies and obstacles from outside: `grasps/NAME/pose`, `guides`,
-/// `bodies`, `nozzle/pose`, through tf2 into the node's frame; frames of tf themselves, see TfInputs; and
-/// `nozzle/flow`, `belt/velocity` and `wind`, which hold from the next step on. Subscribes only to what the scene asks
-/// for. Guides of tracked cloths: TrackingInputs. Bad messages are dropped and counted; the object
-/// that they would have moved keeps its previous input. A message with stamp zero counts as one of the present.
+/// Receives all inputs from outside that move grasps, nozzles, driven bodies and obstacles. Poses arrive on the topics
+/// `grasps/NAME/pose`, `guides`, `bodies` and `nozzle/pose`; tf2 transforms them into the node's frame. TfInputs
+/// follows frames of tf, and TrackingInputs receives the guides of tracked objects. Messages on `nozzle/flow`,
+/// `belt/velocity` and `wind` are valid from the next step on. The class subscribes only to the topics that the scene
+/// asks for. Bad messages are dropped and counted; the object then keeps its previous input. Stamp zero means the
+/// present time.
 class GuideInputs
 {
 public:
-  /// `nh` carries the callback queue of the simulating thread: callbacks never run beside a step. `own_frames`: of tf,
-  /// which the node itself broadcasts. `before`: those of the scene before an edit, from which everything is taken over
-  /// that goes on: what was heard from the same senders for the same things, transforms, and counts. They are of no use
-  /// afterwards.
+  /// `nh` carries the callback queue of the simulating thread, so that callbacks never run during a step. `own_frames`
+  /// are the tf frames that the node itself broadcasts. `before` are the inputs of the scene before an edit, or
+  /// nullptr. The new object takes over their transforms, their counts, and the messages for objects that still have
+  /// the same input. Do not use `before` afterwards.
   GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const Simulation& simulation, const SimClock& clock,
               const SceneTopics& names, std::set<std::string> own_frames, GuideInputs* before = nullptr);
 
   /// Takes in messages whose transforms have arrived meanwhile; drops those that waited too long.
   void processPending();
 
-  /// Hands every input that takes effect to `sink`, too.
+  /// Sets a function that is called with every input that takes effect.
   void onTaken(InputSink sink);
-  /// From now on inputs come from repeat() alone.
+  /// Ends all subscriptions. From now on inputs come only from repeat().
   void stopListening();
-  /// A recorded input takes effect. Throws std::runtime_error when the scene has nothing that it could move.
+  /// Applies a recorded input. Throws std::runtime_error if the scene has no object for this input.
   void repeat(const slender_sim::Input& input);
 
-  /// Replaces the targets of everything driven from outside by where it shall be at `time` [s since the clock's start].
+  /// Sets the targets of all objects that are driven from outside to their places at `time` [s since the clock's
+  /// start].
   void apply(double time, SceneInputs& inputs);
 
-  /// The grasp took hold of the rod where it is now.
+  /// Call it after a grasp took hold of its object at the present place.
   void attachAt(int grasp, const Pose& X_WG);
-  /// Everything was moved: a state was loaded.
+  /// Call it after a state was loaded, because all objects may have moved.
   void attachAll(const Simulation& simulation);
-  /// Everything stood still instead of following its input, which counts again.
+  /// Call it after all objects stood still instead of following their inputs. They follow and catch up again.
   void catchUp(const Simulation& simulation);
-  /// The scene was reset: forgets all input.
+  /// Forgets all inputs. Call it after a reset of the scene.
   void restart(const Simulation& simulation);
-  /// The clock skipped so many seconds, during which everything stood still.
+  /// Call it after the clock skipped this time [s] while all objects stood still.
   void skip(double seconds);
 
-  /// `present` returns the time of others: while the simulation is paused or has failed it may go on.
+  /// `present` returns the time of the other nodes. This time may go on while the simulation is paused or has failed.
   void onPresent(const std::function<ros::Time()>& present);
-  /// Takes in what came while the simulation stood still. With `all` it goes on at the present; else it takes some
-  /// steps where it is, for which only messages without a stamp count.
+  /// Applies messages that arrived while the simulation stood still. With `all` the simulation continues at the present
+  /// time, and all messages count. Otherwise it takes a few steps at its old time, and only messages without a stamp
+  /// count.
   void takeKept(bool all);
 
-  /// What is driven by messages of its own may also be dragged by hand: TOPIC/feedback counts as poses of the present.
-  /// Whoever drags should be the only one who moves it.
+  /// Lets a user drag in rviz what a pose topic of its own drives. Messages on TOPIC/feedback count as poses of the
+  /// present time. No other sender should move the same object meanwhile.
   void listenToHand(ros::NodeHandle nh, const std::string& topic);
-  /// Of what can be dragged, where it is now.
+  /// Returns a handle at the present place of each object that can be dragged.
   std::vector<Handle> handles(const Simulation& simulation) const;
 
   const DropCounter& drops() const { return drops_; }
   bool waiting() const { return !pending_.empty() || !hand_.empty() || tracking_->waiting(); }
 
-  /// Per grasp, body, obstacle and guide driven from outside. `missing`, `lag`, `excess`: see TrackingInputs::Age.
   using Age = TrackingInputs::Age;
-  /// Age of the last pose at the clock's present; nothing while none came.
-  /// "NAME for grasp G" of each body that something follows by the topic `bodies` and that no message has named yet.
+  /// Returns "NAME for grasp G" for each body that an object follows by the topic `bodies`, as long as no message has
+  /// named this body.
   std::vector<std::string> unheardBodies() const;
-  /// Of each frame of tf that something follows.
+  /// Returns the state of each tf frame that an object follows.
   std::vector<TfInputs::State> frames() const { return tf_->states(); }
+  /// Returns the age of the last pose of each grasp, body, obstacle and guide that is driven from outside.
   std::vector<Age> ages() const;
 
-  /// Per flow, belt and wind driven from outside: the value by message.
+  /// The last value of a flow, a belt velocity or a wind that messages set.
   struct Setting
   {
     std::string name, value;
@@ -110,7 +113,7 @@ private:
   void takenPose(std::size_t guided, double time, const Pose& X_WH) const;
   void takenVector(std::uint8_t kind, std::size_t thread, const Eigen::Vector3d& v) const;
 
-  // buffer: null when not driven from outside; frame: of tf, empty when driven by messages
+  // buffer: nullptr if not driven from outside; frame: tf frame that is followed, empty if driven by messages
   struct Guided
   {
     std::string name, body, topic, frame;
@@ -188,7 +191,7 @@ private:
   PendingMessages<Message> pending_;
   PausedMessages<Message> paused_;
   DropCounter drops_;
-  std::shared_ptr<tf2_ros::Buffer> shared_tf_buffer_;   // also after an edit
+  std::shared_ptr<tf2_ros::Buffer> shared_tf_buffer_;   // an edited scene keeps it
   tf2_ros::Buffer& tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::unique_ptr<TfInputs> tf_;

@@ -23,12 +23,13 @@ public:
 
 protected:
   /// `coast` [s] >= 0: within this time the motion comes to rest when no sample comes. With 0 the last sample is held.
-  /// `blend` [s] >= 0: shortest time in which the derived class takes up the speed of a stream, or lets go of it. Where
-  /// samples come faster than that, streams begin and end in the middle of a motion; else they begin and end at rest.
+  /// `blend` [s] >= 0: shortest time in which the derived class blends from rest to the speed of a stream, or back. If
+  /// the interval of the samples is shorter, streams may begin and end in motion. Otherwise they begin and end at rest.
   GuideStream(const GuideTiming::Options& timing, double coast, double blend)
     : timing_(timing),
       coast_(coast),
-      cut_(timing.delay > 0.0 || timing.automatic ? blend : 0.0)   // without a lag each sample is an end for a while
+      cut_(timing.delay > 0.0 || timing.automatic ? blend
+                                                  : 0.0)   // without a lag every sample is the last one at first
   {
   }
   virtual ~GuideStream() = default;
@@ -123,8 +124,8 @@ protected:
   double query_ = 0.0, rate_ = 1.0;   // [s] instant of the trajectory at last_time_, and its rate
 
 private:
-  /// When the motion runs past its last sample and is held there from then on, its speed is an offset to be blended
-  /// out.
+  /// Handles a motion that runs past its last sample and stops there. The jump in velocity becomes an offset, which is
+  /// blended out.
   void halt(double time, const GuideTiming::Instant& now)
   {
     const double end = trajectory_.times().back();
@@ -133,7 +134,7 @@ private:
     const double when = *last_time_ + (time - *last_time_) * (end - query_) / std::max(now.time - query_, end - query_);
     query_ = end - kLimitOffset;
     rate_ = now.rate;
-    output(when);   // with the speed at which it arrives
+    output(when);   // with the speed just before the end
     query_ = end;
     forgetPlain();
     rejoin(when);

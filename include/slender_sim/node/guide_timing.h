@@ -56,10 +56,10 @@ public:
   /// Moves on to simulated `time` [s], which does not decrease.
   Instant advance(double time);
 
-  /// The lag that the stream asks for [s]: the delay, or more.
+  /// Returns the lag that this stream needs [s]. It is at least the delay.
   double wantedLag() const { return own(); }
-  /// From now on the lag is at least this [s], unless there is none at all. Streams that shall be shown at one instant
-  /// are given the greatest lag that any of them asks for.
+  /// Sets a lower bound of the lag [s]. The bound has no effect if the delay is fixed at zero. Give all streams the
+  /// largest wantedLag() among them, so that they are all shown at the same instant.
   void lagAtLeast(double lag) { least_ = lag; }
 
   /// The simulated clock skipped so many seconds.
@@ -74,8 +74,8 @@ public:
   /// By how much the needed lag exceeded the delay [s] during the last 2.5 to 5 seconds; 0 when it did not. The value
   /// is always 0 with the option `automatic`.
   double excess() const;
-  /// Between the last two stamps [s]; 0 when there are not two. A stream needs a lag of two intervals even if its
-  /// messages take no time at all.
+  /// Returns the time between the last two stamps [s], or 0 if there are fewer than two. A stream needs a lag of two
+  /// intervals even if its messages arrive without any delay.
   double interval() const { return count_ > 1 ? last_ - previous_ : 0.0; }
 
 private:

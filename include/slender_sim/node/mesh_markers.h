@@ -12,11 +12,11 @@
 
 namespace slender {
 
-/// Makes pictures for rviz of meshes, one after the other, and removes those that are gone.
+/// Makes a sequence of pictures of meshes for rviz. Markers of meshes that no longer exist are deleted.
 class MeshMarkers
 {
 public:
-  /// Red, green, blue in [0, 1] of an object.
+  /// Returns the colour of an object: red, green and blue in [0, 1].
   using Colors = std::function<Eigen::Vector3d(ObjectKind, int index)>;
   explicit MeshMarkers(Colors colors) : colors_(std::move(colors)) {}
 

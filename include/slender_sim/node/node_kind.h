@@ -2,7 +2,8 @@
 
 namespace slender {
 
-/// The nodes that simulate scenes. `scene` runs every scene, the others every scene that has an object of their kind.
+/// The nodes that simulate scenes. `scene` runs every scene. Each other node runs the scenes that have an object of its
+/// kind.
 enum class NodeKind
 {
   scene,
@@ -11,7 +12,7 @@ enum class NodeKind
   cloths,
   tracking
 };
-/// Name of the program.
+/// Returns the name of the program, for example "rod_node".
 const char* toString(NodeKind kind);
 
 }   // namespace slender

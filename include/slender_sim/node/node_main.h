@@ -4,8 +4,8 @@
 
 namespace slender {
 
-/// The main program of a simulating node: runs a SceneNode until it ends. Returns the exit status: that of
-/// SceneNode::spin(), or 2 with a message when the node cannot start.
+/// Main program of a simulating node. Runs a SceneNode and returns the exit status of SceneNode::spin(). Prints a
+/// message and returns 2 if the node cannot start.
 int nodeMain(int argc, char** argv, const char* name, NodeKind kind);
 
 }   // namespace slender

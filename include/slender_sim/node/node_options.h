@@ -27,7 +27,7 @@ enum class Pace
 /// Axes and tf frame of `grasps/NAME/wrench`.
 enum class WrenchFrame
 {
-  automatic,   ///< those of the grasp in scenes of at most 64 grasps, else those of the node's frame
+  automatic,   ///< those of the grasp in scenes with at most 64 grasps, otherwise those of the node's frame
   grasp,
   world,
 };
@@ -56,7 +56,7 @@ struct MarkerOptions
   double range = 0.0;
   /// ~marker_forces [m/N]: arrows of contacts' and holders' forces so long; 0: none
   double forces = 0.0;
-  /// a line of the legend that does not come from a parameter: how fast time passes in the picture; empty: none
+  /// extra line of the legend, which no parameter sets: how fast time passes in the picture; empty: no line
   std::string note;
 };
 
@@ -73,12 +73,12 @@ struct NodeOptions
   double speed = 1.0;        ///< ~speed > 0: simulated over wall time, with ~pace: wall
   /// ~max_lag [s]: behind the wall clock by more than that, the clock skips to the present; 0: never
   double max_lag = 1.0;
-  bool publish_clock = false;                          ///< ~publish_clock: /clock comes from here; needs /use_sim_time
-  bool paused = false;                                 ///< ~paused: start paused
-  int state_every = 1;                                 ///< ~state_every: steps between state, poses and wrench messages
-  std::string record_bag;                              ///< ~record_bag: path; empty: no bag
-  bool record_inputs = true;                           ///< ~record_inputs: into the same bag, for ~replay
-  std::string replay;                                  ///< ~replay: path of a bag whose run is repeated; empty: none
+  bool publish_clock = false;   ///< ~publish_clock: the node publishes /clock; needs /use_sim_time
+  bool paused = false;          ///< ~paused: start paused
+  int state_every = 1;          ///< ~state_every: steps between state, poses and wrench messages
+  std::string record_bag;       ///< ~record_bag: path; empty: no bag
+  bool record_inputs = true;    ///< ~record_inputs: record inputs into this bag, for ~replay
+  std::string replay;           ///< ~replay: path of the bag whose run is repeated; empty: none
   WrenchFrame wrench_frame = WrenchFrame::automatic;   ///< ~wrench_frame: auto | grasp | world
   double wrench_filter = 0.05;     ///< ~wrench_filter [s], time constant of grasps/NAME/wrench_filtered
   double guide_delay = 0.05;       ///< ~guide_delay [s] behind which grasps follow their guides

@@ -13,32 +13,33 @@
 
 namespace slender {
 
-/// What becomes of a message, by its stamp.
+/// How a message is treated because of its stamp.
 enum class Arrival
 {
-  now,           ///< it counts
-  kept,          ///< it is of the present, at which the paused simulation has not arrived; it counts when that goes on
-  stale,         ///< older than ~guide_timeout
-  from_future,   ///< more than ~guide_ahead ahead
+  now,           ///< used now
+  kept,          ///< ahead of the paused simulation; kept until the simulation goes on
+  stale,         ///< dropped: older than ~guide_timeout
+  from_future,   ///< dropped: more than ~guide_ahead in the future
 };
 
-/// Keeps messages that arrive while the simulation is paused and the time of others goes on. Their stamps run away from
-/// the simulated time, so that they can be followed only when the simulation goes on, which is then at their present.
-/// Of each source it keeps the messages of the last `timeout` seconds, and the last one however old it is. `Message`
-/// has a member `stamp`; stamp zero means now.
+/// Keeps messages that arrive while the simulation is paused and the time of other nodes goes on. The stamps of these
+/// messages are ahead of the simulated time. The simulation uses them when it continues at the present time of the
+/// other nodes. For each source the class keeps the messages of the last `timeout` seconds, and always the last
+/// message. `Message` has a member `stamp`; stamp zero means now.
 template <class Message>
 class PausedMessages
 {
 public:
-  /// `timeout`: ~guide_timeout, `ahead`: ~guide_ahead [s]. The clock outlives this object.
+  /// `timeout` is ~guide_timeout [s], `ahead` is ~guide_ahead [s]. The clock must outlive this object.
   PausedMessages(const SimClock& clock, double timeout, double ahead) : clock_(clock), timeout_(timeout), ahead_(ahead)
   {
   }
 
-  /// `present` returns the time of others while the simulation stands still, and the clock's stamp while it runs.
+  /// `present` returns the clock's stamp while the simulation runs, and the time of other nodes while it stands still.
   void onPresent(std::function<ros::Time()> present) { present_ = std::move(present); }
 
-  /// Decides by the message's stamp, and completes stamp zero. A message that is kept is copied.
+  /// Decides by its stamp how a message is treated. If the simulation runs, stamp zero is replaced by the present
+  /// stamp. A message that is kept is copied.
   Arrival arrive(int source, Message& message)
   {
     const double now = clock_.seconds(), present = present_ ? std::max(now, clock_.secondsAt(present_())) : now;
@@ -65,8 +66,9 @@ public:
     return Arrival::kept;
   }
 
-  /// Hands out what counts from now on, in the order of the stamps: with `all` everything, because the simulation goes
-  /// on at the present; else what has no stamp, because it takes a few steps.
+  /// Returns and forgets kept messages, in the order of their stamps. With `all` the simulation continues at the
+  /// present time, and all messages are returned. Otherwise it takes only a few steps, and messages without a stamp are
+  /// returned.
   std::vector<std::pair<int, Message>> release(bool all)
   {
     std::vector<std::pair<int, Message>> out;
@@ -87,8 +89,8 @@ public:
     return out;
   }
 
-  /// Takes over what another object keeps. change(source, message) may change both; messages for which it returns
-  /// false are dropped.
+  /// Takes over the messages of another object. change(source, message) may change its arguments. If it returns false,
+  /// the message is dropped.
   template <class Change>
   void takeOver(PausedMessages& before, const Change& change)
   {
@@ -113,7 +115,7 @@ public:
 
 private:
   static constexpr double kRounding = 1e-6;        // [s] stamps are whole nanoseconds
-  static constexpr std::size_t kMostKept = 1000;   // of a source
+  static constexpr std::size_t kMostKept = 1000;   // messages per source
 
   const SimClock& clock_;
   double timeout_, ahead_;

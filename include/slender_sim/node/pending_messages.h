@@ -61,7 +61,8 @@ public:
     }
   }
 
-  /// change(source, message) may change both; those for which it returns false are dropped.
+  /// Calls change(source, message) for each waiting message. It may change its arguments. If it returns false, the
+  /// message is dropped.
   template <class Change>
   void change(const Change& change)
   {

@@ -6,10 +6,11 @@
 
 namespace slender {
 
-/// ROS packages by rospack, for programs that run without a master.
+/// Returns sources that find ROS packages with rospack and have no parameters. They work without a ROS master.
 RobotSources packageSources();
 
-/// The same, and ROS parameters: names are looked for in the namespace of the handle and then in those above it.
+/// Returns sources that find ROS packages and also read ROS parameters. A parameter is searched for in the namespace of
+/// the handle and then in the namespaces above it.
 RobotSources rosSources(const ros::NodeHandle& nh);
 
 }   // namespace slender

@@ -37,8 +37,8 @@ struct RunStatistics
   double wallSeconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count(); }
 };
 
-/// At most ten lines about grasps, those with the largest force first, for the closing summary. A last line tells of
-/// the others. `names` are those of all grasps of the scene.
+/// Returns lines about grasps for the closing summary. At most ten grasps have a line, those with the largest force
+/// first; one more line sums up the others. `names` are the names of all grasps of the scene.
 std::vector<std::string> graspLines(const RunStatistics& statistics, const std::vector<std::string>& names);
 
 }   // namespace slender

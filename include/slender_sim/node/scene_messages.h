@@ -21,30 +21,30 @@ namespace slender {
 /// The undeformed cloths.
 slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id);
 
-/// What is published and recorded of one instant, in scene order. What is large is shared: record first, then publish,
-/// and do not read it afterwards.
+/// All messages that are published and recorded for one instant, in scene order. Large messages are shared with their
+/// subscribers: record them first, then publish them, and do not read them afterwards.
 struct SceneMessages
 {
   std::vector<SharedMessage<slender_sim::RodState>> states;       ///< per rod
   std::vector<SharedMessage<slender_sim::ThreadState>> threads;   ///< per thread and piece of it
-  SharedMessage<slender_sim::ClothState> cloth_state;             ///< all of them in one message; none: not published
-  std_msgs::Header header;                                        ///< of all messages of this instant
-  /// Frames of the edges at their middles, object after object.
+  SharedMessage<slender_sim::ClothState> cloth_state;   ///< one message for all cloths; nullptr: not published
+  std_msgs::Header header;                              ///< of all messages of this instant
+  /// One pose per edge: the material frame at the middle of the edge, object after object.
   SharedMessage<geometry_msgs::PoseArray> rod_poses, thread_poses;
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released
-  /// per thread: what it does to its nozzle, about the outlet; zero without one
+  /// per thread: the wrench that the thread exerts on its nozzle, about the outlet; zero without a nozzle
   std::vector<geometry_msgs::WrenchStamped> nozzles;
-  /// the scene's bodies, simulated and driven; none: not published
+  /// the simulated and driven bodies of the scene; not published if there are none
   slender_sim::BodyStates bodies;
 
-  slender_sim::GraspStates grasps;     ///< none: neither published nor recorded
-  slender_sim::BodyStates obstacles;   ///< likewise
+  slender_sim::GraspStates grasps;     ///< neither published nor recorded if there are none
+  slender_sim::BodyStates obstacles;   ///< neither published nor recorded if there are none
 
-  slender_sim::Fields fields;   ///< see fillFields(); no tables: neither published nor recorded
+  slender_sim::Fields fields;   ///< see fillFields(); neither published nor recorded if it has no tables
 
   void fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id, std::uint32_t epoch);
-  /// What `record.fields` of the scene asks for, of the instant of the last fill(). It is computed here, so call it
-  /// only if somebody takes it.
+  /// Computes the fields that `record.fields` of the scene asks for, at the instant of the last fill(). Call it only if
+  /// the fields are used, because it takes time.
   void fillFields(const Simulation& simulation);
 
 private:

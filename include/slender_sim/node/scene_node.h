@@ -37,21 +37,21 @@
 
 namespace slender {
 
-/// Simulates a scene of rods, viscous threads, cloths and bodies. Poses of what moves them come in as messages, and
-/// their motion goes out. docs/nodes.md lists topics, services and parameters.
-/// Everything runs in the thread of spin(), so a callback never sees a half-taken step.
+/// Simulates a scene of rods, viscous threads, cloths and bodies. The node receives poses of grippers and other guides
+/// as messages, or from tf, and publishes the motion of the objects. docs/nodes.md lists topics, services and
+/// parameters. Everything runs in the thread of spin(), so a callback never sees a half-taken step.
 class SceneNode
 {
 public:
-  /// Reads options and scene and composes it before anything is advertised. Throws SceneError, OptionError or
-  /// std::exception with a text for the user.
+  /// Reads the options and the scene, and builds the scene before anything is advertised. Throws SceneError,
+  /// OptionError or std::exception with a text for the user.
   SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, NodeKind kind);
   ~SceneNode();
 
-  /// Until shut down, stop(), or ~stop_after; closes the bag. Returns the exit status: 0, or 3 when it ends after a
-  /// failed step.
+  /// Runs until ROS shuts down, stop() is called, or ~stop_after is reached, and closes the bag. Returns the exit
+  /// status: 0, or 3 if the run ends after a failed step.
   int spin();
-  /// Ends spin() after the step that it is at. From any thread.
+  /// Ends spin() after the present step. May be called from any thread.
   void stop() { stop_ = true; }
 
 private:
@@ -61,14 +61,14 @@ private:
     paused,
     failed
   };
-  static constexpr std::size_t kMostGraspFrames = 64;   // a head of hair has a thousand grasps
+  static constexpr std::size_t kMostGraspFrames = 64;   // a scene of hair may have a thousand grasps
   static constexpr double kBurst = 0.02;                // [s] longest run of steps between two looks at the callbacks
-  static constexpr const char* kByLimit = "limit exceeded";   // text of a recorded release
+  static constexpr const char* kByLimit = "limit exceeded";   // reason in the record of a release
 
   // scene_node.cpp
   static void checkKind(const SceneConfig& scene, const NodeOptions& options, NodeKind kind);   // throws SceneError
   void start();
-  void makeInputs();   // anew for an edited scene
+  void makeInputs();   // called again for an edited scene
   void advertise();
   void publishMesh();
   bool isStateFinite() const;
@@ -76,7 +76,7 @@ private:
   bool advance();   // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
   // scene_node_limits.cpp
-  bool mindLimits(const std::vector<LimitExcess>& begun);   // false: the simulation stops
+  bool mindLimits(const std::vector<LimitExcess>& begun);   // returns false if the simulation must stop
   void letInputsGoOn();                                     // after `on_limit: hold`
   void addLimits(diagnostic_msgs::DiagnosticStatus& status) const;
 
@@ -94,19 +94,19 @@ private:
   void summary() const;
 
   // scene_node_frames.cpp
-  // The frames of tf that the node broadcasts for such a scene and that move.
+  // Returns the moving tf frames that the node broadcasts for this scene.
   std::set<std::string> ownFrames(const Simulation& simulation, const SceneTopics& topics) const;
   void refuseLoops(const Simulation& simulation, const SceneTopics& topics) const;   // throws SceneError
 
   // scene_node_clock.cpp
   void checkClock() const;
   std::optional<ros::Time> firstStamp();   // nothing while there is no /clock to follow
-  bool stampsAreOfTheWall() const;         // and so jump to the present after a pause
-  ros::Time presentOfOthers() const;       // the stamp of the clock unless the simulation stands still beside others
-  void anchor();                           // the present tick is due now
-  // the state was replaced: a new epoch begins, one tick later; returns the ticks skipped
+  bool stampsAreOfTheWall() const;         // true: stamps jump to the present after a pause
+  ros::Time presentOfOthers() const;   // time of other nodes; differs from the clock only while the node stands still
+  void anchor();                       // the present tick is due now
+  // Begins a new epoch one tick later, because the state was replaced. Returns the ticks skipped.
   std::uint64_t jumped();
-  std::uint64_t realign();   // time went on while the scene stood still; returns the ticks skipped
+  std::uint64_t realign();   // skips the time that passed while the scene stood still; returns the ticks skipped
   void skip(std::uint64_t ticks);
   double stampLag() const;   // [s]
   void keepUp();             // ~max_lag
@@ -115,15 +115,15 @@ private:
   // scene_node_replay.cpp
   void openReplay();
   void takeRecordedScene();
-  std::string leftover(const std::string& parameter) const;   // advice on a parameter of an earlier start
+  std::string leftover(const std::string& parameter) const;   // advice if an earlier start may have set the parameter
   void note(slender_sim::Input input, std::uint64_t tick);
   void noteJump(slender_sim::Input input, std::uint64_t tick, std::uint64_t skipped, bool failed);
   void noteGrasp(const slender_sim::SetGrasp::Request& request, const std::string& why = "");
-  bool replayInputs();   // those of the present tick; false when the run is over
+  bool replayInputs();   // repeats the inputs of the present tick; returns false when the run is over
   void repeat(const slender_sim::Input& input);
   void repeatJump(const slender_sim::Input& input);
   void repeatGrasp(const slender_sim::Input& input);
-  std::string refusesInput() const;   // why service calls must not change a run; empty: they may
+  std::string refusesInput() const;   // reason why service calls must not change the run; empty: they may
 
   // scene_node_services.cpp
   void advertiseServices();
@@ -149,7 +149,7 @@ private:
   void advertiseEdits();
   bool onEdit(SceneEdit::Kind kind, slender_sim::EditScene::Request& request,
               slender_sim::EditScene::Response& response);
-  EditedScene edited(const SceneEdit& edit) const;   // throws for an edit that is refused
+  EditedScene edited(const SceneEdit& edit) const;   // throws if the edit is refused
   void takeUp(EditedScene edited);
   std::vector<ros::Publisher> takePublishers();
   void deleteMarkers(const Simulation& before);
@@ -158,13 +158,13 @@ private:
   // scene_node_diagnostics.cpp
   void publishDiagnostics();
   static constexpr double kClockReminder = 10.0;   ///< [s] between complaints about /clock
-  std::string clockWentBack() const;               ///< empty: it did not
-  std::string paceNote() const;                    ///< for pictures: how much slower than real time they are
-  void remindOfInputs();                           ///< bodies and frames that are followed and have not come yet
+  std::string clockWentBack() const;               ///< message if /clock went back; otherwise empty
+  std::string paceNote() const;                    ///< line of the legend: how much slower than real time
+  void remindOfInputs();                           ///< warns of bodies and frames without a first pose
   diagnostic_msgs::DiagnosticStatus simulationStatus() const;
   diagnostic_msgs::DiagnosticStatus inputStatus();
 
-  // of messages, of service calls: a long ~step answers those, and leaves messages for later
+  // messages; service calls. A long ~step answers service calls and leaves messages for later.
   ros::CallbackQueue queue_, services_queue_;
   ros::NodeHandle nh_, nh_priv_;
   const NodeKind kind_;
@@ -175,9 +175,9 @@ private:
   SimClock clock_;
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;
-  SceneInputs step_inputs_;               // of the last step, refilled
+  SceneInputs step_inputs_;               // inputs of the last step, reused
   std::unique_ptr<InputReplay> replay_;   // only with ~replay
-  std::uint64_t inputs_noted_ = 0;        // in the bag
+  std::uint64_t inputs_noted_ = 0;        // number of inputs written to the bag
   std::unique_ptr<HandMarkers> hands_;    // only with ~interactive
   std::unique_ptr<BagRecorder> bag_;
   SceneMessages messages_;
@@ -187,16 +187,16 @@ private:
   Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
   bool stepping_ = false;        // in ~step
-  bool guides_led_on_ = false;   // to the end of a step that was not taken
-  std::string step_ended_;       // by what call; empty while it goes on
+  bool guides_led_on_ = false;   // guides are at the end of a step that was not taken
+  std::string step_ended_;       // name of the call that ended ~step; empty while ~step goes on
   std::atomic<bool> stop_{false};
   std::uint32_t epoch_ = 0;
   std::string failure_, bag_failure_;
   StepReport last_report_;
-  double shown_pace_ = 0.0;        // simulated over wall time between the last two diagnostics; 0: not known
+  double shown_pace_ = 0.0;        // simulated time over wall time between the last two diagnostics; 0: not known
   RunStatistics total_, recent_;   // since the start, since the last diagnostics
   std::uint64_t reported_drops_ = 0, limits_silent_ = 0;   // limits_silent_: excursions since the last warning
-  double inputs_since_ = 0.0;                              // [s] of clock_: earlier ones were forgotten
+  double inputs_since_ = 0.0;                              // [s] of clock_; earlier inputs were forgotten
 
   ros::WallTime wall_start_;   // when the tick wall_start_ticks_ was due
   ros::WallTime next_skip_warning_, next_limit_warning_;
@@ -204,12 +204,12 @@ private:
   ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_, next_input_reminder_;
   std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture
 
-  ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_, fields_pub_;   // only when the scene has any, like the next
+  ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_, fields_pub_;   // only if the scene has such objects
   std::unique_ptr<FrameBroadcaster> frames_;
   std::unique_ptr<GraspWrenches> wrenches_;
-  std::unique_ptr<tf2_ros::StaticTransformBroadcaster> frame_broadcaster_;   // tells rviz that ~frame_id is there
-  ros::Publisher rod_state_pub_, rod_poses_pub_, thread_state_pub_, thread_poses_pub_;   // of kinds that the scene has
-  ros::Publisher cloth_state_pub_, points_pub_, mesh_pub_;                               // likewise
+  std::unique_ptr<tf2_ros::StaticTransformBroadcaster> frame_broadcaster_;   // makes ~frame_id known to rviz
+  ros::Publisher rod_state_pub_, rod_poses_pub_, thread_state_pub_, thread_poses_pub_;   // only of kinds in the scene
+  ros::Publisher cloth_state_pub_, points_pub_, mesh_pub_;                               // only if the scene has cloths
   ros::Publisher markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
   std::vector<ros::Publisher> rod_poses_pubs_, nozzle_pubs_;
   std::vector<ros::ServiceServer> services_;

@@ -5,7 +5,8 @@
 
 namespace slender {
 
-/// Reads ~scene, which is the path of a scene file or its YAML text, with ~set. Throws SceneError.
+/// Reads ~scene, which is the path of a scene file or the YAML text of a scene, and applies the overrides of ~set.
+/// Throws SceneError.
 SceneConfig readScene(const NodeOptions& options);
 
 }   // namespace slender

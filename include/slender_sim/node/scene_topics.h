@@ -8,7 +8,7 @@
 
 namespace slender {
 
-/// Returns true if one of the rods or cloths tracks a guide.
+/// Returns true if at least one of the rods or cloths tracks a guide.
 template <class Objects>
 bool tracksGuide(const Objects& objects)
 {
@@ -20,15 +20,16 @@ bool tracksGuide(const Objects& objects)
 /// `rods/state`, `threads/state`, `cloths/state` and so on.
 struct SceneTopics
 {
-  /// Throws std::invalid_argument when the name of a rod, thread, cloth or grasp cannot be part of a topic.
+  /// Throws std::invalid_argument if the name of a rod, thread, cloth or grasp cannot be part of a topic.
   explicit SceneTopics(const Simulation& simulation);
 
-  bool has_rods = false;   ///< true also for a scene that has no rods, threads or cloths, but bodies
+  bool has_rods = false;   ///< also true for a scene with only bodies
   bool has_threads = false;
   bool has_cloths = false;
   std::string rods, threads, cloths;   ///< prefixes of the kinds: empty, or "rods/" and so on
   std::vector<std::string> grasps;     ///< names of the grasps in scene order
-  /// Per thread: prefix of its inputs and of its wrench. Empty in a scene of one thread, else "threads/NAME/".
+  /// Per thread: prefix of its input topics and of the topic of its wrench. The prefix is empty in a scene with one
+  /// thread, otherwise "threads/NAME/".
   std::vector<std::string> nozzles;
 };
 

@@ -16,39 +16,41 @@
 
 namespace slender {
 
-/// What follows frames of tf. Each step looks the frames up and hands new poses on, as if messages had brought them.
+/// Lets objects follow frames of tf. Before each step the frames are looked up, and new poses are passed to their
+/// followers like poses of messages.
 ///
-/// Method. The pose of a frame is taken at its newest stamp, so that what is handed on are the stamps that the
-/// publisher of the frame gave, and not places between them on the straight lines by which tf joins poses. When tf
-/// knows the frame beyond the step (a planned motion, or a node slower than real time), or at all times (a static
-/// frame), the pose is taken at the step itself, a few times per `~guide_delay`. Frames are looked up one by one: one
-/// that stops coming does not hold up the others. That all inputs are shown with one lag is up to GuideInputs.
+/// Method. The pose of a frame is taken at the newest stamp of the frame. The followers thus receive the samples of the
+/// publisher, and not points of tf's linear interpolation between the samples. If tf knows the frame beyond the step (a
+/// planned motion, or a node slower than real time), or if the frame is static, the pose is taken at the time of the
+/// step, a few times per `~guide_delay`. Each frame is looked up on its own, so that a missing frame does not delay the
+/// others. GuideInputs gives all inputs the same lag.
 class TfInputs
 {
 public:
-  /// Takes the pose of a frame in ~frame_id at `time` [s] of the clock; false when it is not later than the last one.
+  /// Receives the pose of a frame in ~frame_id at `time` [s] of the clock. Returns false if this time is not later than
+  /// that of the last pose.
   using Sink = std::function<bool(double time, const Pose& X_WF)>;
 
-  /// `own`: frames that this node broadcasts. All references must outlive it.
+  /// `own` are the frames that this node broadcasts. All references must outlive this object.
   TfInputs(const NodeOptions& options, const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops,
            std::set<std::string> own);
 
-  /// `who` follows the frame, for example "grasp left".
+  /// Lets `sink` follow a frame. `who` is the name of the follower for messages, for example "grasp left".
   void follow(const std::string& frame, const std::string& who, Sink sink);
   bool any() const { return !frames_.empty(); }
 
-  /// Hands on what is new, before a step.
+  /// Passes new poses to the followers. Call it before each step.
   void look();
-  /// Poses are handed on no more: they come from a record.
+  /// Passes no more poses. Call it if recorded inputs replace tf.
   void stop() { stopped_ = true; }
-  /// The scene was reset: the poses of the present count, too.
+  /// Passes the present poses again. Call it after a reset of the scene.
   void restart();
 
   struct State
   {
     std::string frame, who;
-    bool heard;        ///< since the start or the reset
-    std::string why;   ///< why there is no newer pose; empty: there is nothing to say
+    bool heard;        ///< a pose came since the start or the last reset
+    std::string why;   ///< reason why there is no newer pose; empty: no problem
   };
   std::vector<State> states() const;
 
@@ -62,9 +64,9 @@ private:
   {
     std::string name;
     std::vector<Follower> followers;
-    std::optional<double> last;   // [s] of the pose that was handed on last
+    std::optional<double> last;   // [s] time of the last pose that was passed on
     std::string why;
-    bool checked = false;   // for loops
+    bool checked = false;   // warnOfLoop() was called
   };
 
   std::optional<ros::Time> newest(Frame& frame) const;

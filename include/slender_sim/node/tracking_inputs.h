@@ -29,47 +29,50 @@ namespace slender {
 class TrackingInputs
 {
 public:
-  /// Subscribes to what the scene asks for. The three must outlive it.
+  /// Subscribes to the topics that the scene asks for. All references must outlive this object.
   TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, const GuideBuffer::Options& buffers,
                  const Simulation& simulation, const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops);
 
   bool any() const { return !guides_.empty(); }
-  /// What was heard for the same objects before the scene was edited.
+  /// Takes over the inputs of objects that exist in both scenes. `before` are the inputs before an edit of the scene.
   void takeOver(TrackingInputs& before);
-  /// Has tf tell of the guides that ride on its frames.
+  /// Registers the guides that follow frames of tf.
   void followFrames(TfInputs& tf);
-  /// The greatest lag that a guide asks for which has not fallen silent, and the least for all [s]; see GuideTiming.
+  /// Returns the largest lag [s] that a guide needs. Guides without recent messages do not count. See GuideTiming.
   double wantedLag() const;
+  /// Sets a lower bound [s] of the lag of all guides.
   void lagAtLeast(double lag);
   void processPending();
   bool waiting() const { return !pending_.empty(); }
-  /// Replaces the guides that are driven from outside by where they shall be at `time` [s since the clock's start].
+  /// Sets the guides that are driven from outside to their places at `time` [s since the clock's start].
   void apply(double time, SceneInputs& inputs);
-  /// Everything was moved: a state was loaded.
+  /// Call it after a state was loaded, because all objects may have moved.
   void attachAll(const Simulation& simulation);
-  /// The scene was reset: forgets all input.
+  /// Forgets all inputs. Call it after a reset of the scene.
   void restart(const Simulation& simulation);
 
-  /// The clock skipped so many seconds, during which everything stood still.
+  /// Call it after the clock skipped this time [s] while all objects stood still.
   void skip(double seconds);
 
-  // As those of GuideInputs.
+  // These functions have the same meaning as in GuideInputs.
   void onPresent(std::function<ros::Time()> present) { paused_.onPresent(std::move(present)); }
   void takeKept(bool all);
   void onTaken(InputSink sink) { sink_ = std::move(sink); }
   void stopListening() { subscribers_.clear(); }
   void repeat(const slender_sim::Input& input);
 
-  /// Of each guide by points, and of each body. `missing`: it has not spoken yet, though other bodies of its guide
-  /// have. `lag`: behind which it is followed [s]. `excess`: by how much that had to be more than ~guide_delay lately
-  /// [s]. `interval`: between its messages [s].
+  /// State of the messages of a guide by points, or of one body of a guide.
+  /// `seconds`: age of the last pose; nothing if none came. `missing`: no pose of this body came, but poses of other
+  /// bodies of the same guide came. `lag`: lag of the guide [s]. `excess`: largest recent excess of the lag over
+  /// ~guide_delay [s]. `interval`: time between messages [s].
   struct Age
   {
     std::string name;
     std::optional<double> seconds;
     bool missing;
     double lag, excess, interval;
-    /// By how much messages took longer than ~guide_delay [s]; sparse ones that come at once do not count.
+    /// Returns by how much the transport of messages took longer than ~guide_delay [s]. Sparse messages that arrive at
+    /// once are not late.
     double late() const { return excess - 2.0 * interval; }
   };
   std::vector<Age> ages() const;

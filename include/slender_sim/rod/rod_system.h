@@ -101,7 +101,7 @@ double shareOfEdge(const RodModel& model, int node, int side);
 /// edge's frame bent back by the rest curvature of half an edge.
 Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int node);
 
-/// The same with the node's position: x along the tangent, y along d1.
+/// Returns the same orientation with the position of the node as origin: x along the tangent, y along d1.
 Pose sectionPose(const RodModel& model, const RodState& state, int node);
 
 }   // namespace slender

@@ -134,8 +134,9 @@ struct FixedMotion
 /// driven by `grasps/NAME/pose` or `guides`; fixed without a node
 struct TopicMotion
 {};
-/// Follows a frame of tf; fixed without a node. `offset`: what is moved, in the frame. It is applied to the smoothed
-/// motion of the frame, so that all that follow one frame stand still relative to each other.
+/// Motion that follows a frame of tf. Without a node nothing moves. `offset` is the pose of the moved object in the
+/// frame. It is applied to the smoothed motion of the frame, so that objects that follow the same frame do not move
+/// relative to each other.
 struct TfMotion
 {
   std::string frame;   ///< without a leading slash
@@ -155,7 +156,7 @@ using Motion = std::variant<FixedMotion, TopicMotion, TfMotion, BodyMotion, Tabl
 /// Motion of obstacles and driven bodies. Topic: the entry of the same name in `bodies` messages.
 using GivenMotion = std::variant<FixedMotion, TopicMotion, TfMotion, TableMotion>;
 
-/// Whether a Motion or a GivenMotion comes to a node from outside: by messages or by tf.
+/// Returns true if a Motion or a GivenMotion comes from outside of the node: by messages or by tf.
 template <class AnyMotion>
 bool comesFromOutside(const AnyMotion& motion)
 {
@@ -189,18 +190,19 @@ struct GraspConfig
   Hold hold = Hold::frame;
   Motion motion = FixedMotion{};
   Attach attach = Attach::section;
-  /// Obstacles, or links of robots, that the held object passes through. Nothing: near the grasp the links that the
-  /// held part touches at the start.
+  /// Names of obstacles, or of links of robots, that the whole object passes through. With nothing, the object passes
+  /// near the grasp through the links that its held part touches at the start.
   std::optional<std::vector<std::string>> ignored_contacts;
   GraspLimits limits;
-  /// The held section in the frame that `motion` gives; not with Attach::initial. Nothing: that of a TfMotion, or none.
+  /// Pose of the held section in the frame that `motion` gives; not with Attach::initial. With nothing the offset of a
+  /// TfMotion counts, if `motion` is one.
   std::optional<Pose> offset;
   /// Of a rod: unit tangent and unit first material axis of the held section, in world axes, for motions whose poses
   /// have no orientation. Zero: not given. The director need not be normal to the tangent; its normal part counts.
   Eigen::Vector3d direction{0, 0, 0}, director{0, 0, 0};
 };
 
-/// The held section in the frame that drives the grasp, if the scene says where it is there.
+/// Returns the pose of the held section in the frame that drives the grasp, if the scene gives this pose.
 std::optional<Pose> offsetInFrame(const GraspConfig& grasp);
 
 /// Selects the equations of a rod. `automatic` takes the isotropic form for explicit steps of naturally straight rods
@@ -264,7 +266,8 @@ struct ContactConfig
 /// An obstacle with its motion.
 struct ObstacleConfig : Obstacle
 {
-  /// Of a collision element of a robot: name of the tf frame of its link. Several elements of a link have it in common.
+  /// Name of the tf frame of the link, if the obstacle is a collision element of a robot. All elements of a link have
+  /// the same name here.
   std::string link;
   Pose pose;   ///< of the shape, where the scene starts
   GivenMotion motion = FixedMotion{};
@@ -429,16 +432,16 @@ struct SceneConfig
   std::string name = "scene";
   std::string file;     ///< that it was read from, for messages; may be empty
   std::string source;   ///< the YAML text after --set overrides (what `scene` publishes)
-  /// to which names of files in the scene are relative
+  /// folder from which relative file names in the scene start
   std::string directory = ".";
   /// What the user should know although the scene runs, one sentence or two each. The reader adds to them
   /// (YamlCursor::warning), then the constructor of Simulation. simulate prints them to stderr, nodes log them as ROS
   /// warnings.
   std::vector<std::string> warnings;
-  /// What the constructor of Simulation chose and the user may want to know, one sentence each. They are printed like
-  /// warnings, as information.
+  /// Choices of the constructor of Simulation that the user may want to know, one sentence each. Programs print them as
+  /// information.
   std::vector<std::string> notes;
-  std::vector<std::string> guide_bags;    ///< that guides were read from
+  std::vector<std::string> guide_bags;    ///< paths of bags from which guides were read
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
   Eigen::Vector3d wind{0, 0, 0};          ///< [m/s]
   bool wind_topic = false;                ///< `wind` messages set it; until the first one it is as above

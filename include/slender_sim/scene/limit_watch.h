@@ -11,7 +11,7 @@ namespace slender {
 
 const char* toString(OnLimit on_limit);
 
-/// One limit that is exceeded.
+/// An event: a value begins to exceed its limit.
 struct LimitExcess
 {
   enum class Kind
@@ -22,50 +22,50 @@ struct LimitExcess
     speed
   };
   Kind kind = Kind::strain;
-  double time = 0.0;    ///< [s] simulated, when it was noticed
+  double time = 0.0;    ///< [s] simulated time of the check that found it
   double value = 0.0;   ///< in the unit of the limit
   double limit = 0.0;
-  std::vector<int> to_release;   ///< grasps that `release` lets go
+  std::vector<int> to_release;   ///< grasps that `on_limit: release` releases
   std::string text;              ///< "grasp 'left': its force 41 N exceeds limits.force = 40 N (t = 1.2 s)"
 };
 
-/// Watches the limits of a scene (key `limits`) step by step, and does what `on_limit` asks for. An excursion begins
-/// when a value exceeds its limit and ends below 95 % of it. What the watch does depends on the states and inputs
-/// alone, so that a run that is repeated with the same inputs is the same.
+/// Checks the limits of a scene (key `limits`) in each step, and reacts as `on_limit` says. An excursion begins when a
+/// value exceeds its limit and ends when the value is below 95 % of the limit. The reaction depends only on states and
+/// inputs, so that a repeated run with the same inputs gives the same result.
 class LimitWatch
 {
 public:
-  /// The simulation outlives the watch.
+  /// The simulation must outlive the watch.
   explicit LimitWatch(Simulation& simulation);
 
-  /// Before a step: looks at the speeds of its inputs. While inputs are held, replaces all targets by where things are.
-  /// Returns the excursions that begin.
+  /// Checks the speeds of the inputs of the next step. Call it before the step. While inputs are held, it replaces all
+  /// targets by the present places of the objects. Returns the excursions that begin.
   std::vector<LimitExcess> checkInputs(SceneInputs& inputs);
-  /// After a step: looks at strains, forces and torques. Returns the excursions that begin.
+  /// Checks strains, forces and torques. Call it after a step. Returns the excursions that begin.
   std::vector<LimitExcess> checkStep();
 
-  /// With `release`: the grasps that the last check released.
+  /// Returns the grasps that the last check released (`on_limit: release`).
   const std::vector<int>& released() const { return released_; }
-  /// With `stop`: why the simulation must not go on; otherwise empty.
+  /// Returns the reason why the simulation must stop (`on_limit: stop`); otherwise empty.
   const std::string& stopped() const { return stopped_; }
-  /// With `hold`: why inputs are held; otherwise empty.
+  /// Returns the reason why inputs are held (`on_limit: hold`); otherwise empty.
   const std::string& held() const { return held_; }
-  /// Inputs count again. What exceeds its limit now holds them anew only when it has been below it.
+  /// Ends the holding of inputs. A value that exceeds its limit now can hold them again only after its excursion ended.
   void goOn();
-  /// The state was replaced.
+  /// Forgets all excursions. Call it after the state was replaced.
   void reset();
 
-  /// The excursions that last, one text each.
+  /// Returns the present excursions, one text each.
   std::vector<std::string> lasting() const;
-  /// How many have begun so far.
+  /// Returns the number of excursions that have begun so far.
   std::uint64_t count() const { return count_; }
 
 private:
-  using Key = std::pair<LimitExcess::Kind, int>;   ///< and the index of the object, grasp or input
+  using Key = std::pair<LimitExcess::Kind, int>;   ///< kind, and index of the object, grasp or input
   struct Excursion
   {
     LimitExcess worst;
-    double next_action = 0.0;   ///< [s] simulated
+    double next_action = 0.0;   ///< [s] simulated time of the next release
   };
 
   bool isQuiet(const Key& key, double value, double limit) const;
@@ -80,7 +80,7 @@ private:
 
   Simulation& simulation_;
   const LimitsConfig limits_;
-  /// per cloth: the edges of its mesh, and their lengths at rest [m]
+  /// per cloth: the edges of its mesh, and the rest lengths of these edges [m]
   std::vector<std::vector<std::pair<int, int>>> cloth_edges_;
   std::vector<std::vector<double>> cloth_lengths_;
   std::map<Key, Excursion> excursions_;

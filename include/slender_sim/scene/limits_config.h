@@ -5,29 +5,30 @@
 
 namespace slender {
 
-/// What happens when a limit is exceeded, besides a warning.
+/// Reaction to an exceeded limit, besides a warning.
 enum class OnLimit
 {
-  warn,      ///< nothing
-  hold,      ///< everything that is driven stays where it is until somebody lets it go on
+  warn,      ///< no further reaction
+  hold,      ///< all driven objects stay in place until a user lets them continue
   release,   ///< the grasp is released
   stop,      ///< the simulation stops
 };
 
-/// Limits beyond which a run is told of. An infinite one never is exceeded.
+/// Limits of a run. Infinity means no limit.
 struct LimitsConfig
 {
-  /// Of the stretch strain of rods' edges and of cloths' mesh edges [-]. The laws of stretching are linear: at 0.5 the
-  /// cross-section that they leave out of account has changed by a third to a half, and only rubber bears as much.
+  /// Largest stretch strain of the edges of rods and of the mesh edges of cloths [-]. The laws of stretching are linear
+  /// and neglect the change of the cross-section. At a strain of 0.5 this change is a third to a half, and only rubber
+  /// withstands such a strain.
   double strain = 0.5;
-  /// On a grasp [N], [N m]. What is too much depends on the gripper.
+  /// Largest force [N] and torque [N m] on a grasp. A useful limit depends on the gripper.
   double force = std::numeric_limits<double>::infinity(), torque = std::numeric_limits<double>::infinity();
-  /// Of what is driven [m/s]: several times what robots and trackers of hands move at.
+  /// Largest speed of driven objects [m/s]. The default is several times the speed of robots and of tracked hands.
   double speed = 10.0;
   OnLimit on_limit = OnLimit::warn;
 };
 
-/// What a grasp has instead of the limits of the scene.
+/// Limits of one grasp, in place of the limits of the scene. Nothing: the limit of the scene.
 struct GraspLimits
 {
   std::optional<double> force, torque;   ///< [N], [N m]

@@ -6,8 +6,8 @@
 
 namespace slender {
 
-/// The largest unbalanced force of a run in words, for summaries: "3e-09 of the largest force". With `one_newton_step`
-/// the text adds that the forces of a step are not balanced by design, because a value near one is no failure then.
+/// Returns a text about the largest unbalanced force of a run, for summaries: "3e-09 of the largest force". With
+/// `one_newton_step` the text adds that forces are not balanced by design, because a value near one is then no failure.
 std::string residualText(const SceneConfig& scene, double residual);
 
 }   // namespace slender

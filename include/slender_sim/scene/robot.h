@@ -6,16 +6,20 @@
 
 namespace slender {
 
-/// Where robot descriptions come from besides files. The library knows no ROS; programs that do say how to ask it.
+/// Sources of robot descriptions besides files. The library does not depend on ROS. Programs that use ROS set these
+/// functions.
 struct RobotSources
 {
-  /// Text of the ROS parameter of this name; nothing if there is none. Null: the program has no parameters.
+  /// Returns the text of the ROS parameter of this name, or nothing if there is none. Null if the program has no
+  /// parameters.
   std::function<std::optional<std::string>(const std::string& name)> parameter;
-  /// Folder of the ROS package of this name; empty if there is none. Null: the program knows no packages.
+  /// Returns the folder of the ROS package of this name, or an empty text if there is none. Null if the program cannot
+  /// find packages.
   std::function<std::string(const std::string& name)> package;
 };
 
-/// Sets where the reader looks for robot descriptions and their meshes. It holds for all scenes that are read later.
+/// Sets the sources in which the reader looks for robot descriptions and their meshes. They are used for all scenes
+/// that are read afterwards.
 void setRobotSources(RobotSources sources);
 
 }   // namespace slender

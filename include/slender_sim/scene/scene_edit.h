@@ -7,9 +7,9 @@
 #include "slender_sim/scene/config.h"
 #include "slender_sim/scene/simulation.h"
 
-/// Changes of a scene that runs. The text of the scene is changed and read anew, so that everything holds that holds
-/// for scene files, and the state of what stays is handed over. An edit is deterministic: the same edits of the same
-/// run give the same bits.
+/// Changes a scene while it runs. An edit changes the text of the scene and reads it again, so that the rules of scene
+/// files apply. Objects that stay keep their state. An edit is deterministic: the same edits of the same run give
+/// results that are equal to the last bit.
 namespace slender {
 
 struct SceneEdit
@@ -31,15 +31,16 @@ struct SceneEdit
   std::string text;
 };
 
-/// Name of the service that asks for it, "~spawn" and so on, which also stands before error messages.
+/// Returns the name of the service for this edit, for example "~spawn". Error messages begin with this name.
 const char* toString(SceneEdit::Kind kind);
 
-/// The scene with the edit, read and checked. What follows from other objects unless the scene gives it stays as it is:
-/// the integrator, the gap of contact, and the method of contact of each cloth. Throws SceneError with what is wrong.
+/// Returns the edited scene after reading and checking it. Some defaults depend on all objects of a scene: the
+/// integrator, the gap of contact, and the contact method of each cloth. An edit does not change their values. Throws
+/// SceneError with the reason.
 SceneConfig editedScene(const SceneConfig& scene, const SceneEdit& edit);
 
-/// The edited scene, which goes on where `running` is. An edit that changes nothing leaves the motion the same to the
-/// last bit. Throws SceneError; `running` stays as it is in any case.
+/// Returns a simulation of the edited scene that continues from the present state of `running`. If the edit changes
+/// nothing, the motion is the same to the last bit. Throws SceneError with the reason. Never changes `running`.
 std::unique_ptr<Simulation> editedSimulation(const Simulation& running, const SceneEdit& edit);
 
 }   // namespace slender

@@ -27,8 +27,9 @@ public:
   /// Force and torque on the gripper in the last step.
   const Wrench& wrench(int grasp) const;
 
-  /// The pose of the held section when the driving frame M of a grasp (a gripper, a body) is at X_WM: X_WM and the
-  /// offset that the scene gives, that was taken as it began (`attach: initial`), or last by attach() or setOffset().
+  /// Returns the pose of the held section when the driving frame M of a grasp (a gripper or a body) is at X_WM. The
+  /// offset in M is the one that the scene gives, or the one at the start (`attach: initial`). attach() and setOffset()
+  /// replace it.
   GraspTarget targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity = std::nullopt) const;
   /// Takes the offset between the driving frame now at X_WM and the held section.
   void setOffset(int grasp, const Pose& X_WM);

@@ -29,10 +29,11 @@ public:
   /// makes a warning of it). With `solve_start` false it starts as given all the same, and leaves the search for
   /// equilibria to runStatics().
   explicit Simulation(SceneConfig config, bool solve_start = true);
-  /// A scene that goes on where `running` is: rods, threads, cloths, bodies, obstacles and grasps that both scenes
-  /// have, by their names, keep their state and what reset() gives back. What `running` does not have starts as in the
-  /// scene; new grasps of objects that both have take hold where the object is now. Nothing is solved, whatever `start`
-  /// says. Throws SceneError for what cannot be built, for surfaces that cross now, and for objects of other sizes.
+  /// Builds a simulation of `config` that continues from the present state of `running`. Rods, threads, cloths, bodies,
+  /// obstacles and grasps are matched by name. Those in both scenes keep their state, and the state to which reset()
+  /// returns. Objects that `running` does not have start as the scene says. A new grasp of an object in both scenes
+  /// takes hold at the present place of the object. No equilibrium is solved, whatever `start` says. Throws SceneError
+  /// if the scene cannot be built, if surfaces cross now, or if an object has another size than before.
   Simulation(SceneConfig config, const Simulation& running);
   ~Simulation();
   Simulation(const Simulation&) = delete;
@@ -73,7 +74,8 @@ public:
   /// Threads for scenes of several rods (at least 1; default: what OpenMP offers). Results do not depend on it.
   void setThreads(int threads) { world_->setThreads(threads); }
 
-  /// Back to the initial state. Throws SceneError after edits that leave surfaces crossed there; then the state stays.
+  /// Returns to the initial state. Throws SceneError if an edit makes surfaces cross in the initial state; the present
+  /// state then stays.
   void reset();
 
   /// Test functions in force of a tracked cloth.
@@ -103,8 +105,8 @@ private:
   std::unique_ptr<SceneGrasps> grasps_;
   WorldInputs world_inputs_;
   std::optional<StepReport> start_report_;
-  std::vector<Pose> weld_poses_;   ///< per weld of the world: the held part in its body's frame, as the world began
-  std::string reset_problem_;      ///< why reset() is not possible; empty: it is
+  std::vector<Pose> weld_poses_;   ///< per weld of the world: initial pose of the held part in the body's frame
+  std::string reset_problem_;      ///< reason why reset() is not possible; empty: it is possible
 };
 
 }   // namespace slender

@@ -29,8 +29,8 @@ struct CarriedGuide
   /// bodies carry the mesh from where it and they are at first; else vertices are in the bodies' frames
   bool keeps_offset = true;
   std::vector<PoseTrajectory> poses;   ///< per body; none: by `guide/bodies`
-  bool by_tf = false;                  ///< bodies are frames of tf, instead of names in `guide/bodies`
-  Pose offset;                         ///< of the mesh in that frame
+  bool by_tf = false;                  ///< bodies are names of tf frames instead of names in `guide/bodies`
+  Pose offset;                         ///< pose of the mesh in the tf frame
 };
 /// By `guide/points`.
 struct TopicGuide
@@ -48,7 +48,7 @@ struct GuideConfig
   /// reference shape [m], over which averages are taken; of a rod's guide: nodes of a polyline, no triangles
   TriangleMesh mesh;
   GuideMotion motion;
-  /// [s] within which the speed of a guide by topic or tf dies out when no pose comes; 0: it is held
+  /// [s] time within which a guide by topic or tf comes to rest if no pose comes; 0: it stops at the last pose
   double coast = 0.0;
 
   bool byTopic() const;

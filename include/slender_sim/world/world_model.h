@@ -32,7 +32,7 @@ struct WorldModel
   {
     std::shared_ptr<const RodModel> model;
     std::optional<ContactProperties> contact;   ///< nothing: touches nothing
-    std::vector<IgnoredSolid> ignored;          ///< obstacles, by their numbers, that nodes of it pass through
+    std::vector<IgnoredSolid> ignored;          ///< obstacles, by number, that nodes of the rod pass through
     TrackedGuide tracked;                       ///< with one set
   };
   struct Thread
@@ -49,7 +49,7 @@ struct WorldModel
     std::shared_ptr<const ClothModel> model;
     ClothOptions options;
     std::optional<ContactProperties> contact;   ///< nothing: touches nothing
-    /// Obstacles, by their numbers, that vertices of it pass through; of cloth by impulses the whole cloth.
+    /// Obstacles, by number, that vertices of the cloth pass through. With the impulse method the whole cloth passes.
     std::vector<IgnoredSolid> ignored;
     TrackedGuide tracked;
   };
@@ -65,11 +65,11 @@ struct WorldModel
     /// What others touch. There must be a shape.
     Obstacle solid() const { return {*shape, friction, body.name}; }
   };
-  /// Holds nodes first..last of a rod as they lie in a body when the world is made.
+  /// Welds nodes first..last of a rod to a body.
   struct RodWeld
   {
     int rod = 0, first_node = 0, last_node = 0, body = 0;
-    std::optional<Pose> X_BG;   ///< the held part in the body's frame; nothing: as they lie
+    std::optional<Pose> X_BG;   ///< pose of the held part in the body's frame; nothing: the initial pose
   };
 
   std::vector<Rod> rods;
