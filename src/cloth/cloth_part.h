@@ -33,8 +33,8 @@ public:
     return stages_->accepts(state, inputs, duration, report);
   }
 
-  /// What the cloth touches, in steps of this length [s], and which solids its points pass through. Without a call
-  /// nothing.
+  /// Sets what the cloth touches, and which solids its points pass through. `step` is the length of a step [s]. Without
+  /// a call the cloth touches nothing.
   void setContact(const ContactProperties& contact, double step, const std::vector<IgnoredSolid>& ignored = {});
   /// These vertices are driven corners of the surface from now on. begin() takes them from the state.
   void setPins(const std::vector<int>& pins);

@@ -31,7 +31,8 @@ inline bool mayTouch(const ContactSurface& surface, int object, const ContactSol
          std::find(solid.ignores.begin(), solid.ignores.end(), object) == solid.ignores.end();
 }
 
-/// Whether a piece of an object, which has these points, passes through a solid: the object ignores the solid there.
+/// Returns true if the piece of an object with these points passes through a solid, because the object ignores the
+/// solid there.
 inline bool passesThrough(const ContactSurface& surface, int object, const int* points, int count,
                           const ContactSolid& solid)
 {
@@ -46,7 +47,7 @@ inline bool passesThrough(const ContactSurface& surface, int object, const int* 
   return false;
 }
 
-/// Whether a segment and a solid may touch.
+/// Returns true if a segment and a solid may touch.
 inline bool mayTouch(const ContactSurface& surface, const ContactSegment& segment, const ContactSolid& solid)
 {
   const int points[2] = {segment.a, segment.b};

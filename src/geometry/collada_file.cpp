@@ -18,7 +18,7 @@ namespace slender {
 TriangleMesh readCollada(const std::string& path)
 {
   Assimp::Importer importer;
-  // The file may name another up axis. Meshes of robots are used as they are, without that rotation, as in rviz.
+  // The file may give another up axis. Meshes of robots are used without a rotation to this axis, as in rviz.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS |
                                                           aiComponent_COLORS | aiComponent_TEXCOORDS |

@@ -53,8 +53,8 @@ bool pausesAt(const std::vector<double>& times, std::size_t k, bool growing, dou
          (before && !turnsSteadily(times, k - 1, growing, chord));
 }
 
-/// Whether sample k, the first or the last, is where a motion was cut: see PoseTrajectory::cutWithin(). Two samples
-/// are a step, and no motion.
+/// Returns true if the motion goes on beyond sample k, which is the first or the last one; see
+/// PoseTrajectory::cutWithin(). Returns false for two samples, because they are a step and not a motion.
 inline bool isCut(const std::vector<double>& times, std::size_t k, double within)
 {
   if (times.size() < 3)
@@ -63,8 +63,9 @@ inline bool isCut(const std::vector<double>& times, std::size_t k, double within
   return times[later] - times[later - 1] < within;
 }
 
-/// Slope at such an end. Of the parabola through three samples, the chord is the mean of the slopes at both ends of an
-/// interval. The slope beside it is a bound, so that the motion does not overshoot after a jump or before a pause.
+/// Slope at an end where isCut() is true: that of the parabola through three samples. On a parabola the slope of the
+/// chord is the mean of the slopes at both ends of an interval. The result is bounded by the slope `beside`, so that
+/// the motion does not overshoot after a jump or before a pause.
 inline Eigen::Vector3d cutSlope(const Eigen::Vector3d& chord, const Eigen::Vector3d& beside)
 {
   const Eigen::Vector3d parabola = 2.0 * chord - beside;

@@ -76,7 +76,8 @@ Twist PoseTrajectory::slope(std::size_t k) const
             rotationVector(poses_[k - 1].orientation.conjugate() * poses_[k].orientation) / h};
   }
   if (k == 0 || k + 1 >= times_.size())
-    return isCut(times_, k, cut_) ? endSlope(k) : Twist();   // else held beyond the ends
+    return isCut(times_, k, cut_) ? endSlope(k)
+                                  : Twist();   // otherwise at rest, because the pose is held beyond the end
   const double h0 = times_[k] - times_[k - 1], h1 = times_[k + 1] - times_[k];
   const Eigen::Quaterniond back = poses_[k].orientation.conjugate();
   const auto shift = [this](std::size_t j) { return Eigen::Vector3d(poses_[j].position - poses_[j - 1].position); };
@@ -103,7 +104,7 @@ Twist PoseTrajectory::endSlope(std::size_t k) const
   const double h = times_[second] - times_[first];
   const Pose &a = poses_[first], &b = poses_[second];
   const Twist next = slope(beside);
-  // angular: in the axes of the sample itself. The turn from one sample to the other has the same vector in both.
+  // The angular slope is in the axes of the sample. The rotation from a to b has the same vector in the axes of both.
   const Eigen::Vector3d turn = rotationVector(a.orientation.conjugate() * b.orientation) / h;
   return {cutSlope((b.position - a.position) / h, next.linear), cutSlope(turn, next.angular)};
 }

@@ -8,7 +8,8 @@ Eigen::Quaterniond rotationBetween(const Eigen::Vector3d& from, const Eigen::Vec
   const double sine = cross.norm(), cosine = a.dot(b);
   if (cosine > -0.5)
     return Eigen::Quaterniond(1.0 + cosine, cross.x(), cross.y(), cross.z()).normalized();
-  // 1 + cosine loses its digits near opposite directions. The axis must be normal to a to the last digit.
+  // 1 + cosine suffers from cancellation near opposite directions, so the axis is used. It must be normal to a to the
+  // last digit.
   const Eigen::Vector3d axis = sine > 1e-15 ? (cross / sine - a * a.dot(cross / sine)).normalized() : anyNormal(a);
   const double half = 0.5 * std::atan2(sine, cosine);
   const Eigen::Vector3d v = std::sin(half) * axis;

@@ -119,7 +119,7 @@ TriangleMesh readStl(const std::string& path)
   std::ostringstream content;
   content << file.rdbuf();
   const std::string bytes = content.str();
-  // A binary file may begin with the word solid, too: its length tells.
+  // A binary file may begin with the word solid, too. The length of the file shows whether it is binary.
   if (bytes.size() >= kStlHeader)
   {
     const auto byte = [&](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[i])); };

@@ -4,17 +4,17 @@
 
 namespace slender {
 
-/// Cholesky factor of the 6 x 6 matrix of a rigid body. Its loops are compiled once: each use of Eigen's own factor for
-/// this size costs a second of compiling.
+/// Cholesky factor of the 6 x 6 matrix of a rigid body. The loops are compiled only once. Each use of Eigen's own
+/// factor of this size costs a second of compile time.
 class Cholesky6
 {
 public:
   using Matrix = Eigen::Matrix<double, 6, 6>;
   using Vector = Eigen::Matrix<double, 6, 1>;
 
-  /// Factors a symmetric matrix, of which the lower triangle is read. False when it is not positive definite.
+  /// Factors a symmetric matrix; only its lower triangle is read. Returns false if it is not positive definite.
   bool compute(const Matrix& a);
-  /// v becomes A^-1 v. After a failed compute() the result means nothing.
+  /// Replaces v by A^-1 v. Not valid after a failed compute().
   void solveInPlace(Vector& v) const;
 
 private:

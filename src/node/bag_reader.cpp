@@ -104,7 +104,7 @@ struct BagReader::Contents
   rosbag::Bag bag;
   std::optional<SceneConfig> scene;
   std::string scene_problem;
-  std::vector<slender_sim::MeshStamped> meshes;   ///< one more after each edit of the scene
+  std::vector<slender_sim::MeshStamped> meshes;   ///< the initial meshes, and one entry per edit of the scene
   std::vector<std::unique_ptr<Stream>> streams;
   std::size_t messages = 0, done = 0;
   double step_length = 0.0;   ///< [s]; 0: one instant only
@@ -115,8 +115,8 @@ struct BagReader::Contents
   std::uint32_t epoch = 0;
   StepGaps gaps;
 
-  SceneSnapshot* out = nullptr;        ///< what the streams fill
-  std::vector<std::string> own_axes;   ///< grasps whose wrench of this instant is in the grasp's own frame
+  SceneSnapshot* out = nullptr;        ///< the streams write to this snapshot
+  std::vector<std::string> own_axes;   ///< grasps with a wrench in the grasp's frame at this instant
 
   void open();
   void choosePrefix(const std::string& topic_namespace);
@@ -393,7 +393,7 @@ void BagReader::Contents::add(const slender_sim::ThreadState& thread)
                 "thread " + thread.name);
 }
 
-/// The last mesh of these cloths that was recorded until then; null: none.
+/// Returns the last mesh of these cloths that was recorded before them, or nullptr.
 const slender_sim::MeshStamped* BagReader::Contents::meshOf(const slender_sim::ClothState& cloths) const
 {
   const slender_sim::MeshStamped* found = nullptr;

@@ -71,7 +71,7 @@ BagRecorder::~BagRecorder()
   }
 }
 
-/// A bag must not be lost because a parameter of an earlier start names it again.
+/// Renames older bags, so that no bag is lost if a parameter of an earlier start still names it.
 void BagRecorder::keepEarlierBags(const std::string& active)
 {
   const std::string previous = replaceablePath(previousBag(path_)), unfinished = replaceablePath(previous + ".active");

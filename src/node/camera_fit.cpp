@@ -16,10 +16,10 @@ using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 using Points = std::vector<Eigen::Vector3d>;
 
-constexpr double kFieldOfView = M_PI / 4;   // [rad] of rviz, from bottom to top
-constexpr double kFilled = 0.8;             // of the picture
-constexpr double kSurroundings = 3.0;       // solids that are larger than so many times the objects are not shown whole
-constexpr double kSmallest = 1e-3;          // [m] a picture of less is of no use
+constexpr double kFieldOfView = M_PI / 4;   // [rad] vertical angle of rviz's camera
+constexpr double kFilled = 0.8;             // part of the picture that the points fill
+constexpr double kSurroundings = 3.0;       // solids larger than this multiple of the objects are not shown whole
+constexpr double kSmallest = 1e-3;          // [m] smallest size of a useful picture
 
 bool startsWith(const std::string& text, const std::string& start) { return text.compare(0, start.size(), start) == 0; }
 
@@ -31,7 +31,7 @@ bool isShape(const Marker& marker)
          !startsWith(marker.ns, "frames/");
 }
 
-/// Appends the points of a marker, or the corners of its box.
+/// Appends the points of a marker, or the corners of its box if it has no points.
 void append(const Marker& marker, Points& points)
 {
   const geometry_msgs::Quaternion& q = marker.pose.orientation;
@@ -61,10 +61,10 @@ Eigen::AlignedBox3d boxOf(const Points& points)
   return box;
 }
 
-/// One point of each occupied cell of a grid over the points' box.
+/// Returns one point of each occupied cell of a grid over the bounding box of the points.
 Points thinnedOut(const Points& points)
 {
-  constexpr int kCells = 256;   // along each side
+  constexpr int kCells = 256;   // per side of the box
   const Eigen::AlignedBox3d box = boxOf(points);
   const Eigen::Vector3d scale = (kCells - 1) * box.sizes().cwiseMax(kSmallest).cwiseInverse();
   std::vector<bool> taken(kCells * kCells * kCells);
@@ -80,7 +80,7 @@ Points thinnedOut(const Points& points)
   return thin;
 }
 
-/// Of many points those that lie farthest out in directions all round: they alone bound a picture.
+/// Returns the points that lie farthest out in evenly spread directions. These points bound every picture.
 Points outermost(const Points& points)
 {
   constexpr int kDirections = 400;
@@ -88,7 +88,7 @@ Points outermost(const Points& points)
     return points;
   const Points thin = thinnedOut(points);
   Points hull;
-  for (int k = 0; k < kDirections; ++k)   // a spiral from pole to pole, evenly dense
+  for (int k = 0; k < kDirections; ++k)   // directions on a spiral from pole to pole, evenly dense
   {
     const double z = 1.0 - (2.0 * k + 1.0) / kDirections, r = std::sqrt(1.0 - z * z), angle = 2.39996323 * k;
     const Eigen::Vector3d direction(r * std::cos(angle), r * std::sin(angle), z);
@@ -98,14 +98,14 @@ Points outermost(const Points& points)
   return hull;
 }
 
-/// The view in one direction that has the points in the middle of its picture, at a distance.
+/// Finds the view in one direction, at a given distance, that has the points in the middle of the picture.
 class ViewFit
 {
 public:
   struct Result
   {
     Eigen::Vector3d focal_point;
-    double filled = 0.0;   ///< of the picture's width or height, the larger
+    double filled = 0.0;   ///< filled part of the picture's width or height, whichever is larger
   };
 
   ViewFit(const OrbitView& view, double aspect)
@@ -121,9 +121,9 @@ public:
   Result at(const Points& points, double distance) const
   {
     Result result{boxOf(points).center(), 0.0};
-    for (int round = 0; round < 12; ++round)   // perspective moves the middle a little each time
+    for (int round = 0; round < 12; ++round)   // each round, perspective moves the middle a little
     {
-      Eigen::AlignedBox2d picture;   // in halves of its width and height
+      Eigen::AlignedBox2d picture;   // in units of half its width and half its height
       for (const Eigen::Vector3d& p : points)
       {
         const Eigen::Vector3d r = p - result.focal_point;
@@ -165,7 +165,7 @@ Points pointsToShow(const MarkerArray& markers)
       points.insert(points.end(), solid.begin(), solid.end());
       continue;
     }
-    // of a wide floor, what is below the objects; a thread comes down there
+    // A wide floor counts only below the objects, where a thread comes down.
     const Eigen::Vector3d below(objects.center().x(), objects.center().y(), box.max().z());
     const double height = objects.max().z() - below.z();
     if (marker.ns == "floors" && height > 0)
@@ -184,7 +184,7 @@ OrbitView fittedView(const Points& points, const OrbitView& view, double aspect)
     return view;
   const Points hull = outermost(points);
   const double radius = std::max(kSmallest, 0.5 * boxOf(hull).diagonal().norm());
-  // All points are well in front of the camera. What they fill decreases with the distance.
+  // All points are well in front of the camera. The filled part of the picture decreases with the distance.
   double low = 1.5 * radius, high = 100.0 * radius;
   const ViewFit fit(view, aspect);
   for (int round = 0; round < 50; ++round)
@@ -207,7 +207,7 @@ std::optional<std::string> fittedConfig(const std::string& config, const Points&
     if (!current || current["Class"].as<std::string>("") != "rviz/Orbit")
       return std::nullopt;
     const YAML::Node window = root["Window Geometry"];
-    constexpr double kBars = 80.0;   // pixels of menu and tools
+    constexpr double kBars = 80.0;   // pixels of the menu and tool bars
     const double width = numberOf(window["Width"], 1280), height = numberOf(window["Height"], 800) - kBars;
     OrbitView view;
     view.yaw = numberOf(current["Yaw"], 0.785398);

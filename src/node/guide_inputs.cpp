@@ -70,7 +70,7 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
     takeOver(*before);
 }
 
-/// True when any of them listens to a topic of its own.
+/// Returns true if at least one grasp listens to a topic of its own.
 bool GuideInputs::addGrasps(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
                             const std::vector<std::string>& names)
 {
@@ -102,7 +102,7 @@ bool GuideInputs::addGrasps(ros::NodeHandle& nh, const Simulation& simulation, c
   return topics;
 }
 
-/// "grasp left", for messages.
+/// Returns the kind and name of the object for messages, for example "grasp left".
 std::string GuideInputs::kindOf(std::size_t guided) const
 {
   const std::size_t solid = guided - grasps_;
@@ -126,8 +126,9 @@ void GuideInputs::followFrames()
   tracking_->followFrames(*tf_);
 }
 
-/// What follows frames of tf is shown at one instant, with everything else that moves: links of a robot, what its
-/// gripper holds, and what messages move. The lag is the greatest that any input asks for which has not fallen silent.
+/// Gives all inputs the same lag, so that links of a robot, the grasp in its gripper and objects that messages move are
+/// shown at the same instant. The lag is the largest one that an input with recent poses needs. Scenes without frames
+/// of tf keep a lag per input.
 void GuideInputs::shareLag()
 {
   if (!tf_->any())

@@ -1,11 +1,11 @@
-// What GuideInputs takes over when the scene is edited.
+// GuideInputs of an edited scene take over the inputs from before the edit.
 #include "slender_sim/node/guide_inputs.h"
 
 #include <map>
 
 namespace slender {
 
-/// What the entries of guided_ are, in their order: names that differ, and are the same before and after an edit.
+/// Returns a unique key for each entry of guided_. An edit does not change the key of an object that stays.
 std::vector<std::string> GuideInputs::guidedKeys() const
 {
   std::vector<std::string> keys;
@@ -27,7 +27,7 @@ void GuideInputs::takeOver(GuideInputs& before)
   std::map<std::string, std::size_t> places;
   for (const std::string& key : guidedKeys())
     places.emplace(key, places.size());
-  std::map<int, int> moved;   // indices of before to those of now
+  std::map<int, int> moved;   // index before the edit to index after it
   const std::vector<std::string> keys = before.guidedKeys();
   for (std::size_t g = 0; g < keys.size(); ++g)
   {

@@ -50,7 +50,7 @@ void GuideInputs::listenToHand(ros::NodeHandle nh, const std::string& topic)
 bool GuideInputs::isDraggable(std::size_t guided) const
 {
   const Guided& g = guided_[guided];
-  // grasps with a body are its, and what follows tf is a robot's, not the hand's
+  // A grasp on a body moves with the body, and an object that follows tf moves with a robot.
   return g.buffer && g.frame.empty() && (guided >= grasps_ || g.body.empty());
 }
 

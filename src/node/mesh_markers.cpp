@@ -13,7 +13,7 @@ const char* folderOf(ObjectKind kind)
     case ObjectKind::thread: return "threads/";
     case ObjectKind::cloth: return "cloths/";
     case ObjectKind::body: return "bodies/";
-    case ObjectKind::obstacle: return "obstacles";   // one namespace, as of the nodes' own pictures
+    case ObjectKind::obstacle: return "obstacles";   // one namespace, as in the pictures of nodes
     case ObjectKind::gripper: return "grasps/";
     case ObjectKind::nozzle: return "nozzles/";
   }

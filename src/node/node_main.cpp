@@ -16,7 +16,7 @@ try
 {
   ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
   requireNoArguments(argc, argv);
-  stopOnSignals();   // or the bag stays unfinished, and a long step goes on
+  stopOnSignals();   // a signal also ends a long step, and the bag is completed
   return SceneNode(ros::NodeHandle(), ros::NodeHandle("~"), kind).spin();
 }
 catch (const std::exception& e)

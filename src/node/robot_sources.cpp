@@ -21,7 +21,7 @@ RobotSources rosSources(const ros::NodeHandle& nh)
       if (nh.searchParam(name, key) && nh.getParam(key, text))
         return text;
     }
-    catch (const ros::InvalidNameException&)   // a file name, for example
+    catch (const ros::InvalidNameException&)   // the name is no parameter, for example a file name
     {
     }
     return std::nullopt;

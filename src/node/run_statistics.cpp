@@ -54,7 +54,7 @@ std::vector<std::string> graspLines(const RunStatistics& statistics, const std::
     line << who << ": largest force " << force << " N, torque " << torque << " N m";
     lines.push_back(line.str());
   };
-  double force = 0.0, torque = 0.0;   // of the grasps without a line
+  double force = 0.0, torque = 0.0;   // largest values of the grasps without a line
   for (std::size_t k = 0; k < order.size(); ++k)
   {
     const std::size_t g = order[k];

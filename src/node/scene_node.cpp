@@ -27,7 +27,7 @@
 namespace slender {
 namespace {
 
-/// Throws SceneError when the scene has no object of the node's kind.
+/// Throws SceneError if the scene has no object of the node's kind.
 void requireObjects(const SceneConfig& scene, NodeKind kind)
 {
   const auto require = [&](bool has, const char* objects) {
@@ -141,7 +141,8 @@ void SceneNode::start()
 void SceneNode::makeInputs()
 {
   const std::unique_ptr<GuideInputs> before = std::move(inputs_);
-  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, *topics_, ownFrames(*simulation_, *topics_), before.get());
+  inputs_ = std::make_unique<GuideInputs>(nh_, options_, *simulation_, clock_, *topics_,
+                                          ownFrames(*simulation_, *topics_), before.get());
   if (replay_)
     inputs_->stopListening();
   inputs_->onPresent([this] { return presentOfOthers(); });
@@ -301,7 +302,7 @@ void SceneNode::publishState()
     fields_pub_.publish(messages_.fields);
 }
 
-/// True when somebody listens to what publishState() publishes.
+/// Returns true if a topic of publishState() has a subscriber.
 bool SceneNode::isHeard() const
 {
   const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
@@ -312,7 +313,7 @@ bool SceneNode::isHeard() const
          std::any_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard);
 }
 
-/// Publishes rods, threads and cloths. The messages belong to their listeners afterwards.
+/// Publishes rods, threads and cloths. Do not change the messages afterwards, because subscribers share them.
 void SceneNode::publishObjects()
 {
   if (points_pub_.getNumSubscribers() > 0)
@@ -355,7 +356,8 @@ void SceneNode::broadcastFrame()
   frame_broadcaster_->sendTransform(transform);
 }
 
-/// A thousand frames are too many for tf unless somebody asks for them.
+/// Returns true if grasps are published as tf frames. Many grasps have frames only if ~wrench_frame asks for them,
+/// because a thousand frames are too many for tf.
 bool SceneNode::graspsHaveFrames() const
 {
   return options_.wrench_frame == WrenchFrame::grasp || topics_->grasps.size() <= kMostGraspFrames;
@@ -379,7 +381,7 @@ void SceneNode::publishMarkers()
   const std::uint32_t listeners = markers_pub_.getNumSubscribers();
   const auto now = std::make_pair(clock_.ticks(), listeners);
   if (listeners == 0)
-    drawn_.reset();   // whoever listens next has no picture yet
+    drawn_.reset();   // the next subscriber has no picture yet
   if (listeners == 0 || ros::WallTime::now() < next_markers_ || drawn_ == now)
     return;
   next_markers_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.marker_rate);

@@ -176,10 +176,10 @@ void SceneNode::publishDiagnostics()
   next_diagnostics_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.diagnostics_rate);
 }
 
-/// A slow simulation would otherwise look like one that stands still.
+/// Returns a line of the legend, so that a slow simulation does not look as if it stood still.
 std::string SceneNode::paceNote() const
 {
-  constexpr double kSlow = 0.9;   // of real time
+  constexpr double kSlow = 0.9;   // share of real time below which the legend has this line
   if (mode_ == Mode::paused)
     return "paused";
   if (mode_ == Mode::failed)
@@ -282,7 +282,7 @@ DiagnosticStatus SceneNode::simulationStatus() const
     addTracking(*simulation_, recent_, status);
   if (topics_->has_cloths)
     addCloths(*simulation_, recent_, status);
-  if (topics_->has_rods || topics_->has_cloths)   // viscous threads keep none
+  if (topics_->has_rods || topics_->has_cloths)   // viscous threads keep no energy
     add(status, "energy [J]", energyOf(*simulation_));
   add(status, "recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);
   return status;

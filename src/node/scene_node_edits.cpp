@@ -16,14 +16,14 @@ namespace {
 using slender_sim::Input;
 using Kind = SceneEdit::Kind;
 
-/// The services, and what they are in a bag.
+/// Kinds of edits, and their numbers in the inputs of a bag.
 const std::array<std::pair<Kind, std::uint8_t>, 5> kinds{{{Kind::spawn, Input::SPAWN},
                                                           {Kind::remove, Input::REMOVE},
                                                           {Kind::attach, Input::ATTACH},
                                                           {Kind::detach, Input::DETACH},
                                                           {Kind::set_parameter, Input::SET_PARAMETER}}};
 
-/// Of each grasp that is still there, the value that it had.
+/// Rearranges the values of grasps for the edited scene. A grasp that still exists keeps its value.
 void takeByName(const std::vector<std::string>& before, const std::vector<std::string>& now,
                 std::vector<double>& values)
 {
@@ -35,7 +35,7 @@ void takeByName(const std::vector<std::string>& before, const std::vector<std::s
   values = std::move(taken);
 }
 
-/// A warning without the file and line, which edits change.
+/// Returns a warning without its file and line, because an edit changes these.
 std::string withoutPlace(const SceneConfig& scene, const std::string& warning)
 {
   const auto end = warning.compare(0, scene.file.size(), scene.file) == 0 ? warning.find(": ", scene.file.size())
@@ -71,7 +71,7 @@ bool SceneNode::onEdit(Kind kind, slender_sim::EditScene::Request& request, slen
     response.message = "stopped at " + failure_ + "; call ~reset or ~load_state first";
   if (!response.message.empty())
     return true;
-  queue_.callAvailable();   // older than the edit
+  queue_.callAvailable();   // messages that came before the edit apply to the scene before the edit
   try
   {
     EditedScene scene = edited({kind, request.text});
@@ -108,7 +108,7 @@ SceneNode::EditedScene SceneNode::edited(const SceneEdit& edit) const
   return out;
 }
 
-/// Everything that knows the scene takes up the edited one.
+/// Replaces the scene by the edited one in all parts of the node.
 void SceneNode::takeUp(EditedScene edited)
 {
   if (!edited.warnings.empty())
@@ -118,14 +118,15 @@ void SceneNode::takeUp(EditedScene edited)
     takeByName(topics_->grasps, edited.topics->grasps, statistics->max_force);
     takeByName(topics_->grasps, edited.topics->grasps, statistics->max_torque);
   }
-  const std::unique_ptr<GraspWrenches> wrenches_before = std::move(wrenches_);   // topics that stay keep connections
+  const std::unique_ptr<GraspWrenches> wrenches_before =
+      std::move(wrenches_);   // kept until topics are advertised again
   const std::unique_ptr<FrameBroadcaster> frames_before = std::move(frames_);
-  std::swap(simulation_, edited.simulation);   // the scene before it goes last: inputs still refer to it
+  std::swap(simulation_, edited.simulation);   // inputs_ refers to the old simulation until makeInputs()
   topics_ = std::move(edited.topics);
   limits_ = std::make_unique<LimitWatch>(*simulation_);
   makeInputs();
   {
-    const std::vector<ros::Publisher> before = takePublishers();   // topics that stay keep their connections
+    const std::vector<ros::Publisher> before = takePublishers();   // topics in both scenes keep their connections
     advertise();
   }
   std_msgs::String scene;
@@ -147,7 +148,7 @@ void SceneNode::takeUp(EditedScene edited)
   drawn_.reset();
 }
 
-/// All publishers that advertise() makes. Afterwards there are none.
+/// Moves all publishers that advertise() makes out of the node.
 std::vector<ros::Publisher> SceneNode::takePublishers()
 {
   std::vector<ros::Publisher> taken;
@@ -164,7 +165,7 @@ std::vector<ros::Publisher> SceneNode::takePublishers()
   return taken;
 }
 
-/// Of what is gone.
+/// Deletes the markers of objects that the edit removed.
 void SceneNode::deleteMarkers(const Simulation& before)
 {
   if (markers_pub_.getNumSubscribers() == 0)

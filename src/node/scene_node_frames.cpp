@@ -1,11 +1,11 @@
-// What follows frames of tf must not be what the node broadcasts there.
+// An object must not follow a frame of tf that the node itself broadcasts.
 #include "slender_sim/node/scene_node.h"
 #include "slender_sim/scene/reader.h"
 
 namespace slender {
 namespace {
 
-/// Calls visit(FRAME, WHO) for everything in the scene that follows a frame of tf.
+/// Calls visit(FRAME, WHO) for each object in the scene that follows a frame of tf.
 template <class Visit>
 void visitFollowers(const Simulation& simulation, const std::vector<std::string>& grasp_names, const Visit& visit)
 {
@@ -42,7 +42,8 @@ std::set<std::string> SceneNode::ownFrames(const Simulation& simulation, const S
   return broadcastFrames(nh_priv_.getNamespace().substr(1), topics, simulation);
 }
 
-/// What follows a frame that the node itself broadcasts would follow itself, ~guide_delay late.
+/// Throws SceneError if an object follows a moving frame that the node itself broadcasts. The object would follow its
+/// own motion with a lag of ~guide_delay.
 void SceneNode::refuseLoops(const Simulation& simulation, const SceneTopics& topics) const
 {
   const std::set<std::string> own = ownFrames(simulation, topics);

@@ -1,4 +1,4 @@
-// When a limit of the scene is exceeded, the node warns and does what `on_limit` asks for.
+// If a limit of the scene is exceeded, the node warns and reacts as `on_limit` says.
 #include "slender_sim/node/scene_node.h"
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 namespace slender {
 namespace {
 
-constexpr double kLimitReminder = 1.0;   // [s] of wall time between warnings
+constexpr double kLimitReminder = 1.0;   // [s] wall time between warnings
 
 diagnostic_msgs::KeyValue entry(const std::string& key, const std::string& value)
 {
@@ -45,13 +45,13 @@ bool SceneNode::mindLimits(const std::vector<LimitExcess>& begun)
     noteGrasp(request, kByLimit);
     showHandles();
   }
-  if (limits_->stopped().empty() || replay_)   // a recorded run went on after ~reset or ~load_state, or ends here
+  if (limits_->stopped().empty() || replay_)   // a recorded run either ends here or went on after ~reset or ~load_state
     return true;
   fail("a limit is exceeded (on_limit: stop): " + limits_->stopped());
   return false;
 }
 
-/// What has gone on without the simulation meanwhile is caught up with, as after a pause.
+/// Lets objects follow their inputs again after `on_limit: hold`. They catch up as after a pause.
 void SceneNode::letInputsGoOn()
 {
   limits_->goOn();

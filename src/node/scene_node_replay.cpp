@@ -59,8 +59,8 @@ void SceneNode::openReplay()
   options_.catch_up_speed = settings->values[4];
 }
 
-/// The parameters may be of an earlier start, which had another scene: the recorded one has to run. Where they give the
-/// same scene they stay, because files that a scene names are looked for beside its own file.
+/// Replaces ~scene and ~set by the recorded scene. The parameters may be left from an earlier start with another scene.
+/// If they give the same scene they stay, because the files that a scene names are relative to its own file.
 void SceneNode::takeRecordedScene()
 {
   if (!options_.scene.empty())
@@ -71,7 +71,7 @@ void SceneNode::takeRecordedScene()
     }
     catch (const SceneError&)
     {
-      // the parameter names no scene that could be the recorded one
+      // The parameter gives no valid scene, so the recorded scene runs.
     }
   if (!options_.scene.empty() || !options_.overrides.empty())
     ROS_WARN(
@@ -84,7 +84,7 @@ void SceneNode::takeRecordedScene()
   options_.overrides.clear();
 }
 
-/// Parameters outlive the node that was started with them.
+/// Returns advice for a parameter that an earlier start may have set, because ROS parameters outlive their node.
 std::string SceneNode::leftover(const std::string& parameter) const
 {
   return " (an earlier start may have left ~" + parameter + ": rosparam delete " + nh_priv_.resolveName(parameter) +
@@ -242,7 +242,7 @@ void SceneNode::repeatGrasp(const Input& input)
   const auto named = std::find(topics_->grasps.begin(), topics_->grasps.end(), input.name);
   if (input.text == kByLimit && named != topics_->grasps.end() &&
       !simulation_->grasps().isActive(static_cast<int>(named - topics_->grasps.begin())))
-    return;   // the repeated run has exceeded the same limit
+    return;   // the same limit has already released this grasp in the repeated run
   SetGrasp::Request request;
   SetGrasp::Response response;
   request.name = input.name;

@@ -11,7 +11,8 @@
 namespace slender {
 namespace {
 
-/// Relative paths start at the node's working directory, which whoever calls a service does not see.
+/// Returns the absolute path. A relative path starts at the node's working directory, which callers of a service do not
+/// know.
 std::string wholePath(const std::string& path)
 {
   std::error_code error;
@@ -77,7 +78,7 @@ bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
   {
     simulation_->reset();
   }
-  catch (const SceneError& e)   // after edits
+  catch (const SceneError& e)   // possible only after edits
   {
     response.message = e.what();
     return true;

@@ -8,7 +8,7 @@
 namespace slender {
 namespace {
 
-/// Text of a scene, not the path of one.
+/// Returns true if `scene` is the text of a scene, and false if it is the path of a file.
 bool isText(const std::string& scene)
 {
   std::error_code error;

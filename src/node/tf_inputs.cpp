@@ -10,7 +10,8 @@
 namespace slender {
 namespace {
 
-// Share of ~guide_delay between poses that are taken at steps: two intervals of samples have to fit into the delay.
+// Smallest interval between poses that are taken at the time of a step, as a share of ~guide_delay. Two intervals must
+// fit into the delay.
 constexpr double kSpacing = 0.4;
 constexpr int kMostParents = 100;
 
@@ -53,14 +54,15 @@ void TfInputs::look()
     lookAt(frame);
 }
 
-/// The instant at which the frame is to be looked up; nothing when there is none, or none that is new.
+/// Returns the time at which the frame must be looked up, or nothing if there is no new pose. Throws
+/// tf2::TransformException if tf does not know the frame.
 std::optional<ros::Time> TfInputs::newest(Frame& frame) const
 {
   const ros::Time step = clock_.nextStamp();
   ros::Time stamp;
   if (frame.name != options_.frame_id)
     stamp = tf_.lookupTransform(options_.frame_id, frame.name, ros::Time(0)).header.stamp;
-  const bool beyond = stamp.isZero() || stamp > step;   // zero: static
+  const bool beyond = stamp.isZero() || stamp > step;   // a static frame has stamp zero
   if (beyond)
     stamp = step;
   const double time = clock_.secondsAt(stamp), age = clock_.seconds() - time;
@@ -114,7 +116,7 @@ void TfInputs::lookAt(Frame& frame)
     follower.sink(time, X_WF);
 }
 
-/// A frame that hangs on what it moves runs away, or swings.
+/// Warns if the frame depends on an object of this node. Its motion then feeds back on itself and may diverge.
 void TfInputs::warnOfLoop(Frame& frame) const
 {
   frame.checked = true;

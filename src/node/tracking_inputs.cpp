@@ -88,7 +88,7 @@ void TrackingInputs::takeOver(TrackingInputs& before)
       if (old.of_rod != now.of_rod || old.object != now.object)
         continue;
       moved[static_cast<int>(j)] = static_cast<int>(k);
-      // its place in the scene, its topic and what carries it are those of the edited scene
+      // The index in the scene, the topic and the carried guide come from the edited scene.
       old.index = now.index;
       old.topic = now.topic;
       old.carried = now.carried;

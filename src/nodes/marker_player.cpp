@@ -15,8 +15,8 @@
 #include "slender_sim/node/arguments.h"
 #include "slender_sim/node/mesh_markers.h"
 
-/// marker_player shows a bag that a node or `simulate` has recorded: it publishes on `markers` what the bag holds, at
-/// the pace at which it was recorded. Nothing is simulated. Its parameters are in docs/operation.md.
+/// marker_player shows a bag that a node or `simulate` has recorded. It publishes the recorded objects on `markers` at
+/// the recorded pace and simulates nothing. docs/operation.md lists its parameters.
 namespace slender {
 namespace {
 
@@ -49,7 +49,7 @@ class MarkerPlayer
 public:
   explicit MarkerPlayer(Settings settings) : settings_(std::move(settings)), markers_(objectColor)
   {
-    open();   // before anything is advertised: a bag that cannot be read is told at once
+    open();   // before advertising, so that a bag that cannot be read is reported at once
     publisher_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2, true);
     geometry_msgs::TransformStamped origin;
     origin.header.stamp = ros::Time::now();
@@ -112,7 +112,7 @@ private:
     if (bag_->scene() && !box.isEmpty())
     {
       if (planes_box_.isEmpty())
-        planes_box_ = box;   // or planes would grow and shrink with the motion
+        planes_box_ = box;   // fixed, so that planes do not grow and shrink with the motion
       add(planeMeshes(instant, *bag_->scene(), planes_box_, std::nullopt));
     }
     std_msgs::Header header;

@@ -16,13 +16,13 @@
 
 #include "slender_sim/node/camera_fit.h"
 
-/// rviz_on_scene -d CONFIG [further arguments of rviz]: opens rviz with its camera on what the nodes show. It waits for
-/// the first pictures on the topics of the configuration's marker displays, writes a configuration whose view they fill
-/// to ~/.ros, and becomes rviz.
+/// rviz_on_scene -d CONFIG [further arguments of rviz]: opens rviz with the camera on the scene. The program waits for
+/// the first pictures on the topics of the configuration's marker displays. It writes a configuration with a view that
+/// shows these pictures to ~/.ros, and then executes rviz in its place.
 namespace {
 
-constexpr double kPatience = 20.0;   // [s] until rviz is opened without a picture
-constexpr double kTogether = 0.5;    // [s] in which the pictures of several nodes come
+constexpr double kPatience = 20.0;   // [s] time after which rviz opens without a picture
+constexpr double kTogether = 0.5;    // [s] time in which the pictures of several nodes arrive
 
 std::string textOf(const std::string& path)
 {
@@ -30,7 +30,7 @@ std::string textOf(const std::string& path)
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// The first picture of each topic; fewer when the time runs out.
+/// Returns the points of the first picture of each topic, or of fewer topics if the time runs out.
 std::vector<Eigen::Vector3d> firstPictures(const std::vector<std::string>& topics)
 {
   ros::NodeHandle nh;
@@ -57,7 +57,7 @@ std::vector<Eigen::Vector3d> firstPictures(const std::vector<std::string>& topic
   return slender::pointsToShow(all);
 }
 
-/// The file with the fitted view; `config` itself where there is nothing to fit.
+/// Returns the path of a configuration with the fitted view, or `config` if there is nothing to fit.
 std::string fittedFile(const std::string& config)
 {
   const std::string text = textOf(config);
@@ -96,9 +96,9 @@ std::string fittedFile(const std::string& config)
 
 int main(int argc, char** argv)
 {
-  const std::vector<std::string> given(argv + 1, argv + argc);   // rviz takes the remappings as well
+  const std::vector<std::string> given(argv + 1, argv + argc);   // with the remappings, for rviz
   ros::init(argc, argv, "rviz");
-  const ros::NodeHandle alive;   // ROS shuts down with the last one
+  const ros::NodeHandle alive;   // keeps ROS running; ROS shuts down with its last handle
   std::vector<std::string> arguments = {"rviz"};
   bool has_config = false;
   for (std::size_t k = 0; k < given.size(); ++k)

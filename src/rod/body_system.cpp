@@ -61,7 +61,7 @@ BodySystem::Vector6 BodySystem::startAcceleration(const Vector6& wrench, const M
   Vector6 load = wrench;
   load.tail<3>() += model_.torque - w.cross(i_world * w);
   Cholesky6 factor;
-  factor.compute(inertia);   // of a body with mass, and so positive definite
+  factor.compute(inertia);   // a body has mass, so the matrix is positive definite
   Vector6 a = load;
   factor.solveInPlace(a);
   acceleration_ = {a.head<3>(), a.tail<3>()};

@@ -142,7 +142,7 @@ void ExplicitSystem::predictBody(Body& body, double h)
     Eigen::Matrix<double, 6, 1> end;
     end << body.mass * v.linear, momentum;
     Cholesky6 factor;
-    factor.compute(matrix);   // of a body with mass, and so positive definite
+    factor.compute(matrix);   // a body has mass, so the matrix is positive definite
     factor.solveInPlace(end);
     v.linear = end.head<3>();
     momentum -= k * arm * v.linear + own * Eigen::Vector3d(end.tail<3>());

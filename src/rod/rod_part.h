@@ -38,7 +38,7 @@ public:
   /// Whether an unknown has a number of its own, in the part that an inverse iteration acts on.
   bool isUnknown(int unknown) const { return dof_[unknown] >= 0; }
 
-  /// What the rod touches, and which solids its points pass through; without a call nothing.
+  /// Sets what the rod touches, and which solids its points pass through. Without a call the rod touches nothing.
   void setContact(const ContactProperties& contact, const std::vector<IgnoredSolid>& ignored = {})
   {
     contact_ = contact;

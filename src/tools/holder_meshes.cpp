@@ -67,8 +67,8 @@ void addClothGrasp(const GraspSnapshot& grasp, const ClothSnapshot& cloth, const
 }
 
 /// Returns the unit vector from the outlet into the nozzle at `time` [s] of the scene. It is opposite to the direction
-/// that the scene gives. The poses of a nozzle that messages or tf move are not among what is recorded of each
-/// instant: its newest edge, which runs into it, takes their place.
+/// that the scene gives. If messages or tf move the nozzle, its poses are not recorded. The direction of the newest
+/// edge of the thread, which points into the nozzle, is used instead.
 Vector3d upstream(const NozzleConfig& nozzle, const ThreadSnapshot& thread, double time)
 {
   if (comesFromOutside(nozzle.motion))

@@ -184,14 +184,14 @@ private:
   Clock::time_point start_, last_;
 };
 
-/// Watches the limits of the scene and says on stderr what exceeds them: each excursion once, and at most one per
-/// simulated second.
+/// Checks the limits of the scene and reports excursions on stderr: each excursion once, and at most one per simulated
+/// second.
 class LimitTeller
 {
 public:
   explicit LimitTeller(Simulation& simulation) : simulation_(simulation), watch_(simulation) {}
 
-  /// Both return false when the run must stop.
+  /// beforeStep() and afterStep() return false if the run must stop.
   bool beforeStep(slender::SceneInputs& inputs, Progress& progress)
   {
     return tell(watch_.checkInputs(inputs), progress);
@@ -233,7 +233,7 @@ private:
 
   Simulation& simulation_;
   slender::LimitWatch watch_;
-  std::optional<double> told_;   // [s] simulated
+  std::optional<double> told_;   // [s] simulated time of the last report
 };
 
 slender::ThreadVolumes volumesOf(const Simulation& simulation)

@@ -101,7 +101,7 @@ double shareOfEdge(const RodModel& model, int node, int side);
 /// edge's frame bent back by the rest curvature of half an edge.
 Eigen::Matrix3d sectionFrame(const RodModel& model, const RodState& state, int node);
 
-/// Returns the same orientation with the position of the node as origin: x along the tangent, y along d1.
+/// Pose of the section at a node: the axes of sectionFrame(), x along the tangent and y along d1, at the node [m].
 Pose sectionPose(const RodModel& model, const RodState& state, int node);
 
 }   // namespace slender

@@ -11,12 +11,12 @@ namespace slender {
 
 namespace {
 
-/// An object of a scene, and where its text is.
+/// An object of a scene, and the place of its text.
 struct ObjectEntry
 {
   std::string section, name;
   std::size_t index = 0;
-  bool generated = false;   ///< by `generate`: it has no text of its own
+  bool generated = false;   ///< made by `generate`, without a text of its own
 };
 
 std::size_t entriesIn(const YamlTree& scene, const char* section)
@@ -25,7 +25,7 @@ std::size_t entriesIn(const YamlTree& scene, const char* section)
   return list ? list->items.size() : 0;
 }
 
-/// In the order of the configuration: what the text lists, and then what was generated.
+/// Returns all objects in the order of the configuration: first those listed in the text, then generated ones.
 std::vector<ObjectEntry> objectsOf(const SceneConfig& config, const YamlTree& scene)
 {
   std::vector<ObjectEntry> all;
@@ -53,7 +53,7 @@ YamlTree scalar(const std::string& value, const std::string& origin)
   return tree;
 }
 
-/// The value of a key of a map, which is added when it is missing.
+/// Returns the value of a key of a map. Adds the key if it is missing.
 YamlTree& keyOf(YamlTree& map, const std::string& key)
 {
   map.kind = YamlTree::Kind::map;
@@ -68,7 +68,8 @@ void eraseKey(YamlTree& map, const std::string& key)
   map.members.erase(std::remove_if(map.members.begin(), map.members.end(), has_key), map.members.end());
 }
 
-/// Names that follow from the number of objects of a kind would change with it.
+/// Writes default names into the text. A default name depends on the number of objects, and an edit may change this
+/// number.
 void writeNames(const std::vector<ObjectEntry>& objects, YamlTree& scene)
 {
   for (const ObjectEntry& object : objects)
@@ -101,11 +102,11 @@ public:
   void attach(const std::string& text);
   void detach(const std::string& name);
   void setParameters(const std::string& text);
-  /// Writes down what followed from other objects before, where that would change. Returns whether anything was
-  /// written.
+  /// Writes defaults that depend on all objects into the text, if the edit would change them. Returns true if anything
+  /// was written.
   bool keepDefaults(const SceneConfig& before, const SceneConfig& after);
-  /// Leaves out the settings of contact, which are refused where nothing is left that has any. Returns whether there
-  /// were settings.
+  /// Removes the key `contact` of the scene, because the reader refuses it if no object has contact. Returns true if
+  /// the key existed.
   bool dropContact();
 
   const YamlTree& tree() const { return tree_; }
@@ -124,7 +125,7 @@ private:
 
 const std::vector<std::string> all_sections{"rods", "threads", "cloths", "tracked", "bodies", "obstacles"};
 
-/// Messages name the line of the request.
+/// Sets the place that error messages name, so that they refer to the text of the request.
 void setPlace(YamlTree& tree, const std::string& where)
 {
   tree.origin = where + ":" + std::to_string(std::max(1, tree.line));
@@ -148,7 +149,7 @@ YamlTree SceneText::parsed(const std::string& text) const
   return tree;
 }
 
-/// The one object of this name, or of "SECTION.NAME", in these sections.
+/// Returns the only object with this name, or with "SECTION.NAME", in these sections. Throws SceneError otherwise.
 const ObjectEntry& SceneText::find(const std::string& name, const std::vector<std::string>& sections) const
 {
   std::vector<const ObjectEntry*> found;
@@ -273,7 +274,7 @@ void SceneText::detach(const std::string& name)
          (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
 }
 
-/// Keys whose values may change, by section.
+/// Keys whose values ~set_parameter may change, by section.
 const std::vector<std::pair<std::string, std::vector<std::string>>> changeable{
     {"wind", {"velocity"}},
     {"contact", {"gap", "slip_speed"}},
@@ -338,7 +339,7 @@ bool SceneText::keepDefaults(const SceneConfig& before, const SceneConfig& after
     wrote = true;
   };
   const bool integrates =
-      !before.rods.empty() || !before.bodies.empty() || !before.cloths.empty();   // not only threads
+      !before.rods.empty() || !before.bodies.empty() || !before.cloths.empty();   // more than threads
   if (integrates && after.time.integrator != before.time.integrator)
     keep(keyOf(tree_, "time"), "integrator", toString(before.time.integrator));
   if (before.contact.gap > 0 && after.contact.gap > 0 && after.contact.gap != before.contact.gap)
@@ -396,7 +397,7 @@ SceneConfig editedScene(const SceneConfig& scene, const SceneEdit& edit)
     case SceneEdit::Kind::detach: text.detach(edit.text); break;
     case SceneEdit::Kind::set_parameter: text.setParameters(edit.text); break;
   }
-  // lines of messages are those of the text as it is now
+  // Error messages count lines in the edited text, not in the file, so the name of the file is marked.
   const bool edited_before = scene.file.size() > std::char_traits<char>::length(edited_mark) &&
                              scene.file.compare(scene.file.size() - std::char_traits<char>::length(edited_mark),
                                                 std::string::npos, edited_mark) == 0;

@@ -4,7 +4,7 @@ namespace slender {
 
 namespace {
 
-/// A positive number, or `none`.
+/// Reads a positive number, or `none` as infinity. Returns nothing if a problem was reported.
 std::optional<double> readLimit(const YamlCursor& at, const char* unit)
 {
   if (at.isScalar() && at.tree()->scalar == "none")

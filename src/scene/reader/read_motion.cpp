@@ -44,7 +44,7 @@ std::optional<TableMotion> readTable(const YamlCursor& at, bool needs_orientatio
   return good && !motion.poses.empty() ? std::optional<TableMotion>(std::move(motion)) : std::nullopt;
 }
 
-/// Of the named body, or of the only one in the file.
+/// Reads the motion of the named body, or of the only body in the file.
 std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCursor& body, const ReadContext& context)
 {
   const auto file = path.text();
@@ -89,7 +89,7 @@ void refuseOffset(const YamlCursor& offset, const YamlCursor& tf)
     offset.problem("is for motion: {tf: FRAME}");
 }
 
-/// Nothing when a problem was reported.
+/// Returns nothing if a problem was reported.
 std::optional<TfMotion> readTf(const YamlCursor& tf, const YamlCursor& offset)
 {
   TfMotion motion;

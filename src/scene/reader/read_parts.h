@@ -25,8 +25,8 @@ struct ReadContext
   std::string directory;   ///< files are relative to it
   Eigen::Vector3d gravity{0, 0, -9.81};
   double step = 0.01;                            ///< time.step [s]
-  mutable double nodes = 0;                      ///< of rods and cloths so far
-  mutable std::vector<std::string> guide_bags;   ///< that were read so far
+  mutable double nodes = 0;                      ///< number of nodes of rods and cloths so far
+  mutable std::vector<std::string> guide_bags;   ///< paths of the bags that were read so far
   std::string resolve(const std::string& path) const { return path[0] == '/' ? path : directory + "/" + path; }
   /// Counts nodes that are about to be made; false, and reported, when the scene gets too many: a few words can ask for
   /// more than fits into memory.
@@ -45,9 +45,9 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
 /// `edges` of the rod, or 0 when its centreline could not be read: then indices are not checked.
 /// Nodes held when edges first..last of the rod are (see GraspConfig); reports the joining edge of a closed rod.
 std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges);
-/// Whether the entry of a grasp says where it is in the frame that it follows.
+/// Returns true if the entry of a grasp gives its pose in the frame that it follows.
 bool givesOffset(const YamlMap& grasp);
-/// `offset` of a grasp whose motion and `attach` have been read; reports what does not go with them.
+/// Reads `offset` of a grasp. Call it after `motion` and `attach` were read. Reports an offset that does not fit them.
 void readOffset(YamlMap& map, GraspConfig& grasp);
 LimitsConfig readLimits(const YamlCursor& at);
 GraspLimits readGraspLimits(const YamlCursor& at);
@@ -85,15 +85,16 @@ struct Generated
 /// The list `generate`; `first_rod`: number of rods before them.
 Generated readGenerators(const YamlCursor& at, const ReadContext& context, int first_rod);
 
-/// `contact` of a grasp.
+/// Reads `contact` of a grasp.
 void readGraspContact(YamlMap& map, GraspConfig& grasp);
-/// Reports names in `contact.ignore` of grasps that no obstacle and no link has. All objects have been read.
+/// Reports names in `contact.ignore` of grasps that belong to no obstacle and no link. Call it after all objects were
+/// read.
 void checkIgnoredContacts(const SceneConfig& scene, const std::vector<YamlCursor>& rods,
                           const std::vector<YamlCursor>& cloths);
 Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation);
 /// Nothing: free, which is also the default where it may be.
 std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadContext& context, bool may_be_free);
-/// Name of a frame of tf, without a leading slash. Nothing when a problem was reported.
+/// Reads the name of a frame of tf and removes a leading slash. Returns nothing if a problem was reported.
 std::optional<std::string> readFrameName(const YamlCursor& at);
 std::optional<Pose> readPose(const YamlCursor& at);
 /// `pose` may be replaced by the shape (a plane by point and normal).
@@ -113,10 +114,10 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
                           const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths,
                           const std::vector<BodyConfig>& bodies);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
-/// The obstacles that the collision shapes of robots are, each with the robot's entry.
+/// Reads robots. Returns the obstacles for their collision shapes, each with the entry of its robot.
 std::vector<std::pair<ObstacleConfig, YamlCursor>> readRobots(const YamlCursor& at, const ReadContext& context);
-/// Puts the text of ROS parameters in place of their names in `robot`, so that the scene is complete. Returns whether
-/// there were any. `directory`: of the scene.
+/// Replaces names of ROS parameters in `robot` by their texts, so that the scene is complete. Returns true if there
+/// were such names. `directory` is the folder of the scene.
 bool takeRobotParameters(YamlTree& scene, const std::string& directory);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods);
 TimeConfig readTime(const YamlCursor& at);

@@ -30,7 +30,7 @@ bool isUrdfText(const std::string& description)
   return first != std::string::npos && description[first] == '<';
 }
 
-/// The path of a file that may be given as package://NAME/PATH or file://PATH. Others are relative to `directory`.
+/// Returns the path of a file. `name` is package://NAME/PATH, file://PATH, or a path relative to `directory`.
 std::string filePath(const std::string& name, const std::string& directory)
 {
   const std::string package = "package://", file = "file://";
@@ -53,7 +53,7 @@ std::string filePath(const std::string& name, const std::string& directory)
   return name.empty() || name[0] == '/' ? name : directory + "/" + name;
 }
 
-/// A robot description with the folder that its relative paths start from.
+/// A robot description, and the folder from which its relative paths start.
 struct Description
 {
   std::string text, directory;
@@ -99,7 +99,7 @@ std::map<std::string, double> readJoints(const YamlCursor& at)
   return joints;
 }
 
-/// The obstacles of a link. They have its name, with a number where there are several.
+/// Adds the obstacles of a link. An obstacle has the name of the link, with a number if there are several.
 void addObstacles(const UrdfLink& link, const ObstacleConfig& common, const Pose& X_WR, const std::string& prefix,
                   const YamlCursor& at, std::vector<std::pair<ObstacleConfig, YamlCursor>>& obstacles)
 {

@@ -230,7 +230,7 @@ void checkModuli(const YamlMap& material, const YamlCursor& at_youngs)
     at_youngs.warning("has no effect, since stretch_modulus, bend_modulus and twist_modulus are given; leave it out");
 }
 
-/// Sections of a rod with so many edges (0: not known) whose frames are published.
+/// Reads the sections of a rod whose frames are published. `edges` is the number of edges of the rod; 0: not known.
 std::vector<SectionFrame> readSectionFrames(const YamlCursor& at, bool closed, int edges)
 {
   std::vector<SectionFrame> frames;

@@ -28,7 +28,7 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
 void readBagPoints(const YamlCursor& at, const ReadContext& context, double begin, const std::string& object,
                    GuideSource& source);
 
-/// A guide that rides on a frame of tf as a whole.
+/// Reads the motion of a guide that moves rigidly with a frame of tf.
 void readFramedMotion(const YamlCursor& tf, const YamlCursor& offset, const YamlCursor& attach, GuideConfig& config);
 
 /// `late` of a guide by topic, as GuideConfig::coast.

@@ -7,8 +7,8 @@
 
 namespace slender {
 
-/// Reads and checks a scene as readScene() does. `file`: for messages; `directory`: to which file names are relative.
-/// Throws SceneError.
+/// Reads and checks a scene in the same way as readScene(). Messages name `file`. Relative file names start from
+/// `directory`. Throws SceneError.
 SceneConfig sceneOfTree(const YamlTree& tree, const std::string& file, const std::string& directory);
 
 }   // namespace slender

@@ -7,7 +7,7 @@
 
 namespace slender {
 
-/// Obstacles and bodies are entries of one topic: their names must differ.
+/// Checks that the names of obstacles and bodies differ, because both are entries of the same topic.
 class SolidNames
 {
 public:

@@ -17,7 +17,7 @@ namespace slender {
 
 namespace {
 
-/// Gathers what urdfdom complains about while it exists; urdfdom would print that.
+/// Collects the error messages of urdfdom as long as this object exists. Otherwise urdfdom prints them.
 class UrdfComplaints : public console_bridge::OutputHandler
 {
 public:
@@ -59,10 +59,10 @@ Pose poseOf(const urdf::Pose& pose)
   return result;
 }
 
-/// A tree is what urdfdom makes of a description with loops: it drops joints without a word.
+/// Throws std::runtime_error if the joints do not form a tree. urdfdom silently drops joints of such a description.
 void checkTree(const urdf::ModelInterface& model)
 {
-  std::map<std::string, std::string> parents;   // child link to joint
+  std::map<std::string, std::string> parents;   // child link to its joint
   for (const auto& [name, joint] : model.joints_)
   {
     const auto [other, is_new] = parents.emplace(joint->child_link_name, name);
@@ -83,7 +83,7 @@ void checkTree(const urdf::ModelInterface& model)
   }
 }
 
-/// What a joint adds to its origin at a position [rad] or [m].
+/// Returns the motion of a joint relative to its origin at a position [rad] or [m].
 Pose jointMotion(const urdf::Joint& joint, double position)
 {
   Pose motion;
@@ -97,7 +97,7 @@ Pose jointMotion(const urdf::Joint& joint, double position)
   return motion;
 }
 
-/// Follows `mimic`; a chain of them that comes back to itself stands at 0.
+/// Returns the position of a joint. A joint with `mimic` follows its leader; joints that mimic each other stay at 0.
 double positionOf(const urdf::ModelInterface& model, const urdf::Joint& joint, const UrdfOptions& options,
                   int depth = 0)
 {
@@ -140,7 +140,7 @@ Shape meshShape(const urdf::Mesh& geometry, const UrdfOptions& options)
   if (!(scale.cwiseAbs().minCoeff() > 0) || !scale.allFinite())
     throw std::runtime_error(geometry.filename + ": its scale must not be 0");
   mesh->vertices = scale.asDiagonal() * mesh->vertices;
-  if (scale.prod() < 0)   // mirrored: the other side of each triangle is the outer one
+  if (scale.prod() < 0)   // a mirrored mesh has its outer sides inside, so turn the triangles over
     mesh->triangles.row(1).swap(mesh->triangles.row(2));
   return std::shared_ptr<const TriangleMesh>(std::move(mesh));
 }
@@ -200,7 +200,7 @@ void addLinks(const urdf::ModelInterface& model, const urdf::Link& link, const P
   }
 }
 
-/// Throws if the robot has nothing of this name.
+/// Throws std::runtime_error if the robot has no part with this name.
 template <class Known>
 void requireKnown(const std::string& kind, const std::string& name, const Known& known)
 {

@@ -213,7 +213,7 @@ std::string placesByName(const YamlTree& list)
   return text.empty() ? text : text + ")";
 }
 
-/// Which entry of a list part of a path means: a number, or the name of an entry.
+/// Returns the index in a list that a part of a path refers to. The part is a number or the name of an entry.
 std::optional<double> placeIn(const YamlTree& list, const std::string& part)
 {
   for (std::size_t k = 0; k < list.items.size(); ++k)

@@ -37,9 +37,9 @@ YamlTree parseYaml(const std::string& text, const std::string& file);
 /// The document written out again (what nodes publish after overrides).
 std::string writeYaml(const YamlTree& tree);
 
-/// Applies "path.to.value=YAML": keys that are missing are created, list entries are numbers from 0 (negative: from the
-/// end), or names, where entries have a key `name`. Throws SceneError that says which part of the path does not fit.
-/// `source`: where the assignment comes from, for messages.
+/// Applies "path.to.value=YAML". Missing keys are created. An entry of a list is given by its index (negative: from the
+/// end), or by its name if it has a key `name`. Throws SceneError with the part of the path that does not fit. `source`
+/// is the origin of the assignment, for messages.
 void applyOverride(YamlTree& root, const std::string& assignment, const std::string& source = "--set");
 
 }   // namespace slender

@@ -7,7 +7,8 @@
 
 namespace slender {
 
-/// What does not fit between a state that takes over and the scene, whose state is `now`; empty when all does.
+/// Returns a text if the state `loaded` does not fit the scene with the present state `now`, or an empty text if it
+/// fits.
 std::string misfit(const SceneState& loaded, const SceneState& now, const WorldModel& world);
 
 }   // namespace slender

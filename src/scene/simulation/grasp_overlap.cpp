@@ -12,14 +12,14 @@ namespace slender {
 
 namespace {
 
-/// What one grasp holds at an instant of the step.
+/// The part of a rod that one grasp holds at an instant of the step.
 struct HeldPart
 {
   int grasp = 0, rod = 0;
   int first_node = 0, last_node = 0;
   double radius = 0.0;                  ///< [m]
-  std::vector<Eigen::Vector3d> nodes;   ///< held ones
-  std::vector<Eigen::Vector3d> shape;   ///< the held nodes, and the next ones where clamped sections send the rod
+  std::vector<Eigen::Vector3d> nodes;   ///< the held nodes
+  std::vector<Eigen::Vector3d> shape;   ///< the held nodes, and their neighbours as clamped sections place them
 };
 
 HeldPart heldPart(const Simulation& simulation, int grasp, const GraspState& held, const Pose& X_WG)
@@ -58,7 +58,7 @@ double distanceOf(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen
   return distance;
 }
 
-/// Looks at all pairs of grasps at one instant.
+/// Checks all pairs of grasps at one instant.
 class OverlapSearch
 {
 public:
@@ -118,7 +118,7 @@ private:
 
   std::string betweenNeighbours(const HeldPart& low, const HeldPart& high) const
   {
-    constexpr double kLeastRoom = 0.5;   // of the length between them
+    constexpr double kLeastRoom = 0.5;   // smallest distance, as a share of the length of rod between two grasps
     const int edges = high.first_node - low.last_node;
     const double length = simulation_.rodModel(low.rod).rest_length.segment(low.last_node, edges).sum(),
                  distance = (low.nodes.back() - high.nodes.front()).norm();
@@ -140,7 +140,7 @@ private:
     return "grasps " + name(a) + " and " + name(b) + (a.rod == b.rod ? "" : " of two rods");
   }
 
-  static constexpr int kFewEdges = 3;   // that two grasps may have between them to be neighbours along the rod
+  static constexpr int kFewEdges = 3;   // grasps with at most so many edges between them are neighbours
 
   const Simulation& simulation_;
   const WorldInputs& inputs_;

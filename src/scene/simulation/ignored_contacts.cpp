@@ -11,7 +11,8 @@ namespace slender {
 
 namespace {
 
-/// Whether a point is inside of a closed mesh, by the solid angle under which the point sees the faces.
+/// Returns true if a point is inside of a closed mesh. The test adds up the solid angles of the faces seen from the
+/// point.
 bool isInside(const TriangleMesh& mesh, const Eigen::Vector3d& p)
 {
   double angle = 0.0;
@@ -30,7 +31,7 @@ bool isInside(const TriangleMesh& mesh, const Eigen::Vector3d& p)
   return std::abs(angle) > 2 * M_PI;
 }
 
-/// Whether a segment comes within a distance of an obstacle, or begins inside of it.
+/// Returns true if a segment is within a distance of an obstacle, or begins inside of it.
 bool isNear(const ObstacleConfig& obstacle, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double distance)
 {
   const Eigen::Vector3d p = obstacle.pose.inverse() * from;
@@ -40,22 +41,22 @@ bool isNear(const ObstacleConfig& obstacle, const Eigen::Vector3d& from, const E
   return distanceToShape(obstacle.shape, obstacle.pose, from, to) <= distance || (mesh && isInside(**mesh, p));
 }
 
-/// The points of a rod or cloth at the start, and which of them are neighbours.
+/// The points of a rod or cloth at the start, and their neighbours.
 struct HeldObject
 {
   std::string name;   ///< "rod cable"
   const Eigen::Matrix3Xd& x;
   std::vector<std::vector<int>> neighbours;
-  double reach;   ///< within it surfaces touch [m]
-  bool whole;     ///< contact is ignored by the whole object or not at all
+  double reach;   ///< distance from a point of the object within which surfaces touch [m]
+  bool whole;     ///< true if only the whole object can ignore contact
   std::vector<IgnoredSolid>& ignored;
 };
 
 /// Obstacles of each link, in the order of the scene.
 using Links = std::map<std::string, std::vector<int>>;
 
-/// The points about the held ones that lie within a distance of a link, each next to another one of them; of a cloth
-/// also those whose edge, opposite to such a point, does.
+/// Returns the held points, and the connected points around them that lie within a distance of a link. A point of a
+/// cloth also belongs to them if one of its edges, opposite to such a point, lies within this distance.
 std::vector<char> pointsNear(const HeldObject& object, const std::vector<int>& held, const SceneConfig& scene,
                              const std::vector<int>& obstacles, double distance)
 {
@@ -97,7 +98,7 @@ void ignoreNamed(const GraspConfig& grasp, const HeldObject& object, SceneConfig
   }
 }
 
-/// Links that the held points touch at the start.
+/// Lets the object ignore, near the grasp, the links that its held points touch at the start.
 void ignoreTouched(const GraspConfig& grasp, const std::vector<int>& held, const HeldObject& object, const Links& links,
                    SceneConfig& scene)
 {
@@ -136,7 +137,7 @@ void ignoreOf(const std::vector<GraspConfig>& grasps, const HeldObject& object, 
     else
       ignoreTouched(grasp, held, object, links, scene);
   }
-  // Two grasps may have ignored the same obstacle: the points of both count.
+  // Two grasps may ignore the same obstacle. The points of both pass through it.
   std::map<int, IgnoredSolid> merged;
   for (IgnoredSolid& solid : object.ignored)
   {

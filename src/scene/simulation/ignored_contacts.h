@@ -4,9 +4,9 @@
 
 namespace slender {
 
-/// Says in the model which obstacles the objects of the scene pass through: those that `contact.ignore` of a grasp
-/// names, and near a grasp the link of a robot that its held part touches at the start. Each of them is a sentence in
-/// the notes of the configuration. All parts and obstacles have been built.
+/// Sets in the model which obstacles the objects of the scene pass through. These are the obstacles in `contact.ignore`
+/// of a grasp, and, near a grasp, the links of a robot that its held part touches at the start. Adds a sentence for
+/// each of them to the notes of the configuration. Call it after all parts and obstacles were built.
 void ignoreHeldContacts(SceneConfig& scene, SceneParts& parts);
 
 }   // namespace slender

@@ -11,8 +11,8 @@ namespace {
 
 using LimitKind = LimitExcess::Kind;
 
-constexpr double kExcursionEnd = 0.95;   // of the limit: below it an excursion is over
-constexpr double kNextRelease = 0.1;     // [s] after which an excursion that lasts releases the next grasp
+constexpr double kExcursionEnd = 0.95;   // share of the limit; an excursion ends below it
+constexpr double kNextRelease = 0.1;     // [s] time after which a lasting excursion releases the next grasp
 
 const char* limitName(LimitKind kind)
 {
@@ -26,7 +26,7 @@ const char* limitName(LimitKind kind)
   return "?";
 }
 
-/// Largest distance that one of the points moves [m]; 0 when there are none to compare.
+/// Largest distance that one of the points moves [m]. Returns 0 if the two sets do not have the same points.
 double largestMove(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 {
   return from.cols() == to.cols() && from.cols() > 0 ? (to - from).colwise().norm().maxCoeff() : 0.0;
@@ -71,13 +71,13 @@ LimitWatch::LimitWatch(Simulation& simulation) : simulation_(simulation), limits
   }
 }
 
-/// Whether there is nothing to say of a value: it is within its limit, and was so before.
+/// Returns true if a value is within its limit and no excursion of it is under way.
 bool LimitWatch::isQuiet(const Key& key, double value, double limit) const
 {
   return value <= limit && (excursions_.empty() || excursions_.count(key) == 0);
 }
 
-/// `subject`: what exceeds the limit, e.g. "grasp 'left': its force".
+/// Begins or ends the excursion of a value. `subject` is the text for messages, for example "grasp 'left': its force".
 void LimitWatch::look(const Key& key, double value, double limit, const std::string& subject, const char* unit,
                       std::vector<int> to_release, std::vector<LimitExcess>& begun)
 {
@@ -169,7 +169,7 @@ std::vector<LimitExcess> LimitWatch::checkInputs(SceneInputs& inputs)
   return begun;
 }
 
-/// Targets that stand still where everything is now. Flows, belts and wind go on.
+/// Replaces the targets of all driven objects by their present places, at rest. Flows, belts and wind go on.
 void LimitWatch::holdInputs(SceneInputs& inputs) const
 {
   const SceneState& state = simulation_.state();
@@ -274,7 +274,8 @@ void LimitWatch::checkClothStrain(int cloth, std::vector<LimitExcess>& begun)
        begun);
 }
 
-/// The active grasp of a rod or cloth that bears the largest force; none where nothing holds it.
+/// Returns the active grasp with the largest force of a rod or cloth. Returns no grasp if there is none, and without
+/// `on_limit: release`.
 std::vector<int> LimitWatch::mostLoaded(int rod, int cloth) const
 {
   if (limits_.on_limit != OnLimit::release)

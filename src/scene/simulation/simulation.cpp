@@ -31,10 +31,10 @@ std::unique_ptr<World> buildWorld(const SceneConfig& config, WorldModel model, W
   }
 }
 
-/// Where in their bodies the welds of a world are, right after it was made from this state.
+/// Returns the poses of the welded parts in their bodies, for a world that was just built from this state.
 std::vector<Pose> weldPoses(const SceneConfig& config, const WorldModel& model, const SceneState& state)
 {
-  std::vector<std::size_t> next;   // per rod: its grasps come first
+  std::vector<std::size_t> next;   // per rod: index of the next weld, after the rod's own grasps
   for (const RodConfig& rod : config.rods)
     next.push_back(rod.grasps.size());
   std::vector<Pose> poses;
@@ -79,7 +79,7 @@ Simulation::Simulation(SceneConfig config, const Simulation& running) : config_(
   transfer.takeWelds(running.weld_poses_, parts.model);
   world_inputs_ = std::move(parts.inputs);
 
-  // the state of reset(): nothing forbids that it is not possible
+  // Build the state for reset(). If this fails, only reset() is not possible; see reset_problem_.
   initial_ = parts.state;
   transfer.take(running.initial_, parts.model, initial_);
   reset_problem_ = transfer.newWelds();
@@ -90,7 +90,7 @@ Simulation::Simulation(SceneConfig config, const Simulation& running) : config_(
     SceneGrasps grasps(config_, start.model(), initial_, parts.grasps);
     transfer.attachNew(grasps, initial_.time);
   }
-  catch (const std::invalid_argument& error)   // WorldError, too
+  catch (const std::invalid_argument& error)   // includes WorldError
   {
     reset_problem_ = error.what();
   }

@@ -12,7 +12,7 @@ namespace slender {
 
 namespace {
 
-/// Per entry of `to`, which entry of `from` has its name; -1: none.
+/// Returns, for each entry of `to`, the index of the entry of `from` with the same name, or -1.
 template <class Named>
 std::vector<int> sameNames(const std::vector<Named>& from, const std::vector<Named>& to)
 {
@@ -26,11 +26,11 @@ std::vector<int> sameNames(const std::vector<Named>& from, const std::vector<Nam
   return same;
 }
 
-/// Copies the entries of a list that stay.
+/// Copies the entries of objects that stay.
 template <class Value>
 void takeEntries(const std::vector<int>& same, const std::vector<Value>& from, std::vector<Value>& to)
 {
-  if (from.empty() || to.empty())   // lists that there are only with some kinds of objects
+  if (from.empty() || to.empty())   // some lists are empty in scenes without certain objects
     return;
   for (std::size_t k = 0; k < same.size(); ++k)
     if (same[k] >= 0)
@@ -39,10 +39,10 @@ void takeEntries(const std::vector<int>& same, const std::vector<Value>& from, s
 
 bool isNew(int same) { return same < 0; }
 
-/// Welds of a scene with the bodies that hold them, in the order of WorldModel::welds.
+/// A weld of a scene, and the body that holds it. Lists are in the order of WorldModel::welds.
 struct BodyWeld
 {
-  int body, index;   ///< which of the welds of this body
+  int body, index;   ///< indices of the body, and of the weld among the welds of this body
 };
 
 std::vector<BodyWeld> weldsOf(const SceneConfig& config)
@@ -101,7 +101,7 @@ void StateTransfer::checkTables(double time) const
     if (!table)
       return;
     const Pose first = table->poses.evaluate(table->poses.firstTime()), now = table->poses.evaluate(time);
-    constexpr double kSame = 1e-9;   // [m], and of a unit quaternion
+    constexpr double kSame = 1e-9;   // tolerance [m], also for unit quaternions
     if ((first.position - now.position).norm() <= kSame &&
         1.0 - std::abs(first.orientation.dot(now.orientation)) <= kSame)
       return;
@@ -146,7 +146,7 @@ void StateTransfer::takeWelds(const std::vector<Pose>& before, WorldModel& model
       model.welds[w].X_BG = before[static_cast<std::size_t>(welds_[w])];
 }
 
-/// Of objects that stay. State lists of grasps are as the scene gives them.
+/// Copies the grasps of objects that stay. The lists of grasps in `state` must be as the scene gives them.
 void StateTransfer::takeGrasps(const SceneState& before, SceneState& state) const
 {
   for (std::size_t g = 0; g < now_.size(); ++g)
@@ -176,7 +176,7 @@ void StateTransfer::takeGrasps(const SceneState& before, SceneState& state) cons
   takeEntries(grasps_, before.wrenches, state.wrenches);
 }
 
-/// Whether the same grasps and welds hold a rod before and now, in the same order.
+/// Returns true if the same grasps and welds, in the same order, hold a rod before and after the edit.
 bool StateTransfer::isHeldAsBefore(int rod) const
 {
   std::vector<int> grasps_before, grasps_now, welds_before, welds_now;
@@ -211,7 +211,7 @@ void StateTransfer::take(const SceneState& before, const WorldModel& world, Scen
       continue;
     state.rods[r].grasps = given.rods[r].grasps;
     if (!isHeldAsBefore(static_cast<int>(r)))
-      state.rods[r].forgetHistory();   // the integrator's past was that of another set of constraints
+      state.rods[r].forgetHistory();   // the integrator's history belongs to other constraints
   }
   takeEntries(rods_, before.rod_guides, state.rod_guides);
   takeEntries(threads_, before.threads, state.threads);
@@ -237,7 +237,7 @@ void StateTransfer::takeAdded(const SceneState& before, SceneState& state) const
   takeEntries(bodies_, stiffness.bodies, state.contact_stiffness.bodies);
   takeEntries(cloths_, stiffness.cloths, state.contact_stiffness.cloths);
 
-  // those of a rod are behind its own grasps, in the order of all welds
+  // The welds of a rod follow its own grasps, in the order of all welds.
   const auto places = [](const SceneConfig& config) {
     std::vector<std::pair<int, std::size_t>> all;
     std::vector<std::size_t> next;
@@ -278,7 +278,7 @@ void StateTransfer::attachNew(SceneGrasps& grasps, double time) const
     const auto* body = std::get_if<BodyMotion>(&config.motion);
     if (!isNew(grasps_[g]))
     {
-      if (body && isNewSolid(body->body))   // it followed nothing of the scene before
+      if (body && isNewSolid(body->body))   // before, no body of the scene had this name
         grasps.takeOffset(g, time);
     }
     else if (!ownerStays(now_[g]))

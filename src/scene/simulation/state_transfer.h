@@ -6,31 +6,33 @@
 #include "slender_sim/scene/scene_grasps.h"
 #include "slender_sim/scene/scene_state.h"
 
-/// From the state of a scene that runs to that of the edited scene. Objects, and grasps of an object, are the same in
-/// both if their names are.
+/// Transfers the state of a running scene to the edited scene. Objects with the same name are the same object in both
+/// scenes, and likewise grasps of the same object.
 namespace slender {
 
 class StateTransfer
 {
 public:
-  /// The configurations must outlive it. `before`, `now`: grasps of the two scenes, in their order.
+  /// `before` and `now` are the grasps of the two scenes, in scene order. The configurations must outlive this object.
   StateTransfer(const SceneConfig& from, const SceneGrasps& before, const SceneConfig& to,
                 const std::vector<GraspRef>& now);
 
-  /// Throws SceneError when a table of an object that is new has moved on from its first pose at `time`.
+  /// Throws SceneError if the table of a new object has already left its first pose at `time` [s].
   void checkTables(double time) const;
-  /// Why the two scenes have no common start: a new body is welded to a rod that was there before. Empty: they have.
+  /// Returns the reason why the edited scene has no initial state: a new body is welded to a rod that existed before.
+  /// Returns an empty text if it has an initial state.
   std::string newWelds() const;
-  /// Hands over where in their bodies welds are.
+  /// Copies the poses of welded parts in their bodies.
   void takeWelds(const std::vector<Pose>& before, WorldModel& model) const;
 
-  /// Into a state as the scene gives it, without the grasps of welds. New grasps of objects that stay are released.
-  /// Throws SceneError for objects whose sizes differ; `world`: of the edited scene.
+  /// Copies `before` into `state`, which must be as the edited scene gives it, without the grasps of welds. New grasps
+  /// of objects that stay are released. `world` is that of the edited scene. Throws SceneError if an object has another
+  /// size than before.
   void take(const SceneState& before, const WorldModel& world, SceneState& state) const;
-  /// Into what the world has added to that state: the grasps of welds, and the stiffness of contact.
+  /// Copies the parts that the constructor of World adds to a state: the grasps of welds, and the contact stiffness.
   void takeAdded(const SceneState& before, SceneState& state) const;
-  /// New grasps take hold where their objects are at `time`; those of new objects, and those that follow a body which
-  /// is new, take their offsets. Throws SceneError for nodes that are held already.
+  /// Lets new grasps take hold of objects that stay, at their places at `time` [s]. Grasps of new objects and grasps
+  /// that follow a new body take their offsets. Throws SceneError if a grasp needs nodes that are already held.
   void attachNew(SceneGrasps& grasps, double time) const;
 
 private:
@@ -40,7 +42,7 @@ private:
 
   const SceneConfig &from_, &to_;
   const std::vector<GraspRef> before_, now_;
-  // per object, grasp or weld of the edited scene: which of the scene before it is; -1: it is new
+  // per object, grasp or weld of the edited scene: its index in the scene before the edit; -1: it is new
   std::vector<int> rods_, threads_, cloths_, bodies_, obstacles_, grasps_, welds_;
 };
 

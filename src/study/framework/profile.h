@@ -53,7 +53,7 @@ public:
 
   /// Counts the instructions of the last `counted` of `steps` steps. `scene`: YAML; `options`: further ones of
   /// `simulate`, as words of a shell; FOLDER in them stands for a folder to write into. Throws std::runtime_error when
-  /// a run fails, and when the library has no line tables.
+  /// a run fails, or when the library has no line tables.
   StepProfile instructions(const std::string& scene, double step, const std::vector<std::string>& options, int steps,
                            int counted) const;
 
