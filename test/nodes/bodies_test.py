@@ -98,7 +98,8 @@ class Bodies(NodeCase):
         self.assertAlmostEqual(2 * math.atan2(ball.orientation.z, ball.orientation.w), 1.0, places=6)
         wait_until(lambda: tf.last().transforms[0].header.stamp == stamp, what="tf")
         frames = tf.last().transforms
-        self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in frames], [("world", "ball"), ("world", "t/rod/grasps/left"),
+        self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in frames],
+                         [("world", "ball"), ("world", "t/rod/grasps/left"),
                           ("world", "t/rod/rods/rope/tip")])
         tip, q = frames[2].transform.translation, frames[2].transform.rotation
         before, end = state.last().nodes[-2:]

@@ -206,7 +206,8 @@ class Cloth(NodeCase):
 
     def test_refuses_other_scenes(self):
         self.refused("name: rope\nrods: [{}]\n", "which cloth_node is for; scene_node runs every scene")
-        self.refused("name: none\nbodies: [{mass: 1, inertia: [1, 1, 1]}]\n", "it has no cloths, which cloth_node is for")
+        self.refused("name: none\nbodies: [{mass: 1, inertia: [1, 1, 1]}]\n",
+                     "it has no cloths, which cloth_node is for")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""~spawn, ~remove, ~attach, ~detach, ~set_parameter: the scene changes while it runs, refusals leave it alone, and a replay repeats all of it."""
+"""~spawn, ~remove, ~attach, ~detach, ~set_parameter: the scene changes while it runs, a refused edit changes nothing,
+and a replay repeats all edits."""
 import math
 import os
 import subprocess
@@ -116,10 +117,12 @@ class Edits(NodeCase):
         ball = bodies.last().pose[0].position.z
         self.assertGreater(ball, middle(after) + 0.035)   # the radii are 0.04 together
         self.assertLess(ball, middle(after) + 0.06)
-        wait_until(lambda: any("ball" in m.ns or "bod" in m.ns for message in markers.all() for m in message.markers), what="a picture of the ball")
+        wait_until(lambda: any("ball" in m.ns or "bod" in m.ns for message in markers.all() for m in message.markers),
+                   what="a picture of the ball")
         self.done("remove", "ball")
         wait_until(lambda: not self.published("/t/body_states"), what="the end of body_states")
-        wait_until(lambda: any(m.action == Marker.DELETE for message in markers.all() for m in message.markers), what="the end of its picture")
+        wait_until(lambda: any(m.action == Marker.DELETE for message in markers.all() for m in message.markers),
+                   what="the end of its picture")
         free = self.states_after(state, 60)
         self.assertGreater(middle(free), middle(after) + 0.01)
         # the subscriber heard all the time
@@ -133,8 +136,10 @@ class Edits(NodeCase):
         before = self.states_after(state, 60)
         self.refused("attach", "rope: {left: {nodes: [10]}}", "has a grasp left already")
         self.refused("attach", "rope: {hand: {nodes: [0]}}", "0")
-        self.refused("attach", "rope: {hand: {nodes: [10], motion: {tf: t/rod/grasps/left}}}", "which this node broadcasts itself")
-        self.refused("attach", "rope: {hand: {nodes: [10], motion: {tf: t/rod/grasps/hand}}}", "which this node broadcasts itself")
+        self.refused("attach", "rope: {hand: {nodes: [10], motion: {tf: t/rod/grasps/left}}}",
+                     "which this node broadcasts itself")
+        self.refused("attach", "rope: {hand: {nodes: [10], motion: {tf: t/rod/grasps/hand}}}",
+                     "which this node broadcasts itself")
         self.done("attach", "rope: {hand: {nodes: [10], motion: {topic: true}}}")
         guide = self.publisher("/t/grasps/hand/pose", PoseStamped)
         wrench = self.listen("/t/grasps/hand/wrench", WrenchStamped)
@@ -189,14 +194,17 @@ class Edits(NodeCase):
         self.done("set_parameter", "wind.velocity=[0, 3, 0]\nrods.0.damping={mass: 0.5, drag: 0.2}")
         self.assertGreater(self.states_after(state, 100).nodes[10].y, 0.02)
         before = self.states_after(state, 1)
-        for text, why in (("rods.rope.centerline.straight.edges=30", "these may change while the scene runs"), ("time.step=0.1", "may not change"),
-                          ("rods.rope.material.density=-1", "must be a number in"), ("rods.rope.materal.density=1", "these may change"), ("", "PATH=VALUE")):
+        for text, why in (("rods.rope.centerline.straight.edges=30", "these may change while the scene runs"),
+                          ("time.step=0.1", "may not change"),
+                          ("rods.rope.material.density=-1", "must be a number in"),
+                          ("rods.rope.materal.density=1", "these may change"), ("", "PATH=VALUE")):
             self.refused("set_parameter", text, why)
         self.assertEqual(state.last(), before)
         self.assertEqual(self.states_after(state, 1).step, before.step + 1)   # it runs on
 
     def test_new_warnings_are_answers(self):
-        self.start(ROPE.replace("step: 0.005", "step: 0.005, integrator: bdf2"))   # which bounces where there is contact
+        # bdf2 bounces where there is contact
+        self.start(ROPE.replace("step: 0.005", "step: 0.005, integrator: bdf2"))
         self.assertIn("bounce", self.output("rod.err"))
         self.assertEqual(self.done("set_parameter", "wind.velocity=[0, 0, 0]").message, "")
         answer = self.done("attach", "rope: {hand: {nodes: [3], motion: {body: robot}}}")
@@ -244,7 +252,9 @@ class Edits(NodeCase):
         held = self.states_after(state, 20)
         self.assertAlmostEqual(held.vertices[24].z, before, delta=1e-9)
         self.refused("attach", "sheet: {other: {vertices: [24]}}", "which grasp hand holds already")
-        self.refused("spawn", "cloths: [{name: third, grid: {corner: [0, 0, 0], sides: [[1, 0], [0, 1, 0]], cells: 4}}]", "~spawn:1: cloths.2.grid.sides.0")
+        self.refused("spawn",
+                     "cloths: [{name: third, grid: {corner: [0, 0, 0], sides: [[1, 0], [0, 1, 0]], cells: 4}}]",
+                     "~spawn:1: cloths.2.grid.sides.0")
         self.done("detach", "hand")
         wait_until(lambda: guide.get_num_connections() == 0, what="the end of its topic")
         self.done("remove", "sheet")
@@ -254,7 +264,8 @@ class Edits(NodeCase):
         self.processes[-1].terminate()
         self.assertEqual(self.processes[-1].wait(60), 0, self.output("rod.err"))
         # pictures of the bag have the faces of what was there at each instant
-        out = subprocess.run([find_program("bag_to_mesh"), self.path("run.bag"), "--out", self.path("meshes"), "--format", "obj"], stdout=subprocess.PIPE,
+        out = subprocess.run([find_program("bag_to_mesh"), self.path("run.bag"), "--out", self.path("meshes"),
+                              "--format", "obj"], stdout=subprocess.PIPE,
                              stderr=subprocess.STDOUT, universal_newlines=True)
         self.assertEqual(out.returncode, 0, out.stdout)
         files = sorted(os.listdir(self.path("meshes")))
@@ -293,12 +304,14 @@ class Edits(NodeCase):
         self.done("spawn", SECOND)
         rods, cloths = self.listen("/t/rods/state", RodState), self.listen("/t/cloths/state", ClothState)
         end = self.step(10).stamp
-        wait_until(lambda: rods.last().header.stamp == end and cloths.last().header.stamp == end, what="states of both kinds")
+        wait_until(lambda: rods.last().header.stamp == end and cloths.last().header.stamp == end,
+                   what="states of both kinds")
         self.assertEqual((rods.last().step, rods.last().name, cloths.last().names), (20, "rope", ["second"]))
         self.assertFalse(self.published("/t/state"))
         self.refused("remove", "rope", "which rod_node is for")
         self.done("remove", "second")
-        wait_until(lambda: self.published("/t/state") and not self.published("/t/rods/state"), what="the topics of before")
+        wait_until(lambda: self.published("/t/state") and not self.published("/t/rods/state"),
+                   what="the topics of before")
         wait_until(state.connected, what="the topic of before")
         self.states_after(state, 10)
 
@@ -332,7 +345,8 @@ class Edits(NodeCase):
             rate.sleep()
 
     def raw(self, bag):
-        return [(topic, bytes(raw[1]), stamp) for topic, raw, stamp in rosbag.Bag(self.path(bag)).read_messages(raw=True)]
+        return [(topic, bytes(raw[1]), stamp)
+                for topic, raw, stamp in rosbag.Bag(self.path(bag)).read_messages(raw=True)]
 
     def test_a_replay_repeats_the_edits(self):
         node = self.start(ROPE, pace="wall", guide_delay=0.05, max_lag=0.5, record_bag=self.path("run.bag"))

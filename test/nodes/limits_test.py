@@ -35,14 +35,17 @@ class Limits(NodeCase):
             answer = self.call("step", Step, 2)
             if not answer.success:
                 return answer.message
-        wait_until(lambda: self.state.count() > 0 and self.state.last().header.stamp >= answer.stamp, what="the last state")
+        wait_until(lambda: self.state.count() > 0 and self.state.last().header.stamp >= answer.stamp,
+                   what="the last state")
         return self.state.last()
 
     def warnings(self):
         return self.output("rod.out") + self.output("rod.err")
 
     def raw(self, bag):
-        return [(topic, bytes(raw[1]), stamp) for topic, raw, stamp in rosbag.Bag(self.path(bag)).read_messages(raw=True) if not topic.endswith("/inputs")]
+        return [(topic, bytes(raw[1]), stamp)
+                for topic, raw, stamp in rosbag.Bag(self.path(bag)).read_messages(raw=True)
+                if not topic.endswith("/inputs")]
 
     def replayed(self):
         """Ends the node and repeats its run, which must be the same."""
@@ -65,7 +68,8 @@ class Limits(NodeCase):
         self.assertEqual(status["limits exceeded so far"], "1")
         self.assertEqual(self.warnings().count("exceeds limits.strain"), 1)
         self.follow(1.0, 0.8)
-        wait_until(lambda: self.diagnostics("simulation")["level"] == DiagnosticStatus.OK, what="the end of the excursion")
+        wait_until(lambda: self.diagnostics("simulation")["level"] == DiagnosticStatus.OK,
+                   what="the end of the excursion")
 
     def test_hold_stays_until_it_is_let_go_on(self):
         self.begin("hold")
@@ -94,7 +98,8 @@ class Limits(NodeCase):
         self.assertIn(False, [bool(a) for a in self.grasps.last().active])
         self.replayed()
         with rosbag.Bag(self.path("run.bag")) as bag:
-            kinds = [message.kind for _, message, _ in bag.read_messages(topics=["/t/inputs"]) if message.text == "limit exceeded"]
+            kinds = [message.kind for _, message, _ in bag.read_messages(topics=["/t/inputs"])
+                     if message.text == "limit exceeded"]
         self.assertEqual(kinds, [9])
 
     def test_stop_fails_until_reset(self):

@@ -29,7 +29,7 @@ class Offsets(NodeCase):
         self.stamp = 1.0
 
     def stream(self, place, seconds=0.6):
-        """The gripper stays at a place and its poses stream on at 50 Hz, in time; returns where the end of the rope is."""
+        """Holds the gripper at a place and sends its poses at 50 Hz. Returns the position of the end of the rope."""
         for _ in range(int(50 * seconds)):
             self.gripper.publish(pose(*place, self.stamp))
             self.arrived()

@@ -53,7 +53,8 @@ class Pause(NodeCase):
         self.assertEqual(inputs["dropped"], before, inputs)
         last = self.state.last()
         self.assertTrue(self.call("pause", SetBool, False).success)
-        wait_until(lambda: self.state.last().step > last.step + 200 and self.followed(), what="a node that has caught up")
+        wait_until(lambda: self.state.last().step > last.step + 200 and self.followed(),
+                   what="a node that has caught up")
         inputs = self.diagnostics("inputs")
         self.assertEqual(inputs["dropped from_future"], "0", inputs)
         if stamped:
@@ -71,7 +72,8 @@ class Pause(NodeCase):
         self.check(True)
         node = self.start("", wait=False, pace="fast", replay=self.path("run.bag"), record_bag=self.path("again.bag"))
         self.assertEqual(node.wait(60), 0, self.output("rod.err"))
-        raw = [[(topic, bytes(raw[1]), stamp) for topic, raw, stamp in rosbag.Bag(self.path(name)).read_messages(raw=True) if topic == "/t/state"]
+        raw = [[(topic, bytes(raw[1]), stamp)
+                for topic, raw, stamp in rosbag.Bag(self.path(name)).read_messages(raw=True) if topic == "/t/state"]
                for name in ("run.bag", "again.bag")]
         self.assertGreater(len(raw[0]), 200)
         self.assertTrue(raw[0] == raw[1])

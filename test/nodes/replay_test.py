@@ -94,9 +94,11 @@ class Replay(NodeCase):
     def test_the_recorded_scene_runs_whatever_an_earlier_start_left(self):
         node = self.start(wait=False, pace="fast", stop_after=0.1, record_bag=self.path("run.bag"), record_inputs=False)
         self.assertEqual(node.wait(60), 0, self.output("rod.err"))
-        for scene, overrides, told in ((SCENE.replace("edges: 20", "edges: 21"), "", True), (self.path("gone.yaml"), "", True),
+        for scene, overrides, told in ((SCENE.replace("edges: 20", "edges: 21"), "", True),
+                                       (self.path("gone.yaml"), "", True),
                                        (SCENE, "time.step=0.001", True), (SCENE, "", False)):
-            node = self.start(scene, wait=False, pace="fast", stop_after=0.0, set=overrides, replay=self.path("run.bag"), record_bag=self.path("again.bag"))
+            node = self.start(scene, wait=False, pace="fast", stop_after=0.0, set=overrides,
+                              replay=self.path("run.bag"), record_bag=self.path("again.bag"))
             self.assertEqual(node.wait(60), 0, self.output("rod.err"))
             self.assertTrue(self.raw("run.bag") == self.raw("again.bag"))
             text = self.output("rod.out") + self.output("rod.err")
@@ -128,7 +130,8 @@ class Replay(NodeCase):
         for _ in range(2):
             node = self.start(wait=False, pace="fast", stop_after=0.1, record_bag=bag)
             self.assertEqual(node.wait(60), 0, self.output("rod.err"))
-        self.assertIn("the old one is kept as " + self.path("run.previous.bag"), self.output("rod.out") + self.output("rod.err"))
+        self.assertIn("the old one is kept as " + self.path("run.previous.bag"),
+                      self.output("rod.out") + self.output("rod.err"))
         self.assertTrue(self.raw("run.bag") == self.raw("run.previous.bag"))
 
     def test_what_cannot_be_replayed(self):

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Two arms hang a cable on a hook and let go: it comes to rest over the hook, both ends lower, and the hook carries its weight."""
+"""Two arms hang a cable on a hook and let go. The cable comes to rest over the hook with both ends lower, and the hook
+carries its weight."""
 import math
 import unittest
 
@@ -26,7 +27,8 @@ def upward_contact(message):
 class Hook(unittest.TestCase):
 
     def test_the_cable_hangs_on_the_hook(self):
-        states, grasps, fields = Listener("state", RodState), Listener("grasp_states", GraspStates), Listener("fields", Fields)
+        states = Listener("state", RodState)
+        grasps, fields = Listener("grasp_states", GraspStates), Listener("fields", Fields)
         wait_until(lambda: states.count() > 0 and grasps.count() > 0, 120, "states")
         self.assertTrue(all(grasps.all()[0].active))
         wait_until(lambda: not any(grasps.last().active), 300, "both grippers to let go")
@@ -44,7 +46,8 @@ class Hook(unittest.TestCase):
         up = upward_contact(fields.last())
         self.assertEqual(len(up), len(last.nodes))
         self.assertAlmostEqual(sum(up), WEIGHT, delta=0.05 * WEIGHT)
-        self.assertAlmostEqual(sum(f for p, f in zip(last.nodes, up) if p.z > PEG_TOP - 0.1), WEIGHT, delta=0.05 * WEIGHT)
+        self.assertAlmostEqual(sum(f for p, f in zip(last.nodes, up) if p.z > PEG_TOP - 0.1), WEIGHT,
+                               delta=0.05 * WEIGHT)
 
 
 if __name__ == "__main__":

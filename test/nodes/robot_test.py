@@ -14,8 +14,10 @@ from slender_sim.msg import BodyStates
 
 URDF = """<robot name="arm">
   <link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
-  <link name="arm"><collision><origin xyz="0.2 0 0"/><geometry><cylinder radius="0.02" length="0.3"/></geometry></collision></link>
-  <joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>
+  <link name="arm">
+    <collision><origin xyz="0.2 0 0"/><geometry><cylinder radius="0.02" length="0.3"/></geometry></collision></link>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="arm"/><origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>
     <limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
 </robot>"""
 SCENE = """
@@ -46,11 +48,13 @@ class Robot(NodeCase):
     def send(self, stamp, angle):
         def transform(parent, child, z, turn):
             message = TransformStamped()
-            message.header.stamp, message.header.frame_id, message.child_frame_id = rospy.Time.from_sec(stamp), parent, child
+            message.header.stamp = rospy.Time.from_sec(stamp)
+            message.header.frame_id, message.child_frame_id = parent, child
             message.transform.translation.z = z
             message.transform.rotation.y, message.transform.rotation.w = math.sin(turn / 2), math.cos(turn / 2)
             return message
-        self.broadcaster.sendTransform([transform("world", "left/base", 0, 0), transform("left/base", "left/arm", 0.5, angle)])
+        self.broadcaster.sendTransform([transform("world", "left/base", 0, 0),
+                                        transform("left/base", "left/arm", 0.5, angle)])
 
     def move(self, seconds):
         rate, begin = rospy.Rate(100), rospy.get_time()
@@ -96,11 +100,16 @@ class Robot(NodeCase):
         self.assertTrue(first == again)
 
     def raw(self, bag):
-        return [(topic, bytes(raw[1]), stamp) for topic, raw, stamp in rosbag.Bag(self.path(bag)).read_messages(raw=True) if not topic.endswith("/inputs")]
+        return [(topic, bytes(raw[1]), stamp)
+                for topic, raw, stamp in rosbag.Bag(self.path(bag)).read_messages(raw=True)
+                if not topic.endswith("/inputs")]
 
     def test_what_is_refused(self):
-        for urdf, expected in ((None, "no ROS parameter of this name"), ("robot", "ROS parameter robot_description is no URDF"), ("<robot/>", "is no valid URDF"),
-                               (URDF.replace("<box size=\"0.1 0.1 0.1\"/>", "<mesh filename=\"package://no_such_package/a.stl\"/>"),
+        for urdf, expected in ((None, "no ROS parameter of this name"),
+                               ("robot", "ROS parameter robot_description is no URDF"),
+                               ("<robot/>", "is no valid URDF"),
+                               (URDF.replace("<box size=\"0.1 0.1 0.1\"/>",
+                                             "<mesh filename=\"package://no_such_package/a.stl\"/>"),
                                 "there is no ROS package no_such_package")):
             if urdf:
                 rospy.set_param("/robot_description", urdf)
@@ -117,7 +126,8 @@ class Robot(NodeCase):
             if content:
                 with open(table, "w") as file:
                     file.write(content)
-            done = subprocess.run(["/usr/bin/python3", script, "__ns:=/t", "_file:=" + table] + more, stdout=subprocess.PIPE,
+            done = subprocess.run(["/usr/bin/python3", script, "__ns:=/t", "_file:=" + table] + more,
+                                  stdout=subprocess.PIPE,
                                   stderr=subprocess.STDOUT, universal_newlines=True, timeout=60)
             self.assertEqual(done.returncode, 2, done.stdout)
             self.assertIn(expected, done.stdout)
@@ -128,13 +138,16 @@ class Robot(NodeCase):
             file.write("# a ramp\nt,a,b\n0,0,1\n1,2,1\n2,4,1\n")
         states = Listener("/t/joint_states", JointState)
         self.ends.append(states.subscriber)
-        self.processes.append(subprocess.Popen(["/usr/bin/python3", script, "__ns:=/t", "_file:=" + self.path("joints.csv")]))
-        wait_until(lambda: states.count() > 0 and abs(states.last().position[0] - 4) < 1e-9, what="the end of the table")
+        self.processes.append(subprocess.Popen(["/usr/bin/python3", script, "__ns:=/t",
+                                                "_file:=" + self.path("joints.csv")]))
+        wait_until(lambda: states.count() > 0 and abs(states.last().position[0] - 4) < 1e-9,
+                   what="the end of the table")
         self.assertEqual(states.last().name, ["a", "b"])
         moving = [m for m in states.all() if 0 < m.position[0] < 4]
         self.assertGreater(len(moving), 10)
         for a, b in zip(moving, moving[1:]):
-            self.assertAlmostEqual(b.position[0] - a.position[0], 2 * (b.header.stamp - a.header.stamp).to_sec(), delta=1e-6)
+            self.assertAlmostEqual(b.position[0] - a.position[0], 2 * (b.header.stamp - a.header.stamp).to_sec(),
+                                   delta=1e-6)
             self.assertAlmostEqual(b.position[1], 1.0, delta=1e-9)
 
 

@@ -49,7 +49,8 @@ tracked:
 """
 BODIES = """
 bodies:
-  - {name: ball, mass: 0.008, shape: {sphere: {radius: 0.012}}, pose: {position: [-0.045, 0.02, 0.4]}, broadcast_tf: true}
+  - {name: ball, mass: 0.008, shape: {sphere: {radius: 0.012}}, pose: {position: [-0.045, 0.02, 0.4]},
+     broadcast_tf: true}
 obstacles:
   - {name: floor, shape: {box: {size: [2, 2, 0.02]}}, pose: {position: [0, 0, -1]}}
 """
@@ -84,8 +85,10 @@ class Scene(NodeCase):
     def test_each_kind_has_its_own_topics(self):
         self.begin()
         listeners = {topic: self.listen("/t/" + topic, kind) for topic, kind in (
-            ("rods/poses", PoseArray), ("threads/poses", PoseArray), ("cloths/points", PointCloud2), ("cloths/mesh", MeshStamped),
-            ("body_states", BodyStates), ("grasps/left/wrench", WrenchStamped), ("nozzle/wrench", WrenchStamped), ("markers", MarkerArray))}
+            ("rods/poses", PoseArray), ("threads/poses", PoseArray), ("cloths/points", PointCloud2),
+            ("cloths/mesh", MeshStamped),
+            ("body_states", BodyStates), ("grasps/left/wrench", WrenchStamped), ("nozzle/wrench", WrenchStamped),
+            ("markers", MarkerArray))}
         self.after(10)
         for topic, listener in listeners.items():
             wait_until(lambda: listener.count() > 0, what="messages on " + topic)
@@ -105,7 +108,8 @@ class Scene(NodeCase):
 
     def test_inputs_and_services_reach_every_kind(self):
         self.begin()
-        gripper, nozzle = self.publisher("/t/grasps/left/pose", PoseStamped), self.publisher("/t/nozzle/pose", PoseStamped)
+        gripper = self.publisher("/t/grasps/left/pose", PoseStamped)
+        nozzle = self.publisher("/t/nozzle/pose", PoseStamped)
         self.after(1)
         start = self.rods.last().nodes[0]
         for k in range(1, 41):
@@ -118,7 +122,8 @@ class Scene(NodeCase):
         self.assertAlmostEqual(self.threads.last().nodes[-1].x, 0.02, delta=1e-9)
         answer = self.call("set_grasp", SetGrasp, SetGraspRequest(name="corner", action=SetGraspRequest.ATTACH_NODES))
         self.assertIn("corner holds napkin already", answer.message)
-        self.assertTrue(self.call("set_grasp", SetGrasp, SetGraspRequest(name="corner", action=SetGraspRequest.RELEASE)).success)
+        self.assertTrue(self.call("set_grasp", SetGrasp,
+                                  SetGraspRequest(name="corner", action=SetGraspRequest.RELEASE)).success)
         self.assertIn("test function", self.call("set_functions", SetFunctions, "shell", "none", 0.0).message)
 
     def test_saved_states_go_on_bit_by_bit(self):
@@ -132,13 +137,15 @@ class Scene(NodeCase):
 
     def test_bags_are_identical_and_replay_repeats_them(self):
         for name in ("one.bag", "two.bag"):
-            node = self.start(MIXED, program="scene_node", wait=False, pace="fast", stop_after=0.2, record_bag=self.path(name))
+            node = self.start(MIXED, program="scene_node", wait=False, pace="fast", stop_after=0.2,
+                              record_bag=self.path(name))
             self.assertEqual(node.wait(100), 0, self.output("rod.err"))
         with open(self.path("one.bag"), "rb") as one, open(self.path("two.bag"), "rb") as two:
             self.assertTrue(one.read() == two.read())
         with rosbag.Bag(self.path("one.bag")) as bag:
             topics = set(bag.get_type_and_topic_info().topics)
-        self.assertTrue({"/t/rods/state", "/t/threads/state", "/t/cloths/state", "/t/cloths/mesh", "/t/body_states"} <= topics, topics)
+        self.assertTrue({"/t/rods/state", "/t/threads/state", "/t/cloths/state", "/t/cloths/mesh",
+                         "/t/body_states"} <= topics, topics)
 
         node = self.begin(pace="wall", guide_delay=0.05, stop_after=0.0, record_bag=self.path("run.bag"))
         gripper = self.publisher("/t/grasps/left/pose", PoseStamped)
@@ -148,9 +155,11 @@ class Scene(NodeCase):
             rate.sleep()
         node.terminate()
         self.assertEqual(node.wait(60), 0, self.output("rod.err"))
-        node = self.start("", program="scene_node", wait=False, pace="fast", stop_after=0.0, replay=self.path("run.bag"), record_bag=self.path("again.bag"))
+        node = self.start("", program="scene_node", wait=False, pace="fast", stop_after=0.0,
+                          replay=self.path("run.bag"), record_bag=self.path("again.bag"))
         self.assertEqual(node.wait(200), 0, self.output("rod.err"))
-        first, again = [[(topic, bytes(raw[1]), stamp) for topic, raw, stamp in rosbag.Bag(self.path(name)).read_messages(raw=True)
+        first, again = [[(topic, bytes(raw[1]), stamp)
+                         for topic, raw, stamp in rosbag.Bag(self.path(name)).read_messages(raw=True)
                          if not topic.endswith("/inputs")] for name in ("run.bag", "again.bag")]
         self.assertGreater(len(first), 100)
         self.assertTrue(first == again)
@@ -159,11 +168,13 @@ class Scene(NodeCase):
         for program in ("rod_node", "thread_node", "cloth_node", "tracking_node"):
             node = self.start(MIXED, program=program, wait=False, pace="fast", stop_after=0.008)
             self.assertEqual(node.wait(60), 0, program + self.output("rod.err"))
-        for program, scene, kind in (("rod_node", THREADS, "rods or bodies"), ("thread_node", RODS, "threads"), ("cloth_node", BODIES, "cloths"),
+        for program, scene, kind in (("rod_node", THREADS, "rods or bodies"), ("thread_node", RODS, "threads"),
+                                     ("cloth_node", BODIES, "cloths"),
                                      ("tracking_node", RODS + CLOTHS, "cloths or rods that track a guide")):
             node = self.start(HEAD + scene, program=program, wait=False)
             self.assertEqual(node.wait(20), 2, program)
-            self.assertIn("it has no %s, which %s is for; scene_node runs every scene" % (kind, program), self.output("rod.err"))
+            self.assertIn("it has no %s, which %s is for; scene_node runs every scene" % (kind, program),
+                          self.output("rod.err"))
 
 
 if __name__ == "__main__":

@@ -77,7 +77,8 @@ class Tf(NodeCase):
         def all_heard():
             self.step(1)
             values = self.diagnostics("inputs")
-            ages = {frame: [value for key, value in values.items() if key.startswith("input age") and "(tf %s)" % frame in key]
+            ages = {frame: [value for key, value in values.items()
+                            if key.startswith("input age") and "(tf %s)" % frame in key]
                     for frame in frames}
             self.assertTrue(all(ages.values()), values)   # all of them are followed
             return all(value != "none yet" for some in ages.values() for value in some)
@@ -104,7 +105,8 @@ class Tf(NodeCase):
             self.assertLess(math.dist(link, (grasp[0], grasp[1] + 3, grasp[2] + 0.1)), 1e-12)
             self.assertEqual(table, (0, 5, 0))   # nobody speaks of its frame
             self.assertEqual(cart, (0, 7, 0))
-        self.assertLess(worst, 1e-4)   # tf joins poses of 50 Hz by straight lines: 0.5 m/s^2 * (0.02 s)^2 / 8 and the cubic's
+        # tf interpolates poses of 50 Hz linearly: 0.5 m/s^2 * (0.02 s)^2 / 8, and the error of the cubic
+        self.assertLess(worst, 1e-4)
 
     def test_late_frames_make_all_inputs_late(self):
         """slow comes 0.15 s after its stamps, tool0 and the messages in time: all are shown at one instant."""
@@ -163,7 +165,8 @@ name: flap
 gravity: [0, 0, 0]
 time: {step: 0.01}
 tracked:
-  - {name: flap, guide: {grid: {corner: [0, 0, 0], sides: [[0.2, 0, 0], [0, 0.2, 0]], cells: 2}, motion: %s}, mesh: same,
+  - {name: flap, guide: {grid: {corner: [0, 0, 0], sides: [[0.2, 0, 0], [0, 0.2, 0]], cells: 2}, motion: %s},
+     mesh: same,
      material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 2.0e5}, test_functions: {clusters: {count: 1}}}
 """
         rope = """
@@ -196,7 +199,8 @@ time: {step: 0.002}
 threads:
   - name: honey
     fluid: {density: 1400, viscosity: 20, surface_tension: 0.05}
-    nozzle: {position: [0, 0, 0.03], diameter: 0.005, flow: 6.0e-7, motion: {tf: flange, offset: {rpy: [0, 1.5707963267948966, 0]}}}
+    nozzle: {position: [0, 0, 0.03], diameter: 0.005, flow: 6.0e-7,
+             motion: {tf: flange, offset: {rpy: [0, 1.5707963267948966, 0]}}}
     floor: {height: 0}
     edges: {feed: 0.002, longest: 0.003, shortest: 0.0006, deposited: 25}
 """, program="thread_node", guide_delay=0.05)
@@ -208,7 +212,8 @@ threads:
 
     def test_frames_that_never_come(self):
         self.start(SCENE, pace="wall", guide_timeout=0.5, guide_delay=0.05)
-        wait_until(lambda: "no input yet for right (tf tool0)" in self.diagnostics("inputs")["message"], what="the warning")
+        wait_until(lambda: "no input yet for right (tf tool0)" in self.diagnostics("inputs")["message"],
+                   what="the warning")
         values = self.diagnostics("inputs")
         self.assertEqual(values["level"], 1)
         self.assertIn("tool0", values["tf tool0"])   # what tf says of it
@@ -219,7 +224,8 @@ threads:
         for frame in ("t/rod/grasps/left", "ball"):
             node = self.start(SCENE, wait=False, set=["rods.0.grasps.right.motion={tf: %s}" % frame])
             self.assertEqual(node.wait(60), 2)
-            self.assertIn("grasp right follows the frame %s of tf, which this node broadcasts itself" % frame, self.output("rod.err"))
+            self.assertIn("grasp right follows the frame %s of tf, which this node broadcasts itself" % frame,
+                          self.output("rod.err"))
 
     def test_a_frame_behind_an_own_frame(self):
         """The tool hangs on the grasp that follows it."""
@@ -247,10 +253,13 @@ threads:
         node = self.start("", wait=False, pace="fast", replay=self.path("run.bag"), record_bag=self.path("again.bag"))
         self.assertEqual(node.wait(200), 0, self.output("rod.err"))
         def states(bag):
-            return [(m.header.stamp, numbers(m)) for _, m, _ in rosbag.Bag(self.path(bag)).read_messages(topics=["/t/state"])]
+            return [(m.header.stamp, numbers(m))
+                    for _, m, _ in rosbag.Bag(self.path(bag)).read_messages(topics=["/t/state"])]
         first, again = states("run.bag"), states("again.bag")
         self.assertGreater(len(first), 200)
-        self.assertGreater(max(abs(state[1][-1] - first[0][1][-1]) + abs(state[1][3 * 20 + 1]) for state in first), 0.01)   # it moved
+        # it moved
+        self.assertGreater(max(abs(state[1][-1] - first[0][1][-1]) + abs(state[1][3 * 20 + 1]) for state in first),
+                           0.01)
         self.assertEqual(first, again)
 
 
