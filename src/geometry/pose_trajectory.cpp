@@ -76,8 +76,7 @@ Twist PoseTrajectory::slope(std::size_t k) const
             rotationVector(poses_[k - 1].orientation.conjugate() * poses_[k].orientation) / h};
   }
   if (k == 0 || k + 1 >= times_.size())
-    return isCut(times_, k, cut_) ? endSlope(k)
-                                  : Twist();   // otherwise at rest, because the pose is held beyond the end
+    return isCut(times_, k, cut_) ? endSlope(k) : Twist();   // at rest if the pose is held beyond the end
   const double h0 = times_[k] - times_[k - 1], h1 = times_[k + 1] - times_[k];
   const Eigen::Quaterniond back = poses_[k].orientation.conjugate();
   const auto shift = [this](std::size_t j) { return Eigen::Vector3d(poses_[j].position - poses_[j - 1].position); };

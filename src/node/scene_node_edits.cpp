@@ -118,15 +118,15 @@ void SceneNode::takeUp(EditedScene edited)
     takeByName(topics_->grasps, edited.topics->grasps, statistics->max_force);
     takeByName(topics_->grasps, edited.topics->grasps, statistics->max_torque);
   }
-  const std::unique_ptr<GraspWrenches> wrenches_before =
-      std::move(wrenches_);   // kept until topics are advertised again
+  // Topics in both scenes keep their connections as long as the old publishers exist.
+  const std::unique_ptr<GraspWrenches> wrenches_before = std::move(wrenches_);
   const std::unique_ptr<FrameBroadcaster> frames_before = std::move(frames_);
   std::swap(simulation_, edited.simulation);   // inputs_ refers to the old simulation until makeInputs()
   topics_ = std::move(edited.topics);
   limits_ = std::make_unique<LimitWatch>(*simulation_);
   makeInputs();
   {
-    const std::vector<ros::Publisher> before = takePublishers();   // topics in both scenes keep their connections
+    const std::vector<ros::Publisher> before = takePublishers();
     advertise();
   }
   std_msgs::String scene;

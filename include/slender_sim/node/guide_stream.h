@@ -28,8 +28,7 @@ protected:
   GuideStream(const GuideTiming::Options& timing, double coast, double blend)
     : timing_(timing),
       coast_(coast),
-      cut_(timing.delay > 0.0 || timing.automatic ? blend
-                                                  : 0.0)   // without a lag every sample is the last one at first
+      cut_(timing.delay > 0.0 || timing.automatic ? blend : 0.0)   // without a lag each new sample is an end at first
   {
   }
   virtual ~GuideStream() = default;

@@ -28,7 +28,7 @@ struct SceneMessages
   std::vector<SharedMessage<slender_sim::RodState>> states;       ///< per rod
   std::vector<SharedMessage<slender_sim::ThreadState>> threads;   ///< per thread and piece of it
   SharedMessage<slender_sim::ClothState> cloth_state;   ///< one message for all cloths; nullptr: not published
-  std_msgs::Header header;                              ///< of all messages of this instant
+  std_msgs::Header header;                              ///< common header of the messages of this instant
   /// One pose per edge: the material frame at the middle of the edge, object after object.
   SharedMessage<geometry_msgs::PoseArray> rod_poses, thread_poses;
   std::vector<geometry_msgs::WrenchStamped> wrenches;   ///< per grasp; zero while released

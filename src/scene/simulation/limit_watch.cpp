@@ -26,7 +26,7 @@ const char* limitName(LimitKind kind)
   return "?";
 }
 
-/// Largest distance that one of the points moves [m]. Returns 0 if the two sets do not have the same points.
+/// Largest distance that one of the points moves [m]. Returns 0 if the numbers of points differ or are 0.
 double largestMove(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to)
 {
   return from.cols() == to.cols() && from.cols() > 0 ? (to - from).colwise().norm().maxCoeff() : 0.0;
