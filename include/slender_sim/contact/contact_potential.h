@@ -48,8 +48,9 @@ struct IgnoredSolid
   std::vector<char> points;   ///< per point of the object: 1 if the pieces at this point pass; empty: all pieces pass
 };
 
-/// What a curve or a cloth touches. Pieces of one curve that are closer along it than about a quarter of a turn at its
-/// tightest are neighbours and never a pair. Pieces of one cloth are neighbours if they have a corner in common.
+/// A curve or a cloth of a contact surface. Neighbouring pieces of one object are never a contact pair. Pieces of a
+/// curve are neighbours if their distance along the curve is less than about a quarter of a turn of its tightest bend.
+/// Pieces of a cloth are neighbours if they share a corner.
 struct ContactObject : ContactProperties
 {
   double curve_length = 0.0;   ///< [m]

@@ -60,7 +60,8 @@ private:
   bool open_ = false;
 };
 
-/// The same bag as rod_node writes with `~start_time: 1`, frame world and no namespace, for `simulate --bag`.
+/// Returns a recorder for `simulate --bag`. It writes the same bag as rod_node does with `~start_time: 1`, the frame
+/// world and no namespace.
 std::unique_ptr<Recorder> makeBagRecorder(const std::string& path);
 
 }   // namespace slender

@@ -26,7 +26,7 @@ constexpr int kDropReasons = 11;
 
 const char* toString(Drop reason);
 
-/// Counts messages, and those that are dropped by reason; complains at most once a second about each reason.
+/// Counts all messages, and dropped messages by reason. Warns at most once a second about each reason.
 class DropCounter
 {
 public:
@@ -34,11 +34,12 @@ public:
   void keep(const std::string& what);
   void deliveredKept() { told_of_kept_ = false; }
 
-  /// Every message as it arrives, whatever becomes of it.
+  /// Counts a message. Call it for each message that arrives, also if it is dropped later.
   void receive() { ++received_; }
   std::uint64_t received() const { return received_; }
 
-  /// `what`: e.g. the topic; `detail` ends the sentence, e.g. the value.
+  /// Counts a dropped message. `what` is for example the topic. `detail` ends the sentence of the warning, for example
+  /// with the value.
   void drop(Drop reason, const std::string& what, const std::string& detail = "");
 
   /// Counts a message that is dropped because of its stamp. `ahead` is the stamp minus the simulated time [s].
@@ -46,7 +47,7 @@ public:
 
   std::uint64_t count(Drop reason) const { return reasons_[static_cast<int>(reason)].count; }
   std::uint64_t total() const;
-  /// What was dropped last for this reason, with its detail; empty: nothing.
+  /// Returns the last message that was dropped for this reason, with its detail, or an empty text.
   const std::string& last(Drop reason) const { return reasons_[static_cast<int>(reason)].last; }
 
 private:

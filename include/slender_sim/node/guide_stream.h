@@ -33,9 +33,9 @@ protected:
   }
   virtual ~GuideStream() = default;
 
-  /// The first stream takes effect. trajectory_ begins at `start` [s].
+  /// Called when the first stream takes effect. trajectory_ begins at `start` [s].
   virtual void join(double start) = 0;
-  /// What was evaluated last is not that of the trajectory at query_.
+  /// Called when the last evaluated motion is no longer that of the trajectory at query_.
   virtual void forgetPlain() = 0;
   /// The trajectory may have changed at query_. Starts a blend from the last output, given at simulated `time` [s],
   /// unless they agree.
@@ -43,7 +43,7 @@ protected:
   /// Sets the output at simulated `time` [s] from the trajectory at query_, which passes at rate_.
   virtual void output(double time) = 0;
 
-  /// Whether `time` [s] is later than the last sample.
+  /// Returns true if `time` [s] is later than the last sample.
   bool isNew(double time) const { return !last_stamp_ || time > *last_stamp_; }
 
   /// Adds a sample that is new.

@@ -18,10 +18,10 @@ public:
 
 enum class Pace
 {
-  wall,     ///< keeps real time as well as it can; never skips physics, but where it falls behind by ~max_lag its clock
-  fast,     ///< as fast as it can
+  wall,     ///< keeps real time if possible; never skips steps, but skips its clock if it is ~max_lag behind
+  fast,     ///< steps as fast as possible
   follow,   ///< steps up to the incoming /clock
-  step,     ///< only when the step service is called
+  step,     ///< steps only when the service ~step is called
 };
 
 /// Axes and tf frame of `grasps/NAME/wrench`.
@@ -46,7 +46,7 @@ enum class MarkerColor
   twist
 };
 
-/// What pictures show beside the shape.
+/// Contents of pictures besides the shapes of objects.
 struct MarkerOptions
 {
   MarkerStyle style = MarkerStyle::tube;   ///< ~marker_style: tube | line | regions (of tracked cloths)
@@ -54,7 +54,7 @@ struct MarkerOptions
   MarkerColor color = MarkerColor::none;   ///< ~marker_color: none | strain | curvature | twist
   /// ~marker_range: magnitude of the full colour: strain [-], curvature [1/m], twist [rad/m]; 0: the picture's largest
   double range = 0.0;
-  /// ~marker_forces [m/N]: arrows of contacts' and holders' forces so long; 0: none
+  /// ~marker_forces [m/N]: length of the arrows of contact forces and of forces on grasps; 0: no arrows
   double forces = 0.0;
   /// extra line of the legend, which no parameter sets: how fast time passes in the picture; empty: no line
   std::string note;

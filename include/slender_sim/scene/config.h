@@ -169,7 +169,7 @@ enum class Hold
   position
 };   ///< clamp (position and material frame) or point pin
 
-/// Where the gripper sits relative to its motion's poses.
+/// Meaning of the poses of a grasp's motion.
 enum class Attach
 {
   /// poses are those of the held section itself: x along the tangent, y along d1; of a cloth's grasp: of its frame
@@ -197,8 +197,8 @@ struct GraspConfig
   /// Pose of the held section in the frame that `motion` gives; not with Attach::initial. With nothing the offset of a
   /// TfMotion counts, if `motion` is one.
   std::optional<Pose> offset;
-  /// Of a rod: unit tangent and unit first material axis of the held section, in world axes, for motions whose poses
-  /// have no orientation. Zero: not given. The director need not be normal to the tangent; its normal part counts.
+  /// Unit tangent and unit first material axis of the held section of a rod, in world axes, for motions whose poses
+  /// have no orientation. Zero: not given. The director need not be normal to the tangent; its normal part is used.
   Eigen::Vector3d direction{0, 0, 0}, director{0, 0, 0};
 };
 
@@ -430,11 +430,11 @@ struct RecordConfig
 struct SceneConfig
 {
   std::string name = "scene";
-  std::string file;     ///< that it was read from, for messages; may be empty
+  std::string file;     ///< file from which the scene was read, for messages; may be empty
   std::string source;   ///< the YAML text after --set overrides (what `scene` publishes)
   /// folder from which relative file names in the scene start
   std::string directory = ".";
-  /// What the user should know although the scene runs, one sentence or two each. The reader adds to them
+  /// Warnings for the user about a scene that can run, one or two sentences each. First the reader adds warnings
   /// (YamlCursor::warning), then the constructor of Simulation. simulate prints them to stderr, nodes log them as ROS
   /// warnings.
   std::vector<std::string> warnings;

@@ -9,8 +9,8 @@
 
 namespace slender {
 
-/// The grasps of a scene, over all its rods and then all its cloths: what they hold, what drives them, and what they
-/// bear.
+/// The grasps of a scene: first those of all rods, then those of all cloths. The class knows their held parts, their
+/// driving frames, and the wrenches on them.
 class SceneGrasps
 {
 public:
@@ -20,27 +20,27 @@ public:
   auto end() const { return refs_.end(); }
 
   bool isActive(int grasp) const;
-  /// Where the held section, or the frame of a cloth's grasp, is.
+  /// Returns the pose of the held section, or of the frame of a cloth's grasp, in the world.
   const Pose& pose(int grasp) const;
-  /// Name of the rod or cloth that it holds.
+  /// Returns the name of the rod or cloth that the grasp holds.
   const std::string& heldObject(int grasp) const;
-  /// Force and torque on the gripper in the last step.
+  /// Returns the force [N] and torque [N m] on the gripper in the last step.
   const Wrench& wrench(int grasp) const;
 
   /// Returns the pose of the held section when the driving frame M of a grasp (a gripper or a body) is at X_WM. The
   /// offset in M is the one that the scene gives, or the one at the start (`attach: initial`). attach() and setOffset()
   /// replace it.
   GraspTarget targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity = std::nullopt) const;
-  /// Takes the offset between the driving frame now at X_WM and the held section.
+  /// Sets the offset in the driving frame from the present pose X_WM of this frame and the pose of the held section.
   void setOffset(int grasp, const Pose& X_WM);
 
-  /// Takes hold of nodes first..last of a rod as they are now, under the name of an existing grasp of that rod. Nothing
-  /// jumps: the offset from a table, or from a body or obstacle of the scene, is taken anew, whatever `attach` says of
-  /// the scene's start. Throws std::invalid_argument: no such grasp or nodes, overlap with another active grasp,
-  /// several nodes held by position.
+  /// Lets an existing grasp of a rod take hold of nodes first..last at their present places. Nothing jumps, because the
+  /// offset from a table, or from a body or obstacle of the scene, is measured again, whatever `attach` of the scene
+  /// says. Throws std::invalid_argument if the grasp or the nodes do not exist, if another active grasp holds one of
+  /// the nodes, or if several nodes are held by position.
   void attach(int grasp, int first_node, int last_node, Hold hold);
-  /// Likewise of vertices of a cloth, in any order. Throws std::invalid_argument: no such vertices, none, held by
-  /// another grasp.
+  /// Lets an existing grasp of a cloth take hold of vertices, given in any order. Throws std::invalid_argument if there
+  /// are no vertices, if one does not exist, or if another grasp holds one.
   void attachVertices(int grasp, std::vector<int> vertices);
   void release(int grasp);
 
@@ -49,23 +49,25 @@ private:
   friend class StaticsRunner;
   friend class StateTransfer;
 
-  /// The configuration, the model and the state outlive the grasps.
+  /// The configuration, the model and the state must outlive the grasps.
   SceneGrasps(const SceneConfig& config, const WorldModel& model, SceneState& state, std::vector<GraspRef> refs);
 
-  /// Inputs as the scene itself defines them at `time`: tables evaluated, everything else held where it is.
+  /// Sets the inputs that the scene itself defines at `time` [s]: tables are evaluated, all other objects stay in
+  /// place.
   void inputsAt(double time, SceneInputs& inputs) const;
-  /// Hands the targets of grasps over to the rods and cloths that they hold.
+  /// Copies the targets of grasps to the inputs of the rods and cloths that they hold.
   void takeTargets(const SceneInputs& inputs, WorldInputs& world);
-  /// After a step: grasps of cloths are where they were to go; wrenches of all.
+  /// Updates the poses of grasps of cloths to their targets, and the wrenches of all grasps. Call it after a step.
   void takeWrenches(const World& world);
 
   void check(int grasp) const;
   void checkHeld(int rod, int grasp, int first_node, int last_node) const;
-  /// The offset from the driving frame as a table has it at `time`, or as a body or obstacle of the scene stands now.
+  /// Sets the offset from the driving frame: the pose of a table at `time` [s], or the present pose of the followed
+  /// body or obstacle.
   void takeOffset(int grasp, double time);
-  /// What drives a grasp: its target, or the body or obstacle that it follows.
+  /// Returns the target of a grasp, or that of the body or obstacle that it follows.
   GraspTarget drivenTarget(int grasp, const SceneInputs& inputs) const;
-  /// Of the frame that a grasp with a body's motion follows; null when the scene has no such body or obstacle.
+  /// Returns the target of the followed body or obstacle, or nullptr if the scene has none of this name.
   const GraspTarget* followed(const BodyMotion& motion, const SceneInputs& inputs) const;
   GraspState& held(const GraspRef& ref) { return state_.rods[ref.rod].grasps[ref.index]; }
   const GraspState& held(const GraspRef& ref) const { return state_.rods[ref.rod].grasps[ref.index]; }
@@ -74,7 +76,7 @@ private:
   const WorldModel& model_;
   SceneState& state_;
   std::vector<GraspRef> refs_;
-  std::vector<Pose> cloth_targets_;   ///< per grasp: of those of cloths, where they are at the end of the step
+  std::vector<Pose> cloth_targets_;   ///< per grasp: pose at the end of the step; used for grasps of cloths
 };
 
 }   // namespace slender

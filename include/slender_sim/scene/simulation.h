@@ -53,25 +53,26 @@ public:
   TrackingError trackingError(int cloth) const { return world_->clothTrackingError(cloth, state_); }
   double rodTrackingError(int rod) const { return world_->rodTrackingError(rod, state_); }
 
-  /// Inputs as the scene itself defines them at the end of the coming step: tables evaluated, everything else held
-  /// where it is.
+  /// Returns the inputs that the scene itself defines at the end of the coming step: tables are evaluated, all other
+  /// objects stay in place.
   SceneInputs defaultInputs() const;
-  /// The same into those of an earlier step, which takes no memory.
+  /// Writes the same inputs into those of an earlier step. This allocates no memory.
   void defaultInputs(SceneInputs& inputs) const;
 
-  /// One step of config().time.step. On failure the state is untouched. Throws std::invalid_argument unless there is
-  /// one grasp target per grasp of the scene.
+  /// Takes one step of config().time.step. The state does not change if the step fails. Throws std::invalid_argument
+  /// unless there is one grasp target per grasp of the scene.
   StepReport step(const SceneInputs& inputs);
 
-  /// Of the equilibrium from which the scene starts; nothing when it starts as given.
+  /// Returns the report of the equilibrium from which the scene starts, or nothing if it starts as given.
   const std::optional<StepReport>& startReport() const { return start_report_; }
-  /// What `statics` of the scene asks for, from the present state on; without the key one equilibrium. The state
-  /// becomes the last equilibrium, at rest (with start.keep_velocities bodies keep their velocities). Throws SceneError
-  /// for objects that have no statics: cloth with contact, what tracks a guide, or nothing but threads. Equilibria that
-  /// were not found are told by StaticsRun::end.
+  /// Finds the equilibria that `statics` of the scene asks for, starting from the present state. Without this key it
+  /// finds one equilibrium. The state becomes the last equilibrium, at rest (with start.keep_velocities bodies keep
+  /// their velocities). Throws SceneError if the scene has objects without statics (cloth with contact, or objects that
+  /// track a guide) or only threads. StaticsRun::end tells whether an equilibrium was not found.
   StaticsRun runStatics();
 
-  /// Threads for scenes of several rods (at least 1; default: what OpenMP offers). Results do not depend on it.
+  /// Sets the number of threads for scenes with several rods (at least 1; default: that of OpenMP). Results do not
+  /// depend on it.
   void setThreads(int threads) { world_->setThreads(threads); }
 
   /// Returns to the initial state. Throws SceneError if an edit makes surfaces cross in the initial state; the present
@@ -80,16 +81,16 @@ public:
 
   /// Test functions in force of a tracked cloth.
   const FunctionSet& functions(int cloth) const { return world_->functions(cloth, state_); }
-  /// Has another set of test functions act from the next step on. What its averages are away from the guide's goes
-  /// within `blend` [s] (none: that of the scene), without a jump in position or velocity; 0: in one step. Throws
-  /// std::invalid_argument: not a tracked cloth, no set of this name, not a time, functions that depend on each other
-  /// on the vertices that are free.
+  /// Uses another set of test functions from the next step on. The difference between its averages and those of the
+  /// guide decreases to zero within `blend` [s] (nothing: the value of the scene), without a jump in position or
+  /// velocity. With 0 this takes one step. Throws std::invalid_argument if the cloth is not tracked, if it has no set
+  /// of this name, if `blend` is not a time, or if the functions are linearly dependent on the free vertices.
   void setFunctions(int cloth, const std::string& set, std::optional<double> blend = std::nullopt);
 
-  /// Exact restart. save writes a temporary file and renames it; both throw std::runtime_error naming what does not fit
-  /// or could not be written. A file of another scene (other rods, moduli, step or integrator) and a damaged
-  /// file are refused, and the state stays as it is. save() replaces an older file; if the path is a symbolic link, it
-  /// replaces the file to which the link leads. Neither function touches a path that is not a regular file.
+  /// Saves and loads the state for an exact restart. save() writes a temporary file and renames it. Both functions
+  /// throw std::runtime_error with the reason. load() refuses a damaged file and a file of another scene (other rods,
+  /// moduli, step or integrator); the state then does not change. save() replaces an older file; if the path is a
+  /// symbolic link, it replaces the target of the link. Neither function touches a path that is not a regular file.
   void save(const std::string& path) const;
   void load(const std::string& path);
 

@@ -26,13 +26,13 @@ struct CarriedGuide
 {
   std::vector<std::string> bodies;
   GuideBinding binding;
-  /// bodies carry the mesh from where it and they are at first; else vertices are in the bodies' frames
+  /// true: bodies carry the mesh with the offset at their first poses; false: vertices are in the bodies' frames
   bool keeps_offset = true;
   std::vector<PoseTrajectory> poses;   ///< per body; none: by `guide/bodies`
   bool by_tf = false;                  ///< bodies are names of tf frames instead of names in `guide/bodies`
   Pose offset;                         ///< pose of the mesh in the tf frame
 };
-/// By `guide/points`.
+/// Guide whose points come on the topic `guide/points`.
 struct TopicGuide
 {};
 /// A cloth of the scene, simulated beside what tracks it, and ahead of it in each step.

@@ -16,7 +16,7 @@
 
 namespace slender {
 
-/// What a rod or a cloth follows by weak constraints.
+/// The guide that a rod or a cloth follows by weak constraints.
 struct TrackedGuide
 {
   /// Sets of test functions. The first one acts at the start. Null: the part tracks nothing.
@@ -25,7 +25,7 @@ struct TrackedGuide
   int leader = -1;     ///< the cloth of the world that is the guide; -1: the guide is an input
 };
 
-/// What a world consists of: its parts, what they may touch, and what joins them. Nothing of it changes while it moves.
+/// The constant data of a world: its parts, the contacts that are possible, and the joints between parts.
 struct WorldModel
 {
   struct Rod
@@ -56,13 +56,13 @@ struct WorldModel
   struct Body
   {
     RigidBodyModel body;
-    /// That other parts touch; nothing: they pass through the body. Spheres, boxes and capsules of simulated bodies
-    /// touch obstacles and other bodies, if contact.gap is not 0.
+    /// Shape that other parts touch. With nothing they pass through the body. Spheres, boxes and capsules of simulated
+    /// bodies touch obstacles and other bodies, if contact.gap is not 0.
     std::optional<Shape> shape;
     Pose X_BS;                ///< the shape in the body's frame
     double friction = -1.0;   ///< as Obstacle::friction
 
-    /// What others touch. There must be a shape.
+    /// Returns the obstacle that other parts touch. There must be a shape.
     Obstacle solid() const { return {*shape, friction, body.name}; }
   };
   /// Welds nodes first..last of a rod to a body.
@@ -76,12 +76,12 @@ struct WorldModel
   std::vector<Thread> threads;
   std::vector<Cloth> cloths;
   std::vector<Body> bodies;
-  std::vector<Obstacle> obstacles;   ///< whose motions are inputs
+  std::vector<Obstacle> obstacles;   ///< their motions are inputs
   std::vector<RodWeld> welds;        ///< ascending by body
-  ContactOptions contact;            ///< of all that meets by the barrier; `least_stiffness` is chosen by what touches
+  ContactOptions contact;   ///< for contact by the barrier; `least_stiffness` is chosen from the objects in contact
   TimeConfig time;
 
-  /// Whether a cloth is the guide of another one. Such cloths are stepped first and meet only each other.
+  /// Returns true if a cloth is the guide of another one. Such cloths are stepped first and touch only each other.
   bool leads(int cloth) const;
 };
 
