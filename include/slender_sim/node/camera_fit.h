@@ -21,7 +21,7 @@ struct OrbitView
 /// are not much larger than the objects. Texts, arrows and material frames do not count.
 std::vector<Eigen::Vector3d> pointsToShow(const visualization_msgs::MarkerArray& markers);
 
-/// Returns the view with the same yaw and pitch in which the points lie in the middle of the picture and fill four
+/// Returns the view with the same yaw and pitch in which the points lie in the middle of the picture and fill three
 /// fifths of its width or height. `aspect` is width over height. Returns `view` unchanged if there are no points.
 OrbitView fittedView(const std::vector<Eigen::Vector3d>& points, const OrbitView& view, double aspect);
 
