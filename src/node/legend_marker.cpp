@@ -62,10 +62,14 @@ void addLegend(const Simulation& simulation, const std_msgs::Header& header, con
       const Pose& X = simulation.state().threads[k].threads.front().ends[1].X_WE;
       box.extend(X * Eigen::Vector3d(-4.0 * nozzle->diameter, 0, 0));
     }
-  if (text.empty() || box.isEmpty())
-    return;
-  const double size = box.diagonal().norm();
   Marker marker = makeMarker(header, "legend", 0, Marker::TEXT_VIEW_FACING);
+  if (text.empty() || box.isEmpty())
+  {
+    marker.action = Marker::DELETE;   // rviz would keep an earlier text
+    out.markers.push_back(std::move(marker));
+    return;
+  }
+  const double size = box.diagonal().norm();
   Eigen::Vector3d place = box.center();
   place.z() = box.max().z() + 0.1 * size;
   marker.pose.position = toPoint(place);
