@@ -80,8 +80,7 @@ StepReport IslandStepper::step(double duration, double& first)
   most_energy_ = conserving_ ? energyAtStart(allowance) : 0.0;
   most_energy_ += allowance;
   SubstepRule rule;
-  // all but shortened substeps are equally long
-  rule.longest = longest < duration ? duration / std::ceil(duration / longest * (1 - 1e-9)) : duration;
+  rule.longest = evenSubstep(duration, longest);
   rule.error_tolerance = surface_changes_ ? 0.0 : time_.error_tolerance;
   rule.min_step = time_.min_step;
   rule.order = order(time_.integrator);

@@ -21,6 +21,11 @@ void countWork(const StepReport& substep, StepReport& report)
 
 }   // namespace
 
+double evenSubstep(double duration, double longest)
+{
+  return longest < duration ? duration / std::ceil(duration / longest * (1.0 - kRounding)) : duration;
+}
+
 void SubstepController::run(SubstepEquations& equations, double duration, StepReport& report)
 {
   const bool adaptive = rule_.error_tolerance > 0;

@@ -6,19 +6,18 @@
 
 #include <Eigen/Cholesky>
 
-#include "rod_stepper_impl.h"
-#include "slender_sim/dynamics/substep_controller.h"
+#include "../contact/island_stepper.h"
+#include "rod_part.h"
 #include "slender_sim/rod/average_projection.h"
-#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
-/// A rod's equations under constraints C x = targets, as minimize() wants them.
-class ConstrainedRod
+/// A rod under constraints C x = targets. Directions go along them, by a Schur complement of the rod's matrix.
+class AveragedPart : public RodPart
 {
 public:
-  ConstrainedRod(RodSystem& rod, const AveragedRod::Averages& c)
-    : rod_(rod),
+  AveragedPart(RodStepper::Impl& rod, const AveragedRod::Averages& c)
+    : RodPart(rod, false),
       c_(c),
       rows_(3 * c.rows()),
       columns_(4 * c.cols(), rows_),
@@ -31,90 +30,65 @@ public:
     multipliers_.setZero();
   }
 
-  /// Trial positions of free nodes, moved by the least sum of mass times distance squared so that they have the
-  /// averages. False: averages depend on each other.
-  bool meet(const Eigen::VectorXd& mass, const Eigen::Matrix3Xd& targets)
+  /// The averages move uniformly in the step from where they are in the loaded state to `targets` (3 x count [m]).
+  void setTargets(const Eigen::Matrix3Xd& targets)
   {
     targets_ = &targets;
-    if (!projection_.prepare(mass, [this](int node) { return rod_.isFree(node); }))
-      return false;
-    for (int k = 0; k < 3; ++k)
-    {
-      for (Eigen::Index i = 0; i < c_.rows(); ++i)
-        gap_[i] = targets(k, i) - average(i, rod_.arrays().x[k]);
-      const Eigen::VectorXd& moved = projection_.displacements(gap_.head(c_.rows()));
-      for (int j = 0; j < static_cast<int>(c_.cols()); ++j)
-        if (rod_.isFree(j))
-        {
-          Eigen::Vector3d x = rod_.position(j);
-          x[k] += moved[j];
-          rod_.setPosition(j, x);
-        }
-    }
-    return true;
-  }
-
-  /// Of averages, in the rod's axes: three per average [N].
-  const Eigen::VectorXd& multipliers() const { return multipliers_; }
-
-  RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {})
-  {
-    return rod_.evaluate(with_hessian, shift);
-  }
-  void solve()
-  {
-    rod_.solve();
-    columns_.setZero();
-    for (Eigen::Index i = 0; i < c_.rows(); ++i)
+    start_.setZero(3, targets.cols());   // entry by entry: Eigen's product takes memory
+    for (Eigen::Index i = 0; i < targets.cols(); ++i)
       for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
-        if (rod_.isFree(static_cast<int>(entry.col())))
-          for (int k = 0; k < 3; ++k)
-            columns_(4 * entry.col() + k, 3 * i + k) = entry.value();
-    for (Eigen::Index r = 0; r < rows_; ++r)
-      rod_.solveFor(columns_.col(r).data());
-    Eigen::Map<Eigen::VectorXd> direction(rod_.direction(), columns_.rows());
-    for (Eigen::Index i = 0; i < c_.rows(); ++i)
-      for (int k = 0; k < 3; ++k)
-      {
-        const Eigen::Index row = 3 * i + k;
-        schur_.row(row).setZero();
-        gap_[row] = -(*targets_)(k, i);
-        for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
-        {
-          const Eigen::Index at = 4 * entry.col() + k;
-          schur_.row(row) += entry.value() * columns_.row(at);
-          gap_[row] += entry.value() * (rod_.basePosition(static_cast<int>(entry.col()))[k] + direction[at]);
-        }
-      }
-    factor_.compute(schur_);
-    multipliers_ = gap_;
-    factor_.solveInPlace(multipliers_);
-    direction.noalias() -= columns_ * multipliers_;
+        start_.col(i) += entry.value() * rod().work.x.col(entry.col());
   }
-  void moveAlong(double alpha) { rod_.moveAlong(alpha); }
-  void accept() { rod_.accept(); }
-  void saveBase() { rod_.saveBase(); }
-  void restoreBase() { rod_.restoreBase(); }
-  double stepLimit() const { return rod_.stepLimit(); }
-  double incrementSize() const { return rod_.incrementSize(); }
-  static constexpr bool anglesMayKeepShift() { return RodSystem::anglesMayKeepShift(); }
-  static constexpr double mostUnbalanced() { return RodSystem::mostUnbalanced(); }
-  double slope() const { return rod_.slope(); }
-  double residual()
+
+  Eigen::Matrix3Xd forces;   ///< with which the averages act at the end of the last substep (3 x count [N])
+
+private:
+  // ---- as PartSteps
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override
+  {
+    if (const StepFailure failure = RodPart::beginSubstep(plan, substep); failure != StepFailure::none)
+      return failure;
+    at_ = start_ + (substep.from + substep.length) / duration() * (*targets_ - start_);
+    return projection_.prepare(rod().model->mass, [this](int node) { return system_.isFree(node); })
+               ? StepFailure::none
+               : StepFailure::singular_matrix;   // averages depend on each other
+  }
+  void beginStage(std::size_t stage) override
+  {
+    RodPart::beginStage(stage);
+    meet();
+  }
+  void endStage(std::size_t stage, bool last, StepReport& report) override
+  {
+    RodPart::endStage(stage, last, report);
+    forces = -Eigen::Map<const Eigen::Matrix3Xd>(multipliers_.data(), 3, c_.rows());
+    bearShares();
+  }
+  void refuse(StepFailure failure, double length, StepReport& report) const override
+  {
+    const char* dependent =
+        "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
+    rod().refuseUnsolved(report, failure, length, false, failure == StepFailure::singular_matrix ? dependent : "",
+                         true);
+  }
+
+  // ---- as Part
+  void solve() override;
+  double residual() const override
   {
     addMultipliers(1.0);
-    const double residual = rod_.residual();
+    const double residual = system_.residual();
     addMultipliers(-1.0);
     return residual;
   }
-  double forceScale() const
+  double forceScale() const override
   {
-    return std::max(rod_.forceScale(),
+    return std::max(system_.forceScale(),
                     multipliers_.cwiseAbs().maxCoeff() / std::max<Eigen::Index>(1, c_.cols() / c_.rows()));
   }
-  double noiseLevel() const { return rod_.noiseLevel(); }
 
-private:
+  void meet();
+  void bearShares();
   double average(Eigen::Index i, const double* x) const
   {
     double sum = 0.0;
@@ -122,107 +96,113 @@ private:
       sum += entry.value() * x[entry.col()];
     return sum;
   }
-
-  void addMultipliers(double factor)
+  void addMultipliers(double factor) const
   {
     for (Eigen::Index i = 0; i < c_.rows(); ++i)
       for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
-        if (rod_.isFree(static_cast<int>(entry.col())))
+        if (system_.isFree(static_cast<int>(entry.col())))
           for (int k = 0; k < 3; ++k)
-            rod_.gradient()[4 * entry.col() + k] += factor * entry.value() * multipliers_[3 * i + k];
+            system_.gradient()[4 * entry.col() + k] += factor * entry.value() * multipliers_[3 * i + k];
   }
 
-  RodSystem& rod_;
   const AveragedRod::Averages& c_;
   const Eigen::Matrix3Xd* targets_ = nullptr;
+  Eigen::Matrix3Xd start_, at_;   ///< averages where the step begins, and where the substep ends [m]
   Eigen::Index rows_;
   Eigen::MatrixXd columns_;   ///< K^-1 C^T, 4 nodes x 3 averages
   Eigen::MatrixXd schur_;     ///< C K^-1 C^T
   Eigen::LDLT<Eigen::MatrixXd> factor_;
-  Eigen::VectorXd gap_, multipliers_;
+  Eigen::VectorXd gap_, multipliers_;   ///< multipliers_: three per average [N]
   AverageProjection projection_;
 };
 
-class AveragedRod::Impl : public SubstepEquations
+/// Moves the trial positions of free nodes by the least sum of mass times distance squared, so that they have the
+/// averages.
+void AveragedPart::meet()
+{
+  for (int k = 0; k < 3; ++k)
+  {
+    for (Eigen::Index i = 0; i < c_.rows(); ++i)
+      gap_[i] = at_(k, i) - average(i, system_.arrays().x[k]);
+    const Eigen::VectorXd& moved = projection_.displacements(gap_.head(c_.rows()));
+    for (int j = 0; j < static_cast<int>(c_.cols()); ++j)
+      if (system_.isFree(j))
+      {
+        Eigen::Vector3d x = system_.position(j);
+        x[k] += moved[j];
+        system_.setPosition(j, x);
+      }
+  }
+}
+
+void AveragedPart::solve()
+{
+  system_.solve();
+  columns_.setZero();
+  for (Eigen::Index i = 0; i < c_.rows(); ++i)
+    for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
+      if (system_.isFree(static_cast<int>(entry.col())))
+        for (int k = 0; k < 3; ++k)
+          columns_(4 * entry.col() + k, 3 * i + k) = entry.value();
+  for (Eigen::Index r = 0; r < rows_; ++r)
+    system_.solveFor(columns_.col(r).data());
+  Eigen::Map<Eigen::VectorXd> direction(system_.direction(), columns_.rows());
+  for (Eigen::Index i = 0; i < c_.rows(); ++i)
+    for (int k = 0; k < 3; ++k)
+    {
+      const Eigen::Index row = 3 * i + k;
+      schur_.row(row).setZero();
+      gap_[row] = -at_(k, i);
+      for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
+      {
+        const Eigen::Index at = 4 * entry.col() + k;
+        schur_.row(row) += entry.value() * columns_.row(at);
+        gap_[row] += entry.value() * (system_.basePosition(static_cast<int>(entry.col()))[k] + direction[at]);
+      }
+    }
+  factor_.compute(schur_);
+  multipliers_ = gap_;
+  factor_.solveInPlace(multipliers_);
+  direction.noalias() -= columns_ * multipliers_;
+}
+
+/// Averages pull at held nodes, too, which hand that on to what holds them.
+void AveragedPart::bearShares()
+{
+  RodStepper::Impl& rod = this->rod();
+  for (Eigen::Index i = 0; i < c_.rows(); ++i)
+    for (AveragedRod::Averages::InnerIterator entry(c_, i); entry; ++entry)
+    {
+      const int node = static_cast<int>(entry.col());
+      for (std::size_t k = 0; k < rod.wrenches.size() && !system_.isFree(node); ++k)
+      {
+        const GraspState& grasp = rod.work.grasps[k];
+        if (!grasp.active || node < grasp.first_node || node > grasp.last_node)
+          continue;
+        const Eigen::Vector3d force = entry.value() * forces.col(i);
+        rod.wrenches[k].force += force;
+        rod.wrenches[k].torque += (system_.position(node) - rod.stage_poses[k].position).cross(force);
+      }
+    }
+}
+
+class AveragedRod::Impl
 {
 public:
   Impl(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> a, const TimeConfig& time)
     : rod(std::move(model), time),
       averages(std::move(a)),
-      equations(rod.system, *averages)
+      part(rod, *averages),
+      island(time, false)
   {
-    plan.stages.reserve(2);
-  }
-
-  StepFailure attempt(const Substep& substep, StepReport& report) override
-  {
-    const double t = substep.from, h = substep.length;
-    planStep(Integrator::implicit_euler, rod.time.spectral_radius, h, rod.work.last_step, plan);
-    if (const StepFailure failure = rod.beginStep(plan, *inputs, duration, t, h); failure != StepFailure::none)
-      return failure;
-    rod.beginStage(0, *inputs, duration, t, h);
-    at = start + (t + h) / duration * (*targets - start);
-    if (!equations.meet(rod.model->mass, at))
-      return StepFailure::singular_matrix;
-    const NewtonResult newton = minimize(equations, rod.time.newton);
-    report.iterations += newton.iterations;
-    report.factorizations += newton.factorizations;
-    if (!newton.ok())
-      return newton.failure;
-    report.residual = std::max(report.residual, newton.residual);
-    report.max_strain = std::max(report.max_strain, newton.max_strain);
-    rod.finishStep(*inputs, duration, t, h, report);
-    forces = -Eigen::Map<const Eigen::Matrix3Xd>(equations.multipliers().data(), 3, averages->rows());
-    bearShares();
-    return StepFailure::none;
-  }
-
-  void accept(const Substep& substep) override
-  {
-    rod.moveGrasps(*inputs, duration, substep.to);
-    std::swap(rod.work, rod.next);
-  }
-
-  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override
-  {
-    if (failure == StepFailure::interrupted)
-    {
-      rod.refuse(report, failure, kStepInterrupted);
-      return;
-    }
-    const char* dependent =
-        "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
-    rod.refuseUnsolved(report, failure, substep.length, false, failure == StepFailure::singular_matrix ? dependent : "",
-                       true);
-  }
-
-  /// Averages pull at held nodes, too, which hand that on to what holds them.
-  void bearShares()
-  {
-    for (Eigen::Index i = 0; i < averages->rows(); ++i)
-      for (Averages::InnerIterator entry(*averages, i); entry; ++entry)
-      {
-        const int node = static_cast<int>(entry.col());
-        for (std::size_t k = 0; k < rod.wrenches.size() && !rod.system.isFree(node); ++k)
-        {
-          const GraspState& grasp = rod.work.grasps[k];
-          if (!grasp.active || node < grasp.first_node || node > grasp.last_node)
-            continue;
-          const Eigen::Vector3d force = entry.value() * forces.col(i);
-          rod.wrenches[k].force += force;
-          rod.wrenches[k].torque += (rod.system.position(node) - rod.stage_poses[k].position).cross(force);
-        }
-      }
+    island.island().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
+    island.setMembers({{&part, &part}});
   }
 
   RodStepper::Impl rod;
   std::shared_ptr<const Averages> averages;
-  ConstrainedRod equations;
-  StepPlan plan;
-  Eigen::Matrix3Xd start, at, forces;
-  const Eigen::Matrix3Xd* targets = nullptr;
-  const RodInputs* inputs = nullptr;   ///< of the present step
-  double duration = 0.0;               ///< of the present step [s]
+  AveragedPart part;
+  IslandStepper island;
 };
 
 AveragedRod::AveragedRod(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> averages,
@@ -259,22 +239,16 @@ StepReport AveragedRod::step(RodState& state, const RodInputs& inputs, const Eig
   if (!what.empty() || !rod.inputsFinite(state, inputs, what))
     return rod.refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   rod.begin(state);
-  impl_->start.setZero(3, targets.cols());   // entry by entry: Eigen's product takes memory
-  for (Eigen::Index i = 0; i < targets.cols(); ++i)
-    for (Averages::InnerIterator entry(*impl_->averages, i); entry; ++entry)
-      impl_->start.col(i) += entry.value() * state.x.col(entry.col());
-  impl_->targets = &targets;
-  impl_->inputs = &inputs;
-  impl_->duration = duration;
-  const SubstepRule rule{duration, 0.0, 0.0, rod.time.min_step, 1, rod.time.newton.max_cuts};
-  SubstepController(rule).run(*impl_, duration, report);
-  if (!report.ok)
-    return report;
-  state = rod.work;
+  impl_->part.setTargets(targets);
+  impl_->part.begin(inputs, duration);
+  double first = 0.0;
+  report = impl_->island.step(duration, first);
+  if (report.ok)
+    state = rod.work;
   return report;
 }
 
-const Eigen::Matrix3Xd& AveragedRod::averageForces() const { return impl_->forces; }
+const Eigen::Matrix3Xd& AveragedRod::averageForces() const { return impl_->part.forces; }
 const std::vector<Wrench>& AveragedRod::wrenches() const { return impl_->rod.wrenches; }
 RodEnergies AveragedRod::energies(const RodState& state, const Eigen::Vector3d& gravity) const
 {

@@ -5,6 +5,7 @@
 
 #include "../linalg/cholesky6.h"
 #include "slender_sim/geometry/rotation.h"
+#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
@@ -24,9 +25,10 @@ Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q
 
 }   // namespace
 
-ExplicitSystem::ExplicitSystem(const std::vector<RodStepper::Impl*>& rods, const std::vector<SimulatedBody>& bodies,
-                               std::vector<Weld> welds)
-  : welds_(std::move(welds))
+ExplicitSystem::ExplicitSystem(const TimeConfig& time, const std::vector<RodStepper::Impl*>& rods,
+                               const std::vector<SimulatedBody>& bodies, std::vector<Weld> welds)
+  : time_(time),
+    welds_(std::move(welds))
 {
   for (RodStepper::Impl* rod : rods)
   {
@@ -51,10 +53,38 @@ void ExplicitSystem::begin(const std::vector<RigidBodyState>& bodies, const Eige
     body.now = body.next = bodies[body.number];
 }
 
-void ExplicitSystem::commitStep()
+StepReport ExplicitSystem::step(double duration)
 {
+  StepReport report;
+  duration_ = duration;
+  SubstepController controller({duration, 0.0, 0.0, time_.min_step, order(time_.integrator), time_.newton.max_cuts});
+  controller.run(*this, duration, report);
+  for (const Rod& rod : rods_)
+    rod.rod->work.next_step = controller.nextLength();
+  return report;
+}
+
+void ExplicitSystem::accept(const Substep& substep)
+{
+  for (const Rod& rod : rods_)
+  {
+    rod.rod->moveGrasps(*rod.inputs, duration_, substep.to);
+    std::swap(rod.rod->work, rod.rod->next);
+  }
   for (Body& body : bodies_)
     body.now = body.next;
+}
+
+void ExplicitSystem::refuse(const Substep& substep, StepFailure failure, StepReport& report)
+{
+  report.ok = false;
+  report.failure = failure;
+  if (failure == StepFailure::interrupted)
+    report.message = kStepInterrupted;
+  else if (rods_.empty())
+    report.message = "the bodies' motion was not found: use a shorter step";
+  else
+    rods_[failed_].rod->refuseUnsolved(report, failure, substep.length, true);
 }
 
 void ExplicitSystem::end(std::vector<RigidBodyState>& bodies) const
@@ -194,19 +224,21 @@ void ExplicitSystem::placeStart(Body& body, const Pose& X)
     }
 }
 
-StepFailure ExplicitSystem::step(double duration, double t, double h, StepReport& report, std::size_t& failed)
+StepFailure ExplicitSystem::attempt(const Substep& substep, StepReport& report)
 {
+  const double t = substep.from, h = substep.length;
+  failed_ = 0;
   // before a run's first step whatever stretching a rod comes with is taken out without becoming a velocity
   const bool first =
       std::any_of(rods_.begin(), rods_.end(), [](const Rod& rod) { return rod.rod->work.last_step == 0.0; });
   if (inextensible_ && first)
   {
     composeBodies();
-    if (const StepFailure failure = project(h, true, report, failed); failure != StepFailure::none)
+    if (const StepFailure failure = project(h, true, report); failure != StepFailure::none)
       return failure;
   }
-  for (failed = 0; failed < rods_.size(); ++failed)
-    if (const StepFailure failure = rods_[failed].rod->explicitPredict(*rods_[failed].inputs, duration, t, h, report);
+  for (failed_ = 0; failed_ < rods_.size(); ++failed_)
+    if (const StepFailure failure = rods_[failed_].rod->explicitPredict(*rods_[failed_].inputs, duration_, t, h, report);
         failure != StepFailure::none)
       return failure;
   composeBodies();
@@ -214,14 +246,14 @@ StepFailure ExplicitSystem::step(double duration, double t, double h, StepReport
     predictBody(body, h);
   if (inextensible_)
   {
-    if (const StepFailure failure = project(h, false, report, failed); failure != StepFailure::none)
+    if (const StepFailure failure = project(h, false, report); failure != StepFailure::none)
       return failure;
   }
   else
     for (Body& body : bodies_)
       placeBody(body, body.predicted, body.velocity);
-  for (failed = 0; failed < rods_.size(); ++failed)
-    if (const StepFailure failure = rods_[failed].rod->explicitFinish(*rods_[failed].inputs, duration, t, h);
+  for (failed_ = 0; failed_ < rods_.size(); ++failed_)
+    if (const StepFailure failure = rods_[failed_].rod->explicitFinish(*rods_[failed_].inputs, duration_, t, h);
         failure != StepFailure::none)
       return failure;
   for (const Body& body : bodies_)
@@ -230,7 +262,7 @@ StepFailure ExplicitSystem::step(double duration, double t, double h, StepReport
     if (!b.X_WB.position.allFinite() || !b.X_WB.orientation.coeffs().allFinite() || !b.velocity.linear.allFinite() ||
         !b.velocity.angular.allFinite())
     {
-      failed = 0;
+      failed_ = 0;
       return StepFailure::state_not_finite;
     }
   }
@@ -239,7 +271,7 @@ StepFailure ExplicitSystem::step(double duration, double t, double h, StepReport
 
 /// Restores the lengths of inextensible rods' edges. `start_only`: of the state the substep begins with, velocities
 /// staying what they are.
-StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& report, std::size_t& failed)
+StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& report)
 {
   for (std::size_t r = 0; r < rods_.size(); ++r)
   {
@@ -286,10 +318,10 @@ StepFailure ExplicitSystem::project(double h, bool start_only, StepReport& repor
   const ProjectionReport result = projection_.project(h);
   if (!result.ok)
   {
-    failed = 0;
-    while (failed + 1 < rods_.size() && rods_[failed].chain != std::max(result.chain, 0))
-      ++failed;
-    rods_[failed].rod->overstretched =
+    failed_ = 0;
+    while (failed_ + 1 < rods_.size() && rods_[failed_].chain != std::max(result.chain, 0))
+      ++failed_;
+    rods_[failed_].rod->overstretched =
         result.chain < 0 ? std::array<int, 2>{-1, -1} : std::array<int, 2>{result.first_node, result.last_node};
     return StepFailure::overstretched;
   }

@@ -47,6 +47,12 @@ public:
   int points() const override { return touches_ ? system_.nodes() : 0; }
   void addSurface(ContactSurface& surface) const override;
 
+protected:
+  double duration() const { return duration_; }   ///< of the step [s]
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
+  void beginStage(std::size_t stage) override;
+  void endStage(std::size_t stage, bool last, StepReport& report) override;
+
 private:
   // ---- as Part
   int nodeOf(int point) const override { return point; }
@@ -65,13 +71,10 @@ private:
   // ---- as PartSteps
   double lastSubstep() const override { return rod_.work.last_step; }
   double shortestEdge() const override { return shortest_edge_; }
-  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
   void addStartLoads() override;
   void takeStartAcceleration() override;
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
-  void beginStage(std::size_t stage) override;
-  void endStage(std::size_t stage, bool last, StepReport& report) override;
   void acceptSubstep(const Substep& substep) override;
   bool conserves() const override;
   double energyAtStart(double& allowance) override;

@@ -4,15 +4,46 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "rod_stepper_impl.h"
+#include "../contact/island_stepper.h"
+#include "explicit_system.h"
+#include "rod_part.h"
 #include "slender_sim/geometry/rotation.h"
-#include "step_loop.h"
 
 namespace slender {
 
+/// What steps a rod that nothing else meets.
+class RodStepper::Alone
+{
+public:
+  explicit Alone(Impl& rod) : rod_(rod), part_(rod, false), island_(rod.time, false)
+  {
+    if (rod.time.integrator == Integrator::symplectic_euler)
+      explicit_ = std::make_unique<ExplicitSystem>(rod.time, std::vector<Impl*>{&rod});
+    island_.island().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
+    island_.setMembers({{&part_, &part_}});
+  }
+
+  /// From what the rod has loaded.
+  StepReport step(const RodInputs& inputs, double duration)
+  {
+    if (explicit_)
+    {
+      explicit_->setInputs(0, inputs);
+      return explicit_->step(duration);
+    }
+    part_.begin(inputs, duration);
+    return island_.step(duration, rod_.work.next_step);
+  }
+
+private:
+  Impl& rod_;
+  RodPart part_;
+  IslandStepper island_;
+  std::unique_ptr<ExplicitSystem> explicit_;   ///< null: implicit steps
+};
+
 RodStepper::RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& time)
-  : impl_(std::make_unique<Impl>(std::move(model), time)),
-    loop_(std::make_unique<StepLoop>(time, *impl_))
+  : impl_(std::make_unique<Impl>(std::move(model), time))
 {
 }
 RodStepper::~RodStepper() = default;
@@ -20,7 +51,21 @@ RodStepper::RodStepper(RodStepper&&) noexcept = default;
 
 StepReport RodStepper::step(RodState& state, const RodInputs& inputs, double duration)
 {
-  return loop_->step(state, inputs, duration);
+  StepReport report;
+  std::string what;
+  if (!(duration > 0) || !std::isfinite(duration))
+    return impl_->refuse(report, StepFailure::input_not_finite,
+                         "step length must be positive and finite, got " + std::to_string(duration));
+  if (!impl_->inputsFinite(state, inputs, what))
+    return impl_->refuse(report, StepFailure::input_not_finite,
+                         what + " is not finite or not valid; correct this input");
+  if (!alone_)
+    alone_ = std::make_unique<Alone>(*impl_);
+  impl_->begin(state);
+  report = alone_->step(inputs, duration);
+  if (report.ok)
+    state = impl_->work;
+  return report;
 }
 StepReport RodStepper::solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles)
 {

@@ -14,8 +14,7 @@
 
 namespace slender {
 
-/// One rod's part in a step and its work space, which is reused from step to step. StepLoop runs a rod on its own,
-/// the islands of the world run several.
+/// One rod's part in a step and its work space, which is reused from step to step.
 class RodStepper::Impl
 {
 public:

@@ -10,8 +10,8 @@ void ThreadPart::begin(double from, double to, double h)
   to_ = to;
   share_ = 1.0;
   const ThreadState& work = thread_.work;
-  end_.resize(work.x.size());
-  for (int i = 0; i < work.nodes(); ++i)
+  end_.resize(static_cast<std::size_t>(points()));
+  for (int i = 0; i < points(); ++i)
     end_[i] =
         nodeOf(i) < 0 ? Eigen::Vector3d(work.x[i] + h * thread_.inputs().belt_velocity) : system_.position(nodeOf(i));
 }

@@ -9,7 +9,7 @@
 
 namespace slender {
 
-/// A thread as a part of an island. All its nodes are surface points. Those that lie on a floor which they stick to
+/// A thread as a part of an island. If it touches something, all its nodes are surface points. Those that lie on a floor which they stick to
 /// move with that floor and have no unknowns.
 class ThreadPart : public ChainPart, public PartSteps
 {
@@ -22,10 +22,11 @@ public:
   /// Nodes have been held where they met the floor: they go there from the base.
   void holdLanded();
 
-  /// What the thread touches; `owner` is the number of the thread of which it is a part.
+  /// What the thread touches; without a call nothing. `owner` is the number of the thread of which it is a part.
   /// `merging`: as WorldModel::Thread::merging.
   void setContact(const ContactProperties& contact, double merging, int owner)
   {
+    touches_ = true;
     contact_ = contact;
     merging_ = merging;
     owner_ = owner;
@@ -35,7 +36,7 @@ public:
   /// In the steps below: what a change of shape may not come near (null: nothing).
   void setGuard(const RemeshGuard* guard) { guard_ = guard; }
   void setDuration(double duration) { duration_ = duration; }   ///< of the step [s]
-  int points() const override { return thread_.work.nodes(); }
+  int points() const override { return touches_ ? thread_.work.nodes() : 0; }
   void addSurface(ContactSurface& surface) const override;
 
 private:
@@ -70,6 +71,7 @@ private:
   Eigen::Vector3d lying(int node) const { return thread_.work.x[node] + share_ * (end_[node] - thread_.work.x[node]); }
 
   ThreadStepper::Impl& thread_;
+  bool touches_ = false;
   ContactProperties contact_;
   double merging_ = 0.0;
   int owner_ = 0;

@@ -78,10 +78,7 @@ void ThreadPart::holdMore()
 
 StepFailure ThreadPart::finishSubstep(StepReport&)
 {
-  thread_.takeOver(length_);
-  if (!thread_.remesh(guard_))
-    return StepFailure::overstretched;
-  return thread_.overgrownEdge() >= 0 ? StepFailure::squeezed : StepFailure::none;
+  return thread_.takeOver(length_, guard_);
 }
 
 /// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by

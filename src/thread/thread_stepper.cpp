@@ -7,9 +7,74 @@
 #include <stdexcept>
 #include <utility>
 
-#include "thread_loop.h"
+#include "../contact/island_stepper.h"
+#include "slender_sim/linalg/interruption.h"
+#include "thread_part.h"
 
 namespace slender {
+
+/// What steps a thread that touches nothing but its floor: an island of its own, or explicit steps.
+class ThreadStepper::Alone : SubstepEquations
+{
+public:
+  explicit Alone(Impl& thread) : thread_(thread), part_(thread), island_(timeOf(thread.newton), false)
+  {
+    island_.island().tolerances.most_unbalanced = ThreadSystem::mostUnbalanced();
+    island_.setMembers({{&part_, &part_}});
+  }
+
+  /// From what the thread has loaded.
+  StepReport step(double duration)
+  {
+    duration_ = duration;
+    part_.setDuration(duration);
+    double first = 0.0;
+    return thread_.explicit_step ? stepExplicitly() : island_.step(duration, first);
+  }
+
+private:
+  static TimeConfig timeOf(const NewtonConfig& newton)
+  {
+    TimeConfig time;
+    time.integrator = Integrator::implicit_euler;
+    time.error_tolerance = time.min_step = 0.0;
+    time.newton = newton;
+    return time;
+  }
+
+  StepReport stepExplicitly()
+  {
+    StepReport report;
+    SubstepRule rule;
+    rule.longest = evenSubstep(duration_, thread_.longestSubstep(duration_));
+    rule.max_cuts = thread_.newton.max_cuts;
+    SubstepController(rule).run(*this, duration_, report);
+    return report;
+  }
+
+  // ---- an explicit substep
+  StepFailure attempt(const Substep& substep, StepReport&) override
+  {
+    StepFailure failure = thread_.prepare(substep.from, substep.to, duration_);
+    if (failure == StepFailure::none)
+      failure = thread_.move(substep.to - substep.from);
+    return failure == StepFailure::none ? thread_.takeOver(substep.to - substep.from, nullptr) : failure;
+  }
+  void accept(const Substep&) override {}   // the attempt changes the work state only when it succeeds
+  bool shorterMayHelp(StepFailure) const override { return false; }
+  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override
+  {
+    if (failure == StepFailure::interrupted)
+      thread_.refuse(report, failure, kStepInterrupted);
+    else
+      thread_.refuseUnsolved(report, failure, substep.length);
+  }
+
+  Impl& thread_;
+  ThreadPart part_;
+  IslandStepper island_;
+  double duration_ = 0.0;   ///< of the present step [s]
+};
 
 namespace {
 
@@ -47,6 +112,7 @@ ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const New
         "thread '" + model->name + "': floor.friction is " + std::to_string(model->floor.friction) +
         ", but on a floor that slips a thread needs contact: give it one, for example contact: {}");
   impl_ = std::make_unique<Impl>(std::move(model), newton, integrator == Integrator::symplectic_euler);
+  alone_ = std::make_unique<Alone>(*impl_);
 }
 ThreadStepper::~ThreadStepper() = default;
 ThreadStepper::ThreadStepper(ThreadStepper&&) noexcept = default;
@@ -54,7 +120,13 @@ ThreadStepper& ThreadStepper::operator=(ThreadStepper&&) noexcept = default;
 
 StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, double duration)
 {
-  return advanceThread(*impl_, state, inputs, duration);
+  StepReport report;
+  if (!impl_->begin(state, inputs, duration, report))
+    return report;
+  report = alone_->step(duration);
+  if (report.ok)
+    std::swap(state, impl_->work);
+  return report;
 }
 const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return impl_->loads; }
 const ThreadModel& ThreadStepper::model() const { return *impl_->model; }
@@ -260,16 +332,14 @@ StepFailure ThreadStepper::Impl::prepare(double from, double to, double duration
   return StepFailure::none;
 }
 
-StepFailure ThreadStepper::Impl::solveAlone(double h, StepReport& report)
-{
-  return explicit_step ? move(h) : solve(h, report);
-}
-
-void ThreadStepper::Impl::takeOver(double h)
+StepFailure ThreadStepper::Impl::takeOver(double h, const RemeshGuard* guard)
 {
   finish(*inputs_, h);
   if (explicit_step)
     push(h);
+  if (!remesh(guard))
+    return StepFailure::overstretched;
+  return overgrownEdge() >= 0 ? StepFailure::squeezed : StepFailure::none;
 }
 
 }   // namespace slender

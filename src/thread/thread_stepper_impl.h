@@ -24,7 +24,7 @@ public:
   {
   }
 
-  // ---- a step in substeps, see advanceThread()
+  // ---- a step in substeps
   /// Returns false if an input or the state is not sound. The report then says so.
   bool begin(const ThreadState& state, const ThreadInputs& inputs, double duration, StepReport& report);
   /// Of a substep: no more than an edge leaves the nozzle at a time, and ThreadLimits::max_step.
@@ -35,13 +35,10 @@ public:
   }
   /// The equations of a substep and a first guess.
   StepFailure prepare(double from, double to, double duration);
-  /// Solves them for this thread on its own.
-  StepFailure solveAlone(double h, StepReport& report);
-  /// Takes the solution over.
-  void takeOver(double h);
-  /// Divides, joins and takes away edges, as far as the guard (may be null) allows; nothing of it when the step needs
-  /// none. Returns false if it would take more edges than a motion can mean.
-  bool remesh(const RemeshGuard* guard);
+  /// Explicit step, first half: everything goes on as it moves. What resists this motion is then known.
+  StepFailure move(double h);
+  /// Takes the solution over. Then divides, joins and takes away edges, as far as the guard (may be null) allows.
+  StepFailure takeOver(double h, const RemeshGuard* guard);
   int foldedNode() const;
   /// The edge whose section has grown beyond what a thread can be; -1: there is none. See explainFailure().
   int overgrownEdge() const;
@@ -83,10 +80,9 @@ private:
   bool loadSystem(double h);
   void setResponse(const ThreadInputs& inputs, double h);
   void setTrial(const ThreadInputs& inputs, double h);
-  StepFailure solve(double h, StepReport& report);
-  StepFailure move(double h);
   void push(double h);
-  bool land(double h);
+  /// Returns false if the step would take more edges than a motion can mean.
+  bool remesh(const RemeshGuard* guard);
   bool meetsFloor(int node, double& when) const;
   void finish(const ThreadInputs& inputs, double h);
   void restBetweenLying(const Eigen::Vector3d& belt_velocity);

@@ -165,29 +165,13 @@ void ThreadStepper::Impl::setTrial(const ThreadInputs& inputs, double h)
   }
 }
 
-StepFailure ThreadStepper::Impl::solve(double h, StepReport& report)
-{
-  do
-  {
-    const NewtonResult result = minimize(system, newton);
-    report.iterations += result.iterations;
-    report.factorizations += result.factorizations;
-    if (!result.ok())
-      return result.failure;
-    report.residual = result.residual;
-    report.max_strain = std::max(report.max_strain, result.max_strain);
-  }
-  while (land(h));
-  return StepFailure::none;
-}
-
-/// Explicit step, first half: everything goes on as it moves. What resists this motion is then known.
 StepFailure ThreadStepper::Impl::move(double h)
 {
   for (int j = first_; j + 1 < work.nodes(); ++j)
     if (!isSolid(j))
       system.setTurn(inSystem(j), h * work.spin[j]);
-  land(h);
+  if (const double earliest = firstLanding(); earliest <= 1.0)
+    stopLanding(h, earliest);
   const RodEvaluation there = system.evaluate(false);
   if (there.min_chi <= kFoldedChi)
     return StepFailure::folded_back;
@@ -240,6 +224,8 @@ double ThreadStepper::Impl::firstLanding() const
   return earliest;
 }
 
+/// Stops the nodes that go through the floor where they meet it. From there they move with the belt. Nodes that arrive
+/// first hold back the others, so the others are looked at again after the next solution.
 void ThreadStepper::Impl::stopLanding(double h, double earliest)
 {
   constexpr double kTogether = 0.1;   // of the step
@@ -253,20 +239,6 @@ void ThreadStepper::Impl::stopLanding(double h, double earliest)
       system.hold(k);
       landed[i] = 1;
     }
-}
-
-/// Stops the nodes that go through the floor where they meet it. From there they move with the belt. Nodes that arrive
-/// first hold back the others, so the others are looked at again after the next solution. Returns false if no node
-/// goes through the floor.
-bool ThreadStepper::Impl::land(double h)
-{
-  const double earliest = firstLanding();
-  if (earliest > 1.0)
-    return false;
-  if (!explicit_step)   // the next solution begins here
-    system.accept();
-  stopLanding(h, earliest);
-  return true;
 }
 
 void ThreadStepper::Impl::placeNode(int node, const Eigen::Vector3d& x)

@@ -35,7 +35,7 @@ public:
   virtual RodEnergies rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const = 0;
   /// Forces of contact on the nodes of a rod [N]; without columns for a rod that touches nothing.
   virtual Eigen::Matrix3Xd rodContactForces(int) const { return Eigen::Matrix3Xd(3, 0); }
-  virtual RodStepper* stepper() { return nullptr; }   ///< of the only rod, where it has one
+  virtual RodStepper* stepper(int) { return nullptr; }   ///< of a rod that meets nothing
 };
 
 /// An island of cloths. Cloths are named by their place in the island.

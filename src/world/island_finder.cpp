@@ -29,10 +29,12 @@ void IslandFinder::join(int a, int b)
 bool IslandFinder::joinNear(const std::vector<Reach>& parts, double margin)
 {
   boxes_.resize(parts.size());
-  order_.resize(parts.size());
-  std::iota(order_.begin(), order_.end(), 0);
+  order_.clear();
   for (std::size_t k = 0; k < parts.size(); ++k)
   {
+    if (!parts[k].has_points && !parts[k].is_solid)
+      continue;   // touches nothing
+    order_.push_back(static_cast<int>(k));
     boxes_[k] = {parts[k].box.low.array() - margin, parts[k].box.high.array() + margin};
     if (!boxes_[k].low.allFinite() || !boxes_[k].high.allFinite())
     {

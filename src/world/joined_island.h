@@ -9,27 +9,28 @@
 
 namespace slender {
 
-/// Some of the parts that may meet, which are minimised together in a step, with their contact.
+/// Some of the objects that may meet, whose parts are minimised together in a step, with their contact.
 class JoinedIsland
 {
 public:
-  /// `parts`: numbers of its parts, see JoinedObjects. The objects must outlive the island, and no part may be added.
-  JoinedIsland(JoinedObjects& objects, const std::vector<int>& parts, const TimeConfig& time);
+  /// `places`: of its objects in JoinedObjects::all, ascending. The objects must outlive the island.
+  JoinedIsland(JoinedObjects& objects, const std::vector<int>& places, const TimeConfig& time);
   JoinedIsland(const JoinedIsland&) = delete;
   JoinedIsland& operator=(const JoinedIsland&) = delete;
 
-  /// Begins a step: takes the strands that its threads have now, the motion of solids and the stiffness of contact.
-  void begin(const WorldState& state, const WorldInputs& inputs);
-  /// Advances its parts, whose states have been loaded, by `duration` [s].
+  /// Begins a step of its objects, which have been loaded: takes the parts that they have now, the motion of solids and
+  /// the stiffness of contact.
+  void begin(WorldState& state, const WorldInputs& inputs);
+  /// Advances its parts by `duration` [s].
   StepReport step(double duration);
   /// Writes into the state what belongs to the island as a whole.
   void end(WorldState& state) const;
   bool stepped() const { return stepped_; }   ///< since forgetStep() and begin()
   void forgetStep() { stepped_ = false; }
 
-  /// Box of the surface of a part over the last step, radii included [m]; `place`: among the island's parts.
-  const BoundingBox& sweptBox(std::size_t place) const { return swept_[place]; }
-  const std::vector<int>& parts() const { return parts_; }
+  /// Box of the surface of an object over the last step, radii included [m]; `k`: among the island's objects.
+  const BoundingBox& sweptBox(std::size_t k) const { return swept_[k]; }
+  const std::vector<int>& places() const { return places_; }   ///< of its objects
   /// Contacts of the last step; null: nothing touches.
   const ContactPotential* contact() const { return stepper_.island().contact(); }
   IslandStepper& stepper() { return stepper_; }
@@ -37,27 +38,30 @@ public:
   void setThreads(int threads);
 
 private:
+  void sortObjects();
   std::vector<ContactSolid> takeSolids();
   void setCarriers();
   void setSolids(const WorldState& state, const WorldInputs& inputs);
   void setMembers();
+  void setStrands();
   void trace();
 
   const WorldModel& world_;
-  JoinedObjects& objects_;
-  const std::vector<int> parts_;
-  std::vector<JoinedRod*> rods_;
-  std::vector<JoinedThread*> threads_;
-  std::vector<JoinedCloth*> cloths_;
-  std::vector<JoinedBody*> bodies_;
+  JoinedObjects& shared_;
+  const std::vector<int> places_;
+  std::vector<WorldObject*> objects_;
+  std::vector<RodObject*> rods_;   ///< among them, like the next two
+  std::vector<ThreadObject*> threads_;
+  std::vector<BodyObject*> bodies_;
   std::vector<const JoinedSolid*> solids_;   ///< that its parts may touch
   int nodes_ = 0;                            ///< of its rods
   ThreadGuard guard_;
   ThreadMerging merging_;
-  std::vector<ThreadPart*> strands_;   ///< of the present step
   std::vector<IslandStepper::Member> members_;
+  std::vector<std::size_t> member_end_;   ///< per object: its members end before this one
+  std::vector<ThreadPart*> strands_;      ///< of the present step
   std::vector<ThreadGuard::Strand> guarded_;
-  std::vector<BoundingBox> swept_;   ///< per part
+  std::vector<BoundingBox> swept_;   ///< per object
   IslandStepper stepper_;
   bool stepped_ = false;
 };

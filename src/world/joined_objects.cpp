@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "meeting.h"
 #include "slender_sim/contact/solids.h"
+#include "slender_sim/world/world.h"
 
 namespace slender {
 
@@ -35,14 +37,46 @@ bool meetsSolids(const WorldModel& world, int body)
   return others;
 }
 
-IslandContent rodsAndBodies(IslandContent content)
+/// The bodies, and the rods that may meet something.
+IslandContent rodsAndBodies(const WorldModel& world, IslandContent content)
 {
+  const auto alone = [&](int rod) { return !meetsOthers(world, rod); };
+  content.rods.erase(std::remove_if(content.rods.begin(), content.rods.end(), alone), content.rods.end());
   content.threads.clear();
   content.cloths.clear();
   return content;
 }
 
+/// Nodes made in one step have numbers that differ, as if the threads had been stepped one after the other.
+void renumber(std::vector<ThreadState>& threads, std::uint64_t before)
+{
+  std::uint64_t shift = 0;
+  for (ThreadState& thread : threads)
+  {
+    const std::uint64_t made = thread.next_id - before;
+    for (std::uint64_t& id : thread.id)
+      if (id >= before)
+        id += shift;
+    shift += made;
+    thread.next_id = before + shift;
+  }
+}
+
+std::uint64_t nextId(const std::vector<ThreadState>& threads)
+{
+  std::uint64_t next = 0;
+  for (const ThreadState& thread : threads)
+    next = std::max(next, thread.next_id);
+  return next;
+}
+
 }   // namespace
+
+bool meetsOthers(const WorldModel& world, int rod)
+{
+  return world.rods[rod].contact || std::any_of(world.welds.begin(), world.welds.end(),
+                                                [rod](const WorldModel::RodWeld& weld) { return weld.rod == rod; });
+}
 
 // ---- what there is
 
@@ -54,62 +88,254 @@ JoinedObjects::JoinedObjects(const WorldModel& model, IslandContent parts, World
   state.contact_stiffness.threads.resize(world.threads.size());
   state.contact_stiffness.bodies.resize(world.bodies.size());
   state.contact_stiffness.cloths.resize(world.cloths.size());
-  addParts(world.time);
+  addObjects(world.time);
   addWelds(state);
   addSolids();
 }
 
 JoinedObjects::JoinedObjects(const JoinedObjects& other, const TimeConfig& time)
   : world(other.world),
-    content(rodsAndBodies(other.content)),
+    content(rodsAndBodies(other.world, other.content)),
     welds(other.welds)
 {
-  addParts(time);
+  addObjects(time);
   for (const Weld& weld : welds)
     follow(weld);
   addSolids();
 }
 
-void JoinedObjects::addParts(const TimeConfig& time)
+// ---- rods
+
+RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time)
+  : WorldObject(number),
+    whole(std::make_unique<RodStepper>(world.rods[number].model, time)),
+    stepper(&whole->impl()),
+    part(std::make_unique<RodPart>(*stepper, world.rods[number].contact.has_value())),
+    meets(meetsOthers(world, number)),
+    contact_(world.rods[number].contact),
+    duration_(world.time.step)
 {
-  for (const int b : content.bodies)
-    if (const WorldModel::Body& body = world.bodies[b]; body.body.simulated)
-    {
-      bodies.push_back({b, std::make_unique<BodyPart>(body.body)});
-      if (!body.shape)
-        continue;
-      bodies.back().part->setReach(body.X_BS.position.norm() + boundingRadius(*body.shape));
-      if (meetsSolids(world, b))
-        bodies.back().part->setSurface(makeBodySurface(*body.shape, body.X_BS),
-                                       body.friction < 0.0 ? ContactProperties().friction : body.friction);
-    }
-  for (const int r : content.rods)
+  if (contact_)
+    part->setContact(*contact_, world.rods[number].ignored);
+}
+
+bool RodObject::load(const WorldState& state, const WorldInputs&, StepReport&)
+{
+  stepper->begin(state.rods[index]);
+  part->begin(inputs, duration_);
+  return true;
+}
+
+IslandFinder::Reach RodObject::reach() const
+{
+  const bool touches = contact_.has_value();
+  return {touches, touches && contact_->others, touches && contact_->solids, false, BoundingBox::empty()};
+}
+
+void RodObject::addTo(Meeting& meeting, const WorldState& state)
+{
+  if (!contact_)
+    return;
+  part->addSurface(meeting.surface);
+  meeting.add(name(), state.rods[index].x);
+}
+
+// ---- bodies
+
+BodyObject::BodyObject(const WorldModel& world, int number)
+  : WorldObject(number),
+    part(std::make_unique<BodyPart>(world.bodies[number].body)),
+    model_(world.bodies[number])
+{
+  if (!model_.shape)
+    return;
+  part->setReach(model_.X_BS.position.norm() + boundingRadius(*model_.shape));
+  if (meetsSolids(world, number))
+    part->setSurface(makeBodySurface(*model_.shape, model_.X_BS),
+                     model_.friction < 0.0 ? ContactProperties().friction : model_.friction);
+}
+
+bool BodyObject::load(const WorldState& state, const WorldInputs& inputs, StepReport&)
+{
+  part->begin(state.bodies[index], inputs.gravity);
+  return true;
+}
+
+IslandFinder::Reach BodyObject::reach() const
+{
+  return {part->hasSurface(), false, part->hasSurface(), model_.shape.has_value(), BoundingBox::empty()};
+}
+
+void BodyObject::addTo(Meeting& meeting, const WorldState& state)
+{
+  if (!part->hasSurface())
+    return;
+  static_cast<const PartSteps&>(*part).addSurface(meeting.surface);
+  meeting.add(name(), part->surfaceAt(state.bodies[index].X_WB));
+}
+
+// ---- cloths
+
+ClothObject::ClothObject(const WorldModel& world, int number, const TimeConfig& time)
+  : WorldObject(number),
+    part(std::make_unique<ClothPart>(world.cloths[number].model, world.cloths[number].options)),
+    contact_(*world.cloths[number].contact),
+    duration_(world.time.step)
+{
+  part->setContact(contact_, time.step, world.cloths[number].ignored);
+}
+
+bool ClothObject::load(const WorldState& state, const WorldInputs& inputs, StepReport& report)
+{
+  const ClothState& from = state.cloths[index];
+  const ClothInputs& with = inputs.cloths[index];
+  if (!part->accepts(from, with, duration_, report))
+    return false;
+  part->begin(from, with, duration_);
+  return true;
+}
+
+IslandFinder::Reach ClothObject::reach() const
+{
+  return {true, contact_.others, contact_.solids, false, BoundingBox::empty()};
+}
+
+void ClothObject::addTo(Meeting& meeting, const WorldState& state)
+{
+  part->setPins(state.cloths[index].pins);
+  part->addSurface(meeting.surface);
+  meeting.add(name(), state.cloths[index].x);
+}
+
+// ---- threads
+
+bool ThreadObject::load(const WorldState& state, const WorldInputs& inputs, StepReport& report)
+{
+  inputs_ = still_ = inputs.threads[index];
+  still_.flow_rate = 0.0;
+  work_ = state.threads[index];
+  makeStrands(work_.threads.size());
+  const std::uint64_t next_id = nextId(work_.threads);
+  for (std::size_t s = 0; s < work_.threads.size(); ++s)
   {
-    const WorldModel::Rod& rod = world.rods[r];
-    JoinedRod added{r, std::make_unique<RodStepper::Impl>(rod.model, time), nullptr, {}};
-    added.part = std::make_unique<RodPart>(*added.stepper, rod.contact.has_value());
-    if (rod.contact)
-      added.part->setContact(*rod.contact, rod.ignored);
-    rods.push_back(std::move(added));
+    ThreadState& strand = work_.threads[s];
+    strand.next_id = next_id;
+    if (!strands_[s].stepper->begin(strand, strand.ends[1].held ? inputs_ : still_, time_.step, report))
+      return false;
+    strands_[s].part->setDuration(time_.step);
   }
-  for (const int k : content.threads)
+  return true;
+}
+
+void ThreadObject::makeStrands(std::size_t count)
+{
+  while (strands_.size() < count)
   {
-    threads.emplace_back();
-    threads.back().index = k;
-  }
-  for (const int c : content.cloths)
-  {
-    const WorldModel::Cloth& cloth = world.cloths[c];
-    cloths.push_back({c, std::make_unique<ClothPart>(cloth.model, cloth.options)});
-    cloths.back().part->setContact(*cloth.contact, time.step, cloth.ignored);
+    Strand added;
+    added.stepper = std::make_unique<ThreadStepper::Impl>(model.model, time_.newton, false);
+    added.part = std::make_unique<ThreadPart>(*added.stepper);
+    added.part->setContact(*model.contact, model.merging, index);
+    strands_.push_back(std::move(added));
   }
 }
 
-BodyPart* JoinedObjects::simulated(int body) const
+void ThreadObject::addMembers(std::vector<IslandStepper::Member>& members)
 {
-  for (const JoinedBody& b : bodies)
+  for (std::size_t s = 0; s < strands(); ++s)
+    members.push_back({strands_[s].part.get(), strands_[s].part.get()});
+}
+
+IslandFinder::Reach ThreadObject::reach() const
+{
+  return {true, model.contact->others, model.contact->solids, false, BoundingBox::empty()};
+}
+
+void ThreadObject::finish(WorldState& state)
+{
+  loads = {};
+  const std::uint64_t before = nextId(work_.threads);
+  for (std::size_t s = 0; s < work_.threads.size(); ++s)
+  {
+    ThreadState& strand = work_.threads[s];
+    std::swap(strand, strands_[s].stepper->work);
+    for (int end = 0; end < 2; ++end)
+      if (strand.ends[end].held)
+        loads[end] = strands_[s].stepper->loads[end];
+  }
+  renumber(work_.threads, before);
+  breakThreads(work_, model.model->limits);
+  dropThreads(work_, model.model->limits);
+  std::swap(state.threads[index], work_);
+}
+
+void ThreadObject::addTo(Meeting& meeting, const WorldState& state)
+{
+  const std::vector<ThreadState>& threads = state.threads[index].threads;
+  makeStrands(threads.size());
+  for (std::size_t s = 0; s < threads.size(); ++s)
+  {
+    strands_[s].stepper->work = threads[s];
+    strands_[s].part->addSurface(meeting.surface);
+    meeting.add(name(), Eigen::Map<const Eigen::Matrix3Xd>(threads[s].x.front().data(), 3, threads[s].nodes()));
+  }
+}
+
+// ---- solids
+
+/// Objects with a surface are numbered in their order.
+ContactSolid JoinedSolid::asTouched(const std::vector<WorldObject*>& by) const
+{
+  ContactSolid touched{obstacle};
+  touched.body = body != nullptr;
+  if (kind == Kind::obstacle)
+    touched.number = index;
+  if (kind == Kind::floor)
+    touched.only = index;
+  int number = 0;
+  for (const WorldObject* object : by)
+    if (object->hasSurface())
+    {
+      if (std::find(ignores.begin(), ignores.end(), object) != ignores.end())
+        touched.ignores.push_back(number);
+      ++number;
+    }
+  return touched;
+}
+
+// ---- all of them
+
+void JoinedObjects::addObjects(const TimeConfig& time)
+{
+  for (const int b : content.bodies)
+    if (world.bodies[b].body.simulated)
+      all.push_back(&bodies.emplace_back(world, b));
+  for (const int r : content.rods)
+  {
+    try
+    {
+      all.push_back(&rods.emplace_back(world, r, time));
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw WorldError(FailurePlace::Kind::rod, r, error.what());
+    }
+  }
+  for (const int c : content.cloths)
+    all.push_back(&cloths.emplace_back(world, c, time));
+  for (const int k : content.threads)
+    all.push_back(&threads.emplace_back(world, k));
+}
+
+int JoinedObjects::placeOf(const WorldObject& object) const
+{
+  return static_cast<int>(std::find(all.begin(), all.end(), &object) - all.begin());
+}
+
+const BodyObject* JoinedObjects::simulated(int body) const
+{
+  for (const BodyObject& b : bodies)
     if (b.index == body)
-      return b.part.get();
+      return &b;
   return nullptr;
 }
 
@@ -117,7 +343,7 @@ void JoinedObjects::addWelds(WorldState& state)
 {
   for (const WorldModel::RodWeld& weld : world.welds)
   {
-    const auto at = std::find_if(rods.begin(), rods.end(), [&](const JoinedRod& rod) { return rod.index == weld.rod; });
+    const auto at = std::find_if(rods.begin(), rods.end(), [&](const RodObject& rod) { return rod.index == weld.rod; });
     if (at == rods.end())
       continue;
     RodState& rod = state.rods[weld.rod];
@@ -132,8 +358,8 @@ void JoinedObjects::addWelds(WorldState& state)
 
 void JoinedObjects::follow(const Weld& weld)
 {
-  if (BodyPart* body = simulated(weld.body))
-    rods[weld.rod].part->addWeld({weld.grasp, body, weld.X_BG});
+  if (const BodyObject* body = simulated(weld.body))
+    rods[weld.rod].part->addWeld({weld.grasp, body->part.get(), weld.X_BG});
 }
 
 void JoinedObjects::addSolids()
@@ -145,13 +371,16 @@ void JoinedObjects::addSolids()
     const WorldModel::Body& body = world.bodies[b];
     if (!body.shape)
       continue;
-    solids.push_back({JoinedSolid::Kind::body, b, body.solid(), simulated(b), body.X_BS});
+    const BodyObject* carrier = simulated(b);
+    solids.push_back({JoinedSolid::Kind::body, b, body.solid(), carrier ? carrier->part.get() : nullptr, body.X_BS});
+    if (carrier)
+      solids.back().ignores.push_back(carrier);
     for (const Weld& weld : welds)
       if (weld.body == b)
-        solids.back().welded_rods.push_back(weld.rod);
+        solids.back().ignores.push_back(&rods[weld.rod]);
   }
-  for (const JoinedThread& thread : threads)
-    if (const ThreadFloor& floor = world.threads[thread.index].model->floor; floor.slips())
+  for (const ThreadObject& thread : threads)
+    if (const ThreadFloor& floor = thread.model.model->floor; floor.slips())
       solids.push_back({JoinedSolid::Kind::floor, thread.index, {Plane{}, floor.friction}});
 }
 
@@ -205,11 +434,11 @@ bool JoinedObjects::takeInputs(const WorldState& state, const WorldInputs& input
 {
   if (const std::string bad = badInput(state, inputs); !bad.empty())
     return refuseInput(bad, report);
-  for (JoinedRod& rod : rods)
+  for (RodObject& rod : rods)
     rod.inputs = inputs.rods[rod.index];
   carryGrasps(inputs);
   std::string what;
-  for (const JoinedRod& rod : rods)
+  for (const RodObject& rod : rods)
     if (!rod.stepper->inputsFinite(state.rods[rod.index], rod.inputs, what))
       return refuseInput("rod '" + rod.stepper->model->name + "': " + what, report);
   return true;

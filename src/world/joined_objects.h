@@ -1,53 +1,154 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "../cloth/cloth_part.h"
+#include "../contact/island_stepper.h"
 #include "../rod/rod_part.h"
 #include "../thread/thread_part.h"
+#include "island_finder.h"
 #include "slender_sim/world/world_model.h"
 #include "slender_sim/world/world_state.h"
 
-/// Rods, threads, cloths, bodies and solids as JoinedParts and JoinedIsland share them. `index`: number in the world.
+/// The objects of a world, and the solids that they meet, as islands of them share them.
 namespace slender {
 
-struct JoinedRod
+struct Meeting;
+
+/// A rod, a thread, a cloth or a simulated body: something of which an island has parts.
+class WorldObject
 {
-  int index;
-  std::unique_ptr<RodStepper::Impl> stepper;
-  std::unique_ptr<RodPart> part;
+public:
+  explicit WorldObject(int number) : index(number) {}
+  virtual ~WorldObject() = default;
+  WorldObject(const WorldObject&) = delete;
+  WorldObject& operator=(const WorldObject&) = delete;
+
+  const int index;   ///< among the objects of its kind in the world
+
+  /// For messages: "rod 'rope'".
+  virtual std::string name() const = 0;
+  /// Loads the state where a step begins. Returns false, and fills the report, if the state or the inputs are not
+  /// valid.
+  virtual bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) = 0;
+  /// Appends its parts of the present step, once the object is loaded.
+  virtual void addMembers(std::vector<IslandStepper::Member>& members) = 0;
+  /// What it may touch; without a box.
+  virtual IslandFinder::Reach reach() const = 0;
+  /// Writes the end of the step into the state.
+  virtual void finish(WorldState& state) = 0;
+  /// Of the barrier in the island that had the object last [N].
+  virtual double& stiffness(WorldState& state) const = 0;
+  /// Appends its surface in a state, if it has one.
+  virtual void addTo(Meeting& meeting, const WorldState& state) = 0;
+  bool hasSurface() const { return reach().has_points; }
+};
+
+class RodObject final : public WorldObject
+{
+public:
+  RodObject(const WorldModel& world, int number, const TimeConfig& time);
+  std::string name() const override { return "rod '" + stepper->model->name + "'"; }
+  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
+  void addMembers(std::vector<IslandStepper::Member>& members) override { members.push_back({part.get(), part.get()}); }
+  IslandFinder::Reach reach() const override;
+  void finish(WorldState& state) override { state.rods[index] = stepper->work; }
+  double& stiffness(WorldState& state) const override { return state.contact_stiffness.rods[index]; }
+  void addTo(Meeting& meeting, const WorldState& state) override;
+
+  /// Null: it may meet others.
+  RodStepper* alone() { return meets ? nullptr : whole.get(); }
+
+  const std::unique_ptr<RodStepper> whole;
+  RodStepper::Impl* const stepper;   ///< of `whole`
+  const std::unique_ptr<RodPart> part;
   RodInputs inputs;   ///< of the present step, with the targets of grasps that driven bodies carry
+  const bool meets;   ///< contact or welds may let it meet others
+
+private:
+  const std::optional<ContactProperties>& contact_;
+  const double duration_;   ///< of a step [s]
 };
 
 /// A simulated body.
-struct JoinedBody
+class BodyObject final : public WorldObject
 {
-  int index;
-  std::unique_ptr<BodyPart> part;
+public:
+  BodyObject(const WorldModel& world, int number);
+  std::string name() const override { return "body '" + model_.body.name + "'"; }
+  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
+  void addMembers(std::vector<IslandStepper::Member>& members) override { members.push_back({part.get(), part.get()}); }
+  IslandFinder::Reach reach() const override;
+  void finish(WorldState& state) override { state.bodies[index] = part->state(); }
+  double& stiffness(WorldState& state) const override { return state.contact_stiffness.bodies[index]; }
+  void addTo(Meeting& meeting, const WorldState& state) override;
+
+  const std::unique_ptr<BodyPart> part;
+
+private:
+  const WorldModel::Body& model_;
 };
 
-struct JoinedThread
+/// A thread, with what has broken off it.
+class ThreadObject final : public WorldObject
 {
-  /// The thread, or a part that has broken off it.
+public:
+  ThreadObject(const WorldModel& world, int number)
+    : WorldObject(number),
+      model(world.threads[number]),
+      time_(world.time)
+  {
+  }
+  std::string name() const override { return "thread '" + model.model->name + "'"; }
+  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
+  void addMembers(std::vector<IslandStepper::Member>& members) override;
+  IslandFinder::Reach reach() const override;
+  void finish(WorldState& state) override;
+  double& stiffness(WorldState& state) const override { return state.contact_stiffness.threads[index]; }
+  void addTo(Meeting& meeting, const WorldState& state) override;
+
   struct Strand
   {
     std::unique_ptr<ThreadStepper::Impl> stepper;
     std::unique_ptr<ThreadPart> part;
   };
-  int index;
-  std::vector<Strand> strands;   ///< as many as there have ever been at once
-  ThreadInputs inputs, still;    ///< of the present step; without flow, for what has broken off
-  ThreadGroupState work;         ///< its first strands are those of the present step
-  std::array<EndLoad, 2> loads;
+  /// Strands of the present step.
+  std::size_t strands() const { return work_.threads.size(); }
+  Strand& strand(std::size_t number) { return strands_[number]; }
+
+  const WorldModel::Thread& model;
+  std::array<EndLoad, 2> loads;   ///< of the last step
+
+private:
+  void makeStrands(std::size_t count);
+
+  const TimeConfig& time_;
+  std::vector<Strand> strands_;   ///< as many as there have ever been at once
+  ThreadInputs inputs_, still_;   ///< of the present step; without flow, for what has broken off
+  ThreadGroupState work_;
 };
 
-struct JoinedCloth
+class ClothObject final : public WorldObject
 {
-  int index;
-  std::unique_ptr<ClothPart> part;
+public:
+  ClothObject(const WorldModel& world, int number, const TimeConfig& time);
+  std::string name() const override { return "cloth '" + part->stages().model->name + "'"; }
+  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
+  void addMembers(std::vector<IslandStepper::Member>& members) override { members.push_back({part.get(), part.get()}); }
+  IslandFinder::Reach reach() const override;
+  void finish(WorldState& state) override { part->end(state.cloths[index]); }
+  double& stiffness(WorldState& state) const override { return state.contact_stiffness.cloths[index]; }
+  void addTo(Meeting& meeting, const WorldState& state) override;
+
+  const std::unique_ptr<ClothPart> part;
+
+private:
+  const ContactProperties& contact_;
+  const double duration_;   ///< of a step [s]
 };
 
 /// A solid that parts may touch.
@@ -63,24 +164,31 @@ struct JoinedSolid
   Obstacle obstacle;                ///< what others touch
   BodyPart* body = nullptr;         ///< that carries it; null: it moves as prescribed
   Pose X_BS{};                      ///< in the frame of the body
-  std::vector<int> welded_rods{};   ///< places of rods that begin inside of it
+  std::vector<const WorldObject*> ignores{};   ///< that never touch it: its body, and rods that are welded into it
+
+  /// For a contact of these objects, without the pose.
+  ContactSolid asTouched(const std::vector<WorldObject*>& by) const;
 };
 
 /// Which parts of the world may meet, by their numbers.
 struct IslandContent
 {
-  std::vector<int> rods, threads;
+  std::vector<int> rods;   ///< those that may meet something come first
+  std::vector<int> threads;
   std::vector<int> bodies;   ///< simulated ones, and driven ones that something is welded to or that have a shape
   std::vector<int> cloths;   ///< whose contact is the barrier
 };
+
+/// Returns true if contact or welds may let a rod meet something.
+bool meetsOthers(const WorldModel& world, int rod);
 
 struct JoinedObjects
 {
   /// Appends the grasps of the welds to the rods of the state, and makes room for the stiffnesses of contact. The model
   /// of the world must live as long.
   JoinedObjects(const WorldModel& world, IslandContent content, WorldState& state);
-  /// The same rods and bodies without the threads and cloths, for steps of another kind. The state has the grasps of
-  /// the welds.
+  /// The bodies, and the rods that may meet something, for steps of another kind. The state has the grasps of the
+  /// welds.
   JoinedObjects(const JoinedObjects& other, const TimeConfig& time);
   JoinedObjects& operator=(const JoinedObjects&) = delete;
 
@@ -90,25 +198,25 @@ struct JoinedObjects
 
   const WorldModel& world;
   const IslandContent content;
-  std::vector<JoinedRod> rods;
-  std::vector<JoinedBody> bodies;
-  std::vector<JoinedThread> threads;
-  std::vector<JoinedCloth> cloths;
+  std::deque<BodyObject> bodies;
+  std::deque<RodObject> rods;
+  std::deque<ClothObject> cloths;
+  std::deque<ThreadObject> threads;
+  /// All of them in this order. Bodies come first, because rods follow them.
+  std::vector<WorldObject*> all;
   std::vector<Weld> welds;   ///< rod: place in `rods`; body: number in the world
   std::vector<JoinedSolid> solids;
 
-  // ---- numbers of all parts: rods, then threads, then cloths, then simulated bodies
-  int parts() const { return partOfBody(bodies.size()); }
-  int partOfThread(std::size_t thread) const { return static_cast<int>(rods.size() + thread); }
-  int partOfCloth(std::size_t cloth) const { return partOfThread(threads.size()) + static_cast<int>(cloth); }
-  int partOfBody(std::size_t body) const { return partOfCloth(cloths.size()) + static_cast<int>(body); }
+  /// Place in `all`.
+  int placeOf(const WorldObject& object) const;
+  /// Null: the body is driven.
+  const BodyObject* simulated(int body) const;
 
 private:
-  void addParts(const TimeConfig& time);
+  void addObjects(const TimeConfig& time);
   void addWelds(WorldState& state);
   void addSolids();
   void follow(const Weld& weld);
-  BodyPart* simulated(int body) const;
   std::string badInput(const WorldState& state, const WorldInputs& inputs) const;
   void carryGrasps(const WorldInputs& inputs);
 };

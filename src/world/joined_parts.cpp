@@ -30,8 +30,10 @@ IslandContent checked(const WorldModel& world, IslandContent content)
     check_value(friction >= 0.0 && std::isfinite(friction), "friction", friction, "zero or more");
     check_value(merging >= 0.0 && merging < 1.0, "merging", merging, "zero to 1 (exclusive)");
   }
-  const bool simulates = !content.rods.empty() || std::any_of(content.bodies.begin(), content.bodies.end(),
-                                                              [&](int b) { return world.bodies[b].body.simulated; });
+  const bool simulates =
+      std::any_of(content.rods.begin(), content.rods.end(), [&](int r) { return meetsOthers(world, r); }) ||
+      std::any_of(content.bodies.begin(), content.bodies.end(),
+                  [&](int b) { return world.bodies[b].body.simulated; });
   need(content.threads.empty() || !simulates || world.time.integrator == Integrator::implicit_euler,
        "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
        "implicit_euler");
@@ -44,9 +46,10 @@ JoinedParts::JoinedParts(const WorldModel& world, IslandContent content, WorldSt
   : world_(world),
     objects_(world, checked(world, std::move(content)), state)
 {
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
     nodes_ += rod.stepper->model->nodes();
-  reach_.resize(static_cast<std::size_t>(objects_.parts()));
+  for (const WorldObject* object : objects_.all)
+    reach_.push_back(object->reach());
   checkClearance(state);
 }
 
@@ -60,13 +63,14 @@ void JoinedParts::addContacts(std::vector<ContactForce>& out) const
         out.push_back({term.position, term.force});
 }
 
-/// On the surface points of a part with this number [N].
-Eigen::Matrix3Xd JoinedParts::contactForces(int number, const Part& part, int points) const
+/// On the surface points of an object that is one part [N].
+Eigen::Matrix3Xd JoinedParts::contactForces(const WorldObject& object, const Part& part) const
 {
+  const int points = part.points(), place = objects_.placeOf(object);
   Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, points);
   for (const JoinedIsland* island : islands_)
   {
-    if (!island->contact() || !std::binary_search(island->parts().begin(), island->parts().end(), number))
+    if (!island->contact() || !std::binary_search(island->places().begin(), island->places().end(), place))
       continue;
     for (const ContactTerm& term : island->contact()->terms())
       for (int k = 0; k < 4; ++k)
@@ -78,14 +82,12 @@ Eigen::Matrix3Xd JoinedParts::contactForces(int number, const Part& part, int po
 
 Eigen::Matrix3Xd JoinedParts::rodContactForces(int rod) const
 {
-  const RodPart& part = *objects_.rods[rod].part;
-  return contactForces(rod, part, part.points());
+  return contactForces(objects_.rods[rod], *objects_.rods[rod].part);
 }
 
 Eigen::Matrix3Xd JoinedParts::clothContactForces(int cloth) const
 {
-  const ClothPart& part = *objects_.cloths[cloth].part;
-  return contactForces(objects_.partOfCloth(static_cast<std::size_t>(cloth)), part, part.points());
+  return contactForces(objects_.cloths[cloth], *objects_.cloths[cloth].part);
 }
 
 // ---- statics
@@ -94,11 +96,7 @@ StepReport JoinedParts::solveEquilibrium(WorldState& state, const WorldInputs& i
 {
   if (!objects_.cloths.empty())
     throw std::invalid_argument("cloth with contact has no statics");
-  if (objects_.rods.empty() && objects_.bodies.empty())
-    return {};
-  JoinedStatics statics(objects_);
-  statics.setThreads(loop_.threads);
-  return statics.solve(state, inputs);
+  return solveStatics(objects_, loop_.threads, state, inputs);
 }
 
 }   // namespace slender

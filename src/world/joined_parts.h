@@ -11,8 +11,6 @@
 
 namespace slender {
 
-struct Meeting;
-
 /// Rods, threads, cloths and bodies that contact or welds can join, and the obstacles that they meet, in implicit
 /// steps.
 ///
@@ -39,6 +37,7 @@ public:
   {
     return objects_.rods[rod].stepper->energies(state, gravity);
   }
+  RodStepper* stepper(int rod) override { return objects_.rods[rod].alone(); }
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override
   {
     return objects_.cloths[cloth].part->stages().energies(state, gravity);
@@ -50,35 +49,27 @@ public:
   Eigen::Matrix3Xd clothContactForces(int cloth) const override;
 
 private:
-  std::vector<int> objectsIgnoredBy(const JoinedSolid& solid) const;
-  void addBodies(const WorldState& state, Meeting& meeting, std::vector<Eigen::Vector3d>& points) const;
-  Eigen::Matrix3Xd contactForces(int part, const Part& surface, int points) const;
+  Eigen::Matrix3Xd contactForces(const WorldObject& object, const Part& part) const;
   void checkClearance(const WorldState& state);
 
   bool endsHaveRoom(const WorldState& state, const WorldInputs& inputs, StepReport& report) const;
   bool begin(const WorldState& state, const WorldInputs& inputs, StepReport& report);
-  bool load(int part, const WorldState& state, const WorldInputs& inputs, StepReport& report);
-  bool loadThread(JoinedThread& thread, const WorldState& state, const WorldInputs& inputs, StepReport& report);
-  bool loadCloth(JoinedCloth& cloth, const WorldState& state, const WorldInputs& inputs, StepReport& report);
-  void addStrand(JoinedThread& thread) const;
-
   void predict();
-  void arrange(const WorldState& state, const WorldInputs& inputs);
+  void arrange(WorldState& state, const WorldInputs& inputs);
   StepReport stepIslands();
-  StepReport stepAndJoin(const WorldState& state, const WorldInputs& inputs);
+  StepReport stepAndJoin(WorldState& state, const WorldInputs& inputs);
   bool joinThoseThatMet();
-  void end(WorldState& state);
-  void endThread(JoinedThread& thread);
 
   const WorldModel& world_;
   JoinedObjects objects_;
   int nodes_ = 0;   ///< of its rods
 
   IslandFinder finder_;
-  std::vector<IslandFinder::Reach> reach_;           ///< per part
-  std::map<std::vector<int>, JoinedIsland> known_;   ///< islands that have been needed, by their parts
+  std::vector<IslandFinder::Reach> reach_;           ///< per object
+  std::vector<IslandStepper::Member> members_;       ///< of one object
+  std::map<std::vector<int>, JoinedIsland> known_;   ///< islands that have been needed, by the places of their objects
   std::vector<JoinedIsland*> islands_;               ///< of the present step
-  std::vector<int> numbers_;                         ///< parts of one island
+  std::vector<int> places_;                          ///< objects of one island
   IslandLoop loop_;
 };
 

@@ -14,14 +14,14 @@ void JoinedStatics::beginStability()
 {
   load(1.0);
   system().beginStep(1.0);
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
   {
     RodSystem& chain = rod.stepper->system;
     chain.leaveOutStretching(false);
     chain.load(rod.stepper->work);
     chain.setResponse(0.0, nullptr);
   }
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     body.part->system.load(body.part->state());
   system().place(1.0);
   system().beginSubstep(1.0);
@@ -39,14 +39,14 @@ void JoinedStatics::beginStability()
 
 RodEvaluation JoinedStatics::energyAt(double s)
 {
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
   {
     RodSystem& chain = rod.stepper->system;
     for (int i = 0; i < chain.nodes(); ++i)
       chain.setInertia(i, chain.isMoving(i) ? s * rod.stepper->model->mass[i] : 0.0, chain.position(i),
                        rod.stepper->load(rod.inputs, i));
   }
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     body.part->system.hold(s, inputs_->gravity);
   return system().evaluate(false);
 }
@@ -64,7 +64,7 @@ double JoinedStatics::neutralBand() const
 {
   double mass = 0.0, length = 0.0, stiffness = std::numeric_limits<double>::infinity(), rounding = 0.0,
          least_mass = stiffness;
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
   {
     const RodModel& m = *rod.stepper->model;
     mass += m.totalMass();
@@ -76,7 +76,7 @@ double JoinedStatics::neutralBand() const
           rounding, 4 * m.stretch_modulus[j] / (m.rest_length[j] * std::min(m.mass[j], m.mass[(j + 1) % m.nodes()])));
     least_mass = std::min(least_mass, m.mass.minCoeff());
   }
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     mass += objects_.world.bodies[body.index].body.mass;
   if (const ContactPotential* contact = island_.contact())
     for (const ContactTerm& term : contact->terms())
@@ -100,7 +100,7 @@ void JoinedStatics::findLowestMode()
     shared[k] = start(static_cast<std::size_t>(k));
   std::vector<Eigen::Map<Eigen::VectorXd>> own;   // of the parts that solve on their own, each with
   std::vector<std::function<void()>> solve;       // its solution
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
     if (!rod.part->coupled)
     {
       RodSystem& chain = rod.stepper->system;
@@ -109,7 +109,7 @@ void JoinedStatics::findLowestMode()
         own.back()[u] = rod.part->isUnknown(u) ? start(static_cast<std::size_t>(u)) : 0.0;
       solve.emplace_back([&chain] { chain.solveFor(chain.direction()); });
     }
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     if (!body.part->coupled)
     {
       BodyPart& part = *body.part;
@@ -140,10 +140,10 @@ void JoinedStatics::findLowestMode()
 void JoinedStatics::scaleMode()
 {
   double turn = 0.0, move = 0.0, length = 0.0;
-  const auto directionOf = [](const JoinedRod& rod) {
+  const auto directionOf = [](const RodObject& rod) {
     return Eigen::Map<Eigen::Matrix4Xd>(rod.stepper->system.direction(), 4, rod.stepper->model->nodes());
   };
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
   {
     const Eigen::Map<Eigen::Matrix4Xd> v = directionOf(rod);
     const RodModel& m = *rod.stepper->model;
@@ -153,12 +153,12 @@ void JoinedStatics::scaleMode()
     move = std::max(move, v.topRows<3>().cwiseAbs().maxCoeff());
     length = std::max(length, m.rest_length.sum());
   }
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     turn = std::max(turn, body.part->direction.tail<3>().norm());
   const double scale = std::max({turn, length > 0 ? move / length : 0.0, 1e-300});
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
     directionOf(rod) /= scale;
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     body.part->direction /= scale;
 }
 
@@ -178,7 +178,7 @@ bool JoinedStatics::displaceAlongMode(double alpha)
   const RodEvaluation at = system().evaluate(false);
   if (!std::isfinite(at.energy()) || at.min_chi <= kFoldedChi)
     return false;
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
   {
     RodState& state = work_.rods[rod.index];
     rod.stepper->system.store(state);
@@ -186,7 +186,7 @@ bool JoinedStatics::displaceAlongMode(double alpha)
       if (state.grasps[k].active)
         state.grasps[k].X_WG = rod.stepper->stage_poses[k];
   }
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     work_.bodies[body.index].X_WB = body.part->pose();
   return true;
 }

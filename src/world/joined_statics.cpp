@@ -24,7 +24,7 @@ TimeConfig timeOfStatics(TimeConfig time)
 
 std::vector<int> allParts(const JoinedObjects& objects)
 {
-  std::vector<int> parts(static_cast<std::size_t>(objects.parts()));
+  std::vector<int> parts(static_cast<std::size_t>(objects.all.size()));
   std::iota(parts.begin(), parts.end(), 0);
   return parts;
 }
@@ -67,7 +67,7 @@ JoinedStatics::JoinedStatics(JoinedObjects& objects)
     island_(objects_, allParts(objects_), time_),
     lever_(std::numeric_limits<double>::max())
 {
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
     lever_ = std::min(lever_, rod.stepper->model->rest_length.minCoeff());
 }
 
@@ -77,7 +77,7 @@ void JoinedStatics::take(const WorldState& state)
 {
   work_.rods.resize(state.rods.size());
   work_.bodies.resize(state.bodies.size());
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
     work_.rods[rod.index] = state.rods[rod.index];
   for (const int b : objects_.content.bodies)
     work_.bodies[b] = state.bodies[b];
@@ -88,7 +88,7 @@ void JoinedStatics::take(const WorldState& state)
 
 void JoinedStatics::give(WorldState& state) const
 {
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
     state.rods[rod.index] = work_.rods[rod.index];
   for (const int b : objects_.content.bodies)
     state.bodies[b] = work_.bodies[b];
@@ -110,12 +110,12 @@ void JoinedStatics::restore(const Configuration& c)
 /// Loads the present configuration for a step of this duration [s].
 void JoinedStatics::load(double duration)
 {
-  for (JoinedRod& rod : objects_.rods)
+  for (RodObject& rod : objects_.rods)
   {
     rod.stepper->begin(work_.rods[rod.index]);
     rod.part->begin(rod.inputs, duration);
   }
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     body.part->begin(work_.bodies[body.index], inputs_->gravity);
   island_.begin(work_, *inputs_);
 }
@@ -126,9 +126,9 @@ StepReport JoinedStatics::step(double h)
   const StepReport report = island_.step(h);
   if (!report.ok)
     return report;
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
     work_.rods[rod.index] = rod.stepper->work;
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
     work_.bodies[body.index] = body.part->state();
   island_.end(work_);
   const auto arrive = [h](const GraspTarget& target, Pose& pose, const Twist& velocity) {
@@ -146,7 +146,7 @@ StepReport JoinedStatics::step(double h)
 double JoinedStatics::unbalanced(double h) const
 {
   double sum = 0.0;
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
   {
     const RodModel& m = *rod.stepper->model;
     const Eigen::Matrix3Xd &from = before_.rods[rod.index].x, &to = work_.rods[rod.index].x;
@@ -154,7 +154,7 @@ double JoinedStatics::unbalanced(double h) const
       if (rod.stepper->system.isMoving(i))
         sum = std::max(sum, m.mass[i] * (to.col(i) - from.col(i)).norm() / (h * h));
   }
-  for (const JoinedBody& body : objects_.bodies)
+  for (const BodyObject& body : objects_.bodies)
   {
     const RigidBodyModel& m = objects_.world.bodies[body.index].body;
     const Pose &from = before_.bodies[body.index].X_WB, &to = work_.bodies[body.index].X_WB;
@@ -239,7 +239,7 @@ bool JoinedStatics::settleFrom(double lowest)
 StepReport JoinedStatics::solve(WorldState& state, const WorldInputs& inputs)
 {
   report_ = StepReport();
-  for (const JoinedRod& rod : objects_.rods)
+  for (const RodObject& rod : objects_.rods)
     if (rod.index < static_cast<int>(inputs.rods.size()) && inputs.rods[rod.index].torques.size() > 0)
       return refuseTorques();
   if (!objects_.takeInputs(state, inputs, report_))
@@ -260,6 +260,24 @@ StepReport JoinedStatics::solve(WorldState& state, const WorldInputs& inputs)
   if (report_.message.empty())
     report_.message = explainStatics(report_.failure);
   return report_;
+}
+
+StepReport solveStatics(JoinedObjects& objects, int threads, WorldState& state, const WorldInputs& inputs)
+{
+  StepReport total;
+  bool meet = !objects.bodies.empty();
+  for (RodObject& rod : objects.rods)
+  {
+    meet = meet || rod.meets;
+    if (RodStepper* alone = rod.alone(); alone && total.ok)
+      total.merge(alone->solveEquilibrium(state.rods[rod.index], inputs.rods[rod.index]));
+  }
+  if (!meet || !total.ok)
+    return total;
+  JoinedStatics statics(objects);
+  statics.setThreads(threads);
+  total.merge(statics.solve(state, inputs));
+  return total;
 }
 
 }   // namespace slender

@@ -67,4 +67,8 @@ private:
   double lever_;               ///< divides moments to compare them with forces: the shortest edge [m]
 };
 
+/// The stable equilibrium of all rods and bodies: rods that meet nothing each on its own, the others as one island. On
+/// failure the rods that were solved before have moved.
+StepReport solveStatics(JoinedObjects& objects, int threads, WorldState& state, const WorldInputs& inputs);
+
 }   // namespace slender

@@ -25,6 +25,13 @@ ContactSurface piecesOf(const ContactSurface& all, int a, int b, bool self)
 
 }   // namespace
 
+void Meeting::add(const std::string& name, const Eigen::Matrix3Xd& points)
+{
+  objects.push_back(name);
+  x.conservativeResize(3, x.cols() + points.cols());
+  x.rightCols(points.cols()) = points;
+}
+
 void Meeting::addSolid(const std::string& name, const ContactSolid& solid, const Pose& pose)
 {
   solids.push_back(name);

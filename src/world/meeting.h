@@ -16,6 +16,8 @@ struct Meeting
   std::vector<std::string> solids;    ///< name of each solid
   std::vector<Pose> poses;            ///< of the solids
 
+  /// Names the object whose surface was appended last, and appends its points [m].
+  void add(const std::string& name, const Eigen::Matrix3Xd& points);
   void addSolid(const std::string& name, const ContactSolid& solid, const Pose& pose);
   /// The two that are nearest to each other, of those that may touch: "thread 'honey' and obstacle 'plate'".
   std::string nearest(const ContactOptions& options) const;

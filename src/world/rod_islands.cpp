@@ -9,32 +9,6 @@ namespace slender {
 
 namespace {
 
-class LoneRod : public RodIsland
-{
-public:
-  LoneRod(const WorldModel& world, int rod) : world_(world), rod_(rod), stepper_(world.rods[rod].model, world.time) {}
-
-  StepReport step(WorldState& state, const WorldInputs& inputs) override
-  {
-    return stepper_.step(state.rods[rod_], inputs.rods[rod_], world_.time.step);
-  }
-  StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override
-  {
-    return stepper_.solveEquilibrium(state.rods[rod_], inputs.rods[rod_]);
-  }
-  const std::vector<Wrench>& wrenches(int) const override { return stepper_.wrenches(); }
-  RodEnergies rodEnergies(int, const RodState& state, const Eigen::Vector3d& gravity) const override
-  {
-    return stepper_.energies(state, gravity);
-  }
-  RodStepper* stepper() override { return &stepper_; }
-
-private:
-  const WorldModel& world_;
-  int rod_;
-  RodStepper stepper_;
-};
-
 class TrackedRod : public RodIsland
 {
 public:
@@ -77,11 +51,6 @@ private:
 };
 
 }   // namespace
-
-std::unique_ptr<RodIsland> makeLoneRod(const WorldModel& world, int rod)
-{
-  return std::make_unique<LoneRod>(world, rod);
-}
 
 std::unique_ptr<RodIsland> makeTrackedRod(const WorldModel& world, int rod)
 {

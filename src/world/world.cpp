@@ -105,7 +105,7 @@ public:
 
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs)
   {
-    return advance(state, islands_.size() > 1, [&] {
+    return advance(state, true, [&] {
       StepReport total;
       for (std::size_t i = 0; i < islands_.size() && total.ok; ++i)
         total.merge(islands_[i]->solveEquilibrium(state, inputs));
@@ -117,7 +117,7 @@ public:
   {
     if (threads < 1)
       throw std::invalid_argument("threads = " + std::to_string(threads) + "; must be at least 1");
-    lone_loop_.threads = threads;
+    separate_loop_.threads = threads;
     for (const auto& island : islands_)
       island->setThreads(threads);
   }
@@ -206,52 +206,58 @@ private:
     place(cloths, touching, island);
   }
 
-  /// Rods, alone or joined, and all that the barrier of contact may join with them.
+  /// Rods, and all that the barrier of contact may join with them.
   void addRods(WorldState& state)
   {
-    std::vector<char> joined(model.rods.size(), 0);
-    std::vector<char> welded(model.bodies.size(), 0);
-    for (std::size_t r = 0; r < model.rods.size(); ++r)
-      joined[r] = model.rods[r].contact.has_value();
-    for (const WorldModel::RodWeld& weld : model.welds)
-      joined[weld.rod] = welded[weld.body] = 1;
-    std::vector<int> group_rods, group_bodies;
-    bool simulated = false;
-    for (int b = 0; b < static_cast<int>(model.bodies.size()); ++b)
-    {
-      const WorldModel::Body& body = model.bodies[b];
-      simulated = simulated || body.body.simulated;
-      if (body.body.simulated || welded[b] || body.shape)
-        group_bodies.push_back(b);
-    }
-    lone_begin_ = islands_.size();
+    std::vector<int> meeting, alone;
     for (int r = 0; r < static_cast<int>(model.rods.size()); ++r)
-    {
-      if (joined[r])
-        group_rods.push_back(r);
-      else
-        addLoneRod(r);
-    }
-    lone_end_ = islands_.size();
-    const bool group = !group_rods.empty() || simulated || !touching_threads_.empty() || !joined_cloths_.empty();
+      (meetsOthers(model, r) ? meeting : alone).push_back(r);
+    const std::vector<int> bodies = bodiesThatMeet();
+    const bool simulated = std::any_of(bodies.begin(), bodies.end(),
+                                       [this](int b) { return model.bodies[b].body.simulated; });
+    const bool meet = !meeting.empty() || simulated || !touching_threads_.empty() || !joined_cloths_.empty();
     const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
-    if (!group)
-      group_bodies.clear();
-    for (int b = 0; b < static_cast<int>(model.bodies.size()); ++b)
-      if (!model.bodies[b].body.simulated)
-        given_bodies_.push_back(b);
-    if (!group)
+    IslandContent content{meeting, touching_threads_, meet ? bodies : std::vector<int>{}, joined_cloths_};
+    separate_begin_ = islands_.size();
+    for (const int r : alone)
+    {
+      if (model.rods[r].tracked.sets)
+        addSeparate(r, [&] { return makeTrackedRod(model, r); });
+      else if (explicit_steps)
+        addSeparate(r, [&] { return makeExplicitRods(model, {{r}, {}, {}, {}}, state); });
+      else
+        content.rods.push_back(r);
+    }
+    separate_end_ = islands_.size();
+    if (!meet && content.rods.empty())
       return;
-    const IslandContent content{group_rods, touching_threads_, group_bodies, joined_cloths_};
+    const std::vector<int> rods_of_island = content.rods;
     if (explicit_steps && touching_threads_.empty() && joined_cloths_.empty())
     {
-      place(rods, group_rods, add(built(Kind::none, -1, [&] { return makeExplicitRods(model, content, state); })));
+      place(rods, rods_of_island, add(built(Kind::none, -1, [&] { return makeExplicitRods(model, content, state); })));
       return;
     }
     JoinedParts* island =
         add(built(Kind::none, -1, [&] { return std::make_unique<JoinedParts>(model, content, state); }));
-    place(rods, group_rods, static_cast<RodIsland*>(island));
+    place(rods, rods_of_island, static_cast<RodIsland*>(island));
     place(cloths, joined_cloths_, static_cast<ClothIsland*>(island));
+  }
+
+  /// Simulated ones, and driven ones that rods are welded to or that have a shape.
+  std::vector<int> bodiesThatMeet()
+  {
+    std::vector<int> meeting;
+    for (int b = 0; b < static_cast<int>(model.bodies.size()); ++b)
+    {
+      const WorldModel::Body& body = model.bodies[b];
+      const bool welded = std::any_of(model.welds.begin(), model.welds.end(),
+                                      [b](const WorldModel::RodWeld& weld) { return weld.body == b; });
+      if (body.body.simulated || welded || body.shape)
+        meeting.push_back(b);
+      if (!body.body.simulated)
+        given_bodies_.push_back(b);
+    }
+    return meeting;
   }
 
   /// Notes that an island has these parts, in this order.
@@ -262,38 +268,25 @@ private:
       places[parts[k]] = {island, static_cast<int>(k)};
   }
 
-  void addLoneRod(int r)
+  template <class Make>
+  void addSeparate(int r, const Make& make)
   {
-    lone_nodes_ += model.rods[r].model->nodes();
-    rods[r] = {
-        add(built(Kind::rod, r,
-                  [&] { return model.rods[r].tracked.sets ? makeTrackedRod(model, r) : makeLoneRod(model, r); })),
-        0};
+    separate_nodes_ += model.rods[r].model->nodes();
+    rods[r] = {add(built(Kind::rod, r, make)), 0};
   }
 
   StepReport stepIslands(WorldState& state, const WorldInputs& inputs)
   {
     StepReport total;
-    for (std::size_t i = 0; i < lone_begin_ && total.ok; ++i)
+    for (std::size_t i = 0; i < separate_begin_ && total.ok; ++i)
       total.merge(islands_[i]->step(state, inputs));
-    if (total.ok && lone_end_ > lone_begin_)
-      stepLoneRods(state, inputs, total);
-    for (std::size_t i = lone_end_; i < islands_.size() && total.ok; ++i)
+    if (total.ok && separate_end_ > separate_begin_)
+      separate_loop_.run(
+          static_cast<int>(separate_end_ - separate_begin_), separate_nodes_,
+          [&](int k) { return islands_[separate_begin_ + k]->step(state, inputs); }, total);
+    for (std::size_t i = separate_end_; i < islands_.size() && total.ok; ++i)
       total.merge(islands_[i]->step(state, inputs));
     return total;
-  }
-
-  /// In parallel where that is worth it.
-  void stepLoneRods(WorldState& state, const WorldInputs& inputs, StepReport& total)
-  {
-    const int count = static_cast<int>(lone_end_ - lone_begin_);
-    if (count == 1)
-    {
-      total.merge(islands_[lone_begin_]->step(state, inputs));
-      return;
-    }
-    lone_loop_.run(
-        count, lone_nodes_, [&](int k) { return islands_[lone_begin_ + k]->step(state, inputs); }, total);
   }
 
   /// Bodies and obstacles that are driven, to where they are at the end of the step.
@@ -310,16 +303,16 @@ private:
       move(inputs.obstacles[k], state.obstacles[k], state.obstacle_velocities[k]);
   }
 
-  /// In the order in which they step: threads, cloths that lead others, other cloths, lone rods, rods and bodies that
-  /// are joined.
+  /// In the order in which they step: threads, cloths that lead others, other cloths, rods that track or take explicit
+  /// steps and meet nothing, all others.
   std::vector<std::unique_ptr<Island>> islands_;
-  std::size_t lone_begin_ = 0, lone_end_ = 0;   ///< the lone rods among them
-  int lone_nodes_ = 0;
+  std::size_t separate_begin_ = 0, separate_end_ = 0;   ///< among them the rods that meet nothing
+  int separate_nodes_ = 0;
   std::vector<int> touching_threads_;   ///< that are joined with rods, cloths or bodies
   std::vector<int> joined_cloths_;      ///< whose contact is the barrier
   std::vector<int> given_bodies_;       ///< driven bodies
   WorldState before_;                   ///< a step that may fail in one of several islands
-  IslandLoop lone_loop_;
+  IslandLoop separate_loop_;
 };
 
 World::World(WorldModel model, WorldState& state)
@@ -349,7 +342,11 @@ RodEnergies World::rodEnergies(int rod, const RodState& state, const Eigen::Vect
   return place.island->rodEnergies(place.index, state, gravity);
 }
 
-RodStepper* World::rodStepper(int rod) { return impl_->rods.at(rod).island->stepper(); }
+RodStepper* World::rodStepper(int rod)
+{
+  const auto& place = impl_->rods.at(rod);
+  return place.island->stepper(place.index);
+}
 
 const Eigen::Matrix3Xd& World::pinForces(int cloth) const
 {

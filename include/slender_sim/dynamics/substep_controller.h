@@ -23,6 +23,9 @@ struct SubstepRule
   int max_cuts = 0;               ///< how often a substep is halved in succession, see NewtonConfig
 };
 
+/// Length of equal substeps of a step, none longer than `longest` [s].
+double evenSubstep(double duration, double longest);
+
 /// The equations that a SubstepController advances: those of one object, or of objects that touch.
 class SubstepEquations
 {

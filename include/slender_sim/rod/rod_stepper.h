@@ -39,7 +39,8 @@ struct RodEnergies
   double total() const { return stretch + bend + twist + kinetic + gravity; }
 };
 
-/// Advances one rod: implicit steps by Newton on the banded system, or explicit symplectic Euler (thesis 4.6).
+/// Advances one rod: implicit steps as an island of one part, whose matrix is a band, or explicit symplectic Euler
+/// (thesis 4.6).
 class RodStepper
 {
 public:
@@ -70,10 +71,12 @@ public:
   const RodModel& model() const;
 
   class Impl;
+  Impl& impl() { return *impl_; }
 
 private:
+  class Alone;
   std::unique_ptr<Impl> impl_;
-  std::unique_ptr<class StepLoop> loop_;
+  std::unique_ptr<Alone> alone_;   ///< what step() needs; null before its first call
 };
 
 }   // namespace slender

@@ -50,7 +50,9 @@ public:
   class Impl;   ///< for the parts of islands
 
 private:
+  class Alone;
   std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Alone> alone_;
 };
 
 }   // namespace slender
