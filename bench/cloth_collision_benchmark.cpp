@@ -7,7 +7,7 @@
 
 #include "slender_sim/contact/broad_phase.h"
 #include "slender_sim/contact/surface_collider.h"
-#include "src/contact/kdop_tree.h"
+#include "contact/kdop_tree.h"
 
 namespace {
 

@@ -11,7 +11,7 @@ endforeach()
 configure_file(${CMAKE_CURRENT_LIST_DIR}/package_scenes.cpp.in ${PROJECT_BINARY_DIR}/package_scenes.cpp @ONLY)
 # Object files, because a linker would leave out what only registers itself.
 add_library(slender_sim_studies OBJECT ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)
-target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include PRIVATE ${PROJECT_SOURCE_DIR}/src)
+target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include)
 target_link_libraries(slender_sim_studies PUBLIC slender_sim)
 # Most of the time of compiling a study goes into these headers.
 target_precompile_headers(slender_sim_studies PRIVATE

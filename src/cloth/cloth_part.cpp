@@ -245,7 +245,7 @@ void ClothPart::solve()
 
 // ---- the matrix of the island
 
-void ClothPart::notePattern(CouplingMatrix& matrix)
+void ClothPart::notePattern(SharedMatrix& matrix)
 {
   const auto note = [&](int i, int j, bool whole) {
     for (int c = 0; c < 3; ++c)
@@ -264,7 +264,7 @@ void ClothPart::notePattern(CouplingMatrix& matrix)
         note(i, constant->column(k), false);
 }
 
-void ClothPart::findEntries(const CouplingMatrix& matrix)
+void ClothPart::findEntries(const SharedMatrix& matrix)
 {
   const BlockMatrix& blocks = system().matrix();
   block_entries_.assign(3 * static_cast<std::size_t>(blocks.blocks()), -1);
@@ -282,7 +282,7 @@ void ClothPart::findEntries(const CouplingMatrix& matrix)
 }
 
 /// Rows of a point follow each other in the matrix, so that those of a block's column do.
-void ClothPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
+void ClothPart::addHessian(SharedMatrix& matrix, const HessianShift& shift)
 {
   const BlockMatrix& blocks = system().matrix();
   double* const values = matrix.values();

@@ -4,8 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "../contact/part.h"
-#include "../contact/part_steps.h"
+#include "island/part.h"
 #include "cloth_stages.h"
 #include "slender_sim/contact/contact_properties.h"
 
@@ -18,7 +17,7 @@ namespace slender {
 /// Far from the minimum the Hessian is the one that is never indefinite, near it the exact one, as for a cloth on its
 /// own. There a shift of angles, which cloth does not have, adds a share of its inertia. With a shift of positions the
 /// Hessian is the semidefinite one again.
-class ClothPart final : public Part, public PartSteps
+class ClothPart final : public Part
 {
 public:
   /// Throws std::invalid_argument for other integrators than implicit_euler, for prescribed averages, and for a model
@@ -56,7 +55,7 @@ public:
   }
 
 private:
-  // ---- as PartSteps
+  // ---- its steps
   double shortestEdge() const override { return stages_->shortestEdge(); }
   long surfaceVersion() const override { return surface_version_; }
   BarrierRange barrierRange(double gap) const override;
@@ -79,9 +78,9 @@ private:
   /// Prescribed unknowns stay in the gradient, as the forces of the pins. Nothing else looks at them.
   void closeGradient() override {}
   void solve() override;
-  void notePattern(CouplingMatrix& matrix) override;
-  void findEntries(const CouplingMatrix& matrix) override;
-  void addHessian(CouplingMatrix& matrix, const HessianShift& shift) override;
+  void notePattern(SharedMatrix& matrix) override;
+  void findEntries(const SharedMatrix& matrix) override;
+  void addHessian(SharedMatrix& matrix, const HessianShift& shift) override;
   void takeGradient(double* right) const override;
   void takeDirection(const double* solution) override;
   int base(int point) const override { return number_[point] < 0 ? kPrescribed : offset + number_[point]; }

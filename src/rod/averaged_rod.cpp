@@ -6,7 +6,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "../contact/island_stepper.h"
+#include "island/island.h"
 #include "rod_part.h"
 #include "slender_sim/rod/average_projection.h"
 
@@ -43,7 +43,7 @@ public:
   Eigen::Matrix3Xd forces;   ///< with which the averages act at the end of the last substep (3 x count [N])
 
 private:
-  // ---- as PartSteps
+  // ---- its steps
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override
   {
     if (const StepFailure failure = RodPart::beginSubstep(plan, substep); failure != StepFailure::none)
@@ -195,14 +195,14 @@ public:
       part(rod, *averages),
       island(time, false)
   {
-    island.island().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
-    island.setMembers({{&part, &part}});
+    island.equations().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
+    island.setParts({&part});
   }
 
   RodStepper::Impl rod;
   std::shared_ptr<const Averages> averages;
   AveragedPart part;
-  IslandStepper island;
+  Island island;
 };
 
 AveragedRod::AveragedRod(std::shared_ptr<const RodModel> model, std::shared_ptr<const Averages> averages,

@@ -101,14 +101,14 @@ void BodyPart::addSurface(ContactSurface& surface) const
 
 // ---- the matrix of the island
 
-void BodyPart::notePattern(CouplingMatrix& matrix)
+void BodyPart::notePattern(SharedMatrix& matrix)
 {
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j <= i; ++j)
       matrix.note(offset + i, offset + j);
 }
 
-void BodyPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
+void BodyPart::addHessian(SharedMatrix& matrix, const HessianShift& shift)
 {
   system.addShift(shift);
   for (int i = 0; i < 6; ++i)

@@ -2,9 +2,8 @@
 
 #include <utility>
 
-#include "../contact/part.h"
-#include "../contact/part_steps.h"
-#include "../linalg/cholesky6.h"
+#include "island/part.h"
+#include "linalg/cholesky6.h"
 #include "body_surface.h"
 #include "body_system.h"
 #include "slender_sim/contact/contact_properties.h"
@@ -12,7 +11,7 @@
 namespace slender {
 
 /// A simulated rigid body as a part of an island. Its unknowns are its displacement and its turn (world axes).
-class BodyPart : public RigidPart, public PartSteps
+class BodyPart : public RigidPart
 {
 public:
   explicit BodyPart(const RigidBodyModel& model) : system(model) {}
@@ -72,9 +71,9 @@ private:
     factor_.solveInPlace(direction);
   }
 
-  void notePattern(CouplingMatrix& matrix) override;
-  void findEntries(const CouplingMatrix&) override {}
-  void addHessian(CouplingMatrix& matrix, const HessianShift& shift) override;
+  void notePattern(SharedMatrix& matrix) override;
+  void findEntries(const SharedMatrix&) override {}
+  void addHessian(SharedMatrix& matrix, const HessianShift& shift) override;
   void takeGradient(double* right) const override;
   void takeDirection(const double* solution) override;
 
@@ -93,7 +92,7 @@ private:
   double forceScale() const override;
   double noiseLevel() const override { return 0.0; }
 
-  // ---- as PartSteps
+  // ---- its steps
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
   double lastSubstep() const override { return now_.last_step; }
   bool startsFresh() const override { return now_.last_step == 0.0; }

@@ -5,7 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "../linalg/cholesky6.h"
+#include "linalg/cholesky6.h"
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../linalg/cholesky6.h"
+#include "linalg/cholesky6.h"
 #include "slender_sim/geometry/rotation.h"
 #include "slender_sim/linalg/interruption.h"
 

@@ -166,7 +166,7 @@ void RodPart::addColumns(int point, int component, double weight, Columns& row) 
 }
 
 /// What panels and clamps couple with the bodies that carry the rod.
-void RodPart::notePattern(CouplingMatrix& matrix)
+void RodPart::notePattern(SharedMatrix& matrix)
 {
   ChainPart::notePattern(matrix);
   carried_entries_.clear();
@@ -199,7 +199,7 @@ void RodPart::notePattern(CouplingMatrix& matrix)
     }
 }
 
-void RodPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
+void RodPart::addHessian(SharedMatrix& matrix, const HessianShift& shift)
 {
   ChainPart::addHessian(matrix, shift);
   if (!welded_)
@@ -210,7 +210,7 @@ void RodPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
 
 /// Entries of carried unknowns, and what the curvature of a rotation adds: for a point at r with gradient g, (g r^T + r
 /// g^T)/2 - (g.r) I.
-void RodPart::addCarried(CouplingMatrix& matrix) const
+void RodPart::addCarried(SharedMatrix& matrix) const
 {
   const RodPanel* panels = system_.panels();
   Columns a, b;
@@ -247,7 +247,7 @@ void RodPart::addCarried(CouplingMatrix& matrix) const
 
 /// The turn of a clamped section that a body carries. Turning the section is turning the edge backwards, so its
 /// derivatives follow from those of the edge: gradient -(e x g + g_theta t), and so on.
-void RodPart::addClamps(CouplingMatrix& matrix) const
+void RodPart::addClamps(SharedMatrix& matrix) const
 {
   const RodArrays& arrays = system_.arrays();
   for (const ClampJoint& c : system().clamps())

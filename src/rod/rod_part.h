@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "../contact/chain_part.h"
+#include "island/chain_part.h"
 #include "body_part.h"
 #include "rod_stepper_impl.h"
 #include "slender_sim/contact/contact_properties.h"
@@ -12,7 +12,7 @@
 namespace slender {
 
 /// A rod as a part of an island. Bodies may carry sections and edges of it; the unknowns there are those of the bodies.
-class RodPart : public ChainPart, public PartSteps
+class RodPart : public ChainPart
 {
 public:
   RodPart(RodStepper::Impl& rod, bool touches)
@@ -63,12 +63,12 @@ private:
   void followJoints() override;
   void gather(Eigen::Matrix3Xd& x) const override;
   void passGradient() override;
-  void notePattern(CouplingMatrix& matrix) override;
-  void addHessian(CouplingMatrix& matrix, const HessianShift& shift) override;
+  void notePattern(SharedMatrix& matrix) override;
+  void addHessian(SharedMatrix& matrix, const HessianShift& shift) override;
   void takeDirection(const double* solution) override;
   void addColumns(int point, int component, double weight, Columns& row) const override;
 
-  // ---- as PartSteps
+  // ---- its steps
   double lastSubstep() const override { return rod_.work.last_step; }
   double shortestEdge() const override { return shortest_edge_; }
   void addStartLoads() override;
@@ -85,8 +85,8 @@ private:
   const RodSystem& system() const { return rod_.system; }
   const BodyPart* carrier(int grasp) const;
   void columnsOf(int unknown, double weight, Columns& row) const;
-  void addCarried(CouplingMatrix& matrix) const;
-  void addClamps(CouplingMatrix& matrix) const;
+  void addCarried(SharedMatrix& matrix) const;
+  void addClamps(SharedMatrix& matrix) const;
   /// Inertia of the nodes that bodies carry, as points of these, when a stage has begun.
   void setCarriedInertia(const Stage& stage);
   /// After a stage: poses and velocities of the grasps that bodies carry.

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "../contact/island_stepper.h"
+#include "island/island.h"
 #include "explicit_system.h"
 #include "rod_part.h"
 #include "slender_sim/geometry/rotation.h"
@@ -19,8 +19,8 @@ public:
   {
     if (rod.time.integrator == Integrator::symplectic_euler)
       explicit_ = std::make_unique<ExplicitSystem>(rod.time, std::vector<Impl*>{&rod});
-    island_.island().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
-    island_.setMembers({{&part_, &part_}});
+    island_.equations().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
+    island_.setParts({&part_});
   }
 
   /// From what the rod has loaded.
@@ -38,7 +38,7 @@ public:
 private:
   Impl& rod_;
   RodPart part_;
-  IslandStepper island_;
+  Island island_;
   std::unique_ptr<ExplicitSystem> explicit_;   ///< null: implicit steps
 };
 

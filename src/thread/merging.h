@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "../contact/island_system.h"
+#include "island/equations.h"
 
 namespace slender {
 

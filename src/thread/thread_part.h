@@ -2,8 +2,7 @@
 
 #include <vector>
 
-#include "../contact/chain_part.h"
-#include "../contact/part_steps.h"
+#include "island/chain_part.h"
 #include "slender_sim/contact/contact_properties.h"
 #include "thread_stepper_impl.h"
 
@@ -11,7 +10,7 @@ namespace slender {
 
 /// A thread as a part of an island. If it touches something, all its nodes are surface points. Those that lie on a floor which they stick to
 /// move with that floor and have no unknowns.
-class ThreadPart : public ChainPart, public PartSteps
+class ThreadPart : public ChainPart
 {
 public:
   explicit ThreadPart(ThreadStepper::Impl& thread) : ChainPart(thread.system), thread_(thread) {}
@@ -49,7 +48,7 @@ private:
   void gather(Eigen::Matrix3Xd& x) const override;
   void gatherStart(Eigen::Matrix3Xd& x) const override;
 
-  // ---- as PartSteps
+  // ---- its steps
   double longestSubstep(double duration) const override { return thread_.longestSubstep(duration); }
   double shortestEdge() const override { return system_.leastRestLength(); }
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;

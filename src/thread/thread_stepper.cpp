@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../contact/island_stepper.h"
+#include "island/island.h"
 #include "slender_sim/linalg/interruption.h"
 #include "thread_part.h"
 
@@ -19,8 +19,8 @@ class ThreadStepper::Alone : SubstepEquations
 public:
   explicit Alone(Impl& thread) : thread_(thread), part_(thread), island_(timeOf(thread.newton), false)
   {
-    island_.island().tolerances.most_unbalanced = ThreadSystem::mostUnbalanced();
-    island_.setMembers({{&part_, &part_}});
+    island_.equations().tolerances.most_unbalanced = ThreadSystem::mostUnbalanced();
+    island_.setParts({&part_});
   }
 
   /// From what the thread has loaded.
@@ -72,7 +72,7 @@ private:
 
   Impl& thread_;
   ThreadPart part_;
-  IslandStepper island_;
+  Island island_;
   double duration_ = 0.0;   ///< of the present step [s]
 };
 

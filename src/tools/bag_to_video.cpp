@@ -19,7 +19,7 @@
 #include "holder_meshes.h"
 #include "picture.h"
 #include "video_file.h"
-#include "../study/framework/processes.h"
+#include "study/framework/processes.h"
 
 /// bag_to_video BAG --out FILE.mp4|FILE.gif: pictures of what was recorded, joined by ffmpeg.
 namespace {

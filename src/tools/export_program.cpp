@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "arguments.h"
-#include "../study/framework/processes.h"
+#include "study/framework/processes.h"
 #include "slender_sim/scene/file_paths.h"
 
 namespace slender {

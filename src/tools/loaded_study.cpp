@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "../scene/reader/yaml_tree.h"
-#include "../study/framework/whole_file.h"
+#include "scene/reader/yaml_tree.h"
+#include "study/framework/whole_file.h"
 #include "slender_sim/scene/reader.h"
 
 namespace slender {

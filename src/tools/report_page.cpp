@@ -9,7 +9,7 @@
 #include <map>
 #include <sstream>
 
-#include "../study/framework/whole_file.h"
+#include "study/framework/whole_file.h"
 #include "loaded_study.h"
 #include "markup.h"
 #include "slender_sim/study/bars.h"

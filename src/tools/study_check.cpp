@@ -8,8 +8,8 @@
 #include <fstream>
 #include <iostream>
 
-#include "../study/framework/processes.h"
-#include "../study/framework/whole_file.h"
+#include "study/framework/processes.h"
+#include "study/framework/whole_file.h"
 #include "arguments.h"
 #include "markup.h"
 #include "slender_sim/study/study.h"

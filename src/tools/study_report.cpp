@@ -15,8 +15,8 @@
 #include <Eigen/Core>
 
 #include "arguments.h"
-#include "../study/framework/processes.h"
-#include "../study/framework/whole_file.h"
+#include "study/framework/processes.h"
+#include "study/framework/whole_file.h"
 #include "commit.h"
 #include "report_page.h"
 #include "results_page.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "arguments.h"
-#include "../study/framework/processes.h"
+#include "study/framework/processes.h"
 #include "sweep_runs.h"
 
 namespace slender::sweep {

@@ -1,15 +1,15 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "../rod/explicit_system.h"
-#include "joined_statics.h"
-#include "rod_islands.h"
+#include "rod/explicit_system.h"
+#include "world_statics.h"
+#include "rod_groups.h"
 
 namespace slender {
 
 namespace {
 
-IslandContent checkedForExplicitSteps(const WorldModel& world, IslandContent content)
+WorldContent checkedForExplicitSteps(const WorldModel& world, WorldContent content)
 {
   if (std::any_of(content.rods.begin(), content.rods.end(), [&](int r) { return world.rods[r].contact.has_value(); }))
     throw std::invalid_argument(
@@ -20,7 +20,7 @@ IslandContent checkedForExplicitSteps(const WorldModel& world, IslandContent con
   return content;
 }
 
-std::vector<RodStepper::Impl*> steppersOf(const JoinedObjects& objects)
+std::vector<RodStepper::Impl*> steppersOf(const WorldObjects& objects)
 {
   std::vector<RodStepper::Impl*> steppers;
   for (const RodObject& rod : objects.rods)
@@ -28,7 +28,7 @@ std::vector<RodStepper::Impl*> steppersOf(const JoinedObjects& objects)
   return steppers;
 }
 
-std::vector<ExplicitSystem::SimulatedBody> bodiesOf(const JoinedObjects& objects)
+std::vector<ExplicitSystem::SimulatedBody> bodiesOf(const WorldObjects& objects)
 {
   std::vector<ExplicitSystem::SimulatedBody> bodies;
   for (const BodyObject& body : objects.bodies)
@@ -37,10 +37,10 @@ std::vector<ExplicitSystem::SimulatedBody> bodiesOf(const JoinedObjects& objects
 }
 
 /// Rods, and bodies that welds join with them, in explicit steps.
-class ExplicitRods final : public RodIsland
+class ExplicitRods final : public StepGroup
 {
 public:
-  ExplicitRods(const WorldModel& world, IslandContent content, WorldState& state)
+  ExplicitRods(const WorldModel& world, WorldContent content, WorldState& state)
     : objects_(world, checkedForExplicitSteps(world, std::move(content)), state),
       system_(world.time, steppersOf(objects_), bodiesOf(objects_), objects_.welds)
   {
@@ -77,14 +77,14 @@ public:
   RodStepper* stepper(int rod) override { return objects_.rods[rod].alone(); }
 
 private:
-  JoinedObjects objects_;
+  WorldObjects objects_;
   ExplicitSystem system_;
   int threads_ = 0;
 };
 
 }   // namespace
 
-std::unique_ptr<RodIsland> makeExplicitRods(const WorldModel& world, IslandContent content, WorldState& state)
+std::unique_ptr<StepGroup> makeExplicitRods(const WorldModel& world, WorldContent content, WorldState& state)
 {
   return std::make_unique<ExplicitRods>(world, std::move(content), state);
 }

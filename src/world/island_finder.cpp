@@ -70,16 +70,16 @@ int IslandFinder::find()
   for (int k = 0; k < parts; ++k)
     ++start_[island_of_[k] + 1];
   std::partial_sum(start_.begin(), start_.end(), start_.begin());
-  members_.resize(parent_.size());
+  parts_.resize(parent_.size());
   order_.assign(start_.begin(), start_.end() - 1);
   for (int k = 0; k < parts; ++k)
-    members_[order_[island_of_[k]]++] = k;
+    parts_[order_[island_of_[k]]++] = k;
   return islands;
 }
 
 void IslandFinder::partsOf(int island, std::vector<int>& parts) const
 {
-  parts.assign(members_.begin() + start_[island], members_.begin() + start_[island + 1]);
+  parts.assign(parts_.begin() + start_[island], parts_.begin() + start_[island + 1]);
 }
 
 }   // namespace slender

@@ -41,7 +41,7 @@ public:
 private:
   int root(int part);
 
-  std::vector<int> parent_, order_, island_of_, start_, members_;
+  std::vector<int> parent_, order_, island_of_, start_, parts_;
   std::vector<BoundingBox> boxes_;
 };
 

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "../contact/island_stepper.h"
-#include "../thread/merging.h"
-#include "../thread/thread_part.h"
+#include "island/island.h"
+#include "thread/merging.h"
+#include "thread/thread_part.h"
 
 namespace slender {
 

@@ -5,11 +5,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cloth_islands.h"
-#include "joined_parts.h"
-#include "rod_islands.h"
-#include "step_islands.h"
-#include "thread_islands.h"
+#include "cloth_groups.h"
+#include "island_scheduler.h"
+#include "rod_groups.h"
+#include "group_loop.h"
+#include "thread_groups.h"
 #include "tracked_parts.h"
 
 namespace slender {
@@ -64,11 +64,11 @@ public:
     checkCloths(state);
   }
 
-  /// Calls `advance` on all islands until one fails, or throws. Then the state is as it was before.
+  /// Calls `advance` on all groups until one fails, or throws. Then the state is as it was before.
   template <class Advance>
   StepReport advance(WorldState& state, bool restorable, const Advance& advance)
   {
-    // An island that fails leaves its own part as it was. The others must not have moved either.
+    // A group that fails leaves its own objects as they were. The others must not have moved either.
     if (restorable)
       before_ = state;
     StepReport total;
@@ -89,17 +89,17 @@ public:
 
   StepReport step(WorldState& state, const WorldInputs& inputs)
   {
-    StepReport total = advance(state, islands_.size() > 1 || functionsDue(model, state), [&] {
+    StepReport total = advance(state, groups_.size() > 1 || functionsDue(model, state), [&] {
       takeOverDue(model, state);
-      return stepIslands(state, inputs);
+      return stepGroups(state, inputs);
     });
     if (!total.ok)
       return total;
     moveGiven(inputs, state);
     ++state.steps;
     state.time = static_cast<double>(state.steps) * model.time.step;   // no sum of round-off
-    for (const auto& island : islands_)
-      island->finish(state, inputs, total);
+    for (const auto& group : groups_)
+      group->finish(state, inputs, total);
     return total;
   }
 
@@ -107,8 +107,8 @@ public:
   {
     return advance(state, true, [&] {
       StepReport total;
-      for (std::size_t i = 0; i < islands_.size() && total.ok; ++i)
-        total.merge(islands_[i]->solveEquilibrium(state, inputs));
+      for (std::size_t i = 0; i < groups_.size() && total.ok; ++i)
+        total.merge(groups_[i]->solveEquilibrium(state, inputs));
       return total;
     });
   }
@@ -118,44 +118,40 @@ public:
     if (threads < 1)
       throw std::invalid_argument("threads = " + std::to_string(threads) + "; must be at least 1");
     separate_loop_.threads = threads;
-    for (const auto& island : islands_)
-      island->setThreads(threads);
+    for (const auto& group : groups_)
+      group->setThreads(threads);
   }
 
   void checkCloths(WorldState& state)
   {
     for (const auto& place : cloths)
       if (place.index == 0)
-        place.island->check(state);
+        place.group->check(state);
   }
 
   std::vector<ContactForce> contacts() const
   {
     std::vector<ContactForce> all;
-    for (const auto& island : islands_)
-      island->addContacts(all);
+    for (const auto& group : groups_)
+      group->addContacts(all);
     return all;
   }
 
   const WorldModel model;
 
-  /// Where a part is.
-  template <class IslandType>
+  /// Where an object is.
   struct Place
   {
-    IslandType* island = nullptr;
-    int index = 0;   ///< in the island
+    StepGroup* group = nullptr;
+    int index = 0;   ///< in the group
   };
-  std::vector<Place<RodIsland>> rods;
-  std::vector<Place<ClothIsland>> cloths;
+  std::vector<Place> rods, cloths;
 
 private:
-  template <class IslandType>
-  IslandType* add(std::unique_ptr<IslandType> island)
+  StepGroup* add(std::unique_ptr<StepGroup> group)
   {
-    IslandType* added = island.get();
-    islands_.push_back(std::move(island));
-    return added;
+    groups_.push_back(std::move(group));
+    return groups_.back().get();
   }
 
   void addThreads(WorldState& state)
@@ -180,7 +176,7 @@ private:
         std::any_of(model.cloths.begin(), model.cloths.end(), joins))
       return;   // addRods() joins them with the others
     add(built(Kind::none, -1, [&] {
-      return std::make_unique<JoinedParts>(model, IslandContent{{}, touching_threads_, {}, {}}, state);
+      return std::make_unique<IslandScheduler>(model, WorldContent{{}, touching_threads_, {}, {}}, state);
     }));
     touching_threads_.clear();
   }
@@ -202,8 +198,7 @@ private:
     }
     if (touching.empty())
       return;
-    ClothIsland* island = add(built(Kind::none, -1, [&] { return makeTouchingCloths(model, touching); }));
-    place(cloths, touching, island);
+    place(cloths, touching, add(built(Kind::none, -1, [&] { return makeTouchingCloths(model, touching); })));
   }
 
   /// Rods, and all that the barrier of contact may join with them.
@@ -217,8 +212,8 @@ private:
                                        [this](int b) { return model.bodies[b].body.simulated; });
     const bool meet = !meeting.empty() || simulated || !touching_threads_.empty() || !joined_cloths_.empty();
     const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
-    IslandContent content{meeting, touching_threads_, meet ? bodies : std::vector<int>{}, joined_cloths_};
-    separate_begin_ = islands_.size();
+    WorldContent content{meeting, touching_threads_, meet ? bodies : std::vector<int>{}, joined_cloths_};
+    separate_begin_ = groups_.size();
     for (const int r : alone)
     {
       if (model.rods[r].tracked.sets)
@@ -228,19 +223,19 @@ private:
       else
         content.rods.push_back(r);
     }
-    separate_end_ = islands_.size();
+    separate_end_ = groups_.size();
     if (!meet && content.rods.empty())
       return;
-    const std::vector<int> rods_of_island = content.rods;
+    const std::vector<int> rods_of_group = content.rods;
     if (explicit_steps && touching_threads_.empty() && joined_cloths_.empty())
     {
-      place(rods, rods_of_island, add(built(Kind::none, -1, [&] { return makeExplicitRods(model, content, state); })));
+      place(rods, rods_of_group, add(built(Kind::none, -1, [&] { return makeExplicitRods(model, content, state); })));
       return;
     }
-    JoinedParts* island =
-        add(built(Kind::none, -1, [&] { return std::make_unique<JoinedParts>(model, content, state); }));
-    place(rods, rods_of_island, static_cast<RodIsland*>(island));
-    place(cloths, joined_cloths_, static_cast<ClothIsland*>(island));
+    StepGroup* group =
+        add(built(Kind::none, -1, [&] { return std::make_unique<IslandScheduler>(model, content, state); }));
+    place(rods, rods_of_group, group);
+    place(cloths, joined_cloths_, group);
   }
 
   /// Simulated ones, and driven ones that rods are welded to or that have a shape.
@@ -260,12 +255,11 @@ private:
     return meeting;
   }
 
-  /// Notes that an island has these parts, in this order.
-  template <class IslandType>
-  static void place(std::vector<Place<IslandType>>& places, const std::vector<int>& parts, IslandType* island)
+  /// Notes that a group has these objects, in this order.
+  static void place(std::vector<Place>& places, const std::vector<int>& objects, StepGroup* group)
   {
-    for (std::size_t k = 0; k < parts.size(); ++k)
-      places[parts[k]] = {island, static_cast<int>(k)};
+    for (std::size_t k = 0; k < objects.size(); ++k)
+      places[objects[k]] = {group, static_cast<int>(k)};
   }
 
   template <class Make>
@@ -275,17 +269,17 @@ private:
     rods[r] = {add(built(Kind::rod, r, make)), 0};
   }
 
-  StepReport stepIslands(WorldState& state, const WorldInputs& inputs)
+  StepReport stepGroups(WorldState& state, const WorldInputs& inputs)
   {
     StepReport total;
     for (std::size_t i = 0; i < separate_begin_ && total.ok; ++i)
-      total.merge(islands_[i]->step(state, inputs));
+      total.merge(groups_[i]->step(state, inputs));
     if (total.ok && separate_end_ > separate_begin_)
       separate_loop_.run(
           static_cast<int>(separate_end_ - separate_begin_), separate_nodes_,
-          [&](int k) { return islands_[separate_begin_ + k]->step(state, inputs); }, total);
-    for (std::size_t i = separate_end_; i < islands_.size() && total.ok; ++i)
-      total.merge(islands_[i]->step(state, inputs));
+          [&](int k) { return groups_[separate_begin_ + k]->step(state, inputs); }, total);
+    for (std::size_t i = separate_end_; i < groups_.size() && total.ok; ++i)
+      total.merge(groups_[i]->step(state, inputs));
     return total;
   }
 
@@ -305,14 +299,14 @@ private:
 
   /// In the order in which they step: threads, cloths that lead others, other cloths, rods that track or take explicit
   /// steps and meet nothing, all others.
-  std::vector<std::unique_ptr<Island>> islands_;
+  std::vector<std::unique_ptr<StepGroup>> groups_;
   std::size_t separate_begin_ = 0, separate_end_ = 0;   ///< among them the rods that meet nothing
   int separate_nodes_ = 0;
   std::vector<int> touching_threads_;   ///< that are joined with rods, cloths or bodies
   std::vector<int> joined_cloths_;      ///< whose contact is the barrier
   std::vector<int> given_bodies_;       ///< driven bodies
-  WorldState before_;                   ///< a step that may fail in one of several islands
-  IslandLoop separate_loop_;
+  WorldState before_;                   ///< a step that may fail in one of several groups
+  GroupLoop separate_loop_;
 };
 
 World::World(WorldModel model, WorldState& state)
@@ -333,44 +327,44 @@ void World::checkCloths(WorldState& state) { impl_->checkCloths(state); }
 const std::vector<Wrench>& World::rodWrenches(int rod) const
 {
   const auto& place = impl_->rods.at(rod);
-  return place.island->wrenches(place.index);
+  return place.group->wrenches(place.index);
 }
 
 RodEnergies World::rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const
 {
   const auto& place = impl_->rods.at(rod);
-  return place.island->rodEnergies(place.index, state, gravity);
+  return place.group->rodEnergies(place.index, state, gravity);
 }
 
 RodStepper* World::rodStepper(int rod)
 {
   const auto& place = impl_->rods.at(rod);
-  return place.island->stepper(place.index);
+  return place.group->stepper(place.index);
 }
 
 const Eigen::Matrix3Xd& World::pinForces(int cloth) const
 {
   const auto& place = impl_->cloths.at(cloth);
-  return place.island->pinForces(place.index);
+  return place.group->pinForces(place.index);
 }
 
 Eigen::Matrix3Xd World::rodContactForces(int rod) const
 {
   const auto& place = impl_->rods.at(rod);
-  const Eigen::Matrix3Xd forces = place.island->rodContactForces(place.index);
+  const Eigen::Matrix3Xd forces = place.group->rodContactForces(place.index);
   return forces.cols() > 0 ? forces : Eigen::Matrix3Xd::Zero(3, impl_->model.rods[rod].model->nodes());
 }
 
 Eigen::Matrix3Xd World::clothContactForces(int cloth) const
 {
   const auto& place = impl_->cloths.at(cloth);
-  return place.island->clothContactForces(place.index);
+  return place.group->clothContactForces(place.index);
 }
 
 ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const
 {
   const auto& place = impl_->cloths.at(cloth);
-  return place.island->clothEnergies(place.index, state, gravity);
+  return place.group->clothEnergies(place.index, state, gravity);
 }
 
 std::vector<ContactForce> World::contacts() const { return impl_->contacts(); }

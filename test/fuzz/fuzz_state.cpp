@@ -8,7 +8,7 @@
 #include "memory_file.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
-#include "src/scene/record/byte_archive.h"
+#include "scene/record/byte_archive.h"
 
 namespace {
 

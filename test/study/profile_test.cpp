@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "src/study/framework/profile.h"
+#include "study/framework/profile.h"
 
 using namespace slender;
 using namespace slender::study;

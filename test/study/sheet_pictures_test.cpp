@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "src/study/cloth/sheet_cases.h"
-#include "src/study/framework/surface_script.h"
+#include "study/cloth/sheet_cases.h"
+#include "study/framework/surface_script.h"
 
 using namespace slender;
 using namespace slender::study;

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "src/study/framework/stability.h"
+#include "study/framework/stability.h"
 
 using namespace slender;
 using namespace slender::study;

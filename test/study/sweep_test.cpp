@@ -14,7 +14,7 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/sweep_plan.h"
-#include "src/study/thread/belt_pattern.h"
+#include "study/thread/belt_pattern.h"
 
 using namespace slender;
 using namespace slender::study;

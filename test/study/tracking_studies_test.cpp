@@ -4,9 +4,9 @@
 
 #include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/study/study.h"
-#include "src/study/tracking/biped.h"
-#include "src/study/tracking/region_cases.h"
-#include "src/study/tracking/guided_cloth.h"
+#include "study/tracking/biped.h"
+#include "study/tracking/region_cases.h"
+#include "study/tracking/guided_cloth.h"
 
 using namespace slender;
 using namespace slender::study;

@@ -6,9 +6,9 @@
 #include "slender_sim/cloth/cloth_model.h"
 #include "slender_sim/contact/solids.h"
 #include "slender_sim/geometry/mesh_shapes.h"
-#include "src/cloth/cloth_part.h"
-#include "src/contact/island_stepper.h"
-#include "src/rod/rod_part.h"
+#include "cloth/cloth_part.h"
+#include "island/island.h"
+#include "rod/rod_part.h"
 
 namespace slender::test {
 
@@ -128,8 +128,8 @@ public:
     poses.insert(poses.end(), poses_.begin(), poses_.end());
     return ContactPotential(surface, options_).clearance(x, poses);
   }
-  ContactPotential& contact() { return *stepper_.island().contact(); }
-  IslandStepper& stepper() { return stepper_; }
+  ContactPotential& contact() { return *stepper_.equations().contact(); }
+  Island& stepper() { return stepper_; }
 
   Eigen::Vector3d gravity{0, 0, -9.81};
   std::vector<Cloth> cloths;
@@ -158,7 +158,7 @@ private:
   }
   void begin()
   {
-    std::vector<IslandStepper::Member> members;
+    std::vector<Part*> members;
     for (Body& body : bodies)
       members.push_back({body.part.get(), body.part.get()});
     for (Rod& rod : rods)
@@ -168,14 +168,14 @@ private:
     stepper_.setMembers(members);
     for (Body& body : bodies)
     {
-      stepper_.island().solids.emplace_back();
-      stepper_.island().solids.back().body = body.part.get();
+      stepper_.equations().solids.emplace_back();
+      stepper_.equations().solids.back().body = body.part.get();
     }
     for (const Pose& pose : poses_)
     {
-      stepper_.island().solids.emplace_back();
-      stepper_.island().solids.back().start = pose;
-      stepper_.island().solids.back().target.X_WG = pose;
+      stepper_.equations().solids.emplace_back();
+      stepper_.equations().solids.back().start = pose;
+      stepper_.equations().solids.back().target.X_WG = pose;
     }
     stepper_.setContact(solids(), options_);
   }
@@ -183,7 +183,7 @@ private:
   double step_, stiffness_ = 0.0;
   bool begun_ = false;
   ContactOptions options_;
-  IslandStepper stepper_;
+  Island stepper_;
   std::vector<Shape> shapes_;
   std::vector<Pose> poses_;
 };

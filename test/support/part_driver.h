@@ -1,7 +1,7 @@
 #pragma once
 
 #include "slender_sim/dynamics/newton.h"
-#include "src/contact/part.h"
+#include "island/part.h"
 
 namespace slender::test {
 
@@ -11,7 +11,7 @@ struct PartDriver
 {
   Part& part;
   bool coupled;
-  CouplingMatrix matrix{false};
+  SharedMatrix matrix{false};
 
   PartDriver(Part& p, bool couple) : part(p), coupled(couple) {}
 
@@ -34,9 +34,9 @@ struct PartDriver
     matrix.finish();
     part.findEntries(matrix);
   }
-  CouplingMatrix::Bases basesOf(const int (&point)[4]) const
+  SharedMatrix::Bases basesOf(const int (&point)[4]) const
   {
-    CouplingMatrix::Bases bases;
+    SharedMatrix::Bases bases;
     for (int p = 0; p < 4; ++p)
       bases[p] = point[p] < 0 ? Part::kPrescribed : part.base(point[p] - part.first_point);
     return bases;

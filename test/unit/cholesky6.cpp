@@ -1,4 +1,4 @@
-#include "src/linalg/cholesky6.h"
+#include "linalg/cholesky6.h"
 
 #include <cmath>
 

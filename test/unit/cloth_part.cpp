@@ -1,5 +1,5 @@
 // A cloth as a part of an island, with the least of an island around it: one part, and Newton's method.
-#include "src/cloth/cloth_part.h"
+#include "cloth/cloth_part.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "src/cloth/cloth_part.h"
+#include "cloth/cloth_part.h"
 #include "test/support/allocations.h"
 #include "test/support/cloths.h"
 #include "test/support/part_driver.h"

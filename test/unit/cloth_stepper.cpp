@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "src/cloth/cloth_preconditioner.h"
+#include "cloth/cloth_preconditioner.h"
 #include "test/support/cloths.h"
 
 namespace slender::test {

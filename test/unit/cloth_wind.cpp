@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "src/cloth/wind_load.h"
+#include "cloth/wind_load.h"
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "test/support/cloths.h"
 

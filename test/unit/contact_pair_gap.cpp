@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/contact/distance.h"
-#include "src/contact/pair_gap.h"
+#include "contact/pair_gap.h"
 #include "test/support/random.h"
 
 namespace slender::test {

@@ -2,7 +2,7 @@
 
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/geometry/mesh_shapes.h"
-#include "src/contact/pair_gap.h"
+#include "contact/pair_gap.h"
 #include "test/support/contact.h"
 
 namespace slender::test {

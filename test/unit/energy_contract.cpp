@@ -9,7 +9,7 @@
 #include "slender_sim/energy/membrane_term.h"
 #include "slender_sim/energy/plate_bending.h"
 #include "slender_sim/energy/quadratic_term.h"
-#include "src/cloth/wind_load.h"
+#include "cloth/wind_load.h"
 #include "test/support/cloths.h"
 
 namespace slender::test {

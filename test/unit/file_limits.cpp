@@ -10,7 +10,7 @@
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/scene/sweep_plan.h"
-#include "src/scene/record/byte_archive.h"
+#include "scene/record/byte_archive.h"
 
 /// What files may ask for: a few bytes must not fill the memory, take for ever, or lead out of what there is.
 namespace slender {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/contact/intersection.h"
-#include "src/contact/kdop_tree.h"
+#include "contact/kdop_tree.h"
 #include "test/support/random.h"
 
 namespace slender::test {

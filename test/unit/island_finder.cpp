@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "src/world/island_finder.h"
+#include "world/island_finder.h"
 
 namespace slender::test {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/geometry/rotation.h"
-#include "src/thread/merging.h"
+#include "thread/merging.h"
 #include "test/support/thread_world.h"
 #include "test/support/threads.h"
 

@@ -28,7 +28,7 @@ constexpr double kFoldedChi = 1.5e-3;
 /// Minimises a system's energy by Newton's method from its trial configuration.
 ///
 /// System offers evaluate(with_hessian, shift), solve(), moveAlong(alpha), accept(), saveBase(), restoreBase() and
-/// the measures used below (see RodSystem and IslandSystem). A Hessian with negative eigenvalues (known from the
+/// the measures used below (see RodSystem and Equations). A Hessian with negative eigenvalues (known from the
 /// inertia of its LDL^T) is shifted by a positive diagonal until it is definite, so that the direction descends. Steps
 /// are accepted by a watchdog [Nocedal & Wright, Numerical Optimization, 15.6]: nearly inextensible bodies gain a
 /// little stretching energy in every full step that turns them, and a strict line search would creep. Full steps may

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "../../rod/body_surface.h"
+#include "rod/body_surface.h"
 #include "read_parts.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/geometry/mesh_topology.h"

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "../record/state_fit.h"
+#include "scene/record/state_fit.h"
 #include "cloth_grasps.h"
 #include "slender_sim/scene/reader.h"
 

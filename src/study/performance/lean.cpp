@@ -158,7 +158,7 @@ std::vector<Feature> features()
        {with(rod_on_floor, {"rods.0.contact.friction=0.3"}), with(cloth_on_ball, {"cloths.0.contact.friction=0.3"})}},
       {"coupled matrix",
        {"src/contact/coupling_matrix"},
-       "[cC]onjugateGradientsIn|CouplingMatrix",
+       "[cC]onjugateGradientsIn|SharedMatrix",
        {kRod, kExplicitRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball, thread_with_itself},
        {with(kRod, {welded_disc})}},
       {"rigid bodies",

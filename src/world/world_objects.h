@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "../cloth/cloth_part.h"
-#include "../contact/island_stepper.h"
-#include "../rod/rod_part.h"
-#include "../thread/thread_part.h"
+#include "cloth/cloth_part.h"
+#include "island/island.h"
+#include "rod/rod_part.h"
+#include "thread/thread_part.h"
 #include "island_finder.h"
 #include "slender_sim/world/world_model.h"
 #include "slender_sim/world/world_state.h"
@@ -36,7 +36,7 @@ public:
   /// valid.
   virtual bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) = 0;
   /// Appends its parts of the present step, once the object is loaded.
-  virtual void addMembers(std::vector<IslandStepper::Member>& members) = 0;
+  virtual void addParts(std::vector<Part*>& parts) = 0;
   /// What it may touch; without a box.
   virtual IslandFinder::Reach reach() const = 0;
   /// Writes the end of the step into the state.
@@ -54,7 +54,7 @@ public:
   RodObject(const WorldModel& world, int number, const TimeConfig& time);
   std::string name() const override { return "rod '" + stepper->model->name + "'"; }
   bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addMembers(std::vector<IslandStepper::Member>& members) override { members.push_back({part.get(), part.get()}); }
+  void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
   IslandFinder::Reach reach() const override;
   void finish(WorldState& state) override { state.rods[index] = stepper->work; }
   double& stiffness(WorldState& state) const override { return state.contact_stiffness.rods[index]; }
@@ -81,7 +81,7 @@ public:
   BodyObject(const WorldModel& world, int number);
   std::string name() const override { return "body '" + model_.body.name + "'"; }
   bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addMembers(std::vector<IslandStepper::Member>& members) override { members.push_back({part.get(), part.get()}); }
+  void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
   IslandFinder::Reach reach() const override;
   void finish(WorldState& state) override { state.bodies[index] = part->state(); }
   double& stiffness(WorldState& state) const override { return state.contact_stiffness.bodies[index]; }
@@ -105,7 +105,7 @@ public:
   }
   std::string name() const override { return "thread '" + model.model->name + "'"; }
   bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addMembers(std::vector<IslandStepper::Member>& members) override;
+  void addParts(std::vector<Part*>& parts) override;
   IslandFinder::Reach reach() const override;
   void finish(WorldState& state) override;
   double& stiffness(WorldState& state) const override { return state.contact_stiffness.threads[index]; }
@@ -138,7 +138,7 @@ public:
   ClothObject(const WorldModel& world, int number, const TimeConfig& time);
   std::string name() const override { return "cloth '" + part->stages().model->name + "'"; }
   bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addMembers(std::vector<IslandStepper::Member>& members) override { members.push_back({part.get(), part.get()}); }
+  void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
   IslandFinder::Reach reach() const override;
   void finish(WorldState& state) override { part->end(state.cloths[index]); }
   double& stiffness(WorldState& state) const override { return state.contact_stiffness.cloths[index]; }
@@ -152,7 +152,7 @@ private:
 };
 
 /// A solid that parts may touch.
-struct JoinedSolid
+struct WorldSolid
 {
   enum class Kind
   {
@@ -171,7 +171,7 @@ struct JoinedSolid
 };
 
 /// Which parts of the world may meet, by their numbers.
-struct IslandContent
+struct WorldContent
 {
   std::vector<int> rods;   ///< those that may meet something come first
   std::vector<int> threads;
@@ -182,22 +182,22 @@ struct IslandContent
 /// Returns true if contact or welds may let a rod meet something.
 bool meetsOthers(const WorldModel& world, int rod);
 
-struct JoinedObjects
+struct WorldObjects
 {
   /// Appends the grasps of the welds to the rods of the state, and makes room for the stiffnesses of contact. The model
   /// of the world must live as long.
-  JoinedObjects(const WorldModel& world, IslandContent content, WorldState& state);
+  WorldObjects(const WorldModel& world, WorldContent content, WorldState& state);
   /// The bodies, and the rods that may meet something, for steps of another kind. The state has the grasps of the
   /// welds.
-  JoinedObjects(const JoinedObjects& other, const TimeConfig& time);
-  JoinedObjects& operator=(const JoinedObjects&) = delete;
+  WorldObjects(const WorldObjects& other, const TimeConfig& time);
+  WorldObjects& operator=(const WorldObjects&) = delete;
 
   /// Takes the inputs of the rods for a step. Returns false, and fills the report, where the inputs do not fit the
   /// state or are not finite.
   bool takeInputs(const WorldState& state, const WorldInputs& inputs, StepReport& report);
 
   const WorldModel& world;
-  const IslandContent content;
+  const WorldContent content;
   std::deque<BodyObject> bodies;
   std::deque<RodObject> rods;
   std::deque<ClothObject> cloths;
@@ -205,7 +205,7 @@ struct JoinedObjects
   /// All of them in this order. Bodies come first, because rods follow them.
   std::vector<WorldObject*> all;
   std::vector<Weld> welds;   ///< rod: place in `rods`; body: number in the world
-  std::vector<JoinedSolid> solids;
+  std::vector<WorldSolid> solids;
 
   /// Place in `all`.
   int placeOf(const WorldObject& object) const;

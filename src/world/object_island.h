@@ -2,21 +2,21 @@
 
 #include <vector>
 
-#include "../contact/island_stepper.h"
-#include "../thread/thread_guard.h"
-#include "joined_objects.h"
+#include "island/island.h"
+#include "thread/thread_guard.h"
+#include "world_objects.h"
 #include "thread_merging.h"
 
 namespace slender {
 
 /// Some of the objects that may meet, whose parts are minimised together in a step, with their contact.
-class JoinedIsland
+class ObjectIsland
 {
 public:
-  /// `places`: of its objects in JoinedObjects::all, ascending. The objects must outlive the island.
-  JoinedIsland(JoinedObjects& objects, const std::vector<int>& places, const TimeConfig& time);
-  JoinedIsland(const JoinedIsland&) = delete;
-  JoinedIsland& operator=(const JoinedIsland&) = delete;
+  /// `places`: of its objects in WorldObjects::all, ascending. The objects must outlive the island.
+  ObjectIsland(WorldObjects& objects, const std::vector<int>& places, const TimeConfig& time);
+  ObjectIsland(const ObjectIsland&) = delete;
+  ObjectIsland& operator=(const ObjectIsland&) = delete;
 
   /// Begins a step of its objects, which have been loaded: takes the parts that they have now, the motion of solids and
   /// the stiffness of contact.
@@ -32,8 +32,8 @@ public:
   const BoundingBox& sweptBox(std::size_t k) const { return swept_[k]; }
   const std::vector<int>& places() const { return places_; }   ///< of its objects
   /// Contacts of the last step; null: nothing touches.
-  const ContactPotential* contact() const { return stepper_.island().contact(); }
-  IslandStepper& stepper() { return stepper_; }
+  const ContactPotential* contact() const { return island_.equations().contact(); }
+  Island& island() { return island_; }
   /// Threads that evaluate its parts; 0: as OpenMP says.
   void setThreads(int threads);
 
@@ -42,27 +42,27 @@ private:
   std::vector<ContactSolid> takeSolids();
   void setCarriers();
   void setSolids(const WorldState& state, const WorldInputs& inputs);
-  void setMembers();
+  void setParts();
   void setStrands();
   void trace();
 
   const WorldModel& world_;
-  JoinedObjects& shared_;
+  WorldObjects& shared_;
   const std::vector<int> places_;
   std::vector<WorldObject*> objects_;
   std::vector<RodObject*> rods_;   ///< among them, like the next two
   std::vector<ThreadObject*> threads_;
   std::vector<BodyObject*> bodies_;
-  std::vector<const JoinedSolid*> solids_;   ///< that its parts may touch
+  std::vector<const WorldSolid*> solids_;   ///< that its parts may touch
   int nodes_ = 0;                            ///< of its rods
   ThreadGuard guard_;
   ThreadMerging merging_;
-  std::vector<IslandStepper::Member> members_;
-  std::vector<std::size_t> member_end_;   ///< per object: its members end before this one
+  std::vector<Part*> parts_;
+  std::vector<std::size_t> parts_end_;   ///< per object: its members end before this one
   std::vector<ThreadPart*> strands_;      ///< of the present step
   std::vector<ThreadGuard::Strand> guarded_;
   std::vector<BoundingBox> swept_;   ///< per object
-  IslandStepper stepper_;
+  Island island_;
   bool stepped_ = false;
 };
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "joined_parts.h"
+#include "island_scheduler.h"
 #include "meeting.h"
 #include "slender_sim/contact/solids.h"
 
@@ -10,7 +10,7 @@ namespace slender {
 
 /// An end that is held cannot give way. Returns false, and fills the report, when a solid that moves as prescribed
 /// comes nearer to one than the thread is thick: no shorter step helps then.
-bool JoinedParts::endsHaveRoom(const WorldState& state, const WorldInputs& inputs, StepReport& report) const
+bool IslandScheduler::endsHaveRoom(const WorldState& state, const WorldInputs& inputs, StepReport& report) const
 {
   for (const ThreadObject& thread : objects_.threads)
     for (const ThreadState& strand : state.threads[thread.index].threads)
@@ -41,7 +41,7 @@ bool JoinedParts::endsHaveRoom(const WorldState& state, const WorldInputs& input
   return true;
 }
 
-bool JoinedParts::begin(const WorldState& state, const WorldInputs& inputs, StepReport& report)
+bool IslandScheduler::begin(const WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
   return objects_.takeInputs(state, inputs, report) && endsHaveRoom(state, inputs, report) &&
          std::all_of(objects_.all.begin(), objects_.all.end(),
@@ -51,17 +51,17 @@ bool JoinedParts::begin(const WorldState& state, const WorldInputs& inputs, Step
 // ---- islands
 
 /// Where objects would be at the end of the step if they kept their velocities.
-void JoinedParts::predict()
+void IslandScheduler::predict()
 {
   for (std::size_t k = 0; k < objects_.all.size(); ++k)
   {
     BoundingBox& box = reach_[k].box = BoundingBox::empty();
-    members_.clear();
-    objects_.all[k]->addMembers(members_);
-    for (const IslandStepper::Member& member : members_)
+    parts_.clear();
+    objects_.all[k]->addParts(parts_);
+    for (const Part* part : parts_)
     {
-      box.include(member.steps->surfaceBox(0.0));
-      box.include(member.steps->surfaceBox(world_.time.step));
+      box.include(part->surfaceBox(0.0));
+      box.include(part->surfaceBox(world_.time.step));
     }
   }
   finder_.begin(static_cast<int>(objects_.all.size()));
@@ -72,7 +72,7 @@ void JoinedParts::predict()
 }
 
 /// Takes the islands that the finder has found. Those that the step does not know yet begin theirs.
-void JoinedParts::arrange(WorldState& state, const WorldInputs& inputs)
+void IslandScheduler::arrange(WorldState& state, const WorldInputs& inputs)
 {
   const int count = finder_.find();
   islands_.clear();
@@ -89,11 +89,11 @@ void JoinedParts::arrange(WorldState& state, const WorldInputs& inputs)
   }
 }
 
-StepReport JoinedParts::stepIslands()
+StepReport IslandScheduler::stepIslands()
 {
   StepReport total;
   const int count = static_cast<int>(islands_.size());
-  for (JoinedIsland* island : islands_)
+  for (ObjectIsland* island : islands_)
     island->setThreads(count > 1 ? 1 : loop_.threads);
   loop_.run(
       count, nodes_, [&](int k) { return islands_[k]->stepped() ? StepReport() : islands_[k]->step(world_.time.step); },
@@ -102,17 +102,17 @@ StepReport JoinedParts::stepIslands()
 }
 
 /// Joins islands of which objects came near each other on their ways. Returns whether there were any.
-bool JoinedParts::joinThoseThatMet()
+bool IslandScheduler::joinThoseThatMet()
 {
   if (islands_.size() < 2)
     return false;
-  for (const JoinedIsland* island : islands_)
+  for (const ObjectIsland* island : islands_)
     for (std::size_t k = 0; k < island->places().size(); ++k)
       reach_[island->places()[k]].box = island->sweptBox(k);
   return finder_.joinNear(reach_, 0.5 * world_.contact.gap);
 }
 
-StepReport JoinedParts::stepAndJoin(WorldState& state, const WorldInputs& inputs)
+StepReport IslandScheduler::stepAndJoin(WorldState& state, const WorldInputs& inputs)
 {
   // Islands that no step needs any more are dropped now and then.
   if (known_.size() > 2 * objects_.all.size() + 16)
@@ -125,7 +125,7 @@ StepReport JoinedParts::stepAndJoin(WorldState& state, const WorldInputs& inputs
   while (report.ok && joinThoseThatMet())
   {
     arrange(state, inputs);
-    for (const JoinedIsland* island : islands_)
+    for (const ObjectIsland* island : islands_)
       if (!island->stepped())
         for (const int place : island->places())
           if (!objects_.all[place]->load(state, inputs, report))
@@ -135,7 +135,7 @@ StepReport JoinedParts::stepAndJoin(WorldState& state, const WorldInputs& inputs
   return report;
 }
 
-StepReport JoinedParts::step(WorldState& state, const WorldInputs& inputs)
+StepReport IslandScheduler::step(WorldState& state, const WorldInputs& inputs)
 {
   StepReport report;
   if (!begin(state, inputs, report))
@@ -145,31 +145,31 @@ StepReport JoinedParts::step(WorldState& state, const WorldInputs& inputs)
     return report;
   for (WorldObject* object : objects_.all)
     object->finish(state);
-  for (const JoinedIsland* island : islands_)
+  for (const ObjectIsland* island : islands_)
     island->end(state);
   return report;
 }
 
-void JoinedParts::finish(WorldState& state, const WorldInputs&, StepReport&)
+void IslandScheduler::finish(WorldState& state, const WorldInputs&, StepReport&)
 {
   for (const ThreadObject& thread : objects_.threads)
     state.end_loads[thread.index] = thread.loads;
 }
 
-void JoinedParts::checkClearance(const WorldState& state)
+void IslandScheduler::checkClearance(const WorldState& state)
 {
   Meeting meeting;
   for (WorldObject* object : objects_.all)
     object->addTo(meeting, state);
   if (meeting.surface.segments.empty() && meeting.surface.triangles.empty())
     return;
-  for (const JoinedSolid& solid : objects_.solids)
+  for (const WorldSolid& solid : objects_.solids)
   {
     const int index = solid.index;
-    if (solid.kind == JoinedSolid::Kind::obstacle)
+    if (solid.kind == WorldSolid::Kind::obstacle)
       meeting.addSolid("obstacle '" + world_.obstacles[index].name + "'", solid.asTouched(objects_.all),
                        state.obstacles[index]);
-    else if (solid.kind == JoinedSolid::Kind::body)
+    else if (solid.kind == WorldSolid::Kind::body)
       meeting.addSolid("body '" + world_.bodies[index].body.name + "'", solid.asTouched(objects_.all),
                        state.bodies[index].X_WB * world_.bodies[index].X_BS);
     else

@@ -1,16 +1,16 @@
 #pragma once
 
-#include "island_system.h"
+#include "island/equations.h"
 
 #ifdef _OPENMP
 #include <omp.h>
 #endif
 
-/// Loops over the parts and the contacts of an island. Private to IslandSystem.
+/// Loops over the parts and the contacts of an island. Private to Equations.
 namespace slender {
 
 template <class F>
-void IslandSystem::forParts(F&& f)
+void Equations::forParts(F&& f)
 {
   if (!parallel_ || threads_ == 1)
   {
@@ -27,7 +27,7 @@ void IslandSystem::forParts(F&& f)
 }
 
 template <class F>
-void IslandSystem::forTerms(F&& f) const
+void Equations::forTerms(F&& f) const
 {
   if (contact_)
     for (const ContactTerm& term : contact_->terms())

@@ -3,11 +3,11 @@
 #include <map>
 #include <vector>
 
-#include "island.h"
+#include "step_group.h"
 #include "island_finder.h"
-#include "joined_island.h"
-#include "joined_objects.h"
-#include "step_islands.h"
+#include "object_island.h"
+#include "world_objects.h"
+#include "group_loop.h"
 
 namespace slender {
 
@@ -17,12 +17,12 @@ namespace slender {
 /// In each step the parts are divided into islands. The division begins with parts that are joined, or that would come
 /// near each other if they kept their velocities. When all islands have made their step, parts of different islands
 /// whose ways came near each other are joined, and these islands make their step again.
-class JoinedParts final : public RodIsland, public ClothIsland
+class IslandScheduler final : public StepGroup
 {
 public:
   /// Appends the grasps of the welds to the rods of the state. Throws std::invalid_argument for models that are not
   /// valid, and for states in which surfaces touch or cross.
-  JoinedParts(const WorldModel& world, IslandContent content, WorldState& state);
+  IslandScheduler(const WorldModel& world, WorldContent content, WorldState& state);
 
   StepReport step(WorldState& state, const WorldInputs& inputs) override;
   /// Of rods and bodies. Threads have no equilibrium: they stay where they are, and the others do not feel them.
@@ -61,16 +61,16 @@ private:
   bool joinThoseThatMet();
 
   const WorldModel& world_;
-  JoinedObjects objects_;
+  WorldObjects objects_;
   int nodes_ = 0;   ///< of its rods
 
   IslandFinder finder_;
   std::vector<IslandFinder::Reach> reach_;           ///< per object
-  std::vector<IslandStepper::Member> members_;       ///< of one object
-  std::map<std::vector<int>, JoinedIsland> known_;   ///< islands that have been needed, by the places of their objects
-  std::vector<JoinedIsland*> islands_;               ///< of the present step
+  std::vector<Part*> parts_;       ///< of one object
+  std::map<std::vector<int>, ObjectIsland> known_;   ///< islands that have been needed, by the places of their objects
+  std::vector<ObjectIsland*> islands_;               ///< of the present step
   std::vector<int> places_;                          ///< objects of one island
-  IslandLoop loop_;
+  GroupLoop loop_;
 };
 
 }   // namespace slender

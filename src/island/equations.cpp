@@ -1,35 +1,35 @@
 // Several parts and their contact as one system for Newton's method: what it consists of, and its measures.
-#include "island_system.h"
+#include "island/equations.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "island_loops.h"
+#include "island/equations_loops.h"
 
 namespace slender {
 
 // ---- what the island consists of
 
-void IslandSystem::setParts(const std::vector<Part*>& parts)
+void Equations::setParts(const std::vector<Part*>& parts)
 {
   pattern_valid_ = pattern_valid_ && parts == parts_;
   parts_ = parts;
 }
 
-void IslandSystem::setContact(ContactSurface surface, const ContactOptions& options)
+void Equations::setContact(ContactSurface surface, const ContactOptions& options)
 {
   contact_ = std::make_unique<ContactPotential>(std::move(surface), options);
   for (auto* poses : {&prescribed_, &poses_, &poses_base_, &poses_end_})
     poses->resize(solids.size());
 }
 
-void IslandSystem::setThreads(int threads, bool parallel)
+void Equations::setThreads(int threads, bool parallel)
 {
   threads_ = threads;
   parallel_ = parallel;
 }
 
-void IslandSystem::countPoints()
+void Equations::countPoints()
 {
   part_of_point_.clear();
   for (Part* part : parts_)
@@ -43,7 +43,7 @@ void IslandSystem::countPoints()
       x->resize(3, count);
 }
 
-void IslandSystem::numberUnknowns()
+void Equations::numberUnknowns()
 {
   for (Part* part : parts_)
     pattern_valid_ = part->numberUnknowns() && pattern_valid_;
@@ -51,27 +51,27 @@ void IslandSystem::numberUnknowns()
 
 // ---- configurations
 
-void IslandSystem::placeSolids(double fraction, std::vector<Pose>& poses) const
+void Equations::placeSolids(double fraction, std::vector<Pose>& poses) const
 {
   for (std::size_t k = 0; k < solids.size(); ++k)
     if (const IslandSolid& s = solids[k]; !s.body)
       poses[k] = poseBetween(s.start, s.start_velocity, s.target, duration_, fraction, nullptr) * s.X_BS;
 }
 
-void IslandSystem::gather(Eigen::Matrix3Xd& x, std::vector<Pose>& poses) const
+void Equations::gather(Eigen::Matrix3Xd& x, std::vector<Pose>& poses) const
 {
   for (const Part* part : parts_)
     part->gather(x);
   gatherSolids(poses);
 }
 
-void IslandSystem::gatherSolids(std::vector<Pose>& poses) const
+void Equations::gatherSolids(std::vector<Pose>& poses) const
 {
   for (std::size_t k = 0; k < solids.size(); ++k)
     poses[k] = solids[k].body ? solids[k].body->pose() * solids[k].X_BS : prescribed_[k];
 }
 
-void IslandSystem::place(double fraction)
+void Equations::place(double fraction)
 {
   if (contact_)
     placeSolids(fraction, prescribed_);
@@ -81,7 +81,7 @@ void IslandSystem::place(double fraction)
     part->followJoints();
 }
 
-bool IslandSystem::solidsMove() const
+bool Equations::solidsMove() const
 {
   return std::any_of(solids.begin(), solids.end(), [](const IslandSolid& s) {
     return !s.body && (s.start.position != s.target.X_WG.position ||
@@ -91,7 +91,7 @@ bool IslandSystem::solidsMove() const
 
 // ---- a step
 
-void IslandSystem::beginSubstep(double fraction)
+void Equations::beginSubstep(double fraction)
 {
   exact_ = false;
   for (Part* part : parts_)
@@ -109,7 +109,7 @@ void IslandSystem::beginSubstep(double fraction)
   gatherSolids(poses_base_);
 }
 
-void IslandSystem::beginStage(bool first)
+void Equations::beginStage(bool first)
 {
   if (!contact_)
     return;
@@ -123,7 +123,7 @@ void IslandSystem::beginStage(bool first)
   takeFirst();
 }
 
-NewtonResult IslandSystem::solve(double from, double to, const NewtonConfig& newton)
+NewtonResult Equations::solve(double from, double to, const NewtonConfig& newton)
 {
   if (!contact_)
     return minimize(*this, newton);
@@ -131,7 +131,7 @@ NewtonResult IslandSystem::solve(double from, double to, const NewtonConfig& new
   return minimizeConfined(*this, from, to, newton, contact_->options().gap / tolerances.least_edge);
 }
 
-void IslandSystem::endStage()
+void Equations::endStage()
 {
   points_base_ = points_;
   poses_base_ = poses_;
@@ -139,7 +139,7 @@ void IslandSystem::endStage()
 
 /// Goes from the base towards the trial, as far as nothing touches. Where nothing moves as prescribed, the trial that
 /// was reached is the start of the solution. Otherwise what is prescribed has to wait there until all else gave way.
-Approach IslandSystem::approach(double from, double to, double& reached)
+Approach Equations::approach(double from, double to, double& reached)
 {
   gather(points_end_, poses_end_);
   double alpha = contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
@@ -172,33 +172,33 @@ Approach IslandSystem::approach(double from, double to, double& reached)
   return Approach::squeezed;
 }
 
-double IslandSystem::roomToTrial()
+double Equations::roomToTrial()
 {
   gather(points_end_, poses_end_);
   return contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
 }
 
-void IslandSystem::moveAlong(double alpha)
+void Equations::moveAlong(double alpha)
 {
   forParts([&](Part& part) { part.moveAlong(alpha); });
   for (Part* part : parts_)
     part->followJoints();
 }
 
-void IslandSystem::accept()
+void Equations::accept()
 {
   forParts([](Part& part) { part.accept(); });
   if (contact_)
     endStage();
 }
 
-void IslandSystem::saveBase()
+void Equations::saveBase()
 {
   for (Part* part : parts_)
     part->saveBase();
 }
 
-void IslandSystem::restoreBase()
+void Equations::restoreBase()
 {
   for (Part* part : parts_)
     part->restoreBase();
@@ -206,7 +206,7 @@ void IslandSystem::restoreBase()
 
 // ---- measures
 
-double IslandSystem::stepLimit()
+double Equations::stepLimit()
 {
   double alpha = 1.0;
   for (const Part* part : parts_)
@@ -217,7 +217,7 @@ double IslandSystem::stepLimit()
   return alpha * roomToTrial();
 }
 
-double IslandSystem::incrementSize() const
+double Equations::incrementSize() const
 {
   double largest = 0.0;
   for (const Part* part : parts_)
@@ -238,7 +238,7 @@ double IslandSystem::incrementSize() const
                           : largest;
 }
 
-double IslandSystem::slope() const
+double Equations::slope() const
 {
   double sum = 0.0;
   for (const Part* part : parts_)
@@ -246,7 +246,7 @@ double IslandSystem::slope() const
   return sum;
 }
 
-double IslandSystem::residual() const
+double Equations::residual() const
 {
   double largest = 0.0;
   for (const Part* part : parts_)
@@ -254,7 +254,7 @@ double IslandSystem::residual() const
   return largest;
 }
 
-double IslandSystem::forceScale() const
+double Equations::forceScale() const
 {
   double largest = 0.0;
   for (const Part* part : parts_)
@@ -263,7 +263,7 @@ double IslandSystem::forceScale() const
   return largest;
 }
 
-double IslandSystem::noiseLevel() const
+double Equations::noiseLevel() const
 {
   double largest = 0.0;
   for (const Part* part : parts_)

@@ -4,13 +4,13 @@
 #include <functional>
 #include <limits>
 
-#include "../rod/statics_advice.h"
-#include "joined_statics.h"
+#include "rod/statics_advice.h"
+#include "world_statics.h"
 
 namespace slender {
 
 /// Loads the present configuration, at which everything stands still. The functions below are about it.
-void JoinedStatics::beginStability()
+void WorldStatics::beginStability()
 {
   load(1.0);
   system().beginStep(1.0);
@@ -28,7 +28,7 @@ void JoinedStatics::beginStability()
   system().setExact(true);
   if (ContactPotential* contact = system().contact())
   {
-    contact->setStiffness(island_.stepper().stiffness());
+    contact->setStiffness(island_.island().stiffness());
     // Friction sticks below its slip speed over the whole step. In a step without end nothing sticks.
     constexpr double kForever = 1e15;
     contact->begin(system().startPoints(), system().startSolids(), kForever);
@@ -37,7 +37,7 @@ void JoinedStatics::beginStability()
   system().accept();
 }
 
-RodEvaluation JoinedStatics::energyAt(double s)
+RodEvaluation WorldStatics::energyAt(double s)
 {
   for (const RodObject& rod : objects_.rods)
   {
@@ -53,14 +53,14 @@ RodEvaluation JoinedStatics::energyAt(double s)
 
 /// Factors K + s M, with the exact second derivative of contact and without friction. Returns whether the matrix is
 /// positive definite.
-bool JoinedStatics::definite(double s)
+bool WorldStatics::definite(double s)
 {
   energyAt(s);
   return system().evaluate(true).inertia.positiveDefinite();
 }
 
 /// Half width of the band of eigenvalues that count as zero [1/s^2].
-double JoinedStatics::neutralBand() const
+double WorldStatics::neutralBand() const
 {
   double mass = 0.0, length = 0.0, stiffness = std::numeric_limits<double>::infinity(), rounding = 0.0,
          least_mass = stiffness;
@@ -88,13 +88,13 @@ double JoinedStatics::neutralBand() const
 }
 
 /// The direction becomes the mode of the lowest eigenvalue, by inverse iteration with the matrix last factored.
-void JoinedStatics::findLowestMode()
+void WorldStatics::findLowestMode()
 {
   // a start without a symmetry that a mode could be orthogonal to
   const auto start = [](std::size_t k) {
     return std::sin(1.0 + 1.7 * static_cast<double>(k)) + 0.5 * std::cos(0.3 * static_cast<double>(k));
   };
-  CouplingMatrix& matrix = system().matrix();
+  SharedMatrix& matrix = system().matrix();
   Eigen::Map<Eigen::VectorXd> shared(matrix.solution(), matrix.unknowns());
   for (Eigen::Index k = 0; k < shared.size(); ++k)
     shared[k] = start(static_cast<std::size_t>(k));
@@ -137,7 +137,7 @@ void JoinedStatics::findLowestMode()
 }
 
 /// Nothing turns by more than 1 rad. A mode that moves everything as a whole turns nothing.
-void JoinedStatics::scaleMode()
+void WorldStatics::scaleMode()
 {
   double turn = 0.0, move = 0.0, length = 0.0;
   const auto directionOf = [](const RodObject& rod) {
@@ -164,7 +164,7 @@ void JoinedStatics::scaleMode()
 
 /// The present configuration becomes what is `alpha` times the mode away from the equilibrium. Returns false when
 /// something is in the way.
-bool JoinedStatics::displaceAlongMode(double alpha)
+bool WorldStatics::displaceAlongMode(double alpha)
 {
   system().moveAlong(alpha);
   if (system().contact())

@@ -1,4 +1,4 @@
-#include "cloth_islands.h"
+#include "cloth_groups.h"
 
 #include <stdexcept>
 
@@ -17,7 +17,7 @@ void takeInputs(const ClothInputs& from, ClothInputs& to)
   to.forces = from.forces;
 }
 
-class LoneCloth : public ClothIsland
+class LoneCloth : public StepGroup
 {
 public:
   LoneCloth(const WorldModel& world, int cloth)
@@ -62,7 +62,7 @@ private:
   ClothInputs tracked_inputs_;   ///< those of the world, with the averages
 };
 
-class TouchingCloths : public ClothIsland
+class TouchingCloths : public StepGroup
 {
 public:
   TouchingCloths(const WorldModel& world, std::vector<int> cloths) : world_(world), cloths_(std::move(cloths))
@@ -160,12 +160,12 @@ private:
 
 }   // namespace
 
-std::unique_ptr<ClothIsland> makeLoneCloth(const WorldModel& world, int cloth)
+std::unique_ptr<StepGroup> makeLoneCloth(const WorldModel& world, int cloth)
 {
   return std::make_unique<LoneCloth>(world, cloth);
 }
 
-std::unique_ptr<ClothIsland> makeTouchingCloths(const WorldModel& world, std::vector<int> cloths)
+std::unique_ptr<StepGroup> makeTouchingCloths(const WorldModel& world, std::vector<int> cloths)
 {
   return std::make_unique<TouchingCloths>(world, std::move(cloths));
 }

@@ -2,8 +2,7 @@
 
 #include <vector>
 
-#include "island_system.h"
-#include "part_steps.h"
+#include "island/equations.h"
 #include "slender_sim/dynamics/time_config.h"
 
 namespace slender {
@@ -19,23 +18,17 @@ public:
 };
 
 /// Advances the parts of an island together, in substeps common to all.
-class IslandStepper : SubstepEquations
+class Island : SubstepEquations
 {
 public:
-  explicit IslandStepper(const TimeConfig& time, bool simplicial) : time_(time), island_(simplicial) {}
+  explicit Island(const TimeConfig& time, bool simplicial) : time_(time), equations_(simplicial) {}
 
-  IslandSystem& island() { return island_; }
-  const IslandSystem& island() const { return island_; }
+  Equations& equations() { return equations_; }
+  const Equations& equations() const { return equations_; }
 
-  /// A part and its steps are the same object.
-  struct Member
-  {
-    Part* part;
-    PartSteps* steps;
-  };
   /// The parts, bodies first. They must outlive the stepper, or the next call.
-  void setMembers(const std::vector<Member>& members);
-  /// Makes contact for the surfaces of the members and these solids. `ignores` of a solid are numbers of members.
+  void setParts(const std::vector<Part*>& parts);
+  /// Makes contact for the surfaces of the parts and these solids. `ignores` of a solid are numbers of objects.
   void setContact(const std::vector<ContactSolid>& solids, const ContactOptions& options);
   /// Acts besides contact; null: nothing does.
   void setAttraction(SubstepPotential* attraction);
@@ -43,8 +36,8 @@ public:
   /// Advances by `duration` [s], from what the parts have loaded. `first`: length of the first substep [s], 0: the
   /// longest; becomes that of the next step's first one. On failure the report says why.
   StepReport step(double duration, double& first);
-  /// Box of the surface of a member during the last step, see PartSteps::surfaceBox().
-  const BoundingBox& sweptBox(std::size_t member) const { return swept_[member]; }
+  /// Box of the surface of a part during the last step, see Part::surfaceBox().
+  const BoundingBox& sweptBox(std::size_t part) const { return swept_[part]; }
   /// Of the barrier [N]; part of the state. 0: not chosen yet.
   double stiffness() const { return stiffness_; }
   void setStiffness(double stiffness);
@@ -68,19 +61,18 @@ private:
   void refuse(const Substep& substep, StepFailure failure, StepReport& report) override;
 
   const TimeConfig time_;
-  IslandSystem island_;
-  std::vector<Member> members_;
+  Equations equations_;
   std::vector<Part*> parts_;
-  std::vector<BoundingBox> swept_;   ///< per member
+  std::vector<BoundingBox> swept_;   ///< per part
   SubstepPotential* attraction_ = nullptr;
   ContactSurface surface_;       ///< of the parts, without solids
-  std::vector<long> versions_;   ///< of the members' surfaces
+  std::vector<long> versions_;   ///< of the parts' surfaces
   bool surface_changes_ = false;
   StepPlan plan_;
   double duration_ = 0.0, first_stiffness_ = 0.0, stiffness_ = 0.0, gap_ = 0.0;
   bool conserving_ = false;    ///< the present step may not add to the energy
   double most_energy_ = 0.0;   ///< of a step that conserves [J]
-  std::size_t failed_ = 0;     ///< member that the last failure is about
+  std::size_t failed_ = 0;     ///< part that the last failure is about
 };
 
 }   // namespace slender

@@ -76,7 +76,7 @@ void ChainPart::forPanels(F&& f) const
       }
 }
 
-void ChainPart::notePattern(CouplingMatrix& matrix)
+void ChainPart::notePattern(SharedMatrix& matrix)
 {
   forPanels([&](int a, int b) {
     if (a >= 0)
@@ -84,13 +84,13 @@ void ChainPart::notePattern(CouplingMatrix& matrix)
   });
 }
 
-void ChainPart::findEntries(const CouplingMatrix& matrix)
+void ChainPart::findEntries(const SharedMatrix& matrix)
 {
   entries_.clear();
   forPanels([&](int a, int b) { entries_.push_back(a < 0 ? -1 : matrix.index(offset + a, offset + b)); });
 }
 
-void ChainPart::addHessian(CouplingMatrix& matrix, const HessianShift& shift)
+void ChainPart::addHessian(SharedMatrix& matrix, const HessianShift& shift)
 {
   double* const values = matrix.values();
   const RodPanel* panels = system_.panels();

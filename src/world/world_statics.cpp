@@ -1,11 +1,11 @@
-#include "joined_statics.h"
+#include "world_statics.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
-#include "../rod/statics_advice.h"
+#include "rod/statics_advice.h"
 #include "slender_sim/dynamics/lowest_eigenvalue.h"
 #include "slender_sim/geometry/rotation.h"
 
@@ -22,7 +22,7 @@ TimeConfig timeOfStatics(TimeConfig time)
   return time;
 }
 
-std::vector<int> allParts(const JoinedObjects& objects)
+std::vector<int> allParts(const WorldObjects& objects)
 {
   std::vector<int> parts(static_cast<std::size_t>(objects.all.size()));
   std::iota(parts.begin(), parts.end(), 0);
@@ -60,7 +60,7 @@ StepReport refuseTorques()
 
 }   // namespace
 
-JoinedStatics::JoinedStatics(JoinedObjects& objects)
+WorldStatics::WorldStatics(WorldObjects& objects)
   : origin_(objects),
     time_(timeOfStatics(objects.world.time)),
     objects_(objects, time_),
@@ -73,7 +73,7 @@ JoinedStatics::JoinedStatics(JoinedObjects& objects)
 
 // ---- states of its parts
 
-void JoinedStatics::take(const WorldState& state)
+void WorldStatics::take(const WorldState& state)
 {
   work_.rods.resize(state.rods.size());
   work_.bodies.resize(state.bodies.size());
@@ -86,7 +86,7 @@ void JoinedStatics::take(const WorldState& state)
   work_.contact_stiffness = state.contact_stiffness;
 }
 
-void JoinedStatics::give(WorldState& state) const
+void WorldStatics::give(WorldState& state) const
 {
   for (const RodObject& rod : objects_.rods)
     state.rods[rod.index] = work_.rods[rod.index];
@@ -97,7 +97,7 @@ void JoinedStatics::give(WorldState& state) const
   state.contact_stiffness = work_.contact_stiffness;
 }
 
-void JoinedStatics::restore(const Configuration& c)
+void WorldStatics::restore(const Configuration& c)
 {
   work_ = c.state;
   report_.residual = c.residual;
@@ -108,7 +108,7 @@ void JoinedStatics::restore(const Configuration& c)
 // ---- steps
 
 /// Loads the present configuration for a step of this duration [s].
-void JoinedStatics::load(double duration)
+void WorldStatics::load(double duration)
 {
   for (RodObject& rod : objects_.rods)
   {
@@ -120,7 +120,7 @@ void JoinedStatics::load(double duration)
   island_.begin(work_, *inputs_);
 }
 
-StepReport JoinedStatics::step(double h)
+StepReport WorldStatics::step(double h)
 {
   load(h);
   const StepReport report = island_.step(h);
@@ -143,7 +143,7 @@ StepReport JoinedStatics::step(double h)
 }
 
 /// Returns the largest unbalanced force [N]: the one that accelerates rods and bodies in a step of h from rest.
-double JoinedStatics::unbalanced(double h) const
+double WorldStatics::unbalanced(double h) const
 {
   double sum = 0.0;
   for (const RodObject& rod : objects_.rods)
@@ -166,7 +166,7 @@ double JoinedStatics::unbalanced(double h) const
 }
 
 /// Steps from rest, the first of `h` seconds, until nothing is accelerated. Returns false when that does not end.
-bool JoinedStatics::settle(double h)
+bool WorldStatics::settle(double h)
 {
   constexpr int kMaxRounds = 400;
   constexpr double kUnbalanced = 1e-8;   // of the largest force
@@ -206,7 +206,7 @@ bool JoinedStatics::settle(double h)
 
 // ---- leaving saddles
 
-EquilibriumStability JoinedStatics::assess(bool spectrum)
+EquilibriumStability WorldStatics::assess(bool spectrum)
 {
   beginStability();
   const RodEvaluation at = energyAt(0.0);
@@ -220,7 +220,7 @@ EquilibriumStability JoinedStatics::assess(bool spectrum)
   return result;
 }
 
-bool JoinedStatics::displace(double turn)
+bool WorldStatics::displace(double turn)
 {
   // The factor of the matrix near its lowest eigenvalue, which inverse iteration needs, belongs to the saddle: other
   // steps came in between.
@@ -230,13 +230,13 @@ bool JoinedStatics::displace(double turn)
   return displaceAlongMode(turn);
 }
 
-bool JoinedStatics::settleFrom(double lowest)
+bool WorldStatics::settleFrom(double lowest)
 {
   // Inertia above the negative eigenvalue makes the first steps convex, so that they slide down instead of jumping.
   return settle(std::isfinite(lowest) ? 0.7 / std::sqrt(-lowest) : 1e-3 * time_.step);
 }
 
-StepReport JoinedStatics::solve(WorldState& state, const WorldInputs& inputs)
+StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
 {
   report_ = StepReport();
   for (const RodObject& rod : objects_.rods)
@@ -262,7 +262,7 @@ StepReport JoinedStatics::solve(WorldState& state, const WorldInputs& inputs)
   return report_;
 }
 
-StepReport solveStatics(JoinedObjects& objects, int threads, WorldState& state, const WorldInputs& inputs)
+StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, const WorldInputs& inputs)
 {
   StepReport total;
   bool meet = !objects.bodies.empty();
@@ -274,7 +274,7 @@ StepReport solveStatics(JoinedObjects& objects, int threads, WorldState& state, 
   }
   if (!meet || !total.ok)
     return total;
-  JoinedStatics statics(objects);
+  WorldStatics statics(objects);
   statics.setThreads(threads);
   total.merge(statics.solve(state, inputs));
   return total;

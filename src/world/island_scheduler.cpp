@@ -1,17 +1,17 @@
 // Rods, threads, cloths and bodies as one island: what it consists of.
-#include "joined_parts.h"
+#include "island_scheduler.h"
 
 #include <algorithm>
 #include <stdexcept>
 
-#include "joined_statics.h"
+#include "world_statics.h"
 
 namespace slender {
 
 namespace {
 
 /// Returns the content, which is valid.
-IslandContent checked(const WorldModel& world, IslandContent content)
+WorldContent checked(const WorldModel& world, WorldContent content)
 {
   const auto need = [](bool good, const std::string& what) {
     if (!good)
@@ -42,7 +42,7 @@ IslandContent checked(const WorldModel& world, IslandContent content)
 
 }   // namespace
 
-JoinedParts::JoinedParts(const WorldModel& world, IslandContent content, WorldState& state)
+IslandScheduler::IslandScheduler(const WorldModel& world, WorldContent content, WorldState& state)
   : world_(world),
     objects_(world, checked(world, std::move(content)), state)
 {
@@ -55,20 +55,20 @@ JoinedParts::JoinedParts(const WorldModel& world, IslandContent content, WorldSt
 
 // ---- what the last step leaves
 
-void JoinedParts::addContacts(std::vector<ContactForce>& out) const
+void IslandScheduler::addContacts(std::vector<ContactForce>& out) const
 {
-  for (const JoinedIsland* island : islands_)
+  for (const ObjectIsland* island : islands_)
     if (const ContactPotential* contact = island->contact())
       for (const ContactTerm& term : contact->terms())
         out.push_back({term.position, term.force});
 }
 
 /// On the surface points of an object that is one part [N].
-Eigen::Matrix3Xd JoinedParts::contactForces(const WorldObject& object, const Part& part) const
+Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const Part& part) const
 {
   const int points = part.points(), place = objects_.placeOf(object);
   Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, points);
-  for (const JoinedIsland* island : islands_)
+  for (const ObjectIsland* island : islands_)
   {
     if (!island->contact() || !std::binary_search(island->places().begin(), island->places().end(), place))
       continue;
@@ -80,19 +80,19 @@ Eigen::Matrix3Xd JoinedParts::contactForces(const WorldObject& object, const Par
   return forces;
 }
 
-Eigen::Matrix3Xd JoinedParts::rodContactForces(int rod) const
+Eigen::Matrix3Xd IslandScheduler::rodContactForces(int rod) const
 {
   return contactForces(objects_.rods[rod], *objects_.rods[rod].part);
 }
 
-Eigen::Matrix3Xd JoinedParts::clothContactForces(int cloth) const
+Eigen::Matrix3Xd IslandScheduler::clothContactForces(int cloth) const
 {
   return contactForces(objects_.cloths[cloth], *objects_.cloths[cloth].part);
 }
 
 // ---- statics
 
-StepReport JoinedParts::solveEquilibrium(WorldState& state, const WorldInputs& inputs)
+StepReport IslandScheduler::solveEquilibrium(WorldState& state, const WorldInputs& inputs)
 {
   if (!objects_.cloths.empty())
     throw std::invalid_argument("cloth with contact has no statics");

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "confined_newton.h"
-#include "part.h"
+#include "island/part.h"
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/pose_motion.h"
 
@@ -43,11 +43,11 @@ struct IslandTolerances
 
 /// The energy of several parts with contact as one system for minimize() and minimizeConfined(). Parts that are coupled
 /// share one sparse matrix. All other parts solve with their own matrices.
-class IslandSystem
+class Equations
 {
 public:
   /// `simplicial`: see SparseCholesky.
-  explicit IslandSystem(bool simplicial) : matrix_(simplicial) {}
+  explicit Equations(bool simplicial) : matrix_(simplicial) {}
 
   // ---- what the island consists of
   void setParts(const std::vector<Part*>& parts);
@@ -92,7 +92,7 @@ public:
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
   void moveAlong(double alpha);
   void accept();
-  CouplingMatrix& matrix() { return matrix_; }
+  SharedMatrix& matrix() { return matrix_; }
   /// The solution of the matrix becomes the directions of the coupled parts.
   void spread();
   /// The share of the way from the base to the trial that leaves surfaces apart.
@@ -142,9 +142,9 @@ private:
   void makeRoom(const ContactTerm& term);
   void buildPattern();
   std::vector<int> numberBlocks();
-  CouplingMatrix::Solver chooseSolver();
-  CouplingMatrix::Bases basesOf(const int (&point)[4]) const;
-  bool isCarried(const CouplingMatrix::Bases& bases, int solid) const;
+  SharedMatrix::Solver chooseSolver();
+  SharedMatrix::Bases basesOf(const int (&point)[4]) const;
+  bool isCarried(const SharedMatrix::Bases& bases, int solid) const;
   void columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>& rows) const;
   void columnsOf(const ContactRow& contact, bool whole, Part::Columns& row) const;
   void addForce(const ContactTerm& term);
@@ -156,7 +156,7 @@ private:
   bool parallel_ = false;
   double duration_ = 1.0;
 
-  CouplingMatrix matrix_;
+  SharedMatrix matrix_;
   bool pattern_valid_ = false, exact_ = false;
   HessianShift shift_;   ///< of the last evaluation with a Hessian
   int linear_iterations_ = 0;

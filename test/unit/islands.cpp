@@ -78,7 +78,7 @@ Vector3d momentum(const Simulation& s)
 }
 
 /// A ball falls onto a thread, which falls onto a rod.
-TEST(JoinedParts, ContactBetweenKindsKeepsMomentumAndDistance)
+TEST(IslandScheduler, ContactBetweenKindsKeepsMomentumAndDistance)
 {
   Simulation s(parseScene(kCrossing, "crossing"));
   const Vector3d before = momentum(s);
@@ -96,7 +96,7 @@ TEST(JoinedParts, ContactBetweenKindsKeepsMomentumAndDistance)
   EXPECT_LT((momentum(s) - before).norm(), 1e-5 * before.norm());
 }
 
-TEST(JoinedParts, WhatIsFarApartMovesAsOnItsOwn)
+TEST(IslandScheduler, WhatIsFarApartMovesAsOnItsOwn)
 {
   std::vector<std::string> apart = {"threads.0.centerline.straight={from: [1, -0.02, 0], to: [1, 0.02, 0], edges: 20}",
                                     "gravity=[0, 0, -9.81]"};
@@ -115,7 +115,7 @@ TEST(JoinedParts, WhatIsFarApartMovesAsOnItsOwn)
 }
 
 /// The ball stands still 2 mm above the rod. Its force moves it by 11 mm in one step, which its velocity does not tell.
-TEST(JoinedParts, IslandsThatMeetUnexpectedlyMakeTheirStepAgain)
+TEST(IslandScheduler, IslandsThatMeetUnexpectedlyMakeTheirStepAgain)
 {
   Simulation s(parseScene(std::string(kRod) + kBall, "falling",
                           {"bodies.0.pose.position=[0.001, 0, 0.007]", "bodies.0.velocity.linear=[0, 0, 0]",
@@ -154,7 +154,7 @@ std::string rodsAboveBalls(const std::string& list = "bodies")
   return rods + bodies;
 }
 
-TEST(JoinedParts, IslandsDoNotDependOnTheNumberOfThreads)
+TEST(IslandScheduler, IslandsDoNotDependOnTheNumberOfThreads)
 {
   Simulation one(parseScene(rodsAboveBalls(), "one")), many(parseScene(rodsAboveBalls(), "many"));
   one.setThreads(1);
@@ -178,7 +178,7 @@ TEST(JoinedParts, IslandsDoNotDependOnTheNumberOfThreads)
 }
 
 #ifdef SLENDER_COUNTS_ALLOCATIONS
-TEST(JoinedParts, WarmIslandsTakeNoMemory)
+TEST(IslandScheduler, WarmIslandsTakeNoMemory)
 {
   Simulation s(parseScene(rodsAboveBalls("obstacles"), "warm"));
   s.setThreads(1);
@@ -197,7 +197,7 @@ TEST(JoinedParts, WarmIslandsTakeNoMemory)
 }
 #endif
 
-TEST(JoinedParts, SavedIslandsGoOnBitByBit)
+TEST(IslandScheduler, SavedIslandsGoOnBitByBit)
 {
   Simulation run(parseScene(rodsAboveBalls(), "run")), other(parseScene(rodsAboveBalls(), "other"));
   const std::string file = testing::TempDir() + "islands.state";
@@ -236,7 +236,7 @@ std::string pile(const std::string& solver)
          "  - {name: floor, shape: {plane: {point: [0, 0, 0], normal: [0, 0, 1]}}}\nrods:\n" + rods;
 }
 
-TEST(JoinedParts, IterativeAndDirectSolutionsAgree)
+TEST(IslandScheduler, IterativeAndDirectSolutionsAgree)
 {
   Simulation direct(parseScene(pile("cholesky"), "direct")),
       iterative(parseScene(pile("conjugate_gradients"), "iterative")), automatic(parseScene(pile("auto"), "automatic"));
@@ -257,12 +257,12 @@ TEST(JoinedParts, IterativeAndDirectSolutionsAgree)
     EXPECT_LT((direct.state().rods[r].x - iterative.state().rods[r].x).cwiseAbs().maxCoeff(), 1e-9) << r;
 }
 
-TEST(JoinedParts, RefusesIntegratorsThatThreadsDoNotHave)
+TEST(IslandScheduler, RefusesIntegratorsThatThreadsDoNotHave)
 {
   EXPECT_THROW(Simulation(parseScene(kCrossing, "bdf2", {"time.integrator=bdf2"})), SceneError);
 }
 
-TEST(JoinedParts, NamesWhatCrossesAtTheStart)
+TEST(IslandScheduler, NamesWhatCrossesAtTheStart)
 {
   try
   {
@@ -277,7 +277,7 @@ TEST(JoinedParts, NamesWhatCrossesAtTheStart)
 }
 
 /// Cloth that impulses keep apart does not meet rods, and a scene with both is warned of.
-TEST(JoinedParts, WarnsOfClothsThatPassThroughOthers)
+TEST(IslandScheduler, WarnsOfClothsThatPassThroughOthers)
 {
   const std::string cloth =
       "cloths=[{name: sheet, grid: {corner: [0, 0, -1], sides: [[0.1, 0, 0], [0, 0.1, 0]], "

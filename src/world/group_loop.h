@@ -12,8 +12,8 @@
 
 namespace slender {
 
-/// Steps islands that do not depend on each other, in parallel where that is worth it. Memory is reused.
-class IslandLoop
+/// Steps islands or groups that do not depend on each other, in parallel where that is worth it. Memory is reused.
+class GroupLoop
 {
 public:
   int threads = 0;   ///< that are used; 0: as OpenMP says

@@ -1,4 +1,4 @@
-#include "joined_island.h"
+#include "object_island.h"
 
 #include <algorithm>
 #include <limits>
@@ -16,7 +16,7 @@ TimeConfig timeOf(TimeConfig time, bool damped)
 }
 
 template <class Object>
-bool holds(const JoinedObjects& objects, const std::vector<int>& places)
+bool holds(const WorldObjects& objects, const std::vector<int>& places)
 {
   return std::any_of(places.begin(), places.end(),
                      [&](int place) { return dynamic_cast<const Object*>(objects.all[place]) != nullptr; });
@@ -24,28 +24,28 @@ bool holds(const JoinedObjects& objects, const std::vector<int>& places)
 
 }   // namespace
 
-JoinedIsland::JoinedIsland(JoinedObjects& objects, const std::vector<int>& places, const TimeConfig& time)
+ObjectIsland::ObjectIsland(WorldObjects& objects, const std::vector<int>& places, const TimeConfig& time)
   : world_(objects.world),
     shared_(objects),
     places_(places),
     guard_(world_.contact.gap),
     swept_(places.size()),
-    stepper_(timeOf(time, holds<ThreadObject>(objects, places) || holds<ClothObject>(objects, places)),
+    island_(timeOf(time, holds<ThreadObject>(objects, places) || holds<ClothObject>(objects, places)),
              holds<ThreadObject>(objects, places))
 {
   sortObjects();
-  stepper_.island().solver = world_.time.island_solver;
-  IslandTolerances& tolerances = stepper_.island().tolerances;
+  island_.equations().solver = world_.time.island_solver;
+  IslandTolerances& tolerances = island_.equations().tolerances;
   tolerances.angles_may_keep_shift = !rods_.empty();
   tolerances.most_unbalanced =
       threads_.empty() ? std::numeric_limits<double>::infinity() : ThreadSystem::mostUnbalanced();
   setThreads(0);
-  setMembers();
+  setParts();
   if (std::any_of(objects_.begin(), objects_.end(), [](const WorldObject* object) { return object->hasSurface(); }))
-    stepper_.setContact(takeSolids(), world_.contact);
+    island_.setContact(takeSolids(), world_.contact);
 }
 
-void JoinedIsland::sortObjects()
+void ObjectIsland::sortObjects()
 {
   std::vector<ThreadGuard::Tube> tubes;
   bool merges = false;
@@ -70,22 +70,22 @@ void JoinedIsland::sortObjects()
   }
   guard_.setTubes(std::move(tubes));
   if (merges)
-    stepper_.setAttraction(&merging_);
+    island_.setAttraction(&merging_);
 }
 
-void JoinedIsland::setThreads(int threads)
+void ObjectIsland::setThreads(int threads)
 {
   constexpr int kWorthThreads = 4000;   // nodes; less is done before threads are awake
-  stepper_.island().setThreads(threads, rods_.size() > 1 && nodes_ >= kWorthThreads);
+  island_.equations().setThreads(threads, rods_.size() > 1 && nodes_ >= kWorthThreads);
 }
 
 /// The solids that move as prescribed, and those that its parts carry or lie on.
-std::vector<ContactSolid> JoinedIsland::takeSolids()
+std::vector<ContactSolid> ObjectIsland::takeSolids()
 {
   std::vector<ContactSolid> solids;
-  for (const JoinedSolid& solid : shared_.solids)
+  for (const WorldSolid& solid : shared_.solids)
   {
-    if (solid.kind == JoinedSolid::Kind::floor &&
+    if (solid.kind == WorldSolid::Kind::floor &&
         std::none_of(threads_.begin(), threads_.end(),
                      [&](const ThreadObject* thread) { return thread->index == solid.index; }))
       continue;
@@ -94,16 +94,16 @@ std::vector<ContactSolid> JoinedIsland::takeSolids()
       continue;
     solids_.push_back(&solid);
     solids.push_back(solid.asTouched(objects_));
-    stepper_.island().solids.emplace_back();
-    stepper_.island().solids.back().body = solid.body;
-    stepper_.island().solids.back().X_BS = solid.X_BS;
+    island_.equations().solids.emplace_back();
+    island_.equations().solids.back().body = solid.body;
+    island_.equations().solids.back().X_BS = solid.X_BS;
   }
   setCarriers();
   return solids;
 }
 
 /// Tells bodies which solid of this island is their own.
-void JoinedIsland::setCarriers()
+void ObjectIsland::setCarriers()
 {
   for (const BodyObject* body : bodies_)
     for (std::size_t k = 0; k < solids_.size(); ++k)
@@ -113,19 +113,19 @@ void JoinedIsland::setCarriers()
 
 // ---- a step
 
-void JoinedIsland::setSolids(const WorldState& state, const WorldInputs& inputs)
+void ObjectIsland::setSolids(const WorldState& state, const WorldInputs& inputs)
 {
   for (std::size_t k = 0; k < solids_.size(); ++k)
   {
-    IslandSolid& solid = stepper_.island().solids[k];
+    IslandSolid& solid = island_.equations().solids[k];
     const int index = solids_[k]->index;
-    if (solids_[k]->kind == JoinedSolid::Kind::obstacle)
+    if (solids_[k]->kind == WorldSolid::Kind::obstacle)
     {
       solid.start = state.obstacles[index];
       solid.start_velocity = state.obstacle_velocities[index];
       solid.target = inputs.obstacles[index];
     }
-    else if (solids_[k]->kind == JoinedSolid::Kind::floor)
+    else if (solids_[k]->kind == WorldSolid::Kind::floor)
     {
       solid.start = {Eigen::Vector3d(0, 0, world_.threads[index].model->floor.height), Eigen::Quaterniond::Identity()};
       solid.target.X_WG = solid.start;
@@ -140,19 +140,19 @@ void JoinedIsland::setSolids(const WorldState& state, const WorldInputs& inputs)
   }
 }
 
-void JoinedIsland::setMembers()
+void ObjectIsland::setParts()
 {
-  members_.clear();
-  member_end_.clear();
+  parts_.clear();
+  parts_end_.clear();
   for (WorldObject* object : objects_)
   {
-    object->addMembers(members_);
-    member_end_.push_back(members_.size());
+    object->addParts(parts_);
+    parts_end_.push_back(parts_.size());
   }
-  stepper_.setMembers(members_);
+  island_.setParts(parts_);
 }
 
-void JoinedIsland::begin(WorldState& state, const WorldInputs& inputs)
+void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
 {
   stepped_ = false;
   setCarriers();
@@ -160,15 +160,15 @@ void JoinedIsland::begin(WorldState& state, const WorldInputs& inputs)
   double stiffness = 0.0;
   for (const WorldObject* object : objects_)
     stiffness = std::max(stiffness, object->stiffness(state));
-  stepper_.setStiffness(stiffness);
+  island_.setStiffness(stiffness);
   if (threads_.empty())
     return;
-  setMembers();
+  setParts();
   setStrands();
 }
 
 /// Those of the present step.
-void JoinedIsland::setStrands()
+void ObjectIsland::setStrands()
 {
   strands_.clear();
   guarded_.clear();
@@ -184,13 +184,13 @@ void JoinedIsland::setStrands()
   merging_.setParts(strands_);
 }
 
-StepReport JoinedIsland::step(double duration)
+StepReport ObjectIsland::step(double duration)
 {
   double first = 0.0;
   for (const RodObject* rod : rods_)
     if (const double own = rod->stepper->work.next_step; own > 0.0)
       first = first > 0.0 ? std::min(first, own) : own;
-  StepReport report = stepper_.step(duration, first);
+  StepReport report = island_.step(duration, first);
   stepped_ = report.ok;
   if (!report.ok)
     return report;
@@ -201,21 +201,21 @@ StepReport JoinedIsland::step(double duration)
 }
 
 /// The boxes of its objects from those of their parts.
-void JoinedIsland::trace()
+void ObjectIsland::trace()
 {
   for (std::size_t k = 0, member = 0; k < objects_.size(); ++k)
   {
     swept_[k] = BoundingBox::empty();
-    for (; member < member_end_[k]; ++member)
-      swept_[k].include(stepper_.sweptBox(member));
+    for (; member < parts_end_[k]; ++member)
+      swept_[k].include(island_.sweptBox(member));
   }
 }
 
-void JoinedIsland::end(WorldState& state) const
+void ObjectIsland::end(WorldState& state) const
 {
   if (contact())
     for (const WorldObject* object : objects_)
-      object->stiffness(state) = stepper_.stiffness();
+      object->stiffness(state) = island_.stiffness();
 }
 
 }   // namespace slender

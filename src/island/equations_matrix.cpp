@@ -1,13 +1,13 @@
 // Several parts and their contact as one system for Newton's method: forces, the shared matrix, and its solution.
 #include <algorithm>
 
-#include "island_loops.h"
+#include "island/equations_loops.h"
 
 namespace slender {
 
 // ---- contacts of the present trial
 
-void IslandSystem::makeRoom(const ContactTerm& term)
+void Equations::makeRoom(const ContactTerm& term)
 {
   const Key key{term.point[0], term.point[1], term.point[2], term.point[3], term.solid};
   const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
@@ -18,7 +18,7 @@ void IslandSystem::makeRoom(const ContactTerm& term)
 }
 
 /// Sorts the contacts by parts, and makes room in the pattern for those that couple unknowns.
-void IslandSystem::take()
+void Equations::take()
 {
   for (Part* part : parts_)
   {
@@ -38,7 +38,7 @@ void IslandSystem::take()
 
 /// The same for the first contacts of a substep. The pattern gets room for them alone, so that it follows from the
 /// state and not from the steps before.
-void IslandSystem::takeFirst()
+void Equations::takeFirst()
 {
   const bool valid = pattern_valid_;
   keys_before_.swap(keys_);
@@ -47,7 +47,7 @@ void IslandSystem::takeFirst()
   pattern_valid_ = valid && keys_ == keys_before_;
 }
 
-void IslandSystem::addForce(const ContactTerm& term)
+void Equations::addForce(const ContactTerm& term)
 {
   for (int p = 0; p < 4 && !term.carried; ++p)
     if (term.point[p] >= 0)
@@ -63,22 +63,22 @@ void IslandSystem::addForce(const ContactTerm& term)
 
 // ---- the pattern of the matrix
 
-CouplingMatrix::Bases IslandSystem::basesOf(const int (&point)[4]) const
+SharedMatrix::Bases Equations::basesOf(const int (&point)[4]) const
 {
-  CouplingMatrix::Bases bases;
+  SharedMatrix::Bases bases;
   for (int p = 0; p < 4; ++p)
     bases[p] = point[p] < 0 ? Part::kPrescribed : partOf(point[p]).base(point[p] - partOf(point[p]).first_point);
   return bases;
 }
 
 /// Whether a contact is one of points that do not have three unknowns each: a body carries one of them, or is touched.
-bool IslandSystem::isCarried(const CouplingMatrix::Bases& bases, int solid) const
+bool Equations::isCarried(const SharedMatrix::Bases& bases, int solid) const
 {
   return bodyOf(solid) || std::any_of(bases.begin(), bases.end(), [](int base) { return base < Part::kPrescribed; });
 }
 
 /// Displacement of a contact's points against each other, one row per component.
-void IslandSystem::columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>& rows) const
+void Equations::columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>& rows) const
 {
   for (int c = 0; c < 3; ++c)
   {
@@ -97,7 +97,7 @@ void IslandSystem::columnsOf(const ContactTerm& term, std::array<Part::Columns, 
 }
 
 /// The gap of a pair as the place of contact runs along the pair.
-void IslandSystem::columnsOf(const ContactRow& contact, bool whole, Part::Columns& row) const
+void Equations::columnsOf(const ContactRow& contact, bool whole, Part::Columns& row) const
 {
   row.count = 0;
   for (int p = 0; p < 4; ++p)
@@ -112,7 +112,7 @@ void IslandSystem::columnsOf(const ContactRow& contact, bool whole, Part::Column
   }
 }
 
-void IslandSystem::buildPattern()
+void Equations::buildPattern()
 {
   for (Part* part : parts_)
     part->coupled = part->joined();
@@ -139,7 +139,7 @@ void IslandSystem::buildPattern()
     ContactTerm term;
     std::copy_n(key.begin(), 4, term.point);
     term.solid = key[4];
-    const CouplingMatrix::Bases bases = basesOf(term.point);
+    const SharedMatrix::Bases bases = basesOf(term.point);
     if (!isCarried(bases, term.solid))
     {
       matrix_.noteBases(bases);
@@ -161,7 +161,7 @@ void IslandSystem::buildPattern()
 
 /// Numbers the blocks of the matrix: parts that joints connect are one block, any other part is one. Returns the block
 /// of each unknown.
-std::vector<int> IslandSystem::numberBlocks()
+std::vector<int> Equations::numberBlocks()
 {
   std::vector<int> blocks;
   blocks_ = 1;   // the first is that of joined parts
@@ -177,11 +177,11 @@ std::vector<int> IslandSystem::numberBlocks()
 /// Factors fill up where contacts close loops of parts: each layer of a pile meets many parts of the next one. In large
 /// piles conjugate gradients are faster then. Where parts meet like the links of a chain, or two of them along their
 /// whole lengths, factorisation is always faster. Both limits are measured by the study island_solvers.
-CouplingMatrix::Solver IslandSystem::chooseSolver()
+SharedMatrix::Solver Equations::chooseSolver()
 {
   if (solver != IslandSolver::automatic)
-    return solver == IslandSolver::cholesky ? CouplingMatrix::Solver::cholesky
-                                            : CouplingMatrix::Solver::conjugate_gradients;
+    return solver == IslandSolver::cholesky ? SharedMatrix::Solver::cholesky
+                                            : SharedMatrix::Solver::conjugate_gradients;
   met_.clear();
   for (const Key& key : keys_)
   {
@@ -194,14 +194,14 @@ CouplingMatrix::Solver IslandSystem::chooseSolver()
   met_.erase(std::unique(met_.begin(), met_.end()), met_.end());
   constexpr int kPairsPerBlock = 2, kLeastUnknowns = 40'000;
   const bool loops = static_cast<int>(met_.size()) >= kPairsPerBlock * blocks_;
-  return loops && matrix_.unknowns() >= kLeastUnknowns ? CouplingMatrix::Solver::conjugate_gradients
-                                                       : CouplingMatrix::Solver::cholesky;
+  return loops && matrix_.unknowns() >= kLeastUnknowns ? SharedMatrix::Solver::conjugate_gradients
+                                                       : SharedMatrix::Solver::cholesky;
 }
 
 // ---- the matrix
 
 /// `whole`: with the part of the contacts' second derivatives that may be negative.
-void IslandSystem::assemble(const HessianShift& shift, bool whole)
+void Equations::assemble(const HessianShift& shift, bool whole)
 {
   matrix_.clear();
   for (Part* part : parts_)
@@ -213,7 +213,7 @@ void IslandSystem::assemble(const HessianShift& shift, bool whole)
   forTerms([&](const ContactTerm& term) {
     if (!partOf(term.point[0]).coupled)
       return;
-    const CouplingMatrix::Bases bases = basesOf(term.point);
+    const SharedMatrix::Bases bases = basesOf(term.point);
     if (!isCarried(bases, term.solid))
     {
       matrix_.addTerm(term, bases, whole);
@@ -232,7 +232,7 @@ void IslandSystem::assemble(const HessianShift& shift, bool whole)
   {
     if (!partOf(row.point[0]).coupled)
       continue;
-    const CouplingMatrix::Bases bases = basesOf(row.point);
+    const SharedMatrix::Bases bases = basesOf(row.point);
     if (!isCarried(bases, -1))
     {
       matrix_.addRow(row, bases, whole);
@@ -243,13 +243,13 @@ void IslandSystem::assemble(const HessianShift& shift, bool whole)
   }
 }
 
-bool IslandSystem::factor(const HessianShift& shift)
+bool Equations::factor(const HessianShift& shift)
 {
   const auto assembled = [&](bool whole) { assemble(shift, whole); };
   return exact_ ? matrix_.factorExactly(assembled) : matrix_.factor(contact_ && !contact_->terms().empty(), assembled);
 }
 
-RodEvaluation IslandSystem::evaluate(bool with_hessian, const HessianShift& shift)
+RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
 {
   RodEvaluation sum;
   if (with_hessian)
@@ -295,7 +295,7 @@ RodEvaluation IslandSystem::evaluate(bool with_hessian, const HessianShift& shif
   return sum;
 }
 
-void IslandSystem::solve()
+void Equations::solve()
 {
   for (const Part* part : parts_)
     if (part->coupled)
@@ -315,7 +315,7 @@ void IslandSystem::solve()
   spread();
 }
 
-void IslandSystem::spread()
+void Equations::spread()
 {
   forParts([&](Part& part) {
     if (part.coupled)

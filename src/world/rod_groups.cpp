@@ -1,4 +1,4 @@
-#include "rod_islands.h"
+#include "rod_groups.h"
 
 #include <algorithm>
 #include <stdexcept>
@@ -9,7 +9,7 @@ namespace slender {
 
 namespace {
 
-class TrackedRod : public RodIsland
+class TrackedRod : public StepGroup
 {
 public:
   TrackedRod(const WorldModel& world, int rod)
@@ -52,7 +52,7 @@ private:
 
 }   // namespace
 
-std::unique_ptr<RodIsland> makeTrackedRod(const WorldModel& world, int rod)
+std::unique_ptr<StepGroup> makeTrackedRod(const WorldModel& world, int rod)
 {
   return std::make_unique<TrackedRod>(world, rod);
 }

@@ -1,8 +1,8 @@
-#include "coupling_matrix.h"
+#include "island/shared_matrix.h"
 
 namespace slender {
 
-void CouplingMatrix::begin(int unknowns)
+void SharedMatrix::begin(int unknowns)
 {
   unknowns_ = unknowns;
   solution_.assign(unknowns_, 0.0);
@@ -12,14 +12,14 @@ void CouplingMatrix::begin(int unknowns)
     columns_[u].clear();
 }
 
-void CouplingMatrix::notePairs(const Columns& a, const Columns& b)
+void SharedMatrix::notePairs(const Columns& a, const Columns& b)
 {
   for (int i = 0; i < a.count; ++i)
     for (int j = 0; j < b.count; ++j)
       note(a.index[i], b.index[j]);
 }
 
-void CouplingMatrix::noteBases(const Bases& bases)
+void SharedMatrix::noteBases(const Bases& bases)
 {
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j <= i; ++j)
@@ -29,7 +29,7 @@ void CouplingMatrix::noteBases(const Bases& bases)
             note(bases[i] + r, bases[j] + c);
 }
 
-void CouplingMatrix::finish(const std::vector<int>& blocks, Solver solver)
+void SharedMatrix::finish(const std::vector<int>& blocks, Solver solver)
 {
   solver_ = solver;
   cholesky_known_ = false;
@@ -50,7 +50,7 @@ void CouplingMatrix::finish(const std::vector<int>& blocks, Solver solver)
 }
 
 /// The pattern of the blocks stays when contacts between blocks come and go. Then its analysis stays, too.
-void CouplingMatrix::takeBlocks(const std::vector<int>& blocks)
+void SharedMatrix::takeBlocks(const std::vector<int>& blocks)
 {
   std::vector<int> starts{0}, rows;
   block_entries_.clear();
@@ -74,7 +74,7 @@ void CouplingMatrix::takeBlocks(const std::vector<int>& blocks)
   x_.resize(static_cast<std::size_t>(unknowns_));
 }
 
-int CouplingMatrix::index(int a, int b) const
+int SharedMatrix::index(int a, int b) const
 {
   const int column = std::min(a, b);
   const auto begin = rows_.begin();
@@ -84,9 +84,9 @@ int CouplingMatrix::index(int a, int b) const
 
 // ---- solutions
 
-bool CouplingMatrix::factorPresent() { return solver_ == Solver::cholesky ? factorDirectly() : factorBlocks(); }
+bool SharedMatrix::factorPresent() { return solver_ == Solver::cholesky ? factorDirectly() : factorBlocks(); }
 
-bool CouplingMatrix::factorDirectly()
+bool SharedMatrix::factorDirectly()
 {
   direct_ = true;
   if (unknowns_ == 0)
@@ -98,7 +98,7 @@ bool CouplingMatrix::factorDirectly()
   return cholesky_.factor();
 }
 
-bool CouplingMatrix::factorBlocks()
+bool SharedMatrix::factorBlocks()
 {
   direct_ = false;
   if (unknowns_ == 0)
@@ -109,7 +109,7 @@ bool CouplingMatrix::factorBlocks()
   return block_cholesky_.factor();
 }
 
-bool CouplingMatrix::solve()
+bool SharedMatrix::solve()
 {
   iterations_ = 0;
   if (unknowns_ == 0)
@@ -136,7 +136,7 @@ bool CouplingMatrix::solve()
 }
 
 /// y := A x
-void CouplingMatrix::multiply(const std::vector<double>& x, std::vector<double>& y) const
+void SharedMatrix::multiply(const std::vector<double>& x, std::vector<double>& y) const
 {
   std::fill(y.begin(), y.end(), 0.0);
   for (int u = 0; u < unknowns_; ++u)
@@ -153,20 +153,20 @@ void CouplingMatrix::multiply(const std::vector<double>& x, std::vector<double>&
   }
 }
 
-double CouplingMatrix::Space::dot(const Vector& x, const Vector& y)
+double SharedMatrix::Space::dot(const Vector& x, const Vector& y)
 {
   const auto n = static_cast<Eigen::Index>(x.size());
   return Eigen::Map<const Eigen::VectorXd>(x.data(), n).dot(Eigen::Map<const Eigen::VectorXd>(y.data(), n));
 }
 
-void CouplingMatrix::addPair(const Columns& a, const Columns& b, double value)
+void SharedMatrix::addPair(const Columns& a, const Columns& b, double value)
 {
   for (int i = 0; i < a.count; ++i)
     for (int j = 0; j < b.count; ++j)
       add(a.index[i], b.index[j], (a.index[i] == b.index[j] ? 2.0 : 1.0) * a.value[i] * b.value[j] * value);
 }
 
-void CouplingMatrix::addSquare(const Columns& a, double value)
+void SharedMatrix::addSquare(const Columns& a, double value)
 {
   for (int i = 0; i < a.count; ++i)
     for (int j = 0; j <= i; ++j)
@@ -175,7 +175,7 @@ void CouplingMatrix::addSquare(const Columns& a, double value)
 
 /// block(i, j), 3 x 3, for the points i and j. A point's three rows follow each other.
 template <class Block>
-void CouplingMatrix::addBlocks(const Bases& bases, Block&& block)
+void SharedMatrix::addBlocks(const Bases& bases, Block&& block)
 {
   double* values = values_.data();
   for (int i = 0; i < 4; ++i)
@@ -192,13 +192,13 @@ void CouplingMatrix::addBlocks(const Bases& bases, Block&& block)
       }
 }
 
-void CouplingMatrix::addTerm(const ContactTerm& term, const Bases& bases, bool whole)
+void SharedMatrix::addTerm(const ContactTerm& term, const Bases& bases, bool whole)
 {
   const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
   addBlocks(bases, [&](int i, int j) { return Eigen::Matrix3d(term.weight[i] * term.weight[j] * stiffness); });
 }
 
-void CouplingMatrix::addRow(const ContactRow& row, const Bases& bases, bool whole)
+void SharedMatrix::addRow(const ContactRow& row, const Bases& bases, bool whole)
 {
   Eigen::Vector3d r[4];
   for (int k = 0; k < 4; ++k)

@@ -1,4 +1,4 @@
-#include "joined_objects.h"
+#include "world_objects.h"
 
 #include <algorithm>
 
@@ -38,7 +38,7 @@ bool meetsSolids(const WorldModel& world, int body)
 }
 
 /// The bodies, and the rods that may meet something.
-IslandContent rodsAndBodies(const WorldModel& world, IslandContent content)
+WorldContent rodsAndBodies(const WorldModel& world, WorldContent content)
 {
   const auto alone = [&](int rod) { return !meetsOthers(world, rod); };
   content.rods.erase(std::remove_if(content.rods.begin(), content.rods.end(), alone), content.rods.end());
@@ -80,7 +80,7 @@ bool meetsOthers(const WorldModel& world, int rod)
 
 // ---- what there is
 
-JoinedObjects::JoinedObjects(const WorldModel& model, IslandContent parts, WorldState& state)
+WorldObjects::WorldObjects(const WorldModel& model, WorldContent parts, WorldState& state)
   : world(model),
     content(std::move(parts))
 {
@@ -93,7 +93,7 @@ JoinedObjects::JoinedObjects(const WorldModel& model, IslandContent parts, World
   addSolids();
 }
 
-JoinedObjects::JoinedObjects(const JoinedObjects& other, const TimeConfig& time)
+WorldObjects::WorldObjects(const WorldObjects& other, const TimeConfig& time)
   : world(other.world),
     content(rodsAndBodies(other.world, other.content)),
     welds(other.welds)
@@ -170,7 +170,7 @@ void BodyObject::addTo(Meeting& meeting, const WorldState& state)
 {
   if (!part->hasSurface())
     return;
-  static_cast<const PartSteps&>(*part).addSurface(meeting.surface);
+  static_cast<const Part&>(*part).addSurface(meeting.surface);
   meeting.add(name(), part->surfaceAt(state.bodies[index].X_WB));
 }
 
@@ -239,10 +239,10 @@ void ThreadObject::makeStrands(std::size_t count)
   }
 }
 
-void ThreadObject::addMembers(std::vector<IslandStepper::Member>& members)
+void ThreadObject::addParts(std::vector<Part*>& parts)
 {
   for (std::size_t s = 0; s < strands(); ++s)
-    members.push_back({strands_[s].part.get(), strands_[s].part.get()});
+    parts.push_back(strands_[s].part.get());
 }
 
 IslandFinder::Reach ThreadObject::reach() const
@@ -283,7 +283,7 @@ void ThreadObject::addTo(Meeting& meeting, const WorldState& state)
 // ---- solids
 
 /// Objects with a surface are numbered in their order.
-ContactSolid JoinedSolid::asTouched(const std::vector<WorldObject*>& by) const
+ContactSolid WorldSolid::asTouched(const std::vector<WorldObject*>& by) const
 {
   ContactSolid touched{obstacle};
   touched.body = body != nullptr;
@@ -304,7 +304,7 @@ ContactSolid JoinedSolid::asTouched(const std::vector<WorldObject*>& by) const
 
 // ---- all of them
 
-void JoinedObjects::addObjects(const TimeConfig& time)
+void WorldObjects::addObjects(const TimeConfig& time)
 {
   for (const int b : content.bodies)
     if (world.bodies[b].body.simulated)
@@ -326,12 +326,12 @@ void JoinedObjects::addObjects(const TimeConfig& time)
     all.push_back(&threads.emplace_back(world, k));
 }
 
-int JoinedObjects::placeOf(const WorldObject& object) const
+int WorldObjects::placeOf(const WorldObject& object) const
 {
   return static_cast<int>(std::find(all.begin(), all.end(), &object) - all.begin());
 }
 
-const BodyObject* JoinedObjects::simulated(int body) const
+const BodyObject* WorldObjects::simulated(int body) const
 {
   for (const BodyObject& b : bodies)
     if (b.index == body)
@@ -339,7 +339,7 @@ const BodyObject* JoinedObjects::simulated(int body) const
   return nullptr;
 }
 
-void JoinedObjects::addWelds(WorldState& state)
+void WorldObjects::addWelds(WorldState& state)
 {
   for (const WorldModel::RodWeld& weld : world.welds)
   {
@@ -356,23 +356,23 @@ void JoinedObjects::addWelds(WorldState& state)
   }
 }
 
-void JoinedObjects::follow(const Weld& weld)
+void WorldObjects::follow(const Weld& weld)
 {
   if (const BodyObject* body = simulated(weld.body))
     rods[weld.rod].part->addWeld({weld.grasp, body->part.get(), weld.X_BG});
 }
 
-void JoinedObjects::addSolids()
+void WorldObjects::addSolids()
 {
   for (std::size_t k = 0; k < world.obstacles.size(); ++k)
-    solids.push_back({JoinedSolid::Kind::obstacle, static_cast<int>(k), world.obstacles[k]});
+    solids.push_back({WorldSolid::Kind::obstacle, static_cast<int>(k), world.obstacles[k]});
   for (const int b : content.bodies)
   {
     const WorldModel::Body& body = world.bodies[b];
     if (!body.shape)
       continue;
     const BodyObject* carrier = simulated(b);
-    solids.push_back({JoinedSolid::Kind::body, b, body.solid(), carrier ? carrier->part.get() : nullptr, body.X_BS});
+    solids.push_back({WorldSolid::Kind::body, b, body.solid(), carrier ? carrier->part.get() : nullptr, body.X_BS});
     if (carrier)
       solids.back().ignores.push_back(carrier);
     for (const Weld& weld : welds)
@@ -381,13 +381,13 @@ void JoinedObjects::addSolids()
   }
   for (const ThreadObject& thread : threads)
     if (const ThreadFloor& floor = thread.model.model->floor; floor.slips())
-      solids.push_back({JoinedSolid::Kind::floor, thread.index, {Plane{}, floor.friction}});
+      solids.push_back({WorldSolid::Kind::floor, thread.index, {Plane{}, floor.friction}});
 }
 
 // ---- inputs
 
 /// What is wrong with the inputs that all parts share; empty: nothing is.
-std::string JoinedObjects::badInput(const WorldState& state, const WorldInputs& inputs) const
+std::string WorldObjects::badInput(const WorldState& state, const WorldInputs& inputs) const
 {
   if (inputs.rods.size() != state.rods.size() || state.rods.size() != world.rods.size())
     return "number of rods";
@@ -413,7 +413,7 @@ std::string JoinedObjects::badInput(const WorldState& state, const WorldInputs& 
 }
 
 /// Grasps that driven bodies carry get their targets from these.
-void JoinedObjects::carryGrasps(const WorldInputs& inputs)
+void WorldObjects::carryGrasps(const WorldInputs& inputs)
 {
   for (const Weld& weld : welds)
   {
@@ -430,7 +430,7 @@ void JoinedObjects::carryGrasps(const WorldInputs& inputs)
   }
 }
 
-bool JoinedObjects::takeInputs(const WorldState& state, const WorldInputs& inputs, StepReport& report)
+bool WorldObjects::takeInputs(const WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
   if (const std::string bad = badInput(state, inputs); !bad.empty())
     return refuseInput(bad, report);

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "joined_island.h"
-#include "joined_objects.h"
+#include "object_island.h"
+#include "world_objects.h"
 #include "slender_sim/dynamics/equilibrium_search.h"
 
 namespace slender {
@@ -13,11 +13,11 @@ namespace slender {
 /// step squared. The weight never becomes zero, because contact needs a step. An unstable equilibrium is left along its
 /// mode of negative curvature, until a stable one is found or every way was tried. Threads stay where they are, and the
 /// others do not feel them.
-class JoinedStatics
+class WorldStatics
 {
 public:
   /// The objects must outlive the statics.
-  explicit JoinedStatics(JoinedObjects& objects);
+  explicit WorldStatics(WorldObjects& objects);
   void setThreads(int threads) { island_.setThreads(threads); }
 
   /// Solves under the inputs. Velocities become zero, and what is driven is where its inputs put it. The wrenches of
@@ -53,12 +53,12 @@ private:
   void scaleMode();
   bool displaceAlongMode(double alpha);
 
-  IslandSystem& system() { return island_.stepper().island(); }
+  Equations& system() { return island_.island().equations(); }
 
-  JoinedObjects& origin_;
+  WorldObjects& origin_;
   const TimeConfig time_;
-  JoinedObjects objects_;
-  JoinedIsland island_;
+  WorldObjects objects_;
+  ObjectIsland island_;
   const WorldInputs* inputs_ = nullptr;
   WorldState work_, before_;   ///< rods and bodies of the island, and all obstacles
   StepReport report_;
@@ -69,6 +69,6 @@ private:
 
 /// The stable equilibrium of all rods and bodies: rods that meet nothing each on its own, the others as one island. On
 /// failure the rods that were solved before have moved.
-StepReport solveStatics(JoinedObjects& objects, int threads, WorldState& state, const WorldInputs& inputs);
+StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, const WorldInputs& inputs);
 
 }   // namespace slender

@@ -17,7 +17,7 @@ namespace slender {
 ///
 /// The matrix is solved by sparse Cholesky factorisation, or by conjugate gradients. These are preconditioned by the
 /// factorisation of blocks: the matrix without what couples unknowns of different blocks.
-class CouplingMatrix
+class SharedMatrix
 {
 public:
   enum class Solver
@@ -43,7 +43,7 @@ public:
   using Bases = std::array<int, 4>;
 
   /// `simplicial`: see SparseCholesky.
-  explicit CouplingMatrix(bool simplicial) : cholesky_(simplicial), block_cholesky_(simplicial) {}
+  explicit SharedMatrix(bool simplicial) : cholesky_(simplicial), block_cholesky_(simplicial) {}
 
   // ---- pattern
   void begin(int unknowns);

@@ -1,10 +1,10 @@
-#include "thread_islands.h"
+#include "thread_groups.h"
 
 namespace slender {
 
 namespace {
 
-class LoneThread : public Island
+class LoneThread : public StepGroup
 {
 public:
   LoneThread(const WorldModel& world, int thread)
@@ -32,7 +32,7 @@ private:
 
 }   // namespace
 
-std::unique_ptr<Island> makeLoneThread(const WorldModel& world, int thread)
+std::unique_ptr<StepGroup> makeLoneThread(const WorldModel& world, int thread)
 {
   return std::make_unique<LoneThread>(world, thread);
 }

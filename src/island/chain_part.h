@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "part.h"
+#include "island/part.h"
 #include "slender_sim/dynamics/chain_system.h"
 
 namespace slender {
@@ -26,9 +26,9 @@ public:
   void closeGradient() override { system_.closeGradient(); }
   void solve() override { system_.solve(); }
 
-  void notePattern(CouplingMatrix& matrix) override;
-  void findEntries(const CouplingMatrix& matrix) override;
-  void addHessian(CouplingMatrix& matrix, const HessianShift& shift) override;
+  void notePattern(SharedMatrix& matrix) override;
+  void findEntries(const SharedMatrix& matrix) override;
+  void addHessian(SharedMatrix& matrix, const HessianShift& shift) override;
   void takeGradient(double* right) const override;
   void takeDirection(const double* solution) override;
 

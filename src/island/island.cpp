@@ -1,0 +1,302 @@
+#include "island/island.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "slender_sim/linalg/interruption.h"
+
+namespace slender {
+
+// ---- what the island consists of
+
+void Island::setParts(const std::vector<Part*>& parts)
+{
+  parts_ = parts;
+  surface_changes_ = std::any_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->surfaceChanges(); });
+  equations_.setParts(parts_);
+}
+
+void Island::takeSurface()
+{
+  surface_.points = 0;
+  surface_.segments.clear();
+  surface_.triangles.clear();
+  surface_.objects.clear();
+  versions_.clear();
+  for (Part* part : parts_)
+  {
+    part->addSurface(surface_);
+    versions_.push_back(part->surfaceVersion());
+  }
+}
+
+bool Island::surfaceIsStale() const
+{
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    if (parts_[k]->surfaceVersion() != versions_[k])
+      return true;
+  return false;
+}
+
+void Island::setContact(const std::vector<ContactSolid>& solids, const ContactOptions& options)
+{
+  takeSurface();
+  ContactSurface surface = surface_;
+  surface.solids = solids;
+  ContactOptions own = options;
+  if (!surface_changes_)
+    for (Part* part : parts_)
+      own.least_stiffness = std::max(own.least_stiffness, part->barrierRange(options.gap).least);
+  equations_.setContact(std::move(surface), own);
+  gap_ = options.gap;
+  first_stiffness_ = equations_.contact()->stiffness();
+}
+
+void Island::setAttraction(SubstepPotential* attraction)
+{
+  attraction_ = attraction;
+  equations_.setAttraction(attraction);
+}
+
+void Island::setStiffness(double stiffness) { stiffness_ = stiffness > 0.0 ? stiffness : first_stiffness_; }
+
+// ---- a step
+
+StepReport Island::step(double duration, double& first)
+{
+  StepReport report;
+  duration_ = duration;
+  double longest = duration;
+  for (Part* part : parts_)
+    longest = std::min(longest, part->longestSubstep(duration));
+  conserving_ = conserves();
+  double allowance = 0.0;
+  most_energy_ = conserving_ ? energyAtStart(allowance) : 0.0;
+  most_energy_ += allowance;
+  SubstepRule rule;
+  rule.longest = evenSubstep(duration, longest);
+  rule.error_tolerance = surface_changes_ ? 0.0 : time_.error_tolerance;
+  rule.min_step = time_.min_step;
+  rule.order = order(time_.integrator);
+  rule.max_cuts = time_.newton.max_cuts;
+  rule.first = rule.error_tolerance > 0 ? first : 0.0;
+  equations_.beginStep(duration);
+  swept_.resize(parts_.size());
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    swept_[k] = parts_[k]->surfaceBox(0.0);
+  SubstepController controller(rule);
+  controller.run(*this, duration, report);
+  report.linear_iterations += equations_.linearIterations();
+  if (report.ok)
+    first = controller.nextLength();
+  return report;
+}
+
+/// Whether nothing but the step itself can change the energy. Methods without damping at infinite frequency can feed on
+/// a stiff rod's stretching when it turns far in a step. Contact stores energy that is not counted.
+bool Island::conserves() const
+{
+  return (time_.integrator == Integrator::implicit_midpoint || time_.integrator == Integrator::generalized_alpha) &&
+         !equations_.contact() &&
+         std::all_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->conserves(); });
+}
+
+double Island::energyAtStart(double& allowance)
+{
+  double sum = 0.0;
+  for (Part* part : parts_)
+    sum += part->energyAtStart(allowance);
+  return sum;
+}
+
+double Island::energyAtEnd() const
+{
+  double sum = 0.0;
+  for (Part* part : parts_)
+    sum += part->energyAtEnd();
+  return sum;
+}
+
+void Island::startAccelerations()
+{
+  for (Part* part : parts_)
+    part->addStartLoads();
+  for (Part* part : parts_)
+    part->solveStartAcceleration();
+  for (Part* part : parts_)
+    part->takeStartAcceleration();
+}
+
+/// Surfaces, stiffness and attraction of a substep of h seconds. Returns false if centrelines meet.
+bool Island::loadContact(double h)
+{
+  ContactPotential* contact = equations_.contact();
+  if (!contact)
+    return true;
+  BarrierRange range{stiffness_, 0.0};   // not what an attempt that failed left
+  if (!surface_changes_)
+    range.most = std::numeric_limits<double>::infinity();
+  for (Part* part : parts_)
+  {
+    const BarrierRange own = part->barrierRange(gap_);
+    range.least = std::max(range.least, surface_changes_ ? own.least : 0.0);
+    range.most = std::max(range.most, own.most);
+  }
+  if (surface_changes_ || surfaceIsStale())
+  {
+    takeSurface();
+    contact->setPieces(surface_);
+    if (surface_changes_ && !contact->thinToFit(equations_.startPoints(), equations_.startSolids()))
+      return false;
+  }
+  if (attraction_)
+  {
+    attraction_->begin(equations_.startPoints(), surface_, contact->nearPairs(), gap_, h);
+    range.least = std::max(range.least, attraction_->largestForce());
+  }
+  // of loads that overflow: what they do to the parts says why
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  contact->setMostStiffness(std::min(std::max(range.most, range.least), kLargest));
+  contact->setStiffness(std::min(range.least, kLargest));
+  return true;
+}
+
+StepFailure Island::solveSubstep(const Substep& substep, StepReport& report)
+{
+  double previous = std::numeric_limits<double>::infinity();
+  for (Part* part : parts_)   // a part that has lost its history makes all start anew
+    previous = std::min(previous, part->lastSubstep());
+  planStep(time_.integrator, time_.spectral_radius, substep.length, std::isfinite(previous) ? previous : 0.0, plan_);
+  for (failed_ = 0; failed_ < parts_.size(); ++failed_)
+    if (const StepFailure failure = parts_[failed_]->beginSubstep(plan_, substep); failure != StepFailure::none)
+      return failure;
+  failed_ = 0;
+  double& least_edge = equations_.tolerances.least_edge;
+  least_edge = std::numeric_limits<double>::infinity();
+  for (Part* part : parts_)
+    least_edge = std::min(least_edge, part->shortestEdge());
+  if (plan_.needs_acceleration &&
+      std::any_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->startsFresh(); }))
+    startAccelerations();
+  equations_.beginSubstep(substep.from / duration_);
+  if (!loadContact(substep.length))
+    return StepFailure::squeezed;
+  for (std::size_t s = 0; s < plan_.stages.size(); ++s)
+  {
+    const NewtonResult newton = solveStage(s, substep);
+    report.iterations += newton.iterations;
+    report.factorizations += newton.factorizations;
+    if (!newton.ok())
+    {
+      failed_ = farthestFromBalance();
+      return newton.failure;
+    }
+    report.residual = std::max(report.residual, newton.residual);
+    report.max_strain = std::max(report.max_strain, newton.max_strain);
+    if (equations_.contact())
+      equations_.endStage();
+    for (Part* part : parts_)
+      part->endStage(s, s + 1 == plan_.stages.size(), report);
+  }
+  return StepFailure::none;
+}
+
+NewtonResult Island::solveStage(std::size_t s, const Substep& substep)
+{
+  const double before = s == 0 ? 0.0 : plan_.stages[s - 1].time, now = plan_.stages[s].time, h = substep.length;
+  double from = (substep.from + before * h) / duration_;
+  const double to = now == 1.0 ? substep.to / duration_ : (substep.from + now * h) / duration_;
+  for (Part* part : parts_)
+    part->beginStage(s);
+  equations_.beginStage(s == 0);
+  NewtonResult total = equations_.solve(from, to, time_.newton);
+  while (total.ok())
+  {
+    bool more = false;
+    for (Part* part : parts_)
+      more = part->meetsMore() || more;
+    if (!more)
+      break;
+    equations_.accept();   // the next solution begins here
+    for (Part* part : parts_)
+      part->holdMore();
+    equations_.numberUnknowns();
+    from = to;
+    const NewtonResult next = equations_.solve(from, to, time_.newton);
+    const int iterations = total.iterations + next.iterations,
+              factorizations = total.factorizations + next.factorizations;
+    total = next;
+    total.iterations = iterations;
+    total.factorizations = factorizations;
+  }
+  return total;
+}
+
+/// The member on which the largest unbalanced force acts.
+std::size_t Island::farthestFromBalance() const
+{
+  Largest force;
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    if (const Largest own = parts_[k]->unbalancedForce(); own.any())
+      force.add(static_cast<int>(k), own.value());
+  return force.any() ? static_cast<std::size_t>(force.index()) : 0;
+}
+
+StepFailure Island::attempt(const Substep& substep, StepReport& report)
+{
+  if (const StepFailure failure = solveSubstep(substep, report); failure != StepFailure::none)
+    return failure;
+  if (conserving_ && energyAtEnd() > most_energy_)
+    return StepFailure::energy_grew;
+  if (ContactPotential* contact = equations_.contact())
+    contact->adaptStiffness();
+  for (failed_ = 0; failed_ < parts_.size(); ++failed_)
+    if (const StepFailure failure = parts_[failed_]->finishSubstep(report); failure != StepFailure::none)
+      return failure;
+  failed_ = 0;
+  return StepFailure::none;
+}
+
+void Island::accept(const Substep& substep)
+{
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+  {
+    parts_[k]->acceptSubstep(substep);
+    swept_[k].include(parts_[k]->surfaceBox(0.0));
+  }
+  if (const ContactPotential* contact = equations_.contact())
+    stiffness_ = contact->stiffness();
+}
+
+bool Island::shorterMayHelp(StepFailure failure) const
+{
+  return failed_ >= parts_.size() || parts_[failed_]->shorterMayHelp(failure);
+}
+
+bool Island::mend(StepReport& report)
+{
+  constexpr int kMostFolds = 20;   // in one step
+  if (report.mended_folds >= kMostFolds)
+    return false;
+  for (Part* part : parts_)
+    if (part->mend())
+    {
+      ++report.mended_folds;
+      return true;
+    }
+  return false;
+}
+
+void Island::refuse(const Substep& substep, StepFailure failure, StepReport& report)
+{
+  if (failure == StepFailure::interrupted)
+  {
+    report.ok = false;
+    report.failure = failure;
+    report.message = kStepInterrupted;
+    return;
+  }
+  parts_[std::min(failed_, parts_.size() - 1)]->refuse(failure, substep.length, report);
+}
+
+}   // namespace slender
