@@ -115,8 +115,8 @@ public:
   virtual void solve() = 0;
 
   // ---- the matrix of the island, of a coupled part
-  virtual void notePattern(SharedMatrix& matrix) = 0;         ///< Notes what the part itself couples.
-  virtual void findEntries(const SharedMatrix&) {}   ///< Is called when the pattern is finished.
+  virtual void notePattern(SharedMatrix& matrix) = 0;   ///< Notes what the part itself couples.
+  virtual void findEntries(const SharedMatrix&) {}      ///< Is called when the pattern is finished.
   virtual void addHessian(SharedMatrix& matrix, const HessianShift& shift) = 0;
   virtual void takeGradient(double* right) const = 0;       ///< right-hand side := minus its gradient
   virtual void takeDirection(const double* solution) = 0;   ///< direction := its part of the solution
@@ -125,9 +125,9 @@ public:
   virtual double stepLimit() const { return 1.0; }   ///< share of the direction that keeps the part sound
   /// Largest displacement of the direction, over `length` for parts that have no length of their own [-].
   virtual double incrementSize(double length) const = 0;
-  virtual double slope() const = 0;        ///< gradient . direction [J]
-  virtual double residual() const = 0;     ///< largest unbalanced force [N]
-  virtual double forceScale() const = 0;   ///< largest force [N]
+  virtual double slope() const = 0;                   ///< gradient . direction [J]
+  virtual double residual() const = 0;                ///< largest unbalanced force [N]
+  virtual double forceScale() const = 0;              ///< largest force [N]
   virtual double noiseLevel() const { return 0.0; }   ///< unbalanced force that round-off alone can cause [N]
 
   // ---- a substep
@@ -168,7 +168,7 @@ public:
   virtual void beginStage(std::size_t) {}
   /// After a solution. Returns whether the part holds more than before, so that the stage has to be solved again.
   virtual bool meetsMore() { return false; }
-  /// Holds what meetsMore() found. Is called after Equations has accepted the solution.
+  /// Holds what meetsMore() found. Call it after Equations has accepted the solution.
   virtual void holdMore() {}
   /// Takes over the solution of a stage, the last one of a substep included.
   virtual void endStage(std::size_t, bool, StepReport&) {}

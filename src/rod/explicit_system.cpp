@@ -238,7 +238,8 @@ StepFailure ExplicitSystem::attempt(const Substep& substep, StepReport& report)
       return failure;
   }
   for (failed_ = 0; failed_ < rods_.size(); ++failed_)
-    if (const StepFailure failure = rods_[failed_].rod->explicitPredict(*rods_[failed_].inputs, duration_, t, h, report);
+    if (const StepFailure failure =
+            rods_[failed_].rod->explicitPredict(*rods_[failed_].inputs, duration_, t, h, report);
         failure != StepFailure::none)
       return failure;
   composeBodies();

@@ -8,8 +8,8 @@
 
 namespace slender {
 
-/// A thread as a part of an island. If it touches something, all its nodes are surface points. Those that lie on a floor which they stick to
-/// move with that floor and have no unknowns.
+/// A thread as a part of an island. If it touches something, all its nodes are surface points. Those that lie on a
+/// floor which they stick to move with that floor and have no unknowns.
 class ThreadPart : public ChainPart
 {
 public:

@@ -76,10 +76,7 @@ void ThreadPart::holdMore()
   }
 }
 
-StepFailure ThreadPart::finishSubstep(StepReport&)
-{
-  return thread_.takeOver(length_, guard_);
-}
+StepFailure ThreadPart::finishSubstep(StepReport&) { return thread_.takeOver(length_, guard_); }
 
 /// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by
 /// bit.

@@ -32,8 +32,7 @@ WorldContent checked(const WorldModel& world, WorldContent content)
   }
   const bool simulates =
       std::any_of(content.rods.begin(), content.rods.end(), [&](int r) { return meetsOthers(world, r); }) ||
-      std::any_of(content.bodies.begin(), content.bodies.end(),
-                  [&](int b) { return world.bodies[b].body.simulated; });
+      std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) { return world.bodies[b].body.simulated; });
   need(content.threads.empty() || !simulates || world.time.integrator == Integrator::implicit_euler,
        "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
        "implicit_euler");

@@ -66,7 +66,7 @@ private:
 
   IslandFinder finder_;
   std::vector<IslandFinder::Reach> reach_;           ///< per object
-  std::vector<Part*> parts_;       ///< of one object
+  std::vector<Part*> parts_;                         ///< of one object
   std::map<std::vector<int>, ObjectIsland> known_;   ///< islands that have been needed, by the places of their objects
   std::vector<ObjectIsland*> islands_;               ///< of the present step
   std::vector<int> places_;                          ///< objects of one island

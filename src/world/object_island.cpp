@@ -31,7 +31,7 @@ ObjectIsland::ObjectIsland(WorldObjects& objects, const std::vector<int>& places
     guard_(world_.contact.gap),
     swept_(places.size()),
     island_(timeOf(time, holds<ThreadObject>(objects, places) || holds<ClothObject>(objects, places)),
-             holds<ThreadObject>(objects, places))
+            holds<ThreadObject>(objects, places))
 {
   sortObjects();
   island_.equations().solver = world_.time.island_solver;

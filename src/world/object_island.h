@@ -54,12 +54,12 @@ private:
   std::vector<ThreadObject*> threads_;
   std::vector<BodyObject*> bodies_;
   std::vector<const WorldSolid*> solids_;   ///< that its parts may touch
-  int nodes_ = 0;                            ///< of its rods
+  int nodes_ = 0;                           ///< of its rods
   ThreadGuard guard_;
   ThreadMerging merging_;
   std::vector<Part*> parts_;
   std::vector<std::size_t> parts_end_;   ///< per object: its members end before this one
-  std::vector<ThreadPart*> strands_;      ///< of the present step
+  std::vector<ThreadPart*> strands_;     ///< of the present step
   std::vector<ThreadGuard::Strand> guarded_;
   std::vector<BoundingBox> swept_;   ///< per object
   Island island_;

@@ -208,8 +208,8 @@ private:
     for (int r = 0; r < static_cast<int>(model.rods.size()); ++r)
       (meetsOthers(model, r) ? meeting : alone).push_back(r);
     const std::vector<int> bodies = bodiesThatMeet();
-    const bool simulated = std::any_of(bodies.begin(), bodies.end(),
-                                       [this](int b) { return model.bodies[b].body.simulated; });
+    const bool simulated =
+        std::any_of(bodies.begin(), bodies.end(), [this](int b) { return model.bodies[b].body.simulated; });
     const bool meet = !meeting.empty() || simulated || !touching_threads_.empty() || !joined_cloths_.empty();
     const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
     WorldContent content{meeting, touching_threads_, meet ? bodies : std::vector<int>{}, joined_cloths_};

@@ -160,10 +160,10 @@ struct WorldSolid
     body,
     floor   ///< on which a thread slips
   } kind;
-  int index;                        ///< of the obstacle, the body or the thread
-  Obstacle obstacle;                ///< what others touch
-  BodyPart* body = nullptr;         ///< that carries it; null: it moves as prescribed
-  Pose X_BS{};                      ///< in the frame of the body
+  int index;                                   ///< of the obstacle, the body or the thread
+  Obstacle obstacle;                           ///< what others touch
+  BodyPart* body = nullptr;                    ///< that carries it; null: it moves as prescribed
+  Pose X_BS{};                                 ///< in the frame of the body
   std::vector<const WorldObject*> ignores{};   ///< that never touch it: its body, and rods that are welded into it
 
   /// For a contact of these objects, without the pose.

@@ -112,7 +112,7 @@ public:
   {
     ContactSurface surface;
     Eigen::Matrix3Xd x;
-    const auto add = [&](const PartSteps& part, const Eigen::Matrix3Xd& points) {
+    const auto add = [&](const Part& part, const Eigen::Matrix3Xd& points) {
       part.addSurface(surface);
       x.conservativeResize(3, x.cols() + points.cols());
       x.rightCols(points.cols()) = points;
@@ -158,14 +158,14 @@ private:
   }
   void begin()
   {
-    std::vector<Part*> members;
+    std::vector<Part*> parts;
     for (Body& body : bodies)
-      members.push_back({body.part.get(), body.part.get()});
+      parts.push_back(body.part.get());
     for (Rod& rod : rods)
-      members.push_back({rod.part.get(), rod.part.get()});
+      parts.push_back(rod.part.get());
     for (Cloth& cloth : cloths)
-      members.push_back({cloth.part.get(), cloth.part.get()});
-    stepper_.setMembers(members);
+      parts.push_back(cloth.part.get());
+    stepper_.setParts(parts);
     for (Body& body : bodies)
     {
       stepper_.equations().solids.emplace_back();

@@ -95,7 +95,7 @@ VectorXd gradientOf(const Part& part)
 
 using Case = std::tuple<BendingModel, ClothSolver, bool>;
 
-class ClothPartSteps : public ::testing::TestWithParam<Case>
+class ClothPartInSteps : public ::testing::TestWithParam<Case>
 {};
 
 std::string nameOf(const ::testing::TestParamInfo<Case>& info)
@@ -108,7 +108,7 @@ std::string nameOf(const ::testing::TestParamInfo<Case>& info)
 /// Newton's last increment is below the tolerance in both programs, and the error that is left is no larger than that
 /// increment. Forces differ by the stiffness of an element times that. Each step begins where the stepper's last one
 /// ended, so that differences do not grow.
-TEST_P(ClothPartSteps, AreThoseOfAClothOnItsOwn)
+TEST_P(ClothPartInSteps, AreThoseOfAClothOnItsOwn)
 {
   const auto [bending, solver, coupled] = GetParam();
   Busy cloth(bending);
@@ -173,7 +173,7 @@ TEST_P(ClothPartSteps, AreThoseOfAClothOnItsOwn)
   EXPECT_LE(iterations, own_iterations + own_iterations / 2);
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, ClothPartSteps,
+INSTANTIATE_TEST_SUITE_P(Cases, ClothPartInSteps,
                          ::testing::Combine(::testing::Values(BendingModel::none, BendingModel::hinge,
                                                               BendingModel::isometric_nonconforming,
                                                               BendingModel::isometric_conforming),

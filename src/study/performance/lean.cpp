@@ -140,8 +140,8 @@ std::vector<Feature> features()
   const std::vector<Scene> all = {kRod, kExplicitRod, kThread, kCloth, kTracked};
   return {
       {"contact",
-       {"src/contact/", "include/slender_sim/contact/", "src/world/joined_", "src/world/island_finder",
-        "src/world/meeting", "src/cloth/cloth_group", "include/slender_sim/cloth/cloth_group"},
+       {"src/contact/", "include/slender_sim/contact/", "src/island/confined_newton", "src/world/meeting",
+        "src/cloth/cloth_group", "include/slender_sim/cloth/cloth_group"},
        "[cC]ontact|[tT]ouching|[cC]ollision|[cC]ollide",
        all,
        {rod_on_floor, thread_with_itself, cloth_on_ball}},
@@ -157,7 +157,7 @@ std::vector<Feature> features()
        {kRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball, thread_with_itself},
        {with(rod_on_floor, {"rods.0.contact.friction=0.3"}), with(cloth_on_ball, {"cloths.0.contact.friction=0.3"})}},
       {"coupled matrix",
-       {"src/contact/coupling_matrix"},
+       {"src/island/shared_matrix"},
        "[cC]onjugateGradientsIn|SharedMatrix",
        {kRod, kExplicitRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball, thread_with_itself},
        {with(kRod, {welded_disc})}},
