@@ -6,11 +6,29 @@
 #include "slender_sim/cloth/cloth_model.h"
 #include "slender_sim/contact/solids.h"
 #include "slender_sim/geometry/mesh_shapes.h"
+#include "test/support/cloths.h"
 #include "cloth/cloth_part.h"
 #include "island/island.h"
 #include "rod/rod_part.h"
 
 namespace slender::test {
+
+/// A square sheet of cotton [m].
+inline std::shared_ptr<ClothModel> cotton(double size, int cells)
+{
+  auto model = std::make_shared<ClothModel>(buildCloth(
+      "sheet", gridMesh(size, size, cells, cells, GridPattern::alternating), 0.2, isotropicMembrane(100.0, 0.3, 1.0)));
+  model->bending = BendingModel::hinge;
+  model->bending_modulus = 1e-5;
+  return model;
+}
+
+/// Its vertices [m] when it lies flat about a point.
+inline Matrix3Xd centred(const ClothModel& model, const Vector3d& middle)
+{
+  const Vector3d own = model.rest.vertices.rowwise().mean();
+  return model.rest.vertices.colwise() + (middle - own);
+}
 
 /// Cloths, rods and a body in one island, with solids that stand still, stepped without a world around it.
 class ClothIsland
@@ -132,6 +150,7 @@ public:
   Island& stepper() { return stepper_; }
 
   Eigen::Vector3d gravity{0, 0, -9.81};
+  std::vector<Part*> others;   ///< which load themselves
   std::vector<Cloth> cloths;
   std::vector<Rod> rods;
   std::vector<Body> bodies;
@@ -165,6 +184,7 @@ private:
       parts.push_back(rod.part.get());
     for (Cloth& cloth : cloths)
       parts.push_back(cloth.part.get());
+    parts.insert(parts.end(), others.begin(), others.end());
     stepper_.setParts(parts);
     for (Body& body : bodies)
     {

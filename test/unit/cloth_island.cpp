@@ -11,21 +11,6 @@ namespace {
 
 constexpr double kStep = 0.005, kThickness = 2e-3, kGap = 1e-3;
 
-std::shared_ptr<ClothModel> cotton(double size, int cells)
-{
-  auto model = std::make_shared<ClothModel>(buildCloth(
-      "sheet", gridMesh(size, size, cells, cells, GridPattern::alternating), 0.2, isotropicMembrane(100.0, 0.3, 1.0)));
-  model->bending = BendingModel::hinge;
-  model->bending_modulus = 1e-5;
-  return model;
-}
-
-Matrix3Xd centred(const ClothModel& model, const Vector3d& middle)
-{
-  const Vector3d own = model.rest.vertices.rowwise().mean();
-  return model.rest.vertices.colwise() + (middle - own);
-}
-
 /// Steps that succeed and keep the thickness, by the independent check.
 void expectSound(ClothIsland& island, int steps)
 {

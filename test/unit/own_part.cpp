@@ -1,0 +1,198 @@
+// A kind of part that the package does not have, in an island with a rod and a cloth (docs/architecture.md).
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "test/support/cloth_island.h"
+#include "test/support/rods.h"
+
+namespace slender::test {
+namespace {
+
+/// A ball of mass m [kg] at x [m] on a spring of stiffness k [N/m] to its anchor, by implicit Euler. It has three
+/// unknowns, and its surface is one segment without length.
+class SpringBall final : public Part
+{
+public:
+  Vector3d x, v{0, 0, 0};   ///< where the last accepted substep ended [m], [m/s]
+  Vector3d anchor;          ///< [m]
+  double mass = 0.02, stiffness = 2.0, radius = 0.02;
+  Vector3d gravity{0, 0, -9.81};   ///< [m/s^2]
+
+  explicit SpringBall(const Vector3d& at) : x(at), anchor(at) {}
+
+  // ---- surface
+  int points() const override { return 1; }
+  void gather(Eigen::Matrix3Xd& points) const override { points.col(first_point) = trial_; }
+  int base(int) const override { return offset; }
+  void addForce(int, const Vector3d& force) override { gradient_ -= force; }
+  Vector3d move(int) const override { return direction_; }
+  void addSurface(ContactSurface& surface) const override
+  {
+    const int point = surface.points++;
+    surface.segments.push_back({point, point, radius, static_cast<int>(surface.objects.size())});
+    surface.objects.emplace_back();
+  }
+  BoundingBox surfaceBox(double ahead) const override
+  {
+    BoundingBox box = BoundingBox::empty();
+    box.include(x + ahead * v);
+    box.enlarge(radius);
+    return box;
+  }
+
+  // ---- unknowns and configuration
+  bool numberUnknowns() override { return true; }   // they never change
+  int unknowns() const override { return 3; }
+  void moveAlong(double alpha) override { trial_ = base_ + alpha * direction_; }
+  void accept() override { base_ = trial_; }
+  void saveBase() override { saved_ = base_; }
+  void restoreBase() override { base_ = saved_; }
+  void retreat(double share) override { trial_ = base_ + share * (trial_ - base_); }
+
+  // ---- equations
+  void evaluate(bool, const HessianShift& shift) override
+  {
+    const Vector3d moved = trial_ - free_, stretched = trial_ - anchor;
+    evaluation = {};
+    evaluation.potential = 0.5 * inertia() * moved.squaredNorm() + 0.5 * stiffness * stretched.squaredNorm();
+    gradient_ = inertia() * moved + stiffness * stretched;
+    hessian_ = (inertia() * (1.0 + shift.position) + stiffness) * Eigen::Matrix3d::Identity();
+    for (const ContactTerm* term : own_terms)   // with what moves as prescribed, while the part is not coupled
+      for (int p = 0; p < 2 && !coupled; ++p)
+      {
+        gradient_ -= term->weight[p] * term->force;
+        hessian_ += term->weight[p] * (term->weight[0] + term->weight[1]) * term->stiffness;
+      }
+  }
+  void solve() override { direction_ = -hessian_.ldlt().solve(gradient_); }
+  void notePattern(SharedMatrix& matrix) override
+  {
+    each([&](int i, int j) { matrix.note(offset + i, offset + j); });
+  }
+  void addHessian(SharedMatrix& matrix, const HessianShift&) override
+  {
+    each([&](int i, int j) { matrix.add(offset + i, offset + j, hessian_(i, j)); });
+  }
+  void takeGradient(double* right) const override { Eigen::Map<Vector3d>(right + offset) = -gradient_; }
+  void takeDirection(const double* solution) override { direction_ = Eigen::Map<const Vector3d>(solution + offset); }
+  double incrementSize(double length) const override { return direction_.norm() / std::min(length, radius); }
+  double slope() const override { return gradient_.dot(direction_); }
+  double residual() const override { return gradient_.norm(); }
+  double forceScale() const override { return mass * gravity.norm() + stiffness * (trial_ - anchor).norm(); }
+
+  // ---- its steps
+  StepFailure beginSubstep(const StepPlan&, const Substep& substep) override
+  {
+    h_ = substep.length;
+    free_ = x + h_ * v + h_ * h_ * gravity;
+    base_ = x;
+    trial_ = x + h_ * v;
+    return StepFailure::none;
+  }
+  void acceptSubstep(const Substep&) override
+  {
+    v = (trial_ - x) / h_;
+    x = trial_;
+  }
+  void refuse(StepFailure failure, double, StepReport& report) const override
+  {
+    report.ok = false;
+    report.failure = failure;
+    report.message = "the ball on the spring has no solution: use a shorter step";
+  }
+
+private:
+  double inertia() const { return mass / (h_ * h_); }
+  template <class F>
+  void each(F&& f) const
+  {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j <= i; ++j)
+        f(i, j);
+  }
+
+  double h_ = 1.0;   ///< of the substep [s]
+  Vector3d base_, trial_, saved_, free_, gradient_, direction_{0, 0, 0};
+  Eigen::Matrix3d hessian_;
+};
+
+constexpr double kStep = 0.005, kGap = 1e-3;
+
+StepReport step(ClothIsland& island)
+{
+  const StepReport report = island.step();
+  EXPECT_TRUE(report.ok) << report.message;
+  return report;
+}
+
+/// Alone it solves with its own matrix, and comes to rest where the spring bears its weight.
+TEST(OwnPart, ComesToRestOnItsOwn)
+{
+  SpringBall ball({0, 0, 0});
+  ClothIsland island(kStep, kGap);
+  island.others = {&ball};
+  for (int k = 0; k < 4000; ++k)
+    step(island);
+  EXPECT_NEAR(ball.x.z(), -ball.mass * 9.81 / ball.stiffness, 1e-9);   // implicit Euler damps what is left
+}
+
+/// It flies against a rod and a cloth. What it loses they gain, up to Newton's tolerance, and nothing passes through.
+TEST(OwnPart, SharesAnIslandWithARodAndACloth)
+{
+  SpringBall ball({0.003, 0.004, 0.028});
+  ball.stiffness = 0.0;
+  ball.gravity.setZero();
+  ball.v = {0, 0, -2};
+  ClothIsland island(kStep, kGap);
+  island.gravity.setZero();
+  island.others = {&ball};
+  const Matrix3Xd nodes = straightNodes(8, 0.2, {-0.1, 0, 0});
+  const auto rod = std::make_shared<RodModel>(openRod(nodes, roundSection(4e-3, 1e6, 1000.0)));
+  island.addRod(rod, makeRodState(*rod, nodes, Vector3d::Zero()));
+  const auto cloth = cotton(0.3, 6);
+  island.addCloth(cloth, centred(*cloth, {0, 0, -0.012}), 2e-3);
+  const auto momentum = [&] {
+    Vector3d sum = ball.mass * ball.v;
+    for (Eigen::Index i = 0; i < rod->mass.size(); ++i)
+      sum += rod->mass[i] * island.rods[0].state.v.col(i);
+    for (Eigen::Index i = 0; i < cloth->mass.size(); ++i)
+      sum += cloth->mass[i] * island.cloths[0].state.v.col(i);
+    return sum;
+  };
+  const Vector3d before = momentum();
+  for (int k = 0; k < 15; ++k)
+  {
+    step(island);
+    EXPECT_GT(island.clearance(), 0.0);
+  }
+  EXPECT_GT(ball.v.z(), -1.6);                                    // the rod took a part of its momentum
+  EXPECT_LT(island.cloths[0].state.v.row(2).minCoeff(), -0.01);   // and gave of it to the cloth
+  EXPECT_LT((momentum() - before).norm(), 1e-4 * before.norm());
+}
+
+/// It falls on a rope that is held at its ends, and stays there.
+TEST(OwnPart, FallsOnARope)
+{
+  SpringBall ball({0.2, 0, 0.06});
+  ball.stiffness = 0.1;   // bears 2 % of the weight
+  ClothIsland island(kStep, kGap);
+  island.others = {&ball};
+  const Matrix3Xd nodes = straightNodes(21, 0.4, {0, 0, 0});
+  auto rod = std::make_shared<RodModel>(openRod(nodes, roundSection(4e-3, 1e6, 1000.0)));
+  rod->mass_damping = 5.0;
+  RodState state = makeRodState(*rod, nodes, Vector3d::Zero());
+  for (const int node : {0, 20})
+    state.grasps.push_back(makeGrasp(*rod, state, node, node, true));
+  island.addRod(rod, state);
+  for (const GraspState& grasp : state.grasps)
+    island.rods[0].inputs.grasps.push_back({grasp.X_WG, {}});
+  for (int k = 0; k < 400; ++k)
+    step(island);
+  const Vector3d middle = island.rods[0].state.x.col(10);
+  EXPECT_NEAR(ball.x.z() - middle.z(), ball.radius + 4e-3, kGap + 1e-4);   // within the barrier's range
+  EXPECT_LT(ball.v.norm(), 0.01);
+}
+
+}   // namespace
+}   // namespace slender::test
