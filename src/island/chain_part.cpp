@@ -129,12 +129,6 @@ int ChainPart::base(int point) const
   return number < 0 ? number : offset + number;
 }
 
-void ChainPart::addColumns(int point, int component, double weight, Columns& row) const
-{
-  if (const int first = base(point); first >= 0)
-    row.push(first + component, weight);
-}
-
 void ChainPart::addForce(int point, const Eigen::Vector3d& force)
 {
   if (const int node = nodeOf(point); node >= 0)

@@ -33,7 +33,6 @@ public:
   void takeDirection(const double* solution) override;
 
   int base(int point) const override;
-  void addColumns(int point, int component, double weight, Columns& row) const override;
   void addForce(int point, const Eigen::Vector3d& force) override;
   Eigen::Vector3d move(int point) const override;
 

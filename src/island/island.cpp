@@ -11,6 +11,8 @@ namespace slender {
 
 void Island::setParts(const std::vector<Part*>& parts)
 {
+  if (parts != parts_)
+    versions_.clear();   // of another surface
   parts_ = parts;
   surface_changes_ = std::any_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->surfaceChanges(); });
   equations_.setParts(parts_);
@@ -32,6 +34,8 @@ void Island::takeSurface()
 
 bool Island::surfaceIsStale() const
 {
+  if (versions_.size() != parts_.size())
+    return true;
   for (std::size_t k = 0; k < parts_.size(); ++k)
     if (parts_[k]->surfaceVersion() != versions_[k])
       return true;
@@ -44,8 +48,8 @@ void Island::setContact(const std::vector<ContactSolid>& solids, const ContactOp
   ContactSurface surface = surface_;
   surface.solids = solids;
   ContactOptions own = options;
-  if (!surface_changes_)
-    for (Part* part : parts_)
+  for (const Part* part : parts_)
+    if (!part->surfaceChanges())
       own.least_stiffness = std::max(own.least_stiffness, part->barrierRange(options.gap).least);
   equations_.setContact(std::move(surface), own);
   gap_ = options.gap;
@@ -225,14 +229,16 @@ NewtonResult Island::solveStage(std::size_t s, const Substep& substep)
     const NewtonResult next = equations_.solve(from, to, time_.newton);
     const int iterations = total.iterations + next.iterations,
               factorizations = total.factorizations + next.factorizations;
+    const double max_strain = std::max(total.max_strain, next.max_strain);
     total = next;
+    total.max_strain = max_strain;
     total.iterations = iterations;
     total.factorizations = factorizations;
   }
   return total;
 }
 
-/// The member on which the largest unbalanced force acts.
+/// The part on which the largest unbalanced force acts.
 std::size_t Island::farthestFromBalance() const
 {
   Largest force;

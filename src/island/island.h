@@ -26,7 +26,7 @@ public:
   Equations& equations() { return equations_; }
   const Equations& equations() const { return equations_; }
 
-  /// The parts, bodies first. They must outlive the stepper, or the next call.
+  /// The parts, bodies first. They must outlive the island, or the next call.
   void setParts(const std::vector<Part*>& parts);
   /// Makes contact for the surfaces of the parts and these solids. `ignores` of a solid are numbers of objects.
   void setContact(const std::vector<ContactSolid>& solids, const ContactOptions& options);

@@ -74,6 +74,7 @@ private:
 
   // ---- as Part
   void solve() override;
+  /// With the forces of the averages, which are in the gradient only here.
   double residual() const override
   {
     addMultipliers(1.0);

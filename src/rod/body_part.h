@@ -57,14 +57,11 @@ private:
   void saveBase() override { system.saveBase(); }
   void restoreBase() override { system.restoreBase(); }
   void retreat(double share) override;
-  void placeHeld(double) override {}
-  bool heldMoves(double, double) const override { return false; }
 
   int points() const override { return static_cast<int>(surface_.points.cols()); }
   void gather(Eigen::Matrix3Xd& x) const override;
 
   void evaluate(bool with_hessian, const HessianShift& shift) override;
-  void closeGradient() override {}
   void solve() override
   {
     direction = -system.gradient;
@@ -72,7 +69,6 @@ private:
   }
 
   void notePattern(SharedMatrix& matrix) override;
-  void findEntries(const SharedMatrix&) override {}
   void addHessian(SharedMatrix& matrix, const HessianShift& shift) override;
   void takeGradient(double* right) const override;
   void takeDirection(const double* solution) override;
@@ -90,7 +86,6 @@ private:
   double slope() const override { return system.gradient.dot(direction); }
   double residual() const override;
   double forceScale() const override;
-  double noiseLevel() const override { return 0.0; }
 
   // ---- its steps
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;

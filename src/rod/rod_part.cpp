@@ -21,7 +21,8 @@ const BodyPart* RodPart::carrier(int grasp) const
   return nullptr;
 }
 
-/// An unknown that the body of grasp k carries gets the number -2 - k.
+/// An unknown that the body of grasp k carries gets the number -2 - k. Where nothing carries the grasp of a weld, it
+/// stays at its pose.
 bool RodPart::numberUnknowns()
 {
   const std::vector<GraspState>& grasps = rod_.work.grasps;
@@ -42,8 +43,9 @@ bool RodPart::numberUnknowns()
     holds_.push_back(hold(g));
     if (!g.active)
       continue;
-    const int code = g.body < 0 ? kPrescribed : -2 - static_cast<int>(k);
-    welded_ = welded_ || g.body >= 0;
+    const bool carried = carrier(static_cast<int>(k)) != nullptr;
+    const int code = carried ? -2 - static_cast<int>(k) : kPrescribed;
+    welded_ = welded_ || carried;
     for (int i = g.first_node; i <= g.last_node; ++i)
       for (int c = 0; c < (i < g.last_node ? 4 : 3); ++c)
         dof_[4 * i + c] = code;

@@ -55,10 +55,8 @@ private:
   bool surfaceChanges() const override { return true; }
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
-  void beginStage(std::size_t) override {}
   bool meetsMore() override { return thread_.firstLanding() <= 1.0; }
   void holdMore() override;
-  void endStage(std::size_t, bool, StepReport&) override {}
   StepFailure finishSubstep(StepReport& report) override;
   void acceptSubstep(const Substep&) override {}   // finishSubstep() changed the present state
   bool shorterMayHelp(StepFailure failure) const override;

@@ -16,6 +16,8 @@ StepFailure ThreadPart::beginSubstep(const StepPlan&, const Substep& substep)
 
 void ThreadPart::addSurface(ContactSurface& surface) const
 {
+  if (!touches_)
+    return;
   const ThreadState& state = thread_.work;
   const auto isHeld = [&](int i) {
     return state.deposited[i] || (i == 0 && state.ends[0].held) || (i + 1 == state.nodes() && state.ends[1].held);
@@ -41,6 +43,8 @@ BoundingBox ThreadPart::surfaceBox(double ahead) const
 {
   const ThreadState& state = thread_.work;
   BoundingBox box = BoundingBox::empty();
+  if (!touches_)
+    return box;
   double radius = 0.0;
   for (int i = 0; i < state.nodes(); ++i)
     box.include(state.x[i] + ahead * state.v[i]);

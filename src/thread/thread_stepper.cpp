@@ -64,10 +64,9 @@ private:
   bool shorterMayHelp(StepFailure) const override { return false; }
   void refuse(const Substep& substep, StepFailure failure, StepReport& report) override
   {
+    thread_.refuseUnsolved(report, failure, substep.length);
     if (failure == StepFailure::interrupted)
-      thread_.refuse(report, failure, kStepInterrupted);
-    else
-      thread_.refuseUnsolved(report, failure, substep.length);
+      report.message = kStepInterrupted;
   }
 
   Impl& thread_;

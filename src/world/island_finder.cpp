@@ -32,10 +32,11 @@ bool IslandFinder::joinNear(const std::vector<Reach>& parts, double margin)
   order_.clear();
   for (std::size_t k = 0; k < parts.size(); ++k)
   {
-    if (!parts[k].has_points && !parts[k].is_solid)
-      continue;   // touches nothing
+    const BoundingBox& box = parts[k].box;
+    if ((!parts[k].has_points && !parts[k].is_solid) || (box.low.array() > box.high.array()).any())
+      continue;   // touches nothing, or has no parts now
     order_.push_back(static_cast<int>(k));
-    boxes_[k] = {parts[k].box.low.array() - margin, parts[k].box.high.array() + margin};
+    boxes_[k] = {box.low.array() - margin, box.high.array() + margin};
     if (!boxes_[k].low.allFinite() || !boxes_[k].high.allFinite())
     {
       const Eigen::Vector3d far = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());

@@ -1,4 +1,4 @@
-// Rods, threads, cloths and bodies as one island: what it consists of.
+// The objects that are stepped in islands, and what a step leaves.
 #include "island_scheduler.h"
 
 #include <algorithm>
@@ -33,6 +33,9 @@ WorldContent checked(const WorldModel& world, WorldContent content)
   const bool simulates =
       std::any_of(content.rods.begin(), content.rods.end(), [&](int r) { return meetsOthers(world, r); }) ||
       std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) { return world.bodies[b].body.simulated; });
+  need(world.time.integrator != Integrator::symplectic_euler || !simulates,
+       "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler "
+       "(time.integrator)");
   need(content.threads.empty() || !simulates || world.time.integrator == Integrator::implicit_euler,
        "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
        "implicit_euler");
@@ -65,11 +68,12 @@ void IslandScheduler::addContacts(std::vector<ContactForce>& out) const
 /// On the surface points of an object that is one part [N].
 Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const Part& part) const
 {
-  const int points = part.points(), place = objects_.placeOf(object);
+  const int points = part.points();
   Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, points);
   for (const ObjectIsland* island : islands_)
   {
-    if (!island->contact() || !std::binary_search(island->places().begin(), island->places().end(), place))
+    if (points == 0 || !island->contact() ||
+        !std::binary_search(island->places().begin(), island->places().end(), object.place))
       continue;
     for (const ContactTerm& term : island->contact()->terms())
       for (int k = 0; k < 4; ++k)

@@ -1,4 +1,4 @@
-// Rods, threads, cloths and bodies as one island: their steps.
+// The steps of objects in islands.
 #include <algorithm>
 #include <stdexcept>
 
@@ -65,9 +65,8 @@ void IslandScheduler::predict()
     }
   }
   finder_.begin(static_cast<int>(objects_.all.size()));
-  for (const Weld& weld : objects_.welds)
-    if (const BodyObject* body = objects_.simulated(weld.body))
-      finder_.join(objects_.placeOf(objects_.rods[weld.rod]), objects_.placeOf(*body));
+  for (const auto& [rod, body] : objects_.joined)
+    finder_.join(rod, body);
   finder_.joinNear(reach_, world_.contact.gap);
 }
 
@@ -89,15 +88,22 @@ void IslandScheduler::arrange(WorldState& state, const WorldInputs& inputs)
   }
 }
 
+/// Large islands one after the other, each on all threads, then the others in parallel.
 StepReport IslandScheduler::stepIslands()
 {
   StepReport total;
-  const int count = static_cast<int>(islands_.size());
+  const auto step = [this](ObjectIsland& island) {
+    return island.stepped() ? StepReport() : island.step(world_.time.step);
+  };
   for (ObjectIsland* island : islands_)
-    island->setThreads(count > 1 ? 1 : loop_.threads);
-  loop_.run(
-      count, nodes_, [&](int k) { return islands_[k]->stepped() ? StepReport() : islands_[k]->step(world_.time.step); },
-      total);
+  {
+    island->setThreads(island->isLarge() ? loop_.threads : 1);
+    if (island->isLarge() && total.ok)
+      total.merge(step(*island));
+  }
+  if (total.ok)
+    loop_.run(
+        static_cast<int>(islands_.size()), nodes_, [&](int k) { return step(*islands_[k]); }, total);
   return total;
 }
 
@@ -114,11 +120,17 @@ bool IslandScheduler::joinThoseThatMet()
 
 StepReport IslandScheduler::stepAndJoin(WorldState& state, const WorldInputs& inputs)
 {
-  // Islands that no step needs any more are dropped now and then.
-  if (known_.size() > 2 * objects_.all.size() + 16)
-    known_.clear();
-  for (auto& [places, island] : known_)
-    island.forgetStep();
+  const bool many = known_.size() > 2 * objects_.all.size() + 16;   // then those go that the last step did not need
+  for (auto at = known_.begin(); at != known_.end();)
+  {
+    if (many && !at->second.stepped())
+    {
+      at = known_.erase(at);
+      continue;
+    }
+    at->second.forgetStep();
+    ++at;
+  }
   predict();
   arrange(state, inputs);
   StepReport report = stepIslands();

@@ -73,11 +73,13 @@ void ObjectIsland::sortObjects()
     island_.setAttraction(&merging_);
 }
 
-void ObjectIsland::setThreads(int threads)
+bool ObjectIsland::isLarge() const
 {
   constexpr int kWorthThreads = 4000;   // nodes; less is done before threads are awake
-  island_.equations().setThreads(threads, rods_.size() > 1 && nodes_ >= kWorthThreads);
+  return rods_.size() > 1 && nodes_ >= kWorthThreads;
 }
+
+void ObjectIsland::setThreads(int threads) { island_.equations().setThreads(threads, isLarge()); }
 
 /// The solids that move as prescribed, and those that its parts carry or lie on.
 std::vector<ContactSolid> ObjectIsland::takeSolids()
@@ -158,8 +160,9 @@ void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
   setCarriers();
   setSolids(state, inputs);
   double stiffness = 0.0;
-  for (const WorldObject* object : objects_)
-    stiffness = std::max(stiffness, object->stiffness(state));
+  if (contact())
+    for (const WorldObject* object : objects_)
+      stiffness = std::max(stiffness, object->stiffness(state));
   island_.setStiffness(stiffness);
   if (threads_.empty())
     return;
@@ -190,7 +193,9 @@ StepReport ObjectIsland::step(double duration)
   for (const RodObject* rod : rods_)
     if (const double own = rod->stepper->work.next_step; own > 0.0)
       first = first > 0.0 ? std::min(first, own) : own;
-  StepReport report = island_.step(duration, first);
+  StepReport report;
+  if (!parts_.empty())   // a thread may have left its region
+    report = island_.step(duration, first);
   stepped_ = report.ok;
   if (!report.ok)
     return report;

@@ -34,6 +34,8 @@ public:
   /// Contacts of the last step; null: nothing touches.
   const ContactPotential* contact() const { return island_.equations().contact(); }
   Island& island() { return island_; }
+  /// Whether its parts are worth several threads.
+  bool isLarge() const;
   /// Threads that evaluate its parts; 0: as OpenMP says.
   void setThreads(int threads);
 
@@ -58,7 +60,7 @@ private:
   ThreadGuard guard_;
   ThreadMerging merging_;
   std::vector<Part*> parts_;
-  std::vector<std::size_t> parts_end_;   ///< per object: its members end before this one
+  std::vector<std::size_t> parts_end_;   ///< per object: its parts end before this one
   std::vector<ThreadPart*> strands_;     ///< of the present step
   std::vector<ThreadGuard::Strand> guarded_;
   std::vector<BoundingBox> swept_;   ///< per object

@@ -190,7 +190,7 @@ private:
       if (model.leads(k) != leaders)
         continue;
       if (meetsByBarrier(model.cloths[k]))
-        joined_cloths_.push_back(k);
+        barrier_cloths_.push_back(k);
       else if (model.cloths[k].contact)
         touching.push_back(k);
       else
@@ -206,13 +206,17 @@ private:
   {
     std::vector<int> meeting, alone;
     for (int r = 0; r < static_cast<int>(model.rods.size()); ++r)
+    {
       (meetsOthers(model, r) ? meeting : alone).push_back(r);
+      if (model.rods[r].tracked.sets && meetsOthers(model, r))
+        throw WorldError(Kind::rod, r, "a rod that tracks a guide has no contact and no welds: leave out one of them");
+    }
     const std::vector<int> bodies = bodiesThatMeet();
     const bool simulated =
         std::any_of(bodies.begin(), bodies.end(), [this](int b) { return model.bodies[b].body.simulated; });
-    const bool meet = !meeting.empty() || simulated || !touching_threads_.empty() || !joined_cloths_.empty();
+    const bool meet = !meeting.empty() || simulated || !touching_threads_.empty() || !barrier_cloths_.empty();
     const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
-    WorldContent content{meeting, touching_threads_, meet ? bodies : std::vector<int>{}, joined_cloths_};
+    WorldContent content{meeting, touching_threads_, meet ? bodies : std::vector<int>{}, barrier_cloths_};
     separate_begin_ = groups_.size();
     for (const int r : alone)
     {
@@ -226,16 +230,15 @@ private:
     separate_end_ = groups_.size();
     if (!meet && content.rods.empty())
       return;
-    const std::vector<int> rods_of_group = content.rods;
-    if (explicit_steps && touching_threads_.empty() && joined_cloths_.empty())
+    if (explicit_steps && touching_threads_.empty() && barrier_cloths_.empty())
     {
-      place(rods, rods_of_group, add(built(Kind::none, -1, [&] { return makeExplicitRods(model, content, state); })));
+      place(rods, content.rods, add(built(Kind::none, -1, [&] { return makeExplicitRods(model, content, state); })));
       return;
     }
     StepGroup* group =
         add(built(Kind::none, -1, [&] { return std::make_unique<IslandScheduler>(model, content, state); }));
-    place(rods, rods_of_group, group);
-    place(cloths, joined_cloths_, group);
+    place(rods, content.rods, group);
+    place(cloths, barrier_cloths_, group);
   }
 
   /// Simulated ones, and driven ones that rods are welded to or that have a shape.
@@ -303,7 +306,7 @@ private:
   std::size_t separate_begin_ = 0, separate_end_ = 0;   ///< among them the rods that meet nothing
   int separate_nodes_ = 0;
   std::vector<int> touching_threads_;   ///< that are joined with rods, cloths or bodies
-  std::vector<int> joined_cloths_;      ///< whose contact is the barrier
+  std::vector<int> barrier_cloths_;     ///< whose contact is the barrier
   std::vector<int> given_bodies_;       ///< driven bodies
   WorldState before_;                   ///< a step that may fail in one of several groups
   GroupLoop separate_loop_;

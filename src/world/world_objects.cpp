@@ -84,12 +84,14 @@ WorldObjects::WorldObjects(const WorldModel& model, WorldContent parts, WorldSta
   : world(model),
     content(std::move(parts))
 {
+  addObjects(world.time);
+  addWelds(state);
+  if (!touch())
+    return;
   state.contact_stiffness.rods.resize(world.rods.size());
   state.contact_stiffness.threads.resize(world.threads.size());
   state.contact_stiffness.bodies.resize(world.bodies.size());
   state.contact_stiffness.cloths.resize(world.cloths.size());
-  addObjects(world.time);
-  addWelds(state);
   addSolids();
 }
 
@@ -101,7 +103,8 @@ WorldObjects::WorldObjects(const WorldObjects& other, const TimeConfig& time)
   addObjects(time);
   for (const Weld& weld : welds)
     follow(weld);
-  addSolids();
+  if (touch())
+    addSolids();
 }
 
 // ---- rods
@@ -308,12 +311,12 @@ void WorldObjects::addObjects(const TimeConfig& time)
 {
   for (const int b : content.bodies)
     if (world.bodies[b].body.simulated)
-      all.push_back(&bodies.emplace_back(world, b));
+      add(bodies.emplace_back(world, b));
   for (const int r : content.rods)
   {
     try
     {
-      all.push_back(&rods.emplace_back(world, r, time));
+      add(rods.emplace_back(world, r, time));
     }
     catch (const std::invalid_argument& error)
     {
@@ -321,14 +324,21 @@ void WorldObjects::addObjects(const TimeConfig& time)
     }
   }
   for (const int c : content.cloths)
-    all.push_back(&cloths.emplace_back(world, c, time));
+    add(cloths.emplace_back(world, c, time));
   for (const int k : content.threads)
-    all.push_back(&threads.emplace_back(world, k));
+    add(threads.emplace_back(world, k));
 }
 
-int WorldObjects::placeOf(const WorldObject& object) const
+void WorldObjects::add(WorldObject& object)
 {
-  return static_cast<int>(std::find(all.begin(), all.end(), &object) - all.begin());
+  object.place = static_cast<int>(all.size());
+  all.push_back(&object);
+}
+
+/// Whether any of them may touch something.
+bool WorldObjects::touch() const
+{
+  return std::any_of(all.begin(), all.end(), [](const WorldObject* object) { return object->hasSurface(); });
 }
 
 const BodyObject* WorldObjects::simulated(int body) const
@@ -358,8 +368,11 @@ void WorldObjects::addWelds(WorldState& state)
 
 void WorldObjects::follow(const Weld& weld)
 {
-  if (const BodyObject* body = simulated(weld.body))
-    rods[weld.rod].part->addWeld({weld.grasp, body->part.get(), weld.X_BG});
+  const BodyObject* body = simulated(weld.body);
+  if (!body)
+    return;
+  rods[weld.rod].part->addWeld({weld.grasp, body->part.get(), weld.X_BG});
+  joined.emplace_back(rods[weld.rod].place, body->place);
 }
 
 void WorldObjects::addSolids()

@@ -29,6 +29,7 @@ public:
   WorldObject& operator=(const WorldObject&) = delete;
 
   const int index;   ///< among the objects of its kind in the world
+  int place = 0;     ///< in WorldObjects::all
 
   /// For messages: "rod 'rope'".
   virtual std::string name() const = 0;
@@ -170,7 +171,7 @@ struct WorldSolid
   ContactSolid asTouched(const std::vector<WorldObject*>& by) const;
 };
 
-/// Which parts of the world may meet, by their numbers.
+/// Objects of the world, by their numbers.
 struct WorldContent
 {
   std::vector<int> rods;   ///< those that may meet something come first
@@ -204,16 +205,17 @@ struct WorldObjects
   std::deque<ThreadObject> threads;
   /// All of them in this order. Bodies come first, because rods follow them.
   std::vector<WorldObject*> all;
-  std::vector<Weld> welds;   ///< rod: place in `rods`; body: number in the world
+  std::vector<Weld> welds;                   ///< rod: place in `rods`; body: number in the world
+  std::vector<std::pair<int, int>> joined;   ///< places in `all` of rods and simulated bodies that welds join
   std::vector<WorldSolid> solids;
 
-  /// Place in `all`.
-  int placeOf(const WorldObject& object) const;
   /// Null: the body is driven.
   const BodyObject* simulated(int body) const;
 
 private:
   void addObjects(const TimeConfig& time);
+  void add(WorldObject& object);
+  bool touch() const;
   void addWelds(WorldState& state);
   void addSolids();
   void follow(const Weld& weld);

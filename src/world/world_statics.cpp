@@ -265,12 +265,14 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
 StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, const WorldInputs& inputs)
 {
   StepReport total;
+  if (!objects.takeInputs(state, inputs, total))
+    return total;
   bool meet = !objects.bodies.empty();
   for (RodObject& rod : objects.rods)
   {
     meet = meet || rod.meets;
     if (RodStepper* alone = rod.alone(); alone && total.ok)
-      total.merge(alone->solveEquilibrium(state.rods[rod.index], inputs.rods[rod.index]));
+      total.merge(alone->solveEquilibrium(state.rods[rod.index], rod.inputs));
   }
   if (!meet || !total.ok)
     return total;

@@ -44,7 +44,7 @@ private:
   void take(const WorldState& state);
   void give(WorldState& state) const;
 
-  // ---- stability, joined_stability.cpp
+  // ---- stability, world_stability.cpp
   void beginStability();
   RodEvaluation energyAt(double s);
   bool definite(double s);
