@@ -43,7 +43,8 @@ bodies:
                                          "scene", {}, std::string(SLENDER_SOURCE_DIR) + "/test/unit/data"));
   std::map<std::pair<std::string, int>, Marker> markers;
   for (const Marker& marker : sceneMarkers(simulation, std_msgs::Header(), {MarkerStyle::line}).markers)
-    markers[{marker.ns, marker.id}] = marker;
+    if (marker.action == Marker::ADD)
+      markers[{marker.ns, marker.id}] = marker;
   ASSERT_EQ(markers.size(), 1u + 5u + 1u);   // no picture of the body without a shape
   const Marker& floor = markers[{"obstacles", 0}];
   EXPECT_EQ(floor.type, Marker::TRIANGLE_LIST);

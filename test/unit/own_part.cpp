@@ -10,7 +10,7 @@ namespace slender::test {
 namespace {
 
 /// A ball of mass m [kg] at x [m] on a spring of stiffness k [N/m] to its anchor, by implicit Euler. It has three
-/// unknowns, and its surface is one segment without length.
+/// unknowns, and its surface is one segment between two points at the same place.
 class SpringBall final : public Part
 {
 public:
@@ -22,15 +22,19 @@ public:
   explicit SpringBall(const Vector3d& at) : x(at), anchor(at) {}
 
   // ---- surface
-  int points() const override { return 1; }
-  void gather(Eigen::Matrix3Xd& points) const override { points.col(first_point) = trial_; }
-  int base(int) const override { return offset; }
+  int points() const override { return 2; }
+  void gather(Eigen::Matrix3Xd& all) const override { all.col(first_point) = all.col(first_point + 1) = trial_; }
+  int base(int) const override { return kPrescribed - 1; }   // both points have the same unknowns
+  void addColumns(int, int component, double weight, Columns& row) const override
+  {
+    row.push(offset + component, weight);
+  }
   void addForce(int, const Vector3d& force) override { gradient_ -= force; }
   Vector3d move(int) const override { return direction_; }
   void addSurface(ContactSurface& surface) const override
   {
-    const int point = surface.points++;
-    surface.segments.push_back({point, point, radius, static_cast<int>(surface.objects.size())});
+    surface.segments.push_back({surface.points, surface.points + 1, radius, static_cast<int>(surface.objects.size())});
+    surface.points += 2;
     surface.objects.emplace_back();
   }
   BoundingBox surfaceBox(double ahead) const override
@@ -58,12 +62,12 @@ public:
     evaluation.potential = 0.5 * inertia() * moved.squaredNorm() + 0.5 * stiffness * stretched.squaredNorm();
     gradient_ = inertia() * moved + stiffness * stretched;
     hessian_ = (inertia() * (1.0 + shift.position) + stiffness) * Eigen::Matrix3d::Identity();
-    for (const ContactTerm* term : own_terms)   // with what moves as prescribed, while the part is not coupled
-      for (int p = 0; p < 2 && !coupled; ++p)
-      {
-        gradient_ -= term->weight[p] * term->force;
-        hessian_ += term->weight[p] * (term->weight[0] + term->weight[1]) * term->stiffness;
-      }
+    for (const ContactTerm* term : own_terms)   // with what moves as prescribed
+    {
+      const double weight = term->weight[0] + term->weight[1];
+      gradient_ -= weight * term->force;
+      hessian_ += weight * weight * term->stiffness;
+    }
   }
   void solve() override { direction_ = -hessian_.ldlt().solve(gradient_); }
   void notePattern(SharedMatrix& matrix) override

@@ -63,17 +63,6 @@ std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
   return B;
 }
 
-/// Checks the name that the user gave to an entry of a map.
-void checkNameOf(const std::string& name, const YamlCursor& map, const YamlCursor& entry)
-{
-  YamlTree word;
-  word.kind = YamlTree::Kind::scalar;
-  word.scalar = name;
-  word.line = entry.tree()->line;
-  word.origin = entry.tree()->origin;
-  YamlCursor(&word, map.tree(), entry.path() + " (name)", entry.problems()).name();
-}
-
 void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod, int edges)
 {
   if (!at.present())
@@ -82,7 +71,7 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
        at.members("A grasp under a name of yours (letters, digits and '_'), which topics and tables use."))
   {
     const std::size_t before = value.problems().size();
-    checkNameOf(name, at, value);
+    value.checkOwnName(name);
     GraspConfig grasp = readGrasp(name, value, context, rod.closed, edges);
     for (const GraspConfig& other : rod.grasps)
     {
@@ -240,7 +229,7 @@ std::vector<SectionFrame> readSectionFrames(const YamlCursor& at, bool closed, i
   for (const auto& [name, value] :
        at.members("A section under a name of yours: the index of its node (negative: from the end)."))
   {
-    checkNameOf(name, at, value);
+    value.checkOwnName(name);
     if (const auto node = value.integer(-nodes, nodes - 1))
       frames.push_back({name, *node < 0 ? *node + nodes : *node});
   }

@@ -232,22 +232,35 @@ std::optional<std::string> YamlCursor::word() const
   return tree_->scalar;
 }
 
+namespace {
+
+std::string whyNoName(const std::string& name)
+{
+  const bool fits =
+      !name.empty() && name.size() <= max_name && std::isalpha(static_cast<unsigned char>(name.front())) &&
+      std::all_of(name.begin(), name.end(), [](unsigned char c) { return c < 128 && (std::isalnum(c) || c == '_'); });
+  return fits ? ""
+              : "is not a name; must be a letter and then letters, digits or '_', at most " + std::to_string(max_name);
+}
+
+}   // namespace
+
 std::optional<std::string> YamlCursor::name() const
 {
   problems_->asked(path_, "a name");
-  const auto name = word();
-  if (name)
+  auto name = word();
+  if (const std::string why = name ? whyNoName(*name) : ""; !why.empty())
   {
-    const bool fits = name->size() <= max_name && std::isalpha(static_cast<unsigned char>(name->front())) &&
-                      std::all_of(name->begin(), name->end(),
-                                  [](unsigned char c) { return c < 128 && (std::isalnum(c) || c == '_'); });
-    if (!fits)
-    {
-      problem("is not a name; must be a letter and then letters, digits or '_', at most " + std::to_string(max_name));
-      return std::nullopt;
-    }
+    problem(why);
+    return std::nullopt;
   }
   return name;
+}
+
+void YamlCursor::checkOwnName(const std::string& name) const
+{
+  if (const std::string why = whyNoName(name); !why.empty())
+    problem("is under the name \"" + name + "\", which " + why);
 }
 
 std::optional<Eigen::Vector3d> YamlCursor::vector3(const Range& range) const

@@ -146,6 +146,8 @@ public:
   std::optional<std::string> text() const;
   /// A word of letters, digits and '_' that starts with a letter (names become topic names).
   std::optional<std::string> name() const;
+  /// Reports the entry of a map unless `name`, under which it stands, is a name.
+  void checkOwnName(const std::string& name) const;
   /// `range` holds for each component.
   std::optional<Eigen::Vector3d> vector3(const Range& range) const;
   /// A list of numbers, or a single number as a list of one.
