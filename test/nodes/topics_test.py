@@ -86,7 +86,7 @@ class Topics(NodeCase):
         self.assertEqual(len(poses.last().poses), 20)
         self.assertEqual(poses.last().poses[7].orientation, last.frames[7])
         wait_until(lambda: markers.count() > 0, what="markers")
-        names = [(m.ns, m.id, m.type, m.header.frame_id) for m in markers.last().markers]
+        names = [(m.ns, m.id, m.type, m.header.frame_id) for m in markers.last().markers if m.action == Marker.ADD]
         self.assertEqual(names[0], ("rods/rope", 0, Marker.TRIANGLE_LIST, "map"))
         self.assertEqual([n[:2] for n in names[1:]], [("grasps", 0), ("grasps", 1)])
         tube = markers.last().markers[0]

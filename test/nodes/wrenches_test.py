@@ -76,7 +76,7 @@ class Wrenches(NodeCase):
                                   SetGraspRequest(name="left", action=SetGraspRequest.RELEASE)).success)
         _, raw, filtered = self.after(1)
         self.assertEqual(raw.wrench.force.x, 0.0)
-        _, _, filtered = self.after(19)                     # 0.1 s in all
+        _, raw, filtered = self.after(19)                   # 0.1 s in all
         size = math.sqrt(sum(c * c
                              for c in (filtered.wrench.force.x, filtered.wrench.force.y, filtered.wrench.force.z)))
         # 0.1 s are one time constant
