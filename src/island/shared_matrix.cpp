@@ -68,7 +68,9 @@ void SharedMatrix::takeBlocks(const std::vector<int>& blocks)
   {
     block_starts_ = starts;
     block_rows_ = rows;
-    block_cholesky_.setPattern(unknowns_, std::move(starts), std::move(rows));
+    if (!block_cholesky_)
+      block_cholesky_.emplace(simplicial_);
+    block_cholesky_->setPattern(unknowns_, std::move(starts), std::move(rows));
   }
   gradients_.resize(static_cast<std::size_t>(unknowns_));
   x_.resize(static_cast<std::size_t>(unknowns_));
@@ -91,11 +93,13 @@ bool SharedMatrix::factorDirectly()
   direct_ = true;
   if (unknowns_ == 0)
     return true;
+  if (!cholesky_)
+    cholesky_.emplace(simplicial_);
   if (!cholesky_known_)
-    cholesky_.setPattern(unknowns_, starts_, rows_);
+    cholesky_->setPattern(unknowns_, starts_, rows_);
   cholesky_known_ = true;
-  std::copy(values_.begin(), values_.end(), cholesky_.values());
-  return cholesky_.factor();
+  std::copy(values_.begin(), values_.end(), cholesky_->values());
+  return cholesky_->factor();
 }
 
 bool SharedMatrix::factorBlocks()
@@ -103,10 +107,10 @@ bool SharedMatrix::factorBlocks()
   direct_ = false;
   if (unknowns_ == 0)
     return true;
-  double* values = block_cholesky_.values();
+  double* values = block_cholesky_->values();
   for (std::size_t k = 0; k < block_entries_.size(); ++k)
     values[k] = values_[block_entries_[k]];
-  return block_cholesky_.factor();
+  return block_cholesky_->factor();
 }
 
 bool SharedMatrix::solve()
@@ -116,7 +120,7 @@ bool SharedMatrix::solve()
     return true;
   if (direct_)
   {
-    cholesky_.solve(solution_.data());
+    cholesky_->solve(solution_.data());
     return true;
   }
   constexpr double kTolerance = 1e-9;   // Newton's method then converges as with a direct solution
@@ -126,7 +130,7 @@ bool SharedMatrix::solve()
       [this](const std::vector<double>& p, std::vector<double>& ap) { multiply(p, ap); },
       [this](const std::vector<double>& r, std::vector<double>& z) {
         z = r;
-        block_cholesky_.solve(z.data());
+        block_cholesky_->solve(z.data());
       });
   iterations_ = result.iterations;
   if (!result.definite || result.residual > kTolerance)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "slender_sim/contact/contact_potential.h"
@@ -43,7 +44,7 @@ public:
   using Bases = std::array<int, 4>;
 
   /// `simplicial`: see SparseCholesky.
-  explicit SharedMatrix(bool simplicial) : cholesky_(simplicial), block_cholesky_(simplicial) {}
+  explicit SharedMatrix(bool simplicial) : simplicial_(simplicial) {}
 
   // ---- pattern
   void begin(int unknowns);
@@ -129,11 +130,12 @@ private:
   std::vector<double> solution_;
   Solver solver_ = Solver::cholesky;
 
-  SparseCholesky cholesky_;
-  bool cholesky_known_ = false;   ///< has the present pattern
-  bool direct_ = true;            ///< the last factorisation is that of the whole matrix
+  const bool simplicial_;
+  std::optional<SparseCholesky> cholesky_;   ///< once it is needed, like that of the blocks
+  bool cholesky_known_ = false;              ///< has the present pattern
+  bool direct_ = true;                       ///< the last factorisation is that of the whole matrix
 
-  SparseCholesky block_cholesky_;
+  std::optional<SparseCholesky> block_cholesky_;
   std::vector<int> block_entries_;               ///< places in values_ of the entries of blocks
   std::vector<int> block_starts_, block_rows_;   ///< pattern of the blocks
   ConjugateGradientsIn<Space> gradients_;

@@ -37,6 +37,8 @@ bool meetsSolids(const WorldModel& world, int body)
   return others;
 }
 
+bool touches(const WorldModel::Rod& rod) { return rod.contact.has_value(); }
+
 /// The bodies, and the rods that may meet something.
 WorldContent rodsAndBodies(const WorldModel& world, WorldContent content)
 {
@@ -113,7 +115,7 @@ RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time
   : WorldObject(number),
     whole(std::make_unique<RodStepper>(world.rods[number].model, time)),
     stepper(&whole->impl()),
-    part(std::make_unique<RodPart>(*stepper, world.rods[number].contact.has_value())),
+    part(std::make_unique<RodPart>(*stepper, touches(world.rods[number]))),
     meets(meetsOthers(world, number)),
     contact_(world.rods[number].contact),
     duration_(world.time.step)
