@@ -135,35 +135,37 @@ std::vector<LimitExcess> LimitWatch::checkInputs(SceneInputs& inputs)
   const SceneConfig& config = simulation_.config();
   const SceneState& state = simulation_.state();
   int index = 0;
-  const auto see = [&](double move, const std::string& what, std::vector<int> to_release = {}) {
+  // texts and lists are made only when something is to be told: a quiet step takes no memory
+  const auto see = [&](double move, const char* kind, const std::string& name, int grasp = -1) {
     const Key key{LimitKind::speed, index++};
     const double speed = move / config.time.step;
     if (!isQuiet(key, speed, limits_.speed))
-      look(key, speed, limits_.speed, what + ": the speed of its input", " m/s", std::move(to_release), begun);
+      look(key, speed, limits_.speed, kind + (" '" + name) + "': the speed of its input", " m/s",
+           grasp < 0 ? std::vector<int>{} : std::vector<int>{grasp}, begun);
   };
   for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
   {
     const int grasp = static_cast<int>(g);
     const bool driven = simulation_.grasps().isActive(grasp) &&
                         !std::holds_alternative<FixedMotion>(simulation_.grasps()[g].config->motion);
-    see(driven ? moveTo(simulation_.grasps().pose(grasp), inputs.grasps[g]) : 0.0,
-        "grasp '" + simulation_.grasps()[g].config->name + "'", {grasp});
+    see(driven ? moveTo(simulation_.grasps().pose(grasp), inputs.grasps[g]) : 0.0, "grasp",
+        simulation_.grasps()[g].config->name, grasp);
   }
   for (std::size_t b = 0; b < config.bodies.size(); ++b)
-    see(hasInput(config.bodies[b].motion) ? moveTo(state.bodies[b].X_WB, inputs.bodies[b]) : 0.0,
-        "body '" + config.bodies[b].name + "'");
+    see(hasInput(config.bodies[b].motion) ? moveTo(state.bodies[b].X_WB, inputs.bodies[b]) : 0.0, "body",
+        config.bodies[b].name);
   for (std::size_t k = 0; k < config.obstacles.size(); ++k)
-    see(hasInput(config.obstacles[k].motion) ? moveTo(state.obstacles[k], inputs.obstacles[k]) : 0.0,
-        "obstacle '" + config.obstacles[k].name + "'");
+    see(hasInput(config.obstacles[k].motion) ? moveTo(state.obstacles[k], inputs.obstacles[k]) : 0.0, "obstacle",
+        config.obstacles[k].name);
   for (std::size_t k = 0; k < config.threads.size(); ++k)
     see(config.threads[k].nozzle && hasInput(config.threads[k].nozzle->motion)
             ? (inputs.threads[k].nozzle.position - nozzlePose(state.threads[k]).position).norm()
             : 0.0,
-        "thread '" + config.threads[k].name + "'");
+        "thread", config.threads[k].name);
   for (std::size_t k = 0; k < inputs.guides.size(); ++k)
-    see(largestMove(state.cloth_guides[k].points, inputs.guides[k]), "cloth '" + config.cloths[k].name + "'");
+    see(largestMove(state.cloth_guides[k].points, inputs.guides[k]), "cloth", config.cloths[k].name);
   for (std::size_t k = 0; k < inputs.rod_guides.size(); ++k)
-    see(largestMove(state.rod_guides[k].points, inputs.rod_guides[k]), "rod '" + config.rods[k].name + "'");
+    see(largestMove(state.rod_guides[k].points, inputs.rod_guides[k]), "rod", config.rods[k].name);
   if (!held_.empty())
     holdInputs(inputs);
   return begun;
