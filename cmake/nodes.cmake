@@ -25,7 +25,7 @@ if(BUILD_TESTING)
     ${PROJECT_SOURCE_DIR}/test/nodes/guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/converters_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/bag_recorder_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/markers_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/point_guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/late_guides_test.cpp
-    ${PROJECT_SOURCE_DIR}/test/nodes/paused_messages_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/run_statistics_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/camera_fit_test.cpp
+    ${PROJECT_SOURCE_DIR}/test/nodes/paused_messages_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/camera_fit_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/step_gaps_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/guide_gaps_test.cpp)
   target_compile_definitions(node_unit_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   find_package(GTest REQUIRED)

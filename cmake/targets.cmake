@@ -31,7 +31,7 @@ endif()
 include(${PROJECT_SOURCE_DIR}/cmake/study.cmake OPTIONAL)
 
 # The target's name is long because a catkin workspace shares names between packages.
-add_executable(slender_sim_simulate src/tools/simulate.cpp src/tools/moduli.cpp src/tools/statics_report.cpp)
+add_executable(slender_sim_simulate src/tools/simulate.cpp src/tools/moduli.cpp src/tools/run_summary.cpp src/tools/statics_report.cpp)
 set_target_properties(slender_sim_simulate PROPERTIES OUTPUT_NAME simulate)
 target_link_libraries(slender_sim_simulate PRIVATE slender_sim)
 target_compile_options(slender_sim_simulate PRIVATE ${LINE_TABLES})

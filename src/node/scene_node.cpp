@@ -87,6 +87,9 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   if (simulation_->config().statics)
     ROS_WARN("%s: the key statics of the scene is for simulate --statics; the node does not use it",
              nh_priv_.getNamespace().c_str());
+  if (simulation_->config().record.every != 1)
+    ROS_INFO("%s: the key record.every of the scene is for simulate; the node publishes and records every step",
+             nh_priv_.getNamespace().c_str());
   for (const std::string& warning : simulation_->config().warnings)
     ROS_WARN("%s", warning.c_str());
   for (const std::string& note : simulation_->config().notes)

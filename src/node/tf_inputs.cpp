@@ -110,7 +110,10 @@ void TfInputs::lookAt(Frame& frame)
     return;
   }
   if (!frame.checked)
+  {
+    ROS_INFO("%s: the frame %s of tf has come", frame.followers.front().who.c_str(), frame.name.c_str());
     warnOfLoop(frame);
+  }
   frame.last = time;
   for (const Follower& follower : frame.followers)
     follower.sink(time, X_WF);
@@ -125,9 +128,10 @@ void TfInputs::warnOfLoop(Frame& frame) const
   {
     if (own_.count(parent))
       ROS_WARN(
-          "%s follows the frame %s of tf, which hangs on %s, a frame that this node broadcasts itself: if that is what "
-          "it moves, it follows itself, ever later",
-          frame.followers.front().who.c_str(), frame.name.c_str(), parent.c_str());
+          "%s follows the frame %s of tf, a descendant of %s, which this node broadcasts: if the motion of %s depends on "
+          "%s, both follow each other and may diverge",
+          frame.followers.front().who.c_str(), frame.name.c_str(), parent.c_str(), parent.c_str(),
+          frame.followers.front().who.c_str());
     child = parent;
   }
 }

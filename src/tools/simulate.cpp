@@ -14,13 +14,13 @@
 #include "arguments.h"
 #include "moduli.h"
 #include "program_main.h"
+#include "run_summary.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/linalg/interruption.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/limit_watch.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
-#include "slender_sim/scene/residual_text.h"
 #include "slender_sim/scene/simulation.h"
 #include "statics_report.h"
 #ifdef SLENDER_WITH_BAG
@@ -198,12 +198,7 @@ public:
   }
   bool afterStep(Progress& progress) { return tell(watch_.checkStep(), progress); }
 
-  void printSummary() const
-  {
-    if (watch_.count() > 0)
-      std::printf("limits            exceeded %llu times, %zu still are at the end\n",
-                  static_cast<unsigned long long>(watch_.count()), watch_.lasting().size());
-  }
+  const slender::LimitWatch& watch() const { return watch_; }
 
 private:
   bool tell(const std::vector<slender::LimitExcess>& begun, Progress& progress)
@@ -215,7 +210,7 @@ private:
       told_ = simulation_.state().time;
       progress.clear();
       std::fprintf(stderr, "simulate: warning: %s%s\n", excess.text.c_str(),
-                   watch_.held().empty() ? "" : "; what is driven stays where it is from here on (on_limit: hold)");
+                   watch_.held().empty() ? "" : "; all driven objects stay in place from now on (on_limit: hold)");
     }
     for (const int grasp : watch_.released())
     {
@@ -235,73 +230,6 @@ private:
   slender::LimitWatch watch_;
   std::optional<double> told_;   // [s] simulated time of the last report
 };
-
-slender::ThreadVolumes volumesOf(const Simulation& simulation)
-{
-  slender::ThreadVolumes volumes;
-  for (const slender::ThreadGroupState& thread : simulation.state().threads)
-    volumes.add(thread);
-  return volumes;
-}
-
-/// Says so and returns false when fluid was lost or came out of nothing.
-bool checkVolumes(const Simulation& simulation)
-{
-  const double missing = volumesOf(simulation).missing();
-  if (std::abs(missing) <= slender::ThreadVolumes::kMostMissing)
-    return true;
-  std::fprintf(stderr,
-               "simulate: %.3g of the threads' fluid is not accounted for, more than %.0e: this is a defect of the "
-               "program, please report it\n",
-               missing, slender::ThreadVolumes::kMostMissing);
-  return false;
-}
-
-void printSummary(const Simulation& simulation, const StepReport& total, double wall)
-{
-  const double simulated = simulation.state().time;
-  std::printf("scene             %s\n", simulation.config().name.c_str());
-  std::printf("steps             %llu\n", static_cast<unsigned long long>(simulation.state().steps));
-  std::printf("simulated         %.6g s\n", simulated);
-  std::printf("wall              %.6g s\n", wall);
-  std::printf("real-time factor  %.4g (simulated over wall time)\n", simulated / std::max(wall, 1e-9));
-  std::printf("worst residual    %s\n", slender::residualText(simulation.config(), total.residual).c_str());
-  std::printf("iterations        %d (%.2f per step)\n", total.iterations,
-              total.iterations / std::max(1.0, static_cast<double>(simulation.state().steps)));
-  std::printf("cut steps         %d\n", total.cut_steps);
-  slender::printModuli(simulation);
-  if (total.repulsions > 0 || total.impulses > 0)
-  {
-    std::printf("cloth contacts    %.1f per step, %ld collisions stopped, %ld rigid pieces\n",
-                total.repulsions / std::max(1.0, static_cast<double>(simulation.state().steps)), total.impulses,
-                total.zones);
-  }
-  if (total.mended_folds > 0)
-    std::printf("mended folds      %d\n", total.mended_folds);
-  const auto tracks = [](const auto& objects) {
-    return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.tracking != nullptr; });
-  };
-  if (tracks(simulation.config().cloths) || tracks(simulation.config().rods))
-  {
-    std::printf("tracking          averages at most %.2g of the guide's size away\n", total.tracking_error);
-    if (total.forces_at_bound > 0)
-      std::printf("bounded forces    at most %d at their bounds, whose averages were not met\n", total.forces_at_bound);
-  }
-  if (!simulation.config().threads.empty())
-  {
-    const slender::ThreadVolumes volumes = volumesOf(simulation);
-    std::printf(
-        "fluid             %.9g m^3 at the start, %.9g m^3 fed: %.9g m^3 in the scene, %.9g m^3 left the region, %.9g "
-        "m^3 dropped "
-        "(edges.deposited); missing %.2g\n",
-        volumes.start, volumes.fed, volumes.present, volumes.left, volumes.dropped, volumes.missing());
-  }
-  if (total.projection_iterations > 0)
-  {
-    std::printf("projection        at most %d iterations a step, squared edge lengths to %.2g of their own\n",
-                total.projection_iterations, total.constraint_error);
-  }
-}
 
 void saveState(const Simulation& simulation, const std::string& path)
 {
@@ -354,8 +282,11 @@ void printWarnings(const slender::SceneConfig& scene, const Options& options)
   for (const std::string& warning : scene.warnings)
     std::fprintf(stderr, "simulate: warning: %s\n", warning.c_str());
   if (!options.quiet)
+  {
     for (const std::string& note : scene.notes)
       std::fprintf(stderr, "simulate: note: %s\n", note.c_str());
+    slender::noteInputsOfNodes(scene);
+  }
   if (scene.statics && !options.statics)
   {
     std::fprintf(stderr,
@@ -392,9 +323,9 @@ int run(const Options& options)
   if (options.statics)
     return runStatics(options, simulation, start);
   std::vector<std::unique_ptr<Recorder>> recorders = makeRecorders(options);
-  StepReport total;
+  slender::RunStatistics total;
   for (auto& recorder : recorders)
-    recorder->record(simulation, total);
+    recorder->record(simulation, StepReport{});
   Progress progress(!options.quiet && ::isatty(STDERR_FILENO), steps);
   bool ok = true;
   slender::SceneInputs inputs;
@@ -421,7 +352,7 @@ int run(const Options& options)
                    simulation.state().time + step, slender::toString(report.failure), report.message.c_str());
       break;
     }
-    total.merge(report);
+    total.add(report, simulation, step, 0.0);
     if (k % every == 0)
       for (auto& recorder : recorders)
         recorder->record(simulation, report);
@@ -435,10 +366,10 @@ int run(const Options& options)
   progress.clear();
   if (!options.quiet)
   {
-    printSummary(simulation, total, std::chrono::duration<double>(Clock::now() - start).count());
-    limits.printSummary();
+    const double wall = std::chrono::duration<double>(Clock::now() - start).count();
+    slender::printSummary(simulation, total, limits.watch(), wall);
   }
-  const bool balanced = checkVolumes(simulation);
+  const bool balanced = slender::checkVolumes(simulation);
   return stopped_by != 0 && !ok ? 128 + stopped_by : balanced && ok ? slender::kDone : slender::kFailed;
 }
 

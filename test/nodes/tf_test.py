@@ -232,7 +232,9 @@ threads:
         self.follow(guide_delay=0.05)
         self.stand("tool0", (0, 0, 0.1), parent="t/rod/grasps/right")
         self.heard("tool0")
-        wait_until(lambda: "hangs on t/rod/grasps/right, a frame that this node broadcasts itself" in
+        wait_until(lambda: "the frame tool0 of tf has come" in self.output("rod.out") + self.output("rod.err"),
+                   what="the note")
+        wait_until(lambda: "a descendant of t/rod/grasps/right, which this node broadcasts" in
                    self.output("rod.out") + self.output("rod.err"), what="the warning")
 
     def test_a_run_is_repeated_bit_by_bit(self):

@@ -119,6 +119,27 @@ TEST_F(Simulate, warnsOfLimitsOnce)
   EXPECT_EQ(simulate(cantilever + drawn + " --set 'limits={strain: none}'").output, "");
 }
 
+TEST_F(Simulate, tellsTheLargestStrainAndTheLoadsOfGrasps)
+{
+  std::string loud = drawn;
+  loud.erase(loud.find(" --quiet"), 8);
+  const std::string output = simulate(cantilever + loud).output;
+  EXPECT_NE(output.find("largest strain    0.7"), std::string::npos) << output;
+  for (const char* const grasp : {"grasp a: largest force ", "grasp b: largest force "})
+    EXPECT_NE(output.find(grasp), std::string::npos) << output;
+}
+
+TEST_F(Simulate, notesWhatOnlyANodeMoves)
+{
+  const std::string moved = cantilever + " --duration 0.02 --set 'rods.0.grasps={a: {edges: [0], motion: {tf: tool0}}, "
+                                         "b: {edges: [-1], motion: {topic: true}}}'";
+  const std::string output = simulate(moved).output;
+  EXPECT_NE(output.find("note: these stay in place"), std::string::npos) << output;
+  EXPECT_NE(output.find("grasp 'a' (tf: tool0), grasp 'b' (topic)"), std::string::npos) << output;
+  EXPECT_EQ(simulate(moved + " --quiet").output, "");
+  EXPECT_EQ(simulate(cantilever + " --duration 0.02").output.find("stay in place"), std::string::npos);
+}
+
 TEST_F(Simulate, actsOnLimits)
 {
   const Result stopped = simulate(cantilever + drawn + " --set limits.on_limit=stop");
@@ -126,7 +147,7 @@ TEST_F(Simulate, actsOnLimits)
   EXPECT_NE(stopped.output.find("simulate: stopped after step "), std::string::npos) << stopped.output;
   const Result held = simulate(cantilever + drawn + " --set limits.on_limit=hold");
   EXPECT_EQ(held.status, 0) << held.output;
-  EXPECT_NE(held.output.find("stays where it is from here on"), std::string::npos) << held.output;
+  EXPECT_NE(held.output.find("all driven objects stay in place from now on"), std::string::npos) << held.output;
   const Result released = simulate(cantilever + drawn + " --set limits.on_limit=release");
   EXPECT_EQ(released.status, 0) << released.output;
   EXPECT_NE(released.output.find("' is released (on_limit: release)"), std::string::npos) << released.output;

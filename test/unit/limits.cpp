@@ -65,6 +65,30 @@ struct WatchedRun
   std::vector<int> released;
 };
 
+/// The limit that the cable's first excursion from the default limits exceeds. The speed of its end has no limit.
+double defaultStrainLimit(const std::string& material)
+{
+  std::string scene = pulled("{speed: none}");
+  const std::string own = "{density: 1000, youngs_modulus: 1.0e5}";
+  scene.replace(scene.find(own), own.size(), material);
+  scene.replace(scene.find("gravity: [0, 0, 0]"), 18, "gravity: [0, 0, -9.81]");
+  WatchedRun run(scene);
+  run.to(1.0);
+  return run.all.empty() ? 0.0 : run.all[0].limit;
+}
+
+TEST(Limits, ofStrainFollowTheMaterial)
+{
+  EXPECT_EQ(defaultStrainLimit("{density: 1000, youngs_modulus: 1.0e6}"), 0.5);
+  EXPECT_EQ(defaultStrainLimit("{density: 1000, youngs_modulus: 2.0e9}"), 0.05);
+  EXPECT_EQ(defaultStrainLimit("{density: 1000, youngs_modulus: 1.0e5, inextensible: true}"), 0.01);
+  // 1e6 N over the section's 3.14e-4 m^2 are 3.2 GPa
+  EXPECT_EQ(
+      defaultStrainLimit("{density: 1000, youngs_modulus: 1.0e5, stretch_modulus: 1.0e6, bend_modulus: 1.0e-3, "
+                         "twist_modulus: 1.0e-3}"),
+      0.05);
+}
+
 TEST(Limits, tellOfEachExcursionOnce)
 {
   WatchedRun run(pulled("{strain: 0.3, speed: none}"));

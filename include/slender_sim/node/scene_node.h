@@ -28,7 +28,7 @@
 #include "slender_sim/node/input_replay.h"
 #include "slender_sim/node/node_kind.h"
 #include "slender_sim/node/node_options.h"
-#include "slender_sim/node/run_statistics.h"
+#include "slender_sim/scene/run_statistics.h"
 #include "slender_sim/node/scene_messages.h"
 #include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"

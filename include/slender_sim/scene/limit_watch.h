@@ -83,6 +83,8 @@ private:
   /// per cloth: the edges of its mesh, and the rest lengths of these edges [m]
   std::vector<std::vector<std::pair<int, int>>> cloth_edges_;
   std::vector<std::vector<double>> cloth_lengths_;
+  std::vector<double> rod_strain_limits_;
+  double cloth_strain_limit_ = kSoftStrain;
   std::map<Key, Excursion> excursions_;
   std::vector<int> released_;
   std::string stopped_, held_;

@@ -14,13 +14,19 @@ enum class OnLimit
   stop,      ///< the simulation stops
 };
 
+/// Default limits of strain [-]. The laws of stretching are linear and neglect the change of the cross-section. At a
+/// strain of 0.5 this change is a third to a half, and only rubber withstands such a strain. Metals and stiff polymers
+/// (a modulus of at least kStiffModulus [Pa]) yield or break below 0.05. A rod that the scene calls inextensible is
+/// pulled by a gripper if its strain is above 0.01.
+constexpr double kSoftStrain = 0.5, kStiffStrain = 0.05, kInextensibleStrain = 0.01;
+constexpr double kStiffModulus = 1e9;
+
 /// Limits of a run. Infinity means no limit.
 struct LimitsConfig
 {
-  /// Largest stretch strain of the edges of rods and of the mesh edges of cloths [-]. The laws of stretching are linear
-  /// and neglect the change of the cross-section. At a strain of 0.5 this change is a third to a half, and only rubber
-  /// withstands such a strain.
-  double strain = 0.5;
+  /// Largest stretch strain of the edges of rods and of the mesh edges of cloths [-]. Nothing: the default of its
+  /// material for a rod, kSoftStrain for a cloth.
+  std::optional<double> strain;
   /// Largest force [N] and torque [N m] on a grasp. A useful limit depends on the gripper.
   double force = std::numeric_limits<double>::infinity(), torque = std::numeric_limits<double>::infinity();
   /// Largest speed of driven objects [m/s]. The default is several times the speed of robots and of tracked hands.

@@ -20,7 +20,8 @@ LimitsConfig readLimits(const YamlCursor& at)
   YamlMap map(at);
   assign(limits.strain, readLimit(map.get("strain",
                                           "Largest stretch strain of an edge of a rod, or of a mesh edge of a cloth; "
-                                          "`none` for no limit. Without the key: 0.5.")
+                                          "`none` for no limit. Without the key: 0.01 for inextensible rods, 0.05 for "
+                                          "rods of at least 1 GPa, otherwise 0.5.")
                                       .takes("a number in (0, 1e12], or none"),
                                   ""));
   assign(limits.force, readLimit(map.get("force",

@@ -132,7 +132,7 @@ void readRobot(const YamlCursor& at, const ReadContext& context,
       "ROS parameter, such as robot_description; or the text itself.");
   const auto description = at_description.text();
   assign(prefix, map.get("prefix",
-                         "What stands before the links' names in tf: the frame of a link is PREFIX/LINK. Without the "
+                         "Prefix of the links' names in tf: the frame of a link is PREFIX/LINK. Without the "
                          "key the frame is LINK.")
                      .text());
   options.ignored = readIgnoredLinks(map.get("ignore", "Names of links that nothing touches. Without the key: none."));

@@ -411,7 +411,7 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   const YamlCursor record = map.get("record", "What is recorded. Without the key: every step, the motion alone.");
   scene.record = readRecord(record);
   scene.limits = readLimits(map.get("limits",
-                                    "Limits of what is plausible, of which a run warns when they are exceeded. "
+                                    "Limits of strain, force, torque and speed. A run warns when one is exceeded. "
                                     "Without the key: the defaults of the keys in it."));
   ReadContext context;
   context.directory = directory;

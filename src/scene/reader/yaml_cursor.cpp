@@ -158,12 +158,11 @@ bool YamlCursor::check(YamlTree::Kind kind, const char* expected) const
 std::optional<double> YamlCursor::number(const Range& range) const
 {
   problems_->asked(path_, "a number " + range.text());
-  return numberIn(range);
+  return numberIn(range, "a number " + range.text());
 }
 
-std::optional<double> YamlCursor::numberIn(const Range& range) const
+std::optional<double> YamlCursor::numberIn(const Range& range, const std::string& expected) const
 {
-  const std::string expected = "a number " + range.text();
   if (!check(YamlTree::Kind::scalar, expected.c_str()))
     return std::nullopt;
   const auto value = parseNumber(tree_->scalar);
@@ -188,12 +187,14 @@ std::optional<double> YamlCursor::numberIn(const Range& range) const
 std::optional<int> YamlCursor::integer(long low, long high, const char* unit) const
 {
   const Range range = Range::closed(static_cast<double>(low), static_cast<double>(high), unit);
-  problems_->asked(path_, low == -high - 1 ? "a place, counted from 0, or from the end by negative numbers"
-                                           : "a whole number " + range.text());
-  const auto value = numberIn(range);
+  const bool index = low == -high - 1;
+  const std::string expected =
+      "a whole number " + range.text() + (index ? ", an index from 0 or, if it is negative, from the end" : "");
+  problems_->asked(path_, index ? "an index from 0 or, if it is negative, from the end" : expected);
+  const auto value = numberIn(range, expected);
   if (value && *value != std::floor(*value))
   {
-    problem("must be a whole number " + range.text());
+    problem("must be " + expected);
     return std::nullopt;
   }
   return value ? std::optional<int>(static_cast<int>(*value)) : std::nullopt;
@@ -279,7 +280,7 @@ std::optional<Eigen::Vector3d> YamlCursor::vector3(const Range& range) const
   const auto entries = items();
   for (int k = 0; k < 3; ++k)
   {
-    const auto value = entries[k].numberIn(range);
+    const auto value = entries[k].numberIn(range, "a number " + range.text());
     good = good && value;
     vector[k] = value.value_or(0.0);
   }
@@ -293,14 +294,14 @@ std::optional<std::vector<double>> YamlCursor::numbers(const Range& range) const
     return std::nullopt;
   if (!isList())
   {
-    const auto value = numberIn(range);
+    const auto value = numberIn(range, "a number " + range.text());
     return value ? std::make_optional(std::vector<double>{*value}) : std::nullopt;
   }
   std::vector<double> values;
   bool good = true;
   for (const YamlCursor& item : items())
   {
-    const auto value = item.numberIn(range);
+    const auto value = item.numberIn(range, "a number " + range.text());
     good = good && value;
     values.push_back(value.value_or(0.0));
   }

@@ -171,7 +171,7 @@ public:
   std::vector<std::pair<std::string, YamlCursor>> members(const char* meaning) const;
 
 private:
-  std::optional<double> numberIn(const Range& range) const;
+  std::optional<double> numberIn(const Range& range, const std::string& expected) const;
   std::optional<std::string> word() const;
   bool check(YamlTree::Kind kind, const char* expected) const;
   int chosen(const std::vector<std::string>& words) const;

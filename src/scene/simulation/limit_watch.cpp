@@ -39,6 +39,17 @@ bool hasInput(const std::optional<GivenMotion>& motion)
   return motion && !std::holds_alternative<FixedMotion>(*motion);
 }
 
+/// Limit of the strain of a rod [-] for scenes that give none.
+double defaultStrainLimit(const RodConfig& rod)
+{
+  const Material& material = rod.material;
+  if (material.inextensible)
+    return kInextensibleStrain;
+  const double area = M_PI * rod.cross_section.a.front() * rod.cross_section.b.front();
+  const double modulus = material.stretch_modulus ? *material.stretch_modulus / area : material.youngs_modulus;
+  return modulus >= kStiffModulus ? kStiffStrain : kSoftStrain;
+}
+
 const Pose& nozzlePose(const ThreadGroupState& group) { return group.threads.front().ends[1].X_WE; }
 
 }   // namespace
@@ -57,6 +68,9 @@ const char* toString(OnLimit on_limit)
 
 LimitWatch::LimitWatch(Simulation& simulation) : simulation_(simulation), limits_(simulation.config().limits)
 {
+  for (const RodConfig& rod : simulation.config().rods)
+    rod_strain_limits_.push_back(limits_.strain.value_or(defaultStrainLimit(rod)));
+  cloth_strain_limit_ = limits_.strain.value_or(kSoftStrain);
   for (const ClothConfig& cloth : simulation.config().cloths)
   {
     std::set<std::pair<int, int>> edges;
@@ -219,7 +233,7 @@ std::vector<LimitExcess> LimitWatch::checkStep()
 
 void LimitWatch::checkStrains(std::vector<LimitExcess>& begun)
 {
-  if (std::isinf(limits_.strain))
+  if (limits_.strain && std::isinf(*limits_.strain))
     return;
   for (std::size_t r = 0; r < simulation_.config().rods.size(); ++r)
     checkRodStrain(static_cast<int>(r), begun);
@@ -229,6 +243,7 @@ void LimitWatch::checkStrains(std::vector<LimitExcess>& begun)
 
 void LimitWatch::checkRodStrain(int rod, std::vector<LimitExcess>& begun)
 {
+  const double limit = rod_strain_limits_[static_cast<std::size_t>(rod)];
   const RodModel& model = simulation_.rodModel(rod);
   const Eigen::Matrix3Xd& x = simulation_.state().rods[rod].x;
   double strain = 0.0;
@@ -243,9 +258,9 @@ void LimitWatch::checkRodStrain(int rod, std::vector<LimitExcess>& begun)
       worst = j;
     }
   }
-  if (isQuiet({LimitKind::strain, rod}, strain, limits_.strain))
+  if (isQuiet({LimitKind::strain, rod}, strain, limit))
     return;
-  look({LimitKind::strain, rod}, strain, limits_.strain,
+  look({LimitKind::strain, rod}, strain, limit,
        "rod '" + model.name + "', edge " + std::to_string(worst) + ": its strain", "", mostLoaded(rod, -1), begun);
 }
 
@@ -266,12 +281,12 @@ void LimitWatch::checkClothStrain(int cloth, std::vector<LimitExcess>& begun)
     }
   }
   const int rods = static_cast<int>(simulation_.config().rods.size());
-  if (isQuiet({LimitKind::strain, rods + cloth}, strain, limits_.strain))
+  if (isQuiet({LimitKind::strain, rods + cloth}, strain, cloth_strain_limit_))
     return;
   const std::string where = edges.empty() ? ""
                                           : ", between vertices " + std::to_string(edges[worst].first) + " and " +
                                                 std::to_string(edges[worst].second);
-  look({LimitKind::strain, rods + cloth}, strain, limits_.strain,
+  look({LimitKind::strain, rods + cloth}, strain, cloth_strain_limit_,
        "cloth '" + simulation_.config().cloths[cloth].name + "'" + where + ": its strain", "", mostLoaded(-1, cloth),
        begun);
 }

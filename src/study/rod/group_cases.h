@@ -41,7 +41,7 @@ struct GroupSetup
   /// Welds the section of a rod's node, as it lies when the first world is made.
   void weld(int rod, int node, int body)
   {
-    model.welds.push_back({rod, node, node, body});
+    model.welds.push_back({rod, node, node, body, {}});
     inputs.rods[rod].grasps.emplace_back();
   }
   /// A world of this that takes steps of time.step. With the first one the state gets the grasps of the welds. Others

@@ -1,4 +1,4 @@
-#include "slender_sim/node/run_statistics.h"
+#include "slender_sim/scene/run_statistics.h"
 
 #include <algorithm>
 #include <numeric>
